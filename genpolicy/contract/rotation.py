@@ -45,7 +45,7 @@ def rotation_from_6d(columns: Array) -> Array:
 def orthonormality_error(columns: Array) -> Array:
     """Largest deviation of the two columns from unit length and right angle. Shape (...)."""
     first, second = columns[..., :3], columns[..., 3:]
-    return np.max(
+    worst: Array = np.max(
         np.stack(
             [
                 np.abs(np.linalg.norm(first, axis=-1) - 1.0),
@@ -56,6 +56,7 @@ def orthonormality_error(columns: Array) -> Array:
         ),
         axis=-1,
     )
+    return worst
 
 
 def angle_between(first: Array, second: Array) -> Array:
@@ -70,7 +71,8 @@ def angle_between(first: Array, second: Array) -> Array:
         axis=-1,
     )
     trace = np.trace(relative, axis1=-2, axis2=-1)
-    return np.arctan2(np.linalg.norm(skew, axis=-1), trace - 1.0)
+    angle: Array = np.arctan2(np.linalg.norm(skew, axis=-1), trace - 1.0)
+    return angle
 
 
 def _nan_like(array: Array) -> Array:

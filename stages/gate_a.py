@@ -1,0 +1,13 @@
+"""Stage `gate_a`: judge gate A from its evidence and write its report."""
+
+from stages._gate import judge
+from stages._stage import Params, main
+
+
+def work(params: Params) -> None:
+    """Judge; a FAIL is a result, not an error."""
+    judge("A", params)
+
+
+if __name__ == "__main__":
+    main("gate_a", work)

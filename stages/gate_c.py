@@ -1,0 +1,13 @@
+"""Stage `gate_c`: judge gate C from its evidence and write its report."""
+
+from stages._gate import judge
+from stages._stage import Params, main
+
+
+def work(params: Params) -> None:
+    """Judge; a FAIL is a result, not an error."""
+    judge("C", params)
+
+
+if __name__ == "__main__":
+    main("gate_c", work)

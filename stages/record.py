@@ -1,0 +1,45 @@
+"""Stage `record`: scripted operators demonstrate the task; every episode becomes one MCAP file."""
+
+from genpolicy.contract.settings import Settings
+from genpolicy.integrity.atomic import output_folder, write_bytes
+from genpolicy.integrity.documents import canonical_json
+from genpolicy.integrity.hashing import sha256_tree
+from genpolicy.simulation.sessions import record_session
+from pydantic import Field
+
+from stages._stage import ARTIFACTS, Params, main
+
+
+class RecordSection(Settings):
+    """Section `record`.
+
+    Attributes:
+        episodes: How many demonstrations.
+        shares: Share of each kind of episode; the rest is the task's plain success.
+    """
+
+    episodes: int = Field(ge=1, le=100_000)
+    shares: dict[str, float]
+
+
+def work(params: Params) -> None:
+    """Record the session and its index."""
+    section = params.section("record", RecordSection)
+    with output_folder(ARTIFACTS / "record") as folder:
+        episodes = folder / "episodes"
+        episodes.mkdir()
+        record_session(
+            params.task.name,
+            root_seed=params.seed,
+            episodes=section.episodes,
+            shares=section.shares,
+            folder=episodes,
+            workers=params.compute.workers,
+            scheduler=params.compute.scheduler,
+        )
+        index = {"task": params.task.name, "files": sha256_tree(episodes)}
+        write_bytes(folder / "index.json", canonical_json(index))
+
+
+if __name__ == "__main__":
+    main("record", work)
