@@ -1,0 +1,286 @@
+"""What a task must offer: scene, contract, world, phases, fallback, recordings.
+
+A task is a plug-in of the entry-point group `genpolicy.tasks`. Nothing outside a task's package
+knows what it manipulates.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from genpolicy.contract.observation import ObservationContract
+from genpolicy.errors import ConfigError
+
+if TYPE_CHECKING:
+    from genpolicy.recording.episode import RecordedEpisode
+
+Array = NDArray[np.float64]
+
+ENTRY_POINT_GROUP = "genpolicy.tasks"
+NOMINAL_PROBE = "nominal"
+
+
+@dataclass(frozen=True)
+class Workspace:
+    """Box that the TCP may not leave.
+
+    Attributes:
+        lower_m: Lowest x, y, z in the robot base frame, m.
+        upper_m: Highest x, y, z, m.
+    """
+
+    lower_m: tuple[float, float, float]
+    upper_m: tuple[float, float, float]
+
+    def margin_m(self, position_m: Array) -> Array:
+        """Distance to the nearest face, m; negative outside. Shapes (..., 3) to (...)."""
+        below = position_m - np.asarray(self.lower_m)
+        above = np.asarray(self.upper_m) - position_m
+        return np.asarray(np.minimum(below, above).min(axis=-1))
+
+
+@dataclass(frozen=True)
+class WorldSettings:
+    """What may differ between worlds that begin from one start.
+
+    Attributes:
+        calibration_epoch: Which camera calibration the observations carry.
+        probe: Name of an out-of-distribution probe of the task, or `nominal`.
+        seed: Seed of the probe's own disturbances (sensor noise of a probe, for instance).
+    """
+
+    calibration_epoch: str
+    probe: str = NOMINAL_PROBE
+    seed: int = 0
+
+
+@dataclass(frozen=True)
+class EpisodeSpec:
+    """Everything that decides one demonstration, chosen before anything is simulated.
+
+    Attributes:
+        root_seed: Seed under which all of the episode's streams are named.
+        index: Number of the episode, from 0; later episodes are later in time.
+        kind: What the operator is to do (task-specific; `nominal` for a plain success).
+        operator: Who demonstrates.
+        object_name: What is manipulated.
+        calibration_epoch: Camera calibration and clock offsets in force.
+        mode: Which of the valid ways the operator chose.
+        start: Where the episode begins.
+        start_time_ns: Host clock at the first action, ns.
+    """
+
+    root_seed: int
+    index: int
+    kind: str
+    operator: str
+    object_name: str
+    calibration_epoch: str
+    mode: str
+    start: Start
+    start_time_ns: int
+
+
+class Start(Protocol):
+    """The drawn numbers that a world begins from."""
+
+    def to_json(self) -> str:
+        """Canonical JSON text, for replay."""
+        ...
+
+    def variables(self) -> dict[str, float]:
+        """Each drawn number by name, SI units."""
+        ...
+
+
+class World(Protocol):
+    """One simulated robot cell; knows nothing of policies."""
+
+    @property
+    def time_s(self) -> float:
+        """Simulated time since the start, s."""
+        ...
+
+    @property
+    def phase(self) -> str:
+        """Task phase, from the measured state."""
+        ...
+
+    @property
+    def calibration_epoch(self) -> str:
+        """Camera calibration in force."""
+        ...
+
+    @property
+    def q_meas(self) -> Array:
+        """Measured joint positions, rad. Shape (7,)."""
+        ...
+
+    @property
+    def dq_meas(self) -> Array:
+        """Measured joint velocities, rad/s. Shape (7,)."""
+        ...
+
+    @property
+    def tcp_pose(self) -> tuple[Array, Array]:
+        """Measured TCP position (3,), m, and rotation (3, 3) in the base frame."""
+        ...
+
+    @property
+    def last_action(self) -> Array:
+        """Target commanded last. Shape (D_a,)."""
+        ...
+
+    @property
+    def contact_force_n(self) -> float:
+        """Largest contact force on robot and held object during the last `advance`, N."""
+        ...
+
+    @property
+    def collision(self) -> bool:
+        """A forbidden contact happened during the last `advance`."""
+        ...
+
+    @property
+    def success(self) -> bool:
+        """The task's success test holds now, and no forbidden contact ever happened."""
+        ...
+
+    def state_sha256(self) -> str:
+        """Hash of the full integration state, the scene's poses and the active constraints."""
+        ...
+
+    def observe(self) -> Array:
+        """Observation now, without noise or delay. Shape (D_o,)."""
+        ...
+
+    def command(self, action: Array) -> None:
+        """Set the target that the controller reaches at the end of the next `advance`.
+
+        Raises:
+            NonFiniteError: The action holds NaN, infinity, or a rotation that is none.
+        """
+        ...
+
+    def hold(self) -> None:
+        """Keep the last target."""
+        ...
+
+    def advance(self) -> None:
+        """Simulate one action period."""
+        ...
+
+    def apply_force(self, force_n: Array, duration_s: float) -> None:
+        """Push the hand from now on. Force in the base frame, N, shape (3,)."""
+        ...
+
+    def request_recovery(self, active: bool) -> None:
+        """Flag the phase `recover` (where the task allows it), or clear the flag."""
+        ...
+
+
+class Task(Protocol):
+    """A manipulation task."""
+
+    @property
+    def name(self) -> str:
+        """Name under which the task is registered."""
+        ...
+
+    @property
+    def scene_path(self) -> Path:
+        """The MJCF file that alone describes robot and scene."""
+        ...
+
+    @property
+    def observation(self) -> ObservationContract:
+        """Contract of the observation vector."""
+        ...
+
+    @property
+    def phases(self) -> tuple[str, ...]:
+        """Phases, in the order of the one-hot channel."""
+        ...
+
+    @property
+    def contact_phases(self) -> frozenset[str]:
+        """Phases in which the held object may touch the scene."""
+        ...
+
+    @property
+    def workspace(self) -> Workspace:
+        """Where the TCP may be."""
+        ...
+
+    @property
+    def probes(self) -> tuple[str, ...]:
+        """Names of the out-of-distribution probes."""
+        ...
+
+    @property
+    def calibration_epochs(self) -> tuple[str, ...]:
+        """Names of the calibration epochs, in order of time."""
+        ...
+
+    def sample_start(self, rng: np.random.Generator) -> Start:
+        """Draw a start."""
+        ...
+
+    def start_from_json(self, text: str) -> Start:
+        """The start that `Start.to_json` wrote.
+
+        Raises:
+            BadInputError: The text is not such a start.
+        """
+        ...
+
+    def make_world(self, start: Start, *, settings: WorldSettings) -> World:
+        """A world at rest at the start; equal arguments give equal state hashes."""
+        ...
+
+    def scene_at(self, observation: Array) -> Any:
+        """MuJoCo model and data of the scene as observed, robot left to the caller."""
+        ...
+
+    def fallback(self, world: World, kind: str) -> Array:
+        """Classical plan from the world's state, actions of shape (n, D_a) at 20 Hz."""
+        ...
+
+    def episode_specs(
+        self, root_seed: int, episodes: int, *, shares: Mapping[str, float] | None = None
+    ) -> list[EpisodeSpec]:
+        """Plan of a recording session; simulates nothing."""
+        ...
+
+    def record_episode(self, spec: EpisodeSpec) -> RecordedEpisode:
+        """Demonstrate and record one episode."""
+        ...
+
+    def replay(self, start: Start, actions: Array) -> str:
+        """Outcome (`success` or `failure`) of recorded actions (n, D_a) replayed open loop."""
+        ...
+
+
+def load_task(name: str) -> Task:
+    """The task registered as `name`.
+
+    Raises:
+        ConfigError: No task has that name; the message lists the known ones.
+    """
+    found = {point.name: point for point in entry_points(group=ENTRY_POINT_GROUP)}
+    if name not in found:
+        raise ConfigError(
+            where="the task's name",
+            found=repr(name),
+            expected=f"one of {sorted(found)}",
+            action=f"Name a registered task, or register yours in the group {ENTRY_POINT_GROUP}.",
+        )
+    task: Task = found[name].load()
+    return task
