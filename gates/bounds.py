@@ -1,0 +1,74 @@
+"""Bounds of shares whose rows are not all independent.
+
+Rows that share an episode, an observation or a start are one draw, not many. The exact bound is
+therefore taken over the clusters: the share is that of the rows, the number of trials that of
+the clusters, and the count is rounded to the unfavourable side.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gates.evidence import Array, MissingEvidenceError
+from genpolicy.statistics.intervals import clopper_pearson, order_statistic_interval
+
+
+def share_interval(
+    hits: Array | NDArray[np.bool_],
+    clusters: NDArray[np.generic] | list[str],
+    *,
+    confidence: float,
+    favourable: bool,
+) -> tuple[float, float, float]:
+    """Share of hits with an exact interval over clusters.
+
+    Args:
+        hits: Hit per row, in [0, 1]. Shape (n,).
+        clusters: Cluster of each row. Shape (n,).
+        confidence: Coverage of the interval.
+        favourable: Whether a hit is good; decides to which side the count is rounded.
+
+    Returns:
+        Share, lower and upper bound.
+
+    Raises:
+        MissingEvidenceError: No rows.
+    """
+    if len(hits) == 0:
+        raise MissingEvidenceError("no rows to take a share of")
+    share = float(np.mean(np.asarray(hits, dtype=np.float64)))
+    trials = len(set(np.asarray(clusters).tolist()))
+    product = round(share * trials, 9)
+    successes = math.floor(product) if favourable else math.ceil(product)
+    lower, upper = clopper_pearson(successes, trials, confidence)
+    return share, lower, upper
+
+
+def counted_interval(hits: float, trials: float, *, confidence: float) -> tuple[float, float]:
+    """Exact interval of a share of independent trials.
+
+    Raises:
+        MissingEvidenceError: No trials, or counts that cannot be.
+    """
+    if trials <= 0 or not 0 <= hits <= trials:
+        raise MissingEvidenceError(f"{hits:g} of {trials:g} is no share")
+    return clopper_pearson(int(hits), int(trials), confidence)
+
+
+def upper_quantile(
+    values: Array, quantile: float, *, confidence: float
+) -> tuple[float, tuple[float, float] | None]:
+    """Order statistic at or above a quantile, with its distribution-free interval.
+
+    Returns:
+        The order statistic, and the interval where the sample is large enough for both ends.
+
+    Raises:
+        MissingEvidenceError: No values.
+    """
+    if len(values) == 0:
+        raise MissingEvidenceError("no values to take a quantile of")
+    point = float(np.quantile(values, quantile, method="higher"))
+    lower, upper = order_statistic_interval(values, quantile, confidence)
+    return point, (lower, upper) if math.isfinite(lower) and math.isfinite(upper) else None

@@ -1,0 +1,162 @@
+"""Reading evidence: the bytes that are hashed are the bytes that are judged.
+
+A judge sees the repository only through an `Evidence`. What it read, or bound without reading,
+becomes the `materials` of its report.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from genpolicy.integrity.documents import parse_json
+from genpolicy.integrity.hashing import sha256_bytes_of, sha256_file
+from genpolicy.integrity.tables import table_of
+
+Array = NDArray[np.float64]
+
+
+class MissingEvidenceError(Exception):
+    """A number cannot be measured from what is there. Never leaves the gates."""
+
+
+class Evidence:
+    """The evidence below one repository root, with the hash of everything touched."""
+
+    def __init__(self, root: Path) -> None:
+        self.root = root
+        self._materials: dict[str, str] = {}
+        self._tables: dict[str, pa.Table] = {}
+        self._documents: dict[str, Any] = {}
+
+    @property
+    def materials(self) -> dict[str, str]:
+        """SHA-256 of every file read or bound, by path relative to the root."""
+        return dict(sorted(self._materials.items()))
+
+    def frame(self, path: str, *columns: str) -> pd.DataFrame:
+        """Columns of a table, at least one row.
+
+        Raises:
+            MissingEvidenceError: No such file, column or row.
+            IntegrityError: The file is not a whole table.
+        """
+        table = self._table(path)
+        absent = [name for name in columns if name not in table.column_names]
+        if absent:
+            raise MissingEvidenceError(f"{path} has no column {', '.join(absent)}")
+        if table.num_rows == 0:
+            raise MissingEvidenceError(f"{path} has no rows")
+        frame: pd.DataFrame = table.select(list(columns)).to_pandas()
+        return frame
+
+    def of(self, path: str, method: str, *columns: str) -> pd.DataFrame:
+        """Rows of one method; as `frame`.
+
+        Raises:
+            MissingEvidenceError: No such file, column or row.
+        """
+        frame = self.frame(path, "method", *columns)
+        rows = frame[frame["method"] == method]
+        if len(rows) == 0:
+            raise MissingEvidenceError(f"{path} has no rows of {method}")
+        return rows
+
+    def document(self, path: str) -> dict[str, Any]:
+        """A JSON document whose top is an object.
+
+        Raises:
+            MissingEvidenceError: No such file, or not an object.
+            BadInputError: Not strict JSON.
+        """
+        if path not in self._documents:
+            data = self._read(path)
+            self._documents[path] = parse_json(data, where=path)
+        document = self._documents[path]
+        if not isinstance(document, dict):
+            raise MissingEvidenceError(f"{path} holds no object")
+        return document
+
+    def listing(self, path: str) -> list[Any]:
+        """A JSON document whose top is a list; otherwise as `document`."""
+        if path not in self._documents:
+            self._documents[path] = parse_json(self._read(path), where=path)
+        document = self._documents[path]
+        if not isinstance(document, list):
+            raise MissingEvidenceError(f"{path} holds no list")
+        return document
+
+    def bind(self, *patterns: str) -> list[str]:
+        """Hash files by glob pattern without reading them; returns their paths, sorted."""
+        bound = []
+        for pattern in patterns:
+            for file in sorted(self.root.glob(pattern)):
+                name = file.relative_to(self.root).as_posix()
+                self._materials.setdefault(name, sha256_file(file))
+                bound.append(name)
+        return bound
+
+    def _table(self, path: str) -> pa.Table:
+        if path not in self._tables:
+            self._tables[path] = table_of(self._read(path), where=path)
+        return self._tables[path]
+
+    def _read(self, path: str) -> bytes:
+        file = self.root / path
+        if not file.exists() and not file.is_symlink():
+            raise MissingEvidenceError(f"{path} is missing")
+        self._materials[path], data = sha256_bytes_of(file, keep=True)
+        return data
+
+
+def numbers(frame: pd.DataFrame, column: str) -> Array:
+    """A column as finite float64 numbers. Shape (rows,).
+
+    Raises:
+        MissingEvidenceError: Not numbers, or a value is missing, NaN or infinite.
+    """
+    try:
+        values = np.asarray(frame[column].to_numpy(dtype=np.float64, na_value=np.nan))
+    except (TypeError, ValueError) as error:
+        raise MissingEvidenceError(f"column {column} holds no numbers") from error
+    if not np.all(np.isfinite(values)):
+        raise MissingEvidenceError(f"column {column} has missing or non-finite values")
+    return values
+
+
+def flags(frame: pd.DataFrame, column: str) -> NDArray[np.bool_]:
+    """A column of true or false; not reached (null) counts as false. Shape (rows,).
+
+    Raises:
+        MissingEvidenceError: Other values.
+    """
+    values = frame[column]
+    known = values.dropna()
+    if not all(isinstance(value, bool | np.bool_) for value in known):
+        raise MissingEvidenceError(f"column {column} holds other values than true and false")
+    return np.asarray(values.fillna(False).astype(bool).to_numpy(), dtype=np.bool_)
+
+
+def number(document: dict[str, Any], key: str) -> float:
+    """A finite number of a document.
+
+    Raises:
+        MissingEvidenceError: Absent, null or not a number.
+    """
+    value = document.get(key)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise MissingEvidenceError(f"{key} is missing or not a number")
+    return float(value)
+
+
+def count(document: dict[str, Any], key: str) -> float:
+    """A count of a document, given as a number or as a list.
+
+    Raises:
+        MissingEvidenceError: Absent or neither.
+    """
+    value = document.get(key)
+    return float(len(value)) if isinstance(value, list) else number(document, key)

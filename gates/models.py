@@ -1,0 +1,209 @@
+"""The gate report: what was measured, held against which limit, and what follows from it.
+
+Reports are canonical JSON without a timestamp, so that equal evidence gives equal bytes.
+"""
+
+from pathlib import Path
+from typing import Any, ClassVar, Literal, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from genpolicy.errors import BadInputError, ConfigError, IntegrityError
+from genpolicy.integrity.documents import canonical_json, parse_json
+from genpolicy.integrity.hashing import sha256_bytes_of
+
+SCHEMA_VERSION = 1
+
+Gate = Literal["A", "B", "C", "D", "E"]
+Owner = Literal["model", "perception", "controller", "safety"]
+Comparison = Literal["<=", ">="]
+Verdict = Literal["PASS", "FAIL", "INCONCLUSIVE", "PENDING_REVIEW"]
+
+GATES: tuple[Gate, ...] = ("A", "B", "C", "D", "E")
+OWNERS: tuple[Owner, ...] = ("model", "perception", "controller", "safety")
+REQUIRED = "required"
+
+
+class StrictModel(BaseModel):
+    """Frozen settings or documents: no unknown key, no coercion, no NaN."""
+
+    model_config: ClassVar[ConfigDict] = ConfigDict(
+        extra="forbid", frozen=True, strict=True, allow_inf_nan=False
+    )
+
+
+Model = TypeVar("Model", bound=StrictModel)
+
+
+class Threshold(StrictModel):
+    """A limit with the reason for it and the owner who answers for it."""
+
+    limit: float
+    reason: str = Field(min_length=1)
+    owner: Owner
+
+
+class Criterion(StrictModel):
+    """One question of a gate, answered.
+
+    Attributes:
+        id: Name of the criterion; the key of its threshold in `params.yaml`.
+        candidate: Method it speaks of; None for the whole gate.
+        route: `required`, or the name of the alternative it belongs to: of several routes, one
+            that passes whole is enough.
+        measured: Number held against the limit; None where evidence is missing.
+        interval: Interval of what was measured, where it has one.
+        threshold: The limit; None where `params.yaml` has none.
+        comparison: How `measured` must stand to `threshold`.
+        reason: Why the limit is what it is.
+        evidence: Files that the number comes from, relative to the repository.
+        caveat: What the reader must know about this number.
+    """
+
+    id: str
+    question: str
+    owner: Owner
+    candidate: str | None
+    route: str
+    measured: float | None
+    interval: tuple[float, float] | None
+    threshold: float | None
+    comparison: Comparison
+    reason: str
+    verdict: Verdict
+    evidence: tuple[str, ...]
+    caveat: str
+
+
+class GateReport(StrictModel):
+    """The answer of one gate.
+
+    Attributes:
+        schema_version: Version of this model.
+        verdict: Follows from the criteria by `gates.verdicts.combine`.
+        candidates: Verdict of each method that stands for promotion (gates B to E).
+        criteria: In the order in which a failure is diagnosed.
+        materials: SHA-256 of every file read or bound, by path relative to the repository.
+        upstream: SHA-256 of the reports below this one, by gate.
+        settings: The gate's parameters other than thresholds (levels, margins, candidates).
+        environment: Library versions, threads and regime; not part of what is re-derived.
+        caveats: What this gate does not show.
+        diagnosis: Where to look first; empty after PASS.
+        decision: What to do next.
+    """
+
+    schema_version: int
+    gate: Gate
+    verdict: Verdict
+    candidates: dict[str, Verdict]
+    criteria: tuple[Criterion, ...]
+    materials: dict[str, str]
+    upstream: dict[str, str]
+    settings: dict[str, Any]
+    environment: dict[str, str]
+    caveats: tuple[str, ...]
+    diagnosis: str
+    decision: str
+
+
+def report_path(gate: str) -> str:
+    """Path of a gate's JSON report, relative to the repository."""
+    return f"reports/gate_{gate.lower()}.json"
+
+
+def stage_of(gate: str) -> str:
+    """Name of the stage that judges a gate."""
+    return f"gate_{gate.lower()}"
+
+
+def report_bytes(report: GateReport) -> bytes:
+    """The one serialisation of a report."""
+    return canonical_json(report.model_dump(mode="json"))
+
+
+def read_report(root: Path, gate: str) -> tuple[GateReport, str]:
+    """A gate's report and the SHA-256 of its bytes.
+
+    Raises:
+        IntegrityError: Missing, malformed, of another schema version or of another gate.
+    """
+    path = root / report_path(gate)
+    digest, data = sha256_bytes_of(path, keep=True)
+    return parse_report(data, gate=gate), digest
+
+
+def parse_report(data: bytes, *, gate: str) -> GateReport:
+    """The report in `data`.
+
+    Raises:
+        IntegrityError: Malformed (duplicate keys and NaN included), of another schema version
+            or of another gate.
+    """
+    where = report_path(gate)
+    action = f"Run `dvc repro -f {stage_of(gate)}` to judge the evidence again."
+    try:
+        document = parse_json(data, where=where)
+    except BadInputError as error:
+        raise IntegrityError(
+            where=where, found=error.found, expected=error.expected, action=action
+        ) from error
+    version = document.get("schema_version") if isinstance(document, dict) else None
+    if version != SCHEMA_VERSION or isinstance(version, bool):
+        raise IntegrityError(
+            where=f"{where}: schema_version",
+            found=repr(version),
+            expected=str(SCHEMA_VERSION),
+            action=action,
+        )
+    try:
+        report = GateReport.model_validate_json(data)
+    except ValidationError as error:
+        raise IntegrityError(
+            where=f"{where}: {place(error)}",
+            found=message(error),
+            expected="a gate report",
+            action=action,
+        ) from error
+    if report.gate != gate:
+        raise IntegrityError(
+            where=f"{where}: gate",
+            found=f"a report of gate {report.gate}",
+            expected=f"gate {gate}",
+            action=action,
+        )
+    return report
+
+
+def parse_section(model: type[Model], section: object, *, where: str) -> Model:
+    """A settings section as its model; lists may stand for tuples, nothing else is coerced.
+
+    Raises:
+        ConfigError: The section breaks the model.
+    """
+    try:
+        return model.model_validate_json(canonical_json(section))
+    except ValidationError as error:
+        raise ConfigError(
+            where=f"{where}.{place(error)}",
+            found=message(error),
+            expected="the keys and types of its model",
+            action="Correct the section; no unknown keys, no text for numbers.",
+        ) from error
+    except (BadInputError, TypeError, ValueError) as error:
+        raise ConfigError(
+            where=where,
+            found=f"not a plain settings section ({' '.join(str(error).split())})",
+            expected="mappings, lists, text and finite numbers",
+            action="Correct the section.",
+        ) from error
+
+
+def place(error: ValidationError) -> str:
+    """Dotted path of the first field that breaks a model."""
+    return ".".join(str(part) for part in error.errors()[0]["loc"]) or "document"
+
+
+def message(error: ValidationError) -> str:
+    """First complaint of a validation error, in one line, without the value's address."""
+    first = error.errors(include_url=False, include_context=False)[0]
+    return f"{str(first.get('input'))[:60]!r} ({first['msg']})"

@@ -1,0 +1,84 @@
+"""From numbers to verdicts: one criterion, one candidate, one gate.
+
+Criteria are combined by intersection-union: every one must hold, so each is tested at full
+level and no correction is needed. Nothing that is missing can pass.
+"""
+
+import math
+from collections.abc import Iterable, Sequence
+
+from gates.models import REQUIRED, Comparison, Criterion, Verdict
+
+SEVERITY: dict[Verdict, int] = {"FAIL": 3, "INCONCLUSIVE": 2, "PENDING_REVIEW": 1, "PASS": 0}
+SIGNIFICANT_DIGITS = 12
+
+
+def rounded(value: float) -> float:
+    """`value` to twelve significant digits: the same on every platform, before it is judged."""
+    return float(f"{value:.{SIGNIFICANT_DIGITS}g}")
+
+
+def margin(measured: float, limit: float, comparison: Comparison) -> float:
+    """Distance to the limit; accepted where it is >= 0, so that NaN is not."""
+    return limit - measured if comparison == "<=" else measured - limit
+
+
+def judge_criterion(
+    measured: float | None, limit: float | None, comparison: Comparison
+) -> Verdict:
+    """Verdict of one criterion; INCONCLUSIVE without a finite number on both sides."""
+    if measured is None or limit is None:
+        return "INCONCLUSIVE"
+    if not (math.isfinite(measured) and math.isfinite(limit)):
+        return "INCONCLUSIVE"
+    return "PASS" if margin(measured, limit, comparison) >= 0 else "FAIL"
+
+
+def worst(verdicts: Iterable[Verdict]) -> Verdict:
+    """The most severe verdict; INCONCLUSIVE if there is none."""
+    return max(verdicts, key=SEVERITY.__getitem__, default="INCONCLUSIVE")
+
+
+def best(verdicts: Iterable[Verdict]) -> Verdict:
+    """The least severe verdict; INCONCLUSIVE if there is none."""
+    return min(verdicts, key=SEVERITY.__getitem__, default="INCONCLUSIVE")
+
+
+def combine(
+    criteria: Sequence[Criterion], *, expects_candidates: bool
+) -> tuple[Verdict, dict[str, Verdict]]:
+    """Verdict of a gate and of each candidate.
+
+    A gate passes if and only if every required gate-wide criterion passes, one of the
+    alternative routes (where there are any) passes whole, and, where candidates are expected,
+    at least one candidate passes all of its criteria.
+
+    Args:
+        criteria: Judged criteria.
+        expects_candidates: Whether the gate is about candidates.
+    """
+    common = [c for c in criteria if c.candidate is None]
+    parts: list[Verdict] = [c.verdict for c in common if c.route == REQUIRED]
+    routes = sorted({c.route for c in common} - {REQUIRED})
+    if routes:
+        parts.append(best(worst(c.verdict for c in common if c.route == r) for r in routes))
+    names = sorted({c.candidate for c in criteria if c.candidate is not None})
+    candidates = {
+        name: worst(c.verdict for c in criteria if c.candidate == name) for name in names
+    }
+    if expects_candidates:
+        parts.append(best(candidates.values()))
+    return worst(parts), candidates
+
+
+def first_unmet(criteria: Sequence[Criterion], verdict: Verdict) -> Criterion | None:
+    """The criterion that decided: the first one, in order of diagnosis, with the gate's verdict.
+
+    Criteria of candidates count only if no gate-wide one decides.
+    """
+    if verdict == "PASS":
+        return None
+    unmet = [c for c in criteria if c.verdict == verdict]
+    required = [c for c in unmet if c.candidate is None and c.route == REQUIRED]
+    common = [c for c in unmet if c.candidate is None]
+    return next(iter(required or common or unmet), None)
