@@ -1,0 +1,83 @@
+# Two commands are enough: `make ladder` runs the five gates, `make test` runs the tests.
+#
+#   make ladder   build the environment once, run the pipeline, print the table of the gates
+#   make smoke    the same ladder, reduced (params.smoke.yaml), in its own workspace build/smoke
+#   make test     format, lint, types, import contracts, tests
+#   make lint     the same without the tests
+#   make doctor   versions against the pins, disk, memory, telemetry, DVC
+#   make clean    remove what was generated and is not versioned; the DVC cache stays
+#
+# Variables: TORCH_INDEX=<url>  another package index for torch (CPU or CUDA builds)
+#            PYTHON=<path>      another Python 3.11 (3.12 should do, 3.11 is tested)
+#            JOBS=<n>           test processes, default 2
+#
+# An end of `make ladder`: 0 the ladder ran to its end, gate E's report included; otherwise make
+# prints "Error 3" (refused by a gate, the table says which), "Error 2" (bad configuration or
+# input) or "Error 1" (a fault of ours). make itself always turns these into its own code 2;
+# scripts that need the code call `python -m flows.reproduce`.
+
+SHELL := /bin/bash
+.SHELLFLAGS := -euo pipefail -c
+.DEFAULT_GOAL := help
+
+VENV := .venv
+BIN := $(CURDIR)/$(VENV)/bin
+PYTHON ?= $(shell command -v python3.11 || command -v python3)
+JOBS ?= 2
+TORCH_PIN := $(shell grep -E '^torch==' constraints.txt)
+
+export DVC_NO_ANALYTICS := 1
+export DO_NOT_TRACK := 1
+export PREFECT_SERVER_ANALYTICS_ENABLED := false
+export PREFECT_HOME := $(CURDIR)/.prefect
+export OMP_NUM_THREADS := 1
+export PYTHONHASHSEED := 0
+export MPLBACKEND := Agg
+export MPLCONFIGDIR := $(CURDIR)/build/matplotlib
+export PATH := $(BIN):$(PATH)
+
+# The stamp holds a hash of what the environment is built from, not a time: a fresh checkout gives
+# every file a new time, and an environment that fits must not call pip (nor the network) again.
+SHA256 := $(shell command -v sha256sum >/dev/null && echo sha256sum || echo 'shasum -a 256')
+WANTED := $(shell cat constraints.txt pyproject.toml | $(SHA256) | cut -d' ' -f1)
+
+.PHONY: help env ladder smoke test lint doctor clean
+
+help:
+	@sed -n '1,17p' Makefile | sed 's/^# \{0,1\}//'
+
+env:
+	@if [ "$$(cat $(VENV)/.ok 2>/dev/null)" = "$(WANTED)" ]; then exit 0; fi; \
+	if [ ! -x $(BIN)/python ]; then \
+	  "$(PYTHON)" -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 13))' || { \
+	    echo "No Python 3.11 found (looked for python3.11, then python3). Install Python 3.11, or name one: make PYTHON=/path/to/python3.11 $(MAKECMDGOALS)" >&2; \
+	    exit 2; }; \
+	  "$(PYTHON)" -m venv $(VENV); \
+	fi; \
+	echo "Building the environment (once, a few minutes) ..."; \
+	$(BIN)/python -m pip install --quiet -c constraints.txt $(if $(TORCH_INDEX),--extra-index-url $(TORCH_INDEX)) setuptools "$(TORCH_PIN)"; \
+	$(BIN)/python -m pip install --quiet --no-build-isolation -c constraints.txt -e '.[dev]'; \
+	echo "$(WANTED)" > $(VENV)/.ok
+
+ladder: env
+	@code=0; python -m flows.reproduce || code=$$?; python -m gates summary || true; exit $$code
+
+smoke: env
+	@python -m flows.workspace build/smoke --overrides params.smoke.yaml; \
+	code=0; python -m flows.reproduce --workspace build/smoke || code=$$?; \
+	(cd build/smoke && python -m gates summary) || true; exit $$code
+
+test: env
+	@code=0; $(MAKE) --no-print-directory lint || code=1; \
+	python -m pytest -q -n $(JOBS) --dist loadfile || code=1; exit $$code
+
+lint: env
+	@code=0; ruff check . || code=1; ruff format --check . || code=1; \
+	mypy || code=1; lint-imports --no-logo || code=1; exit $$code
+
+doctor: env
+	@python -m genpolicy.doctor
+
+clean:
+	rm -rf build artifacts .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	find . -path ./$(VENV) -prune -o -name __pycache__ -type d -print0 | xargs -0 rm -rf

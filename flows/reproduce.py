@@ -1,0 +1,206 @@
+"""One `dvc repro` as a subprocess, with an exit code that says why it ended.
+
+DVC itself ends with 255 whatever a stage did. This reads which stage failed and with which code,
+so that a refusal (3), a bad input (2) and a fault (1) stay apart. `python -m flows.reproduce`
+runs the whole ladder, or the stages named, without any server.
+"""
+
+import argparse
+import contextlib
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+EXIT_DONE, EXIT_FAULT, EXIT_BAD_INPUT, EXIT_REFUSED = 0, 1, 2, 3
+KEPT_LINES = 400
+GRACE_S = 5.0
+
+FAILED_STAGE = re.compile(
+    r"failed to reproduce '(?P<stage>[^']+)': failed to run: .*exited with (?P<code>-?\d+)"
+)
+# What can be well again by itself: a lock held by another process, a full disk, a killed process.
+INFRASTRUCTURE = re.compile(
+    r"Unable to acquire lock|is busy, it is being blocked|No space left on device|Disk quota"
+    r"|Cannot allocate memory|Resource temporarily unavailable"
+)
+DVC_REJECTS = re.compile(r"is invalid|does not exist|missing data|not found|Cyclic|overlaps with")
+
+_running: set["subprocess.Popen[str]"] = set()
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a `dvc repro` ended.
+
+    Attributes:
+        code: 0 done, 1 a fault of ours or of the machine, 2 bad input, 3 refused by a gate.
+        stage: Stage that ended it, empty when all went well or DVC itself failed.
+        sentence: What the stage (or DVC) said, one line; empty when all went well.
+        infrastructure: Whether a second try could help: a lock, a full disk, a killed process.
+        duration_s: Wall time.
+    """
+
+    code: int
+    stage: str
+    sentence: str
+    infrastructure: bool
+    duration_s: float
+
+
+def reproduce(
+    workspace: Path,
+    *,
+    stages: Sequence[str] = (),
+    single_item: bool = False,
+    force: bool = False,
+    echo: Callable[[str], None] = print,
+) -> Outcome:
+    """Run `dvc repro` in `workspace` and say how it ended.
+
+    Args:
+        workspace: Folder that holds `dvc.yaml`.
+        stages: Stages to bring up to date; none means all.
+        single_item: Only these stages, without what they depend on.
+        force: Run them even where nothing changed.
+        echo: Called with every line that DVC and the stages print.
+
+    Returns:
+        The outcome. Nothing is raised for a stage that fails: that is an answer.
+    """
+    command = [sys.executable, "-m", "dvc", "repro", *stages]
+    command += ["--single-item"] if single_item else []
+    command += ["--force"] if force else []
+    started = time.monotonic()
+    lines: deque[str] = deque(maxlen=KEPT_LINES)
+    process = subprocess.Popen(
+        command,
+        cwd=workspace,
+        env=stage_environment(workspace),
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        errors="replace",
+        start_new_session=True,
+    )
+    _running.add(process)
+    try:
+        assert process.stdout is not None
+        for line in process.stdout:
+            text = line.rstrip()
+            lines.append(text)
+            echo(text)
+        code = process.wait()
+    finally:
+        if process.poll() is None:
+            stop_group(process)
+        _running.discard(process)
+    return _outcome(code, list(lines), time.monotonic() - started)
+
+
+def stage_environment(workspace: Path) -> dict[str, str]:
+    """The environment of every stage: no telemetry, one thread, this interpreter first in PATH."""
+    return {
+        **os.environ,
+        "PATH": os.pathsep.join((str(Path(sys.executable).parent), os.environ.get("PATH", ""))),
+        "DVC_NO_ANALYTICS": "1",
+        "DO_NOT_TRACK": "1",
+        "OMP_NUM_THREADS": "1",
+        "PYTHONHASHSEED": "0",
+        "PYTHONUNBUFFERED": "1",
+        "MPLBACKEND": "Agg",
+        "MPLCONFIGDIR": str(workspace.resolve() / "build" / "matplotlib"),
+    }
+
+
+def stop_group(process: "subprocess.Popen[str]") -> None:
+    """End DVC together with the stage that it started; DVC alone would leave a second writer."""
+    for sign in (signal.SIGTERM, signal.SIGKILL):
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, sign)
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.wait(timeout=GRACE_S)
+            if sign is signal.SIGKILL:
+                return
+
+
+def stop_all() -> None:
+    """End every `dvc repro` that this process has started, with its stages."""
+    for process in tuple(_running):
+        stop_group(process)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Bring the ladder, or some stages of it, up to date; returns the exit code."""
+    parser = argparse.ArgumentParser(
+        prog="python -m flows.reproduce",
+        description="Run `dvc repro` and leave with 0 done, 1 a fault of ours, 2 bad input, "
+        "3 refused by a gate.",
+        epilog="Example: python -m flows.reproduce --workspace build/smoke gate_c",
+    )
+    parser.add_argument("stages", nargs="*", help="stages to bring up to date; default: all")
+    parser.add_argument("--workspace", type=Path, default=Path(), help="folder with dvc.yaml")
+    parser.add_argument("--single-item", action="store_true", help="not what they depend on")
+    parser.add_argument("--force", action="store_true", help="run also where nothing changed")
+    options = parser.parse_args(arguments)
+    if not (options.workspace / "dvc.yaml").is_file():
+        print(
+            f"{options.workspace} is a folder without dvc.yaml, expected a workspace of the "
+            "ladder. Name one with --workspace.",
+            file=sys.stderr,
+        )
+        return EXIT_BAD_INPUT
+    signal.signal(signal.SIGTERM, _interrupt)
+    try:
+        outcome = reproduce(
+            options.workspace,
+            stages=options.stages,
+            single_item=options.single_item,
+            force=options.force,
+            echo=lambda line: print(line, flush=True),
+        )
+    except KeyboardInterrupt:
+        print("Interrupted: DVC and its stage were stopped.", file=sys.stderr)
+        return EXIT_FAULT
+    if outcome.code != EXIT_DONE:
+        print(f"\nThe ladder stopped: {outcome.sentence}", file=sys.stderr)
+    return outcome.code
+
+
+def _interrupt(number: int, frame: object) -> None:
+    raise KeyboardInterrupt
+
+
+def _outcome(dvc_code: int, lines: list[str], duration_s: float) -> Outcome:
+    if dvc_code == 0:
+        return Outcome(EXIT_DONE, "", "", infrastructure=False, duration_s=duration_s)
+    text = "\n".join(lines)
+    match = next(reversed(list(FAILED_STAGE.finditer(text))), None)
+    errors = [line.removeprefix("ERROR: ") for line in lines if line.startswith("ERROR: ")]
+    killed = dvc_code < 0
+    if match is None:
+        transient = killed or INFRASTRUCTURE.search(text) is not None
+        rejected = not transient and DVC_REJECTS.search("\n".join(errors)) is not None
+        sentence = errors[-1] if errors else f"dvc repro ended with code {dvc_code}"
+        code = EXIT_BAD_INPUT if rejected else EXIT_FAULT
+        return Outcome(code, "", sentence, infrastructure=transient, duration_s=duration_s)
+    stage, stage_code = match["stage"], int(match["code"])
+    said = [line for line in lines if line.startswith(f"{stage}: ")]
+    sentence = said[-1] if said else f"{stage} ended with code {stage_code}"
+    if stage_code in (EXIT_BAD_INPUT, EXIT_REFUSED):
+        full_disk = stage_code == EXIT_BAD_INPUT and INFRASTRUCTURE.search(sentence) is not None
+        return Outcome(stage_code, stage, sentence, full_disk, duration_s)
+    # A shell reports a process that a signal ended as 128 + signal (137: killed for memory).
+    transient = stage_code < 0 or stage_code > 128 or INFRASTRUCTURE.search(text) is not None
+    return Outcome(EXIT_FAULT, stage, sentence, transient, duration_s)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

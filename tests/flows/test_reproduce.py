@@ -1,0 +1,103 @@
+import importlib.util
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from flows.reproduce import _outcome, main, reproduce, stop_group
+from flows.workspace import make_workspace
+
+
+def runs(workspace: Path) -> list[str]:
+    file = workspace / "build" / "runs.txt"
+    return file.read_text().split() if file.exists() else []
+
+
+def test_a_ladder_runs_once_stops_at_a_refusal_and_goes_on_when_it_is_lifted(
+    checkout: Path, tmp_path: Path
+) -> None:
+    target = make_workspace(checkout, tmp_path / "run", {"generators": {"code": 3}})
+    printed: list[str] = []
+    outcome = reproduce(target, echo=printed.append)
+    assert (outcome.code, outcome.stage, outcome.infrastructure) == (3, "generators", False)
+    assert outcome.sentence.startswith("generators: Gate A refuses: share is 0.1, required >= 0.5")
+    assert runs(target) == ["record", "gate_a"]
+    assert (target / "reports" / "gate_a.md").exists()
+    assert any("Gate A refuses" in line for line in printed)
+
+    make_workspace(checkout, target, {})
+    assert reproduce(target, echo=lambda _: None).code == 0
+    assert runs(target) == ["record", "gate_a", "generators", "gate_b"]
+    assert reproduce(target, echo=lambda _: None).code == 0
+    assert runs(target) == ["record", "gate_a", "generators", "gate_b"]
+
+
+@pytest.mark.parametrize(("code", "expected"), [(2, 2), (1, 1), (7, 1)])
+def test_the_command_ends_with_the_code_of_the_stage(
+    checkout: Path, tmp_path: Path, code: int, expected: int, capfd: pytest.CaptureFixture[str]
+) -> None:
+    target = make_workspace(checkout, tmp_path / "run", {"record": {"code": code}})
+    assert main(["--workspace", str(target)]) == expected
+    assert "The ladder stopped: record: " in capfd.readouterr().err
+
+
+def test_a_folder_without_a_pipeline_is_bad_input(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["--workspace", str(tmp_path)]) == 2
+    assert "without dvc.yaml" in capsys.readouterr().err
+
+
+FAILED = "ERROR: failed to reproduce 'x': failed to run: python -m stages.x, exited with {}"
+
+
+@pytest.mark.parametrize(
+    ("lines", "code", "infrastructure"),
+    [
+        ([FAILED.format(-9)], 1, True),
+        ([FAILED.format(137)], 1, True),
+        (["x: OSError: [Errno 28] No space left on device", FAILED.format(1)], 1, True),
+        (["x: f is not writable (No space left on device)", FAILED.format(2)], 2, True),
+        ([FAILED.format(1)], 1, False),
+        ([FAILED.format(2)], 2, False),
+        (["ERROR: Unable to acquire lock. Most likely another DVC process is running"], 1, True),
+        (["ERROR: 'dvc.yaml' is invalid."], 2, False),
+        (["ERROR: unexpected error - boom"], 1, False),
+        ([], 1, False),
+    ],
+)
+def test_faults_of_the_machine_are_told_from_answers(
+    lines: list[str], code: int, infrastructure: bool
+) -> None:
+    outcome = _outcome(255, lines, 1.0)
+    assert (outcome.code, outcome.infrastructure) == (code, infrastructure)
+    assert outcome.sentence
+
+
+def test_a_stop_ends_the_stage_that_dvc_started_too(tmp_path: Path) -> None:
+    file = tmp_path / "child.pid"
+    script = (
+        "import subprocess, sys, pathlib, time\n"
+        "child = subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(60)'])\n"
+        f"pathlib.Path({str(file)!r}).write_text(str(child.pid))\n"
+        "time.sleep(60)\n"
+    )
+    process = subprocess.Popen([sys.executable, "-c", script], start_new_session=True, text=True)
+    deadline = time.monotonic() + 20
+    while not (file.exists() and file.read_text()):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    stop_group(process)
+    time.sleep(0.2)
+    assert process.poll() is not None
+    status = Path(f"/proc/{file.read_text()}/status")
+    assert not status.exists() or "zombie" in status.read_text()
+
+
+def test_driving_the_ladder_without_a_server_does_not_load_prefect() -> None:
+    assert importlib.util.find_spec("prefect") is not None
+    code = "import sys, flows.reproduce, flows.workspace; sys.exit('prefect' in sys.modules)"
+    subprocess.run([sys.executable, "-c", code], env=dict(os.environ), check=True)
