@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -245,8 +245,8 @@ class Task(Protocol):
         """A world at rest at the start; equal arguments give equal state hashes."""
         ...
 
-    def scene_at(self, observation: Array) -> Any:
-        """MuJoCo model and data of the scene as observed, robot left to the caller."""
+    def scene_poses(self, observation: Array) -> dict[str, tuple[Array, Array]]:
+        """Position (3,), m, and quaternion (4,), w x y z, of each movable body, as observed."""
         ...
 
     def fallback(self, world: World, kind: str) -> Array:

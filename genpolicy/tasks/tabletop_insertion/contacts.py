@@ -19,9 +19,7 @@ class ContactMonitor:
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         self._model, self._data = model, data
         self._groups: list[int] = model.geom_group.tolist()
-        self._fixture = [
-            model.geom(geom).name.startswith("fixture") for geom in range(model.ngeom)
-        ]
+        self._fixture = [model.geom(geom).name.startswith("fixture") for geom in range(model.ngeom)]
         self._contact_force = np.zeros(6)
         self._contact_allowed = False
         self.collision = False

@@ -93,9 +93,7 @@ def route(position_m: Array, hover_m: Array, *, side: str, style: Style, post_y_
     if x < scene.POST_X_M - 0.02:
         points.append(np.array([scene.POST_X_M + 0.005, post_y_m + sign * style.via_m, cruise_z]))
     if x < scene.POST_X_M + 0.05:
-        points.append(
-            np.array([scene.POST_X_M + 0.085, 0.62 * sign * style.via_m, cruise_z])
-        )
+        points.append(np.array([scene.POST_X_M + 0.085, 0.62 * sign * style.via_m, cruise_z]))
     points.append(hover_m)
     return np.array(points)
 
@@ -132,9 +130,7 @@ class Operator:
         """The next action, or None when the episode is over. Shape (10,)."""
         if next(self._script, None) is None:
             return None
-        self._tremor += 0.35 * (
-            self._style.tremor_m * self._rng.standard_normal(3) - self._tremor
-        )
+        self._tremor += 0.35 * (self._style.tremor_m * self._rng.standard_normal(3) - self._tremor)
         rotation = scene.tool_rotation(self._yaw)
         return join_action(self._position + self._tremor, rotation, self._opening)
 
@@ -193,9 +189,7 @@ class Operator:
 
     def _disturbance(self) -> Iterator[bool]:
         sign = 1.0 if self._order.side == "left" else -1.0
-        away = np.array(
-            [self._rng.uniform(-0.6, 0.2), sign, self._rng.uniform(-0.2, 0.3)]
-        )
+        away = np.array([self._rng.uniform(-0.6, 0.2), sign, self._rng.uniform(-0.2, 0.3)])
         away /= np.linalg.norm(away)
         pushed = self._order.kind == "pushed"
         if pushed:

@@ -45,9 +45,7 @@ def _rest_to_rest(length_m: float, speed_m_s: float, acceleration_m_s2: float) -
     cruise_s = max(length_m / peak - ramp_s, 0.0)
     total_s = 2 * ramp_s + cruise_s
     time_s = np.arange(0.0, total_s + SMOOTHING_S + GRID_PERIOD_S, GRID_PERIOD_S)
-    speed = np.clip(
-        np.minimum(time_s, total_s - time_s) * acceleration_m_s2, 0.0, peak
-    )
+    speed = np.clip(np.minimum(time_s, total_s - time_s) * acceleration_m_s2, 0.0, peak)
     width = round(SMOOTHING_S / GRID_PERIOD_S)
     smooth = np.convolve(speed, np.full(width, 1.0 / width))[: len(speed)]
     distance = np.concatenate([[0.0], np.cumsum(smooth[:-1])])

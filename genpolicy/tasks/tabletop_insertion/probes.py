@@ -7,7 +7,6 @@ from genpolicy.errors import ConfigError
 from genpolicy.tasks.api import NOMINAL_PROBE
 from genpolicy.tasks.tabletop_insertion.scene import Variant
 
-
 T = TypeVar("T")
 
 

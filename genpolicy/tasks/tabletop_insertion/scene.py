@@ -51,7 +51,7 @@ class Variant:
 
 
 @lru_cache(maxsize=8)
-def load_model(variant: Variant = Variant()) -> mujoco.MjModel:  # noqa: B008 - frozen
+def load_model(variant: Variant = Variant()) -> mujoco.MjModel:
     """The compiled scene; shared by all worlds of the variant, nobody may change it."""
     spec = mujoco.MjSpec.from_file(str(SCENE_PATH))
     peg = spec.geom("peg")

@@ -127,12 +127,12 @@ class TabletopWorld:
     @property
     def q_meas(self) -> Array:
         """Measured joint positions, rad. Shape (7,)."""
-        return self._q.copy()
+        return np.array(self._q)
 
     @property
     def dq_meas(self) -> Array:
         """Measured joint velocities, rad/s. Shape (7,)."""
-        return self._dq.copy()
+        return np.array(self._dq)
 
     @property
     def tcp_pose(self) -> tuple[Array, Array]:

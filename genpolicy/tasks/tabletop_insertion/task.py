@@ -1,0 +1,96 @@
+"""Tabletop insertion: pass a post on either side, put a peg into a hole, let go, withdraw."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from genpolicy.contract.action import GRIPPER, POSITION
+from genpolicy.contract.observation import ObservationContract
+from genpolicy.errors import ContractError
+from genpolicy.recording.episode import RecordedEpisode
+from genpolicy.tasks.api import EpisodeSpec, Start, Workspace, World, WorldSettings
+from genpolicy.tasks.tabletop_insertion import episodes, fallback, scene, sessions
+from genpolicy.tasks.tabletop_insertion.observation import CONTACT_PHASES, OBSERVATION, PHASES
+from genpolicy.tasks.tabletop_insertion.probes import EPOCHS, PROBES
+from genpolicy.tasks.tabletop_insertion.start import InsertionStart, sample_start, start_from_json
+from genpolicy.tasks.tabletop_insertion.world import TabletopWorld
+
+Array = NDArray[np.float64]
+
+# The ceiling keeps the tip of the held peg below the top of the post.
+WORKSPACE = Workspace(lower_m=(0.30, -0.22, 0.02), upper_m=(0.72, 0.22, 0.24))
+
+
+class TabletopInsertion:
+    """The default task; see `genpolicy.tasks.api.Task` for each member's meaning."""
+
+    name: str = episodes.TASK_NAME
+    scene_path: Path = scene.SCENE_PATH
+    observation: ObservationContract = OBSERVATION
+    phases: tuple[str, ...] = PHASES
+    contact_phases: frozenset[str] = CONTACT_PHASES
+    workspace: Workspace = WORKSPACE
+    probes: tuple[str, ...] = tuple(name for name in PROBES if name != "nominal")
+    calibration_epochs: tuple[str, ...] = tuple(EPOCHS)
+
+    def sample_start(self, rng: np.random.Generator) -> InsertionStart:
+        """Draw a start."""
+        return sample_start(rng)
+
+    def start_from_json(self, text: str) -> InsertionStart:
+        """The start that `Start.to_json` wrote."""
+        return start_from_json(text)
+
+    def make_world(self, start: Start, *, settings: WorldSettings) -> TabletopWorld:
+        """A world at rest at the start."""
+        return TabletopWorld(_own(start), settings=settings)
+
+    def scene_poses(self, observation: Array) -> dict[str, tuple[Array, Array]]:
+        """Where the observation puts each movable body of the scene: (m (3,), wxyz (4,))."""
+        hole = observation[OBSERVATION.slices["hole_pose"]]
+        return scene.scene_poses(
+            hole_xy_m=hole[:2],
+            hole_yaw_rad=float(np.arctan2(hole[3], hole[2])),
+            post_y_m=float(observation[OBSERVATION.slices["post_position_m"]][0]),
+        )
+
+    def fallback(self, world: World, kind: str) -> Array:
+        """Classical plan from the last commanded pose; kinds `retreat`, `classical_return`."""
+        action = world.last_action
+        return fallback.plan(
+            kind,
+            tcp_m=action[POSITION],
+            yaw_rad=float(np.arctan2(action[4], action[3])),
+            gripper_opening_m=float(action[GRIPPER]),
+            post_y_m=float(world.observe()[OBSERVATION.slices["post_position_m"]][0]),
+        )
+
+    def episode_specs(
+        self, root_seed: int, episodes: int, *, shares: Mapping[str, float] | None = None
+    ) -> list[EpisodeSpec]:
+        """Plan of a recording session."""
+        return sessions.episode_specs(root_seed, episodes, shares=shares)
+
+    def record_episode(self, spec: EpisodeSpec) -> RecordedEpisode:
+        """Demonstrate and record one episode."""
+        return episodes.record_episode(spec)
+
+    def replay(self, start: Start, actions: Array) -> str:
+        """Outcome of recorded actions replayed open loop."""
+        return episodes.replay(_own(start), actions)
+
+
+def _own(start: Start) -> InsertionStart:
+    if not isinstance(start, InsertionStart):
+        raise ContractError(
+            where="the start",
+            found=type(start).__name__,
+            expected="InsertionStart",
+            action="Draw it with this task's sample_start or start_from_json.",
+        )
+    return start
+
+
+TASK = TabletopInsertion()
