@@ -1,0 +1,356 @@
+"""Kinematics of the arm: Pinocchio's model of the scene file, evaluated for whole batches.
+
+Pinocchio reads the MJCF and stays the reference. Forward kinematics and the Jacobian of many
+configurations at once are numpy over the joint placements that Pinocchio holds (one call of the
+library per configuration costs more than the arithmetic); tests hold the two, and MuJoCo,
+together to 1e-9. Inverse kinematics is damped least squares.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from genpolicy.errors import ConfigError
+
+Array = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+JOINTS = 7
+CONDITION_SLOW = 17.0  # MoveIt Servo default `lower_singularity_threshold`; a default, not "safe"
+CONDITION_HARD_STOP = 30.0  # MoveIt Servo default `hard_stop_singularity_threshold`
+DAMPING = 1e-3
+STEP_LIMIT_RAD = 0.5
+ITERATIONS = 40
+POSITION_TOLERANCE_M = 1e-7
+ROTATION_TOLERANCE_RAD = 1e-7
+_TINY = 1e-12
+
+
+@dataclass(frozen=True)
+class Frames:
+    """Placement of the seven joint frames and the TCP in the base frame.
+
+    Attributes:
+        rotation: Joints 1 to 7, then the TCP. Shape (N, 8, 3, 3).
+        position_m: Shape (N, 8, 3).
+    """
+
+    rotation: Array
+    position_m: Array
+
+
+@dataclass(frozen=True)
+class IkResult:
+    """Inverse kinematics of N poses.
+
+    Attributes:
+        q_rad: Last iterate, converged or not. Shape (N, 7).
+        converged: Both errors within tolerance. Shape (N,).
+        position_error_m: Distance that is left; NaN where an input is not finite. Shape (N,).
+        rotation_error_rad: Angle that is left. Shape (N,).
+    """
+
+    q_rad: Array
+    converged: BoolArray
+    position_error_m: Array
+    rotation_error_rad: Array
+
+
+class ArmKinematics:
+    """A seven-joint revolute arm with a TCP frame, built from an MJCF file.
+
+    Args:
+        scene_path: The MJCF; its first body tree is the arm.
+        tcp_frame: Name of the TCP's frame (site).
+
+    Raises:
+        ConfigError: The first tree is not seven z-axis revolute joints in a row (and what hangs
+            behind them), or the frame is missing.
+    """
+
+    def __init__(self, scene_path: Path, *, tcp_frame: str = "tcp") -> None:
+        self.scene_path = Path(scene_path)
+        self.model: Any = pin.buildModelFromMJCF(str(self.scene_path))
+        self.data: Any = self.model.createData()
+        self._check_structure(tcp_frame)
+        self.tcp_frame_id = int(self.model.getFrameId(tcp_frame))
+        placements = [self.model.jointPlacements[i + 1] for i in range(JOINTS)]
+        tcp = self.model.frames[self.tcp_frame_id].placement
+        self._rotations = _frozen([np.array(p.rotation) for p in [*placements, tcp]])
+        self._translations = _frozen([np.array(p.translation) for p in [*placements, tcp]])
+        self.lower_rad = _frozen(self.model.lowerPositionLimit[:JOINTS])
+        self.upper_rad = _frozen(self.model.upperPositionLimit[:JOINTS])
+
+    def _check_structure(self, tcp_frame: str) -> None:
+        model = self.model
+        names = [model.joints[i].shortname() for i in range(1, min(model.njoints, JOINTS + 1))]
+        chain = list(model.parents)[1 : JOINTS + 1]
+        if names != ["JointModelRZ"] * JOINTS or chain != list(range(JOINTS)):
+            raise ConfigError(
+                where=f"{self.scene_path.name}: first body tree",
+                found=f"joints {names} with parents {chain}",
+                expected="seven revolute joints about their own z axes, one behind the other",
+                action="Describe the arm first in the MJCF, one z axis per joint.",
+            )
+        if not model.existFrame(tcp_frame):
+            raise ConfigError(
+                where=f"{self.scene_path.name}: frame {tcp_frame}",
+                found="missing in the arm's tree",
+                expected="a site of that name behind the seventh joint",
+                action="Add the site to the hand.",
+            )
+
+    @cached_property
+    def reach_m(self) -> float:
+        """No point within 0.25 m of the TCP is farther than this from any joint axis, m."""
+        lengths = np.linalg.norm(self._translations[1:], axis=-1)
+        return float(np.sum(lengths)) + 0.25
+
+    def frames(self, q_rad: Array) -> Frames:
+        """Placements of the joints and the TCP.
+
+        Args:
+            q_rad: Joint positions, rad. Shape (N, 7).
+
+        Returns:
+            Frames of N configurations.
+
+        Source:
+            Product of the fixed joint placements and rotations about z.
+        """
+        n = len(q_rad)
+        rotation = np.empty((n, JOINTS + 1, 3, 3))
+        position = np.empty((n, JOINTS + 1, 3))
+        cosines, sines = np.cos(q_rad)[..., None], np.sin(q_rad)[..., None]
+        position[:, 0] = self._translations[0]
+        fixed = np.broadcast_to(self._rotations[0], (n, 3, 3))
+        for joint in range(JOINTS):
+            if joint:
+                previous = rotation[:, joint - 1]
+                fixed = (previous.reshape(-1, 3) @ self._rotations[joint]).reshape(n, 3, 3)
+                position[:, joint] = position[:, joint - 1] + previous @ self._translations[joint]
+            c, s = cosines[:, joint], sines[:, joint]
+            rotation[:, joint, :, 0] = fixed[:, :, 0] * c + fixed[:, :, 1] * s
+            rotation[:, joint, :, 1] = fixed[:, :, 1] * c - fixed[:, :, 0] * s
+            rotation[:, joint, :, 2] = fixed[:, :, 2]
+        last = rotation[:, JOINTS - 1]
+        rotation[:, JOINTS] = (last.reshape(-1, 3) @ self._rotations[JOINTS]).reshape(n, 3, 3)
+        position[:, JOINTS] = position[:, JOINTS - 1] + last @ self._translations[JOINTS]
+        return Frames(rotation, position)
+
+    def forward(self, q_rad: Array) -> tuple[Array, Array]:
+        """TCP position (m) and rotation in the base frame.
+
+        Args:
+            q_rad: Joint positions, rad. Shape (..., 7).
+
+        Returns:
+            Position, shape (..., 3), and rotation matrix, shape (..., 3, 3).
+        """
+        shape = q_rad.shape[:-1]
+        frames = self.frames(np.asarray(q_rad, dtype=float).reshape(-1, JOINTS))
+        return (
+            frames.position_m[:, JOINTS].reshape(*shape, 3),
+            frames.rotation[:, JOINTS].reshape(*shape, 3, 3),
+        )
+
+    def jacobian(self, q_rad: Array) -> Array:
+        """Jacobian of the TCP: linear (m/rad) over angular rows, in axes of the base frame.
+
+        Args:
+            q_rad: Joint positions, rad. Shape (N, 7).
+
+        Returns:
+            Shape (N, 6, 7).
+        """
+        return _jacobian(self.frames(q_rad))
+
+    def reference_forward(self, q_rad: Array) -> tuple[Array, Array]:
+        """What Pinocchio says for one configuration of shape (7,): position (m), rotation."""
+        pin.framesForwardKinematics(self.model, self.data, self._full(q_rad))
+        placement = self.data.oMf[self.tcp_frame_id]
+        return np.array(placement.translation), np.array(placement.rotation)
+
+    def reference_jacobian(self, q_rad: Array) -> Array:
+        """What Pinocchio says for one configuration; base axes at the TCP. Shape (6, 7)."""
+        jacobian = pin.computeFrameJacobian(
+            self.model, self.data, self._full(q_rad), self.tcp_frame_id, pin.LOCAL_WORLD_ALIGNED
+        )
+        return np.array(jacobian)[:, :JOINTS]
+
+    def _full(self, q_rad: Array) -> Array:
+        full: Array = np.array(pin.neutral(self.model), dtype=float)
+        full[:JOINTS] = q_rad
+        return full
+
+    def condition_number(self, q_rad: Array) -> Array:
+        """Largest over smallest singular value of the TCP Jacobian (m and rad mixed).
+
+        Args:
+            q_rad: Joint positions, rad. Shape (N, 7).
+
+        Returns:
+            Shape (N,); inf at a singular configuration.
+
+        Source:
+            The measure of MoveIt Servo; its defaults are `CONDITION_SLOW` and
+            `CONDITION_HARD_STOP` above.
+        """
+        jacobian = self.jacobian(q_rad)
+        finite = np.all(np.isfinite(jacobian), axis=(1, 2))
+        gram = np.where(finite[:, None, None], jacobian @ jacobian.transpose(0, 2, 1), np.eye(6))
+        values = np.linalg.eigvalsh(gram)
+        smallest = np.maximum(values[:, 0], 0.0)
+        with np.errstate(divide="ignore"):
+            condition = np.sqrt(values[:, -1] / smallest)
+        return np.where(finite, condition, np.nan)
+
+    def solve(
+        self, position_m: Array, rotation: Array, *, q_seed_rad: Array, iterations: int = ITERATIONS
+    ) -> IkResult:
+        """Joint positions that reach N poses, each from its own seed.
+
+        Every row is solved on its own, so the answer does not depend on the batch. Minimum-norm
+        steps keep a redundant arm close to its seed.
+
+        Args:
+            position_m: TCP positions, m. Shape (N, 3).
+            rotation: TCP rotations. Shape (N, 3, 3).
+            q_seed_rad: Where to start. Shape (N, 7).
+            iterations: Most Newton steps.
+
+        Returns:
+            One row per pose; rows with non-finite input never converge.
+
+        Source:
+            Damped least squares (Wampler 1986; Nakamura and Hanafusa 1986), constant damping.
+        """
+        q = np.array(q_seed_rad, dtype=float)
+        n = len(q)
+        position_error, rotation_error = np.full(n, np.nan), np.full(n, np.nan)
+        finite = np.isfinite(position_m).all(1) & np.isfinite(rotation).all((1, 2))
+        active = np.flatnonzero(finite & np.isfinite(q).all(1))
+        for iteration in range(iterations + 1):
+            frames = self.frames(q[active])
+            error = _pose_error(frames, position_m[active], rotation[active])
+            position_error[active] = np.linalg.norm(error[:, :3], axis=1)
+            rotation_error[active] = np.linalg.norm(error[:, 3:], axis=1)
+            left = ~_within(position_error[active], rotation_error[active])
+            if iteration == iterations or not left.any():
+                break
+            active = active[left]
+            q[active] += _step(_jacobian(frames)[left], error[left])
+        return IkResult(q, _within(position_error, rotation_error), position_error, rotation_error)
+
+    def solve_with_restarts(
+        self, position_m: Array, rotation: Array, *, q_seed_rad: Array, restarts: int = 16
+    ) -> IkResult:
+        """`solve`, then for rows that failed or left the joint limits fixed other seeds.
+
+        The seeds are the same in every call, so the answer is deterministic. Of several
+        solutions within the position limits the one closest to the row's own seed is taken.
+        """
+        result = self.solve(position_m, rotation, q_seed_rad=q_seed_rad)
+        good = result.converged & self.within_limits(result.q_rad)
+        failed = np.flatnonzero(~good & np.isfinite(result.position_error_m))
+        if not len(failed) or restarts <= 0:
+            return result
+        seeds = self._restart_seeds(restarts)
+        again = self.solve(
+            np.repeat(position_m[failed], restarts, axis=0),
+            np.repeat(rotation[failed], restarts, axis=0),
+            q_seed_rad=np.tile(seeds, (len(failed), 1)),
+        )
+        q_again = self._wrapped(again.q_rad)
+        usable = (again.converged & self.within_limits(q_again)).reshape(-1, restarts)
+        q_again = q_again.reshape(-1, restarts, JOINTS)
+        distance = np.linalg.norm(q_again - q_seed_rad[failed][:, None], axis=2)
+        best = np.argmin(np.where(usable, distance, np.inf), axis=1)
+        found = usable.any(1)
+        rows, chosen = failed[found], best[found] + np.flatnonzero(found) * restarts
+        q = result.q_rad.copy()
+        position_error, rotation_error = (
+            result.position_error_m.copy(),
+            result.rotation_error_rad.copy(),
+        )
+        q[rows] = q_again.reshape(-1, JOINTS)[chosen]
+        position_error[rows] = again.position_error_m[chosen]
+        rotation_error[rows] = again.rotation_error_rad[chosen]
+        return IkResult(q, _within(position_error, rotation_error), position_error, rotation_error)
+
+    def within_limits(self, q_rad: Array) -> BoolArray:
+        """Whether every joint is inside the position limits of the MJCF. Shape (...)."""
+        inside: BoolArray = np.all((q_rad >= self.lower_rad) & (q_rad <= self.upper_rad), axis=-1)
+        return inside
+
+    def _wrapped(self, q_rad: Array) -> Array:
+        """The same configurations with each joint shifted by whole turns towards its range."""
+        middle = (self.lower_rad + self.upper_rad) / 2
+        return q_rad - 2 * np.pi * np.round((q_rad - middle) / (2 * np.pi))
+
+    def _restart_seeds(self, count: int) -> Array:
+        """Fixed, well spread seeds inside the limits: an additive recurrence. Shape (count, 7)."""
+        ratio = 1.0889670195  # root of x^8 = x + 1: the seven-dimensional golden ratio
+        steps = (1 / ratio) ** np.arange(1, JOINTS + 1)
+        fractions = np.mod(0.5 + np.outer(np.arange(1, count + 1), steps), 1.0)
+        return self.lower_rad + fractions * (self.upper_rad - self.lower_rad)
+
+
+def _frozen(values: Any) -> Array:
+    array = np.array(values, dtype=float)
+    array.flags.writeable = False
+    return array
+
+
+def _jacobian(frames: Frames) -> Array:
+    axes = frames.rotation[:, :JOINTS, :, 2]
+    arms = frames.position_m[:, JOINTS, None, :] - frames.position_m[:, :JOINTS]
+    jacobian = np.empty((len(axes), 6, JOINTS))
+    jacobian[:, 0] = axes[..., 1] * arms[..., 2] - axes[..., 2] * arms[..., 1]
+    jacobian[:, 1] = axes[..., 2] * arms[..., 0] - axes[..., 0] * arms[..., 2]
+    jacobian[:, 2] = axes[..., 0] * arms[..., 1] - axes[..., 1] * arms[..., 0]
+    jacobian[:, 3:] = axes.transpose(0, 2, 1)
+    return jacobian
+
+
+def _pose_error(frames: Frames, position_m: Array, rotation: Array) -> Array:
+    """Position (m) and rotation vector (rad) from the frames to the poses. Shape (N, 6)."""
+    error = np.empty((len(position_m), 6))
+    error[:, :3] = position_m - frames.position_m[:, JOINTS]
+    relative = rotation @ frames.rotation[:, JOINTS].transpose(0, 2, 1)
+    vector = np.stack(
+        [
+            relative[:, 2, 1] - relative[:, 1, 2],
+            relative[:, 0, 2] - relative[:, 2, 0],
+            relative[:, 1, 0] - relative[:, 0, 1],
+        ],
+        axis=1,
+    )
+    double_sine = np.linalg.norm(vector, axis=1)
+    angle = np.arctan2(double_sine, np.trace(relative, axis1=1, axis2=2) - 1.0)
+    scale = np.where(double_sine > _TINY, angle / np.maximum(double_sine, _TINY), 0.5)
+    error[:, 3:] = vector * scale[:, None]
+    half_turn = (double_sine <= 1e-9) & (angle > 1.0)  # the axis is lost: push off it
+    error[half_turn, 3:] = [0.5, 0.5, 0.5]
+    return error
+
+
+def _step(jacobian: Array, error: Array) -> Array:
+    transposed = jacobian.transpose(0, 2, 1)
+    gram = jacobian @ transposed + DAMPING**2 * np.eye(6)
+    step: Array = (transposed @ np.linalg.solve(gram, error[..., None]))[..., 0]
+    largest = np.max(np.abs(step), axis=1, keepdims=True)
+    step *= np.minimum(1.0, STEP_LIMIT_RAD / np.maximum(largest, _TINY))
+    return step
+
+
+def _within(position_error_m: Array, rotation_error_rad: Array) -> BoolArray:
+    within: BoolArray = (position_error_m <= POSITION_TOLERANCE_M) & (
+        rotation_error_rad <= ROTATION_TOLERANCE_RAD
+    )
+    return within
