@@ -1,0 +1,48 @@
+"""The regime in which bits are promised: one thread, deterministic kernels, own generators."""
+
+import contextlib
+import os
+from collections.abc import Iterator
+
+import torch
+
+
+@contextlib.contextmanager
+def deterministic(device: str) -> Iterator[None]:
+    """One CPU thread and deterministic kernels inside the block; the old settings after it.
+
+    Args:
+        device: `cpu`, or a CUDA device, whose matrix products then use a fixed workspace.
+    """
+    threads = torch.get_num_threads()
+    strict = torch.are_deterministic_algorithms_enabled()
+    if device != "cpu":
+        os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")
+    try:
+        torch.use_deterministic_algorithms(True)
+        if threads != 1:
+            torch.set_num_threads(1)
+        yield
+    finally:
+        torch.use_deterministic_algorithms(strict)
+        if threads != 1:
+            torch.set_num_threads(threads)
+
+
+@contextlib.contextmanager
+def initial_weights(seed: int) -> Iterator[None]:
+    """Weights made inside the block depend on `seed` only; the global generator is untouched."""
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(seed)
+        yield
+
+
+def regime(device: str) -> dict[str, str | int]:
+    """What bit equality rests on, for the record."""
+    capability = torch.backends.cpu.get_cpu_capability()
+    return {
+        "torch": torch.__version__,
+        "device": device,
+        "cpu_capability": str(capability),
+        "threads": 1,
+    }

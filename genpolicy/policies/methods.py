@@ -1,0 +1,181 @@
+"""The registry of methods: by name only, never by a class path from a file."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import torch
+from torch import Tensor
+
+from genpolicy.contract.horizons import HorizonConfig
+from genpolicy.errors import ConfigError
+from genpolicy.policies.networks import Dimensions, HeadInput, PolicyNetwork
+from genpolicy.policies.objectives import (
+    ConditionalVae,
+    NoisePrediction,
+    ObjectiveFactory,
+    flow_matching,
+    squared_error,
+)
+from genpolicy.policies.samplers import (
+    DIFFUSION_SAMPLERS,
+    ODE_SAMPLERS,
+    CountedNetwork,
+    NoiseFunction,
+    sample_diffusion,
+    sample_ode,
+)
+from genpolicy.policies.schedules import squared_cosine, trailing_levels
+from genpolicy.policies.settings import HeadConfig, NetworkConfig, SamplerConfig
+
+SINGLE_EVALUATION = ("direct", "z_zero", "z_prior")
+STOCHASTIC_SAMPLERS = ("z_prior", *DIFFUSION_SAMPLERS, *ODE_SAMPLERS)
+
+
+@dataclass(frozen=True)
+class Method:
+    """One method: what its head reads, how it is trained and which samplers fit it.
+
+    Attributes:
+        name: Its name everywhere.
+        chunked: Whether it predicts K actions; False means K = H_e = 1.
+        reads: Input of the head: nothing, a latent, or a noisy chunk with a time.
+        objective: Makes its training objective.
+        samplers: Samplers that fit; the first is the default.
+    """
+
+    name: str
+    chunked: bool
+    reads: Literal["nothing", "latent", "chunk"]
+    objective: ObjectiveFactory
+    samplers: tuple[str, ...]
+
+    def horizons(self, horizons: HorizonConfig) -> HorizonConfig:
+        """The horizons of this method: those given, or K = H_e = 1."""
+        return horizons if self.chunked else horizons.single_action()
+
+    def build(
+        self, dimensions: Dimensions, network: NetworkConfig, head: HeadConfig
+    ) -> PolicyNetwork:
+        """The untrained network.
+
+        Raises:
+            ConfigError: The head's budget is too small.
+        """
+        numbers = {
+            "nothing": 0,
+            "latent": head.latent_dim,
+            "chunk": dimensions.chunk_numbers,
+        }[self.reads]
+        head_input = HeadInput(numbers=numbers, timed=self.reads == "chunk")
+        return PolicyNetwork(dimensions, network, head_input=head_input)
+
+
+METHODS = {
+    method.name: method
+    for method in (
+        Method("bc", False, "nothing", squared_error, ("direct",)),
+        Method("chunked_bc", True, "nothing", squared_error, ("direct",)),
+        Method("act", True, "latent", ConditionalVae, ("z_zero", "z_prior")),
+        Method("diffusion", True, "chunk", NoisePrediction, ("ddim", "ddpm", "dpm_2m")),
+        Method("flow", True, "chunk", flow_matching, ("euler", "heun", "rk4")),
+    )
+}
+
+
+def method_named(name: str) -> Method:
+    """The registered method of that name.
+
+    Raises:
+        ConfigError: There is none.
+    """
+    if name not in METHODS:
+        raise ConfigError(
+            where="method",
+            found=repr(name),
+            expected=f"one of {', '.join(METHODS)}",
+            action="Choose a registered method; a class path is never loaded.",
+        )
+    return METHODS[name]
+
+
+def check_sampler(method: Method, sampler: SamplerConfig, head: HeadConfig) -> None:
+    """Refuse a sampler that does not fit the method or its training.
+
+    Raises:
+        ConfigError: Wrong kind, fewer than one step, more steps than training levels, or
+            several steps of a method that evaluates its network once.
+    """
+    if sampler.name not in method.samplers:
+        raise ConfigError(
+            where=f"sampler of {method.name}",
+            found=repr(sampler.name),
+            expected=f"one of {', '.join(method.samplers)}",
+            action="Choose a sampler that fits the method.",
+        )
+    if sampler.name in DIFFUSION_SAMPLERS:
+        trailing_levels(head.diffusion_levels, sampler.steps)
+    single = sampler.name in SINGLE_EVALUATION
+    if not sampler.steps >= 1 or (single and sampler.steps != 1):
+        raise ConfigError(
+            where=f"sampler_steps of {method.name}",
+            found=str(sampler.steps),
+            expected="exactly 1" if single else "at least 1",
+            action="Correct the sampler's steps.",
+        )
+
+
+def generate(
+    network: PolicyNetwork,
+    condition: Tensor,
+    noise: NoiseFunction,
+    *,
+    sampler: SamplerConfig,
+    head: HeadConfig,
+) -> tuple[Tensor, int]:
+    """Normalised chunks of conditions, and the network evaluations that they took.
+
+    Args:
+        network: Trained network of a method that fits the sampler.
+        condition: Encoded observations. Shape (B, C).
+        noise: Noise of a sampler step, of `noise_shape` per row.
+        sampler: Sampler settings.
+        head: Head settings of the training.
+
+    Returns:
+        Chunks (B, K, D_a) and the counted NFE.
+    """
+
+    def evaluate(values: Tensor, time: Tensor) -> Tensor:
+        if sampler.name == "direct":
+            return network.evaluate(condition)
+        if sampler.name in SINGLE_EVALUATION:
+            return network.evaluate(condition, values)
+        return network.evaluate(condition, values, time)
+
+    counted = CountedNetwork(evaluate)
+    if sampler.name in DIFFUSION_SAMPLERS:
+        chunks = sample_diffusion(
+            counted,
+            noise,
+            schedule=squared_cosine(head.diffusion_levels),
+            name=sampler.name,
+            steps=sampler.steps,
+            clip=sampler.clip,
+        )
+    elif sampler.name in ODE_SAMPLERS:
+        chunks = sample_ode(counted, noise, name=sampler.name, steps=sampler.steps)
+    else:
+        latent = torch.zeros(len(condition), head.latent_dim, device=condition.device)
+        if sampler.name == "z_prior":
+            latent = noise(0)
+        chunks = counted(latent, latent.new_zeros(len(latent)))
+    return chunks, counted.nfe
+
+
+def noise_shape(
+    dimensions: Dimensions, sampler: SamplerConfig, head: HeadConfig
+) -> tuple[int, ...]:
+    """Shape of one row's noise per sampler step: a latent or a chunk."""
+    if sampler.name in SINGLE_EVALUATION:
+        return (head.latent_dim,)
+    return (dimensions.prediction_horizon, dimensions.action_dim)

@@ -1,0 +1,222 @@
+"""One encoder class, one trunk class, one head class with three kinds of input.
+
+Every method has the same encoder and the same trunk, number for number. Heads differ in what
+they feed the trunk (nothing, a latent, a noisy chunk with a time); the hidden width of each
+readout is solved from one parameter budget, so that no method is simply larger.
+"""
+
+import functools
+import math
+from dataclasses import dataclass
+
+import torch
+from pydantic import Field
+from torch import Tensor, nn
+from torch.nn import functional
+
+from genpolicy.contract.settings import Settings
+from genpolicy.errors import ConfigError
+from genpolicy.policies.settings import NetworkConfig
+
+FASTEST_TIME_FREQUENCY = 200.0
+
+
+class Dimensions(Settings):
+    """Sizes that data and horizons fix.
+
+    Attributes:
+        observation_horizon: H_o.
+        observation_dim: D_o.
+        prediction_horizon: K.
+        action_dim: D_a.
+    """
+
+    observation_horizon: int = Field(ge=1, le=64)
+    observation_dim: int = Field(ge=1, le=4096)
+    prediction_horizon: int = Field(ge=1, le=512)
+    action_dim: int = Field(ge=1, le=512)
+
+    @property
+    def chunk_numbers(self) -> int:
+        """Numbers of one chunk, K times D_a."""
+        return self.prediction_horizon * self.action_dim
+
+
+@dataclass(frozen=True)
+class HeadInput:
+    """What a head feeds the trunk besides the condition.
+
+    Attributes:
+        numbers: Length of the input vector; 0 for a head without one.
+        timed: Whether a sampler time comes with it.
+    """
+
+    numbers: int
+    timed: bool
+
+
+class Encoder(nn.Module):
+    """Condition vector of the last H_o observations."""
+
+    def __init__(self, dimensions: Dimensions, config: NetworkConfig) -> None:
+        super().__init__()
+        numbers = dimensions.observation_horizon * dimensions.observation_dim
+        self.hidden = nn.Linear(numbers, config.encoder_width)
+        self.out = nn.Linear(config.encoder_width, config.condition_dim)
+
+    def forward(self, observations: Tensor) -> Tensor:
+        """Normalised observations (B, H_o, D_o) to conditions (B, C)."""
+        condition: Tensor = self.out(functional.silu(self.hidden(observations.flatten(1))))
+        return condition
+
+
+class Trunk(nn.Module):
+    """Residual blocks, each modulated (FiLM) by the condition."""
+
+    def __init__(self, config: NetworkConfig) -> None:
+        super().__init__()
+        width = config.trunk_width
+        self.width = width
+        self.modulation = nn.Linear(config.condition_dim, 2 * width * config.trunk_blocks)
+        self.first = nn.ModuleList(nn.Linear(width, width) for _ in range(config.trunk_blocks))
+        self.second = nn.ModuleList(nn.Linear(width, width) for _ in range(config.trunk_blocks))
+
+    def forward(self, hidden: Tensor, condition: Tensor) -> Tensor:
+        """Features (B, W) and conditions (B, C) to features (B, W)."""
+        modulation = self.modulation(functional.silu(condition)).chunk(2 * len(self.first), dim=-1)
+        for index, (first, second) in enumerate(zip(self.first, self.second, strict=True)):
+            shift, scale = modulation[2 * index], modulation[2 * index + 1]
+            normed = functional.layer_norm(hidden, (self.width,))
+            modulated = torch.addcmul(shift, normed, 1.0 + scale)
+            hidden = hidden + second(functional.silu(first(modulated)))
+        return hidden
+
+
+class Head(nn.Module):
+    """Input projection, time embedding and readout; fills the parameter budget exactly."""
+
+    def __init__(
+        self, dimensions: Dimensions, config: NetworkConfig, *, head_input: HeadInput
+    ) -> None:
+        super().__init__()
+        width, outputs = config.trunk_width, dimensions.chunk_numbers
+        if head_input.numbers:
+            self.entry: nn.Linear | None = nn.Linear(head_input.numbers, width)
+        else:
+            self.entry = None
+            self.start = nn.Parameter(torch.zeros(width))
+        self.time_features = config.time_features
+        self.time: nn.Sequential | None = None
+        if head_input.timed:
+            self.time = nn.Sequential(
+                nn.Linear(config.time_features, config.condition_dim),
+                nn.SiLU(),
+                nn.Linear(config.condition_dim, config.condition_dim),
+            )
+        self.direct = nn.Linear(width, outputs)
+        spent = sum(parameter.numel() for parameter in self.parameters())
+        hidden = (config.head_parameters - spent - outputs) // (width + outputs + 1)
+        if not hidden >= 1:
+            raise ConfigError(
+                where="network.head_parameters",
+                found=str(config.head_parameters),
+                expected=f"at least {spent + width + 2 * outputs + 1} for this head",
+                action="Raise the budget of the head, for every method alike.",
+            )
+        self.branch_in = nn.Linear(width, hidden)
+        self.branch_out = nn.Linear(hidden, outputs)
+
+    def enter(self, values: Tensor | None, rows: int) -> Tensor:
+        """Trunk input (B, W) of a latent or a flattened chunk, or of nothing."""
+        if self.entry is None or values is None:
+            return self.start.expand(rows, -1)
+        entered: Tensor = self.entry(values.flatten(1))
+        return entered
+
+    def embed_time(self, time: Tensor) -> Tensor:
+        """Embedding (B, C) of sampler times (B,), added to the condition."""
+        assert self.time is not None
+        angles = time[:, None] * _frequencies(self.time_features).to(time)
+        embedding: Tensor = self.time(torch.cat([angles.sin(), angles.cos()], dim=-1))
+        return embedding
+
+    def read_out(self, features: Tensor) -> Tensor:
+        """Features (B, W) to numbers (B, K * D_a): a linear path and a one-hidden-layer path."""
+        branch = self.branch_out(functional.silu(self.branch_in(functional.silu(features))))
+        numbers: Tensor = self.direct(features) + branch
+        return numbers
+
+
+class PolicyNetwork(nn.Module):
+    """Encoder, trunk and head of one method; all that inference needs."""
+
+    def __init__(
+        self, dimensions: Dimensions, config: NetworkConfig, *, head_input: HeadInput
+    ) -> None:
+        super().__init__()
+        self.dimensions = dimensions
+        self.encoder = Encoder(dimensions, config)
+        self.trunk = Trunk(config)
+        self.head = Head(dimensions, config, head_input=head_input)
+
+    def encode(self, observations: Tensor) -> Tensor:
+        """Normalised observations (B, H_o, D_o) to conditions (B, C)."""
+        condition: Tensor = self.encoder(observations)
+        return condition
+
+    def evaluate(
+        self, condition: Tensor, values: Tensor | None = None, time: Tensor | None = None
+    ) -> Tensor:
+        """One network evaluation.
+
+        Args:
+            condition: From `encode`. Shape (B, C).
+            values: Latent (B, Z) or noisy chunk (B, K, D_a); None for a head without input.
+            time: Sampler time (B,); None for a head without one.
+
+        Returns:
+            Shape (B, K, D_a).
+        """
+        if time is not None:
+            condition = condition + self.head.embed_time(time)
+        features = self.trunk(self.head.enter(values, len(condition)), condition)
+        return self.head.read_out(features).reshape(
+            -1, self.dimensions.prediction_horizon, self.dimensions.action_dim
+        )
+
+
+def parameter_counts(network: PolicyNetwork) -> dict[str, int]:
+    """Parameters of encoder, trunk, head, and their total."""
+    counts = {
+        name: sum(parameter.numel() for parameter in part.parameters())
+        for name, part in _parts(network).items()
+    }
+    return {**counts, "total": sum(counts.values())}
+
+
+def flops_per_evaluation(network: PolicyNetwork) -> dict[str, int]:
+    """Multiplications and additions of the matrix products for one row, per part.
+
+    The encoder runs once per invocation, trunk and head once per network evaluation.
+    """
+    counts = {
+        name: sum(
+            2 * layer.in_features * layer.out_features
+            for layer in part.modules()
+            if isinstance(layer, nn.Linear)
+        )
+        for name, part in _parts(network).items()
+    }
+    return {**counts, "total": sum(counts.values())}
+
+
+@functools.lru_cache(maxsize=16)
+def _frequencies(time_features: int) -> Tensor:
+    """Angular frequencies, geometric from pi to 200 pi. Shape (time_features / 2,)."""
+    half = time_features // 2
+    exponents = torch.arange(half, dtype=torch.float32) / max(1, half - 1)
+    return math.pi * FASTEST_TIME_FREQUENCY**exponents
+
+
+def _parts(network: PolicyNetwork) -> dict[str, nn.Module]:
+    return {"encoder": network.encoder, "trunk": network.trunk, "head": network.head}

@@ -1,0 +1,287 @@
+"""The policy: physical observations in, physical candidate chunks out, nothing in between stored.
+
+Noise is a pure function of checkpoint, observation, candidate and sampler step, and every
+network call has the same number of rows, so a row's sample does not depend on its company.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from genpolicy.contract.horizons import HorizonConfig
+from genpolicy.errors import ContractError, IntegrityError, NonFiniteError
+from genpolicy.policies.checkpoint import Checkpoint, load_checkpoint
+from genpolicy.policies.determinism import deterministic
+from genpolicy.policies.methods import (
+    STOCHASTIC_SAMPLERS,
+    check_sampler,
+    generate,
+    method_named,
+    noise_shape,
+)
+from genpolicy.policies.settings import SamplerConfig
+from genpolicy.seeds import counter_noise
+
+Array = NDArray[np.float64]
+NoiseName = tuple[str | int, ...]
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Result of one batched invocation.
+
+    Attributes:
+        actions: Candidate chunks, physical units. Shape (B, N, K, D_a).
+        nfe: Network evaluations per sample, counted at the network.
+    """
+
+    actions: Array
+    nfe: int
+
+
+class Policy(Protocol):
+    """What every policy offers, learned or scripted."""
+
+    @property
+    def method(self) -> str:
+        """Name of the method."""
+
+    @property
+    def checkpoint_hash(self) -> str:
+        """SHA-256 of weights and config."""
+
+    @property
+    def sampler_config_hash(self) -> str:
+        """SHA-256 of the sampler's settings."""
+
+    @property
+    def prediction_horizon(self) -> int:
+        """K, actions of one chunk."""
+
+    @property
+    def stochastic(self) -> bool:
+        """Whether candidates of one observation differ."""
+
+    def sample(
+        self, observations: Array, *, noise_names: Sequence[NoiseName], candidates: int
+    ) -> Samples:
+        """Candidate chunks of physical observations (B, H_o, D_o), one noise name per row."""
+
+
+class NetworkPolicy:
+    """A verified checkpoint with a sampler; see `Policy`.
+
+    The invocation's parts are public, so that each can be timed alone:
+    `preprocess`, `encode`, `sample_encoded`; `sample` runs all of them.
+    """
+
+    def __init__(
+        self, checkpoint: Checkpoint, *, sampler: SamplerConfig | None = None, device: str = "cpu"
+    ) -> None:
+        config = checkpoint.config
+        self.checkpoint = checkpoint
+        self.sampler = sampler or config.sampler
+        check_sampler(method_named(config.method), self.sampler, config.head)
+        self.device = device
+        self._normalisation = checkpoint.normalisation
+        self._network = checkpoint.network.to(device).requires_grad_(False)
+        self._sampler_hash = self.sampler.hash()
+
+    @property
+    def method(self) -> str:
+        """Name of the method."""
+        return self.checkpoint.config.method
+
+    @property
+    def checkpoint_hash(self) -> str:
+        """SHA-256 of weights and config."""
+        return self.checkpoint.sha256
+
+    @property
+    def sampler_config_hash(self) -> str:
+        """SHA-256 of the sampler's settings."""
+        return self._sampler_hash
+
+    @property
+    def horizons(self) -> HorizonConfig:
+        """Horizons of the method; K = H_e = 1 for methods without chunks."""
+        return self.checkpoint.config.horizons
+
+    @property
+    def prediction_horizon(self) -> int:
+        """K, actions of one chunk."""
+        return self.horizons.prediction_horizon
+
+    @property
+    def stochastic(self) -> bool:
+        """Whether candidates of one observation differ."""
+        return self.sampler.name in STOCHASTIC_SAMPLERS
+
+    def sample(
+        self, observations: Array, *, noise_names: Sequence[NoiseName], candidates: int
+    ) -> Samples:
+        """Candidate chunks of a batch of observations.
+
+        Args:
+            observations: Physical units, newest last. Shape (B, H_o, D_o).
+            noise_names: Names of each row's noise; equal names give equal noise. Length B.
+            candidates: N >= 1, candidates per row.
+
+        Returns:
+            Actions (B, N, K, D_a) in physical units, and the NFE of one sample.
+
+        Raises:
+            ContractError: Wrong shape, wrong number of names, no candidate.
+            NonFiniteError: An observation or a sampled action is NaN or infinite.
+        """
+        if len(noise_names) != len(observations) or not candidates >= 1:
+            raise ContractError(
+                where="a policy invocation",
+                found=f"{len(observations)} observations, {len(noise_names)} noise names, "
+                f"{candidates} candidates",
+                expected="one noise name per observation and at least one candidate",
+                action="Name the noise of every row.",
+            )
+        condition = self.encode(self.preprocess(observations))
+        return self.sample_encoded(condition, noise_names=noise_names, candidates=candidates)
+
+    def preprocess(self, observations: Array) -> Tensor:
+        """Check and normalise observations (B, H_o, D_o); result on the device.
+
+        Raises:
+            ContractError: Wrong shape.
+            NonFiniteError: NaN or infinity.
+        """
+        sizes = self.checkpoint.config.dimensions
+        expected = (sizes.observation_horizon, sizes.observation_dim)
+        if observations.ndim != 3 or observations.shape[1:] != expected or not len(observations):
+            raise ContractError(
+                where="observations of a policy invocation",
+                found=f"of shape {observations.shape}",
+                expected=f"(B, {expected[0]}, {expected[1]}) with B >= 1",
+                action="Deliver the last H_o observation vectors.",
+            )
+        _check_finite(observations, "observations of a policy invocation", "Hold.")
+        normalised = self._normalisation.observation.normalise(observations)
+        return torch.as_tensor(normalised.astype(np.float32)).to(self.device)
+
+    def encode(self, observations: Tensor) -> Tensor:
+        """Conditions (B, C) of normalised observations (B, H_o, D_o)."""
+        with deterministic(self.device), torch.inference_mode():
+            return torch.cat(
+                [
+                    self._network.encode(_padded(rows, self.sampler.batch_rows))[: len(rows)]
+                    for rows in torch.split(observations, self.sampler.batch_rows)
+                ]
+            )
+
+    def sample_encoded(
+        self, condition: Tensor, *, noise_names: Sequence[NoiseName], candidates: int
+    ) -> Samples:
+        """Candidate chunks of conditions (B, C) from `encode`; see `sample`."""
+        names = [
+            (self.checkpoint_hash, *row, candidate)
+            for row in noise_names
+            for candidate in range(candidates)
+        ]
+        repeated = condition.repeat_interleave(candidates, dim=0)
+        size = self.sampler.batch_rows
+        chunks, evaluations = [], set()
+        with deterministic(self.device), torch.inference_mode():
+            for first in range(0, len(names), size):
+                rows = repeated[first : first + size]
+                result, nfe = generate(
+                    self._network,
+                    _padded(rows, size),
+                    self._noise(names[first : first + size], size),
+                    sampler=self.sampler,
+                    head=self.checkpoint.config.head,
+                )
+                chunks.append(result[: len(rows)].cpu())
+                evaluations.add(nfe)
+        (nfe,) = evaluations
+        normalised = torch.cat(chunks).numpy().astype(np.float64)
+        actions = self._normalisation.action.denormalise(normalised)
+        _check_finite(actions, f"chunks sampled by {self.method}", "Reject all of them and hold.")
+        return Samples(actions.reshape(len(noise_names), candidates, *actions.shape[1:]), nfe)
+
+    def synchronise(self) -> None:
+        """Wait until the device has finished what was asked of it."""
+        if self.device != "cpu":
+            torch.cuda.synchronize(self.device)
+
+    def _noise(self, names: Sequence[NoiseName], rows: int) -> Callable[[int], Tensor]:
+        """Noise function of one padded batch; padding rows get zeros."""
+        shape = noise_shape(
+            self.checkpoint.config.dimensions, self.sampler, self.checkpoint.config.head
+        )
+
+        def draw(step: int) -> Tensor:
+            values = np.zeros((rows, *shape), dtype=np.float32)
+            for row, name in enumerate(names):
+                values[row] = counter_noise((*name, step), shape=shape)
+            return torch.from_numpy(values).to(self.device)
+
+        return draw
+
+
+def load_policy(
+    folder: Path,
+    *,
+    expected_sha256: str | None = None,
+    device: str = "cpu",
+    sampler: SamplerConfig | None = None,
+    action_contract_sha256: str | None = None,
+    observation_contract_sha256: str | None = None,
+) -> NetworkPolicy:
+    """A policy from a checkpoint folder.
+
+    Args:
+        folder: Checkpoint folder.
+        expected_sha256: The identity that the checkpoint must have, where the caller knows one.
+        device: `cpu` or a CUDA device.
+        sampler: Sampler to use instead of the checkpoint's own.
+        action_contract_sha256: The action definition in force, where the caller knows it.
+        observation_contract_sha256: The observation definition in force, likewise.
+
+    Raises:
+        IntegrityError: See `load_checkpoint`; or made for another contract.
+        ConfigError: The sampler does not fit the method or its training levels.
+    """
+    checkpoint = load_checkpoint(folder, expected_sha256=expected_sha256)
+    provenance = checkpoint.config.provenance
+    for name, found, expected in (
+        ("action", provenance.action_contract_sha256, action_contract_sha256),
+        ("observation", provenance.observation_contract_sha256, observation_contract_sha256),
+    ):
+        if expected is not None and found != expected:
+            raise IntegrityError(
+                where=str(folder),
+                found=f"a checkpoint for the {name} contract {found[:16]}…",
+                expected=f"{expected[:16]}…",
+                action="Train again on a dataset with the contract in force.",
+            )
+    return NetworkPolicy(checkpoint, sampler=sampler, device=device)
+
+
+def _padded(rows: Tensor, size: int) -> Tensor:
+    """`rows` (n, C) followed by copies of its last row, up to `size` rows."""
+    missing = size - len(rows)
+    return torch.cat([rows, rows[-1:].expand(missing, *rows.shape[1:])]) if missing else rows
+
+
+def _check_finite(values: Array, where: str, action: str) -> None:
+    if not np.isfinite(values).all():
+        place = np.argwhere(~np.isfinite(values))[0].tolist()
+        raise NonFiniteError(
+            where=f"{where}, {place}",
+            found=str(values[tuple(place)]),
+            expected="a finite number",
+            action=action,
+        )

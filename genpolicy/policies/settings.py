@@ -1,0 +1,99 @@
+"""Settings of networks, training and sampling; the same sections for every method."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from genpolicy.contract.settings import Settings
+from genpolicy.integrity.documents import canonical_json
+from genpolicy.integrity.hashing import sha256_bytes
+
+
+class NetworkConfig(Settings):
+    """Size of the shared encoder and trunk, and the parameter budget that each head fills.
+
+    Attributes:
+        encoder_width: Hidden width of the observation encoder.
+        condition_dim: Length of the condition vector that it makes.
+        trunk_width: Width of the residual trunk.
+        trunk_blocks: Residual blocks of the trunk.
+        time_features: Sinusoidal features of the sampler time; even.
+        head_parameters: Budget of the head; its hidden width is solved from it, so that heads
+            with and without an input cost the same.
+    """
+
+    encoder_width: int = Field(default=256, ge=4, le=4096)
+    condition_dim: int = Field(default=128, ge=4, le=4096)
+    trunk_width: int = Field(default=384, ge=4, le=4096)
+    trunk_blocks: int = Field(default=2, ge=1, le=64)
+    time_features: int = Field(default=64, ge=2, le=1024, multiple_of=2)
+    head_parameters: int = Field(default=220_000, ge=100, le=100_000_000)
+
+
+class HeadConfig(Settings):
+    """Settings that only some heads read; recorded for all, so that they can be compared.
+
+    Attributes:
+        diffusion_levels: Noise levels T of DDPM training.
+        latent_dim: Length of ACT's latent z.
+        posterior_width: Hidden width of ACT's training-only posterior encoder.
+        kl_weight: Weight of ACT's KL term against the L1 error per action number.
+    """
+
+    diffusion_levels: int = Field(default=100, ge=1, le=10_000)
+    latent_dim: int = Field(default=8, ge=1, le=1024)
+    posterior_width: int = Field(default=256, ge=4, le=4096)
+    kl_weight: float = Field(default=0.01, ge=0.0)
+
+
+class TrainingConfig(Settings):
+    """Optimisation, equal for every method.
+
+    Attributes:
+        steps: Optimiser updates; also the stopping rule.
+        batch_size: Windows per update.
+        learning_rate: Peak of the schedule, after a linear warm-up, before the cosine decay.
+        warmup_steps: Updates of the warm-up.
+        weight_decay: AdamW's weight decay.
+        beta_1: AdamW's first-moment decay.
+        beta_2: AdamW's second-moment decay.
+        gradient_clip: Largest global gradient norm.
+        ema_power: Exponent of the averaging decay `1 - (1 + step)^-power`.
+        ema_cap: Largest averaging decay.
+        mask_padding: Whether padded actions stay out of the loss.
+        validation_every: Updates between two measurements of the averaged weights.
+    """
+
+    steps: int = Field(default=5000, ge=1, le=10_000_000)
+    batch_size: int = Field(default=256, ge=1, le=65_536)
+    learning_rate: float = Field(default=1e-3, gt=0.0)
+    warmup_steps: int = Field(default=300, ge=0)
+    weight_decay: float = Field(default=1e-6, ge=0.0)
+    beta_1: float = Field(default=0.95, ge=0.0, lt=1.0)
+    beta_2: float = Field(default=0.999, ge=0.0, lt=1.0)
+    gradient_clip: float = Field(default=1.0, gt=0.0)
+    ema_power: float = Field(default=0.75, gt=0.0, le=1.0)
+    ema_cap: float = Field(default=0.9999, ge=0.0, lt=1.0)
+    mask_padding: bool = True
+    validation_every: int = Field(default=500, ge=1)
+
+
+class SamplerConfig(Settings):
+    """How a trained network is turned into chunks.
+
+    Attributes:
+        name: The sampler.
+        steps: Sampler steps (not NFE: Heun evaluates the network twice a step).
+        clip: Bound of the predicted clean chunk, normalised units; diffusion samplers only.
+        batch_rows: Rows of every network call; shorter batches are padded, so that one row's
+            sample does not depend on how many others there are.
+    """
+
+    name: Literal["direct", "z_zero", "z_prior", "ddpm", "ddim", "dpm_2m", "euler", "heun", "rk4"]
+    steps: int = Field(default=1, le=10_000)
+    clip: float | None = Field(default=1.0, gt=0.0)
+    batch_rows: int = Field(default=16, ge=1, le=65_536)
+
+    def hash(self) -> str:
+        """SHA-256 of the settings."""
+        return sha256_bytes(canonical_json(self.model_dump()))

@@ -1,0 +1,295 @@
+"""Training of one method: deterministic, averaged weights, a checkpoint folder at the end.
+
+AdamW with warm-up and cosine decay and an exponential moving average of the weights, which is
+what is evaluated and saved (defaults after Chi et al., arXiv 2303.04137). Every method with the
+same seed sees the same batches in the same order. The stopping rule is a fixed number of steps.
+"""
+
+import copy
+import json
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from genpolicy.contract.horizons import HorizonConfig
+from genpolicy.errors import NonFiniteError
+from genpolicy.integrity.atomic import output_folder, write_bytes
+from genpolicy.integrity.documents import canonical_json
+from genpolicy.integrity.hashing import sha256_bytes
+from genpolicy.policies.checkpoint import (
+    FORMAT_VERSION,
+    CheckpointConfig,
+    NormalisationRecord,
+    Provenance,
+    save_checkpoint,
+    serialise_weights,
+)
+from genpolicy.policies.determinism import deterministic, initial_weights, regime
+from genpolicy.policies.methods import Method, check_sampler, method_named
+from genpolicy.policies.networks import (
+    Dimensions,
+    PolicyNetwork,
+    flops_per_evaluation,
+    parameter_counts,
+)
+from genpolicy.policies.normalisation import Normalisation
+from genpolicy.policies.objectives import Batch, Objective
+from genpolicy.policies.settings import HeadConfig, NetworkConfig, SamplerConfig, TrainingConfig
+from genpolicy.policies.windows import Windows, as_batch
+from genpolicy.seeds import integer_seed, stream
+
+VALIDATION_WINDOWS = 1024
+TRAINING_FILE = "training.json"
+METRICS_FILE = "metrics.jsonl"
+
+
+@dataclass(frozen=True)
+class TrainingRequest:
+    """Everything that decides the bytes of a checkpoint.
+
+    Attributes:
+        method: Registered name.
+        horizons: Common horizons; `bc` shortens them to one action itself.
+        normalisation: Statistics of the training split.
+        network: Sizes, equal for all methods.
+        head: Head settings.
+        training: Optimisation, equal for all methods.
+        sampler: Sampler that the checkpoint will name as its own.
+        provenance: Dataset and contracts.
+        seed: Root seed of this training.
+    """
+
+    method: str
+    horizons: HorizonConfig
+    normalisation: Normalisation
+    network: NetworkConfig
+    head: HeadConfig
+    training: TrainingConfig
+    sampler: SamplerConfig
+    provenance: Provenance
+    seed: int
+
+
+def train(
+    folder: Path,
+    request: TrainingRequest,
+    *,
+    windows: Windows,
+    validation: Windows | None = None,
+    device: str = "cpu",
+) -> str:
+    """Train one method and write its checkpoint folder, whole or not at all.
+
+    Args:
+        folder: Folder to write: weights, config, `training.json`, `metrics.jsonl`.
+        request: What decides the result.
+        windows: Training split.
+        validation: Validation split, for the record only; it stops and selects nothing.
+        device: `cpu` or a CUDA device.
+
+    Returns:
+        SHA-256 of the checkpoint.
+
+    Raises:
+        ConfigError: Unknown method, or a sampler that does not fit it.
+        ContractError: Windows that do not fit the horizons or the normalisation.
+        NonFiniteError: The loss became NaN or infinite.
+    """
+    method = method_named(request.method)
+    check_sampler(method, request.sampler, request.head)
+    horizons = method.horizons(request.horizons)
+    with deterministic(device):
+        data, held_out = (
+            as_batch(
+                split.shortened(horizons),
+                request.normalisation,
+                mask_padding=request.training.mask_padding,
+                device=device,
+            )
+            if split is not None
+            else None
+            for split in (windows, validation)
+        )
+        assert data is not None
+        network, objective = _build(method, _dimensions(horizons, request), request, device)
+        averaged = copy.deepcopy(network)
+        records = list(
+            _optimise(
+                network,
+                averaged,
+                objective,
+                data=data,
+                held_out=held_out,
+                request=request,
+                device=device,
+            )
+        )
+    weights = serialise_weights(averaged, method=request.method)
+    config = _checkpoint_config(request, averaged, objective, weights=weights)
+    summary = {
+        "stopping_rule": "fixed number of steps",
+        "steps": request.training.steps,
+        "evaluated_weights": "exponential moving average",
+        "windows": len(windows.observations),
+        "validation_windows": len(validation.observations) if validation else 0,
+        "final": records[-1],
+        "regime": regime(device),
+    }
+    lines = "".join(json.dumps(record, sort_keys=True) + "\n" for record in records)
+    with output_folder(folder) as temporary:
+        identity = save_checkpoint(temporary, weights=weights, config=config)
+        write_bytes(temporary / METRICS_FILE, lines.encode())
+        write_bytes(
+            temporary / TRAINING_FILE, canonical_json({**summary, "checkpoint_sha256": identity})
+        )
+    return identity
+
+
+def learning_rate(step: int, config: TrainingConfig) -> float:
+    """Rate of an update: linear warm-up, then a cosine to zero at the last step."""
+    if step < config.warmup_steps:
+        return config.learning_rate * (step + 1) / config.warmup_steps
+    progress = (step - config.warmup_steps) / max(1, config.steps - config.warmup_steps)
+    return config.learning_rate * 0.5 * (1.0 + math.cos(math.pi * progress))
+
+
+def averaging_decay(step: int, config: TrainingConfig) -> float:
+    """Share of the old average kept after update `step` (from 0)."""
+    return float(min(config.ema_cap, 1.0 - (1.0 + step) ** -config.ema_power))
+
+
+def _dimensions(horizons: HorizonConfig, request: TrainingRequest) -> Dimensions:
+    return Dimensions(
+        observation_horizon=horizons.observation_horizon,
+        observation_dim=request.normalisation.observation.dim,
+        prediction_horizon=horizons.prediction_horizon,
+        action_dim=request.normalisation.action.dim,
+    )
+
+
+def _checkpoint_config(
+    request: TrainingRequest, network: PolicyNetwork, objective: Objective, *, weights: bytes
+) -> CheckpointConfig:
+    """The config file of a trained network."""
+    statistics = json.dumps(request.normalisation.as_json())
+    return CheckpointConfig(
+        format_version=FORMAT_VERSION,
+        method=request.method,
+        horizons=method_named(request.method).horizons(request.horizons),
+        dimensions=network.dimensions,
+        normalisation=NormalisationRecord.model_validate_json(statistics),
+        network=request.network,
+        head=request.head,
+        training=request.training,
+        training_seed=request.seed,
+        sampler=request.sampler,
+        provenance=request.provenance,
+        parameters=parameter_counts(network),
+        training_only_parameters=sum(part.numel() for part in objective.parameters()),
+        flops=flops_per_evaluation(network),
+        weights_sha256=sha256_bytes(weights),
+    )
+
+
+def _build(
+    method: Method, dimensions: Dimensions, request: TrainingRequest, device: str
+) -> tuple[PolicyNetwork, Objective]:
+    with initial_weights(integer_seed(request.seed, "weights")):
+        network = method.build(dimensions, request.network, request.head)
+        objective = method.objective(dimensions, request.network, request.head)
+    return network.to(device), objective.to(device)
+
+
+def _optimise(
+    network: PolicyNetwork,
+    averaged: PolicyNetwork,
+    objective: Objective,
+    *,
+    data: Batch,
+    held_out: Batch | None,
+    request: TrainingRequest,
+    device: str,
+) -> Iterator[dict[str, float | int | None]]:
+    """Run all updates; yields one record per measurement."""
+    config = request.training
+    trained = [*network.parameters(), *objective.parameters()]
+    followed: list[Tensor] = list(network.parameters())
+    average: list[Tensor] = list(averaged.parameters())
+    optimiser = torch.optim.AdamW(
+        trained,
+        lr=config.learning_rate,
+        betas=(config.beta_1, config.beta_2),
+        weight_decay=config.weight_decay,
+    )
+    generator = torch.Generator(device=device)
+    generator.manual_seed(integer_seed(request.seed, "training_noise"))
+    order = _batch_order(len(data.actions), config.batch_size, request.seed)
+    total, counted = torch.zeros((), device=device), 0
+    for step in range(config.steps):
+        rows = torch.as_tensor(next(order)).to(device)
+        batch = Batch(data.observations[rows], data.actions[rows], data.weight[rows])
+        for group in optimiser.param_groups:
+            group["lr"] = learning_rate(step, config)
+        loss = objective.loss(network, batch, generator)
+        optimiser.zero_grad(set_to_none=True)
+        loss.backward()  # type: ignore[no-untyped-call]
+        torch.nn.utils.clip_grad_norm_(trained, config.gradient_clip)
+        optimiser.step()
+        with torch.no_grad():
+            torch._foreach_lerp_(average, followed, 1.0 - averaging_decay(step, config))
+        total, counted = total + loss.detach(), counted + 1
+        if (step + 1) % config.validation_every == 0 or step + 1 == config.steps:
+            mean_loss = float(total) / counted
+            if not math.isfinite(mean_loss):
+                raise NonFiniteError(
+                    where=f"loss of {request.method}, step {step + 1}",
+                    found=repr(mean_loss),
+                    expected="a finite number",
+                    action="Lower the learning rate; nothing was written.",
+                )
+            yield {
+                "step": step + 1,
+                "training_loss": mean_loss,
+                "validation_loss": _validate(averaged, objective, held_out, request, device),
+                "learning_rate": learning_rate(step, config),
+            }
+            total, counted = torch.zeros((), device=device), 0
+
+
+def _batch_order(windows: int, batch_size: int, seed: int) -> Iterator[NDArray[np.int64]]:
+    """Row indices of each batch: permutation after permutation, the same for all methods."""
+    generator = stream(seed, "batches")
+    pool = np.empty(0, dtype=np.int64)
+    while True:
+        while len(pool) < batch_size:
+            pool = np.concatenate([pool, generator.permutation(windows)])
+        yield pool[:batch_size]
+        pool = pool[batch_size:]
+
+
+def _validate(
+    averaged: PolicyNetwork,
+    objective: Objective,
+    held_out: Batch | None,
+    request: TrainingRequest,
+    device: str,
+) -> float | None:
+    """Loss of the averaged weights on fixed held-out windows with fixed noise."""
+    if held_out is None:
+        return None
+    stride = max(1, len(held_out.actions) // VALIDATION_WINDOWS)
+    some = Batch(
+        held_out.observations[::stride][:VALIDATION_WINDOWS],
+        held_out.actions[::stride][:VALIDATION_WINDOWS],
+        held_out.weight[::stride][:VALIDATION_WINDOWS],
+    )
+    generator = torch.Generator(device=device)
+    generator.manual_seed(integer_seed(request.seed, "validation_noise"))
+    with torch.no_grad():
+        return float(objective.loss(averaged, some, generator))
