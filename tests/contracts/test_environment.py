@@ -1,0 +1,104 @@
+"""Pins, telemetry and the two commands."""
+
+import configparser
+import importlib.metadata
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from flows.reproduce import stage_environment
+from genpolicy import doctor
+
+ROOT = Path(__file__).parents[2]
+MAKEFILE = (ROOT / "Makefile").read_text()
+
+
+def project() -> dict:
+    return tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+
+
+def pinned() -> dict[str, str]:
+    return doctor.pins((ROOT / "constraints.txt").read_text())
+
+
+def test_everything_that_is_required_is_pinned_exactly() -> None:
+    lists = [project()["dependencies"], *project()["optional-dependencies"].values()]
+    names = {doctor.normalised(re.match(r"[\w.-]+", r)[0]) for requires in lists for r in requires}
+    assert names - {"genpolicy"} <= set(pinned())
+    assert pinned()["torch"] == "2.13.0"
+    assert {"setuptools", "fastapi", "starlette", "numpy"} <= set(pinned())
+
+
+def test_the_environment_is_the_one_that_is_pinned() -> None:
+    own = {"genpolicy", "pip"}
+    installed = doctor.installed_versions()
+    wrong = {n: (installed[n], v) for n, v in pinned().items() if installed.get(n, v) != v}
+    assert wrong == {}
+    # What torch's CUDA build brings along on Linux depends on the index and is not pinned.
+    unpinned = {name for name in set(installed) - set(pinned()) - own if not _of_cuda(name)}
+    assert unpinned <= {"prefect-dask"}
+
+
+def _of_cuda(name: str) -> bool:
+    return name.startswith(("nvidia-", "cuda-")) or name == "triton"
+
+
+def test_fastapi_stays_in_the_range_in_which_prefect_works() -> None:
+    assert "fastapi>=0.139,<0.151" in project()["dependencies"]
+    assert doctor.check_fastapi({"fastapi": pinned()["fastapi"]}).state == doctor.OK
+    assert importlib.metadata.version("fastapi") == pinned()["fastapi"]
+
+
+def test_telemetry_is_off_wherever_it_could_start() -> None:
+    config = configparser.ConfigParser()
+    config.read(ROOT / ".dvc" / "config")
+    core = dict(config["core"])
+    assert (core["analytics"], core["check_update"], core["autostage"]) == ("false",) * 3
+    for line in (
+        "DVC_NO_ANALYTICS := 1",
+        "DO_NOT_TRACK := 1",
+        "PREFECT_SERVER_ANALYTICS_ENABLED := false",
+        "OMP_NUM_THREADS := 1",
+        "PYTHONHASHSEED := 0",
+    ):
+        assert f"export {line}" in MAKEFILE
+    environment = stage_environment(ROOT)
+    assert environment["DVC_NO_ANALYTICS"] == environment["DO_NOT_TRACK"] == "1"
+    code = (
+        "import os, flows.ladder\n"
+        "assert os.environ['PREFECT_SERVER_ANALYTICS_ENABLED'] == 'false'\n"
+        "from prefect.settings import get_current_settings as s\n"
+        "assert s().server.analytics_enabled is False\n"
+        "assert s().server.ephemeral.startup_timeout_seconds == 120\n"
+    )
+    clean = {k: v for k, v in environment.items() if not k.startswith("PREFECT") and k != "PATH"}
+    subprocess.run([sys.executable, "-c", code], env=clean, cwd=ROOT, check=True)
+
+
+def test_dvc_names_no_remote_and_no_place_outside() -> None:
+    text = (ROOT / ".dvc" / "config").read_text()
+    assert "remote" not in text
+    assert "url" not in text
+
+
+@pytest.mark.parametrize("name", ["ladder", "smoke", "test", "doctor", "clean", "lint"])
+def test_the_makefile_has_the_targets_that_the_readme_names(name: str) -> None:
+    assert re.search(rf"^{name}:", MAKEFILE, re.MULTILINE)
+    readme = (ROOT / "README.md").read_text()
+    assert f"make {name}" in readme
+
+
+def test_dvc_ignores_what_python_leaves_behind() -> None:
+    ignored = (ROOT / ".dvcignore").read_text().split()
+    assert {"__pycache__", "*.pyc", ".venv", "build"} <= set(ignored)
+
+
+def test_git_ignores_the_outputs_by_a_committed_rule() -> None:
+    # DVC takes its own lines back when a later stage fails, and failing is an answer here.
+    assert "/artifacts/" in (ROOT / ".gitignore").read_text().split()
+    for name in (".dvc/config", ".dvc/.gitignore", ".dvcignore", ".ci/run"):
+        assert (ROOT / name).is_file()

@@ -1,0 +1,161 @@
+"""The product measures and judges; nothing in it could move a robot, run foreign code or phone."""
+
+import ast
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+BANNED_MODULES = {
+    # a way out of the machine
+    *("socket", "ssl", "http", "urllib", "urllib3", "requests", "httpx", "aiohttp", "ftplib"),
+    *("smtplib", "telnetlib", "xmlrpc", "websocket", "websockets", "paramiko", "grpc", "zmq"),
+    *("paho", "pymodbus", "socketserver"),
+    # a way to a robot
+    *("serial", "can", "usb", "rospy", "rclpy", "moveit_commander", "franky", "frankx", "panda_py"),
+    *("pylibfranka", "franka_interface", "ur_rtde", "rtde_control", "rtde_receive", "urx", "xarm"),
+    *("dynamixel_sdk", "lerobot", "unitree_sdk2py", "interbotix_xs_modules", "pyrealsense2"),
+    # code that comes in with data
+    *("pickle", "cPickle", "dill", "cloudpickle", "shelve", "marshal", "joblib", "dvclive"),
+}
+BANNED_CALLS = {
+    *("eval", "exec", "compile", "__import__"),
+    *("torch.load", "torch.save", "torch.hub.load", "pandas.read_pickle", "pd.read_pickle"),
+    *("yaml.load", "yaml.load_all", "yaml.full_load", "yaml.unsafe_load", "os.system", "os.popen"),
+}
+BANNED_ATTRIBUTES = {
+    *("send_action", "to_pickle", "intermediate_positions", "trust_remote_code", "UnsafeLoader"),
+    *("FullLoader", "set_load_sharing_strategy"),
+}
+BANNED_KEYWORDS = {("allow_pickle", True), ("weights_only", False), ("trust_remote_code", True)}
+LIMIT_CHANGER = re.compile(
+    r"^_?(set|override|relax|disable|widen|lift|loosen|ignore|bypass|mask)_\w*(limit|envelope|stop)"
+)
+
+
+def findings(source: str) -> list[str]:
+    """Everything in a module that this project forbids, as `line: what`."""
+    found: list[str] = []
+    for node in ast.walk(ast.parse(source)):
+        at = getattr(node, "lineno", 0)
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            found += [f"{at}: import {name}" for name in _imported(node) if _banned(name)]
+        elif isinstance(node, ast.Call):
+            name = ast.unparse(node.func)
+            if name in BANNED_CALLS:
+                found.append(f"{at}: call of {name}")
+            for keyword in node.keywords:
+                value = getattr(keyword.value, "value", None)
+                if (keyword.arg, value) in BANNED_KEYWORDS:
+                    found.append(f"{at}: {keyword.arg}={value}")
+        elif isinstance(node, ast.Attribute):
+            found += _attribute(node)
+        elif isinstance(node, ast.FunctionDef) and LIMIT_CHANGER.match(node.name):
+            found.append(f"{at}: function {node.name} changes a limit")
+    return found
+
+
+def _attribute(node: ast.Attribute) -> list[str]:
+    if node.attr in BANNED_ATTRIBUTES:
+        return [f"{node.lineno}: use of {node.attr}"]
+    if LIMIT_CHANGER.match(node.attr):
+        return [f"{node.lineno}: use of {node.attr}"]
+    of_self = isinstance(node.value, ast.Name) and node.value.id == "self"
+    if isinstance(node.ctx, ast.Store) and "limit" in node.attr.lower() and not of_self:
+        return [f"{node.lineno}: assignment to {ast.unparse(node)}"]
+    return []
+
+
+def _imported(node: ast.Import | ast.ImportFrom) -> list[str]:
+    if isinstance(node, ast.Import):
+        return [alias.name for alias in node.names]
+    return [node.module or ""] if node.level == 0 else []
+
+
+def _banned(name: str) -> bool:
+    return name.split(".", maxsplit=1)[0] in BANNED_MODULES
+
+
+def modules() -> list[str]:
+    return sorted(
+        path.relative_to(ROOT).as_posix()
+        for folder in ("genpolicy", "gates", "stages")
+        for path in (ROOT / folder).rglob("*.py")
+    )
+
+
+@pytest.mark.parametrize("module", modules())
+def test_nothing_reaches_a_robot_a_network_or_foreign_code(module: str) -> None:
+    assert findings((ROOT / module).read_text()) == []
+
+
+@pytest.mark.parametrize(
+    ("source", "expected"),
+    [
+        ("import socket", "import socket"),
+        ("from urllib.request import urlopen", "import urllib.request"),
+        ("def f():\n    import serial", "import serial"),
+        ("x = eval('1')", "call of eval"),
+        ("import torch\ntorch.load(p)", "call of torch.load"),
+        ("import yaml\nyaml.load(t, Loader=yaml.SafeLoader)", "call of yaml.load"),
+        ("np.load(p, allow_pickle=True)", "allow_pickle=True"),
+        ("robot.send_action(a)", "use of send_action"),
+        ("request.intermediate_positions = p", "use of intermediate_positions"),
+        ("robot.set_velocity_limits(v)", "use of set_velocity_limits"),
+        ("def disable_stop(self): ...", "function disable_stop changes a limit"),
+        ("model.upperPositionLimit = q", "assignment to model.upperPositionLimit"),
+    ],
+)
+def test_each_forbidden_thing_is_found(source: str, expected: str) -> None:
+    assert any(expected in line for line in findings(source)), findings(source)
+
+
+def test_ordinary_code_is_left_alone() -> None:
+    source = (
+        "import yaml, json, resource\nself.limit_rad = 1\nyaml.safe_load(t)\nre.compile('x')\n"
+        "resource.setrlimit(a, b)\naxis.set_xlim(0, 1)\nnp.load(p, allow_pickle=False)\n"
+    )
+    assert findings(source) == []
+
+
+# Written in pieces, so that this file does not find itself.
+MACHINE_PATH = re.compile(r"(?<![\w.~>-])/(work|root|home|tmp|opt|Users|mnt)" + r"/\w")
+REGISTRY = re.compile(
+    r"(pypi\.or" + r"g|pythonhosted\.or" + r"g|download\.pytorch\.or" + r"g|npmjs\.or" + r"g"
+    r"|anaconda\.or" + r"g|--(extra-)?index-url[ =]+http|artifactor" + r"y)",
+    re.IGNORECASE,
+)
+OWN_PRIVATE_HOST = re.compile(r"https?://[\w.-]+\.(internal|corp|lan|intra)\b", re.IGNORECASE)
+
+
+def tracked() -> list[Path]:
+    command = ["git", "-C", str(ROOT), "ls-files", "-z", "-co", "--exclude-standard"]
+    done = subprocess.run(command, capture_output=True, check=True)
+    return [ROOT / name for name in done.stdout.decode().split("\0") if name]
+
+
+def test_no_file_names_a_registry_a_private_host_or_a_place_on_a_machine() -> None:
+    files = tracked()
+    assert len(files) > 50
+    found = []
+    for path in files:
+        if not path.is_file() or path.is_symlink():
+            continue
+        try:
+            text = path.read_text()
+        except UnicodeDecodeError:
+            continue  # pictures and recordings
+        for pattern in (MACHINE_PATH, REGISTRY, OWN_PRIVATE_HOST):
+            found += [f"{path.relative_to(ROOT)}: {match[0]}" for match in pattern.finditer(text)]
+    assert found == []
+
+
+def test_the_patterns_find_what_they_are_for() -> None:
+    assert MACHINE_PATH.search("open('/" + "home/x')")
+    assert not MACHINE_PATH.search("/path/to/python")
+    assert not MACHINE_PATH.search("artifacts/work/x")
+    assert REGISTRY.search("pip install --index-url " + "https://x")
+    assert OWN_PRIVATE_HOST.search("http://build." + "internal/x")
