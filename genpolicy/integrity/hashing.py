@@ -53,7 +53,7 @@ def sha256_bytes_of(path: Path, *, keep: bool) -> tuple[str, bytes]:
         IntegrityError: The path is missing, a symlink or not a regular file.
     """
     try:
-        descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW)
+        descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
     except OSError as error:
         raise IntegrityError(
             where=str(path),
@@ -61,16 +61,17 @@ def sha256_bytes_of(path: Path, *, keep: bool) -> tuple[str, bytes]:
             expected="a regular file, not a link",
             action="Re-run the stage that writes it (`dvc repro`).",
         ) from error
+    if not _is_regular(descriptor):
+        os.close(descriptor)
+        raise IntegrityError(
+            where=str(path),
+            found="a folder or a device",
+            expected="a regular file",
+            action="Re-run the stage that writes it (`dvc repro`).",
+        )
     digest = hashlib.sha256()
     kept = bytearray()
     with os.fdopen(descriptor, "rb") as stream:
-        if not _is_regular(stream.fileno()):
-            raise IntegrityError(
-                where=str(path),
-                found="a folder or a device",
-                expected="a regular file",
-                action="Re-run the stage that writes it (`dvc repro`).",
-            )
         while block := stream.read(CHUNK_BYTES):
             digest.update(block)
             if keep:
