@@ -183,7 +183,7 @@ class Operator:
                 yield from self._disturbance()
                 yield from self._approach()
                 return
-            if self._order.kind == "dropped" and share > 0.4 + 0.9 * self._event_share:
+            if self._order.kind == "dropped" and share > 0.35 + 0.6 * self._event_share:
                 yield from self._brake()
                 return
 

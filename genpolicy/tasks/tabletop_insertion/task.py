@@ -10,7 +10,7 @@ from genpolicy.contract.action import GRIPPER, POSITION
 from genpolicy.contract.observation import ObservationContract
 from genpolicy.errors import ContractError
 from genpolicy.recording.episode import RecordedEpisode
-from genpolicy.tasks.api import EpisodeSpec, Start, Workspace, World, WorldSettings
+from genpolicy.tasks.api import EpisodeSpec, Start, Task, Workspace, World, WorldSettings
 from genpolicy.tasks.tabletop_insertion import episodes, fallback, scene, sessions
 from genpolicy.tasks.tabletop_insertion.observation import CONTACT_PHASES, OBSERVATION, PHASES
 from genpolicy.tasks.tabletop_insertion.probes import EPOCHS, PROBES
@@ -93,4 +93,4 @@ def _own(start: Start) -> InsertionStart:
     return start
 
 
-TASK = TabletopInsertion()
+TASK: Task = TabletopInsertion()
