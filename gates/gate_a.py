@@ -193,9 +193,7 @@ def _strata_effect(case: Case) -> Measured:
 def _recovery(case: Case) -> tuple[float, tuple[float, float], str]:
     columns = ("split", "mode", "episodes", "successes")
     frame = case.evidence.frame(f"{AUDIT}/recovery.parquet", *columns)
-    frame = frame.assign(
-        episodes=numbers(frame, "episodes"), successes=numbers(frame, "successes")
-    )
+    frame = frame.assign(episodes=numbers(frame, "episodes"), successes=numbers(frame, "successes"))
     by_mode = frame.groupby("mode")[["episodes", "successes"]].sum()
     bounds = {
         str(mode): clopper_pearson(

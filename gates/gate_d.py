@@ -296,7 +296,8 @@ def _stub_violations(case: Case) -> Measured:
 
 def _conservation(case: Case) -> Measured:
     names = ("generated", "executed", "discarded", "queued")
-    rows = case.evidence.of(f"{STRESS}/conservation.parquet", case.candidate, "perturbation", *names)
+    path = f"{STRESS}/conservation.parquet"
+    rows = case.evidence.of(path, case.candidate, "perturbation", *names)
     generated, executed, discarded, queued = (numbers(rows, name) for name in names)
     if generated.sum() <= 0:
         raise MissingEvidenceError("nothing was generated")

@@ -23,6 +23,8 @@ GATES: tuple[Gate, ...] = ("A", "B", "C", "D", "E")
 OWNERS: tuple[Owner, ...] = ("model", "perception", "controller", "safety")
 REQUIRED = "required"
 
+Point = tuple[float, float, float]
+
 
 class StrictModel(BaseModel):
     """Frozen settings or documents: no unknown key, no coercion, no NaN."""

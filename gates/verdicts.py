@@ -23,9 +23,7 @@ def margin(measured: float, limit: float, comparison: Comparison) -> float:
     return limit - measured if comparison == "<=" else measured - limit
 
 
-def judge_criterion(
-    measured: float | None, limit: float | None, comparison: Comparison
-) -> Verdict:
+def judge_criterion(measured: float | None, limit: float | None, comparison: Comparison) -> Verdict:
     """Verdict of one criterion; INCONCLUSIVE without a finite number on both sides."""
     if measured is None or limit is None:
         return "INCONCLUSIVE"
@@ -63,9 +61,7 @@ def combine(
     if routes:
         parts.append(best(worst(c.verdict for c in common if c.route == r) for r in routes))
     names = sorted({c.candidate for c in criteria if c.candidate is not None})
-    candidates = {
-        name: worst(c.verdict for c in criteria if c.candidate == name) for name in names
-    }
+    candidates = {name: worst(c.verdict for c in criteria if c.candidate == name) for name in names}
     if expects_candidates:
         parts.append(best(candidates.values()))
     return worst(parts), candidates

@@ -1,0 +1,264 @@
+"""The trial card: what an independent person must read, complete and sign.
+
+Code drafts it from the passed reports. There is no default force limit: a number that no one
+measured for this cell would look like a safe one. An empty field keeps the card incomplete.
+"""
+
+import datetime
+import re
+from pathlib import Path
+from typing import Any
+
+from pydantic import Field
+
+from gates.models import GateReport, Point, StrictModel, parse_section
+from genpolicy.errors import RefusedError
+from genpolicy.integrity.documents import canonical_json, parse_json
+
+CARD_SCHEMA_VERSION = 1
+DRAFT_PATH = "artifacts/card/card.json"
+
+
+# What the draft fixes; a signed card may not differ here from the draft of this very chain.
+FIXED = (
+    "schema_version",
+    "name",
+    "task",
+    "candidate",
+    "candidate_checkpoint_sha256",
+    "robot_model",
+    "author",
+    "reports",
+    "rollback",
+)
+ABORT_FROM = {
+    "action_age_s": "action_age_p95_s",
+    "deadline_miss_share": "deadline_miss_upper",
+    "fallback_share": "fallback_share_upper",
+    "intervention_share": "intervention_upper",
+}
+
+
+class CardSettings(StrictModel):
+    """Section `card` of `params.yaml`: what the draft starts from.
+
+    Attributes:
+        name: File name of the signed card: `cards/<name>.dsse.json`.
+        author: Who made the candidate; may not review it.
+        robot_model: The one robot model that the card is for.
+        task: Name of the task.
+        workspace_lower_m: Lower corner of the reduced workspace, base frame. Shape (3,).
+        workspace_upper_m: Upper corner. Shape (3,).
+        speed_limit_m_s: Reduced speed of the tool.
+    """
+
+    name: str = Field(pattern=r"^[a-z0-9][a-z0-9_-]{0,63}$")
+    author: str = Field(min_length=1)
+    robot_model: str = Field(min_length=1)
+    task: str = Field(min_length=1)
+    workspace_lower_m: Point
+    workspace_upper_m: Point
+    speed_limit_m_s: float = Field(gt=0.0)
+
+
+class TrialCard(StrictModel):
+    """Reduced envelope and duties of one trial of one candidate on one robot model.
+
+    Empty text and None mean: a person has still to fill this in.
+
+    Attributes:
+        reports: SHA-256 of the reports of gates A to D.
+        force_limit_n: Contact force at which the trial stops, N; measured for this cell.
+        force_limit_reason: Where the force limit comes from.
+        spotter: Who stands at the stop.
+        stop_path: How the robot is stopped, from hand to drive.
+        abort_thresholds: What ends the trial, by name; may be lowered, never raised.
+        rollback: What runs instead.
+        not_before: First day of validity, YYYY-MM-DD.
+        expires: Last day of validity, YYYY-MM-DD.
+        nonce: Makes this card unlike any other; at least 16 characters.
+    """
+
+    schema_version: int
+    name: str
+    task: str
+    candidate: str
+    candidate_checkpoint_sha256: str
+    robot_model: str
+    author: str
+    reports: dict[str, str]
+    workspace_lower_m: Point | None
+    workspace_upper_m: Point | None
+    speed_limit_m_s: float | None
+    force_limit_n: float | None
+    force_limit_reason: str
+    spotter: str
+    stop_path: str
+    abort_thresholds: dict[str, float]
+    rollback: str
+    caveats: tuple[str, ...]
+    reviewer: str
+    not_before: str
+    expires: str
+    nonce: str
+
+
+def draft_card(
+    settings: CardSettings, reports: dict[str, GateReport], hashes: dict[str, str], checkpoint: str
+) -> TrialCard:
+    """Draft from the passed reports, with the fields of the reviewer left empty.
+
+    Args:
+        settings: Section `card`.
+        reports: Passed reports of gates A to D, as `gates.admission.admit` gives them.
+        hashes: Their SHA-256.
+        checkpoint: Hash of the promoted candidate's checkpoint, as Gate B pinned it.
+
+    Raises:
+        RefusedError: Gate D promotes no one.
+    """
+    candidate = promoted(reports["D"])
+    limits = {c.id: c.threshold for c in reports["D"].criteria if c.threshold is not None}
+    caveats = [caveat for gate in sorted(reports) for caveat in reports[gate].caveats]
+    baselines = reports["D"].settings.get("baselines", ())
+    return TrialCard(
+        schema_version=CARD_SCHEMA_VERSION,
+        name=settings.name,
+        task=settings.task,
+        candidate=candidate,
+        candidate_checkpoint_sha256=checkpoint,
+        robot_model=settings.robot_model,
+        author=settings.author,
+        reports=dict(sorted(hashes.items())),
+        workspace_lower_m=settings.workspace_lower_m,
+        workspace_upper_m=settings.workspace_upper_m,
+        speed_limit_m_s=settings.speed_limit_m_s,
+        force_limit_n=None,
+        force_limit_reason="",
+        spotter="",
+        stop_path="",
+        abort_thresholds={
+            name: limits[criterion] for name, criterion in ABORT_FROM.items() if criterion in limits
+        },
+        rollback=f"stop, then the simpler policy (one of {', '.join(baselines)}) or manual control",
+        caveats=tuple(dict.fromkeys(caveats)),
+        reviewer="",
+        not_before="",
+        expires="",
+        nonce="",
+    )
+
+
+def promoted(report: GateReport) -> str:
+    """The method that Gate D promotes.
+
+    Raises:
+        RefusedError: None.
+    """
+    verb, _, name = report.decision.partition(" ")
+    if report.verdict != "PASS" or verb != "promote" or report.candidates.get(name) != "PASS":
+        raise RefusedError(
+            gate="D",
+            criterion="decision",
+            measured=report.decision or "none",
+            limit="promote <method>",
+            report="reports/gate_d.json",
+            action="Keep the simpler policy; there is nothing to put on a card.",
+        )
+    return name
+
+
+def card_bytes(card: TrialCard) -> bytes:
+    """The one serialisation of a card."""
+    return canonical_json(card.model_dump(mode="json"))
+
+
+def missing_fields(card: TrialCard) -> list[str]:
+    """Fields that are still empty; a force limit is never implied."""
+    dump: dict[str, Any] = card.model_dump()
+    empty = [name for name, value in dump.items() if value in (None, "", {}, ())]
+    blank = [name for name, value in dump.items() if isinstance(value, str) and not value.strip()]
+    short = ["nonce"] if 0 < len(card.nonce.strip()) < 16 else []
+    reports = ["reports"] if set(card.reports) != {"A", "B", "C", "D"} else []
+    return sorted({*empty, *blank, *short, *reports} - {"caveats"})
+
+
+def envelope_violations(card: TrialCard, draft: TrialCard, envelope: "Envelope") -> list[str]:
+    """Limits of the card that are looser than the simulated envelope, or impossible.
+
+    Every comparison accepts with `margin >= 0`, so that NaN does not pass.
+    """
+    bad = []
+    lower, upper = card.workspace_lower_m, card.workspace_upper_m
+    if lower is None or upper is None:
+        bad.append("workspace")
+    else:
+        for axis, low, high, floor, ceiling in zip(
+            "xyz",
+            lower,
+            upper,
+            envelope.workspace_lower_m,
+            envelope.workspace_upper_m,
+            strict=True,
+        ):
+            if not (low >= floor and high <= ceiling and high > low):
+                bad.append(f"workspace {axis}")
+    if card.speed_limit_m_s is None or not 0 < card.speed_limit_m_s <= envelope.speed_limit_m_s:
+        bad.append("speed_limit_m_s")
+    if card.force_limit_n is None or not card.force_limit_n > 0:
+        bad.append("force_limit_n")
+    for name, limit in draft.abort_thresholds.items():
+        value = card.abort_thresholds.get(name)
+        if value is None or not 0 <= value <= limit:
+            bad.append(f"abort_thresholds.{name}")
+    return bad
+
+
+class Envelope(StrictModel):
+    """What was simulated; the card must stay inside.
+
+    Attributes:
+        workspace_lower_m: Lower corner, base frame. Shape (3,).
+        workspace_upper_m: Upper corner. Shape (3,).
+        speed_limit_m_s: Speed of the tool.
+        maximum_days: Longest validity of a card.
+    """
+
+    workspace_lower_m: Point
+    workspace_upper_m: Point
+    speed_limit_m_s: float = Field(gt=0.0)
+    maximum_days: int = Field(gt=0)
+
+
+def validity(card: TrialCard, *, today: datetime.date, maximum_days: int) -> tuple[bool, str]:
+    """Whether the card is valid on a day, and the sentence that says why not."""
+    if not all(re.fullmatch(r"\d{4}-\d{2}-\d{2}", t) for t in (card.not_before, card.expires)):
+        return False, "not_before and expires must be days, YYYY-MM-DD"
+    try:
+        first = datetime.date.fromisoformat(card.not_before)
+        last = datetime.date.fromisoformat(card.expires)
+    except ValueError:
+        return False, "not_before or expires is no day of the calendar"
+    for wrong, text in (
+        (last < first, "the card expires before it begins"),
+        ((last - first).days > maximum_days, f"valid for more than {maximum_days} days"),
+        (today < first, f"valid only from {card.not_before}"),
+        (today > last, f"expired on {card.expires}"),
+    ):
+        if wrong:
+            return False, text
+    return True, f"valid from {card.not_before} to {card.expires}"
+
+
+def read_card(data: bytes, *, where: str) -> TrialCard:
+    """A card from its JSON.
+
+    Raises:
+        BadInputError: Not strict JSON, or not a card.
+    """
+    return parse_section(TrialCard, parse_json(data, where=where), where=where)
+
+
+def draft_path(root: Path) -> Path:
+    """Where the draft lies."""
+    return root / DRAFT_PATH

@@ -1,0 +1,310 @@
+"""Signatures of people under a trial card: a DSSE envelope, Ed25519, an allow-list.
+
+The signed payload is an in-toto style statement whose subjects are the whole hash chain: the
+reports of gates A to D, the draft card and the candidate's checkpoint. A changed byte upstream
+changes the statement, and the signatures no longer fit. This module signs only with a private
+key that a person hands to it; it makes and keeps none.
+"""
+
+import base64
+import binascii
+import datetime
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey, Ed25519PublicKey
+from cryptography.hazmat.primitives.serialization import load_pem_private_key
+from pydantic import Field
+from securesystemslib.dsse import Envelope as DsseEnvelope
+from securesystemslib.exceptions import VerificationError
+from securesystemslib.signer import CryptoSigner, SSlibKey  # type: ignore[attr-defined]
+
+from gates.card import FIXED, TrialCard, draft_path, missing_fields, read_card
+from gates.models import OWNERS, StrictModel, parse_section
+from genpolicy.errors import BadInputError, ConfigError, IntegrityError
+from genpolicy.integrity.atomic import write_bytes
+from genpolicy.integrity.documents import canonical_json, parse_json, read_yaml
+from genpolicy.integrity.hashing import sha256_bytes_of, sha256_file
+
+PAYLOAD_TYPE = "application/vnd.genpolicy.trial-card+json"
+STATEMENT_TYPE = "urn:genpolicy:statement:1"
+PREDICATE_TYPE = "urn:genpolicy:trial-card:1"
+ALLOW_LIST = "reviewers.yaml"
+CARDS = "cards"
+REVIEWER = "reviewer"
+ROLES = (REVIEWER, *OWNERS)
+
+
+class Person(StrictModel):
+    """Someone who may sign: one person, one role, one key.
+
+    Attributes:
+        name: Unique.
+        role: `reviewer` or one of the four owners.
+        public_key: Ed25519 public key, 64 hex digits.
+    """
+
+    name: str = Field(min_length=1)
+    role: str = Field(pattern=f"^({'|'.join(ROLES)})$")
+    public_key: str = Field(pattern=r"^[0-9a-f]{64}$")
+
+    @property
+    def key(self) -> SSlibKey:
+        """The public key, with the identifier that its bytes give it."""
+        return SSlibKey.from_crypto(
+            Ed25519PublicKey.from_public_bytes(bytes.fromhex(self.public_key))
+        )
+
+
+class AllowList(StrictModel):
+    """The committed file `reviewers.yaml`."""
+
+    people: tuple[Person, ...]
+
+
+@dataclass(frozen=True)
+class SignedCard:
+    """A card whose signatures verified.
+
+    Attributes:
+        card: What was signed.
+        signers: People whose signatures verified, all of them on the allow-list.
+    """
+
+    card: TrialCard
+    signers: tuple[Person, ...]
+
+
+def load_allow_list(root: Path) -> AllowList:
+    """People who may sign.
+
+    Raises:
+        ConfigError: Missing, malformed, or a name or key that appears twice.
+    """
+    found = parse_section(AllowList, read_yaml(root / ALLOW_LIST), where=ALLOW_LIST)
+    for what, values in (
+        ("name", [_plain(person.name) for person in found.people]),
+        ("public_key", [person.public_key for person in found.people]),
+    ):
+        if len(set(values)) != len(values):
+            raise ConfigError(
+                where=f"{ALLOW_LIST}: {what}",
+                found="the same value twice",
+                expected="one entry per person and key",
+                action="One person holds one role here; remove the double entry.",
+            )
+    return found
+
+
+def statement(root: Path, card: TrialCard) -> bytes:
+    """The payload to be signed: the card, bound to the files that lie here now.
+
+    Raises:
+        IntegrityError: A file of the chain is missing.
+    """
+    paths = [f"reports/gate_{gate}.json" for gate in "abcd"]
+    paths.append(draft_path(root).relative_to(root).as_posix())
+    subject = [{"name": p, "digest": {"sha256": sha256_file(root / p)}} for p in paths]
+    subject.append(
+        {
+            "name": f"checkpoint of {card.candidate}",
+            "digest": {"sha256": card.candidate_checkpoint_sha256},
+        }
+    )
+    return canonical_json(
+        {
+            "_type": STATEMENT_TYPE,
+            "predicateType": PREDICATE_TYPE,
+            "subject": subject,
+            "predicate": card.model_dump(mode="json"),
+        }
+    )
+
+
+def open_envelope(root: Path, data: bytes, *, where: str, allowed: AllowList) -> SignedCard:
+    """Verify an envelope against the allow-list and the files that lie here now.
+
+    Every signature must be by a listed key and must verify; one bad signature voids all.
+
+    Raises:
+        BadInputError: Malformed, another payload type, unknown key, bad signature, or a payload
+            that is not the statement of this chain.
+    """
+    payload, signatures = _parse_envelope(data, where)
+    card = _card_of(payload, where)
+    _check_fixed(root, card, where)
+    if payload != statement(root, card):
+        raise _bad(where, "a payload that names other bytes than lie here", "this hash chain")
+    envelope = _dsse(payload, signatures, where)
+    by_id = {person.key.keyid: person for person in allowed.people}
+    unknown = [keyid for keyid in envelope.signatures if keyid not in by_id]
+    if unknown:
+        raise _bad(where, f"signed by the unknown key {unknown[0][:12]}…", "listed keys only")
+    signers = tuple(by_id[keyid] for keyid in envelope.signatures)
+    try:
+        envelope.verify([person.key for person in signers], len(signers))
+    except (VerificationError, ValueError) as error:
+        raise _bad(where, "a signature that does not verify", "valid signatures only") from error
+    return SignedCard(card, signers)
+
+
+def read_draft(root: Path) -> TrialCard:
+    """The draft card.
+
+    Raises:
+        BadInputError: Missing or malformed.
+    """
+    data = sha256_bytes_of(draft_path(root), keep=True)[1]
+    return read_card(data, where=draft_path(root).relative_to(root).as_posix())
+
+
+def sign_card(root: Path, *, card_file: Path, key_file: Path, reviewer: str) -> Path:
+    """Add one person's signature, by that person's own key.
+
+    Args:
+        root: Repository root.
+        card_file: A completed card (JSON), or an envelope that others have signed.
+        key_file: The person's private key, PEM, Ed25519.
+        reviewer: The person's name as on the allow-list.
+
+    Returns:
+        Path of the envelope, `cards/<name>.dsse.json`.
+
+    Raises:
+        BadInputError: The person is not listed, the key is not theirs, the card is incomplete,
+            changed, self-reviewed, or stands against another card of the same name.
+    """
+    allowed = load_allow_list(root)
+    person = next((p for p in allowed.people if p.name == reviewer), None)
+    if person is None:
+        raise _bad(ALLOW_LIST, f"without {reviewer!r}", "the name of a listed person")
+    key = _private_key(key_file)
+    if SSlibKey.from_crypto(key.public_key()).keyid != person.key.keyid:
+        raise _bad("the private key", "another key", f"the key that {ALLOW_LIST} lists for them")
+    where = card_file.name
+    data = sha256_bytes_of(card_file, keep=True)[1]
+    signatures: list[dict[str, str]] = []
+    if card_file.name.endswith(".dsse.json"):
+        card = open_envelope(root, data, where=where, allowed=allowed).card
+        payload, signatures = _parse_envelope(data, where)
+    else:
+        card = read_card(data, where=where)
+        _check_fixed(root, card, where)
+        payload = statement(root, card)
+    _check_signable(card, person, where)
+    envelope = _dsse(payload, signatures, where)
+    envelope.sign(CryptoSigner(key))
+    target = root / CARDS / f"{card.name}.dsse.json"
+    if target.exists() and _parse_envelope(target.read_bytes(), target.name)[0] != payload:
+        raise _bad(target.name, "another card of this name", "one card; retire the other first")
+    write_bytes(target, canonical_json(envelope.to_dict()))
+    return target
+
+
+def independence(signed: SignedCard) -> tuple[bool, str]:
+    """Whether the named reviewer signed and is not the author."""
+    names = [person.name for person in signed.signers if person.role == REVIEWER]
+    if not names:
+        return False, "no reviewer signed"
+    if signed.card.reviewer not in names:
+        return False, "the reviewer named on the card did not sign"
+    author = _plain(signed.card.author)
+    if any(_plain(name) == author for name in names):
+        return False, "the author reviewed their own candidate"
+    return True, f"reviewed by {signed.card.reviewer}, candidate by {signed.card.author}"
+
+
+def conflicting_cards(root: Path, name: str) -> list[str]:
+    """Other envelopes in `cards/` beside that of `name`; retired cards lie in a subfolder."""
+    own = f"{name}.dsse.json"
+    return sorted(p.name for p in (root / CARDS).glob("*.dsse.json") if p.name != own)
+
+
+def utc_today() -> datetime.date:
+    """Today, UTC."""
+    return datetime.datetime.now(datetime.UTC).date()
+
+
+def _check_signable(card: TrialCard, person: Person, where: str) -> None:
+    missing = missing_fields(card)
+    if missing:
+        raise _bad(where, f"incomplete ({', '.join(missing)})", "every field filled by a person")
+    if person.role == REVIEWER and _plain(person.name) == _plain(card.author):
+        raise _bad(where, f"by {card.author}", "a reviewer who is not the author")
+    if person.role == REVIEWER and person.name != card.reviewer:
+        raise _bad(where, f"naming the reviewer {card.reviewer!r}", f"{person.name!r}")
+
+
+def _check_fixed(root: Path, card: TrialCard, where: str) -> None:
+    draft = read_draft(root)
+    for name in FIXED:
+        if getattr(card, name) != getattr(draft, name):
+            raise _bad(f"{where}: {name}", "another value", f"that of {draft_path(root).name}")
+
+
+def _parse_envelope(data: bytes, where: str) -> tuple[bytes, list[dict[str, str]]]:
+    document = parse_json(data, where=where)
+    if not isinstance(document, dict) or set(document) != {"payload", "payloadType", "signatures"}:
+        raise _bad(where, "another document", "payload, payloadType and signatures")
+    if document["payloadType"] != PAYLOAD_TYPE:
+        raise _bad(f"{where}: payloadType", repr(document["payloadType"])[:60], PAYLOAD_TYPE)
+    signatures = document["signatures"]
+    if not isinstance(signatures, list) or not signatures:
+        raise _bad(f"{where}: signatures", "empty", "at least one signature")
+    for entry in signatures:
+        if not isinstance(entry, dict) or set(entry) != {"keyid", "sig"}:
+            raise _bad(f"{where}: signatures", "another form", "keyid and sig")
+        _decoded(entry["sig"], f"{where}: sig")
+    return _decoded(document["payload"], f"{where}: payload"), signatures
+
+
+def _decoded(text: Any, where: str) -> bytes:
+    try:
+        if not isinstance(text, str):
+            raise ValueError("no text")
+        return base64.b64decode(text, validate=True)
+    except (ValueError, binascii.Error) as error:
+        raise _bad(where, "not base64", "whole base64 text") from error
+
+
+def _card_of(payload: bytes, where: str) -> TrialCard:
+    document = parse_json(payload, where=f"{where}: payload")
+    predicate = document.get("predicate") if isinstance(document, dict) else None
+    return parse_section(TrialCard, predicate, where=f"{where}: predicate")
+
+
+def _dsse(payload: bytes, signatures: list[dict[str, str]], where: str) -> DsseEnvelope:
+    try:
+        return DsseEnvelope.from_dict(
+            {
+                "payload": base64.b64encode(payload).decode(),
+                "payloadType": PAYLOAD_TYPE,
+                "signatures": [dict(entry) for entry in signatures],
+            }
+        )
+    except (ValueError, KeyError, TypeError) as error:
+        raise _bad(f"{where}: signatures", "malformed or double", "one per key") from error
+
+
+def _private_key(path: Path) -> Ed25519PrivateKey:
+    try:
+        key = load_pem_private_key(path.read_bytes(), password=None)
+    except (OSError, ValueError, TypeError) as error:
+        raise _bad("the private key", "not readable", "a PEM file without password") from error
+    if not isinstance(key, Ed25519PrivateKey):
+        raise _bad("the private key", type(key).__name__, "an Ed25519 key")
+    return key
+
+
+def _plain(name: str) -> str:
+    return " ".join(name.split()).casefold()
+
+
+def _bad(where: str, found: str, expected: str) -> BadInputError:
+    return IntegrityError(
+        where=where,
+        found=found,
+        expected=expected,
+        action="Have the card completed and signed again from the current draft.",
+    )
