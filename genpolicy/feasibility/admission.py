@@ -1,0 +1,155 @@
+"""Admission: the only place where an `Admitted` chunk can come into being.
+
+`Admitted` is sealed. It has no public constructor, cannot be copied, pickled, subclassed or
+changed, and `verify` recognises one that was made behind the seal's back or whose actions differ
+from the hash that was taken when the six layers passed.
+"""
+
+import weakref
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from genpolicy.contract.chunk import ChunkMetadata, Projected, Proposal, actions_sha256
+from genpolicy.errors import IntegrityError
+from genpolicy.feasibility.checker import LayerChecker
+from genpolicy.feasibility.context import Context
+from genpolicy.feasibility.verdict import Verdict
+
+Array = NDArray[np.float64]
+
+_SEAL = object()
+
+
+@dataclass(frozen=True)
+class Rejected:
+    """A chunk that a layer rejected, with everything that was known about it.
+
+    Attributes:
+        projected: Raw and projected actions.
+        verdict: The six layers.
+        rejected_at_s: When.
+    """
+
+    projected: Projected
+    verdict: Verdict
+    rejected_at_s: float
+
+    @property
+    def reason(self) -> str:
+        """First reason."""
+        return self.verdict.first_reason
+
+    @property
+    def metadata(self) -> ChunkMetadata:
+        """What the chunk rests on."""
+        return self.projected.metadata
+
+
+class Admitted:
+    """A chunk that passed all six layers; only `FeasibilityChecker` makes one.
+
+    Attributes:
+        projected: Raw and projected actions.
+        actions_sha256: Hash of the projected actions when they passed.
+        verdict: The six layers.
+        admitted_at_s: When.
+    """
+
+    __slots__ = ("__weakref__", "actions_sha256", "admitted_at_s", "projected", "verdict")
+
+    projected: Projected
+    actions_sha256: str
+    verdict: Verdict
+    admitted_at_s: float
+
+    def __init__(
+        self, *, projected: Projected, verdict: Verdict, admitted_at_s: float, seal: object = None
+    ) -> None:
+        if seal is not _SEAL:
+            raise TypeError("Admitted is made by genpolicy.feasibility.admission only.")
+        if verdict.passed is not True:
+            raise TypeError("Admitted needs a verdict that passed all six layers.")
+        put = object.__setattr__
+        put(self, "projected", projected)
+        put(self, "actions_sha256", actions_sha256(projected.actions))
+        put(self, "verdict", verdict)
+        put(self, "admitted_at_s", admitted_at_s)
+        _ISSUED.add(self)
+
+    def __init_subclass__(cls, **kwargs: Any) -> NoReturn:
+        raise TypeError("Admitted cannot be subclassed.")
+
+    def __setattr__(self, name: str, value: object) -> NoReturn:
+        raise TypeError("Admitted cannot be changed; propose a new chunk.")
+
+    def __delattr__(self, name: str) -> NoReturn:
+        raise TypeError("Admitted cannot be changed; propose a new chunk.")
+
+    def __reduce_ex__(self, protocol: object) -> NoReturn:
+        raise TypeError("Admitted cannot be copied or pickled; admit the chunk where it is used.")
+
+    @property
+    def actions(self) -> Array:
+        """Projected actions, read-only. Shape (K, D_a)."""
+        return self.projected.actions
+
+    @property
+    def metadata(self) -> ChunkMetadata:
+        """What the chunk rests on."""
+        return self.projected.metadata
+
+    def verify(self) -> None:
+        """Check that this object was issued here and that its actions are those that passed.
+
+        Raises:
+            IntegrityError: It was not, or they are not.
+        """
+        if self not in _ISSUED:
+            raise IntegrityError(
+                where="an Admitted chunk",
+                found="not issued by the feasibility module",
+                expected="one that passed all six layers",
+                action="Discard it and hold.",
+            )
+        if actions_sha256(self.projected.actions) != self.actions_sha256:
+            raise IntegrityError(
+                where=f"the actions of the admitted chunk {self.metadata.chunk_id}",
+                found="changed since they passed",
+                expected=f"sha256 {self.actions_sha256}",
+                action="Discard it and hold.",
+            )
+
+
+_ISSUED: "weakref.WeakSet[Admitted]" = weakref.WeakSet()
+
+
+class FeasibilityChecker(LayerChecker):
+    """Projection, six layers, and the decision: the only maker of `Admitted`."""
+
+    def admit(self, proposal: Proposal, *, context: Context) -> Admitted | Rejected:
+        """Project, check and decide on one proposal."""
+        return self.admit_many([proposal], [context])[0]
+
+    def admit_many(
+        self, proposals: Sequence[Proposal], contexts: Sequence[Context]
+    ) -> list[Admitted | Rejected]:
+        """Project, check and decide on many proposals, each with its own context."""
+        projected = [
+            self.project(proposal, context=context)
+            for proposal, context in zip(proposals, contexts, strict=True)
+        ]
+        verdicts = self.check_many(projected, contexts)
+        return [
+            _decide(chunk, verdict, context.now_s)
+            for chunk, verdict, context in zip(projected, verdicts, contexts, strict=True)
+        ]
+
+
+def _decide(projected: Projected, verdict: Verdict, now_s: float) -> Admitted | Rejected:
+    if verdict.passed:
+        return Admitted(projected=projected, verdict=verdict, admitted_at_s=now_s, seal=_SEAL)
+    return Rejected(projected, verdict, now_s)

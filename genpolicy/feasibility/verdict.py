@@ -1,0 +1,96 @@
+"""The verdict on one chunk: six layers in order, the first reason, a margin each."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from genpolicy.feasibility.settings import CHECKS_BY_LAYER, LAYERS
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LayerVerdict:
+    """One layer's answer.
+
+    Attributes:
+        name: Layer.
+        passed: None where an earlier layer had already rejected.
+        reason: Name of the first check that failed; empty otherwise.
+        margin: Limit minus value of the check that decided: of the failed one, or of the
+            tightest one (relative to its limit). In the check's unit; NaN where not reached.
+        check: Name of the check that the margin belongs to.
+    """
+
+    name: str
+    passed: bool | None
+    reason: str
+    margin: float
+    check: str
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Answer of the six layers, always six of them, in order.
+
+    Attributes:
+        layers: One verdict each.
+        margins: Limit minus value of every check that was evaluated.
+        rows: First row that was checked, and the row behind the last one.
+        detail: What touched what, for a collision; empty otherwise.
+    """
+
+    layers: tuple[LayerVerdict, ...]
+    margins: Mapping[str, float]
+    rows: tuple[int, int]
+    detail: str = ""
+
+    @property
+    def passed(self) -> bool:
+        """Every layer was reached and passed."""
+        return len(self.layers) == len(LAYERS) and all(v.passed is True for v in self.layers)
+
+    @property
+    def first_reason(self) -> str:
+        """Name of the check that rejected first; empty if none did."""
+        return next((v.reason for v in self.layers if v.passed is False), "")
+
+    @property
+    def first_layer(self) -> str:
+        """Name of the layer that rejected first; empty if none did."""
+        return next((v.name for v in self.layers if v.passed is False), "")
+
+    def layer(self, name: str) -> LayerVerdict:
+        """The verdict of the named layer."""
+        return self.layers[LAYERS.index(name)]
+
+
+def judge_layer(
+    name: str, margins: Mapping[str, float], scales: Mapping[str, float], disabled: frozenset[str]
+) -> LayerVerdict:
+    """Verdict of one layer from the margins of its checks; a missing or NaN margin fails.
+
+    Args:
+        name: Layer.
+        margins: Margin per check.
+        scales: Size of each check's limit, to find the tightest one; 1 where absent.
+        disabled: Checks to leave out.
+    """
+    tightest, tightest_part, tightest_margin = "", float("inf"), float("nan")
+    for check in CHECKS_BY_LAYER[name]:
+        if check in disabled:
+            continue
+        margin = margins.get(check, float("nan"))
+        if not margin >= 0:
+            return LayerVerdict(name, False, check, margin, check)
+        part = margin / scales.get(check, 1.0)
+        if part < tightest_part or not tightest:
+            tightest, tightest_part, tightest_margin = check, part, margin
+    return LayerVerdict(name, True, "", tightest_margin, tightest)
+
+
+def not_reached(name: str) -> LayerVerdict:
+    """Layer behind the one that rejected."""
+    return LayerVerdict(name, None, "", float("nan"), "")
