@@ -17,7 +17,8 @@ NOT_CODE_DATA = {".py", ".pyc", ".pyi"}
 
 @cache
 def graph() -> grimp.ImportGraph:
-    return grimp.build_graph(*PACKAGES, cache_dir=None)
+    # An import for the type checker only cannot change what a stage does.
+    return grimp.build_graph(*PACKAGES, cache_dir=None, exclude_type_checking_imports=True)
 
 
 @cache
