@@ -1,0 +1,161 @@
+"""HTML pages: one self-contained file per gate, and the ladder's front page.
+
+Autoescape is on and nothing from data is marked safe; the only markup passed in are the figures
+drawn here. Numbers stand as `<data value="...">` with the JSON number, so that a test can read
+them back.
+"""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from gates.card import DRAFT_PATH, TrialCard
+from gates.chain import limit_text, measured_text
+from gates.evidence import Evidence
+from gates.gate_e import Params as CardParams
+from gates.gate_e import examine
+from gates.ladder import NAMES
+from gates.models import GATES, Gate, GateReport, read_report, report_bytes
+from gates.render import plots_feasibility, plots_need, plots_stress, plots_time
+from gates.render.figures import Plot, draw_all
+from gates.signing import utc_today
+from gates.verdicts import first_unmet
+from genpolicy.errors import IntegrityError
+from genpolicy.integrity.hashing import sha256_bytes
+
+MARKS = {
+    "PASS": "✓",
+    "FAIL": "✕",
+    "INCONCLUSIVE": "?",
+    "PENDING_REVIEW": "…",
+    "NOT JUDGED": "·",
+    "UNREADABLE": "✕",
+}
+QUESTIONS: dict[str, str] = {
+    "A": "Does one observation truly admit several valid actions that simpler policies lose?",
+    "B": "Is a candidate pinned, and does it come back the same: samples, NFE, latency?",
+    "C": "Of many candidates, which are valid in every layer, and does anything else get through?",
+    "D": "On identical starts and deadlines, is the gain larger than its cost?",
+    "E": "Has an independent person read all this and signed a reduced envelope?",
+}
+PLOTS: dict[str, tuple[Plot, ...]] = {
+    "A": plots_need.PLOTS,
+    "B": plots_time.PLOTS,
+    "C": plots_feasibility.PLOTS,
+    "D": plots_stress.PLOTS,
+    "E": (),
+}
+
+
+def exact(value: float) -> str:
+    """A number as JSON writes it."""
+    return json.dumps(value)
+
+
+def short(value: float) -> str:
+    """A number for the eye, six significant digits."""
+    return f"{value:.6g}"
+
+
+def gate_page(root: Path, report: GateReport) -> str:
+    """HTML of one gate's report; figures are drawn from the evidence below `root`."""
+    decided = first_unmet(report.criteria, report.verdict)
+    text = f"{measured_text(decided)}, required {limit_text(decided)}" if decided else ""
+    state, card = _card(root, report)
+    return _render(
+        "gate.html",
+        current=report.gate,
+        report=report,
+        name=NAMES[report.gate],
+        question=QUESTIONS[report.gate],
+        decided=decided,
+        decided_text=text,
+        pictures=draw_all(PLOTS[report.gate], Evidence(root), report),
+        card=card,
+        card_state=state,
+        digest=sha256_bytes(report_bytes(report)),
+    )
+
+
+def index_page(root: Path) -> str:
+    """HTML of the ladder, from the reports as they lie there."""
+    rows = [_row(root, gate) for gate in GATES]
+    return _render("index.html", current="", rows=rows)
+
+
+def _row(root: Path, gate: Gate) -> dict[str, Any]:
+    row: dict[str, Any] = {
+        "gate": gate,
+        "name": NAMES[gate],
+        "question": QUESTIONS[gate],
+        "candidates": {},
+        "decided": "",
+        "decision": "",
+        "report": False,
+        "verdict": "NOT JUDGED",
+    }
+    if not (root / f"reports/gate_{gate.lower()}.json").is_file():
+        return row
+    try:
+        report, _ = read_report(root, gate)
+    except IntegrityError as error:
+        return {**row, "verdict": "UNREADABLE", "decision": str(error)}
+    decided = first_unmet(report.criteria, report.verdict)
+    if decided:
+        of = f" ({decided.candidate})" if decided.candidate else ""
+        row["decided"] = (
+            f"{decided.id}{of}: {measured_text(decided)}, required {limit_text(decided)}"
+        )
+    row.update(
+        verdict=report.verdict,
+        candidates=report.candidates,
+        decision=report.decision,
+        report=True,
+    )
+    return row
+
+
+def _card(root: Path, report: GateReport) -> tuple[str, list[tuple[str, str]]]:
+    if report.gate != "E" or not (root / DRAFT_PATH).is_file():
+        return "", []
+    params = CardParams.model_validate_json(json.dumps(report.settings))
+    dossier = examine(root, params, today=utc_today())
+    card: TrialCard | None = dossier.signed.card if dossier.signed else dossier.draft
+    if card is None:
+        return "", []
+    state = "signed" if dossier.signed else "draft, not signed"
+    return state, [(key, _field(value)) for key, value in card.model_dump(mode="json").items()]
+
+
+def _field(value: Any) -> str:
+    if value in (None, "", [], {}):
+        return ""
+    if isinstance(value, dict):
+        return "; ".join(f"{key}: {item}" for key, item in value.items())
+    if isinstance(value, list):
+        return "; ".join(str(item) for item in value)
+    return str(value)
+
+
+def _render(template: str, **values: Any) -> str:
+    environment = Environment(
+        loader=PackageLoader("gates.render"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    source, _, _ = PackageLoader("gates.render").get_source(environment, "style.css")
+    page = environment.get_template(template)
+    return page.render(
+        style=Markup(source),
+        gates=GATES,
+        marks=MARKS,
+        exact=exact,
+        short=short,
+        plain=lambda value: json.dumps(value, ensure_ascii=False),
+        **values,
+    )

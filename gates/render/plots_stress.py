@@ -1,0 +1,127 @@
+"""Figures of Gate D: success per condition, action age, outcomes."""
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from gates.evidence import Evidence, MissingEvidenceError, flags, numbers
+from gates.gate_d import ROLLOUTS
+from gates.models import GateReport
+from gates.render.figures import HATCHES, PALETTE, Plot, colours, new_figure
+from gates.render.limits import draw_limit
+from genpolicy.statistics.intervals import clopper_pearson
+
+OUTCOMES = ("success", "failed", "timeout", "stopped", "collision")
+
+
+def _success(evidence: Evidence, report: GateReport) -> Figure:
+    frame = evidence.frame(ROLLOUTS, "method", "perturbation", "success")
+    methods, conditions = sorted(set(frame["method"])), sorted(set(frame["perturbation"]))
+    conditions.sort(key=lambda name: name != "nominal")
+    colour = colours(methods)
+    level = float(report.settings.get("confidence", 0.95))
+    figure, (axes,) = new_figure(height=1.2 + 0.12 * len(methods) * len(conditions))
+    step = 0.8 / len(methods)
+    for rank, method in enumerate(methods):
+        for place, condition in enumerate(conditions):
+            rows = frame[(frame["method"] == method) & (frame["perturbation"] == condition)]
+            if len(rows) == 0:
+                continue
+            hits, height = flags(rows, "success"), place - 0.4 + step * (rank + 0.5)
+            low, high = clopper_pearson(int(hits.sum()), len(hits), level)
+            axes.hlines(height, low, high, color=colour[method], lw=1.8)
+            axes.plot([hits.mean()], [height], "o", color=colour[method], ms=4)
+        axes.plot([], [], "o-", color=colour[method], label=method)
+    counts = frame.groupby("perturbation").size()
+    labels = [f"{name} (n = {int(counts[name]) // len(methods)} each)" for name in conditions]
+    axes.set_yticks(np.arange(len(conditions)), labels)
+    axes.invert_yaxis()
+    axes.set_xlim(0, 1.02)
+    axes.set_xlabel(f"share of successful rollouts, exact {level:.0%} interval over rollouts")
+    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    return figure
+
+
+def _age(evidence: Evidence, report: GateReport) -> Figure:
+    frame = evidence.frame(ROLLOUTS, "method", "action_age_p95_s", "action_ticks")
+    frame = frame[numbers(frame, "action_ticks") > 0]
+    if len(frame) == 0:
+        raise MissingEvidenceError("no rollout executed an action")
+    colour = colours(list(frame["method"]))
+    figure, (axes,) = new_figure(height=2.8)
+    for method, rows in frame.groupby("method"):
+        ages = np.sort(numbers(rows, "action_age_p95_s"))
+        kept = ages[np.linspace(0, len(ages) - 1, min(len(ages), 200)).astype(int)]
+        share = np.linspace(1 / len(kept), 1, len(kept))
+        axes.step(kept, share, where="post", color=colour[str(method)], label=str(method))
+    draw_limit(axes, report, "action_age_p95_s")
+    axes.set_xlabel("p95 of the action age in a rollout, s")
+    axes.set_ylabel("share of rollouts")
+    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    return figure
+
+
+def _outcomes(evidence: Evidence, report: GateReport) -> Figure:
+    frame = evidence.frame(ROLLOUTS, "method", "outcome")
+    methods = sorted(set(frame["method"]))
+    names = [*OUTCOMES, *sorted(set(frame["outcome"]) - set(OUTCOMES))]
+    figure, (axes,) = new_figure(height=1.0 + 0.32 * len(methods))
+    start = np.zeros(len(methods))
+    for rank, name in enumerate(names):
+        shares = np.array(
+            [float((frame.loc[frame["method"] == m, "outcome"] == name).mean()) for m in methods]
+        )
+        axes.barh(
+            np.arange(len(methods)),
+            shares,
+            left=start,
+            height=0.6,
+            color=PALETTE[(rank + 2) % len(PALETTE)],
+            hatch=HATCHES[rank % len(HATCHES)],
+            edgecolor="white",
+            label=str(name),
+        )
+        start += shares
+    axes.set_yticks(np.arange(len(methods)), methods)
+    axes.set_xlim(0, 1)
+    axes.set_xlabel("share of rollouts, all conditions")
+    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    return figure
+
+
+def _force(evidence: Evidence, report: GateReport) -> Figure:
+    frame = evidence.frame(ROLLOUTS, "method", "force_peak_n")
+    methods = sorted(set(frame["method"]))
+    colour = colours(methods)
+    figure, (axes,) = new_figure(height=1.0 + 0.32 * len(methods))
+    for place, method in enumerate(methods):
+        values = numbers(frame[frame["method"] == method], "force_peak_n")
+        low, middle, high = np.quantile(values, [0.05, 0.5, 0.95], method="higher")
+        axes.hlines(place, low, high, color=colour[method], lw=4, alpha=0.5)
+        axes.plot([middle], [place], "o", color=colour[method])
+        axes.plot([values.max()], [place], ">", color=colour[method], ms=4)
+    axes.set_yticks(np.arange(len(methods)), methods)
+    draw_limit(axes, report, "force_peak_p95_n")
+    axes.set_xlabel(
+        "peak contact force in a rollout, N (dot median, band 5 to 95 %, arrow maximum)"
+    )
+    return figure
+
+
+PLOTS = (
+    Plot(
+        "Success, by condition and method",
+        "All methods began from identical states. Points are shares, lines exact intervals. "
+        "The promotion test itself is paired by start; see the e-value above.",
+        ROLLOUTS,
+        _success,
+    ),
+    Plot(
+        "Action age",
+        "How old the observation behind an action is when the controller accepts it; "
+        "dotted: the limit.",
+        ROLLOUTS,
+        _age,
+    ),
+    Plot("How rollouts end", "Each rollout ends in one named outcome.", ROLLOUTS, _outcomes),
+    Plot("Contact force", "Peaks of simulated contact; no limit for hardware.", ROLLOUTS, _force),
+)

@@ -1,0 +1,59 @@
+"""Writing reports: judge, render, and put the JSON there last.
+
+The old JSON is removed first, so that a crash in between leaves no verdict rather than an old
+one. Beside it lies `gate_<x>.verdict.json`, which holds the verdicts alone: a pipeline can depend
+on it, so that a changed number that changes no verdict starts no training. It is a trigger, never
+proof; admission reads the full report and proves it.
+"""
+
+import contextlib
+from pathlib import Path
+
+from gates.ladder import judge
+from gates.models import Gate, GateReport, report_bytes, report_path
+from gates.render.page import gate_page, index_page
+from gates.render.summary import markdown
+from genpolicy.errors import BadInputError
+from genpolicy.integrity.atomic import write_bytes
+from genpolicy.integrity.documents import canonical_json
+
+
+def write_gate(root: Path, gate: Gate) -> GateReport:
+    """Judge a gate and write its report: HTML, Markdown, verdict trigger, then JSON.
+
+    A FAIL is a result like any other and raises nothing.
+
+    Raises:
+        ConfigError: The section of `params.yaml` is missing or wrong.
+        BadInputError: Evidence that is not what it claims to be, or an unwritable place.
+    """
+    base = root / report_path(gate)
+    _remove(base)
+    report = judge(root, gate)
+    write_bytes(base.with_suffix(".html"), gate_page(root, report).encode())
+    write_bytes(base.with_suffix(".md"), markdown(report).encode())
+    verdicts = {"gate": gate, "verdict": report.verdict, "candidates": report.candidates}
+    write_bytes(base.with_suffix(".verdict.json"), canonical_json(verdicts))
+    write_bytes(base, report_bytes(report))
+    write_index(root)
+    return report
+
+
+def write_index(root: Path) -> Path:
+    """Write the ladder's front page from the reports that lie there."""
+    path = root / "reports" / "index.html"
+    write_bytes(path, index_page(root).encode())
+    return path
+
+
+def _remove(path: Path) -> None:
+    try:
+        with contextlib.suppress(FileNotFoundError):
+            path.unlink()
+    except OSError as error:
+        raise BadInputError(
+            where=str(path),
+            found=f"not removable ({error.strerror})",
+            expected="a writable reports folder",
+            action="Fix the permissions, then judge again.",
+        ) from error
