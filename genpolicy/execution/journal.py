@@ -1,0 +1,205 @@
+"""The journal: every event of a session, append-only, and its MCAP file.
+
+One session is one rollout. An event is `(n, kind, time_ns, payload)` where `n` counts from 0 in
+its session. In the file each kind has its topic (`/journal/<kind>`), `log_time` is the event's
+time, and the JSON message is the payload plus `session`, `n` and `t`. Arrays of actions are hex
+of little-endian float64 rows, so that equality is equality of bits (`decode_actions`).
+"""
+
+import io
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mcap.exceptions import McapError
+from mcap.reader import make_reader
+from mcap.writer import CompressionType, Writer
+from numpy.typing import NDArray
+
+from genpolicy.contract.action import ACTION_DIM
+from genpolicy.errors import BadInputError, ContractError
+from genpolicy.execution.settings import to_ns
+from genpolicy.integrity.atomic import write_bytes
+from genpolicy.integrity.documents import canonical_json
+from genpolicy.integrity.hashing import sha256_bytes_of
+
+Array = NDArray[np.float64]
+
+JOURNAL_VERSION = 1
+MAXIMUM_UNCOMPRESSED_BYTES = 8 << 30
+MAXIMUM_RECORD_BYTES = 64 << 20
+
+EVENT_FIELDS: dict[str, tuple[str, ...]] = {
+    "session": ("version", "labels", "execution_horizon", "period_ns", "maximum_age_ns",
+                "watchdog_ns", "queue_capacity", "fallback_hash", "disabled_checks"),
+    "observation": ("event_time_ns", "phase", "calibration_epoch", "used", "ignored_because"),
+    "phase": ("event_time_ns", "old", "new"),
+    "epoch": ("event_time_ns", "old", "new"),
+    "active": ("checkpoint", "sampler"),
+    "invocation": ("id", "stage", "detail"),
+    "candidate": ("chunk_id", "method", "index", "layers", "first_reason"),
+    "enqueue": ("arrival", "chunk_id", "source", "method", "condition_ns", "start_ns", "period_ns",
+                "valid_until_ns", "phase", "calibration_epoch", "checkpoint", "sampler",
+                "session_epoch", "predecessor", "rows", "actions", "actions_sha256",
+                "checked_rows", "layers"),
+    "discard": ("arrival", "chunk_id", "at", "reason", "ended", "rows"),
+    "finish": ("arrival", "chunk_id", "ended", "rows"),
+    "accept": ("arrival", "chunk_id", "row", "sequence", "age_ns", "action"),
+    "fallback": ("arrival", "chunk_id", "row", "sequence", "age_ns", "action"),
+    "refuse": ("arrival", "chunk_id", "row", "reason"),
+    "hold": ("reason",),
+    "supervisor": ("event", "state", "detail"),
+    "recovery": ("old", "new", "cause", "phase", "failures"),
+    "invalidate": ("reason", "before_ns"),
+    "mode": ("old", "new"),
+    "reset": ("session_epoch",),
+    "end": ("chunks", "actions", "events"),
+}  # fmt: skip
+"""Payload of each kind of event; `session`, `n` and `t` (ns) are in every message."""
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """One event as read back: which session, its number there, kind, time in ns and payload."""
+
+    session: str
+    n: int
+    kind: str
+    t: int
+    payload: dict[str, Any]
+
+
+class Journal:
+    """Append-only events of one session.
+
+    Args:
+        session: Name of the rollout, unique within a file.
+        labels: Free text about it (method, perturbation, start), written with the first event.
+    """
+
+    def __init__(self, session: str, labels: Mapping[str, str] | None = None) -> None:
+        self.session = session
+        self.labels = dict(labels or {})
+        self._events: list[tuple[str, int, dict[str, Any]]] = []
+
+    def __len__(self) -> int:
+        return len(self._events)
+
+    def add(self, kind: str, time_ns: int, payload: dict[str, Any]) -> None:
+        """Append an event; the payload is kept, not copied, and must not change afterwards."""
+        self._events.append((kind, time_ns, payload))
+
+    def candidate(
+        self,
+        now_s: float,
+        *,
+        chunk_id: str,
+        method: str,
+        index: int,
+        layers: Mapping[str, bool | None],
+        first_reason: str | None,
+    ) -> None:
+        """Record the verdict on one candidate: passed, failed or not reached, per layer."""
+        payload = {
+            "chunk_id": chunk_id, "method": method, "index": index,
+            "layers": dict(layers), "first_reason": first_reason,
+        }  # fmt: skip
+        self.add("candidate", to_ns(now_s), payload)
+
+    def invocation(self, now_s: float, *, invocation_id: str, stage: str, detail: str = "") -> None:
+        """Record the begin or the end of an invocation."""
+        payload = {"id": invocation_id, "stage": stage, "detail": detail}
+        self.add("invocation", to_ns(now_s), payload)
+
+    def events(self) -> list[Event]:
+        """The events so far, in order."""
+        return [
+            Event(self.session, n, kind, time_ns, payload)
+            for n, (kind, time_ns, payload) in enumerate(self._events)
+        ]
+
+
+def encode_actions(actions: Array) -> str:
+    """Hex of the little-endian float64 bytes, row after row."""
+    return np.ascontiguousarray(actions, dtype="<f8").tobytes().hex()
+
+
+def decode_actions(text: str) -> Array:
+    """Inverse of `encode_actions`. Shape (rows, 10)."""
+    return np.frombuffer(bytes.fromhex(text), dtype="<f8").reshape(-1, ACTION_DIM)
+
+
+def write_journal(path: Path, sessions: Iterable[Journal]) -> None:
+    """Write sessions into one MCAP file: same events, same bytes.
+
+    Raises:
+        ContractError: Two sessions have one name, or an event is of no known kind.
+        BadInputError: The place cannot be written.
+    """
+    buffer = io.BytesIO()
+    writer = Writer(buffer, compression=CompressionType.ZSTD, enable_data_crcs=True)
+    writer.start(profile="", library="genpolicy")
+    channels: dict[str, int] = {}
+    for kind, fields in EVENT_FIELDS.items():
+        schema = {"type": "object", "required": ["session", "n", "t", *fields]}
+        schema_id = writer.register_schema(
+            f"genpolicy.journal.{kind}", "jsonschema", canonical_json(schema)
+        )
+        channels[kind] = writer.register_channel(f"/journal/{kind}", "json", schema_id)
+    encode = json.JSONEncoder(separators=(",", ":"), allow_nan=False).encode
+    names: set[str] = set()
+    for journal in sessions:
+        if journal.session in names:
+            raise ContractError(
+                where=str(path),
+                found=f"two sessions named {journal.session!r}",
+                expected="unique session names",
+                action="Name each rollout once.",
+            )
+        names.add(journal.session)
+        for n, (kind, time_ns, payload) in enumerate(journal._events):
+            message = {"session": journal.session, "n": n, "t": time_ns, **payload}
+            writer.add_message(
+                channels[kind],
+                log_time=max(time_ns, 0),
+                data=encode(message).encode(),
+                publish_time=max(time_ns, 0),
+                sequence=n,
+            )
+    writer.finish()  # type: ignore[no-untyped-call]
+    write_bytes(path, buffer.getvalue())
+
+
+def read_journal(path: Path) -> dict[str, list[Event]]:
+    """Events of each session of a journal file, in order.
+
+    Raises:
+        IntegrityError: No regular file.
+        BadInputError: Not a whole, well-formed journal.
+    """
+    _, data = sha256_bytes_of(path, keep=True)
+    sessions: dict[str, list[Event]] = {}
+    try:
+        reader = make_reader(io.BytesIO(data), validate_crcs=True)
+        summary = reader.get_summary()
+        if summary is None or summary.statistics is None:
+            raise ValueError("no summary")
+        size = sum(index.uncompressed_size for index in summary.chunk_indexes)
+        if size > MAXIMUM_UNCOMPRESSED_BYTES:
+            raise ValueError(f"{size} bytes uncompressed")
+        for _, channel, message in reader.iter_messages(log_time_order=False):
+            payload = json.loads(message.data)
+            session, n, time_ns = payload.pop("session"), payload.pop("n"), payload.pop("t")
+            kind = channel.topic.removeprefix("/journal/")
+            sessions.setdefault(session, []).append(Event(session, n, kind, time_ns, payload))
+    except (McapError, ValueError, KeyError, TypeError, AttributeError, EOFError) as error:
+        raise BadInputError(
+            where=str(path),
+            found=f"no journal ({type(error).__name__}: {error})",
+            expected="a whole MCAP journal",
+            action="Re-run the stage that writes it.",
+        ) from error
+    return sessions

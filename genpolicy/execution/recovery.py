@@ -1,0 +1,298 @@
+"""Recovery: a state machine by task phase over hold, retreat, classical return, human, abort.
+
+Resampling the policy is no recovery. Every phase has its own plan; a stop is reachable from every
+state; failures are bounded; every transition is journaled. The trajectory of a primitive comes
+from the task and goes through feasibility like any other proposal.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from genpolicy.contract.chunk import ChunkMetadata, Proposal
+from genpolicy.errors import ConfigError, ContractError
+from genpolicy.execution.executor import Executor
+from genpolicy.execution.journal import Journal
+from genpolicy.execution.settings import to_ns
+
+if TYPE_CHECKING:
+    from genpolicy.feasibility.admission import Admitted
+
+Array = NDArray[np.float64]
+
+
+class RecoveryState(StrEnum):
+    """Where recovery stands; IDLE while the policy commands."""
+
+    IDLE = "idle"
+    HOLD = "hold"
+    RETREAT = "retreat"
+    CLASSICAL_RETURN = "classical_return"
+    ASK_HUMAN = "ask_human"
+    ABORT = "abort"
+    STOPPED = "stopped"
+
+
+PRIMITIVES = (RecoveryState.RETREAT, RecoveryState.CLASSICAL_RETURN)
+TERMINAL = frozenset({RecoveryState.ABORT, RecoveryState.STOPPED})
+
+
+@dataclass(frozen=True)
+class RecoverySettings:
+    """How recovery goes in each phase.
+
+    Attributes:
+        plans: Per phase the primitives after the hold, in order, of RETREAT and CLASSICAL_RETURN;
+            a phase without a plan holds and asks a human.
+        hold_s: How long it holds before the first primitive.
+        primitive_timeout_s: A primitive that takes longer has failed.
+        human_timeout_s: How long it waits for a person before it aborts.
+        maximum_failures: Failed primitives after which it aborts.
+        maximum_attempts: Recoveries begun after which it asks a human at once.
+    """
+
+    plans: Mapping[str, tuple[RecoveryState, ...]]
+    hold_s: float
+    primitive_timeout_s: float
+    human_timeout_s: float
+    maximum_failures: int = 3
+    maximum_attempts: int = 3
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "plans", MappingProxyType(dict(self.plans)))
+        for phase, plan in self.plans.items():
+            if any(state not in PRIMITIVES for state in plan) or len(set(plan)) != len(plan):
+                raise ConfigError(
+                    where=f"recovery plan of phase {phase}",
+                    found=repr(plan),
+                    expected="retreat and classical_return, each at most once",
+                    action="Correct it in params.yaml.",
+                )
+        times = (self.hold_s, self.primitive_timeout_s, self.human_timeout_s)
+        counts = (self.maximum_failures, self.maximum_attempts)
+        if not (all(0 <= t < math.inf for t in times) and all(n >= 1 for n in counts)):
+            raise ConfigError(
+                where="recovery settings",
+                found=repr(self),
+                expected="finite times >= 0 s and counts >= 1",
+                action="Correct them in params.yaml.",
+            )
+
+
+class Recovery:
+    """The state machine of one session.
+
+    Attributes:
+        state: Where it stands.
+        failures: Failed primitives since the last reset.
+        attempts: Recoveries begun since the last reset.
+        recovered: Recoveries that handed back to the policy without a person.
+    """
+
+    def __init__(self, settings: RecoverySettings, journal: Journal) -> None:
+        self.settings = settings
+        self.state = RecoveryState.IDLE
+        self.failures = self.attempts = self.recovered = 0
+        self._journal = journal
+        self._phase = ""
+        self._since_ns = 0
+        self._hold_ns = to_ns(settings.hold_s)
+        self._primitive_ns = to_ns(settings.primitive_timeout_s)
+        self._human_ns = to_ns(settings.human_timeout_s)
+
+    @property
+    def active(self) -> bool:
+        """Whether recovery, not the policy, is in charge."""
+        return self.state is not RecoveryState.IDLE
+
+    def trigger(self, now_s: float, phase: str, cause: str) -> None:
+        """Begin, from IDLE only; a trigger during recovery changes nothing."""
+        if self.state is not RecoveryState.IDLE:
+            return
+        self.attempts += 1
+        self._phase = phase
+        self._go(now_s, RecoveryState.HOLD, cause)
+
+    def advance(self, now_s: float) -> RecoveryState:
+        """Let time act: the hold ends, a primitive or a person takes too long."""
+        waited_ns = to_ns(now_s) - self._since_ns
+        if self.state is RecoveryState.HOLD and waited_ns >= self._hold_ns:
+            plan = self._plan()
+            exhausted = self.attempts > self.settings.maximum_attempts
+            nowhere = exhausted or not plan
+            following = RecoveryState.ASK_HUMAN if nowhere else plan[0]
+            self._go(now_s, following, "attempts exhausted" if exhausted else "hold over")
+        elif self.state in PRIMITIVES and waited_ns > self._primitive_ns:
+            self.primitive_failed(now_s, "timeout")
+        elif self.state is RecoveryState.ASK_HUMAN and waited_ns > self._human_ns:
+            self._go(now_s, RecoveryState.ABORT, "no person answered")
+        return self.state
+
+    def primitive_succeeded(self, now_s: float) -> None:
+        """The primitive reached its goal: the next of the plan, or back to the policy."""
+        self._expect(*PRIMITIVES)
+        plan = self._plan()
+        following = plan.index(self.state) + 1
+        if following < len(plan):
+            self._go(now_s, plan[following], "primitive reached its goal")
+        else:
+            self.recovered += 1
+            self._go(now_s, RecoveryState.IDLE, "recovered")
+
+    def primitive_failed(self, now_s: float, cause: str) -> None:
+        """The primitive was rejected, lost or too slow: hold and try again, or abort."""
+        self._expect(*PRIMITIVES)
+        self.failures += 1
+        last = self.failures >= self.settings.maximum_failures
+        self._go(now_s, RecoveryState.ABORT if last else RecoveryState.HOLD, cause)
+
+    def human_resolved(self, now_s: float, person: str) -> None:
+        """A person has put things right; the policy may go on.
+
+        Raises:
+            ContractError: Nobody was asked, or no person is named.
+        """
+        self._expect(RecoveryState.ASK_HUMAN)
+        if not person.strip():
+            self._refuse("a resolution without a person", "a person's name")
+        self._go(now_s, RecoveryState.IDLE, f"resolved by {person}")
+
+    def stop(self, now_s: float, cause: str) -> None:
+        """From every state; stays until `human_reset`."""
+        if self.state is not RecoveryState.STOPPED:
+            self._go(now_s, RecoveryState.STOPPED, cause)
+
+    def human_reset(self, now_s: float, person: str) -> None:
+        """Begin anew after a stop or an abort; counters return to 0.
+
+        Raises:
+            ContractError: No person is named.
+        """
+        if not person.strip():
+            self._refuse("a reset without a person", "a person's name")
+        self.failures = self.attempts = 0
+        self._go(now_s, RecoveryState.IDLE, f"reset by {person}")
+
+    def _plan(self) -> tuple[RecoveryState, ...]:
+        return self.settings.plans.get(self._phase, ())
+
+    def _go(self, now_s: float, state: RecoveryState, cause: str) -> None:
+        payload = {
+            "old": str(self.state), "new": str(state), "cause": cause, "phase": self._phase,
+            "failures": self.failures,
+        }  # fmt: skip
+        self._since_ns = to_ns(now_s)
+        self._journal.add("recovery", self._since_ns, payload)
+        self.state = state
+
+    def _expect(self, *states: RecoveryState) -> None:
+        if self.state not in states:
+            self._refuse(f"in state {self.state}", f"one of {', '.join(states)}")
+
+    def _refuse(self, found: str, expected: str) -> None:
+        raise ContractError(
+            where="recovery", found=found, expected=expected, action="Hold and ask a person."
+        )
+
+
+@dataclass(frozen=True)
+class Primitive:
+    """What the task plans for a state: the next actions, or that the goal is reached.
+
+    Attributes:
+        actions: Actions from now on. Shape (N, 10); ignored once reached.
+        reached: Whether the primitive's goal is reached.
+    """
+
+    actions: Array
+    reached: bool = False
+
+
+Plan = Callable[[RecoveryState], Primitive]
+Admit = Callable[[Proposal], "Admitted | None"]
+
+
+def fallback_metadata(
+    executor: Executor, *, now_s: float, chunk_id: str, event_time_s: float, phase: str, epoch: str
+) -> ChunkMetadata:
+    """Metadata of a chunk of the task's fallback, starting now, as an explicit re-plan."""
+    settings = executor.settings
+    return ChunkMetadata(
+        chunk_id=chunk_id,
+        condition_observation_event_time_s=event_time_s,
+        policy_checkpoint_hash=settings.fallback_hash,
+        sampler_config_hash=settings.fallback_hash,
+        action_start_time_s=now_s,
+        action_period_s=settings.action_period_s,
+        valid_until_s=now_s + settings.execution_horizon * settings.action_period_s,
+        task_phase=phase,
+        calibration_epoch=epoch,
+        predecessor_chunk_id="",
+        session_epoch=executor.session_epoch,
+        method="fallback",
+        candidate_index=0,
+    )
+
+
+def step(
+    recovery: Recovery,
+    executor: Executor,
+    *,
+    now_s: float,
+    metadata: Callable[[], ChunkMetadata],
+    plan: Plan,
+    admit: Admit,
+) -> RecoveryState:
+    """One control step of recovery, before `Executor.tick`: plan, admit, deliver, hand back.
+
+    While recovery is active the policy does not command: its chunks are discarded as `stopped`.
+    What is left of a primitive that ended is discarded too.
+
+    Args:
+        recovery: The state machine, already triggered.
+        executor: Where admitted fallback chunks go.
+        now_s: Time, s.
+        metadata: Makes the metadata of a new fallback chunk (`fallback_metadata`).
+        plan: The task's fallback.
+        admit: Feasibility; None when it rejects.
+
+    Returns:
+        The state after this step.
+    """
+    if executor.stub.supervisor.stopped:
+        recovery.stop(now_s, "supervisor")
+    before = recovery.state
+    if recovery.advance(now_s) in PRIMITIVES:
+        executor.begin_fallback(now_s)
+        if executor.needs_invocation(now_s):
+            _plan_primitive(recovery, executor, now_s, metadata, plan, admit)
+    over = before in PRIMITIVES and recovery.state not in PRIMITIVES
+    if over or not recovery.active:
+        executor.end_fallback(now_s)
+    if recovery.active:
+        executor.begin_fallback(now_s)
+    return recovery.state
+
+
+def _plan_primitive(  # noqa: PLR0917
+    recovery: Recovery,
+    executor: Executor,
+    now_s: float,
+    metadata: Callable[[], ChunkMetadata],
+    plan: Plan,
+    admit: Admit,
+) -> None:
+    primitive = plan(recovery.state)
+    if primitive.reached:
+        recovery.primitive_succeeded(now_s)
+        return
+    admitted = admit(Proposal(metadata(), primitive.actions, selected_by=str(recovery.state)))
+    reason = executor.deliver_fallback(admitted, now_s) if admitted is not None else "rejected"
+    if reason is not None:
+        recovery.primitive_failed(now_s, f"fallback {reason}")

@@ -1,0 +1,137 @@
+"""Settings of the executor, its time arithmetic, and the names of its checks.
+
+All comparisons are made in whole nanoseconds: `n * 0.05` is not a multiple of 0.05 in floating
+point, but rounded to nanoseconds it is one of 50 000 000.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+from genpolicy.errors import ConfigError, NonFiniteError
+
+NS_PER_S = 1_000_000_000
+LAYER_COUNT = 6
+LATE = "late"
+BEYOND_HORIZON = "beyond_execution_horizon"
+
+CHECKS = (
+    "calibration_mismatch",
+    "checked_rows",
+    "checkpoint_mismatch",
+    "collision_event",
+    "duplicate",
+    "end_of_episode",
+    "execution_horizon",
+    "expired",
+    "force_event",
+    "future_observation",
+    "action_hash",
+    "infeasible",
+    "intervention",
+    "observation_divergence",
+    "out_of_order",
+    "phase_transition",
+    "predecessor",
+    "sampler_mismatch",
+    "session_epoch",
+    "stale_observation",
+    "stopped",
+    "superseded",
+    "watchdog",
+    "window",
+)
+"""Names that `disabled_checks` understands; a mutant for each proves the checker is awake."""
+
+
+def to_ns(time_s: float) -> int:
+    """Whole nanoseconds of a time in s.
+
+    Raises:
+        NonFiniteError: NaN, infinite, or too large to convert.
+    """
+    scaled = time_s * NS_PER_S
+    if not math.isfinite(scaled):
+        raise NonFiniteError(
+            where="a time", found=repr(time_s), expected="finite, s", action="Hold; fix the clock."
+        )
+    return round(scaled)
+
+
+@dataclass(frozen=True)
+class ExecutorSettings:
+    """What the executor is held to; times in s, converted to ns once.
+
+    Attributes:
+        execution_horizon: Actions of a chunk that may be executed, H_e >= 1.
+        action_period_s: Time between actions, > 0.
+        maximum_age_s: Largest action age per task phase; a phase without one accepts nothing.
+        watchdog_s: Silence after which the stub holds by itself; at least one period.
+        queue_capacity: Chunks kept; the oldest is dropped beyond it.
+        replan_lead_steps: Executable actions left at which the next invocation begins.
+        maximum_divergence_m: Largest distance of measured from commanded TCP position.
+        fallback_hash: Identity of the task's fallback planner, in place of a checkpoint.
+    """
+
+    execution_horizon: int
+    action_period_s: float
+    maximum_age_s: Mapping[str, float]
+    watchdog_s: float
+    queue_capacity: int
+    replan_lead_steps: int
+    maximum_divergence_m: float = math.inf
+    fallback_hash: str = "classical-fallback"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "maximum_age_s", MappingProxyType(dict(self.maximum_age_s)))
+        rules = {
+            "execution_horizon": self.execution_horizon >= 1,
+            "action_period_s": self.action_period_s > 0 and math.isfinite(self.action_period_s),
+            "watchdog_s": self.watchdog_s >= self.action_period_s
+            and math.isfinite(self.watchdog_s),
+            "queue_capacity": self.queue_capacity >= 1,
+            "replan_lead_steps": self.replan_lead_steps >= 0,
+            "maximum_age_s": all(v >= 0 and math.isfinite(v) for v in self.maximum_age_s.values()),
+            "maximum_divergence_m": self.maximum_divergence_m >= 0,
+            "fallback_hash": bool(self.fallback_hash),
+        }
+        for name, holds in rules.items():
+            if not holds:
+                raise ConfigError(
+                    where=f"executor setting {name}",
+                    found=repr(getattr(self, name)),
+                    expected="finite and in its range (period > 0, watchdog >= period)",
+                    action="Correct it in params.yaml.",
+                )
+
+    @property
+    def period_ns(self) -> int:
+        """Time between actions, ns."""
+        return to_ns(self.action_period_s)
+
+    @property
+    def watchdog_ns(self) -> int:
+        """Silence after which the stub holds, ns."""
+        return to_ns(self.watchdog_s)
+
+    @property
+    def maximum_age_ns(self) -> dict[str, int]:
+        """Largest action age per phase, ns."""
+        return {phase: to_ns(age) for phase, age in self.maximum_age_s.items()}
+
+
+def known_checks(disabled: frozenset[str]) -> frozenset[str]:
+    """`disabled`, refused if it names a check that does not exist.
+
+    Raises:
+        ConfigError: A name is not in `CHECKS`.
+    """
+    for name in sorted(disabled - set(CHECKS)):
+        raise ConfigError(
+            where="disabled_checks",
+            found=repr(name),
+            expected="a name in CHECKS",
+            action="Disabling is for tests of the checker only.",
+        )
+    return disabled

@@ -1,0 +1,169 @@
+"""The supervisor: force and collision gate, watchdog, protective stop, E-stop.
+
+It knows no policy, no chunk and no score; it hears forces, collisions, accepted commands and
+people. A stop is sticky: only a named person resets it (Simplex architecture, ASTM F3269: the
+monitor carries the assurance, the learned function does not).
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from types import MappingProxyType
+
+from genpolicy.errors import ConfigError, ContractError
+from genpolicy.execution.journal import Journal
+from genpolicy.execution.settings import to_ns
+
+
+class SupervisorState(StrEnum):
+    """What the supervisor allows."""
+
+    RUN = "run"
+    WATCHDOG_HOLD = "watchdog_hold"
+    PROTECTIVE_STOP = "protective_stop"
+    EMERGENCY_STOP = "emergency_stop"
+
+
+STOPPED = frozenset({SupervisorState.PROTECTIVE_STOP, SupervisorState.EMERGENCY_STOP})
+
+
+@dataclass(frozen=True)
+class SupervisorSettings:
+    """Limits of the supervisor; none has a default that could be taken for a safe value.
+
+    Attributes:
+        force_limit_n: Largest contact force per task phase, N; a phase without one has limit 0.
+        watchdog_s: Time since the last accepted command after which it holds. At least one period:
+            polled every period, the hold comes within `period + watchdog` (P2).
+        action_period_s: Time between actions, s.
+        silence_stop_s: Time since the last accepted command that ends in a protective stop.
+    """
+
+    force_limit_n: Mapping[str, float]
+    watchdog_s: float
+    action_period_s: float
+    silence_stop_s: float = math.inf
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "force_limit_n", MappingProxyType(dict(self.force_limit_n)))
+        limits_hold = all(limit >= 0 for limit in self.force_limit_n.values())
+        times_hold = self.watchdog_s >= self.action_period_s > 0 and self.silence_stop_s > 0
+        if not (limits_hold and times_hold):
+            raise ConfigError(
+                where="supervisor settings",
+                found=repr(self),
+                expected="limits >= 0 N, watchdog >= period > 0 s, silence > 0 s",
+                action="Correct them in params.yaml.",
+            )
+
+
+class Supervisor:
+    """Independent gate between whatever commands and the controller stub.
+
+    Args:
+        settings: Its limits.
+        journal: Where its events go.
+        watchdog_enabled: False only for the mutant that proves the checker sees a dead watchdog.
+    """
+
+    def __init__(
+        self, settings: SupervisorSettings, journal: Journal, *, watchdog_enabled: bool = True
+    ) -> None:
+        self.settings = settings
+        self.state = SupervisorState.RUN
+        self.resumed_ns = -(1 << 62)
+        self.stops = 0
+        self._journal = journal
+        self._watchdog_ns = to_ns(settings.watchdog_s)
+        self._silence_ns = (
+            to_ns(settings.silence_stop_s) if math.isfinite(settings.silence_stop_s) else None
+        )
+        self._watchdog_enabled = watchdog_enabled
+        self._last_accept_ns: int | None = None
+
+    @property
+    def stopped(self) -> bool:
+        """Whether a protective stop or an E-stop stands."""
+        return self.state in STOPPED
+
+    def observe_force(self, now_s: float, force_n: float, phase: str) -> bool:
+        """Force gate; trips a protective stop above the phase's limit, and on NaN.
+
+        Args:
+            now_s: Time, s.
+            force_n: Largest contact force since the last call, N.
+            phase: Current task phase.
+
+        Returns:
+            Whether it tripped.
+        """
+        margin_n = self.settings.force_limit_n.get(phase, 0.0) - force_n
+        if margin_n >= 0:
+            return False
+        self._stop(to_ns(now_s), SupervisorState.PROTECTIVE_STOP, "force", f"{force_n!r} N {phase}")
+        return True
+
+    def observe_collision(self, now_s: float, collision: bool) -> bool:
+        """Collision gate; trips a protective stop. Returns whether it tripped."""
+        if collision:
+            self._stop(to_ns(now_s), SupervisorState.PROTECTIVE_STOP, "collision", "")
+        return collision
+
+    def protective_stop(self, now_s: float, detail: str) -> None:
+        """Stop on any other cause named in `detail`."""
+        self._stop(to_ns(now_s), SupervisorState.PROTECTIVE_STOP, "protective_stop", detail)
+
+    def emergency_stop(self, now_s: float, detail: str = "") -> None:
+        """E-stop; from every state."""
+        self._stop(to_ns(now_s), SupervisorState.EMERGENCY_STOP, "emergency_stop", detail)
+
+    def human_reset(self, now_s: float, person: str) -> None:
+        """Clear a stop; the only way back to RUN, and it needs a name.
+
+        Raises:
+            ContractError: No person is named.
+        """
+        if not person.strip():
+            raise ContractError(
+                where="supervisor reset",
+                found="a reset without a person",
+                expected="the name of the person who looked",
+                action="Nothing but a person may clear a stop.",
+            )
+        now_ns = to_ns(now_s)
+        self.state = SupervisorState.RUN
+        self.resumed_ns = now_ns
+        self._last_accept_ns = None
+        self._record(now_ns, "human_reset", person)
+
+    def heard_accept(self, now_ns: int) -> None:
+        """An accepted command: feeds the watchdog and ends a watchdog hold, never a stop."""
+        self._last_accept_ns = now_ns
+        if self.state is SupervisorState.WATCHDOG_HOLD:
+            self.state = SupervisorState.RUN
+            self._record(now_ns, "watchdog_recovered", "")
+
+    def poll(self, now_ns: int) -> bool:
+        """Watchdog, on the consumer's clock. Returns whether it has just begun to hold."""
+        if self._last_accept_ns is None or self.stopped or not self._watchdog_enabled:
+            return False
+        silence_ns = now_ns - self._last_accept_ns
+        if self._silence_ns is not None and not self._silence_ns - silence_ns >= 0:
+            self._stop(now_ns, SupervisorState.PROTECTIVE_STOP, "silence", f"{silence_ns} ns")
+            return False
+        if self.state is SupervisorState.RUN and not self._watchdog_ns - silence_ns >= 0:
+            self.state = SupervisorState.WATCHDOG_HOLD
+            self._record(now_ns, "watchdog", f"{silence_ns} ns")
+            return True
+        return False
+
+    def _stop(self, now_ns: int, state: SupervisorState, event: str, detail: str) -> None:
+        if self.state is not SupervisorState.EMERGENCY_STOP:
+            self.state = state
+        self.stops += 1
+        self._record(now_ns, event, detail)
+
+    def _record(self, now_ns: int, event: str, detail: str) -> None:
+        payload = {"event": event, "state": str(self.state), "detail": detail}
+        self._journal.add("supervisor", now_ns, payload)

@@ -1,0 +1,275 @@
+"""The independent checker: re-proves P1-P5, P7 and conservation from the journal alone.
+
+It shares no code with the executor, the stub or feasibility, and believes nothing that they say
+about freshness: phase, calibration, newest observation, voiding events and stops are followed
+again from the raw events, and every accepted action is compared bit for bit with the chunk that
+was admitted. Rules: P1 gate to stub, P2 watchdog, P3 monotone, P4 chain, P5 newest first, P7 stop
+is sticky, `conservation`, `journal` (form), `settings` (declared limits).
+"""
+
+import hashlib
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from genpolicy.contract.action import ACTION_DIM
+from genpolicy.verification.balance import Balance
+from genpolicy.verification.journal_source import Message, read_messages
+from genpolicy.verification.report import CheckReport, Violation
+from genpolicy.verification.world_view import WorldView
+
+LAYERS = 6
+FLOAT_HEX_DIGITS = 16
+ROW_HEX_DIGITS = ACTION_DIM * FLOAT_HEX_DIGITS
+
+
+@dataclass(frozen=True)
+class ExpectedSettings:
+    """What the caller knows that the sessions must have been held to; times in s."""
+
+    execution_horizon: int
+    action_period_s: float
+    maximum_age_s: dict[str, float]
+    watchdog_s: float
+    queue_capacity: int
+
+    def declared(self) -> dict[str, Any]:
+        """The same in the journal's words."""
+        return {
+            "execution_horizon": self.execution_horizon,
+            "period_ns": round(self.action_period_s * 1e9),
+            "maximum_age_ns": {k: round(v * 1e9) for k, v in self.maximum_age_s.items()},
+            "watchdog_ns": round(self.watchdog_s * 1e9),
+            "queue_capacity": self.queue_capacity,
+        }
+
+
+def check_journal(path: Path, expected: ExpectedSettings | None = None) -> CheckReport:
+    """Check a journal file.
+
+    Args:
+        path: MCAP journal of one or more sessions.
+        expected: Settings that every session must declare; None trusts the declaration.
+
+    Raises:
+        IntegrityError: No regular file.
+        BadInputError: Not a whole journal.
+    """
+    return check_messages(read_messages(path), expected)
+
+
+def check_messages(
+    messages: Iterable[tuple[str, Message]], expected: ExpectedSettings | None = None
+) -> CheckReport:
+    """Check events, each `(kind, {"session", "n", "t", ...payload})`, in the order written."""
+    report = CheckReport()
+    sessions: dict[str, _Session] = {}
+    for kind, message in messages:
+        name = str(message.get("session"))
+        if name not in sessions:
+            sessions[name] = _Session(name, report, expected)
+        sessions[name].read(kind, message)
+    for session in sessions.values():
+        session.finish()
+    report.sessions = len(sessions)
+    return report
+
+
+class _Session:
+    """Follows one session."""
+
+    def __init__(self, name: str, report: CheckReport, expected: ExpectedSettings | None) -> None:
+        self.name, self.report, self.expected = name, report, expected
+        self.settings: Message = {}
+        self.world = WorldView()
+        self.balance = Balance()
+        self.chunks: dict[str, Message] = {}
+        self.open: dict[int, Message] = {}
+        self.closed: set[int] = set()
+        self.head: tuple[int, str] | None = None
+        self.n = -1
+        self.t = -(1 << 62)
+        self.ended = False
+        self.last_sequence = -1
+        self.last_start_ns: int | None = None
+        self.last_due_ns: int | None = None
+        self.last_row: dict[int, int] = {}
+        self.unanswered_ns: int | None = None
+
+    def flag(self, rule: str, sentence: str) -> None:
+        """Note a violation at the current event."""
+        self.report.violations.append(Violation(self.name, self.n, rule, sentence))
+
+    def read(self, kind: str, m: Message) -> None:
+        """Follow one event."""
+        self.report.events += 1
+        if m.get("n") != self.n + 1:
+            self.flag("journal.gap", f"Event {m.get('n')} follows event {self.n}.")
+        self.n = m.get("n", self.n + 1)
+        if m["t"] < self.t:
+            self.flag("journal.time", f"Time goes back from {self.t} ns to {m['t']} ns.")
+        self.t = m["t"]
+        if self.ended:
+            self.flag("journal.after_end", f"A {kind} event follows the end of the session.")
+        if (self.n == 0) != (kind == "session"):
+            self.flag("journal.settings", f"Event {self.n} is {kind}; settings stand first, once.")
+        try:
+            self._follow(kind, m)
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            self.flag("journal.malformed", f"A {kind} event cannot be read ({error!r}).")
+
+    def finish(self) -> None:
+        """After the last event."""
+        if not self.ended:
+            self.flag("journal.no_end", "The session has no end; its balance cannot be proved.")
+        self._answered(self.t, final=True)
+
+    def _follow(self, kind: str, m: Message) -> None:
+        if kind in ("accept", "fallback"):
+            self._answered(self.t)
+            self._check_accept(kind, m)
+            self.unanswered_ns = self.t
+        elif kind == "hold":
+            self._answered(self.t)
+            self.unanswered_ns = None
+        elif kind == "session":
+            self._check_settings(m)
+        elif kind == "enqueue":
+            self._check_enqueue(m)
+        elif kind in ("discard", "finish"):
+            self._check_close(kind, m)
+        elif kind == "end":
+            self.ended = True
+            for sentence in self.balance.check_end(m, self.n):
+                self.flag("conservation", sentence)
+        else:
+            for rule, sentence in self.world.follow(kind, m):
+                self.flag(rule, sentence)
+            if kind == "reset":
+                self.head = self.last_due_ns = self.last_start_ns = None
+
+    # P2: silence ------------------------------------------------------------------------------
+
+    def _answered(self, now_ns: int, *, final: bool = False) -> None:
+        """An action, a hold or the end of the session ends the silence after an action."""
+        if self.unanswered_ns is None:
+            return
+        silence_ns = now_ns - self.unanswered_ns
+        limit_ns = self.settings.get("period_ns", 0) + self.settings.get("watchdog_ns", 0)
+        self.report.longest_silence_ns = max(self.report.longest_silence_ns, silence_ns)
+        if not limit_ns - silence_ns >= 0:
+            self.flag("P2.watchdog", f"No action and no hold for {silence_ns} ns.")
+        if final:
+            self.unanswered_ns = None
+
+    # P1, P3, P5, P7: accepted actions ----------------------------------------------------------
+
+    def _check_accept(self, kind: str, m: Message) -> None:
+        if kind == "accept":
+            self.report.checked_actions += 1
+        else:
+            self.report.checked_fallback_actions += 1
+        chunk = self.open.get(m["arrival"])
+        if chunk is None or chunk["chunk_id"] != m["chunk_id"]:
+            self.flag("P1.admitted", f"{m['chunk_id']!r} is not an enqueued, open chunk.")
+            return
+        row = m["row"]
+        self.balance.executed(m["arrival"])
+        self._check_bits(chunk, row, m)
+        self._check_window(chunk, row)
+        for rule, sentence in self.world.objections(chunk, kind, self.t, self.settings):
+            self.flag(rule, sentence)
+        age_ns = self.t - chunk["condition_ns"]
+        self.report.oldest_action_ns = max(self.report.oldest_action_ns, age_ns)
+        if m["age_ns"] != age_ns:
+            self.flag("P1.age", f"The age is noted as {m['age_ns']} ns and is {age_ns} ns.")
+        self._check_order(chunk, row, m)
+
+    def _check_bits(self, chunk: Message, row: int, m: Message) -> None:
+        admitted = chunk["actions"][row * ROW_HEX_DIGITS : (row + 1) * ROW_HEX_DIGITS]
+        if len(m["action"]) != ROW_HEX_DIGITS or m["action"] != admitted:
+            self.flag("P1.bits", f"The action is not row {row} of {chunk['chunk_id']!r}.")
+
+    def _check_window(self, chunk: Message, row: int) -> None:
+        due_ns = chunk["start_ns"] + row * chunk["period_ns"]
+        if not due_ns <= self.t < due_ns + chunk["period_ns"]:
+            self.flag("P1.window", f"Row {row} is due from {due_ns} ns, accepted at {self.t} ns.")
+        if not 0 <= row < min(chunk["rows"], self.settings["execution_horizon"]):
+            self.flag("P1.horizon", f"Row {row} lies beyond the execution horizon.")
+        first, last = chunk["checked_rows"]
+        if not first <= row < last:
+            self.flag("P1.checked_rows", f"Row {row} was not among those that were checked.")
+        if not chunk["valid_until_ns"] - self.t >= 0:
+            self.flag("P1.valid_until", f"The chunk was valid until {chunk['valid_until_ns']} ns.")
+
+    def _check_order(self, chunk: Message, row: int, m: Message) -> None:
+        arrival, start_ns = m["arrival"], chunk["start_ns"]
+        due_ns = start_ns + row * chunk["period_ns"]
+        if row <= self.last_row.get(arrival, -1):
+            self.flag("P3.row", f"Row {row} comes after row {self.last_row[arrival]}.")
+        if m["sequence"] <= self.last_sequence:
+            self.flag("P3.sequence", f"Sequence {m['sequence']} after {self.last_sequence}.")
+        if self.last_start_ns is not None and start_ns < self.last_start_ns:
+            self.flag("P3.start", "The chunk starts before the one accepted last.")
+        if self.last_due_ns is not None and due_ns <= self.last_due_ns:
+            self.flag("P3.due", "The action is due no later than the one accepted last.")
+        if any(other > arrival and c["start_ns"] <= self.t for other, c in self.open.items()):
+            self.flag("P5.newest", f"A newer chunk than {chunk['chunk_id']!r} has started.")
+        self.last_row[arrival], self.last_sequence = row, m["sequence"]
+        self.last_start_ns, self.last_due_ns = start_ns, due_ns
+
+    # P4 and the queue --------------------------------------------------------------------------
+
+    def _check_enqueue(self, m: Message) -> None:
+        chunk_id = m["chunk_id"]
+        for sentence in self.balance.arrived(m["arrival"], m["rows"]):
+            self.flag("conservation", sentence)
+        self.report.chunks += 1
+        if chunk_id in self.chunks:
+            self.flag("P3.duplicate", f"{chunk_id!r} was enqueued before.")
+        self.chunks[chunk_id] = self.open[m["arrival"]] = m
+        data = bytes.fromhex(m["actions"])
+        if len(data) * 2 != m["rows"] * ROW_HEX_DIGITS:
+            self.flag("P1.admitted", f"{chunk_id!r} has not {m['rows']} rows of {ACTION_DIM}.")
+        if hashlib.sha256(data).hexdigest() != m["actions_sha256"]:
+            self.flag("P1.hash", f"The actions of {chunk_id!r} are not those that were admitted.")
+        layers = m["layers"]
+        if len(layers) != LAYERS or not all(passed is True for passed in layers.values()):
+            self.flag("P1.admitted", f"{chunk_id!r} did not pass all {LAYERS} layers.")
+        if m["period_ns"] != self.settings["period_ns"]:
+            self.flag("P1.period", f"{chunk_id!r} has a period of {m['period_ns']} ns.")
+        head = self.head[1] if self.head else ""
+        if m["predecessor"] not in ("", head):
+            self.flag("P4.chain", f"{chunk_id!r} continues {m['predecessor']!r}, not {head!r}.")
+        if len(self.open) > self.settings["queue_capacity"]:
+            self.flag("settings.capacity", f"{len(self.open)} chunks are queued.")
+        self.head = (m["arrival"], chunk_id)
+
+    def _check_close(self, kind: str, m: Message) -> None:
+        arrival, reason = m["arrival"], m.get("reason")
+        if m.get("at") == "arrival":
+            self.report.chunks += 1
+            for sentence in self.balance.refused(arrival, m["rows"], str(reason)):
+                self.flag("conservation", sentence)
+        elif arrival in self.open:
+            del self.open[arrival]
+            for sentence in self.balance.closed(arrival, m["rows"], m["ended"], reason):
+                self.flag("conservation", sentence)
+        else:
+            self.flag("conservation", f"Arrival {arrival} ends without being queued.")
+        if m["ended"] == "discarded":
+            self.report.discarded[str(reason)] += 1
+        breaks_chain = kind == "discard" and reason != "superseded"
+        if self.head is not None and self.head[0] == arrival and breaks_chain:
+            self.head = None
+
+    def _check_settings(self, m: Message) -> None:
+        self.settings = m
+        self.world.fallback_hash = m["fallback_hash"]
+        if m["disabled_checks"]:
+            self.report.disabled_checks.update(m["disabled_checks"])
+            self.flag("settings.disabled", f"Checks are disabled: {m['disabled_checks']}.")
+        for key, value in (self.expected.declared() if self.expected else {}).items():
+            if m[key] != value:
+                self.flag("settings.limits", f"{key} is {m[key]!r}, expected {value!r}.")

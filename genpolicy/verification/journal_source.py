@@ -1,0 +1,56 @@
+"""Reads a journal file event by event, with the MCAP library and nothing of the executor."""
+
+import io
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from mcap.exceptions import McapError
+from mcap.reader import make_reader
+
+from genpolicy.errors import BadInputError
+from genpolicy.integrity.hashing import sha256_bytes_of
+
+TOPIC = "/journal/"
+MAXIMUM_UNCOMPRESSED_BYTES = 8 << 30
+Message = dict[str, Any]
+
+
+def read_messages(path: Path) -> Iterator[tuple[str, Message]]:
+    """Kind and message of every event, in the order of the file.
+
+    Raises:
+        IntegrityError: No regular file.
+        BadInputError: Not a whole MCAP file of JSON objects on journal topics.
+    """
+    _, data = sha256_bytes_of(path, keep=True)
+    try:
+        reader = make_reader(io.BytesIO(data), validate_crcs=True)
+        summary = reader.get_summary()
+        if summary is None or summary.statistics is None:
+            raise ValueError("no summary at its end")
+        if sum(c.uncompressed_size for c in summary.chunk_indexes) > MAXIMUM_UNCOMPRESSED_BYTES:
+            raise ValueError(f"more than {MAXIMUM_UNCOMPRESSED_BYTES} bytes uncompressed")
+        count = 0
+        for _, channel, message in reader.iter_messages(log_time_order=False):
+            count += 1
+            document = json.loads(message.data, parse_constant=_no_constant)
+            if not channel.topic.startswith(TOPIC) or not isinstance(document, dict):
+                raise ValueError(f"a message on {channel.topic} that is no journal event")
+            if message.log_time != max(int(document["t"]), 0):
+                raise ValueError(f"log_time {message.log_time} of an event at {document['t']}")
+            yield channel.topic[len(TOPIC) :], document
+        if count != summary.statistics.message_count:
+            raise ValueError(f"{count} messages, {summary.statistics.message_count} announced")
+    except (McapError, ValueError, KeyError, TypeError, AttributeError, EOFError) as error:
+        raise BadInputError(
+            where=str(path),
+            found=f"no journal ({type(error).__name__}: {error})",
+            expected="a whole MCAP journal",
+            action="Re-run the stage that writes it.",
+        ) from error
+
+
+def _no_constant(name: str) -> float:
+    raise ValueError(f"a document with {name}")

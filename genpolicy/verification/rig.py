@@ -1,0 +1,180 @@
+"""A test rig: one session on a simulated clock, and chunks that no feasibility module made.
+
+What is built here has the form of an admitted chunk and none of its authority. It exists so that
+the executor, the stub and the checker can be tried with chunks of which something is wrong.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from genpolicy.contract.action import ACTION_DIM
+from genpolicy.contract.chunk import ChunkMetadata, DiscardReason, actions_sha256, frozen_array
+from genpolicy.execution.executor import Command, Executor
+from genpolicy.execution.journal import Event, Journal
+from genpolicy.execution.settings import LAYER_COUNT, ExecutorSettings
+from genpolicy.execution.stub import ControllerStub
+from genpolicy.execution.supervisor import Supervisor, SupervisorSettings
+
+Array = NDArray[np.float64]
+
+PERIOD_S = 0.05
+ROWS = 16
+CHECKPOINT, SAMPLER = "c" * 64, "5" * 64
+SETTINGS = ExecutorSettings(
+    execution_horizon=8,
+    action_period_s=PERIOD_S,
+    maximum_age_s={"approach": 0.6, "insert": 0.5},
+    watchdog_s=0.1,
+    queue_capacity=2,
+    replan_lead_steps=3,
+    maximum_divergence_m=0.05,
+)
+SUPERVISION = SupervisorSettings(
+    force_limit_n={"approach": 20.0, "insert": 40.0}, watchdog_s=0.1, action_period_s=PERIOD_S
+)
+
+
+@dataclass(frozen=True)
+class StandInLayer:
+    """Verdict of one layer, as claimed."""
+
+    name: str
+    passed: bool
+
+
+@dataclass(frozen=True)
+class StandInVerdict:
+    """Verdict of all layers, as claimed."""
+
+    layers: tuple[StandInLayer, ...]
+    rows: tuple[int, int]
+
+
+@dataclass(frozen=True)
+class StandIn:
+    """Has the attributes of an admitted chunk, true or not."""
+
+    metadata: ChunkMetadata
+    actions: Array
+    actions_sha256: str
+    verdict: StandInVerdict
+    admitted_at_s: float = 0.0
+
+
+def passing_verdict(
+    *, failed: int | None = None, rows: tuple[int, int] = (0, ROWS)
+) -> StandInVerdict:
+    """Six layers, of which at most one fails; `rows` are those that were checked."""
+    layers = (StandInLayer(f"layer_{n}", n != failed) for n in range(LAYER_COUNT))
+    return StandInVerdict(tuple(layers), rows)
+
+
+class Rig:
+    """One session: clock, supervisor, stub and executor.
+
+    Args:
+        disabled: Names of `CHECKS` switched off in executor, stub and supervisor alike.
+        settings: Replaces the standard settings.
+        session: Name of the session.
+    """
+
+    def __init__(
+        self,
+        *,
+        disabled: frozenset[str] = frozenset(),
+        settings: ExecutorSettings = SETTINGS,
+        session: str = "rig",
+    ) -> None:
+        self.journal = Journal(session)
+        self.supervisor = Supervisor(
+            SUPERVISION, self.journal, watchdog_enabled="watchdog" not in disabled
+        )
+        self.stub = ControllerStub(
+            settings, self.journal, self.supervisor, disabled_checks=disabled
+        )
+        self.executor = Executor(settings, self.journal, self.stub, disabled_checks=disabled)
+        self.now_ns = 0
+        self.phase, self.epoch = "approach", "epoch-1"
+        self.made = 0
+        self.executor.set_active(self.now_s, CHECKPOINT, SAMPLER)
+
+    @property
+    def now_s(self) -> float:
+        """Time, s."""
+        return self.now_ns / 1e9
+
+    def observe(self, age_s: float = 0.0, divergence_m: float | None = None) -> bool:
+        """Hand over an observation of this age, in the rig's phase and epoch."""
+        event_time_s = self.now_s - age_s
+        return self.executor.observe(self.now_s, event_time_s, self.phase, self.epoch, divergence_m)
+
+    def chunk(self, **changes: Any) -> StandIn:
+        """A valid chunk from an observation made now, with changes to metadata, actions, verdict.
+
+        Args:
+            changes: Fields of the metadata, or `actions`, `actions_sha256`, `verdict`.
+        """
+        self.made += 1
+        actions = changes.pop("actions", self.actions(self.made))
+        sha256 = changes.pop("actions_sha256", None)
+        verdict = changes.pop("verdict", passing_verdict())
+        metadata = ChunkMetadata(
+            chunk_id=f"chunk-{self.made}",
+            condition_observation_event_time_s=self.now_s,
+            policy_checkpoint_hash=CHECKPOINT,
+            sampler_config_hash=SAMPLER,
+            action_start_time_s=self.now_s,
+            action_period_s=PERIOD_S,
+            valid_until_s=self.now_s + 10.0,
+            task_phase=self.phase,
+            calibration_epoch=self.epoch,
+            predecessor_chunk_id=self.executor.chain_head,
+            session_epoch=self.executor.session_epoch,
+            method="rig",
+            candidate_index=0,
+        )
+        values = frozen_array(actions)
+        return StandIn(
+            replace(metadata, **changes), values, sha256 or actions_sha256(values), verdict
+        )
+
+    @staticmethod
+    def actions(seed: int, rows: int = ROWS) -> Array:
+        """Distinct finite actions. Shape (rows, 10)."""
+        index = np.arange(rows * ACTION_DIM, dtype=np.float64).reshape(rows, ACTION_DIM)
+        return np.sin(index + 1000.0 * seed)
+
+    def deliver(self, chunk: object) -> DiscardReason | None:
+        """Deliver whatever this is as the policy's chunk."""
+        return self.executor.deliver(cast(Any, chunk), self.now_s)
+
+    def advance(self, duration_s: float, *, poll: bool = True) -> None:
+        """Let time pass without ticks; the controller's own clock goes on unless `poll` is off."""
+        end_ns = self.now_ns + round(duration_s * 1e9)
+        step_ns = round(PERIOD_S * 1e9)
+        while self.now_ns < end_ns:
+            self.now_ns = min(self.now_ns + step_ns, end_ns)
+            if poll:
+                self.stub.poll(self.now_s)
+
+    def tick(self, count: int = 1) -> list[Command]:
+        """Ticks, one period apart; time stands at the next tick afterwards."""
+        commands = []
+        for _ in range(count):
+            commands.append(self.executor.tick(self.now_s))
+            self.now_ns += round(PERIOD_S * 1e9)
+        return commands
+
+    def run(self, **changes: Any) -> list[Command]:
+        """Observe, deliver a (changed) chunk, tick it through."""
+        self.observe()
+        self.deliver(self.chunk(**changes))
+        return self.tick(self.executor.settings.execution_horizon)
+
+    def end(self) -> list[Event]:
+        """End the episode and return the journal's events."""
+        self.executor.end_episode(self.now_s)
+        return self.journal.events()

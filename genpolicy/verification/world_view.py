@@ -1,0 +1,128 @@
+"""What was true when: phase, calibration, weights, stops and voiding events, followed again."""
+
+from collections.abc import Iterator
+
+from genpolicy.verification.journal_source import Message
+
+Finding = tuple[str, str]
+STOP_STATES = ("protective_stop", "emergency_stop")
+KINDS = frozenset({
+    "observation", "phase", "epoch", "active", "invocation", "candidate", "refuse", "supervisor",
+    "recovery", "invalidate", "mode", "reset",
+})  # fmt: skip
+
+
+class WorldView:
+    """The checker's own picture of the present, built from raw events.
+
+    Attributes:
+        fallback_hash: Identity of the fallback planner, as declared by the session.
+    """
+
+    def __init__(self) -> None:
+        self.fallback_hash = ""
+        self.phase = self.epoch = ""
+        self.newest_ns: int | None = None
+        self.active = ("", "")
+        self.session_epoch = 0
+        self.mode = "run"
+        self.stopped = False
+        self.void_before: dict[str, int] = {}
+
+    def follow(self, kind: str, m: Message) -> Iterator[Finding]:
+        """Take an event in; yields what is wrong with the event itself."""
+        if kind not in KINDS:
+            yield "journal.kind", f"There is no event of kind {kind!r}."
+        elif kind == "observation":
+            yield from self._observe(m)
+        elif kind == "active":
+            self.active = (m["checkpoint"], m["sampler"])
+        elif kind == "mode":
+            yield from self._change_mode(m)
+        elif kind == "reset":
+            yield from self._reset(m)
+        elif kind == "invalidate":
+            if m["reason"] == "observation_divergence":
+                self._void("an observation divergence", self.newest_ns or m["t"])
+            else:
+                self._void(f"a {m['reason']}", m["t"])
+        elif kind == "supervisor":
+            yield from self._supervise(m)
+        elif kind == "phase" and m["new"] != self.phase:
+            yield "journal.phase", f"Phase {m['new']!r} is noted, {self.phase!r} was observed."
+        elif kind == "epoch" and m["new"] != self.epoch:
+            yield "journal.epoch", f"Epoch {m['new']!r} is noted, {self.epoch!r} was observed."
+
+    def objections(self, chunk: Message, kind: str, t: int, settings: Message) -> Iterator[Finding]:
+        """Why an action of this chunk may not be accepted at `t`; nothing if it may."""
+        seen_ns = chunk["condition_ns"]
+        age_ns = t - seen_ns
+        limit_ns = settings["maximum_age_ns"].get(self.phase)
+        if not age_ns >= 0 or self.newest_ns is None or seen_ns > self.newest_ns:
+            yield "P1.future", f"It rests on an observation of {seen_ns} ns, not yet seen."
+        if limit_ns is None or not limit_ns - age_ns >= 0:
+            yield "P1.age", f"The action is {age_ns} ns old, allowed are {limit_ns} in this phase."
+        if chunk["phase"] != self.phase:
+            yield "P1.phase", f"The chunk is for {chunk['phase']!r}, the phase is {self.phase!r}."
+        if chunk["calibration_epoch"] != self.epoch:
+            yield "P1.calibration", f"The chunk is of epoch {chunk['calibration_epoch']!r}."
+        expected = self.active if kind == "accept" else (self.fallback_hash, self.fallback_hash)
+        if chunk["checkpoint"] != expected[0]:
+            yield "P1.checkpoint", "The chunk was made by other weights than the active ones."
+        if chunk["sampler"] != expected[1]:
+            yield "P1.sampler", "The chunk was made by another sampler than the active one."
+        if chunk["session_epoch"] != self.session_epoch:
+            yield "P1.session", f"The chunk is of session epoch {chunk['session_epoch']}."
+        source = {"accept": "policy", "fallback": "fallback"}[kind]
+        needed = {"accept": "run", "fallback": "fallback"}[kind]
+        if chunk["source"] != source or self.mode != needed:
+            yield "P1.state", f"A {chunk['source']} action in mode {self.mode!r}."
+        if self.stopped:
+            yield "P7.stop", "An action is accepted while the supervisor stops."
+        for cause, before_ns in self.void_before.items():
+            if seen_ns < before_ns:
+                yield "P1.void", f"{cause} at {before_ns} ns voids an observation of {seen_ns} ns."
+
+    def _change_mode(self, m: Message) -> Iterator[Finding]:
+        if m["old"] != self.mode:
+            yield "journal.mode", f"Mode {m['old']!r} is left, but {self.mode!r} was entered."
+        self.mode = m["new"]
+        if m["new"] == "run":
+            self._void(f"the end of {m['old']}", m["t"])
+
+    def _reset(self, m: Message) -> Iterator[Finding]:
+        if m["session_epoch"] <= self.session_epoch:
+            yield "P3.session", f"Session epoch {m['session_epoch']} after {self.session_epoch}."
+        self.session_epoch = m["session_epoch"]
+        self.newest_ns = None
+        self._void("a reset", m["t"])
+
+    def _observe(self, m: Message) -> Iterator[Finding]:
+        event_ns, t = m["event_time_ns"], m["t"]
+        late = self.newest_ns is not None and event_ns < self.newest_ns
+        used = event_ns <= t and not late
+        if used != m["used"]:
+            yield "journal.observation", f"An observation of {event_ns} ns, used: {m['used']}."
+        if not used:
+            return
+        if self.newest_ns is not None:
+            if m["phase"] != self.phase:
+                self._void("a phase transition", event_ns)
+            if m["calibration_epoch"] != self.epoch:
+                self._void("a calibration change", event_ns)
+        self.newest_ns = event_ns
+        self.phase, self.epoch = m["phase"], m["calibration_epoch"]
+
+    def _supervise(self, m: Message) -> Iterator[Finding]:
+        reset = m["event"] == "human_reset"
+        if reset and not str(m["detail"]).strip():
+            yield "P7.reset", "A stop is cleared without a person."
+        now_stopped = m["state"] in STOP_STATES
+        if self.stopped and not now_stopped and not reset:
+            yield "P7.sticky", f"A {m['event']} event clears a stop."
+        if now_stopped or reset:
+            self._void("a stop", m["t"])
+        self.stopped = now_stopped
+
+    def _void(self, cause: str, before_ns: int) -> None:
+        self.void_before[cause] = max(before_ns, self.void_before.get(cause, before_ns))
