@@ -1,5 +1,7 @@
 """The registry of methods: by name only, never by a class path from a file."""
 
+import functools
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -24,7 +26,13 @@ from genpolicy.policies.samplers import (
     sample_diffusion,
     sample_ode,
 )
-from genpolicy.policies.schedules import squared_cosine, trailing_levels
+from genpolicy.policies.schedules import (
+    Gains,
+    flow_gains,
+    noise_gains,
+    squared_cosine,
+    trailing_levels,
+)
 from genpolicy.policies.settings import HeadConfig, NetworkConfig, SamplerConfig
 
 SINGLE_EVALUATION = ("direct", "z_zero", "z_prior")
@@ -41,6 +49,7 @@ class Method:
         reads: Input of the head: nothing, a latent, or a noisy chunk with a time.
         objective: Makes its training objective.
         samplers: Samplers that fit; the first is the default.
+        gains: Fixed gains around the network at a sampler time, for methods that read a chunk.
     """
 
     name: str
@@ -48,6 +57,7 @@ class Method:
     reads: Literal["nothing", "latent", "chunk"]
     objective: ObjectiveFactory
     samplers: tuple[str, ...]
+    gains: Callable[[HeadConfig, Tensor], Gains] | None = None
 
     def horizons(self, horizons: HorizonConfig) -> HorizonConfig:
         """The horizons of this method: those given, or K = H_e = 1."""
@@ -66,8 +76,17 @@ class Method:
             "latent": head.latent_dim,
             "chunk": dimensions.chunk_numbers,
         }[self.reads]
-        head_input = HeadInput(numbers=numbers, timed=self.reads == "chunk")
+        gains = functools.partial(self.gains, head) if self.gains is not None else None
+        head_input = HeadInput(numbers=numbers, gains=gains)
         return PolicyNetwork(dimensions, network, head_input=head_input)
+
+
+def _noise_gains(head: HeadConfig, time: Tensor) -> Gains:
+    return noise_gains(squared_cosine(head.diffusion_levels), time, data_std=head.conditional_std)
+
+
+def _flow_gains(head: HeadConfig, time: Tensor) -> Gains:
+    return flow_gains(time, data_std=head.conditional_std)
 
 
 METHODS = {
@@ -76,8 +95,10 @@ METHODS = {
         Method("bc", False, "nothing", squared_error, ("direct",)),
         Method("chunked_bc", True, "nothing", squared_error, ("direct",)),
         Method("act", True, "latent", ConditionalVae, ("z_zero", "z_prior")),
-        Method("diffusion", True, "chunk", NoisePrediction, ("ddim", "ddpm", "dpm_2m")),
-        Method("flow", True, "chunk", flow_matching, ("euler", "heun", "rk4")),
+        Method(
+            "diffusion", True, "chunk", NoisePrediction, ("ddim", "ddpm", "dpm_2m"), _noise_gains
+        ),
+        Method("flow", True, "chunk", flow_matching, ("euler", "heun", "rk4"), _flow_gains),
     )
 }
 

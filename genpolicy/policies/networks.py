@@ -7,6 +7,7 @@ readout is solved from one parameter budget, so that no method is simply larger.
 
 import functools
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import torch
@@ -16,7 +17,8 @@ from torch.nn import functional
 
 from genpolicy.contract.settings import Settings
 from genpolicy.errors import ConfigError
-from genpolicy.policies.settings import NetworkConfig
+from genpolicy.policies.schedules import Gains
+from genpolicy.policies.settings import WIDTH_UNIT, NetworkConfig
 
 FASTEST_TIME_FREQUENCY = 200.0
 
@@ -48,11 +50,11 @@ class HeadInput:
 
     Attributes:
         numbers: Length of the input vector; 0 for a head without one.
-        timed: Whether a sampler time comes with it.
+        gains: Fixed gains of a sampler time, for a noisy chunk; None for a head without a time.
     """
 
     numbers: int
-    timed: bool
+    gains: Callable[[Tensor], Gains] | None
 
 
 class Encoder(nn.Module):
@@ -93,7 +95,7 @@ class Trunk(nn.Module):
 
 
 class Head(nn.Module):
-    """Input projection, time embedding and readout; fills the parameter budget exactly."""
+    """Input projection, time embedding and readout; fills the parameter budget."""
 
     def __init__(
         self, dimensions: Dimensions, config: NetworkConfig, *, head_input: HeadInput
@@ -107,7 +109,7 @@ class Head(nn.Module):
             self.start = nn.Parameter(torch.zeros(width))
         self.time_features = config.time_features
         self.time: nn.Sequential | None = None
-        if head_input.timed:
+        if head_input.gains is not None:
             self.time = nn.Sequential(
                 nn.Linear(config.time_features, config.condition_dim),
                 nn.SiLU(),
@@ -115,12 +117,13 @@ class Head(nn.Module):
             )
         self.direct = nn.Linear(width, outputs)
         spent = sum(parameter.numel() for parameter in self.parameters())
-        hidden = (config.head_parameters - spent - outputs) // (width + outputs + 1)
-        if not hidden >= 1:
+        cost = WIDTH_UNIT * (width + outputs + 1)
+        hidden = WIDTH_UNIT * round((config.head_parameters - spent - outputs) / cost)
+        if not hidden >= WIDTH_UNIT:
             raise ConfigError(
                 where="network.head_parameters",
                 found=str(config.head_parameters),
-                expected=f"at least {spent + width + 2 * outputs + 1} for this head",
+                expected=f"at least {spent + outputs + cost} for this head",
                 action="Raise the budget of the head, for every method alike.",
             )
         self.branch_in = nn.Linear(width, hidden)
@@ -155,6 +158,7 @@ class PolicyNetwork(nn.Module):
     ) -> None:
         super().__init__()
         self.dimensions = dimensions
+        self._gains = head_input.gains
         self.encoder = Encoder(dimensions, config)
         self.trunk = Trunk(config)
         self.head = Head(dimensions, config, head_input=head_input)
@@ -177,8 +181,14 @@ class PolicyNetwork(nn.Module):
         Returns:
             Shape (B, K, D_a).
         """
-        if time is not None:
-            condition = condition + self.head.embed_time(time)
+        if time is None or self._gains is None or values is None:
+            return self._chunk(condition, values)
+        gains = self._gains(time)
+        condition = condition + self.head.embed_time(time)
+        residual = self._chunk(condition, gains.inner[:, None, None] * values)
+        return gains.skip[:, None, None] * values + gains.outer[:, None, None] * residual
+
+    def _chunk(self, condition: Tensor, values: Tensor | None) -> Tensor:
         features = self.trunk(self.head.enter(values, len(condition)), condition)
         return self.head.read_out(features).reshape(
             -1, self.dimensions.prediction_horizon, self.dimensions.action_dim

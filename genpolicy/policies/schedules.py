@@ -70,6 +70,44 @@ def squared_cosine(levels: int) -> DiffusionSchedule:
     return DiffusionSchedule(alpha_bar)
 
 
+@dataclass(frozen=True)
+class Gains:
+    """Fixed gains around a network F: estimate = skip * x + outer * F(inner * x).
+
+    With F = 0 the estimate is the best linear one for data of the assumed spread around zero;
+    F learns the rest, at unit scale. Each has one entry per row. Shape (B,).
+
+    Source:
+        Karras et al., arXiv 2206.00364, for noise estimates and for velocities.
+    """
+
+    inner: Tensor
+    skip: Tensor
+    outer: Tensor
+
+
+def noise_gains(schedule: DiffusionSchedule, time: Tensor, *, data_std: float) -> Gains:
+    """Gains of a noise estimate at times level / T. Shape of `time`: (B,)."""
+    table = torch.tensor(schedule.alpha_bar, dtype=time.dtype, device=time.device)
+    kept = table[(time * schedule.levels).round().long()]
+    variance = kept * data_std**2 + 1.0 - kept
+    return Gains(
+        inner=variance.rsqrt(),
+        skip=(1.0 - kept).sqrt() / variance,
+        outer=(kept / variance).sqrt() * data_std,
+    )
+
+
+def flow_gains(time: Tensor, *, data_std: float) -> Gains:
+    """Gains of a velocity at flow times. Shape of `time`: (B,)."""
+    variance = (time * data_std).square() + (1.0 - time).square()
+    return Gains(
+        inner=variance.rsqrt(),
+        skip=(time * data_std**2 - (1.0 - time)) / variance,
+        outer=variance.rsqrt() * data_std,
+    )
+
+
 def trailing_levels(levels: int, steps: int) -> list[int]:
     """The noise levels that a sampler of `steps` steps visits, from T - 1 downwards.
 

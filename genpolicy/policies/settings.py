@@ -8,6 +8,10 @@ from genpolicy.contract.settings import Settings
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_bytes
 
+# Widths are multiples of a vector register: kernels treat the odd rest of a row differently from
+# its body, and the same row then differs in its last bit with its place in the batch.
+WIDTH_UNIT = 16
+
 
 class NetworkConfig(Settings):
     """Size of the shared encoder and trunk, and the parameter budget that each head fills.
@@ -18,13 +22,13 @@ class NetworkConfig(Settings):
         trunk_width: Width of the residual trunk.
         trunk_blocks: Residual blocks of the trunk.
         time_features: Sinusoidal features of the sampler time; even.
-        head_parameters: Budget of the head; its hidden width is solved from it, so that heads
-            with and without an input cost the same.
+        head_parameters: Budget of the head; its hidden width is solved from it, to the nearest
+            multiple of 16, so that heads with and without an input cost the same.
     """
 
-    encoder_width: int = Field(default=256, ge=4, le=4096)
-    condition_dim: int = Field(default=128, ge=4, le=4096)
-    trunk_width: int = Field(default=384, ge=4, le=4096)
+    encoder_width: int = Field(default=256, ge=16, le=4096, multiple_of=WIDTH_UNIT)
+    condition_dim: int = Field(default=128, ge=16, le=4096, multiple_of=WIDTH_UNIT)
+    trunk_width: int = Field(default=384, ge=16, le=4096, multiple_of=WIDTH_UNIT)
     trunk_blocks: int = Field(default=2, ge=1, le=64)
     time_features: int = Field(default=64, ge=2, le=1024, multiple_of=2)
     head_parameters: int = Field(default=220_000, ge=100, le=100_000_000)
@@ -35,12 +39,15 @@ class HeadConfig(Settings):
 
     Attributes:
         diffusion_levels: Noise levels T of DDPM training.
+        conditional_std: Assumed spread of normalised actions at one observation; sets the fixed
+            gains around the networks of diffusion and flow (`schedules.Gains`).
         latent_dim: Length of ACT's latent z.
         posterior_width: Hidden width of ACT's training-only posterior encoder.
         kl_weight: Weight of ACT's KL term against the L1 error per action number.
     """
 
     diffusion_levels: int = Field(default=100, ge=1, le=10_000)
+    conditional_std: float = Field(default=0.2, gt=0.0, le=10.0)
     latent_dim: int = Field(default=8, ge=1, le=1024)
     posterior_width: int = Field(default=256, ge=4, le=4096)
     kl_weight: float = Field(default=0.01, ge=0.0)

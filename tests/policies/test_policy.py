@@ -1,0 +1,145 @@
+"""Policies: determinism, independence of the batch, counted NFE, modes, refused inputs."""
+
+import numpy as np
+import pytest
+import torch
+
+from genpolicy.errors import ConfigError, ContractError, IntegrityError, NonFiniteError
+from genpolicy.policies.methods import METHODS
+from genpolicy.policies.policy import load_policy
+from genpolicy.policies.settings import SamplerConfig
+from genpolicy.policies.training import train
+
+STEPS = {"bc": 1, "chunked_bc": 1, "act": 1, "diffusion": 10, "flow": 8}
+STOCHASTIC = {"act": ("z_prior", 1), "diffusion": ("ddim", 10), "flow": ("euler", 8)}
+
+
+def names(count):
+    return [("row", index) for index in range(count)]
+
+
+@pytest.mark.parametrize("method", list(METHODS))
+def test_a_row_does_not_depend_on_its_company(folders, method, two_mode_windows):
+    sampler = SamplerConfig(name=METHODS[method].samplers[-1], steps=STEPS[method])
+    policy = load_policy(folders[method], sampler=sampler)
+    observations = two_mode_windows(40, seed=9).observations
+    together = policy.sample(observations, noise_names=names(40), candidates=3)
+    for row in (0, 17, 39):
+        alone = policy.sample(observations[row : row + 1], noise_names=[("row", row)], candidates=3)
+        assert np.array_equal(alone.actions[0], together.actions[row])
+    order = np.random.default_rng(0).permutation(40)
+    shuffled = policy.sample(
+        observations[order], noise_names=[("row", int(row)) for row in order], candidates=3
+    )
+    assert np.array_equal(shuffled.actions, together.actions[order])
+
+
+@pytest.mark.parametrize("method", list(STOCHASTIC))
+def test_noise_is_a_function_of_its_names(folders, method, two_mode_windows):
+    name, steps = STOCHASTIC[method]
+    policy = load_policy(folders[method], sampler=SamplerConfig(name=name, steps=steps))
+    observations = two_mode_windows(2).observations[:1]
+
+    def draw(noise_name):
+        return policy.sample(observations, noise_names=[noise_name], candidates=2).actions
+
+    first = draw(("a", 1))
+    torch.manual_seed(0)
+    np.random.seed(0)
+    assert draw(("a", 1)).tobytes() == first.tobytes()
+    assert draw(("a", 2)).tobytes() != first.tobytes()
+    assert not np.array_equal(first[0, 0], first[0, 1])
+    assert policy.stochastic
+
+
+@pytest.mark.parametrize("method", list(METHODS))
+def test_two_loads_give_equal_bytes(folders, method, two_mode_windows):
+    observations = two_mode_windows(5).observations
+    actions = [
+        load_policy(folders[method]).sample(observations, noise_names=names(5), candidates=2)
+        for _ in range(2)
+    ]
+    assert actions[0].actions.tobytes() == actions[1].actions.tobytes()
+
+
+@pytest.mark.parametrize(
+    ("method", "name", "steps", "nfe"),
+    [
+        ("bc", "direct", 1, 1), ("chunked_bc", "direct", 1, 1), ("act", "z_zero", 1, 1),
+        ("act", "z_prior", 1, 1), ("diffusion", "ddim", 7, 7), ("diffusion", "ddpm", 100, 100),
+        ("diffusion", "dpm_2m", 6, 6), ("flow", "euler", 5, 5), ("flow", "heun", 5, 10),
+        ("flow", "rk4", 3, 12),
+    ],
+)  # fmt: skip
+def test_nfe_and_shape(folders, method, name, steps, nfe, two_mode_windows):
+    policy = load_policy(folders[method], sampler=SamplerConfig(name=name, steps=steps))
+    samples = policy.sample(
+        two_mode_windows(3).observations[:3], noise_names=names(3), candidates=2
+    )
+    assert samples.nfe == nfe
+    assert samples.actions.shape == (3, 2, 1 if method == "bc" else 4, 2)
+    assert samples.actions.dtype == np.float64
+    assert policy.stochastic == (name not in ("direct", "z_zero"))
+
+
+def test_deterministic_conventions_give_equal_candidates(folders, two_mode_windows):
+    observations = two_mode_windows(2).observations[:2]
+    actions = (
+        load_policy(folders["act"]).sample(observations, noise_names=names(2), candidates=2).actions
+    )
+    assert np.array_equal(actions[:, 0], actions[:, 1])
+
+
+@pytest.mark.parametrize(
+    ("method", "name", "steps"),
+    [("diffusion", "ddim", 101), ("diffusion", "ddim", 0), ("diffusion", "euler", 4),
+     ("flow", "euler", 0), ("flow", "ddim", 4), ("bc", "direct", 2)],
+)  # fmt: skip
+def test_samplers_that_do_not_fit_are_refused(folders, method, name, steps):
+    with pytest.raises(ConfigError, match="sampler"):
+        load_policy(folders[method], sampler=SamplerConfig(name=name, steps=steps))
+
+
+def test_wrong_observations_are_refused(folders, two_mode_windows):
+    policy = load_policy(folders["flow"])
+    good = two_mode_windows(2).observations[:1]
+    for wrong in (good[:, :1], good[..., :2], good[0]):
+        with pytest.raises(ContractError, match="observations"):
+            policy.sample(wrong, noise_names=names(len(wrong)), candidates=1)
+    with pytest.raises(NonFiniteError, match="nan"):
+        policy.sample(np.where(good > 0, np.nan, good), noise_names=names(1), candidates=1)
+    with pytest.raises(ContractError, match="noise name"):
+        policy.sample(good, noise_names=[], candidates=1)
+    with pytest.raises(ContractError, match="candidates"):
+        policy.sample(good, noise_names=names(1), candidates=0)
+
+
+def test_another_contract_is_refused(folders):
+    load_policy(folders["flow"], action_contract_sha256="b" * 64)
+    with pytest.raises(IntegrityError, match="action contract"):
+        load_policy(folders["flow"], action_contract_sha256="d" * 64)
+
+
+def test_identity_covers_sampler_and_weights(folders):
+    own = load_policy(folders["flow"])
+    other = load_policy(folders["flow"], sampler=SamplerConfig(name="euler", steps=4))
+    assert own.checkpoint_hash == other.checkpoint_hash
+    assert own.sampler_config_hash != other.sampler_config_hash
+    assert own.checkpoint_hash != load_policy(folders["diffusion"]).checkpoint_hash
+
+
+def test_generative_heads_keep_both_modes_and_the_mean_lies_between(
+    tmp_path, two_mode_windows, request_for
+):
+    windows = two_mode_windows(1024)
+    observation = np.zeros((1, 2, 3))
+    for method, steps in (("chunked_bc", 150), ("diffusion", 700), ("flow", 700)):
+        train(tmp_path / method, request_for(method, steps=steps), windows=windows)
+        policy = load_policy(tmp_path / method)
+        samples = policy.sample(observation, noise_names=[("modes",)], candidates=200)
+        first = samples.actions[0, :, 0, 0]
+        if method == "chunked_bc":
+            assert np.abs(first).max() < 0.25, "squared error must predict the mean of two modes"
+        else:
+            assert 0.3 < (first > 0).mean() < 0.7
+            assert (np.abs(np.abs(first) - 1.0) < 0.3).mean() > 0.9

@@ -1,0 +1,296 @@
+"""Samplers against diffusers, torchdiffeq and an analytic Gaussian; order of convergence."""
+
+import math
+
+import numpy as np
+import pytest
+import torch
+from diffusers import DDIMScheduler, DDPMScheduler, DPMSolverMultistepScheduler
+from torchdiffeq import odeint
+
+from genpolicy.errors import ConfigError
+from genpolicy.policies.samplers import (
+    DIFFUSION_SAMPLERS,
+    ODE_SAMPLERS,
+    CountedNetwork,
+    sample_diffusion,
+    sample_ode,
+)
+from genpolicy.policies.schedules import (
+    flow_gains,
+    noise_gains,
+    squared_cosine,
+    straight_path,
+    trailing_levels,
+)
+
+LEVELS = 100
+MEAN, STD = 0.4, 0.3
+COMMON = {"num_train_timesteps": LEVELS, "beta_schedule": "squaredcos_cap_v2"}
+
+
+def fixed_noise(shape=(5, 4, 3)):
+    generator = torch.Generator().manual_seed(7)
+    drawn = [
+        torch.randn(shape, generator=generator, dtype=torch.float64) for _ in range(LEVELS + 1)
+    ]
+    return lambda step: drawn[step]
+
+
+def curved_network(x, time):
+    """Bounded, non-linear, time-dependent: any indexing mistake shows."""
+    return torch.tanh(1.3 * x + time[:, None, None]) + 0.1 * x.flip(-1)
+
+
+def with_scheduler(scheduler, steps, noise, network=curved_network, **step_arguments):
+    scheduler.set_timesteps(steps)
+    x = noise(0)
+    for level in scheduler.timesteps:
+        time = torch.full(x.shape[:1], float(level) / LEVELS, dtype=x.dtype)
+        estimate = network(x, time)
+        x = scheduler.step(estimate, level, x, **step_arguments).prev_sample
+    return x
+
+
+@pytest.mark.parametrize("steps", [5, 10, 20, 50, 100])
+@pytest.mark.parametrize("clip", [None, 1.0])
+def test_ddim_equals_diffusers(steps, clip):
+    # without the clip, a network that is no denoiser grows without bound: use the exact one
+    network = gaussian_noise_estimate if clip is None else curved_network
+    noise = fixed_noise()
+    scheduler = DDIMScheduler(
+        **COMMON, clip_sample=clip is not None, timestep_spacing="trailing", set_alpha_to_one=True
+    )
+    arguments = {"eta": 0.0, "use_clipped_model_output": True}
+    expected = with_scheduler(scheduler, steps, noise, network, **arguments)
+    found = sample_diffusion(
+        network, noise, schedule=squared_cosine(LEVELS), name="ddim", steps=steps, clip=clip
+    )
+    assert torch.allclose(found, expected, atol=1e-5, rtol=1e-5)
+
+
+@pytest.mark.parametrize("steps", [10, 50, 100])
+def test_ddpm_equals_diffusers(steps, monkeypatch):
+    noise = fixed_noise()
+    scheduler = DDPMScheduler(**COMMON, clip_sample=True, timestep_spacing="trailing")
+    calls = iter(range(1, LEVELS + 1))
+    monkeypatch.setattr(
+        "diffusers.schedulers.scheduling_ddpm.randn_tensor",
+        lambda *_, **__: noise(next(calls)),
+    )
+    expected = with_scheduler(scheduler, steps, noise)
+    found = sample_diffusion(
+        curved_network, noise, schedule=squared_cosine(LEVELS), name="ddpm", steps=steps, clip=1.0
+    )
+    assert torch.allclose(found, expected, atol=1e-5, rtol=1e-5)
+
+
+@pytest.mark.parametrize("steps", [5, 10, 20])
+def test_dpm_solver_equals_diffusers(steps):
+    # thresholding with a largest value of 1 is exactly the clip to [-1, 1]
+    noise = fixed_noise()
+    scheduler = DPMSolverMultistepScheduler(
+        **COMMON,
+        algorithm_type="dpmsolver++",
+        solver_order=2,
+        timestep_spacing="trailing",
+        final_sigmas_type="zero",
+        thresholding=True,
+        sample_max_value=1.0,
+    )
+    expected = with_scheduler(scheduler, steps, noise)
+    found = sample_diffusion(
+        curved_network, noise, schedule=squared_cosine(LEVELS), name="dpm_2m", steps=steps, clip=1.0
+    )
+    assert torch.allclose(found, expected, atol=1e-5, rtol=1e-5)
+
+
+def test_schedule_equals_diffusers():
+    reference = DDPMScheduler(**COMMON).alphas_cumprod.double().numpy()
+    np.testing.assert_allclose(squared_cosine(LEVELS).alpha_bar, reference, rtol=1e-4)
+
+
+def test_one_step_of_the_second_order_solver_is_ddim():
+    arguments = {"schedule": squared_cosine(LEVELS), "steps": 1, "clip": None}
+    ddim, dpm = (
+        sample_diffusion(curved_network, fixed_noise(), name=name, **arguments)
+        for name in ("ddim", "dpm_2m")
+    )
+    assert torch.allclose(ddim, dpm, atol=1e-9)
+
+
+@pytest.mark.parametrize(("name", "method"), [("euler", "euler"), ("rk4", "rk4")])
+def test_ode_equals_torchdiffeq(name, method):
+    noise = fixed_noise()
+    steps = 8
+
+    def velocity(time, x):
+        return curved_network(x, time.expand(len(x)))
+
+    grid = torch.linspace(0.0, 1.0, steps + 1, dtype=torch.float64)
+    if name == "rk4":  # torchdiffeq's rk4 is the 3/8 rule; compare both with a fine solution
+        expected = odeint(
+            velocity, noise(0), grid[[0, -1]], method="dopri5", rtol=1e-10, atol=1e-10
+        )
+        found = sample_ode(curved_network, noise, name=name, steps=64)
+    else:
+        expected = odeint(velocity, noise(0), grid, method=method)
+        found = sample_ode(curved_network, noise, name=name, steps=steps)
+    assert torch.allclose(found, expected[-1], atol=1e-7)
+
+
+def test_heun_equals_torchdiffeq():
+    noise = fixed_noise()
+    grid = torch.linspace(0.0, 1.0, 9, dtype=torch.float64)
+    expected = odeint(
+        lambda time, x: curved_network(x, time.expand(len(x))), noise(0), grid, method="heun2"
+    )
+    found = sample_ode(curved_network, noise, name="heun", steps=8)
+    assert torch.allclose(found, expected[-1], atol=1e-9)
+
+
+@pytest.mark.parametrize(("name", "order"), [("euler", 1), ("heun", 2), ("rk4", 4)])
+def test_order_of_convergence_is_measured(name, order):
+    noise = fixed_noise()
+    exact = sample_ode(curved_network, noise, name="rk4", steps=512)
+    steps = np.array([8, 16, 32, 64])
+    errors = [
+        float((sample_ode(curved_network, noise, name=name, steps=int(n)) - exact).abs().max())
+        for n in steps
+    ]
+    slope = -np.polyfit(np.log(steps), np.log(errors), 1)[0]
+    assert slope == pytest.approx(order, abs=0.25)
+
+
+def gaussian_noise_estimate(x, time):
+    """Exact noise estimate of data N(MEAN, STD^2)."""
+    kept = torch.tensor(squared_cosine(LEVELS).alpha_bar)[(time * LEVELS).round().long()]
+    kept = kept[:, None, None]
+    variance = kept * STD**2 + 1.0 - kept
+    return (1.0 - kept).sqrt() * (x - kept.sqrt() * MEAN) / variance
+
+
+def gaussian_velocity(x, time):
+    """Exact velocity of the straight path to data N(MEAN, STD^2)."""
+    t = time[:, None, None]
+    variance = t**2 * STD**2 + (1.0 - t) ** 2
+    return MEAN + (t * STD**2 - (1.0 - t)) / variance * (x - t * MEAN)
+
+
+@pytest.mark.parametrize("std", [0.05, 0.3, 1.0])
+def test_gains_alone_are_the_exact_answer_for_a_centred_gaussian(std):
+    x = torch.linspace(-2.0, 2.0, 10, dtype=torch.float64)[:, None, None]
+    time = torch.arange(10, dtype=torch.float64) * 11 / LEVELS
+    kept = torch.tensor(squared_cosine(LEVELS).alpha_bar)[(time * LEVELS).round().long()]
+    noise = (1.0 - kept).sqrt() / (kept * std**2 + 1.0 - kept) * x.flatten()
+    found = noise_gains(squared_cosine(LEVELS), time, data_std=std)
+    assert torch.allclose(found.skip * x.flatten(), noise)
+    velocity = (time * std**2 - (1.0 - time)) / ((time * std) ** 2 + (1.0 - time) ** 2)
+    gains = flow_gains(time, data_std=std)
+    assert torch.allclose(gains.skip, velocity)
+    # what is left for the network has the variance outer^2: law of total variance
+    left = 1.0 + std**2 - velocity**2 * ((time * std) ** 2 + (1.0 - time) ** 2)
+    assert torch.allclose(gains.outer**2, left)
+
+
+def normal_grid(count=4001):
+    """Quantiles of the standard normal: expectations without sampling error."""
+    levels = (torch.arange(count, dtype=torch.float64) + 0.5) / count
+    return torch.special.ndtri(levels)[:, None, None]
+
+
+# Golden: methods.md annex (exact denoiser of N(.4, .3^2), trailing DDIM, squared-cosine T = 100).
+@pytest.mark.parametrize(("steps", "std"), [(5, 0.183), (10, 0.236), (20, 0.266)])
+def test_ddim_shrinks_the_spread_before_the_mean(steps, std):
+    grid = normal_grid()
+    samples = sample_diffusion(
+        gaussian_noise_estimate,
+        lambda _: grid,
+        schedule=squared_cosine(LEVELS),
+        name="ddim",
+        steps=steps,
+        clip=None,
+    )
+    assert float(samples.std()) == pytest.approx(std, abs=2e-3)
+    assert float(samples.mean()) == pytest.approx(MEAN, abs=2e-3)
+
+
+# Golden: methods.md annex (root mean square distance to the exact map MEAN + STD * noise).
+@pytest.mark.parametrize(
+    ("name", "steps", "rmse"),
+    [
+        ("euler", 8, 0.065), ("heun", 4, 0.010), ("rk4", 2, 0.023),
+        ("euler", 16, 0.034), ("heun", 8, 0.0045), ("rk4", 4, 0.0006),
+    ],
+)  # fmt: skip
+def test_flow_error_at_equal_nfe(name, steps, rmse):
+    grid = normal_grid()
+    counted = CountedNetwork(gaussian_velocity)
+    samples = sample_ode(counted, lambda _: grid, name=name, steps=steps)
+    assert counted.nfe == (
+        8 if (steps in (2, 4) and rmse > 0.005) or (name == "euler" and steps == 8) else 16
+    )
+    error = float((samples - (MEAN + STD * grid)).square().mean().sqrt())
+    assert error == pytest.approx(rmse, rel=0.12)
+
+
+def test_flow_time_is_zero_at_noise_and_one_at_the_action():
+    noise, action = torch.randn(2, 3, 2), torch.randn(2, 3, 2)
+    start, velocity = straight_path(noise, action, torch.zeros(2))
+    end, _ = straight_path(noise, action, torch.ones(2))
+    assert torch.equal(start, noise)
+    assert torch.equal(end, action)
+    assert torch.equal(velocity, action - noise)
+    found = sample_ode(lambda x, t: velocity, lambda _: noise, name="euler", steps=1)
+    assert torch.allclose(found, action)
+
+
+@pytest.mark.parametrize("name", [*DIFFUSION_SAMPLERS, *ODE_SAMPLERS])
+def test_nfe_is_counted(name):
+    counted = CountedNetwork(curved_network)
+    if name in DIFFUSION_SAMPLERS:
+        sample_diffusion(
+            counted, fixed_noise(), schedule=squared_cosine(LEVELS), name=name, steps=5, clip=1.0
+        )
+    else:
+        sample_ode(counted, fixed_noise(), name=name, steps=5)
+    assert counted.nfe == {"heun": 10, "rk4": 20}.get(name, 5)
+
+
+@pytest.mark.parametrize("steps", [0, -1, LEVELS + 1])
+def test_steps_outside_the_training_levels_are_refused(steps):
+    with pytest.raises(ConfigError, match="sampler_steps"):
+        trailing_levels(LEVELS, steps)
+
+
+def test_trailing_levels_start_at_pure_noise():
+    for steps in range(1, LEVELS + 1):
+        levels = trailing_levels(LEVELS, steps)
+        assert levels[0] == LEVELS - 1
+        assert len(set(levels)) == steps
+        assert min(levels) >= 0
+
+
+def test_no_step_and_unknown_names_are_refused():
+    with pytest.raises(ConfigError):
+        sample_ode(curved_network, fixed_noise(), name="euler", steps=0)
+    with pytest.raises(ConfigError):
+        sample_ode(curved_network, fixed_noise(), name="ddim", steps=2)
+    with pytest.raises(ConfigError):
+        sample_diffusion(
+            curved_network,
+            fixed_noise(),
+            schedule=squared_cosine(9),
+            name="euler",
+            steps=2,
+            clip=None,
+        )
+
+
+def test_half_the_levels_hold_half_the_signal():
+    # cos^2 at its middle, with the offset of 0.008: golden from the formula
+    middle = (
+        math.cos((0.5 + 0.008) / 1.008 * math.pi / 2) ** 2
+        / math.cos(0.008 / 1.008 * math.pi / 2) ** 2
+    )
+    assert squared_cosine(LEVELS).alpha_bar[49] == pytest.approx(middle, rel=1e-9)
