@@ -198,10 +198,9 @@ class LayerChecker:
             layers.dynamic(batch, q, limits=self.limits, settings=self.settings),
             "dynamic",
         )
-        length = self.collision.shapes.held_half_length_m
         self._record(
             states,
-            layers.contact(batch, settings=self.settings, held_length_m=length),
+            layers.contact(batch, settings=self.settings, shapes=self.collision.shapes),
             "contact",
         )
 

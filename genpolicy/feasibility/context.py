@@ -46,7 +46,7 @@ class Context:
         maximum_age_s: Oldest observation that may still be acted on in this phase.
         active_checkpoint_hash: Weights in force.
         active_sampler_hash: Sampler settings in force.
-        scene: Where obstacle and target stand.
+        scene: Where the movable bodies of the scene stand.
         q_cmd_history: Commands before `q_cmd`, oldest first, one period apart, rad; what is not
             given is not assumed: acceleration needs one of them at the seam, jerk two. (n, 7).
         newest_accepted_observation_s: Observation under the newest chunk accepted so far; an

@@ -21,6 +21,7 @@ from genpolicy.feasibility.context import Context, Workspace
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.robot.kinematics import ArmKinematics
 from genpolicy.robot.limits import RobotLimits
+from genpolicy.robot.shapes import SceneShapes
 
 Array = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -218,13 +219,13 @@ def dynamic(
     return margins
 
 
-def contact(batch: Batch, *, settings: FeasibilitySettings, held_length_m: float) -> Margins:
+def contact(batch: Batch, *, settings: FeasibilitySettings, shapes: SceneShapes) -> Margins:
     """Towards the target only straight down and slowly; let go only where that is meant.
 
     Args:
         batch: The chunks.
         settings: Cone, speed and depth.
-        held_length_m: How far the held object reaches below the TCP, m.
+        shapes: Size of the held object, and where the target opens.
     """
     in_contact = np.array([c.phase in settings.contact_phases for c in batch.contexts])
     held = batch.held(settings.held_opening_m)
@@ -241,7 +242,7 @@ def contact(batch: Batch, *, settings: FeasibilitySettings, held_length_m: float
     return {
         "approach_direction": _smallest(direction, applies),
         "contact_speed": _smallest(speed, applies),
-        "gripper_opening": _opening(batch, held, in_contact, settings, held_length_m),
+        "gripper_opening": _opening(batch, held, in_contact, settings, shapes),
     }
 
 
@@ -250,11 +251,11 @@ def _opening(
     held: BoolArray,
     in_contact: BoolArray,
     settings: FeasibilitySettings,
-    held_length_m: float,
+    shapes: SceneShapes,
 ) -> Array:
     free = np.array([c.phase in settings.opening_phases for c in batch.contexts])
-    hole = np.array([c.scene.hole_position_m for c in batch.contexts])
-    depth = hole[:, None, 2] - (batch.actions[..., 2] - held_length_m)
+    hole = np.array([c.scene.target_position_m(shapes) for c in batch.contexts])
+    depth = hole[:, None, 2] - (batch.actions[..., 2] - shapes.held_reach_m)
     deep = in_contact[:, None] & (depth >= settings.release_depth_m)
     # The moment of letting go: held before, open now.
     opened = held[:, :-1] & ~held[:, 1:]

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.robot.kinematics import JOINTS, Frames
-from genpolicy.robot.scene_state import TARGET_BODY
 from genpolicy.robot.shapes import BASE_FRAME, HELD, SceneShapes, bounding_spheres
 
 Array = NDArray[np.float64]
@@ -204,5 +203,7 @@ class BroadPhase:
         ]
         shape, body, other = np.array(pairs, dtype=np.int64).T
         held = np.array([robot[i].body == HELD for i in shape])
-        target = np.array([b >= 0 and self.bodies[b] == TARGET_BODY for b in body]) & held
+        target = (
+            np.array([b >= 0 and self.bodies[b] == self.shapes.target_body for b in body]) & held
+        )
         return Columns(shape, body, other, held, target)

@@ -17,7 +17,7 @@ from genpolicy.errors import ConfigError
 from genpolicy.robot.broadphase import BroadPhase
 from genpolicy.robot.kinematics import ArmKinematics, Frames
 from genpolicy.robot.narrowphase import NarrowPhase, require_finite
-from genpolicy.robot.scene_state import SceneState, body_pose
+from genpolicy.robot.scene_state import SceneState
 from genpolicy.robot.shapes import SceneShapes, shapes_of
 
 Array = NDArray[np.float64]
@@ -248,8 +248,9 @@ class CollisionModel:
     def _poses(self, scenes: tuple[SceneState, ...]) -> Array:
         poses = np.empty((len(scenes), len(self.bodies), 5))
         for i, scene in enumerate(scenes):
+            scene.require_known(self.shapes)
             for j, name in enumerate(self.bodies):
-                position, yaw = body_pose(self.shapes, scene, name)
+                position, yaw = scene.placement(self.shapes, name)
                 poses[i, j] = [*position, np.cos(yaw), np.sin(yaw)]
         return poses
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from genpolicy.errors import ContractError, NonFiniteError
 from genpolicy.robot.broadphase import Columns
 from genpolicy.robot.kinematics import Frames
-from genpolicy.robot.scene_state import SceneState, body_pose
+from genpolicy.robot.scene_state import SceneState
 from genpolicy.robot.shapes import BASE_FRAME, SceneShapes, fcl_geometry
 
 Array = NDArray[np.float64]
@@ -75,7 +75,7 @@ class NarrowPhase:
     def scene_placement(self, scene: SceneState, shape: int) -> tuple[Array, Array]:
         """Rotation and position (m) of a scene shape."""
         part = self.shapes.scene[shape]
-        position, yaw = body_pose(self.shapes, scene, part.body)
+        position, yaw = scene.placement(self.shapes, part.body)
         c, s = np.cos(yaw), np.sin(yaw)
         turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         return turn @ part.rotation, position + turn @ part.position_m

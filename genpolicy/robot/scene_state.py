@@ -1,49 +1,84 @@
-"""Where the movable parts of the scene stand in one situation."""
+"""Where the movable bodies of the scene stand in one situation."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from genpolicy.errors import NonFiniteError
+from genpolicy.errors import ContractError, NonFiniteError
 from genpolicy.robot.shapes import SceneShapes
 
 Array = NDArray[np.float64]
 
-TARGET_BODY, OBSTACLE_BODY = "fixture", "post"
+UPRIGHT_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True)
 class SceneState:
-    """What may stand elsewhere in another situation; base frame.
+    """Placement of scene bodies by name; a body that is not named stands as in the file.
+
+    What a task's `scene_poses` returns fits.
 
     Attributes:
-        post_y_m: Lateral position of the obstacle's axis, m.
-        hole_position_m: Centre of the target's opening, on its upper face, m. Shape (3,).
-        hole_yaw_rad: Yaw of the target, rad.
+        bodies: Position (3,), m, and unit quaternion (4,), w x y z, in the base frame. Bodies
+            stand upright: only a turn about z is possible.
+
+    Raises:
+        NonFiniteError: A number is not finite.
+        ContractError: A body does not stand upright, or the quaternion has no unit length.
     """
 
-    post_y_m: float
-    hole_position_m: tuple[float, float, float]
-    hole_yaw_rad: float
+    bodies: Mapping[str, tuple[ArrayLike, ArrayLike]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        values = (self.post_y_m, *self.hole_position_m, self.hole_yaw_rad)
-        if len(self.hole_position_m) != 3 or not np.all(np.isfinite(values)):
-            raise NonFiniteError(
-                where="SceneState",
-                found=repr(self),
-                expected="finite positions (m) and a finite yaw (rad)",
-                action="Reject the chunk and hold.",
+        placed = {}
+        for name, (position, quaternion) in self.bodies.items():
+            at, turn = np.array(position, dtype=float), np.array(quaternion, dtype=float)
+            finite = np.all(np.isfinite(at)) and np.all(np.isfinite(turn))
+            if at.shape != (3,) or turn.shape != (4,) or not finite:
+                raise NonFiniteError(
+                    where=f"SceneState.bodies[{name!r}]",
+                    found=f"{at.tolist()}, {turn.tolist()}",
+                    expected="a finite position (3,), m, and quaternion (4,)",
+                    action="Reject the chunk and hold.",
+                )
+            tilt = max(abs(turn[1]), abs(turn[2]), abs(float(turn @ turn) - 1.0))
+            if not tilt <= UPRIGHT_TOLERANCE:
+                raise ContractError(
+                    where=f"SceneState.bodies[{name!r}]",
+                    found=f"turned by the quaternion {turn.tolist()}",
+                    expected="a unit quaternion about z: bodies stand upright",
+                    action="Reject the chunk and hold.",
+                )
+            at.flags.writeable = False
+            placed[name] = (at, float(2 * np.arctan2(turn[3], turn[0])))
+        object.__setattr__(self, "_placed", placed)
+
+    def placement(self, shapes: SceneShapes, name: str) -> tuple[Array, float]:
+        """Position (3,), m, and yaw, rad, of a scene body."""
+        placed: dict[str, tuple[Array, float]] = self.__dict__["_placed"]
+        return placed[name] if name in placed else shapes.nominal_bodies[name]
+
+    def target_position_m(self, shapes: SceneShapes) -> Array:
+        """Centre of the target's opening in the base frame, m. Shape (3,)."""
+        position, yaw = self.placement(shapes, shapes.target_body)
+        c, s = np.cos(yaw), np.sin(yaw)
+        x, y, z = shapes.target_offset_m
+        centre: Array = position + np.array([c * x - s * y, s * x + c * y, z])
+        return centre
+
+    def require_known(self, shapes: SceneShapes) -> None:
+        """Refuse a body that the scene file does not have.
+
+        Raises:
+            ContractError: It does not.
+        """
+        unknown = set(self.bodies) - set(shapes.nominal_bodies)
+        if unknown:
+            raise ContractError(
+                where="SceneState.bodies",
+                found=f"naming {sorted(unknown)}",
+                expected=f"bodies out of {sorted(shapes.nominal_bodies)}",
+                action="Reject the chunk and hold; name bodies as the scene file does.",
             )
-
-
-def body_pose(shapes: SceneShapes, scene: SceneState, name: str) -> tuple[Array, float]:
-    """Position (3,), m, and yaw, rad, of a scene body; as in the file where it cannot move."""
-    position, yaw = shapes.nominal_bodies[name]
-    if name == OBSTACLE_BODY:
-        return np.array([position[0], scene.post_y_m, position[2]]), yaw
-    if name == TARGET_BODY:
-        hole = np.asarray(scene.hole_position_m, dtype=float)
-        return hole - [0.0, 0.0, shapes.target_height_m], scene.hole_yaw_rad
-    return position, yaw

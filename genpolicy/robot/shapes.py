@@ -22,6 +22,7 @@ Kind = Literal["box", "cylinder", "capsule", "sphere"]
 ROBOT_GROUP, HELD_GROUP, SCENE_GROUP = 1, 2, 3
 BASE_FRAME = -1
 HELD = "held"
+TARGET_SITE, TCP_SITE = "hole", "tcp"
 _KINDS: dict[int, Kind] = {
     int(mujoco.mjtGeom.mjGEOM_BOX): "box",
     int(mujoco.mjtGeom.mjGEOM_CYLINDER): "cylinder",
@@ -66,17 +67,20 @@ class SceneShapes:
         robot: Links, hand and fingers, then the held object where the scene has one.
         scene: Everything else that collides.
         nominal_bodies: Position (3,), m, and yaw, rad, of the scene's bodies in the file.
-        held_half_length_m: How far the held object reaches below the TCP, m.
+        held_reach_m: How far the held object reaches below the TCP, m.
         held_half_width_m: Smallest opening of each finger around the held object, m.
-        target_height_m: Height of the site `hole` above its body, m; 0 without one.
+        target_body: Body with the site `hole`, which the held object may touch in contact
+            phases; empty without one.
+        target_offset_m: Where the site lies on that body, m. Shape (3,).
     """
 
     robot: tuple[Shape, ...]
     scene: tuple[Shape, ...]
     nominal_bodies: dict[str, tuple[Array, float]]
-    held_half_length_m: float
+    held_reach_m: float
     held_half_width_m: float
-    target_height_m: float
+    target_body: str
+    target_offset_m: Array
 
 
 def shapes_of(scene_path: Path) -> SceneShapes:
@@ -103,14 +107,16 @@ def shapes_of(scene_path: Path) -> SceneShapes:
             robot.append(_robot_shape(model, data, geom, links))
         else:
             scene.append(_scene_shape(model, geom))
+    target_body, target_offset = _target(model)
     length, width = _held_size(model, data, links, held_shapes)
     return SceneShapes(
         robot=tuple(robot + held_shapes),
         scene=tuple(scene),
         nominal_bodies=_nominal_bodies(model, scene),
-        held_half_length_m=length,
+        held_reach_m=length,
         held_half_width_m=width,
-        target_height_m=_target_height(model),
+        target_body=target_body,
+        target_offset_m=target_offset,
     )
 
 
@@ -252,7 +258,7 @@ def _nominal_bodies(model: Any, scene: list[Shape]) -> dict[str, tuple[Array, fl
 
 
 def _held_size(model: Any, data: Any, links: list[int], held: list[Shape]) -> tuple[float, float]:
-    sites = [i for i in range(model.nsite) if model.site(i).name == "tcp"]
+    sites = [i for i in range(model.nsite) if model.site(i).name == TCP_SITE]
     if not held or not sites:
         return 0.0, 0.0
     frame = held[0].frame
@@ -270,8 +276,9 @@ def _held_size(model: Any, data: Any, links: list[int], held: list[Shape]) -> tu
     return max(tips), min(float(s.half_size_m.min()) for s in held)
 
 
-def _target_height(model: Any) -> float:
-    heights = [
-        float(model.site(i).pos[2]) for i in range(model.nsite) if model.site(i).name == "hole"
-    ]
-    return heights[0] if heights else 0.0
+def _target(model: Any) -> tuple[str, Array]:
+    for site in range(model.nsite):
+        if model.site(site).name == TARGET_SITE:
+            body = int(model.site_bodyid[site])
+            return str(model.body(body).name), np.array(model.site_pos[site])
+    return "", np.zeros(3)
