@@ -141,14 +141,7 @@ def train(
         "final": records[-1],
         "regime": regime(device),
     }
-    lines = "".join(json.dumps(record, sort_keys=True) + "\n" for record in records)
-    with output_folder(folder) as temporary:
-        identity = save_checkpoint(temporary, weights=weights, config=config)
-        write_bytes(temporary / METRICS_FILE, lines.encode())
-        write_bytes(
-            temporary / TRAINING_FILE, canonical_json({**summary, "checkpoint_sha256": identity})
-        )
-    return identity
+    return _write(folder, weights=weights, config=config, records=records, summary=summary)
 
 
 def learning_rate(step: int, config: TrainingConfig) -> float:
@@ -162,6 +155,25 @@ def learning_rate(step: int, config: TrainingConfig) -> float:
 def averaging_decay(step: int, config: TrainingConfig) -> float:
     """Share of the old average kept after update `step` (from 0)."""
     return float(min(config.ema_cap, 1.0 - (1.0 + step) ** -config.ema_power))
+
+
+def _write(
+    folder: Path,
+    *,
+    weights: bytes,
+    config: CheckpointConfig,
+    records: list[dict[str, float | int | None]],
+    summary: dict[str, object],
+) -> str:
+    """Write all four files, whole or not at all; returns the checkpoint's SHA-256."""
+    lines = "".join(json.dumps(record, sort_keys=True) + "\n" for record in records)
+    with output_folder(folder) as temporary:
+        identity = save_checkpoint(temporary, weights=weights, config=config)
+        write_bytes(temporary / METRICS_FILE, lines.encode())
+        write_bytes(
+            temporary / TRAINING_FILE, canonical_json({**summary, "checkpoint_sha256": identity})
+        )
+    return identity
 
 
 def _dimensions(horizons: HorizonConfig, request: TrainingRequest) -> Dimensions:
