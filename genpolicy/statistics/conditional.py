@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import stats
 
 from genpolicy.errors import ContractError
 
@@ -24,9 +25,9 @@ class ConditionalTest:
     Attributes:
         p_value: Permutation p-value, at least 1 / (permutations + 1).
         effect: Share of the labels' entropy inside the blocks that the stratum explains, corrected
-            for what a random stratum of the same sizes explains; 0 to 1.
-        effect_lower: Lower end of the bootstrap interval.
-        effect_upper: Upper end of the bootstrap interval.
+            for the bias of small blocks; 0 to 1.
+        effect_lower: Lower end of the jackknife interval over the rows.
+        effect_upper: Upper end of the jackknife interval.
         n: Rows in blocks that hold at least two labels and two strata.
     """
 
@@ -44,7 +45,6 @@ def conditional_test(
     *,
     rng: np.random.Generator,
     permutations: int = 999,
-    bootstrap: int = 200,
     confidence: float = 0.95,
 ) -> ConditionalTest:
     """Permutation test and effect size of a stratum on a label, inside blocks.
@@ -53,9 +53,8 @@ def conditional_test(
         labels: Mode of each row. Shape (n,).
         strata: Value of the variable of each row. Shape (n,).
         blocks: Block of each row; rows of different blocks are independent. Shape (n,).
-        rng: Generator of permutations and bootstrap.
+        rng: Generator of the permutations.
         permutations: Permutations of the null.
-        bootstrap: Resamples of the rows inside each block for the interval.
         confidence: Nominal coverage of the interval.
 
     Returns:
@@ -82,41 +81,44 @@ def conditional_test(
     observed = float(_explained(label, stratum[None], block)[0])
     hits = int(np.count_nonzero(null >= observed - 1e-12))
     p_value = (1 + hits) / (permutations + 1)
-    baseline = float(null.mean())
-    lower, upper = _interval(
-        label, stratum, block, rng=rng, bootstrap=bootstrap, confidence=confidence
-    )
-    effect = _corrected(observed, baseline)
-    return ConditionalTest(p_value, effect, min(lower, effect), max(upper, effect), n)
+    point, error = _jackknife(label, stratum, block)
+    half = error * float(stats.t.isf((1.0 - confidence) / 2.0, max(1, n - 1)))
+    effect, low, high = (min(1.0, max(0.0, x)) for x in (point, point - half, point + half))
+    return ConditionalTest(p_value, effect, low, high, n)
 
 
-def _interval(
-    label: Integers,
-    stratum: Integers,
-    block: Integers,
-    *,
-    rng: np.random.Generator,
-    bootstrap: int,
-    confidence: float,
-) -> tuple[float, float]:
-    """Percentile interval over resampled episodes; each resample is corrected by its own null."""
-    effects = []
-    for _ in range(bootstrap):
-        chosen = _resampled(block, rng)
-        a, b, c = label[chosen], stratum[chosen], block[chosen]
-        null = _explained(a, _permuted(b, c, rng=rng, draws=16), c).mean()
-        effects.append(_corrected(float(_explained(a, b[None], c)[0]), float(null)))
-    if not effects:
-        return 0.0, 1.0
-    tail = (1.0 - confidence) / 2.0
-    low, high = np.quantile(np.asarray(effects), [tail, 1.0 - tail])
-    return float(low), float(high)
+def _jackknife(label: Integers, stratum: Integers, block: Integers) -> tuple[float, float]:
+    """Bias-corrected explained share and its standard error, each row left out once.
+
+    The plug-in share is biased upwards in small blocks (by .09 for 15 rows and a share of .39);
+    the jackknife takes the bias away. Source: Efron and Stein 1981.
+    """
+    of_block, in_block = _counts(block)
+    of_label, in_label = _counts(block, label)
+    of_stratum, in_stratum = _counts(block, stratum)
+    of_cell, in_cell = _counts(block, stratum, label)
+    total = float(_plogp(of_block).sum() - _plogp(of_label).sum())
+    rest = float(_plogp(of_stratum).sum() - _plogp(of_cell).sum())
+    total_without = total - _drop(in_block) + _drop(in_label)
+    rest_without = rest - _drop(in_stratum) + _drop(in_cell)
+    n = len(label)
+    without = 1.0 - rest_without / np.maximum(total_without, 1e-12)
+    corrected = n * (1.0 - rest / total) - (n - 1) * float(without.mean())
+    spread = (n - 1) / n * float(np.sum((without - without.mean()) ** 2))
+    return corrected, float(np.sqrt(spread))
 
 
-def _corrected(observed: float, baseline: float) -> float:
-    if baseline >= 1.0 - 1e-9:
-        return 0.0
-    return float(np.clip((observed - baseline) / (1.0 - baseline), 0.0, 1.0))
+def _counts(*codes: Integers) -> tuple[Integers, Integers]:
+    """Count of each combination of codes, and of the combination of each row."""
+    key = np.zeros(len(codes[0]), dtype=np.int64)
+    for code in codes:
+        key = key * (int(code.max()) + 1) + code
+    _, place, counts = np.unique(key, return_inverse=True, return_counts=True)
+    return counts, counts[place.reshape(-1)]
+
+
+def _drop(counts: Integers) -> Array:
+    return _plogp(counts) - _plogp(counts - 1)
 
 
 def _explained(label: Integers, strata: Integers, block: Integers) -> Array:
@@ -154,15 +156,6 @@ def _permuted(
     result = np.empty((draws, len(block)), dtype=np.int64)
     result[:, order] = stratum[order][shuffled]
     return result
-
-
-def _resampled(block: Integers, rng: np.random.Generator) -> Integers:
-    """Rows drawn with replacement inside each block."""
-    order = np.argsort(block, kind="stable")
-    sizes = np.bincount(block)
-    starts = np.concatenate([[0], np.cumsum(sizes)[:-1]])
-    offsets = (rng.random(len(block)) * np.repeat(sizes, sizes)).astype(np.int64)
-    return np.asarray(order[np.repeat(starts, sizes) + offsets], dtype=np.int64)
 
 
 def _informative(label: Integers, stratum: Integers, block: Integers) -> NDArray[np.bool_]:

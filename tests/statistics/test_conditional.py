@@ -16,10 +16,7 @@ def test_type_one_error():
         # Both depend on the block, not on each other: an unconditional test would be fooled.
         labels = (rng.random(96) < 0.2 + 0.1 * blocks).astype(int)
         strata = (rng.random(96) < 0.8 - 0.1 * blocks).astype(int)
-        wrong += (
-            conditional_test(labels, strata, blocks, rng=rng, permutations=99, bootstrap=0).p_value
-            <= 0.05
-        )
+        wrong += conditional_test(labels, strata, blocks, rng=rng, permutations=99).p_value <= 0.05
     assert wrong / 300 <= 0.05 + 3 * np.sqrt(0.05 * 0.95 / 300)
 
 
@@ -43,7 +40,6 @@ def test_an_unrelated_stratum_of_many_values_has_no_effect():
             blocks,
             rng=rng,
             permutations=99,
-            bootstrap=0,
         ).effect
         for _ in range(40)
     ]
@@ -78,3 +74,15 @@ def test_nothing_to_tell_is_not_evidence():
     assert (empty.p_value, empty.effect, empty.n) == (1.0, 0.0, 0)
     with pytest.raises(ContractError):
         conditional_test(np.zeros(2), np.zeros(3), np.zeros(2), rng=stream(1, "z"))
+
+
+def test_the_interval_covers():
+    rng = stream(12, "coverage")
+    blocks = np.repeat(np.arange(8), 15)
+    hits = 0
+    for _ in range(200):
+        labels = rng.integers(0, 2, 120)
+        strata = np.where(rng.random(120) < 0.85, labels, 1 - labels)
+        test = conditional_test(labels, strata, blocks, rng=rng, permutations=99)
+        hits += test.effect_lower <= 0.390 <= test.effect_upper  # 1 - H(.15)/H(.5)
+    assert hits / 200 >= 0.85

@@ -1,0 +1,152 @@
+"""The audit's evidence as files: the tables that the gate reads, and nothing that decides."""
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+
+from genpolicy.audit.data import AuditInput
+from genpolicy.audit.labels import disagreement
+from genpolicy.audit.persistence import persistent
+from genpolicy.audit.run import AuditResult, Situation
+from genpolicy.integrity.atomic import write_bytes
+from genpolicy.integrity.documents import canonical_json
+from genpolicy.integrity.tables import write_table
+
+TEXT, WHOLE, REAL, FLAG = pa.string(), pa.int64(), pa.float64(), pa.bool_()
+
+CLOCKS = pa.schema(
+    [
+        ("stream", TEXT), ("epoch", TEXT), ("episodes", WHOLE), ("offset_before_s", REAL),
+        ("offset_after_s", REAL), ("lag_steps", REAL), ("receive_delay_p50_s", REAL),
+        ("receive_delay_p95_s", REAL), ("jitter_p95_s", REAL),
+    ]
+)  # fmt: skip
+CALIBRATION = pa.schema([("epoch", TEXT), ("episodes", WHOLE), ("residual_m", REAL)])
+NEIGHBOURHOODS = pa.schema(
+    [
+        ("split", TEXT), ("phase", TEXT), ("episode_uuid", TEXT), ("index", WHOLE),
+        ("neighbours", WHOLE), ("clusters", WHOLE), ("cluster_sizes", pa.list_(WHOLE)),
+        ("two_mode", FLAG), ("separation_m", REAL), ("mean_admissible", FLAG),
+        ("mean_reason", TEXT), ("modes_admissible", WHOLE), ("mean_path", pa.list_(REAL)),
+        ("mode_paths", pa.list_(pa.list_(REAL))), ("persistent", FLAG),
+    ]
+)  # fmt: skip
+MODES = pa.schema(
+    [
+        ("mode", TEXT), ("phase", TEXT), ("episodes", WHOLE), ("successes", WHOLE),
+        ("success_lower", REAL), ("success_upper", REAL), ("admissible", WHOLE),
+        ("checked", WHOLE),
+    ]
+)  # fmt: skip
+STRATA = pa.schema(
+    [
+        ("variable", TEXT), ("phase", TEXT), ("p_value", REAL), ("p_adjusted", REAL),
+        ("effect", REAL), ("effect_lower", REAL), ("effect_upper", REAL), ("n", WHOLE),
+        ("recorded", FLAG),
+    ]
+)  # fmt: skip
+REPLAY = pa.schema([("episode_uuid", TEXT), ("label", TEXT), ("replayed", TEXT)])
+RECOVERY = pa.schema([("split", TEXT), ("mode", TEXT), ("episodes", WHOLE), ("successes", WHOLE)])
+
+
+def write_evidence(result: AuditResult, folder: Path) -> None:
+    """Write every table and document of the audit into an existing folder.
+
+    Raises:
+        BadInputError: The place cannot be written.
+    """
+    tables = {
+        "clocks": _table(result.semantics.clocks, CLOCKS),
+        "calibration": _table(result.semantics.calibrations, CALIBRATION),
+        "neighbourhoods": pa.Table.from_pylist(
+            [_situation(result.data, item) for item in result.situations], NEIGHBOURHOODS
+        ),
+        "modes": _table(result.modes, MODES),
+        "strata": _table(result.strata, STRATA),
+        "replay": _table(result.replayed, REPLAY),
+        "recovery": _table(result.recovery, RECOVERY),
+    }
+    for name, table in tables.items():
+        write_table(folder / f"{name}.parquet", table)
+    write_bytes(folder / "persistence.json", canonical_json(asdict(result.persistence)))
+    write_bytes(folder / "summary.json", canonical_json(summary(result)))
+
+
+def summary(result: AuditResult) -> dict[str, Any]:
+    """Cause and counts, as written to `summary.json`."""
+    wrong, replays, upper = disagreement(result.replayed)
+    several = [item for item in result.situations if item.two_mode]
+    checked = [item for item in several if item.chunks.mean_admissible is not None]
+    return {
+        "cause": result.verdict.cause.value,
+        "variable": result.verdict.variable,
+        "kind": result.verdict.kind,
+        "next_action": result.verdict.next_action,
+        "modes_before_realignment": result.counts.two_mode_episodes,
+        "modes_after_realignment": result.modes_after_realignment,
+        "episodes": len(result.data.episodes),
+        "rows": len(result.data.observation),
+        "counts": asdict(result.counts),
+        "support": [asdict(item) for item in result.support],
+        "two_mode_by_phase": {
+            phase: sum(item.phase == phase for item in several)
+            for phase in sorted({item.phase for item in several})
+        },
+        "mean_checked": len(checked),
+        "mean_defeated": sum(_defeated(item) for item in checked),
+        "median_defeated": sum(not item.chunks.median_admissible for item in checked),
+        "label_disagreements": wrong,
+        "label_replays": replays,
+        "label_disagreement_upper": upper,
+        "gaps": result.semantics.gaps,
+        "negative_delays": result.semantics.negative_delays,
+        "start_drift": result.semantics.start_drift,
+    }
+
+
+def _defeated(item: Situation) -> bool:
+    """The mean is refused and every modal chunk passes."""
+    return not item.chunks.mean_admissible and all(item.chunks.mode_admissible)
+
+
+def _situation(data: AuditInput, item: Situation) -> dict[str, Any]:
+    query = item.neighbourhood.query
+    episode = int(data.episode[query])
+    position = data.action_position
+    return {
+        "split": str(data.episodes.split[episode]),
+        "phase": item.phase,
+        "episode_uuid": str(data.episodes.uuid[episode]),
+        "index": int(data.index[query]),
+        "neighbours": len(item.neighbourhood.rows),
+        "clusters": item.clustering.count,
+        "cluster_sizes": list(item.clustering.sizes),
+        "two_mode": item.two_mode,
+        "separation_m": item.clustering.separation,
+        "mean_admissible": item.chunks.mean_admissible,
+        "mean_reason": item.chunks.mean_reason,
+        "modes_admissible": sum(item.chunks.mode_admissible),
+        "mean_path": item.chunks.mean[:, position].ravel().tolist(),
+        "mode_paths": [mode[:, position].ravel().tolist() for mode in item.chunks.modes],
+        "persistent": persistent(item.identity),
+    }
+
+
+def _table(rows: Sequence[Any], schema: pa.Schema) -> pa.Table:
+    """Rows of dataclasses in the columns of `schema`; fields that it lacks are left out."""
+    return pa.Table.from_pylist(
+        [
+            {name: _plain(value) for name, value in asdict(row).items() if name in schema.names}
+            for row in rows
+        ],
+        schema,
+    )
+
+
+def _plain(value: Any) -> Any:
+    """NaN is written as missing: unknown is never a number."""
+    return None if isinstance(value, float) and np.isnan(value) else value

@@ -1,0 +1,263 @@
+"""Modes: clusters of whole chunks that two independent opinions agree on.
+
+First opinion: the best split into two or three along a principal axis must gain over one
+component under the integrated classification likelihood (Biernacki, Celeux and Govaert 2000),
+which a single Gaussian and a uniform cloud both fail. Second opinion: HDBSCAN (Campello et al.
+2013) must find the same split; alone it is not enough, since it calls a cloud without structure
+noise. On top, the centres must lie further apart than a length that matters, and each group must
+have enough members.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.cluster.hierarchy import fcluster, linkage
+from scipy.spatial.distance import squareform
+from sklearn.cluster import HDBSCAN
+
+from genpolicy.audit.data import Array, Integers
+from genpolicy.audit.settings import AuditSettings
+
+AXES = 3
+AGREEMENT = 0.9
+MAXIMUM_DEPTH = 2
+MINIMUM_SAMPLES = 2
+UNKNOWN_PAIR = 0.5
+
+
+@dataclass(frozen=True)
+class Clustering:
+    """Modes of one set of chunks.
+
+    Attributes:
+        labels: Mode of each chunk, 0 the largest. Shape (n,).
+        separation: Smallest RMS distance between two centres, unit of the paths; 0 for one mode.
+        medoids: Chunk nearest to all of its mode, one per mode.
+    """
+
+    labels: Integers
+    separation: float
+    medoids: tuple[int, ...]
+
+    @property
+    def count(self) -> int:
+        """Number of modes, at least 1."""
+        return len(self.medoids)
+
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        """Members per mode."""
+        return tuple(int(size) for size in np.bincount(self.labels, minlength=self.count))
+
+
+def features(paths: Array, settings: AuditSettings) -> Array:
+    """Vectors whose Euclidean distance is the RMS distance of two chunks.
+
+    Args:
+        paths: Positions of chunks from a common origin. Shape (n, K, P).
+        settings: `representation`: `path` resamples at equal arc length, so that fast and slow
+            along one route are one mode; `time` compares position by position.
+
+    Returns:
+        Shape (n, K * P).
+    """
+    n, steps, _ = paths.shape
+    used = paths if settings.representation == "time" else _by_arc_length(paths)
+    return np.asarray(used.reshape(n, -1) / np.sqrt(steps), dtype=np.float64)
+
+
+def cluster_chunks(paths: Array, settings: AuditSettings) -> Clustering:
+    """Modes of chunks from one situation.
+
+    Args:
+        paths: Positions relative to the TCP of their own observation. Shape (n, K, P).
+        settings: Sizes, separation, representation.
+
+    Returns:
+        The modes; a single one unless both opinions agree on more.
+    """
+    vectors = features(paths, settings)
+    n = len(vectors)
+    labels = np.zeros(n, dtype=np.int64)
+    _bisect(vectors, np.arange(n), labels, settings)
+    labels = _by_size(labels)
+    count = int(labels.max()) + 1
+    gaps = np.linalg.norm(vectors[:, None] - vectors[None], axis=2)
+    medoids = tuple(_medoid(gaps, np.flatnonzero(labels == mode)) for mode in range(count))
+    return Clustering(labels=labels, separation=_separation(vectors, labels), medoids=medoids)
+
+
+def split_gain(values: Array, least: int, groups: int = 2) -> tuple[float, Integers]:
+    """Best split of one-dimensional values into components of equal spread.
+
+    Args:
+        values: Shape (n,).
+        least: Smallest size of a group.
+        groups: Number of components, 2 or 3.
+
+    Returns:
+        Gain of `groups` components over one (> 0: better), and the group of each value. Shape
+        (n,).
+    """
+    n = len(values)
+    order = np.argsort(values, kind="stable")
+    x = values[order] - values.mean()
+    cuts = _cuts(n, least, groups)
+    if len(cuts) == 0:
+        return -np.inf, np.zeros(n, dtype=np.int64)
+    edges = np.hstack([np.zeros((len(cuts), 1), dtype=np.int64), cuts, np.full((len(cuts), 1), n)])
+    total, squares = np.append(0.0, np.cumsum(x)), np.append(0.0, np.cumsum(x * x))
+    sizes = np.diff(edges, axis=1)
+    within = squares[-1] - np.sum(np.diff(total[edges], axis=1) ** 2 / sizes, axis=1)
+    best = int(np.argmin(within))
+    floor = 1e-12 * float(squares[-1]) + 1e-300
+    share = sizes[best] / n
+    gain = n * np.log((squares[-1] + floor) / (max(float(within[best]), 0.0) + floor))
+    gain += 2 * n * float(np.sum(share * np.log(share))) - 2 * (groups - 1) * np.log(n)
+    sides = np.empty(n, dtype=np.int64)
+    sides[order] = np.searchsorted(cuts[best], np.arange(n), side="right")
+    return float(gain), sides
+
+
+def _cuts(n: int, least: int, groups: int) -> Integers:
+    """All places to cut n sorted values into groups of at least `least`. Shape (c, groups - 1)."""
+    first = np.arange(least, n - (groups - 1) * least + 1, dtype=np.int64)
+    if groups == 2:
+        return first[:, None]
+    a, b = np.meshgrid(first, np.arange(2 * least, n - least + 1, dtype=np.int64), indexing="ij")
+    keep = b - a >= least
+    return np.stack([a[keep], b[keep]], axis=1)
+
+
+def _bisect(
+    vectors: Array, rows: Integers, labels: Integers, settings: AuditSettings, depth: int = 0
+) -> None:
+    """Split `rows` while both opinions agree; writes new labels in place."""
+    least = _least(settings, len(labels))
+    if depth == MAXIMUM_DEPTH or len(rows) < 2 * least:
+        return
+    part = vectors[rows]
+    sides = next(
+        (
+            split
+            for split in _principal_splits(part, least, settings.minimum_gain)
+            if _separation(part, split) >= settings.minimum_separation_m
+            and _confirmed(part, split, least)
+        ),
+        None,
+    )
+    if sides is None:
+        return
+    for side in range(1, int(sides.max()) + 1):
+        labels[rows[sides == side]] = labels.max() + 1
+    for side in range(int(sides.max()) + 1):
+        _bisect(vectors, rows[sides == side], labels, settings, depth + 1)
+
+
+def _least(settings: AuditSettings, members: int) -> int:
+    """Smallest size of a mode among `members` chunks."""
+    return max(settings.minimum_mode_size, int(np.ceil(settings.minimum_mode_share * members)))
+
+
+def _principal_splits(vectors: Array, least: int, minimum_gain: float) -> list[Integers]:
+    """Splits along the principal axes that gain enough, best first."""
+    centred = vectors - vectors.mean(axis=0)
+    values, axes = np.linalg.eigh(centred @ centred.T)
+    found: list[tuple[float, Integers]] = []
+    for number in range(1, 1 + min(AXES, len(values))):
+        if values[-number] <= 0.0:
+            break
+        # The sign of an eigenvector is arbitrary: fix it, so that equal data give equal labels.
+        axis = axes[:, -number] * np.sign(axes[np.argmax(np.abs(axes[:, -number])), -number])
+        for groups in (2, 3):
+            gain, sides = split_gain(axis * np.sqrt(values[-number]), least, groups)
+            if gain > minimum_gain:
+                found.append((gain, sides))
+    return [sides for _, sides in sorted(found, key=lambda item: -item[0])]
+
+
+def _confirmed(vectors: Array, sides: Integers, least: int) -> bool:
+    """Whether HDBSCAN finds clusters in every group and none that mixes them."""
+    found = HDBSCAN(
+        min_cluster_size=least, min_samples=MINIMUM_SAMPLES, algorithm="brute", copy=True
+    ).fit_predict(vectors)
+    clear = found >= 0
+    if np.count_nonzero(clear) < len(vectors) / 2:
+        return False
+    pure, majorities = 0, set()
+    for cluster in np.unique(found[clear]):
+        counts = np.bincount(sides[found == cluster])
+        pure += int(counts.max())
+        majorities.add(int(counts.argmax()))
+    return majorities == set(sides.tolist()) and bool(pure >= AGREEMENT * np.count_nonzero(clear))
+
+
+def link(memberships: list[tuple[Integers, Integers]], episodes: int, minimum: int) -> Integers:
+    """Modes of episodes over all situations, from who was clustered with whom.
+
+    Args:
+        memberships: Per situation the episodes and their local modes. Shapes (n,) and (n,).
+        episodes: Number of episodes.
+        minimum: Smallest number of episodes of a mode.
+
+    Returns:
+        Mode of each episode, 0 the largest; -1 where the episode was never in a situation with
+        several modes, or its group is smaller than `minimum`. Shape (episodes,).
+    """
+    together, apart = np.zeros((episodes, episodes)), np.zeros((episodes, episodes))
+    for members, labels in memberships:
+        same = labels[:, None] == labels[None, :]
+        block = np.ix_(members, members)
+        together[block] += same
+        apart[block] += ~same
+    seen = np.flatnonzero(together.diagonal() > 0)
+    result = np.full(episodes, -1, dtype=np.int64)
+    if len(seen) < 2:
+        return result
+    known = together + apart
+    distance = np.divide(apart, known, out=np.full(known.shape, UNKNOWN_PAIR), where=known > 0)
+    distance = distance[np.ix_(seen, seen)]
+    np.fill_diagonal(distance, 0.0)
+    tree = linkage(squareform(distance, checks=False), method="average")
+    groups = _by_size(fcluster(tree, UNKNOWN_PAIR - 1e-9, criterion="distance").astype(np.int64))
+    large = np.bincount(groups)[groups] >= minimum
+    result[seen] = np.where(large, groups, -1)
+    return result
+
+
+def _by_arc_length(paths: Array) -> Array:
+    """Paths resampled at equal arc lengths up to one that most of them reach."""
+    n, steps, width = paths.shape
+    along = np.zeros((n, steps))
+    along[:, 1:] = np.cumsum(np.linalg.norm(np.diff(paths, axis=1), axis=2), axis=1)
+    lengths = along[:, -1]
+    common = max(float(np.quantile(lengths, 0.25)), 0.5 * float(np.median(lengths)))
+    at = np.linspace(0.0, common, steps)
+    result = np.empty_like(paths)
+    for row in range(n):
+        for axis in range(width):
+            result[row, :, axis] = np.interp(at, along[row], paths[row, :, axis])
+    return result
+
+
+def _separation(vectors: Array, labels: Integers) -> float:
+    centres = np.stack([vectors[labels == mode].mean(axis=0) for mode in np.unique(labels)])
+    if len(centres) < 2:
+        return 0.0
+    gaps = np.linalg.norm(centres[:, None] - centres[None], axis=2)
+    return float(gaps[np.triu_indices(len(centres), 1)].min())
+
+
+def _medoid(gaps: Array, members: Integers) -> int:
+    return int(members[np.argmin(gaps[np.ix_(members, members)].sum(axis=1))])
+
+
+def _by_size(labels: Integers) -> Integers:
+    """Labels renumbered: 0 the largest; of equals, the one that appears first."""
+    values, first, codes, counts = np.unique(
+        labels, return_index=True, return_inverse=True, return_counts=True
+    )
+    order = np.lexsort((first, -counts))
+    rank = np.empty(len(values), dtype=np.int64)
+    rank[order] = np.arange(len(values))
+    return np.asarray(rank[codes.reshape(-1)], dtype=np.int64)

@@ -1,0 +1,91 @@
+"""Persistence: a mode keeps its episodes together over time, noise deals them anew.
+
+The clusters of a situation are looked up again a chunk later, when not one action is shared:
+each episode should then lie nearer to the others of its own cluster than to the other cluster.
+The null deals the later chunks at random among the episodes (the link over time is shuffled).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from genpolicy.audit.data import Array, AuditInput, Integers, relative_paths
+from genpolicy.audit.modes import Clustering, features
+from genpolicy.audit.neighbourhoods import Neighbourhood
+from genpolicy.audit.settings import AuditSettings
+
+NULL_QUANTILE = 0.95
+MINIMUM_PER_MODE = 2
+
+
+@dataclass(frozen=True)
+class Persistence:
+    """Identity kept over time.
+
+    Attributes:
+        observed: Mean share of episodes that keep their cluster, over the situations.
+        null_q95: 95 % quantile of the same under the null.
+        null_mean: Its mean.
+        n: Situations in which it could be measured.
+    """
+
+    observed: float
+    null_q95: float
+    null_mean: float
+    n: int
+
+
+def kept_identity(
+    data: AuditInput,
+    settings: AuditSettings,
+    situation: Neighbourhood,
+    clustering: Clustering,
+    *,
+    rng: np.random.Generator,
+) -> tuple[float, Array] | None:
+    """Share of episodes whose later chunk still belongs to their cluster, and its null.
+
+    Returns:
+        Share and null draws, shape (99,); None where too few episodes go on that long.
+    """
+    members = situation.members
+    later = members + settings.persistence_lag_steps
+    alive = later + settings.chunk_steps // 2 <= data.last_row[members]
+    labels = clustering.labels[alive]
+    counts = np.bincount(labels, minlength=clustering.count)
+    if np.count_nonzero(counts >= MINIMUM_PER_MODE) < 2:
+        return None
+    vectors = features(relative_paths(data, later[alive], settings.chunk_steps), settings)
+    gaps = np.linalg.norm(vectors[:, None] - vectors[None], axis=2)
+    observed = _share(gaps, labels)
+    null = np.array([_share(gaps, rng.permutation(labels)) for _ in range(99)])
+    return observed, null
+
+
+def summarise(measured: list[tuple[float, Array] | None]) -> Persistence:
+    """Mean over the situations against the mean of their nulls."""
+    known = [item for item in measured if item is not None]
+    if not known:
+        return Persistence(0.0, 1.0, 1.0, 0)
+    null = np.mean([item[1] for item in known], axis=0)
+    return Persistence(
+        observed=float(np.mean([item[0] for item in known])),
+        null_q95=float(np.quantile(null, NULL_QUANTILE)),
+        null_mean=float(null.mean()),
+        n=len(known),
+    )
+
+
+def persistent(measured: tuple[float, Array] | None) -> bool:
+    """Whether one situation keeps its identity beyond its own null."""
+    return measured is not None and measured[0] > float(np.quantile(measured[1], NULL_QUANTILE))
+
+
+def _share(gaps: Array, labels: Integers) -> float:
+    """Share of chunks nearer on average to their own cluster (itself left out) than to others."""
+    kinds = np.unique(labels)
+    own = labels[:, None] == kinds[None]
+    counts = own.sum(axis=0)[None] - own
+    means = (gaps @ own) / np.maximum(counts, 1)
+    means[np.broadcast_to(counts == 0, means.shape)] = np.inf
+    return float(np.mean(kinds[np.argmin(means, axis=1)] == labels))

@@ -1,0 +1,89 @@
+"""The disturbed episodes on their own: which mode did each follow, and did it succeed?"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from genpolicy.audit.data import AuditInput, Integers, observation_history, relative_paths
+from genpolicy.audit.labels import SUCCESS
+from genpolicy.audit.modes import Clustering, features
+from genpolicy.audit.neighbourhoods import Neighbourhood
+from genpolicy.audit.settings import AuditSettings
+
+UNASSIGNED = "unassigned"
+
+
+@dataclass(frozen=True)
+class RecoveryOutcome:
+    """Disturbed episodes of one split that followed one mode."""
+
+    split: str
+    mode: str
+    episodes: int
+    successes: int
+
+
+def assign(
+    data: AuditInput,
+    settings: AuditSettings,
+    situations: list[tuple[Neighbourhood, Clustering]],
+    episode_modes: Integers,
+    episodes: Integers,
+) -> Integers:
+    """Mode of episodes that were in no situation, by their nearest chunks.
+
+    Args:
+        data: Canonical audit input.
+        settings: Radius, representation.
+        situations: Situations with several modes.
+        episode_modes: Mode of each episode, -1 for none. Shape (E,).
+        episodes: Which episodes to assign. Shape (n,).
+
+    Returns:
+        Mode of each, by majority over its situations; -1 where none is near. Shape (n,).
+    """
+    result = np.full(len(episodes), -1, dtype=np.int64)
+    if not situations:
+        return result
+    queries = np.array([item[0].query for item in situations], dtype=np.int64)
+    places = observation_history(data, queries, settings.observation_horizon)
+    for number, episode in enumerate(episodes):
+        rows = np.flatnonzero(data.episode == episode)
+        votes = np.zeros(int(episode_modes.max(initial=-1)) + 2, dtype=np.int64)
+        history = observation_history(data, rows, settings.observation_horizon)
+        gaps = np.linalg.norm(history[:, None] - places[None], axis=2)
+        near = np.argmin(gaps, axis=0)
+        for place in np.flatnonzero(gaps.min(axis=0) <= settings.radius):
+            situation, _ = situations[int(place)]
+            chunks = np.append(situation.members, rows[near[place]])
+            vectors = features(relative_paths(data, chunks, settings.chunk_steps), settings)
+            nearest = int(np.argmin(np.linalg.norm(vectors[:-1] - vectors[-1], axis=1)))
+            votes[episode_modes[data.episode[situation.members[nearest]]]] += 1
+        if votes[:-1].any():
+            result[number] = int(np.argmax(votes[:-1]))
+    return result
+
+
+def recovery_outcomes(
+    data: AuditInput,
+    settings: AuditSettings,
+    situations: list[tuple[Neighbourhood, Clustering]],
+    episode_modes: Integers,
+) -> tuple[RecoveryOutcome, ...]:
+    """Disturbed episodes per split and mode; episodes near no situation are `unassigned`."""
+    disturbed = np.flatnonzero(data.episodes.is_recovery)
+    modes = assign(data, settings, situations, episode_modes, disturbed)
+    rows = []
+    for split in np.unique(data.episodes.split[disturbed]):
+        for mode in np.unique(modes):
+            member = disturbed[(modes == mode) & (data.episodes.split[disturbed] == split)]
+            if len(member):
+                rows.append(
+                    RecoveryOutcome(
+                        split=str(split),
+                        mode=f"m{mode}" if mode >= 0 else UNASSIGNED,
+                        episodes=len(member),
+                        successes=int(np.sum(data.episodes.outcome[member] == SUCCESS)),
+                    )
+                )
+    return tuple(rows)

@@ -1,0 +1,92 @@
+"""Settings of the audit: what counts as near, as two modes, and as red. One section of params."""
+
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+
+class AuditSettings(BaseModel):
+    """Frozen and strict. Lengths in m (or the unit of the action's position), times in s.
+
+    Attributes:
+        observation_horizon: Observations that condition an invocation.
+        chunk_steps: Actions per chunk, K.
+        position_channel: Observed TCP position; its components pair with the action's position.
+        reference_channel: Observed pose of what is released into; None where there is none.
+        calibration_phase: Phase whose first row gives the calibration residual.
+        context_channels: Observed channels that are held against the modes.
+        ignored_channels: Channels without a part in the distance between observations.
+        scale_m: Difference of a length that makes another observation, m.
+        scale_n: The same for a force, N.
+        scale_px: The same for a length in pixels.
+        scale_unit: The same for a pure number (direction cosines and the like).
+        noise_floor_m: Spread below which action-to-action noise does not matter.
+        radius: Furthest neighbour, in units of the scales (Euclidean over the history).
+        neighbours: Training episodes per neighbourhood, at most.
+        minimum_neighbours: Fewer inside the radius: the situation is not analysed.
+        query_stride: Every how many rows of a held-out episode a query is made.
+        maximum_queries_per_phase: Cap; above it queries are drawn at random.
+        representation: `path` compares routes at equal arc length, `time` at equal times.
+        minimum_separation_m: Modes nearer than this (RMS over the chunk) are one.
+        minimum_gain: Likelihood gain of two components over one that makes two modes; at 10 about
+            1.5 % of uniform clouds of 20 chunks pass along one axis, and 0.1 % of Gaussian ones.
+        minimum_mode_share: Smallest share of a neighbourhood that makes a mode.
+        minimum_mode_size: Smallest number of episodes that makes a mode.
+        resolved_auc: One observed component that tells the clusters apart this well (and by more
+            than its scale) means that the observation is not the same.
+        persistence_lag_steps: How much later the clusters must still be there.
+        maximum_lag_steps: Search range of the action-to-state lag.
+        declared_lag_steps: Lag that the contract states; None takes the median of the episodes.
+        clock_limit_s: Red above: clock residual of an epoch.
+        calibration_limit_m: Red above: calibration residual of an epoch.
+        label_disagreement_limit: Red above: exact upper bound of label against replay.
+        replay_episodes: Episodes to replay, drawn at random, at most.
+        minimum_situations: Fewer analysed held-out episodes: insufficient support.
+        minimum_two_mode_situations: Held-out episodes of a phase with several modes, below which
+            the phase is said to have one.
+        strata_alpha: Family-wise error of the strata tests.
+        strata_effect_limit: Red above: explained share of a significant stratum.
+        mode_success_limit: Lower bound of a mode's success that makes it valid.
+        mode_feasible_limit: Share of a mode's chunks that must be admissible.
+        permutations: Permutations per test.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+
+    observation_horizon: int = Field(default=2, ge=1)
+    chunk_steps: int = Field(default=16, ge=2)
+    position_channel: str = "tcp_position_m"
+    reference_channel: str | None = "hole_pose"
+    calibration_phase: str = "release"
+    context_channels: list[str] = ["hole_pose"]
+    ignored_channels: list[str] = ["phase"]
+    scale_m: float = Field(default=0.01, gt=0)
+    scale_n: float = Field(default=5.0, gt=0)
+    scale_px: float = Field(default=10.0, gt=0)
+    scale_unit: float = Field(default=0.1, gt=0)
+    noise_floor_m: float = Field(default=0.002, gt=0)
+    radius: float = Field(default=6.0, gt=0)
+    neighbours: int = Field(default=20, ge=4)
+    minimum_neighbours: int = Field(default=12, ge=4)
+    query_stride: int = Field(default=2, ge=1)
+    maximum_queries_per_phase: int = Field(default=4000, ge=1)
+    representation: Literal["path", "time"] = "path"
+    minimum_separation_m: float = Field(default=0.03, gt=0)
+    minimum_gain: float = Field(default=10.0, ge=0)
+    minimum_mode_share: float = Field(default=0.15, gt=0, lt=0.5)
+    minimum_mode_size: int = Field(default=3, ge=2)
+    resolved_auc: float = Field(default=0.95, gt=0.5, le=1.0)
+    persistence_lag_steps: int = Field(default=16, ge=1)
+    maximum_lag_steps: int = Field(default=12, ge=1)
+    declared_lag_steps: float | None = None
+    clock_limit_s: float = Field(default=0.02, gt=0)
+    calibration_limit_m: float = Field(default=0.005, gt=0)
+    label_disagreement_limit: float = Field(default=0.08, gt=0, lt=1)
+    replay_episodes: int = Field(default=60, ge=0)
+    minimum_situations: int = Field(default=20, ge=1)
+    minimum_two_mode_situations: int = Field(default=5, ge=1)
+    strata_alpha: float = Field(default=0.05, gt=0, lt=1)
+    strata_effect_limit: float = Field(default=0.3, gt=0, lt=1)
+    mode_success_limit: float = Field(default=0.5, gt=0, lt=1)
+    mode_feasible_limit: float = Field(default=0.8, gt=0, le=1)
+    permutations: int = Field(default=999, ge=99)

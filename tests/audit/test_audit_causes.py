@@ -1,0 +1,126 @@
+"""Planted causes on the planar task: each must be named, and none for another's reason."""
+
+import pytest
+from planar import SETTINGS, admissible, planar
+
+from genpolicy.audit.evidence import summary
+from genpolicy.audit.run import audit
+from genpolicy.audit.verdict import Cause
+
+
+def run(settings=SETTINGS, check=admissible, **planted):
+    data, replayed = planar(**planted)
+    return audit(data, settings, admissible=check, replay=replayed.__getitem__, root_seed=3)
+
+
+@pytest.fixture(scope="module")
+def valid():
+    return run(recoveries=20)
+
+
+def test_valid_modes_are_found(valid):
+    assert valid.verdict.cause is Cause.VALID_MODES
+    assert valid.counts.two_mode_episodes >= 40
+    assert valid.counts.persistent >= 0.95 * valid.counts.two_mode
+    assert valid.persistence.observed - valid.persistence.null_q95 > 0.3
+    assert len(valid.modes) == 2
+    assert min(mode.success_lower for mode in valid.modes) > 0.9
+
+
+def test_the_mean_hits_the_post_and_the_modes_do_not(valid):
+    numbers = summary(valid)
+    assert numbers["mean_defeated"] == numbers["mean_checked"] == valid.counts.two_mode
+    assert numbers["modes_before_realignment"] == numbers["modes_after_realignment"]
+
+
+def test_disturbed_episodes_stand_on_their_own(valid):
+    assert sum(row.episodes for row in valid.recovery) == 20
+    assert {row.mode for row in valid.recovery} <= {"m0", "m1", "unassigned"}
+    used = {
+        int(e) for item in valid.situations for e in valid.data.episode[item.neighbourhood.members]
+    }
+    assert not any(valid.data.episodes.is_recovery[e] for e in used)
+
+
+def test_neighbours_are_independent_training_episodes(valid):
+    data = valid.data
+    for item in valid.situations:
+        episodes = data.episode[item.neighbourhood.rows]
+        assert len(set(episodes.tolist())) == len(episodes)
+        assert set(data.episodes.split[episodes]) == {"train"}
+        assert set(data.phase[item.neighbourhood.members]) == {item.phase}
+        assert data.episodes.split[data.episode[item.neighbourhood.query]] != "train"
+
+
+def test_a_hidden_operator_is_named():
+    verdict = run(modes="operator").verdict
+    assert (verdict.cause, verdict.variable) == (Cause.HIDDEN_STATE, "operator")
+    assert "operator explains" in verdict.next_action
+
+
+def test_modes_of_an_epoch_are_a_data_defect():
+    verdict = run(modes="epoch").verdict
+    assert (verdict.cause, verdict.variable) == (Cause.DATA_DEFECT, "calibration_epoch")
+
+
+def test_one_side_only_is_unimodal():
+    result = run(modes="none")
+    assert result.verdict.cause is Cause.UNIMODAL
+    assert result.counts.two_mode == 0
+
+
+def test_tremor_is_not_a_mode():
+    assert run(modes="none", tremor_m=0.02).verdict.cause is Cause.POINTWISE_NOISE
+
+
+@pytest.mark.parametrize("modes", ["free", "none"])
+def test_a_clock_offset_is_named_before_its_modes(modes):
+    result = run(modes=modes, clock_steps=3)
+    assert (result.verdict.cause, result.verdict.kind) == (Cause.DATA_DEFECT, "clock")
+    offsets = {clock.epoch: clock.offset_before_s for clock in result.semantics.clocks}
+    assert abs(offsets["e1"] - offsets["e0"]) == pytest.approx(0.3, abs=0.02)
+    assert all(abs(clock.offset_after_s) < 0.02 for clock in result.semantics.clocks)
+
+
+def test_false_modes_of_a_clock_offset_vanish_after_realignment():
+    result = run(modes="none", clock_steps=6, settings=SETTINGS.model_copy(
+        update={"representation": "time"}))  # fmt: skip
+    assert result.counts.two_mode_episodes > 10
+    assert result.modes_after_realignment <= result.counts.two_mode_episodes / 4
+
+
+def test_a_shifted_calibration_is_a_data_defect():
+    verdict = run(epoch_shift_m=0.01).verdict
+    assert (verdict.cause, verdict.kind) == (Cause.DATA_DEFECT, "calibration")
+
+
+def test_wrong_labels_are_contamination():
+    verdict = run(wrong_labels=0.2).verdict
+    assert verdict.cause is Cause.LABEL_CONTAMINATION
+
+
+def test_a_mode_that_fails_honestly_leaves_one():
+    verdict = run(side_fails=True).verdict
+    assert (verdict.cause, verdict.kind) == (Cause.UNIMODAL, "one_valid_mode")
+
+
+def test_an_infeasible_mode_leaves_one():
+    verdict = run(check=lambda a, o: (a[:, 1].min() > -0.03, "collision")).verdict
+    assert (verdict.cause, verdict.kind) == (Cause.UNIMODAL, "one_valid_mode")
+
+
+def test_few_data_support_nothing():
+    settings = SETTINGS.model_copy(update={"label_disagreement_limit": 0.5})
+    verdict = run(episodes=20, settings=settings).verdict
+    assert (verdict.cause, verdict.kind) == (Cause.INSUFFICIENT_SUPPORT, "neighbourhoods")
+    assert run(episodes=20).verdict.kind == "replay"
+
+
+def test_without_outcomes_no_mode_is_valid():
+    from dataclasses import replace
+
+    data, _ = planar()
+    data = replace(data, episodes=replace(data.episodes, outcome=data.episodes.split.astype("<U1")))
+    data.episodes.outcome[:] = ""
+    verdict = audit(data, SETTINGS, admissible=None, replay=None, root_seed=3).verdict
+    assert (verdict.cause, verdict.kind) == (Cause.INSUFFICIENT_SUPPORT, "not_recorded")

@@ -1,0 +1,127 @@
+"""Evidence files: exact columns, same bytes, no dependence on the order of episodes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from planar import SETTINGS, admissible, planar, shuffled
+
+from genpolicy.audit.data import AuditInput, canonical
+from genpolicy.audit.evidence import write_evidence
+from genpolicy.audit.method_modes import one_per_episode, read_situations, sample_modes
+from genpolicy.audit.run import audit
+from genpolicy.errors import ContractError, NonFiniteError
+from genpolicy.integrity.documents import read_json
+from genpolicy.integrity.tables import read_table
+
+FILES = {
+    "clocks.parquet", "calibration.parquet", "neighbourhoods.parquet", "modes.parquet",
+    "strata.parquet", "replay.parquet", "recovery.parquet", "persistence.json", "summary.json",
+}  # fmt: skip
+
+
+def write(data, replayed, folder, seed=3):
+    folder.mkdir()
+    result = audit(
+        data, SETTINGS, admissible=admissible, replay=replayed.__getitem__, root_seed=seed
+    )
+    write_evidence(result, folder)
+    return {path.name: path.read_bytes() for path in sorted(folder.iterdir())}
+
+
+@pytest.fixture(scope="module")
+def evidence(tmp_path_factory):
+    data, replayed = planar(episodes=80)
+    folder = tmp_path_factory.mktemp("evidence") / "first"
+    return data, replayed, folder, write(data, replayed, folder)
+
+
+def test_same_bytes_again_and_for_any_order_of_episodes(evidence, tmp_path):
+    data, replayed, _, first = evidence
+    assert set(first) == FILES
+    np.random.seed(5)
+    assert write(data, replayed, tmp_path / "again") == first
+    assert write(shuffled(data, 7), replayed, tmp_path / "shuffled") == first
+
+
+def test_another_seed_changes_draws_but_not_the_cause(evidence, tmp_path):
+    data, replayed, folder, first = evidence
+    other = write(data, replayed, tmp_path / "other", seed=4)
+    assert other != first
+    assert (
+        read_json(tmp_path / "other" / "summary.json")["cause"]
+        == read_json(folder / "summary.json")["cause"]
+    )
+
+
+def test_tables_have_the_columns_that_the_gate_reads(evidence):
+    _, _, folder, _ = evidence
+    table = read_table(folder / "neighbourhoods.parquet")
+    assert table.column_names == [
+        "split", "phase", "episode_uuid", "index", "neighbours", "clusters", "cluster_sizes",
+        "two_mode", "separation_m", "mean_admissible", "mean_reason", "modes_admissible",
+        "mean_path", "mode_paths", "persistent",
+    ]  # fmt: skip
+    rows = table.to_pylist()
+    assert all(sum(row["cluster_sizes"]) == row["neighbours"] + 1 for row in rows)
+    assert all(len(row["mode_paths"]) == row["clusters"] for row in rows)
+    assert all((row["mean_admissible"] is None) == (not row["two_mode"]) for row in rows)
+    strata = read_table(folder / "strata.parquet").to_pylist()
+    assert {"operator", "object", "calibration_epoch", "episode_order", "time_in_episode"} <= {
+        row["variable"] for row in strata
+    }
+
+
+def test_what_was_not_recorded_is_said_so(tmp_path):
+    data, replayed = planar(episodes=80)
+    data = replace(data, episodes=replace(
+        data.episodes, operator=np.full(80, ""), order=np.full(80, np.nan)))  # fmt: skip
+    write(data, replayed, tmp_path / "blank")
+    rows = {r["variable"]: r for r in read_table(tmp_path / "blank" / "strata.parquet").to_pylist()}
+    for name in ("operator", "episode_order"):
+        assert rows[name]["recorded"] is False and rows[name]["p_value"] is None
+    assert rows["calibration_epoch"]["recorded"] is True
+
+
+def test_samples_between_modes_cover_none(evidence):
+    _, _, folder, _ = evidence
+    situations = read_situations(folder, width=2)
+    assert len(situations) >= 10
+    assert len({s.episode_uuid for s in one_per_episode(situations)}) == len(
+        one_per_episode(situations)
+    )
+    item = situations[0]
+    means = np.repeat(item.mode_paths.mean(axis=0)[None], 8, axis=0)
+    found = sample_modes(means, item.mode_paths, position=slice(0, 2))
+    assert found.between.all() and found.modes_covered == 0 and found.modes_present == 2
+    both = sample_modes(item.mode_paths, item.mode_paths, position=slice(0, 2))
+    assert both.modes_covered == 2 and not both.between.any() and both.nearest.tolist() == [0, 1]
+    wild = sample_modes(item.mode_paths + 5.0, item.mode_paths, position=slice(0, 2))
+    assert wild.modes_covered == 0
+    with pytest.raises(ContractError, match="at least two modes"):
+        sample_modes(means, item.mode_paths[:1], position=slice(0, 2))
+
+
+def test_equal_observations_are_broken_at_random_not_by_order():
+    # All starts equal: which 20 of 48 training episodes are taken must not follow the identifier.
+    from genpolicy.audit.neighbourhoods import find
+
+    data, _ = planar(episodes=80)
+    data = canonical(replace(data, observation=data.observation * 0.0))
+    taken = []
+    for seed in range(40):
+        items, _ = find(data, SETTINGS, phase="approach", root_seed=seed)
+        taken += data.episode[items[0].rows].tolist()
+    counts = np.bincount(taken, minlength=80)[data.episodes.split == "train"]
+    assert counts.min() > 0 and counts.max() < 40
+
+
+def test_broken_input_is_refused():
+    data, _ = planar(episodes=10)
+    action = data.action.copy()
+    action[3, 0] = np.nan
+    with pytest.raises(NonFiniteError, match="audit input: action"):
+        replace(data, action=action)
+    with pytest.raises(ContractError, match="one identifier twice"):
+        replace(data, episodes=replace(data.episodes, uuid=np.full(10, "same")))
+    assert isinstance(data, AuditInput)

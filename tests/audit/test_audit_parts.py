@@ -1,0 +1,119 @@
+"""Parts: split test, clustering, linking, lag, type I error of the whole strata test."""
+
+import numpy as np
+import pytest
+from planar import SETTINGS, planar
+
+from genpolicy.audit.data import canonical
+from genpolicy.audit.modes import cluster_chunks, link, split_gain
+from genpolicy.audit.run import _situations
+from genpolicy.audit.semantics import episode_lags
+from genpolicy.audit.strata import examine_strata
+from genpolicy.seeds import stream
+
+TIMES = np.linspace(0.0, 1.0, 16)
+
+
+def fan(lateral, rng, noise=0.002):
+    """Chunks straight ahead that end at the given lateral positions."""
+    n = len(lateral)
+    ahead = 0.3 * TIMES[None] * np.ones((n, 1))
+    side = np.asarray(lateral)[:, None] * TIMES[None]
+    paths = np.stack([ahead, side, np.zeros_like(side)], axis=2)
+    return paths + noise * rng.normal(size=paths.shape)
+
+
+def test_false_modes_of_structureless_clouds_are_rare():
+    rng = stream(20, "clouds")
+    gauss = [
+        cluster_chunks(fan(0.08 * rng.normal(size=21), rng), SETTINGS).count > 1 for _ in range(300)
+    ]
+    uniform = [
+        cluster_chunks(fan(rng.uniform(-0.15, 0.15, 21), rng), SETTINGS).count > 1
+        for _ in range(300)
+    ]
+    assert np.mean(gauss) <= 0.01
+    assert np.mean(uniform) <= 0.05
+
+
+@pytest.mark.parametrize("share", [0.25, 0.5])
+def test_two_and_three_modes_are_counted(share):
+    rng = stream(21, "modes")
+    found = []
+    for _ in range(50):
+        left = rng.random(21) < share
+        left[:4], left[-4:] = True, False
+        lateral = np.where(left, 0.12, -0.12) + 0.015 * rng.normal(size=21)
+        split = cluster_chunks(fan(lateral, rng), SETTINGS)
+        found.append(split.count == 2 and len(set(split.labels[left].tolist())) == 1)
+    assert np.mean(found) >= 0.95
+    three = np.repeat([-0.15, 0.0, 0.15], 7) + 0.004 * rng.normal(size=21)
+    assert cluster_chunks(fan(three, rng), SETTINGS).count == 3
+
+
+def test_speed_is_no_mode_of_the_route_but_one_of_time():
+    rng = stream(22, "speed")
+    speed = np.where(np.arange(21) % 2 == 0, 1.0, 0.5)
+    paths = fan(np.zeros(21), rng, noise=0.0005) * speed[:, None, None]
+    assert cluster_chunks(paths, SETTINGS).count == 1
+    timed = SETTINGS.model_copy(update={"representation": "time"})
+    assert cluster_chunks(paths, timed).count == 2
+
+
+def test_labels_do_not_depend_on_rotation_or_order():
+    rng = stream(23, "rotation")
+    lateral = np.where(np.arange(21) < 8, 0.1, -0.1) + 0.01 * rng.normal(size=21)
+    paths = fan(lateral, rng)
+    turn = np.array([[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]])
+    first = cluster_chunks(paths, SETTINGS)
+    turned = cluster_chunks(paths @ turn.T, SETTINGS)
+    order = rng.permutation(21)
+    dealt = cluster_chunks(paths[order], SETTINGS)
+    assert np.array_equal(first.labels, turned.labels)
+    assert np.array_equal(first.labels[order], dealt.labels)
+    assert first.separation == pytest.approx(turned.separation)
+
+
+def test_split_gain_golden():
+    # Two tight groups of 4: total scatter 8 (within 0 up to the floor), so the gain is large;
+    # eight equal values have none.
+    gain, sides = split_gain(np.array([0.0, 2, 0, 2, 0, 2, 0, 2]), 2)
+    assert gain > 100 and sides.tolist() == [0, 1, 0, 1, 0, 1, 0, 1]
+    assert split_gain(np.zeros(8), 2)[0] < 0
+    # By hand, n = 4, values -3 -1 1 3: scatter 20 against 4; 4 ln 5 - 8 ln 2 - 2 ln 4.
+    assert split_gain(np.array([-3.0, -1, 1, 3]), 2)[0] == pytest.approx(
+        4 * np.log(5) - 8 * np.log(2) - 2 * np.log(4)
+    )
+
+
+def test_linking_follows_modes_through_overlapping_situations():
+    rng = stream(24, "link")
+    side = rng.integers(0, 2, 60)
+    seen = [np.sort(rng.choice(50, 15, replace=False)) for _ in range(30)]
+    # Local names are arbitrary, and one situation in thirty is dealt at random.
+    memberships = [(s, side[s] ^ int(rng.integers(0, 2))) for s in seen]
+    memberships[3] = (seen[3], rng.integers(0, 2, 15))
+    groups = link(memberships, 60, 4)
+    assert set(groups[:50].tolist()) <= {-1, 0, 1} and np.all(groups[50:] == -1)
+    for group in (0, 1):
+        assert len(set(side[:50][groups[:50] == group].tolist())) == 1
+
+
+@pytest.mark.parametrize("steps", [0, 2, 5])
+def test_lag_is_recovered(steps):
+    data = canonical(planar(episodes=20, clock_steps=steps)[0])
+    lags = episode_lags(data, 12)
+    late = data.episodes.calibration_epoch == "e1"
+    assert np.nanmedian(lags[late]) == pytest.approx(1 + steps, abs=0.15)
+    assert np.nanmedian(lags[~late]) == pytest.approx(1, abs=0.15)
+
+
+def test_family_wise_error_of_the_strata_test():
+    wrong = 0
+    for seed in range(40):
+        data = canonical(planar(episodes=80, seed=100 + seed)[0])
+        settings = SETTINGS.model_copy(update={"query_stride": 40})
+        several = [(i, c) for _, i, c in _situations(data, settings, seed)[0] if c.count > 1]
+        rows = examine_strata(data, settings, {"approach": several}, root_seed=seed)
+        wrong += any(r.p_adjusted is not None and r.p_adjusted <= 0.05 for r in rows)
+    assert wrong / 40 <= 0.05 + 3 * np.sqrt(0.05 * 0.95 / 40)
