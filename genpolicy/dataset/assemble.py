@@ -26,6 +26,7 @@ FRAMES_FILE = "frames.parquet"
 EPISODES_FILE = "episodes.parquet"
 REFUSALS_FILE = "refusals.json"
 MANIFEST_FILE = "manifest.json"
+SEAL = "manifest_body_sha256"
 STRATA = ("task", "object", "operator", "calibration_epoch", "outcome")
 FLAGS = ("is_recovery", "is_intervention")
 NS_PER_S = 1e9
@@ -127,7 +128,7 @@ def write_dataset(
         }
         manifest = _manifest(episodes, splits, description, normalisation, files)
         manifest["counts"] |= {"found": found, "refused": len(refused)}
-        write_bytes(folder / MANIFEST_FILE, canonical_json(manifest))
+        write_bytes(folder / MANIFEST_FILE, seal(manifest))
 
 
 def frames_table(episodes: Sequence[AcceptedEpisode], description: Description) -> pa.Table:
@@ -171,11 +172,20 @@ def episodes_table(episodes: Sequence[AcceptedEpisode], splits: Sequence[str]) -
         "source_sha256": [e.source_sha256 for e in episodes],
         "content_sha256": [e.content_sha256 for e in episodes],
         "rows": pa.array([len(e.rows.tick_ns) for e in episodes], pa.int64()),
-        "lead_rows": pa.array([e.rows.lead_rows for e in episodes], pa.int64()),
+        "lead_rows": pa.array([len(e.rows.lead_action) for e in episodes], pa.int64()),
         "recorded_at_s": pa.array([e.recorded_at_ns / NS_PER_S for e in episodes], pa.float64()),
+        "lead_action": pa.array(
+            [e.rows.lead_action.tolist() for e in episodes], pa.list_(pa.list_(pa.float64()))
+        ),
         "scene_start": [e.scene_start for e in episodes],
     }
     return pa.table(columns)
+
+
+def seal(manifest: dict[str, Any]) -> bytes:
+    """Bytes of a manifest that carries the hash of its own other fields."""
+    body = {key: value for key, value in manifest.items() if key != SEAL}
+    return canonical_json({**body, SEAL: sha256_bytes(canonical_json(body))})
 
 
 def content_hash(arrays: Sequence[NDArray[Any]]) -> str:

@@ -81,7 +81,7 @@ def check_metadata(episode: RecordedEpisode, contract: IngestContract, *, where:
             _refuse(f"{where}: metadata {key}", repr(found), "true or false")
     try:
         json.loads(episode.metadata["scene_start"])
-    except ValueError:
+    except (ValueError, RecursionError):
         _refuse(f"{where}: metadata scene_start", "not JSON", "the start of the scene as JSON")
     for name in (*sensor_streams(contract), ACTION_STREAM):
         clock_offset_ns(episode, name, where=where)

@@ -19,6 +19,7 @@ from genpolicy.dataset.assemble import (
     REFUSALS_FILE,
     SCHEMA_VERSION,
     STRATA,
+    seal,
 )
 from genpolicy.dataset.checks import check_finite
 from genpolicy.dataset.split import SPLITS, split_hash
@@ -197,6 +198,13 @@ def load_dataset(folder: Path, verify: bool = True) -> Dataset:
     manifest = parse_json(data, where=where)
     try:
         _check_manifest(manifest, where)
+        if seal(manifest) != data:
+            raise IntegrityError(
+                where=where,
+                found="changed since it was written",
+                expected="the bytes that its own hash names",
+                action=ACTION,
+            )
         if verify:
             _check_listing(folder)
         tables = {

@@ -212,7 +212,7 @@ def _accept(
             observation=observation,
             action=action,
             phase=np.full(len(state), PHASE_ALL),
-            lead_rows=0,
+            lead_action=action[:0],
         ),
         strata={name: NOT_RECORDED for name in STRATA} | {"task": contract.task},
         flags=dict.fromkeys(FLAGS, None),

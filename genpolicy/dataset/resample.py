@@ -31,7 +31,8 @@ class Rows:
         observation: Shape (n, D_o).
         action: Shape (n, D_a).
         phase: Phase names. Shape (n,).
-        lead_rows: Actions before the first complete observation; they are no frames.
+        lead_action: Actions before the first complete observation; they are no frames, but a
+            replay needs them. Shape (lead, D_a).
     """
 
     tick_ns: Times
@@ -40,20 +41,22 @@ class Rows:
     observation: Array
     action: Array
     phase: NDArray[np.str_]
-    lead_rows: int
+    lead_action: Array
 
 
 def remove_clock_offsets(episode: RecordedEpisode, *, where: str) -> RecordedEpisode:
     """The episode with every event time on the host's clock: event time minus declared offset.
 
     Raises:
-        ContractError: An offset is missing or not an integer.
+        ContractError: An offset is missing, not an integer, or moves a time out of range.
     """
     streams = {}
     for name, samples in episode.streams.items():
         offset = clock_offset_ns(episode, name, where=where)
+        _check_shift(samples.event_time_ns.tolist(), offset, f"{where}: stream {name}")
         streams[name] = replace(samples, event_time_ns=samples.event_time_ns - offset)
     offset = clock_offset_ns(episode, PHASE_STREAM, where=where)
+    _check_shift([event for event, _, _ in episode.phase_events], offset, f"{where}: phase")
     events = tuple((event - offset, receive, p) for event, receive, p in episode.phase_events)
     return replace(episode, streams=streams, phase_events=events)
 
@@ -108,8 +111,19 @@ def resample(episode: RecordedEpisode, contract: IngestContract, *, where: str) 
         observation=_observe(episode, contract, picks, names),
         action=action.values[lead:],
         phase=names[picks[PHASE_STREAM]],
-        lead_rows=lead,
+        lead_action=action.values[:lead],
     )
+
+
+def _check_shift(event_ns: list[int], offset_ns: int, where: str) -> None:
+    """Raises ContractError where an offset moves a time out of 1 to 2**63 - 1 ns."""
+    if event_ns and not 0 < min(event_ns) - offset_ns <= max(event_ns) - offset_ns < 1 << 63:
+        raise ContractError(
+            where=f"{where}: declared clock offset",
+            found=f"{offset_ns} ns",
+            expected="one that leaves every event time between 1 and 2**63 - 1 ns",
+            action="Declare the sensor's clock minus the host's clock, in ns.",
+        )
 
 
 def _lead_rows(

@@ -22,18 +22,18 @@ def canonical_json(value: Any) -> bytes:
     """The one serialisation of `value`: sorted keys, two-space indent, UTF-8, final newline.
 
     Raises:
-        ContractError: A float in `value` is NaN or infinite.
+        ContractError: A float in `value` is NaN or infinite, or a text has no UTF-8 form.
     """
     try:
         text = json.dumps(value, sort_keys=True, indent=2, ensure_ascii=False, allow_nan=False)
+        return text.encode() + b"\n"
     except ValueError as error:
         raise ContractError(
             where="a JSON document to be written",
             found=str(error),
-            expected="finite numbers only",
+            expected="finite numbers and plain text only",
             action="Write null for a value that is unknown; never NaN.",
         ) from error
-    return text.encode() + b"\n"
 
 
 def parse_json(data: bytes, *, where: str) -> Any:
@@ -68,7 +68,7 @@ def parse_json(data: bytes, *, where: str) -> Any:
             parse_constant=constant,
             parse_float=number,
         )
-    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:
         _refuse(where, f"not JSON ({error})", "one UTF-8 JSON document")
 
 
@@ -95,7 +95,7 @@ def parse_yaml(data: bytes, *, where: str) -> Any:
             return loader.get_single_data()
         finally:
             loader.dispose()
-    except (UnicodeDecodeError, yaml.YAMLError, RecursionError) as error:
+    except (ValueError, TypeError, yaml.YAMLError, RecursionError) as error:
         raise ConfigError(
             where=where,
             found=f"not readable ({' '.join(str(error).split())})",

@@ -44,7 +44,7 @@ def table_of(data: bytes, *, where: str) -> pa.Table:
         file = pq.ParquetFile(io.BytesIO(data), page_checksum_verification=True)
         _check_size(file, where)
         return file.read()
-    except (pa.ArrowInvalid, OSError) as error:
+    except (pa.ArrowException, OSError, MemoryError) as error:
         raise IntegrityError(
             where=where,
             found=f"not a readable table ({' '.join(str(error).split())[:200]})",

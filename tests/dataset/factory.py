@@ -10,7 +10,10 @@ from scipy.spatial.transform import Rotation
 from genpolicy.contract.action import join_action
 from genpolicy.contract.observation import Channel, ObservationContract
 from genpolicy.contract.rotation import rotation_to_6d
+from genpolicy.dataset.contract import TCP_ACTION, IngestContract, plausible_ranges
+from genpolicy.dataset.ingest import ingest_recordings
 from genpolicy.recording.episode import RecordedEpisode, StreamSamples
+from genpolicy.recording.writer import write_episode
 from genpolicy.seeds import stream as random_stream
 
 PHASES = ("approach", "align", "insert")
@@ -75,10 +78,8 @@ def episode(number=0, *, steps=12, joints=False, start_ns=None, **metadata):
         base = streams["robot"]
         angle = np.linspace(0, 0.5, len(base))[:, None] + np.linspace(-1, 1, 7)
         streams["joints"] = replace(base, stream="joints", values=angle)
-    events = tuple(
-        (int(start - 200_000_000 + k * (end - start) // 3), int(start - 199_000_000 + k * (end - start) // 3), p)
-        for k, p in enumerate(PHASES)
-    )  # fmt: skip
+    changes = [start - 200_000_000 + k * (end - start) // 3 for k in range(len(PHASES))]
+    events = tuple((int(t), int(t) + 1_000_000, p) for t, p in zip(changes, PHASES, strict=True))
     offsets = {f"clock_offset_{name}_ns": str(value) for name, value in OFFSETS_NS.items()}
     plain = {
         "task": "reach", "object": "peg_a", "operator": f"op{number % 2}",
@@ -98,3 +99,30 @@ def with_stream(recorded, name, **changes):
 def without_stream(recorded, name):
     """The episode without one stream."""
     return replace(recorded, streams={k: v for k, v in recorded.streams.items() if k != name})
+
+
+def contract(**changes):
+    """Ingest contract of the factory's episodes."""
+    ranges = plausible_ranges(
+        OBSERVATION,
+        TCP_ACTION,
+        workspace_lower_m=np.array([0.30, -0.22, 0.02]),
+        workspace_upper_m=np.array([0.72, 0.22, 0.28]),
+    )
+    fields = {"observation": OBSERVATION, "phases": PHASES, "ranges": ranges, **changes}
+    return IngestContract(**fields)
+
+
+def write_all(folder, episodes):
+    """Write episodes as e000.mcap, …; returns the paths."""
+    paths = [folder / f"e{number:03d}.mcap" for number in range(len(episodes))]
+    for path, recorded in zip(paths, episodes, strict=True):
+        write_episode(path, recorded)
+    return paths
+
+
+def build(folder, count=7, **changes):
+    """A dataset of `count` good episodes in folder/dataset; returns its path."""
+    paths = write_all(folder, [episode(number, **changes) for number in range(count)])
+    ingest_recordings(paths, contract=contract(), out=folder / "dataset")
+    return folder / "dataset"
