@@ -6,54 +6,25 @@ ones from its start on. Whatever is doubtful is discarded with one reason, and t
 """
 
 import math
-from dataclasses import dataclass, field
-from enum import StrEnum
-from typing import TYPE_CHECKING
-
-import numpy as np
-from numpy.typing import NDArray
+from collections.abc import Callable
 
 from genpolicy.contract.chunk import ChunkMetadata, DiscardReason
-from genpolicy.execution.arrival import MALFORMED, is_whole, shape_of
+from genpolicy.execution.arrival import (
+    MALFORMED,
+    context_refusal,
+    is_whole,
+    issued_by_feasibility,
+    shape_of,
+    standing_refusal,
+)
 from genpolicy.execution.chunk_queue import ChunkQueue
-from genpolicy.execution.freshness import Situation, identity_refusal, time_refusal
-from genpolicy.execution.journal import JOURNAL_VERSION, Journal
+from genpolicy.execution.command import Command, Mode
+from genpolicy.execution.freshness import Situation
+from genpolicy.execution.journal import Journal, session_payload
 from genpolicy.execution.ledger import FALLBACK, POLICY, ChunkTimes, Conservation
 from genpolicy.execution.settings import NS_PER_S, ExecutorSettings, known_checks, to_ns
 from genpolicy.execution.stub import ControllerStub
-
-if TYPE_CHECKING:
-    from genpolicy.feasibility.admission import Admitted
-
-Array = NDArray[np.float64]
-
-
-class Mode(StrEnum):
-    """Who commands."""
-
-    RUN = "run"
-    FALLBACK = "fallback"
-    INTERVENTION = "intervention"
-    ENDED = "ended"
-
-
-@dataclass(frozen=True)
-class Command:
-    """What one tick hands on.
-
-    Attributes:
-        kind: `action`, `fallback` (an action of the fallback), `hold` or `stop`.
-        reason: Why it holds or stops; empty with an action.
-        action: The action, read-only, shape (10,); None on hold and stop.
-        chunk_id: Its chunk; empty on hold and stop.
-        action_index: Its row; -1 on hold and stop.
-    """
-
-    kind: str
-    reason: str = ""
-    action: Array | None = field(default=None, repr=False)
-    chunk_id: str = ""
-    action_index: int = -1
+from genpolicy.feasibility.admission import Admitted
 
 
 class Executor:
@@ -64,6 +35,8 @@ class Executor:
         journal: Where every event goes; one journal, one session.
         stub: The controller stub with its supervisor.
         disabled_checks: For tests of the checker only; names of `CHECKS`.
+        genuine: Tells a chunk that feasibility issued from an imitation. Another rule than the
+            default is for tests only and is declared in the journal.
 
     Attributes:
         observations_ignored: Observations dropped as older than one already used, or from the
@@ -80,6 +53,7 @@ class Executor:
         stub: ControllerStub,
         *,
         disabled_checks: frozenset[str] = frozenset(),
+        genuine: Callable[[object], bool] = issued_by_feasibility,
     ) -> None:
         self.settings = settings
         self.stub = stub
@@ -87,7 +61,7 @@ class Executor:
         self.mode = Mode.RUN
         self._journal = journal
         self._disabled = known_checks(disabled_checks)
-        self._maximum_age_ns = settings.maximum_age_ns
+        self._genuine = genuine
         self._situation = Situation()
         self._queue = ChunkQueue(settings, journal, self._disabled)
         self._seen_ids: set[str] = set()
@@ -274,7 +248,7 @@ class Executor:
         payload = {"id": invocation_id, "stage": "end", "detail": detail}
         self._journal.add("invocation", now_ns, payload)
 
-    def deliver(self, admitted: "Admitted", now_s: float) -> DiscardReason | None:
+    def deliver(self, admitted: Admitted, now_s: float) -> DiscardReason | None:
         """Enqueue a chunk of the policy, or discard it.
 
         Returns:
@@ -282,7 +256,7 @@ class Executor:
         """
         return self._arrive(admitted, self._begin(now_s), POLICY)
 
-    def deliver_fallback(self, admitted: "Admitted", now_s: float) -> DiscardReason | None:
+    def deliver_fallback(self, admitted: Admitted, now_s: float) -> DiscardReason | None:
         """Enqueue a chunk of the task's fallback; only in fallback mode, same checks."""
         return self._arrive(admitted, self._begin(now_s), FALLBACK)
 
@@ -354,22 +328,16 @@ class Executor:
         self._last_now_ns = now_ns
         if not self._begun:
             self._begun = True
-            settings = self.settings
-            payload = {
-                "version": JOURNAL_VERSION,
-                "labels": self._journal.labels,
-                "execution_horizon": settings.execution_horizon,
-                "period_ns": settings.period_ns,
-                "maximum_age_ns": self._maximum_age_ns,
-                "watchdog_ns": settings.watchdog_ns,
-                "queue_capacity": settings.queue_capacity,
-                "fallback_hash": settings.fallback_hash,
-                "disabled_checks": sorted(self._disabled),
-            }
+            payload = session_payload(
+                self.settings,
+                labels=self._journal.labels,
+                disabled=self._disabled,
+                genuine=self._genuine is issued_by_feasibility,
+            )
             self._journal.add("session", now_ns, payload)
         return now_ns
 
-    def _arrive(self, admitted: "Admitted", now_ns: int, source: str) -> DiscardReason | None:
+    def _arrive(self, admitted: Admitted, now_ns: int, source: str) -> DiscardReason | None:
         self._heed_supervisor(now_ns)
         rows, chunk_id = shape_of(admitted)
         arrival = self._queue.arrive(rows)
@@ -383,50 +351,30 @@ class Executor:
         return None
 
     def _arrival_refusal(
-        self, admitted: "Admitted", chunk_id: str, now_ns: int, source: str
+        self, admitted: Admitted, chunk_id: str, now_ns: int, source: str
     ) -> DiscardReason | None:
-        disabled = self._disabled
-        if self.mode is Mode.ENDED and "end_of_episode" not in disabled:
-            return DiscardReason.END_OF_EPISODE
         known = chunk_id != MALFORMED and chunk_id in self._seen_ids
-        if known and "duplicate" not in disabled:
-            return DiscardReason.DUPLICATE
-        if not is_whole(admitted, period_ns=self.settings.period_ns, disabled=disabled):
-            return DiscardReason.INFEASIBLE
-        if self.mode is Mode.INTERVENTION and "intervention" not in disabled:
-            return DiscardReason.INTERVENTION
-        other = Mode.RUN if source == FALLBACK else Mode.FALLBACK
-        barred = self.mode is other or self.stub.supervisor.stopped
-        if barred and "stopped" not in disabled:
-            return DiscardReason.STOPPED
-        return self._context_refusal(admitted, now_ns, source)
-
-    def _context_refusal(
-        self, admitted: "Admitted", now_ns: int, source: str
-    ) -> DiscardReason | None:
-        metadata, times = admitted.metadata, ChunkTimes.of(admitted.metadata)
-        situation, fallback = self._situation, self.settings.fallback_hash
-        reason = identity_refusal(
-            metadata,
-            situation,
-            checkpoint=fallback if source == FALLBACK else situation.checkpoint,
-            sampler=fallback if source == FALLBACK else situation.sampler,
-            disabled=self._disabled,
-        ) or time_refusal(
-            times,
-            situation,
-            now_ns=now_ns,
-            first_use_ns=max(now_ns, times.start_ns),
-            maximum_age_ns=self._maximum_age_ns,
+        reason = standing_refusal(
+            self.mode,
+            source,
+            known=known,
+            whole=self._genuine(admitted)
+            and is_whole(admitted, period_ns=self.settings.period_ns, disabled=self._disabled),
+            stopped=self.stub.supervisor.stopped,
             disabled=self._disabled,
         )
         if reason is not None:
             return reason
-        usable = min(len(admitted.actions), self.settings.execution_horizon)
-        past = now_ns - times.start_ns >= usable * times.period_ns
-        if past and not {"window", "execution_horizon"} & self._disabled:
-            return DiscardReason.EXPIRED
-        return self._queue.order_refusal(times, metadata.predecessor_chunk_id)
+        return context_refusal(
+            admitted,
+            self._situation,
+            now_ns=now_ns,
+            source=source,
+            settings=self.settings,
+            disabled=self._disabled,
+        ) or self._queue.order_refusal(
+            ChunkTimes.of(admitted.metadata), admitted.metadata.predecessor_chunk_id
+        )
 
     def _refuse(
         self, now_ns: int, arrival: int, chunk_id: str, rows: int, reason: DiscardReason

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from genpolicy.contract.action import ACTION_DIM
 from genpolicy.errors import BadInputError, ContractError
-from genpolicy.execution.settings import to_ns
+from genpolicy.execution.settings import ExecutorSettings, to_ns
 from genpolicy.integrity.atomic import write_bytes
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_bytes_of
@@ -34,7 +34,7 @@ MAXIMUM_RECORD_BYTES = 64 << 20
 
 EVENT_FIELDS: dict[str, tuple[str, ...]] = {
     "session": ("version", "labels", "execution_horizon", "period_ns", "maximum_age_ns",
-                "watchdog_ns", "queue_capacity", "fallback_hash", "disabled_checks"),
+                "watchdog_ns", "queue_capacity", "fallback_hash", "disabled_checks", "admission"),
     "observation": ("event_time_ns", "phase", "calibration_epoch", "used", "ignored_because"),
     "phase": ("event_time_ns", "old", "new"),
     "epoch": ("event_time_ns", "old", "new"),
@@ -120,6 +120,28 @@ class Journal:
             Event(self.session, n, kind, time_ns, payload)
             for n, (kind, time_ns, payload) in enumerate(self._events)
         ]
+
+
+def session_payload(
+    settings: ExecutorSettings,
+    *,
+    labels: Mapping[str, str],
+    disabled: frozenset[str],
+    genuine: bool,
+) -> dict[str, Any]:
+    """Payload of the first event: what the session is held to."""
+    return {
+        "version": JOURNAL_VERSION,
+        "labels": dict(labels),
+        "execution_horizon": settings.execution_horizon,
+        "period_ns": settings.period_ns,
+        "maximum_age_ns": settings.maximum_age_ns,
+        "watchdog_ns": settings.watchdog_ns,
+        "queue_capacity": settings.queue_capacity,
+        "fallback_hash": settings.fallback_hash,
+        "disabled_checks": sorted(disabled),
+        "admission": "feasibility" if genuine else "imitation",
+    }
 
 
 def encode_actions(actions: Array) -> str:

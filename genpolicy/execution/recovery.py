@@ -9,7 +9,6 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -65,7 +64,7 @@ class RecoverySettings:
     maximum_attempts: int = 3
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "plans", MappingProxyType(dict(self.plans)))
+        object.__setattr__(self, "plans", dict(self.plans))
         for phase, plan in self.plans.items():
             if any(state not in PRIMITIVES for state in plan) or len(set(plan)) != len(plan):
                 raise ConfigError(

@@ -7,7 +7,7 @@ point, but rounded to nanoseconds it is one of 50 000 000.
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
+from functools import cached_property
 
 from genpolicy.errors import ConfigError, NonFiniteError
 
@@ -84,7 +84,7 @@ class ExecutorSettings:
     fallback_hash: str = "classical-fallback"
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "maximum_age_s", MappingProxyType(dict(self.maximum_age_s)))
+        object.__setattr__(self, "maximum_age_s", dict(self.maximum_age_s))
         rules = {
             "execution_horizon": self.execution_horizon >= 1,
             "action_period_s": self.action_period_s > 0 and math.isfinite(self.action_period_s),
@@ -105,7 +105,7 @@ class ExecutorSettings:
                     action="Correct it in params.yaml.",
                 )
 
-    @property
+    @cached_property
     def period_ns(self) -> int:
         """Time between actions, ns."""
         return to_ns(self.action_period_s)
@@ -115,7 +115,7 @@ class ExecutorSettings:
         """Silence after which the stub holds, ns."""
         return to_ns(self.watchdog_s)
 
-    @property
+    @cached_property
     def maximum_age_ns(self) -> dict[str, int]:
         """Largest action age per phase, ns."""
         return {phase: to_ns(age) for phase, age in self.maximum_age_s.items()}

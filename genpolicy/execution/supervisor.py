@@ -9,7 +9,6 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from types import MappingProxyType
 
 from genpolicy.errors import ConfigError, ContractError
 from genpolicy.execution.journal import Journal
@@ -46,7 +45,7 @@ class SupervisorSettings:
     silence_stop_s: float = math.inf
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "force_limit_n", MappingProxyType(dict(self.force_limit_n)))
+        object.__setattr__(self, "force_limit_n", dict(self.force_limit_n))
         limits_hold = all(limit >= 0 for limit in self.force_limit_n.values())
         times_hold = self.watchdog_s >= self.action_period_s > 0 and self.silence_stop_s > 0
         if not (limits_hold and times_hold):

@@ -110,7 +110,8 @@ class _Session:
         if m["t"] < self.t:
             self.flag("journal.time", f"Time goes back from {self.t} ns to {m['t']} ns.")
         self.t = m["t"]
-        if self.ended:
+        late_arrival = kind == "discard" and m.get("reason") == "end_of_episode"
+        if self.ended and not late_arrival:
             self.flag("journal.after_end", f"A {kind} event follows the end of the session.")
         if (self.n == 0) != (kind == "session"):
             self.flag("journal.settings", f"Event {self.n} is {kind}; settings stand first, once.")
@@ -267,6 +268,8 @@ class _Session:
     def _check_settings(self, m: Message) -> None:
         self.settings = m
         self.world.fallback_hash = m["fallback_hash"]
+        if self.expected is not None and m["admission"] != "feasibility":
+            self.flag("settings.admission", "Chunks were accepted that feasibility did not issue.")
         if m["disabled_checks"]:
             self.report.disabled_checks.update(m["disabled_checks"])
             self.flag("settings.disabled", f"Checks are disabled: {m['disabled_checks']}.")
