@@ -34,7 +34,7 @@ STAGES = (
     "record", "ingest", "audit", "baselines", "gate_a", "generators", "reload", "latency",
     "gate_b", "shadow", "gate_c", "stress", "gate_d", "card", "gate_e",
 )  # fmt: skip
-SHARED = ("seed", "task", "horizons", "compute", "feasibility", "execution")
+SHARED = ("seed", "task", "horizons", "compute", "policy", "feasibility", "execution")
 
 
 class TaskSection(Settings):

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from genpolicy.compute import map_shards
-from genpolicy.recording.mcap_writer import write_episode
+from genpolicy.recording.writer import write_episode
 from genpolicy.tasks.api import EpisodeSpec, load_task
 
 

@@ -245,6 +245,23 @@ class Task(Protocol):
         """A world at rest at the start; equal arguments give equal state hashes."""
         ...
 
+    @property
+    def posture_rad(self) -> Array:
+        """Joint positions from which inverse kinematics begins. Shape (7,)."""
+        ...
+
+    def action_at(self, observation: Array) -> Array:
+        """The action that would keep the observed pose. Shapes (D_o,) to (D_a,)."""
+        ...
+
+    def phase_of(self, observation: Array) -> str:
+        """Task phase that an observation (D_o,) states."""
+        ...
+
+    def mode_of(self, path_m: Array, observation: Array) -> str:
+        """Which of the valid ways a TCP path (n, 3) takes, or `unassigned`."""
+        ...
+
     def scene_poses(self, observation: Array) -> dict[str, tuple[Array, Array]]:
         """Position (3,), m, and quaternion (4,), w x y z, of each movable body, as observed."""
         ...

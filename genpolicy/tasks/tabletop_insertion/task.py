@@ -8,10 +8,12 @@ from numpy.typing import NDArray
 
 from genpolicy.contract.action import GRIPPER, POSITION
 from genpolicy.contract.observation import ObservationContract
+from genpolicy.control.impedance import POSTURE_RAD
 from genpolicy.errors import ContractError
 from genpolicy.recording.episode import RecordedEpisode
 from genpolicy.tasks.api import EpisodeSpec, Start, Task, Workspace, World, WorldSettings
 from genpolicy.tasks.tabletop_insertion import episodes, fallback, scene, sessions
+from genpolicy.tasks.tabletop_insertion.experts import SIDES
 from genpolicy.tasks.tabletop_insertion.observation import CONTACT_PHASES, OBSERVATION, PHASES
 from genpolicy.tasks.tabletop_insertion.probes import EPOCHS, PROBES
 from genpolicy.tasks.tabletop_insertion.start import InsertionStart, sample_start, start_from_json
@@ -21,6 +23,11 @@ Array = NDArray[np.float64]
 
 # The ceiling keeps the tip of the held peg below the top of the post.
 WORKSPACE = Workspace(lower_m=(0.30, -0.22, 0.02), upper_m=(0.72, 0.22, 0.24))
+
+
+UNASSIGNED = "unassigned"
+CLEAR_SIDE_M = 0.03
+PAST_POST_M = 0.05
 
 
 class TabletopInsertion:
@@ -55,6 +62,36 @@ class TabletopInsertion:
             hole_yaw_rad=float(np.arctan2(hole[3], hole[2])),
             post_y_m=float(observation[OBSERVATION.slices["post_position_m"]][0]),
         )
+
+    @property
+    def posture_rad(self) -> Array:
+        """The controller's posture."""
+        return np.array(POSTURE_RAD)
+
+    def action_at(self, observation: Array) -> Array:
+        """The action that would keep the observed pose and opening."""
+        slices = OBSERVATION.slices
+        parts = ("tcp_position_m", "tcp_rotation", "gripper_opening_m")
+        return np.concatenate([observation[slices[name]] for name in parts])
+
+    def phase_of(self, observation: Array) -> str:
+        """Phase of the one-hot channel."""
+        return PHASES[int(np.argmax(observation[OBSERVATION.slices["phase"]]))]
+
+    def mode_of(self, path_m: Array, observation: Array) -> str:
+        """Side on which a path passes the post: `left` at larger y, `right` at smaller y.
+
+        Unassigned where the path begins beyond the post, or leaves its plane by less than 3 cm.
+        """
+        post_y_m = float(observation[OBSERVATION.slices["post_position_m"]][0])
+        before = path_m[path_m[:, 0] < scene.POST_X_M + PAST_POST_M]
+        if path_m[0, 0] >= scene.POST_X_M or not len(before):
+            return UNASSIGNED
+        offset = before[:, 1] - post_y_m
+        widest = float(offset[np.argmax(np.abs(offset))])
+        if not abs(widest) - CLEAR_SIDE_M >= 0:
+            return UNASSIGNED
+        return SIDES[0] if widest > 0 else SIDES[1]
 
     def fallback(self, world: World, kind: str) -> Array:
         """Classical plan from the last commanded pose; kinds `retreat`, `classical_return`."""

@@ -1,0 +1,211 @@
+"""A matched study: train methods alike, then measure errors and modes on held-out data."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+
+from genpolicy.comparison.fleet import (
+    PolicySettings,
+    matched_configuration,
+    seed_folders,
+    train_fleet,
+    training_windows,
+)
+from genpolicy.comparison.held_out import held_out_situations, modes_of_policy
+from genpolicy.compute import map_shards
+from genpolicy.contract.horizons import HorizonConfig
+from genpolicy.dataset.dataset import Dataset, load_dataset
+from genpolicy.feasibility.settings import FeasibilitySettings
+from genpolicy.integrity.atomic import write_bytes
+from genpolicy.integrity.documents import canonical_json
+from genpolicy.integrity.tables import write_table
+from genpolicy.policies.offline import masked_errors
+from genpolicy.policies.policy import NetworkPolicy, load_policy
+from genpolicy.policies.settings import SamplerConfig
+from genpolicy.simulation.situation import make_checker
+from genpolicy.tasks.api import load_task
+
+SPLITS = ("validation", "test")
+DEFAULT_CONVENTION = "default"
+
+
+@dataclass(frozen=True)
+class Study:
+    """Everything a study needs besides its folders.
+
+    Attributes:
+        task: Registered name of the task.
+        samplers: Sampler of each method.
+        conventions: Further samplers to count modes with, by method and name.
+        settings: What the methods share.
+        horizons: Common horizons.
+        feasibility: Thresholds of the six layers.
+        maximum_age_s: Largest action age by phase.
+        samples: Candidates per situation.
+        root_seed: Root seed.
+        device: Torch device of training.
+        workers: Local processes.
+        scheduler: `local` or the address of a Dask scheduler.
+    """
+
+    task: str
+    samplers: Mapping[str, SamplerConfig]
+    conventions: Mapping[str, Mapping[str, SamplerConfig]]
+    settings: PolicySettings
+    horizons: HorizonConfig
+    feasibility: FeasibilitySettings
+    maximum_age_s: Mapping[str, float]
+    samples: int
+    root_seed: int
+    device: str
+    workers: int
+    scheduler: str
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """One trained method and seed, to be measured by one process."""
+
+    study: Study
+    method: str
+    seed: int
+    folder: Path
+    sha256: str
+    dataset: Path
+    audit: Path
+
+
+def run_study(
+    study: Study,
+    *,
+    dataset: Path,
+    audit: Path,
+    folder: Path,
+    reference: Path | None = None,
+    reference_method: str = "chunked_bc",
+) -> None:
+    """Train and measure every method; write checkpoints, errors, modes and the config differ.
+
+    Args:
+        study: What to do.
+        dataset: Folder of the dataset.
+        audit: Folder of the audit, which names the situations with several modes.
+        folder: Existing folder to write into.
+        reference: Checkpoint folder that configurations are held against; the reference
+            method's own where None.
+        reference_method: The method of that checkpoint.
+    """
+    trained = train_fleet(
+        dataset=dataset,
+        folder=folder,
+        samplers=study.samplers,
+        settings=study.settings,
+        horizons=study.horizons,
+        root_seed=study.root_seed,
+        device=study.device,
+        workers=study.workers,
+        scheduler=study.scheduler,
+    )
+    jobs = [
+        Evaluation(
+            study=study,
+            method=method,
+            seed=seed,
+            folder=folder / method / f"seed_{seed}",
+            sha256=sha256,
+            dataset=dataset,
+            audit=audit,
+        )
+        for method, seeds in trained.items()
+        for seed, sha256 in seeds.items()
+    ]
+    parts = map_shards(evaluate, jobs, workers=study.workers, scheduler=study.scheduler)
+    offline = [row for rows, _ in parts for row in rows]
+    modes = [row for _, rows in parts for row in rows]
+    write_table(folder / "offline.parquet", pa.Table.from_pylist(offline, OFFLINE))
+    write_table(folder / "modes.parquet", pa.Table.from_pylist(modes, MODES))
+    folders = seed_folders(folder, list(study.samplers), study.settings.seeds[0])
+    if reference is not None:
+        folders = {reference_method: reference, **folders}
+    matched = matched_configuration(folders, reference=reference_method)
+    write_bytes(folder / "matched.json", canonical_json(matched))
+
+
+def evaluate(job: Evaluation) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    """Rows of `offline.parquet` and of `modes.parquet` of one checkpoint."""
+    data = load_dataset(job.dataset)
+    policy = load_policy(job.folder, expected_sha256=job.sha256)
+    return offline_rows(job, data, policy), mode_rows(job, data, policy)
+
+
+def offline_rows(job: Evaluation, data: Dataset, policy: NetworkPolicy) -> list[dict[str, Any]]:
+    """Errors of one checkpoint on the held-out splits, by phase."""
+    rows = []
+    horizons = job.study.horizons
+    for split in SPLITS:
+        cut = data.windows(
+            split,
+            observation_horizon=horizons.observation_horizon,
+            prediction_horizon=horizons.prediction_horizon,
+        )
+        uuids = data.episodes["episode_uuid"].to_numpy()
+        starts = data.frames.episode.searchsorted(cut.episode)
+        names = [
+            ("offline", str(uuids[e]), int(i)) for e, i in zip(cut.episode, cut.index, strict=True)
+        ]
+        errors = masked_errors(
+            policy,
+            training_windows(data, split, horizons),
+            phases=data.frames.phase[starts + cut.index],
+            normalisation=data.normalisation,
+            noise_names=names,
+        )
+        rows += [
+            {"method": job.method, "seed": job.seed, "split": split, **asdict(error)}
+            for error in errors
+        ]
+    return rows
+
+
+def mode_rows(job: Evaluation, data: Dataset, policy: NetworkPolicy) -> list[dict[str, Any]]:
+    """Modes that one checkpoint reaches, under each sampling convention."""
+    study = job.study
+    task = load_task(study.task)
+    checker = make_checker(task, study.feasibility)
+    held_out = held_out_situations(job.audit, data, horizons=study.horizons)
+    conventions: dict[str, SamplerConfig] = {DEFAULT_CONVENTION: policy.sampler}
+    conventions |= study.conventions.get(job.method, {})
+    rows = []
+    for convention, sampler in conventions.items():
+        rows += modes_of_policy(
+            NetworkPolicy(policy.checkpoint, sampler=sampler),
+            held_out,
+            seed=job.seed,
+            convention=sampler.name if convention == DEFAULT_CONVENTION else convention,
+            samples=study.samples,
+            task=task,
+            checker=checker,
+            maximum_age_s=dict(study.maximum_age_s),
+        )
+    return rows
+
+
+OFFLINE = pa.schema(
+    [
+        ("method", pa.string()), ("seed", pa.int64()), ("split", pa.string()),
+        ("phase", pa.string()), ("windows", pa.int64()), ("masked_mae", pa.float64()),
+        ("position_rmse_m", pa.float64()),
+    ]
+)  # fmt: skip
+MODES = pa.schema(
+    [
+        ("method", pa.string()), ("seed", pa.int64()), ("convention", pa.string()),
+        ("episode_uuid", pa.string()), ("index", pa.int64()), ("samples", pa.int64()),
+        ("modes_present", pa.int64()), ("modes_covered", pa.int64()),
+        ("between_modes", pa.int64()), ("admissible", pa.int64()), ("nfe", pa.int64()),
+        ("spread_m", pa.float64()),
+    ]
+)  # fmt: skip

@@ -1,0 +1,540 @@
+"""One closed-loop rollout on the virtual clock: world, executor, stub, supervisor, recovery.
+
+The world goes on while the policy thinks: an invocation that begins at a tick is delivered at the
+first tick after its latency has passed. A rollout is advanced tick by tick from outside, so that
+many of them run in lockstep and share the network's batches; it never sees the others.
+"""
+
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from genpolicy.contract.chunk import Candidate, ChunkMetadata, DiscardReason, Proposal
+from genpolicy.contract.horizons import HorizonConfig
+from genpolicy.contract.settings import Settings
+from genpolicy.errors import ContractError
+from genpolicy.execution.executor import Command, Executor
+from genpolicy.execution.journal import Journal
+from genpolicy.execution.recovery import (
+    Primitive,
+    Recovery,
+    RecoverySettings,
+    RecoveryState,
+    fallback_metadata,
+    step,
+)
+from genpolicy.execution.settings import ExecutorSettings
+from genpolicy.execution.stub import ControllerStub
+from genpolicy.execution.supervisor import Supervisor, SupervisorSettings
+from genpolicy.feasibility.admission import Admitted
+from genpolicy.feasibility.checker import FeasibilityChecker
+from genpolicy.simulation.latency import LatencyModel, draw_latency
+from genpolicy.simulation.perturbations import PerturbationSettings, Push, injection, push
+from genpolicy.simulation.situation import COMMANDS_AT_THE_SEAM, Session, context_of
+from genpolicy.tasks.api import Start, Task, World, WorldSettings
+
+Array = NDArray[np.float64]
+
+SELECTOR = "first_admissible"
+
+
+class Outcome(StrEnum):
+    """How a rollout ended."""
+
+    SUCCESS = "success"
+    COLLISION = "collision"
+    FORCE_STOP = "force_stop"
+    INTERVENTION = "intervention"
+    TIMEOUT = "timeout"
+
+
+class ExecutionSettings(Settings):
+    """Section `execution`: fixtures of the executor and the supervisor, equal for all methods.
+
+    Attributes:
+        replan_lead_steps: Executable actions left at which the next invocation begins.
+        deadline_s: An invocation that takes longer has missed its deadline and is given up.
+        watchdog_s: Silence after which the stub holds.
+        queue_capacity: Chunks kept.
+        maximum_age_s: Largest action age by phase.
+        maximum_divergence_m: Measured against commanded TCP, beyond which chunks are void.
+        force_limit_n: Contact force by phase at which the simulated supervisor stops. A fixture
+            of the simulation, not a value for any robot.
+        hold_before_recovery_s: Silence after which recovery begins.
+        recovery_hold_s: Hold at the start of a recovery.
+        primitive_timeout_s: Longest fallback primitive.
+        human_timeout_s: How long recovery waits for a person.
+        maximum_failures: Failed primitives before it aborts.
+        recovery_plans: Primitives by phase.
+    """
+
+    replan_lead_steps: int
+    deadline_s: float
+    watchdog_s: float
+    queue_capacity: int
+    maximum_age_s: dict[str, float]
+    maximum_divergence_m: float
+    force_limit_n: dict[str, float]
+    hold_before_recovery_s: float
+    recovery_hold_s: float
+    primitive_timeout_s: float
+    human_timeout_s: float
+    maximum_failures: int
+    recovery_plans: dict[str, list[str]]
+
+    def executor(self, horizons: HorizonConfig) -> ExecutorSettings:
+        """Settings of the executor and its stub."""
+        return ExecutorSettings(
+            execution_horizon=horizons.execution_horizon,
+            action_period_s=horizons.action_period_s,
+            maximum_age_s=self.maximum_age_s,
+            watchdog_s=self.watchdog_s,
+            queue_capacity=self.queue_capacity,
+            replan_lead_steps=self.replan_lead_steps,
+            maximum_divergence_m=self.maximum_divergence_m,
+        )
+
+    def supervisor(self, horizons: HorizonConfig) -> SupervisorSettings:
+        """Settings of the simulated supervisor."""
+        return SupervisorSettings(
+            force_limit_n=self.force_limit_n,
+            watchdog_s=self.watchdog_s,
+            action_period_s=horizons.action_period_s,
+        )
+
+    def recovery(self) -> RecoverySettings:
+        """Settings of the recovery state machine."""
+        plans = {
+            phase: tuple(RecoveryState(name) for name in names)
+            for phase, names in self.recovery_plans.items()
+        }
+        return RecoverySettings(
+            plans=plans,
+            hold_s=self.recovery_hold_s,
+            primitive_timeout_s=self.primitive_timeout_s,
+            human_timeout_s=self.human_timeout_s,
+            maximum_failures=self.maximum_failures,
+            maximum_attempts=self.maximum_failures,
+        )
+
+
+@dataclass(frozen=True)
+class Fixture:
+    """What all rollouts of one method under one perturbation share.
+
+    Attributes:
+        task: The task.
+        checker: The six layers.
+        horizons: H_o, K, H_e and the period.
+        execution: Executor, supervisor and recovery.
+        latency: Latency of the method.
+        perturbation: Name of the perturbation.
+        schedule: What it injects.
+        root_seed: Root seed.
+        method: Name of the method.
+        checkpoint: Its weights.
+        sampler: Its sampler settings.
+    """
+
+    task: Task
+    checker: FeasibilityChecker
+    horizons: HorizonConfig
+    execution: ExecutionSettings
+    latency: LatencyModel
+    perturbation: str
+    schedule: PerturbationSettings
+    root_seed: int
+    method: str
+    checkpoint: str
+    sampler: str
+
+
+@dataclass
+class InFlight:
+    """An invocation that has not been delivered yet.
+
+    Attributes:
+        number: Count of invocations in this rollout.
+        metadata: Of the chunk to come; candidate 0.
+        observation: What it is conditioned on; the newest of the history. Shape (D_o,).
+        begun_s: Tick at which it began.
+        arrival_s: When it is delivered.
+        terms: The eleven latency terms, s.
+        dropped: Lost on the way.
+        chunks: Sampled candidates, filled in by the batch. Shape (N, K, D_a).
+        given_up: Its deadline has passed.
+    """
+
+    number: int
+    metadata: ChunkMetadata
+    observation: Array
+    begun_s: float
+    arrival_s: float
+    terms: Mapping[str, float]
+    dropped: bool
+    chunks: Array | None = None
+    given_up: bool = False
+
+
+@dataclass
+class Tally:
+    """What a rollout counts while it runs."""
+
+    action_ticks: int = 0
+    hold_ticks: int = 0
+    fallback_ticks: int = 0
+    deadline_misses: int = 0
+    rejections: int = 0
+    interventions: int = 0
+    force_peak_n: float = 0.0
+    rejected_by: dict[str, int] = field(default_factory=dict)
+    latencies_s: list[float] = field(default_factory=list)
+    path_m: list[Array] = field(default_factory=list)
+
+
+class Rollout:
+    """One world under one policy; call `sense`, fill `wanted`, then `act`, until `outcome`.
+
+    Args:
+        fixture: What it shares with the others.
+        start: Initial state.
+        start_index: Its number; keys of all draws.
+        calibration_epoch: Calibration in force.
+    """
+
+    def __init__(
+        self, fixture: Fixture, start: Start, start_index: int, *, calibration_epoch: str
+    ) -> None:
+        self.fixture = fixture
+        self.start_index = start_index
+        settings = WorldSettings(calibration_epoch=calibration_epoch)
+        self.world: World = fixture.task.make_world(start, settings=settings)
+        self.start_sha256 = self.world.state_sha256()
+        session = f"{fixture.method}/{fixture.perturbation}/{start_index}"
+        labels = {
+            "method": fixture.method, "perturbation": fixture.perturbation,
+            "start": str(start_index), "start_sha256": self.start_sha256,
+        }  # fmt: skip
+        self.journal = Journal(session, labels)
+        self.supervisor = Supervisor(fixture.execution.supervisor(fixture.horizons), self.journal)
+        executor_settings = fixture.execution.executor(fixture.horizons)
+        self.stub = ControllerStub(executor_settings, self.journal, self.supervisor)
+        self.executor = Executor(executor_settings, self.journal, self.stub)
+        self.recovery = Recovery(fixture.execution.recovery(), self.journal)
+        self.outcome: Outcome | None = None
+        self.tally = Tally()
+        self.tick = 0
+        self.invocations = 0
+        self.wanted: InFlight | None = None
+        self._flying: list[InFlight] = []
+        self._fallback_chunks = 0
+        self._newest_accepted_s: float | None = None
+        self._last_command_s: float | None = None
+        self._commanded: deque[Array] = deque(
+            [self.world.last_action] * COMMANDS_AT_THE_SEAM, maxlen=COMMANDS_AT_THE_SEAM
+        )
+        self.history: deque[Array] = deque(maxlen=fixture.horizons.observation_horizon)
+        self._push: Push | None = push(
+            fixture.schedule,
+            root_seed=fixture.root_seed,
+            name=fixture.perturbation,
+            start=start_index,
+        )
+        self.executor.set_active(0.0, fixture.checkpoint, fixture.sampler)
+
+    @property
+    def now_s(self) -> float:
+        """Virtual time, s."""
+        return self.tick * self.fixture.horizons.action_period_s
+
+    @property
+    def done(self) -> bool:
+        """Whether the rollout has ended."""
+        return self.outcome is not None
+
+    def conditioning(self) -> Array:
+        """The last H_o observations, oldest first, the first one repeated. Shape (H_o, D_o)."""
+        missing = self.fixture.horizons.observation_horizon - len(self.history)
+        return np.stack([self.history[0]] * missing + list(self.history))
+
+    def sense(self) -> None:
+        """Observe, take deliveries, supervise, recover; sets `wanted` if the policy must sample."""
+        now_s, world = self.now_s, self.world
+        observation = world.observe()
+        self.history.append(observation)
+        position, _ = world.tcp_pose
+        self.tally.path_m.append(np.array(position))
+        divergence_m = float(np.linalg.norm(position - world.last_action[:3]))
+        self.executor.observe(now_s, now_s, world.phase, world.calibration_epoch, divergence_m)
+        self._supervise(now_s)
+        if self.done:
+            return
+        self._take_deliveries(now_s)
+        self._recover(now_s)
+        self.wanted = None
+        if not self.done and self._may_invoke(now_s):
+            self.wanted = self._begin_invocation(now_s, observation)
+
+    def act(self) -> None:
+        """One tick of the executor, one action period of the world."""
+        now_s = self.now_s
+        if self.wanted is not None:
+            self._flying.append(self.wanted)
+            self.wanted = None
+        command = self.executor.tick(now_s)
+        self._apply(command, now_s)
+        if self._push is not None and now_s >= self._push.time_s:
+            self.world.apply_force(np.array([0.0, self._push.force_n, 0.0]), self._push.duration_s)
+            self._push = None
+        self.world.advance()
+        self.tick += 1
+        self.tally.force_peak_n = max(self.tally.force_peak_n, self.world.contact_force_n)
+        if self.world.success:
+            self._end(Outcome.SUCCESS)
+
+    def end(self, outcome: Outcome) -> None:
+        """End from outside: the time is over."""
+        if not self.done:
+            self._end(outcome)
+
+    # -- inside -------------------------------------------------------------------------------
+
+    def _end(self, outcome: Outcome) -> None:
+        self.outcome = outcome
+        for flying in self._flying:
+            self.executor.write_off(
+                flying.metadata, self._rows(flying), DiscardReason.END_OF_EPISODE, self.now_s
+            )
+        self._flying.clear()
+        self.executor.end_episode(self.now_s)
+
+    def _supervise(self, now_s: float) -> None:
+        world = self.world
+        if self.supervisor.observe_collision(now_s, world.collision):
+            self.executor.collision_event(now_s)
+            self.recovery.stop(now_s, "collision")
+            self._end(Outcome.COLLISION)
+        elif self.supervisor.observe_force(now_s, world.contact_force_n, world.phase):
+            self.executor.force_event(now_s)
+            self.recovery.stop(now_s, "force")
+            self._end(Outcome.FORCE_STOP)
+
+    def _may_invoke(self, now_s: float) -> bool:
+        return self.recovery.state is RecoveryState.IDLE and self.executor.needs_invocation(now_s)
+
+    def _begin_invocation(self, now_s: float, observation: Array) -> InFlight:
+        fixture, horizons = self.fixture, self.fixture.horizons
+        number = self.invocations
+        self.invocations += 1
+        hit = injection(
+            fixture.schedule,
+            root_seed=fixture.root_seed,
+            name=fixture.perturbation,
+            start=self.start_index,
+            invocation=number,
+        )
+        draw = draw_latency(
+            fixture.latency,
+            root_seed=fixture.root_seed,
+            perturbation=fixture.perturbation,
+            start=self.start_index,
+            invocation=number,
+            extra_s=hit.extra_s,
+            compute_factor=hit.compute_factor,
+        )
+        metadata = ChunkMetadata(
+            chunk_id=f"{self.journal.session}/{number}",
+            condition_observation_event_time_s=now_s,
+            policy_checkpoint_hash=fixture.checkpoint,
+            sampler_config_hash=fixture.sampler,
+            action_start_time_s=now_s,
+            action_period_s=horizons.action_period_s,
+            valid_until_s=now_s + horizons.execution_horizon * horizons.action_period_s,
+            task_phase=self.world.phase,
+            calibration_epoch=self.world.calibration_epoch,
+            predecessor_chunk_id=self.executor.chain_head,
+            session_epoch=self.executor.session_epoch,
+            method=fixture.method,
+            candidate_index=0,
+        )
+        self.executor.begin_invocation(now_s, metadata.chunk_id)
+        self.tally.latencies_s.append(draw.total_s)
+        return InFlight(
+            number=number,
+            metadata=metadata,
+            observation=observation,
+            begun_s=now_s,
+            arrival_s=now_s + draw.total_s,
+            terms=draw.terms,
+            dropped=hit.dropped,
+        )
+
+    def _take_deliveries(self, now_s: float) -> None:
+        for flying in sorted(self._flying, key=lambda item: (item.arrival_s, item.number)):
+            if flying.arrival_s <= now_s and not flying.dropped:
+                self._flying.remove(flying)
+                self._deliver(flying, now_s)
+            elif now_s - flying.begun_s >= self.fixture.execution.deadline_s - 1e-9:
+                self._miss(flying, now_s)
+
+    def _miss(self, flying: InFlight, now_s: float) -> None:
+        """The deadline has passed: the next invocation may begin; the chunk may still come."""
+        if not flying.given_up:
+            flying.given_up = True
+            self.tally.deadline_misses += 1
+            self.executor.end_invocation(now_s, flying.metadata.chunk_id, "deadline")
+        if flying.dropped:
+            self._flying.remove(flying)
+            self.executor.write_off(
+                flying.metadata, self._rows(flying), DiscardReason.EXPIRED, now_s
+            )
+
+    def _deliver(self, flying: InFlight, now_s: float) -> None:
+        if not flying.given_up:
+            self.executor.end_invocation(now_s, flying.metadata.chunk_id, "answered")
+        horizons = self.fixture.horizons
+        late = round((now_s - flying.metadata.action_start_time_s) / horizons.action_period_s)
+        if late >= horizons.execution_horizon:
+            self.executor.write_off(
+                flying.metadata, self._rows(flying), DiscardReason.EXPIRED, now_s
+            )
+            return
+        admitted = self._admit_first(flying, now_s, late)
+        if admitted is None:
+            self.tally.rejections += 1
+            self.executor.write_off(
+                flying.metadata, self._rows(flying), DiscardReason.INFEASIBLE, now_s
+            )
+        elif self.executor.deliver(admitted, now_s) is None:
+            self._newest_accepted_s = flying.metadata.condition_observation_event_time_s
+
+    def _admit_first(self, flying: InFlight, now_s: float, late: int) -> Admitted | None:
+        """The selector: candidates in order, the first that passes all layers."""
+        if flying.chunks is None:
+            raise ContractError(
+                where=f"chunk {flying.metadata.chunk_id}",
+                found="delivered before it was sampled",
+                expected="the batch to fill in its candidates",
+                action="Sample every wanted invocation before `act`.",
+            )
+        context = context_of(
+            self.fixture.task,
+            self.fixture.checker,
+            observation=self.history[-1],
+            q_meas=self.world.q_meas,
+            commanded=list(self._commanded),
+            now_s=now_s,
+            phase=self.world.phase,
+            latest_observation_s=now_s,
+            session=self._session(self.fixture.checkpoint, self.fixture.sampler),
+            first_index=late,
+            end_index=self.fixture.horizons.execution_horizon,
+            newest_accepted_observation_s=self._newest_accepted_s,
+        )
+        for index, actions in enumerate(flying.chunks):
+            candidate = Candidate(flying.metadata, actions)
+            proposal = Proposal(candidate.metadata, candidate.actions, selected_by=SELECTOR)
+            result = self.fixture.checker.admit(proposal, context=context)
+            verdict = result.verdict
+            self.journal.candidate(
+                now_s,
+                chunk_id=flying.metadata.chunk_id,
+                method=self.fixture.method,
+                index=index,
+                layers={layer.name: layer.passed for layer in verdict.layers},
+                first_reason=verdict.first_reason or None,
+            )
+            if isinstance(result, Admitted):
+                return result
+            counts = self.tally.rejected_by
+            counts[verdict.first_reason] = counts.get(verdict.first_reason, 0) + 1
+        return None
+
+    def _recover(self, now_s: float) -> None:
+        last_s = self._last_command_s if self._last_command_s is not None else 0.0
+        silent = now_s - last_s >= self.fixture.execution.hold_before_recovery_s - 1e-9
+        if not self.recovery.active and silent:
+            self.recovery.trigger(now_s, self.world.phase, "silence")
+        if not self.recovery.active:
+            return
+        state = step(
+            self.recovery,
+            self.executor,
+            now_s=now_s,
+            metadata=lambda: self._fallback_metadata(now_s),
+            plan=self._plan,
+            admit=lambda proposal: self._admit_fallback(proposal, now_s),
+        )
+        if state in (RecoveryState.ASK_HUMAN, RecoveryState.ABORT):
+            self.tally.interventions += 1
+            self.executor.intervene(now_s)
+            self._end(Outcome.INTERVENTION)
+        elif state is RecoveryState.IDLE:
+            self._last_command_s = now_s  # the silence is over; the policy gets its time
+
+    def _plan(self, state: RecoveryState) -> Primitive:
+        actions = self.fixture.task.fallback(self.world, str(state))
+        distance = np.linalg.norm(actions[-1] - self.world.last_action)
+        rows = actions[: self.fixture.horizons.prediction_horizon]
+        return Primitive(rows, reached=bool(distance < 1e-3))
+
+    def _fallback_metadata(self, now_s: float) -> ChunkMetadata:
+        self._fallback_chunks += 1
+        return fallback_metadata(
+            self.executor,
+            now_s=now_s,
+            chunk_id=f"{self.journal.session}/fallback/{self._fallback_chunks}",
+            event_time_s=now_s,
+            phase=self.world.phase,
+            epoch=self.world.calibration_epoch,
+        )
+
+    def _admit_fallback(self, proposal: Proposal, now_s: float) -> Admitted | None:
+        identity = self.executor.settings.fallback_hash
+        context = context_of(
+            self.fixture.task,
+            self.fixture.checker,
+            observation=self.history[-1],
+            q_meas=self.world.q_meas,
+            commanded=list(self._commanded),
+            now_s=now_s,
+            phase=self.world.phase,
+            latest_observation_s=now_s,
+            session=self._session(identity, identity),
+            first_index=0,
+            end_index=self.fixture.horizons.execution_horizon,
+        )
+        result = self.fixture.checker.admit(proposal, context=context)
+        return result if isinstance(result, Admitted) else None
+
+    def _session(self, checkpoint: str, sampler: str) -> Session:
+        return Session(
+            calibration_epoch=self.world.calibration_epoch,
+            session_epoch=self.executor.session_epoch,
+            checkpoint=checkpoint,
+            sampler=sampler,
+            maximum_age_s=self.fixture.execution.maximum_age_s,
+        )
+
+    def _apply(self, command: Command, now_s: float) -> None:
+        if command.action is None:
+            self.world.hold()
+            self.tally.hold_ticks += 1
+            self._commanded.append(self._commanded[-1])
+            return
+        self.world.command(command.action)
+        self._commanded.append(np.array(command.action))
+        self._last_command_s = now_s
+        if command.kind == "fallback":
+            self.tally.fallback_ticks += 1
+        else:
+            self.tally.action_ticks += 1
+
+    def _rows(self, flying: InFlight) -> int:
+        if flying.chunks is not None:
+            return int(flying.chunks.shape[1])
+        return self.fixture.horizons.prediction_horizon

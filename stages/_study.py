@@ -1,0 +1,41 @@
+"""What `baselines` and `generators` share: one matched study each, from their sections."""
+
+from genpolicy.comparison.fleet import PolicySettings
+from genpolicy.comparison.study import Study
+from genpolicy.contract.settings import Settings
+from genpolicy.feasibility.settings import FeasibilitySettings
+from genpolicy.policies.settings import SamplerConfig
+from genpolicy.simulation.rollout import ExecutionSettings
+from stages._stage import Params
+
+
+class StudySection(Settings):
+    """Section `baselines` or `generators`.
+
+    Attributes:
+        samplers: Methods, and the sampler of each.
+        conventions: Further samplers to count modes with, by method and name.
+        samples: Candidates per held-out situation.
+    """
+
+    samplers: dict[str, SamplerConfig]
+    conventions: dict[str, dict[str, SamplerConfig]] = {}
+    samples: int
+
+
+def study_of(params: Params, section: StudySection) -> Study:
+    """The study that a section describes, with the shared sections of `params.yaml`."""
+    return Study(
+        task=params.task.name,
+        samplers=section.samplers,
+        conventions=section.conventions,
+        settings=params.section("policy", PolicySettings),
+        horizons=params.horizons,
+        feasibility=params.section("feasibility", FeasibilitySettings),
+        maximum_age_s=params.section("execution", ExecutionSettings).maximum_age_s,
+        samples=section.samples,
+        root_seed=params.seed,
+        device=params.compute.device,
+        workers=params.compute.workers,
+        scheduler=params.compute.scheduler,
+    )
