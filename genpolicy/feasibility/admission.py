@@ -138,10 +138,7 @@ class FeasibilityChecker(LayerChecker):
         self, proposals: Sequence[Proposal], contexts: Sequence[Context]
     ) -> list[Admitted | Rejected]:
         """Project, check and decide on many proposals, each with its own context."""
-        projected = [
-            self.project(proposal, context=context)
-            for proposal, context in zip(proposals, contexts, strict=True)
-        ]
+        projected = self.project_many(proposals, contexts)
         verdicts = self.check_many(projected, contexts)
         return [
             _decide(chunk, verdict, context.now_s)

@@ -2,27 +2,26 @@
 
 from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from genpolicy.contract.action import GRIPPER, POSITION, split_action
+from genpolicy.contract.action import POSITION, split_action
 from genpolicy.contract.chunk import Projected, Proposal
 from genpolicy.errors import ConfigError
 from genpolicy.feasibility import layers
 from genpolicy.feasibility.context import Context, Workspace
-from genpolicy.feasibility.projection import project
+from genpolicy.feasibility.geometric import geometric
+from genpolicy.feasibility.projection import project, smooth_rates
 from genpolicy.feasibility.settings import CHECKS, CHECKS_BY_LAYER, LAYERS, FeasibilitySettings
 from genpolicy.feasibility.verdict import Verdict, judge_layer, not_reached
-from genpolicy.robot.collision import CollisionModel, CollisionReport, Hit, Paths
-from genpolicy.robot.kinematics import ArmKinematics
+from genpolicy.robot.collision import CollisionModel
+from genpolicy.robot.kinematics import JOINTS, ArmKinematics
 from genpolicy.robot.limits import RobotLimits, limits_of
 
 Array = NDArray[np.float64]
-
-TOUCH_M = 1e-9  # a touch without depth is still a collision
 
 
 @dataclass
@@ -91,8 +90,44 @@ class LayerChecker:
         }
 
     def project(self, proposal: Proposal, *, context: Context) -> Projected:
-        """Nearest chunk that keeps to rotations, workspace, gripper and TCP speed."""
-        return project(proposal, context=context, settings=self.settings, workspace=self.workspace)
+        """A chunk close by within rotations, workspace, gripper and rates; see `project_many`."""
+        return self.project_many([proposal], [context])[0]
+
+    def project_many(
+        self, proposals: Sequence[Proposal], contexts: Sequence[Context]
+    ) -> list[Projected]:
+        """Project many proposals, each with its own context.
+
+        What cannot be projected (not finite, of another shape, not reachable) is left for the
+        layers to reject.
+        """
+        result = [
+            project(p, context=c, settings=self.settings, workspace=self.workspace)
+            for p, c in zip(proposals, contexts, strict=True)
+        ]
+        groups: dict[int, list[int]] = defaultdict(list)
+        for i, (chunk, context) in enumerate(zip(result, contexts, strict=True)):
+            rows = context.rows(len(chunk.actions))
+            if np.isfinite(chunk.position_change_m) and rows.stop > rows.start:
+                groups[rows.stop - rows.start].append(i)
+        for members in groups.values():
+            batch = layers.batch_of([result[i] for i in members], [contexts[i] for i in members])
+            solved = self.kinematics.solve(
+                batch.actions[..., POSITION].reshape(-1, 3),
+                batch.rotation.reshape(-1, 3, 3),
+                q_seed_rad=np.repeat(batch.q_cmd_rad, batch.actions.shape[1], axis=0),
+            )
+            reached = np.atleast_1d(solved.converged.reshape(len(members), -1).all(axis=1))
+            for i, ok, q in zip(
+                members, reached, solved.q_rad.reshape(len(members), -1, JOINTS), strict=True
+            ):
+                if ok:
+                    result[i] = smooth_rates(
+                        result[i], q, context=contexts[i], settings=self.settings,
+                        workspace=self.workspace, kinematics=self.kinematics,
+                        limits=self._usable_limits(),
+                    )  # fmt: skip
+        return result
 
     def check(
         self, projected: Projected, *, context: Context, evaluate_all: bool = False
@@ -173,6 +208,15 @@ class LayerChecker:
         )
         return q[0], reached
 
+    def _usable_limits(self) -> RobotLimits:
+        """The robot's limits times the factors of the settings."""
+        return replace(
+            self.limits,
+            velocity_rad_s=self.limits.velocity_rad_s * self.settings.velocity_factor,
+            acceleration_rad_s2=self.limits.acceleration_rad_s2 * self.settings.acceleration_factor,
+            jerk_rad_s3=self.limits.jerk_rad_s3 * self.settings.jerk_factor,
+        )
+
     def _motion(self, states: list[_State], evaluate_all: bool) -> None:
         """Kinematic, geometric, dynamic and contact layer of chunks with equally many rows."""
         batch = layers.batch_of([s.projected for s in states], [s.context for s in states])
@@ -187,7 +231,16 @@ class LayerChecker:
         states = [states[i] for i in chosen]
         q = q[chosen]
         batch = layers.batch_of([s.projected for s in states], [s.context for s in states])
-        self._geometric(states, batch, q)
+        margins, details = geometric(
+            batch,
+            q,
+            collision=self.collision,
+            settings=self.settings,
+            disabled=self.disabled_checks,
+        )
+        for state, detail in zip(states, details, strict=True):
+            state.detail = detail
+        self._record(states, margins, "geometric")
         chosen = [i for i, s in enumerate(states) if s.alive or evaluate_all]
         if not chosen:
             return
@@ -195,62 +248,13 @@ class LayerChecker:
         batch = layers.batch_of([s.projected for s in states], [s.context for s in states])
         self._record(
             states,
-            layers.dynamic(batch, q, limits=self.limits, settings=self.settings),
+            layers.dynamic(batch, q, limits=self._usable_limits(), settings=self.settings),
             "dynamic",
         )
         self._record(
             states,
             layers.contact(batch, settings=self.settings, shapes=self.collision.shapes),
             "contact",
-        )
-
-    def _geometric(self, states: list[_State], batch: layers.Batch, q: Array) -> None:
-        paths = self._paths(batch, q)
-        samples = self.collision.check_samples(paths)
-        for i, state in enumerate(states):
-            hit = samples.hits[i]
-            own = hit is not None and hit.second in self.robot_shape_names
-            scene = hit is not None and not own
-            free = float(samples.clearance_m[i])
-            state.margins["scene_collision"] = -_depth(hit) if scene else free
-            state.margins["self_collision"] = -_depth(hit) if own else free
-            state.detail = _detail(hit)
-        left = [i for i, s in enumerate(states) if self._sweep(s)]
-        if left:
-            swept: CollisionReport = self.collision.check_swept(_subset(paths, left))
-            for place, i in enumerate(left):
-                hit = swept.hits[place]
-                margin = float(swept.clearance_m[place])
-                states[i].margins["swept_collision"] = -_depth(hit) if hit else margin
-                states[i].detail = states[i].detail or _detail(hit)
-        for state in states:
-            state.alive = state.alive and self._passes(state, "geometric")
-
-    def _sweep(self, state: _State) -> bool:
-        """The swept test is worth its time: not disabled, and the samples left it open."""
-        if "swept_collision" in self.disabled_checks:
-            return False
-        return all(
-            state.margins[name] >= 0 or name in self.disabled_checks
-            for name in ("scene_collision", "self_collision")
-        )
-
-    @property
-    def robot_shape_names(self) -> frozenset[str]:
-        """Names of the robot's own shapes."""
-        return frozenset(shape.name for shape in self.collision.shapes.robot)
-
-    def _paths(self, batch: layers.Batch, q: Array) -> Paths:
-        settings = self.settings
-        openings = np.concatenate([batch.last_action[:, None], batch.actions], axis=1)
-        contact = np.array([c.phase in settings.contact_phases for c in batch.contexts])
-        return Paths(
-            q_rad=np.concatenate([batch.q_cmd_rad[:, None], q], axis=1),
-            opening_m=openings[..., GRIPPER],
-            held=batch.held(settings.held_opening_m),
-            scenes=tuple(c.scene for c in batch.contexts),
-            contact_allowed=contact,
-            clearance_m=np.where(contact, settings.contact_clearance_m, settings.clearance_m),
         )
 
     def _record(self, states: list[_State], margins: layers.Margins, layer: str) -> None:
@@ -311,24 +315,3 @@ def _computable(state: _State) -> bool:
 
 def _shaped(state: _State) -> bool:
     return state.margins["shape"] >= 0
-
-
-def _depth(hit: Hit | None) -> float:
-    return 0.0 if hit is None else max(hit.depth_m, TOUCH_M)
-
-
-def _detail(hit: Hit | None) -> str:
-    if hit is None:
-        return ""
-    return f"{hit.first} and {hit.second} at row {hit.index}"
-
-
-def _subset(paths: Paths, rows: list[int]) -> Paths:
-    return Paths(
-        q_rad=paths.q_rad[rows],
-        opening_m=paths.opening_m[rows],
-        held=paths.held[rows],
-        scenes=tuple(paths.scenes[i] for i in rows),
-        contact_allowed=paths.contact_allowed[rows],
-        clearance_m=paths.clearance_m[rows],
-    )

@@ -188,7 +188,7 @@ def dynamic(
     """Period, joint velocity, acceleration and jerk from the last commands on, TCP rates.
 
     Source:
-        Backward differences at the action period; limits of the robot's table times the factors.
+        Backward differences at the action period; `limits` are those that may be used.
     """
     period_s = settings.action_period_s
     off = np.array([abs(m.action_period_s - period_s) for m in batch.metadata])
@@ -196,9 +196,9 @@ def dynamic(
     seams = [c.q_cmd_history for c in batch.contexts]
     names = ("joint_velocity", "joint_acceleration", "joint_jerk")
     bounds = (
-        limits.velocity_rad_s * settings.velocity_factor,
-        limits.acceleration_rad_s2 * settings.acceleration_factor,
-        limits.jerk_rad_s3 * settings.jerk_factor,
+        limits.velocity_rad_s,
+        limits.acceleration_rad_s2,
+        limits.jerk_rad_s3,
     )
     path = np.concatenate([_history(seams), batch.q_cmd_rad[:, None], q_rad], axis=1)
     known = np.array([min(len(s), 2) for s in seams]) + 1 + q_rad.shape[1]

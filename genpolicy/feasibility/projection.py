@@ -1,4 +1,4 @@
-"""Projection: the nearest chunk that keeps to rotations, workspace, gripper and TCP speed.
+"""Projection: a chunk close by that keeps to rotations, workspace, gripper and rate limits.
 
 Projection repairs rounding and small excess, it does not make a bad chunk good: how much it
 changed stands beside the result, and too much is a reason for rejection.
@@ -7,11 +7,14 @@ changed stands beside the result, and too much is a reason for rejection.
 import numpy as np
 from numpy.typing import NDArray
 
-from genpolicy.contract.action import ACTION_DIM, GRIPPER, POSITION, ROTATION
+from genpolicy.contract.action import ACTION_DIM, GRIPPER, POSITION, ROTATION, join_action
 from genpolicy.contract.chunk import Projected, Proposal
 from genpolicy.contract.rotation import angle_between, rotation_from_6d, rotation_to_6d
 from genpolicy.feasibility.context import Context, Workspace
 from genpolicy.feasibility.settings import FeasibilitySettings
+from genpolicy.feasibility.smoothing import smoothed
+from genpolicy.robot.kinematics import ArmKinematics
+from genpolicy.robot.limits import RobotLimits
 
 Array = NDArray[np.float64]
 
@@ -22,7 +25,7 @@ ROUNDING = 1e-9
 def project(
     proposal: Proposal, *, context: Context, settings: FeasibilitySettings, workspace: Workspace
 ) -> Projected:
-    """Project a proposal; one of another shape or with a non-finite number is left as it is.
+    """The geometric part of the projection; a proposal that is no chunk is left as it is.
 
     In this order: rotation columns to the rotation matrix (Gram-Schmidt), position into the
     workspace, opening into its range, then from the last action on each step to the TCP's speed
@@ -40,24 +43,70 @@ def project(
     position = np.clip(raw[:, POSITION], workspace.lower_m, workspace.upper_m)
     opening = np.clip(raw[:, GRIPPER], settings.gripper_lower_m, settings.gripper_upper_m)
     rows = context.rows(len(raw))
-    turned = rotation.copy()
-    step_m = settings.tcp_speed_limit_m_s * settings.action_period_s
-    turn_rad = settings.tcp_turn_limit_rad_s * settings.action_period_s
     last_position = context.last_action[POSITION]
     last_rotation = rotation_from_6d(context.last_action[ROTATION])
+    step_m, turn_rad = _step_limits(settings)
     if _too_fast(position[rows], last_position, step_m):
         position[rows] = _limit_steps(position[rows], last_position, step_m)
     if np.all(np.isfinite(last_rotation)) and _turns_too_fast(
-        turned[rows], last_rotation, turn_rad
+        rotation[rows], last_rotation, turn_rad
     ):
-        turned[rows] = _limit_turns(turned[rows], last_rotation, turn_rad)
-    actions = np.concatenate([position, rotation_to_6d(turned), opening[:, None]], axis=1)
+        rotation[rows] = _limit_turns(rotation[rows], last_rotation, turn_rad)
+    return _projected(proposal, join_action(position, rotation, opening))
+
+
+def smooth_rates(
+    projected: Projected,
+    q_rad: Array,
+    *,
+    context: Context,
+    settings: FeasibilitySettings,
+    workspace: Workspace,
+    kinematics: ArmKinematics,
+    limits: RobotLimits,
+) -> Projected:
+    """The dynamic part: the least smoothing that keeps the joints within their rate limits.
+
+    Args:
+        projected: Result of `project`.
+        q_rad: Its inverse kinematics, executable rows only. Shape (n, 7).
+        context: State; its commands are the fixed beginning of the path.
+        settings: TCP speed limits.
+        workspace: Where the smoothed positions must be.
+        kinematics: The arm.
+        limits: Rate limits that may be used.
+
+    Returns:
+        The chunk unchanged where it needs no smoothing, and where none is enough.
+    """
+    rows = context.rows(len(projected.actions))
+    fixed = np.concatenate([context.q_cmd_history[-2:], context.q_cmd[None]])
+    step_m, turn_rad = _step_limits(settings)
+    last_rotation = rotation_from_6d(context.last_action[ROTATION])
+    for path in smoothed(q_rad, fixed, limits=limits, period_s=settings.action_period_s):
+        position, rotation = kinematics.forward(path)
+        inside = np.all((position >= workspace.lower_m) & (position <= workspace.upper_m))
+        fast = _too_fast(position, context.last_action[POSITION], step_m)
+        if inside and not fast and not _turns_too_fast(rotation, last_rotation, turn_rad):
+            actions = projected.actions.copy()
+            actions[rows] = join_action(position, rotation, actions[rows, GRIPPER])
+            return _projected(projected.proposal, actions)
+    return projected
+
+
+def _projected(proposal: Proposal, actions: Array) -> Projected:
+    raw = proposal.actions
+    before, after = rotation_from_6d(raw[:, ROTATION]), rotation_from_6d(actions[:, ROTATION])
+    moved = np.linalg.norm(actions[:, POSITION] - raw[:, POSITION], axis=1)
     return Projected(
-        proposal,
-        actions,
-        float(np.max(np.linalg.norm(position - raw[:, POSITION], axis=1))),
-        float(np.max(angle_between(rotation, turned))),
+        proposal, actions, float(np.max(moved)), float(np.max(angle_between(before, after)))
     )
+
+
+def _step_limits(settings: FeasibilitySettings) -> tuple[float, float]:
+    """Most that one action may move (m) and turn (rad)."""
+    period_s = settings.action_period_s
+    return settings.tcp_speed_limit_m_s * period_s, settings.tcp_turn_limit_rad_s * period_s
 
 
 def _too_fast(position: Array, last: Array, step_m: float) -> bool:
