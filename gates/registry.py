@@ -1,5 +1,6 @@
 """The judges of gates A to D and the sections of `params.yaml`; Gate E joins them in `ladder`."""
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,8 +9,9 @@ from typing import Any
 from gates import gate_a, gate_b, gate_c, gate_d
 from gates.engine import GateSpec, check_thresholds
 from gates.models import Gate, GateReport, StrictModel, Threshold, parse_section, stage_of
-from genpolicy.errors import BadInputError, ConfigError
-from genpolicy.integrity.documents import read_yaml
+from genpolicy.errors import ConfigError, IntegrityError
+from genpolicy.integrity.documents import parse_yaml
+from genpolicy.integrity.hashing import sha256_bytes_of
 
 PARAMS_FILE = "params.yaml"
 
@@ -66,13 +68,15 @@ def plain_section(root: Path, name: str) -> dict[str, Any]:
         ConfigError: The file or the section is missing.
     """
     try:
-        document = read_yaml(root / PARAMS_FILE)
-    except ConfigError:
-        raise
-    except BadInputError as error:
+        data = sha256_bytes_of(root / PARAMS_FILE, keep=True)[1]
+    except IntegrityError as error:
         raise ConfigError(
-            where=PARAMS_FILE, found=error.found, expected=error.expected, action=error.action
+            where=PARAMS_FILE,
+            found=error.found,
+            expected=error.expected,
+            action="Restore the settings file.",
         ) from error
+    document = _parsed(data)
     section = document.get(name) if isinstance(document, dict) else None
     if not isinstance(section, dict):
         raise ConfigError(
@@ -82,6 +86,11 @@ def plain_section(root: Path, name: str) -> dict[str, Any]:
             action="Add the section.",
         )
     return section
+
+
+@functools.lru_cache(maxsize=4)
+def _parsed(data: bytes) -> Any:
+    return parse_yaml(data, where=PARAMS_FILE)
 
 
 def judge_with(root: Path, judge: Judge) -> GateReport:

@@ -49,7 +49,8 @@ def combine(
 
     A gate passes if and only if every required gate-wide criterion passes, one of the
     alternative routes (where there are any) passes whole, and, where candidates are expected,
-    at least one candidate passes all of its criteria.
+    at least one candidate passes all of its criteria. A route waives what failed in another one,
+    never what was not measured.
 
     Args:
         criteria: Judged criteria.
@@ -60,6 +61,7 @@ def combine(
     routes = sorted({c.route for c in common} - {REQUIRED})
     if routes:
         parts.append(best(worst(c.verdict for c in common if c.route == r) for r in routes))
+        parts += [c.verdict for c in common if c.verdict == "INCONCLUSIVE"]
     names = sorted({c.candidate for c in criteria if c.candidate is not None})
     candidates = {name: worst(c.verdict for c in criteria if c.candidate == name) for name in names}
     if expects_candidates:

@@ -1,0 +1,61 @@
+"""Fixtures of the gate tests: a repository with evidence, with reports, with a drafted card."""
+
+import shutil
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+import evidence
+
+from gates.admission import admit
+from gates.card import card_bytes
+from gates.drafting import draft
+from gates.ladder import judge
+from gates.models import GATES, report_bytes, report_path
+from genpolicy.integrity.atomic import write_bytes
+
+
+def judge_all(root: Path, gates: str = "ABCD") -> None:
+    """Write JSON reports without pages: quick."""
+    for gate in GATES:
+        if gate in gates:
+            write_bytes(root / report_path(gate), report_bytes(judge(root, gate)))
+
+
+def write_draft(root: Path) -> None:
+    """Write the draft card, as the card stage does."""
+    write_bytes(root / "artifacts/card/card.json", card_bytes(draft(root, admit("card", root))))
+
+
+@pytest.fixture(scope="session")
+def _evidence(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    root = tmp_path_factory.mktemp("evidence")
+    evidence.build(root)
+    return root
+
+
+@pytest.fixture(scope="session")
+def _ladder(tmp_path_factory: pytest.TempPathFactory, _evidence: Path) -> Path:
+    root = tmp_path_factory.mktemp("ladder") / "repo"
+    shutil.copytree(_evidence, root)
+    judge_all(root)
+    write_draft(root)
+    (root / "reviewers.yaml").write_text("people: []\n")
+    return root
+
+
+@pytest.fixture
+def repo(tmp_path: Path, _evidence: Path) -> Path:
+    """Evidence and settings, no report."""
+    shutil.copytree(_evidence, tmp_path / "repo")
+    return tmp_path / "repo"
+
+
+@pytest.fixture
+def ladder(tmp_path: Path, _ladder: Path) -> Path:
+    """Evidence, reports A to D (all PASS) and a drafted card."""
+    shutil.copytree(_ladder, tmp_path / "repo")
+    return tmp_path / "repo"

@@ -1,0 +1,621 @@
+"""Small synthetic evidence on which every gate passes, and the settings that judge it."""
+
+import copy
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pyarrow as pa
+import yaml
+
+from gates.gate_b import MEASURED_HERE, TERMS
+from gates.gate_c import LAYERS
+from genpolicy.integrity.documents import canonical_json
+from genpolicy.integrity.tables import read_table, write_table
+
+BASELINES = ("bc", "chunked_bc", "act")
+CANDIDATES = ("diffusion", "flow")
+CONDITIONS = ("nominal", "camera_delay", "compute_contention")
+STARTS = 40
+SPEED = {"diffusion": 0.02, "flow": 0.01}
+
+
+def _t(limit: float, owner: str) -> dict[str, Any]:
+    return {"limit": limit, "reason": "test", "owner": owner}
+
+
+PARAMS: dict[str, Any] = {
+    "gate_a": {
+        "confidence": 0.95,
+        "strata_level": 0.05,
+        "held_out_splits": ["validation", "test"],
+        "baselines": list(BASELINES),
+        "thresholds": {
+            "refused_recordings_accounted": _t(0, "perception"),
+            "clock_residual_s": _t(0.01, "perception"),
+            "lag_spread_steps": _t(1, "controller"),
+            "calibration_residual_m": _t(0.005, "perception"),
+            "label_disagreement": _t(0.2, "model"),
+            "held_out_situations": _t(20, "model"),
+            "multimodal_situations": _t(10, "model"),
+            "persistence_margin": _t(0.05, "model"),
+            "mode_success_lower": _t(0.6, "model"),
+            "mode_feasible_share": _t(0.9, "controller"),
+            "mean_defeated_share": _t(0.5, "model"),
+            "recovery_benefit": _t(0.1, "model"),
+            "strata_effect": _t(0.3, "perception"),
+            "cause_accepted": _t(1, "model"),
+            "baselines_matched": _t(0, "model"),
+            "baseline_mode_coverage": _t(0.6, "model"),
+        },
+    },
+    "gate_b": {
+        "confidence": 0.95,
+        "candidates": list(CANDIDATES),
+        "budget_reference": "chunked_bc",
+        "budget_parts": ["total"],
+        "thresholds": {
+            "unmatched_keys": _t(0, "model"),
+            "parameter_budget_deviation": _t(0.05, "model"),
+            "unpinned_items": _t(0, "model"),
+            "nonfinite_weights": _t(0, "model"),
+            "metadata_mismatches": _t(0, "model"),
+            "samples_difference": _t(0, "model"),
+            "nfe_mismatch": _t(0, "model"),
+            "mode_coverage_lower": _t(0.6, "model"),
+            "latency_terms_missing": _t(0, "perception"),
+            "latency_median_ratio": _t(1.5, "controller"),
+        },
+    },
+    "gate_c": {
+        "confidence": 0.95,
+        "candidates": list(CANDIDATES),
+        "thresholds": {
+            "mode_admissible_gap": _t(0.3, "controller"),
+            "admissible_share": _t(0.6, "model"),
+            "projection_p95_m": _t(0.02, "controller"),
+            "boundary_jerk_p95_m_s3": _t(500, "controller"),
+            "corrupted_refused_share": _t(1, "controller"),
+            "stub_stale": _t(0, "safety"),
+            "stub_invalid": _t(0, "safety"),
+            "stub_violation_upper": _t(0.01, "safety"),
+            "conservation_error": _t(0, "controller"),
+            "checker_violations": _t(0, "safety"),
+            "mutants_undetected": _t(0, "safety"),
+        },
+    },
+    "gate_d": {
+        "confidence": 0.95,
+        "candidates": list(CANDIDATES),
+        "baselines": list(BASELINES),
+        "perturbations": list(CONDITIONS),
+        "margin": 0.1,
+        "alpha": 0.05,
+        "planned_starts": STARTS,
+        "minimum_power": 0.8,
+        "thresholds": {
+            "unmatched_starts": _t(0, "model"),
+            "verdict_reachable": _t(1, "model"),
+            "nominal_success_lower": _t(0.7, "model"),
+            "deadline_miss_upper": _t(0.1, "controller"),
+            "action_age_p95_s": _t(0.5, "perception"),
+            "fallback_share_upper": _t(0.15, "safety"),
+            "intervention_upper": _t(0.1, "safety"),
+            "stub_violations": _t(0, "safety"),
+            "force_peak_p95_n": _t(20, "safety"),
+            "stress_success_lower": _t(0.6, "model"),
+            "conservation_error": _t(0, "controller"),
+            "checker_violations": _t(0, "safety"),
+            "promotion_e_value": _t(20, "model"),
+        },
+    },
+    "gate_e": {
+        "card": "trial",
+        "workspace_lower_m": [0.3, -0.22, 0.02],
+        "workspace_upper_m": [0.72, 0.22, 0.28],
+        "speed_limit_m_s": 0.4,
+        "maximum_days": 30,
+        "thresholds": {
+            "upstream_passed": _t(1, "safety"),
+            "draft_complete": _t(0, "safety"),
+            "signature_valid": _t(1, "safety"),
+            "reviewer_independent": _t(1, "safety"),
+            "owners_signed": _t(4, "safety"),
+            "envelope_within_limits": _t(0, "safety"),
+            "not_expired": _t(1, "safety"),
+        },
+    },
+    "card": {
+        "name": "trial",
+        "author": "Ada Author",
+        "robot_model": "panda",
+        "task": "tabletop_insertion",
+        "workspace_lower_m": [0.35, -0.2, 0.03],
+        "workspace_upper_m": [0.7, 0.2, 0.25],
+        "speed_limit_m_s": 0.25,
+    },
+}
+
+
+def write_params(root: Path, change: dict[str, Any] | None = None) -> None:
+    """params.yaml, with some sections replaced."""
+    (root / "params.yaml").write_text(yaml.safe_dump({**copy.deepcopy(PARAMS), **(change or {})}))
+
+
+def table(root: Path, path: str, rows: list[dict[str, Any]]) -> None:
+    write_table(root / "artifacts" / path, pa.Table.from_pylist(rows))
+
+
+def document(root: Path, path: str, value: Any) -> None:
+    file = root / "artifacts" / path
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_bytes(canonical_json(value))
+
+
+def edit_table(root: Path, path: str, change: Any) -> None:
+    """Apply `change` (a function of the data frame) to one table."""
+    file = root / "artifacts" / path
+    frame = change(read_table(file).to_pandas())
+    write_table(file, pa.Table.from_pandas(pd.DataFrame(frame), preserve_index=False))
+
+
+def edit_document(root: Path, path: str, change: Any) -> None:
+    """Apply `change` (in place, or returning the new value) to one JSON document."""
+    file = root / "artifacts" / path
+    value = json.loads(file.read_bytes())
+    document(root, path, change(value) or value)
+
+
+def build(root: Path) -> None:
+    """All evidence and settings, without any report."""
+    write_params(root)
+    _dataset(root)
+    _audit(root)
+    _baselines(root)
+    _generators(root)
+    _reload(root)
+    _latency(root)
+    _shadow(root)
+    _stress(root)
+
+
+def _dataset(root: Path) -> None:
+    document(
+        root, "ingest/refusals.json", {"found": 50, "accepted": 49, "refused": [{"file": "x"}]}
+    )
+    document(root, "ingest/manifest.json", {"schema_version": 1})
+    table(root, "ingest/frames.parquet", [{"index": 0}])
+    table(root, "ingest/episodes.parquet", [{"episode_uuid": "e0"}])
+
+
+def _audit(root: Path) -> None:
+    table(
+        root,
+        "audit/clocks.parquet",
+        [
+            {
+                "stream": stream,
+                "epoch": epoch,
+                "episodes": 20,
+                "offset_before_s": 0.03,
+                "offset_after_s": 0.002,
+                "lag_steps": 2.0,
+                "receive_delay_p50_s": 0.02,
+                "receive_delay_p95_s": 0.05,
+                "jitter_p95_s": 0.004,
+            }
+            for stream in ("robot", "camera")
+            for epoch in ("e1", "e2")
+        ],
+    )
+    table(
+        root,
+        "audit/calibration.parquet",
+        [{"epoch": e, "episodes": 20, "residual_m": 0.001} for e in ("e1", "e2")],
+    )
+    table(root, "audit/neighbourhoods.parquet", [_situation(i) for i in range(60)])
+    table(
+        root,
+        "audit/modes.parquet",
+        [
+            {
+                "mode": mode,
+                "phase": "approach",
+                "episodes": 25,
+                "successes": 24,
+                "success_lower": 0.8,
+                "success_upper": 1.0,
+                "admissible": 49,
+                "checked": 50,
+            }
+            for mode in ("left", "right")
+        ],
+    )
+    table(
+        root,
+        "audit/strata.parquet",
+        [
+            {
+                "variable": variable,
+                "phase": "approach",
+                "p_value": 0.4,
+                "p_adjusted": 0.9,
+                "effect": 0.05,
+                "effect_lower": 0.0,
+                "effect_upper": 0.2,
+                "n": 100,
+                "recorded": True,
+            }
+            for variable in ("operator", "object", "epoch")
+        ],
+    )
+    table(
+        root,
+        "audit/replay.parquet",
+        [{"episode_uuid": f"e{i}", "label": "success", "replayed": "success"} for i in range(40)],
+    )
+    document(
+        root,
+        "audit/persistence.json",
+        {"observed": 0.95, "null_q95": 0.6, "null_mean": 0.5, "n": 200},
+    )
+    table(
+        root,
+        "audit/recovery.parquet",
+        [
+            {"split": "recovery", "mode": "left", "episodes": 40, "successes": 38},
+            {"split": "recovery", "mode": "right", "episodes": 40, "successes": 8},
+        ],
+    )
+    document(
+        root,
+        "audit/summary.json",
+        {
+            "cause": "valid_modes",
+            "variable": None,
+            "kind": None,
+            "next_action": "train generators",
+            "modes_before_realignment": 3,
+            "modes_after_realignment": 2,
+            "obstacles": [{"x_m": 0.5, "y_m": 0.0, "radius_m": 0.025}],
+        },
+    )
+
+
+def _situation(i: int) -> dict[str, Any]:
+    xs = [0.37 + 0.02 * k for k in range(16)]
+    left = [v for x in xs for v in (x, 0.13 * (1 - abs(x - 0.5) / 0.2), 0.15)]
+    right = [v for x in xs for v in (x, -0.13 * (1 - abs(x - 0.5) / 0.2), 0.15)]
+    mean = [v for x in xs for v in (x, 0.0, 0.15)]
+    return {
+        "split": ("train", "validation", "test")[i % 3],
+        "phase": "approach",
+        "episode_uuid": f"e{i}",
+        "index": i,
+        "neighbours": 12,
+        "clusters": 2,
+        "cluster_sizes": [6, 6],
+        "two_mode": True,
+        "separation_m": 0.2,
+        "mean_admissible": False,
+        "mean_reason": "collision",
+        "modes_admissible": 2,
+        "mean_path": mean,
+        "mode_paths": [left, right],
+        "persistent": True,
+    }
+
+
+def _modes(methods: tuple[str, ...], covered: int) -> list[dict[str, Any]]:
+    return [
+        {
+            "method": method,
+            "seed": 0,
+            "convention": "default",
+            "episode_uuid": f"e{i}",
+            "index": i,
+            "samples": 16,
+            "modes_present": 2,
+            "modes_covered": covered,
+            "between_modes": 0,
+            "admissible": 16,
+        }
+        for method in methods
+        for i in range(30)
+    ]
+
+
+def _matched(methods: tuple[str, ...]) -> dict[str, Any]:
+    return {
+        "methods": {
+            m: {
+                "parameters": {"encoder": 10, "trunk": 80, "head": 10, "total": 100},
+                "flops": 1,
+                "config": {},
+            }
+            for m in methods
+        },
+        "differing_keys": {m: ["head"] for m in methods},
+        "whitelist": ["head"],
+    }
+
+
+def _checkpoints(root: Path, stage: str, methods: tuple[str, ...]) -> None:
+    for method in methods:
+        folder = root / "artifacts" / stage / method / "seed_0"
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "model.safetensors").write_bytes(method.encode())
+        (folder / "config.json").write_bytes(b"{}\n")
+
+
+def _baselines(root: Path) -> None:
+    table(root, "baselines/modes.parquet", _modes(BASELINES, 1))
+    document(root, "baselines/matched.json", _matched(BASELINES))
+    table(root, "baselines/offline.parquet", [{"method": "bc", "seed": 0}])
+    _checkpoints(root, "baselines", BASELINES)
+
+
+def _generators(root: Path) -> None:
+    table(root, "generators/modes.parquet", _modes(CANDIDATES, 2))
+    document(root, "generators/matched.json", _matched(CANDIDATES))
+    table(root, "generators/offline.parquet", [{"method": "flow", "seed": 0}])
+    _checkpoints(root, "generators", CANDIDATES)
+
+
+def _reload(root: Path) -> None:
+    digest = hashlib.sha256(b"sample").hexdigest()
+    table(
+        root,
+        "reload/samples.parquet",
+        [
+            {
+                "method": m,
+                "seed": 0,
+                "row": i,
+                "sha256_trained": digest,
+                "sha256_reloaded": digest,
+                "max_abs_difference": 0.0,
+            }
+            for m in CANDIDATES
+            for i in range(8)
+        ],
+    )
+    table(
+        root,
+        "reload/nfe.parquet",
+        [{"method": m, "seed": 0, "recorded": 8, "counted": 8} for m in CANDIDATES],
+    )
+    table(
+        root,
+        "reload/coverage.parquet",
+        [
+            {
+                "method": m,
+                "nfe": nfe,
+                "situations": 30,
+                "modes_covered_share": min(1.0, 0.7 + nfe / 30),
+                "coverage_lower": 0.8,
+                "spread_m": 0.1,
+            }
+            for m in CANDIDATES
+            for nfe in (2, 4, 8, 16)
+        ],
+    )
+    document(
+        root,
+        "reload/identity.json",
+        {
+            m: {
+                "checkpoint": hashlib.sha256(m.encode()).hexdigest(),
+                "config": "c",
+                "dataset": "d",
+                "normalisation": "n",
+                "seed": 0,
+                "sampler": "s",
+                "metadata_mismatches": 0,
+                "nonfinite_weights": 0,
+            }
+            for m in CANDIDATES
+        },
+    )
+
+
+def _latency(root: Path) -> None:
+    table(
+        root,
+        "latency/latency.parquet",
+        [
+            {
+                "method": m,
+                "run": run,
+                "component": term,
+                "temperature": temperature,
+                "repeat": i,
+                "seconds": (SPEED[m] if term == "sample" else 0.001) * (1 + 0.01 * i + 0.02 * run),
+                "source": "measured" if term in MEASURED_HERE else "declared",
+            }
+            for m in CANDIDATES
+            for run in (1, 2)
+            for term in TERMS
+            for temperature in ("cold", "warm")
+            for i in range(8)
+        ],
+    )
+
+
+def _candidate(method: str, fixture: str, observation: int, candidate: int) -> dict[str, Any]:
+    held = fixture == "held_out"
+    layers: dict[str, Any] = dict.fromkeys(LAYERS, True)
+    if not held:
+        layers.update(dynamic=False, contact=None, fresh=None)
+    return {
+        "method": method,
+        "seed": 0,
+        "fixture": fixture,
+        "situation": "two_mode",
+        "observation": observation,
+        "candidate": candidate,
+        "mode": ("left", "right")[candidate % 2],
+        **layers,
+        "first_reason": "" if held else "dynamic",
+        "layer_margin": 0.1,
+        "position_change_m": 0.001 * (1 + candidate) if held else None,
+        "rotation_change_rad": 0.01,
+        "boundary_jerk_m_s3": 50.0 + observation if held else None,
+        "raw": [0.0, 1.0],
+        "projected": [0.0, 1.0],
+    }
+
+
+FIXTURES = (
+    "held_out",
+    "stale_observation",
+    "infeasible_rotation",
+    "collision",
+    "phase_change",
+    "reordered_chunk",
+)
+
+
+def _shadow(root: Path) -> None:
+    table(
+        root,
+        "shadow/candidates.parquet",
+        [
+            _candidate(m, fixture, o, c)
+            for m in CANDIDATES
+            for fixture in FIXTURES
+            for o in range(20 if fixture == "held_out" else 4)
+            for c in range(4)
+        ],
+    )
+    table(
+        root,
+        "shadow/stub.parquet",
+        [
+            {"method": m, "fixture": f, "arrivals": 200, "stale": 0, "invalid": 0}
+            for m in CANDIDATES
+            for f in FIXTURES
+        ],
+    )
+    table(
+        root,
+        "shadow/counts.parquet",
+        [
+            {
+                "method": m,
+                "fixture": f,
+                "generated": 100,
+                "executed": 80,
+                "queued": 5,
+                "reason": reason,
+                "count": n,
+            }
+            for m in CANDIDATES
+            for f in FIXTURES
+            for reason, n in (("expired", 10), ("phase", 5))
+        ],
+    )
+    document(root, "shadow/checker.json", {"violations": [], "checked_actions": 1000})
+    document(
+        root,
+        "shadow/mutants.json",
+        [{"check": name, "detected": True, "violations": 3} for name in LAYERS],
+    )
+    (root / "artifacts/shadow/journal.mcap").write_bytes(b"journal")
+
+
+def _succeeds(method: str, start: int) -> bool:
+    if method in BASELINES:
+        return start % 2 == 0
+    return not (method == "flow" and start == 7)
+
+
+def _stress(root: Path) -> None:
+    methods = (*BASELINES, *CANDIDATES)
+    rows = []
+    for method in methods:
+        for condition in CONDITIONS:
+            for start in range(STARTS):
+                success = _succeeds(method, start)
+                rows.append(
+                    {
+                        "method": method,
+                        "seed": 0,
+                        "perturbation": condition,
+                        "start": start,
+                        "start_sha256": hashlib.sha256(f"{condition}{start}".encode()).hexdigest(),
+                        "outcome": "success" if success else "collision",
+                        "success": success,
+                        "duration_s": 8.0,
+                        "ticks": 160,
+                        "action_ticks": 150,
+                        "hold_ticks": 8,
+                        "fallback_ticks": 2,
+                        "invocations": 20,
+                        "deadline_misses": 0,
+                        "discards": 1,
+                        "rejections": 1,
+                        "recovery_attempted": False,
+                        "recovered": False,
+                        "interventions": 0,
+                        "action_age_p50_s": 0.1,
+                        "action_age_p95_s": 0.2 + 0.001 * start,
+                        "action_age_max_s": 0.3,
+                        "force_peak_n": 5.0 + 0.1 * start,
+                        "mode": "left",
+                    }
+                )
+    table(root, "stress/rollouts.parquet", rows)
+    cells = [(m, c) for m in methods for c in CONDITIONS]
+    table(
+        root,
+        "stress/counts.parquet",
+        [{"method": m, "perturbation": c, "reason": "expired", "count": 10} for m, c in cells],
+    )
+    table(
+        root,
+        "stress/conservation.parquet",
+        [
+            {
+                "method": m,
+                "perturbation": c,
+                "generated": 100,
+                "executed": 88,
+                "discarded": 10,
+                "queued": 2,
+            }
+            for m, c in cells
+        ],
+    )
+    table(
+        root,
+        "stress/stub.parquet",
+        [
+            {"method": m, "perturbation": c, "arrivals": 500, "stale": 0, "invalid": 0}
+            for m, c in cells
+        ],
+    )
+    document(
+        root,
+        "stress/checker.json",
+        {"violations": [], "checked_actions": 5000, "journals": ["a.mcap"]},
+    )
+    power = {"margin": 0.1, "alpha": 0.05, "pairs": STARTS}
+    row = {"baseline_success": 0.5, "correlation": 0.6, "margin": 0.1, "pairs": STARTS}
+    document(
+        root,
+        "stress/power.json",
+        {
+            **power,
+            "rows": [
+                {**row, "candidate_success": 0.95, "promote_share": 0.97, "return_share": 0.03},
+                {**row, "candidate_success": 0.55, "promote_share": 0.02, "return_share": 0.98},
+            ],
+        },
+    )
+    journals = root / "artifacts/stress/journals"
+    journals.mkdir(parents=True, exist_ok=True)
+    (journals / "flow__nominal.mcap").write_bytes(b"journal")

@@ -1,0 +1,463 @@
+"""The judges A to D: every criterion can fail, never improves by getting worse, never by absence.
+
+`WORSE` gives for each criterion an edit that makes its metric worse, by a severity from 0 to 1.
+"""
+
+import shutil
+
+import evidence
+import numpy as np
+import pytest
+
+from gates.ladder import JUDGES, judge
+from gates.models import report_bytes, report_path
+from gates.registry import read_section
+from genpolicy.errors import ConfigError, IntegrityError
+from genpolicy.integrity.atomic import write_bytes
+
+
+def _cells(column, value, *, where=None, share=1.0):
+    """Set `share` of the chosen rows of a column, spread evenly so that all clusters are hit."""
+
+    def change(frame):
+        mask = np.ones(len(frame), bool) if where is None else where(frame).to_numpy()
+        chosen = np.flatnonzero(mask)
+        chosen = chosen[: max(1, int(np.ceil(share * len(chosen))))]
+        series = frame[column].astype(object)
+        series.iloc[chosen] = value
+        frame[column] = series.tolist()
+        return frame
+
+    return change
+
+
+def _of(method):
+    return lambda frame: frame["method"] == method
+
+
+def _held(frame):
+    return frame["fixture"] == "held_out"
+
+
+def _set(key, value):
+    return lambda document: document.__setitem__(key, value)
+
+
+def _table(path, make):
+    return lambda root, s: evidence.edit_table(root, path, make(s))
+
+
+def _document(path, make):
+    return lambda root, s: evidence.edit_document(root, path, make(s))
+
+
+def _identity(key):
+    return lambda s: lambda d: [e.__setitem__(key, int(3 * s) + 1) for e in d.values()] and None
+
+
+def _collapse(frame, share):
+    """Reject the right-hand mode in `share` of the held-out observations."""
+    bad = (frame["fixture"] == "held_out") & (frame["mode"] == "right")
+    bad &= frame["observation"] < np.ceil(20 * share)
+    frame.loc[bad, "geometric"] = False
+    return frame
+
+
+AUDIT, BASE, GEN, SHADOW, STRESS = "audit/", "baselines/", "generators/", "shadow/", "stress/"
+ROLL = STRESS + "rollouts.parquet"
+WORSE = {
+    "A": {
+        "refused_recordings_accounted": _document(
+            "ingest/refusals.json", lambda s: _set("accepted", 48 - int(9 * s))
+        ),
+        "clock_residual_s": _table(
+            AUDIT + "clocks.parquet", lambda s: _cells("offset_after_s", -s)
+        ),
+        "lag_spread_steps": _table(
+            AUDIT + "clocks.parquet", lambda s: _cells("lag_steps", 2 + 4 * s, share=0.25)
+        ),
+        "calibration_residual_m": _table(
+            AUDIT + "calibration.parquet", lambda s: _cells("residual_m", s)
+        ),
+        "label_disagreement": _table(
+            AUDIT + "replay.parquet", lambda s: _cells("replayed", "failure", share=s)
+        ),
+        "held_out_situations": _table(
+            AUDIT + "neighbourhoods.parquet", lambda s: _cells("split", "train", share=s)
+        ),
+        "multimodal_situations": _table(
+            AUDIT + "neighbourhoods.parquet", lambda s: _cells("persistent", False, share=s)
+        ),
+        "persistence_margin": _document(
+            AUDIT + "persistence.json", lambda s: _set("observed", 0.95 - 0.5 * s)
+        ),
+        "mode_success_lower": _table(
+            AUDIT + "modes.parquet", lambda s: _cells("successes", 24 - int(20 * s), share=0.5)
+        ),
+        "mode_feasible_share": _table(
+            AUDIT + "modes.parquet", lambda s: _cells("admissible", 49 - int(40 * s), share=0.5)
+        ),
+        "mean_defeated_share": _table(
+            AUDIT + "neighbourhoods.parquet", lambda s: _cells("mean_admissible", True, share=s)
+        ),
+        "strata_effect": _table(
+            AUDIT + "strata.parquet",
+            lambda s: lambda f: _cells("effect", s)(_cells("p_adjusted", 0.001)(f)),
+        ),
+        "cause_accepted": _document(
+            AUDIT + "summary.json", lambda s: _set("cause", "hidden_state" if s else "valid_modes")
+        ),
+        "baselines_matched": _document(
+            BASE + "matched.json",
+            lambda s: lambda d: d["differing_keys"]["bc"].extend(["k"] * int(1 + 3 * s)),
+        ),
+        "baseline_mode_coverage": _table(
+            BASE + "modes.parquet",
+            lambda s: _cells("modes_covered", 2, where=_of("act"), share=s),
+        ),
+    },
+    "B": {
+        "unmatched_keys": _document(
+            GEN + "matched.json",
+            lambda s: (
+                lambda d: (
+                    [v.extend(["k"] * int(1 + 3 * s)) for v in d["differing_keys"].values()]
+                    and None
+                )
+            ),
+        ),
+        "parameter_budget_deviation": _document(
+            GEN + "matched.json",
+            lambda s: (
+                lambda d: (
+                    [
+                        v["parameters"].__setitem__("total", 100 + 50 * s)
+                        for v in d["methods"].values()
+                    ]
+                    and None
+                )
+            ),
+        ),
+        "unpinned_items": _document(
+            "reload/identity.json",
+            lambda s: lambda d: [e.__setitem__("sampler", "") for e in d.values()] and None,
+        ),
+        "nonfinite_weights": _document("reload/identity.json", _identity("nonfinite_weights")),
+        "metadata_mismatches": _document("reload/identity.json", _identity("metadata_mismatches")),
+        "samples_difference": _table(
+            "reload/samples.parquet",
+            lambda s: (
+                lambda f: (
+                    _cells("sha256_reloaded", "other")(_cells("max_abs_difference", s)(f))
+                    if s
+                    else f
+                )
+            ),
+        ),
+        "nfe_mismatch": _table(
+            "reload/nfe.parquet", lambda s: _cells("counted", 8 + int(8 * s) + 1)
+        ),
+        "mode_coverage_lower": _table(
+            "reload/coverage.parquet", lambda s: _cells("modes_covered_share", 1 - s)
+        ),
+        "latency_terms_missing": _table(
+            "latency/latency.parquet",
+            lambda s: (
+                lambda f: f[~f["component"].isin(["queue", "network", "select"][: 1 + int(2 * s)])]
+            ),
+        ),
+        "latency_median_ratio": _table(
+            "latency/latency.parquet",
+            lambda s: (
+                lambda f: f.assign(seconds=f["seconds"] * np.where(f["run"] == 2, 1 + 2 * s, 1))
+            ),
+        ),
+    },
+    "C": {
+        "mode_admissible_gap": _table(
+            SHADOW + "candidates.parquet", lambda s: lambda f: _collapse(f, s)
+        ),
+        "admissible_share": _table(
+            SHADOW + "candidates.parquet", lambda s: _cells("kinematic", False, share=s)
+        ),
+        "projection_p95_m": _table(
+            SHADOW + "candidates.parquet", lambda s: _cells("position_change_m", s, where=_held)
+        ),
+        "boundary_jerk_p95_m_s3": _table(
+            SHADOW + "candidates.parquet",
+            lambda s: _cells("boundary_jerk_m_s3", 9000 * s, where=_held),
+        ),
+        "corrupted_refused_share": _table(
+            SHADOW + "candidates.parquet",
+            lambda s: (
+                lambda f: f.assign(
+                    first_reason=np.where(f["observation"] < 4 * s, "", f["first_reason"])
+                )
+            ),
+        ),
+        "stub_stale": _table(SHADOW + "stub.parquet", lambda s: _cells("stale", int(9 * s) + 1)),
+        "stub_invalid": _table(
+            SHADOW + "stub.parquet", lambda s: _cells("invalid", int(9 * s) + 1)
+        ),
+        "stub_violation_upper": _table(
+            SHADOW + "stub.parquet", lambda s: _cells("stale", int(100 * s))
+        ),
+        "conservation_error": _table(
+            SHADOW + "counts.parquet", lambda s: _cells("executed", 81 + int(9 * s))
+        ),
+        "checker_violations": _document(
+            SHADOW + "checker.json", lambda s: _set("violations", ["v"] * (1 + int(3 * s)))
+        ),
+        "mutants_undetected": _document(
+            SHADOW + "mutants.json",
+            lambda s: (
+                lambda d: [e.__setitem__("detected", False) for e in d[: 1 + int(4 * s)]] and None
+            ),
+        ),
+    },
+    "D": {
+        "unmatched_starts": _table(
+            ROLL, lambda s: _cells("start_sha256", "x", where=_of("act"), share=max(s, 0.02))
+        ),
+        "verdict_reachable": _document(
+            STRESS + "power.json",
+            lambda s: lambda d: d["rows"][0].__setitem__("promote_share", 0.97 - 0.9 * s),
+        ),
+        "nominal_success_lower": _table(
+            ROLL,
+            lambda s: _cells(
+                "success", False, where=lambda f: f["perturbation"] == "nominal", share=s
+            ),
+        ),
+        "deadline_miss_upper": _table(ROLL, lambda s: _cells("deadline_misses", int(20 * s))),
+        "action_age_p95_s": _table(ROLL, lambda s: _cells("action_age_p95_s", 0.3 + s)),
+        "fallback_share_upper": _table(ROLL, lambda s: _cells("fallback_ticks", int(160 * s))),
+        "intervention_upper": _table(ROLL, lambda s: _cells("interventions", 1, share=s)),
+        "stub_violations": _table(
+            STRESS + "stub.parquet", lambda s: _cells("stale", 1 + int(9 * s))
+        ),
+        "force_peak_p95_n": _table(ROLL, lambda s: _cells("force_peak_n", 10 + 40 * s)),
+        "stress_success_lower": _table(
+            ROLL,
+            lambda s: _cells(
+                "success", False, where=lambda f: f["perturbation"] != "nominal", share=s
+            ),
+        ),
+        "conservation_error": _table(
+            STRESS + "conservation.parquet", lambda s: _cells("executed", 89 + int(9 * s))
+        ),
+        "checker_violations": _document(
+            STRESS + "checker.json", lambda s: _set("violations", ["v"] * (1 + int(3 * s)))
+        ),
+        "promotion_e_value": _table(
+            ROLL,
+            lambda s: _cells(
+                "success", False, share=s, where=lambda f: f["method"].isin(evidence.CANDIDATES)
+            ),
+        ),
+    },
+}
+CASES = [(gate, name) for gate, cases in WORSE.items() for name in cases]
+TABLES = {
+    "A": [
+        "audit/clocks",
+        "audit/neighbourhoods",
+        "audit/modes",
+        "audit/strata",
+        "audit/replay",
+        "audit/calibration",
+        "baselines/modes",
+    ],
+    "B": ["reload/samples", "reload/nfe", "reload/coverage", "latency/latency"],
+    "C": ["shadow/candidates", "shadow/stub", "shadow/counts"],
+    "D": ["stress/rollouts", "stress/stub", "stress/conservation", "stress/counts"],
+}
+
+
+def _found(report, name):
+    return [c for c in report.criteria if c.id == name]
+
+
+@pytest.mark.parametrize("gate", "ABCD")
+def test_good_evidence_passes_and_names_every_threshold(gate, ladder):
+    report = judge(ladder, gate)
+    assert report.verdict == "PASS", report.diagnosis
+    assert {c.id for c in report.criteria} == set(
+        evidence.PARAMS[f"gate_{gate.lower()}"]["thresholds"]
+    )
+    assert all(c.verdict == "PASS" for c in report.criteria)
+
+
+def test_every_criterion_has_a_mutation():
+    for gate, cases in WORSE.items():
+        known = set(evidence.PARAMS[f"gate_{gate.lower()}"]["thresholds"])
+        assert known - set(cases) <= {"recovery_benefit"}
+
+
+@pytest.mark.parametrize(("gate", "name"), CASES)
+def test_worse_evidence_is_red_and_stays_red(gate, name, ladder):
+    """P19: as the metric gets worse, the verdict never returns from red to PASS."""
+    WORSE[gate][name](ladder, 1.0)
+    # Gate A may still pass by its second route: take that away.
+    if gate == "A":
+        evidence.edit_table(ladder, "audit/recovery.parquet", _cells("successes", 20))
+    report = judge(ladder, gate)
+    assert all(c.verdict != "PASS" for c in _found(report, name)), name
+    assert report.verdict != "PASS"
+    assert report.diagnosis
+
+
+@pytest.mark.parametrize(
+    ("gate", "name"),
+    [c for c in CASES if c[1] not in {"unpinned_items", "cause_accepted"}],
+)
+def test_measured_moves_one_way_as_evidence_worsens(gate, name, _ladder, tmp_path):
+    """P19 again, on the number: growing severity never improves it."""
+    values, comparison = [], ""
+    for severity in (0.2, 1.0):
+        copy = tmp_path / f"s{severity}"
+        shutil.copytree(_ladder, copy)
+        WORSE[gate][name](copy, severity)
+        found = _found(judge(copy, gate), name)
+        values.append([c.measured for c in found])
+        comparison = found[0].comparison
+    sign = 1 if comparison == "<=" else -1
+    for mild, hard in zip(*values, strict=True):
+        assert hard is None or (mild is not None and sign * (hard - mild) >= 0), values
+
+
+@pytest.mark.parametrize(("gate", "path"), [(g, p) for g, paths in TABLES.items() for p in paths])
+def test_missing_table_is_inconclusive_never_pass(gate, path, ladder):
+    (ladder / "artifacts" / f"{path}.parquet").unlink()
+    report = judge(ladder, gate)
+    assert report.verdict == "INCONCLUSIVE"
+    assert any("missing" in c.caveat for c in report.criteria)
+
+
+@pytest.mark.parametrize(("gate", "path"), [(g, p) for g, paths in TABLES.items() for p in paths])
+def test_empty_table_is_inconclusive_never_pass(gate, path, ladder):
+    evidence.edit_table(ladder, f"{path}.parquet", lambda frame: frame.head(0))
+    assert judge(ladder, gate).verdict == "INCONCLUSIVE"
+
+
+@pytest.mark.parametrize(
+    ("gate", "path", "column"),
+    [
+        ("A", "audit/clocks", "offset_after_s"),
+        ("A", "audit/strata", "p_adjusted"),
+        ("B", "reload/samples", "max_abs_difference"),
+        ("B", "reload/coverage", "modes_covered_share"),
+        ("C", "shadow/candidates", "position_change_m"),
+        ("D", "stress/rollouts", "action_age_p95_s"),
+        ("D", "stress/rollouts", "force_peak_n"),
+    ],
+)
+def test_nan_is_inconclusive_never_pass(gate, path, column, ladder):
+    evidence.edit_table(ladder, f"{path}.parquet", _cells(column, float("nan")))
+    assert judge(ladder, gate).verdict == "INCONCLUSIVE"
+
+
+@pytest.mark.parametrize("gate", "ABCD")
+def test_emptied_thresholds_are_inconclusive(gate, ladder):
+    section = {**evidence.PARAMS[f"gate_{gate.lower()}"], "thresholds": {}}
+    evidence.write_params(ladder, {f"gate_{gate.lower()}": section})
+    assert judge(ladder, gate).verdict == "INCONCLUSIVE"
+
+
+@pytest.mark.parametrize("gate", "ABCD")
+def test_each_removed_threshold_is_not_pass(gate, _ladder):
+    thresholds, params = read_section(_ladder, JUDGES[gate].spec, JUDGES[gate].params)
+    for name in thresholds:
+        left = {key: value for key, value in thresholds.items() if key != name}
+        report = JUDGES[gate].judge(_ladder, left, params)
+        assert report.verdict == "INCONCLUSIVE", name
+
+
+def test_unknown_threshold_is_a_configuration_error(repo):
+    section = evidence.PARAMS["gate_a"]
+    more = {**section["thresholds"], "clock_residul_s": section["thresholds"]["clock_residual_s"]}
+    evidence.write_params(repo, {"gate_a": {**section, "thresholds": more}})
+    with pytest.raises(ConfigError, match="clock_residul_s"):
+        judge(repo, "A")
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [{"limit": "0"}, {"limit": float("nan")}, {"owner": "nobody"}, {"reason": ""}, {"more": 1}],
+)
+def test_malformed_threshold_is_a_configuration_error(repo, wrong):
+    section = evidence.PARAMS["gate_a"]
+    one = {**section["thresholds"]["clock_residual_s"], **wrong}
+    thresholds = {**section["thresholds"], "clock_residual_s": one}
+    evidence.write_params(repo, {"gate_a": {**section, "thresholds": thresholds}})
+    with pytest.raises(ConfigError, match=r"clock_residual_s|gate_a"):
+        judge(repo, "A")
+
+
+def test_a_lax_promotion_limit_contradicts_alpha(ladder):
+    section = evidence.PARAMS["gate_d"]
+    lax = {**section["thresholds"]["promotion_e_value"], "limit": 5}
+    thresholds = {**section["thresholds"], "promotion_e_value": lax}
+    evidence.write_params(ladder, {"gate_d": {**section, "thresholds": thresholds}})
+    with pytest.raises(ConfigError, match="at least 1 / alpha"):
+        judge(ladder, "D")
+
+
+def test_recovery_benefit_is_a_second_route_but_waives_no_data_check(repo):
+    evidence.edit_document(repo, "audit/summary.json", _set("cause", "unimodal"))
+    assert judge(repo, "A").verdict == "PASS"
+    evidence.edit_table(repo, "audit/clocks.parquet", _cells("offset_after_s", 0.5))
+    report = judge(repo, "A")
+    assert report.verdict == "FAIL"
+    assert "clock_residual_s" in report.diagnosis
+
+
+def test_a_method_that_failed_below_does_not_stand(ladder):
+    evidence.edit_table(
+        ladder,
+        "reload/samples.parquet",
+        lambda f: _cells("sha256_reloaded", "x", where=_of("flow"))(
+            _cells("max_abs_difference", 0.1, where=_of("flow"))(f)
+        ),
+    )
+    for gate in "BC":
+        write_bytes(ladder / report_path(gate), report_bytes(judge(ladder, gate)))
+    report = judge(ladder, "C")
+    assert set(report.candidates) == {"diffusion"}
+    assert any("flow does not stand" in caveat for caveat in report.caveats)
+
+
+def test_no_gain_returns_to_the_best_baseline(ladder):
+    evidence.edit_table(
+        ladder, "stress/rollouts.parquet", _cells("success", True, where=_of("chunked_bc"))
+    )
+    report = judge(ladder, "D")
+    assert (report.verdict, report.decision) == ("FAIL", "return to chunked_bc")
+    assert "promotion_e_value" in report.diagnosis
+
+
+def test_fewer_starts_than_planned_gives_no_verdict(ladder):
+    evidence.edit_table(ladder, "stress/rollouts.parquet", lambda f: f[f["start"] < 30])
+    report = judge(ladder, "D")
+    assert report.verdict == "INCONCLUSIVE"
+    assert report.decision.startswith("No decision")
+
+
+def test_corrupt_table_is_an_integrity_error(repo):
+    file = repo / "artifacts/audit/clocks.parquet"
+    data = bytearray(file.read_bytes())
+    data[len(data) // 3] ^= 0x10
+    file.write_bytes(bytes(data[:-9]))
+    with pytest.raises(IntegrityError, match=r"clocks\.parquet"):
+        judge(repo, "A")
+
+
+def test_same_evidence_same_bytes(ladder):
+    for gate in "ABCD":
+        assert report_bytes(judge(ladder, gate)) == report_bytes(judge(ladder, gate))
+
+
+def test_golden_exact_bound_of_label_disagreement(repo):
+    """0 of 40: upper end 1 - 0.025^(1/40) = 0.0881, Clopper and Pearson 1934."""
+    found = _found(judge(repo, "A"), "label_disagreement")[0]
+    assert found.measured == pytest.approx(1 - 0.025 ** (1 / 40), abs=1e-12)

@@ -1,0 +1,96 @@
+"""Verdicts: monotone, total, and never PASS for what is missing."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gates.models import Criterion
+from gates.verdicts import SEVERITY, combine, first_unmet, judge_criterion, rounded
+
+NUMBERS = st.floats(allow_nan=False, allow_infinity=False, width=64)
+VERDICTS = st.sampled_from(sorted(SEVERITY))
+
+
+def criterion(verdict: str, candidate: str | None = None, route: str = "required", name: str = "x"):
+    return Criterion(
+        id=name,
+        question="?",
+        owner="model",
+        candidate=candidate,
+        route=route,
+        measured=1.0,
+        interval=None,
+        threshold=1.0,
+        comparison="<=",
+        reason="r",
+        verdict=verdict,
+        evidence=(),
+        caveat="",
+    )
+
+
+@given(NUMBERS, NUMBERS, NUMBERS)
+def test_worse_never_turns_fail_into_pass(measured, worse, limit):
+    low, high = sorted((measured, worse))
+    assert not (
+        judge_criterion(low, limit, "<=") == "FAIL" and judge_criterion(high, limit, "<=") == "PASS"
+    )
+    assert not (
+        judge_criterion(high, limit, ">=") == "FAIL" and judge_criterion(low, limit, ">=") == "PASS"
+    )
+
+
+@given(NUMBERS, NUMBERS)
+def test_rounding_is_monotone(a, b):
+    low, high = sorted((a, b))
+    assert rounded(low) <= rounded(high)
+
+
+@pytest.mark.parametrize("comparison", ["<=", ">="])
+@pytest.mark.parametrize(
+    ("measured", "limit"),
+    [(None, 1.0), (1.0, None), (math.nan, 1.0), (1.0, math.nan), (math.inf, 1.0), (-math.inf, 1.0)],
+)
+def test_missing_or_not_finite_is_inconclusive(measured, limit, comparison):
+    assert judge_criterion(measured, limit, comparison) == "INCONCLUSIVE"
+
+
+def test_the_limit_itself_is_accepted():
+    assert judge_criterion(1.0, 1.0, "<=") == judge_criterion(1.0, 1.0, ">=") == "PASS"
+
+
+def test_nothing_judged_is_inconclusive():
+    assert combine([], expects_candidates=False)[0] == "INCONCLUSIVE"
+    assert combine([criterion("PASS")], expects_candidates=True)[0] == "INCONCLUSIVE"
+
+
+@given(st.lists(VERDICTS, min_size=1, max_size=5))
+def test_gate_wide_criteria_are_an_intersection(verdicts):
+    verdict, _ = combine([criterion(v) for v in verdicts], expects_candidates=False)
+    assert (verdict == "PASS") == all(v == "PASS" for v in verdicts)
+
+
+@given(st.dictionaries(st.sampled_from("abc"), st.lists(VERDICTS, min_size=1), min_size=1))
+def test_candidates_are_a_union_of_intersections(cases):
+    criteria = [criterion(v, name) for name, found in cases.items() for v in found]
+    verdict, candidates = combine(criteria, expects_candidates=True)
+    assert (verdict == "PASS") == any(all(v == "PASS" for v in f) for f in cases.values())
+    assert {n for n, v in candidates.items() if v == "PASS"} == {
+        n for n, found in cases.items() if all(v == "PASS" for v in found)
+    }
+
+
+def test_one_whole_route_is_enough_but_required_ones_stay():
+    bad, good = criterion("FAIL", route="one"), criterion("PASS", route="two")
+    assert combine([criterion("PASS"), bad, good], expects_candidates=False)[0] == "PASS"
+    assert combine([criterion("FAIL"), bad, good], expects_candidates=False)[0] == "FAIL"
+    half = [criterion("PASS", route="one"), bad, criterion("FAIL", route="two")]
+    assert combine(half, expects_candidates=False)[0] == "FAIL"
+
+
+def test_the_first_unmet_criterion_is_named_required_before_candidates():
+    rows = [criterion("FAIL", "m", name="own"), criterion("FAIL", name="common")]
+    assert first_unmet(rows, "FAIL").id == "common"
+    assert first_unmet(rows, "PASS") is None
