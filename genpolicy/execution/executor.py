@@ -65,7 +65,6 @@ class Executor:
         self._situation = Situation()
         self._queue = ChunkQueue(settings, journal, self._disabled)
         self._seen_ids: set[str] = set()
-        self._last_now_ns: int | None = None
         self._in_flight: set[str] = set()
         self._sequence = 0
         self._stops_seen = 0
@@ -231,7 +230,7 @@ class Executor:
             return False
         if self.mode not in (Mode.RUN, Mode.FALLBACK):
             return False
-        now_ns = to_ns(now_s)
+        now_ns = self._journal.clock(now_s)
         return self._queue.remaining(now_ns) <= self.settings.replan_lead_steps
 
     def begin_invocation(self, now_s: float, invocation_id: str) -> None:
@@ -321,11 +320,9 @@ class Executor:
 
     def _begin(self, now_s: float) -> int:
         """Now in ns, never before an earlier now; the first call opens the journal."""
-        now_ns = to_ns(now_s)
-        if self._last_now_ns is not None and now_ns < self._last_now_ns:
+        if to_ns(now_s) < self._journal.latest_ns:
             self.clock_faults += 1
-            now_ns = self._last_now_ns
-        self._last_now_ns = now_ns
+        now_ns = self._journal.clock(now_s)
         if not self._begun:
             self._begun = True
             payload = session_payload(

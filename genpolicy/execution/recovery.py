@@ -120,7 +120,7 @@ class Recovery:
 
     def advance(self, now_s: float) -> RecoveryState:
         """Let time act: the hold ends, a primitive or a person takes too long."""
-        waited_ns = to_ns(now_s) - self._since_ns
+        waited_ns = self._journal.clock(now_s) - self._since_ns
         if self.state is RecoveryState.HOLD and waited_ns >= self._hold_ns:
             plan = self._plan()
             exhausted = self.attempts > self.settings.maximum_attempts
@@ -186,7 +186,7 @@ class Recovery:
             "old": str(self.state), "new": str(state), "cause": cause, "phase": self._phase,
             "failures": self.failures,
         }  # fmt: skip
-        self._since_ns = to_ns(now_s)
+        self._since_ns = self._journal.clock(now_s)
         self._journal.add("recovery", self._since_ns, payload)
         self.state = state
 

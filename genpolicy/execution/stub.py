@@ -93,7 +93,7 @@ class ControllerStub:
 
     def poll(self, now_s: float) -> None:
         """The consumer's own clock: runs the watchdog also while the executor is paused."""
-        now_ns = to_ns(now_s)
+        now_ns = self._journal.clock(now_s)
         if self.supervisor.poll(now_ns):
             self.hold(now_ns, "watchdog")
 

@@ -100,22 +100,31 @@ class Supervisor:
         margin_n = self.settings.force_limit_n.get(phase, 0.0) - force_n
         if margin_n >= 0:
             return False
-        self._stop(to_ns(now_s), SupervisorState.PROTECTIVE_STOP, "force", f"{force_n!r} N {phase}")
+        self._stop(
+            self._journal.clock(now_s),
+            SupervisorState.PROTECTIVE_STOP,
+            "force",
+            f"{force_n!r} N {phase}",
+        )
         return True
 
     def observe_collision(self, now_s: float, collision: bool) -> bool:
         """Collision gate; trips a protective stop. Returns whether it tripped."""
         if collision:
-            self._stop(to_ns(now_s), SupervisorState.PROTECTIVE_STOP, "collision", "")
+            self._stop(self._journal.clock(now_s), SupervisorState.PROTECTIVE_STOP, "collision", "")
         return collision
 
     def protective_stop(self, now_s: float, detail: str) -> None:
         """Stop on any other cause named in `detail`."""
-        self._stop(to_ns(now_s), SupervisorState.PROTECTIVE_STOP, "protective_stop", detail)
+        self._stop(
+            self._journal.clock(now_s), SupervisorState.PROTECTIVE_STOP, "protective_stop", detail
+        )
 
     def emergency_stop(self, now_s: float, detail: str = "") -> None:
         """E-stop; from every state."""
-        self._stop(to_ns(now_s), SupervisorState.EMERGENCY_STOP, "emergency_stop", detail)
+        self._stop(
+            self._journal.clock(now_s), SupervisorState.EMERGENCY_STOP, "emergency_stop", detail
+        )
 
     def human_reset(self, now_s: float, person: str) -> None:
         """Clear a stop; the only way back to RUN, and it needs a name.
@@ -130,7 +139,7 @@ class Supervisor:
                 expected="the name of the person who looked",
                 action="Nothing but a person may clear a stop.",
             )
-        now_ns = to_ns(now_s)
+        now_ns = self._journal.clock(now_s)
         self.state = SupervisorState.RUN
         self.resumed_ns = now_ns
         self._last_accept_ns = None

@@ -1,0 +1,171 @@
+"""The checker against journals that were tampered with after an honest run."""
+
+import copy
+
+import pytest
+
+from genpolicy.errors import BadInputError
+from genpolicy.execution.journal import Journal, write_journal
+from genpolicy.verification.checker import ExpectedSettings, check_journal, check_messages
+from genpolicy.verification.rig import SETTINGS, Rig
+
+EXPECTED = ExpectedSettings(
+    execution_horizon=SETTINGS.execution_horizon,
+    action_period_s=SETTINGS.action_period_s,
+    maximum_age_s=dict(SETTINGS.maximum_age_s),
+    watchdog_s=SETTINGS.watchdog_s,
+    queue_capacity=SETTINGS.queue_capacity,
+)
+
+
+def messages(events):
+    return [(e.kind, {"session": e.session, "n": e.n, "t": e.t, **e.payload}) for e in events]
+
+
+@pytest.fixture
+def honest():
+    rig = Rig()
+    rig.run()
+    rig.tick(1)
+    rig.run()
+    return messages(rig.end())
+
+
+def rules(report):
+    return {violation.rule for violation in report.violations}
+
+
+def find(journal, kind):
+    return next(m for k, m in journal if k == kind)
+
+
+def test_an_honest_run_has_no_violation_and_every_action_is_counted(honest):
+    report = check_messages(honest)
+    assert report.violations == []
+    assert (report.checked_actions, report.chunks, report.sessions) == (16, 2, 1)
+    assert report.oldest_action_ns == 7 * 50_000_000  # row 7 of a chunk from an observation at 0 s
+    assert report.longest_silence_ns == 50_000_000
+
+
+TAMPERING = {
+    "one bit of an action": ("accept", "action", lambda v: "1" + v[1:], "P1.bits"),
+    "one bit of the chunk": ("enqueue", "actions", lambda v: "1" + v[1:], "P1.hash"),
+    "a layer": ("enqueue", "layers", lambda v: {**v, "layer_3": False}, "P1.admitted"),
+    "a missing layer": ("enqueue", "layers", lambda v: {"layer_0": True}, "P1.admitted"),
+    "validity": ("enqueue", "valid_until_ns", lambda v: 10, "P1.valid_until"),
+    "condition": ("enqueue", "condition_ns", lambda v: v - 10**9, "P1.age"),
+    "condition ahead": ("enqueue", "condition_ns", lambda v: v + 10**10, "P1.future"),
+    "start": ("enqueue", "start_ns", lambda v: v + 50_000_000, "P1.window"),
+    "phase": ("enqueue", "phase", lambda v: "insert", "P1.phase"),
+    "epoch": ("enqueue", "calibration_epoch", lambda v: "epoch-9", "P1.calibration"),
+    "weights": ("enqueue", "checkpoint", lambda v: "0", "P1.checkpoint"),
+    "sampler": ("enqueue", "sampler", lambda v: "0", "P1.sampler"),
+    "session epoch": ("enqueue", "session_epoch", lambda v: 1, "P1.session"),
+    "source": ("enqueue", "source", lambda v: "fallback", "P1.state"),
+    "predecessor": ("enqueue", "predecessor", lambda v: "ghost", "P4.chain"),
+    "row": ("accept", "row", lambda v: v + 1, "P1.bits"),
+    "age": ("accept", "age_ns", lambda v: v + 1, "P1.age"),
+    "unknown chunk": ("accept", "chunk_id", lambda v: "ghost", "P1.admitted"),
+    "observed phase": ("observation", "phase", lambda v: "insert", "P1.phase"),
+    "balance": ("end", "chunks", lambda v: {**v, "executed": 1}, "conservation"),
+    "rows": ("finish", "rows", lambda v: {**v, "executed": 7}, "conservation"),
+    "reason": ("finish", "rows", lambda v: {"executed": 8, "mislaid": 8}, "conservation"),
+    "event count": ("end", "events", lambda v: v - 1, "conservation"),
+    "number": ("accept", "n", lambda v: v + 5, "journal.gap"),
+    "time": ("accept", "t", lambda v: v + 10**9, "journal.time"),
+    "missing field": ("accept", "row", lambda v: None, "journal.malformed"),
+}
+
+
+@pytest.mark.parametrize("name", TAMPERING)
+def test_tampering_is_found(honest, name):
+    kind, key, change, rule = TAMPERING[name]
+    journal = copy.deepcopy(honest)
+    message = find(journal, kind)
+    message[key] = change(message[key])
+    assert rule in rules(check_messages(journal))
+
+
+@pytest.mark.parametrize("kind", ["session", "enqueue", "accept", "finish", "end", "active"])
+def test_a_removed_event_is_found_even_when_the_rest_is_renumbered(honest, kind):
+    journal = copy.deepcopy(honest)
+    journal.remove(next(item for item in journal if item[0] == kind))
+    for n, (_, message) in enumerate(journal):
+        message["n"] = n
+    assert check_messages(journal).violations
+
+
+def test_a_repeated_accept_is_found(honest):
+    journal = copy.deepcopy(honest)
+    at = next(i for i, (kind, _) in enumerate(journal) if kind == "accept")
+    journal.insert(at, copy.deepcopy(journal[at]))
+    for n, (_, message) in enumerate(journal):
+        message["n"] = n
+    assert {"P3.row", "P3.sequence", "P3.due"} <= rules(check_messages(journal))
+
+
+def test_a_stop_that_clears_itself_is_found():
+    rig = Rig()
+    rig.run()
+    rig.supervisor.emergency_stop(rig.now_s)
+    rig.journal.add(
+        "supervisor", rig.now_ns, {"event": "ood_score", "state": "run", "detail": "0.01"}
+    )
+    assert "P7.sticky" in rules(check_messages(messages(rig.end())))
+
+
+def test_declared_limits_are_compared_with_the_expected_ones(honest):
+    report = check_messages(honest, EXPECTED)
+    assert rules(report) == {
+        "settings.admission"
+    }  # the rig's chunks are imitations, and it says so
+    looser = ExpectedSettings(8, 0.05, {"approach": 0.3}, 0.1, 2)
+    assert "settings.limits" in rules(check_messages(honest, looser))
+
+
+def test_sessions_of_one_file_are_checked_apart(tmp_path):
+    rigs = [Rig(session=f"rollout-{n}") for n in range(3)]
+    for rig in rigs:
+        rig.run()
+        rig.end()
+    path = tmp_path / "journal.mcap"
+    write_journal(path, [rig.journal for rig in rigs])
+    report = check_journal(path)
+    assert (report.sessions, report.checked_actions, report.violations) == (3, 24, [])
+
+
+def test_a_session_without_end_is_no_proof():
+    rig = Rig()
+    rig.run()
+    assert "journal.no_end" in rules(check_messages(messages(rig.journal.events())))
+
+
+def test_a_damaged_file_is_refused_not_believed(tmp_path):
+    path = tmp_path / "journal.mcap"
+    rig = Rig()
+    for _ in range(20):
+        rig.run()
+    rig.end()
+    write_journal(path, [rig.journal])
+    whole = path.read_bytes()
+    for cut in range(0, len(whole), len(whole) // 20):
+        path.write_bytes(whole[:cut])
+        with pytest.raises(BadInputError, match="whole MCAP journal"):
+            check_journal(path)
+    silent = 0
+    for at in range(8, len(whole), len(whole) // 150):
+        path.write_bytes(whole[:at] + bytes([whole[at] ^ 4]) + whole[at + 1 :])
+        try:
+            report = check_journal(path)
+        except BadInputError:
+            continue
+        # A flip may hit bytes that carry no event; then exactly the same events were read.
+        silent += report.violations != [] or report.checked_actions != 160
+    assert silent == 0
+
+
+def test_an_empty_journal_proves_nothing(tmp_path):
+    path = tmp_path / "journal.mcap"
+    write_journal(path, [Journal("empty")])
+    report = check_journal(path)
+    assert report.sessions == 0 and report.checked_actions == 0
