@@ -197,14 +197,15 @@ def recorded(values: Text) -> bool:
 
 
 def from_dataset(
-    dataset: Dataset, *, contract: ObservationContract, settings: AuditSettings
+    dataset: Dataset, *, contract: ObservationContract, settings: AuditSettings, period_s: float
 ) -> AuditInput:
     """The audit's view of an ingested dataset.
 
     Args:
-        dataset: A verified dataset; its manifest names the action period.
+        dataset: A verified dataset.
         contract: The observation contract of the task.
         settings: Names of channels and scales.
+        period_s: Action period, s.
 
     Raises:
         ContractError: A channel that the settings name does not exist, or rows do not fit.
@@ -235,7 +236,7 @@ def from_dataset(
             observation_position=position,
             action_position=slice(0, position.stop - position.start),
             action_rotation=ROTATION if position.stop - position.start == POSITION.stop else None,
-            period_s=float(dataset.manifest["action_period_s"]),
+            period_s=period_s,
             delay_s={
                 name: received - frames.stream_event_time_s[name]
                 for name, received in frames.stream_receive_time_s.items()

@@ -9,6 +9,7 @@ have enough members.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from scipy.cluster.hierarchy import fcluster, linkage
@@ -119,6 +120,7 @@ def split_gain(values: Array, least: int, groups: int = 2) -> tuple[float, Integ
     return float(gain), sides
 
 
+@lru_cache(maxsize=256)
 def _cuts(n: int, least: int, groups: int) -> Integers:
     """All places to cut n sorted values into groups of at least `least`. Shape (c, groups - 1)."""
     first = np.arange(least, n - (groups - 1) * least + 1, dtype=np.int64)
@@ -137,6 +139,10 @@ def _bisect(
     if depth == MAXIMUM_DEPTH or len(rows) < 2 * least:
         return
     part = vectors[rows]
+    share = least / len(rows)
+    reach = np.sqrt(part.var(axis=0).sum() / (share * (1.0 - share)))
+    if reach < settings.minimum_separation_m:  # no split of this spread can be that far apart
+        return
     sides = next(
         (
             split
@@ -227,17 +233,17 @@ def link(memberships: list[tuple[Integers, Integers]], episodes: int, minimum: i
 
 def _by_arc_length(paths: Array) -> Array:
     """Paths resampled at equal arc lengths up to one that most of them reach."""
-    n, steps, width = paths.shape
+    n, steps, _ = paths.shape
     along = np.zeros((n, steps))
     along[:, 1:] = np.cumsum(np.linalg.norm(np.diff(paths, axis=1), axis=2), axis=1)
     lengths = along[:, -1]
     common = max(float(np.quantile(lengths, 0.25)), 0.5 * float(np.median(lengths)))
-    at = np.linspace(0.0, common, steps)
-    result = np.empty_like(paths)
-    for row in range(n):
-        for axis in range(width):
-            result[row, :, axis] = np.interp(at, along[row], paths[row, :, axis])
-    return result
+    at = np.broadcast_to(np.linspace(0.0, common, steps), (n, steps))
+    left = np.sum(along[:, None, 1:-1] <= at[:, :, None], axis=2)
+    rows = np.arange(n)[:, None]
+    gap = along[rows, left + 1] - along[rows, left]
+    share = np.clip((at - along[rows, left]) / np.where(gap > 0.0, gap, 1.0), 0.0, 1.0)[..., None]
+    return np.asarray((1.0 - share) * paths[rows, left] + share * paths[rows, left + 1])
 
 
 def _separation(vectors: Array, labels: Integers) -> float:

@@ -42,6 +42,7 @@ class AuditSettings(BaseModel):
         label_disagreement_limit: Red above: exact upper bound of label against replay.
         replay_episodes: Episodes to replay, drawn at random, at most.
         minimum_situations: Fewer analysed held-out episodes: insufficient support.
+        minimum_support_share: Share of held-out situations with enough neighbours, at least.
         minimum_two_mode_situations: Held-out episodes of a phase with several modes, below which
             the phase is said to have one.
         strata_alpha: Family-wise error of the strata tests.
@@ -84,6 +85,7 @@ class AuditSettings(BaseModel):
     label_disagreement_limit: float = Field(default=0.08, gt=0, lt=1)
     replay_episodes: int = Field(default=60, ge=0)
     minimum_situations: int = Field(default=20, ge=1)
+    minimum_support_share: float = Field(default=0.2, gt=0, lt=1)
     minimum_two_mode_situations: int = Field(default=5, ge=1)
     strata_alpha: float = Field(default=0.05, gt=0, lt=1)
     strata_effect_limit: float = Field(default=0.3, gt=0, lt=1)

@@ -158,8 +158,18 @@ def _labels(settings: AuditSettings, replayed: tuple[Replayed, ...]) -> AuditVer
 
 
 def _support(settings: AuditSettings, counts: Counts) -> AuditVerdict | None:
+    share = counts.analysed / counts.queries if counts.queries else 0.0
     if counts.analysed_episodes >= settings.minimum_situations:
-        return None
+        if share - settings.minimum_support_share >= 0:
+            return None
+        return AuditVerdict(
+            Cause.INSUFFICIENT_SUPPORT,
+            "",
+            "neighbourhoods",
+            f"Only {share:.0%} of the held-out situations have enough comparable training "
+            f"episodes ({settings.minimum_support_share:.0%} needed): record more, from fewer "
+            "starts.",
+        )
     return AuditVerdict(
         Cause.INSUFFICIENT_SUPPORT,
         "",
@@ -183,8 +193,15 @@ def _structure(
             "observation_decides" if decided else "",
             "Use the simple baselines: one observation has one action here.",
         )
-    margin = persistence.observed - persistence.null_q95
-    if persistence.n == 0 or not margin >= 0:
+    if persistence.n < settings.minimum_two_mode_situations:
+        return AuditVerdict(
+            Cause.INSUFFICIENT_SUPPORT,
+            "",
+            "persistence",
+            f"Only {persistence.n} situations with several modes go on long enough to see whether "
+            "the modes persist: record more, from fewer starts.",
+        )
+    if not persistence.observed - persistence.null_q95 >= 0:
         return _noise("Clusters do not persist over a chunk")
     return None
 

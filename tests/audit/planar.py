@@ -12,13 +12,13 @@ from genpolicy.seeds import stream
 
 SETTINGS = AuditSettings(
     position_channel="tcp", reference_channel=None, minimum_situations=15,
-    replay_episodes=80, permutations=199,
+    replay_episodes=80, permutations=199, query_stride=4,
 )  # fmt: skip
 POST = np.array([0.15, 0.0])
 
 
 def planar(
-    *, episodes=160, modes="free", seed=1, tremor_m=0.001, wrong_labels=0.0, clock_steps=0,
+    *, episodes=100, modes="free", seed=1, tremor_m=0.001, wrong_labels=0.0, clock_steps=0,
     side_fails=False, epoch_shift_m=0.0, order=None, recoveries=0,
 ):  # fmt: skip
     rng = stream(seed, "planar")

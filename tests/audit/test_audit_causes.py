@@ -20,7 +20,7 @@ def valid():
 
 def test_valid_modes_are_found(valid):
     assert valid.verdict.cause is Cause.VALID_MODES
-    assert valid.counts.two_mode_episodes >= 40
+    assert valid.counts.two_mode_episodes >= 30
     assert valid.counts.persistent >= 0.95 * valid.counts.two_mode
     assert valid.persistence.observed - valid.persistence.null_q95 > 0.3
     assert len(valid.modes) == 2

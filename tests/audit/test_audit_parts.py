@@ -5,7 +5,7 @@ import pytest
 from planar import SETTINGS, planar
 
 from genpolicy.audit.data import canonical
-from genpolicy.audit.modes import cluster_chunks, link, split_gain
+from genpolicy.audit.modes import cluster_chunks, features, link, split_gain
 from genpolicy.audit.run import _situations
 from genpolicy.audit.semantics import episode_lags
 from genpolicy.audit.strata import examine_strata
@@ -117,3 +117,16 @@ def test_family_wise_error_of_the_strata_test():
         rows = examine_strata(data, settings, {"approach": several}, root_seed=seed)
         wrong += any(r.p_adjusted is not None and r.p_adjusted <= 0.05 for r in rows)
     assert wrong / 40 <= 0.05 + 3 * np.sqrt(0.05 * 0.95 / 40)
+
+
+def test_resampling_by_arc_length_agrees_with_interpolation():
+    rng = stream(25, "arc")
+    paths = np.cumsum(rng.normal(size=(7, 16, 3)), axis=1)
+    paths[2] = paths[2, 0]  # one that stands still
+    length = np.linalg.norm(np.diff(paths, axis=1), axis=2)
+    along = np.concatenate([np.zeros((7, 1)), np.cumsum(length, axis=1)], axis=1)
+    common = max(np.quantile(along[:, -1], 0.25), 0.5 * np.median(along[:, -1]))
+    at = np.linspace(0, common, 16)
+    expected = [[np.interp(at, along[i], paths[i, :, j]) for j in range(3)] for i in range(7)]
+    got = features(paths, SETTINGS).reshape(7, 16, 3) * 4.0
+    assert got == pytest.approx(np.swapaxes(np.array(expected), 1, 2), abs=1e-12)

@@ -1,0 +1,51 @@
+"""PushT: real demonstrations without clock, operator, epoch or outcome.
+
+No start is repeated, so there is little to compare; the audit must say so and claim nothing.
+"""
+
+from pathlib import Path
+
+import pytest
+
+from genpolicy.audit.data import from_dataset
+from genpolicy.audit.evidence import write_evidence
+from genpolicy.audit.run import audit
+from genpolicy.audit.settings import AuditSettings
+from genpolicy.audit.verdict import Cause
+from genpolicy.dataset.dataset import load_dataset
+from genpolicy.dataset.replay_buffer import PUSHT, ingest_zarr_replay_buffer
+from genpolicy.integrity.tables import read_table
+
+BUFFER = Path(__file__).parents[3] / "shared/data/pusht_v7/pusht_cchi_v7_replay.zarr"
+SETTINGS = AuditSettings(
+    position_channel="agent_position_px", reference_channel=None,
+    context_channels=["block_position_px", "block_angle"], ignored_channels=[],
+    minimum_separation_m=30.0, noise_floor_m=5.0, radius=3.0, permutations=199, query_stride=4,
+)  # fmt: skip
+
+pytestmark = pytest.mark.skipif(not BUFFER.exists(), reason="the PushT replay buffer is not here")
+
+
+def test_pusht_has_too_little_support_to_claim_modes(tmp_path):
+    ingest_zarr_replay_buffer(BUFFER, out=tmp_path / "dataset")
+    data = from_dataset(
+        load_dataset(tmp_path / "dataset"), contract=PUSHT.observation, settings=SETTINGS,
+        period_s=0.1,
+    )  # fmt: skip
+    result = audit(data, SETTINGS, admissible=None, replay=None, root_seed=1)
+    assert result.verdict.cause is Cause.INSUFFICIENT_SUPPORT
+    assert result.verdict.kind == "neighbourhoods"
+    assert result.counts.analysed < 0.2 * result.counts.queries
+    (clock,) = result.semantics.clocks
+    assert 1.0 < clock.lag_steps < 4.0  # the agent trails its target by some tenths of a second
+    assert abs(clock.offset_after_s) < 0.02
+    folder = tmp_path / "evidence"
+    folder.mkdir()
+    write_evidence(result, folder)
+    recorded = {
+        row["variable"]: row["recorded"]
+        for row in read_table(folder / "strata.parquet").to_pylist()
+    }
+    for name in ("operator", "object", "calibration_epoch"):
+        assert recorded.get(name) in (False, None)
+    assert read_table(folder / "replay.parquet").num_rows == 0
