@@ -216,6 +216,11 @@ class watch_server:  # noqa: N801  (used like a function, as a context)
                 return
 
 
+def server_url() -> str | None:
+    """Address of the Prefect server that the settings name; None for a temporary one."""
+    return PREFECT_API_URL.value()
+
+
 def server_answers(url: str, *, timeout_s: float = FIRST_ANSWER_S) -> bool:
     """Whether a Prefect server answers at `url` within the time given."""
     try:
@@ -234,7 +239,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("--workspace", type=Path, default=Path(), help="folder with dvc.yaml")
     options = parser.parse_args(arguments)
-    url = PREFECT_API_URL.value()
+    url = server_url()
     if url and not server_answers(url):
         print(
             f"PREFECT_API_URL is {url}, where no server answers within {FIRST_ANSWER_S:.0f} s, "

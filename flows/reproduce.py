@@ -30,7 +30,11 @@ INFRASTRUCTURE = re.compile(
     r"Unable to acquire lock|is busy, it is being blocked|No space left on device|Disk quota"
     r"|Cannot allocate memory|Resource temporarily unavailable"
 )
-DVC_REJECTS = re.compile(r"is invalid|does not exist|missing data|not found|Cyclic|overlaps with")
+BROKEN_PIPELINE = re.compile(r"^'.*dvc\.(yaml|lock)' (is invalid|is corrupted|validation failed)")
+DVC_REJECTS = re.compile(
+    r"is (invalid|corrupted)|validation failed|does not exist|missing data|not found"
+    r"|Cyclic|overlaps with"
+)
 
 _running: set["subprocess.Popen[str]"] = set()
 
@@ -184,6 +188,7 @@ def _outcome(dvc_code: int, lines: list[str], duration_s: float) -> Outcome:
     text = "\n".join(lines)
     match = next(reversed(list(FAILED_STAGE.finditer(text))), None)
     errors = [line.removeprefix("ERROR: ") for line in lines if line.startswith("ERROR: ")]
+    errors += [line for line in lines if BROKEN_PIPELINE.search(line)]
     killed = dvc_code < 0
     if match is None:
         transient = killed or INFRASTRUCTURE.search(text) is not None

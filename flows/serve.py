@@ -5,7 +5,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from flows.ladder import FIRST_ANSWER_S, PREFECT_API_URL, ladder, server_answers
+from flows.ladder import FIRST_ANSWER_S, ladder, server_answers, server_url
 from flows.reproduce import EXIT_FAULT
 
 
@@ -21,7 +21,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--workspace", type=Path, default=Path(), help="folder with dvc.yaml")
     parser.add_argument("--cron", default=None, help="schedule; default: started by hand")
     options = parser.parse_args(arguments)
-    url = PREFECT_API_URL.value()
+    url = server_url()
     if not url or not server_answers(url):
         print(
             f"PREFECT_API_URL is {url or 'not set'}, where no server answers within "

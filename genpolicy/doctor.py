@@ -198,7 +198,7 @@ def check_git(root: Path) -> Finding:
     if shutil.which("git") is None:
         return Finding("git", WRONG, "not on PATH", "Install git.")
     command = ["git", "-C", str(root), "rev-parse", "--short", "HEAD"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode == 0:
         return Finding("git", OK, f"commit {done.stdout.strip()}")
     return Finding("git", WARNING, "no commit here", "Work in a clone: git versions the reports.")

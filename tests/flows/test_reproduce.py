@@ -44,6 +44,23 @@ def test_the_command_ends_with_the_code_of_the_stage(
     assert "The ladder stopped: record: " in capfd.readouterr().err
 
 
+@pytest.mark.parametrize(
+    "broken",
+    [
+        "stages: [",
+        "stages:\n  x:\n    comand: y\n",
+        "stages:\n  x: {cmd: 'true', deps: [absent]}\n",
+    ],
+)
+def test_a_broken_pipeline_is_bad_input(
+    checkout: Path, tmp_path: Path, broken: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    target = make_workspace(checkout, tmp_path / "run", {})
+    (target / "dvc.yaml").write_text(broken)
+    assert main(["--workspace", str(target)]) == 2
+    assert "The ladder stopped: " in capfd.readouterr().err
+
+
 def test_a_folder_without_a_pipeline_is_bad_input(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
