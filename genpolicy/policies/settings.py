@@ -41,14 +41,16 @@ class HeadConfig(Settings):
         diffusion_levels: Noise levels T of DDPM training.
         conditional_std: Assumed spread of normalised actions at one observation; sets the fixed
             gains around the networks of diffusion and flow (`schedules.Gains`).
-        latent_dim: Length of ACT's latent z.
+        latent_dim: Length of ACT's latent z. Small, because z = 0 is one of the two conventions:
+            training draws z near a sphere of radius sqrt(latent_dim), and the more dimensions,
+            the further from anything seen is its centre.
         posterior_width: Hidden width of ACT's training-only posterior encoder.
         kl_weight: Weight of ACT's KL term against the L1 error per action number.
     """
 
     diffusion_levels: int = Field(default=100, ge=1, le=10_000)
     conditional_std: float = Field(default=0.2, gt=0.0, le=10.0)
-    latent_dim: int = Field(default=8, ge=1, le=1024)
+    latent_dim: int = Field(default=2, ge=1, le=1024)
     posterior_width: int = Field(default=256, ge=4, le=4096)
     kl_weight: float = Field(default=0.01, ge=0.0)
 

@@ -205,7 +205,11 @@ def test_a_row_keeps_its_bits_at_every_place_of_a_batch(method, rows):
     reads = METHODS[method].reads
     values = time = None
     if reads == "latent":
-        values = torch.randn(1, 8, generator=generator).expand(rows, -1).contiguous()
+        values = (
+            torch.randn(1, HeadConfig().latent_dim, generator=generator)
+            .expand(rows, -1)
+            .contiguous()
+        )
     elif reads == "chunk":
         values = torch.randn(1, 16, 10, generator=generator).expand(rows, -1, -1).contiguous()
         time = torch.full((rows,), 0.37)
