@@ -218,7 +218,8 @@ class watch_server:  # noqa: N801  (used like a function, as a context)
 
 def server_url() -> str | None:
     """Address of the Prefect server that the settings name; None for a temporary one."""
-    return PREFECT_API_URL.value()
+    url = PREFECT_API_URL.value()
+    return str(url) if url else None
 
 
 def server_answers(url: str, *, timeout_s: float = FIRST_ANSWER_S) -> bool:
