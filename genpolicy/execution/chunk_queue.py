@@ -155,7 +155,8 @@ class ChunkQueue:
         ended = self._ledger.close(chunk, reason)
         if reason is None and ended == "discarded":
             reason = DiscardReason.EXPIRED
-        keeps_chain = reason in (None, DiscardReason.SUPERSEDED)
+        displaced = (DiscardReason.SUPERSEDED, DiscardReason.QUEUE_OVERFLOW)
+        keeps_chain = reason is None or reason in displaced
         if self.head == chunk.chunk_id and not keeps_chain:
             self.head = None
         payload: Payload = {

@@ -10,7 +10,6 @@ from collections.abc import Callable
 
 from genpolicy.contract.chunk import ChunkMetadata, DiscardReason
 from genpolicy.execution.arrival import (
-    MALFORMED,
     context_refusal,
     is_whole,
     issued_by_feasibility,
@@ -338,8 +337,10 @@ class Executor:
         self._heed_supervisor(now_ns)
         rows, chunk_id = shape_of(admitted)
         arrival = self._queue.arrive(rows)
-        reason = self._arrival_refusal(admitted, chunk_id, now_ns, source)
-        self._seen_ids.add(chunk_id)
+        genuine = self._genuine(admitted)
+        reason = self._arrival_refusal(admitted, now_ns, source, genuine=genuine)
+        if genuine:  # an imitation must not use up the name of a chunk to come
+            self._seen_ids.add(chunk_id)
         if reason is not None:
             self._refuse(now_ns, arrival, chunk_id, rows, reason)
             return reason
@@ -348,14 +349,13 @@ class Executor:
         return None
 
     def _arrival_refusal(
-        self, admitted: Admitted, chunk_id: str, now_ns: int, source: str
+        self, admitted: Admitted, now_ns: int, source: str, *, genuine: bool
     ) -> DiscardReason | None:
-        known = chunk_id != MALFORMED and chunk_id in self._seen_ids
         reason = standing_refusal(
             self.mode,
             source,
-            known=known,
-            whole=self._genuine(admitted)
+            known=genuine and admitted.metadata.chunk_id in self._seen_ids,
+            whole=genuine
             and is_whole(admitted, period_ns=self.settings.period_ns, disabled=self._disabled),
             stopped=self.stub.supervisor.stopped,
             disabled=self._disabled,

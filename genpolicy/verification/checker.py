@@ -261,7 +261,8 @@ class _Session:
             self.flag("conservation", f"Arrival {arrival} ends without being queued.")
         if m["ended"] == "discarded":
             self.report.discarded[str(reason)] += 1
-        breaks_chain = kind == "discard" and reason != "superseded"
+        displaced = reason in ("superseded", "queue_overflow")
+        breaks_chain = kind == "discard" and not displaced
         if self.head is not None and self.head[0] == arrival and breaks_chain:
             self.head = None
 

@@ -5,14 +5,15 @@ chunks at any time, between phase changes, forces, stops, resets, interventions 
 """
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
-from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
+from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 
 from genpolicy.verification.checker import check_messages
-from genpolicy.verification.rig import CHECKPOINT, ROWS, SAMPLER, Rig, passing_verdict
+from genpolicy.verification.rig import CHECKPOINT, ROWS, SAMPLER, SETTINGS, Rig, passing_verdict
 
 FORGERIES = {
     "hash": lambda rig: {"actions_sha256": "0" * 64},
@@ -51,6 +52,11 @@ class Session(RuleBasedStateMachine):
         super().__init__()
         self.rig = Rig()
         self.in_transit = []
+
+    @initialize(queue_capacity=st.integers(1, 3), execution_horizon=st.sampled_from([1, 8, 16]))
+    def begin(self, queue_capacity, execution_horizon):
+        limits = {"queue_capacity": queue_capacity, "execution_horizon": execution_horizon}
+        self.rig = Rig(settings=replace(SETTINGS, **limits))
 
     @rule(age_s=st.sampled_from([0.0, 0.0, 0.03, 0.2, -0.01]))
     def observe(self, age_s):

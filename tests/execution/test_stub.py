@@ -1,0 +1,88 @@
+"""The stub asks again by itself: with the executor's check asleep, it still refuses."""
+
+import numpy as np
+import pytest
+
+from genpolicy.execution.executor import Executor
+from genpolicy.verification.checker import check_messages
+from genpolicy.verification.mutants import SCENARIOS
+from genpolicy.verification.rig import CHECKPOINT, SAMPLER, SETTINGS, Rig, looks_admitted
+
+SEEN_BY_THE_STUB = (
+    "action_hash", "calibration_mismatch", "checked_rows", "checkpoint_mismatch",
+    "collision_event", "end_of_episode", "execution_horizon", "expired", "force_event",
+    "future_observation", "intervention", "observation_divergence", "phase_transition",
+    "sampler_mismatch", "session_epoch", "stale_observation", "stopped", "window",
+)  # fmt: skip
+ADMISSION = {"action_hash"}
+
+
+def half_asleep(check):
+    """A rig whose executor lacks one check, while its stub has them all."""
+    rig = Rig()
+    rig.executor = Executor(
+        SETTINGS, rig.journal, rig.stub,
+        disabled_checks=frozenset({check}), genuine=looks_admitted,
+    )  # fmt: skip
+    rig.executor.set_active(0.0, CHECKPOINT, SAMPLER)
+    return rig
+
+
+@pytest.mark.parametrize("check", SEEN_BY_THE_STUB)
+def test_the_stub_refuses_what_the_executor_lets_through(check):
+    rig = half_asleep(check)
+    SCENARIOS[check](rig)
+    assert rig.stub.stale + rig.stub.invalid > 0
+    assert rig.stub.arrivals == rig.stub.accepted + rig.stub.stale + rig.stub.invalid
+    if check != "end_of_episode":
+        rig.executor.end_episode(rig.now_s)
+    accepted = [e for e in rig.journal.events() if e.kind in ("accept", "fallback")]
+    report = check_messages(
+        (e.kind, {"session": e.session, "n": e.n, "t": e.t, **e.payload})
+        for e in rig.journal.events()
+    )
+    broken = {violation.rule for violation in report.violations}
+    if check == "action_hash":  # no action passes; the checker still names the forged enqueue
+        assert accepted == [] and "P1.hash" in broken
+    assert not {rule for rule in broken if rule.startswith(("P1", "P7"))} - {"P1.hash"}
+
+
+def test_another_action_than_the_admitted_row_is_invalid():
+    rig = Rig()
+    rig.observe()
+    chunk = rig.chunk()
+    offer = {"source": "policy", "arrival": 0, "now_ns": 0}
+    flipped = chunk.actions[0].copy()
+    flipped[3] = np.nextafter(flipped[3], 1.0)
+    assert rig.stub.offer(chunk, flipped, row=0, sequence=1, **offer) == "infeasible"
+    assert rig.stub.offer(chunk, chunk.actions[1], row=0, sequence=2, **offer) == "infeasible"
+    assert rig.stub.offer(chunk, chunk.actions[0], row=-1, sequence=3, **offer) == "infeasible"
+    assert rig.stub.offer(chunk, chunk.actions[8], row=8, sequence=4, **offer) == "infeasible"
+    assert rig.stub.invalid == 4 and rig.stub.accepted == 0
+    assert rig.stub.offer(chunk, chunk.actions[0], row=0, sequence=5, **offer) is None
+
+
+def test_sequence_and_due_time_never_go_back():
+    rig = Rig()
+    rig.observe()
+    chunk = rig.chunk()
+    give = {"source": "policy", "arrival": 0}
+
+    def offer(row, sequence, now_ns):
+        return rig.stub.offer(
+            chunk, chunk.actions[row], row=row, sequence=sequence, now_ns=now_ns, **give
+        )
+
+    assert offer(1, 5, 60_000_000) is None
+    assert offer(1, 6, 70_000_000) == "out_of_order"
+    assert offer(2, 5, 110_000_000) == "out_of_order"
+    assert offer(2, 6, 110_000_000) is None
+    assert rig.stub.stale == 2
+
+
+def test_a_refusal_means_hold_and_discards_the_rest():
+    rig = half_asleep("expired")
+    rig.observe()
+    rig.deliver(rig.chunk(valid_until_s=0.06))
+    assert [c.kind for c in rig.tick(4)] == ["action", "action", "hold", "hold"]
+    assert rig.executor.conservation().rest_discarded == {"expired": 1}

@@ -1,0 +1,134 @@
+"""Force gate, collision gate, watchdog, stops: sticky until a person, deaf to anything learned."""
+
+import ast
+import math
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from genpolicy.errors import ConfigError, ContractError
+from genpolicy.execution import supervisor as module
+from genpolicy.execution.journal import Journal
+from genpolicy.execution.settings import to_ns
+from genpolicy.execution.supervisor import Supervisor, SupervisorSettings, SupervisorState
+from genpolicy.verification.rig import SUPERVISION, Rig
+
+
+@pytest.fixture
+def supervisor():
+    return Supervisor(SUPERVISION, Journal("s"))
+
+
+@pytest.mark.parametrize("force_n, phase, trips", [
+    (20.0, "approach", False), (math.nextafter(20.0, 30.0), "approach", True),
+    (40.0, "insert", False), (41.0, "insert", True), (0.1, "unknown phase", True),
+    (math.nan, "insert", True), (math.inf, "insert", True),
+])  # fmt: skip
+def test_force_gate(supervisor, force_n, phase, trips):
+    assert supervisor.observe_force(1.0, force_n, phase) is trips
+    assert supervisor.stopped is trips
+
+
+def test_collision_gate(supervisor):
+    assert supervisor.observe_collision(0.0, False) is False and not supervisor.stopped
+    assert supervisor.observe_collision(0.1, True) is True and supervisor.stopped
+
+
+def test_watchdog_holds_within_period_plus_watchdog(supervisor):
+    supervisor.heard_accept(0)
+    held = [supervisor.poll(to_ns(n * 0.05)) for n in range(6)]
+    assert held == [False, False, False, True, False, False]  # 0.15 s = 0.05 + 0.1
+    assert supervisor.state is SupervisorState.WATCHDOG_HOLD and not supervisor.stopped
+    supervisor.heard_accept(to_ns(0.3))
+    assert supervisor.state is SupervisorState.RUN
+
+
+def test_long_silence_ends_in_a_protective_stop():
+    quiet = SupervisorSettings({}, 0.1, 0.05, silence_stop_s=1.0)
+    supervisor = Supervisor(quiet, Journal("s"))
+    supervisor.heard_accept(0)
+    supervisor.poll(to_ns(0.2))
+    supervisor.poll(to_ns(1.0))
+    assert not supervisor.stopped
+    supervisor.poll(to_ns(1.05))
+    assert supervisor.state is SupervisorState.PROTECTIVE_STOP
+
+
+EVENTS = (
+    "accept",
+    "poll",
+    "reset",
+    "hand_back",
+    "observe",
+    "deliver",
+    "tick",
+    "swap",
+    "small_force",
+)
+
+
+@given(st.lists(st.sampled_from(EVENTS), max_size=30))
+@settings(max_examples=60, deadline=None, derandomize=True)
+def test_nothing_but_a_person_clears_a_stop(events):
+    rig = Rig()
+    rig.observe()
+    rig.deliver(rig.chunk())
+    rig.tick()
+    rig.supervisor.emergency_stop(rig.now_s)
+    actions = {
+        "accept": lambda: rig.supervisor.heard_accept(rig.now_ns),
+        "poll": lambda: rig.advance(0.2),
+        "reset": lambda: rig.executor.reset(rig.now_s),
+        "hand_back": lambda: rig.executor.hand_back(rig.now_s),
+        "observe": rig.observe,
+        "deliver": lambda: rig.deliver(rig.chunk()),
+        "tick": rig.tick,
+        "swap": lambda: rig.executor.set_active(rig.now_s, "f" * 64, "f" * 64),
+        "small_force": lambda: rig.supervisor.observe_force(rig.now_s, 0.0, "approach"),
+    }
+    accepted = rig.stub.accepted
+    for event in events:
+        actions[event]()
+    assert rig.tick()[0].kind == "stop"
+    assert rig.supervisor.state is SupervisorState.EMERGENCY_STOP
+    assert rig.stub.accepted == accepted
+
+
+def test_a_protective_stop_does_not_replace_an_emergency_stop(supervisor):
+    supervisor.emergency_stop(0.0)
+    supervisor.observe_collision(0.1, True)
+    assert supervisor.state is SupervisorState.EMERGENCY_STOP
+
+
+def test_a_person_clears_it_by_name_and_old_observations_stay_void():
+    rig = Rig()
+    rig.observe()
+    rig.supervisor.protective_stop(0.0, "test")
+    with pytest.raises(ContractError, match="without a person"):
+        rig.supervisor.human_reset(0.1, "  ")
+    before = rig.chunk()
+    rig.advance(0.1)
+    rig.supervisor.human_reset(rig.now_s, "spotter")
+    assert rig.deliver(before) == "stopped"
+    rig.observe()
+    assert rig.deliver(rig.chunk()) is None
+    assert rig.tick()[0].kind == "action"
+
+
+def test_it_has_no_way_to_hear_a_score():
+    tree = ast.parse(Path(module.__file__).read_text())
+    names = {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}
+    assert not {name for name in names if "score" in name or "ood" in name or "clear" in name}
+    words = {node.arg for node in ast.walk(tree) if isinstance(node, ast.arg)}
+    assert not words & {"score", "confidence", "probability", "uncertainty"}
+
+
+@pytest.mark.parametrize("values", [
+    ({"approach": -1.0}, 0.1, 0.05), ({"approach": math.nan}, 0.1, 0.05), ({}, 0.01, 0.05),
+    ({}, 0.1, 0.0), ({}, math.nan, 0.05),
+])  # fmt: skip
+def test_settings_are_checked(values):
+    with pytest.raises(ConfigError, match="supervisor settings"):
+        SupervisorSettings(*values)
