@@ -16,6 +16,7 @@ from genpolicy.feasibility.context import Context, Workspace
 from genpolicy.feasibility.geometric import geometric
 from genpolicy.feasibility.projection import project, smooth_rates
 from genpolicy.feasibility.settings import CHECKS, CHECKS_BY_LAYER, LAYERS, FeasibilitySettings
+from genpolicy.feasibility.smoothing import rate_excess
 from genpolicy.feasibility.verdict import Verdict, judge_layer, not_reached
 from genpolicy.robot.collision import CollisionModel
 from genpolicy.robot.kinematics import JOINTS, ArmKinematics
@@ -111,23 +112,54 @@ class LayerChecker:
             if np.isfinite(chunk.position_change_m) and rows.stop > rows.start:
                 groups[rows.stop - rows.start].append(i)
         for members in groups.values():
-            batch = layers.batch_of([result[i] for i in members], [contexts[i] for i in members])
-            solved = self.kinematics.solve(
-                batch.actions[..., POSITION].reshape(-1, 3),
-                batch.rotation.reshape(-1, 3, 3),
-                q_seed_rad=np.repeat(batch.q_cmd_rad, batch.actions.shape[1], axis=0),
-            )
-            reached = np.atleast_1d(solved.converged.reshape(len(members), -1).all(axis=1))
-            for i, ok, q in zip(
-                members, reached, solved.q_rad.reshape(len(members), -1, JOINTS), strict=True
-            ):
-                if ok:
-                    result[i] = smooth_rates(
-                        result[i], q, context=contexts[i], settings=self.settings,
-                        workspace=self.workspace, kinematics=self.kinematics,
-                        limits=self._usable_limits(),
-                    )  # fmt: skip
+            smoothed = self._smooth([result[i] for i in members], [contexts[i] for i in members])
+            for i, chunk in zip(members, smoothed, strict=True):
+                result[i] = chunk
         return result
+
+    def _smooth(self, chunks: list[Projected], contexts: list[Context]) -> list[Projected]:
+        """Least smoothed chunks whose joint path keeps the rate limits; else as they were."""
+        limits = self._usable_limits()
+        path, reached = self._seeded(chunks, contexts)
+        options = {
+            i: smooth_rates(
+                chunk, path[i], context=contexts[i], settings=self.settings,
+                workspace=self.workspace, kinematics=self.kinematics, limits=limits,
+            )
+            for i, chunk in enumerate(chunks) if reached[i]
+        }  # fmt: skip
+        chosen = list(chunks)
+        while options:
+            trial = {i: chunk for i, it in options.items() if (chunk := next(it, None))}
+            if not trial:
+                break
+            rows = list(trial)
+            path, reached = self._seeded(list(trial.values()), [contexts[i] for i in rows])
+            for place, i in enumerate(rows):
+                fixed = np.concatenate([contexts[i].q_cmd_history[-2:], contexts[i].q_cmd[None]])
+                excess = rate_excess(
+                    np.concatenate([fixed, path[place]]), seam=len(fixed), limits=limits,
+                    period_s=self.settings.action_period_s,
+                )  # fmt: skip
+                if reached[place] and excess <= 1.0:
+                    chosen[i] = trial[i]
+                    del options[i]
+            options = {i: it for i, it in options.items() if i in trial}
+        return chosen
+
+    def _seeded(
+        self, chunks: list[Projected], contexts: list[Context]
+    ) -> tuple[Array, NDArray[np.bool_]]:
+        """Inverse kinematics from the last commands, without restarts: (B, n, 7) and (B,)."""
+        batch = layers.batch_of(chunks, contexts)
+        size, rows = batch.actions.shape[:2]
+        solved = self.kinematics.solve(
+            batch.actions[..., POSITION].reshape(-1, 3),
+            batch.rotation.reshape(-1, 3, 3),
+            q_seed_rad=np.repeat(batch.q_cmd_rad, rows, axis=0),
+        )
+        reached = np.array([part.all() for part in solved.converged.reshape(size, rows)])
+        return solved.q_rad.reshape(size, rows, JOINTS), reached
 
     def check(
         self, projected: Projected, *, context: Context, evaluate_all: bool = False

@@ -204,7 +204,8 @@ def dynamic(
     known = np.array([min(len(s), 2) for s in seams]) + 1 + q_rad.shape[1]
     for order, (name, bound) in enumerate(zip(names, bounds, strict=True), start=1):
         path = np.diff(path, axis=1) / period_s
-        usable = known - order  # how many of the last differences rest on given commands
+        # Differences that end at a row of the chunk and rest on given commands only.
+        usable = np.minimum(known - order, q_rad.shape[1])
         margins[name] = np.full(len(path), np.inf)
         left = np.min(bound * (1 + ROUNDING) - np.abs(path), axis=2)
         for chunk, count in enumerate(usable):

@@ -4,6 +4,8 @@ Projection repairs rounding and small excess, it does not make a bad chunk good:
 changed stands beside the result, and too much is a reason for rejection.
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -35,7 +37,8 @@ def project(
         Changes are infinite where nothing could be projected; the layers reject such a chunk.
     """
     raw = proposal.actions
-    if raw.ndim != 2 or raw.shape[1:] != (ACTION_DIM,) or not np.all(np.isfinite(raw)):
+    shaped = raw.ndim == 2 and raw.shape[1] == ACTION_DIM and len(raw) > 0
+    if not shaped or not np.all(np.isfinite(raw)):
         return Projected(proposal, raw, float("inf"), float("inf"))
     rotation = rotation_from_6d(raw[:, ROTATION])
     if not np.all(np.isfinite(rotation)):
@@ -64,8 +67,8 @@ def smooth_rates(
     workspace: Workspace,
     kinematics: ArmKinematics,
     limits: RobotLimits,
-) -> Projected:
-    """The dynamic part: the least smoothing that keeps the joints within their rate limits.
+) -> Iterator[Projected]:
+    """The dynamic part: smoothing that keeps the joints within their rate limits, least first.
 
     Args:
         projected: Result of `project`.
@@ -76,8 +79,9 @@ def smooth_rates(
         kinematics: The arm.
         limits: Rate limits that may be used.
 
-    Returns:
-        The chunk unchanged where it needs no smoothing, and where none is enough.
+    Yields:
+        Chunks to choose from; none where no smoothing is needed. The joint path of a chunk is
+        not quite the smoothed one (the elbow may differ), so whoever chooses solves it again.
     """
     rows = context.rows(len(projected.actions))
     fixed = np.concatenate([context.q_cmd_history[-2:], context.q_cmd[None]])
@@ -90,8 +94,7 @@ def smooth_rates(
         if inside and not fast and not _turns_too_fast(rotation, last_rotation, turn_rad):
             actions = projected.actions.copy()
             actions[rows] = join_action(position, rotation, actions[rows, GRIPPER])
-            return _projected(projected.proposal, actions)
-    return projected
+            yield _projected(projected.proposal, actions)
 
 
 def _projected(proposal: Proposal, actions: Array) -> Projected:

@@ -75,7 +75,7 @@ class ArmKinematics:
 
     def __init__(self, scene_path: Path, *, tcp_frame: str = "tcp") -> None:
         self.scene_path = Path(scene_path)
-        self.model: Any = pin.buildModelFromMJCF(str(self.scene_path))
+        self.model: Any = _read_model(self.scene_path)
         self.data: Any = self.model.createData()
         self._check_structure(tcp_frame)
         self.tcp_frame_id = int(self.model.getFrameId(tcp_frame))
@@ -299,6 +299,18 @@ class ArmKinematics:
         steps = (1 / ratio) ** np.arange(1, JOINTS + 1)
         fractions = np.mod(0.5 + np.outer(np.arange(1, count + 1), steps), 1.0)
         return self.lower_rad + fractions * (self.upper_rad - self.lower_rad)
+
+
+def _read_model(scene_path: Path) -> Any:
+    try:
+        return pin.buildModelFromMJCF(str(scene_path))
+    except (ValueError, RuntimeError) as error:
+        raise ConfigError(
+            where=scene_path.name,
+            found=f"refused by Pinocchio: {str(error).strip().splitlines()[-1]}",
+            expected="an MJCF whose first body tree is the arm",
+            action="Correct the scene file.",
+        ) from error
 
 
 def _frozen(values: Any) -> Array:

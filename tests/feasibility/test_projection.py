@@ -1,0 +1,149 @@
+"""P9: inside the limits, idempotent, feasible input unchanged, raw kept beside it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from genpolicy.contract.action import POSITION, ROTATION
+from genpolicy.contract.chunk import Proposal
+from genpolicy.contract.rotation import angle_between, orthonormality_error, rotation_from_6d
+from genpolicy.feasibility.smoothing import rate_excess, smoothed
+from genpolicy.robot.limits import PANDA
+
+
+def again(checker, projected, ctx):
+    return checker.project(Proposal(projected.metadata, projected.actions, "first"), context=ctx)
+
+
+def limits_hold(checker, kit, actions, ctx):
+    low, high = kit.WORKSPACE.lower_m, kit.WORKSPACE.upper_m
+    position, rotation = actions[:, POSITION], rotation_from_6d(actions[:, ROTATION])
+    steps = np.diff(np.concatenate([ctx.last_action[None, POSITION], position]), axis=0)
+    last = rotation_from_6d(ctx.last_action[ROTATION])[None]
+    turns = angle_between(np.concatenate([last, rotation[:-1]]), rotation)
+    one = 1 + 1e-8
+    return (
+        np.all(position >= np.array(low) - 1e-9)
+        and np.all(position <= np.array(high) + 1e-9)
+        and np.all(
+            np.linalg.norm(steps, axis=1) <= checker.settings.tcp_speed_limit_m_s * 0.05 * one
+        )
+        and np.all(turns <= checker.settings.tcp_turn_limit_rad_s * 0.05 * one + 1e-7)
+        and np.all(orthonormality_error(actions[:, ROTATION]) < 1e-9)
+        and np.all((actions[:, 9] >= 0) & (actions[:, 9] <= 0.04))
+    )
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    noise=st.sampled_from([0.0, 1e-4, 1e-3, 3e-3, 0.02, 0.3]),
+    reach=st.floats(0.0, 0.3),
+)
+def test_output_is_within_limits_and_projecting_twice_is_once(checker, kit, seed, noise, reach):
+    rng = np.random.default_rng(seed)
+    ctx = kit.context(checker, kit.START)
+    end = np.array(kit.START) + reach * rng.normal(0, 1, 3)
+    raw = kit.line(kit.START, end) + noise * rng.normal(0, 1, (kit.K, 10)) * ([1] * 9 + [0.3])
+    first = checker.project(kit.proposal(raw), context=ctx)
+    assert np.array_equal(first.proposal.actions, raw)
+    assert limits_hold(checker, kit, first.actions, ctx)
+    second = again(checker, first, ctx)
+    assert np.abs(second.actions - first.actions).max() <= 1e-9
+    moved = np.linalg.norm(first.actions[:, POSITION] - raw[:, POSITION], axis=1).max()
+    assert first.position_change_m == pytest.approx(moved, abs=1e-12)
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_a_feasible_chunk_is_left_alone(checker, kit, seed):
+    rng = np.random.default_rng(seed)
+    ctx = kit.context(checker, kit.START)
+    raw = kit.line(kit.START, np.array(kit.START) + rng.uniform(-0.04, 0.04, 3))
+    verdict = checker.check(checker.project(kit.proposal(raw), context=ctx), context=ctx)
+    projected = checker.project(kit.proposal(raw), context=ctx)
+    assert verdict.passed, verdict.first_reason
+    assert np.abs(projected.actions - raw).max() <= 1e-9
+    assert projected.position_change_m <= 1e-9
+    assert projected.rotation_change_rad <= 1e-7
+
+
+def test_pairs_inside_unchanged_outside_changed_and_then_within(checker, kit):
+    ctx = kit.context(checker, kit.START)
+    inside = kit.line(kit.START, kit.SIDE)
+    fast = inside.copy()
+    fast[8:, 0] += 0.04
+    outside = kit.line(kit.START, (0.37, 0.0, 0.2805))
+    wide = inside.copy()
+    wide[:, 9] = 0.042
+    skew = inside.copy()
+    skew[:, 3:9] *= 1.02
+    assert np.abs(checker.project(kit.proposal(inside), context=ctx).actions - inside).max() <= 1e-9
+    for raw in (fast, outside, wide, skew):
+        projected = checker.project(kit.proposal(raw), context=ctx)
+        assert np.abs(projected.actions - raw).max() > 1e-4
+        assert limits_hold(checker, kit, projected.actions, ctx)
+
+
+def test_jitter_is_smoothed_into_the_joint_limits(checker, kit):
+    """A millimetre of jitter breaks the acceleration limit; little smoothing brings it back."""
+    ctx = kit.context(checker, kit.START)
+    rng = np.random.default_rng(5)
+    raw = kit.line(kit.START, kit.SIDE)
+    raw[:, :3] += rng.normal(0, 1e-3, (kit.K, 3))
+    projected = checker.project(kit.proposal(raw), context=ctx)
+    assert 0 < projected.position_change_m < 0.006
+    assert checker.check(projected, context=ctx).passed
+    q, reached = checker.ik_chunk(raw, ctx.q_cmd)
+    assert reached.all()
+    whole = np.concatenate([ctx.q_cmd_history, ctx.q_cmd[None], q])
+    assert rate_excess(whole, seam=3, limits=PANDA.scaled(0.5), period_s=0.05) > 1
+
+
+def test_smoothing_keeps_the_fixed_beginning_and_the_order_of_the_ladder():
+    rng = np.random.default_rng(0)
+    fixed = np.zeros((3, 7))
+    path = np.cumsum(rng.normal(0, 0.01, (16, 7)), axis=0)
+    results = list(smoothed(path, fixed, limits=PANDA.scaled(0.5), period_s=0.05))
+    assert results
+    change = [np.abs(r - path).max() for r in results]
+    assert change == sorted(change)
+    assert not list(smoothed(path * 1e-3, fixed, limits=PANDA.scaled(0.5), period_s=0.05))
+
+
+def test_a_large_change_is_rejected(checker, kit):
+    ctx = kit.context(checker, kit.START)
+    far = kit.line(kit.START, (0.37, 0.0, 0.33))
+    result = checker.admit(kit.proposal(far), context=ctx)
+    assert result.reason == "projection_too_large"
+    assert np.array_equal(result.projected.proposal.actions, far)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_the_non_finite_is_kept_and_rejected_before_any_geometry(checker, kit, bad, monkeypatch):
+    """P12: neither inverse kinematics nor FCL is called."""
+    ctx = kit.context(checker, kit.START)
+
+    def never(*args, **kwargs):
+        raise AssertionError("reached with a non-finite chunk")
+
+    monkeypatch.setattr(checker.kinematics, "solve", never)
+    monkeypatch.setattr(checker.collision, "check_samples", never)
+    monkeypatch.setattr(checker.collision, "check_swept", never)
+    for column in range(10):
+        raw = kit.line(kit.START, kit.SIDE)
+        raw[7, column] = bad
+        result = checker.admit(kit.proposal(raw), context=ctx)
+        assert result.reason == "finite"
+        assert np.array_equal(result.projected.actions, raw, equal_nan=True)
+        assert result.projected.position_change_m == np.inf
+
+
+def test_late_rows_do_not_slow_the_chunk(checker, kit):
+    ctx = replace(kit.context(checker, kit.START), first_index=3)
+    raw = np.concatenate([kit.line(kit.START, kit.SIDE)[-3:], kit.line(kit.START, kit.SIDE)[:13]])
+    projected = checker.project(kit.proposal(raw), context=ctx)
+    assert np.abs(projected.actions - raw).max() <= 1e-9
