@@ -50,8 +50,8 @@ def _ladder(tmp_path_factory: pytest.TempPathFactory, _evidence: Path) -> Path:
 @pytest.fixture
 def repo(tmp_path: Path, _evidence: Path) -> Path:
     """Evidence and settings, no report."""
-    shutil.copytree(_evidence, tmp_path / "repo")
-    return tmp_path / "repo"
+    shutil.copytree(_evidence, tmp_path / "evidence")
+    return tmp_path / "evidence"
 
 
 @pytest.fixture

@@ -295,33 +295,23 @@ def test_every_criterion_has_a_mutation():
 
 
 @pytest.mark.parametrize(("gate", "name"), CASES)
-def test_worse_evidence_is_red_and_stays_red(gate, name, ladder):
-    """P19: as the metric gets worse, the verdict never returns from red to PASS."""
-    WORSE[gate][name](ladder, 1.0)
-    # Gate A may still pass by its second route: take that away.
-    if gate == "A":
-        evidence.edit_table(ladder, "audit/recovery.parquet", _cells("successes", 20))
-    report = judge(ladder, gate)
-    assert all(c.verdict != "PASS" for c in _found(report, name)), name
-    assert report.verdict != "PASS"
-    assert report.diagnosis
-
-
-@pytest.mark.parametrize(
-    ("gate", "name"),
-    [c for c in CASES if c[1] not in {"unpinned_items", "cause_accepted"}],
-)
-def test_measured_moves_one_way_as_evidence_worsens(gate, name, _ladder, tmp_path):
-    """P19 again, on the number: growing severity never improves it."""
-    values, comparison = [], ""
+def test_worse_evidence_is_red_and_measured_moves_one_way(gate, name, _ladder, tmp_path):
+    """P19: growing severity never improves the number, and the worst is never PASS."""
+    values = []
     for severity in (0.2, 1.0):
         copy = tmp_path / f"s{severity}"
         shutil.copytree(_ladder, copy)
         WORSE[gate][name](copy, severity)
-        found = _found(judge(copy, gate), name)
+        # Gate A may still pass by its second route: take that away.
+        if gate == "A":
+            evidence.edit_table(copy, "audit/recovery.parquet", _cells("successes", 20))
+        report = judge(copy, gate)
+        found = _found(report, name)
         values.append([c.measured for c in found])
-        comparison = found[0].comparison
-    sign = 1 if comparison == "<=" else -1
+    assert all(c.verdict != "PASS" for c in found), name
+    assert report.verdict != "PASS"
+    assert report.diagnosis
+    sign = 1 if found[0].comparison == "<=" else -1
     for mild, hard in zip(*values, strict=True):
         assert hard is None or (mild is not None and sign * (hard - mild) >= 0), values
 
@@ -334,7 +324,7 @@ def test_missing_table_is_inconclusive_never_pass(gate, path, ladder):
     assert any("missing" in c.caveat for c in report.criteria)
 
 
-@pytest.mark.parametrize(("gate", "path"), [(g, p) for g, paths in TABLES.items() for p in paths])
+@pytest.mark.parametrize(("gate", "path"), [(g, paths[-1]) for g, paths in TABLES.items()])
 def test_empty_table_is_inconclusive_never_pass(gate, path, ladder):
     evidence.edit_table(ladder, f"{path}.parquet", lambda frame: frame.head(0))
     assert judge(ladder, gate).verdict == "INCONCLUSIVE"

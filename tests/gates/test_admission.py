@@ -1,0 +1,225 @@
+"""Admission: a chain that is proved again, and twenty ways in which it is not (P20)."""
+
+import json
+import shutil
+
+import evidence
+import pytest
+
+from gates.admission import STAGE_REQUIRES, admit
+from gates.ladder import judge, prove_all
+from gates.models import report_bytes, report_path
+from genpolicy.errors import ConfigError, IntegrityError, RefusedError
+from genpolicy.integrity.atomic import write_bytes
+
+
+def _edit_report(root, gate, change):
+    path = root / report_path(gate)
+    report = json.loads(path.read_bytes())
+    change(report)
+    path.write_text(json.dumps(report, sort_keys=True, indent=2))
+
+
+def test_a_true_chain_admits_and_names_its_candidates(ladder):
+    admission = admit("card", ladder)
+    assert list(admission.reports) == ["A", "B", "C", "D"]
+    assert admission.candidates == ("diffusion", "flow")
+    assert set(admission.hashes) == set("ABCD")
+
+
+def test_stages_before_a_gate_and_gate_stages_need_nothing(tmp_path):
+    for stage, needed in STAGE_REQUIRES.items():
+        if needed is None:
+            assert admit(stage, tmp_path).reports == {}
+
+
+def test_unknown_stage_is_a_configuration_error(tmp_path):
+    with pytest.raises(ConfigError, match="one of record"):
+        admit("deploy", tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("stage", "gate"), [("generators", "A"), ("shadow", "B"), ("stress", "C"), ("card", "D")]
+)
+def test_a_missing_report_refuses(ladder, stage, gate):
+    (ladder / report_path(gate)).unlink()
+    with pytest.raises(RefusedError, match=f"Gate {gate} refuses: report is missing") as caught:
+        admit(stage, ladder)
+    assert caught.value.exit_code == 3
+    assert f"dvc repro gate_{gate.lower()}" in str(caught.value)
+
+
+def test_the_sentence_names_gate_criterion_numbers_report_and_next_step(ladder):
+    section = evidence.PARAMS["gate_a"]
+    strict = {**section["thresholds"]["clock_residual_s"], "limit": 0.001}
+    thresholds = {**section["thresholds"], "clock_residual_s": strict}
+    evidence.write_params(ladder, {"gate_a": {**section, "thresholds": thresholds}})
+    with pytest.raises(RefusedError, match="derived again"):
+        admit("generators", ladder)
+    _judge_again(ladder, "A")
+    with pytest.raises(
+        RefusedError,
+        match=r"Gate A refuses: clock_residual_s is 0\.002, required <= 0\.001; "
+        r"see reports/gate_a\.json\. Return to",
+    ):
+        admit("generators", ladder)
+
+
+def _judge_again(root, gates):
+    for gate in gates:
+        write_bytes(root / report_path(gate), report_bytes(judge(root, gate)))
+
+
+FILES = (
+    "audit/clocks.parquet",
+    "audit/summary.json",
+    "ingest/frames.parquet",
+    "baselines/act/seed_0/model.safetensors",
+    "generators/flow/seed_0/config.json",
+    "reload/identity.json",
+    "shadow/journal.mcap",
+    "stress/rollouts.parquet",
+    "stress/journals/flow__nominal.mcap",
+)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_one_flipped_bit_in_any_material_refuses(ladder, name):
+    file = ladder / "artifacts" / name
+    data = bytearray(file.read_bytes())
+    data[len(data) // 2] ^= 1
+    file.write_bytes(bytes(data))
+    with pytest.raises((RefusedError, IntegrityError), match=name.rsplit("/", 1)[1]):
+        admit("card", ladder)
+
+
+def test_a_removed_or_added_material_refuses(ladder):
+    file = ladder / "artifacts/generators/flow/seed_0/model.safetensors"
+    other = ladder / "artifacts/generators/flow/seed_1/model.safetensors"
+    other.parent.mkdir()
+    shutil.copy(file, other)
+    with pytest.raises(RefusedError, match="seed_1"):
+        admit("shadow", ladder)
+    shutil.rmtree(other.parent)
+    file.unlink()
+    with pytest.raises(RefusedError, match="not readable"):
+        admit("shadow", ladder)
+
+
+def test_a_link_in_place_of_a_material_refuses(ladder):
+    file = ladder / "artifacts/audit/clocks.parquet"
+    file.rename(file.with_suffix(".moved"))
+    file.symlink_to(file.with_suffix(".moved"))
+    with pytest.raises((RefusedError, IntegrityError), match="clocks"):
+        admit("generators", ladder)
+
+
+def _failing_a(root):
+    evidence.edit_table(root, "audit/clocks.parquet", lambda f: f.assign(offset_after_s=0.5))
+    _judge_again(root, "A")
+
+
+@pytest.mark.parametrize(
+    "forge",
+    [
+        lambda r: r.update(verdict="PASS"),
+        lambda r: r.update(verdict="PASS", diagnosis="", decision="go on"),
+        lambda r: r.update(criteria=[]),
+        lambda r: r.update(criteria=[c for c in r["criteria"] if c["verdict"] == "PASS"]),
+        lambda r: [c.update(verdict="PASS") for c in r["criteria"]] and r.update(verdict="PASS"),
+        lambda r: [c.update(threshold=-1e9) for c in r["criteria"] if c["comparison"] == ">="],
+        lambda r: [c.update(measured=1e9) for c in r["criteria"] if c["comparison"] == ">="],
+        lambda r: r["materials"].popitem(),
+        lambda r: r["materials"].update({"../outside": "0" * 64}),
+        lambda r: r["upstream"].update({"A": "0" * 64}),
+        lambda r: r.update(caveats=[]),
+        lambda r: r["settings"].update(strata_level=0.001),
+    ],
+)
+def test_an_edited_report_refuses(ladder, forge):
+    _failing_a(ladder)
+    _edit_report(ladder, "A", forge)
+    with pytest.raises(RefusedError):
+        admit("generators", ladder)
+
+
+def test_a_promotion_written_by_hand_refuses(ladder):
+    evidence.edit_table(
+        ladder, "stress/rollouts.parquet", lambda f: f.assign(success=f["method"] == "bc")
+    )
+    _judge_again(ladder, "D")
+    _edit_report(ladder, "D", lambda r: r.update(verdict="PASS", decision="promote flow"))
+    with pytest.raises(RefusedError, match="derived again"):
+        admit("card", ladder)
+
+
+def test_the_environment_is_recorded_but_not_compared(ladder):
+    _edit_report(ladder, "A", lambda r: r["environment"].update(threads="64"))
+    admit("generators", ladder)
+
+
+@pytest.mark.parametrize("version", [0, 2, "1", True, None])
+def test_another_schema_version_asks_to_judge_again(ladder, version):
+    _edit_report(ladder, "A", lambda r: r.update(schema_version=version))
+    with pytest.raises(IntegrityError, match=r"dvc repro -f gate_a") as caught:
+        admit("generators", ladder)
+    assert caught.value.exit_code == 2
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        '{"schema_version": 1, "schema_version": 1}',
+        '{"schema_version": 1, "verdict": NaN}',
+        "[]",
+        "",
+        "{",
+        '{"schema_version": 1}',
+    ],
+)
+def test_a_malformed_report_is_an_integrity_error(ladder, text):
+    (ladder / report_path("A")).write_text(text)
+    with pytest.raises(IntegrityError, match="gate_a"):
+        admit("generators", ladder)
+
+
+def test_a_duplicate_key_in_a_true_report_is_refused(ladder):
+    path = ladder / report_path("A")
+    path.write_text(path.read_text().replace('"gate": "A"', '"gate": "B", "gate": "A"'))
+    with pytest.raises(IntegrityError, match="twice"):
+        admit("generators", ladder)
+
+
+def test_a_report_of_another_gate_or_another_run_refuses(ladder, repo):
+    shutil.copy(ladder / report_path("A"), ladder / report_path("B"))
+    with pytest.raises(IntegrityError, match="gate B"):
+        admit("shadow", ladder)
+    evidence.edit_table(repo, "audit/clocks.parquet", lambda f: f.assign(offset_after_s=0.003))
+    _judge_again(repo, "AB")
+    shutil.copy(repo / report_path("B"), ladder / report_path("B"))
+    with pytest.raises(RefusedError, match=r"reports/gate_a\.json"):
+        admit("shadow", ladder)
+
+
+def test_judging_below_again_voids_what_stands_above(ladder):
+    evidence.edit_table(ladder, "audit/clocks.parquet", lambda f: f.assign(offset_after_s=0.003))
+    _judge_again(ladder, "A")
+    with pytest.raises(RefusedError, match="judged again since"):
+        admit("shadow", ladder)
+
+
+def test_every_verdict_but_pass_refuses(ladder):
+    evidence.edit_document(ladder, "reload/identity.json", lambda d: {"other": {}})
+    _judge_again(ladder, "B")
+    with pytest.raises(RefusedError, match="not measured"):
+        admit("shadow", ladder)
+
+
+def test_prove_all_reports_each_rung(ladder):
+    rungs = {rung.gate: rung for rung in prove_all(ladder)}
+    assert [rungs[g].verdict for g in "ABCD"] == ["PASS"] * 4
+    assert rungs["E"].verdict == "NOT JUDGED"
+    _edit_report(ladder, "C", lambda r: r.update(decision="go"))
+    rungs = {rung.gate: rung for rung in prove_all(ladder)}
+    assert rungs["C"].verdict == "REFUSED"
+    assert rungs["D"].verdict == "REFUSED"
