@@ -7,7 +7,9 @@ network. Results come back in the order of the shards, whatever finishes first.
 from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
-import dask
+from dask import config
+from dask.base import compute as compute_local
+from dask.delayed import delayed
 
 Shard = TypeVar("Shard")
 Result = TypeVar("Result")
@@ -35,13 +37,15 @@ def map_shards(
     """
     if scheduler == LOCAL and (workers == 1 or len(shards) < 2):
         return [function(shard) for shard in shards]
-    tasks: list[Any] = [dask.delayed(function, pure=False)(shard) for shard in shards]
+    tasks: list[Any] = [delayed(function, pure=False)(shard) for shard in shards]
+    run_local: Any = compute_local
     if scheduler == LOCAL:
-        with dask.config.set({"multiprocessing.context": "spawn"}):
+        with config.set({"multiprocessing.context": "spawn"}):
             return list(
-                dask.compute(*tasks, scheduler="processes", num_workers=workers, chunksize=1)
+                run_local(*tasks, scheduler="processes", num_workers=workers, chunksize=1)
             )
     from distributed import Client  # noqa: PLC0415  (slow import, only with a cluster)
 
-    with Client(scheduler) as client:
+    connect: Any = Client
+    with connect(scheduler) as client:
         return list(client.gather(client.compute(tasks)))

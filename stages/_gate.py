@@ -8,7 +8,6 @@ re-judges and re-trains nothing; admission still re-derives the verdict from the
 from pathlib import Path
 
 from gates.reports import write_gate
-
 from genpolicy.integrity.atomic import output_folder, write_bytes
 from genpolicy.integrity.documents import canonical_json
 from stages._stage import ARTIFACTS, Params

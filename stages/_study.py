@@ -1,5 +1,7 @@
 """What `baselines` and `generators` share: one matched study each, from their sections."""
 
+from pydantic import Field
+
 from genpolicy.comparison.fleet import PolicySettings
 from genpolicy.comparison.study import Study
 from genpolicy.contract.settings import Settings
@@ -16,11 +18,13 @@ class StudySection(Settings):
         samplers: Methods, and the sampler of each.
         conventions: Further samplers to count modes with, by method and name.
         samples: Candidates per held-out situation.
+        fixtures: Observations whose samples must be reproduced after reload.
     """
 
     samplers: dict[str, SamplerConfig]
-    conventions: dict[str, dict[str, SamplerConfig]] = {}
+    conventions: dict[str, dict[str, SamplerConfig]] = Field(default_factory=dict)
     samples: int
+    fixtures: int
 
 
 def study_of(params: Params, section: StudySection) -> Study:
@@ -34,6 +38,7 @@ def study_of(params: Params, section: StudySection) -> Study:
         feasibility=params.section("feasibility", FeasibilitySettings),
         maximum_age_s=params.section("execution", ExecutionSettings).maximum_age_s,
         samples=section.samples,
+        fixtures=section.fixtures,
         root_seed=params.seed,
         device=params.compute.device,
         workers=params.compute.workers,

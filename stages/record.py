@@ -1,12 +1,12 @@
 """Stage `record`: scripted operators demonstrate the task; every episode becomes one MCAP file."""
 
+from pydantic import Field
+
 from genpolicy.contract.settings import Settings
 from genpolicy.integrity.atomic import output_folder, write_bytes
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_tree
 from genpolicy.simulation.sessions import record_session
-from pydantic import Field
-
 from stages._stage import ARTIFACTS, Params, main
 
 

@@ -62,7 +62,13 @@ def audit_task(
 
 
 def replay_episode(task: Task, data: Dataset, episode_uuid: str) -> str:
-    """Outcome of an episode's actions, replayed in simulation from its recorded start."""
+    """Outcome of an episode's actions, replayed in simulation from its recorded start.
+
+    The actions before the first whole observation are no frames, but the robot executed them.
+    """
     position = data.episodes["episode_uuid"].tolist().index(episode_uuid)
     start = task.start_from_json(str(data.episodes["scene_start"].iloc[position]))
-    return task.replay(start, data.frames.action[data.frames.episode == position])
+    lead = data.episodes["lead_action"].iloc[position]
+    actions = data.frames.action[data.frames.episode == position]
+    before = np.array([np.asarray(row) for row in lead]).reshape(-1, actions.shape[1])
+    return task.replay(start, np.concatenate([before, actions]))

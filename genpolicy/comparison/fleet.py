@@ -16,7 +16,8 @@ from genpolicy.dataset.dataset import Dataset, load_dataset
 from genpolicy.integrity.documents import read_json
 from genpolicy.policies.checkpoint import CONFIG_FILE, Provenance
 from genpolicy.policies.settings import HeadConfig, NetworkConfig, SamplerConfig, TrainingConfig
-from genpolicy.policies.training import TrainingRequest, Windows, train
+from genpolicy.policies.training import TrainingRequest, train
+from genpolicy.policies.windows import Windows
 from genpolicy.seeds import integer_seed
 
 ALLOWED_DIFFERENCES = (
@@ -132,9 +133,7 @@ def training_windows(data: Dataset, split: str, horizons: HorizonConfig) -> Wind
     return Windows(cut.observations, cut.actions, cut.is_pad)
 
 
-def matched_configuration(
-    folders: Mapping[str, Path], *, reference: str
-) -> dict[str, Any]:
+def matched_configuration(folders: Mapping[str, Path], *, reference: str) -> dict[str, Any]:
     """How the configurations of trained methods differ from that of `reference`.
 
     Args:

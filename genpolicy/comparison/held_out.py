@@ -18,7 +18,7 @@ from genpolicy.contract.action import POSITION
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.dataset.dataset import Dataset
 from genpolicy.errors import ContractError
-from genpolicy.feasibility.checker import FeasibilityChecker
+from genpolicy.feasibility.admission import FeasibilityChecker
 from genpolicy.policies.policy import NetworkPolicy
 from genpolicy.simulation.situation import context_at_rest, recorded_proposal
 from genpolicy.tasks.api import Task

@@ -7,6 +7,7 @@ from typing import Any
 
 import pyarrow as pa
 
+from genpolicy.comparison.fixtures import FIXTURES, fixture_observations, fixture_rows
 from genpolicy.comparison.fleet import (
     PolicySettings,
     matched_configuration,
@@ -23,10 +24,12 @@ from genpolicy.integrity.atomic import write_bytes
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.tables import write_table
 from genpolicy.policies.offline import masked_errors
-from genpolicy.policies.policy import NetworkPolicy, load_policy
+from genpolicy.policies.policy import NetworkPolicy, NoiseName, load_policy
 from genpolicy.policies.settings import SamplerConfig
 from genpolicy.simulation.situation import make_checker
 from genpolicy.tasks.api import load_task
+
+Rows = list[dict[str, Any]]
 
 SPLITS = ("validation", "test")
 DEFAULT_CONVENTION = "default"
@@ -45,6 +48,7 @@ class Study:
         feasibility: Thresholds of the six layers.
         maximum_age_s: Largest action age by phase.
         samples: Candidates per situation.
+        fixtures: Observations whose samples must be reproduced after reload.
         root_seed: Root seed.
         device: Torch device of training.
         workers: Local processes.
@@ -59,6 +63,7 @@ class Study:
     feasibility: FeasibilitySettings
     maximum_age_s: Mapping[str, float]
     samples: int
+    fixtures: int
     root_seed: int
     device: str
     workers: int
@@ -123,10 +128,12 @@ def run_study(
         for seed, sha256 in seeds.items()
     ]
     parts = map_shards(evaluate, jobs, workers=study.workers, scheduler=study.scheduler)
-    offline = [row for rows, _ in parts for row in rows]
-    modes = [row for _, rows in parts for row in rows]
+    offline = [row for part in parts for row in part[0]]
+    modes = [row for part in parts for row in part[1]]
+    fixtures = [row for part in parts for row in part[2]]
     write_table(folder / "offline.parquet", pa.Table.from_pylist(offline, OFFLINE))
     write_table(folder / "modes.parquet", pa.Table.from_pylist(modes, MODES))
+    write_table(folder / "fixtures.parquet", pa.Table.from_pylist(fixtures, FIXTURES))
     folders = seed_folders(folder, list(study.samplers), study.settings.seeds[0])
     if reference is not None:
         folders = {reference_method: reference, **folders}
@@ -134,11 +141,13 @@ def run_study(
     write_bytes(folder / "matched.json", canonical_json(matched))
 
 
-def evaluate(job: Evaluation) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
-    """Rows of `offline.parquet` and of `modes.parquet` of one checkpoint."""
+def evaluate(job: Evaluation) -> tuple[Rows, Rows, Rows]:
+    """Rows of `offline.parquet`, `modes.parquet` and `fixtures.parquet` of one checkpoint."""
     data = load_dataset(job.dataset)
     policy = load_policy(job.folder, expected_sha256=job.sha256)
-    return offline_rows(job, data, policy), mode_rows(job, data, policy)
+    observations = fixture_observations(data, horizons=job.study.horizons, count=job.study.fixtures)
+    fixtures = fixture_rows(policy, observations, method=job.method, seed=job.seed)
+    return offline_rows(job, data, policy), mode_rows(job, data, policy), fixtures
 
 
 def offline_rows(job: Evaluation, data: Dataset, policy: NetworkPolicy) -> list[dict[str, Any]]:
@@ -153,7 +162,7 @@ def offline_rows(job: Evaluation, data: Dataset, policy: NetworkPolicy) -> list[
         )
         uuids = data.episodes["episode_uuid"].to_numpy()
         starts = data.frames.episode.searchsorted(cut.episode)
-        names = [
+        names: list[NoiseName] = [
             ("offline", str(uuids[e]), int(i)) for e, i in zip(cut.episode, cut.index, strict=True)
         ]
         errors = masked_errors(

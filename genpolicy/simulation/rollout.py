@@ -17,7 +17,8 @@ from genpolicy.contract.chunk import Candidate, ChunkMetadata, DiscardReason, Pr
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.contract.settings import Settings
 from genpolicy.errors import ContractError
-from genpolicy.execution.executor import Command, Executor
+from genpolicy.execution.command import Command
+from genpolicy.execution.executor import Executor
 from genpolicy.execution.journal import Journal
 from genpolicy.execution.recovery import (
     Primitive,
@@ -30,8 +31,7 @@ from genpolicy.execution.recovery import (
 from genpolicy.execution.settings import ExecutorSettings
 from genpolicy.execution.stub import ControllerStub
 from genpolicy.execution.supervisor import Supervisor, SupervisorSettings
-from genpolicy.feasibility.admission import Admitted
-from genpolicy.feasibility.checker import FeasibilityChecker
+from genpolicy.feasibility.admission import Admitted, FeasibilityChecker
 from genpolicy.simulation.latency import LatencyModel, draw_latency
 from genpolicy.simulation.perturbations import PerturbationSettings, Push, injection, push
 from genpolicy.simulation.situation import COMMANDS_AT_THE_SEAM, Session, context_of

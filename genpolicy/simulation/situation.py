@@ -7,11 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.contract.chunk import ChunkMetadata, Proposal
-from genpolicy.errors import ContractError
-from genpolicy.feasibility.checker import FeasibilityChecker
-from genpolicy.feasibility.context import Context, Workspace
+from genpolicy.feasibility.admission import FeasibilityChecker
+from genpolicy.feasibility.context import Context
 from genpolicy.feasibility.settings import FeasibilitySettings
-from genpolicy.robot.scene_state import OBSTACLE_BODY, TARGET_BODY, SceneState
+from genpolicy.robot.scene_state import SceneState
 from genpolicy.tasks.api import Task
 
 Array = NDArray[np.float64]
@@ -47,41 +46,9 @@ def make_checker(
     """The six layers for a task; `disabled_checks` only for the evidence on mutants."""
     return FeasibilityChecker(
         task.scene_path,
-        workspace=Workspace(task.workspace.lower_m, task.workspace.upper_m),
+        workspace=task.workspace,
         settings=settings,
         disabled_checks=disabled_checks,
-    )
-
-
-def scene_state(task: Task, observation: Array, checker: FeasibilityChecker) -> SceneState:
-    """Where the observation puts obstacle and target.
-
-    Args:
-        task: The task, which knows what its observation means.
-        observation: One observation vector. Shape (D_o,).
-        checker: Knows how high the target stands above its body.
-
-    Raises:
-        ContractError: The task names no such bodies.
-    """
-    poses = task.scene_poses(observation)
-    if OBSTACLE_BODY not in poses or TARGET_BODY not in poses:
-        raise ContractError(
-            where=f"task {task.name}: scene_poses",
-            found=f"with the bodies {sorted(poses)}",
-            expected=f"{OBSTACLE_BODY} and {TARGET_BODY}",
-            action="Return the pose of every movable body of the scene.",
-        )
-    target, quaternion = poses[TARGET_BODY]
-    yaw = 2.0 * float(np.arctan2(quaternion[3], quaternion[0]))
-    return SceneState(
-        post_y_m=float(poses[OBSTACLE_BODY][0][1]),
-        hole_position_m=(
-            float(target[0]),
-            float(target[1]),
-            float(target[2]) + checker.collision.shapes.target_height_m,
-        ),
-        hole_yaw_rad=float(np.arctan2(np.sin(yaw), np.cos(yaw))),
     )
 
 
@@ -114,7 +81,7 @@ def context_of(
     latest_observation_s: float,
     session: Session,
     first_index: int,
-    end_index: int,
+    end_index: int | None,
     newest_accepted_observation_s: float | None = None,
 ) -> Context:
     """Context of a check at `now_s`; see `genpolicy.feasibility.context.Context`."""
@@ -131,7 +98,7 @@ def context_of(
         maximum_age_s=session.maximum_age_s[phase],
         active_checkpoint_hash=session.checkpoint,
         active_sampler_hash=session.sampler,
-        scene=scene_state(task, observation, checker),
+        scene=SceneState(task.scene_poses(observation)),
         q_cmd_history=history,
         newest_accepted_observation_s=newest_accepted_observation_s,
         first_index=first_index,

@@ -1,0 +1,52 @@
+"""Stage `reload`: every candidate comes back in a fresh process; spread and modes against NFE."""
+
+from pydantic import Field
+
+from genpolicy.comparison.fleet import PolicySettings
+from genpolicy.comparison.reload import ReloadPlan, write_reload
+from genpolicy.contract.settings import Settings
+from genpolicy.feasibility.settings import FeasibilitySettings
+from genpolicy.integrity.atomic import output_folder
+from genpolicy.simulation.rollout import ExecutionSettings
+from genpolicy.simulation.situation import make_checker
+from genpolicy.tasks.api import load_task
+from stages._stage import ARTIFACTS, Params, main
+from stages._study import StudySection
+
+
+class ReloadSection(Settings):
+    """Section `reload`.
+
+    Attributes:
+        sweep: Sampler steps to try besides the chosen ones, by method.
+        samples: Candidates per situation.
+    """
+
+    sweep: dict[str, list[int]]
+    samples: int = Field(ge=2)
+
+
+def work(params: Params) -> None:
+    """Reload, compare, sweep."""
+    section = params.section("reload", ReloadSection)
+    generators = params.section("generators", StudySection)
+    task = load_task(params.task.name)
+    with output_folder(ARTIFACTS / "reload") as folder:
+        plan = ReloadPlan(
+            checkpoints=ARTIFACTS / "generators",
+            dataset=ARTIFACTS / "ingest",
+            audit=ARTIFACTS / "audit",
+            methods=list(generators.samplers),
+            seeds=params.section("policy", PolicySettings).seeds,
+            fixtures=generators.fixtures,
+            sweep=section.sweep,
+            samples=section.samples,
+            horizons=params.horizons,
+            maximum_age_s=params.section("execution", ExecutionSettings).maximum_age_s,
+        )
+        checker = make_checker(task, params.section("feasibility", FeasibilitySettings))
+        write_reload(plan, folder, task=task, checker=checker)
+
+
+if __name__ == "__main__":
+    main("reload", work)
