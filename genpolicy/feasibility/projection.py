@@ -40,9 +40,10 @@ def project(
     shaped = raw.ndim == 2 and raw.shape[1] == ACTION_DIM and len(raw) > 0
     if not shaped or not np.all(np.isfinite(raw)):
         return Projected(proposal, raw, float("inf"), float("inf"))
-    rotation = rotation_from_6d(raw[:, ROTATION])
-    if not np.all(np.isfinite(rotation)):
+    before = rotation_from_6d(raw[:, ROTATION])
+    if not np.all(np.isfinite(before)):
         return Projected(proposal, raw, float("inf"), float("inf"))
+    rotation = before.copy()
     position = np.clip(raw[:, POSITION], workspace.lower_m, workspace.upper_m)
     opening = np.clip(raw[:, GRIPPER], settings.gripper_lower_m, settings.gripper_upper_m)
     rows = context.rows(len(raw))
@@ -55,7 +56,9 @@ def project(
         rotation[rows], last_rotation, turn_rad
     ):
         rotation[rows] = _limit_turns(rotation[rows], last_rotation, turn_rad)
-    return _projected(proposal, join_action(position, rotation, opening))
+    return _projected(
+        proposal, join_action(position, rotation, opening), before=before, after=rotation
+    )
 
 
 def smooth_rates(
@@ -87,6 +90,7 @@ def smooth_rates(
     fixed = np.concatenate([context.q_cmd_history[-2:], context.q_cmd[None]])
     step_m, turn_rad = _step_limits(settings)
     last_rotation = rotation_from_6d(context.last_action[ROTATION])
+    before = rotation_from_6d(projected.proposal.actions[:, ROTATION])
     for path in smoothed(q_rad, fixed, limits=limits, period_s=settings.action_period_s):
         position, rotation = kinematics.forward(path)
         inside = np.all((position >= workspace.lower_m) & (position <= workspace.upper_m))
@@ -94,16 +98,16 @@ def smooth_rates(
         if inside and not fast and not _turns_too_fast(rotation, last_rotation, turn_rad):
             actions = projected.actions.copy()
             actions[rows] = join_action(position, rotation, actions[rows, GRIPPER])
-            yield _projected(projected.proposal, actions)
+            after = before.copy()
+            after[rows] = rotation
+            yield _projected(projected.proposal, actions, before=before, after=after)
 
 
-def _projected(proposal: Proposal, actions: Array) -> Projected:
-    raw = proposal.actions
-    before, after = rotation_from_6d(raw[:, ROTATION]), rotation_from_6d(actions[:, ROTATION])
-    moved = np.linalg.norm(actions[:, POSITION] - raw[:, POSITION], axis=1)
-    return Projected(
-        proposal, actions, float(np.max(moved)), float(np.max(angle_between(before, after)))
-    )
+def _projected(proposal: Proposal, actions: Array, *, before: Array, after: Array) -> Projected:
+    """The projected chunk with its changes; `before` and `after` are its rotations."""
+    moved = np.linalg.norm(actions[:, POSITION] - proposal.actions[:, POSITION], axis=1)
+    turned = angle_between(before, after)
+    return Projected(proposal, actions, float(np.max(moved)), float(np.max(turned)))
 
 
 def _step_limits(settings: FeasibilitySettings) -> tuple[float, float]:
