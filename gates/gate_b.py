@@ -11,8 +11,8 @@ from pydantic import Field
 from gates.bounds import counted_interval
 from gates.engine import Case, CriterionSpec, GateSpec, Measured, judge_gate, standing
 from gates.evidence import Evidence, MissingEvidenceError, count, number, numbers
-from gates.gate_a import unmatched_keys
 from gates.models import GateReport, StrictModel, Threshold
+from gates.need import unmatched_keys
 
 RELOAD = "artifacts/reload"
 LATENCY = "artifacts/latency/latency.parquet"

@@ -1,9 +1,7 @@
 """Writing reports: judge, render, and put the JSON there last.
 
 The old JSON is removed first, so that a crash in between leaves no verdict rather than an old
-one. Beside it lies `gate_<x>.verdict.json`, which holds the verdicts alone: a pipeline can depend
-on it, so that a changed number that changes no verdict starts no training. It is a trigger, never
-proof; admission reads the full report and proves it.
+one.
 """
 
 import contextlib
@@ -15,11 +13,10 @@ from gates.render.page import gate_page, index_page
 from gates.render.summary import markdown
 from genpolicy.errors import BadInputError
 from genpolicy.integrity.atomic import write_bytes
-from genpolicy.integrity.documents import canonical_json
 
 
 def write_gate(root: Path, gate: Gate) -> GateReport:
-    """Judge a gate and write its report: HTML, Markdown, verdict trigger, then JSON.
+    """Judge a gate and write its report: HTML, Markdown, then JSON.
 
     A FAIL is a result like any other and raises nothing.
 
@@ -32,8 +29,6 @@ def write_gate(root: Path, gate: Gate) -> GateReport:
     report = judge(root, gate)
     write_bytes(base.with_suffix(".html"), gate_page(root, report).encode())
     write_bytes(base.with_suffix(".md"), markdown(report).encode())
-    verdicts = {"gate": gate, "verdict": report.verdict, "candidates": report.candidates}
-    write_bytes(base.with_suffix(".verdict.json"), canonical_json(verdicts))
     write_bytes(base, report_bytes(report))
     write_index(root)
     return report

@@ -17,5 +17,18 @@ def draw_limit(axes: Axes, report: GateReport, name: str, *, horizontal: bool = 
     if limit is None:
         return
     line = axes.axhline if horizontal else axes.axvline
-    line(limit, color=INK, ls=":", lw=1.4, label=f"limit {limit:g}")
-    axes.legend(loc="best")
+    line(limit, color=INK, ls=":", lw=1.4)
+    coordinates = ("axes fraction", "data") if horizontal else ("data", "axes fraction")
+    low, high = axes.get_ylim() if horizontal else axes.get_xlim()
+    near_start = limit < low + 0.2 * (high - low)
+    axes.annotate(
+        f"limit {limit:g}",
+        xy=(0.01, limit) if horizontal else (limit, 1.0),
+        xycoords=coordinates,
+        xytext=(0, 3) if horizontal else (4 if near_start else -4, -2),
+        textcoords="offset points",
+        ha="left" if horizontal or near_start else "right",
+        va="bottom" if horizontal else "top",
+        fontsize=8,
+        bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.8, "alpha": 0.85},
+    )

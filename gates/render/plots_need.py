@@ -5,8 +5,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from gates.evidence import Evidence, MissingEvidenceError, flags, numbers
-from gates.gate_a import AUDIT, BASELINES
 from gates.models import GateReport
+from gates.need import AUDIT, BASELINES
 from gates.render.figures import BLUE, GREEN, GREY, INK, ORANGE, RED, Plot, new_figure
 from gates.render.limits import draw_limit
 from genpolicy.statistics.intervals import clopper_pearson
@@ -90,6 +90,7 @@ def _mode_success(evidence: Evidence, report: GateReport) -> Figure:
         for mode, phase, n in zip(frame["mode"], frame["phase"], trials, strict=True)
     ]
     axes.set_yticks(np.arange(len(frame)), labels)
+    axes.set_ylim(-0.7, len(frame) - 0.3)
     axes.set_xlim(0, 1.02)
     draw_limit(axes, report, "mode_success_lower")
     axes.set_xlabel(f"share of successful episodes, exact {level:.0%} interval")

@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from gates.evidence import Evidence, MissingEvidenceError, flags, numbers
-from gates.gate_d import ROLLOUTS
+from gates.gain import ROLLOUTS
 from gates.models import GateReport
 from gates.render.figures import HATCHES, PALETTE, Plot, colours, new_figure
 from gates.render.limits import draw_limit

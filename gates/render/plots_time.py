@@ -59,6 +59,8 @@ def _coverage(evidence: Evidence, report: GateReport) -> Figure:
         )
     for axes in (left, right):
         axes.set_xscale("log", base=2)
+        ticks = sorted(set(numbers(frame, "nfe").tolist()))
+        axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
         axes.set_xlabel("NFE")
     left.set_ylim(0, 1.05)
     left.set_ylabel("share of modes covered")

@@ -75,15 +75,6 @@ def test_the_front_page_names_every_gate(pages):
     assert "PENDING REVIEW" in text and "http:" not in text.replace("http-equiv", "")
 
 
-def test_the_trigger_holds_verdicts_only(pages):
-    found = json.loads((pages / "reports/gate_b.verdict.json").read_bytes())
-    assert found == {
-        "gate": "B",
-        "verdict": "PASS",
-        "candidates": {"diffusion": "PASS", "flow": "PASS"},
-    }
-
-
 @pytest.mark.parametrize("gate", "AD")
 def test_same_evidence_same_bytes(pages, gate):
     report = judge(pages, gate)
