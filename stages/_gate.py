@@ -7,6 +7,7 @@ re-judges and re-trains nothing; admission still re-derives the verdict from the
 
 from pathlib import Path
 
+from gates.models import Criterion
 from gates.reports import write_gate
 from genpolicy.integrity.atomic import output_folder, write_bytes
 from genpolicy.integrity.documents import canonical_json
@@ -26,4 +27,20 @@ def judge(letter: str, params: Params) -> None:
             "materials": dict(report.materials),
         }
         write_bytes(folder / "verdict.json", canonical_json(token))
+        measured = {_name(item): item.measured for item in report.criteria}
+        write_bytes(folder / "metrics.json", canonical_json(measured))
+        lines = ["criterion,measured,threshold,verdict"]
+        lines += [
+            f"{_name(item)},{_plain(item.measured)},{_plain(item.threshold)},{item.verdict}"
+            for item in report.criteria
+        ]
+        write_bytes(folder / "criteria.csv", "\n".join([*lines, ""]).encode())
     print(f"gate {letter}: {report.verdict}; see reports/{name}.html")
+
+
+def _name(criterion: Criterion) -> str:
+    return f"{criterion.candidate}.{criterion.id}" if criterion.candidate else criterion.id
+
+
+def _plain(value: float | None) -> str:
+    return "" if value is None else f"{value:.10g}"

@@ -6,12 +6,10 @@ Measured times live here and nowhere else, so that everything else is byte-repro
 from pathlib import Path
 
 import pyarrow as pa
-from pydantic import Field
 
 from gates.admission import admit
 from genpolicy.comparison.fleet import PolicySettings
-from genpolicy.comparison.latency import LATENCY, DeclaredSettings, LatencyJob, latency_rows
-from genpolicy.contract.settings import Settings
+from genpolicy.comparison.latency import LATENCY, LatencyJob, latency_rows
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import output_folder
 from genpolicy.integrity.tables import write_table
@@ -20,24 +18,7 @@ from genpolicy.seeds import stream
 from genpolicy.simulation.rollout import ExecutionSettings
 from stages._stage import ARTIFACTS, Params, main
 from stages._study import StudySection
-
-
-class LatencySection(Settings):
-    """Section `latency`.
-
-    Attributes:
-        warm: Warm invocations per run.
-        cold: Cold invocations per run.
-        declared: Bounds of the terms that this machine cannot measure.
-        declared_draws: Values drawn from each of them for the report.
-        baselines: Baselines that are compared with the candidates later.
-    """
-
-    warm: int = Field(ge=20)
-    cold: int = Field(ge=2)
-    declared: dict[str, DeclaredSettings]
-    declared_draws: int = Field(ge=20)
-    baselines: list[str]
+from stages._timing import LatencySection
 
 
 def work(params: Params) -> None:

@@ -1,7 +1,10 @@
 """Stage `reload`: every candidate comes back in a fresh process; spread and modes against NFE."""
 
+from pathlib import Path
+
 from pydantic import Field
 
+from gates.admission import admit
 from genpolicy.comparison.fleet import PolicySettings
 from genpolicy.comparison.reload import ReloadPlan, write_reload
 from genpolicy.contract.settings import Settings
@@ -27,7 +30,8 @@ class ReloadSection(Settings):
 
 
 def work(params: Params) -> None:
-    """Reload, compare, sweep."""
+    """Admit through gate A, then reload, compare, sweep."""
+    admit("reload", Path.cwd())
     section = params.section("reload", ReloadSection)
     generators = params.section("generators", StudySection)
     task = load_task(params.task.name)

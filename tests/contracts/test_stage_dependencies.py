@@ -12,13 +12,19 @@ import yaml
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("genpolicy", "gates", "stages", "flows")
 TASK_LOADER = "genpolicy.tasks.api"
+# Admission decides whether a stage may begin, never what it computes. Evidence stages depend on
+# what it decides about (`artifacts/gate_x/verdict.json`), so that an edit of a gate or of a report
+# template re-judges, and re-trains only if the verdict changed.
+ADMISSION = "gates.admission"
 NOT_CODE_DATA = {".py", ".pyc", ".pyi"}
 
 
 @cache
 def graph() -> grimp.ImportGraph:
     # An import for the type checker only cannot change what a stage does.
-    return grimp.build_graph(*PACKAGES, cache_dir=None, exclude_type_checking_imports=True)
+    built = grimp.build_graph(*PACKAGES, cache_dir=None, exclude_type_checking_imports=True)
+    built.remove_module(ADMISSION)
+    return built
 
 
 @cache
@@ -110,6 +116,15 @@ def test_no_stage_imports_another(stage: str) -> None:
             assert f"stages.{other}" not in reached_modules(f"stages.{stage}"), (
                 f"stage {stage} imports stage {other}; stages meet in artifacts/"
             )
+
+
+def test_a_stage_that_asks_for_admission_depends_on_the_verdict_before_it() -> None:
+    verdicts = {"generators": "a", "shadow": "b", "stress": "c", "card": "d"}
+    for stage, gate in verdicts.items():
+        assert f"artifacts/gate_{gate}/verdict.json" in pipeline()[stage]["deps"]
+    for stage in stage_names():
+        asks = f'admit("{stage}"' in (ROOT / "stages" / f"{stage}.py").read_text()
+        assert asks == (stage in {*verdicts, "reload", "latency"}), stage
 
 
 def test_the_pipeline_has_stages_at_all() -> None:
