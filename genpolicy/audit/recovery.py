@@ -68,10 +68,12 @@ def recovery_outcomes(
     data: AuditInput,
     settings: AuditSettings,
     situations: list[tuple[Neighbourhood, Clustering]],
-    episode_modes: Integers,
+    episode_modes: Integers | None,
 ) -> tuple[RecoveryOutcome, ...]:
     """Disturbed episodes per split and mode; episodes near no situation are `unassigned`."""
     disturbed = np.flatnonzero(data.episodes.is_recovery)
+    if episode_modes is None:
+        episode_modes = np.full(len(data.episodes), -1, dtype=np.int64)
     modes = assign(data, settings, situations, episode_modes, disturbed)
     rows = []
     for split in np.unique(data.episodes.split[disturbed]):

@@ -116,12 +116,6 @@ def audit(
     strata = examine_strata(data, settings, several, root_seed=root_seed)
     counts = _counts(data, settings, situations, support)
     primary = _primary(several)
-    shifted, moved = realigned(data, semantics.clocks)
-    after = counts.two_mode_episodes
-    if moved:
-        again = _situations(shifted, settings, root_seed)[0]
-        kept = _claimed(shifted, settings, again)
-        after = _episodes(shifted, [again[number][1] for number in kept])
     return AuditResult(
         data=data,
         semantics=semantics,
@@ -131,14 +125,11 @@ def audit(
         modes=modes,
         strata=strata,
         replayed=replayed,
-        recovery=recovery_outcomes(
-            data,
-            settings,
-            several.get(primary, []),
-            links.get(primary, np.full(len(data.episodes), -1, dtype=np.int64)),
-        ),
+        recovery=recovery_outcomes(data, settings, several.get(primary, []), links.get(primary)),
         counts=counts,
-        modes_after_realignment=after,
+        modes_after_realignment=_after_realignment(
+            data, settings, semantics, counts.two_mode_episodes, root_seed
+        ),
         verdict=decide(
             settings,
             semantics=semantics,
@@ -149,6 +140,18 @@ def audit(
             modes=tuple(mode for mode in modes if mode.phase == primary),
         ),
     )
+
+
+def _after_realignment(
+    data: AuditInput, settings: AuditSettings, semantics: Semantics, before: int, root_seed: int
+) -> int:
+    """Held-out episodes with several modes once every epoch is shifted by its measured offset."""
+    shifted, moved = realigned(data, semantics.clocks)
+    if not moved:
+        return before
+    found, _ = _situations(shifted, settings, root_seed)
+    kept = _claimed(shifted, settings, found)
+    return _episodes(shifted, [found[number][1] for number in kept])
 
 
 def _situations(

@@ -62,7 +62,7 @@ class Semantics:
         clocks: One per stream and epoch.
         calibrations: One per epoch.
         gaps: Rows that follow a gap in time.
-        negative_delays: Samples received before they happened.
+        negative_delays: Samples received before they happened, beyond the tolerance.
         start_drift: Largest difference of the median start position between training and held-out
             episodes, unit of the position.
     """
@@ -86,7 +86,10 @@ def measure(data: AuditInput, settings: AuditSettings) -> Semantics:
         clocks=tuple(clocks),
         calibrations=_calibrations(data, settings),
         gaps=int(np.count_nonzero(steps > GAP_PERIODS * data.period_s)),
-        negative_delays=sum(int(np.count_nonzero(d < 0)) for d in data.delay_s.values()),
+        negative_delays=sum(
+            int(np.count_nonzero(delay < -settings.negative_delay_tolerance_s))
+            for delay in data.delay_s.values()
+        ),
         start_drift=_start_drift(data),
     )
 

@@ -38,6 +38,8 @@ class AuditSettings(BaseModel):
         maximum_lag_steps: Search range of the action-to-state lag.
         declared_lag_steps: Lag that the contract states; None takes the median of the episodes.
         clock_limit_s: Red above: clock residual of an epoch.
+        negative_delay_tolerance_s: A sample may be received this much before it happened (what the
+            correction of a clock leaves); beyond it is counted and red.
         calibration_limit_m: Red above: calibration residual of an epoch.
         label_disagreement_limit: Red above: exact upper bound of label against replay.
         replay_episodes: Episodes to replay, drawn at random, at most.
@@ -81,6 +83,7 @@ class AuditSettings(BaseModel):
     maximum_lag_steps: int = Field(default=12, ge=1)
     declared_lag_steps: float | None = None
     clock_limit_s: float = Field(default=0.02, gt=0)
+    negative_delay_tolerance_s: float = Field(default=0.001, ge=0)
     calibration_limit_m: float = Field(default=0.005, gt=0)
     label_disagreement_limit: float = Field(default=0.08, gt=0, lt=1)
     replay_episodes: int = Field(default=60, ge=0)

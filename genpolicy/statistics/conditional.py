@@ -25,7 +25,7 @@ class ConditionalTest:
     Attributes:
         p_value: Permutation p-value, at least 1 / (permutations + 1).
         effect: Share of the labels' entropy inside the blocks that the stratum explains, corrected
-            for the bias of small blocks; 0 to 1.
+            for what a random stratum of the same sizes explains; 0 to 1.
         effect_lower: Lower end of the jackknife interval over the rows.
         effect_upper: Upper end of the jackknife interval.
         n: Rows in blocks that hold at least two labels and two strata.
@@ -81,17 +81,19 @@ def conditional_test(
     observed = float(_explained(label, stratum[None], block)[0])
     hits = int(np.count_nonzero(null >= observed - 1e-12))
     p_value = (1 + hits) / (permutations + 1)
-    point, error = _jackknife(label, stratum, block)
-    half = error * float(stats.t.isf((1.0 - confidence) / 2.0, max(1, n - 1)))
+    baseline = float(null.mean())
+    point = (observed - baseline) / (1.0 - baseline) if baseline < 1.0 - 1e-9 else 0.0
+    half = _standard_error(label, stratum, block)
+    half *= float(stats.t.isf((1.0 - confidence) / 2.0, max(1, n - 1)))
     effect, low, high = (min(1.0, max(0.0, x)) for x in (point, point - half, point + half))
     return ConditionalTest(p_value, effect, low, high, n)
 
 
-def _jackknife(label: Integers, stratum: Integers, block: Integers) -> tuple[float, float]:
-    """Bias-corrected explained share and its standard error, each row left out once.
+def _standard_error(label: Integers, stratum: Integers, block: Integers) -> float:
+    """Jackknife standard error of the explained share, each row left out once.
 
-    The plug-in share is biased upwards in small blocks (by .09 for 15 rows and a share of .39);
-    the jackknife takes the bias away. Source: Efron and Stein 1981.
+    Resampling rows with replacement would repeat rows, which looks like association. Source:
+    Efron and Stein 1981.
     """
     of_block, in_block = _counts(block)
     of_label, in_label = _counts(block, label)
@@ -103,9 +105,7 @@ def _jackknife(label: Integers, stratum: Integers, block: Integers) -> tuple[flo
     rest_without = rest - _drop(in_stratum) + _drop(in_cell)
     n = len(label)
     without = 1.0 - rest_without / np.maximum(total_without, 1e-12)
-    corrected = n * (1.0 - rest / total) - (n - 1) * float(without.mean())
-    spread = (n - 1) / n * float(np.sum((without - without.mean()) ** 2))
-    return corrected, float(np.sqrt(spread))
+    return float(np.sqrt((n - 1) / n * np.sum((without - without.mean()) ** 2)))
 
 
 def _counts(*codes: Integers) -> tuple[Integers, Integers]:

@@ -29,14 +29,15 @@ def planar(
     outcome = np.full(n, "success", dtype=object)
     truth = outcome.copy()
     for number in range(n):
+        start = np.array([0.0, 0.0]) + rng.uniform(-0.004, 0.004, 2)
+        goal = np.array([0.30, 0.0]) + rng.uniform(-0.004, 0.004, 2)
         side = {
             "free": 1 if rng.random() < 0.5 else -1,
             "operator": 1 if operator[number] == "0" else -1,
             "epoch": 1 if epoch[number] == "e0" else -1,
+            "goal": 1 if goal[1] > 0 else -1,
             "none": 1,
         }[modes]
-        start = np.array([0.0, 0.0]) + rng.uniform(-0.004, 0.004, 2)
-        goal = np.array([0.30, 0.0]) + rng.uniform(-0.004, 0.004, 2)
         speed = 0.010 * rng.uniform(0.85, 1.15)
         reference = _route(start, goal, side, speed) + tremor_m * rng.normal(size=(1, 2))
         reference = reference + tremor_m * rng.normal(size=reference.shape)

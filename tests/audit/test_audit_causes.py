@@ -15,7 +15,7 @@ def run(settings=SETTINGS, check=admissible, **planted):
 
 @pytest.fixture(scope="module")
 def valid():
-    return run(recoveries=20)
+    return run(recoveries=20, episodes=160)
 
 
 def test_valid_modes_are_found(valid):
@@ -24,12 +24,19 @@ def test_valid_modes_are_found(valid):
     assert valid.counts.persistent >= 0.95 * valid.counts.two_mode
     assert valid.persistence.observed - valid.persistence.null_q95 > 0.3
     assert len(valid.modes) == 2
-    assert min(mode.success_lower for mode in valid.modes) > 0.9
+    assert min(mode.success_lower for mode in valid.modes) > 0.85
 
 
 def test_the_mean_hits_the_post_and_the_modes_do_not(valid):
     numbers = summary(valid)
-    assert numbers["mean_defeated"] == numbers["mean_checked"] == valid.counts.two_mode
+    assert numbers["mean_checked"] == valid.counts.two_mode
+    several = [item for item in valid.situations if item.two_mode]
+    assert all(all(item.chunks.mode_admissible) for item in several)
+    # Where the sides are even the mean must hit; where one side rules it may pass by it.
+    even = [item for item in several if min(item.clustering.sizes) >= 0.4 * 21]
+    assert len(even) >= 5
+    assert not any(item.chunks.mean_admissible for item in even)
+    assert {item.chunks.mean_reason for item in even} == {"collision"}
     assert numbers["modes_before_realignment"] == numbers["modes_after_realignment"]
 
 
@@ -63,6 +70,13 @@ def test_modes_of_an_epoch_are_a_data_defect():
     assert (verdict.cause, verdict.variable) == (Cause.DATA_DEFECT, "calibration_epoch")
 
 
+def test_what_the_policy_sees_is_no_hidden_state():
+    # The goal's side decides, by less than the scale that makes another observation.
+    verdict = run(modes="goal", episodes=200).verdict
+    assert (verdict.cause, verdict.kind) == (Cause.UNIMODAL, "observed_variable")
+    assert verdict.variable == "goal.y_m"
+
+
 def test_one_side_only_is_unimodal():
     result = run(modes="none")
     assert result.verdict.cause is Cause.UNIMODAL
@@ -70,7 +84,9 @@ def test_one_side_only_is_unimodal():
 
 
 def test_tremor_is_not_a_mode():
-    assert run(modes="none", tremor_m=0.02).verdict.cause is Cause.POINTWISE_NOISE
+    settings = SETTINGS.model_copy(update={"calibration_limit_m": 0.03})
+    verdict = run(modes="none", tremor_m=0.02, settings=settings).verdict
+    assert verdict.cause is Cause.POINTWISE_NOISE
 
 
 @pytest.mark.parametrize("modes", ["free", "none"])
