@@ -136,7 +136,7 @@ class QueuedChunk:
         """Drop the rows from `row` on."""
         limit = min(max(row, self.next_row), self.end_row)
         if limit < self.end_row:
-            self.lost[reason] += self.end_row - limit
+            self.lost[str(reason)] += self.end_row - limit
             self.end_row = limit
 
     def first_row_due_from(self, time_ns: int) -> int:
@@ -183,9 +183,9 @@ class Ledger:
         if chunk.executed:
             self.executed_chunks += 1
             if reason is not None:
-                self.rest_discarded[reason] += 1
+                self.rest_discarded[str(reason)] += 1
             return "executed"
-        self.discarded_chunks[reason or "expired"] += 1
+        self.discarded_chunks[str(reason or "expired")] += 1
         return "discarded"
 
     def conservation(self, queue: list[QueuedChunk]) -> Conservation:

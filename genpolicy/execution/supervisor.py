@@ -140,9 +140,10 @@ class Supervisor:
                 action="Nothing but a person may clear a stop.",
             )
         now_ns = self._journal.clock(now_s)
+        if self.stopped:
+            self._last_accept_ns = None  # it stands still until the next accepted command
         self.state = SupervisorState.RUN
         self.resumed_ns = now_ns
-        self._last_accept_ns = None
         self._record(now_ns, "human_reset", person)
 
     def heard_accept(self, now_ns: int) -> None:

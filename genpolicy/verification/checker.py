@@ -147,6 +147,9 @@ class _Session:
         else:
             for rule, sentence in self.world.follow(kind, m):
                 self.flag(rule, sentence)
+            if kind == "supervisor" and self.world.stopped:
+                self._answered(self.t)
+                self.unanswered_ns = None
             if kind == "reset":
                 self.head = self.last_due_ns = self.last_start_ns = None
 

@@ -4,7 +4,7 @@ What is built here has the form of an admitted chunk and none of its authority. 
 the executor, the stub and the checker can be tried with chunks of which something is wrong.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, cast
 
 import numpy as np
@@ -54,12 +54,12 @@ class StandInVerdict:
     rows: tuple[int, int]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class StandIn:
     """Has the attributes of an admitted chunk, true or not."""
 
     metadata: ChunkMetadata
-    actions: Array
+    actions: Array = field(repr=False)
     actions_sha256: str
     verdict: StandInVerdict
     admitted_at_s: float = 0.0

@@ -101,11 +101,11 @@ class Session(RuleBasedStateMachine):
         command = self.rig.executor.tick(self.rig.now_s - back_s)
         assert command.kind in ("hold", "stop") or self.rig.executor.clock_faults == faults
 
-    @rule(phase=st.sampled_from(["approach", "insert", "unknown"]))
+    @rule(phase=st.sampled_from(["approach", "approach", "insert", "unknown"]))
     def change_phase(self, phase):
         self.rig.phase = phase
 
-    @rule(epoch=st.sampled_from(["epoch-1", "epoch-2"]))
+    @rule(epoch=st.sampled_from(["epoch-1", "epoch-1", "epoch-2"]))
     def change_calibration(self, epoch):
         self.rig.epoch = epoch
 
@@ -113,16 +113,39 @@ class Session(RuleBasedStateMachine):
     def diverge(self, divergence_m):
         self.rig.observe(divergence_m=divergence_m)
 
-    @rule(event=st.sampled_from(["force_event", "collision_event", "reset", "intervene",
+    @rule(ticks=st.integers(0, 5), lead_s=st.sampled_from([0.0, 0.0, 0.1, 0.15]))
+    def all_is_well(self, ticks, lead_s):
+        rig = self.rig
+        if rig.supervisor.stopped:
+            rig.supervisor.human_reset(rig.now_s, "spotter")
+        rig.executor.hand_back(rig.now_s)
+        rig.executor.end_fallback(rig.now_s)
+        rig.executor.set_active(rig.now_s, CHECKPOINT, SAMPLER)
+        rig.phase, rig.epoch = "approach", "epoch-1"
+        rig.observe()
+        rig.deliver(rig.chunk(action_start_time_s=rig.now_s + lead_s))
+        rig.tick(ticks)
+
+    @rule()
+    def the_fallback_commands(self):
+        rig = self.rig
+        rig.executor.begin_fallback(rig.now_s)
+        rig.observe()
+        chunk = rig.chunk(**FORGERIES["fallback"](rig), predecessor_chunk_id="")
+        rig.executor.deliver_fallback(chunk, rig.now_s)
+        rig.tick(2)
+
+    @rule(event=st.sampled_from(["", "", "", "force_event", "collision_event", "reset", "intervene",
                                  "hand_back", "begin_fallback", "end_fallback"]))  # fmt: skip
     def happen(self, event):
-        getattr(self.rig.executor, event)(self.rig.now_s)
+        if event:
+            getattr(self.rig.executor, event)(self.rig.now_s)
 
     @rule(checkpoint=st.sampled_from([CHECKPOINT, CHECKPOINT, "d" * 64]))
     def swap_checkpoint(self, checkpoint):
         self.rig.executor.set_active(self.rig.now_s, checkpoint, SAMPLER)
 
-    @rule(force_n=st.sampled_from([1.0, 30.0, math.nan]), collision=st.booleans())
+    @rule(force_n=st.sampled_from([1.0, 1.0, 1.0, 30.0, math.nan]), collision=st.booleans())
     def feel(self, force_n, collision):
         self.rig.supervisor.observe_force(self.rig.now_s, force_n, self.rig.phase)
         self.rig.supervisor.observe_collision(self.rig.now_s, collision and force_n > 20.0)
