@@ -25,7 +25,7 @@ class Params(StrictModel):
         confidence: Coverage of every interval.
         candidates: Methods that stand for promotion.
         required_fixtures: Corrupted fixtures that must have been tried.
-        required_checks: Checks whose disabling the oracle must have seen.
+        required_checks: Checks, or layers of checks, each of which must have been disabled once.
         unassigned_modes: Labels of candidates that belong to no mode.
     """
 
@@ -39,7 +39,7 @@ class Params(StrictModel):
         "reordered_chunk",
     )
     required_checks: tuple[str, ...] = LAYERS
-    unassigned_modes: tuple[str, ...] = ("", "none", "between")
+    unassigned_modes: tuple[str, ...] = ("", "none", "unassigned", "between")
 
 
 def judge(root: Path, thresholds: Mapping[str, Threshold], params: Params) -> GateReport:
@@ -211,15 +211,15 @@ def _checker_violations(case: Case) -> Measured:
 
 def _mutants_undetected(case: Case) -> Measured:
     entries = case.evidence.listing(f"{SHADOW}/mutants.json")
-    detected: dict[str, bool] = {}
+    silent, covered = [], set()
     for entry in entries:
         if not isinstance(entry, dict) or not isinstance(entry.get("detected"), bool):
             raise MissingEvidenceError("mutants.json has an entry without check or detected")
-        name = str(entry.get("check"))
-        detected[name] = entry["detected"] and detected.get(name, True)
-    names = sorted(set(detected) | set(case.params.required_checks))
-    silent = [name for name in names if not detected.get(name, False)]
-    text = f"not detected: {', '.join(silent)}" if silent else f"all {len(names)} seen"
+        covered |= {str(entry.get("check")), str(entry.get("layer"))}
+        if not entry["detected"]:
+            silent.append(str(entry.get("check")))
+    silent += [f"{name} (not tried)" for name in case.params.required_checks if name not in covered]
+    text = f"not detected: {', '.join(silent)}" if silent else f"all {len(entries)} detected"
     return Measured(float(len(silent)), caveat=text)
 
 
