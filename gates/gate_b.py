@@ -17,6 +17,7 @@ from gates.need import unmatched_keys
 RELOAD = "artifacts/reload"
 LATENCY = "artifacts/latency/latency.parquet"
 GENERATORS = "artifacts/generators"
+MANIFEST = "artifacts/ingest/manifest.json"
 PINNED = ("checkpoint", "config", "dataset", "normalisation", "seed", "sampler")
 TERMS = (
     "exposure",
@@ -101,6 +102,9 @@ def _unpinned_items(case: Case) -> Measured:
     )
     if not any(file.endswith("model.safetensors") for file in files):
         missing.append("checkpoint file")
+    case.evidence.bind(MANIFEST)
+    if entry.get("dataset") != case.evidence.materials.get(MANIFEST):
+        missing.append("dataset: trained on another one than the audited")
     return Measured(float(len(missing)), caveat=", ".join(missing) or "all pinned by hash")
 
 

@@ -410,7 +410,7 @@ def _reload(root: Path) -> None:
             m: {
                 "checkpoint": hashlib.sha256(m.encode()).hexdigest(),
                 "config": "c",
-                "dataset": "d",
+                "dataset": hashlib.sha256(canonical_json({"schema_version": 1})).hexdigest(),
                 "normalisation": "n",
                 "seed": 0,
                 "sampler": "s",

@@ -417,6 +417,20 @@ def test_a_method_that_failed_below_does_not_stand(ladder):
     assert any("flow does not stand" in caveat for caveat in report.caveats)
 
 
+def test_a_candidate_of_another_dataset_is_not_pinned(ladder):
+    evidence.document(ladder, "ingest/manifest.json", {"schema_version": 2})
+    report = judge(ladder, "B")
+    assert report.verdict == "FAIL"
+    assert "another one than the audited" in _found(report, "unpinned_items")[0].caveat
+
+
+def test_a_check_that_was_never_disabled_is_undetected(ladder):
+    evidence.edit_document(ladder, "shadow/mutants.json", lambda d: d[1:])
+    report = judge(ladder, "C")
+    assert report.verdict == "FAIL"
+    assert "representation (not tried)" in _found(report, "mutants_undetected")[0].caveat
+
+
 def test_no_gain_returns_to_the_best_baseline(ladder):
     evidence.edit_table(
         ladder, "stress/rollouts.parquet", _cells("success", True, where=_of("chunked_bc"))
