@@ -477,3 +477,45 @@ def test_settings_are_checked(values):
 def test_a_time_that_is_no_time_is_a_fault():
     with pytest.raises(NonFiniteError, match="finite"):
         Rig().executor.tick(math.nan)
+
+
+def test_a_chunk_that_feasibility_issued_is_taken_and_a_tampered_one_is_not():
+    from genpolicy.contract.chunk import Projected, Proposal
+    from genpolicy.feasibility import admission
+    from genpolicy.feasibility.settings import LAYERS
+    from genpolicy.feasibility.verdict import LayerVerdict, Verdict
+
+    rig = Rig()
+    strict = Executor(SETTINGS, rig.journal, rig.stub)
+    strict.set_active(0.0, CHECKPOINT, SAMPLER)
+    strict.observe(0.0, 0.0, "approach", "epoch-1")
+
+    def issued():
+        made = rig.chunk()
+        layers = tuple(LayerVerdict(name, True, "", 1.0, "any") for name in LAYERS)
+        projected = Projected(Proposal(made.metadata, made.actions, "first"), made.actions, 0, 0)
+        return admission.Admitted(
+            projected=projected, verdict=Verdict(layers, {}, (0, 16)), admitted_at_s=0.0,
+            seal=admission._SEAL,
+        )  # fmt: skip
+
+    good, bad = issued(), issued()
+    bad.projected.actions.flags.writeable = True
+    bad.projected.actions[0, 0] += 1e-9
+    assert strict.deliver(bad, 0.0) is R.INFEASIBLE
+    assert strict.deliver(good, 0.0) is None
+    assert strict.tick(0.0).kind == "action"
+    good.projected.actions.flags.writeable = True
+    good.projected.actions[1, 0] += 1e-9  # changed after admission: the stub sees it
+    command = strict.tick(0.05)
+    assert command.kind == "hold" and command.reason == "refused: infeasible"
+    assert rig.stub.invalid == 1
+
+
+def test_a_chunk_may_not_rest_on_an_observation_that_was_never_heard():
+    rig = Rig()
+    assert rig.deliver(rig.chunk()) is R.FUTURE_OBSERVATION
+    rig.observe()
+    rig.advance(0.1)
+    assert rig.deliver(rig.chunk()) is R.FUTURE_OBSERVATION  # claims 0.1 s; heard was 0 s
+    judged(rig)
