@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from genpolicy.contract.chunk import DiscardReason
 from genpolicy.errors import ConfigError, NonFiniteError
 from genpolicy.execution.executor import Executor
+from genpolicy.execution.ledger import Account, Conservation
 from genpolicy.execution.settings import to_ns
 from genpolicy.verification.checker import check_messages
 from genpolicy.verification.rig import CHECKPOINT, SAMPLER, SETTINGS, Rig, passing_verdict
@@ -283,6 +284,7 @@ def test_an_older_observation_is_ignored_and_counted():
     assert rig.observe(age_s=-0.1) is False
     assert rig.executor.observe(rig.now_s, math.nan, "insert", "epoch-1") is False
     assert rig.executor.observations_ignored == 3
+    assert Rig().executor.observe(0.0, math.nan, "insert", "epoch-1") is False
     rig.phase = "approach"
     assert rig.deliver(rig.chunk()) is None
     judged(rig)
@@ -513,9 +515,80 @@ def test_a_chunk_that_feasibility_issued_is_taken_and_a_tampered_one_is_not():
 
 
 def test_a_chunk_may_not_rest_on_an_observation_that_was_never_heard():
+    blind = Rig()
+    blank = {"task_phase": "", "calibration_epoch": ""}
+    assert blind.deliver(blind.chunk(**blank)) is R.FUTURE_OBSERVATION
     rig = Rig()
-    assert rig.deliver(rig.chunk()) is R.FUTURE_OBSERVATION
     rig.observe()
     rig.advance(0.1)
     assert rig.deliver(rig.chunk()) is R.FUTURE_OBSERVATION  # claims 0.1 s; heard was 0 s
     judged(rig)
+
+
+def test_naming_the_active_weights_again_changes_nothing():
+    rig = Rig()
+    begin(rig)
+    rig.executor.set_active(rig.now_s, CHECKPOINT, SAMPLER)
+    assert rig.tick()[0].kind == "action"
+    judged(rig)
+
+
+def test_a_chunk_that_ran_out_may_be_continued():
+    rig = Rig()
+    begin(rig, ticks=9)
+    rig.observe()
+    assert rig.executor.chain_head == "chunk-1"
+    assert rig.deliver(rig.chunk(predecessor_chunk_id="chunk-1")) is None
+    judged(rig)
+
+
+def test_a_chunk_whose_last_window_has_just_closed_is_expired_on_arrival():
+    for late_s, reason in ((0.399, None), (0.4, R.EXPIRED)):
+        rig = Rig()
+        rig.observe()
+        chunk = rig.chunk()
+        rig.advance(late_s)
+        assert rig.deliver(chunk) is reason
+        judged(rig)
+
+
+@pytest.mark.parametrize("name, there, reason", [
+    ("phase", "insert", R.PHASE_TRANSITION), ("epoch", "epoch-2", R.CALIBRATION_MISMATCH),
+])  # fmt: skip
+def test_going_there_and_back_does_not_revive_an_old_chunk(name, there, reason):
+    rig = Rig()
+    rig.observe()
+    old = rig.chunk()
+    home = getattr(rig, name)
+    for value in (there, home):
+        rig.advance(0.02)
+        setattr(rig, name, value)
+        rig.observe()
+    assert rig.deliver(old) is reason
+    judged(rig)
+
+
+def test_after_the_fallback_only_observations_from_then_on_count():
+    rig = Rig()
+    rig.executor.begin_fallback(0.0)
+    rig.observe()
+    during = rig.chunk()
+    rig.advance(0.02)
+    rig.executor.end_fallback(rig.now_s)
+    assert rig.deliver(during) is R.STOPPED
+    judged(rig)
+
+
+def test_a_reset_does_not_reopen_an_ended_episode():
+    rig = Rig()
+    rig.executor.end_episode(0.0)
+    rig.executor.reset(0.0)
+    assert rig.executor.mode == "ended"
+
+
+def test_an_error_of_either_balance_is_an_error():
+    closed = Account(3, 1, {"expired": 1}, 1)
+    lost, double = Account(3, 1, {}, 1), Account(3, 2, {"expired": 1}, 1)
+    assert (closed.error, lost.error, double.error) == (0, 1, -1)
+    assert Conservation(lost, double, {}).error == 2
+    assert Conservation(closed, closed, {}).error == 0

@@ -220,3 +220,36 @@ def test_a_supervisor_stop_ends_recovery():
     assert session.recovery.state is S.STOPPED
     assert [command.kind for command in session.commands[-5:]] == ["stop"] * 5
     session.judged()
+
+
+def test_what_is_left_of_a_failed_primitive_is_not_executed():
+    session = Session(needed=99)
+    session.recovery.trigger(0.0, "approach", "lost")
+    session.run(6)
+    assert session.commands[-1].kind == "fallback"
+    session.rig.advance(5.1)  # longer than a primitive may take
+    session.run(1)
+    assert session.recovery.state is S.HOLD and session.commands[-1].kind == "hold"
+    session.judged()
+
+
+def test_a_primitive_that_fails_mid_chunk_loses_its_rest():
+    session = Session(needed=99)
+    session.recovery.trigger(0.0, "approach", "lost")
+    session.run(6)
+    session.recovery._primitive_ns = 0  # times out at the next step, with actions still queued
+    session.run(1)
+    assert session.recovery.state is S.HOLD and session.commands[-1].kind == "hold"
+    assert session.rig.executor.conservation().rest_discarded == {"stopped": 1}
+    session.judged()
+
+
+def test_one_failure_may_be_the_limit_and_plans_are_copied():
+    plans = {"approach": (S.CLASSICAL_RETURN,)}
+    settings = RecoverySettings(plans, 0.0, 1.0, 1.0, maximum_failures=1)
+    plans.clear()
+    recovery = Recovery(settings, Journal("r"))
+    recovery.trigger(0.0, "approach", "lost")
+    assert recovery.advance(0.0) is S.CLASSICAL_RETURN
+    recovery.primitive_failed(0.1, "rejected")
+    assert recovery.state is S.ABORT

@@ -33,6 +33,8 @@ def test_the_stub_refuses_what_the_executor_lets_through(check):
     rig = half_asleep(check)
     SCENARIOS[check](rig)
     assert rig.stub.stale + rig.stub.invalid > 0
+    refusals = sum(event.kind == "refuse" for event in rig.journal.events())
+    assert refusals == rig.stub.stale + rig.stub.invalid
     assert rig.stub.arrivals == rig.stub.accepted + rig.stub.stale + rig.stub.invalid
     if check != "end_of_episode":
         rig.executor.end_episode(rig.now_s)
@@ -86,3 +88,18 @@ def test_a_refusal_means_hold_and_discards_the_rest():
     rig.deliver(rig.chunk(valid_until_s=0.06))
     assert [c.kind for c in rig.tick(4)] == ["action", "action", "hold", "hold"]
     assert rig.executor.conservation().rest_discarded == {"expired": 1}
+
+
+@pytest.mark.parametrize("name, there", [("phase", "insert"), ("epoch", "epoch-2")])
+def test_the_stub_remembers_a_change_that_was_taken_back(name, there):
+    rig = Rig()
+    rig.observe()
+    old, home = rig.chunk(), getattr(rig, name)
+    for value in (there, home):
+        rig.advance(0.01)
+        setattr(rig, name, value)
+        rig.observe()
+    reason = rig.stub.offer(
+        old, old.actions[0], row=0, source="policy", arrival=0, sequence=1, now_ns=rig.now_ns
+    )
+    assert reason in ("phase_transition", "calibration_mismatch") and rig.stub.stale == 1

@@ -36,12 +36,20 @@ def test_collision_gate(supervisor):
     assert supervisor.observe_collision(0.1, True) is True and supervisor.stopped
 
 
+def test_any_cause_may_stop_it_and_a_limit_of_zero_is_a_limit(supervisor):
+    supervisor.protective_stop(0.0, "light curtain")
+    assert supervisor.state is SupervisorState.PROTECTIVE_STOP and supervisor.stops == 1
+    touchless = Supervisor(SupervisorSettings({"approach": 0.0}, 0.05, 0.05), Journal("s"))
+    assert touchless.observe_force(0.0, 0.0, "approach") is False
+    assert touchless.observe_force(0.0, 1e-9, "approach") is True
+
+
 def test_watchdog_holds_within_period_plus_watchdog(supervisor):
-    supervisor.heard_accept(0)
-    held = [supervisor.poll(to_ns(n * 0.05)) for n in range(6)]
+    supervisor.heard_accept(to_ns(1.0))
+    held = [supervisor.poll(to_ns(1.0 + n * 0.05)) for n in range(6)]
     assert held == [False, False, False, True, False, False]  # 0.15 s = 0.05 + 0.1
     assert supervisor.state is SupervisorState.WATCHDOG_HOLD and not supervisor.stopped
-    supervisor.heard_accept(to_ns(0.3))
+    supervisor.heard_accept(to_ns(1.3))
     assert supervisor.state is SupervisorState.RUN
 
 
