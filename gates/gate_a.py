@@ -24,12 +24,15 @@ class Params(StrictModel):
         strata_level: Adjusted p-value at which a stratum counts as explaining the modes.
         held_out_splits: Splits whose situations are judged.
         baselines: Simpler policies that must be there, frozen and matched.
+        deployed_conventions: Sampling conventions under which a baseline is deployed; drawing
+            from a latent is a generator's way and is reported beside them.
     """
 
     confidence: float = Field(default=0.95, gt=0.5, lt=1.0)
     strata_level: float = Field(default=0.05, gt=0.0, lt=1.0)
     held_out_splits: tuple[str, ...] = ("validation", "test")
     baselines: tuple[str, ...] = ("bc", "chunked_bc", "act")
+    deployed_conventions: tuple[str, ...] = ("direct", "z_zero")
 
 
 def judge(root: Path, thresholds: Mapping[str, Threshold], params: Params) -> GateReport:

@@ -41,9 +41,7 @@ def map_shards(
     run_local: Any = compute_local
     if scheduler == LOCAL:
         with config.set({"multiprocessing.context": "spawn"}):
-            return list(
-                run_local(*tasks, scheduler="processes", num_workers=workers, chunksize=1)
-            )
+            return list(run_local(*tasks, scheduler="processes", num_workers=workers, chunksize=1))
     from distributed import Client  # noqa: PLC0415  (slow import, only with a cluster)
 
     connect: Any = Client

@@ -1,6 +1,6 @@
 """The audit's evidence as files: the tables that the gate reads, and nothing that decides."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -53,8 +53,15 @@ REPLAY = pa.schema([("episode_uuid", TEXT), ("label", TEXT), ("replayed", TEXT)]
 RECOVERY = pa.schema([("split", TEXT), ("mode", TEXT), ("episodes", WHOLE), ("successes", WHOLE)])
 
 
-def write_evidence(result: AuditResult, folder: Path) -> None:
+def write_evidence(
+    result: AuditResult, folder: Path, *, obstacles: Sequence[Mapping[str, float]] = ()
+) -> None:
     """Write every table and document of the audit into an existing folder.
+
+    Args:
+        result: The audit.
+        folder: Existing folder.
+        obstacles: Round obstacles in the base frame, for plots: `x_m`, `y_m`, `radius_m`.
 
     Raises:
         BadInputError: The place cannot be written.
@@ -73,7 +80,10 @@ def write_evidence(result: AuditResult, folder: Path) -> None:
     for name, table in tables.items():
         write_table(folder / f"{name}.parquet", table)
     write_bytes(folder / "persistence.json", canonical_json(asdict(result.persistence)))
-    write_bytes(folder / "summary.json", canonical_json(summary(result)))
+    write_bytes(
+        folder / "summary.json",
+        canonical_json(summary(result) | {"obstacles": [dict(o) for o in obstacles]}),
+    )
 
 
 def summary(result: AuditResult) -> dict[str, Any]:

@@ -72,3 +72,22 @@ def replay_episode(task: Task, data: Dataset, episode_uuid: str) -> str:
     actions = data.frames.action[data.frames.episode == position]
     before = np.array([np.asarray(row) for row in lead]).reshape(-1, actions.shape[1])
     return task.replay(start, np.concatenate([before, actions]))
+
+
+def round_obstacles(task: Task, feasibility: FeasibilitySettings) -> list[dict[str, float]]:
+    """Standing cylinders of the scene file, as circles in the base frame's plane, m."""
+    shapes = make_checker(task, feasibility).collision.shapes
+    found = []
+    for shape in shapes.scene:
+        if shape.kind != "cylinder":
+            continue
+        origin, _ = shapes.nominal_bodies[shape.body]
+        centre = origin + shape.position_m
+        found.append(
+            {
+                "x_m": float(centre[0]),
+                "y_m": float(centre[1]),
+                "radius_m": float(shape.half_size_m[0]),
+            }
+        )
+    return found

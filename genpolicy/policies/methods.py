@@ -95,6 +95,9 @@ METHODS = {
         Method("bc", False, "nothing", squared_error, ("direct",)),
         Method("chunked_bc", True, "nothing", squared_error, ("direct",)),
         Method("act", True, "latent", ConditionalVae, ("z_zero", "z_prior")),
+        # The same network and objective as `act`; drawn from its prior it is a generator and
+        # stands for promotion like the others.
+        Method("cvae", True, "latent", ConditionalVae, ("z_prior",)),
         Method(
             "diffusion", True, "chunk", NoisePrediction, ("ddim", "ddpm", "dpm_2m"), _noise_gains
         ),

@@ -232,6 +232,7 @@ class Rollout:
         self.wanted: InFlight | None = None
         self._flying: list[InFlight] = []
         self._fallback_chunks = 0
+        self._primitive: tuple[tuple[str, int, int], Array, int] | None = None
         self._newest_accepted_s: float | None = None
         self._last_command_s: float | None = None
         self._commanded: deque[Array] = deque(
@@ -432,7 +433,7 @@ class Rollout:
             latest_observation_s=now_s,
             session=self._session(self.fixture.checkpoint, self.fixture.sampler),
             first_index=late,
-            end_index=self.fixture.horizons.execution_horizon,
+            end_index=None,
             newest_accepted_observation_s=self._newest_accepted_s,
         )
         for index, actions in enumerate(flying.chunks):
@@ -477,10 +478,14 @@ class Rollout:
             self._last_command_s = now_s  # the silence is over; the policy gets its time
 
     def _plan(self, state: RecoveryState) -> Primitive:
-        actions = self.fixture.task.fallback(self.world, str(state))
-        distance = np.linalg.norm(actions[-1] - self.world.last_action)
-        rows = actions[: self.fixture.horizons.prediction_horizon]
-        return Primitive(rows, reached=bool(distance < 1e-3))
+        """The rest of the primitive's trajectory, which is planned once, from where it begins."""
+        key = (str(state), self.recovery.attempts, self.recovery.failures)
+        if self._primitive is None or self._primitive[0] != key:
+            planned = self.fixture.task.fallback(self.world, str(state))
+            self._primitive = (key, planned, self.tally.fallback_ticks)
+        _, actions, begun = self._primitive
+        rest = actions[self.tally.fallback_ticks - begun :]
+        return Primitive(rest[: self.fixture.horizons.prediction_horizon], reached=len(rest) == 0)
 
     def _fallback_metadata(self, now_s: float) -> ChunkMetadata:
         self._fallback_chunks += 1

@@ -313,7 +313,7 @@ def _modes(methods: tuple[str, ...], covered: int) -> list[dict[str, Any]]:
         {
             "method": method,
             "seed": 0,
-            "convention": "default",
+            "convention": "direct",
             "episode_uuid": f"e{i}",
             "index": i,
             "samples": 16,
