@@ -1,0 +1,1 @@
+"""Criteria, verdicts, admission, signing, reports."""

@@ -217,7 +217,8 @@ def baseline_coverage(case: Case) -> Measured:
     generator itself and has to pass the gates like any other candidate.
     """
     columns = ("seed", "convention", "modes_present", "modes_covered")
-    deployed, drawn = [], []
+    deployed: list[tuple[float, str]] = []
+    drawn: list[tuple[float, str]] = []
     for method in case.params.baselines:
         rows = case.evidence.of(f"{BASELINES}/modes.parquet", method, *columns)
         rows = rows[numbers(rows, "modes_present") >= 2]

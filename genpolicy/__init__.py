@@ -1,0 +1,1 @@
+"""The library: measures; knows neither DVC nor Prefect nor gates."""

@@ -1,0 +1,1 @@
+"""Studies on a task: matched training, reload, latency, shadow and stress evidence."""

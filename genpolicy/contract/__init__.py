@@ -1,0 +1,1 @@
+"""Action, observation, chunk, horizons, normalisation: what every piece agrees on."""

@@ -1,0 +1,1 @@
+"""The contact controller of the simulated cell; a pinned fixture."""

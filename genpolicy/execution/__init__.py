@@ -1,0 +1,1 @@
+"""Queue, executor, stub, supervisor, recovery, journal; imports no policy."""

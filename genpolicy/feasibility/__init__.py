@@ -1,0 +1,1 @@
+"""Projection and the six layers; the only maker of admitted chunks."""

@@ -1,0 +1,1 @@
+"""Hashes, strict documents, checked tables, atomic writes."""

@@ -1,0 +1,1 @@
+"""One network, swapped heads, own samplers, verified checkpoints."""

@@ -1,0 +1,1 @@
+"""Episodes as MCAP, written and read with every check on."""

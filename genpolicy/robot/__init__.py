@@ -1,0 +1,1 @@
+"""Limits, kinematics and collision of the arm, from the one scene file."""

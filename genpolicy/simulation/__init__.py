@@ -1,0 +1,1 @@
+"""The virtual clock: latency, perturbations, rollouts, matched comparison."""

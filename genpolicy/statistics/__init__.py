@@ -1,0 +1,1 @@
+"""Exact intervals, multiplicity, sequential and conditional tests."""

@@ -1,0 +1,1 @@
+"""Task plug-ins; nothing outside a task knows what it manipulates."""

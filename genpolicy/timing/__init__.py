@@ -1,0 +1,1 @@
+"""The eleven terms of latency, measured and summarised."""

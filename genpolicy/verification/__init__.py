@@ -1,0 +1,1 @@
+"""An independent checker of journals, and the mutants that keep it awake."""

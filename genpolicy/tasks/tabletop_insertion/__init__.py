@@ -1,0 +1,1 @@
+"""The default task: round a post on either side, then insert a peg."""
