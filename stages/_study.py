@@ -7,7 +7,7 @@ from genpolicy.comparison.study import Study
 from genpolicy.contract.settings import Settings
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.policies.settings import SamplerConfig
-from genpolicy.simulation.rollout import ExecutionSettings
+from genpolicy.simulation.execution_settings import ExecutionSettings
 from stages._stage import Params
 
 

@@ -5,7 +5,7 @@ from genpolicy.audit.settings import AuditSettings
 from genpolicy.comparison.audit_task import audit_task, round_obstacles
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import output_folder
-from genpolicy.simulation.rollout import ExecutionSettings
+from genpolicy.simulation.execution_settings import ExecutionSettings
 from genpolicy.tasks.api import load_task
 from stages._stage import ARTIFACTS, Params, main
 

@@ -15,7 +15,7 @@ from genpolicy.integrity.atomic import output_folder
 from genpolicy.integrity.tables import write_table
 from genpolicy.policies.policy import load_policy
 from genpolicy.seeds import stream
-from genpolicy.simulation.rollout import ExecutionSettings
+from genpolicy.simulation.execution_settings import ExecutionSettings
 from stages._stage import ARTIFACTS, Params, main
 from stages._study import StudySection
 from stages._timing import LatencySection

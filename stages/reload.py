@@ -10,7 +10,7 @@ from genpolicy.comparison.reload import ReloadPlan, write_reload
 from genpolicy.contract.settings import Settings
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import output_folder
-from genpolicy.simulation.rollout import ExecutionSettings
+from genpolicy.simulation.execution_settings import ExecutionSettings
 from genpolicy.simulation.situation import make_checker
 from genpolicy.tasks.api import load_task
 from stages._stage import ARTIFACTS, Params, main

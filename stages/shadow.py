@@ -21,7 +21,7 @@ from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import output_folder
 from genpolicy.policies.policy import load_policy
 from genpolicy.seeds import stream
-from genpolicy.simulation.rollout import ExecutionSettings
+from genpolicy.simulation.execution_settings import ExecutionSettings
 from genpolicy.simulation.situation import make_checker
 from genpolicy.tasks.api import load_task
 from stages._stage import ARTIFACTS, Params, main

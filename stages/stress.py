@@ -10,8 +10,8 @@ from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import output_folder
 from genpolicy.integrity.tables import read_table
 from genpolicy.policies.policy import load_policy
+from genpolicy.simulation.execution_settings import ExecutionSettings
 from genpolicy.simulation.matched import Shard, matched_starts
-from genpolicy.simulation.rollout import ExecutionSettings
 from genpolicy.tasks.api import load_task
 from stages._stage import ARTIFACTS, Params, main
 from stages._study import StudySection

@@ -25,13 +25,14 @@ from genpolicy.execution.supervisor import Supervisor
 from genpolicy.feasibility.admission import Admitted, FeasibilityChecker, Rejected
 from genpolicy.feasibility.verdict import Verdict
 from genpolicy.policies.policy import Policy
-from genpolicy.simulation.rollout import SELECTOR, ExecutionSettings
+from genpolicy.simulation.execution_settings import ExecutionSettings
 from genpolicy.simulation.situation import COMMANDS_AT_THE_SEAM, Session, context_of
 from genpolicy.tasks.api import Task
 
 Array = NDArray[np.float64]
 
 HELD_OUT = "held_out"
+SELECTOR = "first_admissible"
 IN_FLIGHT_PHASE_CHANGE = "phase_change_in_flight"
 
 

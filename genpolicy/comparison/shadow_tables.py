@@ -14,7 +14,7 @@ from genpolicy.feasibility.settings import LAYERS
 from genpolicy.integrity.atomic import write_bytes
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.tables import write_table
-from genpolicy.simulation.rollout import ExecutionSettings
+from genpolicy.simulation.execution_settings import ExecutionSettings
 from genpolicy.verification.checker import ExpectedSettings, check_journal
 from genpolicy.verification.mutants import run_mutants
 

@@ -18,9 +18,10 @@ from genpolicy.execution.ledger import Account
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.policies.policy import NetworkPolicy, load_policy
 from genpolicy.seeds import stream
+from genpolicy.simulation.execution_settings import ExecutionSettings
 from genpolicy.simulation.latency import LatencyModel
 from genpolicy.simulation.perturbations import PerturbationSettings
-from genpolicy.simulation.rollout import ExecutionSettings, Fixture, Outcome, Rollout
+from genpolicy.simulation.rollout import Fixture, Outcome, Rollout
 from genpolicy.simulation.situation import make_checker
 from genpolicy.tasks.api import Start, Task, load_task
 
