@@ -140,6 +140,10 @@ def run_shard(shard: Shard) -> ShardResult:
 def _step(active: Sequence[Rollout], policy: NetworkPolicy, shard: Shard) -> None:
     for rollout in active:
         rollout.sense()
+    _judge_deliveries(active)
+    for rollout in active:
+        if not rollout.done:
+            rollout.decide()
     asking = [rollout for rollout in active if rollout.wanted is not None]
     if asking:
         drawn = policy.sample(
@@ -156,6 +160,21 @@ def _step(active: Sequence[Rollout], policy: NetworkPolicy, shard: Shard) -> Non
     for rollout in active:
         if not rollout.done:
             rollout.act()
+
+
+def _judge_deliveries(active: Sequence[Rollout]) -> None:
+    """Feasibility of everything that arrived, one candidate per rollout and batch."""
+    checker = active[0].fixture.checker
+    while True:
+        asked = [(rollout, rollout.pending()) for rollout in active]
+        open_ones = [(rollout, question) for rollout, question in asked if question is not None]
+        if not open_ones:
+            return
+        results = checker.admit_many(
+            [proposal for _, (proposal, _) in open_ones], [context for _, (_, context) in open_ones]
+        )
+        for (rollout, _), result in zip(open_ones, results, strict=True):
+            rollout.settle(result)
 
 
 def rollout_row(shard: Shard, rollout: Rollout) -> tuple[dict[str, Any], Array]:

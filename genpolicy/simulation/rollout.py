@@ -7,7 +7,7 @@ many of them run in lockstep and share the network's batches; it never sees the 
 
 from collections import deque
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 import numpy as np
@@ -28,7 +28,8 @@ from genpolicy.execution.recovery import (
 )
 from genpolicy.execution.stub import ControllerStub
 from genpolicy.execution.supervisor import Supervisor
-from genpolicy.feasibility.admission import Admitted, FeasibilityChecker
+from genpolicy.feasibility.admission import Admitted, FeasibilityChecker, Rejected
+from genpolicy.feasibility.context import Context
 from genpolicy.simulation.execution_settings import ExecutionSettings
 from genpolicy.simulation.latency import LatencyModel, draw_latency
 from genpolicy.simulation.perturbations import PerturbationSettings, Push, injection, push
@@ -125,7 +126,10 @@ class Tally:
 
 
 class Rollout:
-    """One world under one policy; call `sense`, fill `wanted`, then `act`, until `outcome`.
+    """One world under one policy, advanced from outside, tick by tick, until `outcome`.
+
+    A tick is: `sense`; while `pending` names a chunk, judge it and `settle` it; `decide`; fill the
+    `wanted` invocation with samples; `act`.
 
     Args:
         fixture: What it shares with the others.
@@ -159,6 +163,8 @@ class Rollout:
         self.invocations = 0
         self.wanted: InFlight | None = None
         self._flying: list[InFlight] = []
+        self._arrived: deque[tuple[InFlight, int]] = deque()
+        self._candidate = 0
         self._fallback_chunks = 0
         self._primitive: tuple[tuple[str, int, int], Array, int] | None = None
         self._newest_accepted_s: float | None = None
@@ -191,7 +197,7 @@ class Rollout:
         return np.stack([self.history[0]] * missing + list(self.history))
 
     def sense(self) -> None:
-        """Observe, take deliveries, supervise, recover; sets `wanted` if the policy must sample."""
+        """Observe, supervise, and collect what has been delivered by now."""
         now_s, world = self.now_s, self.world
         observation = world.observe()
         self.history.append(observation)
@@ -200,13 +206,59 @@ class Rollout:
         divergence_m = float(np.linalg.norm(position - world.last_action[:3]))
         self.executor.observe(now_s, now_s, world.phase, world.calibration_epoch, divergence_m)
         self._supervise(now_s)
-        if self.done:
+        if not self.done:
+            self._collect_deliveries(now_s)
+
+    def pending(self) -> tuple[Proposal, Context] | None:
+        """The next delivered candidate to be judged, or None if there is none (left)."""
+        if self.done or not self._arrived:
+            return None
+        flying, late = self._arrived[0]
+        if flying.chunks is None:
+            raise ContractError(
+                where=f"chunk {flying.metadata.chunk_id}",
+                found="delivered before it was sampled",
+                expected="the batch to fill in its candidates",
+                action="Sample every wanted invocation before `act`.",
+            )
+        metadata = replace(flying.metadata, candidate_index=self._candidate)
+        candidate = Candidate(metadata, flying.chunks[self._candidate])
+        proposal = Proposal(candidate.metadata, candidate.actions, selected_by=SELECTOR)
+        return proposal, self._delivery_context(late)
+
+    def settle(self, result: Admitted | Rejected) -> None:
+        """Take the verdict on `pending`: the selector takes the first that passes all layers."""
+        flying, _ = self._arrived[0]
+        verdict, now_s = result.verdict, self.now_s
+        self.journal.candidate(
+            now_s,
+            chunk_id=flying.metadata.chunk_id,
+            method=self.fixture.method,
+            index=self._candidate,
+            layers={layer.name: layer.passed for layer in verdict.layers},
+            first_reason=verdict.first_reason or None,
+        )
+        assert flying.chunks is not None
+        if isinstance(result, Admitted):
+            self._next_arrival()
+            if self.executor.deliver(result, now_s) is None:
+                self._newest_accepted_s = flying.metadata.condition_observation_event_time_s
             return
-        self._take_deliveries(now_s)
-        self._recover(now_s)
+        counts = self.tally.rejected_by
+        counts[verdict.first_reason] = counts.get(verdict.first_reason, 0) + 1
+        self._candidate += 1
+        if self._candidate == len(flying.chunks):
+            self._next_arrival()
+            self.tally.rejections += 1
+            self._write_off(flying, DiscardReason.INFEASIBLE)
+
+    def decide(self) -> None:
+        """Recover where needed; sets `wanted` if the policy must sample."""
+        now_s = self.now_s
         self.wanted = None
+        self._recover(now_s)
         if not self.done and self._may_invoke(now_s):
-            self.wanted = self._begin_invocation(now_s, observation)
+            self.wanted = self._begin_invocation(now_s, self.history[-1])
 
     def act(self) -> None:
         """One tick of the executor, one action period of the world."""
@@ -234,11 +286,10 @@ class Rollout:
 
     def _end(self, outcome: Outcome) -> None:
         self.outcome = outcome
-        for flying in self._flying:
-            self.executor.write_off(
-                flying.metadata, self._rows(flying), DiscardReason.END_OF_EPISODE, self.now_s
-            )
+        for flying in [*self._flying, *(item for item, _ in self._arrived)]:
+            self._write_off(flying, DiscardReason.END_OF_EPISODE)
         self._flying.clear()
+        self._arrived.clear()
         self.executor.end_episode(self.now_s)
 
     def _supervise(self, now_s: float) -> None:
@@ -302,11 +353,11 @@ class Rollout:
             dropped=hit.dropped,
         )
 
-    def _take_deliveries(self, now_s: float) -> None:
+    def _collect_deliveries(self, now_s: float) -> None:
         for flying in sorted(self._flying, key=lambda item: (item.arrival_s, item.number)):
             if flying.arrival_s <= now_s and not flying.dropped:
                 self._flying.remove(flying)
-                self._deliver(flying, now_s)
+                self._arrive(flying, now_s)
             elif now_s - flying.begun_s >= self.fixture.execution.deadline_s - 1e-9:
                 self._miss(flying, now_s)
 
@@ -318,70 +369,44 @@ class Rollout:
             self.executor.end_invocation(now_s, flying.metadata.chunk_id, "deadline")
         if flying.dropped:
             self._flying.remove(flying)
-            self.executor.write_off(
-                flying.metadata, self._rows(flying), DiscardReason.EXPIRED, now_s
-            )
+            self._write_off(flying, DiscardReason.EXPIRED)
 
-    def _deliver(self, flying: InFlight, now_s: float) -> None:
+    def _arrive(self, flying: InFlight, now_s: float) -> None:
         if not flying.given_up:
             self.executor.end_invocation(now_s, flying.metadata.chunk_id, "answered")
         horizons = self.fixture.horizons
         late = round((now_s - flying.metadata.action_start_time_s) / horizons.action_period_s)
         if late >= horizons.execution_horizon:
-            self.executor.write_off(
-                flying.metadata, self._rows(flying), DiscardReason.EXPIRED, now_s
-            )
-            return
-        admitted = self._admit_first(flying, now_s, late)
-        if admitted is None:
-            self.tally.rejections += 1
-            self.executor.write_off(
-                flying.metadata, self._rows(flying), DiscardReason.INFEASIBLE, now_s
-            )
-        elif self.executor.deliver(admitted, now_s) is None:
-            self._newest_accepted_s = flying.metadata.condition_observation_event_time_s
+            self._write_off(flying, DiscardReason.EXPIRED)
+        else:
+            self._arrived.append((flying, late))
 
-    def _admit_first(self, flying: InFlight, now_s: float, late: int) -> Admitted | None:
-        """The selector: candidates in order, the first that passes all layers."""
-        if flying.chunks is None:
-            raise ContractError(
-                where=f"chunk {flying.metadata.chunk_id}",
-                found="delivered before it was sampled",
-                expected="the batch to fill in its candidates",
-                action="Sample every wanted invocation before `act`.",
-            )
-        context = context_of(
+    def _next_arrival(self) -> None:
+        self._arrived.popleft()
+        self._candidate = 0
+
+    def _write_off(self, flying: InFlight, reason: DiscardReason) -> None:
+        rows = self.fixture.horizons.prediction_horizon
+        if flying.chunks is not None:
+            rows = int(flying.chunks.shape[1])
+        self.executor.write_off(flying.metadata, rows, reason, self.now_s)
+
+    def _delivery_context(self, late: int) -> Context:
+        """All rows from the first that is not late are judged, also those never executed."""
+        return context_of(
             self.fixture.task,
             self.fixture.checker,
             observation=self.history[-1],
             q_meas=self.world.q_meas,
             commanded=list(self._commanded),
-            now_s=now_s,
+            now_s=self.now_s,
             phase=self.world.phase,
-            latest_observation_s=now_s,
+            latest_observation_s=self.now_s,
             session=self._session(self.fixture.checkpoint, self.fixture.sampler),
             first_index=late,
             end_index=None,
             newest_accepted_observation_s=self._newest_accepted_s,
         )
-        for index, actions in enumerate(flying.chunks):
-            candidate = Candidate(flying.metadata, actions)
-            proposal = Proposal(candidate.metadata, candidate.actions, selected_by=SELECTOR)
-            result = self.fixture.checker.admit(proposal, context=context)
-            verdict = result.verdict
-            self.journal.candidate(
-                now_s,
-                chunk_id=flying.metadata.chunk_id,
-                method=self.fixture.method,
-                index=index,
-                layers={layer.name: layer.passed for layer in verdict.layers},
-                first_reason=verdict.first_reason or None,
-            )
-            if isinstance(result, Admitted):
-                return result
-            counts = self.tally.rejected_by
-            counts[verdict.first_reason] = counts.get(verdict.first_reason, 0) + 1
-        return None
 
     def _recover(self, now_s: float) -> None:
         last_s = self._last_command_s if self._last_command_s is not None else 0.0
@@ -466,8 +491,3 @@ class Rollout:
             self.tally.fallback_ticks += 1
         else:
             self.tally.action_ticks += 1
-
-    def _rows(self, flying: InFlight) -> int:
-        if flying.chunks is not None:
-            return int(flying.chunks.shape[1])
-        return self.fixture.horizons.prediction_horizon
