@@ -26,6 +26,7 @@ def judged(rig):
     )
     assert report.violations == []
     assert rig.executor.conservation().error == 0
+    assert rig.stub.stale == rig.stub.invalid == 0  # the executor saw it first
     return report
 
 
@@ -386,6 +387,7 @@ def test_only_checked_rows_are_executed():
     rig.observe()
     rig.deliver(rig.chunk(verdict=passing_verdict(rows=(1, 4))))
     assert [c.action_index for c in rig.tick(5)] == [-1, 1, 2, 3, -1]
+    assert rig.executor.conservation().actions.discarded["infeasible"] == 4
     judged(rig)
 
 
@@ -592,3 +594,89 @@ def test_an_error_of_either_balance_is_an_error():
     assert (closed.error, lost.error, double.error) == (0, 1, -1)
     assert Conservation(lost, double, {}).error == 2
     assert Conservation(closed, closed, {}).error == 0
+
+
+def test_an_action_due_no_later_than_the_last_one_waits():
+    rig = Rig()
+    begin(rig)
+    rig.tick()  # row 2, due at 0.1 s
+    rig.now_ns = 120_000_000
+    rig.observe()
+    assert rig.deliver(rig.chunk(action_start_time_s=0.1)) is None
+    assert rig.executor.tick(0.12).kind == "hold"
+    assert rig.executor.tick(0.15).action_index == 1
+    judged(rig)
+
+
+def test_after_a_reset_an_observation_from_before_it_carries_nothing():
+    rig = Rig()
+    rig.observe()
+    rig.executor.begin_invocation(0.0, "i-1")
+    rig.executor.intervene(0.0)
+    rig.advance(0.1)
+    rig.executor.reset(rig.now_s)
+    assert rig.executor.mode == "run" and rig.executor.needs_invocation(rig.now_s)
+    assert rig.observe(age_s=0.05) is True
+    late = {"condition_observation_event_time_s": rig.now_s - 0.05}
+    assert rig.deliver(rig.chunk(**late)) is R.RESET
+    rig.observe()
+    assert rig.deliver(rig.chunk()) is None
+    judged(rig)
+
+
+def test_divergence_at_the_limit_is_within_it():
+    rig = Rig()
+    begin(rig)
+    rig.observe(divergence_m=0.05)
+    assert rig.tick()[0].kind == "action"
+    rig.observe(divergence_m=math.nan)
+    assert rig.tick()[0].kind == "hold"
+    judged(rig)
+
+
+def test_an_older_chunk_that_ends_does_not_break_the_chain_of_the_newer():
+    rig = Rig()
+    rig.observe()
+    rig.deliver(rig.chunk(valid_until_s=0.06))
+    rig.deliver(rig.chunk(action_start_time_s=0.2))
+    rig.tick(3)  # the first chunk expires at 0.1 s
+    assert rig.executor.chain_head == "chunk-2"
+    judged(rig)
+
+
+def test_events_are_noted_with_what_happened():
+    rig = Rig()
+    rig.observe()
+    rig.executor.begin_invocation(0.0, "i-1")
+    rig.executor.end_invocation(0.0, "i-1", "answered")
+    rig.deliver(rig.chunk())
+    rig.tick(8)
+    assert rig.executor.conservation().chunks.queued == 0  # ended with its last action
+    rig.now_ns += 200_000_000  # nobody polls
+    rig.tick()
+    rig.phase, rig.epoch = "insert", "epoch-2"
+    rig.observe()
+    rig.deliver(rig.chunk())
+    rig.tick()
+    rig.supervisor.emergency_stop(rig.now_s)
+    rig.tick()
+    seen = [(e.kind, e.payload) for e in rig.end()]
+    stages = [p["stage"] for kind, p in seen if kind == "invocation"]
+    changes = [(kind, p["old"], p["new"]) for kind, p in seen if kind in ("phase", "epoch")]
+    holds = [p["reason"] for kind, p in seen if kind == "hold"]
+    supervised = [p["event"] for kind, p in seen if kind == "supervisor"]
+    assert stages == ["begin", "end"]
+    assert changes == [("phase", "", "approach"), ("epoch", "", "epoch-1"),
+                       ("phase", "approach", "insert"), ("epoch", "epoch-1", "epoch-2"),
+                       ]  # fmt: skip
+    assert holds == ["watchdog", "empty", "stopped"]
+    assert supervised == ["watchdog", "watchdog_recovered", "emergency_stop"]
+
+
+def test_clock_faults_are_counted():
+    rig = Rig()
+    rig.advance(1.0)
+    rig.tick()
+    for n in range(3):
+        assert rig.executor.tick(0.5).reason == "clock_backwards"
+        assert rig.executor.clock_faults == n + 1

@@ -117,7 +117,11 @@ def test_a_stop_is_reachable_from_every_state_and_sticky(recovery, state):
 
 
 def test_what_does_not_fit_the_state_is_refused(recovery):
-    for call in (recovery.primitive_succeeded, lambda t: recovery.human_resolved(t, "x")):
+    for call in (
+        recovery.primitive_succeeded,
+        lambda t: recovery.primitive_failed(t, "x"),
+        lambda t: recovery.human_resolved(t, "x"),
+    ):
         with pytest.raises(ContractError, match="in state idle"):
             call(0.0)
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from genpolicy.contract.chunk import DiscardReason
 from genpolicy.execution.executor import Executor
 from genpolicy.verification.checker import check_messages
 from genpolicy.verification.mutants import SCENARIOS
@@ -103,3 +104,24 @@ def test_the_stub_remembers_a_change_that_was_taken_back(name, there):
         old, old.actions[0], row=0, source="policy", arrival=0, sequence=1, now_ns=rig.now_ns
     )
     assert reason in ("phase_transition", "calibration_mismatch") and rig.stub.stale == 1
+
+
+def test_the_stub_remembers_every_voiding_event():
+    rig = Rig()
+    rig.observe()
+    chunk = rig.chunk()
+    rig.advance(0.01)
+    rig.executor.force_event(rig.now_s)
+    rig.stub.void("collision_event", DiscardReason.COLLISION_EVENT, 0)  # an older event
+    offer = {"row": 0, "source": "policy", "arrival": 0, "sequence": 1, "now_ns": rig.now_ns}
+    assert rig.stub.offer(chunk, chunk.actions[0], **offer) == "force_event"
+
+
+def test_the_stub_takes_nothing_from_before_a_reset():
+    rig = Rig()
+    rig.advance(0.1)
+    rig.executor.reset(rig.now_s)
+    rig.observe(age_s=0.05)
+    chunk = rig.chunk(condition_observation_event_time_s=0.05)
+    offer = {"row": 0, "source": "policy", "arrival": 0, "sequence": 1, "now_ns": rig.now_ns}
+    assert rig.stub.offer(chunk, chunk.actions[0], **offer) == "reset"

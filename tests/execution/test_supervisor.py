@@ -140,3 +140,5 @@ def test_it_has_no_way_to_hear_a_score():
 def test_settings_are_checked(values):
     with pytest.raises(ConfigError, match="supervisor settings"):
         SupervisorSettings(*values)
+    with pytest.raises(ConfigError, match="supervisor settings"):
+        SupervisorSettings({}, 0.1, 0.05, silence_stop_s=0.0)
