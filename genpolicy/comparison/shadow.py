@@ -23,6 +23,7 @@ from genpolicy.execution.ledger import Account
 from genpolicy.execution.stub import ControllerStub
 from genpolicy.execution.supervisor import Supervisor
 from genpolicy.feasibility.admission import Admitted, FeasibilityChecker, Rejected
+from genpolicy.feasibility.settings import LAYERS
 from genpolicy.feasibility.verdict import Verdict
 from genpolicy.policies.policy import Policy
 from genpolicy.simulation.execution_settings import ExecutionSettings
@@ -388,13 +389,17 @@ def _deliver(
         if isinstance(result, Admitted) and not delivered:
             delivered += executor.deliver(result, now_s) is None
         else:
-            reason = (
-                DiscardReason.SUPERSEDED
-                if isinstance(result, Admitted)
-                else DiscardReason.INFEASIBLE
-            )
-            executor.write_off(metadata, len(case.proposal.actions), reason, now_s)
+            executor.write_off(metadata, len(case.proposal.actions), _reason(result), now_s)
     return delivered
+
+
+def _reason(result: Admitted | Rejected) -> DiscardReason:
+    """Why a chunk is not delivered: another was, it is not fresh, or a layer rejected it."""
+    if isinstance(result, Admitted):
+        return DiscardReason.SUPERSEDED
+    if result.verdict.first_layer == LAYERS[-1]:
+        return DiscardReason(result.verdict.first_reason)
+    return DiscardReason.INFEASIBLE
 
 
 def _smallest(verdict: Verdict) -> float | None:

@@ -30,6 +30,7 @@ from genpolicy.execution.stub import ControllerStub
 from genpolicy.execution.supervisor import Supervisor
 from genpolicy.feasibility.admission import Admitted, FeasibilityChecker, Rejected
 from genpolicy.feasibility.context import Context
+from genpolicy.feasibility.settings import LAYERS
 from genpolicy.simulation.execution_settings import ExecutionSettings
 from genpolicy.simulation.latency import LatencyModel, draw_latency
 from genpolicy.simulation.perturbations import PerturbationSettings, Push, injection, push
@@ -39,6 +40,7 @@ from genpolicy.tasks.api import Start, Task, World, WorldSettings
 Array = NDArray[np.float64]
 
 SELECTOR = "first_admissible"
+FRESH = LAYERS[-1]
 
 
 class Outcome(StrEnum):
@@ -165,6 +167,7 @@ class Rollout:
         self._flying: list[InFlight] = []
         self._arrived: deque[tuple[InFlight, int]] = deque()
         self._candidate = 0
+        self._not_fresh: DiscardReason | None = None
         self._fallback_chunks = 0
         self._primitive: tuple[tuple[str, int, int], Array, int] | None = None
         self._newest_accepted_s: float | None = None
@@ -246,11 +249,15 @@ class Rollout:
             return
         counts = self.tally.rejected_by
         counts[verdict.first_reason] = counts.get(verdict.first_reason, 0) + 1
+        # What made one candidate late or void holds for all of its invocation.
+        if verdict.first_layer == FRESH:
+            self._not_fresh = DiscardReason(verdict.first_reason)
         self._candidate += 1
         if self._candidate == len(flying.chunks):
+            reason = self._not_fresh or DiscardReason.INFEASIBLE
             self._next_arrival()
             self.tally.rejections += 1
-            self._write_off(flying, DiscardReason.INFEASIBLE)
+            self._write_off(flying, reason)
 
     def decide(self) -> None:
         """Recover where needed; sets `wanted` if the policy must sample."""
@@ -384,6 +391,7 @@ class Rollout:
     def _next_arrival(self) -> None:
         self._arrived.popleft()
         self._candidate = 0
+        self._not_fresh = None
 
     def _write_off(self, flying: InFlight, reason: DiscardReason) -> None:
         rows = self.fixture.horizons.prediction_horizon
