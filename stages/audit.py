@@ -3,8 +3,9 @@
 from genpolicy.audit.evidence import write_evidence
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.comparison.audit_task import audit_task, round_obstacles
+from genpolicy.comparison.pictures import scene_png
 from genpolicy.feasibility.settings import FeasibilitySettings
-from genpolicy.integrity.atomic import output_folder
+from genpolicy.integrity.atomic import output_folder, write_bytes
 from genpolicy.simulation.execution_settings import ExecutionSettings
 from genpolicy.tasks.api import load_task
 from stages._stage import ARTIFACTS, Params, main
@@ -26,6 +27,7 @@ def work(params: Params) -> None:
         )
         obstacles = round_obstacles(load_task(params.task.name), feasibility)
         write_evidence(result, folder, obstacles=obstacles)
+        write_bytes(folder / "scene.png", scene_png(params.task.name))
 
 
 if __name__ == "__main__":
