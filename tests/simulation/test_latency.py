@@ -92,7 +92,7 @@ def test_a_perturbation_adds_to_its_term_only():
 
 def test_declared_terms_stay_within_their_bounds():
     values = [draw(model(), invocation=n).terms["queue"] for n in range(1, 100)]
-    assert 0.001 <= min(values) and max(values) < 0.003
+    assert min(values) >= 0.001 and max(values) < 0.003
 
 
 def test_quantiles_are_order_statistics_and_never_interpolated():
