@@ -503,6 +503,10 @@ def test_a_chunk_that_feasibility_issued_is_taken_and_a_tampered_one_is_not():
             seal=admission._SEAL,
         )  # fmt: skip
 
+    forged = object.__new__(admission.Admitted)  # behind the seal's back, all else in order
+    for name in ("projected", "actions_sha256", "verdict", "admitted_at_s"):
+        object.__setattr__(forged, name, getattr(issued(), name))
+    assert strict.deliver(forged, 0.0) is R.INFEASIBLE
     good, bad = issued(), issued()
     bad.projected.actions.flags.writeable = True
     bad.projected.actions[0, 0] += 1e-9

@@ -39,7 +39,9 @@ def test_collision_gate(supervisor):
 def test_any_cause_may_stop_it_and_a_limit_of_zero_is_a_limit(supervisor):
     supervisor.protective_stop(0.0, "light curtain")
     assert supervisor.state is SupervisorState.PROTECTIVE_STOP and supervisor.stops == 1
-    touchless = Supervisor(SupervisorSettings({"approach": 0.0}, 0.05, 0.05), Journal("s"))
+    limits = {"approach": 0.0}
+    touchless = Supervisor(SupervisorSettings(limits, 0.05, 0.05), Journal("s"))
+    limits["approach"] = 99.0  # the supervisor keeps its own copy
     assert touchless.observe_force(0.0, 0.0, "approach") is False
     assert touchless.observe_force(0.0, 1e-9, "approach") is True
 
