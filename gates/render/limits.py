@@ -12,7 +12,7 @@ def limit_of(report: GateReport, name: str) -> float | None:
 
 
 def draw_limit(axes: Axes, report: GateReport, name: str, *, horizontal: bool = False) -> None:
-    """Draw the limit of a criterion as a labelled dotted line."""
+    """Draw the limit of a criterion as a labelled dotted line; the axis grows to show it."""
     limit = limit_of(report, name)
     if limit is None:
         return
@@ -20,6 +20,10 @@ def draw_limit(axes: Axes, report: GateReport, name: str, *, horizontal: bool = 
     line(limit, color=INK, ls=":", lw=1.4)
     coordinates = ("axes fraction", "data") if horizontal else ("data", "axes fraction")
     low, high = axes.get_ylim() if horizontal else axes.get_xlim()
+    if not low <= limit <= high:
+        room = 0.05 * (max(high, limit) - min(low, limit))
+        low, high = (min(low, limit - room), max(high, limit + room))
+        (axes.set_ylim if horizontal else axes.set_xlim)(low, high)
     near_start = limit < low + 0.2 * (high - low)
     axes.annotate(
         f"limit {limit:g}",

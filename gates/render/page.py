@@ -13,16 +13,16 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from gates.card import DRAFT_PATH, TrialCard
-from gates.chain import limit_text, measured_text
 from gates.evidence import Evidence
 from gates.gate_e import Params as CardParams
 from gates.gate_e import examine
 from gates.ladder import NAMES
 from gates.models import GATES, Gate, GateReport, read_report, report_bytes
 from gates.render import plots_feasibility, plots_need, plots_stress, plots_time
-from gates.render.figures import Plot, draw_all
+from gates.render.figures import Photo, Plot, draw_all
+from gates.render.guide import BACK_TO, QUESTIONS, READING, words
+from gates.render.table import deciding, groups, passed_by, stops, tally
 from gates.signing import utc_today
-from gates.verdicts import first_unmet
 from genpolicy.errors import IntegrityError
 from genpolicy.integrity.hashing import sha256_bytes
 
@@ -34,14 +34,7 @@ MARKS = {
     "NOT JUDGED": "·",
     "UNREADABLE": "✕",
 }
-QUESTIONS: dict[str, str] = {
-    "A": "Does one observation truly admit several valid actions that simpler policies lose?",
-    "B": "Is a candidate pinned, and does it come back the same: samples, NFE, latency?",
-    "C": "Of many candidates, which are valid in every layer, and does anything else get through?",
-    "D": "On identical starts and deadlines, is the gain larger than its cost?",
-    "E": "Has an independent person read all this and signed a reduced envelope?",
-}
-PLOTS: dict[str, tuple[Plot, ...]] = {
+PLOTS: dict[str, tuple[Plot | Photo, ...]] = {
     "A": plots_need.PLOTS,
     "B": plots_time.PLOTS,
     "C": plots_feasibility.PLOTS,
@@ -62,8 +55,6 @@ def short(value: float) -> str:
 
 def gate_page(root: Path, report: GateReport) -> str:
     """HTML of one gate's report; figures are drawn from the evidence below `root`."""
-    decided = first_unmet(report.criteria, report.verdict)
-    text = f"{measured_text(decided)}, required {limit_text(decided)}" if decided else ""
     state, card = _card(root, report)
     return _render(
         "gate.html",
@@ -71,8 +62,12 @@ def gate_page(root: Path, report: GateReport) -> str:
         report=report,
         name=NAMES[report.gate],
         question=QUESTIONS[report.gate],
-        decided=decided,
-        decided_text=text,
+        decided=deciding(report) or passed_by(report),
+        tally=tally(report),
+        stops=stops(report),
+        groups=groups(report),
+        reading=READING[report.gate],
+        words=words(report.gate),
         pictures=draw_all(PLOTS[report.gate], Evidence(root), report),
         card=card,
         card_state=state,
@@ -91,7 +86,10 @@ def _row(root: Path, gate: Gate) -> dict[str, Any]:
         "gate": gate,
         "name": NAMES[gate],
         "question": QUESTIONS[gate],
+        "back_to": BACK_TO[gate],
         "candidates": {},
+        "stops": {},
+        "tally": "",
         "decided": "",
         "decision": "",
         "report": False,
@@ -103,15 +101,12 @@ def _row(root: Path, gate: Gate) -> dict[str, Any]:
         report, _ = read_report(root, gate)
     except IntegrityError as error:
         return {**row, "verdict": "UNREADABLE", "decision": str(error)}
-    decided = first_unmet(report.criteria, report.verdict)
-    if decided:
-        of = f" ({decided.candidate})" if decided.candidate else ""
-        row["decided"] = (
-            f"{decided.id}{of}: {measured_text(decided)}, required {limit_text(decided)}"
-        )
     row.update(
         verdict=report.verdict,
+        decided=deciding(report) or passed_by(report),
         candidates=report.candidates,
+        stops=stops(report),
+        tally=tally(report),
         decision=report.decision,
         report=True,
     )

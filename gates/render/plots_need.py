@@ -2,13 +2,25 @@
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle
 
 from gates.evidence import Evidence, MissingEvidenceError, flags, numbers
 from gates.models import GateReport
 from gates.need import AUDIT, BASELINES
-from gates.render.figures import BLUE, GREEN, GREY, INK, ORANGE, RED, Plot, new_figure
+from gates.render import plots_scene
+from gates.render.figures import (
+    BLUE,
+    GREEN,
+    GREY,
+    INK,
+    ORANGE,
+    RED,
+    Photo,
+    Plot,
+    in_order,
+    new_figure,
+)
 from gates.render.limits import draw_limit
+from gates.render.plots_scene import SUMMARY, draw_obstacles
 from genpolicy.statistics.intervals import clopper_pearson
 
 FANS = 24
@@ -16,12 +28,17 @@ FANS = 24
 
 def _overlay(evidence: Evidence, report: GateReport) -> Figure:
     path = f"{AUDIT}/neighbourhoods.parquet"
-    columns = ("split", "two_mode", "mean_admissible", "mean_path", "mode_paths")
+    columns = ("split", "two_mode", "mean_admissible", "mean_reason", "mean_path", "mode_paths")
     frame = evidence.frame(path, *columns)
-    frame = frame[flags(frame, "two_mode")].head(FANS)
-    if len(frame) == 0:
-        raise MissingEvidenceError("no situation has two modes")
-    figure, (axes,) = new_figure(height=3.6)
+    held_out = frame["split"].isin(report.settings.get("held_out_splits", []))
+    frame = frame[held_out & flags(frame, "two_mode")]
+    total = len(frame)
+    if total == 0:
+        raise MissingEvidenceError("no held-out situation has two modes")
+    frame = frame.iloc[np.unique(np.linspace(0, total - 1, FANS).round().astype(int))]
+    figure, (axes,) = new_figure(height=3.7)
+    draw_obstacles(axes, evidence)
+    counts = {GREEN: 0, RED: 0}
     for _, row in frame.iterrows():
         for flat in row["mode_paths"]:
             line = np.asarray(flat, dtype=np.float64).reshape(-1, 3)
@@ -29,30 +46,27 @@ def _overlay(evidence: Evidence, report: GateReport) -> Figure:
             axes.plot(line[:, 0], line[:, 1], color=BLUE if left else ORANGE, alpha=0.55, lw=1.2)
         mean = np.asarray(row["mean_path"], dtype=np.float64).reshape(-1, 3)
         rejected = row["mean_admissible"] is not True and not bool(row["mean_admissible"])
-        axes.plot(mean[:, 0], mean[:, 1], color=RED if rejected else GREEN, ls="--", lw=1.4)
-    for obstacle in _obstacles(evidence):
-        place = (float(obstacle["x_m"]), float(obstacle["y_m"]))
-        axes.add_patch(Circle(place, float(obstacle["radius_m"]), color=INK, alpha=0.8))
+        colour = RED if rejected else GREEN
+        counts[colour] += 1
+        axes.plot(mean[:, 0], mean[:, 1], color=colour, ls="--", lw=1.4)
+    reasons = sorted({str(reason) for reason in frame["mean_reason"].dropna()} - {""})
     for colour, style, label in (
-        (BLUE, "-", "mode, left"),
-        (ORANGE, "-", "mode, right"),
-        (RED, "--", "mean, rejected"),
-        (GREEN, "--", "mean, admissible"),
+        (BLUE, "-", "mode, to larger y"),
+        (ORANGE, "-", "mode, to smaller y"),
+        (RED, "--", f"mean, refused: {counts[RED]} of {len(frame)}"),
+        (GREEN, "--", f"mean, admissible: {counts[GREEN]} of {len(frame)}"),
     ):
         axes.plot([], [], color=colour, ls=style, label=label)
     axes.set_aspect("equal", adjustable="datalim")
+    axes.set_title(f"{len(frame)} of {total} held-out situations with two modes, from above")
     axes.set_xlabel("x, m (base frame)")
     axes.set_ylabel("y, m")
-    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    title = "means are refused for\n" + "\n".join(reasons[:4]) if reasons else ""
+    legend = axes.legend(
+        loc="center left", bbox_to_anchor=(1.0, 0.5), title=title, alignment="left"
+    )
+    legend.get_title().set_fontsize(8)
     return figure
-
-
-def _obstacles(evidence: Evidence) -> list[dict[str, float]]:
-    try:
-        found = evidence.document(f"{AUDIT}/summary.json").get("obstacles", [])
-    except MissingEvidenceError:
-        return []
-    return [item for item in found if isinstance(item, dict)]
 
 
 def _strata(evidence: Evidence, report: GateReport) -> Figure:
@@ -71,7 +85,7 @@ def _strata(evidence: Evidence, report: GateReport) -> Figure:
         places, [f"{v} · {p}" for v, p in zip(frame["variable"], frame["phase"], strict=True)]
     )
     draw_limit(axes, report, "strata_effect")
-    axes.set_xlabel(f"effect size (red: adjusted p at most {level:g})")
+    axes.set_xlabel(f"share of uncertainty removed (red: adjusted p at most {level:g})")
     return figure
 
 
@@ -102,40 +116,64 @@ def _baselines(evidence: Evidence, report: GateReport) -> Figure:
     frame = evidence.frame(f"{BASELINES}/modes.parquet", *columns)
     frame = frame[numbers(frame, "modes_present") >= 2]
     share = numbers(frame, "modes_covered") / numbers(frame, "modes_present")
-    means = frame.assign(share=share).groupby(["method", "convention"])["share"].mean()
-    figure, (axes,) = new_figure(height=1.0 + 0.26 * len(means))
-    axes.barh(np.arange(len(means)), means.to_numpy(), color=BLUE, height=0.6)
-    axes.set_yticks(np.arange(len(means)), [f"{m} · {c}" for m, c in means.index])
+    means = (
+        frame.assign(share=share).groupby(["method", "convention"])["share"].agg(["mean", "size"])
+    )
+    deployed = report.settings.get("deployed_conventions", [])
+    order = [key for name in in_order(frame["method"]) for key in means.index if key[0] == name]
+    figure, (axes,) = new_figure(height=1.0 + 0.3 * len(order))
+    for place, (method, convention) in enumerate(order):
+        drawn = convention not in deployed
+        axes.barh(
+            place,
+            float(means.loc[(method, convention), "mean"]),
+            color="white" if drawn else BLUE,
+            edgecolor=BLUE,
+            hatch="//" if drawn else "",
+            height=0.6,
+        )
+    labels = [f"{m} · {c} (n = {int(means.loc[(m, c), 'size'])})" for m, c in order]
+    axes.set_yticks(np.arange(len(order)), labels)
+    axes.invert_yaxis()
     axes.set_xlim(0, 1.02)
     draw_limit(axes, report, "baseline_mode_coverage")
-    axes.set_xlabel("share of modes covered, two-mode situations")
+    axes.set_xlabel("mean share of modes covered, situations with two modes")
     return figure
 
 
-PLOTS = (
+PLOTS: tuple[Plot | Photo, ...] = (
+    *plots_scene.PLOTS,
     Plot(
         "Modes and their mean, in the scene plane",
-        "Solid: recorded modes of held-out situations, seen from above. Dashed: their mean chunk. "
-        "A generator is needed where both fans pass and the dashed line is rejected.",
+        "Solid: the next chunk of nearest neighbours, one line per mode. Dashed: the mean of the "
+        "modes, which is what a policy trained by regression tends to. A generator is needed "
+        "where both fans pass and the mean is refused. Lines are the tool centre; gripper and "
+        "held object are wider, so a mean beside the obstacle may still hit it.",
         f"{AUDIT}/neighbourhoods.parquet",
         _overlay,
+        also=(SUMMARY,),
     ),
     Plot(
         "What explains the modes",
-        "Effect of each recorded variable on mode membership, with intervals. A red bar beyond "
-        "the limit means: give this variable to the policy instead.",
+        "Share of the uncertainty (entropy) about the mode that each recorded variable removes: "
+        "bar the estimate, line its interval. Grey: not significant after Holm's correction. A "
+        "red bar beyond the limit means: give this variable to the policy instead.",
         f"{AUDIT}/strata.parquet",
         _strata,
     ),
     Plot(
         "Success of each mode",
-        "Point: share of successful episodes. Line: exact interval. The gate judges the lower end.",
+        "Point: share of successful episodes that took this mode. Line: exact interval. The gate "
+        "judges the lower end. The audit numbers the modes m0, m1 and so on.",
         f"{AUDIT}/modes.parquet",
         _mode_success,
     ),
     Plot(
         "Modes that the simple policies keep",
-        "A deterministic policy can cover one of two modes at most.",
+        "Share of the modes of a held-out situation that a policy's samples reach. A deterministic "
+        "policy reaches one of two at most, which is 0.5; less means that it lands between them. "
+        "Judged is the best baseline as it is deployed (solid bars); hatched bars draw at random, "
+        "as a generator does.",
         f"{BASELINES}/modes.parquet",
         _baselines,
     ),

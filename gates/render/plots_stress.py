@@ -6,21 +6,42 @@ from matplotlib.figure import Figure
 from gates.evidence import Evidence, MissingEvidenceError, flags, numbers
 from gates.gain import ROLLOUTS
 from gates.models import GateReport
-from gates.render.figures import HATCHES, PALETTE, Plot, colours, new_figure
+from gates.render.figures import (
+    BLUE,
+    GREEN,
+    GREY,
+    HATCHES,
+    ORANGE,
+    PURPLE,
+    RED,
+    Plot,
+    colours,
+    dashes,
+    in_order,
+    new_figure,
+)
 from gates.render.limits import draw_limit
 from genpolicy.statistics.intervals import clopper_pearson
 
-OUTCOMES = ("success", "failed", "timeout", "stopped", "collision")
+OUTCOMES = {
+    "success": GREEN,
+    "failed": PURPLE,
+    "timeout": ORANGE,
+    "stopped": BLUE,
+    "collision": RED,
+}
 
 
 def _success(evidence: Evidence, report: GateReport) -> Figure:
     frame = evidence.frame(ROLLOUTS, "method", "perturbation", "success")
-    methods, conditions = sorted(set(frame["method"])), sorted(set(frame["perturbation"]))
+    methods, conditions = in_order(frame["method"]), sorted(set(frame["perturbation"]))
     conditions.sort(key=lambda name: name != "nominal")
     colour = colours(methods)
     level = float(report.settings.get("confidence", 0.95))
     figure, (axes,) = new_figure(height=1.2 + 0.12 * len(methods) * len(conditions))
     step = 0.8 / len(methods)
+    for place in range(1, len(conditions)):
+        axes.axhline(place - 0.5, color=GREY, lw=0.6)
     for rank, method in enumerate(methods):
         for place, condition in enumerate(conditions):
             rows = frame[(frame["method"] == method) & (frame["perturbation"] == condition)]
@@ -34,7 +55,8 @@ def _success(evidence: Evidence, report: GateReport) -> Figure:
     counts = frame.groupby("perturbation").size()
     labels = [f"{name} (n = {int(counts[name]) // len(methods)} each)" for name in conditions]
     axes.set_yticks(np.arange(len(conditions)), labels)
-    axes.invert_yaxis()
+    axes.set_ylim(len(conditions) - 0.5, -0.5)
+    axes.grid(visible=False, axis="y")
     axes.set_xlim(0, 1.02)
     axes.set_xlabel(f"share of successful rollouts, exact {level:.0%} interval over rollouts")
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
@@ -46,13 +68,14 @@ def _age(evidence: Evidence, report: GateReport) -> Figure:
     frame = frame[numbers(frame, "action_ticks") > 0]
     if len(frame) == 0:
         raise MissingEvidenceError("no rollout executed an action")
-    colour = colours(list(frame["method"]))
+    colour, dash = colours(frame["method"]), dashes(frame["method"])
     figure, (axes,) = new_figure(height=2.8)
-    for method, rows in frame.groupby("method"):
+    for method in in_order(frame["method"]):
+        rows = frame[frame["method"] == method]
         ages = np.sort(numbers(rows, "action_age_p95_s"))
         kept = ages[np.linspace(0, len(ages) - 1, min(len(ages), 200)).astype(int)]
         share = np.linspace(1 / len(kept), 1, len(kept))
-        axes.step(kept, share, where="post", color=colour[str(method)], label=str(method))
+        axes.step(kept, share, where="post", color=colour[method], ls=dash[method], label=method)
     draw_limit(axes, report, "action_age_p95_s")
     axes.set_xlabel("p95 of the action age in a rollout, s")
     axes.set_ylabel("share of rollouts")
@@ -62,7 +85,7 @@ def _age(evidence: Evidence, report: GateReport) -> Figure:
 
 def _outcomes(evidence: Evidence, report: GateReport) -> Figure:
     frame = evidence.frame(ROLLOUTS, "method", "outcome")
-    methods = sorted(set(frame["method"]))
+    methods = in_order(frame["method"])
     names = [*OUTCOMES, *sorted(set(frame["outcome"]) - set(OUTCOMES))]
     figure, (axes,) = new_figure(height=1.0 + 0.32 * len(methods))
     start = np.zeros(len(methods))
@@ -75,13 +98,14 @@ def _outcomes(evidence: Evidence, report: GateReport) -> Figure:
             shares,
             left=start,
             height=0.6,
-            color=PALETTE[(rank + 2) % len(PALETTE)],
+            color=OUTCOMES.get(str(name), GREY),
             hatch=HATCHES[rank % len(HATCHES)],
             edgecolor="white",
             label=str(name),
         )
         start += shares
     axes.set_yticks(np.arange(len(methods)), methods)
+    axes.invert_yaxis()
     axes.set_xlim(0, 1)
     axes.set_xlabel("share of rollouts, all conditions")
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
@@ -90,7 +114,7 @@ def _outcomes(evidence: Evidence, report: GateReport) -> Figure:
 
 def _force(evidence: Evidence, report: GateReport) -> Figure:
     frame = evidence.frame(ROLLOUTS, "method", "force_peak_n")
-    methods = sorted(set(frame["method"]))
+    methods = in_order(frame["method"])
     colour = colours(methods)
     figure, (axes,) = new_figure(height=1.0 + 0.32 * len(methods))
     for place, method in enumerate(methods):
@@ -100,6 +124,8 @@ def _force(evidence: Evidence, report: GateReport) -> Figure:
         axes.plot([middle], [place], "o", color=colour[method])
         axes.plot([values.max()], [place], ">", color=colour[method], ms=4)
     axes.set_yticks(np.arange(len(methods)), methods)
+    axes.set_ylim(len(methods) - 0.4, -0.6)
+    axes.set_xlim(left=0)
     draw_limit(axes, report, "force_peak_p95_n")
     axes.set_xlabel(
         "peak contact force in a rollout, N (dot median, band 5 to 95 %, arrow maximum)"
@@ -110,18 +136,29 @@ def _force(evidence: Evidence, report: GateReport) -> Figure:
 PLOTS = (
     Plot(
         "Success, by condition and method",
-        "All methods began from identical states. Points are shares, lines exact intervals. "
-        "The promotion test itself is paired by start; see the e-value above.",
+        "All methods began from identical states. Point: share of successful rollouts, line: exact "
+        "interval as if rollouts were independent. The promotion test is paired by start and "
+        "stricter; its e-value stands under Criteria.",
         ROLLOUTS,
         _success,
     ),
     Plot(
         "Action age",
-        "How old the observation behind an action is when the controller accepts it; "
-        "dotted: the limit.",
+        "How old the observation behind an action is when the controller accepts it: share of "
+        "rollouts whose 95th percentile is at most this. Dotted: the limit.",
         ROLLOUTS,
         _age,
     ),
-    Plot("How rollouts end", "Each rollout ends in one named outcome.", ROLLOUTS, _outcomes),
-    Plot("Contact force", "Peaks of simulated contact; no limit for hardware.", ROLLOUTS, _force),
+    Plot(
+        "How rollouts end",
+        "Each rollout ends in one named outcome. Stopped: by the supervisor.",
+        ROLLOUTS,
+        _outcomes,
+    ),
+    Plot(
+        "Contact force",
+        "Peaks of simulated contact per rollout. They set no limit for hardware.",
+        ROLLOUTS,
+        _force,
+    ),
 )

@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 from gates.evidence import Evidence, MissingEvidenceError, numbers
 from gates.gate_b import LATENCY, RELOAD, TERMS
 from gates.models import GateReport
-from gates.render.figures import GREY, Plot, colours, new_figure
+from gates.render.figures import GREY, Plot, colours, dashes, in_order, new_figure, plain_ticks
 from gates.render.limits import draw_limit
 
 MILLI = 1e3
@@ -17,7 +17,7 @@ def _latency(evidence: Evidence, report: GateReport) -> Figure:
     warm = frame[frame["temperature"] == "warm"]
     if len(warm) == 0:
         raise MissingEvidenceError("no warm measurement")
-    methods = sorted(set(warm["method"]))
+    methods = in_order(warm["method"])
     colour = colours(methods)
     figure, (axes,) = new_figure(height=1.0 + 0.3 * len(TERMS))
     step = 0.7 / max(len(methods), 1)
@@ -41,6 +41,7 @@ def _latency(evidence: Evidence, report: GateReport) -> Figure:
     )
     axes.invert_yaxis()
     axes.set_xscale("log")
+    plain_ticks(axes.xaxis)
     axes.set_xlabel("warm latency, ms (dot p50, bar p95, arrow maximum)")
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     return figure
@@ -51,29 +52,31 @@ def _coverage(evidence: Evidence, report: GateReport) -> Figure:
     frame = evidence.frame(f"{RELOAD}/coverage.parquet", *columns)
     figure, (left, right) = new_figure(columns=2)
     colour = colours(list(frame["method"]))
-    for method, rows in frame.sort_values("nfe").groupby("method"):
+    dash = dashes(frame["method"])
+    for method in in_order(frame["method"]):
+        rows = frame[frame["method"] == method].sort_values("nfe")
+        look = {"color": colour[method], "ls": dash[method], "marker": "o", "ms": 4}
         nfe = numbers(rows, "nfe")
-        left.plot(nfe, numbers(rows, "modes_covered_share"), "o-", color=colour[str(method)])
-        right.plot(
-            nfe, numbers(rows, "spread_m"), "o-", color=colour[str(method)], label=str(method)
-        )
+        left.plot(nfe, numbers(rows, "modes_covered_share"), **look)
+        right.plot(nfe, numbers(rows, "spread_m"), label=method, **look)
     for axes in (left, right):
         axes.set_xscale("log", base=2)
         ticks = sorted(set(numbers(frame, "nfe").tolist()))
         axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
-        axes.set_xlabel("NFE")
+        axes.set_xlabel("network evaluations per sample (NFE)")
     left.set_ylim(0, 1.05)
+    right.set_ylim(bottom=0)
     left.set_ylabel("share of modes covered")
     draw_limit(left, report, "mode_coverage_lower", horizontal=True)
     right.set_ylabel("spread of samples, m")
-    right.legend(loc="best")
+    figure.legend(loc="outside lower center", ncols=4)
     return figure
 
 
 def _cold(evidence: Evidence, report: GateReport) -> Figure:
     frame = evidence.frame(LATENCY, "method", "component", "run", "temperature", "seconds")
     part = frame[frame["component"] == "sample"]
-    methods = sorted(set(part["method"]))
+    methods = in_order(part["method"])
     colour = colours(methods)
     figure, (axes,) = new_figure(height=2.6)
     for method in methods:
@@ -88,6 +91,9 @@ def _cold(evidence: Evidence, report: GateReport) -> Figure:
             axes.plot(kept, share, ls=style, color=colour[method], label=f"{method}, run {run}")
     axes.axhline(0.95, color=GREY, lw=0.8)
     axes.set_xscale("log")
+    plain_ticks(axes.xaxis)
+    axes.set_ylim(0, 1.02)
+    axes.annotate("p95", (0.0, 0.95), xycoords=("axes fraction", "data"), fontsize=8, va="bottom")
     axes.set_xlabel("time to sample, ms")
     axes.set_ylabel("share of invocations")
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
@@ -97,21 +103,24 @@ def _cold(evidence: Evidence, report: GateReport) -> Figure:
 PLOTS = (
     Plot(
         "Where the time goes",
-        "Eleven terms, each with its p50, p95 and maximum. Declared terms come from settings. "
-        "The p95 values do not add up to the end-to-end p95: slow terms seldom coincide.",
+        "The eleven terms from exposure to queue, logarithmic. Declared terms are drawn from "
+        "settings, the others were measured here, one thread. The p95 values do not add up to "
+        "the end-to-end p95: slow terms seldom coincide.",
         LATENCY,
         _latency,
     ),
     Plot(
         "Modes and spread against NFE",
-        "Fewer evaluations lose spread before they lose the mean; the gate judges the lower bound "
-        "at the chosen NFE.",
+        "Left: share of the modes of held-out situations that samples reach. Right: how far "
+        "samples of one situation lie apart. The gate judges the lower bound at the chosen NFE, "
+        "so points near the limit do not pass.",
         f"{RELOAD}/coverage.parquet",
         _coverage,
     ),
     Plot(
         "Two fresh processes, same latency?",
-        "Distribution of the sampling time in the first (solid) and second (dashed) run.",
+        "Share of invocations whose warm sampling time is at most this long, in the first (solid) "
+        "and second (dashed) process. The gate compares their medians.",
         LATENCY,
         _cold,
     ),

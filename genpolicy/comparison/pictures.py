@@ -31,8 +31,9 @@ def scene_png(task_name: str) -> bytes:
     """
     model, data = _state(load_task(task_name))
     pixels = draw(model, data, width=WIDTH_PX, height=HEIGHT_PX)
+    nothing: Any = {"Software": None}
     sink = io.BytesIO()
-    imsave(sink, pixels, format="png", metadata={"Software": None})
+    imsave(sink, pixels, format="png", metadata=nothing)
     return sink.getvalue()
 
 
