@@ -5,6 +5,7 @@ section of `params.yaml` and the shared ones, refuses unknown keys, and writes i
 or not at all.
 """
 
+import contextlib
 import json
 import os
 import resource
@@ -122,7 +123,8 @@ def main(name: str, work: Callable[[Params], None]) -> NoReturn:
         work: Admits, measures or judges, and writes the outputs.
     """
     started = time.perf_counter()
-    (TIMES / f"{name}.json").unlink(missing_ok=True)
+    with contextlib.suppress(OSError):
+        (TIMES / f"{name}.json").unlink(missing_ok=True)
     try:
         work(load_params())
     except GenpolicyError as error:

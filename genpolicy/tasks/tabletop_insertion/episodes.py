@@ -19,6 +19,7 @@ from genpolicy.recording.episode import (
     ACTION_STREAM,
     CAMERA_STREAM,
     FORCE_STREAM,
+    JOINTS_STREAM,
     PHASE_STREAM,
     ROBOT_STREAM,
     RecordedEpisode,
@@ -51,12 +52,16 @@ CAMERA_RATE_HZ = 30.0
 # Shortest and longest time from exposure to the host, s.
 DELAY_S: dict[str, tuple[float, float]] = {
     ROBOT_STREAM: (0.001, 0.003),
+    JOINTS_STREAM: (0.001, 0.003),
     FORCE_STREAM: (0.001, 0.002),
     CAMERA_STREAM: (0.020, 0.060),
     ACTION_STREAM: (0.0002, 0.0006),
 }
+# The arm's controller stamps joints and TCP with one clock.
+SAME_CLOCK = {JOINTS_STREAM: ROBOT_STREAM}
 # Standard deviations of white sensor noise.
 POSITION_NOISE_M = 0.00003
+JOINT_NOISE_RAD = 0.00005
 FORCE_NOISE_N = 0.15
 CAMERA_NOISE_M = 0.0003
 CAMERA_NOISE_RAD = 0.002
@@ -69,7 +74,10 @@ class Demonstration:
     """What happened, on the true clock, before any sensor looked at it.
 
     Attributes:
-        robot: Sensor step (physics steps since the start), TCP position, rotation, opening, force.
+        steps: Physics steps since the start of each sensor sample. Shape (m,).
+        robot: TCP position, rotation and opening. Shape (m, 10).
+        joints: Joint positions, rad. Shape (m, 7).
+        force: Contact force, N. Shape (m, 3).
         actions: Commanded actions, one per period. Shape (n, 10).
         phases: Phase at the start of each period, and after the last. Length n + 1.
         success: The task's success test held at the end.
@@ -78,6 +86,7 @@ class Demonstration:
 
     steps: Times
     robot: Array
+    joints: Array
     force: Array
     actions: Array
     phases: tuple[str, ...]
@@ -106,6 +115,7 @@ def demonstrate(spec: EpisodeSpec) -> Demonstration:
     )
     steps: list[int] = []
     robot: list[Array] = []
+    joints: list[Array] = []
     force: list[Array] = []
 
     def sample(step: int) -> None:
@@ -114,6 +124,7 @@ def demonstrate(spec: EpisodeSpec) -> Demonstration:
             opening = [world.gripper_opening_m]
             steps.append(step)
             robot.append(np.concatenate([position, rotation_to_6d(rotation), opening]))
+            joints.append(world.q_meas)
             force.append(world.wrench_n)
 
     actions: list[Array] = []
@@ -128,6 +139,7 @@ def demonstrate(spec: EpisodeSpec) -> Demonstration:
     return Demonstration(
         steps=np.array(steps, dtype=np.int64),
         robot=np.array(robot),
+        joints=np.array(joints),
         force=np.array(force),
         actions=np.array(actions),
         phases=tuple(phases),
@@ -144,11 +156,13 @@ def record_episode(spec: EpisodeSpec) -> RecordedEpisode:
     duration_ns = len(done.actions) * period_ns
     robot = done.robot.copy()
     robot[:, :3] += POSITION_NOISE_M * recorder.noise(ROBOT_STREAM, (len(robot), 3))
+    joints = done.joints + JOINT_NOISE_RAD * recorder.noise(JOINTS_STREAM, done.joints.shape)
     force = done.force + FORCE_NOISE_N * recorder.noise(FORCE_STREAM, done.force.shape)
     frames_ns = np.round(np.arange(0, duration_ns, 1e9 / CAMERA_RATE_HZ)).astype(np.int64)
     ticks_ns = period_ns * np.arange(len(done.actions), dtype=np.int64)
     streams = {
         ROBOT_STREAM: recorder.samples(ROBOT_STREAM, STEP_NS * done.steps, robot),
+        JOINTS_STREAM: recorder.samples(JOINTS_STREAM, STEP_NS * done.steps, joints),
         FORCE_STREAM: recorder.samples(FORCE_STREAM, STEP_NS * done.steps, force),
         CAMERA_STREAM: recorder.samples(
             CAMERA_STREAM, frames_ns, _camera(spec, recorder, len(frames_ns))
@@ -201,13 +215,14 @@ class _Recorder:
 
     def offset_ns(self, name: str) -> int:
         """Clock of the stream minus clock of the host, ns."""
-        return round(1e9 * self._offsets_s[name])
+        return round(1e9 * self._offsets_s[SAME_CLOCK.get(name, name)])
 
     def declared_offset_ns(self, name: str) -> int:
         """The same as the calibration measured it; exact for the host's own streams."""
-        if self._offsets_s[name] == 0.0:
+        if self.offset_ns(name) == 0:
             return 0
-        error_s = DECLARED_OFFSET_ERROR_S * self._rng("declared", name).standard_normal()
+        clock = SAME_CLOCK.get(name, name)
+        error_s = DECLARED_OFFSET_ERROR_S * self._rng("declared", clock).standard_normal()
         return self.offset_ns(name) + round(1e9 * error_s)
 
     def samples(self, name: str, elapsed_ns: Times, values: Array) -> StreamSamples:
@@ -246,7 +261,7 @@ def _episode_uuid(spec: EpisodeSpec) -> str:
 
 
 def _metadata(spec: EpisodeSpec, done: Demonstration, recorder: _Recorder) -> dict[str, str]:
-    streams = (ROBOT_STREAM, FORCE_STREAM, CAMERA_STREAM, ACTION_STREAM)
+    streams = (ROBOT_STREAM, JOINTS_STREAM, FORCE_STREAM, CAMERA_STREAM, ACTION_STREAM)
     offsets = {clock_offset_key(name): str(recorder.declared_offset_ns(name)) for name in streams}
     return {
         "task": TASK_NAME,
