@@ -1,0 +1,85 @@
+"""A workspace with `params.yaml` and nothing else, and stages called in it."""
+
+import importlib
+import importlib.util
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+import yaml
+
+from stages._stage import main
+
+ROOT = Path(__file__).parents[2]
+Edit = Callable[[dict[str, Any]], Any]
+
+
+@pytest.fixture
+def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The current folder, with the parameters of the checkout."""
+    (tmp_path / "params.yaml").write_bytes((ROOT / "params.yaml").read_bytes())
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def edit() -> Callable[[Path, Edit], None]:
+    """Change `params.yaml` of a workspace."""
+
+    def change(workspace: Path, how: Edit) -> None:
+        path = workspace / "params.yaml"
+        params = yaml.safe_load(path.read_text())
+        how(params)
+        path.write_text(yaml.safe_dump(params, sort_keys=False))
+
+    return change
+
+
+@pytest.fixture
+def stage(capsys: pytest.CaptureFixture[str]) -> Callable[[str], tuple[int, str]]:
+    """Run a stage in this process, in the current folder; exit code and what it said."""
+
+    def run(name: str) -> tuple[int, str]:
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as end:
+            main(name, importlib.import_module(f"stages.{name}").work)
+        assert isinstance(end.value.code, int)
+        return end.value.code, capsys.readouterr().err
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def process() -> Callable[..., tuple[int, str]]:
+    """Run a stage in a process of its own, with what `subprocess.run` takes; code and stderr."""
+
+    def run(name: str, workspace: Path, **options: Any) -> tuple[int, str]:
+        done = subprocess.run(
+            [sys.executable, "-B", "-m", f"stages.{name}"],
+            cwd=workspace,
+            env={**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"},
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=300,
+            **options,
+        )
+        return done.returncode, done.stderr
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def gate_evidence() -> ModuleType:
+    """The synthetic evidence of the gate tests, on which every gate passes."""
+    path = ROOT / "tests" / "gates" / "evidence.py"
+    spec = importlib.util.spec_from_file_location("stage_gate_evidence", path)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module

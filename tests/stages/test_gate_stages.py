@@ -1,0 +1,138 @@
+"""Gate stages: the report for people, the verdict for the next stage, the numbers for DVC."""
+
+import csv
+import json
+
+import pytest
+import yaml
+
+GATES = ("gate_a", "gate_b", "gate_c", "gate_d")
+
+
+@pytest.fixture
+def evidence(workspace, gate_evidence):
+    """A workspace with evidence on which gates A to D pass, and all sections of the settings."""
+    shared = yaml.safe_load((workspace / "params.yaml").read_text())
+    gate_evidence.build(workspace)
+    own = yaml.safe_load((workspace / "params.yaml").read_text())
+    (workspace / "params.yaml").write_text(yaml.safe_dump({**shared, **own}, sort_keys=False))
+    return workspace
+
+
+def judge(stage, *gates):
+    for gate in gates:
+        code, said = stage(gate)
+        assert code == 0, said
+
+
+def read(workspace, gate, name):
+    return (workspace / "artifacts" / gate / name).read_bytes()
+
+
+def test_each_gate_writes_its_verdict_numbers_and_table(evidence, stage) -> None:
+    judge(stage, *GATES)
+    for gate in GATES:
+        report = json.loads((evidence / "reports" / f"{gate}.json").read_text())
+        token = json.loads(read(evidence, gate, "verdict.json"))
+        assert token == {key: report[key] for key in token}
+        assert set(token) == {"gate", "verdict", "candidates", "materials"}
+        assert token["verdict"] == "PASS"
+        names = [
+            f"{c['candidate']}.{c['id']}" if c["candidate"] else c["id"] for c in report["criteria"]
+        ]
+        metrics = json.loads(read(evidence, gate, "metrics.json"))
+        assert sorted(metrics) == sorted(names)
+        rows = list(csv.DictReader(read(evidence, gate, "criteria.csv").decode().splitlines()))
+        assert [row["criterion"] for row in rows] == names
+        for row, criterion in zip(rows, report["criteria"], strict=True):
+            assert metrics[row["criterion"]] == criterion["measured"]
+            assert float(row["measured"]) == pytest.approx(criterion["measured"], rel=1e-9)
+            assert float(row["threshold"]) == criterion["threshold"]
+            assert row["verdict"] == criterion["verdict"]
+        for suffix in ("md", "html"):
+            assert (evidence / "reports" / f"{gate}.{suffix}").stat().st_size > 200
+    assert (evidence / "reports" / "index.html").is_file()
+
+
+def test_judging_twice_gives_the_same_bytes(evidence, stage) -> None:
+    judge(stage, "gate_a")
+    first = {p: p.read_bytes() for p in evidence.rglob("*gate_a*/*") if p.is_file()}
+    first |= {p: p.read_bytes() for p in (evidence / "reports").iterdir()}
+    judge(stage, "gate_a")
+    assert {p: p.read_bytes() for p in first} == first
+
+
+def test_the_verdict_file_moves_with_verdict_or_evidence_and_not_with_a_limit(
+    evidence, stage, edit, gate_evidence
+) -> None:
+    def limit(value):
+        def change(params):
+            params["gate_a"]["thresholds"]["clock_residual_s"]["limit"] = value
+
+        return change
+
+    judge(stage, "gate_a")
+    before = read(evidence, "gate_a", "verdict.json")
+    report = (evidence / "reports" / "gate_a.json").read_bytes()
+    edit(evidence, limit(0.5))
+    judge(stage, "gate_a")
+    assert read(evidence, "gate_a", "verdict.json") == before
+    assert (evidence / "reports" / "gate_a.json").read_bytes() != report
+    edit(evidence, limit(-1.0))
+    judge(stage, "gate_a")
+    failed = json.loads(read(evidence, "gate_a", "verdict.json"))
+    assert failed["verdict"] == "FAIL"
+    edit(evidence, limit(0.5))
+    gate_evidence.edit_document(
+        evidence, "audit/persistence.json", lambda d: {**d, "null_mean": d["null_mean"] * 0.99}
+    )
+    judge(stage, "gate_a")
+    other = json.loads(read(evidence, "gate_a", "verdict.json"))
+    assert other["verdict"] == "PASS"
+    assert other != json.loads(before), "other evidence is another verdict file"
+
+
+def test_a_failed_gate_ends_with_0_and_its_report_says_fail(evidence, stage, edit) -> None:
+    edit(
+        evidence,
+        lambda p: p["gate_a"]["thresholds"]["held_out_situations"].update(limit=1e9),
+    )
+    judge(stage, "gate_a")
+    report = json.loads((evidence / "reports" / "gate_a.json").read_text())
+    assert report["verdict"] == "FAIL"
+    code, said = stage("generators")
+    assert code == 3
+    assert "Gate A refuses: held_out_situations is" in said
+
+
+def test_missing_evidence_is_inconclusive_never_a_pass(workspace, stage) -> None:
+    for gate in GATES:
+        judge(stage, gate)
+        token = json.loads(read(workspace, gate, "verdict.json"))
+        assert token["verdict"] == "INCONCLUSIVE"
+        assert token["materials"] == {}
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        (
+            lambda t: t.update(clock_residuall_s=dict(t["clock_residual_s"])),
+            "gate_a.thresholds.clock_residuall_s is a threshold of no criterion",
+        ),
+        (lambda t: t["clock_residual_s"].pop("reason"), "gate_a.thresholds.clock_residual_s.reason"),
+        (lambda t: t["clock_residual_s"].update(owner="nobody"), "clock_residual_s.owner is 'nobody'"),
+        (lambda t: t["clock_residual_s"].update(limit="1"), "clock_residual_s.limit is '1'"),
+        (lambda t: t["clock_residual_s"].update(limit=float("nan")), "gate_a"),
+    ],
+)  # fmt: skip
+def test_a_bad_threshold_is_a_bad_setting_and_leaves_no_verdict(
+    evidence, stage, edit, change, sentence
+) -> None:
+    judge(stage, "gate_a")
+    edit(evidence, lambda params: change(params["gate_a"]["thresholds"]))
+    code, said = stage("gate_a")
+    assert (code, said.count("\n")) == (2, 1), said
+    assert sentence in said
+    assert not (evidence / "reports" / "gate_a.json").exists()
+    assert not (evidence / "artifacts" / "gate_a").exists()
