@@ -144,23 +144,28 @@ def not_a_number(case: Case, _: FeasibilityChecker) -> Case:
     return case.with_actions(actions)
 
 
-def collision(case: Case, _: FeasibilityChecker) -> Case | None:
-    """The obstacle stands where the chunk goes; None where the task has no such body."""
-    if "post" not in case.poses:
-        return None
+def collision(case: Case, checker: FeasibilityChecker) -> Case | None:
+    """The obstacle stands where the projected chunk goes; None without such a place or body."""
     actions, rows = case.proposal.actions, case.context.rows(len(case.proposal.actions))
+    if "post" not in case.poses or not np.all(np.isfinite(actions)):
+        return None
+    actions = checker.project(case.proposal, context=case.context).actions
     middle = actions[(rows.start + min(rows.stop, len(actions)) - 1) // 2, POSITION]
     position, quaternion = case.poses["post"]
     at = np.array([middle[0], middle[1], position[2]])
     return case.with_context(scene=SceneState({**case.poses, "post": (at, quaternion)}))
 
 
-def tremble(case: Case, _: FeasibilityChecker) -> Case:
-    """Every other action is 4 mm to the side: smooth enough to look at, too rough to drive."""
-    actions = np.array(case.proposal.actions)
-    actions[1::2, 1] += 0.004
-    actions[::2, 1] -= 0.004
-    return case.with_actions(actions)
+def broken_seam(case: Case, _: FeasibilityChecker) -> Case:
+    """The commands before came in so fast that nothing can go on from them without a jolt.
+
+    A chunk that is merely rough is no such case: projection smooths it.
+    """
+    q_cmd = case.context.q_cmd
+    step_rad = np.zeros_like(q_cmd)
+    step_rad[0] = 3.0 * case.proposal.metadata.action_period_s
+    history = np.stack([q_cmd - 2 * step_rad, q_cmd - step_rad])
+    return case.with_context(q_cmd_history=history)
 
 
 def early_release(case: Case, _: FeasibilityChecker) -> Case:
@@ -207,13 +212,7 @@ CORRUPTIONS = (
     Corruption("scaled_rotation", scaled_rotation, "representation", ("rotation_not_orthonormal",)),
     Corruption("not_a_number", not_a_number, "representation"),
     Corruption("collision", collision, "geometric", ("scene_collision", "swept_collision")),
-    Corruption(
-        "tremble",
-        tremble,
-        "dynamic",
-        ("joint_velocity", "joint_acceleration", "joint_jerk"),
-        ("approach",),
-    ),
+    Corruption("broken_seam", broken_seam, "dynamic", ("joint_acceleration", "joint_jerk")),
     Corruption("early_release", early_release, "contact", ("gripper_opening",), ("approach",)),
     Corruption("awkward_posture", awkward_posture, "kinematic", ("joint_position",), ("approach",)),
 )
