@@ -172,6 +172,18 @@ def test_the_first_admissible_candidate_is_taken(run, kit, plans):
         assert [row["first_reason"] for row in verdicts] == ["finite", None]
 
 
+def test_an_executor_that_forgets_the_phase_is_caught(make_fixture, kit, plans):
+    """Injected fault: chunks of the old phase stay queued; the stub must refuse them."""
+    fixture = make_fixture()
+    rollout = Rollout(fixture, plans.starts[0], 0, calibration_epoch=kit.EPOCH)
+    blind = frozenset({"phase_transition"})
+    rollout.executor._disabled = rollout.executor._queue._disabled = blind
+    kit.drive([rollout], kit.Replay(plans.actions))
+    assert rollout.stub.stale + rollout.stub.invalid > 0
+    offered = {event.payload["reason"] for event in of_kind(rollout, "refuse")}
+    assert offered == {"phase_transition"}
+
+
 # -- slow -----------------------------------------------------------------------------------------
 
 
