@@ -46,19 +46,20 @@ def judge(root: Path, thresholds: Mapping[str, Threshold], params: Params) -> Ga
 
     def diagnosis(criteria: Sequence[Criterion], verdict: Verdict) -> str:
         text = default_diagnosis(SPEC)(criteria, verdict)
-        return f"{text} {_cause(evidence)}".strip()
+        return f"{text} {_cause(evidence, passed=verdict == 'PASS')}".strip()
 
     return judge_gate(SPEC, evidence, thresholds, params, diagnosis=diagnosis)
 
 
-def _cause(evidence: Evidence) -> str:
+def _cause(evidence: Evidence, *, passed: bool) -> str:
     try:
         summary = evidence.document(f"{AUDIT}/summary.json")
     except MissingEvidenceError as error:
         return f"Cause unknown: {error}."
     detail = next((str(summary[key]) for key in ("variable", "kind") if summary.get(key)), "")
     cause = f"{summary.get('cause')}({detail})" if detail else str(summary.get("cause"))
-    return f"Cause found by the audit: {cause}. Next: {summary.get('next_action') or 'none'}"
+    text = f"Cause found by the audit: {cause}."
+    return text if passed else f"{text} Next: {summary.get('next_action') or 'none'}"
 
 
 SPEC = GateSpec(
@@ -67,6 +68,7 @@ SPEC = GateSpec(
         "artifacts/ingest/frames.parquet",
         "artifacts/ingest/episodes.parquet",
         "artifacts/ingest/manifest.json",
+        f"{AUDIT}/scene.png",
         f"{BASELINES}/*/seed_*/model.safetensors",
         f"{BASELINES}/*/seed_*/config.json",
         f"{BASELINES}/offline.parquet",

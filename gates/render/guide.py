@@ -74,6 +74,7 @@ USED: dict[Gate, tuple[str, ...]] = {
 }
 UNITS: tuple[tuple[str, str], ...] = (
     ("_m_s3", "m/s³"),
+    ("_m_s", "m/s"),
     ("_steps", "action steps"),
     ("_s", "s"),
     ("_m", "m"),
@@ -84,6 +85,13 @@ UNITS: tuple[tuple[str, str], ...] = (
 def unit(criterion: str) -> str:
     """Unit of a criterion by the suffix of its name; empty for counts, shares and ratios."""
     return next((text for suffix, text in UNITS if criterion.endswith(suffix)), "")
+
+
+def label(name: str) -> str:
+    """A field's name as a reader writes it, its unit behind a comma."""
+    suffix, text = next(((s, t) for s, t in UNITS if name.endswith(s)), ("", ""))
+    plain = name.removesuffix(suffix).replace("_", " ")
+    return f"{plain}, {text}" if text else plain
 
 
 def words(gate: Gate) -> list[tuple[str, str]]:

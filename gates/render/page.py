@@ -20,7 +20,7 @@ from gates.ladder import NAMES
 from gates.models import GATES, Gate, GateReport, read_report, report_bytes
 from gates.render import plots_feasibility, plots_need, plots_stress, plots_time
 from gates.render.figures import Photo, Plot, draw_all
-from gates.render.guide import BACK_TO, QUESTIONS, READING, words
+from gates.render.guide import BACK_TO, QUESTIONS, READING, label, words
 from gates.render.table import deciding, groups, passed_by, stops, tally
 from gates.signing import utc_today
 from genpolicy.errors import IntegrityError
@@ -113,7 +113,7 @@ def _row(root: Path, gate: Gate) -> dict[str, Any]:
     return row
 
 
-def _card(root: Path, report: GateReport) -> tuple[str, list[tuple[str, str]]]:
+def _card(root: Path, report: GateReport) -> tuple[str, list[tuple[str, list[str]]]]:
     if report.gate != "E" or not (root / DRAFT_PATH).is_file():
         return "", []
     params = CardParams.model_validate_json(json.dumps(report.settings))
@@ -122,17 +122,18 @@ def _card(root: Path, report: GateReport) -> tuple[str, list[tuple[str, str]]]:
     if card is None:
         return "", []
     state = "signed" if dossier.signed else "draft, not signed"
-    return state, [(key, _field(value)) for key, value in card.model_dump(mode="json").items()]
+    return state, [(label(k), _lines(value)) for k, value in card.model_dump(mode="json").items()]
 
 
-def _field(value: Any) -> str:
+def _lines(value: Any) -> list[str]:
+    """A field of the card as lines of text; none if it is empty."""
     if value in (None, "", [], {}):
-        return ""
+        return []
     if isinstance(value, dict):
-        return "; ".join(f"{key}: {item}" for key, item in value.items())
-    if isinstance(value, list):
-        return "; ".join(str(item) for item in value)
-    return str(value)
+        return [f"{key}: {item}" for key, item in value.items()]
+    if isinstance(value, list) and not any(isinstance(item, str) for item in value):
+        return [", ".join(str(item) for item in value)]
+    return [str(item) for item in value] if isinstance(value, list) else [str(value)]
 
 
 def _render(template: str, **values: Any) -> str:

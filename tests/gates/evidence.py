@@ -1,5 +1,6 @@
 """Small synthetic evidence on which every gate passes, and the settings that judge it."""
 
+import base64
 import copy
 import hashlib
 import json
@@ -19,6 +20,10 @@ BASELINES = ("bc", "chunked_bc", "act")
 CANDIDATES = ("diffusion", "flow")
 CONDITIONS = ("nominal", "camera_delay", "compute_contention")
 STARTS = 40
+PNG = base64.b64decode(
+    "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAAAAAA6fptVAAAACklEQVR4nGNgAAAAAgABSK+kcQAAAABJRU5ErkJggg=="
+)
+"""The smallest grey picture: one pixel."""
 SPEED = {"diffusion": 0.02, "flow": 0.01}
 
 
@@ -186,11 +191,35 @@ def _dataset(root: Path) -> None:
         root, "ingest/refusals.json", {"found": 50, "accepted": 49, "refused": [{"file": "x"}]}
     )
     document(root, "ingest/manifest.json", {"schema_version": 1})
-    table(root, "ingest/frames.parquet", [{"index": 0}])
-    table(root, "ingest/episodes.parquet", [{"episode_uuid": "e0"}])
+    rows = range(9)
+    table(
+        root,
+        "ingest/frames.parquet",
+        [
+            {"episode_uuid": f"e{e}", "index": i, "action": [0.38 + 0.03 * i, _bow(e, i), 0.15] * 3}
+            for e in range(4)
+            for i in rows
+        ],
+    )
+    table(
+        root,
+        "ingest/episodes.parquet",
+        [
+            {"episode_uuid": f"e{e}", "outcome": "failure" if e == 3 else "success"}
+            for e in range(4)
+        ],
+    )
+
+
+def _bow(episode: int, index: int) -> float:
+    """Lateral position of a path that passes on the left in even episodes, else on the right."""
+    return 0.13 * (1 if episode % 2 == 0 else -1) * (1 - ((index - 4) / 4) ** 2)
 
 
 def _audit(root: Path) -> None:
+    photo = root / "artifacts/audit/scene.png"
+    photo.parent.mkdir(parents=True, exist_ok=True)
+    photo.write_bytes(PNG)
     table(
         root,
         "audit/clocks.parquet",
