@@ -18,6 +18,7 @@ from gates.admission import prove_chain
 from gates.chain import limit_text, measured_text
 from gates.ladder import Rung, decided_text, prove_all
 from gates.models import GATES, Gate, read_report
+from gates.overview import as_text, overview
 from gates.registry import read_section
 from gates.signing import sign_card
 from genpolicy.errors import BadInputError, GenpolicyError
@@ -30,6 +31,7 @@ app = typer.Typer(
 )
 Root = Annotated[Path, typer.Option(help="Repository root.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON instead of text.")]
+INDEX = "reports/index.html"
 Letter = Annotated[str, typer.Argument(help="Gate: A, B, C, D or E.")]
 
 
@@ -165,10 +167,14 @@ def verify_card(
 @_clean
 def summary(root: Root = Path(), as_json: AsJson = False) -> None:
     """The ladder in one table, each report proved; always exits 0."""
-    rungs = prove_all(root)
-    _print_rungs(rungs, as_json)
-    if not as_json:
-        typer.echo("Reports: reports/index.html")
+    lines = overview(root, prove_all(root))
+    if as_json:
+        rows = [dataclasses.asdict(line) for line in lines]
+        typer.echo(json.dumps(rows, indent=2, ensure_ascii=False))
+        return
+    typer.echo(as_text(lines))
+    if (root / INDEX).is_file():
+        typer.echo(f"Reports: {INDEX}")
 
 
 def _day(text: str) -> datetime.date:

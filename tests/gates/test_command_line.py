@@ -7,6 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from gates.__main__ import app
+from gates.admission import STAGE_REQUIRES
 
 RUN = CliRunner()
 
@@ -27,13 +28,17 @@ def test_check_passes_through_d_and_not_through_e(ladder):
     assert "NOT JUDGED" in result.output
 
 
-def test_summary_prints_one_line_per_gate_and_exits_0(ladder):
+def test_summary_prints_one_line_per_stage_and_exits_0(ladder):
     result = _run(ladder, "summary")
     assert result.exit_code == 0
-    assert [line[0] for line in result.output.splitlines()[:5]] == list("ABCDE")
-    assert "reports/index.html" in result.output
+    stages = [line.split()[0] for line in result.output.splitlines()[1:16]]
+    assert stages == list(STAGE_REQUIRES)
+    assert "reports/index.html" not in result.output, "a page that is not there is not announced"
+    (ladder / "reports" / "index.html").write_text("")
+    assert "reports/index.html" in _run(ladder, "summary").output
     rows = json.loads(_run(ladder, "summary", "--json").output)
-    assert [row["gate"] for row in rows] == list("ABCDE")
+    verdicts = {row["stage"]: row["verdict"] for row in rows}
+    assert [verdicts[f"gate_{letter}"] for letter in "abcd"] == ["PASS"] * 4
 
 
 def test_verify_finds_a_changed_byte(ladder):
