@@ -1,10 +1,16 @@
 """A toy ladder: three stages behind two gates, without any numeric library."""
 
+import fcntl
+import socket
+import struct
 import subprocess
 import textwrap
 from pathlib import Path
 
 import pytest
+
+# Prefect talks to its own server over the loopback interface; without any network it is down.
+SIOCGIFFLAGS, SIOCSIFFLAGS, IFF_UP = 0x8913, 0x8914, 0x1
 
 STAGE = """
 import pathlib, sys, yaml
@@ -52,3 +58,36 @@ def checkout(tmp_path: Path) -> Path:
     (folder / "dvc.yaml").write_text("\n".join(lines) + "\n")
     subprocess.run(["git", "init", "-q", str(folder)], check=True)
     return folder
+
+
+def _loopback_works() -> bool:
+    with socket.socket() as listener, socket.socket() as caller:
+        try:
+            listener.bind(("127.0.0.1", 0))
+            listener.listen(1)
+            caller.settimeout(1.0)
+            caller.connect(listener.getsockname())
+        except OSError:
+            return False
+    return True
+
+
+def _raise_loopback() -> None:
+    """`ip link set lo up`, which a fresh network namespace leaves to its user."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as handle:
+        request = struct.pack("16sh14x", b"lo", 0)
+        flags = struct.unpack("16sh14x", fcntl.ioctl(handle, SIOCGIFFLAGS, request))[1]
+        fcntl.ioctl(handle, SIOCSIFFLAGS, struct.pack("16sh14x", b"lo", flags | IFF_UP))
+
+
+@pytest.fixture(scope="session", autouse=True)
+def loopback() -> None:
+    """A machine that can talk to itself, also where there is no network at all."""
+    if _loopback_works():
+        return
+    try:
+        _raise_loopback()
+    except OSError as error:
+        pytest.skip(f"the loopback interface is down and cannot be raised ({error.strerror})")
+    if not _loopback_works():
+        pytest.skip("the loopback interface is down")
