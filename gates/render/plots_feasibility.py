@@ -1,13 +1,16 @@
 """Figures of Gate C: rejection waterfall, size of projection, boundary jerk."""
 
+from typing import Any
+
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from gates.evidence import Evidence, MissingEvidenceError, flags
 from gates.gate_c import CANDIDATES, HELD_OUT, LAYERS, admissible
 from gates.models import GateReport
-from gates.render.figures import HATCHES, Plot, colours, dashes, in_order, new_figure
+from gates.render.figures import GREY, HATCHES, Plot, colours, dashes, in_order, new_figure
 from gates.render.limits import draw_limit
 
 
@@ -51,42 +54,45 @@ def _waterfall(evidence: Evidence, report: GateReport) -> Figure:
     return figure
 
 
-def _curve(evidence: Evidence, column: str, by: str) -> pd.DataFrame:
+def _admitted(evidence: Evidence, column: str) -> pd.DataFrame:
     frame = evidence.frame(CANDIDATES, "method", "mode", "fixture", column, *LAYERS)
     frame = frame[(frame["fixture"] == HELD_OUT).to_numpy()]
     frame = frame[admissible(frame) == 1.0].dropna(subset=[column])
     if len(frame) == 0:
         raise MissingEvidenceError("no admissible held-out candidate")
-    frame = frame.assign(mode=frame["mode"].fillna("").replace("", "unassigned"))
-    lines: pd.DataFrame = frame.assign(
-        line=frame["method"] + (" · " + frame["mode"] if by == "mode" else "")
-    )
-    return lines
+    named: pd.DataFrame = frame.assign(mode=frame["mode"].fillna("").replace("", "unassigned"))
+    return named
 
 
 def _distribution(
     evidence: Evidence, report: GateReport, *, column: str, by: str, label: str, name: str
 ) -> Figure:
-    frame = _curve(evidence, column, by)
+    frame = _admitted(evidence, column)
     colour, dash = colours(frame["method"]), dashes(frame[by])
-    figure, (axes,) = new_figure(height=2.8)
-    ordered = [
-        line
-        for method in in_order(frame["method"])
-        for line in sorted(set(frame.loc[frame["method"] == method, "line"]))
-    ]
-    for line in ordered:
-        rows = frame[frame["line"] == line]
-        look = {"color": colour[rows["method"].iloc[0]], "ls": dash[rows[by].iloc[0]]}
-        values = np.sort(np.abs(rows[column].to_numpy(dtype=np.float64)))
-        kept = values[np.linspace(0, len(values) - 1, min(len(values), 200)).astype(int)]
-        share = np.linspace(1 / len(kept), 1, len(kept))
-        axes.step(kept, share, where="post", label=f"{line} (n = {len(values)})", **look)
+    figure, (axes,) = new_figure(height=3.4 if by == "mode" else 2.8)
+    for method in in_order(frame["method"]):
+        own = frame[frame["method"] == method]
+        if by == "mode":
+            _draw_curve(axes, own[column], f"{method} · all", color=colour[method], lw=2.6)
+        for name_of, rows in own.groupby(by):
+            text = method if by == "method" else f"{method} · {name_of}"
+            look = {"color": colour[method], "ls": dash[str(name_of)], "lw": 1.2}
+            _draw_curve(axes, rows[column], text, **look)
+    axes.axhline(0.95, color=GREY, lw=0.8)
+    axes.set_ylim(0, 1.12)
     draw_limit(axes, report, name)
     axes.set_xlabel(label)
-    axes.set_ylabel("share of candidates")
+    axes.set_ylabel("share of chunks (line: 95 %)")
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     return figure
+
+
+def _draw_curve(axes: Axes, column: "pd.Series[float]", text: str, **look: Any) -> None:
+    """Share of values that are at most this, at 200 of them or fewer."""
+    values = np.sort(np.abs(column.to_numpy(dtype=np.float64)))
+    kept = values[np.linspace(0, len(values) - 1, min(len(values), 200)).astype(int)]
+    share = np.linspace(1 / len(kept), 1, len(kept))
+    axes.step(kept, share, where="post", label=f"{text} (n = {len(values)})", **look)
 
 
 def _projection(evidence: Evidence, report: GateReport) -> Figure:
@@ -122,7 +128,8 @@ PLOTS = (
     Plot(
         "Size of projection, by mode",
         "Admissible chunks of held-out observations: share that projection moved by at most this "
-        "much. A mode whose curve lies far to the right is being bent into the feasible set.",
+        "much. Thick: all of a method, which the gate holds against the limit at 95 %. Thin: by "
+        "mode; one that lies far to the right is being bent into the feasible set.",
         CANDIDATES,
         _projection,
     ),

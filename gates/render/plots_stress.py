@@ -11,9 +11,11 @@ from gates.render.figures import (
     GREEN,
     GREY,
     HATCHES,
+    INK,
     ORANGE,
     PURPLE,
     RED,
+    SKY,
     Plot,
     colours,
     dashes,
@@ -27,9 +29,12 @@ OUTCOMES = {
     "success": GREEN,
     "failed": PURPLE,
     "timeout": ORANGE,
-    "stopped": BLUE,
+    "intervention": BLUE,
+    "force_stop": SKY,
+    "stopped": GREY,
     "collision": RED,
 }
+"""Known outcomes, best first; a colour stays with its outcome in every report."""
 
 
 def _success(evidence: Evidence, report: GateReport) -> Figure:
@@ -76,6 +81,7 @@ def _age(evidence: Evidence, report: GateReport) -> Figure:
         kept = ages[np.linspace(0, len(ages) - 1, min(len(ages), 200)).astype(int)]
         share = np.linspace(1 / len(kept), 1, len(kept))
         axes.step(kept, share, where="post", color=colour[method], ls=dash[method], label=method)
+    axes.set_ylim(0, 1.12)
     draw_limit(axes, report, "action_age_p95_s")
     axes.set_xlabel("p95 of the action age in a rollout, s")
     axes.set_ylabel("share of rollouts")
@@ -86,10 +92,12 @@ def _age(evidence: Evidence, report: GateReport) -> Figure:
 def _outcomes(evidence: Evidence, report: GateReport) -> Figure:
     frame = evidence.frame(ROLLOUTS, "method", "outcome")
     methods = in_order(frame["method"])
-    names = [*OUTCOMES, *sorted(set(frame["outcome"]) - set(OUTCOMES))]
+    seen = set(frame["outcome"])
+    names = [*(name for name in OUTCOMES if name in seen), *sorted(seen - set(OUTCOMES))]
     figure, (axes,) = new_figure(height=1.0 + 0.32 * len(methods))
+    hatches = [*OUTCOMES, *names]
     start = np.zeros(len(methods))
-    for rank, name in enumerate(names):
+    for name in names:
         shares = np.array(
             [float((frame.loc[frame["method"] == m, "outcome"] == name).mean()) for m in methods]
         )
@@ -98,8 +106,8 @@ def _outcomes(evidence: Evidence, report: GateReport) -> Figure:
             shares,
             left=start,
             height=0.6,
-            color=OUTCOMES.get(str(name), GREY),
-            hatch=HATCHES[rank % len(HATCHES)],
+            color=OUTCOMES.get(str(name), INK),
+            hatch=HATCHES[hatches.index(name) % len(HATCHES)],
             edgecolor="white",
             label=str(name),
         )
@@ -151,7 +159,8 @@ PLOTS = (
     ),
     Plot(
         "How rollouts end",
-        "Each rollout ends in one named outcome. Stopped: by the supervisor.",
+        "Each rollout ends in one named outcome. Intervention: recovery asked for a person. Force "
+        "stop: the supervisor stopped on contact force.",
         ROLLOUTS,
         _outcomes,
     ),
