@@ -65,7 +65,8 @@ ladder: env
 smoke: env
 	@python -m flows.workspace build/smoke --overrides params.smoke.yaml; \
 	code=0; python -m flows.reproduce --workspace build/smoke || code=$$?; \
-	(cd build/smoke && python -m gates summary) || true; exit $$code
+	(cd build/smoke && python -m gates summary) || true; \
+	echo "This was the smoke ladder, in build/smoke; open build/smoke/reports/index.html"; exit $$code
 
 test: env
 	@code=0; $(MAKE) --no-print-directory lint || code=1; \

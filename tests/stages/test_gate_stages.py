@@ -120,10 +120,10 @@ def test_missing_evidence_is_inconclusive_never_a_pass(workspace, stage) -> None
             lambda t: t.update(clock_residuall_s=dict(t["clock_residual_s"])),
             "gate_a.thresholds.clock_residuall_s is a threshold of no criterion",
         ),
-        (lambda t: t["clock_residual_s"].pop("reason"), "gate_a.thresholds.clock_residual_s.reason"),
-        (lambda t: t["clock_residual_s"].update(owner="nobody"), "clock_residual_s.owner is 'nobody'"),
-        (lambda t: t["clock_residual_s"].update(limit="1"), "clock_residual_s.limit is '1'"),
-        (lambda t: t["clock_residual_s"].update(limit=float("nan")), "gate_a"),
+        (lambda t: t["lag_spread_steps"].pop("reason"), "thresholds.lag_spread_steps.reason"),
+        (lambda t: t["lag_spread_steps"].update(owner="me"), "lag_spread_steps.owner is 'me'"),
+        (lambda t: t["lag_spread_steps"].update(limit="1"), "lag_spread_steps.limit is '1'"),
+        (lambda t: t["lag_spread_steps"].update(limit=float("nan")), "gate_a"),
     ],
 )  # fmt: skip
 def test_a_bad_threshold_is_a_bad_setting_and_leaves_no_verdict(

@@ -1,0 +1,123 @@
+"""A small ladder in a workspace of its own, copies of it, and what changed between two looks."""
+
+import hashlib
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from flows.reproduce import Outcome, reproduce, stage_environment
+from flows.workspace import make_workspace
+from gates.registry import LOWER
+
+ROOT = Path(__file__).parents[2]
+OVERRIDES = Path(__file__).with_name("overrides.yaml")
+REASON = "test: proves only that the pipeline runs"
+DROPPED = {
+    "baselines": ("samplers.bc", "samplers.act", "conventions.act"),
+    "generators": ("samplers.cvae",),
+    "stress": tuple(
+        f"perturbations.{name}"
+        for name in ("compute_contention", "network_jitter", "queue_reorder", "push")
+    ),
+}
+
+
+def make_small_ladder(target: Path) -> Path:
+    """The checkout as a workspace with few of everything, and limits that nothing breaks."""
+    overrides = yaml.safe_load(OVERRIDES.read_text())
+    for gate, judge in LOWER.items():
+        limits = {
+            item.id: {"limit": 1e9 if item.comparison == "<=" else -1e9, "reason": REASON}
+            for item in judge.spec.criteria
+        }
+        overrides.setdefault(f"gate_{gate.lower()}", {})["thresholds"] = limits
+    gate_d = overrides["gate_d"]
+    gate_d["thresholds"]["promotion_e_value"]["limit"] = 1.0 / gate_d["alpha"]
+    make_workspace(ROOT, target, overrides)
+
+    def drop(params: dict[str, Any]) -> None:
+        for section, places in DROPPED.items():
+            for place in places:
+                name, key = place.split(".")
+                del params[section][name][key]
+
+    edit_params(target, drop)
+    return target
+
+
+def edit_params(workspace: Path, change: Callable[[dict[str, Any]], Any]) -> None:
+    """Change `params.yaml` of a workspace."""
+    path = workspace / "params.yaml"
+    params = yaml.safe_load(path.read_text())
+    change(params)
+    path.write_text(yaml.safe_dump(params, sort_keys=False))
+
+
+def set_limit(workspace: Path, gate: str, criterion: str, limit: float) -> None:
+    """Move one threshold."""
+
+    def change(params: dict[str, Any]) -> None:
+        params[gate]["thresholds"][criterion]["limit"] = limit
+
+    edit_params(workspace, change)
+
+
+def copy_of(workspace: Path, target: Path) -> Path:
+    """An independent copy, with DVC's cache and lock; times are kept."""
+    shutil.copytree(workspace, target, symlinks=True)
+    return target
+
+
+def repro(workspace: Path, *stages: str, **options: Any) -> tuple[Outcome, list[str]]:
+    """A real `dvc repro`; the outcome, and the stages that ran."""
+    lines: list[str] = []
+    outcome = reproduce(workspace, stages=stages, echo=lines.append, **options)
+    ran = [line.split("'")[1] for line in lines if line.startswith("Running stage '")]
+    return outcome, ran
+
+
+def run_stage(workspace: Path, name: str) -> tuple[int, str]:
+    """`python -m stages.<name>` without DVC; exit code and what it said."""
+    done = subprocess.run(
+        [sys.executable, "-m", f"stages.{name}"],
+        cwd=workspace,
+        env=stage_environment(workspace),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    said = [line for line in done.stderr.splitlines() if line.startswith(f"{name}: ")]
+    return done.returncode, said[-1] if said else done.stderr
+
+
+def hashes(workspace: Path, *folders: str, leave: Iterable[str] = ()) -> dict[str, str]:
+    """SHA-256 of every file below the folders, by path; `leave` names prefixes to leave out."""
+    left = tuple(leave)
+    return {
+        name: hashlib.sha256(path.read_bytes()).hexdigest()
+        for folder in folders
+        for path in sorted((workspace / folder).rglob("*"))
+        if path.is_file() and not (name := path.relative_to(workspace).as_posix()).startswith(left)
+    }
+
+
+def half_written(workspace: Path) -> list[str]:
+    """Temporary files and locks that a dead writer left beside the artifacts."""
+    return [path.name for path in (workspace / "artifacts").glob(".*")]
+
+
+def flip_a_bit(path: Path) -> None:
+    """Change one bit in the middle of a file; size and times stay."""
+    times = path.stat()
+    with path.open("r+b") as stream:
+        stream.seek(times.st_size // 2)
+        byte = stream.read(1)[0]
+        stream.seek(-1, os.SEEK_CUR)
+        stream.write(bytes([byte ^ 1]))
+    os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))

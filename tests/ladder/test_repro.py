@@ -1,0 +1,99 @@
+"""What runs again, and what does not, after nothing or a threshold has changed."""
+
+import json
+from pathlib import Path
+
+from ladder_workspace import edit_params, hashes, repro, set_limit
+
+GATES = [f"gate_{letter}" for letter in "abcde"]
+EVIDENCE = [
+    "record", "ingest", "audit", "baselines", "generators", "reload", "latency", "shadow",
+    "stress",
+]  # fmt: skip
+
+
+def verdicts(workspace: Path) -> dict[str, str]:
+    return {
+        gate: json.loads((workspace / "reports" / f"{gate}.json").read_text())["verdict"]
+        for gate in GATES
+        if (workspace / "reports" / f"{gate}.json").exists()
+    }
+
+
+def test_the_ladder_runs_through_all_five_gates_and_waits_for_a_person(finished: Path) -> None:
+    assert verdicts(finished) == {
+        **dict.fromkeys(GATES[:4], "PASS"),
+        "gate_e": "PENDING_REVIEW",
+    }
+    assert (finished / "artifacts" / "card" / "card.json").is_file()
+    for gate in GATES:
+        for suffix in ("json", "md", "html"):
+            assert (finished / "reports" / f"{gate}.{suffix}").stat().st_size > 200
+        names = {path.name for path in (finished / "artifacts" / gate).iterdir()}
+        assert names == {"verdict.json", "metrics.json", "criteria.csv"}
+    assert not list((finished / "artifacts").glob(".*"))
+
+
+def test_a_second_repro_does_nothing_and_takes_seconds(copy: Path) -> None:
+    before = hashes(copy, "artifacts", "reports")
+    lock = (copy / "dvc.lock").read_bytes()
+    outcome, ran = repro(copy)
+    assert (outcome.code, ran) == (0, [])
+    assert hashes(copy, "artifacts", "reports") == before
+    assert (copy / "dvc.lock").read_bytes() == lock
+    print(f"no-op repro: {outcome.duration_s:.2f} s")
+    assert outcome.duration_s < 20.0, "the promise is 5 s on a machine of its own"
+
+
+def test_judging_one_gate_again_changes_its_report_only(copy: Path) -> None:
+    """A moved threshold, `dvc repro -s gate_c`: seconds, and nothing but that gate's report."""
+    before = hashes(copy, "artifacts", "reports")
+    set_limit(copy, "gate_c", "projection_p95_m", 1e8)
+    outcome, ran = repro(copy, "gate_c", single_item=True)
+    assert (outcome.code, ran) == (0, ["gate_c"])
+    after = hashes(copy, "artifacts", "reports")
+    changed = {name for name in before | after if before.get(name) != after.get(name)}
+    assert changed <= {
+        "reports/gate_c.json", "reports/gate_c.md", "reports/gate_c.html", "reports/index.html",
+        "artifacts/gate_c/criteria.csv",
+    }  # fmt: skip
+    assert "reports/gate_c.json" in changed
+    print(f"re-judging one gate: {outcome.duration_s:.2f} s")
+    assert outcome.duration_s < 20.0, "the promise is 5 s on a machine of its own"
+
+
+def test_a_threshold_within_the_same_verdict_judges_again_and_trains_nothing(copy: Path) -> None:
+    evidence = [f"artifacts/{name}" for name in EVIDENCE]
+    before = hashes(copy, *evidence)
+    set_limit(copy, "gate_a", "clock_residual_s", 1e8)
+    outcome, ran = repro(copy)
+    assert outcome.code == 0, outcome.sentence
+    assert not set(ran) & set(EVIDENCE), ran
+    assert set(ran) >= set(GATES), "a new report below is a new upstream for every gate above"
+    assert hashes(copy, *evidence) == before
+    assert verdicts(copy)["gate_d"] == "PASS"
+
+
+def test_an_edited_report_is_put_right_by_repro(copy: Path) -> None:
+    report = copy / "reports" / "gate_b.json"
+    before = report.read_bytes()
+    report.write_bytes(before.replace(b'"PASS"', b'"FAIL"', 1))
+    outcome, ran = repro(copy)
+    assert outcome.code == 0, outcome.sentence
+    assert ran == ["gate_b"]
+    assert report.read_bytes() == before
+
+
+def test_the_number_of_workers_changes_no_byte(copy: Path) -> None:
+    """Two workers made the finished ladder; one makes the same recordings, dataset and audit."""
+    folders = [f"artifacts/{name}" for name in ("record", "ingest", "audit")]
+    before = hashes(copy, *folders)
+
+    def one_worker(params: dict) -> None:
+        assert params["compute"]["workers"] == 2
+        params["compute"]["workers"] = 1
+
+    edit_params(copy, one_worker)
+    outcome, ran = repro(copy, "record", "ingest", "audit", single_item=True, force=True)
+    assert (outcome.code, ran) == (0, ["record", "ingest", "audit"])
+    assert hashes(copy, *folders) == before
