@@ -16,6 +16,7 @@ SAMPLERS = {
     "bc": ("direct", 1),
     "chunked_bc": ("direct", 1),
     "act": ("z_zero", 1),
+    "cvae": ("z_prior", 1),
     "diffusion": ("ddim", 10),
     "flow": ("euler", 8),
 }

@@ -10,7 +10,7 @@ from genpolicy.policies.policy import load_policy
 from genpolicy.policies.settings import SamplerConfig
 from genpolicy.policies.training import train
 
-STEPS = {"bc": 1, "chunked_bc": 1, "act": 1, "diffusion": 10, "flow": 8}
+STEPS = {"bc": 1, "chunked_bc": 1, "act": 1, "cvae": 1, "diffusion": 10, "flow": 8}
 STOCHASTIC = {"act": ("z_prior", 1), "diffusion": ("ddim", 10), "flow": ("euler", 8)}
 
 

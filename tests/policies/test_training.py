@@ -10,6 +10,7 @@ import torch
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.contract.settings import parse_settings
 from genpolicy.errors import ConfigError, ContractError, NonFiniteError
+from genpolicy.policies.checkpoint import load_checkpoint
 from genpolicy.policies.determinism import deterministic
 from genpolicy.policies.methods import METHODS, method_named
 from genpolicy.policies.networks import (
@@ -216,3 +217,10 @@ def test_a_row_keeps_its_bits_at_every_place_of_a_batch(method, rows):
     with deterministic("cpu"), torch.inference_mode():
         out = network.evaluate(network.encode(observations), values, time)
     assert all(torch.equal(out[0], row) for row in out)
+
+
+def test_cvae_is_act_drawn_from_its_prior(folders):
+    act, cvae = (load_checkpoint(folders[name]) for name in ("act", "cvae"))
+    assert act.config.method != cvae.config.method
+    weights = cvae.network.state_dict()
+    assert all(torch.equal(weights[k], v) for k, v in act.network.state_dict().items())
