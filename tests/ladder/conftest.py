@@ -39,3 +39,10 @@ def copy(finished: Path, tmp_path: Path) -> Iterator[Path]:
     """An independent copy of the finished workspace."""
     yield copy_of(finished, tmp_path / "copy")
     rmtree(tmp_path / "copy", ignore_errors=True)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """The first test waits for the whole small ladder, which a busy machine makes slow."""
+    for item in items:
+        if Path(__file__).parent in item.path.parents:
+            item.add_marker(pytest.mark.timeout(1800))
