@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from genpolicy.audit.method_modes import (
+from genpolicy.comparison.method_modes import (
     ModeSituation,
     one_per_episode,
     read_situations,

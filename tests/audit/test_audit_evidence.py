@@ -8,7 +8,7 @@ from planar import SETTINGS, admissible, planar, shuffled
 
 from genpolicy.audit.data import AuditInput, canonical, from_dataset
 from genpolicy.audit.evidence import write_evidence
-from genpolicy.audit.method_modes import one_per_episode, read_situations, sample_modes
+from genpolicy.comparison.method_modes import one_per_episode, read_situations, sample_modes
 from genpolicy.audit.run import audit
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.errors import ContractError, NonFiniteError

@@ -12,9 +12,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from genpolicy.audit.data import Array, Integers
 from genpolicy.errors import ContractError
 from genpolicy.integrity.tables import read_table
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 MIDDLE_SHARE = 0.5
 

@@ -1,0 +1,1 @@
+"""The command `genpolicy`: audit or ingest a dataset of one's own, without DVC."""

@@ -1,0 +1,6 @@
+"""The command `genpolicy`."""
+
+
+def main() -> int:
+    """Entry point of the console script."""
+    raise NotImplementedError

@@ -1,0 +1,1 @@
+"""Figures for self-contained pages: drawn without a display, the same bytes every time."""
