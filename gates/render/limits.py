@@ -3,7 +3,7 @@
 from matplotlib.axes import Axes
 
 from gates.models import GateReport
-from gates.render.figures import INK
+from genpolicy.figures.drawing import INK
 
 
 def limit_of(report: GateReport, name: str) -> float | None:

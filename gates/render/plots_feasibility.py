@@ -10,8 +10,9 @@ from matplotlib.figure import Figure
 from gates.evidence import Evidence, MissingEvidenceError, flags
 from gates.gate_c import CANDIDATES, HELD_OUT, LAYERS, admissible
 from gates.models import GateReport
-from gates.render.figures import GREY, HATCHES, Plot, colours, dashes, in_order, new_figure
+from gates.render.figures import Plot, colours, dashes, in_order
 from gates.render.limits import draw_limit
+from genpolicy.figures.drawing import GREY, HATCHES, new_figure
 
 
 def _waterfall(evidence: Evidence, report: GateReport) -> Figure:

@@ -7,20 +7,10 @@ from gates.evidence import Evidence, MissingEvidenceError, flags, numbers
 from gates.models import GateReport
 from gates.need import AUDIT, BASELINES
 from gates.render import plots_scene
-from gates.render.figures import (
-    BLUE,
-    GREEN,
-    GREY,
-    INK,
-    ORANGE,
-    RED,
-    Photo,
-    Plot,
-    in_order,
-    new_figure,
-)
+from gates.render.figures import Photo, Plot, in_order
 from gates.render.limits import draw_limit
 from gates.render.plots_scene import SUMMARY, draw_obstacles
+from genpolicy.figures.drawing import BLUE, GREEN, GREY, INK, ORANGE, RED, new_figure
 from genpolicy.statistics.intervals import clopper_pearson
 
 FANS = 24

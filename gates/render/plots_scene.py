@@ -12,7 +12,8 @@ from matplotlib.patches import Circle, Rectangle
 from gates.evidence import Array, Evidence, MissingEvidenceError
 from gates.models import GateReport
 from gates.need import AUDIT
-from gates.render.figures import BLUE, GREY, INK, ORANGE, RED, Photo, Plot, new_figure
+from gates.render.figures import Photo, Plot
+from genpolicy.figures.drawing import BLUE, GREY, INK, ORANGE, RED, new_figure
 
 SCENE = f"{AUDIT}/scene.png"
 FRAMES = "artifacts/ingest/frames.parquet"

@@ -6,7 +6,9 @@ from matplotlib.figure import Figure
 from gates.evidence import Evidence, MissingEvidenceError, flags, numbers
 from gates.gain import ROLLOUTS
 from gates.models import GateReport
-from gates.render.figures import (
+from gates.render.figures import Plot, colours, dashes, in_order
+from gates.render.limits import draw_limit
+from genpolicy.figures.drawing import (
     BLUE,
     GREEN,
     GREY,
@@ -16,13 +18,8 @@ from gates.render.figures import (
     PURPLE,
     RED,
     SKY,
-    Plot,
-    colours,
-    dashes,
-    in_order,
     new_figure,
 )
-from gates.render.limits import draw_limit
 from genpolicy.statistics.intervals import clopper_pearson
 
 OUTCOMES = {

@@ -6,8 +6,9 @@ from matplotlib.figure import Figure
 from gates.evidence import Evidence, MissingEvidenceError, numbers
 from gates.gate_b import LATENCY, RELOAD, TERMS
 from gates.models import GateReport
-from gates.render.figures import GREY, Plot, colours, dashes, in_order, new_figure, plain_ticks
+from gates.render.figures import Plot, colours, dashes, in_order
 from gates.render.limits import draw_limit
+from genpolicy.figures.drawing import GREY, new_figure, plain_ticks
 
 MILLI = 1e3
 
