@@ -5,22 +5,19 @@ order in which episodes arrive can change no number.
 """
 
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from genpolicy.audit.settings import AuditSettings
-from genpolicy.contract.action import POSITION, ROTATION
-from genpolicy.contract.observation import Channel, ObservationContract
-from genpolicy.dataset.dataset import Dataset
 from genpolicy.errors import ContractError, NonFiniteError
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Text = NDArray[np.str_]
 Flags = NDArray[np.bool_]
+Index = slice | Integers
 
+ACROSS_PHASES = "any"
 NOT_RECORDED = ("", "not_recorded", "unknown", "none", "nan")
 
 
@@ -66,14 +63,17 @@ class AuditInput:
         episodes: The episodes.
         observation_scale: Difference that makes another observation; inf ignores. Shape (D_o,).
         observation_names: Name of each component. Length D_o.
-        observation_position: Where the TCP position lies in the observation.
-        action_position: Where the TCP position lies in the action.
+        observation_position: Where the TCP position (or the joint angles) lies in the observation.
+        action_position: Where what is commanded of it lies in the action, component by component.
         action_rotation: Where the six-number rotation lies in the action, if there is one.
         period_s: Action period.
         delay_s: Receive time minus event time of the sample used, per stream. Shape (N,).
         position_stream: Stream that delivers the observed position.
         reference: Where the pose of reference begins with its position, if there is one.
         context: Observed channels that are held against the modes.
+        paired: Whether the action commands something observed. If not (a leader arm of another
+            build), there is no lag, and a chunk is taken relative to its own first action.
+        phase_observed: Whether a policy sees the phase.
     """
 
     observation: Array
@@ -85,14 +85,16 @@ class AuditInput:
     episodes: Episodes
     observation_scale: Array
     observation_names: tuple[str, ...]
-    observation_position: slice
-    action_position: slice
+    observation_position: Index
+    action_position: Index
     period_s: float
     action_rotation: slice | None = None
     delay_s: dict[str, Array] = field(default_factory=dict)
     position_stream: str = "robot"
     reference: slice | None = None
     context: dict[str, slice] = field(default_factory=dict)
+    paired: bool = True
+    phase_observed: bool = True
 
     def __post_init__(self) -> None:
         n = len(self.observation)
@@ -122,8 +124,18 @@ class AuditInput:
 
     @property
     def position(self) -> Array:
-        """Observed TCP position. Shape (N, P)."""
+        """Observed TCP position, or joint angles. Shape (N, P); (N, 0) where nothing pairs."""
         return self.observation[:, self.observation_position]
+
+    @property
+    def commanded(self) -> Array:
+        """What is commanded of the position. Shape (N, P)."""
+        return self.action[:, self.action_position]
+
+    @property
+    def grouping(self) -> Text:
+        """Inside of which situations are looked for: the phase, if a policy sees it. Shape (N,)."""
+        return self.phase if self.phase_observed else np.full(len(self.phase), ACROSS_PHASES)
 
     @property
     def last_row(self) -> Integers:
@@ -167,13 +179,24 @@ def chunk_rows(data: AuditInput, rows: Integers, steps: int) -> Integers:
 
 
 def relative_paths(data: AuditInput, rows: Integers, steps: int) -> Array:
-    """Commanded positions of the chunks at `rows`, from the observed position there.
+    """Commanded positions of the chunks at `rows`, from their origin there.
 
     Returns:
         Shape (n, steps, P).
     """
-    commanded = data.action[chunk_rows(data, rows, steps)][:, :, data.action_position]
-    return np.asarray(commanded - data.position[rows][:, None, :])
+    commanded = data.action[chunk_rows(data, rows, steps)][..., data.action_position]
+    return np.asarray(commanded - origin(data, rows)[:, None, :])
+
+
+def origin(data: AuditInput, rows: Integers) -> Array:
+    """Where chunks at `rows` begin: the observed position, or the first action if none pairs.
+
+    Returns:
+        Shape (n, P).
+    """
+    if data.paired:
+        return np.asarray(data.observation[rows][:, data.observation_position])
+    return np.asarray(data.action[rows][:, data.action_position])
 
 
 def observation_history(data: AuditInput, rows: Integers, horizon: int) -> Array:
@@ -194,109 +217,3 @@ def observation_history(data: AuditInput, rows: Integers, horizon: int) -> Array
 def recorded(values: Text) -> bool:
     """Whether a text variable was recorded in at least one episode."""
     return any(str(value).strip().lower() not in NOT_RECORDED for value in values)
-
-
-def from_dataset(
-    dataset: Dataset, *, contract: ObservationContract, settings: AuditSettings, period_s: float
-) -> AuditInput:
-    """The audit's view of an ingested dataset.
-
-    Args:
-        dataset: A verified dataset.
-        contract: The observation contract of the task.
-        settings: Names of channels and scales.
-        period_s: Action period, s.
-
-    Raises:
-        ContractError: A channel that the settings name does not exist, or rows do not fit.
-    """
-    frames, table = dataset.frames, dataset.episodes
-    for name in (settings.position_channel, settings.reference_channel, *settings.context_channels):
-        if name is not None and name not in contract.slices:
-            raise ContractError(
-                where="params: audit",
-                found=f"naming the channel {name}",
-                expected=f"one of {', '.join(contract.slices)}",
-                action="Name channels of the observation contract.",
-            )
-    slices = contract.slices
-    position = slices[settings.position_channel]
-    streams = {channel.name: channel.stream for channel in contract.channels}
-    return canonical(
-        AuditInput(
-            observation=frames.observation,
-            action=frames.action,
-            phase=frames.phase,
-            episode=frames.episode,
-            index=frames.index,
-            event_time_s=frames.event_time_s,
-            episodes=_episodes(table, frames.event_time_s, frames.episode),
-            observation_scale=scales(contract, settings),
-            observation_names=contract.component_names,
-            observation_position=position,
-            action_position=slice(0, position.stop - position.start),
-            action_rotation=ROTATION if position.stop - position.start == POSITION.stop else None,
-            period_s=period_s,
-            delay_s={
-                name: received - frames.stream_event_time_s[name]
-                for name, received in frames.stream_receive_time_s.items()
-                if name in contract.streams
-            },
-            position_stream=streams[settings.position_channel],
-            reference=slices.get(settings.reference_channel or ""),
-            context={name: slices[name] for name in settings.context_channels},
-        )
-    )
-
-
-def scales(contract: ObservationContract, settings: AuditSettings) -> Array:
-    """Difference of each observation component that makes another observation. Shape (D_o,)."""
-    result: list[float] = []
-    for channel in contract.channels:
-        result += [_scale(channel, part, settings) for part in channel.components]
-    return np.asarray(result, dtype=np.float64)
-
-
-def _scale(channel: Channel, component: str, settings: AuditSettings) -> float:
-    if channel.name in settings.ignored_channels:
-        return float("inf")
-    if component.endswith("_m") or channel.unit == "m":
-        return settings.scale_m
-    if channel.unit == "px":
-        return settings.scale_px
-    if component.endswith("_n") or channel.unit == "N":
-        return settings.scale_n
-    return settings.scale_unit
-
-
-def _episodes(table: Any, event_time_s: Array, episode: Integers) -> Episodes:
-    n = len(table)
-
-    def text(name: str) -> Text:
-        values = table[name] if name in table else [""] * n
-        return np.asarray(["" if _missing(value) else str(value) for value in values], dtype=str)
-
-    if "recorded_at_s" in table:
-        starts = np.asarray(table["recorded_at_s"], dtype=np.float64)
-    else:
-        starts = np.full(n, np.inf)
-        np.minimum.at(starts, episode, event_time_s)
-    # Recordings that all start at the same time have no known order.
-    distinct = len(np.unique(starts)) == n and n > 1
-    order = np.argsort(np.argsort(starts)).astype(np.float64) if distinct else np.full(n, np.nan)
-    flags = table["is_recovery"] if "is_recovery" in table else [False] * n
-    return Episodes(
-        uuid=text("episode_uuid"),
-        split=text("split"),
-        operator=text("operator"),
-        object=text("object"),
-        calibration_epoch=text("calibration_epoch"),
-        outcome=text("outcome"),
-        is_recovery=np.asarray([flag is not None and flag == 1 for flag in flags], dtype=bool),
-        order=order,
-    )
-
-
-def _missing(value: object) -> bool:
-    blank = isinstance(value, float) and np.isnan(value)
-    return value is None or blank or str(value).strip().lower() in NOT_RECORDED

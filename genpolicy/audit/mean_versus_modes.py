@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from genpolicy.audit.data import Array, AuditInput, chunk_rows
+from genpolicy.audit.data import Array, AuditInput, chunk_rows, origin
 from genpolicy.audit.modes import Clustering
 from genpolicy.audit.neighbourhoods import Neighbourhood
 from genpolicy.audit.settings import AuditSettings
@@ -62,7 +62,8 @@ def compare(
     """
     members = situation.members
     actions = data.action[chunk_rows(data, members, settings.chunk_steps)].copy()
-    move = data.position[situation.query] - data.position[members]
+    start = origin(data, members)
+    move = start[-1] - start  # the query is the last member
     actions[:, :, data.action_position] += move[:, None, :]
     mean = _orthonormal(data, actions.mean(axis=0))
     median = _orthonormal(data, np.median(actions, axis=0))

@@ -54,13 +54,13 @@ def find(
     Args:
         data: Canonical audit input.
         settings: Neighbours, radius, stride.
-        phase: The phase; neighbours come from the same one.
+        phase: The phase, or `any` where the policy does not see it; neighbours are of the same.
         root_seed: Seed of ties and of the draw of queries.
 
     Returns:
         The analysed situations in order of the query row, and the support.
     """
-    clean = ~data.episodes.is_recovery[data.episode] & (data.phase == phase)
+    clean = ~data.episodes.is_recovery[data.episode] & (data.grouping == phase)
     training = (data.episodes.split == "train")[data.episode]
     pool = np.flatnonzero(clean & training)
     queries = _queries(data, settings, np.flatnonzero(clean & ~training), phase, root_seed)

@@ -158,7 +158,7 @@ def _situations(
     data: AuditInput, settings: AuditSettings, root_seed: int
 ) -> tuple[list[Found], tuple[Support, ...]]:
     found, support = [], []
-    for phase in np.unique(data.phase):
+    for phase in np.unique(data.grouping):
         items, reach = find(data, settings, phase=str(phase), root_seed=root_seed)
         support.append(reach)
         for item in items:

@@ -11,7 +11,14 @@ class AuditSettings(BaseModel):
     Attributes:
         observation_horizon: Observations that condition an invocation.
         chunk_steps: Actions per chunk, K.
-        position_channel: Observed TCP position; its components pair with the action's position.
+        position_channel: Observed TCP position (or joint angles); its components pair with the
+            first of the action. None: nothing in the observation pairs with the action.
+        position_components: Names `channel.component` that pair with the action, where they are
+            not one whole channel; overrides `position_channel`.
+        action_components: Names of the action's components that pair with them, in their order;
+            None takes the first ones.
+        phase_observed: Whether the policy sees the phase. If not, situations are looked for
+            across phases and the phase is tested as a hidden variable.
         reference_channel: Observed pose of what is released into; None where there is none.
         calibration_phase: Phase whose first row gives the calibration residual.
         context_channels: Observed channels that are held against the modes.
@@ -19,7 +26,9 @@ class AuditSettings(BaseModel):
         scale_m: Difference of a length that makes another observation, m.
         scale_n: The same for a force, N.
         scale_px: The same for a length in pixels.
+        scale_rad: The same for an angle, rad.
         scale_unit: The same for a pure number (direction cosines and the like).
+        channel_scale: The same by channel, in its unit; overrides the rules above.
         noise_floor_m: Spread below which action-to-action noise does not matter.
         radius: Furthest neighbour, in units of the scales (Euclidean over the history).
         neighbours: Training episodes per neighbourhood, at most.
@@ -52,13 +61,17 @@ class AuditSettings(BaseModel):
         mode_success_limit: Lower bound of a mode's success that makes it valid.
         mode_feasible_limit: Share of a mode's chunks that must be admissible.
         permutations: Permutations per test.
+        resamples: Draws of the resampling that gives the confidence of the verdict.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
     observation_horizon: int = Field(default=2, ge=1)
     chunk_steps: int = Field(default=16, ge=2)
-    position_channel: str = "tcp_position_m"
+    position_channel: str | None = "tcp_position_m"
+    position_components: list[str] | None = None
+    action_components: list[str] | None = None
+    phase_observed: bool = True
     reference_channel: str | None = "hole_pose"
     calibration_phase: str = "release"
     context_channels: list[str] = ["hole_pose"]
@@ -66,7 +79,9 @@ class AuditSettings(BaseModel):
     scale_m: float = Field(default=0.01, gt=0)
     scale_n: float = Field(default=5.0, gt=0)
     scale_px: float = Field(default=10.0, gt=0)
+    scale_rad: float = Field(default=0.05, gt=0)
     scale_unit: float = Field(default=0.1, gt=0)
+    channel_scale: dict[str, float] = Field(default_factory=dict)
     noise_floor_m: float = Field(default=0.002, gt=0)
     radius: float = Field(default=6.0, gt=0)
     neighbours: int = Field(default=20, ge=4)
@@ -95,3 +110,4 @@ class AuditSettings(BaseModel):
     mode_success_limit: float = Field(default=0.5, gt=0, lt=1)
     mode_feasible_limit: float = Field(default=0.8, gt=0, le=1)
     permutations: int = Field(default=999, ge=99)
+    resamples: int = Field(default=200, ge=20)

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from genpolicy.audit.data import from_dataset
+from genpolicy.audit.view import from_dataset
 from genpolicy.audit.run import AuditResult, audit
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.comparison.held_out import admissible

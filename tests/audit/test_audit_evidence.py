@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from planar import SETTINGS, admissible, planar, shuffled
 
-from genpolicy.audit.data import AuditInput, canonical, from_dataset
+from genpolicy.audit.data import AuditInput, canonical
 from genpolicy.audit.evidence import write_evidence
-from genpolicy.comparison.method_modes import one_per_episode, read_situations, sample_modes
 from genpolicy.audit.run import audit
 from genpolicy.audit.settings import AuditSettings
+from genpolicy.comparison.method_modes import one_per_episode, read_situations, sample_modes
 from genpolicy.errors import ContractError, NonFiniteError
 from genpolicy.integrity.documents import read_json
 from genpolicy.integrity.tables import read_table
@@ -126,53 +126,6 @@ def test_broken_input_is_refused():
     with pytest.raises(ContractError, match="one identifier twice"):
         replace(data, episodes=replace(data.episodes, uuid=np.full(10, "same")))
     assert isinstance(data, AuditInput)
-
-
-def small_dataset():
-    import pandas as pd
-
-    from genpolicy.dataset.dataset import Dataset, Frames
-
-    times = np.array([0.0, 0.05, 0.1, 9.0, 9.05])
-    frames = Frames(
-        episode=np.array([0, 0, 0, 1, 1]), index=np.array([0, 1, 2, 0, 1]), event_time_s=times,
-        observation=np.arange(25.0).reshape(5, 5), action=np.arange(50.0).reshape(5, 10),
-        phase=np.array(["approach"] * 5), stream_event_time_s={"robot": times, "other": times},
-        stream_receive_time_s={"robot": times + 0.01, "other": times},
-    )  # fmt: skip
-    episodes = pd.DataFrame({
-        "episode_uuid": ["b", "a"], "split": ["train", "test"], "operator": ["not_recorded", "x"],
-        "object": ["peg", None], "calibration_epoch": ["e", "e"], "outcome": ["success", "failure"],
-        "is_recovery": [None, True], "recorded_at_s": [5.0, 9.0],
-    })  # fmt: skip
-    return Dataset(frames, episodes, {}, "", None)
-
-
-def contract():
-    from genpolicy.contract.observation import Channel, ObservationContract
-
-    return ObservationContract((
-        Channel("tcp_position_m", ("x", "y", "z"), "m", "robot", 0.1),
-        Channel("hole_pose", ("x_m", "cos_yaw"), "1", "robot", 0.1),
-    ))  # fmt: skip
-
-
-def test_a_dataset_becomes_audit_input():
-    settings = AuditSettings(ignored_channels=[])
-    data = from_dataset(small_dataset(), contract=contract(), settings=settings, period_s=0.05)
-    assert data.episodes.uuid.tolist() == ["a", "b"]
-    assert data.index.tolist() == [0, 1, 0, 1, 2]
-    assert data.observation[2].tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
-    assert data.observation_scale.tolist() == [0.01, 0.01, 0.01, 0.01, 0.1]
-    assert data.episodes.operator.tolist() == ["x", ""]
-    assert data.episodes.is_recovery.tolist() == [True, False]
-    assert data.episodes.order.tolist() == [1.0, 0.0]
-    assert list(data.delay_s) == ["robot"] and data.delay_s["robot"] == pytest.approx(0.01)
-    with pytest.raises(ContractError, match="naming the channel force"):
-        from_dataset(
-            small_dataset(), contract=contract(), period_s=0.05,
-            settings=AuditSettings(context_channels=["force"]),
-        )  # fmt: skip
 
 
 def test_settings_are_strict():

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from genpolicy.audit.data import from_dataset
 from genpolicy.audit.evidence import write_evidence
 from genpolicy.audit.run import audit
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.audit.verdict import Cause
+from genpolicy.audit.view import from_dataset
 from genpolicy.dataset.dataset import load_dataset
 from genpolicy.importers.zarr_buffer import PUSHT, ingest_zarr_replay_buffer
 from genpolicy.integrity.tables import read_table
