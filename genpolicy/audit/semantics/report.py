@@ -1,0 +1,108 @@
+"""What the layer of data semantics says: clocks, calibration, and the defects it found."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from genpolicy.audit.data import Integers
+
+# In the order of diagnosis; the first defect found names the verdict.
+KINDS = (
+    "clock", "rate", "gaps", "jitter", "unit", "columns", "frame", "clock_drift", "glued",
+    "duplicate", "stub", "calibration",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Clock:
+    """One stream in one calibration epoch; unknown numbers are None.
+
+    Attributes:
+        stream: Name of the stream.
+        epoch: Calibration epoch.
+        episodes: Episodes measured.
+        offset_before_s: Deviation from the declared alignment.
+        offset_after_s: What is left after realignment, measured on the other half of the episodes.
+        lag_steps: Action-to-state lag for the stream of the position; for the others the median
+            receive delay, in action steps.
+        receive_delay_p50_s: Median receive delay.
+        receive_delay_p95_s: 95 % quantile of the receive delay.
+        jitter_p95_s: 95 % quantile of the deviation from the period (position) or from the median
+            delay (others).
+    """
+
+    stream: str
+    epoch: str
+    episodes: int
+    offset_before_s: float | None
+    offset_after_s: float | None
+    lag_steps: float | None
+    receive_delay_p50_s: float | None
+    receive_delay_p95_s: float | None
+    jitter_p95_s: float | None
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Residual of one epoch: how far its releases lie from those of the others, m."""
+
+    epoch: str
+    episodes: int
+    residual_m: float
+
+
+@dataclass(frozen=True)
+class Defect:
+    """One fault of the data.
+
+    Attributes:
+        kind: One of `KINDS`.
+        variable: What it is a fault of: a stream, an epoch or a component.
+        where: Which episodes, epochs or rows.
+        measured: The number that is beyond the limit.
+        limit: The limit.
+        unit: Unit of both.
+        action: What to do about it, a sentence.
+    """
+
+    kind: str
+    variable: str
+    where: str
+    measured: float
+    limit: float
+    unit: str
+    action: str
+
+
+@dataclass(frozen=True)
+class Semantics:
+    """All of it, and numbers for the summary.
+
+    Attributes:
+        clocks: One per stream and epoch.
+        calibrations: One per epoch.
+        gaps: Rows that follow a gap in time.
+        negative_delays: Samples received before they happened, beyond the tolerance.
+        start_drift: Largest difference of the median start position between training and held-out
+            episodes, unit of the position.
+        defects: Faults beyond their limits, the first red one first.
+        notes: Sentences on what is worth knowing and no defect.
+        shift_steps: By how many rows the commands of each episode are to be moved so that all
+            episodes are aligned. Shape (E,).
+        stream_shift_steps: The same for the columns of each other stream that was measured.
+    """
+
+    clocks: tuple[Clock, ...]
+    calibrations: tuple[Calibration, ...]
+    gaps: int
+    negative_delays: int
+    start_drift: float
+    defects: tuple[Defect, ...] = ()
+    notes: tuple[str, ...] = ()
+    shift_steps: Integers = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    stream_shift_steps: dict[str, Integers] = field(default_factory=dict)
+
+
+def in_order(defects: list[Defect]) -> tuple[Defect, ...]:
+    """The defects in the order of diagnosis."""
+    return tuple(sorted(defects, key=lambda defect: KINDS.index(defect.kind)))
