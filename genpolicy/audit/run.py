@@ -1,50 +1,33 @@
 """The whole audit: from rows to a cause, every number on the way kept as evidence."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from genpolicy.audit.data import Array, AuditInput, Integers, canonical, relative_paths
-from genpolicy.audit.labels import (
-    ModeOutcome,
-    Replay,
-    Replayed,
-    mode_outcomes,
-    replay_sample,
-)
-from genpolicy.audit.mean_versus_modes import Admissible, MeanVersusModes, compare
-from genpolicy.audit.modes import Clustering, cluster_chunks, link
-from genpolicy.audit.neighbourhoods import Neighbourhood, Support, find
-from genpolicy.audit.persistence import Persistence, kept_identity, persistent, summarise
+from genpolicy.audit.confidence import confidence
+from genpolicy.audit.counts import count
+from genpolicy.audit.data import AuditInput, Integers, canonical
+from genpolicy.audit.labels import ModeOutcome, Replay, Replayed, mode_outcomes, replay_sample
+from genpolicy.audit.mean_versus_modes import Admissible
+from genpolicy.audit.modes import link
+from genpolicy.audit.neighbourhoods import Support
+from genpolicy.audit.persistence import Persistence, summarise
 from genpolicy.audit.recovery import RecoveryOutcome, recovery_outcomes
 from genpolicy.audit.semantics import Semantics, measure, realigned
 from genpolicy.audit.settings import AuditSettings
-from genpolicy.audit.strata import Stratum, examine_strata, resolved_by_observation
-from genpolicy.audit.verdict import AuditVerdict, Counts, decide
-from genpolicy.seeds import stream
-
-Found = tuple[str, Neighbourhood, Clustering]
-
-
-@dataclass(frozen=True)
-class Situation:
-    """One analysed situation with all that was found about it.
-
-    Attributes:
-        phase: Task phase.
-        neighbourhood: Query and neighbours.
-        clustering: Modes of their chunks.
-        two_mode: Several modes, and no observed component tells them apart.
-        identity: Share of episodes that keep their mode, and its null; None if not measurable.
-        chunks: Mean, median and modal chunks with their verdicts.
-    """
-
-    phase: str
-    neighbourhood: Neighbourhood
-    clustering: Clustering
-    two_mode: bool
-    identity: tuple[float, Array] | None
-    chunks: MeanVersusModes
+from genpolicy.audit.situations import (
+    Found,
+    Several,
+    Situation,
+    by_phase,
+    claimed,
+    episodes_of,
+    examine,
+    find_situations,
+    primary_phase,
+)
+from genpolicy.audit.strata import Stratum, examine_strata
+from genpolicy.audit.verdict import AuditVerdict, Counts, Layers, decide
 
 
 @dataclass(frozen=True)
@@ -63,7 +46,10 @@ class AuditResult:
         recovery: The disturbed episodes.
         counts: Numbers for the summary.
         modes_after_realignment: Held-out episodes with two modes on realigned data.
+        modes_other_phases: The same with the phase looked at the other way: across phases if the
+            policy sees the phase, inside each if not; None with one phase only.
         verdict: The cause.
+        confidence: Share of resampled audits that name the same cause.
     """
 
     data: AuditInput
@@ -77,7 +63,9 @@ class AuditResult:
     recovery: tuple[RecoveryOutcome, ...]
     counts: Counts
     modes_after_realignment: int
+    modes_other_phases: int | None
     verdict: AuditVerdict
+    confidence: float
 
 
 def audit(
@@ -103,42 +91,44 @@ def audit(
     """
     data = canonical(data)
     semantics = measure(data, settings)
-    found, support = _situations(data, settings, root_seed)
-    claimed = _claimed(data, settings, found)
+    found, support = find_situations(data, settings, root_seed)
+    chosen = claimed(data, settings, found)
     situations = tuple(
-        _examine(data, settings, entry, number in claimed, admissible=admissible, seed=root_seed)
+        examine(data, settings, entry, number in chosen, admissible=admissible, seed=root_seed)
         for number, entry in enumerate(found)
     )
-    several = _by_phase(situations)
-    persistence = summarise([item.identity for item in situations if item.two_mode])
+    several = by_phase(situations)
     replayed = replay_sample(data, settings, replay=replay, root_seed=root_seed)
-    modes, links = _modes(data, settings, situations, replayed)
-    strata = examine_strata(data, settings, several, root_seed=root_seed)
-    counts = _counts(data, settings, situations, support)
-    primary = _primary(several)
+    links = _links(data, settings, several)
+    modes = _modes(data, situations, links, replayed)
+    strata = examine_strata(data, settings, several, links, root_seed=root_seed)
+    counts = count(data, settings, situations, support)
+    primary = primary_phase(several)
+    layers = Layers(
+        semantics=semantics,
+        replayed=replayed,
+        counts=counts,
+        persistence=summarise([item.identity for item in situations if item.two_mode]),
+        strata=strata,
+        modes=tuple(mode for mode in modes if mode.phase == primary),
+    )
+    verdict = decide(settings, layers)
+    before = counts.two_mode_episodes
     return AuditResult(
         data=data,
         semantics=semantics,
         support=support,
         situations=situations,
-        persistence=persistence,
+        persistence=layers.persistence,
         modes=modes,
         strata=strata,
         replayed=replayed,
         recovery=recovery_outcomes(data, settings, several.get(primary, []), links.get(primary)),
         counts=counts,
-        modes_after_realignment=_after_realignment(
-            data, settings, semantics, counts.two_mode_episodes, root_seed
-        ),
-        verdict=decide(
-            settings,
-            semantics=semantics,
-            replayed=replayed,
-            counts=counts,
-            persistence=persistence,
-            strata=strata,
-            modes=tuple(mode for mode in modes if mode.phase == primary),
-        ),
+        modes_after_realignment=_after_realignment(data, settings, semantics, before, root_seed),
+        modes_other_phases=_other_phases(data, settings, root_seed),
+        verdict=verdict,
+        confidence=confidence(data, settings, layers, situations, verdict, root_seed=root_seed),
     )
 
 
@@ -149,93 +139,50 @@ def _after_realignment(
     shifted, moved = realigned(data, semantics.clocks)
     if not moved:
         return before
-    found, _ = _situations(shifted, settings, root_seed)
-    kept = _claimed(shifted, settings, found)
-    return _episodes(shifted, [found[number][1] for number in kept])
+    found, _ = find_situations(shifted, settings, root_seed)
+    return _claimed_episodes(shifted, settings, found)
 
 
-def _situations(
-    data: AuditInput, settings: AuditSettings, root_seed: int
-) -> tuple[list[Found], tuple[Support, ...]]:
-    found, support = [], []
-    for phase in np.unique(data.grouping):
-        items, reach = find(data, settings, phase=str(phase), root_seed=root_seed)
-        support.append(reach)
-        for item in items:
-            paths = relative_paths(data, item.members, settings.chunk_steps)
-            found.append((str(phase), item, cluster_chunks(paths, settings)))
-    return found, tuple(support)
+def _other_phases(data: AuditInput, settings: AuditSettings, root_seed: int) -> int | None:
+    """The same count with the phase looked at the other way; None where there is only one phase.
 
-
-def _claimed(data: AuditInput, settings: AuditSettings, found: list[Found]) -> set[int]:
-    """Which entries of `found` have several modes under one observation.
-
-    A phase in which too few held-out episodes show them is said to have one mode: a handful
-    among many situations is what chance gives.
+    Across phases if the policy sees the phase, inside each phase if it does not: modes that are
+    only there across phases are made by a phase that is not looked at.
     """
-    numbers: dict[str, list[int]] = {}
-    for number, (phase, item, split) in enumerate(found):
-        if split.count > 1 and not resolved_by_observation(data, settings, item, split):
-            numbers.setdefault(phase, []).append(number)
+    if len(np.unique(data.phase)) < 2:
+        return None
+    other = replace(data, phase_observed=not data.phase_observed)
+    found, _ = find_situations(other, settings, root_seed)
+    return _claimed_episodes(other, settings, found)
+
+
+def _claimed_episodes(data: AuditInput, settings: AuditSettings, found: list[Found]) -> int:
+    return episodes_of(data, [found[number][1] for number in claimed(data, settings, found)])
+
+
+def _links(data: AuditInput, settings: AuditSettings, several: Several) -> dict[str, Integers]:
+    """Modes followed over situations: the mode of each episode, per phase."""
     return {
-        number
-        for chosen in numbers.values()
-        if _episodes(data, [found[k][1] for k in chosen]) >= settings.minimum_two_mode_situations
-        for number in chosen
+        phase: link(
+            [(data.episode[item.members], split.labels) for item, split in items],
+            len(data.episodes),
+            settings.minimum_neighbours // 2,
+        )
+        for phase, items in sorted(several.items())
     }
-
-
-def _examine(
-    data: AuditInput,
-    settings: AuditSettings,
-    entry: Found,
-    two_mode: bool,
-    *,
-    admissible: Admissible | None,
-    seed: int,
-) -> Situation:
-    phase, item, clustering = entry
-    identity = None
-    if two_mode:
-        name = str(data.episodes.uuid[data.episode[item.query]])
-        rng = stream(seed, "audit", "persistence", phase, name, int(data.index[item.query]))
-        identity = kept_identity(data, settings, item, clustering, rng=rng)
-    check = admissible if two_mode else None
-    chunks = compare(data, settings, item, clustering, admissible=check)
-    return Situation(phase, item, clustering, two_mode, identity, chunks)
-
-
-def _by_phase(
-    situations: tuple[Situation, ...],
-) -> dict[str, list[tuple[Neighbourhood, Clustering]]]:
-    result: dict[str, list[tuple[Neighbourhood, Clustering]]] = {}
-    for item in situations:
-        if item.two_mode:
-            result.setdefault(item.phase, []).append((item.neighbourhood, item.clustering))
-    return result
-
-
-def _primary(several: dict[str, list[tuple[Neighbourhood, Clustering]]]) -> str:
-    """The phase with most situations of several modes."""
-    return max(sorted(several), key=lambda phase: len(several[phase]), default="")
 
 
 def _modes(
     data: AuditInput,
-    settings: AuditSettings,
     situations: tuple[Situation, ...],
+    links: dict[str, Integers],
     replayed: tuple[Replayed, ...],
-) -> tuple[tuple[ModeOutcome, ...], dict[str, Integers]]:
-    """Modes followed over situations, and the mode of each episode, per phase."""
+) -> tuple[ModeOutcome, ...]:
     outcomes: list[ModeOutcome] = []
-    links: dict[str, Integers] = {}
-    for phase, items in sorted(_by_phase(situations).items()):
-        memberships = [(data.episode[item.members], split.labels) for item, split in items]
-        links[phase] = link(memberships, len(data.episodes), settings.minimum_neighbours // 2)
+    for phase, linked in links.items():
         chosen = [item for item in situations if item.two_mode and item.phase == phase]
-        checks = _checks(data, chosen, links[phase])
-        outcomes += mode_outcomes(data, phase, links[phase], replayed, checks)
-    return tuple(outcomes), links
+        outcomes += mode_outcomes(data, phase, linked, replayed, _checks(data, chosen, linked))
+    return tuple(outcomes)
 
 
 def _checks(
@@ -253,44 +200,3 @@ def _checks(
                 good, checked = result.get(mode, (0, 0))
                 result[mode] = (good + int(passed), checked + 1)
     return result
-
-
-def _counts(
-    data: AuditInput,
-    settings: AuditSettings,
-    situations: tuple[Situation, ...],
-    support: tuple[Support, ...],
-) -> Counts:
-    several = [item for item in situations if item.two_mode]
-    ratios, spreads = [], []
-    for item in situations:
-        paths = relative_paths(data, item.neighbourhood.members, settings.chunk_steps)
-        ratio, spread = _noise(paths)
-        ratios.append(ratio)
-        spreads.append(spread)
-    return Counts(
-        queries=sum(item.queries for item in support),
-        analysed=len(situations),
-        analysed_episodes=_episodes(data, [item.neighbourhood for item in situations]),
-        two_mode=len(several),
-        two_mode_episodes=_episodes(data, [item.neighbourhood for item in several]),
-        resolved=sum(item.clustering.count > 1 and not item.two_mode for item in situations),
-        persistent=sum(persistent(item.identity) for item in several),
-        noise_ratio=float(np.median(ratios)) if ratios else 0.0,
-        noise_spread=float(np.median(spreads)) if spreads else 0.0,
-    )
-
-
-def _noise(paths: Array) -> tuple[float, float]:
-    """Von Neumann ratio of the residual along the chunk (1 white, 0 smooth), and its RMS."""
-    residual = paths - paths.mean(axis=0)
-    residual = residual - residual.mean(axis=1, keepdims=True)
-    power = float(np.mean(residual**2))
-    if power <= 0.0:
-        return 0.0, 0.0
-    steps = float(np.mean(np.diff(residual, axis=1) ** 2))
-    return steps / (2.0 * power), float(np.sqrt(power * paths.shape[2]))
-
-
-def _episodes(data: AuditInput, items: list[Neighbourhood]) -> int:
-    return len({int(data.episode[item.query]) for item in items})

@@ -5,15 +5,16 @@ situations conditions on the observation. Situations share training episodes; fo
 set of situations without a common episode is drawn, so that every episode counts once.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from genpolicy.audit.data import Array, AuditInput, Integers, Text, recorded
+from genpolicy.audit.data import AuditInput, Integers, Text, recorded
+from genpolicy.audit.history import history_test
 from genpolicy.audit.modes import Clustering
 from genpolicy.audit.neighbourhoods import Neighbourhood
+from genpolicy.audit.resolution import observed_gap
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.seeds import stream
 from genpolicy.statistics.conditional import conditional_test
@@ -23,6 +24,8 @@ BINS = 3
 Variable = tuple[str, NDArray[np.generic] | None, bool]
 
 EPISODE_VARIABLES = ("operator", "object", "calibration_epoch")
+HISTORY = "history"
+Drawn = tuple[Integers, Integers, Integers]
 
 
 @dataclass(frozen=True)
@@ -40,6 +43,7 @@ class Stratum:
         n: Episodes that could tell.
         recorded: False where the variable was not recorded at all: it stays unknown.
         observed: Whether a policy sees it.
+        detail: What of it, in words; empty where the name says all.
     """
 
     variable: str
@@ -52,69 +56,24 @@ class Stratum:
     n: int
     recorded: bool
     observed: bool
-
-
-def resolved_by_observation(
-    data: AuditInput,
-    settings: AuditSettings,
-    situation: Neighbourhood,
-    clustering: Clustering,
-) -> bool:
-    """Whether one observed component already tells the clusters apart.
-
-    Then the members do not share one observation, and a deterministic policy can follow both.
-    It must order them (nearly) perfectly and differ by at least its own scale.
-    """
-    for values, inside in _observed(data, settings, situation, clustering):
-        gap = np.abs(np.median(values[inside], axis=0) - np.median(values[~inside], axis=0))
-        far = np.flatnonzero(gap >= 1.0)
-        if any(_auc(values[:, j], inside) >= settings.resolved_auc for j in far):
-            return True
-    return False
-
-
-def observed_gap(
-    data: AuditInput,
-    settings: AuditSettings,
-    situation: Neighbourhood,
-    clustering: Clustering,
-) -> float:
-    """Largest difference of a component's median between a cluster and the rest, in scales."""
-    return max(
-        float(np.max(np.abs(np.median(v[inside], axis=0) - np.median(v[~inside], axis=0))))
-        for v, inside in _observed(data, settings, situation, clustering)
-    )
-
-
-def _observed(
-    data: AuditInput,
-    settings: AuditSettings,
-    situation: Neighbourhood,
-    clustering: Clustering,
-) -> Iterator[tuple[Array, NDArray[np.bool_]]]:
-    """Scaled observations of the members, per row of the history, and each cluster against all."""
-    used = np.flatnonzero(np.isfinite(data.observation_scale))
-    first = data.first_row[situation.members]
-    for back in range(settings.observation_horizon):
-        rows = np.maximum(situation.members - back, first)
-        values = data.observation[np.ix_(rows, used)] / data.observation_scale[used]
-        for mode in range(clustering.count):
-            yield values, clustering.labels == mode
+    detail: str = ""
 
 
 def examine_strata(
     data: AuditInput,
     settings: AuditSettings,
     situations: dict[str, list[tuple[Neighbourhood, Clustering]]],
+    links: dict[str, Integers],
     *,
     root_seed: int,
 ) -> tuple[Stratum, ...]:
-    """Test every recorded variable against the modes of every phase.
+    """Test every recorded variable, and the unrecorded past, against the modes of every phase.
 
     Args:
         data: Canonical audit input.
         settings: Permutations, family-wise error.
         situations: Situations with several modes, per phase.
+        links: Mode of each episode, -1 for none, per phase. Shape (E,).
         root_seed: Seed of the draws.
 
     Returns:
@@ -132,35 +91,69 @@ def examine_strata(
         least = settings.minimum_neighbours // 2
         hidden = _disjoint(data, items, closest, least)
         seen = _disjoint(data, items, drawn, least)
-        tested = [(*entry, hidden) for entry in _hidden_variables(data, hidden[0])]
-        tested += [(*entry, seen) for entry in _observed_variables(data, seen[0])]
-        for variable, values, observed, (_, labels, blocks) in tested:
-            if values is None:
-                rows.append(_unknown(variable, phase))
-                continue
-            rng = stream(root_seed, "audit", "strata", phase, variable)
-            test = conditional_test(
-                labels,
-                _binned(values, blocks) if values.dtype.kind == "f" else values,
-                blocks,
-                rng=rng,
-                permutations=settings.permutations,
-            )
-            rows.append(
-                Stratum(
-                    variable=variable,
-                    phase=phase,
-                    p_value=test.p_value,
-                    p_adjusted=None,
-                    effect=test.effect,
-                    effect_lower=test.effect_lower,
-                    effect_upper=test.effect_upper,
-                    n=test.n,
-                    recorded=True,
-                    observed=observed,
-                )
-            )
+        tested = [(*entry, hidden) for entry in _hidden_variables(data, hidden[0], links[phase])]
+        tested += [(*entry, seen) for entry in _observed_variables(data, settings, seen[0])]
+        for variable, values, observed, place in tested:
+            seeds = (root_seed, phase, variable)
+            rows.append(_tested(settings, seeds, values, place, observed=observed))
+        rows.append(_history(data, settings, phase, hidden, root_seed))
     return _adjusted(rows)
+
+
+def _tested(
+    settings: AuditSettings,
+    seeds: tuple[int, str, str],
+    values: NDArray[np.generic] | None,
+    drawn: Drawn,
+    *,
+    observed: bool,
+) -> Stratum:
+    root_seed, phase, variable = seeds
+    if values is None:
+        return _unknown(variable, phase)
+    _, labels, blocks = drawn
+    test = conditional_test(
+        labels,
+        _binned(values, blocks) if values.dtype.kind == "f" else values,
+        blocks,
+        rng=stream(root_seed, "audit", "strata", phase, variable),
+        permutations=settings.permutations,
+    )
+    return Stratum(
+        variable=variable,
+        phase=phase,
+        p_value=test.p_value,
+        p_adjusted=None,
+        effect=test.effect,
+        effect_lower=test.effect_lower,
+        effect_upper=test.effect_upper,
+        n=test.n,
+        recorded=True,
+        observed=observed,
+    )
+
+
+def _history(
+    data: AuditInput, settings: AuditSettings, phase: str, drawn: Drawn, root_seed: int
+) -> Stratum:
+    rows, labels, blocks = drawn
+    rng = stream(root_seed, "audit", "strata", phase, HISTORY)
+    test = history_test(data, settings, rows=rows, labels=labels, blocks=blocks, rng=rng)
+    # What the present shows as well is no matter of the past.
+    effect = test.effect if test.effect - test.present > 0 else 0.0
+    return Stratum(
+        variable=HISTORY,
+        phase=phase,
+        p_value=test.p_value,
+        p_adjusted=None,
+        effect=effect,
+        effect_lower=min(effect, test.effect_lower),
+        effect_upper=test.effect_upper,
+        n=test.n,
+        recorded=True,
+        observed=False,
+        detail=test.feature,
+    )
 
 
 def _disjoint(
@@ -168,7 +161,7 @@ def _disjoint(
     items: list[tuple[Neighbourhood, Clustering]],
     order: Integers,
     least: int,
-) -> tuple[Integers, Integers, Integers]:
+) -> Drawn:
     """Rows, modes and block of situations taken in `order`; each episode only once.
 
     A situation of which fewer than `least` episodes are left is passed over.
@@ -191,24 +184,43 @@ def _disjoint(
     )
 
 
-def _hidden_variables(data: AuditInput, rows: Integers) -> list[Variable]:
+def _hidden_variables(data: AuditInput, rows: Integers, links: Integers) -> list[Variable]:
     """Name, value of each row (None: not recorded) and that no policy sees it."""
     episode, table = data.episode[rows], data.episodes
     result: list[Variable] = []
+    if not data.phase_observed:
+        known = len(np.unique(data.phase)) > 1
+        result.append(("phase", data.phase[rows] if known else None, False))
     for name in EPISODE_VARIABLES:
         values: Text = getattr(table, name)
         result.append((name, values[episode] if recorded(values) else None, False))
     ordered = bool(np.all(np.isfinite(table.order)))
     result.append(("episode_order", table.order[episode] if ordered else None, False))
+    before = _mode_before(table.order, links)[episode] if ordered else None
+    result.append(("previous_episode", before, False))
     result.append(("time_in_episode", data.index[rows].astype(np.float64), False))
     return result
 
 
-def _observed_variables(data: AuditInput, rows: Integers) -> list[Variable]:
-    """Start position and context channels of each row, which a policy sees."""
+def _mode_before(order: NDArray[np.float64], links: Integers) -> Integers:
+    """Mode of the episode recorded just before each one; -1 where it has none. Shape (E,)."""
+    sequence = np.argsort(order, kind="stable")
+    result = np.full(len(order), -1, dtype=np.int64)
+    result[sequence[1:]] = links[sequence[:-1]]
+    return result
+
+
+def _observed_variables(
+    data: AuditInput, settings: AuditSettings, rows: Integers
+) -> list[Variable]:
+    """Start position and context channels of each row.
+
+    A policy sees the context, and the start as long as it is about to leave it.
+    """
     start = data.position[data.first_row[rows]]
+    fresh = bool(np.median(data.index[rows]) < settings.chunk_steps) if len(rows) else True
     result: list[Variable] = [
-        (f"start_position.{axis}", start[:, axis], True) for axis in range(start.shape[1])
+        (f"start_position.{axis}", start[:, axis], fresh) for axis in range(start.shape[1])
     ]
     for part in data.context.values():
         for column in range(part.start, part.stop):
@@ -234,16 +246,9 @@ def _adjusted(rows: list[Stratum]) -> tuple[Stratum, ...]:
     result = []
     for number, row in enumerate(rows):
         value = float(adjusted[number]) if number in adjusted else row.p_value
-        result.append(Stratum(**{**row.__dict__, "p_adjusted": value}))
+        result.append(replace(row, p_adjusted=value))
     return tuple(result)
 
 
 def _unknown(variable: str, phase: str) -> Stratum:
     return Stratum(variable, phase, None, None, None, None, None, 0, False, False)
-
-
-def _auc(values: Array, inside: NDArray[np.bool_]) -> float:
-    """Share of pairs that the value orders one way, the better of the two ways."""
-    pairs = values[inside][:, None] - values[~inside][None]
-    share = float(np.mean((pairs > 0) + 0.5 * (pairs == 0)))
-    return max(share, 1.0 - share)

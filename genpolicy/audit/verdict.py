@@ -4,17 +4,25 @@ Order: clocks and frames, calibration, labels, support, modes at all, persistenc
 variables, validity of each mode. A later layer is not believed while an earlier one is red.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from genpolicy.audit.labels import ModeOutcome, Replayed, disagreement
 from genpolicy.audit.persistence import Persistence
 from genpolicy.audit.semantics import Semantics
 from genpolicy.audit.settings import AuditSettings
-from genpolicy.audit.strata import Stratum
+from genpolicy.audit.strata import HISTORY, Stratum
 
 DATA_VARIABLES = ("calibration_epoch",)
 POINTWISE_RATIO = 0.5
+# Which variable to name when several explain the modes equally well, most concrete first; all
+# others (observed ones) come before the last three, which anything else may shine through.
+CONCRETE = (
+    "phase", "object", "operator", "calibration_epoch", "episode_order", "previous_episode",
+    "time_in_episode", HISTORY,
+)  # fmt: skip
+VAGUE = 3
+NEARLY = 0.15
 
 
 class Cause(StrEnum):
@@ -57,83 +65,84 @@ class Counts:
     noise_spread: float
 
 
+class Layer(StrEnum):
+    """The layers of the diagnosis, in the order in which they are believed."""
+
+    DATA = "data"
+    LABELS = "labels"
+    SUPPORT = "support"
+    STRUCTURE = "structure"
+    HIDDEN = "hidden"
+    VALIDITY = "validity"
+    NONE = "none"
+
+
 @dataclass(frozen=True)
 class AuditVerdict:
-    """Cause, the variable or the kind that it names (else empty), and what to do next."""
+    """Cause, the variable or the kind that it names (else empty), and what to do next.
+
+    `layer` is the first red one, `none` where all are green.
+    """
 
     cause: Cause
     variable: str
     kind: str
     next_action: str
+    layer: Layer = Layer.NONE
 
 
-def decide(
-    settings: AuditSettings,
-    *,
-    semantics: Semantics,
-    replayed: tuple[Replayed, ...],
-    counts: Counts,
-    persistence: Persistence,
-    strata: tuple[Stratum, ...],
-    modes: tuple[ModeOutcome, ...],
-) -> AuditVerdict:
+@dataclass(frozen=True)
+class Layers:
+    """What the layers measured.
+
+    Attributes:
+        semantics: Clocks, frames, calibration.
+        replayed: Replays; none leaves the label layer open, which `modes` then answers.
+        counts: Support and modes.
+        persistence: Identity over time.
+        strata: Tests of recorded variables and of the past.
+        modes: Modes of the phase with most situations.
+    """
+
+    semantics: Semantics
+    replayed: tuple[Replayed, ...]
+    counts: Counts
+    persistence: Persistence
+    strata: tuple[Stratum, ...]
+    modes: tuple[ModeOutcome, ...]
+
+
+def decide(settings: AuditSettings, layers: Layers) -> AuditVerdict:
     """The cause from the layers, first red first.
 
     Args:
         settings: Limits.
-        semantics: Clocks and calibration.
-        replayed: Replays; none leaves the label layer open, which `modes` then answers.
-        counts: Support and modes.
-        persistence: Identity over time.
-        strata: Tests of recorded variables.
-        modes: Modes of the phase with most situations.
+        layers: What was measured.
     """
-    return (
-        _data(settings, semantics)
-        or _labels(settings, replayed)
-        or _support(settings, counts)
-        or _structure(settings, counts, persistence)
-        or _explained(settings, strata)
-        or _validity(settings, modes)
-        or AuditVerdict(
-            Cause.VALID_MODES,
-            "",
-            "",
-            "Train the simple baselines on this dataset and see whether they lose the modes.",
-        )
+    found = (
+        (Layer.DATA, _data(layers.semantics)),
+        (Layer.LABELS, _labels(settings, layers.replayed)),
+        (Layer.SUPPORT, _support(settings, layers.counts)),
+        (Layer.STRUCTURE, _structure(settings, layers.counts, layers.persistence)),
+        (Layer.HIDDEN, _explained(settings, layers.strata)),
+        (Layer.VALIDITY, _validity(settings, layers.modes)),
+    )
+    for layer, verdict in found:
+        if verdict is not None:
+            return replace(verdict, layer=layer)
+    return AuditVerdict(
+        Cause.VALID_MODES,
+        "",
+        "",
+        "Train the simple baselines on this dataset and see whether they lose the modes.",
     )
 
 
-def _data(settings: AuditSettings, semantics: Semantics) -> AuditVerdict | None:
-    for clock in semantics.clocks:
-        offset = clock.offset_before_s
-        if offset is not None and not settings.clock_limit_s - abs(offset) >= 0:
-            return AuditVerdict(
-                Cause.DATA_DEFECT,
-                clock.stream,
-                "clock",
-                f"Correct the clock of stream {clock.stream} in epoch {clock.epoch or '-'} "
-                f"({offset:+.3f} s), ingest again and repeat the audit.",
-            )
-    if semantics.negative_delays:
-        return AuditVerdict(
-            Cause.DATA_DEFECT,
-            "",
-            "clock",
-            f"{semantics.negative_delays} samples were received before they happened: put both "
-            "times on one clock and ingest again.",
-        )
-    for calibration in semantics.calibrations:
-        known = calibration.residual_m == calibration.residual_m
-        if known and not settings.calibration_limit_m - calibration.residual_m >= 0:
-            return AuditVerdict(
-                Cause.DATA_DEFECT,
-                calibration.epoch,
-                "calibration",
-                f"Recalibrate or leave out epoch {calibration.epoch}: its releases lie "
-                f"{calibration.residual_m * 1e3:.1f} mm from those of the others.",
-            )
-    return None
+def _data(semantics: Semantics) -> AuditVerdict | None:
+    if not semantics.defects:
+        return None
+    first = semantics.defects[0]
+    return AuditVerdict(Cause.DATA_DEFECT, first.variable, first.kind, first.action)
 
 
 def _labels(settings: AuditSettings, replayed: tuple[Replayed, ...]) -> AuditVerdict | None:
@@ -217,11 +226,21 @@ def _explained(settings: AuditSettings, strata: tuple[Stratum, ...]) -> AuditVer
     ]
     if not found:
         return None
-    row = max(found, key=lambda item: (item.effect or 0.0, item.variable))
+    row = _foremost(found)
     share = f"{row.variable} explains {row.effect or 0.0:.0%} of the modes in {row.phase}"
     if row.variable in DATA_VARIABLES:
         return AuditVerdict(
             Cause.DATA_DEFECT, row.variable, row.variable, f"{share}: correct the epochs."
+        )
+    if row.variable == HISTORY:
+        return AuditVerdict(
+            Cause.HIDDEN_STATE,
+            "unrecorded",
+            HISTORY,
+            f"The past explains {row.effect or 0.0:.0%} of the modes in "
+            f"{row.phase} ({row.detail}): "
+            "record what was decided there, or lengthen the observation history, then repeat the "
+            "audit.",
         )
     if row.observed:
         return AuditVerdict(
@@ -236,6 +255,19 @@ def _explained(settings: AuditSettings, strata: tuple[Stratum, ...]) -> AuditVer
         "stratum",
         f"{share}: add it to the observation or standardise it, then repeat the audit.",
     )
+
+
+def _foremost(found: list[Stratum]) -> Stratum:
+    """The variable to name: the strongest, and of nearly equal ones the most concrete."""
+    best = max(row.effect or 0.0 for row in found)
+    equal = [row for row in found if (row.effect or 0.0) >= best - NEARLY]
+
+    def rank(row: Stratum) -> tuple[int, float, str]:
+        name = row.variable
+        place = CONCRETE.index(name) if name in CONCRETE else len(CONCRETE) - VAGUE
+        return place, -(row.effect or 0.0), name
+
+    return min(equal, key=rank)
 
 
 def _validity(settings: AuditSettings, modes: tuple[ModeOutcome, ...]) -> AuditVerdict | None:
