@@ -1,0 +1,361 @@
+"""The catalogue: what is planted, at which strengths, and what counts as the right answer.
+
+Each cause has a smallest strength from which the audit is expected to name it. These were written
+down, with their reasons, before any report seed was run. Below, a data set is still run and shown,
+and either the planted cause or the answer without it counts as right.
+
+Order of diagnosis: data, labels, support, structure, hidden state, validity. Of two planted
+causes, the first red layer is the answer.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from benchmarks.audit.plan import Defect, Plan
+
+PERIOD_S = {"planar": 0.1, "insertion": 0.05}
+HALF = (0.5, 0.5)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A verdict that counts as right.
+
+    Attributes:
+        cause: The verdict.
+        names: One of these must occur in its variable or kind; none: any will do.
+    """
+
+    cause: str
+    names: tuple[str, ...] = ()
+
+    def fits(self, cause: str, variable: str, kind: str) -> bool:
+        """Whether a verdict is this one."""
+        text = f"{variable} {kind}"
+        return cause == self.cause and (not self.names or any(n in text for n in self.names))
+
+
+VALID = Answer("valid_modes")
+UNIMODAL = Answer("unimodal")
+SUPPORT = Answer("insufficient_support")
+NOISE = Answer("pointwise_noise")
+LABELS = Answer("label_contamination")
+ONE_VALID = Answer("unimodal", ("one_valid_mode",))
+CLOCK = Answer("data_defect", ("clock", "drift"))
+CALIBRATION = Answer("data_defect", ("calibration",))
+UNIT = Answer("data_defect", ("unit",))
+FRAME = Answer("data_defect", ("frame", "rotat", "mirror", "swap"))
+REPEATED = Answer("data_defect", ("duplicate",))
+GLUED = Answer("data_defect", ("glue", "duplicate"))
+ANY_DEFECT = Answer("data_defect")
+EPOCH = (Answer("data_defect", ("epoch",)), Answer("hidden_state", ("epoch",)))
+ORDER = Answer("hidden_state", ("order", "session", "unrecorded"))
+
+
+def hidden(name: str) -> Answer:
+    """A hidden variable by name."""
+    return Answer("hidden_state", (name,))
+
+
+@dataclass(frozen=True)
+class Cause:
+    """One kind of planted cause.
+
+    Attributes:
+        name: Its name in the tables.
+        group: Name of its row in the confusion matrix.
+        unit: What the strength is measured in.
+        strengths: From invisible to obvious.
+        minimum: Strength from which it is to be named; above it if `falling`.
+        reason: Why there, in physical terms.
+        plan: Plan of one data set from its seed, strength and task.
+        answers: Right answers from the minimum on.
+        weaker: Further right answers below the minimum.
+        falling: Smaller strengths are stronger.
+    """
+
+    name: str
+    group: str
+    unit: str
+    strengths: tuple[float, ...]
+    minimum: float
+    reason: str
+    plan: Callable[[int, float, str], Plan]
+    answers: tuple[Answer, ...]
+    weaker: tuple[Answer, ...] = ()
+    falling: bool = False
+
+    def strong(self, strength: float) -> bool:
+        """Whether a strength is one at which the cause is to be named."""
+        return strength <= self.minimum if self.falling else strength >= self.minimum
+
+
+def base(seed: int) -> Plan:
+    """Data sets in which a fault of data or labels is planted: with one mode, or with two."""
+    return Plan(seed, shares=HALF if seed % 2 else (1.0,))
+
+
+def _skew(count: int, smallest: float) -> tuple[float, ...]:
+    """Shares of modes of which all but the first have the smallest."""
+    return (1.0 - (count - 1) * smallest, *(smallest,) * (count - 1))
+
+
+def _modes(count: int, contexts: int) -> Cause:
+    even = 1.0 / count
+    context = f", {contexts} contexts" if contexts > 1 else ""
+    return Cause(
+        f"{count} valid modes{context}", "valid_modes", "share of the smallest mode",
+        tuple(sorted({s for s in (0.05, 0.2, even) if s <= even})), 0.2,
+        "4 of 20 neighbours; rarer modes are absent from many neighbourhoods by chance",
+        lambda seed, s, task: Plan(seed, shares=_skew(count, s), contexts=contexts),
+        (VALID,), (UNIMODAL, SUPPORT, NOISE),
+    )  # fmt: skip
+
+
+def _decided(name: str, decided_by: str, answers: tuple[Answer, ...]) -> Cause:
+    return Cause(
+        name, "hidden_state", "share of episodes that obey", (0.3, 0.6, 0.8, 1.0), 0.8,
+        "it then predicts 9 of 10 modes and explains half of their entropy",
+        lambda seed, s, task: Plan(seed, shares=HALF, decided_by=decided_by, fidelity=s),
+        answers, (VALID,),
+    )  # fmt: skip
+
+
+def _clock(name: str, kind: str, scope: str, share: float = 1.0, minimum: float = 1.0) -> Cause:
+    return Cause(
+        name, "data_defect: clock", "action periods", (0.1, 0.5, 1.0, 2.0, 4.0), minimum,
+        "one action period: the action stands beside the observation of another one",
+        lambda seed, s, task: replace(
+            base(seed), defects=(Defect(kind, s * PERIOD_S[task], scope, share),)
+        ),
+        (CLOCK,), (VALID, UNIMODAL),
+    )  # fmt: skip
+
+
+def _fault(
+    name: str, group: str, unit: str, strengths, minimum: float, reason: str,
+    defect: Callable[[float], Defect], answer: Answer,
+) -> Cause:  # fmt: skip
+    return Cause(
+        name, group, unit, strengths, minimum, reason,
+        lambda seed, s, task: replace(base(seed), defects=(defect(s),)),
+        (answer,), (VALID, UNIMODAL, SUPPORT),
+    )  # fmt: skip
+
+
+MODES = tuple(_modes(count, contexts) for count in (2, 3, 4) for contexts in (1, 2)) + (
+    Cause(
+        "2 valid modes, narrow", "valid_modes", "distance relative to usual", (0.2, 0.35, 0.6, 0.8),
+        0.6, "5 cm and more from the obstacle, beyond the declared 3 cm of separation",
+        lambda seed, s, task: Plan(seed, shares=HALF, width=s), (VALID,), (UNIMODAL, SUPPORT, NOISE),
+    ),
+)  # fmt: skip
+
+HIDDEN = (
+    _decided("hidden operator", "operator", (hidden("operator"),)),
+    _decided("hidden object", "object", (hidden("object"),)),
+    _decided("hidden epoch", "calibration_epoch", EPOCH),
+    _decided("side by session", "session", (ORDER,)),
+    _decided("side in turns", "alternation", (ORDER,)),
+    _decided("early lamp", "lamp_early", (hidden("unrecorded"),)),
+    _decided("early path", "path_early", (hidden("unrecorded"),)),
+    Cause(
+        "hidden phase", "hidden_state", "rest in both phases, s", (0.1, 0.4, 0.8, 1.6), 0.8,
+        "8 observations and more without a motion that tells the phases apart",
+        lambda seed, s, task: Plan(seed, station_dwell_s=s, phase_observed=False),
+        (hidden("phase"),), (UNIMODAL,),
+    ),
+)  # fmt: skip
+
+CLOCKS = (
+    _clock("robot clock, epoch", "robot_clock", "epoch"),
+    _clock("robot clock, 15 % of episodes", "robot_clock", "some", 0.15),
+    _clock("camera clock, epoch", "camera_clock", "epoch"),
+    _clock("clock drift in the episode", "clock_within", "epoch", minimum=2.0),
+    _clock("clock drift over the session", "clock_session", "all", minimum=2.0),
+)
+
+DATA = (
+    _fault(
+        "camera shift", "data_defect: calibration", "mm", (1, 5, 10, 20), 10,
+        "twice what a check of a calibration allows",
+        lambda s: Defect("camera_shift", s * 1e-3), CALIBRATION,
+    ),
+    _fault(
+        "tool shift", "data_defect: calibration", "mm", (1, 5, 10, 20), 10,
+        "twice what a check of a calibration allows",
+        lambda s: Defect("tool_shift", s * 1e-3), CALIBRATION,
+    ),
+    _fault(
+        "position unit, epoch", "data_defect: unit", "factor", (1.02, 1.2, 10, 39.37, 1000), 10,
+        "the smallest confusion of units, cm for dm",
+        lambda s: Defect("position_unit", s), UNIT,
+    ),
+    _fault(
+        "action unit, all", "data_defect: unit", "factor", (1.02, 10, 1000), 10,
+        "the smallest confusion of units, cm for dm",
+        lambda s: Defect("action_unit", s, "all"), UNIT,
+    ),
+    _fault(
+        "position unit, share of episodes", "data_defect: unit", "share of episodes in mm",
+        (0.02, 0.1, 0.3), 0.1, "a tenth of the episodes, ten or more",
+        lambda s: Defect("position_unit", 1000.0, "some", s), UNIT,
+    ),
+    _fault(
+        "scene unit, epoch", "data_defect: unit", "factor", (1.01, 10, 1000), 10,
+        "the smallest confusion of units, cm for dm",
+        lambda s: Defect("scene_unit", s), Answer("data_defect", ("unit", "calibration")),
+    ),
+    _fault(
+        "frame turned, epoch", "data_defect: frame", "degrees", (1, 5, 15, 90), 15,
+        "8 cm at the reach of the task",
+        lambda s: Defect("turn", s * 0.017453292519943295), FRAME,
+    ),
+    _fault(
+        "frame turned, all", "data_defect: frame", "degrees", (1, 5, 15, 90), 15,
+        "8 cm at the reach of the task",
+        lambda s: Defect("turn", s * 0.017453292519943295, "all"), FRAME,
+    ),
+    _fault(
+        "mirrored, share of episodes", "data_defect: frame", "share of episodes", (0.02, 0.2, 1.0),
+        0.2, "a fifth of the episodes",
+        lambda s: Defect("mirror", 1.0, "some", s), FRAME,
+    ),
+    _fault(
+        "columns swapped, share of episodes", "data_defect: frame", "share of episodes",
+        (0.02, 0.2, 1.0), 0.2, "a fifth of the episodes",
+        lambda s: Defect("swap", 1.0, "some", s), FRAME,
+    ),
+    _fault(
+        "stored twice", "data_defect: duplicate", "share of episodes", (0.01, 0.05, 0.1, 0.3), 0.05,
+        "five and more copies: one in a hundred may be a slip of the hand",
+        lambda s: Defect("repeat", s), REPEATED,
+    ),
+    _fault(
+        "glued to the next", "data_defect: glued", "share of episodes", (0.01, 0.1, 0.5), 0.1,
+        "ten and more episodes", lambda s: Defect("glue", s, "some"), GLUED,
+    ),
+    _fault(
+        "glued to itself", "data_defect: glued", "share of episodes", (0.01, 0.1, 1.0), 0.1,
+        "ten and more episodes", lambda s: Defect("glue", s, "all"), GLUED,
+    ),
+)  # fmt: skip
+
+LABELLED = (
+    Cause(
+        "wrong labels", "label_contamination", "share of labels", (0.02, 0.05, 0.1, 0.25), 0.1,
+        "one label in ten; the exact bound of 60 replays cannot tell less from the limit of 8 %",
+        lambda seed, s, task: replace(base(seed), wrong_labels=s),
+        (LABELS,), (VALID, UNIMODAL, SUPPORT),
+    ),
+    Cause(
+        "a mode that fails", "one valid mode", "share of its episodes that fail",
+        (0.2, 0.5, 0.8, 0.95), 0.8, "it fails four times out of five",
+        lambda seed, s, task: Plan(seed, shares=HALF, failing=s), (ONE_VALID,), (VALID,),
+    ),
+)  # fmt: skip
+
+STRUCTURE = (
+    Cause(
+        "tremor", "pointwise_noise", "mm", (0.5, 2, 6, 12, 20), 6,
+        "three times the declared noise floor",
+        lambda seed, s, task: Plan(seed, tremor_m=s * 1e-3), (NOISE,), (UNIMODAL,),
+    ),
+    Cause(
+        "unimodal", "unimodal", "spread of the routes, mm", (2, 8, 15, 25), 0,
+        "one way, however wide",
+        lambda seed, s, task: Plan(seed, route_spread_m=s * 1e-3), (UNIMODAL,),
+    ),
+    Cause(
+        "the goal decides", "unimodal", "half width of the goal, mm", (4, 10, 30), 10,
+        "one declared scale (10 mm) between the middles of the two sides",
+        lambda seed, s, task: Plan(
+            seed, shares=HALF, decided_by="goal", goal_half_width_m=s * 1e-3
+        ), (UNIMODAL,), (VALID,),
+    ),
+    Cause(
+        "a lamp decides", "unimodal", "share of episodes that obey", (0.3, 0.8, 1.0), 0.8,
+        "it then predicts 9 of 10 modes",
+        lambda seed, s, task: Plan(seed, shares=HALF, decided_by="lamp", fidelity=s),
+        (UNIMODAL,), (VALID,),
+    ),
+    Cause(
+        "too few episodes", "insufficient_support", "episodes", (60, 40, 20, 10), 20,
+        "fewer training episodes than a neighbourhood needs",
+        lambda seed, s, task: replace(base(seed), episodes=int(s)),
+        (SUPPORT,), (VALID, UNIMODAL), falling=True,
+    ),
+    Cause(
+        "starts too far apart", "insufficient_support", "width of starts relative to usual",
+        (3, 8, 15, 25), 15, "200 starts over an area in which each has less than 12 neighbours",
+        lambda seed, s, task: replace(base(seed), start_wide=s, goal_half_width_m=0.01 * s),
+        (SUPPORT,), (VALID, UNIMODAL),
+    ),
+)  # fmt: skip
+
+
+def _pair(name: str, group: str, plan: Callable[[int, str], Plan], *answers: Answer) -> Cause:
+    return Cause(
+        name, group, "both obvious", (1.0,), 1.0, "the first red layer in the order of diagnosis",
+        lambda seed, s, task: plan(seed, task), answers,
+    )  # fmt: skip
+
+
+def _late(task: str) -> Defect:
+    return Defect("robot_clock", 2.0 * PERIOD_S[task])
+
+
+PAIRS = (
+    _pair(
+        "clock + wrong labels", "data_defect: clock",
+        lambda seed, task: replace(base(seed), wrong_labels=0.25, defects=(_late(task),)), CLOCK,
+    ),
+    _pair(
+        "clock + hidden operator", "data_defect: clock",
+        lambda seed, task: Plan(
+            seed, shares=HALF, decided_by="operator", defects=(_late(task),)
+        ), CLOCK,
+    ),
+    _pair(
+        "clock + camera shift", "data_defect: clock",
+        lambda seed, task: replace(
+            base(seed), defects=(_late(task), Defect("camera_shift", 0.02))
+        ), CLOCK,
+    ),
+    _pair(
+        "camera shift + a mode that fails", "data_defect: calibration",
+        lambda seed, task: Plan(
+            seed, shares=HALF, failing=0.8, defects=(Defect("camera_shift", 0.02),)
+        ), CALIBRATION,
+    ),
+    _pair(
+        "stored twice + hidden object", "data_defect: duplicate",
+        lambda seed, task: Plan(
+            seed, shares=HALF, decided_by="object", defects=(Defect("repeat", 0.2),)
+        ), REPEATED,
+    ),
+    _pair(
+        "wrong labels + hidden operator", "label_contamination",
+        lambda seed, task: Plan(seed, shares=HALF, decided_by="operator", wrong_labels=0.25),
+        LABELS,
+    ),
+    _pair(
+        "wrong labels + tremor", "label_contamination",
+        lambda seed, task: Plan(seed, tremor_m=0.012, wrong_labels=0.25), LABELS,
+    ),
+    _pair(
+        "few episodes + hidden object", "insufficient_support",
+        lambda seed, task: Plan(seed, shares=HALF, decided_by="object", episodes=15), SUPPORT,
+    ),
+    _pair(
+        "hidden object + a mode that fails", "hidden_state",
+        lambda seed, task: Plan(seed, shares=HALF, decided_by="object", failing=0.8),
+        hidden("object"),
+    ),
+    _pair(
+        "3 modes + a mode that fails", "valid_modes",
+        lambda seed, task: Plan(seed, shares=(0.34, 0.33, 0.33), failing=0.8), VALID,
+    ),
+)  # fmt: skip
+
+CAUSES = MODES + HIDDEN + CLOCKS + DATA + LABELLED + STRUCTURE + PAIRS

@@ -1,0 +1,175 @@
+"""What is planted in one data set, and who recorded which episode when.
+
+Everything that is not planted is nuisance, drawn from the seed: number of episodes, operators and
+their speed, objects, small clock and calibration errors that every cell has, which strata were
+recorded, disturbed and failed episodes. No draw depends on what the audit would say.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from genpolicy.seeds import stream
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+OPERATORS = ("amber", "birch", "cedar")
+OBJECTS = ("peg_a", "peg_b")
+# What decides the mode of an episode; `chance` is a free choice of the operator.
+DECIDERS = (
+    "chance", "operator", "object", "calibration_epoch", "session", "alternation",
+    "lamp_early", "path_early", "lamp", "goal",
+)  # fmt: skip
+# Episodes that are not as they should be in every data set: disturbed ones and honest failures.
+RECOVERY_SHARE = 0.08
+FAILURE_SHARE = 0.03
+
+
+@dataclass(frozen=True)
+class Defect:
+    """One fault of the recording.
+
+    Attributes:
+        kind: Name of the fault, see `defects.py`.
+        size: Its size: seconds, metres, a factor, radians or a share, by kind.
+        scope: `epoch` (all episodes of the last epoch), `some` (a share of all episodes) or `all`.
+        share: Share of the episodes where the scope is `some`.
+    """
+
+    kind: str
+    size: float = 1.0
+    scope: str = "epoch"
+    share: float = 1.0
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is planted in one data set.
+
+    Attributes:
+        seed: Seed of every draw.
+        shares: Share of each mode, the first the largest; one mode for (1.0,).
+        width: Distance of the first two modes' routes, relative to the task's usual one.
+        decided_by: One of `DECIDERS`.
+        fidelity: How often the decider decides; otherwise chance does.
+        contexts: Clusters of goals, each with all the modes.
+        goal_half_width_m: Half width of the goal's lateral position; None takes the task's.
+        start_wide: Half width of the start position, relative to the task's.
+        route_spread_m: Standard deviation of the width of the routes of one mode.
+        tremor_m: Standard deviation of white noise on every command.
+        station_dwell_s: How long the arm rests, twice, at one place, before it goes one way in the
+            first phase and another in the second; 0: it does not go to the station.
+        phase_observed: Whether a policy would see the phase.
+        failing: Share of the last mode's episodes that fail.
+        wrong_labels: Share of labels that are wrong.
+        episodes: Number of episodes; None draws 100 to 200.
+        defects: Faults of the recording.
+    """
+
+    seed: int
+    shares: tuple[float, ...] = (1.0,)
+    width: float = 1.0
+    decided_by: str = "chance"
+    fidelity: float = 1.0
+    contexts: int = 1
+    goal_half_width_m: float | None = None
+    start_wide: float = 1.0
+    route_spread_m: float = 0.008
+    tremor_m: float = 0.0005
+    station_dwell_s: float = 0.0
+    phase_observed: bool = True
+    failing: float = 0.0
+    wrong_labels: float = 0.0
+    episodes: int | None = None
+    defects: tuple[Defect, ...] = field(default=())
+
+    def __post_init__(self) -> None:
+        if self.decided_by not in DECIDERS or abs(sum(self.shares) - 1.0) > 1e-9:
+            raise ValueError(f"{self.decided_by} decides, shares {self.shares}")
+
+
+@dataclass(frozen=True)
+class Roster:
+    """Who recorded which episode when, and how; arrays of shape (E,).
+
+    Attributes:
+        operator: Name.
+        object: Name.
+        epoch: Number of the calibration epoch, in order of time.
+        mode: Mode of the episode.
+        cue: The mode that the decider stands for, where it is seen in the episode.
+        context: Cluster of the goal.
+        goal_lateral_m: The goal's lateral position relative to its cluster.
+        recovery: Disturbed.
+        failure: Fails honestly.
+        split: train, validation or test.
+    """
+
+    operator: NDArray[np.str_]
+    object: NDArray[np.str_]
+    epoch: Integers
+    mode: Integers
+    cue: Integers
+    context: Integers
+    goal_lateral_m: Array
+    recovery: NDArray[np.bool_]
+    failure: NDArray[np.bool_]
+    split: NDArray[np.str_]
+
+
+def draw_roster(plan: Plan, goal_half_width_m: float) -> Roster:
+    """Who recorded which episode when; the goal's half width is the task's own."""
+    rng = stream(plan.seed, "roster")
+    n = plan.episodes or int(rng.integers(100, 201))
+    blocks = bool(rng.random() < 0.5)  # operators take turns, or come at random
+    turns = np.arange(n) // int(rng.integers(5, 16)) if blocks else rng.integers(0, 1000, n)
+    operator = np.array(OPERATORS)[turns % len(OPERATORS)]
+    objects = np.array(OBJECTS)[rng.integers(0, 2, n)]
+    epochs = int(rng.integers(2, 4))
+    epoch = np.arange(n) * epochs // n
+    context = rng.integers(0, plan.contexts, n)
+    wide = goal_half_width_m if plan.goal_half_width_m is None else plan.goal_half_width_m
+    goal = wide * rng.uniform(-1.0, 1.0, n)
+    mode, cue = _modes(plan, operator, objects, epoch, goal, rng)
+    failure = rng.random(n) < FAILURE_SHARE
+    if plan.failing:
+        failure |= (mode == len(plan.shares) - 1) & (rng.random(n) < plan.failing)
+    return Roster(
+        operator=operator, object=objects, epoch=epoch, mode=mode, cue=cue, context=context,
+        goal_lateral_m=goal, recovery=rng.random(n) < RECOVERY_SHARE, failure=failure,
+        split=_splits(n, rng),
+    )  # fmt: skip
+
+
+def _modes(plan, operator, objects, epoch, goal, rng):
+    """Mode of each episode, and the mode that the decider stands for."""
+    n, count = len(operator), len(plan.shares)
+    free = rng.choice(count, size=n, p=np.array(plan.shares))
+    if count == 1:
+        return free, free
+    number = np.arange(n)
+    decided = {
+        "chance": free,
+        "operator": np.isin(operator, OPERATORS[1:2]).astype(int),
+        "object": np.isin(objects, OBJECTS[1:]).astype(int),
+        "calibration_epoch": epoch % 2,
+        # Sessions of changing length: the operator is told a side, and keeps it for the session.
+        "session": np.searchsorted(np.cumsum(rng.integers(10, 19, n)), number, side="right") % 2,
+        "alternation": number % 2,
+        "lamp_early": free,
+        "path_early": free,
+        "lamp": free,
+        "goal": (goal > 0).astype(int),
+    }[plan.decided_by]
+    obeys = rng.random(n) < plan.fidelity
+    cue = np.asarray(decided, dtype=np.int64)
+    other = rng.choice(count, size=n, p=np.array(plan.shares))
+    return np.where(obeys, cue, other), cue
+
+
+def _splits(n, rng):
+    """60 % train, 20 % validation, 20 % test, in random order."""
+    names = np.array(["train"] * 3 + ["validation", "test"])
+    return rng.permutation(names[np.arange(n) % 5])

@@ -1,0 +1,93 @@
+"""One data set: recorded, audited, and compared with what was planted."""
+
+import time
+from dataclasses import asdict, dataclass
+
+from threadpoolctl import threadpool_limits
+
+from benchmarks.audit.cases import CAUSES
+from benchmarks.audit.recorder import TASKS, record
+from benchmarks.audit.settings import SETTINGS
+from genpolicy.audit.run import audit
+
+
+@dataclass(frozen=True)
+class Job:
+    """One data set to be.
+
+    Attributes:
+        cause: Place in the catalogue.
+        strength: Strength of the cause.
+        task: planar or insertion.
+        seed: Seed of the data set.
+    """
+
+    cause: int
+    strength: float
+    task: str
+    seed: int
+
+
+@dataclass(frozen=True)
+class Result:
+    """What the audit said of one data set.
+
+    Attributes:
+        job: The data set.
+        name: Name of the planted cause.
+        group: Row of the confusion matrix.
+        strong: Whether the strength is at least the stated minimum.
+        verdict: Cause that was said.
+        variable: Variable that was named.
+        kind: Kind that was named.
+        named: Whether it is the planted cause.
+        right: The same, or below the minimum also what would be said without it.
+        detail: Numbers that tell which layer decided.
+        cpu_s: Processor time of recording and audit.
+    """
+
+    job: Job
+    name: str
+    group: str
+    strong: bool
+    verdict: str
+    variable: str
+    kind: str
+    named: bool
+    right: bool
+    detail: dict[str, object]
+    cpu_s: float
+
+    def as_row(self) -> dict[str, object]:
+        """One flat row."""
+        row = asdict(self)
+        row.update(row.pop("job"))
+        row["cause"] = self.name
+        return row
+
+
+def run(job: Job) -> Result:
+    """Record and audit one data set."""
+    cause = CAUSES[job.cause]
+    begin = time.process_time()
+    with threadpool_limits(1):
+        plan = cause.plan(job.seed, job.strength, job.task)
+        labelled = record(job.task, plan)
+        result = audit(
+            labelled.data,
+            SETTINGS[job.task],
+            admissible=TASKS[job.task].admissible(plan),
+            replay=labelled.outcomes.__getitem__,
+            root_seed=job.seed,
+        )
+    verdict = result.verdict
+    said = (str(verdict.cause.value), verdict.variable, verdict.kind)
+    named = any(answer.fits(*said) for answer in cause.answers)
+    strong = cause.strong(job.strength)
+    weak = not strong and any(answer.fits(*said) for answer in cause.weaker)
+    return Result(
+        job=job, name=cause.name, group=cause.group, strong=strong,
+        verdict=said[0], variable=said[1], kind=said[2], named=named, right=named or weak,
+        detail={"action": verdict.next_action, **asdict(result.counts)},
+        cpu_s=time.process_time() - begin,
+    )  # fmt: skip

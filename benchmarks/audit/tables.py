@@ -1,0 +1,113 @@
+"""The benchmark's tables: confusion, accuracy by cause and strength, and the two costly errors."""
+
+from collections import defaultdict
+from collections.abc import Sequence
+
+from benchmarks.audit.cases import CAUSES
+from benchmarks.audit.runner import Result
+from genpolicy.statistics.intervals import clopper_pearson
+
+VALID = "valid_modes"
+
+
+def markdown(results: Sequence[Result], *, seeds: str) -> str:
+    """All tables as Markdown."""
+    strong = [result for result in results if result.strong]
+    parts = [
+        f"{len(results)} data sets ({seeds} seeds), {len(strong)} of them at or above the stated "
+        "minimum strength.",
+        "",
+        *_headline(strong, results),
+        "",
+        "### What was planted (rows, from the minimum strength on) and what was said (columns)",
+        "",
+        *_confusion(strong),
+        "",
+        "### Right answers by cause and strength",
+        "",
+        "Named: the planted cause was said. Below the minimum the answer without it also counts as "
+        "right, and the audit must not be relied on to name it.",
+        "",
+        *_strengths(results),
+        "",
+        *_wrong(results),
+    ]
+    return "\n".join(parts) + "\n"
+
+
+def _headline(strong: Sequence[Result], results: Sequence[Result]) -> list[str]:
+    others = [r for r in strong if r.group != VALID]
+    weak = [r for r in results if not r.strong and r.group != VALID]
+    valid = [r for r in strong if r.group == VALID]
+    # Too many modes claimed are no false need where a weak cause leaves two modes: `right` knows.
+    lines = [
+        ("right, from the minimum strength on", sum(r.right for r in strong), len(strong)),
+        (
+            "false need: valid_modes said of anything else",
+            sum(r.verdict == VALID for r in others), len(others),
+        ),
+        (
+            "false need below the minimum, where even two modes were not planted",
+            sum(r.verdict == VALID and not r.right for r in weak), len(weak),
+        ),
+        ("true modes denied", sum(r.verdict != VALID for r in valid), len(valid)),
+    ]  # fmt: skip
+    for task in ("planar", "insertion"):
+        part = [r for r in strong if r.job.task == task]
+        lines.append((f"right, {task}", sum(r.right for r in part), len(part)))
+    rows = ["| | n | of | share | exact 95 % interval |", "|---|---|---|---|---|"]
+    for name, k, n in lines:
+        if n:
+            low, high = clopper_pearson(k, n)
+            rows.append(f"| {name} | {k} | {n} | {k / n:.3f} | {low:.4f} to {high:.4f} |")
+    return rows
+
+
+def _said(result: Result) -> str:
+    if result.verdict == "unimodal" and result.kind == "one_valid_mode":
+        return "one valid mode"
+    return result.verdict
+
+
+def _confusion(results: Sequence[Result]) -> list[str]:
+    counts: dict[str, dict[str, int]] = defaultdict(lambda: defaultdict(int))
+    for result in results:
+        counts[result.group][_said(result)] += 1
+    columns = sorted({name for row in counts.values() for name in row})
+    rows = [f"| planted | {' | '.join(columns)} |", "|---" * (len(columns) + 1) + "|"]
+    for group in counts:
+        cells = [str(counts[group].get(name, "")) for name in columns]
+        rows.append(f"| {group} | {' | '.join(cells)} |")
+    return rows
+
+
+def _strengths(results: Sequence[Result]) -> list[str]:
+    rows = ["| cause | strength | minimum | named | right | of |", "|---|---|---|---|---|---|"]
+    for cause in CAUSES:
+        for strength in cause.strengths:
+            part = [r for r in results if r.name == cause.name and r.job.strength == strength]
+            if part:
+                mark = "yes" if cause.strong(strength) else "below"
+                named, right = sum(r.named for r in part), sum(r.right for r in part)
+                rows.append(
+                    f"| {cause.name} | {strength:g} {cause.unit} | {mark} | {named} | {right} "
+                    f"| {len(part)} |"
+                )
+    return rows
+
+
+def _wrong(results: Sequence[Result]) -> list[str]:
+    wrong = [r for r in results if not r.right]
+    if not wrong:
+        return []
+    rows = [
+        "### Wrong answers", "",
+        "| cause | strength | task | seed | said |", "|---|---|---|---|---|",
+    ]  # fmt: skip
+    for r in wrong:
+        said = f"{r.verdict}({', '.join(x for x in (r.variable, r.kind) if x)})"
+        mark = "" if r.strong else " (below)"
+        rows.append(
+            f"| {r.name} | {r.job.strength:g}{mark} | {r.job.task} | {r.job.seed} | {said} |"
+        )
+    return rows
