@@ -1,0 +1,111 @@
+"""Settings for a dataset of one's own: what is near, what is apart, from units and spread.
+
+Every scale is declared, in the units of the data; where a unit says nothing, a share of the
+spread of the training data stands in for it. Whatever is proposed here can be overridden in the
+`audit` section of the contract, and what was proposed is written beside the verdict.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from genpolicy.audit.settings import AuditSettings
+from genpolicy.contract.observation import Channel, ObservationContract
+from genpolicy.contract.settings import parse_settings
+from genpolicy.dataset.dataset import Dataset
+
+# Length that makes another observation; another mode is three of them, noise a fifth of one.
+SCALES = {"m": 0.01, "px": 10.0, "rad": 0.05, "N": 5.0}
+SPREAD_SHARE = 0.05
+APART, NOISE = 3.0, 0.2
+# The radius grows with the root of the number of components: 1.4 scales in each (RMS).
+RADIUS_PER_COMPONENT = 1.4
+CHUNK_S = 0.8
+MINIMUM_CHUNK, MAXIMUM_CHUNK = 8, 32
+
+
+def observation_contract(dataset: Dataset) -> ObservationContract:
+    """The observation contract as the manifest carries it."""
+    stored = dataset.manifest["observation_contract"]["channels"]
+    return ObservationContract(
+        tuple(Channel(**{**item, "components": tuple(item["components"])}) for item in stored)
+    )
+
+
+def propose_settings(dataset: Dataset, overrides: Mapping[str, Any] | None = None) -> AuditSettings:
+    """Settings of an audit from what the manifest says of the data.
+
+    Args:
+        dataset: A verified dataset.
+        overrides: Settings that the user states; they win.
+
+    Returns:
+        Settings with every scale filled in.
+
+    Raises:
+        ConfigError: An override that does not exist or does not fit.
+    """
+    source = dataset.manifest.get("import_contract") or {}
+    contract = observation_contract(dataset)
+    stated = {**(source.get("audit") or {}), **(overrides or {})}
+    pairing: Mapping[str, str] = source.get("pairing") or {}
+    training = dataset.split("train").frames
+    values: dict[str, Any] = {
+        "position_channel": None,
+        "position_components": list(pairing.values()) or None,
+        "action_components": list(pairing) or None,
+        "reference_channel": None,
+        "ignored_channels": [],
+        "context_channels": _context(contract, set(pairing.values())),
+        "phase_observed": (source.get("labels") or {}).get("phase") is None,
+        "chunk_steps": _chunk_steps(float(dataset.manifest["action_contract"]["period_s"])),
+    }
+    values["channel_scale"] = _scales(contract, training.observation)
+    values |= _separations(dataset, values["action_components"])
+    values |= {name: value for name, value in stated.items() if name != "channel_scale"}
+    values["channel_scale"] |= stated.get("channel_scale", {})
+    horizon = int(values.get("observation_horizon", 2))
+    used = sum(c.size for c in contract.channels if c.name not in values["ignored_channels"])
+    values.setdefault("radius", max(6.0, RADIUS_PER_COMPONENT * float(np.sqrt(horizon * used))))
+    return parse_settings(AuditSettings, values, where="contract.yaml: audit")
+
+
+def _context(contract: ObservationContract, paired: set[str]) -> list[str]:
+    """Channels of which no component is the robot's own position."""
+    return [
+        channel.name
+        for channel in contract.channels
+        if not paired & {f"{channel.name}.{part}" for part in channel.components}
+    ]
+
+
+def _chunk_steps(period_s: float) -> int:
+    """As many actions as go into 0.8 s, within reason."""
+    return int(np.clip(round(CHUNK_S / period_s), MINIMUM_CHUNK, MAXIMUM_CHUNK))
+
+
+def _scales(contract: ObservationContract, observation: np.ndarray) -> dict[str, float]:
+    """By unit where it is known, else a share of the middle 90 % of the training data."""
+    result = {}
+    for channel in contract.channels:
+        part = observation[:, contract.slices[channel.name]]
+        result[channel.name] = SCALES.get(channel.unit, _spread_scale(part))
+    return result
+
+
+def _spread_scale(values: np.ndarray) -> float:
+    low, high = np.quantile(values, [0.05, 0.95], axis=0)
+    scale = SPREAD_SHARE * float(np.max(high - low, initial=0.0))
+    return scale if scale > 0.0 else 1.0
+
+
+def _separations(dataset: Dataset, names: list[str] | None) -> dict[str, float]:
+    """Least distance of two modes and noise floor, in the unit of what is commanded."""
+    stated = dataset.manifest["action_contract"]
+    columns = [k for k, name in enumerate(stated["components"]) if names is None or name in names]
+    units = {stated["units"][k] for k in columns}
+    unit = next(iter(units)) if len(units) == 1 else ""
+    commanded = dataset.split("train").frames.action[:, columns]
+    scale = SCALES.get(unit, _spread_scale(commanded))
+    return {"minimum_separation_m": APART * scale, "noise_floor_m": NOISE * scale}

@@ -1,0 +1,193 @@
+"""The audit of any ingested dataset, as one value: the verdict and all that it rests on."""
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from genpolicy.audit.labels import Replay, disagreement
+from genpolicy.audit.mean_versus_modes import Admissible
+from genpolicy.audit.propose import observation_contract, propose_settings
+from genpolicy.audit.run import AuditResult
+from genpolicy.audit.run import audit as audit_rows
+from genpolicy.audit.settings import AuditSettings
+from genpolicy.audit.strata import EPISODE_VARIABLES
+from genpolicy.audit.view import from_dataset
+from genpolicy.dataset.dataset import Dataset
+
+SCHEMA_VERSION = 1
+
+
+@dataclass(frozen=True)
+class AuditReport:
+    """What `audit.json` says.
+
+    Attributes:
+        verdict: The cause, one of `genpolicy.audit.verdict.Cause`.
+        variable: The variable or stream that it names; empty where it names none.
+        kind: The kind of defect or of evidence; empty where there is none.
+        layer: First red layer of the diagnosis, `none` where all are green.
+        confidence: Share of resampled audits that name the same cause, 0 to 1.
+        modes: Episodes, successes and feasibility of each mode.
+        support: How far the data reach.
+        evidence: What each layer measured, a sentence each.
+        rests_on: What was guessed, not recorded or not checked, a sentence each.
+        next_action: What to do.
+        settings: The settings of the audit, proposed ones included.
+        dataset: Hash of the dataset's manifest.
+        result: All evidence; not part of the document.
+    """
+
+    verdict: str
+    variable: str
+    kind: str
+    layer: str
+    confidence: float
+    modes: tuple[dict[str, Any], ...]
+    support: dict[str, Any]
+    evidence: tuple[str, ...]
+    rests_on: tuple[str, ...]
+    next_action: str
+    settings: AuditSettings
+    dataset: str
+    result: AuditResult
+
+    def as_json(self) -> dict[str, Any]:
+        """The document, ready for `canonical_json`."""
+        return {
+            "schema_version": SCHEMA_VERSION,
+            "verdict": self.verdict,
+            "variable": self.variable,
+            "kind": self.kind,
+            "layer": self.layer,
+            "confidence": self.confidence,
+            "modes": list(self.modes),
+            "support": self.support,
+            "evidence": list(self.evidence),
+            "rests_on": list(self.rests_on),
+            "next_action": self.next_action,
+            "settings": self.settings.model_dump(),
+            "dataset_manifest_sha256": self.dataset,
+        }
+
+
+def audit(
+    dataset: Dataset,
+    config: AuditSettings | None = None,
+    *,
+    admissible: Admissible | None = None,
+    replay: Replay | None = None,
+    root_seed: int = 0,
+) -> AuditReport:
+    """Audit an ingested dataset.
+
+    Args:
+        dataset: A verified dataset, see `genpolicy.dataset.dataset.load_dataset`.
+        config: What counts as near, as two modes, as red; proposed from the data where None, see
+            `genpolicy.audit.propose.propose_settings`.
+        admissible: Feasibility of a chunk, `(actions (K, D_a), observation (D_o,)) -> (bool,
+            reason)`; None: no mean and no mode is checked.
+        replay: Outcome of a replayed episode, by identifier; None: labels are taken as they are.
+        root_seed: Seed of all draws.
+
+    Returns:
+        Verdict and evidence; the same for every order of episodes.
+
+    Raises:
+        ContractError: The settings name what the dataset does not have.
+    """
+    settings = config or propose_settings(dataset)
+    data = from_dataset(
+        dataset,
+        contract=observation_contract(dataset),
+        settings=settings,
+        period_s=float(dataset.manifest["action_contract"]["period_s"]),
+    )
+    result = audit_rows(data, settings, admissible=admissible, replay=replay, root_seed=root_seed)
+    verdict, counts = result.verdict, result.counts
+    return AuditReport(
+        verdict=verdict.cause.value,
+        variable=verdict.variable,
+        kind=verdict.kind,
+        layer=verdict.layer.value,
+        confidence=result.confidence,
+        modes=tuple(asdict(mode) for mode in result.modes),
+        support={
+            "episodes": len(result.data.episodes),
+            "rows": len(result.data.observation),
+            "situations": counts.queries,
+            "situations_with_support": counts.analysed,
+            "held_out_episodes_with_support": counts.analysed_episodes,
+            "by_phase": [
+                {"phase": item.phase, "situations": item.queries, "with_support": item.analysed}
+                for item in result.support
+            ],
+        },
+        evidence=tuple(_evidence(result, settings)),
+        rests_on=tuple(_rests_on(dataset, result, admissible, replay)),
+        next_action=verdict.next_action,
+        settings=settings,
+        dataset=dataset.manifest_sha256,
+        result=result,
+    )
+
+
+def _evidence(result: AuditResult, settings: AuditSettings) -> list[str]:
+    """What the layers measured, in the order of the diagnosis."""
+    counts, persistence = result.counts, result.persistence
+    wrong, replays, upper = disagreement(result.replayed)
+    defects = [f"{item.kind} {item.variable}".strip() for item in result.semantics.defects]
+    lines = [
+        f"data: {', '.join(defects)}" if defects else "data: no defect found",
+        f"labels: {wrong} of {replays} replayed episodes disagree, at most {upper:.1%}"
+        if replays
+        else "labels: not replayed",
+        f"support: {counts.analysed} of {counts.queries} held-out situations have "
+        f"{settings.minimum_neighbours} or more comparable training episodes, from "
+        f"{counts.analysed_episodes} held-out episodes",
+        f"structure: {counts.two_mode} situations from {counts.two_mode_episodes} held-out "
+        f"episodes have several modes; after realignment {result.modes_after_realignment}",
+    ]
+    if persistence.n:
+        lines.append(
+            f"persistence: {persistence.observed:.2f} of the episodes keep their mode, "
+            f"{persistence.null_q95:.2f} is what chance reaches"
+        )
+    tested = [row for row in result.strata if row.p_adjusted is not None and row.n]
+    if tested:
+        row = max(tested, key=lambda item: (item.effect or 0.0, item.variable))
+        lines.append(
+            f"hidden: {len(tested)} variables tested; the strongest is {row.variable} "
+            f"{row.detail}".rstrip()
+            + f", effect {row.effect:.2f}, adjusted p {row.p_adjusted:.3f}"
+        )
+    lines += [
+        f"validity: {mode.mode} in {mode.phase}: {mode.successes} of {mode.episodes} succeed "
+        f"(at least {mode.success_lower:.2f}), {mode.admissible} of {mode.checked} "
+        "modal chunks pass"
+        for mode in result.modes
+    ]
+    return lines
+
+
+def _rests_on(
+    dataset: Dataset,
+    result: AuditResult,
+    admissible: Admissible | None,
+    replay: Replay | None,
+) -> list[str]:
+    """Everything that was guessed, not recorded or not checked."""
+    episodes = result.data.episodes
+    lines = [str(note) for note in dataset.manifest.get("notes", ())]
+    for name in EPISODE_VARIABLES:
+        if not any(getattr(episodes, name)):
+            lines.append(f"{name}: not recorded, so it may explain the modes unseen.")
+    if not any(episodes.outcome):
+        lines.append("outcome: not recorded, so no mode can be called valid.")
+    elif replay is None:
+        lines.append("outcome: taken as labelled; no episode was replayed.")
+    if admissible is None:
+        lines.append(
+            "feasibility: not checked; neither the mean nor a mode was held against limits."
+        )
+    if not result.data.paired:
+        lines.append("pairing: no action commands an observed number, so no lag was measured.")
+    return lines
