@@ -26,7 +26,7 @@ def work(params: Params) -> None:
             root_seed=params.seed,
         )
         obstacles = round_obstacles(load_task(params.task.name), feasibility)
-        write_evidence(result, folder, obstacles=obstacles)
+        write_evidence(result, folder, settings=settings, obstacles=obstacles)
         write_bytes(folder / "scene.png", scene_png(params.task.name))
 
 

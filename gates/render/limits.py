@@ -3,7 +3,7 @@
 from matplotlib.axes import Axes
 
 from gates.models import GateReport
-from genpolicy.figures.drawing import INK
+from genpolicy.figures.limits import limit_line
 
 
 def limit_of(report: GateReport, name: str) -> float | None:
@@ -14,25 +14,5 @@ def limit_of(report: GateReport, name: str) -> float | None:
 def draw_limit(axes: Axes, report: GateReport, name: str, *, horizontal: bool = False) -> None:
     """Draw the limit of a criterion as a labelled dotted line; the axis grows to show it."""
     limit = limit_of(report, name)
-    if limit is None:
-        return
-    line = axes.axhline if horizontal else axes.axvline
-    line(limit, color=INK, ls=":", lw=1.4)
-    coordinates = ("axes fraction", "data") if horizontal else ("data", "axes fraction")
-    low, high = axes.get_ylim() if horizontal else axes.get_xlim()
-    if not low <= limit <= high:
-        room = 0.05 * (max(high, limit) - min(low, limit))
-        low, high = (min(low, limit - room), max(high, limit + room))
-        (axes.set_ylim if horizontal else axes.set_xlim)(low, high)
-    near_start = limit < low + 0.2 * (high - low)
-    axes.annotate(
-        f"limit {limit:g}",
-        xy=(0.01, limit) if horizontal else (limit, 1.0),
-        xycoords=coordinates,
-        xytext=(0, 3) if horizontal else (4 if near_start else -4, -2),
-        textcoords="offset points",
-        ha="left" if horizontal or near_start else "right",
-        va="bottom" if horizontal else "top",
-        fontsize=8,
-        bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.8, "alpha": 0.85},
-    )
+    if limit is not None:
+        limit_line(axes, limit, horizontal=horizontal)

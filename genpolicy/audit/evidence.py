@@ -9,9 +9,18 @@ import numpy as np
 import pyarrow as pa
 
 from genpolicy.audit.data import AuditInput
+from genpolicy.audit.examples import (
+    alignment,
+    example_chunks,
+    position_names,
+    position_unit,
+    support_points,
+)
 from genpolicy.audit.labels import disagreement
 from genpolicy.audit.persistence import persistent
-from genpolicy.audit.run import AuditResult, Situation
+from genpolicy.audit.run import AuditResult
+from genpolicy.audit.settings import AuditSettings
+from genpolicy.audit.situations import Situation
 from genpolicy.integrity.atomic import write_bytes
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.tables import write_table
@@ -46,21 +55,52 @@ STRATA = pa.schema(
     [
         ("variable", TEXT), ("phase", TEXT), ("p_value", REAL), ("p_adjusted", REAL),
         ("effect", REAL), ("effect_lower", REAL), ("effect_upper", REAL), ("n", WHOLE),
-        ("recorded", FLAG),
+        ("recorded", FLAG), ("observed", FLAG), ("detail", TEXT),
     ]
 )  # fmt: skip
 REPLAY = pa.schema([("episode_uuid", TEXT), ("label", TEXT), ("replayed", TEXT)])
 RECOVERY = pa.schema([("split", TEXT), ("mode", TEXT), ("episodes", WHOLE), ("successes", WHOLE)])
 
+DEFECTS = pa.schema(
+    [
+        ("kind", TEXT), ("variable", TEXT), ("where", TEXT), ("measured", REAL), ("limit", REAL),
+        ("unit", TEXT), ("action", TEXT),
+    ]
+)  # fmt: skip
+EXAMPLES = pa.schema(
+    [
+        ("example", WHOLE), ("phase", TEXT), ("two_mode", FLAG), ("query_uuid", TEXT),
+        ("query_index", WHOLE), ("episode_uuid", TEXT), ("is_query", FLAG), ("distance", REAL),
+        ("cluster", WHOLE), ("coordinate", REAL), ("path", pa.list_(REAL)),
+    ]
+)  # fmt: skip
+ALIGNMENT = pa.schema(
+    [
+        ("episode_uuid", TEXT), ("epoch", TEXT), ("order", REAL), ("lag_steps", REAL),
+        ("offset_before_s", REAL), ("offset_after_s", REAL),
+    ]
+)  # fmt: skip
+SUPPORT = pa.schema(
+    [
+        ("phase", TEXT), ("episode_uuid", TEXT), ("index", WHOLE), ("analysed", FLAG),
+        ("two_mode", FLAG), ("position", pa.list_(REAL)),
+    ]
+)  # fmt: skip
+
 
 def write_evidence(
-    result: AuditResult, folder: Path, *, obstacles: Sequence[Mapping[str, float]] = ()
+    result: AuditResult,
+    folder: Path,
+    *,
+    settings: AuditSettings,
+    obstacles: Sequence[Mapping[str, float]] = (),
 ) -> None:
     """Write every table and document of the audit into an existing folder.
 
     Args:
         result: The audit.
         folder: Existing folder.
+        settings: What the audit was made with; its limits stand beside the numbers.
         obstacles: Round obstacles in the base frame, for plots: `x_m`, `y_m`, `radius_m`.
 
     Raises:
@@ -76,10 +116,15 @@ def write_evidence(
         "strata": _table(result.strata, STRATA),
         "replay": _table(result.replayed, REPLAY),
         "recovery": _table(result.recovery, RECOVERY),
+        "defects": _table(result.semantics.defects, DEFECTS),
+        "examples": _table(example_chunks(result, settings), EXAMPLES),
+        "alignment": _table(alignment(result, settings), ALIGNMENT),
+        "support": _table(support_points(result), SUPPORT),
     }
     for name, table in tables.items():
         write_table(folder / f"{name}.parquet", table)
     write_bytes(folder / "persistence.json", canonical_json(asdict(result.persistence)))
+    write_bytes(folder / "settings.json", canonical_json(settings.model_dump(mode="json")))
     write_bytes(
         folder / "summary.json",
         canonical_json(summary(result) | {"obstacles": [dict(o) for o in obstacles]}),
@@ -95,13 +140,21 @@ def summary(result: AuditResult) -> dict[str, Any]:
         "cause": result.verdict.cause.value,
         "variable": result.verdict.variable,
         "kind": result.verdict.kind,
+        "layer": result.verdict.layer.value,
+        "confidence": result.confidence,
         "next_action": result.verdict.next_action,
         "modes_before_realignment": result.counts.two_mode_episodes,
         "modes_after_realignment": result.modes_after_realignment,
         "episodes": len(result.data.episodes),
         "rows": len(result.data.observation),
         "counts": asdict(result.counts),
-        "support": [asdict(item) for item in result.support],
+        **_by_phase(result),
+        "position_names": position_names(result.data),
+        "position_unit": position_unit(result.data),
+        "support": [
+            {"phase": item.phase, "queries": item.queries, "analysed": item.analysed}
+            for item in result.support
+        ],
         "two_mode_by_phase": {
             phase: sum(item.phase == phase for item in several)
             for phase in sorted({item.phase for item in several})
@@ -115,6 +168,21 @@ def summary(result: AuditResult) -> dict[str, Any]:
         "gaps": result.semantics.gaps,
         "negative_delays": result.semantics.negative_delays,
         "start_drift": result.semantics.start_drift,
+        "notes": list(result.semantics.notes),
+    }
+
+
+def _by_phase(result: AuditResult) -> dict[str, int | None]:
+    """Held-out episodes with several modes, with the phase looked at and without.
+
+    With one phase only both are the same number, because there is nothing to look at.
+    """
+    here, other = result.counts.two_mode_episodes, result.modes_other_phases
+    other = here if other is None else other
+    seen = result.data.phase_observed
+    return {
+        "modes_with_phase": here if seen else other,
+        "modes_without_phase": other if seen else here,
     }
 
 

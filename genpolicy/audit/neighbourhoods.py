@@ -39,11 +39,19 @@ class Neighbourhood:
 
 @dataclass(frozen=True)
 class Support:
-    """How far the training data reach: queries made and queries with enough neighbours."""
+    """How far the training data reach.
+
+    Attributes:
+        phase: Task phase.
+        queries: Queries made.
+        analysed: Of them with enough neighbours.
+        missed: Rows of the others.
+    """
 
     phase: str
     queries: int
     analysed: int
+    missed: tuple[int, ...] = ()
 
 
 def find(
@@ -65,7 +73,7 @@ def find(
     pool = np.flatnonzero(clean & training)
     queries = _queries(data, settings, np.flatnonzero(clean & ~training), phase, root_seed)
     if len(pool) == 0 or len(queries) == 0:
-        return [], Support(phase, len(queries), 0)
+        return [], Support(phase, len(queries), 0, tuple(queries.tolist()))
     pool = stream(root_seed, "audit", "ties", phase).permutation(pool)
     tree = cKDTree(observation_history(data, pool, settings.observation_horizon))
     points = observation_history(data, queries, settings.observation_horizon)
@@ -89,7 +97,8 @@ def find(
                 found[number] = Neighbourhood(int(queries[number]), *result)
         pending, k = np.asarray(again, dtype=np.int64), k * 4
     kept = [item for item in found if item is not None]
-    return kept, Support(phase, len(queries), len(kept))
+    missed = tuple(int(q) for q, item in zip(queries, found, strict=True) if item is None)
+    return kept, Support(phase, len(queries), len(kept), missed)
 
 
 def _nearest(

@@ -18,6 +18,7 @@ from genpolicy.integrity.tables import read_table
 FILES = {
     "clocks.parquet", "calibration.parquet", "neighbourhoods.parquet", "modes.parquet",
     "strata.parquet", "replay.parquet", "recovery.parquet", "persistence.json", "summary.json",
+    "settings.json", "defects.parquet", "examples.parquet", "alignment.parquet", "support.parquet",
 }  # fmt: skip
 
 
@@ -26,7 +27,7 @@ def write(data, replayed, folder, seed=3):
     result = audit(
         data, SETTINGS, admissible=admissible, replay=replayed.__getitem__, root_seed=seed
     )
-    write_evidence(result, folder)
+    write_evidence(result, folder, settings=SETTINGS)
     return {path.name: path.read_bytes() for path in sorted(folder.iterdir())}
 
 

@@ -41,7 +41,7 @@ def test_pusht_has_too_little_support_to_claim_modes(tmp_path):
     assert abs(clock.offset_after_s) < 0.02
     folder = tmp_path / "evidence"
     folder.mkdir()
-    write_evidence(result, folder)
+    write_evidence(result, folder, settings=SETTINGS)
     recorded = {
         row["variable"]: row["recorded"]
         for row in read_table(folder / "strata.parquet").to_pylist()
