@@ -72,7 +72,19 @@ class Refusal:
 
 @dataclass(frozen=True)
 class Description:
-    """What the manifest says of the whole dataset."""
+    """What the manifest says of the whole dataset.
+
+    Attributes:
+        source_kind: Layout of the recordings.
+        observation: The observation contract.
+        action: The action contract.
+        phases: Known phases.
+        action_period_s: Time between actions, s.
+        split: Shares of the splits.
+        clock_note: What the times mean.
+        notes: What was guessed, contradictory or not recorded, a sentence each.
+        import_contract: How the columns of foreign recordings were read, if they were foreign.
+    """
 
     source_kind: str
     observation: ObservationContract
@@ -81,6 +93,8 @@ class Description:
     action_period_s: float
     split: SplitRule
     clock_note: str
+    notes: tuple[str, ...] = ()
+    import_contract: dict[str, Any] | None = None
 
 
 def write_dataset(
@@ -231,7 +245,14 @@ def _manifest(
     rule = rule_as_json(description.split)
     rows = [len(episode.rows.tick_ns) for episode in episodes]
     observation, action = description.observation, description.action
+    # Absent where there is nothing to say: manifests written before these fields keep their bytes.
+    optional: dict[str, Any] = {}
+    if description.notes:
+        optional["notes"] = list(description.notes)
+    if description.import_contract is not None:
+        optional["import_contract"] = description.import_contract
     return {
+        **optional,
         "schema_version": SCHEMA_VERSION,
         "source_kind": description.source_kind,
         "tasks": sorted({episode.strata["task"] for episode in episodes}),

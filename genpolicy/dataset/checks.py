@@ -50,6 +50,8 @@ def check_recording(episode: RecordedEpisode, contract: IngestContract, *, where
         samples = episode.streams.get(name)
         if samples is None or len(samples) < 2:
             _refuse(place, "missing or of fewer than 2 samples", "recorded during the episode")
+        if name == ACTION_STREAM and len(samples) < contract.minimum_rows:
+            _refuse(place, f"{len(samples)} rows long", f"at least {contract.minimum_rows}")
         names = component_names(contract, name, samples.values.shape[1])
         if samples.values.shape[1] != len(names):
             _refuse(place, f"{samples.values.shape[1]} numbers wide", f"{len(names)}: {names}")

@@ -106,6 +106,7 @@ class IngestContract:
         maximum_gap_s: Longest time between two samples of a stream.
         maximum_lead_s: The first actions that lack a first observation may span this long; they
             are counted in `lead_rows` and become no frames.
+        minimum_rows: A recording of fewer actions is no demonstration.
         clock_tolerance_s: A sample may seem received this much before it was exposed.
         frozen_s: A sensor bit-constant for this long, while the action moves, is frozen.
         frozen_motion: How far a component of the action must move for that, in its unit.
@@ -120,6 +121,7 @@ class IngestContract:
     motion_streams: tuple[str, ...] = (ROBOT_STREAM, JOINTS_STREAM)
     maximum_gap_s: float = 0.25
     maximum_lead_s: float = 0.25
+    minimum_rows: int = 2
     clock_tolerance_s: float = 0.001
     frozen_s: float = 0.5
     frozen_motion: float = 0.01

@@ -4,6 +4,7 @@ import os
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from genpolicy.dataset.assemble import (
     FLAGS,
@@ -33,6 +34,8 @@ def ingest_recordings(
     contract: IngestContract,
     out: Path,
     split: SplitRule | None = None,
+    notes: tuple[str, ...] = (),
+    import_contract: dict[str, Any] | None = None,
 ) -> None:
     """Read recordings, hold each against the contract, write the dataset folder.
 
@@ -44,6 +47,8 @@ def ingest_recordings(
         contract: What each must satisfy.
         out: The dataset folder; whole or not at all, an old one is replaced.
         split: Shares of the splits; 70 / 15 / 15 if absent.
+        notes: What was guessed or not recorded, for the manifest.
+        import_contract: The contract as a document, for the manifest.
 
     Raises:
         ContractError: No recording, or too few of them, were accepted.
@@ -72,6 +77,8 @@ def ingest_recordings(
             action_period_s=contract.action_period_s,
             split=split or SplitRule(),
             clock_note=CLOCK_NOTE,
+            notes=notes,
+            import_contract=import_contract,
         ),
     )
 

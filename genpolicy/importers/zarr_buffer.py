@@ -6,116 +6,147 @@ and can name codecs that unpickle; both are refused before anything is decoded.
 """
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
-from uuid import NAMESPACE_OID, uuid5
 
 import numpy as np
 import zarr
 from numpy.typing import NDArray
 
-from genpolicy.contract.observation import Channel, ObservationContract
-from genpolicy.dataset.assemble import (
-    FLAGS,
-    STRATA,
-    AcceptedEpisode,
-    Description,
-    Refusal,
-    content_hash,
-    write_dataset,
-)
-from genpolicy.dataset.checks import check_finite, check_frozen, check_range
-from genpolicy.dataset.contract import ActionContract, IngestContract, SplitRule
-from genpolicy.dataset.resample import Rows
+from genpolicy.dataset.assemble import Refusal
+from genpolicy.dataset.contract import SplitRule
 from genpolicy.errors import BadInputError, ContractError, IntegrityError
+from genpolicy.importers.collect import import_source
+from genpolicy.importers.contract import (
+    ActionSource,
+    ChannelSource,
+    Frozen,
+    ImportContract,
+    Labels,
+)
+from genpolicy.importers.source import Column, RawEpisode
 from genpolicy.integrity.documents import canonical_json, read_json
 from genpolicy.integrity.hashing import sha256_bytes, sha256_tree
-from genpolicy.recording.episode import ACTION_STREAM, NOT_RECORDED, StreamSamples
-
-Array = NDArray[np.float64]
 
 MAXIMUM_ARRAY_BYTES = 1 << 30
 NUMERIC_TYPES = ("<f4", "<f8", "<i4", "<i8")
 COMPRESSORS = ("blosc", "zstd", "zlib", "lz4")
-PHASE_ALL = "all"
-CLOCK_NOTE = (
-    "no clock was recorded: event and receive time are row / rate, recording time is the order "
-    "of the episodes in the buffer"
-)
 ACTION = "Fetch the buffer again, or leave this episode out."
+BOARD_PX = [-64.0, 576.0]
+PUSHT_ARRAYS = {"state": 5, "action": 2, "n_contacts": 1}
 
-
-@dataclass(frozen=True)
-class ReplayBufferContract:
-    """How the arrays of a buffer become observations and actions.
-
-    Attributes:
-        task: Name of the task.
-        observation: Channels of the observation, all of one stream.
-        action: The action.
-        state_width: Width of `data/state`.
-        observe: `data/state` rows (n, state_width) to observations (n, D_o).
-        action_period_s: Time between rows, s.
-        ranges: Plausible values by `channel.component` and `action.component`.
-        frozen_s: A state bit-constant for this long, while the action moves, is frozen.
-        frozen_motion: How far the action must move for that, in its unit.
-    """
-
-    task: str
-    observation: ObservationContract
-    action: ActionContract
-    state_width: int
-    observe: Callable[[Array], Array]
-    action_period_s: float
-    ranges: dict[str, tuple[float, float]] = field(default_factory=dict)
-    frozen_s: float = 2.0
-    frozen_motion: float = 64.0
-
-
-def _observe_pusht(state: Array) -> Array:
-    """Agent and block position, px; the block's angle as cosine and sine, free of its jump."""
-    angle = state[:, 4:5]
-    return np.concatenate([state[:, :4], np.cos(angle), np.sin(angle)], axis=1)
-
-
-_BOARD_PX = (-64.0, 576.0)
-PUSHT = ReplayBufferContract(
+PUSHT = ImportContract(
+    format="zarr",
     task="pusht",
-    observation=ObservationContract(
-        (
-            Channel("agent_position_px", ("x", "y"), "px", "state", 0.1),
-            Channel("block_position_px", ("x", "y"), "px", "state", 0.1),
-            Channel("block_angle", ("cos", "sin"), "1", "state", 0.1),
-        )
+    rate_hz=10.0,
+    channels=[
+        ChannelSource(
+            name="agent_position_px", columns=["state[0:2]"], components=["x", "y"], unit="px",
+            stream="state", maximum_age_s=0.1,
+        ),
+        ChannelSource(
+            name="block_position_px", columns=["state[2:4]"], components=["x", "y"], unit="px",
+            stream="state", maximum_age_s=0.1,
+        ),
+        ChannelSource(
+            name="block_angle", columns=["state[4]"], components=["cos", "sin"], unit="rad",
+            stream="state", transform="cos_sin", maximum_age_s=0.1,
+        ),
+    ],
+    action=ActionSource(
+        columns=["action[0:2]"], components=["agent_x_px", "agent_y_px"], units=["px", "px"],
+        frame="board",
     ),
-    action=ActionContract("board", ("agent_x_px", "agent_y_px"), ("px", "px")),
-    state_width=5,
-    observe=_observe_pusht,
-    action_period_s=0.1,
+    pairing={"agent_x_px": "agent_position_px.x", "agent_y_px": "agent_position_px.y"},
     ranges={
-        "agent_position_px.x": _BOARD_PX,
-        "agent_position_px.y": _BOARD_PX,
-        "block_position_px.x": _BOARD_PX,
-        "block_position_px.y": _BOARD_PX,
-        "action.agent_x_px": _BOARD_PX,
-        "action.agent_y_px": _BOARD_PX,
+        "agent_position_px.x": BOARD_PX,
+        "agent_position_px.y": BOARD_PX,
+        "block_position_px.x": BOARD_PX,
+        "block_position_px.y": BOARD_PX,
+        "action.agent_x_px": BOARD_PX,
+        "action.agent_y_px": BOARD_PX,
     },
-)
+    frozen=Frozen(streams=["state"], seconds=2.0, motion=64.0),
+    audit={"minimum_separation_m": 30.0, "noise_floor_m": 5.0},
+)  # fmt: skip
+
+
+class ReplayBuffer:
+    """The arrays of a buffer as a source; see `genpolicy.importers.source.Source`."""
+
+    rate_hz: float | None = None
+    labels = Labels()
+
+    def __init__(self, path: Path) -> None:
+        """Describe the arrays; decodes nothing but the episode ends.
+
+        Raises:
+            BadInputError: Not such a buffer, or an array that is not plain numbers.
+        """
+        self.path = path
+        self.name = path.name
+        self.digest = sha256_bytes(canonical_json(sha256_tree(path)))
+        self._ends = _array(path / "meta" / "episode_ends")
+        steps = np.diff(self._ends, prepend=0)
+        if self._ends.ndim != 1 or not (steps > 0).all():
+            _refuse(f"{path}/meta/episode_ends", "not rising", "the last row of each episode")
+        columns: list[Column] = []
+        skipped: list[str] = []
+        for folder in sorted((path / "data").glob("*/.zarray")):
+            column = _column(folder.parent)
+            if column is None:
+                skipped.append(folder.parent.name)
+            else:
+                columns.append(column)
+        self.columns = tuple(columns)
+        self.notes = (f"Not read: {', '.join(skipped)} (no plain columns).",) if skipped else ()
+        self.count = len(self._ends)
+
+    @property
+    def known(self) -> ImportContract | None:
+        """PushT, recognised by its arrays."""
+        widths = {column.name: column.width for column in self.columns}
+        return PUSHT if PUSHT_ARRAYS.items() <= widths.items() else None
+
+    def episodes(self, wanted: Sequence[str]) -> Iterator[RawEpisode | Refusal]:
+        """Each episode with the wanted arrays.
+
+        Raises:
+            BadInputError: An array is missing, incomplete, or of another length than the ends.
+        """
+        rows = int(self._ends[-1])
+        arrays = {name: _array(self.path / "data" / name) for name in wanted}
+        for name, values in arrays.items():
+            if len(values) != rows:
+                place = f"{self.path}/meta/episode_ends"
+                _refuse(place, f"{rows} at its end", f"{len(values)}, the rows of {name}")
+        for number, end in enumerate(self._ends.tolist()):
+            start = int(self._ends[number - 1]) if number else 0
+            yield RawEpisode(
+                label=f"{self.name}#episode_{number:06d}",
+                digest=self.digest,
+                columns={name: values[start:end] for name, values in arrays.items()},
+                first_row=start,
+            )
+
+
+def open_source(path: Path) -> ReplayBuffer:
+    """A replay buffer, described; see `ReplayBuffer`."""
+    return ReplayBuffer(path)
 
 
 def ingest_zarr_replay_buffer(
     path: Path,
     *,
     out: Path,
-    contract: ReplayBufferContract = PUSHT,
+    contract: ImportContract = PUSHT,
     split: SplitRule | None = None,
 ) -> None:
     """Read a replay buffer, hold each episode against the contract, write the dataset folder.
 
     Args:
-        path: The `.zarr` folder with `data/state`, `data/action` and `meta/episode_ends`.
+        path: The `.zarr` folder with arrays in `data` and `meta/episode_ends`.
         out: The dataset folder; whole or not at all, an old one is replaced.
         contract: How its arrays become observations and actions.
         split: Shares of the splits, in the order of the buffer; 70 / 15 / 15 if absent.
@@ -123,112 +154,28 @@ def ingest_zarr_replay_buffer(
     Raises:
         BadInputError: Not such a buffer, a chunk is missing, or too few episodes were accepted.
     """
-    digest = sha256_bytes(canonical_json(sha256_tree(path)))
-    state = _array(path / "data" / "state").astype(np.float64)
-    action = _array(path / "data" / "action").astype(np.float64)
-    ends = _array(path / "meta" / "episode_ends")
-    _check_shapes(path, state, action, ends, contract)
-    accepted: list[AcceptedEpisode] = []
-    refused: list[Refusal] = []
-    seen: dict[str, str] = {}
-    for number, end in enumerate(ends.tolist()):
-        start = int(ends[number - 1]) if number else 0
-        label = f"{path.name}#episode_{number:06d}"
-        try:
-            episode = _accept(
-                state[start:end],
-                action[start:end],
-                start=start,
-                label=label,
-                digest=digest,
-                contract=contract,
-            )
-            if episode.content_sha256 in seen:
-                _refuse(label, f"the samples of {seen[episode.content_sha256]} again", "once")
-            seen[episode.content_sha256] = label
-            accepted.append(episode)
-        except BadInputError as error:
-            refused.append(Refusal(file=label, where=error.where, reason=str(error)))
-    write_dataset(
-        out,
-        accepted=accepted,
-        refused=refused,
-        found=len(ends),
-        description=Description(
-            source_kind="zarr_replay_buffer",
-            observation=contract.observation,
-            action=contract.action,
-            phases=(PHASE_ALL,),
-            action_period_s=contract.action_period_s,
-            split=split or SplitRule(),
-            clock_note=CLOCK_NOTE,
-        ),
-    )
+    import_source(ReplayBuffer(path), contract, out=out, split=split or SplitRule())
 
 
-def _accept(
-    state: Array,
-    action: Array,
-    *,
-    start: int,
-    label: str,
-    digest: str,
-    contract: ReplayBufferContract,
-) -> AcceptedEpisode:
-    if len(state) < 2:
-        _refuse(label, f"{len(state)} rows long", "at least 2")
-    stream = contract.observation.streams[0]
-    names = list(contract.observation.component_names)
-    action_names = [f"action.{component}" for component in contract.action.components]
-    check_finite(state, [f"state[{i}]" for i in range(state.shape[1])], where=f"{label}: state")
-    observation = contract.observe(state)
-    for values, columns, place in (
-        (observation, names, f"{label}: {stream}"),
-        (action, action_names, f"{label}: action"),
-    ):
-        check_finite(values, columns, where=place)
-        bounds = np.array([contract.ranges.get(c, (-np.inf, np.inf)) for c in columns])
-        check_range(values, columns, bounds[:, 0], bounds[:, 1], place)
-    period_ns = round(contract.action_period_s * 1e9)
-    tick_ns = (start + np.arange(len(state), dtype=np.int64)) * period_ns + 1
-    check_frozen(
-        StreamSamples(stream, tick_ns, tick_ns, state),
-        StreamSamples(ACTION_STREAM, tick_ns, tick_ns, action),
-        IngestContract(
-            contract.observation,
-            (PHASE_ALL,),
-            frozen_s=contract.frozen_s,
-            frozen_motion=contract.frozen_motion,
-        ),
-        where=f"{label}: {stream}",
-    )
-    content = content_hash([state, action])
-    return AcceptedEpisode(
-        episode_uuid=str(uuid5(NAMESPACE_OID, content)),
-        rows=Rows(
-            tick_ns=tick_ns,
-            stream_event_ns={stream: tick_ns},
-            stream_receive_ns={stream: tick_ns},
-            observation=observation,
-            action=action,
-            phase=np.full(len(state), PHASE_ALL),
-            lead_action=action[:0],
-        ),
-        strata={name: NOT_RECORDED for name in STRATA} | {"task": contract.task},
-        flags=dict.fromkeys(FLAGS, None),
-        scene_start="",
-        source_file=label,
-        source_sha256=digest,
-        content_sha256=content,
-        recorded_at_ns=int(tick_ns[0]),
-        clock_offsets_ns={},
-    )
+def _column(folder: Path) -> Column | None:
+    """An array as a column; None for pictures and other arrays of more than two axes."""
+    head = _head(folder)
+    if not (isinstance(head["shape"], list) and len(head["shape"]) <= 2):
+        return None
+    _check_head(head, str(folder))
+    return Column(folder.name, int(head["shape"][1]) if len(head["shape"]) == 2 else None)
 
 
-def _array(folder: Path) -> NDArray[Any]:
-    """A whole numeric zarr v2 array, its description checked before it is decoded."""
-    place = str(folder)
+def _head(folder: Path) -> dict[str, Any]:
     head = read_json(folder / ".zarray")
+    keys = ("dtype", "shape", "compressor", "filters", "zarr_format")
+    if not isinstance(head, dict) or any(key not in head for key in keys):
+        _refuse(f"{folder}/.zarray", "not an array description", f"the keys {keys}")
+    return head
+
+
+def _check_head(head: dict[str, Any], place: str) -> None:
+    """Plain numbers of a bounded size, in a codec that runs no foreign code."""
     try:
         kind, shape, compressor = head["dtype"], list(head["shape"]), head["compressor"]
         size = math.prod(int(n) for n in shape) * int(str(kind)[2:])
@@ -243,8 +190,14 @@ def _array(folder: Path) -> NDArray[Any]:
         ) from error
     if not plain or codec not in (None, *COMPRESSORS):
         _refuse(f"{place}/.zarray", f"of type {kind!r:.20}, codec {codec!r:.20}", "plain numbers")
-    if not 0 < size <= MAXIMUM_ARRAY_BYTES:
+    if not (0 < size <= MAXIMUM_ARRAY_BYTES and all(int(n) > 0 for n in shape)):
         _refuse(place, f"{size} bytes", f"1 to {MAXIMUM_ARRAY_BYTES}")
+
+
+def _array(folder: Path) -> NDArray[Any]:
+    """A whole numeric zarr v2 array, its description checked before it is decoded."""
+    place = str(folder)
+    _check_head(_head(folder), place)
     try:
         array = zarr.open_array(str(folder), mode="r", zarr_format=2)
         if array.nchunks_initialized != array.nchunks:
@@ -259,21 +212,6 @@ def _array(folder: Path) -> NDArray[Any]:
             expected="whole chunks",
             action=ACTION,
         ) from error
-
-
-def _check_shapes(
-    path: Path, state: Array, action: Array, ends: NDArray[Any], contract: ReplayBufferContract
-) -> None:
-    rows = len(state)
-    if state.ndim != 2 or state.shape[1] != contract.state_width:
-        _refuse(f"{path}/data/state", f"of shape {state.shape}", f"(N, {contract.state_width})")
-    if action.shape != (rows, contract.action.dim):
-        _refuse(
-            f"{path}/data/action", f"of shape {action.shape}", f"({rows}, {contract.action.dim})"
-        )
-    steps = np.diff(ends, prepend=0)
-    if ends.ndim != 1 or not (steps > 0).all() or ends[-1] != rows:
-        _refuse(f"{path}/meta/episode_ends", "not rising to the last row", f"cumulative to {rows}")
 
 
 def _refuse(where: str, found: str, expected: str) -> NoReturn:

@@ -1,0 +1,65 @@
+"""The audit's evidence folder, read back: a page can show only what was written."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from genpolicy.integrity.documents import read_json
+from genpolicy.integrity.hashing import sha256_file
+from genpolicy.integrity.tables import read_table
+
+TABLES = (
+    "alignment", "calibration", "clocks", "defects", "examples", "modes", "neighbourhoods",
+    "recovery", "replay", "strata", "support",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class AuditEvidence:
+    """Tables and documents of one audit.
+
+    Attributes:
+        tables: By name, without the suffix.
+        summary: Counts and names, `summary.json`.
+        settings: What the audit was made with, `settings.json`.
+        persistence: Identity over time, `persistence.json`.
+        digests: SHA-256 of every file, by name.
+    """
+
+    tables: Mapping[str, pd.DataFrame]
+    summary: Mapping[str, Any]
+    settings: Mapping[str, Any]
+    persistence: Mapping[str, Any]
+    digests: Mapping[str, str]
+
+    def __getitem__(self, name: str) -> pd.DataFrame:
+        return self.tables[name]
+
+    @property
+    def primary_phase(self) -> str:
+        """The phase with most situations of several modes; empty where there is none."""
+        counts: Mapping[str, int] = self.summary["two_mode_by_phase"]
+        return max(sorted(counts), key=lambda phase: counts[phase], default="")
+
+
+def read_evidence(folder: Path) -> AuditEvidence:
+    """Read what `genpolicy.audit.evidence.write_evidence` wrote.
+
+    Raises:
+        BadInputError: A file is missing or damaged.
+    """
+    tables = {name: read_table(folder / f"{name}.parquet").to_pandas() for name in TABLES}
+    documents = {
+        name: read_json(folder / f"{name}.json") for name in ("summary", "settings", "persistence")
+    }
+    files = sorted(path for path in folder.iterdir() if path.is_file())
+    return AuditEvidence(
+        tables=tables,
+        summary=documents["summary"],
+        settings=documents["settings"],
+        persistence=documents["persistence"],
+        digests={path.name: sha256_file(path) for path in files},
+    )
