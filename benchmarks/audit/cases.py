@@ -49,7 +49,7 @@ REPEATED = Answer("data_defect", ("duplicate",))
 GLUED = Answer("data_defect", ("glue", "duplicate"))
 ANY_DEFECT = Answer("data_defect")
 EPOCH = (Answer("data_defect", ("epoch",)), Answer("hidden_state", ("epoch",)))
-ORDER = Answer("hidden_state", ("order", "session", "unrecorded"))
+ORDER = Answer("hidden_state", ("order", "session", "previous", "unrecorded"))
 
 
 def hidden(name: str) -> Answer:
@@ -143,11 +143,13 @@ def _fault(
     )  # fmt: skip
 
 
-MODES = tuple(_modes(count, contexts) for count in (2, 3, 4) for contexts in (1, 2)) + (
+MODES = (
+    *(_modes(count, contexts) for count in (2, 3, 4) for contexts in (1, 2)),
     Cause(
         "2 valid modes, narrow", "valid_modes", "distance relative to usual", (0.2, 0.35, 0.6, 0.8),
         0.6, "5 cm and more from the obstacle, beyond the declared 3 cm of separation",
-        lambda seed, s, task: Plan(seed, shares=HALF, width=s), (VALID,), (UNIMODAL, SUPPORT, NOISE),
+        lambda seed, s, task: Plan(seed, shares=HALF, width=s),
+        (VALID,), (UNIMODAL, SUPPORT, NOISE),
     ),
 )  # fmt: skip
 
@@ -158,7 +160,7 @@ HIDDEN = (
     _decided("side by session", "session", (ORDER,)),
     _decided("side in turns", "alternation", (ORDER,)),
     _decided("early lamp", "lamp_early", (hidden("unrecorded"),)),
-    _decided("early path", "path_early", (hidden("unrecorded"),)),
+    _decided("early path", "path_early", (hidden("unrecorded"), hidden("start_position"))),
     Cause(
         "hidden phase", "hidden_state", "rest in both phases, s", (0.1, 0.4, 0.8, 1.6), 0.8,
         "8 observations and more without a motion that tells the phases apart",
@@ -257,7 +259,7 @@ LABELLED = (
 
 STRUCTURE = (
     Cause(
-        "tremor", "pointwise_noise", "mm", (0.5, 2, 6, 12, 20), 6,
+        "tremor", "pointwise_noise", "mm", (0.5, 2, 6, 12), 6,
         "three times the declared noise floor",
         lambda seed, s, task: Plan(seed, tremor_m=s * 1e-3), (NOISE,), (UNIMODAL,),
     ),

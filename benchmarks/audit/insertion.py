@@ -21,7 +21,7 @@ from genpolicy.tasks.tabletop_insertion.plans import ACTION_PERIOD_S
 from genpolicy.tasks.tabletop_insertion.start import InsertionStart, sample_start
 
 PERIOD_S = ACTION_PERIOD_S
-MAXIMUM_TICKS = 260
+MAXIMUM_TICKS = 400
 CONTEXT_M = 0.10
 # Distance from the post's axis relative to the operator's own; near and wide where there are more.
 LANES = {2: (("left", 1.0), ("right", 1.0))}

@@ -75,8 +75,8 @@ def _confusion(results: Sequence[Result]) -> list[str]:
         counts[result.group][_said(result)] += 1
     columns = sorted({name for row in counts.values() for name in row})
     rows = [f"| planted | {' | '.join(columns)} |", "|---" * (len(columns) + 1) + "|"]
-    for group in counts:
-        cells = [str(counts[group].get(name, "")) for name in columns]
+    for group, said in counts.items():
+        cells = [str(said.get(name, "")) for name in columns]
         rows.append(f"| {group} | {' | '.join(cells)} |")
     return rows
 
