@@ -1,4 +1,4 @@
-"""The audit's settings in the benchmark: its defaults, with fewer queries and permutations.
+"""The audit's settings in the benchmark: its defaults, with fewer queries.
 
 One for each task and the same for all of its data sets; lengths are in metres in both.
 """
@@ -7,10 +7,9 @@ from genpolicy.audit.settings import AuditSettings
 
 PLANAR = AuditSettings(
     position_channel="tcp", reference_channel="goal", context_channels=["goal", "lamp"],
-    ignored_channels=[], query_stride=4, permutations=199, replay_episodes=80,
+    ignored_channels=[], query_stride=4,
 )  # fmt: skip
 INSERTION = AuditSettings(
     context_channels=["hole_pose", "lamp"], query_stride=4, maximum_queries_per_phase=250,
-    permutations=199, replay_episodes=80,
 )  # fmt: skip
 SETTINGS = {"planar": PLANAR, "insertion": INSERTION}
