@@ -172,8 +172,8 @@ def _check_clock(ticks: Times, where: str, maximum_gap_s: float) -> None:
         row = int(bad[0]) + 1
         found = f"a gap of {steps[row - 1] / NS_PER_S:.6g} s"
         refuse(f"{where}, row {row}", found, f"at most {maximum_gap_s:.6g} s")
-    if ticks[0] <= 0:
-        refuse(f"{where}, row 0", f"{ticks[0]} ns", "a time after 0")
+    if ticks[0] < 0:
+        refuse(f"{where}, row 0", f"{ticks[0]} ns", "a time from 0 on")
 
 
 def _check_streams(

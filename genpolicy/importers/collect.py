@@ -81,7 +81,7 @@ def import_source(
 def _outcomes(
     source: Source, contract: ImportContract, seen: dict[str, str]
 ) -> Iterator[AcceptedEpisode | Refusal]:
-    for raw in source.episodes(wanted_columns(contract)):
+    for raw in source.episodes(wanted_columns(contract), contract.labels.episode):
         if isinstance(raw, Refusal):
             yield raw
             continue

@@ -275,7 +275,7 @@ class _Dumper(yaml.SafeDumper):
     """PyYAML's safe dumper that writes lists of plain values on one line."""
 
     def represent_sequence(self, tag: str, sequence: Any, flow_style: Any = None) -> Any:
-        plain = all(isinstance(v, str | int | float) and len(str(v)) < 60 for v in sequence)
+        plain = all(isinstance(v, str | int | float) and " " not in str(v) for v in sequence)
         return super().represent_sequence(tag, sequence, flow_style=plain or flow_style)
 
     def ignore_aliases(self, data: Any) -> bool:

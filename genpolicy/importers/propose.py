@@ -1,8 +1,7 @@
 """A contract proposed from the recordings: names as given, units and pairs guessed and marked."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from itertools import islice
+from itertools import islice, pairwise
 from pathlib import PurePath
 
 import numpy as np
@@ -10,7 +9,9 @@ from numpy.typing import NDArray
 
 from genpolicy.dataset.assemble import Refusal
 from genpolicy.errors import BadInputError, ContractError
+from genpolicy.importers.columns import BOOKKEEPING
 from genpolicy.importers.contract import (
+    SI,
     ActionSource,
     ChannelSource,
     Format,
@@ -20,17 +21,11 @@ from genpolicy.importers.contract import (
     contract_of,
 )
 from genpolicy.importers.pairing import are_differences, pair_by_name, pair_by_numbers
+from genpolicy.importers.sample import Sample, action_of, channels_of
 from genpolicy.importers.source import Column, RawEpisode, Source, as_float
-from genpolicy.importers.units import (
-    guess_unit,
-    is_wrapped_angle,
-    runs_of_one_unit,
-    tokens,
-    turns,
-)
+from genpolicy.importers.units import tokens
 
 Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 SAMPLE_EPISODES = 12
 SAMPLE_LOOKED_AT = 40
@@ -43,28 +38,7 @@ FROZEN_S = 2.0
 FROZEN_SHARE = 0.1
 EPOCH_S = 1e6
 TIME_UNITS = {"ns": 1e9, "us": 1e6, "ms": 1e3}
-ACTION_NAMES = ("action", "actions", "command", "cmd", "target")
-
-
-@dataclass(frozen=True)
-class Sample:
-    """Some episodes, read whole, to guess from.
-
-    Attributes:
-        episodes: The episodes.
-        number: Which of them each row belongs to. Shape (n,).
-    """
-
-    episodes: list[RawEpisode]
-    number: Integers
-
-    def values(self, column: str) -> NDArray[np.generic]:
-        """All rows of a column."""
-        return np.concatenate([episode.columns[column] for episode in self.episodes])
-
-    def numbers(self, column: str) -> Array:
-        """All rows of a column as numbers. Shape (n, width)."""
-        return as_float(self.values(column)).reshape(len(self.number), -1)
+ACTION_WORDS = (("action", "actions"), ("command", "cmd", "commanded"), ("target", "goal"))
 
 
 def propose_contract(source: Source, kind: Format, *, task: str | None = None) -> ImportContract:
@@ -73,16 +47,14 @@ def propose_contract(source: Source, kind: Format, *, task: str | None = None) -
     Raises:
         BadInputError: No readable episode, or no action or no observation among the columns.
     """
-    labels = source.labels
+    notes: list[str] = list(source.notes)
+    labels = _rows_numbered(source, source.labels, notes)
     actions, observed = _roles(source, labels)
     sample = _sample(source, [c.name for c in (*actions, *observed)], labels)
-    observed = tuple(c for c in observed if sample.numbers(c.name).shape[1] > 0)
-    notes: list[str] = list(source.notes)
     rate_hz, rate_guessed, unit = _rate(source, sample, labels, notes)
-    action = _action(actions, sample)
-    channels = _channels(observed, sample, notes)
+    action = action_of(actions, sample, notes)
+    channels = channels_of(observed, sample, notes)
     pairing, by_numbers = _pairing(channels, action, sample, notes)
-    first = _first_times(sample, labels)
     values = ImportContract(
         format=kind,
         task=task or _task(source),
@@ -94,7 +66,7 @@ def propose_contract(source: Source, kind: Format, *, task: str | None = None) -
         pairing_guessed=by_numbers,
         labels=labels,
         time_unit=unit,  # type: ignore[arg-type]  # one of TIME_UNITS or s
-        time_origin="recording" if len(set(first)) == len(first) > 1 else "episode",
+        time_origin="recording" if _is_one_clock(sample, labels) else "episode",
         minimum_rows=int(
             np.clip(np.ceil(SHORTEST_DEMONSTRATION_S * rate_hz), FEWEST_ROWS, MOST_ROWS)
         ),
@@ -113,10 +85,18 @@ def _roles(source: Source, labels: Labels) -> tuple[tuple[Column, ...], tuple[Co
         for c in source.columns
         if c.kind == "number" and not c.per_episode and c.name not in taken
     ]
-    actions = [c for c in numeric if _is_action(c.name)]
+    actions: list[Column] = []
+    for words in ACTION_WORDS:
+        actions = actions or [c for c in numeric if _is_action(c.name, words)]
     exact = [c for c in actions if tokens(c.name)[-1:] in (["action"], ["actions"])]
     actions = exact[:1] or actions
-    observed = [c for c in numeric if c not in actions and not _is_action(c.name)]
+    observed = [
+        c
+        for c in numeric
+        if c not in actions
+        and not _is_action(c.name, ACTION_WORDS[0])
+        and not BOOKKEEPING & {tokens(c.name)[0], tokens(c.name)[-1]}
+    ]
     stated = [c for c in observed if {"observation", "obs", "state"} & set(tokens(c.name))]
     observed = stated or observed
     for found, what in ((actions, "an action"), (observed, "an observation")):
@@ -130,16 +110,16 @@ def _roles(source: Source, labels: Labels) -> tuple[tuple[Column, ...], tuple[Co
     return tuple(actions), tuple(observed)
 
 
-def _is_action(name: str) -> bool:
-    words = tokens(name)
-    return bool(words) and any(word in ACTION_NAMES for word in words[:1] + words[-1:])
+def _is_action(name: str, words: tuple[str, ...]) -> bool:
+    parts = tokens(name) or [name]
+    return parts[0] in words or parts[-1] in words
 
 
 def _sample(source: Source, columns: Sequence[str], labels: Labels) -> Sample:
     wanted = list(dict.fromkeys([*columns, *labels.named().values()]))
     episodes: list[RawEpisode] = []
     reason = "it holds no episode"
-    for item in islice(source.episodes(wanted), SAMPLE_LOOKED_AT):
+    for item in islice(source.episodes(wanted, labels.episode), SAMPLE_LOOKED_AT):
         if isinstance(item, Refusal):
             reason = item.reason
             continue
@@ -158,93 +138,11 @@ def _sample(source: Source, columns: Sequence[str], labels: Labels) -> Sample:
     return Sample(episodes, np.repeat(np.arange(len(lengths)), lengths))
 
 
-def _action(columns: Sequence[Column], sample: Sample) -> ActionSource:
-    selected, names, units, guessed = [], [], [], False
-    for column in columns:
-        components, chosen = _components(column, sample)
-        values = sample.numbers(column.name)
-        selected += chosen
-        names += components
-        units += [
-            column.unit or guess_unit(column.name, component, values[:, i])
-            for i, component in enumerate(components)
-        ]
-        guessed = guessed or not column.unit
-    return ActionSource(columns=_ranges(selected), components=names, units=units, guessed=guessed)
-
-
-def _channels(columns: Sequence[Column], sample: Sample, notes: list[str]) -> list[ChannelSource]:
-    """One channel per column and unit; an angle that jumps is written as cosine and sine."""
-    channels: list[ChannelSource] = []
-    used: set[str] = set()
-    for column in columns:
-        components, selected = _components(column, sample)
-        values = sample.numbers(column.name)
-        units = []
-        for i, component in enumerate(components):
-            unit = column.unit or guess_unit(column.name, component, values[:, i])
-            wrapped = unit in ("rad", "unknown") and is_wrapped_angle(values[:, i], sample.number)
-            units.append("rad wrapped" if wrapped else unit)
-            if unit == "rad" and not wrapped and turns(values[:, i]) > 1.0:
-                notes.append(f"{column.name}: {component} spans {turns(values[:, i]):.1f} turns.")
-        for start, stop in runs_of_one_unit(units):
-            unit = units[start].removesuffix(" wrapped")
-            wrapped = unit != units[start]
-            parts = components[start:stop]
-            name = _channel_name(column.name, unit, used)
-            used.add(name)
-            if wrapped:
-                notes.append(f"{', '.join(parts)} jumps by a turn: written as cosine and sine.")
-                parts = [f"{turn}_{part}" for part in parts for turn in ("cos", "sin")]
-            channels.append(
-                ChannelSource(
-                    name=name,
-                    columns=_ranges(selected[start:stop]),
-                    components=parts,
-                    unit=unit,
-                    guessed=not column.unit,
-                    stream=_word(column.name),
-                    transform="cos_sin" if wrapped else "none",
-                )
-            )
-    return channels
-
-
-def _components(column: Column, sample: Sample) -> tuple[list[str], list[str]]:
-    """Name and selector of each number of a column."""
-    width = sample.numbers(column.name).shape[1]
-    if column.width is None:
-        return [_word(column.name)], [column.name]
-    names = list(column.components)
-    if len(names) != width or len(set(names)) != width:
-        names = [f"{_word(column.name)}_{i}" for i in range(width)]
-    return names, [f"{column.name}[{i}]" for i in range(width)]
-
-
-def _ranges(selected: Sequence[str]) -> list[str]:
-    """`a[0]`, `a[1]`, `a[2]` as `a[0:3]`."""
-    result: list[str] = []
-    run: tuple[str, int, int] | None = None
-    for text in [*selected, ""]:
-        name, _, rest = text.partition("[")
-        index = int(rest[:-1]) if rest else -1
-        if run is not None and rest and run[0] == name and run[2] == index:
-            run = (name, run[1], index + 1)
-            continue
-        if run is not None:
-            single = run[2] - run[1] == 1
-            result.append(f"{run[0]}[{run[1]}]" if single else f"{run[0]}[{run[1]}:{run[2]}]")
-        run = (name, index, index + 1) if rest else None
-        if text and not rest:
-            result.append(text)
-    return result
-
-
 def _pairing(
     channels: Sequence[ChannelSource], action: ActionSource, sample: Sample, notes: list[str]
 ) -> tuple[dict[str, str] | None, bool]:
     observed, names = _matrix(channels, sample)
-    commanded = _selected(action.columns, sample)
+    commanded = sample.selected(action.columns)
     pairing = pair_by_name(channels, action)
     if pairing is not None:
         left = [action.components.index(name) for name in pairing]
@@ -274,16 +172,7 @@ def _matrix(channels: Sequence[ChannelSource], sample: Sample) -> tuple[Array, l
     if not plain:
         return np.zeros((len(sample.number), 0)), []
     names = [f"{c.name}.{component}" for c in plain for component in c.components]
-    return np.concatenate([_selected(c.columns, sample) for c in plain], axis=1), names
-
-
-def _selected(columns: list[str], sample: Sample) -> Array:
-    from genpolicy.importers.contract import selectors  # noqa: PLC0415
-
-    parts = [
-        sample.numbers(s.column)[:, s.element or 0] for s in selectors(columns, where="contract")
-    ]
-    return np.stack(parts, axis=1)
+    return np.concatenate([sample.selected(c.columns) for c in plain], axis=1), names
 
 
 def _rate(
@@ -319,10 +208,26 @@ def _time_unit(name: str, times: Array, steps: Array) -> str:
     return "ns" if np.median(steps) >= 1e5 else "ms"
 
 
-def _first_times(sample: Sample, labels: Labels) -> list[float]:
-    if labels.time is None:
-        return []
-    return [float(episode.columns[labels.time][0]) for episode in sample.episodes]
+def _is_one_clock(sample: Sample, labels: Labels) -> bool:
+    """Whether each episode begins after the one before has ended: one clock for all."""
+    if labels.time is None or len(sample.episodes) < 2:
+        return False
+    times = [as_float(episode.columns[labels.time]) for episode in sample.episodes]
+    return all(after[0] > before[-1] for before, after in pairwise(times))
+
+
+def _rows_numbered(source: Source, labels: Labels, notes: list[str]) -> Labels:
+    """The labels without a column that only looks like row numbers."""
+    if labels.frame is None:
+        return labels
+    for item in islice(source.episodes([labels.frame], labels.episode), SAMPLE_LOOKED_AT):
+        if isinstance(item, Refusal) or len(item.columns[labels.frame]) < 2:
+            continue
+        if np.median(np.diff(as_float(item.columns[labels.frame]))) == 1.0:
+            return labels
+        break
+    notes.append(f"{labels.frame} does not count rows one by one; it was left aside.")
+    return labels.model_copy(update={"frame": None})
 
 
 def _frozen(
@@ -334,7 +239,9 @@ def _frozen(
     """Only a stream that holds what the action commands must move with it."""
     paired = set((pairing or {}).values())
     streams = [c.stream for c in channels if paired & {f"{c.name}.{part}" for part in c.components}]
-    spread = float(np.nanmax(np.ptp(_selected(action.columns, sample), axis=0)))
+    factors = [SI.get(unit, (unit, 1.0))[1] for unit in action.units]
+    spread = float(np.max(np.ptp(sample.selected(action.columns) * factors, axis=0)))
+    # NaN fails: the sample may hold rows that the import refuses.
     if not streams or not FROZEN_SHARE * spread > 0:
         return None
     motion = float(f"{FROZEN_SHARE * spread:.3g}")
@@ -343,23 +250,3 @@ def _frozen(
 
 def _task(source: Source) -> str:
     return PurePath(source.name).stem or "unnamed"
-
-
-def _channel_name(column: str, unit: str, used: set[str]) -> str:
-    base = _word(column)
-    suffix = {"m": "m", "mm": "m", "cm": "m", "rad": "rad", "deg": "rad", "px": "px"}.get(unit, "")
-    if suffix and not base.endswith(f"_{suffix}"):
-        base = f"{base}_{suffix}"
-    name, number = base, 2
-    while name in used:
-        name, number = f"{base}_{number}", number + 1
-    return name
-
-
-def _word(name: str) -> str:
-    """A column's name as an identifier: `observation.state` is `state`, `obs/eef_pos` `eef_pos`."""
-    for prefix in ("observation.", "observations.", "obs/", "obs.", "data/"):
-        name = name.removeprefix(prefix)
-    word = "".join(letter if letter.isalnum() and letter.isascii() else "_" for letter in name)
-    word = word.strip("_") or "column"
-    return word if word[0].isalpha() else f"c_{word}"

@@ -102,8 +102,15 @@ class Source(Protocol):
         """The contract of these very recordings, where their layout is known by heart."""
         ...
 
-    def episodes(self, wanted: Sequence[str]) -> Iterator[RawEpisode | Refusal]:
-        """Each episode with the `wanted` columns, or why it could not be read, in order."""
+    def episodes(
+        self, wanted: Sequence[str], episode: str | None = None
+    ) -> Iterator[RawEpisode | Refusal]:
+        """Each episode with the `wanted` columns, or why it could not be read, in order.
+
+        Args:
+            wanted: Columns to read.
+            episode: Column of the episodes, for layouts that do not define it.
+        """
         ...
 
 

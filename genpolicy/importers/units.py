@@ -115,7 +115,9 @@ def is_wrapped_angle(values: Array, episode: NDArray[np.int64]) -> bool:
     """
     inside = np.diff(episode) == 0
     step = np.abs(np.diff(values))[inside]
-    within = float(np.ptp(values)) <= FULL_TURN_RAD + 1e-3
+    low, high = float(values.min()), float(values.max())
+    half = FULL_TURN_RAD / 2.0 + 1e-3
+    within = (low >= -half and high <= half) or (low >= -1e-3 and high <= 2.0 * half)
     return bool(within and np.any(step > 0.9 * FULL_TURN_RAD))
 
 

@@ -109,7 +109,9 @@ class ReplayBuffer:
         widths = {column.name: column.width for column in self.columns}
         return PUSHT if PUSHT_ARRAYS.items() <= widths.items() else None
 
-    def episodes(self, wanted: Sequence[str]) -> Iterator[RawEpisode | Refusal]:
+    def episodes(
+        self, wanted: Sequence[str], episode: str | None = None
+    ) -> Iterator[RawEpisode | Refusal]:
         """Each episode with the wanted arrays.
 
         Raises:
