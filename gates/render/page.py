@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
-from markupsafe import Markup
 
 from gates.card import DRAFT_PATH, TrialCard
 from gates.evidence import Evidence
@@ -24,6 +23,7 @@ from gates.render.guide import BACK_TO, QUESTIONS, READING, label, words
 from gates.render.table import deciding, groups, passed_by, stops, tally
 from gates.signing import utc_today
 from genpolicy.errors import IntegrityError
+from genpolicy.figures.style import page_style
 from genpolicy.integrity.hashing import sha256_bytes
 
 MARKS = {
@@ -144,10 +144,9 @@ def _render(template: str, **values: Any) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    source, _, _ = PackageLoader("gates.render").get_source(environment, "style.css")
     page = environment.get_template(template)
     return page.render(
-        style=Markup(source),
+        style=page_style(),
         gates=GATES,
         marks=MARKS,
         exact=exact,

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from genpolicy.audit.data import AuditInput
+from genpolicy.audit.data import AuditInput, Integers
 from genpolicy.audit.examples import (
     alignment,
     example_chunks,
@@ -58,7 +58,7 @@ STRATA = pa.schema(
         ("recorded", FLAG), ("observed", FLAG), ("detail", TEXT),
     ]
 )  # fmt: skip
-REPLAY = pa.schema([("episode_uuid", TEXT), ("label", TEXT), ("replayed", TEXT)])
+REPLAY = pa.schema([("episode_uuid", TEXT), ("label", TEXT), ("replayed", TEXT), ("mode", TEXT)])
 RECOVERY = pa.schema([("split", TEXT), ("mode", TEXT), ("episodes", WHOLE), ("successes", WHOLE)])
 
 DEFECTS = pa.schema(
@@ -114,7 +114,7 @@ def write_evidence(
         ),
         "modes": _table(result.modes, MODES),
         "strata": _table(result.strata, STRATA),
-        "replay": _table(result.replayed, REPLAY),
+        "replay": pa.Table.from_pylist(_replays(result), REPLAY),
         "recovery": _table(result.recovery, RECOVERY),
         "defects": _table(result.semantics.defects, DEFECTS),
         "examples": _table(example_chunks(result, settings), EXAMPLES),
@@ -212,6 +212,22 @@ def _situation(data: AuditInput, item: Situation) -> dict[str, Any]:
         "mode_paths": [mode[:, position].ravel().tolist() for mode in item.chunks.modes],
         "persistent": persistent(item.identity),
     }
+
+
+def _replays(result: AuditResult) -> list[dict[str, Any]]:
+    """Replayed episodes with the mode that each followed, in the phase with most situations."""
+    several = [item.phase for item in result.situations if item.two_mode]
+    primary = max(sorted(set(several)), key=several.count, default="")
+    linked = result.links.get(primary)
+    places = {str(uuid): place for place, uuid in enumerate(result.data.episodes.uuid)}
+    return [
+        asdict(item) | {"mode": _mode(linked, places[item.episode_uuid])}
+        for item in result.replayed
+    ]
+
+
+def _mode(linked: Integers | None, episode: int) -> str | None:
+    return None if linked is None or linked[episode] < 0 else f"m{linked[episode]}"
 
 
 def _table(rows: Sequence[Any], schema: pa.Schema) -> pa.Table:

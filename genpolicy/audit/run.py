@@ -41,6 +41,7 @@ class AuditResult:
         situations: Every analysed situation, by phase and query row.
         persistence: Identity over time.
         modes: Outcome of each mode of each phase.
+        links: Mode of each episode, -1 for none, per phase. Shape (E,).
         strata: Tests of recorded variables.
         replayed: Labels against replay.
         recovery: The disturbed episodes.
@@ -58,6 +59,7 @@ class AuditResult:
     situations: tuple[Situation, ...]
     persistence: Persistence
     modes: tuple[ModeOutcome, ...]
+    links: dict[str, Integers]
     strata: tuple[Stratum, ...]
     replayed: tuple[Replayed, ...]
     recovery: tuple[RecoveryOutcome, ...]
@@ -121,6 +123,7 @@ def audit(
         situations=situations,
         persistence=layers.persistence,
         modes=modes,
+        links=links,
         strata=strata,
         replayed=replayed,
         recovery=recovery_outcomes(data, settings, several.get(primary, []), links.get(primary)),

@@ -27,9 +27,10 @@ def strata_bars(frame: pd.DataFrame, *, level: float, limit: float | None) -> Fi
     Raises:
         NothingToDrawError: No variable was tested.
     """
-    tested = frame[frame["effect"].notna()]
+    tested = frame[frame["effect"].notna() & (frame["n"] > 0)]
     if len(tested) == 0:
         raise NothingToDrawError("no variable was tested, because no situation has several modes")
+    silent = sorted(set(frame["variable"]) - set(tested["variable"]))
     tested = tested.sort_values(["effect", "variable", "phase"]).tail(ROWS)
     places = np.arange(len(tested))
     adjusted = tested["p_adjusted"].to_numpy(dtype=np.float64)
@@ -44,7 +45,10 @@ def strata_bars(frame: pd.DataFrame, *, level: float, limit: float | None) -> Fi
     axes.set_yticks(places, [f"{variable} · {phase}" for variable, phase in names])
     if limit is not None:
         limit_line(axes, limit)
-    axes.set_xlabel(f"share of uncertainty removed (red: adjusted p at most {level:g})")
+    said = f"share of uncertainty removed (red: adjusted p at most {level:g})"
+    if silent:
+        said += "\ncould not be tested: " + ", ".join(silent[:6])
+    axes.set_xlabel(said)
     return figure
 
 
@@ -153,14 +157,15 @@ def support_map(frame: pd.DataFrame, *, names: Sequence[str], unit: str, limit: 
         x_label, y_label = "row of the episode", f"{names[0]}, {unit}" if unit else names[0]
     reached = shown["analysed"].to_numpy(dtype=bool)
     several = shown["two_mode"].to_numpy(dtype=bool)
-    for chosen, mark, colour, size, text in (
-        (reached & ~several, "o", GREY, 2.5, "one mode"),
-        (several, "o", BLUE, 3.5, "several modes"),
-        (~reached, "x", RED, 4.0, "too few neighbours"),
+    total = np.array([np.sum(frame["analysed"]), np.sum(frame["two_mode"])], dtype=np.int64)
+    for chosen, mark, colour, size, text, count in (
+        (reached & ~several, "o", GREY, 2.5, "one mode", total[0] - total[1]),
+        (several, "o", BLUE, 3.5, "several modes", total[1]),
+        (~reached, "x", RED, 4.0, "too few neighbours", len(frame) - total[0]),
     ):
         axes.plot(
             places[chosen, 0], places[chosen, 1], mark, color=colour, ms=size, alpha=0.7,
-            label=f"{text} ({np.count_nonzero(chosen)})",
+            label=f"{text} ({count})",
         )  # fmt: skip
     axes.set_xlabel(x_label)
     axes.set_ylabel(y_label)
@@ -171,6 +176,7 @@ def support_map(frame: pd.DataFrame, *, names: Sequence[str], unit: str, limit: 
     bars.set_yticks(
         np.arange(len(table)), [f"{phase} (n = {n})" for phase, n in table["size"].items()]
     )
+    bars.set_ylim(-0.8, max(len(table), 3) - 0.2)
     bars.set_xlim(0, 1.02)
     limit_line(bars, limit)
     bars.set_xlabel("share with enough neighbours")

@@ -155,15 +155,11 @@ def _fan(
     """The chunks themselves, and their mean dashed."""
     labels = part["cluster"].to_numpy()
     looks = _looks(labels, lines)
-    low = np.min([line.min(axis=0) for line in lines], axis=0)
-    high = np.max([line.max(axis=0) for line in lines], axis=0)
     for label, line in zip(labels, lines, strict=True):
         axes.plot(line[:, 0], line[:, 1], color=looks[label][0], lw=0.9, alpha=0.6)
     mean = np.mean(lines, axis=0)
     axes.plot(mean[:, 0], mean[:, 1], color=INK, ls="--", lw=1.3)
     draw_obstacles(axes, obstacles)
-    room = 0.08 * np.maximum(high - low, 1e-9)
-    axes.set_xlim(low[0] - room[0], high[0] + room[0])
     if plane.is_scene:
         axes.set_aspect("equal", adjustable="datalim")
 

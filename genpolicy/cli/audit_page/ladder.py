@@ -16,6 +16,7 @@ from genpolicy.cli.audit_page.evidence import AuditEvidence
 HOLDS, RED, OPEN, UNBELIEVED = "holds", "red", "open", "not believed"
 AT_MOST, AT_LEAST = "≤", "≥"
 SHOWN = 8
+UNIT_OF_POSITION = "unit of the position"
 
 
 @dataclass(frozen=True)
@@ -29,6 +30,8 @@ class Check:
         comparison: How the two must stand to each other.
         unit: Unit of both; empty for counts and shares.
         note: Where, or why it is not known.
+        judged: Whether the limit alone decides; where the measurement has an error of its own, a
+            defect is only what lies beyond both, and stands among the defects.
     """
 
     what: str
@@ -37,11 +40,12 @@ class Check:
     comparison: str = AT_MOST
     unit: str = ""
     note: str = ""
+    judged: bool = True
 
     @property
     def holds(self) -> bool | None:
-        """Whether the number keeps its limit; None where one of them is missing."""
-        if self.measured is None or self.limit is None:
+        """Whether the number keeps its limit; None where that is not to be said."""
+        if self.measured is None or self.limit is None or not self.judged:
             return None
         margin = self.limit - self.measured
         return margin >= 0 if self.comparison == AT_MOST else -margin >= 0
@@ -75,7 +79,11 @@ def ladder(document: Mapping[str, Any], evidence: AuditEvidence) -> list[Layer]:
         ("data", "Are clocks, frames, units and calibration what they claim to be?", _data),
         ("labels", "Do the outcome labels agree with what a replay does?", _labels),
         ("support", "Are there enough comparable demonstrations to answer at all?", _support),
-        ("structure", "Does one observation have several actions, and do they persist?", _structure),
+        (
+            "structure",
+            "Has one observation several actions, and do they persist?",
+            _structure,
+        ),
         ("hidden", "Does a recorded variable, or the past, explain which one was taken?", _hidden),
         ("validity", "Does each mode succeed, and is it feasible?", _validity),
     )
@@ -100,7 +108,7 @@ def _data(evidence: AuditEvidence) -> list[Check]:
     defects = evidence["defects"]
     checks = [Check("defects found", float(len(defects)), 0.0)]
     for _, row in defects.head(SHOWN).iterrows():
-        checks.append(_defect(row))
+        checks.append(_defect(row, str(summary["position_unit"])))
     offset = _largest(evidence["clocks"], "offset_before_s")
     if offset is None:
         note = "not measured: nothing that is observed follows the action"
@@ -110,8 +118,11 @@ def _data(evidence: AuditEvidence) -> list[Check]:
         value = abs(float(offset["offset_before_s"]))
         limit = float(settings["clock_limit_s"])
         checks.append(
-            Check("largest clock offset of an epoch", value, limit, unit="s", note=place)
-        )
+            Check(
+                "largest clock offset of an epoch", value, limit, unit="s", note=place,
+                judged=False,
+            )
+        )  # fmt: skip
     residual = _largest(evidence["calibration"], "residual_m")
     if residual is not None:
         checks.append(
@@ -121,6 +132,7 @@ def _data(evidence: AuditEvidence) -> list[Check]:
                 float(settings["calibration_limit_m"]),
                 unit=str(summary["position_unit"]),
                 note=f"epoch {residual['epoch'] or 'not recorded'}",
+                judged=False,
             )
         )
     checks += [
@@ -135,11 +147,12 @@ def _data(evidence: AuditEvidence) -> list[Check]:
     return checks
 
 
-def _defect(row: pd.Series) -> Check:
+def _defect(row: pd.Series, position_unit: str) -> Check:
     measured, limit = float(row["measured"]), float(row["limit"])
     name = f"{row['kind']} {row['variable']}".replace("_", " ").strip()
     comparison = AT_LEAST if measured < limit else AT_MOST
-    return Check(name, measured, limit, comparison, unit=str(row["unit"]), note=str(row["where"]))
+    unit = position_unit if row["unit"] == UNIT_OF_POSITION else str(row["unit"])
+    return Check(name, measured, limit, comparison, unit=unit, note=str(row["where"]))
 
 
 def _labels(evidence: AuditEvidence) -> list[Check]:
@@ -188,7 +201,7 @@ def _structure(evidence: AuditEvidence) -> list[Check]:
         Check(
             "held-out episodes with several modes",
             float(counts["two_mode_episodes"]),
-            least,
+            float(counts["needed_episodes"]),
             AT_LEAST,
             note=f"{counts['two_mode']} situations; {counts['resolved']} more have clusters that "
             "the observation tells apart",
@@ -232,7 +245,7 @@ def _hidden(evidence: AuditEvidence) -> list[Check]:
         detail = f"{row['detail']}; " if row["detail"] else ""
         checks.append(
             Check(
-                f"share of the modes that {row['variable'].replace('_', ' ')} explains{seen}",
+                f"share of the modes that {_plain(row['variable'])} explains{seen}",
                 float(row["effect"]),
                 limit,
                 note=f"{detail}{row['phase']}, adjusted p {float(row['p_adjusted']):.3g}",
@@ -244,7 +257,7 @@ def _hidden(evidence: AuditEvidence) -> list[Check]:
             Check(
                 "largest share that one of them explains beyond chance", 0.0, limit,
                 note=f"smallest adjusted p {float(strongest['p_adjusted']):.3g} "
-                f"({strongest['variable'].replace('_', ' ')})",
+                f"({_plain(strongest['variable'])})",
             )
         )  # fmt: skip
     return checks
@@ -281,6 +294,10 @@ def _validity(evidence: AuditEvidence) -> list[Check]:
     why = f"{summary['mean_defeated']} of {total} situations" if total else "no feasibility check"
     checks.append(Check("situations whose mean is refused where all modes pass", share, note=why))
     return checks
+
+
+def _plain(variable: str) -> str:
+    return "the past" if variable == "history" else variable.replace("_", " ")
 
 
 def _largest(frame: pd.DataFrame, column: str) -> pd.Series | None:
