@@ -6,7 +6,7 @@ from genpolicy.audit.data import Array, AuditInput, relative_paths
 from genpolicy.audit.neighbourhoods import Support
 from genpolicy.audit.persistence import persistent
 from genpolicy.audit.settings import AuditSettings
-from genpolicy.audit.situations import Situation, episodes_of
+from genpolicy.audit.situations import Situation, by_phase, episodes_of, primary_phase
 from genpolicy.audit.verdict import Counts
 
 
@@ -18,6 +18,7 @@ def count(
 ) -> Counts:
     """Counts of all situations, and what their spread looks like."""
     several = [item for item in situations if item.two_mode]
+    primary = primary_phase(by_phase(situations))
     ratios, spreads = [], []
     for item in situations:
         paths = relative_paths(data, item.neighbourhood.members, settings.chunk_steps)
@@ -30,6 +31,9 @@ def count(
         analysed_episodes=episodes_of(data, [item.neighbourhood for item in situations]),
         two_mode=len(several),
         two_mode_episodes=episodes_of(data, [item.neighbourhood for item in several]),
+        needed_episodes=settings.least_two_mode_episodes(
+            episodes_of(data, [item.neighbourhood for item in situations if item.phase == primary])
+        ),
         resolved=sum(item.clustering.count > 1 and not item.two_mode for item in situations),
         persistent=sum(persistent(item.identity) for item in several),
         noise_ratio=float(np.median(ratios)) if ratios else 0.0,

@@ -85,17 +85,14 @@ def history_test(
     best = int(np.argmax(observed))
     hits = int(np.count_nonzero(null >= observed[best] - CHANCE))
     chosen = past_values[:, best]
-    perfect = _perfect(chosen, labels, cell)
-    point = _beyond(float(observed[best]), null, perfect)
-    half = 2.0 * _jackknife(chosen[:, None], labels, cell) / perfect
+    point = _share_of(past_values, labels, cell, null)
+    half = 2.0 * _jackknife(chosen[:, None], labels, cell) / _perfect(chosen, labels, cell)
     return HistoryTest(
         p_value=(1 + hits) / (settings.permutations + 1),
         effect=point,
         effect_lower=max(0.0, point - half),
         effect_upper=min(1.0, point + half),
-        present=_beyond(
-            float(_ratio(now_values, labels, cell).max(initial=0.0)), null_now, perfect
-        ),
+        present=_share_of(now_values, labels, cell, null_now),
         feature=names[best],
         n=len(rows),
     )
@@ -199,6 +196,13 @@ def _dealt(labels: Integers, cell: Integers, rng: np.random.Generator) -> Intege
     result = np.empty_like(labels)
     result[order] = labels[shuffled]
     return result
+
+
+def _share_of(values: Array, labels: Integers, cell: Integers, null: Array) -> float:
+    """How much of a perfect order the best of all features shows beyond chance."""
+    shares = _ratio(values, labels, cell)
+    best = int(np.argmax(shares))
+    return _beyond(float(shares[best]), null, _perfect(values[:, best], labels, cell))
 
 
 def _perfect(values: Array, labels: Integers, cell: Integers) -> float:

@@ -1,5 +1,6 @@
 """Settings of the audit: what counts as near, as two modes, and as red. One section of params."""
 
+import math
 from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -47,6 +48,21 @@ class AuditSettings(BaseModel):
         maximum_lag_steps: Search range of the action-to-state lag.
         declared_lag_steps: Lag that the contract states; None takes the median of the episodes.
         clock_limit_s: Red above: clock residual of an epoch.
+        clock_limit_steps: No lag is believed finer than this, action steps; red above both.
+        significance: An offset is red only beyond this many of its standard errors: with some
+            twenty of them per data set one in 10,000 clean ones is called defective by chance.
+        outlier_share: Share of single episodes with one fault (and two of them at least) that
+            makes it a defect of the data; below it is a mishap without weight.
+        drift_limit_steps: Red above: growth of the lag from the first to the last row of an
+            episode, action steps. Plants differ by a part of a step between slow and fast motion.
+        gain_limit: Red above: factor between commanded and observed motion. No arm follows that
+            badly, and units differ by more.
+        gain_epoch_limit: Red above: the same between one epoch and all.
+        frame_limit_rad: Red above: angle between commanded and observed motion. An arm that
+            follows its axes unequally stays below it.
+        gap_share_limit: Red above: share of rows that follow a gap. At 1 % every sixth chunk of 16
+            holds one.
+        jitter_limit_share: Red above: deviation of every tenth row from the period, as its share.
         negative_delay_tolerance_s: A sample may be received this much before it happened (what the
             correction of a clock leaves); beyond it is counted and red.
         calibration_limit_m: Red above: calibration residual of an epoch.
@@ -56,6 +72,8 @@ class AuditSettings(BaseModel):
         minimum_support_share: Share of held-out situations with enough neighbours, at least.
         minimum_two_mode_situations: Held-out episodes of a phase with several modes, below which
             the phase is said to have one.
+        minimum_two_mode_share: The same as a share of its analysed held-out episodes; about twice
+            what chance gives a cloud without modes that is looked at in ten situations an episode.
         strata_alpha: Family-wise error of the strata tests.
         strata_effect_limit: Red above: explained share of a significant stratum.
         mode_success_limit: Lower bound of a mode's success that makes it valid.
@@ -98,6 +116,15 @@ class AuditSettings(BaseModel):
     maximum_lag_steps: int = Field(default=12, ge=1)
     declared_lag_steps: float | None = None
     clock_limit_s: float = Field(default=0.02, gt=0)
+    clock_limit_steps: float = Field(default=0.25, gt=0)
+    significance: float = Field(default=4.5, gt=0)
+    outlier_share: float = Field(default=0.02, gt=0, lt=1)
+    drift_limit_steps: float = Field(default=1.0, gt=0)
+    gain_limit: float = Field(default=3.0, gt=1)
+    gain_epoch_limit: float = Field(default=1.15, gt=1)
+    frame_limit_rad: float = Field(default=0.14, gt=0)
+    gap_share_limit: float = Field(default=0.01, gt=0, lt=1)
+    jitter_limit_share: float = Field(default=0.5, gt=0)
     negative_delay_tolerance_s: float = Field(default=0.001, ge=0)
     calibration_limit_m: float = Field(default=0.005, gt=0)
     label_disagreement_limit: float = Field(default=0.08, gt=0, lt=1)
@@ -105,9 +132,15 @@ class AuditSettings(BaseModel):
     minimum_situations: int = Field(default=20, ge=1)
     minimum_support_share: float = Field(default=0.2, gt=0, lt=1)
     minimum_two_mode_situations: int = Field(default=5, ge=1)
+    minimum_two_mode_share: float = Field(default=0.1, gt=0, lt=1)
     strata_alpha: float = Field(default=0.05, gt=0, lt=1)
     strata_effect_limit: float = Field(default=0.3, gt=0, lt=1)
     mode_success_limit: float = Field(default=0.5, gt=0, lt=1)
     mode_feasible_limit: float = Field(default=0.8, gt=0, le=1)
     permutations: int = Field(default=999, ge=99)
     resamples: int = Field(default=200, ge=20)
+
+    def least_two_mode_episodes(self, analysed: int) -> int:
+        """Held-out episodes with several modes that it takes among so many analysed ones."""
+        share = math.ceil(self.minimum_two_mode_share * analysed)
+        return max(self.minimum_two_mode_situations, share)

@@ -59,13 +59,16 @@ def claimed(data: AuditInput, settings: AuditSettings, found: list[Found]) -> se
     among many situations is what chance gives.
     """
     numbers: dict[str, list[int]] = {}
+    analysed: dict[str, list[Neighbourhood]] = {}
     for number, (phase, item, split) in enumerate(found):
+        analysed.setdefault(phase, []).append(item)
         if split.count > 1 and not resolved_by_observation(data, settings, item, split):
             numbers.setdefault(phase, []).append(number)
     return {
         number
-        for chosen in numbers.values()
-        if episodes_of(data, [found[k][1] for k in chosen]) >= settings.minimum_two_mode_situations
+        for phase, chosen in numbers.items()
+        if episodes_of(data, [found[k][1] for k in chosen])
+        >= settings.least_two_mode_episodes(episodes_of(data, analysed[phase]))
         for number in chosen
     }
 

@@ -25,6 +25,11 @@ Variable = tuple[str, NDArray[np.generic] | None, bool]
 
 EPISODE_VARIABLES = ("operator", "object", "calibration_epoch")
 HISTORY = "history"
+SEQUENCE = "recording_sequence"
+# Same side in turns of two, or for a session: both show in the episodes two and four places off.
+SEQUENCE_PLACES = (-4, -2, 2, 4)
+# A cluster that has begun to move apart by half a scale is no longer a matter of the past.
+STILL_TOGETHER = 0.5
 Drawn = tuple[Integers, Integers, Integers]
 
 
@@ -80,6 +85,7 @@ def examine_strata(
         One row per variable and phase, adjusted together; not recorded ones untested.
     """
     rows: list[Stratum] = []
+    settings = _enough_permutations(data, settings, len(situations))
     for phase, items in sorted(situations.items()):
         drawn = stream(root_seed, "audit", "blocks", phase).permutation(len(items))
         # Hidden variables are tested where the clusters differ least in what is observed: a
@@ -92,12 +98,24 @@ def examine_strata(
         hidden = _disjoint(data, items, closest, least)
         seen = _disjoint(data, items, drawn, least)
         tested = [(*entry, hidden) for entry in _hidden_variables(data, hidden[0], links[phase])]
-        tested += [(*entry, seen) for entry in _observed_variables(data, settings, seen[0])]
+        tested += [(*entry, seen) for entry in _observed_variables(data, seen[0])]
         for variable, values, observed, place in tested:
             seeds = (root_seed, phase, variable)
             rows.append(_tested(settings, seeds, values, place, observed=observed))
-        rows.append(_history(data, settings, phase, hidden, root_seed))
+        together = closest[np.sort(gaps) < STILL_TOGETHER]
+        past = _disjoint(data, items, together, least)
+        rows.append(_history(data, settings, phase, past, root_seed))
     return _adjusted(rows)
+
+
+def _enough_permutations(data: AuditInput, settings: AuditSettings, phases: int) -> AuditSettings:
+    """So many permutations that the smallest p-value survives the correction for all tests."""
+    context = sum(part.stop - part.start for part in data.context.values())
+    tests = phases * (len(EPISODE_VARIABLES) + 5 + data.position.shape[1] + context)
+    least = int(np.ceil(2 * tests / settings.strata_alpha))
+    if settings.permutations >= least:
+        return settings
+    return settings.model_copy(update={"permutations": least})
 
 
 def _tested(
@@ -196,29 +214,40 @@ def _hidden_variables(data: AuditInput, rows: Integers, links: Integers) -> list
         result.append((name, values[episode] if recorded(values) else None, False))
     ordered = bool(np.all(np.isfinite(table.order)))
     result.append(("episode_order", table.order[episode] if ordered else None, False))
-    before = _mode_before(table.order, links)[episode] if ordered else None
-    result.append(("previous_episode", before, False))
+    nearby = _nearby_mode(table.order, links)[episode] if ordered else None
+    result.append((SEQUENCE, nearby, False))
     result.append(("time_in_episode", data.index[rows].astype(np.float64), False))
     return result
 
 
-def _mode_before(order: NDArray[np.float64], links: Integers) -> Integers:
-    """Mode of the episode recorded just before each one; -1 where it has none. Shape (E,)."""
+def _nearby_mode(order: NDArray[np.float64], links: Integers) -> Integers:
+    """Most frequent mode of episodes recorded shortly before and after each; -1 for a tie (E,)."""
     sequence = np.argsort(order, kind="stable")
-    result = np.full(len(order), -1, dtype=np.int64)
-    result[sequence[1:]] = links[sequence[:-1]]
+    inside = links[sequence]
+    n, kinds = len(order), int(links.max(initial=-1)) + 1
+    votes = np.zeros((n, kinds + 1))
+    for place in SEQUENCE_PLACES:
+        other = np.arange(n) + place
+        valid = (other >= 0) & (other < n)
+        votes[np.flatnonzero(valid), inside[other[valid]]] += 1.0
+    votes = votes[:, :kinds]  # the last column counts episodes without a mode
+    result = np.full(n, -1, dtype=np.int64)
+    if kinds:
+        ranked = np.sort(votes, axis=1)
+        clear = ranked[:, -1] > (ranked[:, -2] if kinds > 1 else 0.0)
+        result[sequence] = np.where(clear, np.argmax(votes, axis=1), -1)
     return result
 
 
-def _observed_variables(
-    data: AuditInput, settings: AuditSettings, rows: Integers
-) -> list[Variable]:
+def _observed_variables(data: AuditInput, rows: Integers) -> list[Variable]:
     """Start position and context channels of each row.
 
-    A policy sees the context, and the start as long as it is about to leave it.
+    A policy sees the context, and the start as long as it has not left it.
     """
     start = data.position[data.first_row[rows]]
-    fresh = bool(np.median(data.index[rows]) < settings.chunk_steps) if len(rows) else True
+    scale = data.observation_scale[data.observation_position]
+    moved = np.linalg.norm((data.position[rows] - start) / scale, axis=1)
+    fresh = bool(np.median(moved) < STILL_TOGETHER) if len(rows) else True
     result: list[Variable] = [
         (f"start_position.{axis}", start[:, axis], fresh) for axis in range(start.shape[1])
     ]

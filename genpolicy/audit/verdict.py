@@ -11,18 +11,21 @@ from genpolicy.audit.labels import ModeOutcome, Replayed, disagreement
 from genpolicy.audit.persistence import Persistence
 from genpolicy.audit.semantics import Semantics
 from genpolicy.audit.settings import AuditSettings
-from genpolicy.audit.strata import HISTORY, Stratum
+from genpolicy.audit.strata import HISTORY, SEQUENCE, Stratum
 
 DATA_VARIABLES = ("calibration_epoch",)
 POINTWISE_RATIO = 0.5
 # Which variable to name when several explain the modes equally well, most concrete first; all
 # others (observed ones) come before the last three, which anything else may shine through.
 CONCRETE = (
-    "phase", "object", "operator", "calibration_epoch", "episode_order", "previous_episode",
+    "phase", "object", "operator", "calibration_epoch", "episode_order", SEQUENCE,
     "time_in_episode", HISTORY,
 )  # fmt: skip
 VAGUE = 3
 NEARLY = 0.15
+# Time and the past show whatever else was recorded: they must explain this much more to be named.
+EVERYTHING = ("time_in_episode", HISTORY)
+SHINES = 0.3
 
 
 class Cause(StrEnum):
@@ -47,6 +50,7 @@ class Counts:
         analysed_episodes: Held-out episodes with at least one of them.
         two_mode: Situations with several modes under one observation.
         two_mode_episodes: Held-out episodes with at least one of them.
+        needed_episodes: How many it takes to speak of modes.
         resolved: Situations with clusters that are not claimed as modes: an observed component
             tells them apart, or they are too few in their phase.
         persistent: Situations with several modes that persist.
@@ -59,6 +63,7 @@ class Counts:
     analysed_episodes: int
     two_mode: int
     two_mode_episodes: int
+    needed_episodes: int
     resolved: int
     persistent: int
     noise_ratio: float
@@ -191,7 +196,7 @@ def _support(settings: AuditSettings, counts: Counts) -> AuditVerdict | None:
 def _structure(
     settings: AuditSettings, counts: Counts, persistence: Persistence
 ) -> AuditVerdict | None:
-    if counts.two_mode_episodes < settings.minimum_two_mode_situations:
+    if counts.two_mode_episodes < counts.needed_episodes:
         white = counts.noise_ratio >= POINTWISE_RATIO
         if white and counts.noise_spread >= settings.noise_floor_m:
             return _noise("The spread is noise from action to action")
@@ -232,6 +237,15 @@ def _explained(settings: AuditSettings, strata: tuple[Stratum, ...]) -> AuditVer
         return AuditVerdict(
             Cause.DATA_DEFECT, row.variable, row.variable, f"{share}: correct the epochs."
         )
+    if row.variable == SEQUENCE:
+        return AuditVerdict(
+            Cause.HIDDEN_STATE,
+            "unrecorded",
+            SEQUENCE,
+            f"The mode of {row.phase} follows from those of the episodes recorded just before and "
+            f"after ({row.effect or 0.0:.0%}): find out what was decided per session or in turns, "
+            "record it, or draw it anew for every episode, then repeat the audit.",
+        )
     if row.variable == HISTORY:
         return AuditVerdict(
             Cause.HIDDEN_STATE,
@@ -259,7 +273,7 @@ def _explained(settings: AuditSettings, strata: tuple[Stratum, ...]) -> AuditVer
 
 def _foremost(found: list[Stratum]) -> Stratum:
     """The variable to name: the strongest, and of nearly equal ones the most concrete."""
-    best = max(row.effect or 0.0 for row in found)
+    best = max((row.effect or 0.0) - SHINES * (row.variable in EVERYTHING) for row in found)
     equal = [row for row in found if (row.effect or 0.0) >= best - NEARLY]
 
     def rank(row: Stratum) -> tuple[int, float, str]:

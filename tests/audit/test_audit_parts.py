@@ -117,7 +117,7 @@ def test_family_wise_error_of_the_strata_test():
         members = [(data.episode[item.members], split.labels) for item, split in several]
         links = {"approach": link(members, len(data.episodes), 6)}
         rows = examine_strata(data, settings, {"approach": several}, links, root_seed=seed)
-        assert {"history", "previous_episode", "operator"} <= {row.variable for row in rows}
+        assert {"history", "recording_sequence", "operator"} <= {row.variable for row in rows}
         wrong += any(r.p_adjusted is not None and r.p_adjusted <= 0.05 for r in rows)
     assert wrong / 40 <= 0.05 + 3 * np.sqrt(0.05 * 0.95 / 40)
 
