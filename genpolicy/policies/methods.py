@@ -10,11 +10,14 @@ from torch import Tensor
 
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.errors import ConfigError
+from genpolicy.policies.derivative_free import noise_length, search_codes
+from genpolicy.policies.energy import CODE_BOUND, EnergyContrast, EnergyNetwork
 from genpolicy.policies.networks import Dimensions, HeadInput, PolicyNetwork
 from genpolicy.policies.objectives import (
     ConditionalVae,
     NoisePrediction,
     ObjectiveFactory,
+    absolute_error,
     flow_matching,
     squared_error,
 )
@@ -36,7 +39,8 @@ from genpolicy.policies.schedules import (
 from genpolicy.policies.settings import HeadConfig, NetworkConfig, SamplerConfig
 
 SINGLE_EVALUATION = ("direct", "z_zero", "z_prior")
-STOCHASTIC_SAMPLERS = ("z_prior", *DIFFUSION_SAMPLERS, *ODE_SAMPLERS)
+ENERGY_SAMPLER = "derivative_free"
+STOCHASTIC_SAMPLERS = ("z_prior", ENERGY_SAMPLER, *DIFFUSION_SAMPLERS, *ODE_SAMPLERS)
 
 
 @dataclass(frozen=True)
@@ -46,7 +50,8 @@ class Method:
     Attributes:
         name: Its name everywhere.
         chunked: Whether it predicts K actions; False means K = H_e = 1.
-        reads: Input of the head: nothing, a latent, or a noisy chunk with a time.
+        reads: Input of the head: nothing, a latent, a noisy chunk with a time, or candidate codes
+            to score.
         objective: Makes its training objective.
         samplers: Samplers that fit; the first is the default.
         gains: Fixed gains around the network at a sampler time, for methods that read a chunk.
@@ -54,7 +59,7 @@ class Method:
 
     name: str
     chunked: bool
-    reads: Literal["nothing", "latent", "chunk"]
+    reads: Literal["nothing", "latent", "chunk", "codes"]
     objective: ObjectiveFactory
     samplers: tuple[str, ...]
     gains: Callable[[HeadConfig, Tensor], Gains] | None = None
@@ -71,6 +76,8 @@ class Method:
         Raises:
             ConfigError: The head's budget is too small.
         """
+        if self.reads == "codes":
+            return EnergyNetwork(dimensions, network, head)
         numbers = {
             "nothing": 0,
             "latent": head.latent_dim,
@@ -94,10 +101,13 @@ METHODS = {
     for method in (
         Method("bc", False, "nothing", squared_error, ("direct",)),
         Method("chunked_bc", True, "nothing", squared_error, ("direct",)),
+        # As `chunked_bc` with the other usual error, for the separation of factors.
+        Method("chunked_l1", True, "nothing", absolute_error, ("direct",)),
         Method("act", True, "latent", ConditionalVae, ("z_zero", "z_prior")),
         # The same network and objective as `act`; drawn from its prior it is a generator and
         # stands for promotion like the others.
         Method("cvae", True, "latent", ConditionalVae, ("z_prior",)),
+        Method("ibc", True, "codes", EnergyContrast, (ENERGY_SAMPLER,)),
         Method(
             "diffusion", True, "chunk", NoisePrediction, ("ddim", "ddpm", "dpm_2m"), _noise_gains
         ),
@@ -126,8 +136,9 @@ def check_sampler(method: Method, sampler: SamplerConfig, head: HeadConfig) -> N
     """Refuse a sampler that does not fit the method or its training.
 
     Raises:
-        ConfigError: Wrong kind, fewer than one step, more steps than training levels, or
-            several steps of a method that evaluates its network once.
+        ConfigError: Wrong kind, fewer than one step, more steps than training levels,
+            several steps of a method that evaluates its network once, or a population of a
+            sampler that has none.
     """
     if sampler.name not in method.samplers:
         raise ConfigError(
@@ -145,6 +156,14 @@ def check_sampler(method: Method, sampler: SamplerConfig, head: HeadConfig) -> N
             found=str(sampler.steps),
             expected="exactly 1" if single else "at least 1",
             action="Correct the sampler's steps.",
+        )
+    searches = sampler.name == ENERGY_SAMPLER
+    if searches != (sampler.population > 1):
+        raise ConfigError(
+            where=f"sampler.population of {method.name}",
+            found=str(sampler.population),
+            expected="at least 2" if searches else "exactly 1",
+            action="Set a population for the energy's search, and for no other sampler.",
         )
 
 
@@ -172,7 +191,7 @@ def generate(
     def evaluate(values: Tensor, time: Tensor) -> Tensor:
         if sampler.name == "direct":
             return network.evaluate(condition)
-        if sampler.name in SINGLE_EVALUATION:
+        if sampler.name in SINGLE_EVALUATION or sampler.name == ENERGY_SAMPLER:
             return network.evaluate(condition, values)
         return network.evaluate(condition, values, time)
 
@@ -186,6 +205,10 @@ def generate(
             steps=sampler.steps,
             clip=sampler.clip,
         )
+    elif sampler.name == ENERGY_SAMPLER:
+        assert isinstance(network, EnergyNetwork)
+        codes = search_codes(counted, noise, iterations=sampler.steps, bound=CODE_BOUND)
+        chunks = network.code.decode(codes)
     elif sampler.name in ODE_SAMPLERS:
         chunks = sample_ode(counted, noise, name=sampler.name, steps=sampler.steps)
     else:
@@ -199,7 +222,10 @@ def generate(
 def noise_shape(
     dimensions: Dimensions, sampler: SamplerConfig, head: HeadConfig
 ) -> tuple[int, ...]:
-    """Shape of one row's noise per sampler step: a latent or a chunk."""
+    """Shape of one row's noise per sampler step: a latent, a chunk, or a population of codes."""
+    if sampler.name == ENERGY_SAMPLER:
+        length = min(head.code_dim, dimensions.chunk_numbers)
+        return (sampler.population, noise_length(length))
     if sampler.name in SINGLE_EVALUATION:
         return (head.latent_dim,)
     return (dimensions.prediction_horizon, dimensions.action_dim)

@@ -161,7 +161,13 @@ class PolicyNetwork(nn.Module):
         self._gains = head_input.gains
         self.encoder = Encoder(dimensions, config)
         self.trunk = Trunk(config)
-        self.head = Head(dimensions, config, head_input=head_input)
+        self.head = self.make_head(dimensions, config, head_input)
+
+    def make_head(
+        self, dimensions: Dimensions, config: NetworkConfig, head_input: HeadInput
+    ) -> Head:
+        """The head; made last, so that equal seeds give every method one encoder and trunk."""
+        return Head(dimensions, config, head_input=head_input)
 
     def encode(self, observations: Tensor) -> Tensor:
         """Normalised observations (B, H_o, D_o) to conditions (B, C)."""

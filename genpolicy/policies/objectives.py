@@ -33,6 +33,9 @@ class Batch:
 class Objective(nn.Module):
     """Loss of one method; parameters of its own, if any, are used in training only."""
 
+    def prepare(self, network: PolicyNetwork, data: Batch) -> None:
+        """Fix what the network takes from the training split; by default nothing."""
+
     def loss(self, network: PolicyNetwork, batch: Batch, generator: torch.Generator) -> Tensor:
         """Scalar loss of a batch; `generator` is the only source of randomness."""
         raise NotImplementedError
@@ -45,6 +48,15 @@ class SquaredError(Objective):
         """Masked mean squared error."""
         predicted = network.evaluate(network.encode(batch.observations))
         return masked_mean((predicted - batch.actions).square(), batch.weight)
+
+
+class AbsoluteError(Objective):
+    """Mean absolute error of the predicted chunk: its optimum is the median, not the mean."""
+
+    def loss(self, network: PolicyNetwork, batch: Batch, generator: torch.Generator) -> Tensor:
+        """Masked mean absolute error."""
+        predicted = network.evaluate(network.encode(batch.observations))
+        return masked_mean((predicted - batch.actions).abs(), batch.weight)
 
 
 class ConditionalVae(Objective):
@@ -121,6 +133,11 @@ ObjectiveFactory = Callable[[Dimensions, NetworkConfig, HeadConfig], Objective]
 def squared_error(dimensions: Dimensions, network: NetworkConfig, head: HeadConfig) -> Objective:
     """`SquaredError`, which needs none of these."""
     return SquaredError()
+
+
+def absolute_error(dimensions: Dimensions, network: NetworkConfig, head: HeadConfig) -> Objective:
+    """`AbsoluteError`, which needs none of these."""
+    return AbsoluteError()
 
 
 def flow_matching(dimensions: Dimensions, network: NetworkConfig, head: HeadConfig) -> Objective:

@@ -46,6 +46,10 @@ class HeadConfig(Settings):
             the further from anything seen is its centre.
         posterior_width: Hidden width of ACT's training-only posterior encoder.
         kl_weight: Weight of ACT's KL term against the L1 error per action number.
+        code_dim: Length of the code that the energy head scores, at most the chunk's numbers.
+            Uniform candidates thin out with every number more; 16 keep a chunk of the default
+            task within 5 mm.
+        energy_negatives: Negatives per demonstrated chunk in the energy head's training.
     """
 
     diffusion_levels: int = Field(default=100, ge=1, le=10_000)
@@ -53,6 +57,8 @@ class HeadConfig(Settings):
     latent_dim: int = Field(default=2, ge=1, le=1024)
     posterior_width: int = Field(default=256, ge=4, le=4096)
     kl_weight: float = Field(default=0.01, ge=0.0)
+    code_dim: int = Field(default=16, ge=1, le=256)
+    energy_negatives: int = Field(default=16, ge=1, le=4096)
 
 
 class TrainingConfig(Settings):
@@ -94,13 +100,19 @@ class SamplerConfig(Settings):
         name: The sampler.
         steps: Sampler steps (not NFE: Heun evaluates the network twice a step).
         clip: Bound of the predicted clean chunk, normalised units; diffusion samplers only.
+        population: Candidates that every pass of the energy's search scores; other samplers draw
+            none and leave it at 1.
         batch_rows: Rows of every network call; shorter batches are padded, so that one row's
             sample does not depend on how many others there are.
     """
 
-    name: Literal["direct", "z_zero", "z_prior", "ddpm", "ddim", "dpm_2m", "euler", "heun", "rk4"]
+    name: Literal[
+        "direct", "z_zero", "z_prior", "ddpm", "ddim", "dpm_2m", "euler", "heun", "rk4",
+        "derivative_free",
+    ]  # fmt: skip
     steps: int = Field(default=1, le=10_000)
     clip: float | None = Field(default=1.0, gt=0.0)
+    population: int = Field(default=1, ge=1, le=65_536)
     batch_rows: int = Field(default=16, ge=1, le=65_536)
 
     def hash(self) -> str:

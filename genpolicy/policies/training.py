@@ -118,6 +118,7 @@ def train(
         )
         assert data is not None
         network, objective = _build(method, _dimensions(horizons, request), request, device)
+        objective.prepare(network, data)
         averaged = copy.deepcopy(network)
         records = list(
             _optimise(

@@ -15,11 +15,14 @@ from genpolicy.policies.windows import Windows
 SAMPLERS = {
     "bc": ("direct", 1),
     "chunked_bc": ("direct", 1),
+    "chunked_l1": ("direct", 1),
     "act": ("z_zero", 1),
     "cvae": ("z_prior", 1),
+    "ibc": ("derivative_free", 8),
     "diffusion": ("ddim", 10),
     "flow": ("euler", 8),
 }
+POPULATION = {"derivative_free": 32}
 NETWORK = NetworkConfig(
     encoder_width=16, condition_dim=16, trunk_width=48, trunk_blocks=2, time_features=16,
     head_parameters=6000,
@@ -61,7 +64,9 @@ def request_for(
         "training": TrainingConfig(
             steps=steps, batch_size=128, learning_rate=3e-3, warmup_steps=10, validation_every=10
         ),
-        "sampler": SamplerConfig(name=name, steps=sampler_steps),
+        "sampler": SamplerConfig(
+            name=name, steps=sampler_steps, population=POPULATION.get(name, 1)
+        ),
         "provenance": Provenance(
             dataset_manifest_sha256="a" * 64,
             action_contract_sha256="b" * 64,

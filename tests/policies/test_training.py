@@ -214,6 +214,9 @@ def test_a_row_keeps_its_bits_at_every_place_of_a_batch(method, rows):
     elif reads == "chunk":
         values = torch.randn(1, 16, 10, generator=generator).expand(rows, -1, -1).contiguous()
         time = torch.full((rows,), 0.37)
+    elif reads == "codes":
+        values = torch.randn(1, 32, HeadConfig().code_dim, generator=generator)
+        values = values.expand(rows, -1, -1).contiguous()
     with deterministic("cpu"), torch.inference_mode():
         out = network.evaluate(network.encode(observations), values, time)
     assert all(torch.equal(out[0], row) for row in out)
