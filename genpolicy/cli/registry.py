@@ -3,7 +3,7 @@
 import argparse
 from typing import Any, Protocol
 
-from genpolicy.cli import ingest
+from genpolicy.cli import audit, ingest
 
 
 class Command(Protocol):
@@ -14,4 +14,4 @@ class Command(Protocol):
         ...
 
 
-COMMANDS: tuple[Command, ...] = (ingest,)
+COMMANDS: tuple[Command, ...] = (audit, ingest)

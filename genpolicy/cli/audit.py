@@ -1,0 +1,192 @@
+"""`genpolicy audit`: is there a need for a generator in these data, and if not, why?"""
+
+import argparse
+import os
+import shutil
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+from genpolicy.audit.evidence import write_evidence
+from genpolicy.audit.propose import propose_settings
+from genpolicy.audit.standalone import AuditReport, audit
+from genpolicy.cli.audit_page.evidence import read_evidence
+from genpolicy.cli.audit_page.page import audit_page
+from genpolicy.cli.audit_page.words import TITLES
+from genpolicy.cli.ingest import add_input, given_contract
+from genpolicy.cli.progress import ProgressLine
+from genpolicy.cli.resume import DATASET, fingerprint, kept_or_new, work_folder
+from genpolicy.cli.task_checks import task_checks
+from genpolicy.dataset.dataset import Dataset, load_dataset
+from genpolicy.errors import BadInputError
+from genpolicy.importers import Opened, open_dataset
+from genpolicy.importers.contract import write_contract
+from genpolicy.integrity.atomic import output_folder, write_bytes
+from genpolicy.integrity.documents import canonical_json
+
+EXAMPLES = """examples:
+  genpolicy audit recordings/ --out audit/              # whatever they are
+  genpolicy audit recordings/ --contract contract.yaml --out audit/
+  genpolicy audit dataset/ --out audit/                 # what `genpolicy ingest` wrote
+
+writes audit.html (read this), audit.json, contract.yaml (what was guessed; correct it and give
+it back), evidence/ and dataset/. The exit code is 0 whatever the verdict: it was measured.
+"""
+DOCUMENT, PAGE, CONTRACT, EVIDENCE = "audit.json", "audit.html", "contract.yaml", "evidence"
+SHOWN_REFUSALS = 5
+
+
+def add(verbs: "argparse._SubParsersAction[Any]") -> None:
+    """Add the verb `audit`."""
+    parser = verbs.add_parser(
+        "audit",
+        help="name the cause of different actions under one observation",
+        description="Audit recordings: do they hold several valid actions under one observation, "
+        "or is a variable hidden, the data broken, a label wrong?",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    add_input(parser)
+    parser.add_argument("--out", type=Path, required=True, help="folder to write, or to replace")
+    parser.add_argument("--seed", type=int, default=0, help="root of all random draws (default: 0)")
+    parser.set_defaults(run=run_audit)
+
+
+def run_audit(options: argparse.Namespace) -> int:
+    """Import, audit, write everything or nothing, and print the verdict."""
+    began_s = time.monotonic()
+    out: Path = options.out
+    check_output(options.path, out)
+    work = work_folder(out)
+    opened = _opened(options, work)
+    _say(f"{opened.accepted} episodes accepted, {len(opened.refused)} refused; auditing")
+    dataset = load_dataset(opened.folder)
+    settings = propose_settings(dataset, opened.contract.audit)
+    checks = task_checks(dataset, task=options.task, chunk_steps=settings.chunk_steps)
+    report = audit(
+        dataset,
+        settings,
+        admissible=checks.admissible,
+        replay=checks.replay,
+        root_seed=options.seed,
+    )
+    _say("writing the evidence and the page")
+    with output_folder(out) as folder:
+        write_contract(folder / CONTRACT, opened.contract)
+        write_report(
+            report, folder, name=name_of(dataset, options.path), obstacles=checks.obstacles
+        )
+        if opened.folder == work / DATASET:
+            os.replace(opened.folder, folder / DATASET)
+    shutil.rmtree(work, ignore_errors=True)
+    print(as_text(report, opened, out))
+    _say(f"{time.monotonic() - began_s:.1f} s")
+    return 0
+
+
+def write_report(
+    report: AuditReport, folder: Path, *, name: str, obstacles: list[dict[str, float]]
+) -> None:
+    """Write audit.json, audit.html and the evidence into an existing folder.
+
+    Args:
+        report: What the audit found.
+        folder: Existing folder.
+        name: What the dataset is called on the page.
+        obstacles: Round obstacles of the scene plane, for figures.
+    """
+    evidence = folder / EVIDENCE
+    evidence.mkdir()
+    write_evidence(report.result, evidence, settings=report.settings, obstacles=obstacles)
+    document = report.as_json()
+    write_bytes(folder / DOCUMENT, canonical_json(document))
+    page = audit_page(document, read_evidence(evidence), name=name)
+    write_bytes(folder / PAGE, page.encode())
+
+
+def check_output(path: Path, out: Path) -> None:
+    """Refuse an output that would overwrite the recordings or something that is no audit.
+
+    Raises:
+        BadInputError: It would.
+    """
+    source, target = path.resolve(), out.resolve()
+    if source.is_relative_to(target) or target.is_relative_to(source):
+        raise BadInputError(
+            where="--out",
+            found=f"{out}, in or around the recordings {path}",
+            expected="a place apart from them",
+            action="Name another folder; recordings are never written to.",
+        )
+    if out.is_symlink() or (out.exists() and not out.is_dir()):
+        raise BadInputError(
+            where="--out",
+            found=f"{out}, not a folder",
+            expected="a new folder, or that of an earlier audit",
+            action="Name another folder.",
+        )
+    if out.is_dir() and any(out.iterdir()) and not (out / DOCUMENT).is_file():
+        raise BadInputError(
+            where="--out",
+            found=f"{out}, which holds something else than an audit",
+            expected="a new folder, or that of an earlier audit, which is replaced",
+            action="Name another folder; nothing was removed.",
+        )
+
+
+def name_of(dataset: Dataset, path: Path) -> str:
+    """The task's name where the data state one, else that of the file or folder."""
+    tasks = [str(task) for task in dataset.manifest["tasks"]]
+    return tasks[0] if len(tasks) == 1 and tasks[0] != "unnamed" else path.resolve().name
+
+
+def as_text(report: AuditReport, opened: Opened, out: Path) -> str:
+    """The verdict for a person at a terminal."""
+    named = [part.replace("_", " ") for part in (report.variable, report.kind) if part]
+    cause = f"{report.verdict} ({', '.join(dict.fromkeys(named))})" if named else report.verdict
+    red = "no layer is red" if report.layer == "none" else f"first red layer: {report.layer}"
+    title = TITLES.get(report.verdict, report.verdict)
+    lines = [
+        *_block("verdict", (cause, f"{title}; confidence {report.confidence:.2f}; {red}")),
+        *_block("evidence", report.evidence),
+        *_block("rests on", report.rests_on),
+        *_block("next", (report.next_action,)),
+    ]
+    refused = tuple(refusal.reason for refusal in opened.refused)
+    shown, more = refused[:SHOWN_REFUSALS], len(refused) - SHOWN_REFUSALS
+    lines += _block("refused", (*shown, f"and {more} more") if more > 0 else shown)
+    lines.append(f"page        {out / PAGE}")
+    return "\n".join(lines)
+
+
+def _block(title: str, texts: tuple[str, ...]) -> list[str]:
+    return [f"{title if number == 0 else '':<12}{text}" for number, text in enumerate(texts)]
+
+
+def _opened(options: argparse.Namespace, work: Path) -> Opened:
+    """The recordings as a dataset: kept from an interrupted audit, or imported now."""
+    contract = given_contract(options)
+    progress = ProgressLine("episodes")
+
+    def make(folder: Path) -> Opened:
+        return open_dataset(
+            options.path,
+            out=folder,
+            format=options.format,
+            contract=contract,
+            task=options.task,
+            progress=progress,
+        )
+
+    if not options.path.exists():
+        return make(work / DATASET)  # which says what is missing
+    key = fingerprint(options.path, format=options.format, contract=contract, task=options.task)
+    try:
+        return kept_or_new(work, key, make)
+    finally:
+        progress.close()
+
+
+def _say(text: str) -> None:
+    print(f"genpolicy audit: {text}", file=sys.stderr, flush=True)

@@ -1,0 +1,86 @@
+"""What a registered task can check about its data: feasibility of a chunk, replay of an episode."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from importlib.metadata import entry_points
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from genpolicy.audit.labels import Replay
+from genpolicy.audit.mean_versus_modes import Admissible
+from genpolicy.dataset.dataset import Dataset
+from genpolicy.integrity.documents import canonical_json
+from genpolicy.integrity.hashing import sha256_bytes
+from genpolicy.tasks.api import ENTRY_POINT_GROUP, load_task
+
+Array = NDArray[np.float64]
+
+ANY_AGE_S = 1.0
+"""Recorded chunks are checked at the age 0; any positive limit of the age lets them pass."""
+
+
+@dataclass(frozen=True)
+class TaskChecks:
+    """What is known about a dataset through its task; nothing, if the task is not registered.
+
+    Attributes:
+        admissible: Feasibility of a chunk at a recorded observation.
+        replay: Outcome of a replayed episode, by identifier.
+        obstacles: Round obstacles of the scene plane, for figures.
+    """
+
+    admissible: Admissible | None = None
+    replay: Replay | None = None
+    obstacles: list[dict[str, float]] = field(default_factory=list)
+
+
+def task_checks(dataset: Dataset, *, task: str | None, chunk_steps: int) -> TaskChecks:
+    """The checks of the task that the dataset was recorded for.
+
+    They are used only if the task is registered and the dataset has exactly its observations:
+    another contract would be read as something that it is not.
+
+    Args:
+        dataset: A verified dataset.
+        task: Name of the task; that of the dataset if absent.
+        chunk_steps: Longest chunk to check.
+    """
+    names = [task] if task is not None else list(dataset.manifest["tasks"])
+    known = {point.name for point in entry_points(group=ENTRY_POINT_GROUP)}
+    if len(names) != 1 or names[0] not in known:
+        return TaskChecks()
+    from genpolicy.comparison.audit_task import (  # noqa: PLC0415  (loads a simulator)
+        replay_episode,
+        round_obstacles,
+    )
+    from genpolicy.comparison.held_out import admissible  # noqa: PLC0415
+    from genpolicy.feasibility.settings import FeasibilitySettings  # noqa: PLC0415
+    from genpolicy.simulation.situation import make_checker  # noqa: PLC0415
+
+    plugin = load_task(names[0])
+    if contract_hash(dataset.manifest) != plugin.observation.hash():
+        return TaskChecks()
+    period_s = float(dataset.manifest["action_contract"]["period_s"])
+    limits = FeasibilitySettings(action_period_s=period_s, maximum_actions=max(16, chunk_steps))
+    checker = make_checker(plugin, limits)
+    ages = dict.fromkeys(dataset.manifest["phases"], ANY_AGE_S)
+
+    def is_admissible(actions: Array, observation: Array) -> tuple[bool, str]:
+        return admissible(
+            plugin, checker, actions, observation, action_period_s=period_s, maximum_age_s=ages
+        )
+
+    starts = dataset.episodes["scene_start"].tolist()
+    recorded = all(isinstance(start, str) and start not in ("", "null", "{}") for start in starts)
+    return TaskChecks(
+        admissible=is_admissible,
+        replay=(lambda uuid: replay_episode(plugin, dataset, uuid)) if recorded else None,
+        obstacles=round_obstacles(plugin, limits),
+    )
+
+
+def contract_hash(manifest: Mapping[str, Any]) -> str:
+    """Hash of the dataset's observation contract, as `ObservationContract.hash` makes it."""
+    return sha256_bytes(canonical_json(manifest["observation_contract"]["channels"]))
