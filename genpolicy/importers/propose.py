@@ -12,6 +12,7 @@ from genpolicy.errors import BadInputError, ContractError
 from genpolicy.importers.columns import BOOKKEEPING
 from genpolicy.importers.contract import (
     SI,
+    UNKNOWN_UNIT,
     ActionSource,
     ChannelSource,
     Format,
@@ -23,7 +24,7 @@ from genpolicy.importers.contract import (
 from genpolicy.importers.pairing import are_differences, pair_by_name, pair_by_numbers
 from genpolicy.importers.sample import Sample, action_of, channels_of
 from genpolicy.importers.source import Column, RawEpisode, Source, as_float
-from genpolicy.importers.units import tokens
+from genpolicy.importers.units import BULK, tokens
 
 Array = NDArray[np.float64]
 
@@ -55,6 +56,7 @@ def propose_contract(source: Source, kind: Format, *, task: str | None = None) -
     action = action_of(actions, sample, notes)
     channels = channels_of(observed, sample, notes)
     pairing, by_numbers = _pairing(channels, action, sample, notes)
+    action = _with_units_of(action, channels, pairing)
     values = ImportContract(
         format=kind,
         task=task or _task(source),
@@ -127,6 +129,8 @@ def _sample(source: Source, columns: Sequence[str], labels: Labels) -> Sample:
             episodes.append(item)
         if len(episodes) == SAMPLE_EPISODES:
             break
+    # What the import will refuse must not decide what is proposed.
+    episodes = [e for e in episodes if _is_finite(e, columns)] or episodes
     if not episodes:
         raise BadInputError(
             where=source.name,
@@ -136,6 +140,10 @@ def _sample(source: Source, columns: Sequence[str], labels: Labels) -> Sample:
         )
     lengths = [len(episode.columns[columns[0]]) for episode in episodes]
     return Sample(episodes, np.repeat(np.arange(len(lengths)), lengths))
+
+
+def _is_finite(episode: RawEpisode, columns: Sequence[str]) -> bool:
+    return all(bool(np.isfinite(as_float(episode.columns[name])).all()) for name in columns)
 
 
 def _pairing(
@@ -156,10 +164,25 @@ def _pairing(
         return pairing, False
     pairs = pair_by_numbers(observed, commanded, sample.number)
     units = _units(channels)
-    if pairs is None:
-        return None, False
-    found = {action.components[a]: names[o] for a, o in pairs if units[names[o]] == action.units[a]}
+    found = {
+        action.components[a]: names[o]
+        for a, o in pairs or ()
+        if action.units[a] in (units[names[o]], UNKNOWN_UNIT)
+    }
     return found or None, bool(found)
+
+
+def _with_units_of(
+    action: ActionSource, channels: Sequence[ChannelSource], pairing: dict[str, str] | None
+) -> ActionSource:
+    """What commands a number has its unit, where nothing else tells it."""
+    units = _units(channels)
+    known = {name: units[observed] for name, observed in (pairing or {}).items()}
+    told = [
+        known.get(name, unit) if unit == UNKNOWN_UNIT else unit
+        for name, unit in zip(action.components, action.units, strict=True)
+    ]
+    return action.model_copy(update={"units": told})
 
 
 def _units(channels: Sequence[ChannelSource]) -> dict[str, str]:
@@ -240,9 +263,9 @@ def _frozen(
     paired = set((pairing or {}).values())
     streams = [c.stream for c in channels if paired & {f"{c.name}.{part}" for part in c.components}]
     factors = [SI.get(unit, (unit, 1.0))[1] for unit in action.units]
-    spread = float(np.max(np.ptp(sample.selected(action.columns) * factors, axis=0)))
-    # NaN fails: the sample may hold rows that the import refuses.
-    if not streams or not FROZEN_SHARE * spread > 0:
+    low, high = np.quantile(sample.selected(action.columns) * factors, BULK, axis=0)
+    spread = float(np.max(high - low))
+    if not streams or not (FROZEN_SHARE * spread > 0 and np.isfinite(spread)):
         return None
     motion = float(f"{FROZEN_SHARE * spread:.3g}")
     return Frozen(streams=list(dict.fromkeys(streams)), seconds=FROZEN_S, motion=motion)

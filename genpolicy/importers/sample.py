@@ -130,11 +130,13 @@ def _atoms(column: Column, sample: Sample, notes: list[str]) -> list[Atom]:
 
 
 def _parted(name: str) -> tuple[str, str]:
-    """Group and component of a scalar column: `tcp_x_m` is `x` of `tcp`, `x` is `x` of `state`."""
+    """Group and component of a scalar column: `tcp_x_m` is `x` of `tcp`, `x_m` `x` of `state`."""
     word = _word(name)
     body = word.rsplit("_", 1)[0] if stated_unit(word) is not None else word
     group, _, component = body.rpartition("_")
-    return (group, component) if group and component else ("state", word)
+    if group and component:
+        return group, component
+    return ("state" if len(body) == 1 else body), body
 
 
 def _ranges(selected: Sequence[str]) -> list[str]:

@@ -129,6 +129,8 @@ def check_columns(
     """
     length: int | None = None
     for name, values in columns.items():
+        if known[name].kind == "number" and values.dtype.kind not in "fiub":
+            refuse(f"{label}: {name}", f"of type {values.dtype}", "numbers")
         width = known[name].width
         expected = (len(values),) if width is None else (len(values), width)
         if values.shape != expected:
@@ -136,8 +138,6 @@ def check_columns(
         if length is not None and len(values) != length:
             refuse(f"{label}: {name}", f"{len(values)} rows long", f"{length}, as the others")
         length = len(values)
-        if known[name].kind == "number" and values.dtype.kind not in "fiub":
-            refuse(f"{label}: {name}", f"of type {values.dtype}", "numbers")
 
 
 def as_float(values: NDArray[Any]) -> NDArray[np.float64]:

@@ -90,14 +90,16 @@ def batches(table: Table, wanted: Sequence[str]) -> Iterator[dict[str, NDArray[A
             refuse(f"{table.label}: column {name}", "missing", f"{sorted(table.columns)[:12]}")
     done = 0
     try:
-        for batch in table.file.iter_batches(batch_size=BATCH_ROWS, columns=list(wanted)):
-            yield {
-                name: _array(
-                    batch.column(name), table.columns[name], f"{table.label}: {name}", done
-                )
-                for name in wanted
-            }
-            done += batch.num_rows
+        # Group by group: a damaged one must not take down the good rows before it.
+        for group in range(table.file.metadata.num_row_groups):
+            for batch in table.file.iter_batches(
+                batch_size=BATCH_ROWS, columns=list(wanted), row_groups=[group]
+            ):
+                yield {
+                    name: _array(batch.column(name), table.columns[name], table.label, done)
+                    for name in wanted
+                }
+                done += batch.num_rows
     except (pa.ArrowException, OSError, MemoryError) as error:
         raise _unreadable(table.label, error) from error
 
@@ -188,7 +190,8 @@ def _column(file: pq.ParquetFile, name: str, kind: str) -> Column:
     return Column(name, len(value or ()), unit=unit)
 
 
-def _array(values: pa.Array, column: Column, where: str, done: int) -> NDArray[Any]:
+def _array(values: pa.Array, column: Column, label: str, done: int) -> NDArray[Any]:
+    where = f"{label}: {column.name}"
     if pa.types.is_dictionary(values.type):
         values = values.dictionary_decode()
     if column.kind == "text":

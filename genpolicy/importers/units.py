@@ -29,6 +29,7 @@ PIXELS = {"pixel", "pixels", "keypoint", "keypoints", "image", "agent", "cursor"
 SPEEDS = {"vel", "velocity", "speed", "qvel"}
 FORCES, TORQUES = {"force", "wrench", "ft"}, {"torque", "effort", "current"}
 
+BULK = (0.002, 0.998)
 FULL_TURN_RAD = 2.0 * np.pi
 TURNS_RAD = 3.0 * FULL_TURN_RAD
 DEGREES = 540.0
@@ -63,8 +64,11 @@ def guess_unit(column: str, component: str, values: Array) -> str:
         return stated
     words = {*tokens(column), *tokens(component)}
     finite = values[np.isfinite(values)]
-    low, high = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 0.0)
-    return _by_words(words, low, high)
+    if not len(finite):
+        return UNKNOWN_UNIT
+    # A single wild number must not decide the unit of all others.
+    low, high = np.quantile(finite, BULK)
+    return _by_words(words, float(low), float(high))
 
 
 def _by_words(words: set[str], low: float, high: float) -> str:

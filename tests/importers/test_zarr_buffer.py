@@ -9,8 +9,8 @@ import pytest
 import zarr
 
 from genpolicy.dataset.dataset import load_dataset
-from genpolicy.importers.zarr_buffer import PUSHT, ingest_zarr_replay_buffer
 from genpolicy.errors import BadInputError, ContractError
+from genpolicy.importers.zarr_buffer import PUSHT, ingest_zarr_replay_buffer
 
 REAL = Path(__file__).parents[3] / "shared/data/pusht_v7/pusht_cchi_v7_replay.zarr"
 
