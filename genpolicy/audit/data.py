@@ -5,6 +5,7 @@ order in which episodes arrive can change no number.
 """
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,6 +72,7 @@ class AuditInput:
         position_stream: Stream that delivers the observed position.
         reference: Where the pose of reference begins with its position, if there is one.
         context: Observed channels that are held against the modes.
+        streams: Columns of each stream in the observation.
         paired: Whether the action commands something observed. If not (a leader arm of another
             build), there is no lag, and a chunk is taken relative to its own first action.
         phase_observed: Whether a policy sees the phase.
@@ -93,6 +95,7 @@ class AuditInput:
     position_stream: str = "robot"
     reference: slice | None = None
     context: dict[str, slice] = field(default_factory=dict)
+    streams: dict[str, Index] = field(default_factory=dict)
     paired: bool = True
     phase_observed: bool = True
 
@@ -137,13 +140,13 @@ class AuditInput:
         """Inside of which situations are looked for: the phase, if a policy sees it. Shape (N,)."""
         return self.phase if self.phase_observed else np.full(len(self.phase), ACROSS_PHASES)
 
-    @property
+    @cached_property
     def last_row(self) -> Integers:
         """Last row of the episode of each row (canonical order). Shape (N,)."""
         ends = np.searchsorted(self.episode, np.arange(len(self.episodes)), side="right") - 1
         return np.asarray(ends[self.episode], dtype=np.int64)
 
-    @property
+    @cached_property
     def first_row(self) -> Integers:
         """First row of the episode of each row (canonical order). Shape (N,)."""
         return np.asarray(np.searchsorted(self.episode, self.episode), dtype=np.int64)

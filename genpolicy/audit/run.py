@@ -139,7 +139,7 @@ def _after_realignment(
     data: AuditInput, settings: AuditSettings, semantics: Semantics, before: int, root_seed: int
 ) -> int:
     """Held-out episodes with several modes once every epoch is shifted by its measured offset."""
-    shifted, moved = realigned(data, semantics.clocks)
+    shifted, moved = realigned(data, semantics)
     if not moved:
         return before
     found, _ = find_situations(shifted, settings, root_seed)

@@ -67,6 +67,7 @@ def from_dataset(
             position_stream=stream,
             reference=slices.get(settings.reference_channel or ""),
             context={name: slices[name] for name in settings.context_channels},
+            streams=_streams(contract),
             paired=width > 0,
             phase_observed=settings.phase_observed,
         )
@@ -109,6 +110,15 @@ def _pairing(
     commanded = _columns([columns.index(name) for name in chosen])
     stream = streams[names.index(wanted[0])] if wanted else contract.streams[0]
     return observed, commanded, stream
+
+
+def _streams(contract: ObservationContract) -> dict[str, Index]:
+    """Columns of each stream."""
+    owners = [channel.stream for channel in contract.channels for _ in channel.components]
+    return {
+        name: _columns([column for column, owner in enumerate(owners) if owner == name])
+        for name in contract.streams
+    }
 
 
 def _columns(numbers: list[int]) -> Index:

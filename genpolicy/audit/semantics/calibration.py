@@ -1,23 +1,29 @@
-"""Calibration: does an epoch's frame lie where those of the others lie?"""
+"""Calibration: does an epoch's frame lie where those of the others lie?
+
+With a pose of reference by where the arm releases, and without one by how far the observed position
+stands beside its command where both rest.
+"""
 
 import numpy as np
 
-from genpolicy.audit.data import Array, AuditInput, Integers
-from genpolicy.audit.semantics.report import Calibration
+from genpolicy.audit.data import Array, AuditInput, Integers, Text
+from genpolicy.audit.semantics.motion import Motion
+from genpolicy.audit.semantics.report import Calibration, Defect
+from genpolicy.audit.semantics.robust import densest_half, episode_deviation, episode_medians
 from genpolicy.audit.settings import AuditSettings
+
+LEAST_EPISODES = 4
+# Offsets below this share of the usual motion are no calibration: another unit may be in use.
+MOTION_SHARE = 0.02
+# Rows at rest: the slowest part of an episode.
+REST_SHARE = 0.3
 
 
 def calibrations(data: AuditInput, settings: AuditSettings) -> tuple[Calibration, ...]:
     """Where each epoch releases, against the reference pose and the other epochs."""
     if data.reference is None:
         return ()
-    releases = _first_rows(data, settings.calibration_phase)
-    releases = releases[data.episodes.outcome[data.episode[releases]] == "success"]
-    releases = releases[~data.episodes.is_recovery[data.episode[releases]]]
-    start = data.reference.start
-    planar = slice(start, min(data.reference.stop, start + 2))
-    residual = data.position[releases][:, :2] - data.observation[releases][:, planar]
-    epochs = data.episodes.calibration_epoch[data.episode[releases]]
+    residual, epochs = _releases(data, settings)
     names = np.unique(data.episodes.calibration_epoch)
     medians = {
         str(name): np.median(residual[epochs == name], axis=0)
@@ -34,6 +40,142 @@ def calibrations(data: AuditInput, settings: AuditSettings) -> tuple[Calibration
     )
 
 
+def release_defects(
+    data: AuditInput, found: tuple[Calibration, ...], settings: AuditSettings
+) -> list[Defect]:
+    """Epochs that release elsewhere, beyond the limit and beyond what their scatter allows."""
+    if data.reference is None:
+        return []
+    residual, epochs = _releases(data, settings)
+    spread = _scatter(residual, epochs)
+    defects = []
+    for row in found:
+        if not np.isfinite(row.residual_m):
+            continue
+        error = 1.2533 * spread * np.sqrt(2.0 / max(row.episodes, 1))
+        limit = max(settings.calibration_limit_m, settings.significance * float(error))
+        if not limit - row.residual_m >= 0:
+            defects.append(
+                Defect(
+                    kind="calibration",
+                    variable=row.epoch,
+                    where=f"epoch {row.epoch or '-'}",
+                    measured=row.residual_m,
+                    limit=limit,
+                    unit="unit of the position",
+                    action=f"Recalibrate or leave out epoch {row.epoch or '-'}: its releases lie "
+                    f"{row.residual_m:.4g} (unit of the position) from those of the others.",
+                )
+            )
+    return defects
+
+
+def offset_defects(data: AuditInput, motion: Motion, settings: AuditSettings) -> list[Defect]:
+    """Epochs in which the observed position stands beside its command as in no other."""
+    if motion.commanded.shape[1] == 0 or len(np.unique(motion.epoch)) < 2:
+        return []
+    offsets = _rest_offsets(motion)
+    travel = np.median(np.linalg.norm(episode_deviation(motion.commanded, motion.starts), axis=1))
+    floor = max(settings.calibration_limit_m, MOTION_SHARE * float(travel))
+    names = np.unique(motion.epoch)
+    medians = {str(name): np.median(offsets[motion.epoch == name], axis=0) for name in names}
+    spread = _scatter(offsets, motion.epoch)
+    defects = []
+    for name in names:
+        count = int(np.count_nonzero(motion.epoch == name))
+        gap = _epoch_residual(str(name), medians)
+        error = 1.2533 * spread * np.sqrt(2.0 / count)
+        limit = max(floor, settings.significance * float(error))
+        if count >= LEAST_EPISODES and not limit - gap >= 0:
+            defects.append(
+                Defect(
+                    kind="calibration",
+                    variable=str(name),
+                    where=f"epoch {name or '-'}",
+                    measured=gap,
+                    limit=limit,
+                    unit="unit of the position",
+                    action=f"Recalibrate or leave out epoch {name or '-'}: at rest its observed "
+                    f"position stands {gap:.4g} (unit of the position) further from the command "
+                    "than that of the others.",
+                )
+            )
+    return defects
+
+
+def start_drift(data: AuditInput) -> float:
+    """Largest difference of the median start between training and held-out episodes."""
+    first = data.position[np.unique(data.first_row)]
+    training = data.episodes.split == "train"
+    if training.all() or not training.any() or first.shape[1] == 0:
+        return 0.0
+    gap = np.median(first[training], axis=0) - np.median(first[~training], axis=0)
+    return float(np.max(np.abs(gap)))
+
+
+def start_note(data: AuditInput) -> str | None:
+    """A sentence where starts wander over the recordings; empty starts are no defect of the data.
+
+    A drifting start makes the held-out episodes unlike the training ones: that is a matter of
+    support, which the neighbourhoods measure, and never makes a mode.
+    """
+    first = data.position[np.unique(data.first_row)]
+    order = data.episodes.order
+    if not np.all(np.isfinite(order)) or len(order) < 30 or first.shape[1] == 0:
+        return None
+    ranked = first[np.argsort(order)]
+    third = len(ranked) // 3
+    early, late = ranked[:third], ranked[-third:]
+    gap = np.abs(np.median(early, axis=0) - np.median(late, axis=0))
+    spread = np.array([densest_half(column)[1] for column in (ranked - np.median(ranked, 0)).T])
+    worst = int(np.argmax(gap / np.maximum(spread, 1e-12)))
+    if gap[worst] <= max(2.0 * spread[worst], 1e-9):
+        return None
+    return (
+        f"Starts wander over the recordings: component {worst} of the position by "
+        f"{gap[worst]:.4g}, {gap[worst] / max(spread[worst], 1e-12):.1f} times its spread."
+    )
+
+
+def _releases(data: AuditInput, settings: AuditSettings) -> tuple[Array, Text]:
+    """Released position minus the pose of reference, and the epoch, of undisturbed successes."""
+    releases = _first_rows(data, settings.calibration_phase)
+    releases = releases[data.episodes.outcome[data.episode[releases]] == "success"]
+    releases = releases[~data.episodes.is_recovery[data.episode[releases]]]
+    assert data.reference is not None
+    start = data.reference.start
+    planar = slice(start, min(data.reference.stop, start + 2))
+    residual = data.position[releases][:, :2] - data.observation[releases][:, planar]
+    return residual, data.episodes.calibration_epoch[data.episode[releases]]
+
+
+def _scatter(values: Array, epochs: Text) -> float:
+    """Spread of the values inside their epochs, over all components."""
+    if len(values) == 0:
+        return 0.0
+    inside = values.copy()
+    for name in np.unique(epochs):
+        inside[epochs == name] -= np.median(values[epochs == name], axis=0)
+    parts = [densest_half(np.concatenate([column, -column]))[1] for column in inside.T]
+    return float(np.linalg.norm(parts))
+
+
+def _rest_offsets(motion: Motion) -> Array:
+    """Median of observed minus commanded over the rows at rest of each episode. Shape (E, P)."""
+    steps = np.linalg.norm(np.diff(motion.commanded, axis=0, prepend=motion.commanded[:1]), axis=1)
+    steps += np.linalg.norm(np.diff(motion.observed, axis=0, prepend=motion.observed[:1]), axis=1)
+    gap = motion.observed - motion.commanded
+    result = np.zeros((len(motion.starts) - 1, gap.shape[1]))
+    for number, (a, b) in enumerate(zip(motion.starts[:-1], motion.starts[1:], strict=True)):
+        if b - a < 4:
+            result[number] = episode_medians(gap[a:b], np.array([0, b - a]))[0] if b > a else 0.0
+            continue
+        # The first row's step belongs to the episode before.
+        slow = np.argsort(steps[a + 1 : b], kind="stable")[: max(3, int(REST_SHARE * (b - a)))]
+        result[number] = np.median(gap[a + 1 : b][slow], axis=0)
+    return result
+
+
 def _epoch_residual(name: str, medians: dict[str, Array]) -> float:
     """Distance to the median epoch; with two epochs to the other one; NaN without a release."""
     if name not in medians:
@@ -43,16 +185,6 @@ def _epoch_residual(name: str, medians: dict[str, Array]) -> float:
         return 0.0
     pool = others if len(medians) == 2 else list(medians.values())
     return float(np.linalg.norm(medians[name] - np.median(np.stack(pool), axis=0)))
-
-
-def start_drift(data: AuditInput) -> float:
-    """Largest difference of the median start between training and held-out episodes."""
-    first = data.position[np.unique(data.first_row)]
-    training = data.episodes.split == "train"
-    if training.all() or not training.any():
-        return 0.0
-    gap = np.median(first[training], axis=0) - np.median(first[~training], axis=0)
-    return float(np.max(np.abs(gap)))
 
 
 def _first_rows(data: AuditInput, phase: str) -> Integers:

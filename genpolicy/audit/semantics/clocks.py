@@ -1,37 +1,44 @@
-"""Clocks and lag: is what looks like two modes only a shift in time?
+"""Clock offsets: is what looks like two modes only a shift in time?
 
-The action-to-state lag is measured per episode by the shift that brings the observed position
-closest to the commanded one. An epoch that deviates from the declared lag has a clock or a
-frame defect. Streams without motion are judged by their receive delay.
+The stream of the position is judged by the lag between command and response, any other by its
+receive delay and, where its channels move with the arm, by the lag behind that motion. An epoch is
+held against all episodes, an episode against its epoch.
 """
-
-from itertools import pairwise
 
 import numpy as np
 
-from genpolicy.audit.data import Array, AuditInput, Flags, Integers
-from genpolicy.audit.semantics.report import Clock
+from genpolicy.audit.data import Array, AuditInput, Flags, Integers, Text
+from genpolicy.audit.semantics.lags import Lags
+from genpolicy.audit.semantics.lags import episode_lags as piecewise_lags
+from genpolicy.audit.semantics.motion import Motion, make_motion
+from genpolicy.audit.semantics.report import Clock, Defect, listed
+from genpolicy.audit.semantics.robust import (
+    episode_medians,
+    group_medians,
+    some,
+    within_groups,
+)
 from genpolicy.audit.settings import AuditSettings
+
+# Fewer episodes say nothing about an epoch; each of them is then held against all.
+LEAST_EPISODES = 4
+# An epoch within this many spreads of single episodes is not off: the lag of an arm depends on how
+# it is moved, and so on who moves it.
+EPOCH_SPREADS = 2.0
+# An episode is off by its own clock beyond this many spreads of its epoch...
+EPISODE_SPREADS = 6.0
+# ...and this many steps, or, by delays, this many clock limits.
+EPISODE_STEPS = 0.75
+EPISODE_DELAYS = 2.5
 
 
 def episode_lags(data: AuditInput, maximum_steps: int) -> Array:
-    """Action-to-state lag of each episode, in steps, by least squares with a parabola.
+    """Action-to-state lag of each episode, in steps.
 
     Returns:
-        Shape (E,); NaN where the episode is too short or does not move.
+        Shape (E,); NaN where the episode is too short, does not move or does not follow.
     """
-    shifts = np.arange(-maximum_steps, maximum_steps + 1)
-    result = np.full(len(data.episodes), np.nan)
-    starts = np.searchsorted(data.episode, np.arange(len(data.episodes) + 1))
-    commanded, observed = data.action[:, data.action_position], data.position
-    for number in range(len(data.episodes)):
-        a = commanded[starts[number] : starts[number + 1]]
-        o = observed[starts[number] : starts[number + 1]]
-        if len(a) < 2 * maximum_steps + 8 or float(np.ptp(a, axis=0).max()) <= 0.0:
-            continue
-        errors = np.array([_shift_error(a, o, int(shift)) for shift in shifts])
-        result[number] = _vertex(shifts, errors)
-    return result
+    return _lags(make_motion(data), maximum_steps).steps
 
 
 def position_clocks(data: AuditInput, lags: Array, settings: AuditSettings) -> list[Clock]:
@@ -65,10 +72,10 @@ def position_clocks(data: AuditInput, lags: Array, settings: AuditSettings) -> l
     return rows
 
 
-def delay_clocks(data: AuditInput, stream: str) -> list[Clock]:
-    """A stream without motion of its own, by its receive delay; one clock per epoch."""
+def delay_clocks(data: AuditInput, stream: str, starts: Integers) -> list[Clock]:
+    """A stream other than that of the position, by its receive delay; one clock per epoch."""
     delay = data.delay_s[stream]
-    medians = _episode_medians(data, delay)
+    medians = episode_medians(delay, starts)
     reference = float(np.median(medians))
     rows = []
     for epoch in np.unique(data.episodes.calibration_epoch):
@@ -93,6 +100,112 @@ def delay_clocks(data: AuditInput, stream: str) -> list[Clock]:
     return rows
 
 
+def offset_defects(
+    stream: str,
+    offsets_s: Array,
+    data: AuditInput,
+    settings: AuditSettings,
+    *,
+    declared_s: float | None,
+    finest_s: float,
+    episode_limit_s: float,
+) -> tuple[list[Defect], Array]:
+    """Epochs and single episodes of a stream that are off.
+
+    Args:
+        stream: Name of the stream.
+        offsets_s: Lag of each episode; NaN where unknown. Shape (E,).
+        data: The data.
+        settings: Limits.
+        declared_s: Lag that the contract states; None takes the median of the episodes.
+        finest_s: What the measure resolves.
+        episode_limit_s: A single episode is off beyond this.
+
+    Returns:
+        Defects, and the offset to take out of each episode, s. Shape (E,).
+    """
+    table, defects = data.episodes, []
+    taken = np.zeros(len(table))
+    deviations, spread = within_groups(offsets_s, table.calibration_epoch, LEAST_EPISODES)
+    floor = max(finest_s, settings.clock_limit_s, EPOCH_SPREADS * np.nan_to_num(spread))
+    for name, count, gap, error in group_medians(
+        offsets_s, table.calibration_epoch, reference=declared_s, least=LEAST_EPISODES
+    ):
+        limit = max(floor, settings.significance * error)
+        member = table.calibration_epoch == name
+        if count >= LEAST_EPISODES and not limit - abs(gap) >= 0:
+            taken[member] = gap
+            defects.append(_epoch_defect(stream, name, gap, limit))
+    least = max(episode_limit_s, EPISODE_SPREADS * spread)
+    off = np.isfinite(deviations) & (np.abs(np.nan_to_num(deviations)) > least)
+    known = int(np.count_nonzero(np.isfinite(offsets_s)))
+    if some(off, known, settings.outlier_share):
+        taken[off] += deviations[off]
+        defects.append(_episode_defect(stream, table.uuid[off], deviations[off], known, least))
+    return defects, taken
+
+
+def shift_steps(taken_s: Array, period_s: float) -> Integers:
+    """Offsets as whole rows. Shape (E,)."""
+    return np.asarray(np.round(taken_s / period_s), dtype=np.int64)
+
+
+def leading_defects(lags: Array, data: AuditInput, settings: AuditSettings) -> list[Defect]:
+    """A response that comes before its command, everywhere: no arm does that."""
+    known = lags[np.isfinite(lags)]
+    if settings.declared_lag_steps is not None or len(known) < LEAST_EPISODES:
+        return []
+    median, limit = (
+        float(np.median(known)),
+        max(EPISODE_STEPS, settings.clock_limit_s / data.period_s),
+    )
+    if limit + median >= 0:
+        return []
+    return [
+        Defect(
+            kind="clock",
+            variable=data.position_stream,
+            where="all episodes",
+            measured=-median * data.period_s,
+            limit=limit * data.period_s,
+            unit="s",
+            action=f"The observed position moves {-median * data.period_s:.3f} s before its "
+            f"command: put stream {data.position_stream} and the actions on one clock, ingest "
+            "again and repeat the audit.",
+        )
+    ]
+
+
+def _epoch_defect(stream: str, epoch: str, gap_s: float, limit_s: float) -> Defect:
+    return Defect(
+        kind="clock",
+        variable=stream,
+        where=f"epoch {epoch or '-'}",
+        measured=abs(gap_s),
+        limit=limit_s,
+        unit="s",
+        action=f"Correct the clock of stream {stream} in epoch {epoch or '-'} ({gap_s:+.3f} s), "
+        "ingest again and repeat the audit.",
+    )
+
+
+def _episode_defect(
+    stream: str, names: Text, deviations_s: Array, known: int, limit_s: float
+) -> Defect:
+    typical = float(np.median(np.abs(deviations_s)))
+    return Defect(
+        kind="clock",
+        variable=stream,
+        where=listed(names),
+        measured=typical,
+        limit=limit_s,
+        unit="s",
+        action=f"Correct the clock of stream {stream} in {len(names)} of {known} episodes, which "
+        f"stand {typical:.3f} s beside the others ({listed(names)}), or leave them out, and "
+        "repeat the audit.",
+    )
+
+
 def _offsets(deviations: Array) -> tuple[float | None, float | None]:
     """Median deviation, and what is left on one half after the other half's is removed."""
     if len(deviations) == 0:
@@ -103,32 +216,19 @@ def _offsets(deviations: Array) -> tuple[float | None, float | None]:
     return before, float(np.median(deviations[1::2]) - np.median(deviations[::2]))
 
 
-def _episode_medians(data: AuditInput, values: Array) -> Array:
-    starts = np.searchsorted(data.episode, np.arange(len(data.episodes) + 1))
-    return np.array([np.median(values[a:b]) for a, b in pairwise(starts)])
-
-
-def _shift_error(commanded: Array, observed: Array, shift: int) -> float:
-    """Variance of observed[t + shift] - commanded[t]; a constant frame offset does not count."""
-    n = len(commanded)
-    if shift >= 0:
-        gap = observed[shift:] - commanded[: n - shift]
-    else:
-        gap = observed[: n + shift] - commanded[-shift:]
-    return float(np.mean((gap - gap.mean(axis=0)) ** 2))
-
-
-def _vertex(shifts: Integers, errors: Array) -> float:
-    best = int(np.argmin(errors))
-    if best in (0, len(errors) - 1):
-        return float(shifts[best])
-    left, centre, right = errors[best - 1 : best + 2]
-    bend = left - 2 * centre + right
-    return float(shifts[best] + (0.5 * (left - right) / bend if bend > 0 else 0.0))
-
-
 def _quantile(values: Array | None, rows: Flags, share: float) -> float | None:
     if values is None:
         return None
     chosen = values[rows]
     return float(np.quantile(chosen, share)) if len(chosen) else None
+
+
+def measure_lags(motion: Motion, settings: AuditSettings) -> Lags:
+    """Lag of the response behind the command, by episode."""
+    return _lags(motion, settings.maximum_lag_steps)
+
+
+def _lags(motion: Motion, maximum_steps: int) -> Lags:
+    return piecewise_lags(
+        motion.commanded, motion.observed, motion.starts, motion.pieces, maximum_steps
+    )

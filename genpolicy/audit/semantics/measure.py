@@ -1,90 +1,181 @@
-"""All measures of data semantics, and the defects in the order of diagnosis."""
+"""All measures of data semantics, and the defects in the order of diagnosis.
+
+Units and frames come first: clocks are then measured on the motion as it is answered, so that a
+turned frame is not taken for a lag. Each defect must be beyond a physical limit and beyond what the
+spread of the episodes explains.
+"""
+
+from dataclasses import replace
 
 import numpy as np
 
-from genpolicy.audit.data import AuditInput
-from genpolicy.audit.semantics.calibration import calibrations, start_drift
-from genpolicy.audit.semantics.clocks import delay_clocks, episode_lags, position_clocks
-from genpolicy.audit.semantics.report import Calibration, Clock, Defect, Semantics, in_order
+from genpolicy.audit.data import Array, AuditInput, Integers
+from genpolicy.audit.semantics import calibration, continuity, copies
+from genpolicy.audit.semantics.clocks import (
+    EPISODE_DELAYS,
+    EPISODE_STEPS,
+    delay_clocks,
+    leading_defects,
+    measure_lags,
+    offset_defects,
+    position_clocks,
+    shift_steps,
+)
+from genpolicy.audit.semantics.drift import (
+    delay_drift_defects,
+    drift_defects,
+    episode_drifts,
+    order_defects,
+)
+from genpolicy.audit.semantics.frames import frame_defects
+from genpolicy.audit.semantics.motion import Motion, make_motion
+from genpolicy.audit.semantics.report import Clock, Defect, Semantics, in_order
+from genpolicy.audit.semantics.robust import episode_medians
+from genpolicy.audit.semantics.streams import stream_lags
+from genpolicy.audit.semantics.units import component_defects, gain_defects, magnitude_defects
 from genpolicy.audit.settings import AuditSettings
 
-GAP_PERIODS = 1.5
+# A change of the lag over the recordings below this is no clock, steps.
+ORDER_STEPS = 1.0
 
 
 def measure(data: AuditInput, settings: AuditSettings) -> Semantics:
-    """Clocks, calibration, gaps and drift of canonical data."""
-    lags = episode_lags(data, settings.maximum_lag_steps)
-    clocks = [*position_clocks(data, lags, settings)]
-    for stream in data.delay_s:
-        if stream != data.position_stream:
-            clocks += delay_clocks(data, stream)
-    steps = np.diff(data.event_time_s)[data.episode[1:] == data.episode[:-1]]
-    found = calibrations(data, settings)
-    negative = sum(
-        int(np.count_nonzero(delay < -settings.negative_delay_tolerance_s))
-        for delay in data.delay_s.values()
-    )
+    """Clocks, frames, units, continuity, copies and calibration of canonical data."""
+    motion = make_motion(data)
+    notes: list[str] = []
+    if motion.wraps:
+        notes.append(f"{motion.wraps} jumps by a whole turn were taken out of angles.")
+    defects, factors = gain_defects(data, motion, settings)
+    defects += magnitude_defects(data, motion, settings)
+    turned, answered = frame_defects(data, motion, settings)
+    defects += turned
+    repeated = np.repeat(factors, np.diff(motion.starts))[:, None]
+    recorded, motion = motion, replace(motion, commanded=answered * repeated)
+    if not defects:
+        defects += component_defects(data, motion, settings)
+    clocks, shift, found = _position(data, motion, settings)
+    defects += found
+    others, stream_shift, found = _others(data, motion, shift, settings)
+    defects += found
+    stubs, remarks = continuity.stub_defects(data, motion, settings)
+    releases = calibration.calibrations(data, settings)
+    negative = continuity.negative_delays(data, settings)
+    defects += [
+        *continuity.negative_defects(negative),
+        *continuity.time_defects(data, settings),
+        *stubs,
+        *copies.seam_defects(data, motion, settings),
+        *copies.copy_defects(copies.find_copies(data, motion), data, settings),
+        *calibration.release_defects(data, releases, settings),
+    ]
+    if not any(defect.kind in ("unit", "frame", "swapped_columns") for defect in defects):
+        defects += calibration.offset_defects(data, recorded, settings)
+    wander = calibration.start_note(data)
     return Semantics(
-        clocks=tuple(clocks),
-        calibrations=found,
-        gaps=int(np.count_nonzero(steps > GAP_PERIODS * data.period_s)),
+        clocks=(*clocks, *others),
+        calibrations=releases,
+        gaps=continuity.gap_count(data),
         negative_delays=negative,
-        start_drift=start_drift(data),
-        defects=in_order(
-            [
-                *_offsets(clocks, settings),
-                *_negative(negative),
-                *_shifted(found, settings),
-            ]
-        ),
+        start_drift=calibration.start_drift(data),
+        defects=in_order(defects),
+        notes=(*notes, *remarks, *([wander] if wander else [])),
+        shift_steps=shift,
+        stream_shift_steps=stream_shift,
     )
 
 
-def _offsets(clocks: list[Clock], settings: AuditSettings) -> list[Defect]:
-    result = []
-    for clock in clocks:
-        offset = clock.offset_before_s
-        if offset is not None and not settings.clock_limit_s - abs(offset) >= 0:
-            result.append(
-                Defect(
-                    "clock",
-                    clock.stream,
-                    f"epoch {clock.epoch or '-'}",
-                    abs(offset),
-                    settings.clock_limit_s,
-                    "s",
-                    f"Correct the clock of stream {clock.stream} in epoch {clock.epoch or '-'} "
-                    f"({offset:+.3f} s), ingest again and repeat the audit.",
-                )
-            )
-    return result
-
-
-def _negative(negative: int) -> list[Defect]:
-    if not negative:
-        return []
-    action = (
-        f"{negative} samples were received before they happened: put both times on one clock and "
-        "ingest again."
+def _position(
+    data: AuditInput, motion: Motion, settings: AuditSettings
+) -> tuple[list[Clock], Integers, list[Defect]]:
+    """Clocks, shift and defects of the stream of the position."""
+    stream, period = data.position_stream, data.period_s
+    lags = measure_lags(motion, settings)
+    offsets = lags.steps * period
+    declared = settings.declared_lag_steps
+    defects, taken = offset_defects(
+        stream,
+        offsets,
+        data,
+        settings,
+        declared_s=None if declared is None else declared * period,
+        finest_s=settings.clock_limit_steps * period,
+        episode_limit_s=max(EPISODE_STEPS * period, settings.clock_limit_s),
     )
-    return [Defect("clock", "", "receive times", float(negative), 0.0, "samples", action)]
+    if not defects:
+        defects += leading_defects(lags.steps, data, settings)
+        defects += order_defects(
+            stream,
+            offsets,
+            data,
+            settings,
+            limit_s=max(ORDER_STEPS * period, settings.clock_limit_s),
+        )
+    defects += drift_defects(episode_drifts(motion, lags.steps, settings), data, settings)
+    return position_clocks(data, lags.steps, settings), shift_steps(taken, period), defects
 
 
-def _shifted(found: tuple[Calibration, ...], settings: AuditSettings) -> list[Defect]:
-    result = []
-    for row in found:
-        known = row.residual_m == row.residual_m
-        if known and not settings.calibration_limit_m - row.residual_m >= 0:
-            result.append(
-                Defect(
-                    "calibration",
-                    row.epoch,
-                    f"epoch {row.epoch}",
-                    row.residual_m,
-                    settings.calibration_limit_m,
-                    "m",
-                    f"Recalibrate or leave out epoch {row.epoch}: its releases lie "
-                    f"{row.residual_m * 1e3:.1f} mm from those of the others.",
-                )
-            )
-    return result
+def _others(
+    data: AuditInput, motion: Motion, shift: Integers, settings: AuditSettings
+) -> tuple[list[Clock], dict[str, Integers], list[Defect]]:
+    """Clocks, shifts and defects of all other streams: by delay, and by motion where they move."""
+    clocks: list[Clock] = []
+    defects: list[Defect] = []
+    shifts: dict[str, Integers] = {}
+    names = sorted({*data.delay_s, *data.streams} - {data.position_stream})
+    for stream in names:
+        taken = np.zeros(len(data.episodes))
+        if stream in data.delay_s:
+            clocks += delay_clocks(data, stream, motion.starts)
+            found, taken = _by_delay(data, stream, motion, settings)
+            defects += found
+        if stream in data.streams:
+            found, moved = _by_motion(data, stream, motion, shift, settings)
+            # One fault shows in both: it is said once.
+            if found and not any(item.variable == stream for item in defects):
+                defects += found
+                taken = moved
+        shifts[stream] = shift_steps(taken, data.period_s)
+    return clocks, shifts, defects
+
+
+def _by_delay(
+    data: AuditInput, stream: str, motion: Motion, settings: AuditSettings
+) -> tuple[list[Defect], Array]:
+    # A stream whose clock runs ahead seems to arrive too early: the sign is turned.
+    offsets = -episode_medians(data.delay_s[stream], motion.starts)
+    defects, taken = offset_defects(
+        stream,
+        offsets,
+        data,
+        settings,
+        declared_s=None,
+        finest_s=settings.clock_limit_s,
+        episode_limit_s=EPISODE_DELAYS * settings.clock_limit_s,
+    )
+    if not defects:
+        defects += order_defects(stream, offsets, data, settings, limit_s=settings.clock_limit_s)
+    return defects + delay_drift_defects(stream, data, motion.starts, settings), taken
+
+
+def _by_motion(
+    data: AuditInput, stream: str, motion: Motion, shift: Integers, settings: AuditSettings
+) -> tuple[list[Defect], Array]:
+    columns = np.arange(data.observation.shape[1])[data.streams[stream]]
+    lags = stream_lags(data, motion, columns, settings)
+    if lags is None:
+        return [], np.zeros(len(data.episodes))
+    # What is late against a late position is late by both.
+    offsets = (lags.steps + shift) * data.period_s
+    defects, taken = offset_defects(
+        stream,
+        offsets,
+        data,
+        settings,
+        declared_s=None,
+        finest_s=settings.clock_limit_steps * data.period_s,
+        episode_limit_s=max(EPISODE_STEPS * data.period_s, settings.clock_limit_s),
+    )
+    if not defects:
+        limit = max(ORDER_STEPS * data.period_s, settings.clock_limit_s)
+        defects = order_defects(stream, offsets, data, settings, limit_s=limit)
+    return defects, taken

@@ -4,23 +4,30 @@ from dataclasses import replace
 
 import numpy as np
 
-from genpolicy.audit.data import AuditInput
-from genpolicy.audit.semantics.report import Clock
+from genpolicy.audit.data import AuditInput, Integers
+from genpolicy.audit.semantics.report import Semantics
 
 
-def realigned(data: AuditInput, clocks: tuple[Clock, ...]) -> tuple[AuditInput, bool]:
-    """Actions moved by the whole steps by which their epoch's position stream is off.
+def realigned(data: AuditInput, semantics: Semantics) -> tuple[AuditInput, bool]:
+    """Actions, and columns of other streams, moved by the rows by which their clock is off.
 
     Returns:
         The data and whether anything moved.
     """
-    shift = np.zeros(len(data.episodes), dtype=np.int64)
-    for clock in clocks:
-        if clock.stream == data.position_stream and clock.offset_before_s is not None:
-            steps = round(clock.offset_before_s / data.period_s)
-            shift[data.episodes.calibration_epoch == clock.epoch] = steps
-    if not shift.any():
-        return data, False
-    rows = np.arange(len(data.action)) - shift[data.episode]
-    rows = np.clip(rows, data.first_row, data.last_row)
-    return replace(data, action=data.action[rows]), True
+    moved = False
+    shift = semantics.shift_steps
+    if shift.size and shift.any():
+        data, moved = replace(data, action=data.action[_rows(data, -shift)]), True
+    for name, late in semantics.stream_shift_steps.items():
+        if name in data.streams and late.any():
+            observation = data.observation.copy()
+            columns = np.arange(observation.shape[1])[data.streams[name]]
+            observation[:, columns] = observation[_rows(data, late)][:, columns]
+            data, moved = replace(data, observation=observation), True
+    return data, moved
+
+
+def _rows(data: AuditInput, later: Integers) -> Integers:
+    """The row that comes `later` rows after each, inside its episode. Shape (N,)."""
+    rows = np.arange(len(data.action)) + later[data.episode]
+    return np.asarray(np.clip(rows, data.first_row, data.last_row), dtype=np.int64)

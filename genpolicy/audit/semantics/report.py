@@ -4,11 +4,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from genpolicy.audit.data import Integers
+from genpolicy.audit.data import Integers, Text
 
-# In the order of diagnosis; the first defect found names the verdict.
+# In the order of diagnosis; the first defect found names the verdict. Units and frames are measured
+# whatever the lag is, but a lag is not worth much in a turned frame: so they stand before clocks.
 KINDS = (
-    "clock", "rate", "gaps", "jitter", "unit", "columns", "frame", "clock_drift", "glued",
+    "unit", "swapped_columns", "frame", "clock", "rate", "gaps", "jitter", "clock_drift", "glued",
     "duplicate", "stub", "calibration",
 )  # fmt: skip
 
@@ -106,3 +107,9 @@ class Semantics:
 def in_order(defects: list[Defect]) -> tuple[Defect, ...]:
     """The defects in the order of diagnosis."""
     return tuple(sorted(defects, key=lambda defect: KINDS.index(defect.kind)))
+
+
+def listed(names: Text) -> str:
+    """The first names, and how many more."""
+    shown = ", ".join(str(name) for name in names[:3])
+    return shown + (f" and {len(names) - 3} more" if len(names) > 3 else "")

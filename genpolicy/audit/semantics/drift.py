@@ -1,0 +1,176 @@
+"""Clock drift: a lag that grows along an episode, or changes over the recordings.
+
+Along an episode the lag of the first half of the motion is held against that of the second half;
+over the recordings the lags are cut in two at the place that separates them best.
+"""
+
+import numpy as np
+
+from genpolicy.audit.data import Array, AuditInput, Integers
+from genpolicy.audit.semantics.clocks import LEAST_EPISODES
+from genpolicy.audit.semantics.lags import segment_lags
+from genpolicy.audit.semantics.motion import Motion
+from genpolicy.audit.semantics.report import Defect
+from genpolicy.audit.semantics.robust import densest_half, episode_sums, group_medians
+from genpolicy.audit.settings import AuditSettings
+
+# A change over the recordings must stand out of the changes between neighbours this much: the best
+# of many cuts is taken, and operators take turns.
+CUT_ERRORS = 6.0
+# ...and so must be more than operators and their ways make of it.
+CUT_SPREADS = 3.0
+LEAST_SIDE = 8
+# The spread of lags from one recording to the next is not believed below this, steps.
+FINEST_STEPS = 0.02
+
+
+def episode_drifts(motion: Motion, lags: Array, settings: AuditSettings) -> Array:
+    """Growth of the lag from the first to the last row of each episode, steps. Shape (E,)."""
+    count = len(motion.starts) - 1
+    result = np.full(count, np.nan)
+    if motion.commanded.shape[1] == 0:
+        return result
+    cut, distance = _halves(motion)
+    edges = np.stack([motion.starts[:-1], cut], axis=1).ravel()
+    edges = np.append(edges, motion.starts[-1])
+    halves = segment_lags(
+        motion.commanded, motion.observed, edges, settings.maximum_lag_steps
+    ).steps.reshape(count, 2)
+    whole = np.isin(
+        motion.starts[1:], motion.pieces[1:][np.isin(motion.pieces[:-1], motion.starts)]
+    )
+    known = whole & np.isfinite(lags) & np.isfinite(halves).all(axis=1) & (distance >= 4.0)
+    length = np.diff(motion.starts)
+    growth = (halves[known, 1] - halves[known, 0]) * (length[known] / distance[known])
+    result[known] = growth
+    return result
+
+
+def drift_defects(drifts: Array, data: AuditInput, settings: AuditSettings) -> list[Defect]:
+    """Drift along the episodes of an epoch, from the growth of the lag."""
+    defects = []
+    for name, count, growth, error in group_medians(
+        drifts, data.episodes.calibration_epoch, reference=0.0, least=LEAST_EPISODES
+    ):
+        limit = max(settings.drift_limit_steps, settings.clock_limit_s / data.period_s)
+        limit = max(limit, settings.significance * error)
+        if count >= LEAST_EPISODES and not limit - abs(growth) >= 0:
+            defects.append(
+                Defect(
+                    kind="clock_drift",
+                    variable=data.position_stream,
+                    where=f"epoch {name or '-'}",
+                    measured=abs(growth) * data.period_s,
+                    limit=limit * data.period_s,
+                    unit="s per episode",
+                    action=f"The lag of stream {data.position_stream} behind the actions changes "
+                    f"by {growth * data.period_s:+.3f} s within an episode of epoch "
+                    f"{name or '-'}: put both on one clock, ingest again and repeat the audit.",
+                )
+            )
+    return defects
+
+
+def delay_drift_defects(
+    stream: str, data: AuditInput, starts: Integers, settings: AuditSettings
+) -> list[Defect]:
+    """Drift of a stream's clock along the episodes, from the growth of its receive delay."""
+    length = np.diff(starts)
+    centred = np.arange(len(data.episode)) - np.repeat(starts[:-1] + (length - 1) / 2, length)
+    power = episode_sums(np.asarray(centred**2, dtype=np.float64), starts)
+    slope = episode_sums(centred * data.delay_s[stream], starts) / np.maximum(power, 1.0)
+    growth = np.where(length >= LEAST_SIDE, slope * length, np.nan)
+    defects = []
+    for name, count, gap, error in group_medians(
+        growth, data.episodes.calibration_epoch, reference=0.0, least=LEAST_EPISODES
+    ):
+        limit = max(settings.clock_limit_s, settings.significance * error)
+        if count >= LEAST_EPISODES and not limit - abs(gap) >= 0:
+            defects.append(
+                Defect(
+                    kind="clock_drift",
+                    variable=stream,
+                    where=f"epoch {name or '-'}",
+                    measured=abs(gap),
+                    limit=limit,
+                    unit="s per episode",
+                    action=f"The receive delay of stream {stream} changes by {gap:+.3f} s within "
+                    f"an episode of epoch {name or '-'}: its clock runs at another rate; "
+                    "synchronise it, ingest again and repeat the audit.",
+                )
+            )
+    return defects
+
+
+def order_defects(
+    stream: str, offsets_s: Array, data: AuditInput, settings: AuditSettings, *, limit_s: float
+) -> list[Defect]:
+    """A change of a stream's lag over the recordings."""
+    order = data.episodes.order
+    known = np.flatnonzero(np.isfinite(offsets_s) & np.isfinite(order))
+    if len(known) < 4 * LEAST_SIDE:
+        return []
+    ordered = known[np.argsort(order[known])]
+    values = offsets_s[ordered]
+    centre, spread = densest_half(values)
+    floor = FINEST_STEPS * data.period_s
+    noise = max(densest_half(np.diff(values))[1] / np.sqrt(2.0), floor)
+    # A few wild episodes are another matter.
+    wide = 6.0 * max(spread, limit_s)
+    kept = np.clip(values, centre - wide, centre + wide)
+    cut, change, error = _best_cut(kept)
+    trend = np.polyfit(np.arange(len(kept)), kept, 1)
+    if float(np.sum((kept - np.polyval(trend, np.arange(len(kept)))) ** 2)) < error:
+        change = float(trend[0]) * (len(kept) - 1)
+    deviation = noise * np.sqrt(1.0 / cut + 1.0 / (len(kept) - cut))
+    limit = max(limit_s, CUT_SPREADS * noise, CUT_ERRORS * float(deviation))
+    if limit - abs(change) >= 0:
+        return []
+    first = str(data.episodes.uuid[ordered[cut]])
+    return [
+        Defect(
+            kind="clock_drift",
+            variable=stream,
+            where=f"from episode {first} on, in order of recording",
+            measured=abs(change),
+            limit=limit,
+            unit="s",
+            action=f"The lag of stream {stream} changes by {change:+.3f} s over the recordings, "
+            f"most about episode {first}: put its clock right from there on, ingest again and "
+            "repeat the audit.",
+        )
+    ]
+
+
+def _halves(motion: Motion) -> tuple[Integers, Array]:
+    """First row of the second half of each episode's motion, and the rows between both halves."""
+    scale = np.std(motion.commanded, axis=0)
+    steps = np.abs(np.diff(motion.commanded, axis=0, prepend=motion.commanded[:1]))
+    length = np.diff(motion.starts)
+    first = motion.starts[:-1][length > 0]
+    steps[first] = 0.0
+    travel = steps @ (1.0 / np.where(scale > 0, scale, np.inf))
+    gone = np.cumsum(travel)
+    begin = np.concatenate([[0.0], gone])[motion.starts[:-1]]
+    total = episode_sums(travel, motion.starts)
+    rows = np.arange(len(travel))
+    later = gone - np.repeat(begin, length) >= np.repeat(0.5 * total, length)
+    weight = episode_sums(np.where(later, travel, 0.0), motion.starts)
+    late = episode_sums(np.where(later, travel * rows, 0.0), motion.starts)
+    early = episode_sums(np.where(later, 0.0, travel * rows), motion.starts)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        distance = np.nan_to_num(late / weight - early / (total - weight), posinf=0.0, neginf=0.0)
+    cut = motion.starts[1:] - episode_sums(later.astype(np.float64), motion.starts).astype(int)
+    return np.asarray(cut, dtype=np.int64), distance
+
+
+def _best_cut(values: Array) -> tuple[int, float, float]:
+    """Where two sides differ most for their size, by how much, and the squares left beside them."""
+    n = len(values)
+    before = np.cumsum(values)[LEAST_SIDE - 1 : n - LEAST_SIDE]
+    sizes = np.arange(LEAST_SIDE, n - LEAST_SIDE + 1)
+    gaps = (values.sum() - before) / (n - sizes) - before / sizes
+    gained = gaps**2 * sizes * (n - sizes) / n
+    best = int(np.argmax(gained))
+    left = float(np.sum((values - values.mean()) ** 2) - gained[best])
+    return int(sizes[best]), float(gaps[best]), left

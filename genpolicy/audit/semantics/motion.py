@@ -1,0 +1,111 @@
+"""The commanded and the observed motion of every episode, ready to be held against each other."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from genpolicy.audit.data import Array, AuditInput, Flags, Integers, Text
+from genpolicy.audit.semantics.robust import episode_medians
+
+TURNS = (2.0 * np.pi, 360.0)  # rad, degrees
+# A jump by a turn is one if it is within this share of a turn, and far beyond the other steps.
+TURN_TOLERANCE = 0.05
+STEP_RATIO = 5.0
+# A seam is a step this many times as large as the fast steps of all motion, and as its neighbours:
+# a fast motion is fast in its neighbours too.
+SEAM_STEP = 5.0
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Paired motion; without a pair both have no columns.
+
+    Attributes:
+        commanded: Shape (N, P), angles unwrapped.
+        observed: Shape (N, P), angles unwrapped.
+        names: Name of each component.
+        starts: First row of each episode, and the number of rows. Shape (E + 1,).
+        pieces: The same, with the seams at which command and response jump together. A jump
+            looks like a response without lag.
+        epoch: Calibration epoch of each episode. Shape (E,).
+        wraps: Jumps by a whole turn that were taken out.
+    """
+
+    commanded: Array
+    observed: Array
+    names: tuple[str, ...]
+    starts: Integers
+    pieces: Integers
+    epoch: Text
+    wraps: int
+
+    @property
+    def segment(self) -> Integers:
+        """Episode of each row. Shape (N,)."""
+        return np.repeat(np.arange(len(self.starts) - 1), np.diff(self.starts))
+
+
+def make_motion(data: AuditInput) -> Motion:
+    """The motion in canonical data."""
+    starts = np.searchsorted(data.episode, np.arange(len(data.episodes) + 1))
+    columns = np.arange(data.observation.shape[1])[data.observation_position]
+    if not data.paired:
+        columns = columns[:0]
+    commanded = np.array(data.commanded if data.paired else data.action[:, :0], dtype=np.float64)
+    observed = np.array(data.observation[:, columns], dtype=np.float64)
+    inside = data.episode[1:] == data.episode[:-1]
+    wraps = 0
+    for component in range(len(columns)):
+        turned = 0.0
+        for values in (commanded, observed):
+            values[:, component], found, turn = _unwrapped(
+                values[:, component], inside, data.episode
+            )
+            wraps, turned = wraps + found, max(turned, turn)
+        if turned:
+            gap = commanded[:, component] - observed[:, component]
+            observed[:, component] += turned * np.round(_repeated_medians(gap, starts) / turned)
+    return Motion(
+        commanded=commanded,
+        observed=observed,
+        names=tuple(data.observation_names[column] for column in columns),
+        starts=np.asarray(starts, dtype=np.int64),
+        pieces=_pieces(commanded, observed, data.episode, starts),
+        epoch=data.episodes.calibration_epoch,
+        wraps=wraps,
+    )
+
+
+def _unwrapped(values: Array, inside: Flags, episode: Integers) -> tuple[Array, int, float]:
+    """The angle without jumps by a turn inside an episode, how many there were, and the turn."""
+    steps = np.where(inside, np.diff(values), 0.0)
+    for turn in TURNS:
+        if np.ptp(values) > (1.0 + TURN_TOLERANCE) * turn:
+            continue
+        jump = np.abs(np.abs(steps) - turn) <= TURN_TOLERANCE * turn
+        if not jump.any() or np.max(np.abs(steps[~jump]), initial=0.0) > turn / STEP_RATIO:
+            continue
+        turns = np.concatenate([[0.0], np.cumsum(np.where(jump, -np.sign(steps) * turn, 0.0))])
+        first = np.searchsorted(episode, episode)
+        return values + turns - turns[first], int(np.count_nonzero(jump)), turn
+    return values, 0, 0.0
+
+
+def _pieces(commanded: Array, observed: Array, episode: Integers, starts: Integers) -> Integers:
+    """First rows of the pieces without a seam, and the number of rows."""
+    inside = episode[1:] == episode[:-1]
+    seam = np.full(len(inside), commanded.shape[1] > 0)
+    for values in (commanded, observed):
+        scale = np.std(values, axis=0)
+        scaled = values / np.where(scale > 0, scale, np.inf)
+        steps = np.where(inside, np.linalg.norm(np.diff(scaled, axis=0), axis=1), 0.0)
+        moving = steps[inside & (steps > 0)]
+        usual = float(np.quantile(moving, 0.95)) if len(moving) else np.inf
+        beside = np.maximum(np.append(0.0, steps[:-1]), np.append(steps[1:], 0.0))
+        seam &= (steps > SEAM_STEP * usual) & (steps > SEAM_STEP * beside)
+    return np.union1d(starts, np.flatnonzero(seam) + 1).astype(np.int64)
+
+
+def _repeated_medians(values: Array, starts: Integers) -> Array:
+    """Median of each episode, at each of its rows. Shape (N,)."""
+    return np.asarray(np.repeat(np.nan_to_num(episode_medians(values, starts)), np.diff(starts)))

@@ -1,0 +1,191 @@
+"""Units: is the observed motion as large as the commanded one, and a value as large as its like?
+
+Standard deviations inside an episode are compared, so that neither lag nor frame matters. A factor
+that no arm produces is a unit; so is an epoch that answers by another factor than the others.
+"""
+
+import numpy as np
+
+from genpolicy.audit.data import Array, AuditInput, Flags
+from genpolicy.audit.semantics.motion import Motion
+from genpolicy.audit.semantics.report import Defect, listed
+from genpolicy.audit.semantics.robust import (
+    densest_half,
+    episode_deviation,
+    episode_medians,
+    group_medians,
+    some,
+)
+from genpolicy.audit.settings import AuditSettings
+
+LEAST_EPISODES = 4
+# Motion below this share of the usual one has no gain.
+STANDING = 0.1
+# A factor by which the values of a channel never differ between episodes of one task...
+MAGNITUDE = 5.0
+# ...if it is far beyond their spread; one episode is enough beyond the second factor.
+MAGNITUDE_SPREADS = 8.0
+LONE_MAGNITUDE = 20.0
+# One episode is enough to be a defect where its gain is beyond this.
+LONE_FACTOR = 10.0
+FACTORS = (
+    (1000.0, "m and mm"), (100.0, "m and cm"), (180.0 / np.pi, "degrees and radians"),
+    (25.4, "inches and mm"), (10.0, "cm and mm"), (2.54, "inches and cm"),
+)  # fmt: skip
+
+
+def gain_defects(
+    data: AuditInput, motion: Motion, settings: AuditSettings
+) -> tuple[list[Defect], Array]:
+    """Factors between commanded and observed motion.
+
+    Returns:
+        Defects, and the usual factor of each episode, which is taken out before clocks are
+        measured. Shape (E,).
+    """
+    factors = np.ones(len(data.episodes))
+    if motion.commanded.shape[1] == 0:
+        return [], factors
+    asked = episode_deviation(motion.commanded, motion.starts)
+    seen = episode_deviation(motion.observed, motion.starts)
+    gains = _log_gain(np.linalg.norm(seen, axis=1), np.linalg.norm(asked, axis=1))
+    defects = _epochs(data, gains, "position", settings, factors)
+    defects += _episodes(data, gains, settings, factors)
+    return defects, factors
+
+
+def component_defects(data: AuditInput, motion: Motion, settings: AuditSettings) -> list[Defect]:
+    """The same for single components, once no frame is turned and no column swapped."""
+    asked = episode_deviation(motion.commanded, motion.starts)
+    seen = episode_deviation(motion.observed, motion.starts)
+    defects = []
+    for column, name in enumerate(motion.names):
+        gains = _log_gain(seen[:, column], asked[:, column])
+        defects += _epochs(data, gains, name, settings, None)
+    return defects
+
+
+def magnitude_defects(data: AuditInput, motion: Motion, settings: AuditSettings) -> list[Defect]:
+    """Episodes whose positions or channels are larger or smaller than all others by a unit."""
+    defects = []
+    if motion.commanded.shape[1]:
+        size = np.linalg.norm(episode_medians(np.abs(motion.commanded), motion.starts), axis=1)
+        travel = np.linalg.norm(episode_deviation(motion.commanded, motion.starts), axis=1)
+        both = np.stack([_off(size), _off(travel)])
+        # Both must say the same factor: a start elsewhere or an arm that stands is no unit.
+        same = np.abs(both[0] - both[1]) <= np.log(2.0)
+        defects += _magnitude(data, "position", np.where(same, both[0], 0.0), settings)
+    for name, part in data.context.items():
+        values = data.observation[:, part]
+        size = np.linalg.norm(episode_medians(np.abs(values), motion.starts), axis=1)
+        defects += _magnitude(data, name, _off(size), settings)
+    return defects
+
+
+def _log_gain(seen: Array, asked: Array) -> Array:
+    """Logarithm of the gain; NaN where next to nothing is commanded. Shape (E,)."""
+    typical = np.median(asked)
+    valid = (asked > STANDING * typical) & (seen > 0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(valid, np.log(seen) - np.log(asked), np.nan)
+
+
+def _epochs(
+    data: AuditInput, gains: Array, name: str, settings: AuditSettings, factors: Array | None
+) -> list[Defect]:
+    """Epochs whose gain is no arm's, or another than that of the other epochs."""
+    groups = data.episodes.calibration_epoch
+    absolute = group_medians(gains, groups, reference=0.0, least=LEAST_EPISODES)
+    relative = group_medians(gains, groups, reference=None, least=LEAST_EPISODES)
+    ratio = settings.gain_epoch_limit if factors is not None else settings.gain_limit
+    defects = []
+    for (epoch, count, gain, error), (_, _, gap, _) in zip(absolute, relative, strict=True):
+        noise = settings.significance * error
+        beyond = abs(gain) > max(np.log(settings.gain_limit), noise)
+        beside = abs(gap) > max(np.log(ratio), noise)
+        if factors is not None:
+            factors[groups == epoch] = np.exp(gain)
+        if count < LEAST_EPISODES or not (beyond or beside):
+            continue
+        limit = settings.gain_limit if beyond else ratio
+        defects.append(_gain(name, f"epoch {epoch or '-'}", gain if beyond else gap, limit))
+    return defects
+
+
+def _episodes(
+    data: AuditInput, gains: Array, settings: AuditSettings, factors: Array
+) -> list[Defect]:
+    """Single episodes whose gain is another than that of all."""
+    left = gains - np.log(factors)
+    known = np.isfinite(left)
+    if np.count_nonzero(known) < LEAST_EPISODES:
+        return []
+    centre, spread = densest_half(left[known])
+    gap = np.where(known, left - centre, 0.0)
+    off = np.abs(gap) > max(np.log(settings.gain_limit), settings.significance * 2.0 * spread)
+    lone = off & (np.abs(gap) > np.log(LONE_FACTOR))
+    total = int(np.count_nonzero(known))
+    if not (lone.any() or some(off, total, settings.outlier_share)):
+        return []
+    factors[off] *= np.exp(gap[off])
+    names = data.episodes.uuid[off]
+    return [_gain("position", listed(names), float(np.median(gap[off])), settings.gain_limit)]
+
+
+def _off(size: Array) -> Array:
+    """Logarithm of each episode's size against that of all; 0 where the sizes say nothing."""
+    known = np.isfinite(size) & (size > 0)
+    result = np.zeros(len(size))
+    if np.count_nonzero(known) < max(LEAST_EPISODES, 0.9 * len(size)):
+        return result
+    logs = np.log(size[known])
+    centre, spread = densest_half(logs)
+    gaps = logs - centre
+    far = np.abs(gaps) > max(np.log(MAGNITUDE), MAGNITUDE_SPREADS * spread)
+    if spread <= np.log(2.0):  # else the channel has no usual size
+        result[known] = np.where(far, gaps, 0.0)
+    return result
+
+
+def _magnitude(data: AuditInput, name: str, off: Array, settings: AuditSettings) -> list[Defect]:
+    chosen: Flags = off != 0.0
+    lone = bool(np.any(np.abs(off) > np.log(LONE_MAGNITUDE)))
+    if not (lone or some(chosen, len(off), settings.outlier_share)):
+        return []
+    factor = float(np.exp(np.median(np.abs(off[chosen]))))
+    names = data.episodes.uuid[chosen]
+    return [
+        Defect(
+            kind="unit",
+            variable=name,
+            where=listed(names),
+            measured=factor,
+            limit=MAGNITUDE,
+            unit="factor",
+            action=f"{name} is {'larger' if np.median(off[chosen]) > 0 else 'smaller'} by a "
+            f"factor of {factor:.4g}{_named(factor)} in {len(names)} episodes ({listed(names)}): "
+            "convert them to the unit of the contract, ingest again and repeat the audit.",
+        )
+    ]
+
+
+def _gain(name: str, where: str, gain: float, limit: float) -> Defect:
+    factor = float(np.exp(abs(gain)))
+    side = "larger" if gain > 0 else "smaller"
+    return Defect(
+        kind="unit",
+        variable=name,
+        where=where,
+        measured=factor,
+        limit=limit,
+        unit="factor",
+        action=f"In {where} the observed motion of {name} is {side} by a factor of {factor:.4g}"
+        f"{_named(factor)}: convert both to one unit, ingest again and repeat the audit.",
+    )
+
+
+def _named(factor: float) -> str:
+    for value, words in FACTORS:
+        if abs(np.log(factor / value)) < np.log(1.15):
+            return f" (as between {words})"
+    return ""
