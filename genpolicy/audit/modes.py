@@ -12,8 +12,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from scipy.cluster.hierarchy import fcluster, linkage
-from scipy.spatial.distance import squareform
 from sklearn.cluster import HDBSCAN
 
 from genpolicy.audit.data import Array, Integers
@@ -23,7 +21,6 @@ AXES = 3
 AGREEMENT = 0.9
 MAXIMUM_DEPTH = 2
 MINIMUM_SAMPLES = 2
-UNKNOWN_PAIR = 0.5
 
 
 @dataclass(frozen=True)
@@ -81,7 +78,7 @@ def cluster_chunks(paths: Array, settings: AuditSettings) -> Clustering:
     n = len(vectors)
     labels = np.zeros(n, dtype=np.int64)
     _bisect(vectors, np.arange(n), labels, settings)
-    labels = _by_size(labels)
+    labels = by_size(labels)
     count = int(labels.max()) + 1
     gaps = np.linalg.norm(vectors[:, None] - vectors[None], axis=2)
     medoids = tuple(_medoid(gaps, np.flatnonzero(labels == mode)) for mode in range(count))
@@ -198,39 +195,6 @@ def _confirmed(vectors: Array, sides: Integers, least: int) -> bool:
     return majorities == set(sides.tolist()) and bool(pure >= AGREEMENT * np.count_nonzero(clear))
 
 
-def link(memberships: list[tuple[Integers, Integers]], episodes: int, minimum: int) -> Integers:
-    """Modes of episodes over all situations, from who was clustered with whom.
-
-    Args:
-        memberships: Per situation the episodes and their local modes. Shapes (n,) and (n,).
-        episodes: Number of episodes.
-        minimum: Smallest number of episodes of a mode.
-
-    Returns:
-        Mode of each episode, 0 the largest; -1 where the episode was never in a situation with
-        several modes, or its group is smaller than `minimum`. Shape (episodes,).
-    """
-    together, apart = np.zeros((episodes, episodes)), np.zeros((episodes, episodes))
-    for members, labels in memberships:
-        same = labels[:, None] == labels[None, :]
-        block = np.ix_(members, members)
-        together[block] += same
-        apart[block] += ~same
-    seen = np.flatnonzero(together.diagonal() > 0)
-    result = np.full(episodes, -1, dtype=np.int64)
-    if len(seen) < 2:
-        return result
-    known = together + apart
-    distance = np.divide(apart, known, out=np.full(known.shape, UNKNOWN_PAIR), where=known > 0)
-    distance = distance[np.ix_(seen, seen)]
-    np.fill_diagonal(distance, 0.0)
-    tree = linkage(squareform(distance, checks=False), method="average")
-    groups = _by_size(fcluster(tree, UNKNOWN_PAIR - 1e-9, criterion="distance").astype(np.int64))
-    large = np.bincount(groups)[groups] >= minimum
-    result[seen] = np.where(large, groups, -1)
-    return result
-
-
 def _by_arc_length(paths: Array) -> Array:
     """Paths resampled at equal arc lengths up to one that most of them reach."""
     n, steps, _ = paths.shape
@@ -258,7 +222,7 @@ def _medoid(gaps: Array, members: Integers) -> int:
     return int(members[np.argmin(gaps[np.ix_(members, members)].sum(axis=1))])
 
 
-def _by_size(labels: Integers) -> Integers:
+def by_size(labels: Integers) -> Integers:
     """Labels renumbered: 0 the largest; of equals, the one that appears first."""
     values, first, codes, counts = np.unique(
         labels, return_index=True, return_inverse=True, return_counts=True

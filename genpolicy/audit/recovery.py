@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from genpolicy.audit.data import AuditInput, Integers, observation_history, relative_paths
 from genpolicy.audit.labels import SUCCESS
@@ -45,15 +46,16 @@ def assign(
     result = np.full(len(episodes), -1, dtype=np.int64)
     if not situations:
         return result
+    starts = np.searchsorted(data.episode, np.arange(len(data.episodes) + 1))
     queries = np.array([item[0].query for item in situations], dtype=np.int64)
     places = observation_history(data, queries, settings.observation_horizon)
     for number, episode in enumerate(episodes):
-        rows = np.flatnonzero(data.episode == episode)
+        rows = np.arange(starts[episode], starts[episode + 1])
         votes = np.zeros(int(episode_modes.max(initial=-1)) + 2, dtype=np.int64)
         history = observation_history(data, rows, settings.observation_horizon)
-        gaps = np.linalg.norm(history[:, None] - places[None], axis=2)
-        near = np.argmin(gaps, axis=0)
-        for place in np.flatnonzero(gaps.min(axis=0) <= settings.radius):
+        found = cKDTree(history).query(places, distance_upper_bound=settings.radius)
+        gaps, near = np.asarray(found[0]), np.asarray(found[1])
+        for place in np.flatnonzero(np.isfinite(gaps)):
             situation, _ = situations[int(place)]
             chunks = np.append(situation.members, rows[near[place]])
             vectors = features(relative_paths(data, chunks, settings.chunk_steps), settings)

@@ -8,8 +8,8 @@ from genpolicy.audit.confidence import confidence
 from genpolicy.audit.counts import count
 from genpolicy.audit.data import AuditInput, Integers, canonical
 from genpolicy.audit.labels import ModeOutcome, Replay, Replayed, mode_outcomes, replay_sample
+from genpolicy.audit.linking import link
 from genpolicy.audit.mean_versus_modes import Admissible
-from genpolicy.audit.modes import link
 from genpolicy.audit.neighbourhoods import Support
 from genpolicy.audit.persistence import Persistence, summarise
 from genpolicy.audit.recovery import RecoveryOutcome, recovery_outcomes

@@ -5,7 +5,8 @@ import pytest
 from planar import SETTINGS, planar
 
 from genpolicy.audit.data import canonical
-from genpolicy.audit.modes import cluster_chunks, features, link, split_gain
+from genpolicy.audit.linking import link
+from genpolicy.audit.modes import cluster_chunks, features, split_gain
 from genpolicy.audit.semantics import episode_lags
 from genpolicy.audit.situations import find_situations
 from genpolicy.audit.strata import examine_strata
@@ -84,19 +85,6 @@ def test_split_gain_golden():
     assert split_gain(np.array([-3.0, -1, 1, 3]), 2)[0] == pytest.approx(
         4 * np.log(5) - 8 * np.log(2) - 2 * np.log(4)
     )
-
-
-def test_linking_follows_modes_through_overlapping_situations():
-    rng = stream(24, "link")
-    side = rng.integers(0, 2, 60)
-    seen = [np.sort(rng.choice(50, 15, replace=False)) for _ in range(30)]
-    # Local names are arbitrary, and one situation in thirty is dealt at random.
-    memberships = [(s, side[s] ^ int(rng.integers(0, 2))) for s in seen]
-    memberships[3] = (seen[3], rng.integers(0, 2, 15))
-    groups = link(memberships, 60, 4)
-    assert set(groups[:50].tolist()) <= {-1, 0, 1} and np.all(groups[50:] == -1)
-    for group in (0, 1):
-        assert len(set(side[:50][groups[:50] == group].tolist())) == 1
 
 
 @pytest.mark.parametrize("steps", [0, 2, 5])
