@@ -1,4 +1,4 @@
-"""One encoder class, one trunk class, one head class with three kinds of input.
+"""One encoder class and one head class with three kinds of input, around a trunk (`trunks`).
 
 Every method has the same encoder and the same trunk, number for number. Heads differ in what
 they feed the trunk (nothing, a latent, a noisy chunk with a time); the hidden width of each
@@ -19,6 +19,7 @@ from genpolicy.contract.settings import Settings
 from genpolicy.errors import ConfigError
 from genpolicy.policies.schedules import Gains
 from genpolicy.policies.settings import WIDTH_UNIT, NetworkConfig
+from genpolicy.policies.trunks import TokenLinear, make_trunk
 
 FASTEST_TIME_FREQUENCY = 200.0
 
@@ -63,35 +64,19 @@ class Encoder(nn.Module):
     def __init__(self, dimensions: Dimensions, config: NetworkConfig) -> None:
         super().__init__()
         numbers = dimensions.observation_horizon * dimensions.observation_dim
-        self.hidden = nn.Linear(numbers, config.encoder_width)
-        self.out = nn.Linear(config.encoder_width, config.condition_dim)
+        self.hidden = None
+        if config.encoder == "mlp":
+            self.hidden = nn.Linear(numbers, config.encoder_width)
+            numbers = config.encoder_width
+        self.out = nn.Linear(numbers, config.condition_dim)
 
     def forward(self, observations: Tensor) -> Tensor:
         """Normalised observations (B, H_o, D_o) to conditions (B, C)."""
-        condition: Tensor = self.out(functional.silu(self.hidden(observations.flatten(1))))
+        numbers = observations.flatten(1)
+        if self.hidden is not None:
+            numbers = functional.silu(self.hidden(numbers))
+        condition: Tensor = self.out(numbers)
         return condition
-
-
-class Trunk(nn.Module):
-    """Residual blocks, each modulated (FiLM) by the condition."""
-
-    def __init__(self, config: NetworkConfig) -> None:
-        super().__init__()
-        width = config.trunk_width
-        self.width = width
-        self.modulation = nn.Linear(config.condition_dim, 2 * width * config.trunk_blocks)
-        self.first = nn.ModuleList(nn.Linear(width, width) for _ in range(config.trunk_blocks))
-        self.second = nn.ModuleList(nn.Linear(width, width) for _ in range(config.trunk_blocks))
-
-    def forward(self, hidden: Tensor, condition: Tensor) -> Tensor:
-        """Features (B, W) and conditions (B, C) to features (B, W)."""
-        modulation = self.modulation(functional.silu(condition)).chunk(2 * len(self.first), dim=-1)
-        for index, (first, second) in enumerate(zip(self.first, self.second, strict=True)):
-            shift, scale = modulation[2 * index], modulation[2 * index + 1]
-            normed = functional.layer_norm(hidden, (self.width,))
-            modulated = torch.addcmul(shift, normed, 1.0 + scale)
-            hidden = hidden + second(functional.silu(first(modulated)))
-        return hidden
 
 
 class Head(nn.Module):
@@ -160,7 +145,7 @@ class PolicyNetwork(nn.Module):
         self.dimensions = dimensions
         self._gains = head_input.gains
         self.encoder = Encoder(dimensions, config)
-        self.trunk = Trunk(config)
+        self.trunk = make_trunk(config)
         self.head = self.make_head(dimensions, config, head_input)
 
     def make_head(
@@ -217,13 +202,17 @@ def flops_per_evaluation(network: PolicyNetwork) -> dict[str, int]:
     """
     counts = {
         name: sum(
-            2 * layer.in_features * layer.out_features
+            2 * layer.in_features * layer.out_features * _tokens(layer)
             for layer in part.modules()
             if isinstance(layer, nn.Linear)
         )
         for name, part in _parts(network).items()
     }
     return {**counts, "total": sum(counts.values())}
+
+
+def _tokens(layer: nn.Linear) -> int:
+    return layer.tokens if isinstance(layer, TokenLinear) else 1
 
 
 @functools.lru_cache(maxsize=16)

@@ -17,6 +17,9 @@ class NetworkConfig(Settings):
     """Size of the shared encoder and trunk, and the parameter budget that each head fills.
 
     Attributes:
+        encoder: `mlp` with one hidden layer, or `linear` on the flattened observations.
+        trunk: `mlp` (residual, modulated by the condition) or `transformer` (tokens); both have
+            the same number of parameters.
         encoder_width: Hidden width of the observation encoder.
         condition_dim: Length of the condition vector that it makes.
         trunk_width: Width of the residual trunk.
@@ -26,6 +29,8 @@ class NetworkConfig(Settings):
             multiple of 16, so that heads with and without an input cost the same.
     """
 
+    encoder: Literal["mlp", "linear"] = "mlp"
+    trunk: Literal["mlp", "transformer"] = "mlp"
     encoder_width: int = Field(default=256, ge=16, le=4096, multiple_of=WIDTH_UNIT)
     condition_dim: int = Field(default=128, ge=16, le=4096, multiple_of=WIDTH_UNIT)
     trunk_width: int = Field(default=384, ge=16, le=4096, multiple_of=WIDTH_UNIT)
