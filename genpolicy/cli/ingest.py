@@ -6,8 +6,10 @@ from pathlib import Path
 from typing import Any
 
 from genpolicy.cli.progress import ProgressLine
+from genpolicy.errors import ConfigError
 from genpolicy.importers import FORMATS, Opened, open_dataset, propose
 from genpolicy.importers.contract import ImportContract, load_contract, write_contract
+from genpolicy.importers.standing import standing_notes
 
 EXAMPLES = """examples:
   genpolicy propose recordings/ --out contract.yaml     # look, correct what was guessed
@@ -40,6 +42,7 @@ def add(verbs: "argparse._SubParsersAction[Any]") -> None:
     )
     add_input(proposal, contract=False)
     proposal.add_argument("--out", type=Path, required=True, help="contract.yaml to write")
+    proposal.add_argument("--force", action="store_true", help="replace an old contract.yaml")
     proposal.set_defaults(run=run_propose)
 
 
@@ -77,18 +80,33 @@ def run_ingest(options: argparse.Namespace) -> int:
         )
     finally:
         progress.close()
+    if opened.folder != options.out:
+        raise ConfigError(
+            where=str(options.path),
+            found="a dataset already",
+            expected="recordings",
+            action="Use it as it is, for instance with `genpolicy audit`.",
+        )
     print(json.dumps(as_json(opened), indent=2) if options.json else as_text(opened))
     return 0
 
 
 def run_propose(options: argparse.Namespace) -> int:
     """Write the proposal, and print what it leaves open."""
+    if options.out.exists() and not options.force:
+        raise ConfigError(
+            where=str(options.out),
+            found="there already",
+            expected="a new file: somebody may have corrected the old one",
+            action="Name another file, or give --force.",
+        )
     contract = propose(options.path, format=options.format, task=options.task)
     write_contract(options.out, contract)
-    guessed = [channel.name for channel in contract.channels if channel.guessed]
-    print(f"{options.out}: {len(contract.channels)} channels, guessed units: {len(guessed)}")
-    for note in contract.notes:
-        print(f"  note: {note}")
+    print(f"contract  {options.out}")
+    print(f"channels  {', '.join(f'{c.name} ({len(c.components)})' for c in contract.channels)}")
+    print(f"action    {len(contract.action.components)} numbers at {contract.rate_hz:g} Hz")
+    for note in dict.fromkeys([*contract.notes, *standing_notes(contract)]):
+        print(f"note      {note}")
     return 0
 
 

@@ -38,7 +38,7 @@ from genpolicy.recording.episode import (
     RecordedEpisode,
 )
 from genpolicy.recording.reader import read_episode
-from genpolicy.robot.limits import limits_of
+from genpolicy.robot.limits import RobotName, limits_of
 from genpolicy.tasks.api import ENTRY_POINT_GROUP, Task, load_task
 
 # What the audit holds modes against, where a recording has the channels of the insertion task.
@@ -49,6 +49,7 @@ INSERTION_AUDIT = {
     "reference_channel": "hole_pose",
     "context_channels": ["hole_pose"],
 }
+ROBOTS: tuple[RobotName, ...] = ("panda", "fr3")
 LOOKED_AT = 5
 MAXIMUM_AGE_S = 0.3
 PHASE_AGE_S = 60.0
@@ -232,14 +233,15 @@ def _task_contract(task: Task, episode: RecordedEpisode) -> ImportContract:
                 maximum_age_s=channel.maximum_age_s,
             )
         )
-    robot = episode.metadata.get("robot", "")
+    recorded = episode.metadata.get("robot", "").lower()
+    robot: RobotName | None = next((name for name in ROBOTS if name in recorded), None)
     contract = _contract(
         task.name, channels, tuple(task.phases), _period_s([episode]), _tcp_action()
     )
     update: dict[str, object] = {
         "ranges": {name: [low, high] for name, (low, high) in ranges.items()}
     }
-    if robot in ("panda", "fr3"):
+    if robot is not None:
         limits = limits_of(robot)
         update["joint_range_rad"] = [
             limits.position_lower_rad.tolist(),

@@ -4,6 +4,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, Literal, get_args
 
+from genpolicy.dataset.assemble import MANIFEST_FILE
 from genpolicy.dataset.contract import SplitRule
 from genpolicy.errors import ConfigError
 from genpolicy.importers.collect import import_source
@@ -55,6 +56,7 @@ def open_dataset(
     kind = _kind(path, format, contract)
     if kind == DATASET:
         return open_ingested(path, contract)
+    check_target(path, out)
     if kind == "mcap":
         rules = contract or propose_recordings(path, task=task)
         return import_recordings(path, contract=rules, out=out, split=split)
@@ -97,6 +99,29 @@ def open_source(path: Path, kind: Format) -> Source:
         ) from error
     source: Source = module.open_source(path)
     return source
+
+
+def check_target(path: Path, out: Path) -> None:
+    """Refuse a place whose content would be lost: the old folder is removed before the new one.
+
+    Raises:
+        ConfigError: `out` overlaps the recordings, or holds something else than a dataset.
+    """
+    source, target = path.resolve(), out.resolve()
+    if source.is_relative_to(target) or target.is_relative_to(source):
+        found = f"{out}, in or around the recordings {path}"
+    elif out.is_symlink() or (out.exists() and not out.is_dir()):
+        found = f"{out}, not a folder"
+    elif out.is_dir() and any(out.iterdir()) and not (out / MANIFEST_FILE).is_file():
+        found = f"{out}, which holds something else than a dataset"
+    else:
+        return
+    raise ConfigError(
+        where="the dataset folder to write",
+        found=found,
+        expected="a new folder, or that of an earlier dataset, which is replaced",
+        action="Name another folder; nothing was removed.",
+    )
 
 
 def _kind(path: Path, format: str, contract: ImportContract | None) -> Any:

@@ -1,5 +1,6 @@
 """One small synthetic task, two joints and a gripper, written in the layouts of others."""
 
+import importlib.util
 import json
 from pathlib import Path
 
@@ -140,3 +141,13 @@ class Layouts:
 @pytest.fixture(scope="session")
 def layouts():
     return Layouts
+
+
+@pytest.fixture(scope="session")
+def factory():
+    """Synthetic MCAP episodes."""
+    path = Path(__file__).parents[1] / "dataset" / "factory.py"
+    spec = importlib.util.spec_from_file_location("dataset_factory", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
