@@ -69,6 +69,8 @@ SPEC = GateSpec(
         "artifacts/ingest/episodes.parquet",
         "artifacts/ingest/manifest.json",
         f"{AUDIT}/scene.png",
+        f"{AUDIT}/examples.parquet",
+        f"{AUDIT}/alignment.parquet",
         f"{BASELINES}/*/seed_*/model.safetensors",
         f"{BASELINES}/*/seed_*/config.json",
         f"{BASELINES}/offline.parquet",

@@ -1,19 +1,42 @@
 """Figures of Gate A: modes and their mean, strata, success per mode, baselines."""
 
+from typing import Any
+
 import numpy as np
 from matplotlib.figure import Figure
 
-from gates.evidence import Evidence, MissingEvidenceError, flags, numbers
+from gates.evidence import Evidence, MissingEvidenceError, count, flags, numbers
 from gates.models import GateReport
 from gates.need import AUDIT, BASELINES
 from gates.render import plots_scene
 from gates.render.figures import Photo, Plot, in_order
-from gates.render.limits import draw_limit
-from gates.render.plots_scene import SUMMARY, draw_obstacles
-from genpolicy.figures.drawing import BLUE, GREEN, GREY, INK, ORANGE, RED, new_figure
+from gates.render.limits import draw_limit, limit_of
+from gates.render.plots_scene import SUMMARY, obstacles
+from genpolicy.figures import captions, checks, situations
+from genpolicy.figures.drawing import BLUE, new_figure
 from genpolicy.statistics.intervals import clopper_pearson
 
-FANS = 24
+EXAMPLES = f"{AUDIT}/examples.parquet"
+ALIGNMENT = f"{AUDIT}/alignment.parquet"
+REPLAY = f"{AUDIT}/replay.parquet"
+
+
+def _plane(evidence: Evidence) -> dict[str, Any]:
+    """Names and unit of the position, and the obstacles, as the audit wrote them."""
+    summary = evidence.document(SUMMARY)
+    return {
+        "names": summary.get("position_names", ["x", "y", "z"]),
+        "unit": summary.get("position_unit", "m"),
+        "obstacles": obstacles(evidence),
+    }
+
+
+def _clusters(evidence: Evidence, report: GateReport) -> Figure:
+    columns = (
+        "example", "phase", "query_uuid", "query_index", "is_query", "distance", "cluster",
+        "coordinate", "path",
+    )  # fmt: skip
+    return situations.clusters(evidence.frame(EXAMPLES, *columns), **_plane(evidence))
 
 
 def _overlay(evidence: Evidence, report: GateReport) -> Figure:
@@ -21,84 +44,52 @@ def _overlay(evidence: Evidence, report: GateReport) -> Figure:
     columns = ("split", "two_mode", "mean_admissible", "mean_reason", "mean_path", "mode_paths")
     frame = evidence.frame(path, *columns)
     held_out = frame["split"].isin(report.settings.get("held_out_splits", []))
-    frame = frame[held_out & flags(frame, "two_mode")]
-    total = len(frame)
-    if total == 0:
-        raise MissingEvidenceError("no held-out situation has two modes")
-    frame = frame.iloc[np.unique(np.linspace(0, total - 1, FANS).round().astype(int))]
-    figure, (axes,) = new_figure(height=3.7)
-    draw_obstacles(axes, evidence)
-    counts = {GREEN: 0, RED: 0}
-    for _, row in frame.iterrows():
-        for flat in row["mode_paths"]:
-            line = np.asarray(flat, dtype=np.float64).reshape(-1, 3)
-            left = line[:, 1].mean() > line[0, 1]
-            axes.plot(line[:, 0], line[:, 1], color=BLUE if left else ORANGE, alpha=0.55, lw=1.2)
-        mean = np.asarray(row["mean_path"], dtype=np.float64).reshape(-1, 3)
-        rejected = row["mean_admissible"] is not True and not bool(row["mean_admissible"])
-        colour = RED if rejected else GREEN
-        counts[colour] += 1
-        axes.plot(mean[:, 0], mean[:, 1], color=colour, ls="--", lw=1.4)
-    reasons = sorted({str(reason) for reason in frame["mean_reason"].dropna()} - {""})
-    for colour, style, label in (
-        (BLUE, "-", "mode, to larger y"),
-        (ORANGE, "-", "mode, to smaller y"),
-        (RED, "--", f"mean, refused: {counts[RED]} of {len(frame)}"),
-        (GREEN, "--", f"mean, admissible: {counts[GREEN]} of {len(frame)}"),
-    ):
-        axes.plot([], [], color=colour, ls=style, label=label)
-    axes.set_aspect("equal", adjustable="datalim")
-    axes.set_title(f"{len(frame)} of {total} held-out situations with two modes, from above")
-    axes.set_xlabel("x, m (base frame)")
-    axes.set_ylabel("y, m")
-    title = "means are refused for\n" + "\n".join(reasons[:4]) if reasons else ""
-    legend = axes.legend(
-        loc="center left", bbox_to_anchor=(1.0, 0.5), title=title, alignment="left"
+    return situations.mean_versus_modes(
+        frame[held_out & flags(frame, "two_mode")], **_plane(evidence)
     )
-    legend.get_title().set_fontsize(8)
-    return figure
+
+
+def _realignment(evidence: Evidence, report: GateReport) -> Figure:
+    summary = evidence.document(SUMMARY)
+    frame = evidence.frame(
+        ALIGNMENT, "episode_uuid", "epoch", "order", "offset_before_s", "offset_after_s"
+    )
+    limit_s = limit_of(report, "clock_residual_s")
+    if limit_s is None:
+        raise MissingEvidenceError("the report has no limit of the clock")
+    return checks.realignment(
+        frame,
+        limit_s=limit_s,
+        modes_before=int(count(summary, "modes_before_realignment")),
+        modes_after=int(count(summary, "modes_after_realignment")),
+    )
+
+
+def _labels(evidence: Evidence, report: GateReport) -> Figure:
+    return checks.label_agreement(evidence.frame(REPLAY, "label", "replayed", "mode"))
 
 
 def _strata(evidence: Evidence, report: GateReport) -> Figure:
-    columns = ("variable", "phase", "p_adjusted", "effect", "effect_lower", "effect_upper")
-    frame = evidence.frame(f"{AUDIT}/strata.parquet", *columns)
-    frame = frame.sort_values(["effect", "variable", "phase"]).tail(24)
-    effect, adjusted = numbers(frame, "effect"), numbers(frame, "p_adjusted")
-    level = float(report.settings.get("strata_level", 0.05))
-    places = np.arange(len(frame))
-    figure, (axes,) = new_figure(height=1.0 + 0.22 * len(frame))
-    colour = [RED if p <= level else GREY for p in adjusted]
-    axes.barh(places, effect, color=colour, height=0.6)
-    lower, upper = (frame[f"effect_{end}"].to_numpy(dtype=np.float64) for end in ("lower", "upper"))
-    axes.hlines(places, lower, upper, color=INK, lw=1.0)
-    axes.set_yticks(
-        places, [f"{v} · {p}" for v, p in zip(frame["variable"], frame["phase"], strict=True)]
+    columns = ("variable", "phase", "p_adjusted", "effect", "effect_lower", "effect_upper", "n")
+    return checks.strata_bars(
+        evidence.frame(f"{AUDIT}/strata.parquet", *columns),
+        level=float(report.settings.get("strata_level", 0.05)),
+        limit=limit_of(report, "strata_effect"),
     )
-    draw_limit(axes, report, "strata_effect")
-    axes.set_xlabel(f"share of uncertainty removed (red: adjusted p at most {level:g})")
-    return figure
 
 
 def _mode_success(evidence: Evidence, report: GateReport) -> Figure:
     frame = evidence.frame(f"{AUDIT}/modes.parquet", "mode", "phase", "episodes", "successes")
-    frame = frame.sort_values(["phase", "mode"]).tail(24)
-    trials, hits = numbers(frame, "episodes"), numbers(frame, "successes")
     level = float(report.settings.get("confidence", 0.95))
-    figure, (axes,) = new_figure(height=1.0 + 0.24 * len(frame))
-    for place, (n, k) in enumerate(zip(trials, hits, strict=True)):
-        low, high = clopper_pearson(int(k), int(n), level)
-        axes.hlines(place, low, high, color=BLUE, lw=2)
-        axes.plot([k / n if n else np.nan], [place], "o", color=BLUE, ms=5)
-    labels = [
-        f"{mode} · {phase} (n = {int(n)})"
-        for mode, phase, n in zip(frame["mode"], frame["phase"], trials, strict=True)
-    ]
-    axes.set_yticks(np.arange(len(frame)), labels)
-    axes.set_ylim(-0.7, len(frame) - 0.3)
-    axes.set_xlim(0, 1.02)
-    draw_limit(axes, report, "mode_success_lower")
-    axes.set_xlabel(f"share of successful episodes, exact {level:.0%} interval")
-    return figure
+    trials, hits = numbers(frame, "episodes"), numbers(frame, "successes")
+    ends = np.array(
+        [clopper_pearson(int(k), int(n), level) for k, n in zip(hits, trials, strict=True)]
+    ).reshape(-1, 2)
+    return checks.mode_success(
+        frame.assign(success_lower=ends[:, 0], success_upper=ends[:, 1]),
+        confidence=level,
+        limit=limit_of(report, "mode_success_lower"),
+    )
 
 
 def _baselines(evidence: Evidence, report: GateReport) -> Figure:
@@ -134,6 +125,12 @@ def _baselines(evidence: Evidence, report: GateReport) -> Figure:
 PLOTS: tuple[Plot | Photo, ...] = (
     *plots_scene.PLOTS,
     Plot(
+        *captions.CLUSTERS,
+        EXAMPLES,
+        _clusters,
+        also=(SUMMARY,),
+    ),
+    Plot(
         "Modes and their mean, in the scene plane",
         "Solid: the next chunk of nearest neighbours, one line per mode. Dashed: the mean of the "
         "modes, which is what a policy trained by regression tends to. A generator is needed "
@@ -144,10 +141,13 @@ PLOTS: tuple[Plot | Photo, ...] = (
         also=(SUMMARY,),
     ),
     Plot(
-        "What explains the modes",
-        "Share of the uncertainty (entropy) about the mode that each recorded variable removes: "
-        "bar the estimate, line its interval. Grey: not significant after Holm's correction. A "
-        "red bar beyond the limit means: give this variable to the policy instead.",
+        *captions.REALIGNMENT,
+        ALIGNMENT,
+        _realignment,
+        also=(SUMMARY,),
+    ),
+    Plot(
+        *captions.STRATA,
         f"{AUDIT}/strata.parquet",
         _strata,
     ),
@@ -157,6 +157,11 @@ PLOTS: tuple[Plot | Photo, ...] = (
         "judges the lower end. The audit numbers the modes m0, m1 and so on.",
         f"{AUDIT}/modes.parquet",
         _mode_success,
+    ),
+    Plot(
+        *captions.LABELS,
+        REPLAY,
+        _labels,
     ),
     Plot(
         "Modes that the simple policies keep",

@@ -7,13 +7,14 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle, Rectangle
+from matplotlib.patches import Rectangle
 
 from gates.evidence import Array, Evidence, MissingEvidenceError
 from gates.models import GateReport
 from gates.need import AUDIT
 from gates.render.figures import Photo, Plot
-from genpolicy.figures.drawing import BLUE, GREY, INK, ORANGE, RED, new_figure
+from genpolicy.figures.drawing import BLUE, GREY, ORANGE, RED, new_figure
+from genpolicy.figures.situations import STONE, draw_obstacles
 
 SCENE = f"{AUDIT}/scene.png"
 FRAMES = "artifacts/ingest/frames.parquet"
@@ -22,7 +23,6 @@ SUMMARY = f"{AUDIT}/summary.json"
 POINTS = 32
 """Points kept of each path; the recorded ones lie a few millimetres apart."""
 LEFT, RIGHT, BETWEEN = "left", "right", "does not pass"
-STONE = "#C3C8D0"
 SIDES = {LEFT: BLUE, RIGHT: ORANGE, BETWEEN: GREY}
 
 
@@ -46,21 +46,6 @@ def obstacles(evidence: Evidence) -> list[dict[str, float]]:
     except MissingEvidenceError:
         return []
     return [item for item in found if isinstance(item, dict)]
-
-
-def draw_obstacles(axes: Axes, evidence: Evidence) -> None:
-    """Draw the obstacles as circles, seen from above."""
-    for index, item in enumerate(obstacles(evidence)):
-        axes.add_patch(
-            Circle(
-                (float(item["x_m"]), float(item["y_m"])),
-                float(item["radius_m"]),
-                facecolor=STONE,
-                edgecolor=INK,
-                zorder=1,
-                label="obstacle" if index == 0 else None,
-            )
-        )
 
 
 def side(points_m: Array, x_m: float, y_m: float) -> str:
@@ -121,7 +106,7 @@ def _demonstrations(evidence: Evidence, report: GateReport) -> Figure:
         axes.scatter(failed[:, 0], failed[:, second], marker="x", s=22, color=RED, lw=1.2, zorder=6)
         axes.set_xlabel("x, m (base frame)")
     above.scatter([], [], marker="x", s=22, color=RED, label=f"end of a failure ({len(failed)})")
-    draw_obstacles(above, evidence)
+    draw_obstacles(above, obstacles(evidence))
     for item in obstacles(evidence):
         low, high = aside.get_ylim()
         corner = (item["x_m"] - item["radius_m"], low)

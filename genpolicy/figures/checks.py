@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from genpolicy.figures.drawing import BLUE, GREY, INK, ORANGE, PALETTE, RED, new_figure
+from genpolicy.figures.drawing import BLUE, GREY, INK, ORANGE, PALETTE, RED, SKY, new_figure
 from genpolicy.figures.limits import limit_line
 from genpolicy.figures.plane import scatter_of
 from genpolicy.figures.situations import NothingToDrawError
@@ -14,6 +14,7 @@ from genpolicy.figures.situations import NothingToDrawError
 POINTS = 1200
 ROWS = 24
 MARKS = "os^Dv<>P"
+NO_MODE = "in no mode"
 
 
 def strata_bars(frame: pd.DataFrame, *, level: float, limit: float | None) -> Figure:
@@ -84,6 +85,42 @@ def mode_success(frame: pd.DataFrame, *, confidence: float, limit: float | None)
     if limit is not None:
         limit_line(axes, limit)
     axes.set_xlabel(f"share of successful episodes, exact {confidence:.0%} interval")
+    return figure
+
+
+def label_agreement(frame: pd.DataFrame) -> Figure:
+    """Replayed episodes by mode: how many labels the replay confirms, and how many it turns over.
+
+    Args:
+        frame: Rows of `replay.parquet`: mode (may be missing), label, replayed.
+
+    Raises:
+        NothingToDrawError: Nothing was replayed.
+    """
+    if len(frame) == 0:
+        raise NothingToDrawError("no episode was replayed")
+    modes = frame["mode"].astype(object).where(frame["mode"].notna(), NO_MODE)
+    names = sorted(set(modes))[:ROWS]
+    label, replayed = (frame[name] == "success" for name in ("label", "replayed"))
+    agree = frame["label"] == frame["replayed"]
+    kinds = (
+        ("label agrees", agree, GREY, ""),
+        ("labelled success, replay fails", ~agree & label, RED, "//"),
+        ("labelled failure, replay succeeds", ~agree & replayed, SKY, ".."),
+    )
+    figure, (axes,) = new_figure(height=1.3 + 0.28 * len(names))
+    left = np.zeros(len(names))
+    for text, chosen, colour, hatch in kinds:
+        counts = np.array([np.count_nonzero(chosen & (modes == name)) for name in names])
+        axes.barh(
+            np.arange(len(names)), counts, left=left, color=colour, hatch=hatch, height=0.6,
+            edgecolor="white", label=f"{text} ({counts.sum()})",
+        )  # fmt: skip
+        left = left + counts
+    axes.set_yticks(np.arange(len(names)), names)
+    axes.invert_yaxis()
+    axes.set_xlabel("replayed episodes")
+    figure.legend(loc="outside lower center", ncols=3)
     return figure
 
 

@@ -100,7 +100,7 @@ def mean_versus_modes(
     """
     total = len(frame)
     if total == 0:
-        raise NothingToDrawError("no held-out situation has two modes")
+        raise NothingToDrawError("no held-out situation has several modes")
     frame = frame.iloc[np.unique(np.linspace(0, total - 1, FANS).round().astype(int))]
     modes = [_paths(list(flat), len(names)) for flat in frame["mode_paths"]]
     means = _paths(frame["mean_path"], len(names))
@@ -117,7 +117,7 @@ def mean_versus_modes(
     reasons = sorted({str(reason) for reason in frame["mean_reason"].dropna()} - {""})
     _overlay_legend(axes, plane, verdicts, reasons, most=max(len(chunks) for chunks in modes))
     above = ", from above" if obstacles else ""
-    axes.set_title(f"{len(frame)} of {total} held-out situations with two modes{above}")
+    axes.set_title(f"{len(frame)} of {total} held-out situations with several modes{above}")
     axes.set_xlabel(plane.x_label)
     axes.set_ylabel(plane.y_label)
     if plane.is_scene:

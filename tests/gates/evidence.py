@@ -283,7 +283,30 @@ def _audit(root: Path) -> None:
     table(
         root,
         "audit/replay.parquet",
-        [{"episode_uuid": f"e{i}", "label": "success", "replayed": "success"} for i in range(40)],
+        [
+            {
+                "episode_uuid": f"e{i}",
+                "label": "success",
+                "replayed": "success",
+                "mode": ("m0", "m1")[i % 2],
+            }
+            for i in range(40)
+        ],
+    )
+    table(root, "audit/examples.parquet", [_example(i) for i in range(12)])
+    table(
+        root,
+        "audit/alignment.parquet",
+        [
+            {
+                "episode_uuid": f"e{i}",
+                "epoch": "c0",
+                "order": float(i),
+                "offset_before_s": 0.01 * (i % 2),
+                "offset_after_s": 0.0,
+            }
+            for i in range(10)
+        ],
     )
     document(
         root,
@@ -308,9 +331,26 @@ def _audit(root: Path) -> None:
             "next_action": "train generators",
             "modes_before_realignment": 3,
             "modes_after_realignment": 2,
+            "position_names": ["x", "y", "z"],
+            "position_unit": "m",
             "obstacles": [{"x_m": 0.5, "y_m": 0.0, "radius_m": 0.025}],
         },
     )
+
+
+def _example(i: int) -> dict[str, Any]:
+    path = [v for k in range(16) for v in (0.37 + 0.02 * k, (-1) ** i * 0.01 * k, 0.15)]
+    return {
+        "example": 0,
+        "phase": "approach",
+        "query_uuid": "e1",
+        "query_index": 4,
+        "is_query": i == 0,
+        "distance": 0.1 * i,
+        "cluster": i % 2,
+        "coordinate": (-1.0) ** i * 0.05,
+        "path": path,
+    }
 
 
 def _situation(i: int) -> dict[str, Any]:

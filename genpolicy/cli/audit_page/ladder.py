@@ -180,7 +180,7 @@ def _support(evidence: AuditEvidence) -> list[Check]:
             float(counts["analysed_episodes"]),
             float(settings["minimum_situations"]),
             AT_LEAST,
-            note=f"at least {settings['minimum_neighbours']} within {settings['radius']:g} scales",
+            note=f"{settings['minimum_neighbours']} or more within {settings['radius']:.3g} scales",
         ),
         Check(
             "share of held-out situations with enough of them",

@@ -16,12 +16,12 @@ from genpolicy.cli.audit_page.evidence import AuditEvidence
 from genpolicy.cli.audit_page.ladder import ladder
 from genpolicy.cli.audit_page.pictures import draw_all
 from genpolicy.cli.audit_page.words import MARKS, MEANINGS, READING, TITLES, TONES, WORDS, short
+from genpolicy.figures.checks import NO_MODE
 from genpolicy.figures.style import page_style
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_bytes
 from genpolicy.statistics.intervals import clopper_pearson
 
-NO_MODE = "in no mode"
 SHOWN_EPISODES = 12
 
 

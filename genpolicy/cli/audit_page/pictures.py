@@ -7,7 +7,7 @@ from functools import partial
 from matplotlib.figure import Figure
 
 from genpolicy.cli.audit_page.evidence import AuditEvidence
-from genpolicy.figures import checks, situations
+from genpolicy.figures import captions, checks, situations
 from genpolicy.figures.drawing import Picture, drawn
 from genpolicy.figures.situations import NothingToDrawError
 
@@ -80,6 +80,10 @@ def _realignment(evidence: AuditEvidence) -> Figure:
     )
 
 
+def _labels(evidence: AuditEvidence) -> Figure:
+    return checks.label_agreement(evidence["replay"])
+
+
 def _support(evidence: AuditEvidence) -> Figure:
     summary = evidence.summary
     return checks.support_map(
@@ -92,11 +96,7 @@ def _support(evidence: AuditEvidence) -> Figure:
 
 PLOTS: tuple[Plot, ...] = (
     Plot(
-        "Nearest observations and what was done",
-        "Three held-out situations, chosen evenly over how far apart their chunks lie. Above: "
-        "each mark is a demonstration, to the right the less alike its observation, up and down "
-        "what was done next. Bundles that stay apart down to distance 0 are several actions for "
-        "one observation. Below: the chunks themselves; dashed their mean.",
+        *captions.CLUSTERS,
         "examples",
         _clusters,
     ),
@@ -109,18 +109,12 @@ PLOTS: tuple[Plot, ...] = (
         _overlay,
     ),
     Plot(
-        "Before and after realignment",
-        "Clock of every episode against the others: by how much what is observed trails what "
-        "was commanded, compared with the usual. Modes that vanish after realignment were a "
-        "defect of the data.",
+        *captions.REALIGNMENT,
         "alignment",
         _realignment,
     ),
     Plot(
-        "What explains the modes",
-        "Share of the uncertainty (entropy) about the mode that each variable removes: bar the "
-        "estimate, line its interval. Grey: not significant after Holm's correction. A red bar "
-        "beyond the limit means: give this variable to the policy, or standardise it.",
+        *captions.STRATA,
         "strata",
         _strata,
     ),
@@ -130,6 +124,11 @@ PLOTS: tuple[Plot, ...] = (
         "lower end is held against the limit.",
         "modes",
         _modes,
+    ),
+    Plot(
+        *captions.LABELS,
+        "replay",
+        _labels,
     ),
     Plot(
         "Where the data can answer",

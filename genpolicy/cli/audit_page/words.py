@@ -7,7 +7,7 @@ TITLES = {
     "label_contamination": "Wrong labels",
     "pointwise_noise": "Noise, not modes",
     "unimodal": "One action",
-    "insufficient_support": "Too little data to say",
+    "insufficient_support": "Not enough to say",
 }
 MEANINGS = {
     "valid_modes": "One observation has several actions, each works, and nothing recorded or past "
@@ -22,7 +22,7 @@ MEANINGS = {
     "Averaging over a chunk removes it.",
     "unimodal": "One observation has one action here: the simple policies are enough.",
     "insufficient_support": "The data cannot answer. That is not the same as one action: what "
-    "would be needed is said below.",
+    "is missing is said below.",
 }
 TONES = {
     "valid_modes": "pass",
