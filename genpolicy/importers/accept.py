@@ -20,6 +20,7 @@ Times = NDArray[np.int64]
 PHASE_ALL = "all"
 NS_PER_S = 1_000_000_000
 NS = {"s": 1e9, "ms": 1e6, "us": 1e3, "ns": 1.0}
+LARGEST_NS = 2.0**62
 MAXIMUM_TEXT = 200
 SUCCESS = ("success", "succeeded", "successful", "true", "1", "1.0", "yes")
 FAILURE = ("failure", "fail", "failed", "false", "0", "0.0", "no")
@@ -148,17 +149,23 @@ def _ticks(raw: RawEpisode, contract: ImportContract, length: int) -> Times:
     if recorded.ndim != 1 or recorded.dtype.kind not in "fiu":
         refuse(f"{raw.label}: {name}", f"of type {recorded.dtype}", "one time per row")
     check_finite(as_float(recorded)[:, None], [name], where=raw.label)
-    origin = recorded[0] if contract.time_origin == "episode" else recorded.dtype.type(0)
-    # Integers are subtracted before they become floats: 1.7e18 ns has no exact float.
-    since = (
-        recorded.astype(np.float64) - origin if recorded.dtype.kind == "f" else recorded - origin
-    )
-    ticks = np.round(np.asarray(since, dtype=np.float64) * NS[contract.time_unit]).astype(np.int64)
-    if recorded.dtype.kind != "f" and contract.time_unit == "ns":
-        ticks = np.asarray(since, dtype=np.int64)
+    ticks = _nanoseconds(recorded, contract, f"{raw.label}: {name}")
     ticks = ticks + begin if contract.time_origin == "episode" else ticks
     _check_clock(ticks, f"{raw.label}: {name}", contract.maximum_gap_s)
     return ticks
+
+
+def _nanoseconds(recorded: NDArray[Any], contract: ImportContract, where: str) -> Times:
+    """Recorded times as ns, from the first row of the episode or of the recordings."""
+    wild = np.flatnonzero(~(np.abs(as_float(recorded)) * NS[contract.time_unit] < LARGEST_NS))
+    if len(wild):
+        refuse(f"{where}, row {wild[0]}", str(recorded[wild[0]]), "a time within 146 years")
+    # Integers are subtracted as integers: 1.7e18 ns has no exact float.
+    times = recorded.astype(np.float64 if recorded.dtype.kind == "f" else np.int64)
+    since = times - times[0] if contract.time_origin == "episode" else times
+    if since.dtype.kind == "i" and contract.time_unit == "ns":
+        return np.asarray(since, dtype=np.int64)
+    return np.round(since * NS[contract.time_unit]).astype(np.int64)
 
 
 def _check_clock(ticks: Times, where: str, maximum_gap_s: float) -> None:

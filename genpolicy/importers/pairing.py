@@ -112,7 +112,8 @@ def pair_by_numbers(
 
 def _residual(told: Array, seen: Array) -> Array:
     """RMS distance in units of the commanded spread; infinite where the scales differ."""
-    spread_told, spread_seen = told.std(axis=0), seen.std(axis=0)
+    with np.errstate(over="ignore"):  # a damaged number pairs with nothing
+        spread_told, spread_seen = told.std(axis=0), seen.std(axis=0)
     floor = 1e-9 * (1.0 + np.abs(told).max(axis=0))
     result = np.full((told.shape[1], seen.shape[1]), np.inf)
     for i in np.flatnonzero(spread_told > floor):

@@ -146,7 +146,10 @@ def _open(path: Path) -> Iterator[tuple[Any, str]]:
         except READ_ERRORS as error:
             raise _unreadable(path.name, error) from error
         with file:
-            yield file, digest.hexdigest()
+            try:
+                yield file, digest.hexdigest()
+            except READ_ERRORS as error:  # what a damaged file makes the library raise
+                raise _unreadable(path.name, error) from error
 
 
 def _member(group: Any, name: str, where: str) -> Any:

@@ -86,6 +86,7 @@ def test_how_the_table_is_cut_into_files_and_groups_changes_no_frame(long, layou
 FAULTS = {
     "step, row 5": {"step": np.arange(30) + (np.arange(30) >= 5)},
     "timestamp, row 6": {"timestamp": 300 + np.where(np.arange(30) == 6, 0, np.arange(30)) / 20},
+    "timestamp, row 2 is 1e+30": {"timestamp": [300.0, 300.05] + [1e30] * 28},
     "row 8, column tool_x_m is nan": {"tool_x_m": pa.array([0.0] * 8 + [None] + [0.1] * 21)},
     "row 9, column action_tool_y_m is inf": {
         "action_tool_y_m": np.where(np.arange(30) == 9, np.inf, 0.0)
@@ -212,3 +213,24 @@ def test_a_contract_that_names_what_is_not_there(long, tmp_path):
     ):
         with pytest.raises(BadInputError, match=text):
             open_dataset(long, out=tmp_path / "out", contract=contract.model_copy(update=part))
+
+
+@pytest.mark.parametrize("kind", ["i8", "u8"])
+def test_a_clock_of_nanoseconds_keeps_its_digits_and_its_sign(layouts, tmp_path, kind):
+    folder = tmp_path / "clock"
+    folder.mkdir()
+    begin = 1_700_000_000_000_000_001
+    for i in range(5):
+        state, action = layouts.samples(i)
+        times = begin + 10_000_000_000 * i + 50_000_001 * np.arange(30)
+        if i == 3:
+            times[7] = times[6] - 1
+        columns = {"stamp": times.astype(kind), "state": state.tolist(), "action": action.tolist()}
+        pq.write_table(pa.table(columns), folder / f"{i}.parquet")
+    opened = open_dataset(folder, out=tmp_path / "out")
+    assert (opened.contract.time_unit, opened.contract.time_origin) == ("ns", "recording")
+    assert opened.contract.rate_hz == 20.0
+    assert [r.file for r in opened.refused] == ["3.parquet"]
+    assert "stamp, row 7 is -1e-09 s later" in opened.refused[0].reason
+    recorded = load_dataset(tmp_path / "out").episodes["recorded_at_s"].to_numpy()
+    np.testing.assert_allclose(np.diff(recorded), [10, 10, 20])
