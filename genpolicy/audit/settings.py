@@ -54,7 +54,7 @@ class AuditSettings(BaseModel):
         outlier_share: Share of single episodes with one fault (and two of them at least) that
             makes it a defect of the data; below it is a mishap without weight.
         drift_limit_steps: Red above: growth of the lag from the first to the last row of an
-            episode, action steps. Plants differ by a part of a step between slow and fast motion.
+            episode, action steps. Plants differ by up to a step between slow and fast motion.
         gain_limit: Red above: factor between commanded and observed motion. No arm follows that
             badly, and units differ by more.
         gain_epoch_limit: Red above: the same between one epoch and all.
@@ -74,6 +74,8 @@ class AuditSettings(BaseModel):
             the phase is said to have one.
         minimum_two_mode_share: The same as a share of its analysed held-out episodes; about twice
             what chance gives a cloud without modes that is looked at in ten situations an episode.
+        minimum_persistent_share: Share of a phase's situations with clusters that must keep them,
+            each beyond its own shuffled-time null, for the clusters to be modes: most of them.
         strata_alpha: Family-wise error of the strata tests.
         strata_effect_limit: Red above: explained share of a significant stratum.
         mode_success_limit: Lower bound of a mode's success that makes it valid.
@@ -119,7 +121,7 @@ class AuditSettings(BaseModel):
     clock_limit_steps: float = Field(default=0.25, gt=0)
     significance: float = Field(default=4.5, gt=0)
     outlier_share: float = Field(default=0.02, gt=0, lt=1)
-    drift_limit_steps: float = Field(default=1.0, gt=0)
+    drift_limit_steps: float = Field(default=1.5, gt=0)
     gain_limit: float = Field(default=3.0, gt=1)
     gain_epoch_limit: float = Field(default=1.15, gt=1)
     frame_limit_rad: float = Field(default=0.14, gt=0)
@@ -133,6 +135,7 @@ class AuditSettings(BaseModel):
     minimum_support_share: float = Field(default=0.2, gt=0, lt=1)
     minimum_two_mode_situations: int = Field(default=5, ge=1)
     minimum_two_mode_share: float = Field(default=0.1, gt=0, lt=1)
+    minimum_persistent_share: float = Field(default=0.5, gt=0, le=1)
     strata_alpha: float = Field(default=0.05, gt=0, lt=1)
     strata_effect_limit: float = Field(default=0.3, gt=0, lt=1)
     mode_success_limit: float = Field(default=0.5, gt=0, lt=1)

@@ -109,6 +109,7 @@ def offset_defects(
     declared_s: float | None,
     finest_s: float,
     episode_limit_s: float,
+    errors_s: Array | None = None,
 ) -> tuple[list[Defect], Array]:
     """Epochs and single episodes of a stream that are off.
 
@@ -120,6 +121,7 @@ def offset_defects(
         declared_s: Lag that the contract states; None takes the median of the episodes.
         finest_s: What the measure resolves.
         episode_limit_s: A single episode is off beyond this.
+        errors_s: Standard error of each episode's lag, where it is known. Shape (E,).
 
     Returns:
         Defects, and the offset to take out of each episode, s. Shape (E,).
@@ -138,6 +140,9 @@ def offset_defects(
             defects.append(_epoch_defect(stream, name, gap, limit))
     least = max(episode_limit_s, EPISODE_SPREADS * spread)
     off = np.isfinite(deviations) & (np.abs(np.nan_to_num(deviations)) > least)
+    if errors_s is not None:
+        own = settings.significance * np.nan_to_num(errors_s)
+        off &= np.abs(np.nan_to_num(deviations)) > own
     known = int(np.count_nonzero(np.isfinite(offsets_s)))
     if some(off, known, settings.outlier_share):
         taken[off] += deviations[off]

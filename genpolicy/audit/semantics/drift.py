@@ -7,11 +7,16 @@ over the recordings the lags are cut in two at the place that separates them bes
 import numpy as np
 
 from genpolicy.audit.data import Array, AuditInput, Integers
-from genpolicy.audit.semantics.clocks import LEAST_EPISODES
+from genpolicy.audit.semantics.clocks import EPOCH_SPREADS, LEAST_EPISODES
 from genpolicy.audit.semantics.lags import segment_lags
 from genpolicy.audit.semantics.motion import Motion
 from genpolicy.audit.semantics.report import Defect
-from genpolicy.audit.semantics.robust import densest_half, episode_sums, group_medians
+from genpolicy.audit.semantics.robust import (
+    densest_half,
+    episode_sums,
+    group_medians,
+    within_groups,
+)
 from genpolicy.audit.settings import AuditSettings
 
 # A change over the recordings must stand out of the changes between neighbours this much: the best
@@ -49,11 +54,13 @@ def episode_drifts(motion: Motion, lags: Array, settings: AuditSettings) -> Arra
 def drift_defects(drifts: Array, data: AuditInput, settings: AuditSettings) -> list[Defect]:
     """Drift along the episodes of an epoch, from the growth of the lag."""
     defects = []
+    _, spread = within_groups(drifts, data.episodes.calibration_epoch, LEAST_EPISODES)
+    floor = max(settings.drift_limit_steps, settings.clock_limit_s / data.period_s)
+    floor = max(floor, EPOCH_SPREADS * float(np.nan_to_num(spread)))
     for name, count, growth, error in group_medians(
         drifts, data.episodes.calibration_epoch, reference=0.0, least=LEAST_EPISODES
     ):
-        limit = max(settings.drift_limit_steps, settings.clock_limit_s / data.period_s)
-        limit = max(limit, settings.significance * error)
+        limit = max(floor, settings.significance * error)
         if count >= LEAST_EPISODES and not limit - abs(growth) >= 0:
             defects.append(
                 Defect(

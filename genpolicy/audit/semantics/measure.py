@@ -100,6 +100,7 @@ def _position(
         declared_s=None if declared is None else declared * period,
         finest_s=settings.clock_limit_steps * period,
         episode_limit_s=max(EPISODE_STEPS * period, settings.clock_limit_s),
+        errors_s=lags.error * period,
     )
     if not defects:
         defects += leading_defects(lags.steps, data, settings)
@@ -174,6 +175,7 @@ def _by_motion(
         declared_s=None,
         finest_s=settings.clock_limit_steps * data.period_s,
         episode_limit_s=max(EPISODE_STEPS * data.period_s, settings.clock_limit_s),
+        errors_s=lags.error * data.period_s,
     )
     if not defects:
         limit = max(ORDER_STEPS * data.period_s, settings.clock_limit_s)

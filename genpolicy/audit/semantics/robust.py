@@ -10,6 +10,8 @@ from genpolicy.audit.data import Array, Flags, Integers, Text
 NORMAL_HALF = 2.0 * 0.6745
 # Standard error of a median, in standard errors of the mean, for normal values.
 MEDIAN_ERROR = 1.2533
+# The spread of a dozen episodes is itself known badly: the error grows by this over their number.
+FEW = 5.0
 
 
 def densest_half(values: Array) -> tuple[float, float]:
@@ -63,11 +65,12 @@ def group_medians(
     total = np.count_nonzero(known)
     common = 0.0 if reference is not None else 1.0 / total
     centre = float(np.median(values[known])) if reference is None else reference
+    few = 1.0 + FEW / total
     result = []
     for name in np.unique(groups):
         chosen = values[known & (groups == name)]
         if len(chosen):
-            error = MEDIAN_ERROR * spread * float(np.sqrt(1.0 / len(chosen) + common))
+            error = few * MEDIAN_ERROR * spread * float(np.sqrt(1.0 / len(chosen) + common))
             result.append((str(name), len(chosen), float(np.median(chosen)) - centre, error))
     return result
 
