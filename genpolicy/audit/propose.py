@@ -33,12 +33,18 @@ def observation_contract(dataset: Dataset) -> ObservationContract:
     )
 
 
-def propose_settings(dataset: Dataset, overrides: Mapping[str, Any] | None = None) -> AuditSettings:
+def propose_settings(
+    dataset: Dataset,
+    overrides: Mapping[str, Any] | None = None,
+    *,
+    source: Mapping[str, Any] | None = None,
+) -> AuditSettings:
     """Settings of an audit from what the manifest says of the data.
 
     Args:
         dataset: A verified dataset.
         overrides: Settings that the user states; they win.
+        source: The import contract as plain values; that of the manifest if absent.
 
     Returns:
         Settings with every scale filled in.
@@ -46,7 +52,7 @@ def propose_settings(dataset: Dataset, overrides: Mapping[str, Any] | None = Non
     Raises:
         ConfigError: An override that does not exist or does not fit.
     """
-    source = dataset.manifest.get("import_contract") or {}
+    source = source or dataset.manifest.get("import_contract") or {}
     contract = observation_contract(dataset)
     stated = {**(source.get("audit") or {}), **(overrides or {})}
     pairing: Mapping[str, str] = source.get("pairing") or {}

@@ -62,7 +62,7 @@ def run_audit(options: argparse.Namespace) -> int:
     opened = _opened(options, work)
     _say(f"{opened.accepted} episodes accepted, {len(opened.refused)} refused; auditing")
     dataset = load_dataset(opened.folder)
-    settings = propose_settings(dataset, opened.contract.audit)
+    settings = propose_settings(dataset, source=opened.contract.model_dump(mode="json"))
     checks = task_checks(dataset, task=options.task, chunk_steps=settings.chunk_steps)
     report = audit(
         dataset,
