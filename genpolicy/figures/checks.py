@@ -154,7 +154,7 @@ def realignment(
         axes.axhspan(-limit_s, limit_s, color=GREY, alpha=0.15, lw=0, label="within the limit")
         for number, epoch in enumerate(epochs):
             part = known[known["epoch"] == epoch]
-            name = f"epoch {epoch}" if epoch else "episode"
+            name = "episode" if not epoch else epoch if "epoch" in epoch else f"epoch {epoch}"
             axes.plot(
                 part["order"], part[column], MARKS[number % len(MARKS)], ms=3.5, alpha=0.8,
                 color=PALETTE[number % len(PALETTE)], label=name,

@@ -56,15 +56,16 @@ def plane_of(
         paths: Shapes (K, P), of one situation or of many.
         names: Name of each component. Length P.
         unit: Their unit; empty if they have none in common.
-        from_above: Show the first two components whatever happens in the third, because
-            obstacles are known there.
+        from_above: Show the first two components of a scene whatever happens in the third,
+            because obstacles are known there.
     """
     width = len(names)
     if width <= 1:
         return Plane("action steps ahead", _label(names[0] if names else "value", unit), None)
-    if width <= SCENE:
+    scene = _scene(names)
+    if scene:
         spread = np.sum([np.ptp(path - path[0], axis=0) ** 2 for path in paths], axis=0)
-        used = [0, 1] if from_above else sorted(np.argsort(-spread, kind="stable")[:2].tolist())
+        used = scene[:2] if from_above else _widest(spread, scene)
         return Plane(_label(names[used[0]], unit), _label(names[used[1]], unit), (used[0], used[1]))
     direction = main_direction(np.concatenate([path - path[0] for path in paths]))[0]
     return Plane("action steps ahead", _label("motion along main direction", unit), None, direction)
@@ -81,9 +82,9 @@ def scatter_of(positions: Array, names: Sequence[str], unit: str) -> tuple[Array
     Returns:
         Shape (n, 2), and the labels.
     """
-    if positions.shape[1] <= SCENE:
-        spread = np.ptp(positions, axis=0)
-        used = sorted(np.argsort(-spread, kind="stable")[:2].tolist())
+    scene = _scene(names)
+    if scene:
+        used = _widest(np.ptp(positions, axis=0), scene)
         return positions[:, used], _label(names[used[0]], unit), _label(names[used[1]], unit)
     axes = main_direction(positions, count=2)
     centred = positions - positions.mean(axis=0)
@@ -112,6 +113,22 @@ def main_direction(points: Array, count: int = 1) -> Array:
     axes = np.linalg.eigh(centred.T @ centred)[1][:, ::-1][:, :count].T
     signs = np.sign(axes[np.arange(count), np.argmax(np.abs(axes), axis=1)])
     return np.asarray(axes * np.where(signs == 0, 1.0, signs)[:, None])
+
+
+def _scene(names: Sequence[str]) -> list[int]:
+    """Which components are a place in the scene; none if they are joints, or of two arms."""
+    if len(names) <= SCENE:
+        return list(range(len(names)))
+    ends = [name.rpartition(".")[2].removesuffix("_m").removesuffix("_px") for name in names]
+    found = [place for place, end in enumerate(ends) if end in ("x", "y", "z")]
+    kinds = [ends[place] for place in found]
+    return found if kinds in (["x", "y"], ["x", "y", "z"]) else []
+
+
+def _widest(spread: Array, scene: list[int]) -> list[int]:
+    """The two components of a scene with the largest spread, in their order."""
+    order = np.argsort(-spread[scene], kind="stable")[:2]
+    return sorted(scene[int(place)] for place in order)
 
 
 def _label(name: str, unit: str) -> str:

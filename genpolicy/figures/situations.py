@@ -106,7 +106,8 @@ def mean_versus_modes(
     means = _paths(frame["mean_path"], len(names))
     plane = plane_of([*means, *chain.from_iterable(modes)], names, unit, from_above=bool(obstacles))
     figure, (axes,) = new_figure(height=3.7)
-    draw_obstacles(axes, obstacles)
+    if plane.is_scene:
+        draw_obstacles(axes, obstacles)
     verdicts = [_mean_verdict(value) for value in frame["mean_admissible"]]
     for chunks, mean, verdict in zip(modes, means, verdicts, strict=True):
         lines = [plane.line(chunk) for chunk in chunks]
@@ -116,7 +117,7 @@ def mean_versus_modes(
         axes.plot(line[:, 0], line[:, 1], color=MEANS[verdict], ls="--", lw=1.4)
     reasons = sorted({str(reason) for reason in frame["mean_reason"].dropna()} - {""})
     _overlay_legend(axes, plane, verdicts, reasons, most=max(len(chunks) for chunks in modes))
-    above = ", from above" if obstacles else ""
+    above = ", from above" if obstacles and plane.is_scene else ""
     axes.set_title(f"{len(frame)} of {total} held-out situations with several modes{above}")
     axes.set_xlabel(plane.x_label)
     axes.set_ylabel(plane.y_label)
@@ -159,8 +160,8 @@ def _fan(
         axes.plot(line[:, 0], line[:, 1], color=looks[label][0], lw=0.9, alpha=0.6)
     mean = np.mean(lines, axis=0)
     axes.plot(mean[:, 0], mean[:, 1], color=INK, ls="--", lw=1.3)
-    draw_obstacles(axes, obstacles)
     if plane.is_scene:
+        draw_obstacles(axes, obstacles)
         axes.set_aspect("equal", adjustable="datalim")
 
 

@@ -89,6 +89,18 @@ def test_every_width_is_drawn_without_a_warning_and_twice_the_same(width):
         assert "nan" not in str(svg).lower() and len(texts(svg)) > 8
 
 
+@pytest.mark.parametrize(("width", "drawn_there"), [(2, True), (26, False)])
+def test_obstacles_stand_only_in_a_scene(width, drawn_there):
+    names, stone = [f"c{i}" for i in range(width)], [{"x_m": 0.0, "y_m": 0.0, "radius_m": 0.04}]
+    for draw in (
+        lambda: situations.clusters(examples(width), names=names, unit="m", obstacles=stone),
+        lambda: situations.mean_versus_modes(
+            neighbourhoods(width), names=names, unit="m", obstacles=stone
+        ),
+    ):
+        assert (situations.STONE.lower() in str(quiet(draw)).lower()) == drawn_there
+
+
 def test_situations_of_one_cluster_are_drawn_too():
     svg = quiet(lambda: situations.clusters(examples(2, clusters=1), names=["x", "y"], unit=""))
     assert "12 alike" in texts(svg)
