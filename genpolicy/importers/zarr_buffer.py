@@ -68,7 +68,6 @@ PUSHT = ImportContract(
         "action.agent_y_px": BOARD_PX,
     },
     frozen=Frozen(streams=["state"], seconds=2.0, motion=64.0),
-    audit={"minimum_separation_m": 30.0, "noise_floor_m": 5.0},
 )  # fmt: skip
 
 
