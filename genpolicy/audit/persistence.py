@@ -16,6 +16,7 @@ from genpolicy.audit.settings import AuditSettings
 
 NULL_QUANTILE = 0.95
 MINIMUM_PER_MODE = 2
+POINTWISE_RATIO = 0.5  # half way from a smooth spread to white noise
 
 
 @dataclass(frozen=True)
@@ -89,3 +90,14 @@ def _share(gaps: Array, labels: Integers) -> float:
     means = (gaps @ own) / np.maximum(counts, 1)
     means[np.broadcast_to(counts == 0, means.shape)] = np.inf
     return float(np.mean(kinds[np.argmin(means, axis=1)] == labels))
+
+
+def von_neumann(paths: Array) -> tuple[float, float]:
+    """Von Neumann ratio of the residual along the chunk (1 white, 0 smooth), and its RMS."""
+    residual = paths - paths.mean(axis=0)
+    residual = residual - residual.mean(axis=1, keepdims=True)
+    power = float(np.mean(residual**2))
+    if power <= 0.0:
+        return 0.0, 0.0
+    steps = float(np.mean(np.diff(residual, axis=1) ** 2))
+    return steps / (2.0 * power), float(np.sqrt(power * paths.shape[2]))

@@ -4,10 +4,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from genpolicy.audit.data import Array, AuditInput, Flags
+from genpolicy.audit.data import Array, AuditInput, Flags, Integers
 from genpolicy.audit.modes import Clustering
 from genpolicy.audit.neighbourhoods import Neighbourhood
 from genpolicy.audit.settings import AuditSettings
+
+AXES = (2, 3)
+JITTER = 0.01  # a tenth of a scale, squared: flat clouds stay solvable
 
 
 def resolved_by_observation(
@@ -16,17 +19,48 @@ def resolved_by_observation(
     situation: Neighbourhood,
     clustering: Clustering,
 ) -> bool:
-    """Whether one observed component already tells the clusters apart.
+    """Whether one observed component, or the place, already tells the clusters apart.
 
     Then the members do not share one observation, and a deterministic policy can follow both.
-    It must order them (nearly) perfectly and differ by at least its own scale.
+    It must order them (nearly) perfectly and differ by at least its own scale. The place (up to
+    three components) is also looked at along Fisher's line from one cluster to the other, which
+    need not lie along an axis; more components would always have such a line among so few members.
     """
+    place = _place(data)
     for values, inside in _observed(data, settings, situation, clustering):
+        if len(place):
+            line = _along(values[:, place], inside)
+            if _apart(line, inside) >= 1.0 and _auc(line, inside) >= settings.resolved_auc:
+                return True
         gap = np.abs(np.median(values[inside], axis=0) - np.median(values[~inside], axis=0))
         far = np.flatnonzero(gap >= 1.0)
         if any(_auc(values[:, j], inside) >= settings.resolved_auc for j in far):
             return True
     return False
+
+
+def _place(data: AuditInput) -> Integers:
+    """Columns of the position among those used, where there are two or three of them."""
+    used = np.isfinite(data.observation_scale)
+    columns = np.arange(len(used))[data.observation_position]
+    if len(columns) not in AXES or not used[columns].all():
+        return np.zeros(0, dtype=np.int64)
+    return np.asarray(np.cumsum(used)[columns] - 1, dtype=np.int64)
+
+
+def _along(values: Array, inside: Flags) -> Array:
+    """Coordinate along Fisher's line from a cluster to the rest, in scales. Shape (n,)."""
+    parts = (values[inside], values[~inside])
+    within = sum(np.cov(part, rowvar=False) * len(part) for part in parts) / len(values)
+    line = np.linalg.solve(
+        within + JITTER * np.eye(values.shape[1]), parts[0].mean(axis=0) - parts[1].mean(axis=0)
+    )
+    length = float(np.linalg.norm(line))
+    return np.asarray(values @ (line / length if length > 0.0 else line))
+
+
+def _apart(values: Array, inside: Flags) -> float:
+    return abs(float(np.median(values[inside]) - np.median(values[~inside])))
 
 
 def observed_gap(

@@ -21,6 +21,7 @@ from genpolicy.audit.situations import (
     Situation,
     by_phase,
     claimed,
+    coherent,
     episodes_of,
     examine,
     find_situations,
@@ -99,12 +100,13 @@ def audit(
         examine(data, settings, entry, number in chosen, admissible=admissible, seed=root_seed)
         for number, entry in enumerate(found)
     )
+    situations, incoherent = coherent(settings, situations)
     several = by_phase(situations)
     replayed = replay_sample(data, settings, replay=replay, root_seed=root_seed)
     links = _links(data, settings, several)
     modes = _modes(data, situations, links, replayed)
     strata = examine_strata(data, settings, several, links, root_seed=root_seed)
-    counts = count(data, settings, situations, support)
+    counts = count(data, settings, situations, support, incoherent)
     primary = primary_phase(several)
     layers = Layers(
         semantics=semantics,

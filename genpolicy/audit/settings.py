@@ -72,8 +72,9 @@ class AuditSettings(BaseModel):
         minimum_support_share: Share of held-out situations with enough neighbours, at least.
         minimum_two_mode_situations: Held-out episodes of a phase with several modes, below which
             the phase is said to have one.
-        minimum_two_mode_share: The same as a share of its analysed held-out episodes; about twice
-            what chance gives a cloud without modes that is looked at in ten situations an episode.
+        minimum_two_mode_share: The same as a share of its analysed held-out episodes. Where the
+            task has modes, most episodes come by; chance gives a cloud without modes that is
+            looked at in ten situations an episode up to a tenth of them.
         minimum_persistent_share: Share of a phase's situations with clusters that must keep them,
             each beyond its own shuffled-time null, for the clusters to be modes: most of them.
         strata_alpha: Family-wise error of the strata tests.
@@ -134,7 +135,7 @@ class AuditSettings(BaseModel):
     minimum_situations: int = Field(default=20, ge=1)
     minimum_support_share: float = Field(default=0.2, gt=0, lt=1)
     minimum_two_mode_situations: int = Field(default=5, ge=1)
-    minimum_two_mode_share: float = Field(default=0.1, gt=0, lt=1)
+    minimum_two_mode_share: float = Field(default=0.2, gt=0, lt=1)
     minimum_persistent_share: float = Field(default=0.5, gt=0, le=1)
     strata_alpha: float = Field(default=0.05, gt=0, lt=1)
     strata_effect_limit: float = Field(default=0.3, gt=0, lt=1)

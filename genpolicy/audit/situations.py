@@ -1,6 +1,6 @@
 """Every analysed situation: neighbours, clusters, whether they are modes, and what passes."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from genpolicy.audit.data import Array, AuditInput, relative_paths
 from genpolicy.audit.mean_versus_modes import Admissible, MeanVersusModes, compare
 from genpolicy.audit.modes import Clustering, cluster_chunks
 from genpolicy.audit.neighbourhoods import Neighbourhood, Support, find
-from genpolicy.audit.persistence import kept_identity
+from genpolicy.audit.persistence import POINTWISE_RATIO, kept_identity, persistent, von_neumann
 from genpolicy.audit.resolution import resolved_by_observation
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.seeds import stream
@@ -28,6 +28,8 @@ class Situation:
         two_mode: Several modes, and no observed component tells them apart.
         identity: Share of episodes that keep their mode, and its null; None if not measurable.
         chunks: Mean, median and modal chunks with their verdicts.
+        noise_ratio: Von Neumann ratio of the spread along the chunk: 1 white, 0 smooth.
+        noise_spread: RMS of that spread, unit of the position.
     """
 
     phase: str
@@ -36,6 +38,8 @@ class Situation:
     two_mode: bool
     identity: tuple[float, Array] | None
     chunks: MeanVersusModes
+    noise_ratio: float
+    noise_spread: float
 
 
 def find_situations(
@@ -91,7 +95,49 @@ def examine(
         identity = kept_identity(data, settings, item, clustering, rng=rng)
     check = admissible if two_mode else None
     chunks = compare(data, settings, item, clustering, admissible=check)
-    return Situation(phase, item, clustering, two_mode, identity, chunks)
+    ratio, spread = von_neumann(relative_paths(data, item.members, settings.chunk_steps))
+    return Situation(phase, item, clustering, two_mode, identity, chunks, ratio, spread)
+
+
+def coherent(
+    settings: AuditSettings, situations: tuple[Situation, ...]
+) -> tuple[tuple[Situation, ...], int]:
+    """Take back modes of phases in which they do not persist, or are noise along the chunk.
+
+    Where clusters are strategies, nearly all situations of a phase keep them, and their spread is
+    smooth along the chunk; where chance made them of tremor, neither holds. Phases that end too
+    soon to tell are kept only if no other phase has modes.
+
+    Args:
+        settings: Share of the measured situations that must persist.
+        situations: Every analysed situation.
+
+    Returns:
+        The situations, and how many lost their modes.
+    """
+    measured: dict[str, list[bool]] = {}
+    ratios: dict[str, list[float]] = {}
+    for item in situations:
+        if item.two_mode:
+            known = measured.setdefault(item.phase, [])
+            ratios.setdefault(item.phase, []).append(item.noise_ratio)
+            if item.identity is not None:
+                known.append(persistent(item.identity))
+    white = {name for name, found in ratios.items() if np.median(found) >= POINTWISE_RATIO}
+    good = {
+        phase
+        for phase, kept in measured.items()
+        if len(kept) >= settings.minimum_two_mode_situations
+        and float(np.mean(kept)) - settings.minimum_persistent_share >= 0
+    }
+    if not good:
+        silent = settings.minimum_two_mode_situations
+        good = {phase for phase, kept in measured.items() if len(kept) < silent}
+    good -= white
+    kept = tuple(
+        replace(item, two_mode=item.two_mode and item.phase in good) for item in situations
+    )
+    return kept, sum(a.two_mode and not b.two_mode for a, b in zip(situations, kept, strict=True))
 
 
 def by_phase(situations: tuple[Situation, ...]) -> Several:

@@ -97,13 +97,15 @@ def examine_strata(
         least = settings.minimum_neighbours // 2
         hidden = _disjoint(data, items, closest, least)
         seen = _disjoint(data, items, drawn, least)
+        together = closest[np.sort(gaps) < STILL_TOGETHER]
+        past = _disjoint(data, items, together, least)
         tested = [(*entry, hidden) for entry in _hidden_variables(data, hidden[0], links[phase])]
+        # Routes of different length are at another time as soon as they part.
+        tested.append(("time_in_episode", data.index[past[0]].astype(np.float64), False, past))
         tested += [(*entry, seen) for entry in _observed_variables(data, seen[0])]
         for variable, values, observed, place in tested:
             seeds = (root_seed, phase, variable)
             rows.append(_tested(settings, seeds, values, place, observed=observed))
-        together = closest[np.sort(gaps) < STILL_TOGETHER]
-        past = _disjoint(data, items, together, least)
         rows.append(_history(data, settings, phase, past, root_seed))
     return _adjusted(rows)
 
@@ -216,7 +218,6 @@ def _hidden_variables(data: AuditInput, rows: Integers, links: Integers) -> list
     result.append(("episode_order", table.order[episode] if ordered else None, False))
     nearby = _nearby_mode(table.order, links)[episode] if ordered else None
     result.append((SEQUENCE, nearby, False))
-    result.append(("time_in_episode", data.index[rows].astype(np.float64), False))
     return result
 
 

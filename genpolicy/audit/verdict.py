@@ -8,13 +8,12 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from genpolicy.audit.labels import ModeOutcome, Replayed, disagreement
-from genpolicy.audit.persistence import Persistence
+from genpolicy.audit.persistence import POINTWISE_RATIO, Persistence
 from genpolicy.audit.semantics import Semantics
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.audit.strata import HISTORY, SEQUENCE, Stratum
 
 DATA_VARIABLES = ("calibration_epoch",)
-POINTWISE_RATIO = 0.5
 # Which variable to name when several explain the modes equally well, most concrete first; all
 # others (observed ones) come before the last three, which anything else may shine through.
 CONCRETE = (
@@ -53,6 +52,7 @@ class Counts:
         needed_episodes: How many it takes to speak of modes.
         resolved: Situations with clusters that are not claimed as modes: an observed component
             tells them apart, or they are too few in their phase.
+        incoherent: Situations with clusters in phases where they do not persist.
         persistent: Situations with several modes that persist.
         noise_ratio: Median von Neumann ratio of the spread inside situations: 1 white, 0 smooth.
         noise_spread: Median spread inside situations, unit of the position.
@@ -65,6 +65,7 @@ class Counts:
     two_mode_episodes: int
     needed_episodes: int
     resolved: int
+    incoherent: int
     persistent: int
     noise_ratio: float
     noise_spread: float
@@ -196,10 +197,14 @@ def _support(settings: AuditSettings, counts: Counts) -> AuditVerdict | None:
 def _structure(
     settings: AuditSettings, counts: Counts, persistence: Persistence
 ) -> AuditVerdict | None:
+    loud = counts.noise_spread >= settings.noise_floor_m
+    white = counts.noise_ratio >= POINTWISE_RATIO and loud
+    unseen = persistence.n < settings.minimum_two_mode_situations
+    if white and (unseen or counts.two_mode_episodes < counts.needed_episodes):
+        return _noise("The spread is noise from action to action")
     if counts.two_mode_episodes < counts.needed_episodes:
-        white = counts.noise_ratio >= POINTWISE_RATIO
-        if white and counts.noise_spread >= settings.noise_floor_m:
-            return _noise("The spread is noise from action to action")
+        if counts.incoherent >= settings.minimum_two_mode_situations:
+            return _noise("Clusters do not persist over a chunk")
         decided = counts.resolved > counts.two_mode
         return AuditVerdict(
             Cause.UNIMODAL,
@@ -207,7 +212,7 @@ def _structure(
             "observation_decides" if decided else "",
             "Use the simple baselines: one observation has one action here.",
         )
-    if persistence.n < settings.minimum_two_mode_situations:
+    if unseen:
         return AuditVerdict(
             Cause.INSUFFICIENT_SUPPORT,
             "",
