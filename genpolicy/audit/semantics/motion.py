@@ -8,9 +8,9 @@ from genpolicy.audit.data import Array, AuditInput, Flags, Integers, Text
 from genpolicy.audit.semantics.robust import episode_medians
 
 TURNS = (2.0 * np.pi, 360.0)  # rad, degrees
-# A jump by a turn is one if it is within this share of a turn, and far beyond the other steps.
-TURN_TOLERANCE = 0.05
-STEP_RATIO = 5.0
+# A wrapped angle spans its turn, within this share, and steps either little or nearly by a turn.
+TURN_TOLERANCE = 0.1
+SMALL_STEP = 0.35
 # A seam is a step this many times as large as the fast steps of all motion, and as its neighbours:
 # a fast motion is fast in its neighbours too.
 SEAM_STEP = 5.0
@@ -80,10 +80,10 @@ def _unwrapped(values: Array, inside: Flags, episode: Integers) -> tuple[Array, 
     """The angle without jumps by a turn inside an episode, how many there were, and the turn."""
     steps = np.where(inside, np.diff(values), 0.0)
     for turn in TURNS:
-        if np.ptp(values) > (1.0 + TURN_TOLERANCE) * turn:
-            continue
-        jump = np.abs(np.abs(steps) - turn) <= TURN_TOLERANCE * turn
-        if not jump.any() or np.max(np.abs(steps[~jump]), initial=0.0) > turn / STEP_RATIO:
+        jump = np.abs(steps) > (1.0 - SMALL_STEP) * turn
+        spans = abs(float(np.ptp(values)) / turn - 1.0) <= TURN_TOLERANCE
+        unclear = (np.abs(steps) > SMALL_STEP * turn) & ~jump
+        if not spans or not jump.any() or unclear.any():
             continue
         turns = np.concatenate([[0.0], np.cumsum(np.where(jump, -np.sign(steps) * turn, 0.0))])
         first = np.searchsorted(episode, episode)

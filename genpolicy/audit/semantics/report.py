@@ -9,7 +9,7 @@ from genpolicy.audit.data import Integers, Text
 # In the order of diagnosis; the first defect found names the verdict. Units and frames are measured
 # whatever the lag is, but a lag is not worth much in a turned frame: so they stand before clocks.
 KINDS = (
-    "unit", "swapped_columns", "frame", "clock", "rate", "gaps", "jitter", "clock_drift", "glued",
+    "unit", "swapped_columns", "frame", "clock", "rate", "jitter", "gaps", "clock_drift", "glued",
     "duplicate", "stub", "calibration",
 )  # fmt: skip
 

@@ -56,15 +56,19 @@ def group_medians(
 ) -> list[tuple[str, int, float, float]]:
     """Name, count, median deviation and its standard error of each group with known values.
 
-    The spread is that inside the groups, so that a group that is off does not hide itself.
+    Without a reference it is the median of all; of two groups that of the larger (the first of
+    equal ones), for the median of all would lie between them. The spread is that inside the
+    groups, so that a group that is off does not hide itself.
     """
     known = np.isfinite(values)
     if not known.any():
         return []
     _, spread = within_groups(values, groups, least)
-    total = np.count_nonzero(known)
-    common = 0.0 if reference is not None else 1.0 / total
-    centre = float(np.median(values[known])) if reference is None else reference
+    total = int(np.count_nonzero(known))
+    names, sizes = np.unique(groups[known], return_counts=True)
+    pool = known if len(names) != 2 else known & (groups == names[np.argmax(sizes)])
+    common = 0.0 if reference is not None else 1.0 / np.count_nonzero(pool)
+    centre = float(np.median(values[pool])) if reference is None else reference
     few = 1.0 + FEW / total
     result = []
     for name in np.unique(groups):
