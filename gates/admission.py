@@ -17,6 +17,7 @@ STAGE_REQUIRES: dict[str, Gate | None] = {
     "ingest": None,
     "audit": None,
     "baselines": None,
+    "factors": None,
     "gate_a": None,
     "generators": "A",
     "reload": "A",

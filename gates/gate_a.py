@@ -9,11 +9,12 @@ from pathlib import Path
 
 from pydantic import Field
 
-from gates import need
+from gates import need, shortcuts
 from gates.engine import CriterionSpec, GateSpec, default_diagnosis, judge_gate
 from gates.evidence import Evidence, MissingEvidenceError
 from gates.models import Criterion, GateReport, StrictModel, Threshold, Verdict
 from gates.need import AUDIT, BASELINES, REFUSALS, VALID_CAUSE
+from gates.shortcuts import FACTORS, LATENT, VARIANTS
 
 
 class Params(StrictModel):
@@ -26,13 +27,25 @@ class Params(StrictModel):
         baselines: Simpler policies that must be there, frozen and matched.
         deployed_conventions: Sampling conventions under which a baseline is deployed; drawing
             from a latent is a generator's way and is reported beside them.
+        generative_baselines: Baselines that are drawn at random under every convention (an
+            energy's candidates are), so that they are reported beside the deployed ones.
+        chunked_baseline: Baseline that shows what chunking alone does.
+        latent_baseline: Baseline whose latent must answer the observation.
+        factors: Factors of which each must have been changed alone.
+        conditioning_factors: Factors that could make a density unnecessary; a head is what the
+            gate is about, and a single action commits to no mode.
     """
 
     confidence: float = Field(default=0.95, gt=0.5, lt=1.0)
     strata_level: float = Field(default=0.05, gt=0.0, lt=1.0)
     held_out_splits: tuple[str, ...] = ("validation", "test")
-    baselines: tuple[str, ...] = ("bc", "chunked_bc", "act")
+    baselines: tuple[str, ...] = ("bc", "chunked_bc", "act", "ibc")
     deployed_conventions: tuple[str, ...] = ("direct", "z_zero")
+    generative_baselines: tuple[str, ...] = ("ibc",)
+    chunked_baseline: str = "chunked_bc"
+    latent_baseline: str = "act"
+    factors: tuple[str, ...] = ("reference", "representation", "trunk", "head", "temporal")
+    conditioning_factors: tuple[str, ...] = ("representation", "trunk")
 
 
 def judge(root: Path, thresholds: Mapping[str, Threshold], params: Params) -> GateReport:
@@ -74,12 +87,19 @@ SPEC = GateSpec(
         f"{BASELINES}/*/seed_*/model.safetensors",
         f"{BASELINES}/*/seed_*/config.json",
         f"{BASELINES}/offline.parquet",
+        f"{FACTORS}/*/seed_*/model.safetensors",
+        f"{FACTORS}/*/seed_*/config.json",
+        f"{FACTORS}/errors.parquet",
     ),
     back_to="the dataset, the observation, or the simpler policy",
     go_on="A generator is a candidate: train diffusion and flow under the matched configuration.",
     caveats=(
         "Modes are clusters of recorded chunks; a mode that no demonstrator used is not seen.",
         "Conditional tests see measured variables only; an unrecorded one can still explain modes.",
+        "An energy policy (IBC) draws its candidates at random: a generator, reported beside the "
+        "deployed baselines and not judged as one.",
+        "Factors are separated after a short training with one seed; their intervals cover "
+        "held-out episodes, not training, and small effects may be luck.",
     ),
     criteria=(
         CriterionSpec(
@@ -216,13 +236,58 @@ SPEC = GateSpec(
             route=VALID_CAUSE,
         ),
         CriterionSpec(
+            "phase_collapse_share",
+            "Do the modes collapse when the phase is seen?",
+            "<=",
+            "perception",
+            (f"{AUDIT}/summary.json",),
+            shortcuts.phase_collapse,
+            "Conditioning: the phase explains the modes; give it to the policy.",
+        ),
+        CriterionSpec(
             "baselines_matched",
-            "Are BC, chunked BC and ACT frozen under one configuration?",
+            "Are BC, chunked BC, ACT and IBC frozen under one configuration?",
             "<=",
             "model",
             (f"{BASELINES}/matched.json",),
             need.baselines_matched,
             "Baselines: configurations differ in more than the head; retrain them matched.",
+        ),
+        CriterionSpec(
+            "chunking_valid_share",
+            "Does chunking alone remove the mean action?",
+            "<=",
+            "model",
+            (f"{BASELINES}/modes.parquet",),
+            shortcuts.chunking_valid,
+            "Baselines: temporal context was missing, not a density; keep chunked BC.",
+        ),
+        CriterionSpec(
+            "latent_dependence_p",
+            "Do ACT's samples depend on the observation beyond chance?",
+            "<=",
+            "model",
+            (LATENT,),
+            shortcuts.latent_dependence,
+            "Baselines: the latent encodes style or noise; clean the demonstrations first.",
+        ),
+        CriterionSpec(
+            "factors_isolated",
+            "Was each factor changed alone?",
+            "<=",
+            "model",
+            (VARIANTS,),
+            shortcuts.factors_isolated,
+            "Baselines: a variant changes more than its factor, so nothing is separated.",
+        ),
+        CriterionSpec(
+            "factor_valid_share",
+            "Does another encoder, history or trunk alone remove the mean action?",
+            "<=",
+            "model",
+            (f"{FACTORS}/modes.parquet", VARIANTS),
+            shortcuts.factor_valid,
+            "Baselines: the conditioning was too poor; take that encoder, history or trunk.",
         ),
         CriterionSpec(
             "baseline_mode_coverage",

@@ -222,13 +222,17 @@ def baseline_coverage(case: Case) -> Measured:
     for method in case.params.baselines:
         rows = case.evidence.of(f"{BASELINES}/modes.parquet", method, *columns)
         rows = rows[numbers(rows, "modes_present") >= 2]
-        if not rows["convention"].isin(case.params.deployed_conventions).any():
+        generative = method in case.params.generative_baselines
+        if not (generative or rows["convention"].isin(case.params.deployed_conventions).any()):
             raise MissingEvidenceError(f"no two-mode situation was given to {method} as deployed")
         share = numbers(rows, "modes_covered") / numbers(rows, "modes_present")
         means = rows.assign(share=share).groupby("convention")["share"].mean()
         for name, value in means.items():
-            into = deployed if name in case.params.deployed_conventions else drawn
+            fixed = name in case.params.deployed_conventions and not generative
+            into = deployed if fixed else drawn
             into.append((float(value), f"{method}, {name}"))
+    if not deployed:
+        raise MissingEvidenceError("no baseline is deployed without drawing at random")
     best, name = max(deployed)
     text = f"best of {len(deployed)} deployed conventions, by {name}"
     if drawn:

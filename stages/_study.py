@@ -3,7 +3,7 @@
 from pydantic import Field
 
 from genpolicy.comparison.fleet import PolicySettings
-from genpolicy.comparison.study import Study
+from genpolicy.comparison.study import LatentTest, Study
 from genpolicy.contract.settings import Settings
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.policies.settings import SamplerConfig
@@ -17,12 +17,14 @@ class StudySection(Settings):
     Attributes:
         samplers: Methods, and the sampler of each.
         conventions: Further samplers to count modes with, by method and name.
+        latent: Method whose latent is tested for depending on the observation, if any.
         samples: Candidates per held-out situation.
         fixtures: Observations whose samples must be reproduced after reload.
     """
 
     samplers: dict[str, SamplerConfig]
     conventions: dict[str, dict[str, SamplerConfig]] = Field(default_factory=dict)
+    latent: LatentTest | None = None
     samples: int
     fixtures: int
 
@@ -37,6 +39,7 @@ def study_of(params: Params, section: StudySection) -> Study:
         horizons=params.horizons,
         feasibility=params.section("feasibility", FeasibilitySettings),
         maximum_age_s=params.section("execution", ExecutionSettings).maximum_age_s,
+        latent=section.latent,
         samples=section.samples,
         fixtures=section.fixtures,
         root_seed=params.seed,

@@ -145,7 +145,6 @@ def matched_configuration(folders: Mapping[str, Path], *, reference: str) -> dic
         Content of `matched.json`: parameters and FLOPs per part, differing keys, whitelist.
     """
     configs = {method: read_json(folder / CONFIG_FILE) for method, folder in folders.items()}
-    base = _flat(configs[reference])
     methods, differing = {}, {}
     for method, config in configs.items():
         methods[method] = {
@@ -154,14 +153,10 @@ def matched_configuration(folders: Mapping[str, Path], *, reference: str) -> dic
             "flops": config["flops"],
             "config": config,
         }
-        flat = _flat(config)
         # A method that predicts one action differs in its horizon by definition (chapter 1.2).
         skip = SINGLE_ACTION_KEYS if config["horizons"]["prediction_horizon"] == 1 else ()
-        differing[method] = sorted(
-            key
-            for key in base.keys() | flat.keys()
-            if base.get(key) != flat.get(key) and key not in skip
-        )
+        changed = differing_keys(configs[reference], config)
+        differing[method] = [key for key in changed if key not in skip]
     return {
         "reference": reference,
         "methods": methods,
@@ -174,6 +169,12 @@ def matched_configuration(folders: Mapping[str, Path], *, reference: str) -> dic
 SINGLE_ACTION_KEYS = (
     "horizons.prediction_horizon", "horizons.execution_horizon", "dimensions.prediction_horizon",
 )  # fmt: skip
+
+
+def differing_keys(one: Mapping[str, Any], other: Mapping[str, Any]) -> list[str]:
+    """Sorted keys in which two checkpoint configurations differ, derived numbers left out."""
+    base, flat = _flat(one), _flat(other)
+    return sorted(key for key in base.keys() | flat.keys() if base.get(key) != flat.get(key))
 
 
 def _flat(config: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:

@@ -16,8 +16,10 @@ from genpolicy.comparison.fleet import (
     training_windows,
 )
 from genpolicy.comparison.held_out import held_out_situations, modes_of_policy
+from genpolicy.comparison.latent import as_row, latent_dependence
 from genpolicy.compute import map_shards
 from genpolicy.contract.horizons import HorizonConfig
+from genpolicy.contract.settings import Settings
 from genpolicy.dataset.dataset import Dataset, load_dataset
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import write_bytes
@@ -35,6 +37,22 @@ SPLITS = ("validation", "test")
 DEFAULT_CONVENTION = "default"
 
 
+class LatentTest(Settings):
+    """What is asked of a latent: whether its samples depend on the observation.
+
+    Attributes:
+        method: Method with a latent.
+        convention: The convention of `conventions` that draws it.
+        samples: Latents, the same at every situation.
+        permutations: Permutations of the test.
+    """
+
+    method: str
+    convention: str
+    samples: int
+    permutations: int
+
+
 @dataclass(frozen=True)
 class Study:
     """Everything a study needs besides its folders.
@@ -47,6 +65,7 @@ class Study:
         horizons: Common horizons.
         feasibility: Thresholds of the six layers.
         maximum_age_s: Largest action age by phase.
+        latent: Method whose latent is tested; None tests none.
         samples: Candidates per situation.
         fixtures: Observations whose samples must be reproduced after reload.
         root_seed: Root seed.
@@ -62,6 +81,7 @@ class Study:
     horizons: HorizonConfig
     feasibility: FeasibilitySettings
     maximum_age_s: Mapping[str, float]
+    latent: LatentTest | None
     samples: int
     fixtures: int
     root_seed: int
@@ -134,6 +154,9 @@ def run_study(
     write_table(folder / "offline.parquet", pa.Table.from_pylist(offline, OFFLINE))
     write_table(folder / "modes.parquet", pa.Table.from_pylist(modes, MODES))
     write_table(folder / "fixtures.parquet", pa.Table.from_pylist(fixtures, FIXTURES))
+    if study.latent is not None:
+        found = [row for part in parts for row in part[3]]
+        write_bytes(folder / "latent.json", canonical_json(found))
     folders = seed_folders(folder, list(study.samplers), study.settings.seeds[0])
     if reference is not None:
         folders = {reference_method: reference, **folders}
@@ -141,13 +164,18 @@ def run_study(
     write_bytes(folder / "matched.json", canonical_json(matched))
 
 
-def evaluate(job: Evaluation) -> tuple[Rows, Rows, Rows]:
-    """Rows of `offline.parquet`, `modes.parquet` and `fixtures.parquet` of one checkpoint."""
+def evaluate(job: Evaluation) -> tuple[Rows, Rows, Rows, Rows]:
+    """Rows of `offline`, `modes` and `fixtures.parquet` and of `latent.json` of one checkpoint."""
     data = load_dataset(job.dataset)
     policy = load_policy(job.folder, expected_sha256=job.sha256)
     observations = fixture_observations(data, horizons=job.study.horizons, count=job.study.fixtures)
     fixtures = fixture_rows(policy, observations, method=job.method, seed=job.seed)
-    return offline_rows(job, data, policy), mode_rows(job, data, policy), fixtures
+    return (
+        offline_rows(job, data, policy),
+        mode_rows(job, data, policy),
+        fixtures,
+        latent_rows(job, data, policy),
+    )
 
 
 def offline_rows(job: Evaluation, data: Dataset, policy: NetworkPolicy) -> list[dict[str, Any]]:
@@ -200,6 +228,23 @@ def mode_rows(job: Evaluation, data: Dataset, policy: NetworkPolicy) -> list[dic
             maximum_age_s=dict(study.maximum_age_s),
         )
     return rows
+
+
+def latent_rows(job: Evaluation, data: Dataset, policy: NetworkPolicy) -> list[dict[str, Any]]:
+    """Whether the tested method's latent depends on the observation; nothing for the others."""
+    test = job.study.latent
+    held_out = held_out_situations(job.audit, data, horizons=job.study.horizons)
+    if test is None or test.method != job.method or len(held_out.situations) < 2:
+        return []
+    sampler = job.study.conventions[test.method][test.convention]
+    found = latent_dependence(
+        NetworkPolicy(policy.checkpoint, sampler=sampler),
+        held_out,
+        samples=test.samples,
+        permutations=test.permutations,
+        root_seed=job.study.root_seed,
+    )
+    return [as_row(found, method=job.method, convention=test.convention, seed=job.seed)]
 
 
 OFFLINE = pa.schema(

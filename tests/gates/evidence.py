@@ -17,6 +17,7 @@ from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.tables import read_table, write_table
 
 BASELINES = ("bc", "chunked_bc", "act")
+DRAWN = "ibc"
 CANDIDATES = ("diffusion", "flow")
 CONDITIONS = ("nominal", "camera_delay", "compute_contention")
 STARTS = 40
@@ -36,7 +37,7 @@ PARAMS: dict[str, Any] = {
         "confidence": 0.95,
         "strata_level": 0.05,
         "held_out_splits": ["validation", "test"],
-        "baselines": list(BASELINES),
+        "baselines": [*BASELINES, DRAWN],
         "thresholds": {
             "refused_recordings_accounted": _t(0, "perception"),
             "clock_residual_s": _t(0.01, "perception"),
@@ -54,6 +55,11 @@ PARAMS: dict[str, Any] = {
             "cause_accepted": _t(1, "model"),
             "baselines_matched": _t(0, "model"),
             "baseline_mode_coverage": _t(0.6, "model"),
+            "phase_collapse_share": _t(0.5, "perception"),
+            "chunking_valid_share": _t(0.5, "model"),
+            "latent_dependence_p": _t(0.05, "model"),
+            "factors_isolated": _t(0, "model"),
+            "factor_valid_share": _t(0.5, "model"),
         },
     },
     "gate_b": {
@@ -179,6 +185,7 @@ def build(root: Path) -> None:
     _dataset(root)
     _audit(root)
     _baselines(root)
+    _factors(root)
     _generators(root)
     _reload(root)
     _latency(root)
@@ -331,6 +338,8 @@ def _audit(root: Path) -> None:
             "next_action": "train generators",
             "modes_before_realignment": 3,
             "modes_after_realignment": 2,
+            "modes_with_phase": 40,
+            "modes_without_phase": 42,
             "position_names": ["x", "y", "z"],
             "position_unit": "m",
             "obstacles": [{"x_m": 0.5, "y_m": 0.0, "radius_m": 0.025}],
@@ -420,10 +429,59 @@ def _checkpoints(root: Path, stage: str, methods: tuple[str, ...]) -> None:
 
 
 def _baselines(root: Path) -> None:
-    table(root, "baselines/modes.parquet", _modes(BASELINES, 1))
-    document(root, "baselines/matched.json", _matched(BASELINES))
+    fixed = [{**row, "admissible": 0} for row in _modes(BASELINES, 1)]
+    drawn = [{**row, "convention": "derivative_free"} for row in _modes((DRAWN,), 2)]
+    table(root, "baselines/modes.parquet", fixed + drawn)
+    document(root, "baselines/matched.json", _matched((*BASELINES, DRAWN)))
     table(root, "baselines/offline.parquet", [{"method": "bc", "seed": 0}])
-    _checkpoints(root, "baselines", BASELINES)
+    latent = {
+        "method": "act", "convention": "z_prior", "seed": 0, "situations": 30, "spread_m": 0.03,
+        "condition_share": 0.4, "distance_correlation": 0.6, "exceeding": 0, "permutations": 999,
+    }  # fmt: skip
+    document(root, "baselines/latent.json", [latent])
+    _checkpoints(root, "baselines", (*BASELINES, DRAWN))
+
+
+VARIANTS = {
+    "reference": ("reference", "direct", 16, []),
+    "linear_encoder": ("representation", "direct", 16, ["network.encoder"]),
+    "transformer": ("trunk", "direct", 16, ["network.trunk"]),
+    "energy_head": ("head", "derivative_free", 16, ["method", "sampler.name"]),
+    "single_action": ("temporal", "direct", 1, ["method"]),
+}
+
+
+def _factors(root: Path) -> None:
+    modes, errors = [], []
+    for place, (name, (factor, convention, _, _)) in enumerate(VARIANTS.items()):
+        named = {"variant": name, "factor": factor, "convention": convention}
+        covered = 2 if factor == "head" else 1
+        modes += [{**row, **named, "admissible": 0} for row in _modes((name,), covered)]
+        errors += [
+            {
+                **named, "seed": 0, "split": "test", "episode_uuid": f"e{i}", "windows": 9,
+                "chunk_error": 0.02 + 0.001 * place + 0.0001 * i,
+                "first_error": 0.01 + 0.0001 * (i + place),
+            }
+            for i in range(30)
+        ]  # fmt: skip
+    table(root, "factors/modes.parquet", modes)
+    table(root, "factors/errors.parquet", errors)
+    variants = {
+        name: {
+            "factor": factor,
+            "method": "chunked_bc",
+            "parameters": {"encoder": 10, "trunk": 80, "head": 10, "total": 100},
+            "changed": changed,
+            "allowed": changed,
+            "prediction_horizon": horizon,
+        }
+        for name, (factor, _, horizon, changed) in VARIANTS.items()
+    }
+    document(
+        root, "factors/factors.json", {"reference": "reference", "steps": 10, "variants": variants}
+    )
+    _checkpoints(root, "factors", tuple(VARIANTS))
 
 
 def _generators(root: Path) -> None:

@@ -115,6 +115,27 @@ WORSE = {
             BASE + "modes.parquet",
             lambda s: _cells("modes_covered", 2, where=_of("act"), share=s),
         ),
+        "phase_collapse_share": _document(
+            AUDIT + "summary.json", lambda s: _set("modes_with_phase", 40 - int(40 * s))
+        ),
+        "chunking_valid_share": _table(
+            BASE + "modes.parquet",
+            lambda s: _cells("admissible", 16, where=_of("chunked_bc"), share=s),
+        ),
+        "latent_dependence_p": _document(
+            BASE + "latent.json",
+            lambda s: lambda d: d[0].__setitem__("exceeding", int(999 * s)),
+        ),
+        "factors_isolated": _document(
+            "factors/factors.json",
+            lambda s: (
+                lambda d: d["variants"]["transformer"]["changed"].extend(["k"] * int(1 + 3 * s))
+            ),
+        ),
+        "factor_valid_share": _table(
+            "factors/modes.parquet",
+            lambda s: _cells("admissible", 16, where=_of("transformer"), share=s),
+        ),
     },
     "B": {
         "unmatched_keys": _document(
@@ -267,6 +288,7 @@ TABLES = {
         "audit/replay",
         "audit/calibration",
         "baselines/modes",
+        "factors/modes",
     ],
     "B": ["reload/samples", "reload/nfe", "reload/coverage", "latency/latency"],
     "C": ["shadow/candidates", "shadow/stub", "shadow/counts"],

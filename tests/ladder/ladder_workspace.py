@@ -19,13 +19,17 @@ ROOT = Path(__file__).parents[2]
 OVERRIDES = Path(__file__).with_name("overrides.yaml")
 REASON = "test: proves only that the pipeline runs"
 DROPPED = {
-    "baselines": ("samplers.bc", "samplers.act", "conventions.act"),
+    "baselines": ("samplers.bc", "samplers.ibc"),
+    "factors": (
+        "variants.newest_only", "variants.longer_history", "variants.l1_head",
+        "variants.act_head",
+    ),
     "generators": ("samplers.cvae",),
     "stress": tuple(
         f"perturbations.{name}"
         for name in ("compute_contention", "network_jitter", "queue_reorder", "push")
     ),
-}
+}  # fmt: skip
 
 
 def make_small_ladder(target: Path) -> Path:

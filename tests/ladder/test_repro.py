@@ -7,8 +7,8 @@ from ladder_workspace import edit_params, hashes, repro, set_limit
 
 GATES = [f"gate_{letter}" for letter in "abcde"]
 EVIDENCE = [
-    "record", "ingest", "audit", "baselines", "generators", "reload", "latency", "shadow",
-    "stress",
+    "record", "ingest", "audit", "baselines", "factors", "generators", "reload", "latency",
+    "shadow", "stress",
 ]  # fmt: skip
 
 
