@@ -47,6 +47,8 @@ STYLE: Any = {
 }
 
 NUMBER = re.compile(r"-?\d+\.\d{3,}")
+NAME = re.compile(r' id="([^"]+)"')
+REFERENCE = re.compile(r'(?:href="#|url\(#)([^")]+)')
 
 
 @dataclass(frozen=True)
@@ -109,6 +111,9 @@ def svg(figure: Figure, label: str) -> Markup:
     body = re.sub(r"<style[^>]*>.*?</style>", "", body, flags=re.DOTALL)
     body = re.sub(r"<metadata>.*?</metadata>", "", body, flags=re.DOTALL)
     body = body.replace("xlink:href", "href")
+    # Groups are named alike in every figure; only what a figure refers to keeps its name.
+    used = set(REFERENCE.findall(body))
+    body = NAME.sub(lambda name: name.group(0) if name.group(1) in used else "", body)
     body = re.sub(r' d="[^"]*"', lambda path: NUMBER.sub(_rounded, path.group(0)), body)
     start = Markup('<svg role="img" aria-label="{}" {}>').format(
         label, Markup(box.group(0) if box else "")

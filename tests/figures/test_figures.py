@@ -76,6 +76,16 @@ def quiet(draw):
         return drawn(draw, "a figure", salt="s")
 
 
+def test_only_names_that_are_referred_to_are_kept_and_two_figures_share_none():
+    frame = neighbourhoods(2)
+    draw = lambda: situations.mean_versus_modes(frame, names=XY, unit="m")  # noqa: E731
+    one, two = (str(drawn(draw, "a figure", salt=salt)) for salt in "ab")
+    names = [set(re.findall(r' id="([^"]+)"', svg)) for svg in (one, two)]
+    assert names[0] and not names[0] & names[1]
+    for svg, own in ((one, names[0]), (two, names[1])):
+        assert set(re.findall(r'(?:href="#|url\(#)([^")]+)', svg)) == own
+
+
 @pytest.mark.parametrize("width", WIDTHS)
 def test_every_width_is_drawn_without_a_warning_and_twice_the_same(width):
     names = [f"c{i}" for i in range(width)]
