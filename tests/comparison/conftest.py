@@ -4,6 +4,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
+import pyarrow as pa
 import pytest
 
 from genpolicy.comparison.fleet import PolicySettings, train_fleet
@@ -13,6 +14,7 @@ from genpolicy.dataset.dataset import load_dataset
 from genpolicy.dataset.ingest import ingest_recordings
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.documents import read_yaml
+from genpolicy.integrity.tables import write_table
 from genpolicy.policies.policy import load_policy
 from genpolicy.policies.settings import HeadConfig, NetworkConfig, SamplerConfig, TrainingConfig
 from genpolicy.simulation.execution_settings import ExecutionSettings
@@ -25,6 +27,7 @@ HORIZONS = HorizonConfig(**PARAMS["horizons"])
 EXECUTION = ExecutionSettings(**PARAMS["execution"])
 FEASIBILITY = FeasibilitySettings(**PARAMS["feasibility"])
 EPISODES = 10
+SIDE_M = (0.0, 0.1, 0.0)
 SAMPLERS = {
     "bc": SamplerConfig(name="direct"),
     "chunked_bc": SamplerConfig(name="direct"),
@@ -41,12 +44,33 @@ POLICY = PolicySettings(
 )  # fmt: skip
 
 
+def write_situations(folder, rows):
+    """An audit folder whose situations are `(uuid, index, changes)`."""
+    folder.mkdir(exist_ok=True)
+    straight = np.zeros((16, 3))
+    left, right = straight + np.array(SIDE_M), straight - np.array(SIDE_M)
+    table = [
+        {
+            "split": "test", "phase": "approach", "episode_uuid": uuid, "index": index,
+            "two_mode": True, "persistent": True, "mean_path": straight.ravel().tolist(),
+            "mode_paths": [left.ravel().tolist(), right.ravel().tolist()], **changes,
+        }
+        for uuid, index, changes in rows
+    ]  # fmt: skip
+    write_table(folder / "neighbourhoods.parquet", pa.Table.from_pylist(table))
+    return folder
+
+
+def uuids(data):
+    return data.episodes["episode_uuid"].tolist()
+
+
 @pytest.fixture(scope="session")
 def kit():
     """Settings in force, by name."""
     return SimpleNamespace(
         PARAMS=PARAMS, HORIZONS=HORIZONS, EXECUTION=EXECUTION, FEASIBILITY=FEASIBILITY,
-        POLICY=POLICY, SAMPLERS=SAMPLERS,
+        POLICY=POLICY, SAMPLERS=SAMPLERS, write_situations=write_situations, uuids=uuids,
     )  # fmt: skip
 
 

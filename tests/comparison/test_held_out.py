@@ -1,7 +1,6 @@
 """Held-out situations: the right rows, and errors for rows that are not there."""
 
 import numpy as np
-import pyarrow as pa
 import pytest
 
 from genpolicy.comparison.held_out import (
@@ -11,30 +10,6 @@ from genpolicy.comparison.held_out import (
     modes_of_policy,
 )
 from genpolicy.errors import ContractError
-from genpolicy.integrity.tables import write_table
-
-SIDE_M = (0.0, 0.1, 0.0)
-
-
-def write_situations(folder, rows):
-    """An audit folder whose situations are `(uuid, index, changes)`."""
-    folder.mkdir(exist_ok=True)
-    straight = np.zeros((16, 3))
-    left, right = straight + np.array(SIDE_M), straight - np.array(SIDE_M)
-    table = [
-        {
-            "split": "test", "phase": "approach", "episode_uuid": uuid, "index": index,
-            "two_mode": True, "persistent": True, "mean_path": straight.ravel().tolist(),
-            "mode_paths": [left.ravel().tolist(), right.ravel().tolist()], **changes,
-        }
-        for uuid, index, changes in rows
-    ]  # fmt: skip
-    write_table(folder / "neighbourhoods.parquet", pa.Table.from_pylist(table))
-    return folder
-
-
-def uuids(data):
-    return data.episodes["episode_uuid"].tolist()
 
 
 def rows_of(data, number):
@@ -45,8 +20,8 @@ def rows_of(data, number):
 
 
 def test_each_situation_gets_its_own_history(data, kit, tmp_path):
-    names = uuids(data)
-    audit = write_situations(tmp_path / "audit", [(names[8], 5, {}), (names[9], 0, {})])
+    names = kit.uuids(data)
+    audit = kit.write_situations(tmp_path / "audit", [(names[8], 5, {}), (names[9], 0, {})])
     found = held_out_situations(audit, data, horizons=kit.HORIZONS)
     by_name = dict(zip([s.episode_uuid for s in found.situations], found.observations, strict=True))
     np.testing.assert_array_equal(by_name[names[8]], rows_of(data, 8)[4:6])
@@ -55,8 +30,8 @@ def test_each_situation_gets_its_own_history(data, kit, tmp_path):
 
 
 def test_one_situation_per_episode_and_phase_and_only_persistent_ones(data, kit, tmp_path):
-    name = uuids(data)[9]
-    audit = write_situations(
+    name = kit.uuids(data)[9]
+    audit = kit.write_situations(
         tmp_path / "audit",
         [
             (name, 7, {}), (name, 3, {}), (name, 9, {"phase": "align"}),
@@ -70,14 +45,16 @@ def test_one_situation_per_episode_and_phase_and_only_persistent_ones(data, kit,
 
 @pytest.mark.parametrize(("number", "index"), [(None, 0), (0, -1), (0, 10_000)])
 def test_a_row_that_the_dataset_does_not_have_is_refused(data, kit, tmp_path, number, index):
-    name = "nobody" if number is None else uuids(data)[number]
-    audit = write_situations(tmp_path / "audit", [(name, index, {})])
+    name = "nobody" if number is None else kit.uuids(data)[number]
+    audit = kit.write_situations(tmp_path / "audit", [(name, index, {})])
     with pytest.raises(ContractError, match=f"situation {name}, row {index} is not in the dataset"):
         held_out_situations(audit, data, horizons=kit.HORIZONS)
 
 
 def test_no_situation_gives_no_row(data, kit, tmp_path, policy, task, checker):
-    audit = write_situations(tmp_path / "audit", [(uuids(data)[0], 0, {"persistent": False})])
+    audit = kit.write_situations(
+        tmp_path / "audit", [(kit.uuids(data)[0], 0, {"persistent": False})]
+    )
     found = held_out_situations(audit, data, horizons=kit.HORIZONS)
     rows = modes_of_policy(
         policy, found, seed=0, convention="x", samples=2, task=task, checker=checker,
@@ -87,7 +64,9 @@ def test_no_situation_gives_no_row(data, kit, tmp_path, policy, task, checker):
 
 
 def test_rows_count_modes_and_samples(data, kit, tmp_path, policy, task, checker):
-    audit = write_situations(tmp_path / "audit", [(uuids(data)[8], 4, {}), (uuids(data)[9], 4, {})])
+    audit = kit.write_situations(
+        tmp_path / "audit", [(kit.uuids(data)[8], 4, {}), (kit.uuids(data)[9], 4, {})]
+    )
     found = held_out_situations(audit, data, horizons=kit.HORIZONS)
     rows = modes_of_policy(
         policy, found, seed=3, convention="euler", samples=4, task=task, checker=checker,

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from test_held_out import uuids, write_situations
 
 from genpolicy.comparison.held_out import held_out_situations
 from genpolicy.comparison.latent import dependence, latent_dependence
@@ -79,8 +78,8 @@ def test_the_unit_of_the_change_is_metres_and_nothing_else_depends_on_it():
 
 
 def test_a_trained_policy_is_asked_with_shared_latents(data, kit, tmp_path, policy):
-    names = uuids(data)
-    audit = write_situations(tmp_path / "audit", [(names[i], 4, {}) for i in range(6)])
+    names = kit.uuids(data)
+    audit = kit.write_situations(tmp_path / "audit", [(names[i], 4, {}) for i in range(6)])
     found = held_out_situations(audit, data, horizons=kit.HORIZONS)
     one, two = (
         latent_dependence(policy, found, samples=4, permutations=19, root_seed=5) for _ in range(2)
