@@ -15,7 +15,7 @@ from genpolicy.audit.data import Array, AuditInput, Integers
 from genpolicy.audit.labels import ModeOutcome, Replayed
 from genpolicy.audit.persistence import NULL_QUANTILE, Persistence
 from genpolicy.audit.settings import AuditSettings
-from genpolicy.audit.situations import Situation
+from genpolicy.audit.situations import Situation, coherent_phases
 from genpolicy.audit.strata import Stratum
 from genpolicy.audit.verdict import AuditVerdict, Counts, Layers, decide
 from genpolicy.seeds import stream
@@ -31,13 +31,15 @@ class Table:
     Attributes:
         episodes: Held-out episodes with an analysed situation. Shape (E,).
         place: Position in `episodes` of each situation. Shape (n,).
-        two_mode: Several modes, per situation. Shape (n,).
+        claims: The situations as claimed, before phases were held to persist. Length n.
+        claimed: Several clusters claimed as modes, per situation. Shape (n,).
         identity: Situation, identity kept, and its null, of those measured.
     """
 
     episodes: Integers
     place: Integers
-    two_mode: Array
+    claims: tuple[Situation, ...]
+    claimed: Array
     identity: tuple[Integers, Array, Array]
 
 
@@ -56,7 +58,7 @@ def confidence(
         data: Canonical audit input.
         settings: Limits and number of draws.
         layers: What was measured.
-        situations: Every analysed situation.
+        situations: Every analysed situation, before phases were held to persist.
         verdict: What was decided.
         root_seed: Seed of the draws.
 
@@ -67,7 +69,7 @@ def confidence(
     table = _table(data, situations)
     same = 0
     for _ in range(settings.resamples):
-        drawn = decide(settings, _draw(layers, table, rng))
+        drawn = decide(settings, _draw(settings, layers, table, rng))
         same += (drawn.cause, drawn.variable) == (verdict.cause, verdict.variable)
     return same / settings.resamples
 
@@ -79,7 +81,8 @@ def _table(data: AuditInput, situations: tuple[Situation, ...]) -> Table:
     return Table(
         episodes=episodes,
         place=place.reshape(-1),
-        two_mode=np.array([item.two_mode for item in situations], dtype=np.float64),
+        claims=situations,
+        claimed=np.array([item.two_mode for item in situations], dtype=np.float64),
         identity=(
             np.array([n for n, _ in known], dtype=np.int64),
             np.array([value[0] for _, value in known]),
@@ -88,34 +91,40 @@ def _table(data: AuditInput, situations: tuple[Situation, ...]) -> Table:
     )
 
 
-def _draw(layers: Layers, table: Table, rng: np.random.Generator) -> Layers:
+def _draw(
+    settings: AuditSettings, layers: Layers, table: Table, rng: np.random.Generator
+) -> Layers:
     count = len(table.episodes)
     times = np.bincount(rng.integers(0, count, count), minlength=count) if count else table.episodes
+    weights = times[table.place].astype(np.float64)
+    good = coherent_phases(settings, table.claims, weights)
+    kept = table.claimed * np.array([item.phase in good for item in table.claims])
     return replace(
         layers,
         replayed=_replayed(layers.replayed, rng),
-        counts=_counts(layers.counts, table, times),
-        persistence=_persistence(layers.persistence, table, times),
+        counts=_counts(layers.counts, table, times, kept),
+        persistence=_persistence(layers.persistence, table, weights * kept),
         strata=tuple(_stratum(row, rng) for row in layers.strata),
         modes=tuple(_mode(mode, rng) for mode in layers.modes),
     )
 
 
-def _counts(counts: Counts, table: Table, times: Integers) -> Counts:
+def _counts(counts: Counts, table: Table, times: Integers, kept: Array) -> Counts:
     weights = times[table.place]
-    two_mode = np.bincount(table.place, weights=table.two_mode, minlength=len(times)) > 0
+    two_mode = np.bincount(table.place, weights=kept, minlength=len(times)) > 0
     return replace(
         counts,
-        two_mode=int(np.sum(weights * table.two_mode)),
+        two_mode=int(np.sum(weights * kept)),
         two_mode_episodes=int(np.sum(times * two_mode)),
+        incoherent=int(np.sum(weights * (table.claimed - kept))),
     )
 
 
-def _persistence(measured: Persistence, table: Table, times: Integers) -> Persistence:
+def _persistence(measured: Persistence, table: Table, weight: Array) -> Persistence:
     numbers, shares, null = table.identity
     if len(numbers) == 0:
         return measured
-    weights = times[table.place[numbers]].astype(np.float64)
+    weights = weight[numbers]
     if weights.sum() <= 0.0:
         return replace(measured, n=0)
     expected = weights @ null / weights.sum()

@@ -100,7 +100,8 @@ def audit(
         examine(data, settings, entry, number in chosen, admissible=admissible, seed=root_seed)
         for number, entry in enumerate(found)
     )
-    situations, incoherent = coherent(settings, situations)
+    claims = situations
+    situations, incoherent = coherent(settings, claims)
     several = by_phase(situations)
     replayed = replay_sample(data, settings, replay=replay, root_seed=root_seed)
     links = _links(data, settings, several)
@@ -133,7 +134,7 @@ def audit(
         modes_after_realignment=_after_realignment(data, settings, semantics, before, root_seed),
         modes_other_phases=_other_phases(data, settings, root_seed),
         verdict=verdict,
-        confidence=confidence(data, settings, layers, situations, verdict, root_seed=root_seed),
+        confidence=confidence(data, settings, layers, claims, verdict, root_seed=root_seed),
     )
 
 

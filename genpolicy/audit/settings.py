@@ -70,6 +70,8 @@ class AuditSettings(BaseModel):
         replay_episodes: Episodes to replay, drawn at random, at most.
         minimum_situations: Fewer analysed held-out episodes: insufficient support.
         minimum_support_share: Share of held-out situations with enough neighbours, at least.
+        minimum_absence_share: The same before it may be said that there are no modes: where half
+            of the situations cannot be looked at, modes may be there.
         minimum_two_mode_situations: Held-out episodes of a phase with several modes, below which
             the phase is said to have one.
         minimum_two_mode_share: The same as a share of its analysed held-out episodes. Where the
@@ -134,6 +136,7 @@ class AuditSettings(BaseModel):
     replay_episodes: int = Field(default=60, ge=0)
     minimum_situations: int = Field(default=20, ge=1)
     minimum_support_share: float = Field(default=0.2, gt=0, lt=1)
+    minimum_absence_share: float = Field(default=0.5, gt=0, lt=1)
     minimum_two_mode_situations: int = Field(default=5, ge=1)
     minimum_two_mode_share: float = Field(default=0.2, gt=0, lt=1)
     minimum_persistent_share: float = Field(default=0.5, gt=0, le=1)

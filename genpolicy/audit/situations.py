@@ -115,29 +115,35 @@ def coherent(
     Returns:
         The situations, and how many lost their modes.
     """
-    measured: dict[str, list[bool]] = {}
-    ratios: dict[str, list[float]] = {}
-    for item in situations:
-        if item.two_mode:
-            known = measured.setdefault(item.phase, [])
-            ratios.setdefault(item.phase, []).append(item.noise_ratio)
-            if item.identity is not None:
-                known.append(persistent(item.identity))
-    white = {name for name, found in ratios.items() if np.median(found) >= POINTWISE_RATIO}
-    good = {
-        phase
-        for phase, kept in measured.items()
-        if len(kept) >= settings.minimum_two_mode_situations
-        and float(np.mean(kept)) - settings.minimum_persistent_share >= 0
-    }
-    if not good:
-        silent = settings.minimum_two_mode_situations
-        good = {phase for phase, kept in measured.items() if len(kept) < silent}
-    good -= white
+    good = coherent_phases(settings, situations, np.ones(len(situations)))
     kept = tuple(
         replace(item, two_mode=item.two_mode and item.phase in good) for item in situations
     )
     return kept, sum(a.two_mode and not b.two_mode for a, b in zip(situations, kept, strict=True))
+
+
+def coherent_phases(
+    settings: AuditSettings, situations: tuple[Situation, ...], weights: Array
+) -> set[str]:
+    """Phases whose modes persist and are smooth; situations counted `weights` times. Shape (n,)."""
+    measured: dict[str, float] = {}
+    persist: dict[str, float] = {}
+    ratios: dict[str, list[float]] = {}
+    for item, weight in zip(situations, weights.tolist(), strict=True):
+        if item.two_mode and weight > 0.0:
+            known = weight * (item.identity is not None)
+            measured[item.phase] = measured.get(item.phase, 0.0) + known
+            kept = known * persistent(item.identity)
+            persist[item.phase] = persist.get(item.phase, 0.0) + kept
+            ratios.setdefault(item.phase, []).append(item.noise_ratio)
+    least = settings.minimum_two_mode_situations
+    good = {
+        phase
+        for phase, count in measured.items()
+        if count >= least and persist[phase] - settings.minimum_persistent_share * count >= 0
+    }
+    good = good or {phase for phase, count in measured.items() if count < least}
+    return good - {phase for phase, found in ratios.items() if np.median(found) >= POINTWISE_RATIO}
 
 
 def by_phase(situations: tuple[Situation, ...]) -> Several:

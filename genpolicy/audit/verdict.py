@@ -201,17 +201,9 @@ def _structure(
     white = counts.noise_ratio >= POINTWISE_RATIO and loud
     unseen = persistence.n < settings.minimum_two_mode_situations
     if white and (unseen or counts.two_mode_episodes < counts.needed_episodes):
-        return _noise("The spread is noise from action to action")
+        return _absent(settings, counts, white=True)
     if counts.two_mode_episodes < counts.needed_episodes:
-        if counts.incoherent >= settings.minimum_two_mode_situations:
-            return _noise("Clusters do not persist over a chunk")
-        decided = counts.resolved > counts.two_mode
-        return AuditVerdict(
-            Cause.UNIMODAL,
-            "",
-            "observation_decides" if decided else "",
-            "Use the simple baselines: one observation has one action here.",
-        )
+        return _absent(settings, counts, white=False)
     if unseen:
         return AuditVerdict(
             Cause.INSUFFICIENT_SUPPORT,
@@ -223,6 +215,32 @@ def _structure(
     if not persistence.observed - persistence.null_q95 >= 0:
         return _noise("Clusters do not persist over a chunk")
     return None
+
+
+def _absent(settings: AuditSettings, counts: Counts, *, white: bool) -> AuditVerdict:
+    """No modes were found; is that enough to say that there are none?"""
+    share = counts.analysed / counts.queries if counts.queries else 0.0
+    if not share - settings.minimum_absence_share >= 0:
+        return AuditVerdict(
+            Cause.INSUFFICIENT_SUPPORT,
+            "",
+            "neighbourhoods",
+            f"No modes were found in the {share:.0%} of the held-out situations that have enough "
+            "comparable training episodes; the others may hold some "
+            f"({settings.minimum_absence_share:.0%} needed to deny it): record more, from fewer "
+            "starts.",
+        )
+    if white:
+        return _noise("The spread is noise from action to action")
+    if counts.incoherent >= settings.minimum_two_mode_situations:
+        return _noise("Clusters do not persist over a chunk")
+    decided = counts.resolved > counts.two_mode
+    return AuditVerdict(
+        Cause.UNIMODAL,
+        "",
+        "observation_decides" if decided else "",
+        "Use the simple baselines: one observation has one action here.",
+    )
 
 
 def _explained(settings: AuditSettings, strata: tuple[Stratum, ...]) -> AuditVerdict | None:
