@@ -1,98 +1,37 @@
-"""The catalogue: what is planted, at which strengths, and what counts as the right answer.
+"""The catalogue: every cause alone, from invisible to obvious.
 
-Each cause has a smallest strength from which the audit is expected to name it. These were written
-down, with their reasons, before any report seed was run. Below, a data set is still run and shown,
-and either the planted cause or the answer without it counts as right.
-
-Order of diagnosis: data, labels, support, structure, hidden state, validity. Of two planted
-causes, the first red layer is the answer.
+Each has a smallest strength from which the audit is expected to name it. These were written down,
+with their reasons, before any report seed was run. Below, a data set is still run and shown, and
+either the planted cause or the answer without it counts as right.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
+from benchmarks.audit.catalogue import (
+    CALIBRATION,
+    CLOCK,
+    EPOCH,
+    FRAME,
+    GLUED,
+    HALF,
+    LABELS,
+    NOISE,
+    ONE_VALID,
+    ORDER,
+    PERIOD_S,
+    REPEATED,
+    SUPPORT,
+    UNIMODAL,
+    UNIT,
+    VALID,
+    Answer,
+    Cause,
+    base,
+    hidden,
+)
+from benchmarks.audit.pairs import PAIRS
 from benchmarks.audit.plan import Defect, Plan
-
-PERIOD_S = {"planar": 0.1, "insertion": 0.05}
-HALF = (0.5, 0.5)
-
-
-@dataclass(frozen=True)
-class Answer:
-    """A verdict that counts as right.
-
-    Attributes:
-        cause: The verdict.
-        names: One of these must occur in its variable or kind; none: any will do.
-    """
-
-    cause: str
-    names: tuple[str, ...] = ()
-
-    def fits(self, cause: str, variable: str, kind: str) -> bool:
-        """Whether a verdict is this one."""
-        text = f"{variable} {kind}"
-        return cause == self.cause and (not self.names or any(n in text for n in self.names))
-
-
-VALID = Answer("valid_modes")
-UNIMODAL = Answer("unimodal")
-SUPPORT = Answer("insufficient_support")
-NOISE = Answer("pointwise_noise")
-LABELS = Answer("label_contamination")
-ONE_VALID = Answer("unimodal", ("one_valid_mode",))
-CLOCK = Answer("data_defect", ("clock", "drift"))
-CALIBRATION = Answer("data_defect", ("calibration",))
-UNIT = Answer("data_defect", ("unit",))
-FRAME = Answer("data_defect", ("frame", "rotat", "mirror", "swap"))
-REPEATED = Answer("data_defect", ("duplicate",))
-GLUED = Answer("data_defect", ("glue", "duplicate"))
-ANY_DEFECT = Answer("data_defect")
-EPOCH = (Answer("data_defect", ("epoch",)), Answer("hidden_state", ("epoch",)))
-ORDER = Answer("hidden_state", ("order", "session", "previous", "unrecorded"))
-
-
-def hidden(name: str) -> Answer:
-    """A hidden variable by name."""
-    return Answer("hidden_state", (name,))
-
-
-@dataclass(frozen=True)
-class Cause:
-    """One kind of planted cause.
-
-    Attributes:
-        name: Its name in the tables.
-        group: Name of its row in the confusion matrix.
-        unit: What the strength is measured in.
-        strengths: From invisible to obvious.
-        minimum: Strength from which it is to be named; above it if `falling`.
-        reason: Why there, in physical terms.
-        plan: Plan of one data set from its seed, strength and task.
-        answers: Right answers from the minimum on.
-        weaker: Further right answers below the minimum.
-        falling: Smaller strengths are stronger.
-    """
-
-    name: str
-    group: str
-    unit: str
-    strengths: tuple[float, ...]
-    minimum: float
-    reason: str
-    plan: Callable[[int, float, str], Plan]
-    answers: tuple[Answer, ...]
-    weaker: tuple[Answer, ...] = ()
-    falling: bool = False
-
-    def strong(self, strength: float) -> bool:
-        """Whether a strength is one at which the cause is to be named."""
-        return strength <= self.minimum if self.falling else strength >= self.minimum
-
-
-def base(seed: int) -> Plan:
-    """Data sets in which a fault of data or labels is planted: with one mode, or with two."""
-    return Plan(seed, shares=HALF if seed % 2 else (1.0,))
 
 
 def _skew(count: int, smallest: float) -> tuple[float, ...]:
@@ -170,7 +109,7 @@ HIDDEN = (
         "hidden phase", "hidden_state", "rest in both phases, s", (0.1, 0.4, 0.8, 1.6), 0.8,
         "8 observations and more without a motion that tells the phases apart",
         lambda seed, s, task: Plan(seed, station_dwell_s=s, phase_observed=False),
-        (hidden("phase"),), (UNIMODAL,),
+        (hidden("phase"),), (UNIMODAL, hidden("time_in_episode")),
     ),
 )  # fmt: skip
 
@@ -297,71 +236,6 @@ STRUCTURE = (
         (3, 8, 15, 25, 40), 25, "fewer than 3 training episodes within reach of most places",
         lambda seed, s, task: replace(base(seed), start_wide=s, goal_half_width_m=0.01 * s),
         (SUPPORT,), (VALID, UNIMODAL),
-    ),
-)  # fmt: skip
-
-
-def _pair(name: str, group: str, plan: Callable[[int, str], Plan], *answers: Answer) -> Cause:
-    return Cause(
-        name, group, "both obvious", (1.0,), 1.0, "the first red layer in the order of diagnosis",
-        lambda seed, s, task: plan(seed, task), answers,
-    )  # fmt: skip
-
-
-def _late(task: str) -> Defect:
-    return Defect("robot_clock", 2.0 * PERIOD_S[task])
-
-
-PAIRS = (
-    _pair(
-        "clock + wrong labels", "data_defect: clock",
-        lambda seed, task: replace(base(seed), wrong_labels=0.25, defects=(_late(task),)), CLOCK,
-    ),
-    _pair(
-        "clock + hidden operator", "data_defect: clock",
-        lambda seed, task: Plan(
-            seed, shares=HALF, decided_by="operator", defects=(_late(task),)
-        ), CLOCK,
-    ),
-    _pair(
-        "clock + camera shift", "data_defect: clock",
-        lambda seed, task: replace(
-            base(seed), defects=(_late(task), Defect("camera_shift", 0.02))
-        ), CLOCK,
-    ),
-    _pair(
-        "camera shift + a mode that fails", "data_defect: calibration",
-        lambda seed, task: Plan(
-            seed, shares=HALF, failing=0.8, defects=(Defect("camera_shift", 0.02),)
-        ), CALIBRATION,
-    ),
-    _pair(
-        "stored twice + hidden object", "data_defect: duplicate",
-        lambda seed, task: Plan(
-            seed, shares=HALF, decided_by="object", defects=(Defect("repeat", 0.2),)
-        ), REPEATED,
-    ),
-    _pair(
-        "wrong labels + hidden operator", "label_contamination",
-        lambda seed, task: Plan(seed, shares=HALF, decided_by="operator", wrong_labels=0.25),
-        LABELS,
-    ),
-    _pair(
-        "wrong labels + tremor", "label_contamination",
-        lambda seed, task: Plan(seed, tremor_m=0.012, wrong_labels=0.25), LABELS,
-    ),
-    _pair(
-        "few episodes + hidden object", "insufficient_support",
-        lambda seed, task: Plan(seed, shares=HALF, decided_by="object", episodes=15), SUPPORT,
-    ),
-    _pair(
-        "hidden object + a mode that fails", "hidden_state",
-        lambda seed, task: Plan(seed, shares=HALF, decided_by="object", failing=0.8),
-        hidden("object"),
-    ),
-    _pair(
-        "3 modes + a mode that fails", "valid_modes",
-        lambda seed, task: Plan(seed, shares=(0.34, 0.33, 0.33), failing=0.8), VALID,
     ),
 )  # fmt: skip
 

@@ -32,6 +32,8 @@ START_HALF_WIDTH_M = 0.010
 POST_AND_HAND_M = 0.055
 FORCE_NOISE_N = 0.15
 INSERTION_FORCE_N = 2.0
+# An operator judges where the arm is on average over this time, not where its tremor takes it.
+GLANCE_S = 0.3
 MEASURED_ROTATION_NOISE = 0.001
 SCENE_LENGTHS = [0, 1, 4]
 SLICES = OBSERVATION.slices
@@ -58,6 +60,7 @@ class Kinematic:
     def __init__(self, start: InsertionStart, cell: Cell) -> None:
         self.start = start
         self.tcp = np.array([start.tcp_x_m, start.tcp_y_m, start.tcp_z_m])
+        self._seen: list[Array] = [self.tcp]
         self.fine: list[Array] = []
         self.contact_force_n = 0.0
         self._share = 1.0 - np.exp(-PERIOD_S / SUB_STEPS / cell.constant_s)
@@ -69,7 +72,7 @@ class Kinematic:
 
     @property
     def tcp_pose(self) -> tuple[Array, Array]:
-        return self.tcp, np.eye(3)
+        return np.mean(self._seen[-round(GLANCE_S / PERIOD_S) :], axis=0), np.eye(3)
 
     @property
     def phase(self) -> str:
@@ -77,7 +80,7 @@ class Kinematic:
 
     @property
     def tip_depth_m(self) -> float:
-        return scene.FIXTURE_TOP_M - (float(self.tcp[2]) - scene.TIP_OFFSET_M)
+        return scene.FIXTURE_TOP_M - (float(self.tcp_pose[0][2]) - scene.TIP_OFFSET_M)
 
     def request_recovery(self, active: bool) -> None:
         self._recover = active
@@ -89,6 +92,7 @@ class Kinematic:
             self._queue.append(self._from + step / SUB_STEPS * (action[:3] - self._from))
             self.tcp = self.tcp + self._share * (self._queue.pop(0) - self.tcp)
         self._from = action[:3]
+        self._seen.append(self.tcp)
         opening = float(action[9])
         self._holding = self._holding and opening < scene.RELEASE_OPENING_M
         self._phases.update(

@@ -1,5 +1,6 @@
 """One data set: recorded, audited, and compared with what was planted."""
 
+import sys
 import time
 from dataclasses import asdict, dataclass
 
@@ -67,7 +68,7 @@ class Result:
 
 
 def run(job: Job) -> Result:
-    """Record and audit one data set."""
+    """Record and audit one data set; a wrong answer is said at once."""
     cause = CAUSES[job.cause]
     begin = time.process_time()
     with threadpool_limits(1):
@@ -85,9 +86,15 @@ def run(job: Job) -> Result:
     named = any(answer.fits(*said) for answer in cause.answers)
     strong = cause.strong(job.strength)
     weak = not strong and any(answer.fits(*said) for answer in cause.weaker)
+    if not (named or weak):
+        place = f"{cause.name} {job.strength:g} {job.task} {job.seed}"
+        print(f"{place}: {said[0]}({said[1]}, {said[2]})", file=sys.stderr, flush=True)
     return Result(
         job=job, name=cause.name, group=cause.group, strong=strong,
         verdict=said[0], variable=said[1], kind=said[2], named=named, right=named or weak,
-        detail={"action": verdict.next_action, **asdict(result.counts)},
+        detail={
+            "layer": str(verdict.layer.value), "action": verdict.next_action,
+            "confidence": result.confidence, **asdict(result.counts),
+        },
         cpu_s=time.process_time() - begin,
     )  # fmt: skip
