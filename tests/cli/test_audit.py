@@ -1,0 +1,194 @@
+"""`genpolicy audit`: whole or nothing, never over the recordings, going on where it was."""
+
+import json
+import shutil
+import sys
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "audit"))
+
+from planar import planar
+
+from genpolicy.cli import audit as command
+from genpolicy.cli.main import main
+from genpolicy.cli.resume import work_folder
+from genpolicy.cli.task_checks import contract_hash, task_checks
+from genpolicy.contract.observation import ObservationContract
+from genpolicy.dataset.dataset import load_dataset
+from genpolicy.importers.contract import load_contract
+from genpolicy.integrity.documents import read_json
+from genpolicy.tasks.api import load_task
+
+OUTPUTS = {"audit.json", "audit.html", "contract.yaml", "evidence", "dataset"}
+
+
+@pytest.fixture(scope="module")
+def table():
+    data, _ = planar(episodes=60)
+    episode = data.episode
+    return pa.table(
+        {
+            "episode_index": episode, "frame_index": data.index, "timestamp": data.event_time_s,
+            "tcp_x_m": data.observation[:, 0], "tcp_y_m": data.observation[:, 1],
+            "action_x_m": data.action[:, 0], "action_y_m": data.action[:, 1],
+            "operator": pa.array(data.episodes.operator[episode].tolist()),
+            "outcome": pa.array(data.episodes.outcome[episode].tolist()),
+        }
+    )  # fmt: skip
+
+
+@pytest.fixture
+def recordings(table, tmp_path):
+    path = tmp_path / "recordings" / "planar.parquet"
+    path.parent.mkdir()
+    pq.write_table(table, path)
+    return path
+
+
+def run(path, out, *more):
+    return main(["audit", str(path), "--out", str(out), *more])
+
+
+def files(folder):
+    return {
+        path.relative_to(folder).as_posix(): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file()
+    }
+
+
+@pytest.fixture
+def unaudited(monkeypatch):
+    """The audit is never reached: what is refused before it must not cost it."""
+    monkeypatch.setattr(command, "audit", lambda *_, **__: pytest.fail("the audit began"))
+
+
+def test_everything_is_written_and_again_the_same(recordings, tmp_path, capsys):
+    out = tmp_path / "audit"
+    assert run(recordings, out) == 0
+    printed = capsys.readouterr()
+    assert {path.name for path in out.iterdir()} == OUTPUTS
+    document = read_json(out / "audit.json")
+    for name in ("verdict", "variable", "kind", "confidence", "modes", "support", "evidence",
+                 "next_action", "rests_on"):  # fmt: skip
+        assert name in document
+    assert f"verdict     {document['verdict']}" in printed.out
+    assert document["next_action"] in printed.out and str(out / "audit.html") in printed.out
+    assert all(line in printed.out for line in document["rests_on"])
+    assert "60 episodes accepted, 0 refused" in printed.err
+    assert load_dataset(out / "dataset").manifest_sha256 == document["dataset_manifest_sha256"]
+    assert not work_folder(out).exists()
+    first = files(out)
+
+    contract = tmp_path / "contract.yaml"
+    shutil.copyfile(out / "contract.yaml", contract)
+    load_contract(contract)
+    assert run(recordings, out, "--contract", str(contract)) == 0
+    assert files(out) == first
+
+    again = tmp_path / "of-the-dataset"
+    shutil.copytree(out / "dataset", tmp_path / "dataset")
+    assert run(tmp_path / "dataset", again) == 0
+    assert {path.name for path in again.iterdir()} == OUTPUTS - {"dataset"}
+    assert read_json(again / "audit.json")["verdict"] == document["verdict"]
+
+
+@pytest.mark.usefixtures("unaudited")
+@pytest.mark.parametrize("place", [".", "recordings", "recordings/audit"])
+def test_recordings_are_never_written_over(recordings, tmp_path, place, capsys):
+    before = files(tmp_path)
+    assert run(recordings.parent, tmp_path / place) == 2
+    assert "never written to" in capsys.readouterr().err
+    assert files(tmp_path) == before
+
+
+@pytest.mark.usefixtures("unaudited")
+def test_a_folder_that_is_no_audit_is_not_replaced(recordings, tmp_path, capsys):
+    out = tmp_path / "precious"
+    out.mkdir()
+    (out / "thesis.tex").write_text("years")
+    assert run(recordings, out) == 2
+    assert "nothing was removed" in capsys.readouterr().err
+    assert (out / "thesis.tex").read_text() == "years"
+    (tmp_path / "link").symlink_to(tmp_path / "recordings")
+    assert run(recordings, tmp_path / "link") == 2
+    (tmp_path / "file").write_text("x")
+    assert run(recordings, tmp_path / "file") == 2
+    assert (tmp_path / "file").read_text() == "x"
+
+
+@pytest.mark.usefixtures("unaudited")
+def test_bad_input_leaves_nothing(tmp_path, capsys):
+    assert run(tmp_path / "nowhere", tmp_path / "out") == 2
+    (tmp_path / "broken.parquet").write_bytes(b"PAR1")
+    assert run(tmp_path / "broken.parquet", tmp_path / "out") == 2
+    error = capsys.readouterr().err
+    assert "Traceback" not in error
+    assert [path.name for path in tmp_path.iterdir()] == ["broken.parquet"]
+
+
+def interrupt(*_, **__):
+    raise KeyboardInterrupt
+
+
+def test_an_interrupted_audit_goes_on_without_importing_again(
+    recordings, tmp_path, monkeypatch, capsys
+):
+    out = tmp_path / "audit"
+    with monkeypatch.context() as patched:
+        patched.setattr(command, "audit", interrupt)
+        assert run(recordings, out) == 130
+    assert not out.exists() and (work_folder(out) / "dataset").is_dir()
+    with monkeypatch.context() as patched:
+        patched.setattr(command, "open_dataset", lambda *_, **__: pytest.fail("imported again"))
+        assert run(recordings, out) == 0
+    assert {path.name for path in out.iterdir()} == OUTPUTS
+    assert not work_folder(out).exists()
+
+
+def test_other_recordings_are_imported_anew(recordings, table, tmp_path, monkeypatch, capsys):
+    out = tmp_path / "audit"
+    monkeypatch.setattr(command, "audit", interrupt)
+    assert run(recordings, out) == 130
+    kept = load_dataset(work_folder(out) / "dataset")
+    pq.write_table(table.filter(pa.compute.less(table["episode_index"], 50)), recordings)
+    assert run(recordings, out) == 130
+    new = load_dataset(work_folder(out) / "dataset")
+    assert len(kept.episodes) == 60 and len(new.episodes) == 50
+    # A kept dataset that was changed is not believed.
+    (work_folder(out) / "dataset" / "frames.parquet").write_bytes(b"PAR1")
+    assert run(recordings, out) == 130
+    assert len(load_dataset(work_folder(out) / "dataset").episodes) == 50
+
+
+def test_a_failure_while_writing_leaves_no_half_audit(recordings, tmp_path, monkeypatch):
+    out = tmp_path / "audit"
+    monkeypatch.setattr(command, "audit_page", interrupt)
+    assert run(recordings, out) == 130
+    assert not out.exists()
+    assert (work_folder(out) / "dataset" / "manifest.json").is_file()
+
+
+def test_only_the_task_of_the_data_checks_them(recordings, tmp_path, monkeypatch):
+    out = tmp_path / "audit"
+    monkeypatch.setattr(command, "audit", interrupt)
+    run(recordings, out)
+    dataset = load_dataset(work_folder(out) / "dataset")
+    for name in (None, "no such task", "tabletop_insertion"):
+        checks = task_checks(dataset, task=name, chunk_steps=16)
+        assert checks.admissible is None and checks.replay is None and checks.obstacles == []
+
+
+def test_a_contract_in_a_manifest_has_the_hash_of_the_contract():
+    contract: ObservationContract = load_task("tabletop_insertion").observation
+    channels = [
+        {"name": c.name, "components": list(c.components), "unit": c.unit, "stream": c.stream,
+         "maximum_age_s": c.maximum_age_s}
+        for c in contract.channels
+    ]  # fmt: skip
+    manifest = json.loads(json.dumps({"observation_contract": {"channels": channels, "dim": 1}}))
+    assert contract_hash(manifest) == contract.hash()
