@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 from sklearn.cluster import HDBSCAN
 
 from genpolicy.audit.data import Array, Integers
@@ -21,6 +22,11 @@ AXES = 3
 AGREEMENT = 0.9
 MAXIMUM_DEPTH = 2
 MINIMUM_SAMPLES = 2
+# Chunks whose rows are looked at for one chunk's route: the chunk and what follows it.
+ROUTE_CHUNKS = 2
+# Share of a chunk over which its length is smoothed; order and noise gain of third differences.
+SMOOTHING_SHARE = 4
+THIRD, THIRD_POWER = 3, 20.0
 
 
 @dataclass(frozen=True)
@@ -52,15 +58,17 @@ def features(paths: Array, settings: AuditSettings) -> Array:
     """Vectors whose Euclidean distance is the RMS distance of two chunks.
 
     Args:
-        paths: Positions of chunks from a common origin. Shape (n, K, P).
+        paths: Positions of chunks from a common origin, and what follows them. Shape (n, S, P).
         settings: `representation`: `path` resamples at equal arc length, so that fast and slow
             along one route are one mode; `time` compares position by position.
 
     Returns:
-        Shape (n, K * P).
+        Shape (n, min(K, S) * P).
     """
-    n, steps, _ = paths.shape
-    used = paths if settings.representation == "time" else _by_arc_length(paths)
+    n, steps = len(paths), min(settings.chunk_steps, paths.shape[1])
+    used = paths[:, :steps]
+    if settings.representation == "path":
+        used = _by_arc_length(paths, steps)
     return np.asarray(used.reshape(n, -1) / np.sqrt(steps), dtype=np.float64)
 
 
@@ -68,7 +76,8 @@ def cluster_chunks(paths: Array, settings: AuditSettings) -> Clustering:
     """Modes of chunks from one situation.
 
     Args:
-        paths: Positions relative to the TCP of their own observation. Shape (n, K, P).
+        paths: Positions relative to the TCP of their own observation, `ROUTE_CHUNKS` chunks long
+            where what follows is known. Shape (n, S, P).
         settings: Sizes, separation, representation.
 
     Returns:
@@ -195,12 +204,15 @@ def _confirmed(vectors: Array, sides: Integers, least: int) -> bool:
     return majorities == set(sides.tolist()) and bool(pure >= AGREEMENT * np.count_nonzero(clear))
 
 
-def _by_arc_length(paths: Array) -> Array:
-    """Paths resampled at equal arc lengths up to one that most of them reach."""
-    n, steps, _ = paths.shape
-    along = np.zeros((n, steps))
-    along[:, 1:] = np.cumsum(np.linalg.norm(np.diff(paths, axis=1), axis=2), axis=1)
-    lengths = along[:, -1]
+def _by_arc_length(paths: Array, steps: int) -> Array:
+    """Paths resampled at equal arc lengths up to one that most of them reach within `steps`.
+
+    Whoever still rests when the chunk begins goes the same way a little later: what follows the
+    chunk counts until the common length is reached, so that to wait is no route of its own.
+    """
+    n = len(paths)
+    along = progress(paths, max(1, steps // SMOOTHING_SHARE))
+    lengths = along[:, steps - 1]
     common = max(float(np.quantile(lengths, 0.25)), 0.5 * float(np.median(lengths)))
     at = np.broadcast_to(np.linspace(0.0, common, steps), (n, steps))
     left = np.sum(along[:, None, 1:-1] <= at[:, :, None], axis=2)
@@ -208,6 +220,23 @@ def _by_arc_length(paths: Array) -> Array:
     gap = along[rows, left + 1] - along[rows, left]
     share = np.clip((at - along[rows, left]) / np.where(gap > 0.0, gap, 1.0), 0.0, 1.0)[..., None]
     return np.asarray((1.0 - share) * paths[rows, left] + share * paths[rows, left + 1])
+
+
+def progress(paths: Array, width: int) -> Array:
+    """How far each path has come at each step, tremor left out. Shape (n, S).
+
+    The length of a path that trembles grows while it stands. So it is taken from running means,
+    less the square that white noise adds to a step; the noise is read off third differences, in
+    which a smooth motion is next to nothing.
+    """
+    smooth = uniform_filter1d(paths, width, axis=1, mode="nearest")
+    squares = np.sum(np.diff(smooth, axis=1) ** 2, axis=2)
+    if paths.shape[1] > THIRD:
+        third = np.sum(np.diff(paths, THIRD, axis=1) ** 2, axis=2) / THIRD_POWER
+        squares = np.maximum(squares - 2.0 * np.median(third) / width**2, 0.0)
+    along = np.zeros(paths.shape[:2])
+    along[:, 1:] = np.cumsum(np.sqrt(squares), axis=1)
+    return along
 
 
 def _separation(vectors: Array, labels: Integers) -> float:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from genpolicy.audit.data import Array, AuditInput, Integers, relative_paths
-from genpolicy.audit.modes import Clustering, features
+from genpolicy.audit.modes import ROUTE_CHUNKS, Clustering, features
 from genpolicy.audit.neighbourhoods import Neighbourhood
 from genpolicy.audit.settings import AuditSettings
 
@@ -56,7 +56,8 @@ def kept_identity(
     counts = np.bincount(labels, minlength=clustering.count)
     if np.count_nonzero(counts >= MINIMUM_PER_MODE) < 2:
         return None
-    vectors = features(relative_paths(data, later[alive], settings.chunk_steps), settings)
+    paths = relative_paths(data, later[alive], ROUTE_CHUNKS * settings.chunk_steps)
+    vectors = features(paths, settings)
     gaps = np.linalg.norm(vectors[:, None] - vectors[None], axis=2)
     observed = _share(gaps, labels)
     null = np.array([_share(gaps, rng.permutation(labels)) for _ in range(99)])

@@ -6,7 +6,7 @@ import numpy as np
 
 from genpolicy.audit.data import Array, AuditInput, relative_paths
 from genpolicy.audit.mean_versus_modes import Admissible, MeanVersusModes, compare
-from genpolicy.audit.modes import Clustering, cluster_chunks
+from genpolicy.audit.modes import ROUTE_CHUNKS, Clustering, cluster_chunks
 from genpolicy.audit.neighbourhoods import Neighbourhood, Support, find
 from genpolicy.audit.persistence import POINTWISE_RATIO, kept_identity, persistent, von_neumann
 from genpolicy.audit.resolution import resolved_by_observation
@@ -51,7 +51,7 @@ def find_situations(
         items, reach = find(data, settings, phase=str(phase), root_seed=root_seed)
         support.append(reach)
         for item in items:
-            paths = relative_paths(data, item.members, settings.chunk_steps)
+            paths = relative_paths(data, item.members, ROUTE_CHUNKS * settings.chunk_steps)
             found.append((str(phase), item, cluster_chunks(paths, settings)))
     return found, tuple(support)
 

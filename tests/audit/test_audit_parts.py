@@ -6,7 +6,7 @@ from planar import SETTINGS, planar
 
 from genpolicy.audit.data import canonical
 from genpolicy.audit.linking import link
-from genpolicy.audit.modes import cluster_chunks, features, split_gain
+from genpolicy.audit.modes import cluster_chunks, features, progress, split_gain
 from genpolicy.audit.semantics import episode_lags
 from genpolicy.audit.situations import find_situations
 from genpolicy.audit.strata import examine_strata
@@ -114,10 +114,34 @@ def test_resampling_by_arc_length_agrees_with_interpolation():
     rng = stream(25, "arc")
     paths = np.cumsum(rng.normal(size=(7, 16, 3)), axis=1)
     paths[2] = paths[2, 0]  # one that stands still
-    length = np.linalg.norm(np.diff(paths, axis=1), axis=2)
-    along = np.concatenate([np.zeros((7, 1)), np.cumsum(length, axis=1)], axis=1)
+    along = progress(paths, 4)
     common = max(np.quantile(along[:, -1], 0.25), 0.5 * np.median(along[:, -1]))
     at = np.linspace(0, common, 16)
     expected = [[np.interp(at, along[i], paths[i, :, j]) for j in range(3)] for i in range(7)]
     got = features(paths, SETTINGS).reshape(7, 16, 3) * 4.0
     assert got == pytest.approx(np.swapaxes(np.array(expected), 1, 2), abs=1e-12)
+
+
+def test_progress_of_a_straight_line_is_its_length_and_tremor_adds_little():
+    rng = stream(26, "progress")
+    line = np.zeros((9, 32, 3))
+    line[:, :, 0] = 0.012 * np.arange(32)
+    assert progress(line, 1) == pytest.approx(line[:, :, 0], abs=1e-9)
+    still = np.zeros((200, 32, 3)) + 0.006 * rng.normal(size=(200, 32, 3))
+    raw = np.linalg.norm(np.diff(still, axis=1), axis=2).sum(axis=1)
+    assert np.mean(progress(still, 4)[:, -1]) < 0.15 * np.mean(raw)
+
+
+@pytest.mark.parametrize("tremor_m", [0.0, 0.003])
+def test_to_rest_first_is_no_route_of_its_own(tremor_m):
+    # Some go at once, others first rest for up to half a chunk; all go the same way.
+    rng = stream(27, "rest")
+    found = []
+    for _ in range(40):
+        waits = np.where(np.arange(21) < 14, 0, rng.integers(4, 9, 21))
+        at = np.maximum(np.arange(32)[None] - waits[:, None], 0) * 0.012
+        bend = 0.1 * np.sin(np.minimum(at / 0.2, 1.0) * np.pi / 2)
+        paths = np.stack([at, bend + 0.004 * rng.normal(size=(21, 1)), np.zeros_like(at)], axis=2)
+        paths = paths + tremor_m * rng.normal(size=paths.shape)
+        found.append(cluster_chunks(paths - paths[:, :1], SETTINGS).count > 1)
+    assert np.mean(found) <= 0.05
