@@ -90,6 +90,7 @@ SPEC = GateSpec(
         f"{FACTORS}/*/seed_*/model.safetensors",
         f"{FACTORS}/*/seed_*/config.json",
         f"{FACTORS}/errors.parquet",
+        f"{FACTORS}/effects.parquet",
     ),
     back_to="the dataset, the observation, or the simpler policy",
     go_on="A generator is a candidate: train diffusion and flow under the matched configuration.",

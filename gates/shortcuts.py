@@ -4,13 +4,7 @@ Chunking alone removes it; the task phase collapses the modes; a latent answers 
 another encoder, trunk or history would have done. Each is one number with its interval.
 """
 
-import math
-from collections.abc import Sequence
-
-import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
-from scipy import stats
 
 from gates.bounds import counted_interval, share_interval
 from gates.engine import Case, Measured
@@ -139,63 +133,6 @@ def factor_valid(case: Case) -> Measured:
         "bound over episodes, level divided among the variants; short training"
     )
     return Measured(upper, (lower, upper), text)
-
-
-def factor_effects(
-    errors: pd.DataFrame,
-    modes: pd.DataFrame,
-    variants: Sequence[tuple[str, str]],
-    *,
-    reference: tuple[str, str],
-    first_only: set[str],
-    confidence: float,
-) -> pd.DataFrame:
-    """Difference of each variant and convention to the reference, paired by episode.
-
-    Args:
-        errors: Columns variant, convention, episode_uuid, seed, chunk_error, first_error.
-        modes: Columns variant, convention, episode_uuid, seed, modes_present, modes_covered.
-        variants: Variants and conventions to list.
-        reference: Variant and convention that they are held against.
-        first_only: Variants of one action, compared by the first action's error.
-        confidence: Coverage of the intervals, normal approximation over episodes.
-
-    Returns:
-        Columns variant, convention, and for `error` and `coverage` each value, effect, half
-        width of its interval, and the episodes that it rests on.
-    """
-    share = numbers(modes, "modes_covered") / numbers(modes, "modes_present")
-    coverage = modes.assign(share=share)
-    rows = []
-    for name, convention in variants:
-        column = "first_error" if name in first_only else "chunk_error"
-        row: dict[str, object] = {"variant": name, "convention": convention}
-        for kind, frame, value in (("error", errors, column), ("coverage", coverage, "share")):
-            own, base = (
-                _by_episode(frame, pair, value) for pair in ((name, convention), reference)
-            )
-            gain = (own - base).dropna()
-            row[kind] = float(own.mean())
-            row[f"{kind}_effect"] = float(gain.mean())
-            row[f"{kind}_half"] = _half_width(np.asarray(gain, dtype=np.float64), confidence)
-            row[f"{kind}_episodes"] = len(gain)
-        rows.append(row)
-    return pd.DataFrame(rows)
-
-
-def _by_episode(frame: pd.DataFrame, pair: tuple[str, str], value: str) -> "pd.Series[float]":
-    rows = frame[(frame["variant"] == pair[0]) & (frame["convention"] == pair[1])]
-    if len(rows) == 0:
-        raise MissingEvidenceError(f"no rows of {pair[0]}, {pair[1]}")
-    means: pd.Series[float] = rows.groupby("episode_uuid")[value].mean()
-    return means
-
-
-def _half_width(values: NDArray[np.float64], confidence: float) -> float:
-    if len(values) < 2:
-        return float("nan")
-    quantile = float(stats.t.isf((1.0 - confidence) / 2.0, len(values) - 1))
-    return quantile * float(values.std(ddof=1)) / math.sqrt(len(values))
 
 
 def _variants(case: Case) -> dict[str, dict[str, object]]:

@@ -15,6 +15,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 from pydantic import Field
 
+from genpolicy.comparison.effects import EFFECTS, effect_rows
 from genpolicy.comparison.fleet import (
     SINGLE_ACTION_KEYS,
     PolicySettings,
@@ -125,7 +126,7 @@ class VariantJob:
 
 
 def run_factors(study: FactorStudy, *, dataset: Path, audit: Path, folder: Path) -> None:
-    """Train and measure all variants; write `errors`, `modes` (Parquet) and `factors.json`.
+    """Train and measure all variants; write tables of errors, modes, effects, and `factors.json`.
 
     Raises:
         ConfigError: Not exactly one reference.
@@ -149,12 +150,35 @@ def run_factors(study: FactorStudy, *, dataset: Path, audit: Path, folder: Path)
     modes = [row for part in parts for row in part[1]]
     write_table(folder / "errors.parquet", pa.Table.from_pylist(errors, ERRORS))
     write_table(folder / "modes.parquet", pa.Table.from_pylist(modes, MODES))
+    effects = effect_table(study, errors, modes, reference=names[0])
+    write_table(folder / "effects.parquet", pa.Table.from_pylist(effects, EFFECTS))
     configs = {
         job.name: read_json(job.training.folder / CONFIG_FILE)
         for job in jobs
         if job.seed == study.settings.seeds[0]
     }
     write_bytes(folder / "factors.json", canonical_json(isolation(study, configs, names[0])))
+
+
+def effect_table(study: FactorStudy, errors: Rows, modes: Rows, *, reference: str) -> Rows:
+    """Rows of `effects.parquet`: what each variant and convention changes, paired by episode."""
+    base = (reference, study.variants[reference].sampler.name)
+    rows: Rows = []
+    for name, variant in study.variants.items():
+        single = variant.factor == "temporal"
+        for convention in (variant.sampler.name, *variant.conventions):
+            named = {"variant": name, "factor": variant.factor, "convention": convention}
+            rows += [
+                {**named, **row}
+                for row in effect_rows(
+                    errors,
+                    modes,
+                    own=(name, convention),
+                    reference=base,
+                    error="first_error" if single else "chunk_error",
+                )
+            ]
+    return rows
 
 
 def isolation(

@@ -98,6 +98,18 @@ def test_all_are_measured_on_the_same_rows_and_situations(measured):
     assert set(modes.loc[~drawn, "samples"]) == {1}
 
 
+def test_effects_are_against_the_reference(measured):
+    effects = frame(measured, "effects")
+    assert len(effects) == 3 * (len(VARIANTS) + 1)
+    own = effects[effects["variant"] == "reference"]
+    assert (own["effect"] == 0.0).all()
+    single = effects[effects["variant"] == "single_action"]
+    assert set(single["measure"]) == {"first_error", "mode_coverage", "valid_share"}
+    assert set(effects["measure"]) - {"first_error"} == {
+        "chunk_error", "mode_coverage", "valid_share",
+    }  # fmt: skip
+
+
 def test_errors_are_finite_and_one_action_has_one_error(measured):
     errors = frame(measured, "errors")
     assert np.isfinite(errors[["chunk_error", "first_error"]].to_numpy()).all()
