@@ -53,7 +53,7 @@ class LeRobotDataset:
         self._tasks = read_tasks(path, self._info)
         self._listed, notes = read_episodes(path, self._info)
         if not self._files:
-            refuse(str(path), "without a data file", "files as data_path names them")
+            refuse(str(path), "without a data file", "files named by its template")
         with open_table(self._files[0][1], label=self._label(self._files[0][1])) as table:
             stored = dict(table.columns)
         self.columns = self._columns(stored, notes)

@@ -175,8 +175,17 @@ def test_a_link_out_of_the_dataset_is_refused(layouts, tmp_path):
     outside = tmp_path / "outside.parquet"
     layouts.file(root, 0).rename(outside)
     layouts.file(root, 0).symlink_to(outside)
-    with pytest.raises(BadInputError, match="link"):
+    with pytest.raises(BadInputError, match="leads out of the dataset"):
         open_dataset(root, out=tmp_path / "out")
+
+
+def test_a_link_inside_the_dataset_is_not_followed(layouts, tmp_path):
+    root = layouts.v2(tmp_path / "recordings")
+    layouts.file(root, 4).rename(root / "elsewhere.parquet")
+    layouts.file(root, 4).symlink_to(root / "elsewhere.parquet")
+    opened = open_dataset(root, out=tmp_path / "out")
+    assert [r.file for r in opened.refused] == ["data/chunk-000/episode_000004.parquet"]
+    assert "expected a regular file, not a link" in opened.refused[0].reason
 
 
 def test_leader_and_follower_of_different_build(layouts, tmp_path):

@@ -160,7 +160,7 @@ def test_a_row_bomb_is_refused_by_what_it_claims(tmp_path, monkeypatch):
     pq.write_table(table, path, compression="zstd", row_group_size=count)
     assert path.stat().st_size < 100_000
     monkeypatch.setattr(tables_module, "MAXIMUM_SOURCE_ROWS", 1_000_000)
-    with pytest.raises(BadInputError, match="5000000 rows"):
+    with pytest.raises(BadInputError, match="is 5000000 rows, expected"):
         open_dataset(path, out=tmp_path / "out")
     monkeypatch.undo()
     with pytest.raises(BadInputError, match="5000000 rows long, expected at most 1000000"):
@@ -209,6 +209,18 @@ def test_a_contract_that_names_what_is_not_there(long, tmp_path):
             {"channels": [contract.channels[0].model_copy(update={"columns": ["a", "b"]})]},
             "column a",
         ),
+        (
+            {
+                "channels": [
+                    contract.channels[0].model_copy(update={"columns": ["tool_x_m[3]", "step"]})
+                ]
+            },
+            "tool_x_m is 1 numbers wide, expected element 3",
+        ),
+        (
+            {"channels": [contract.channels[0].model_copy(update={"columns": ["phase", "step"]})]},
+            "phase is not numbers per row",
+        ),
         ({"labels": contract.labels.model_copy(update={"object": "thing"})}, "label object"),
     ):
         with pytest.raises(BadInputError, match=text):
@@ -234,3 +246,27 @@ def test_a_clock_of_nanoseconds_keeps_its_digits_and_its_sign(layouts, tmp_path,
     assert "stamp, row 7 is -1e-09 s later" in opened.refused[0].reason
     recorded = load_dataset(tmp_path / "out").episodes["recorded_at_s"].to_numpy()
     np.testing.assert_allclose(np.diff(recorded), [10, 10, 20])
+
+
+def test_millimetres_and_degrees_become_metres_and_radians(layouts, tmp_path):
+    folder = tmp_path / "mm"
+    folder.mkdir()
+    for i in range(5):
+        state, action = layouts.samples(i)
+        columns = {
+            "tool_x_mm": 1000 * state[:, 0],
+            "wrist_deg": np.degrees(state[:, 1]),
+            "action_tool_x_mm": 1000 * action[:, 0],
+            "action_wrist_deg": np.degrees(action[:, 1]),
+        }
+        pq.write_table(pa.table(columns), folder / f"{i}.parquet")
+    opened = open_dataset(folder, out=tmp_path / "out")
+    assert [c.unit for c in opened.contract.channels] == ["mm", "deg"]
+    assert opened.contract.pairing == {
+        "action_tool_x_mm": "tool_m.x", "action_wrist_deg": "wrist_rad.wrist",
+    }  # fmt: skip
+    dataset = load_dataset(tmp_path / "out")
+    assert dataset.manifest["action_contract"]["units"] == ["m", "rad"]
+    state, action = layouts.samples(0)
+    np.testing.assert_allclose(dataset.frames.observation[:30], state[:, :2], atol=1e-12)
+    np.testing.assert_allclose(dataset.frames.action[:30], action[:, :2], atol=1e-12)
