@@ -2,12 +2,14 @@
 
 from collections import defaultdict
 from collections.abc import Sequence
+from pathlib import Path
 
 from benchmarks.audit.cases import CAUSES
 from benchmarks.audit.runner import Result
 from genpolicy.statistics.intervals import clopper_pearson
 
 VALID = "valid_modes"
+BEGIN, END = "<!-- tables of the benchmark -->", "<!-- end of the tables -->"
 
 
 def markdown(results: Sequence[Result], *, seeds: str) -> str:
@@ -31,15 +33,34 @@ def markdown(results: Sequence[Result], *, seeds: str) -> str:
         *_strengths(results),
         "",
         *_wrong(results),
+        "",
+        "### Why the minimum lies where it lies",
+        "",
+        *_minima(),
     ]
     return "\n".join(parts) + "\n"
+
+
+def into_page(page: Path, text: str) -> None:
+    """Put the tables between the marks of a page."""
+    before, rest = page.read_text().split(BEGIN)
+    page.write_text(f"{before}{BEGIN}\n\n{text}\n{END}{rest.split(END)[1]}")
+
+
+def _minima() -> list[str]:
+    rows = ["| cause | named from | because |", "|---|---|---|"]
+    for cause in CAUSES:
+        bound = "at most " if cause.falling else ""
+        single = len(cause.strengths) == 1
+        least = cause.unit if single else f"{bound}{cause.minimum:g} {cause.unit}"
+        rows.append(f"| {cause.name} | {least} | {cause.reason} |")
+    return rows
 
 
 def _headline(strong: Sequence[Result], results: Sequence[Result]) -> list[str]:
     others = [r for r in strong if r.group != VALID]
     weak = [r for r in results if not r.strong and r.group != VALID]
     valid = [r for r in strong if r.group == VALID]
-    # Too many modes claimed are no false need where a weak cause leaves two modes: `right` knows.
     lines = [
         ("right, from the minimum strength on", sum(r.right for r in strong), len(strong)),
         (
