@@ -18,6 +18,7 @@ from genpolicy.figures.drawing import (
     ORANGE,
     PALETTE,
     PURPLE,
+    SKY,
     Picture,
     drawn,
 )
@@ -28,6 +29,7 @@ METHODS = {
     "chunked_bc": GREY,
     "act": GREEN,
     "cvae": PURPLE,
+    "ibc": SKY,
     "diffusion": BLUE,
     "flow": ORANGE,
 }

@@ -21,6 +21,7 @@ READING: dict[Gate, tuple[str, ...]] = {
         "What was demonstrated: are there two bundles, and do both succeed?",
         "Modes and their mean: is the mean refused where the modes pass, and for which reason?",
         "What explains the modes: is there a variable that nobody recorded and that would?",
+        "What each part earns: would an encoder, a history or a trunk do without a generator?",
         "The criteria: is each limit one that you would sign? Then the caveats.",
     ),
     "B": (

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from gates.evidence import Evidence, MissingEvidenceError, count, flags, numbers
 from gates.models import GateReport
 from gates.need import AUDIT, BASELINES
-from gates.render import plots_scene
+from gates.render import plots_factors, plots_scene
 from gates.render.figures import Photo, Plot, in_order
 from gates.render.limits import draw_limit, limit_of
 from gates.render.plots_scene import SUMMARY, obstacles
@@ -101,10 +101,11 @@ def _baselines(evidence: Evidence, report: GateReport) -> Figure:
         frame.assign(share=share).groupby(["method", "convention"])["share"].agg(["mean", "size"])
     )
     deployed = report.settings.get("deployed_conventions", [])
+    generative = report.settings.get("generative_baselines", [])
     order = [key for name in in_order(frame["method"]) for key in means.index if key[0] == name]
     figure, (axes,) = new_figure(height=1.0 + 0.3 * len(order))
     for place, (method, convention) in enumerate(order):
-        drawn = convention not in deployed
+        drawn = convention not in deployed or method in generative
         axes.barh(
             place,
             float(means.loc[(method, convention), "mean"]),
@@ -172,4 +173,5 @@ PLOTS: tuple[Plot | Photo, ...] = (
         f"{BASELINES}/modes.parquet",
         _baselines,
     ),
+    *plots_factors.PLOTS,
 )

@@ -467,6 +467,16 @@ def _factors(root: Path) -> None:
         ]  # fmt: skip
     table(root, "factors/modes.parquet", modes)
     table(root, "factors/errors.parquet", errors)
+    effects = [
+        {
+            "variant": name, "factor": factor, "convention": convention, "measure": measure,
+            "value": 0.5, "reference": 0.4, "effect": 0.1 * place, "lower": 0.1 * place - 0.05,
+            "upper": 0.1 * place + 0.05, "episodes": 30,
+        }
+        for place, (name, (factor, convention, _, _)) in enumerate(VARIANTS.items())
+        for measure in ("chunk_error", "mode_coverage", "valid_share")
+    ]  # fmt: skip
+    table(root, "factors/effects.parquet", effects)
     variants = {
         name: {
             "factor": factor,
