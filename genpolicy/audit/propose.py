@@ -22,7 +22,9 @@ APART, NOISE = 3.0, 0.2
 # The radius grows with the root of the number of components: 1.4 scales in each (RMS).
 RADIUS_PER_COMPONENT = 1.4
 CHUNK_S = 0.8
-MINIMUM_CHUNK, MAXIMUM_CHUNK = 8, 32
+MINIMUM_CHUNK, MAXIMUM_CHUNK = 8, 64
+# Two routes can only lie apart by what was travelled: a chunk covers three times that distance.
+TRAVELLED = 3.0
 
 
 def observation_contract(dataset: Dataset) -> ObservationContract:
@@ -65,10 +67,12 @@ def propose_settings(
         "ignored_channels": [],
         "context_channels": _context(contract, set(pairing.values())),
         "phase_observed": (source.get("labels") or {}).get("phase") is None,
-        "chunk_steps": _chunk_steps(float(dataset.manifest["action_contract"]["period_s"])),
     }
     values["channel_scale"] = _scales(contract, training.observation)
     values |= _separations(dataset, values["action_components"])
+    values["chunk_steps"] = _chunk_steps(
+        dataset, values["action_components"], values["minimum_separation_m"]
+    )
     values |= {name: value for name, value in stated.items() if name != "channel_scale"}
     values["channel_scale"] |= stated.get("channel_scale", {})
     horizon = int(values.get("observation_horizon", 2))
@@ -86,9 +90,24 @@ def _context(contract: ObservationContract, paired: set[str]) -> list[str]:
     ]
 
 
-def _chunk_steps(period_s: float) -> int:
-    """As many actions as go into 0.8 s, within reason."""
-    return int(np.clip(round(CHUNK_S / period_s), MINIMUM_CHUNK, MAXIMUM_CHUNK))
+def _chunk_steps(dataset: Dataset, names: list[str] | None, separation: float) -> int:
+    """As many actions as go into 0.8 s, or as it takes to travel far enough to part ways."""
+    period_s = float(dataset.manifest["action_contract"]["period_s"])
+    frames = dataset.split("train").frames
+    inside = np.diff(frames.episode) == 0
+    steps = np.linalg.norm(
+        np.diff(frames.action[:, _columns(dataset, names)], axis=0)[inside], axis=1
+    )
+    moving = steps[steps > 0.0]
+    speed = float(np.median(moving)) if len(moving) else 0.0
+    far = TRAVELLED * separation / speed if speed > 0.0 else 0.0
+    return int(np.clip(round(max(CHUNK_S / period_s, far)), MINIMUM_CHUNK, MAXIMUM_CHUNK))
+
+
+def _columns(dataset: Dataset, names: list[str] | None) -> list[int]:
+    """Columns of the action that pair with the observation; all where none is named."""
+    stated = dataset.manifest["action_contract"]["components"]
+    return [k for k, name in enumerate(stated) if names is None or name in names]
 
 
 def _scales(contract: ObservationContract, observation: np.ndarray) -> dict[str, float]:
@@ -109,7 +128,7 @@ def _spread_scale(values: np.ndarray) -> float:
 def _separations(dataset: Dataset, names: list[str] | None) -> dict[str, float]:
     """Least distance of two modes and noise floor, in the unit of what is commanded."""
     stated = dataset.manifest["action_contract"]
-    columns = [k for k, name in enumerate(stated["components"]) if names is None or name in names]
+    columns = _columns(dataset, names)
     units = {stated["units"][k] for k in columns}
     unit = next(iter(units)) if len(units) == 1 else ""
     commanded = dataset.split("train").frames.action[:, columns]

@@ -93,7 +93,7 @@ def test_settings_are_proposed_from_units_and_pairing(valid):
     assert settings.minimum_situations == 7
     assert settings.context_channels == ["goal", "flag"]
     assert not settings.phase_observed
-    assert settings.chunk_steps == 8  # 0.8 s of 10 Hz
+    assert 8 <= settings.chunk_steps <= 10  # 3 x 3 cm at 1 cm a step
 
 
 def test_an_unknown_unit_is_scaled_by_the_spread(valid):
