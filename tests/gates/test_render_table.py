@@ -23,7 +23,7 @@ def test_a_failed_route_is_said_not_to_count(ladder):
     assert report.verdict == "PASS" and [c.id for c in failed] == ["recovery_benefit"]
     assert waived(failed[0], report) == "not needed: route valid modes holds"
     assert passed_by(report) == "every required criterion holds, by route valid modes"
-    assert tally(report) == "15 of 16 hold; 1 fails (without weight for the verdict)"
+    assert tally(report) == "20 of 21 hold; 1 fails (without weight for the verdict)"
     page = (ladder / "reports/gate_a.html").read_text()
     assert "not needed: route valid modes holds" in page and "1 fails" in markdown(report)
 
@@ -36,7 +36,7 @@ def test_a_required_failure_is_never_waived(ladder):
     assert deciding(report) == "clock_residual_s: 0.5 s, required ≤ 0.01 s"
     assert passed_by(report) == ""
     text = markdown(report)
-    assert text.index("## Not met") < text.index("All 16 criteria")
+    assert text.index("## Not met") < text.index("All 21 criteria")
 
 
 def test_a_candidate_that_stops_names_its_criterion(ladder):
