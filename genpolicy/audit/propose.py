@@ -15,10 +15,11 @@ from genpolicy.contract.observation import Channel, ObservationContract
 from genpolicy.contract.settings import parse_settings
 from genpolicy.dataset.dataset import Dataset
 
-# Length that makes another observation; another mode is three of them, noise a fifth of one.
+# Length that makes another observation; another mode is three of them, noise a
+# fifth of one, a calibration is off by half of one.
 SCALES = {"m": 0.01, "px": 10.0, "rad": 0.05, "N": 5.0}
 SPREAD_SHARE = 0.05
-APART, NOISE = 3.0, 0.2
+APART, NOISE, SHIFTED = 3.0, 0.2, 0.5
 # The radius grows with the root of the number of components: 1.4 scales in each (RMS).
 RADIUS_PER_COMPONENT = 1.4
 CHUNK_S = 0.8
@@ -73,6 +74,7 @@ def propose_settings(
     values["chunk_steps"] = _chunk_steps(
         dataset, values["action_components"], values["minimum_separation_m"]
     )
+    values["persistence_lag_steps"] = values["chunk_steps"]
     values |= {name: value for name, value in stated.items() if name != "channel_scale"}
     values["channel_scale"] |= stated.get("channel_scale", {})
     horizon = int(values.get("observation_horizon", 2))
@@ -133,4 +135,8 @@ def _separations(dataset: Dataset, names: list[str] | None) -> dict[str, float]:
     unit = next(iter(units)) if len(units) == 1 else ""
     commanded = dataset.split("train").frames.action[:, columns]
     scale = SCALES.get(unit, _spread_scale(commanded))
-    return {"minimum_separation_m": APART * scale, "noise_floor_m": NOISE * scale}
+    return {
+        "minimum_separation_m": APART * scale,
+        "noise_floor_m": NOISE * scale,
+        "calibration_limit_m": SHIFTED * scale,
+    }
