@@ -65,8 +65,8 @@ def effect_rows(
 
 
 def valid(row: dict[str, Any]) -> float:
-    """1 if all samples pass the six layers and a mode is reached, else 0."""
-    return float(row["admissible"] >= row["samples"] and row["modes_covered"] >= 1)
+    """Share of the samples that pass the six layers, where a mode is reached at all; else 0."""
+    return float(row["admissible"] / row["samples"]) if row["modes_covered"] >= 1 else 0.0
 
 
 def half_width(gains: Array) -> float:

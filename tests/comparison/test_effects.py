@@ -55,9 +55,9 @@ def test_situations_with_one_mode_do_not_count_and_nothing_measured_is_nan():
 
 
 @pytest.mark.parametrize(
-    ("covered", "admissible", "expected"), [(1, 4, 1.0), (1, 3, 0.0), (0, 4, 0.0), (2, 4, 1.0)]
+    ("covered", "admissible", "expected"), [(1, 4, 1.0), (1, 3, 0.75), (0, 4, 0.0), (2, 4, 1.0)]
 )
-def test_valid_needs_a_mode_and_all_layers(covered, admissible, expected):
+def test_valid_needs_a_mode_and_counts_samples_that_pass_all_layers(covered, admissible, expected):
     assert valid(situation("a", "e", covered, admissible)) == expected
 
 
