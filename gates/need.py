@@ -214,11 +214,13 @@ def baseline_coverage(case: Case) -> Measured:
     """Mode coverage of the best baseline as it is deployed, which is without drawing at random.
 
     What a baseline covers when its latent is drawn stands in the caveat: drawn from, it is a
-    generator itself and has to pass the gates like any other candidate.
+    generator itself and has to pass the gates like any other candidate. Wide scatter reaches
+    modes by chance, so the share of its samples that pass all six layers stands beside it.
     """
-    columns = ("seed", "convention", "modes_present", "modes_covered")
+    columns = ("seed", "convention", "modes_present", "modes_covered", "samples", "admissible")
     deployed: list[tuple[float, str]] = []
     drawn: list[tuple[float, str]] = []
+    admissible: dict[str, float] = {}
     for method in case.params.baselines:
         rows = case.evidence.of(f"{BASELINES}/modes.parquet", method, *columns)
         rows = rows[numbers(rows, "modes_present") >= 2]
@@ -231,12 +233,16 @@ def baseline_coverage(case: Case) -> Measured:
             fixed = name in case.params.deployed_conventions and not generative
             into = deployed if fixed else drawn
             into.append((float(value), f"{method}, {name}"))
+            own = rows[rows["convention"] == name]
+            passed = numbers(own, "admissible").sum() / numbers(own, "samples").sum()
+            admissible[f"{method}, {name}"] = float(passed)
     if not deployed:
         raise MissingEvidenceError("no baseline is deployed without drawing at random")
     best, name = max(deployed)
     text = f"best of {len(deployed)} deployed conventions, by {name}"
     if drawn:
         text += "; drawn at random, as a generator: " + ", ".join(
-            f"{who} {value:.3g}" for value, who in sorted(drawn, reverse=True)
+            f"{who} {value:.3g} ({admissible[who]:.0%} of samples admissible)"
+            for value, who in sorted(drawn, reverse=True)
         )
     return Measured(best, caveat=text)
