@@ -117,6 +117,8 @@ class Guided(Operator):
         for what, argument in self.prelude:
             if what == "wait":
                 yield from self._wait(float(argument))
+            elif what == "begin":
+                self.begun = True
             else:
                 yield from self._move(np.asarray(argument), speed_m_s=self._style.speed_m_s)
         self.begun = True
@@ -179,9 +181,10 @@ def _prelude(plan: Plan, start: InsertionStart, rng: np.random.Generator):
         return (("wait", PERIOD_S * (on + int(rng.integers(5, 11)))),), on
     if plan.station_dwell_s:
         station = np.array([0.44, -0.17, 0.16]) + 0.006 * rng.uniform(-1.0, 1.0, 3)
+        rest_s = plan.station_dwell_s + PERIOD_S * int(rng.integers(0, 3))
         return (
             ("wait", pause_s + plan.station_dwell_s), ("move", station), ("wait", 0.2),
-            ("move", here), ("wait", plan.station_dwell_s + PERIOD_S * int(rng.integers(0, 3))),
+            ("move", here), ("begin", None), ("wait", rest_s),
         ), 0  # fmt: skip
     return (("wait", pause_s),), 0
 
