@@ -156,6 +156,7 @@ def test_v3_episode_in_two_files_is_refused_once(layouts, tmp_path):
         ({"data_path": "/etc/{episode_index:06d}.parquet"}, "data_path"),
         ({"data_path": "C:\\{episode_index:06d}.parquet"}, "data_path"),
         ({"data_path": "data/\u0000{episode_index:06d}.parquet"}, "data_path"),
+        ({"data_path": "data/{video_key}/{episode_index:06d}.parquet"}, "data_path"),
         ({"data_path": 5}, "data_path"),
         ({"data_path": "elsewhere/{episode_index:06d}.parquet"}, "without a data file"),
         ({"features": []}, "features"),
@@ -214,6 +215,17 @@ def test_leader_and_follower_of_different_build(layouts, tmp_path):
     layouts.write(root / "meta/info.json", layouts.info(features=features))
     opened = open_dataset(root, out=tmp_path / "out")
     assert opened.accepted == 6
+
+
+def test_a_difference_under_the_same_name_pairs_with_nothing(layouts, tmp_path):
+    root = layouts.v2(tmp_path / "recordings")
+    for i in range(6):
+        state = layouts.samples(i)[0]
+        change = layouts.vectors(np.diff(state, axis=0, append=state[-1:]))
+        layouts.write(layouts.file(root, i), layouts.table(i, first=30 * i, action=change))
+    contract = propose(root)
+    assert contract.pairing is None
+    assert any("follows the change of what bears its name" in note for note in contract.notes)
 
 
 def test_names_however_nested():

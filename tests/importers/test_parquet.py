@@ -8,6 +8,7 @@ import pytest
 from genpolicy.dataset.dataset import load_dataset
 from genpolicy.errors import BadInputError
 from genpolicy.importers import open_dataset, propose
+from genpolicy.importers import segments as segments_module
 from genpolicy.importers import tables as tables_module
 from genpolicy.importers.contract import load_contract, write_contract
 
@@ -165,6 +166,31 @@ def test_a_row_bomb_is_refused_by_what_it_claims(tmp_path, monkeypatch):
     monkeypatch.undo()
     with pytest.raises(BadInputError, match="5000000 rows long, expected at most 1000000"):
         open_dataset(path, out=tmp_path / "out")
+
+
+def test_a_row_of_too_many_numbers_is_refused_by_what_it_claims(tmp_path):
+    path = tmp_path / "wide.parquet"
+    wide = pa.array([np.zeros(5000)])
+    pq.write_table(pa.table({"state": wide, "action": wide}), path)
+    with pytest.raises(BadInputError, match="5000 values in 1 rows"):
+        open_dataset(path, out=tmp_path / "out")
+
+
+def test_an_endless_episode_in_a_long_table_is_refused(long, tmp_path, monkeypatch):
+    table = pq.read_table(long)
+    ids = [UUIDS[0]] * 90 + table["episode_uuid"].to_pylist()[90:]
+    pq.write_table(table.set_column(0, "episode_uuid", pa.array(ids)), long)
+    monkeypatch.setattr(segments_module, "MAXIMUM_EPISODE_ROWS", 60)
+    opened = open_dataset(long, out=tmp_path / "out")
+    assert (opened.found, opened.accepted) == (6, 5)
+    assert "90 rows long, expected at most 60" in opened.refused[0].reason
+
+
+def test_what_will_be_refused_decides_nothing_of_the_proposal(long, layouts):
+    clean = propose(long)
+    rewrite(long, layouts, 0, action_tool_x_m=np.full(30, np.nan))
+    assert propose(long) == clean.model_copy(update={"frozen": propose(long).frozen})
+    assert propose(long).frozen is not None
 
 
 def test_ragged_vectors_are_refused_by_row(tmp_path):

@@ -80,6 +80,13 @@ def test_descriptions_that_are_refused_before_decoding(buffer, tmp_path, changes
         ingest_zarr_replay_buffer(buffer, out=tmp_path / "out")
 
 
+@pytest.mark.parametrize("name", ["compressor", "filters"])
+def test_a_codec_that_runs_code_is_named_before_it_is_asked_for(buffer, tmp_path, name):
+    edit(buffer, **{name: {"id": "pickle"} if name == "compressor" else [{"id": "pickle"}]})
+    with pytest.raises(ContractError, match="expected plain numbers"):
+        ingest_zarr_replay_buffer(buffer, out=tmp_path / "out")
+
+
 def test_changed_chunk_and_missing_array(buffer, tmp_path):
     chunk = buffer / "data" / "state" / "0.0"
     chunk.write_bytes(chunk.read_bytes()[:20])
