@@ -132,6 +132,8 @@ def _widest(spread: Array, scene: list[int]) -> list[int]:
 
 
 def _label(name: str, unit: str) -> str:
+    end = name.rpartition(".")[2]
+    name = end if end in ("x", "y", "z") else name
     plain = name.removesuffix(f"_{unit}") if unit else name
     plain = plain.replace("_", " ")
     return f"{plain}, {unit}" if unit else plain

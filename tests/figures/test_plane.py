@@ -27,6 +27,7 @@ def test_a_gripper_beside_a_tool_leaves_the_scene_a_scene_and_two_arms_do_not():
     path = np.random.default_rng(3).normal(size=(16, 4)) * [1, 3, 2, 9]
     names = ["tcp.x", "tcp.y", "tcp.z", "gripper.opening"]
     assert plane_of([path], names, "m").columns == (1, 2)
+    assert plane_of([path], names, "m").y_label == "z, m"
     assert plane_of([path], names, "m", from_above=True).columns == (0, 1)
     arms = [f"{arm}.{axis}" for arm in ("left", "right") for axis in "xyz"]
     assert not plane_of([np.ones((4, 6)) * np.arange(4)[:, None]], arms, "m").is_scene

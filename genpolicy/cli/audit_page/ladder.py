@@ -193,6 +193,23 @@ def _support(evidence: AuditEvidence) -> list[Check]:
 
 
 def _structure(evidence: AuditEvidence) -> list[Check]:
+    checks = _modes_found(evidence)
+    counts, settings = evidence.summary["counts"], evidence.settings
+    if counts["two_mode_episodes"] < counts["needed_episodes"]:
+        queries = int(counts["queries"])
+        checks.append(
+            Check(
+                "share of situations with enough demonstrations to deny modes",
+                counts["analysed"] / queries if queries else 0.0,
+                float(settings["minimum_absence_share"]),
+                AT_LEAST,
+                note="modes may hide in the others",
+            )
+        )
+    return checks
+
+
+def _modes_found(evidence: AuditEvidence) -> list[Check]:
     counts, settings = evidence.summary["counts"], evidence.settings
     kept = evidence.persistence
     least = float(settings["minimum_two_mode_situations"])
