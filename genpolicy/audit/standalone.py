@@ -9,7 +9,7 @@ from genpolicy.audit.propose import observation_contract, propose_settings
 from genpolicy.audit.run import AuditResult
 from genpolicy.audit.run import audit as audit_rows
 from genpolicy.audit.settings import AuditSettings
-from genpolicy.audit.strata import EPISODE_VARIABLES
+from genpolicy.audit.strata import EPISODE_VARIABLES, HISTORY
 from genpolicy.audit.view import from_dataset
 from genpolicy.dataset.dataset import Dataset
 
@@ -187,6 +187,11 @@ def _rests_on(
     if admissible is None:
         lines.append(
             "feasibility: not checked; neither the mean nor a mode was held against limits."
+        )
+    if any(row.variable == HISTORY and row.n == 0 for row in result.strata):
+        lines.append(
+            "history: the modes part before there is a past to look at, so whether something "
+            "earlier decided them was not tested."
         )
     if not result.data.paired:
         lines.append("pairing: no action commands an observed number, so no lag was measured.")

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from genpolicy.audit.data import AuditInput, Integers, Text, recorded
+from genpolicy.audit.data import Array, AuditInput, Integers, Text, recorded
 from genpolicy.audit.history import history_test
 from genpolicy.audit.modes import Clustering
 from genpolicy.audit.neighbourhoods import Neighbourhood
@@ -97,8 +97,7 @@ def examine_strata(
         least = settings.minimum_neighbours // 2
         hidden = _disjoint(data, items, closest, least)
         seen = _disjoint(data, items, drawn, least)
-        together = closest[np.sort(gaps) < STILL_TOGETHER]
-        past = _disjoint(data, items, together, least)
+        past = _disjoint(data, items, _together(closest, np.sort(gaps)), least)
         tested = [(*entry, hidden) for entry in _hidden_variables(data, hidden[0], links[phase])]
         # Routes of different length are at another time as soon as they part.
         tested.append(("time_in_episode", data.index[past[0]].astype(np.float64), False, past))
@@ -118,6 +117,14 @@ def _enough_permutations(data: AuditInput, settings: AuditSettings, phases: int)
     if settings.permutations >= least:
         return settings
     return settings.model_copy(update={"permutations": least})
+
+
+def _together(closest: Integers, gaps: Array) -> Integers:
+    """Situations whose clusters are still in one place; if there is none, the closest quarter."""
+    together = closest[gaps < STILL_TOGETHER]
+    if len(together):
+        return together
+    return closest[: len(closest) // 4][gaps[: len(closest) // 4] < 2 * STILL_TOGETHER]
 
 
 def _tested(

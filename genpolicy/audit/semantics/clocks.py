@@ -129,7 +129,7 @@ def offset_defects(
     table, defects = data.episodes, []
     taken = np.zeros(len(table))
     deviations, spread = within_groups(offsets_s, table.calibration_epoch, LEAST_EPISODES)
-    floor = max(finest_s, settings.clock_limit_s, EPOCH_SPREADS * np.nan_to_num(spread))
+    floor = max(finest_s, settings.clock_limit_s, EPOCH_SPREADS * float(np.nan_to_num(spread)))
     for name, count, gap, error in group_medians(
         offsets_s, table.calibration_epoch, reference=declared_s, least=LEAST_EPISODES
     ):

@@ -76,10 +76,19 @@ def magnitude_defects(data: AuditInput, motion: Motion, settings: AuditSettings)
         same = np.abs(both[0] - both[1]) <= np.log(2.0)
         defects += _magnitude(data, "position", np.where(same, both[0], 0.0), settings)
     for name, part in data.context.items():
-        values = data.observation[:, part]
-        size = np.linalg.norm(episode_medians(np.abs(values), motion.starts), axis=1)
-        defects += _magnitude(data, name, _off(size), settings)
+        # Component by component: beside a direction cosine a length hardly counts.
+        medians = episode_medians(data.observation[:, part], motion.starts)
+        off = np.stack([_off(np.abs(values)) * _clear(values) for values in medians.T])
+        worst = off[np.argmax(np.abs(off), axis=0), np.arange(off.shape[1])]
+        defects += _magnitude(data, name, worst, settings)
     return defects
+
+
+def _clear(values: Array) -> Array:
+    """0 for small values of a component that lies about zero: there, small is no other unit."""
+    about_zero = min(np.mean(values > 0), np.mean(values < 0)) > 0.05
+    small = np.abs(values) <= np.quantile(np.abs(values), 0.5)
+    return np.where(about_zero & small, 0.0, 1.0)
 
 
 def _log_gain(seen: Array, asked: Array) -> Array:
