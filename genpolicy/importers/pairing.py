@@ -25,6 +25,7 @@ LAGS = (0, 1, 2, 4, 8, 12)
 SAME_SCALE = (0.7, 1.4)
 MAXIMUM_RESIDUAL = 0.5
 DIFFERENCE_CORRELATION = 0.5
+DIFFERENCE_LEAD = 0.1
 MINIMUM_SAMPLES = 20
 
 
@@ -135,13 +136,22 @@ def are_differences(observed: Array, commanded: Array, episode: Integers) -> boo
     inside = np.flatnonzero(np.diff(episode) == 0)
     if len(inside) < MINIMUM_SAMPLES:
         return False
-    change = observed[inside + 1] - observed[inside]
-    votes = [
-        _correlation(commanded[inside, i], change[:, i]) > DIFFERENCE_CORRELATION
-        and abs(_correlation(commanded[inside, i], observed[inside, i])) < DIFFERENCE_CORRELATION
-        for i in range(observed.shape[1])
-    ]
-    return sum(votes) > len(votes) / 2
+    told, seen = commanded[inside], observed[inside]
+    change = observed[inside + 1] - seen
+    votes = 0
+    for i in range(seen.shape[1]):
+        moved = _correlation(told[:, i], change[:, i])
+        explains = moved > DIFFERENCE_CORRELATION
+        better = moved > _correlation(told[:, i], seen[:, i]) + DIFFERENCE_LEAD
+        votes += int(explains and better and not _is_same_place(told[:, i], seen[:, i]))
+    return votes > seen.shape[1] / 2
+
+
+def _is_same_place(told: Array, seen: Array) -> bool:
+    """Same spread about the same centre: a fast target leads its response, and is yet a place."""
+    spread, width = float(seen.std()), float(told.std())
+    near = abs(float(told.mean() - seen.mean())) <= spread
+    return near and SAME_SCALE[0] * spread <= width <= SAME_SCALE[1] * spread
 
 
 def _correlation(a: Array, b: Array) -> float:

@@ -107,6 +107,12 @@ def test_differences_are_told_from_positions():
     change = np.diff(path, axis=0, append=path[-1:])
     assert are_differences(path, change, episode)
     assert not are_differences(path, path + 0.01, episode)
+    # A fast target leads its response by a quarter turn: it looks like its change, and is a place.
+    turn = np.arange(300)[:, None] * 0.4 + np.arange(3)
+    assert not are_differences(np.sin(turn), np.sin(turn + np.pi / 2), episode)
+    # Slow and short, a change looks like a place; its spread tells.
+    slow = np.sin(np.arange(300)[:, None] * 0.02 + np.arange(3))
+    assert are_differences(slow, np.diff(slow, axis=0, append=slow[-1:]), episode)
 
 
 def sample(values, name="state"):
