@@ -144,7 +144,7 @@ def are_differences(observed: Array, commanded: Array, episode: Integers) -> boo
         explains = moved > DIFFERENCE_CORRELATION
         better = moved > _correlation(told[:, i], seen[:, i]) + DIFFERENCE_LEAD
         votes += int(explains and better and not _is_same_place(told[:, i], seen[:, i]))
-    return votes > seen.shape[1] / 2
+    return 2 * votes > int(seen.shape[1])
 
 
 def _is_same_place(told: Array, seen: Array) -> bool:
