@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from genpolicy.audit.data import AuditInput, Integers
+from genpolicy.audit.progress import Progress, silent
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.seeds import stream
 from genpolicy.statistics.intervals import clopper_pearson
@@ -49,7 +50,12 @@ class ModeOutcome:
 
 
 def replay_sample(
-    data: AuditInput, settings: AuditSettings, *, replay: Replay | None, root_seed: int
+    data: AuditInput,
+    settings: AuditSettings,
+    *,
+    replay: Replay | None,
+    root_seed: int,
+    progress: Progress = silent,
 ) -> tuple[Replayed, ...]:
     """Replay a random sample of the labelled episodes, in order of identifier.
 
@@ -58,20 +64,20 @@ def replay_sample(
         settings: Size of the sample.
         replay: Called with the identifier, answers with the outcome; None: no replay.
         root_seed: Seed of the sample.
+        progress: Called after every replay.
     """
     if replay is None:
         return ()
     labelled = np.flatnonzero(data.episodes.outcome != "")
     count = min(settings.replay_episodes, len(labelled))
     chosen = stream(root_seed, "audit", "replay").choice(labelled, count, replace=False)
-    return tuple(
-        Replayed(
-            episode_uuid=str(data.episodes.uuid[number]),
-            label=str(data.episodes.outcome[number]),
-            replayed=replay(str(data.episodes.uuid[number])),
-        )
-        for number in np.sort(chosen)
-    )
+    replayed = []
+    for number in np.sort(chosen):
+        uuid = str(data.episodes.uuid[number])
+        label = str(data.episodes.outcome[number])
+        replayed.append(Replayed(episode_uuid=uuid, label=label, replayed=replay(uuid)))
+        progress("episodes replayed", len(replayed), count)
+    return tuple(replayed)
 
 
 def disagreement(replayed: tuple[Replayed, ...]) -> tuple[int, int, float]:

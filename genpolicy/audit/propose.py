@@ -22,6 +22,10 @@ SPREAD_SHARE = 0.05
 APART, NOISE, SHIFTED = 3.0, 0.2, 0.5
 # The radius grows with the root of the number of components: 1.4 scales in each (RMS).
 RADIUS_PER_COMPONENT = 1.4
+OWN_BODY = {
+    *("tcp", "eef", "ee", "gripper", "joint", "joints", "robot", "robot0", "qpos", "qvel", "arm"),
+    *("hand", "force", "torque", "wrench", "velocity", "vel", "state", "proprio", "phase"),
+}
 CHUNK_S = 0.8
 MINIMUM_CHUNK, MAXIMUM_CHUNK = 8, 64
 # Two routes can only lie apart by what was travelled: a chunk covers three times that distance.
@@ -84,11 +88,22 @@ def propose_settings(
 
 
 def _context(contract: ObservationContract, paired: set[str]) -> list[str]:
-    """Channels of which no component is the robot's own position."""
+    """Channels that show the scene: what the robot's own body does follows from the mode.
+
+    Where the body has a stream of its own, everything in it is left out; else names tell.
+    """
+    body = {
+        channel.stream
+        for channel in contract.channels
+        if paired & {f"{channel.name}.{part}" for part in channel.components}
+    }
+    alone = {channel.stream for channel in contract.channels} - body
     return [
         channel.name
         for channel in contract.channels
         if not paired & {f"{channel.name}.{part}" for part in channel.components}
+        and not (alone and channel.stream in body)
+        and not OWN_BODY & set(channel.name.lower().split("_"))
     ]
 
 

@@ -12,6 +12,7 @@ from genpolicy.audit.linking import link
 from genpolicy.audit.mean_versus_modes import Admissible
 from genpolicy.audit.neighbourhoods import Support
 from genpolicy.audit.persistence import Persistence, summarise
+from genpolicy.audit.progress import Progress, silent
 from genpolicy.audit.recovery import RecoveryOutcome, recovery_outcomes
 from genpolicy.audit.semantics import Semantics, measure, realigned
 from genpolicy.audit.settings import AuditSettings
@@ -78,6 +79,7 @@ def audit(
     admissible: Admissible | None,
     replay: Replay | None,
     root_seed: int,
+    progress: Progress = silent,
 ) -> AuditResult:
     """Audit a dataset.
 
@@ -88,22 +90,26 @@ def audit(
             reason)`; None leaves the columns empty.
         replay: Outcome of a replayed episode, by identifier; None leaves labels unproven.
         root_seed: Seed of all draws.
+        progress: Called as `progress(what, done, total)` after every situation and replay.
 
     Returns:
         The evidence and the cause; the same for every order of episodes.
     """
     data = canonical(data)
     semantics = measure(data, settings)
-    found, support = find_situations(data, settings, root_seed)
+    found, support = find_situations(data, settings, root_seed, progress=progress)
     chosen = claimed(data, settings, found)
-    situations = tuple(
-        examine(data, settings, entry, number in chosen, admissible=admissible, seed=root_seed)
-        for number, entry in enumerate(found)
-    )
+    examined: list[Situation] = []
+    for number, entry in enumerate(found):
+        split = number in chosen
+        item = examine(data, settings, entry, split, admissible=admissible, seed=root_seed)
+        examined.append(item)
+        progress("situations examined", number + 1, len(found))
+    situations = tuple(examined)
     claims = situations
     situations, incoherent = coherent(settings, claims)
     several = by_phase(situations)
-    replayed = replay_sample(data, settings, replay=replay, root_seed=root_seed)
+    replayed = replay_sample(data, settings, replay=replay, root_seed=root_seed, progress=progress)
     links = _links(data, settings, several)
     modes = _modes(data, situations, links, replayed)
     strata = examine_strata(data, settings, several, links, root_seed=root_seed)

@@ -9,6 +9,7 @@ from genpolicy.audit.mean_versus_modes import Admissible, MeanVersusModes, compa
 from genpolicy.audit.modes import ROUTE_CHUNKS, Clustering, cluster_chunks
 from genpolicy.audit.neighbourhoods import Neighbourhood, Support, find
 from genpolicy.audit.persistence import POINTWISE_RATIO, kept_identity, persistent, von_neumann
+from genpolicy.audit.progress import Progress, silent
 from genpolicy.audit.resolution import resolved_by_observation
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.seeds import stream
@@ -43,16 +44,19 @@ class Situation:
 
 
 def find_situations(
-    data: AuditInput, settings: AuditSettings, root_seed: int
+    data: AuditInput, settings: AuditSettings, root_seed: int, *, progress: Progress = silent
 ) -> tuple[list[Found], tuple[Support, ...]]:
     """Situations with their clusters, and the support, of every group of `data.grouping`."""
-    found, support = [], []
+    found: list[Found] = []
+    support: list[Support] = []
     for phase in np.unique(data.grouping):
         items, reach = find(data, settings, phase=str(phase), root_seed=root_seed)
         support.append(reach)
+        offset = len(found)
         for item in items:
             paths = relative_paths(data, item.members, ROUTE_CHUNKS * settings.chunk_steps)
             found.append((str(phase), item, cluster_chunks(paths, settings)))
+            progress(f"situations of {phase} clustered", len(found) - offset, len(items))
     return found, tuple(support)
 
 

@@ -5,6 +5,7 @@ from typing import Any
 
 from genpolicy.audit.labels import Replay, disagreement
 from genpolicy.audit.mean_versus_modes import Admissible
+from genpolicy.audit.progress import Progress, silent
 from genpolicy.audit.propose import observation_contract, propose_settings
 from genpolicy.audit.run import AuditResult
 from genpolicy.audit.run import audit as audit_rows
@@ -76,6 +77,7 @@ def audit(
     admissible: Admissible | None = None,
     replay: Replay | None = None,
     root_seed: int = 0,
+    progress: Progress | None = None,
 ) -> AuditReport:
     """Audit an ingested dataset.
 
@@ -87,6 +89,7 @@ def audit(
             reason)`; None: no mean and no mode is checked.
         replay: Outcome of a replayed episode, by identifier; None: labels are taken as they are.
         root_seed: Seed of all draws.
+        progress: Called as `progress(what, done, total)`.
 
     Returns:
         Verdict and evidence; the same for every order of episodes.
@@ -101,7 +104,14 @@ def audit(
         settings=settings,
         period_s=float(dataset.manifest["action_contract"]["period_s"]),
     )
-    result = audit_rows(data, settings, admissible=admissible, replay=replay, root_seed=root_seed)
+    result = audit_rows(
+        data,
+        settings,
+        admissible=admissible,
+        replay=replay,
+        root_seed=root_seed,
+        progress=progress or silent,
+    )
     verdict, counts = result.verdict, result.counts
     return AuditReport(
         verdict=verdict.cause.value,

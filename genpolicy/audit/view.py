@@ -15,7 +15,7 @@ from genpolicy.audit.data import (
     canonical,
 )
 from genpolicy.audit.settings import AuditSettings
-from genpolicy.contract.action import POSITION, ROTATION
+from genpolicy.contract.action import ACTION_COMPONENTS, POSITION, ROTATION
 from genpolicy.contract.observation import Channel, ObservationContract
 from genpolicy.dataset.dataset import Dataset
 from genpolicy.errors import ContractError
@@ -130,9 +130,9 @@ def _columns(numbers: list[int]) -> Index:
 
 def _rotation(dataset: Dataset, commanded: Index) -> slice | None:
     """Where the rotation lies, in the action contract of tool poses; None in any other."""
-    units = list(dataset.manifest["action_contract"]["units"])
-    pose = commanded == POSITION if isinstance(commanded, slice) else False
-    return ROTATION if pose and units[ROTATION] == ["1"] * 6 else None
+    names = list(dataset.manifest["action_contract"]["components"])
+    whole = set(range(POSITION.start, POSITION.stop)) <= set(np.arange(len(names))[commanded])
+    return ROTATION if whole and names[ROTATION] == list(ACTION_COMPONENTS[ROTATION]) else None
 
 
 def _scale(channel: Channel, component: str, settings: AuditSettings) -> float:

@@ -5,25 +5,29 @@ import os
 import shutil
 import sys
 import time
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from genpolicy.audit.evidence import write_evidence
 from genpolicy.audit.propose import propose_settings
+from genpolicy.audit.settings import AuditSettings
 from genpolicy.audit.standalone import AuditReport, audit
 from genpolicy.cli.audit_page.evidence import read_evidence
 from genpolicy.cli.audit_page.page import audit_page
 from genpolicy.cli.audit_page.words import TITLES
 from genpolicy.cli.ingest import add_input, given_contract
 from genpolicy.cli.progress import ProgressLine
+from genpolicy.cli.remember import Answers, remembered_admissible, remembered_replay
 from genpolicy.cli.resume import DATASET, fingerprint, kept_or_new, work_folder
-from genpolicy.cli.task_checks import task_checks
+from genpolicy.cli.task_checks import TaskChecks, task_checks
 from genpolicy.dataset.dataset import Dataset, load_dataset
 from genpolicy.errors import BadInputError
 from genpolicy.importers import Opened, open_dataset
 from genpolicy.importers.contract import write_contract
 from genpolicy.integrity.atomic import output_folder, write_bytes
 from genpolicy.integrity.documents import canonical_json
+from genpolicy.integrity.hashing import sha256_bytes
 
 EXAMPLES = """examples:
   genpolicy audit recordings/ --out audit/              # whatever they are
@@ -64,13 +68,7 @@ def run_audit(options: argparse.Namespace) -> int:
     dataset = load_dataset(opened.folder)
     settings = propose_settings(dataset, source=opened.contract.model_dump(mode="json"))
     checks = task_checks(dataset, task=options.task, chunk_steps=settings.chunk_steps)
-    report = audit(
-        dataset,
-        settings,
-        admissible=checks.admissible,
-        replay=checks.replay,
-        root_seed=options.seed,
-    )
+    report = _audited(options, dataset, settings, checks, work)
     _say("writing the evidence and the page")
     with output_folder(out) as folder:
         write_contract(folder / CONTRACT, opened.contract)
@@ -162,6 +160,40 @@ def as_text(report: AuditReport, opened: Opened, out: Path) -> str:
 
 def _block(title: str, texts: tuple[str, ...]) -> list[str]:
     return [f"{title if number == 0 else '':<12}{text}" for number, text in enumerate(texts)]
+
+
+def _audited(
+    options: argparse.Namespace,
+    dataset: Dataset,
+    settings: AuditSettings,
+    checks: TaskChecks,
+    work: Path,
+) -> AuditReport:
+    """The audit, with a progress line; slow checks are remembered beside the output."""
+    rests = [dataset.manifest_sha256, settings.model_dump(mode="json"), version("genpolicy")]
+    answers = Answers(work / f"answers-{sha256_bytes(canonical_json(rests))[:16]}.jsonl")
+    lines: dict[str, ProgressLine] = {}
+
+    def progress(what: str, done: int, total: int) -> None:
+        if what not in lines:
+            for line in lines.values():
+                line.close()
+            lines[what] = ProgressLine(what)
+        lines[what](done, total)
+
+    replay, admissible = checks.replay, checks.admissible
+    try:
+        return audit(
+            dataset,
+            settings,
+            admissible=None if admissible is None else remembered_admissible(admissible, answers),
+            replay=None if replay is None else remembered_replay(replay, answers),
+            root_seed=options.seed,
+            progress=progress,
+        )
+    finally:
+        for line in lines.values():
+            line.close()
 
 
 def _opened(options: argparse.Namespace, work: Path) -> Opened:

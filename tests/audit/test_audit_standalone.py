@@ -91,7 +91,7 @@ def test_settings_are_proposed_from_units_and_pairing(valid):
     assert settings.channel_scale["tcp"] == 0.01 and settings.channel_scale["goal"] == 0.02
     assert settings.minimum_separation_m == pytest.approx(0.03)
     assert settings.minimum_situations == 7
-    assert settings.context_channels == ["goal", "flag"]
+    assert settings.context_channels == ["goal", "flag"]  # of one stream with the position
     assert not settings.phase_observed
     assert 8 <= settings.chunk_steps <= 10  # 3 x 3 cm at 1 cm a step
 
@@ -126,3 +126,32 @@ def test_it_says_what_it_rests_on(valid):
         assert what in text
     assert (report.verdict, report.variable) == ("insufficient_support", "outcome")
     assert any(line.startswith("labels: not replayed") for line in report.evidence)
+
+
+def test_what_the_body_does_is_no_context(valid):
+    channels = [
+        {"name": "tcp", "components": ["x", "y"], "stream": "robot"},
+        {"name": "goal", "components": ["x_m", "y_m"], "stream": "camera"},
+        {"name": "wrist", "components": ["phase"], "stream": "robot"},
+    ]
+    stored = {"channels": [{**c, "unit": "m", "maximum_age_s": 0.5} for c in channels]}
+    pairs = {"import_contract": {"pairing": {"x": "tcp.x", "y": "tcp.y"}}}
+    dataset = dataset_of(valid[0], manifest={"observation_contract": stored, **pairs})
+    assert propose_settings(dataset).context_channels == ["goal"]
+    for channel in stored["channels"]:
+        channel["stream"] = "all"
+    stored["channels"][2]["name"] = "gripper_opening"
+    dataset = dataset_of(valid[0], manifest={"observation_contract": stored, **pairs})
+    assert propose_settings(dataset).context_channels == ["goal"]
+
+
+def test_progress_is_told_and_changes_nothing(valid):
+    data, replayed = valid
+    settings = SETTINGS.model_copy(update={**NAMES, "query_stride": 20})
+    told = []
+    options = {"admissible": admissible, "replay": replayed.__getitem__, "root_seed": 3}
+    with_it = audit(dataset_of(data), settings, progress=lambda *a: told.append(a), **options)
+    assert with_it.as_json() == audit(dataset_of(data), settings, **options).as_json()
+    last = {what: (done, total) for what, done, total in told}
+    assert {"situations examined", "episodes replayed"} <= set(last)
+    assert all(done == total for done, total in last.values())
