@@ -7,6 +7,8 @@ import pytest
 from arms import SETTINGS, arms, last_epoch, late, parts, rebuilt, some
 
 from genpolicy.audit.semantics import episode_lags, measure, realigned
+from genpolicy.audit.semantics.clocks import offset_defects
+from genpolicy.audit.semantics.drift import drift_defects
 from genpolicy.audit.semantics.lags import segment_lags
 from genpolicy.audit.semantics.robust import densest_half
 from genpolicy.seeds import stream
@@ -55,6 +57,31 @@ def test_what_does_not_move_or_follow_has_no_lag():
     assert np.isnan(segment_lags(walk(60, 2), noise, edges, 8).steps[0])
 
 
+def test_straight_motion_at_one_speed_does_not_tell_a_lag():
+    # Any shift is a constant offset; what the noise prefers must not count.
+    rng = stream(4, "straight")
+    ramp = np.linspace(0.0, 3.0, 60)[:, None] * np.ones((1, 2))
+    edges = np.arange(0, 60 * 30 + 1, 60)
+    leading = np.vstack([ramp] * 30)
+    trailing = leading - 0.1 + 0.003 * rng.normal(size=leading.shape)
+    assert np.isnan(segment_lags(leading, trailing, edges, 8).steps).mean() >= 0.9
+
+
+def test_an_episode_is_off_only_beyond_its_own_error():
+    data = arms(21)
+    offsets = 0.1 + 0.001 * stream(7, "offsets").normal(size=60)
+    offsets[[3, 9, 27, 40]] += 0.08
+    limits = {"declared_s": None, "finest_s": 0.0125, "episode_limit_s": 0.0375}
+    sure, taken = offset_defects(
+        "robot", offsets, data, SETTINGS, **limits, errors_s=np.full(60, 0.002)
+    )
+    assert [d.kind for d in sure] == ["clock"] and np.flatnonzero(taken).tolist() == [3, 9, 27, 40]
+    unsure, taken = offset_defects(
+        "robot", offsets, data, SETTINGS, **limits, errors_s=np.full(60, 0.03)
+    )
+    assert unsure == [] and not taken.any()
+
+
 def test_the_densest_half_stays_in_one_cluster():
     rng = stream(3, "half")
     values = np.concatenate([rng.normal(size=600), 50 + rng.normal(size=500)])
@@ -96,6 +123,13 @@ def test_a_drift_along_the_episode_is_named():
     found = measure(drifting, SETTINGS).defects
     assert found[0].kind == "clock_drift" and found[0].unit == "s per episode"
     assert found[0].measured == pytest.approx(4 / 20, rel=0.3)
+
+
+def test_a_drift_within_the_spread_of_episodes_is_the_way_of_moving():
+    data = arms(22, epochs=1, episodes=400)
+    rng = stream(8, "drifts")
+    assert drift_defects(2.0 + 0.3 * rng.normal(size=400), data, SETTINGS)
+    assert not drift_defects(2.0 + 3.0 * rng.normal(size=400), data, SETTINGS)
 
 
 @pytest.mark.parametrize("shape", ["step", "trend"])

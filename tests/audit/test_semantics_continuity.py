@@ -82,6 +82,10 @@ def test_a_way_gone_twice_is_not_glued():
     assert "glued" not in kinds(again) and "duplicate" not in kinds(again)
 
 
+def test_slow_motion_without_noise_does_not_repeat_itself():
+    assert kinds(arms(62, noise=0.0, rate_hz=40.0, rows=(300, 320), episodes=20)) == []
+
+
 def test_stubs_under_success_are_named_and_honest_failures_are_not():
     data = arms(56)
     commands, seen = parts(data)

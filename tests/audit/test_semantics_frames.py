@@ -7,6 +7,7 @@ import pytest
 from arms import SETTINGS, arms, last_epoch, late, parts, rebuilt, some
 
 from genpolicy.audit.semantics import measure
+from genpolicy.audit.semantics.frames import _assignment
 from genpolicy.audit.semantics.motion import make_motion
 
 
@@ -110,6 +111,15 @@ def test_swapped_columns_are_named(width, share):
     order[[0, 1]] = [1, 0]
     kind, _ = first(mapped(data, some(data, share), lambda part: part[:, order]))
     assert kind == "swapped_columns"
+
+
+def test_columns_are_swapped_beyond_doubt_or_not_at_all():
+    near = np.array([[0.95, 0.96, 0.1], [0.96, 0.95, 0.1], [0.1, 0.1, 0.9]])
+    assert _assignment(near).tolist() == [0, 1, 2]
+    clear = np.array([[0.6, 0.97, 0.1], [0.97, 0.6, 0.1], [0.1, 0.1, 0.9]])
+    assert _assignment(clear).tolist() == [1, 0, 2]
+    still = np.array([[0.2, 0.5], [0.5, 0.2]])
+    assert _assignment(still).tolist() == [0, 1]
 
 
 def test_joints_that_move_together_are_not_swapped():
