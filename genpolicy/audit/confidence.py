@@ -149,7 +149,8 @@ def _stratum(row: Stratum, rng: np.random.Generator) -> Stratum:
     shock = float(rng.normal())
     effect = min(1.0, max(0.0, row.effect + shock * wide / (2 * TWO_SIDED_95)))
     p_value = float(norm.sf(norm.isf(min(max(row.p_adjusted, 1e-12), 1.0 - 1e-12)) + shock))
-    return replace(row, effect=effect, p_adjusted=p_value)
+    lower = max(0.0, effect - (row.effect - (row.effect_lower or 0.0)))
+    return replace(row, effect=effect, effect_lower=lower, p_adjusted=p_value)
 
 
 def _mode(mode: ModeOutcome, rng: np.random.Generator) -> ModeOutcome:

@@ -81,6 +81,8 @@ class AuditSettings(BaseModel):
             each beyond its own shuffled-time null, for the clusters to be modes: most of them.
         strata_alpha: Family-wise error of the strata tests.
         strata_effect_limit: Red above: explained share of a significant stratum.
+        strata_lower_limit: The lower end of its interval must reach this as well: among a dozen
+            variables one shows a large share by luck, and then a wide interval.
         mode_success_limit: Lower bound of a mode's success that makes it valid.
         mode_feasible_limit: Share of a mode's chunks that must be admissible.
         permutations: Permutations per test.
@@ -142,6 +144,7 @@ class AuditSettings(BaseModel):
     minimum_persistent_share: float = Field(default=0.5, gt=0, le=1)
     strata_alpha: float = Field(default=0.05, gt=0, lt=1)
     strata_effect_limit: float = Field(default=0.3, gt=0, lt=1)
+    strata_lower_limit: float = Field(default=0.1, ge=0, lt=1)
     mode_success_limit: float = Field(default=0.5, gt=0, lt=1)
     mode_feasible_limit: float = Field(default=0.8, gt=0, le=1)
     permutations: int = Field(default=999, ge=99)

@@ -251,6 +251,7 @@ def _explained(settings: AuditSettings, strata: tuple[Stratum, ...]) -> AuditVer
         and row.effect is not None
         and row.p_adjusted <= settings.strata_alpha
         and not settings.strata_effect_limit - row.effect >= 0
+        and (row.effect_lower or 0.0) - settings.strata_lower_limit >= 0
     ]
     if not found:
         return None
