@@ -66,6 +66,15 @@ def test_the_code_does_not_depend_on_the_order_of_the_data():
     torch.testing.assert_close(one.encode(chunks), two.encode(chunks), atol=1e-5, rtol=0)
 
 
+def test_an_axis_points_where_its_largest_entry_is_positive():
+    """The sign of an eigenvector is the library's whim; the code's must not be."""
+    for seed in range(5):
+        code = ChunkCode(SIZES, 4)
+        code.fit(chunks_of_rank(5, seed=seed))
+        largest = code.axes.gather(0, code.axes.abs().argmax(dim=0, keepdim=True))
+        assert bool((largest > 0).all())
+
+
 def test_a_constant_number_gives_a_finite_code():
     chunks = torch.zeros(10, 4, 2)
     code = ChunkCode(SIZES, 4)
