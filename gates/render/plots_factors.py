@@ -20,8 +20,8 @@ COLOURS = {
 }
 PANELS = (
     (("chunk_error", "first_error"), "error"),
-    (("mode_coverage",), "share of modes covered"),
-    (("valid_share",), "share of valid chunks"),
+    (("mode_coverage",), "modes covered"),
+    (("valid_share",), "valid chunks"),
 )
 
 
@@ -46,7 +46,7 @@ def _factors(evidence: Evidence, report: GateReport) -> Figure:
         panel.axvline(0.0, color=INK, lw=0.8)
         panel.set_ylim(len(order) - 0.4, -0.6)
         panel.set_yticks([])
-        panel.set_xlabel(f"change of {name}\n(number: its value)")
+        panel.set_xlabel(f"change of\n{name}")
         panel.margins(x=0.12)
     labels = [f"{factor}: {v.replace('_', ' ')} · {c}" for v, c, factor in order]
     axes[0].set_yticks(np.arange(len(order)), labels)
@@ -70,7 +70,7 @@ PLOTS: tuple[Plot, ...] = (
     Plot(
         "What each part earns, changed alone",
         "Point: change against the reference (chunked BC with the MLP encoder and trunk) on the "
-        "same held-out episodes; line: 95 % interval; small number: the variant's own value. Left: "
+        "same held-out episodes; line: 95 % interval; number: its own value. Left: "
         "distance to the demonstrated chunk, normalised, for one action that of the first action; "
         "a generator is further from any one demonstration by design. Middle and right: modes "
         "reached, and chunks that reach one and pass all six layers. A point right of zero in blue "
