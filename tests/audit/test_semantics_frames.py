@@ -69,6 +69,24 @@ def test_a_context_channel_in_another_unit_is_named(factor):
     assert (found[0].kind, found[0].variable) == ("unit", "goal")
 
 
+def test_an_object_that_stands_elsewhere_or_near_zero_is_no_unit():
+    # Three in ten goals stand six times as far out; an angle passes through zero.
+    data = arms(44)
+    rng = np.random.default_rng(2)
+    near = rng.random(60) < 0.7
+    goal = np.where(near, 0.1, 0.6) + 0.005 * rng.normal(size=60)
+    angle = 0.8 + 0.2 * rng.normal(size=60)
+    angle[:6] = 0.02 * rng.normal(size=6)
+    columns = np.stack([goal, angle], axis=1)[data.episode]
+    found = measure(replace(
+        data, observation=np.hstack([data.observation, columns]),
+        observation_names=(*data.observation_names, "goal", "angle"),
+        observation_scale=np.full(5, 0.01),
+        context={"goal": slice(3, 4), "angle": slice(4, 5)},
+    ), SETTINGS)  # fmt: skip
+    assert found.defects == ()
+
+
 def turned(degrees, width=3):
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     matrix = np.eye(width)

@@ -21,11 +21,15 @@ from genpolicy.audit.settings import AuditSettings
 LEAST_EPISODES = 4
 # Motion below this share of the usual one has no gain.
 STANDING = 0.1
-# A factor by which the values of a channel never differ between episodes of one task...
+# A factor between episodes that may be one of units, if it is also this many spreads...
 MAGNITUDE = 5.0
-# ...if it is far beyond their spread; one episode is enough beyond the second factor.
 MAGNITUDE_SPREADS = 8.0
-LONE_MAGNITUDE = 20.0
+# ...and if the scatter of the episodes is larger by that factor too, within another one: an object
+# that stands elsewhere scatters as before.
+SCATTER = 2.0
+LEAST_SCATTER = 5
+# Fewer episodes are a defect beyond this only.
+LONE_MAGNITUDE = 100.0
 # One episode is enough to be a defect where its gain is beyond this.
 LONE_FACTOR = 10.0
 FACTORS = (
@@ -74,13 +78,13 @@ def magnitude_defects(data: AuditInput, motion: Motion, settings: AuditSettings)
         both = np.stack([_off(size), _off(travel)])
         # Both must say the same factor: a start elsewhere or an arm that stands is no unit.
         same = np.abs(both[0] - both[1]) <= np.log(2.0)
-        defects += _magnitude(data, "position", np.where(same, both[0], 0.0), settings)
+        defects += _magnitude(data, "position", np.where(same, both[0], 0.0))
     for name, part in data.context.items():
         # Component by component: beside a direction cosine a length hardly counts.
         medians = episode_medians(data.observation[:, part], motion.starts)
         off = np.stack([_off(np.abs(values)) * _clear(values) for values in medians.T])
         worst = off[np.argmax(np.abs(off), axis=0), np.arange(off.shape[1])]
-        defects += _magnitude(data, name, worst, settings)
+        defects += _magnitude(data, name, worst)
     return defects
 
 
@@ -142,24 +146,35 @@ def _episodes(
 
 
 def _off(size: Array) -> Array:
-    """Logarithm of each episode's size against that of all; 0 where the sizes say nothing."""
-    known = np.isfinite(size) & (size > 0)
+    """Logarithm of each episode's size against the usual one; 0 where it may be no unit."""
+    known = np.isfinite(size)
     result = np.zeros(len(size))
     if np.count_nonzero(known) < max(LEAST_EPISODES, 0.9 * len(size)):
         return result
-    logs = np.log(size[known])
-    centre, spread = densest_half(logs)
-    gaps = logs - centre
-    far = np.abs(gaps) > max(np.log(MAGNITUDE), MAGNITUDE_SPREADS * spread)
-    if spread <= np.log(2.0):  # else the channel has no usual size
-        result[known] = np.where(far, gaps, 0.0)
+    centre, spread = densest_half(size[known])
+    if not 0.5 * centre - spread > 0:  # nothing is usual
+        return result
+    gap = np.log(np.maximum(np.where(known, size, centre), 1e-12 * centre) / centre)
+    beyond = np.abs(size - centre) > MAGNITUDE_SPREADS * spread
+    far = known & beyond & (np.abs(gap) > np.log(MAGNITUDE))
+    scattered = densest_half(size[known & ~far])[1]
+    for side in (far & (gap > 0), far & (gap < 0)):
+        if np.count_nonzero(side) >= LEAST_SCATTER:
+            factor = float(np.exp(np.median(gap[side])))
+            scatter = densest_half(size[side])[1]
+            expected = factor * scattered
+            if expected > 0 and not expected / SCATTER <= scatter <= expected * SCATTER:
+                continue
+            result[side] = gap[side]
+        else:
+            lone = side & (np.abs(gap) > np.log(LONE_MAGNITUDE))
+            result[lone] = gap[lone]
     return result
 
 
-def _magnitude(data: AuditInput, name: str, off: Array, settings: AuditSettings) -> list[Defect]:
+def _magnitude(data: AuditInput, name: str, off: Array) -> list[Defect]:
     chosen: Flags = off != 0.0
-    lone = bool(np.any(np.abs(off) > np.log(LONE_MAGNITUDE)))
-    if not (lone or some(chosen, len(off), settings.outlier_share)):
+    if not chosen.any():
         return []
     factor = float(np.exp(np.median(np.abs(off[chosen]))))
     names = data.episodes.uuid[chosen]
