@@ -15,7 +15,7 @@ from genpolicy.audit.data import Array, AuditInput, Integers
 from genpolicy.audit.labels import ModeOutcome, Replayed
 from genpolicy.audit.persistence import NULL_QUANTILE, Persistence
 from genpolicy.audit.settings import AuditSettings
-from genpolicy.audit.situations import Situation, coherent_phases
+from genpolicy.audit.situations import Claim, Situation, claims_of, coherent_phases
 from genpolicy.audit.strata import Stratum
 from genpolicy.audit.verdict import AuditVerdict, Counts, Layers, decide
 from genpolicy.seeds import stream
@@ -31,14 +31,16 @@ class Table:
     Attributes:
         episodes: Held-out episodes with an analysed situation. Shape (E,).
         place: Position in `episodes` of each situation. Shape (n,).
-        claims: The situations as claimed, before phases were held to persist. Length n.
+        phases: Phase of each situation. Length n.
+        claims: What speaks for the modes of those claimed, before phases were held to persist.
         claimed: Several clusters claimed as modes, per situation. Shape (n,).
         identity: Situation, identity kept, and its null, of those measured.
     """
 
     episodes: Integers
     place: Integers
-    claims: tuple[Situation, ...]
+    phases: list[str]
+    claims: list[Claim]
     claimed: Array
     identity: tuple[Integers, Array, Array]
 
@@ -81,7 +83,8 @@ def _table(data: AuditInput, situations: tuple[Situation, ...]) -> Table:
     return Table(
         episodes=episodes,
         place=place.reshape(-1),
-        claims=situations,
+        phases=[item.phase for item in situations],
+        claims=claims_of(situations),
         claimed=np.array([item.two_mode for item in situations], dtype=np.float64),
         identity=(
             np.array([n for n, _ in known], dtype=np.int64),
@@ -98,7 +101,7 @@ def _draw(
     times = np.bincount(rng.integers(0, count, count), minlength=count) if count else table.episodes
     weights = times[table.place].astype(np.float64)
     good = coherent_phases(settings, table.claims, weights)
-    kept = table.claimed * np.array([item.phase in good for item in table.claims])
+    kept = table.claimed * np.array([phase in good for phase in table.phases])
     return replace(
         layers,
         replayed=_replayed(layers.replayed, rng),

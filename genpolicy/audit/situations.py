@@ -43,6 +43,25 @@ class Situation:
     noise_spread: float
 
 
+@dataclass(frozen=True)
+class Claim:
+    """What speaks for the modes of one situation.
+
+    Attributes:
+        situation: Its position.
+        phase: Task phase.
+        measured: Whether it goes on long enough to see whether the modes persist.
+        persists: Whether they do, beyond their null.
+        noise_ratio: As of the situation.
+    """
+
+    situation: int
+    phase: str
+    measured: bool
+    persists: bool
+    noise_ratio: float
+
+
 def find_situations(
     data: AuditInput, settings: AuditSettings, root_seed: int, *, progress: Progress = silent
 ) -> tuple[list[Found], tuple[Support, ...]]:
@@ -119,27 +138,40 @@ def coherent(
     Returns:
         The situations, and how many lost their modes.
     """
-    good = coherent_phases(settings, situations, np.ones(len(situations)))
+    good = coherent_phases(settings, claims_of(situations), np.ones(len(situations)))
     kept = tuple(
         replace(item, two_mode=item.two_mode and item.phase in good) for item in situations
     )
     return kept, sum(a.two_mode and not b.two_mode for a, b in zip(situations, kept, strict=True))
 
 
-def coherent_phases(
-    settings: AuditSettings, situations: tuple[Situation, ...], weights: Array
-) -> set[str]:
+def claims_of(situations: tuple[Situation, ...]) -> list[Claim]:
+    """What speaks for the modes of each situation that has some, to be weighed again and again."""
+    return [
+        Claim(
+            number,
+            item.phase,
+            item.identity is not None,
+            persistent(item.identity),
+            item.noise_ratio,
+        )
+        for number, item in enumerate(situations)
+        if item.two_mode
+    ]
+
+
+def coherent_phases(settings: AuditSettings, claims: list[Claim], weights: Array) -> set[str]:
     """Phases whose modes persist and are smooth; situations counted `weights` times. Shape (n,)."""
     measured: dict[str, float] = {}
     persist: dict[str, float] = {}
     ratios: dict[str, list[float]] = {}
-    for item, weight in zip(situations, weights.tolist(), strict=True):
-        if item.two_mode and weight > 0.0:
-            known = weight * (item.identity is not None)
-            measured[item.phase] = measured.get(item.phase, 0.0) + known
-            kept = known * persistent(item.identity)
-            persist[item.phase] = persist.get(item.phase, 0.0) + kept
-            ratios.setdefault(item.phase, []).append(item.noise_ratio)
+    for claim in claims:
+        weight = float(weights[claim.situation])
+        if weight > 0.0:
+            phase, known = claim.phase, weight * claim.measured
+            measured[phase] = measured.get(phase, 0.0) + known
+            persist[phase] = persist.get(phase, 0.0) + known * claim.persists
+            ratios.setdefault(phase, []).append(claim.noise_ratio)
     least = settings.minimum_two_mode_situations
     good = {
         phase
