@@ -187,6 +187,7 @@ def _rests_on(
     """Everything that was guessed, not recorded or not checked."""
     episodes = result.data.episodes
     lines = [str(note) for note in dataset.manifest.get("notes", ())]
+    lines += result.semantics.notes
     for name in EPISODE_VARIABLES:
         if not any(getattr(episodes, name)):
             lines.append(f"{name}: not recorded, so it may explain the modes unseen.")

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from genpolicy.audit.view import from_dataset
 from genpolicy.audit.run import AuditResult, audit
 from genpolicy.audit.settings import AuditSettings
+from genpolicy.audit.view import from_dataset
 from genpolicy.comparison.held_out import admissible
 from genpolicy.dataset.dataset import Dataset, load_dataset
 from genpolicy.feasibility.settings import FeasibilitySettings

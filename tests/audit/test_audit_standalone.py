@@ -1,5 +1,7 @@
 """The audit as one value: same verdict as from the rows, and everything that it rests on."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -155,3 +157,13 @@ def test_progress_is_told_and_changes_nothing(valid):
     last = {what: (done, total) for what, done, total in told}
     assert {"situations examined", "episodes replayed"} <= set(last)
     assert all(done == total for done, total in last.values())
+
+
+def test_what_was_noticed_but_is_no_defect_is_said(valid):
+    data, _ = valid
+    late = 0.05 * (data.episodes.order > 80)[data.episode][:, None]
+    wandering = data.observation + np.hstack([late, late, np.zeros((len(late), 3))])
+    commanded = data.action + late
+    moved = replace(data, observation=wandering, action=commanded)
+    report = audit(dataset_of(moved), SETTINGS.model_copy(update={**NAMES, "query_stride": 20}))
+    assert any("Starts wander" in line for line in report.rests_on)
