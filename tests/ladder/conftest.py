@@ -29,7 +29,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRe
             rmtree(workspace, ignore_errors=True)
             outcome, ran = repro(make_small_ladder(workspace))
             assert outcome.code == 0, outcome.sentence
-            assert (ran[0], ran[-1], len(ran)) == ("record", "gate_e", 15)
+            assert (ran[0], ran[-1], len(ran)) == ("record", "gate_e", 16)
             done.touch()
     return workspace
 
