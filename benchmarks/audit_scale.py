@@ -19,10 +19,10 @@ import numpy as np
 
 from genpolicy.audit import audit, propose_settings
 from genpolicy.contract.observation import Channel, ObservationContract
-from genpolicy.dataset.assemble import FLAGS, AcceptedEpisode, Description, write_dataset
-from genpolicy.dataset.contract import ActionContract, SplitRule
-from genpolicy.dataset.dataset import load_dataset
-from genpolicy.dataset.resample import Rows
+from genpolicy.data.assemble import FLAGS, AcceptedEpisode, Description, write_dataset
+from genpolicy.data.contract import ActionContract, SplitRule
+from genpolicy.data.dataset import load_dataset
+from genpolicy.data.resample import Rows
 from genpolicy.seeds import stream
 
 STEPS = 100

@@ -22,32 +22,32 @@ from unittest.mock import patch
 import mujoco
 import numpy as np
 
-from genpolicy.comparison.fleet import PolicySettings
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.contract.normalisation import MinMax, Normalisation
+from genpolicy.evidence.admission_context import make_checker
+from genpolicy.evidence.stress import rollout as rollout_module
+from genpolicy.evidence.stress.latency import (
+    DECLARED_TERMS,
+    MEASURED_TERMS,
+    DeclaredTerm,
+    LatencyModel,
+)
+from genpolicy.evidence.stress.matched import _step
+from genpolicy.evidence.stress.perturbations import PerturbationSettings
+from genpolicy.evidence.stress.rollout import Fixture, Outcome, Rollout
+from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.execution.executor import Executor
 from genpolicy.feasibility.admission import FeasibilityChecker
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.documents import read_yaml
 from genpolicy.policies.checkpoint import Provenance
+from genpolicy.policies.matched_training import PolicySettings
 from genpolicy.policies.policy import NetworkPolicy, Samples, load_policy
 from genpolicy.policies.settings import SamplerConfig
 from genpolicy.policies.training import TrainingRequest, train
 from genpolicy.policies.windows import Windows
 from genpolicy.robot.collision import CollisionModel
 from genpolicy.robot.kinematics import ArmKinematics
-from genpolicy.simulation import rollout as rollout_module
-from genpolicy.simulation.execution_settings import ExecutionSettings
-from genpolicy.simulation.latency import (
-    DECLARED_TERMS,
-    MEASURED_TERMS,
-    DeclaredTerm,
-    LatencyModel,
-)
-from genpolicy.simulation.matched import _step
-from genpolicy.simulation.perturbations import PerturbationSettings
-from genpolicy.simulation.rollout import Fixture, Outcome, Rollout
-from genpolicy.simulation.situation import make_checker
 from genpolicy.tasks.api import load_task
 from genpolicy.tasks.tabletop_insertion.episodes import demonstrate
 from genpolicy.tasks.tabletop_insertion.world import SUB_STEPS, TabletopWorld

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from gates.ladder import judge
 from gates.models import Gate, GateReport, report_bytes, report_path
-from gates.render.page import gate_page, index_page
-from gates.render.summary import markdown
+from gates.pages.page import gate_page, index_page
+from gates.pages.summary import markdown
 from genpolicy.errors import BadInputError
 from genpolicy.integrity.atomic import write_bytes
 

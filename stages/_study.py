@@ -2,12 +2,12 @@
 
 from pydantic import Field
 
-from genpolicy.comparison.fleet import PolicySettings
-from genpolicy.comparison.study import LatentTest, Study
 from genpolicy.contract.settings import Settings
+from genpolicy.evidence.need.study import LatentTest, Study
+from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.feasibility.settings import FeasibilitySettings
+from genpolicy.policies.matched_training import PolicySettings
 from genpolicy.policies.settings import SamplerConfig
-from genpolicy.simulation.execution_settings import ExecutionSettings
 from stages._stage import Params
 
 

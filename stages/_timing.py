@@ -2,8 +2,8 @@
 
 from pydantic import Field
 
-from genpolicy.comparison.latency import DeclaredSettings
 from genpolicy.contract.settings import Settings
+from genpolicy.evidence.reproducibility.latency import DeclaredSettings
 
 
 class LatencySection(Settings):

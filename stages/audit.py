@@ -2,11 +2,11 @@
 
 from genpolicy.audit.evidence import write_evidence
 from genpolicy.audit.settings import AuditSettings
-from genpolicy.comparison.audit_task import audit_task, round_obstacles
-from genpolicy.comparison.pictures import scene_png
+from genpolicy.evidence.need.audit_task import audit_task, round_obstacles
+from genpolicy.evidence.need.pictures import scene_png
+from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import output_folder, write_bytes
-from genpolicy.simulation.execution_settings import ExecutionSettings
 from genpolicy.tasks.api import load_task
 from stages._stage import ARTIFACTS, Params, main
 

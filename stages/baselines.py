@@ -1,6 +1,6 @@
 """Stage `baselines`: the simpler policies, trained and measured under one configuration."""
 
-from genpolicy.comparison.study import run_study
+from genpolicy.evidence.need.study import run_study
 from genpolicy.integrity.atomic import output_folder
 from stages._stage import ARTIFACTS, Params, main
 from stages._study import StudySection, study_of

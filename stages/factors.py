@@ -2,12 +2,12 @@
 
 from pydantic import Field
 
-from genpolicy.comparison.factors import FactorStudy, Variant, run_factors
-from genpolicy.comparison.fleet import PolicySettings
 from genpolicy.contract.settings import Settings
+from genpolicy.evidence.need.factors import FactorStudy, Variant, run_factors
+from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import output_folder
-from genpolicy.simulation.execution_settings import ExecutionSettings
+from genpolicy.policies.matched_training import PolicySettings
 from stages._stage import ARTIFACTS, Params, main
 
 

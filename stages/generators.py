@@ -3,9 +3,9 @@
 from pathlib import Path
 
 from gates.admission import admit
-from genpolicy.comparison.fleet import PolicySettings
-from genpolicy.comparison.study import run_study
+from genpolicy.evidence.need.study import run_study
 from genpolicy.integrity.atomic import output_folder
+from genpolicy.policies.matched_training import PolicySettings
 from stages._stage import ARTIFACTS, Params, main
 from stages._study import StudySection, study_of
 

@@ -3,8 +3,8 @@
 import numpy as np
 
 from genpolicy.contract.settings import Settings
-from genpolicy.dataset.contract import TCP_ACTION, IngestContract, SplitRule, plausible_ranges
-from genpolicy.dataset.ingest import ingest_recordings
+from genpolicy.data.contract import TCP_ACTION, IngestContract, SplitRule, plausible_ranges
+from genpolicy.data.ingest import ingest_recordings
 from genpolicy.robot.limits import limits_of
 from genpolicy.tasks.api import load_task
 from stages._stage import ARTIFACTS, Params, main

@@ -8,14 +8,14 @@ from pathlib import Path
 import pyarrow as pa
 
 from gates.admission import admit
-from genpolicy.comparison.fleet import PolicySettings
-from genpolicy.comparison.latency import LATENCY, LatencyJob, latency_rows
+from genpolicy.evidence.reproducibility.latency import LATENCY, LatencyJob, latency_rows
+from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import output_folder
 from genpolicy.integrity.tables import write_table
+from genpolicy.policies.matched_training import PolicySettings
 from genpolicy.policies.policy import load_policy
 from genpolicy.seeds import stream
-from genpolicy.simulation.execution_settings import ExecutionSettings
 from stages._stage import ARTIFACTS, Params, main
 from stages._study import StudySection
 from stages._timing import LatencySection

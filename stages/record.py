@@ -6,7 +6,7 @@ from genpolicy.contract.settings import Settings
 from genpolicy.integrity.atomic import output_folder, write_bytes
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_tree
-from genpolicy.simulation.sessions import record_session
+from genpolicy.tasks.demonstrations import record_session
 from stages._stage import ARTIFACTS, Params, main
 
 

@@ -5,13 +5,13 @@ from pathlib import Path
 from pydantic import Field
 
 from gates.admission import admit
-from genpolicy.comparison.fleet import PolicySettings
-from genpolicy.comparison.reload import ReloadPlan, write_reload
 from genpolicy.contract.settings import Settings
+from genpolicy.evidence.admission_context import make_checker
+from genpolicy.evidence.reproducibility.reload import ReloadPlan, write_reload
+from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import output_folder
-from genpolicy.simulation.execution_settings import ExecutionSettings
-from genpolicy.simulation.situation import make_checker
+from genpolicy.policies.matched_training import PolicySettings
 from genpolicy.tasks.api import load_task
 from stages._stage import ARTIFACTS, Params, main
 from stages._study import StudySection

@@ -6,23 +6,23 @@ import pyarrow as pa
 from pydantic import Field
 
 from gates.admission import admit
-from genpolicy.comparison.corruption import CORRUPTIONS
-from genpolicy.comparison.fleet import PolicySettings
-from genpolicy.comparison.shadow import (
+from genpolicy.contract.settings import Settings
+from genpolicy.data.dataset import load_dataset
+from genpolicy.evidence.admission_context import make_checker
+from genpolicy.evidence.shadow.corruption import CORRUPTIONS
+from genpolicy.evidence.shadow.shadow import (
     Shadow,
     disabled_checks_evidence,
     held_out_observations,
     shadow_policy,
 )
-from genpolicy.comparison.shadow_tables import CANDIDATES, write_shadow
-from genpolicy.contract.settings import Settings
-from genpolicy.dataset.dataset import load_dataset
+from genpolicy.evidence.shadow.tables import CANDIDATES, write_shadow
+from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import output_folder
+from genpolicy.policies.matched_training import PolicySettings
 from genpolicy.policies.policy import load_policy
 from genpolicy.seeds import stream
-from genpolicy.simulation.execution_settings import ExecutionSettings
-from genpolicy.simulation.situation import make_checker
 from genpolicy.tasks.api import load_task
 from stages._stage import ARTIFACTS, Params, main
 from stages._study import StudySection

@@ -3,15 +3,15 @@
 from pathlib import Path
 
 from gates.admission import admit
-from genpolicy.comparison.fleet import PolicySettings
-from genpolicy.comparison.latency import latency_models
-from genpolicy.comparison.stress import Entrant, StressSettings, plan_shards, write_stress
+from genpolicy.evidence.reproducibility.latency import latency_models
+from genpolicy.evidence.stress.matched import Shard, matched_starts
+from genpolicy.evidence.stress.tables import Entrant, StressSettings, plan_shards, write_stress
+from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import output_folder
 from genpolicy.integrity.tables import read_table
+from genpolicy.policies.matched_training import PolicySettings
 from genpolicy.policies.policy import load_policy
-from genpolicy.simulation.execution_settings import ExecutionSettings
-from genpolicy.simulation.matched import Shard, matched_starts
 from genpolicy.tasks.api import load_task
 from stages._stage import ARTIFACTS, Params, main
 from stages._study import StudySection

@@ -13,7 +13,7 @@ import numpy as np
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.contract.observation import Channel, ObservationContract
 from genpolicy.contract.settings import parse_settings
-from genpolicy.dataset.dataset import Dataset
+from genpolicy.data.dataset import Dataset
 
 # Length that makes another observation; another mode is three of them, noise a
 # fifth of one, a calibration is off by half of one.

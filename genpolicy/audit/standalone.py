@@ -12,7 +12,7 @@ from genpolicy.audit.run import audit as audit_rows
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.audit.strata import EPISODE_VARIABLES, HISTORY
 from genpolicy.audit.view import from_dataset
-from genpolicy.dataset.dataset import Dataset
+from genpolicy.data.dataset import Dataset
 
 SCHEMA_VERSION = 1
 
@@ -82,7 +82,7 @@ def audit(
     """Audit an ingested dataset.
 
     Args:
-        dataset: A verified dataset, see `genpolicy.dataset.dataset.load_dataset`.
+        dataset: A verified dataset, see `genpolicy.data.dataset.load_dataset`.
         config: What counts as near, as two modes, as red; proposed from the data where None, see
             `genpolicy.audit.propose.propose_settings`.
         admissible: Feasibility of a chunk, `(actions (K, D_a), observation (D_o,)) -> (bool,

@@ -17,7 +17,7 @@ from genpolicy.audit.data import (
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.contract.action import ACTION_COMPONENTS, POSITION, ROTATION
 from genpolicy.contract.observation import Channel, ObservationContract
-from genpolicy.dataset.dataset import Dataset
+from genpolicy.data.dataset import Dataset
 from genpolicy.errors import ContractError
 
 

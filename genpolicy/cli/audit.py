@@ -13,21 +13,21 @@ from genpolicy.audit.evidence import write_evidence
 from genpolicy.audit.propose import propose_settings
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.audit.standalone import AuditReport, audit
-from genpolicy.cli.audit_page.evidence import read_evidence
-from genpolicy.cli.audit_page.page import audit_page
-from genpolicy.cli.audit_page.words import TITLES
 from genpolicy.cli.ingest import add_input, given_contract
 from genpolicy.cli.progress import ProgressLine
 from genpolicy.cli.remember import Answers, remembered_admissible, remembered_replay
 from genpolicy.cli.resume import DATASET, fingerprint, kept_or_new, work_folder
 from genpolicy.cli.task_checks import TaskChecks, task_checks
-from genpolicy.dataset.dataset import Dataset, load_dataset
+from genpolicy.data.dataset import Dataset, load_dataset
+from genpolicy.data.formats import Opened, open_dataset
+from genpolicy.data.formats.contract import write_contract
 from genpolicy.errors import BadInputError
-from genpolicy.importers import Opened, open_dataset
-from genpolicy.importers.contract import write_contract
 from genpolicy.integrity.atomic import output_folder, write_bytes
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_bytes
+from genpolicy.pages.audit.evidence import read_evidence
+from genpolicy.pages.audit.page import audit_page
+from genpolicy.pages.audit.words import TITLES
 
 EXAMPLES = """examples:
   genpolicy audit recordings/ --out audit/              # whatever they are

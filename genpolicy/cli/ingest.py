@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Any
 
 from genpolicy.cli.progress import ProgressLine
+from genpolicy.data.formats import FORMATS, Opened, open_dataset, propose
+from genpolicy.data.formats.contract import ImportContract, load_contract, write_contract
+from genpolicy.data.formats.standing import standing_notes
 from genpolicy.errors import ConfigError
-from genpolicy.importers import FORMATS, Opened, open_dataset, propose
-from genpolicy.importers.contract import ImportContract, load_contract, write_contract
-from genpolicy.importers.standing import standing_notes
 
 EXAMPLES = """examples:
   genpolicy propose recordings/ --out contract.yaml     # look, correct what was guessed

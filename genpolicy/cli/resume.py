@@ -11,9 +11,9 @@ from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
 
+from genpolicy.data.formats import Opened, open_dataset
+from genpolicy.data.formats.contract import ImportContract
 from genpolicy.errors import BadInputError
-from genpolicy.importers import Opened, open_dataset
-from genpolicy.importers.contract import ImportContract
 from genpolicy.integrity.atomic import write_bytes
 from genpolicy.integrity.documents import canonical_json, read_json
 from genpolicy.integrity.hashing import sha256_bytes

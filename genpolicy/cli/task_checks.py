@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from genpolicy.audit.labels import Replay
 from genpolicy.audit.mean_versus_modes import Admissible
-from genpolicy.dataset.dataset import Dataset
+from genpolicy.data.dataset import Dataset
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_bytes
 from genpolicy.tasks.api import ENTRY_POINT_GROUP, load_task
@@ -51,13 +51,13 @@ def task_checks(dataset: Dataset, *, task: str | None, chunk_steps: int) -> Task
     known = {point.name for point in entry_points(group=ENTRY_POINT_GROUP)}
     if len(names) != 1 or names[0] not in known:
         return TaskChecks()
-    from genpolicy.comparison.audit_task import (  # noqa: PLC0415  (loads a simulator)
+    from genpolicy.evidence.admission_context import make_checker  # noqa: PLC0415
+    from genpolicy.evidence.need.audit_task import (  # noqa: PLC0415  (loads a simulator)
         replay_episode,
         round_obstacles,
     )
-    from genpolicy.comparison.held_out import admissible  # noqa: PLC0415
+    from genpolicy.evidence.need.held_out import admissible  # noqa: PLC0415
     from genpolicy.feasibility.settings import FeasibilitySettings  # noqa: PLC0415
-    from genpolicy.simulation.situation import make_checker  # noqa: PLC0415
 
     plugin = load_task(names[0])
     if contract_hash(dataset.manifest) != plugin.observation.hash():

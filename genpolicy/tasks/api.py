@@ -19,7 +19,7 @@ from genpolicy.contract.observation import ObservationContract
 from genpolicy.errors import ConfigError
 
 if TYPE_CHECKING:
-    from genpolicy.recording.episode import RecordedEpisode
+    from genpolicy.data.recording.episode import RecordedEpisode
 
 Array = NDArray[np.float64]
 

@@ -12,8 +12,8 @@ from genpolicy.audit.run import audit
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.audit.verdict import Cause
 from genpolicy.audit.view import from_dataset
-from genpolicy.dataset.dataset import load_dataset
-from genpolicy.importers.zarr_buffer import PUSHT, ingest_zarr_replay_buffer
+from genpolicy.data.dataset import load_dataset
+from genpolicy.data.formats.zarr_buffer import PUSHT, ingest_zarr_replay_buffer
 from genpolicy.integrity.tables import read_table
 
 BUFFER = Path(__file__).parents[3] / "shared/data/pusht_v7/pusht_cchi_v7_replay.zarr"

@@ -10,7 +10,7 @@ from planar import SETTINGS, admissible, planar
 from genpolicy.audit import AuditReport, audit, propose_settings
 from genpolicy.audit.run import audit as audit_rows
 from genpolicy.contract.normalisation import Normalisation, statistics_of
-from genpolicy.dataset.dataset import Dataset, Frames
+from genpolicy.data.dataset import Dataset, Frames
 from genpolicy.errors import ConfigError, ContractError
 from genpolicy.integrity.documents import canonical_json, parse_json
 

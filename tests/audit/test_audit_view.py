@@ -6,14 +6,14 @@ import pytest
 from genpolicy.audit.data import relative_paths
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.audit.view import from_dataset
-from genpolicy.dataset.contract import TCP_ACTION
+from genpolicy.data.contract import TCP_ACTION
 from genpolicy.errors import ContractError
 
 
 def small_dataset():
     import pandas as pd
 
-    from genpolicy.dataset.dataset import Dataset, Frames
+    from genpolicy.data.dataset import Dataset, Frames
 
     times = np.array([0.0, 0.05, 0.1, 9.0, 9.05])
     frames = Frames(

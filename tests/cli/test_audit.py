@@ -18,8 +18,8 @@ from genpolicy.cli.main import main
 from genpolicy.cli.resume import work_folder
 from genpolicy.cli.task_checks import contract_hash, task_checks
 from genpolicy.contract.observation import ObservationContract
-from genpolicy.dataset.dataset import load_dataset
-from genpolicy.importers.contract import load_contract
+from genpolicy.data.dataset import load_dataset
+from genpolicy.data.formats.contract import load_contract
 from genpolicy.integrity.documents import read_json
 from genpolicy.tasks.api import load_task
 

@@ -11,12 +11,12 @@ import yaml
 
 from genpolicy.cli.main import main
 from genpolicy.cli.progress import ProgressLine
-from genpolicy.dataset.dataset import load_dataset
+from genpolicy.data.dataset import load_dataset
 
 
 @pytest.fixture(scope="session")
 def layouts():
-    path = Path(__file__).parents[1] / "importers" / "conftest.py"
+    path = Path(__file__).parents[1] / "data" / "formats" / "conftest.py"
     spec = importlib.util.spec_from_file_location("importers_conftest", path)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)

@@ -9,8 +9,8 @@ from genpolicy.contract.action import ROTATION, join_action
 from genpolicy.contract.chunk import DiscardReason, Proposal, actions_sha256
 from genpolicy.contract.rotation import orthonormality_error
 from genpolicy.errors import ContractError
+from genpolicy.evidence.shadow.rig import Rig
 from genpolicy.execution.blending import blend
-from genpolicy.verification.rig import Rig
 
 
 def straight(x_m, yaw_rad=0.0):

@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 
 from genpolicy.contract.chunk import DiscardReason
 from genpolicy.errors import ConfigError, NonFiniteError
+from genpolicy.evidence.shadow.rig import CHECKPOINT, SAMPLER, SETTINGS, Rig, passing_verdict
 from genpolicy.execution.executor import Executor
 from genpolicy.execution.ledger import Account, Conservation
 from genpolicy.execution.settings import to_ns
 from genpolicy.verification.checker import check_messages
-from genpolicy.verification.rig import CHECKPOINT, SAMPLER, SETTINGS, Rig, passing_verdict
 
 R = DiscardReason
 

@@ -10,6 +10,7 @@ import pytest
 from mcap.reader import make_reader
 
 from genpolicy.errors import BadInputError, ContractError, IntegrityError
+from genpolicy.evidence.shadow.rig import Rig
 from genpolicy.execution.journal import (
     EVENT_FIELDS,
     Journal,
@@ -18,7 +19,6 @@ from genpolicy.execution.journal import (
     read_journal,
     write_journal,
 )
-from genpolicy.verification.rig import Rig
 
 
 def played(name):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from genpolicy.errors import ConfigError, ContractError
+from genpolicy.evidence.shadow.rig import Rig
 from genpolicy.execution.journal import Journal
 from genpolicy.execution.recovery import (
     Primitive,
@@ -16,7 +17,6 @@ from genpolicy.execution.recovery import (
     step,
 )
 from genpolicy.verification.checker import check_messages
-from genpolicy.verification.rig import Rig
 
 S = RecoveryState
 SETTINGS = RecoverySettings(

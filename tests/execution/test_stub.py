@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from genpolicy.contract.chunk import DiscardReason
+from genpolicy.evidence.shadow.mutants import SCENARIOS
+from genpolicy.evidence.shadow.rig import CHECKPOINT, SAMPLER, SETTINGS, Rig, looks_admitted
 from genpolicy.execution.executor import Executor
 from genpolicy.verification.checker import check_messages
-from genpolicy.verification.mutants import SCENARIOS
-from genpolicy.verification.rig import CHECKPOINT, SAMPLER, SETTINGS, Rig, looks_admitted
 
 SEEN_BY_THE_STUB = (
     "action_hash", "calibration_mismatch", "checked_rows", "checkpoint_mismatch",

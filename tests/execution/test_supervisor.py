@@ -9,11 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from genpolicy.errors import ConfigError, ContractError
+from genpolicy.evidence.shadow.rig import SUPERVISION, Rig
 from genpolicy.execution import supervisor as module
 from genpolicy.execution.journal import Journal
 from genpolicy.execution.settings import to_ns
 from genpolicy.execution.supervisor import Supervisor, SupervisorSettings, SupervisorState
-from genpolicy.verification.rig import SUPERVISION, Rig
 
 
 @pytest.fixture

@@ -10,8 +10,8 @@ import pytest
 
 from gates.ladder import judge
 from gates.models import report_bytes, report_path
-from gates.render.page import gate_page, index_page
-from gates.render.summary import markdown, plain
+from gates.pages.page import gate_page, index_page
+from gates.pages.summary import markdown, plain
 from gates.reports import write_gate
 from genpolicy.errors import GenpolicyError
 

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 import yaml
 
-from genpolicy.recording.episode import RecordedEpisode
-from genpolicy.recording.reader import read_episode
-from genpolicy.recording.writer import write_episode
+from genpolicy.data.recording.episode import RecordedEpisode
+from genpolicy.data.recording.reader import read_episode
+from genpolicy.data.recording.writer import write_episode
 
 EPISODES = 14
 ROOT = Path(__file__).parents[2]

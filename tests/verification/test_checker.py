@@ -5,9 +5,9 @@ import copy
 import pytest
 
 from genpolicy.errors import BadInputError
+from genpolicy.evidence.shadow.rig import SETTINGS, Rig
 from genpolicy.execution.journal import Journal, write_journal
 from genpolicy.verification.checker import ExpectedSettings, check_journal, check_messages
-from genpolicy.verification.rig import SETTINGS, Rig
 
 EXPECTED = ExpectedSettings(
     execution_horizon=SETTINGS.execution_horizon,

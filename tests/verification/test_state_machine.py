@@ -12,8 +12,8 @@ from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 
+from genpolicy.evidence.shadow.rig import CHECKPOINT, ROWS, SAMPLER, SETTINGS, Rig, passing_verdict
 from genpolicy.verification.checker import check_messages
-from genpolicy.verification.rig import CHECKPOINT, ROWS, SAMPLER, SETTINGS, Rig, passing_verdict
 
 FORGERIES = {
     "hash": lambda rig: {"actions_sha256": "0" * 64},

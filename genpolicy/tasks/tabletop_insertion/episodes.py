@@ -13,9 +13,7 @@ from numpy.typing import NDArray
 
 from genpolicy.contract.action import action_contract_hash
 from genpolicy.contract.rotation import rotation_to_6d
-from genpolicy.errors import ContractError
-from genpolicy.integrity.hashing import sha256_bytes
-from genpolicy.recording.episode import (
+from genpolicy.data.recording.episode import (
     ACTION_STREAM,
     CAMERA_STREAM,
     FORCE_STREAM,
@@ -26,6 +24,8 @@ from genpolicy.recording.episode import (
     StreamSamples,
     clock_offset_key,
 )
+from genpolicy.errors import ContractError
+from genpolicy.integrity.hashing import sha256_bytes
 from genpolicy.seeds import stream
 from genpolicy.tasks.api import EpisodeSpec, WorldSettings
 from genpolicy.tasks.tabletop_insertion.experts import (

@@ -8,8 +8,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from genpolicy.control.impedance import ARM_JOINTS, POSTURE_RAD
 from genpolicy.errors import ContractError
+from genpolicy.robot.impedance import ARM_JOINTS, POSTURE_RAD
 from genpolicy.tasks.tabletop_insertion.start import InsertionStart
 
 Array = NDArray[np.float64]

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from genpolicy.contract.action import GRIPPER, POSITION
 from genpolicy.contract.observation import ObservationContract
-from genpolicy.control.impedance import POSTURE_RAD
+from genpolicy.data.recording.episode import RecordedEpisode
 from genpolicy.errors import ContractError
-from genpolicy.recording.episode import RecordedEpisode
+from genpolicy.robot.impedance import POSTURE_RAD
 from genpolicy.tasks.api import EpisodeSpec, Start, Task, Workspace, World, WorldSettings
 from genpolicy.tasks.tabletop_insertion import episodes, fallback, scene, sessions
 from genpolicy.tasks.tabletop_insertion.experts import SIDES

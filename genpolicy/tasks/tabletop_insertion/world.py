@@ -14,8 +14,8 @@ from scipy.spatial.transform import Rotation
 
 from genpolicy.contract.action import join_action, split_action
 from genpolicy.contract.rotation import rotation_to_6d
-from genpolicy.control.impedance import ARM_JOINTS, ImpedanceController
 from genpolicy.errors import NonFiniteError
+from genpolicy.robot.impedance import ARM_JOINTS, ImpedanceController
 from genpolicy.seeds import stream
 from genpolicy.tasks.api import WorldSettings
 from genpolicy.tasks.tabletop_insertion import scene

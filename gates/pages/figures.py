@@ -1,0 +1,124 @@
+"""Figures of the gates' pages: what is drawn from evidence, what is shown as it lies there."""
+
+import base64
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from gates.evidence import Evidence, MissingEvidenceError
+from gates.models import GateReport
+from genpolicy.integrity.hashing import sha256_bytes_of
+from genpolicy.pages.figures.drawing import (
+    BLUE,
+    DASHES,
+    GREEN,
+    GREY,
+    INK,
+    ORANGE,
+    PALETTE,
+    PURPLE,
+    SKY,
+    Picture,
+    drawn,
+)
+
+METHODS = {
+    "bc": INK,
+    "chunked_bc": GREY,
+    "act": GREEN,
+    "cvae": PURPLE,
+    "ibc": SKY,
+    "diffusion": BLUE,
+    "flow": ORANGE,
+}
+"""Colour of each method, the same in every figure of every gate; baselines first."""
+PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
+LARGEST_PHOTO_BYTES = 400_000
+
+
+@dataclass(frozen=True)
+class Plot:
+    """A figure that can be drawn: `draw(evidence, report)` fills a new figure.
+
+    Attributes:
+        also: Further files that it is drawn from.
+    """
+
+    title: str
+    caption: str
+    source: str
+    draw: Callable[[Evidence, GateReport], Figure]
+    also: tuple[str, ...] = ()
+
+    def picture(self, evidence: Evidence, report: GateReport, salt: str) -> dict[str, Any]:
+        """What this adds to a `Picture`."""
+        return {"svg": drawn(lambda: self.draw(evidence, report), self.title, salt=salt)}
+
+
+@dataclass(frozen=True)
+class Photo:
+    """A PNG among the evidence; shown only if the report names these very bytes."""
+
+    title: str
+    caption: str
+    source: str
+    also: tuple[str, ...] = ()
+
+    def picture(self, evidence: Evidence, report: GateReport, salt: str) -> dict[str, Any]:
+        """What this adds to a `Picture`; a photo has no inner names and needs no salt.
+
+        Raises:
+            MissingEvidenceError: No such file, no PNG, too large, or other bytes than judged.
+            IntegrityError: It cannot be read.
+        """
+        file = evidence.root / self.source
+        if not file.is_file():
+            raise MissingEvidenceError(f"{self.source} is missing")
+        digest, data = sha256_bytes_of(file, keep=True)
+        if report.materials.get(self.source) != digest:
+            raise MissingEvidenceError(f"{self.source} is not the file that the report names")
+        if not data.startswith(PNG_MAGIC) or len(data) > LARGEST_PHOTO_BYTES:
+            raise MissingEvidenceError(
+                f"{self.source} is no PNG of at most {LARGEST_PHOTO_BYTES} bytes"
+            )
+        return {"photo": f"data:image/png;base64,{base64.b64encode(data).decode()}"}
+
+
+def draw_all(
+    plots: Sequence[Plot | Photo], evidence: Evidence, report: GateReport
+) -> list[Picture]:
+    """Draw what the evidence allows; what is missing is said, never left out in silence."""
+    pictures = []
+    for index, plot in enumerate(plots):
+        sources = (plot.source, *plot.also)
+        try:
+            found = plot.picture(evidence, report, f"{report.gate}{index}")
+        except (MissingEvidenceError, KeyError, ValueError, TypeError, IndexError) as error:
+            found = {"skipped": " ".join(str(error).split())[:200] or type(error).__name__}
+        pictures.append(Picture(plot.title, plot.caption, sources, **found))
+    return pictures
+
+
+def in_order(names: Iterable[str]) -> list[str]:
+    """Names once each: known methods as in `METHODS`, then the others by name."""
+    known = list(METHODS)
+    return sorted(
+        set(names), key=lambda name: (known.index(name) if name in known else len(known), name)
+    )
+
+
+def colours(names: Iterable[str]) -> dict[str, str]:
+    """One colour per name: that of the method, where it is one."""
+    order = in_order(names)
+    free = [colour for colour in PALETTE if colour not in {METHODS.get(n) for n in order}]
+    others = [name for name in order if name not in METHODS]
+    return {name: METHODS[name] for name in order if name in METHODS} | {
+        name: free[i % len(free)] for i, name in enumerate(others)
+    }
+
+
+def dashes(names: Iterable[str]) -> dict[str, Any]:
+    """One line style per name, so that curves which coincide can still be told apart."""
+    return {name: DASHES[i % len(DASHES)] for i, name in enumerate(in_order(names))}

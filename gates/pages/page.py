@@ -1,0 +1,156 @@
+"""HTML pages: one self-contained file per gate, and the ladder's front page.
+
+Autoescape is on and nothing from data is marked safe; the only markup passed in are the figures
+drawn here. Numbers stand as `<data value="...">` with the JSON number, so that a test can read
+them back.
+"""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from gates.card import DRAFT_PATH, TrialCard
+from gates.evidence import Evidence
+from gates.gate_e import Params as CardParams
+from gates.gate_e import examine
+from gates.ladder import NAMES
+from gates.models import GATES, Gate, GateReport, read_report, report_bytes
+from gates.pages import plots_feasibility, plots_need, plots_stress, plots_time
+from gates.pages.figures import Photo, Plot, draw_all
+from gates.pages.guide import BACK_TO, QUESTIONS, READING, label, words
+from gates.pages.table import deciding, groups, passed_by, stops, tally
+from gates.signing import utc_today
+from genpolicy.errors import IntegrityError
+from genpolicy.integrity.hashing import sha256_bytes
+from genpolicy.pages.style import page_style
+
+MARKS = {
+    "PASS": "✓",
+    "FAIL": "✕",
+    "INCONCLUSIVE": "?",
+    "PENDING_REVIEW": "…",
+    "NOT JUDGED": "·",
+    "UNREADABLE": "✕",
+}
+PLOTS: dict[str, tuple[Plot | Photo, ...]] = {
+    "A": plots_need.PLOTS,
+    "B": plots_time.PLOTS,
+    "C": plots_feasibility.PLOTS,
+    "D": plots_stress.PLOTS,
+    "E": (),
+}
+
+
+def exact(value: float) -> str:
+    """A number as JSON writes it."""
+    return json.dumps(value)
+
+
+def short(value: float) -> str:
+    """A number for the eye, six significant digits."""
+    return f"{value:.6g}"
+
+
+def gate_page(root: Path, report: GateReport) -> str:
+    """HTML of one gate's report; figures are drawn from the evidence below `root`."""
+    state, card = _card(root, report)
+    return _render(
+        "gate.html",
+        current=report.gate,
+        report=report,
+        name=NAMES[report.gate],
+        question=QUESTIONS[report.gate],
+        decided=deciding(report) or passed_by(report),
+        tally=tally(report),
+        stops=stops(report),
+        groups=groups(report),
+        reading=READING[report.gate],
+        words=words(report.gate),
+        pictures=draw_all(PLOTS[report.gate], Evidence(root), report),
+        card=card,
+        card_state=state,
+        digest=sha256_bytes(report_bytes(report)),
+    )
+
+
+def index_page(root: Path) -> str:
+    """HTML of the ladder, from the reports as they lie there."""
+    rows = [_row(root, gate) for gate in GATES]
+    return _render("index.html", current="", rows=rows)
+
+
+def _row(root: Path, gate: Gate) -> dict[str, Any]:
+    row: dict[str, Any] = {
+        "gate": gate,
+        "name": NAMES[gate],
+        "question": QUESTIONS[gate],
+        "back_to": BACK_TO[gate],
+        "candidates": {},
+        "stops": {},
+        "tally": "",
+        "decided": "",
+        "decision": "",
+        "report": False,
+        "verdict": "NOT JUDGED",
+    }
+    if not (root / f"reports/gate_{gate.lower()}.json").is_file():
+        return row
+    try:
+        report, _ = read_report(root, gate)
+    except IntegrityError as error:
+        return {**row, "verdict": "UNREADABLE", "decision": str(error)}
+    row.update(
+        verdict=report.verdict,
+        decided=deciding(report) or passed_by(report),
+        candidates=report.candidates,
+        stops=stops(report),
+        tally=tally(report),
+        decision=report.decision,
+        report=True,
+    )
+    return row
+
+
+def _card(root: Path, report: GateReport) -> tuple[str, list[tuple[str, list[str]]]]:
+    if report.gate != "E" or not (root / DRAFT_PATH).is_file():
+        return "", []
+    params = CardParams.model_validate_json(json.dumps(report.settings))
+    dossier = examine(root, params, today=utc_today())
+    card: TrialCard | None = dossier.signed.card if dossier.signed else dossier.draft
+    if card is None:
+        return "", []
+    state = "signed" if dossier.signed else "draft, not signed"
+    return state, [(label(k), _lines(value)) for k, value in card.model_dump(mode="json").items()]
+
+
+def _lines(value: Any) -> list[str]:
+    """A field of the card as lines of text; none if it is empty."""
+    if value in (None, "", [], {}):
+        return []
+    if isinstance(value, dict):
+        return [f"{key}: {item}" for key, item in value.items()]
+    if isinstance(value, list) and not any(isinstance(item, str) for item in value):
+        return [", ".join(str(item) for item in value)]
+    return [str(item) for item in value] if isinstance(value, list) else [str(value)]
+
+
+def _render(template: str, **values: Any) -> str:
+    environment = Environment(
+        loader=PackageLoader("gates.pages"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    page = environment.get_template(template)
+    return page.render(
+        style=page_style(),
+        gates=GATES,
+        marks=MARKS,
+        exact=exact,
+        short=short,
+        plain=lambda value: json.dumps(value, ensure_ascii=False),
+        **values,
+    )

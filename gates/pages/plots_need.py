@@ -1,0 +1,177 @@
+"""Figures of Gate A: modes and their mean, strata, success per mode, baselines."""
+
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from gates.evidence import Evidence, MissingEvidenceError, count, flags, numbers
+from gates.models import GateReport
+from gates.need import AUDIT, BASELINES
+from gates.pages import plots_factors, plots_scene
+from gates.pages.figures import Photo, Plot, in_order
+from gates.pages.limits import draw_limit, limit_of
+from gates.pages.plots_scene import SUMMARY, obstacles
+from genpolicy.pages.figures import captions, checks, situations
+from genpolicy.pages.figures.drawing import BLUE, new_figure
+from genpolicy.statistics.intervals import clopper_pearson
+
+EXAMPLES = f"{AUDIT}/examples.parquet"
+ALIGNMENT = f"{AUDIT}/alignment.parquet"
+REPLAY = f"{AUDIT}/replay.parquet"
+
+
+def _plane(evidence: Evidence) -> dict[str, Any]:
+    """Names and unit of the position, and the obstacles, as the audit wrote them."""
+    summary = evidence.document(SUMMARY)
+    return {
+        "names": summary.get("position_names", ["x", "y", "z"]),
+        "unit": summary.get("position_unit", "m"),
+        "obstacles": obstacles(evidence),
+    }
+
+
+def _clusters(evidence: Evidence, report: GateReport) -> Figure:
+    columns = (
+        "example", "phase", "query_uuid", "query_index", "is_query", "distance", "cluster",
+        "coordinate", "path",
+    )  # fmt: skip
+    return situations.clusters(evidence.frame(EXAMPLES, *columns), **_plane(evidence))
+
+
+def _overlay(evidence: Evidence, report: GateReport) -> Figure:
+    path = f"{AUDIT}/neighbourhoods.parquet"
+    columns = ("split", "two_mode", "mean_admissible", "mean_reason", "mean_path", "mode_paths")
+    frame = evidence.frame(path, *columns)
+    held_out = frame["split"].isin(report.settings.get("held_out_splits", []))
+    return situations.mean_versus_modes(
+        frame[held_out & flags(frame, "two_mode")], **_plane(evidence)
+    )
+
+
+def _realignment(evidence: Evidence, report: GateReport) -> Figure:
+    summary = evidence.document(SUMMARY)
+    frame = evidence.frame(
+        ALIGNMENT, "episode_uuid", "epoch", "order", "offset_before_s", "offset_after_s"
+    )
+    limit_s = limit_of(report, "clock_residual_s")
+    if limit_s is None:
+        raise MissingEvidenceError("the report has no limit of the clock")
+    return checks.realignment(
+        frame,
+        limit_s=limit_s,
+        modes_before=int(count(summary, "modes_before_realignment")),
+        modes_after=int(count(summary, "modes_after_realignment")),
+    )
+
+
+def _labels(evidence: Evidence, report: GateReport) -> Figure:
+    return checks.label_agreement(evidence.frame(REPLAY, "label", "replayed", "mode"))
+
+
+def _strata(evidence: Evidence, report: GateReport) -> Figure:
+    columns = ("variable", "phase", "p_adjusted", "effect", "effect_lower", "effect_upper", "n")
+    return checks.strata_bars(
+        evidence.frame(f"{AUDIT}/strata.parquet", *columns),
+        level=float(report.settings.get("strata_level", 0.05)),
+        limit=limit_of(report, "strata_effect"),
+    )
+
+
+def _mode_success(evidence: Evidence, report: GateReport) -> Figure:
+    frame = evidence.frame(f"{AUDIT}/modes.parquet", "mode", "phase", "episodes", "successes")
+    level = float(report.settings.get("confidence", 0.95))
+    trials, hits = numbers(frame, "episodes"), numbers(frame, "successes")
+    ends = np.array(
+        [clopper_pearson(int(k), int(n), level) for k, n in zip(hits, trials, strict=True)]
+    ).reshape(-1, 2)
+    return checks.mode_success(
+        frame.assign(success_lower=ends[:, 0], success_upper=ends[:, 1]),
+        confidence=level,
+        limit=limit_of(report, "mode_success_lower"),
+    )
+
+
+def _baselines(evidence: Evidence, report: GateReport) -> Figure:
+    columns = ("method", "convention", "modes_present", "modes_covered")
+    frame = evidence.frame(f"{BASELINES}/modes.parquet", *columns)
+    frame = frame[numbers(frame, "modes_present") >= 2]
+    share = numbers(frame, "modes_covered") / numbers(frame, "modes_present")
+    means = (
+        frame.assign(share=share).groupby(["method", "convention"])["share"].agg(["mean", "size"])
+    )
+    deployed = report.settings.get("deployed_conventions", [])
+    generative = report.settings.get("generative_baselines", [])
+    order = [key for name in in_order(frame["method"]) for key in means.index if key[0] == name]
+    figure, (axes,) = new_figure(height=1.0 + 0.3 * len(order))
+    for place, (method, convention) in enumerate(order):
+        drawn = convention not in deployed or method in generative
+        axes.barh(
+            place,
+            float(means.loc[(method, convention), "mean"]),
+            color="white" if drawn else BLUE,
+            edgecolor=BLUE,
+            hatch="//" if drawn else "",
+            height=0.6,
+        )
+    labels = [f"{m} · {c} (n = {int(means.loc[(m, c), 'size'])})" for m, c in order]
+    axes.set_yticks(np.arange(len(order)), labels)
+    axes.invert_yaxis()
+    axes.set_xlim(0, 1.02)
+    draw_limit(axes, report, "baseline_mode_coverage")
+    axes.set_xlabel("mean share of modes covered, situations with two modes")
+    return figure
+
+
+PLOTS: tuple[Plot | Photo, ...] = (
+    *plots_scene.PLOTS,
+    Plot(
+        *captions.CLUSTERS,
+        EXAMPLES,
+        _clusters,
+        also=(SUMMARY,),
+    ),
+    Plot(
+        "Modes and their mean, in the scene plane",
+        "Solid: the next chunk of nearest neighbours, one line per mode. Dashed: the mean of the "
+        "modes, which is what a policy trained by regression tends to. A generator is needed "
+        "where both fans pass and the mean is refused. Lines are the tool centre; gripper and "
+        "held object are wider, so a mean beside the obstacle may still hit it.",
+        f"{AUDIT}/neighbourhoods.parquet",
+        _overlay,
+        also=(SUMMARY,),
+    ),
+    Plot(
+        *captions.REALIGNMENT,
+        ALIGNMENT,
+        _realignment,
+        also=(SUMMARY,),
+    ),
+    Plot(
+        *captions.STRATA,
+        f"{AUDIT}/strata.parquet",
+        _strata,
+    ),
+    Plot(
+        "Success of each mode",
+        "Point: share of successful episodes that took this mode. Line: exact interval. The gate "
+        "judges the lower end. The audit numbers the modes m0, m1 and so on.",
+        f"{AUDIT}/modes.parquet",
+        _mode_success,
+    ),
+    Plot(
+        *captions.LABELS,
+        REPLAY,
+        _labels,
+    ),
+    Plot(
+        "Modes that the simple policies keep",
+        "Share of the modes of a held-out situation that a policy's samples reach. A deterministic "
+        "policy reaches one of two at most, which is 0.5; less means that it lands between them. "
+        "Judged is the best baseline as it is deployed (solid bars); hatched bars draw at random, "
+        "as a generator does.",
+        f"{BASELINES}/modes.parquet",
+        _baselines,
+    ),
+    *plots_factors.PLOTS,
+)

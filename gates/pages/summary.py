@@ -1,0 +1,86 @@
+"""Markdown summary of a report, fit for a pull request; names cannot break out of the table."""
+
+import re
+
+from gates.chain import limit_text, measured_text
+from gates.ladder import NAMES
+from gates.models import Criterion, GateReport, report_path
+from gates.pages.guide import unit
+from gates.pages.table import deciding, passed_by, sign, stops, tally, waived
+
+SPECIAL = re.compile(r"([\\`*_\[\]()|#!~])")
+PROOF = "python -m gates verify"
+MARKS = {"PASS": "✓", "FAIL": "✕", "INCONCLUSIVE": "?", "PENDING_REVIEW": "…"}
+HEAD = (
+    "| verdict | criterion | candidate | measured | interval | required | owner |",
+    "|---|---|---|---|---|---|---|",
+)
+
+
+def markdown(report: GateReport) -> str:
+    """Verdict on top, then what decided it, the open criteria, all criteria, the caveats."""
+    lines = [
+        f"# Gate {report.gate}, {NAMES[report.gate]}: {MARKS[report.verdict]} "
+        f"{plain(report.verdict.replace('_', ' '))}",
+        "",
+        f"**Decision:** {plain(report.decision)}",
+        "",
+    ]
+    if decided := deciding(report) or passed_by(report):
+        lines += [f"**Decided by:** {plain(decided)}", ""]
+    if report.diagnosis:
+        label = "Diagnosis" if report.verdict == "PASS" else "Look first at"
+        lines += [f"**{label}:** {plain(report.diagnosis)}", ""]
+    lines += [f"**Criteria:** {plain(tally(report))}.", ""]
+    lines += _candidates(report)
+    unmet = [c for c in report.criteria if c.verdict != "PASS"]
+    if unmet:
+        lines += ["## Not met", "", *HEAD, *(_row(c, report) for c in unmet), ""]
+    rows = [_row(criterion, report) for criterion in report.criteria]
+    lines += [f"<details><summary>All {len(rows)} criteria</summary>", "", *HEAD, *rows, ""]
+    lines += ["</details>", "", "## Caveats", ""]
+    lines += [f"- {plain(caveat)}" for caveat in report.caveats]
+    page = report_path(report.gate).removesuffix(".json")
+    lines += ["", f"Figures: `{page}.html`. All numbers: `{page}.json`. Proof: `{PROOF}`."]
+    return "\n".join(lines) + "\n"
+
+
+def _candidates(report: GateReport) -> list[str]:
+    if not report.candidates:
+        return []
+    why = stops(report)
+    lines = []
+    for name, verdict in sorted(report.candidates.items()):
+        reason = f", {plain(why[name])}" if why[name] else ""
+        text = plain(verdict.replace("_", " "))
+        lines.append(f"- {MARKS[verdict]} **{plain(name)}** {text}{reason}")
+    return [*lines, ""]
+
+
+def _row(c: Criterion, report: GateReport) -> str:
+    interval = f"{c.interval[0]:.6g} to {c.interval[1]:.6g}" if c.interval else ""
+    after = f" {unit(c.id)}" if unit(c.id) else ""
+    measured = f"{c.measured:.6g}{after}" if c.measured is not None else measured_text(c)
+    note = f" ({waived(c, report)})" if waived(c, report) else ""
+    cells = (
+        f"{MARKS[c.verdict]} {c.verdict.replace('_', ' ')}{note}",
+        c.id,
+        c.candidate or "",
+        measured,
+        interval,
+        f"{sign(limit_text(c))}{after}",
+        c.owner,
+    )
+    return "| " + " | ".join(plain(cell) for cell in cells) + " |"
+
+
+def plain(text: str) -> str:
+    """Text that Markdown shows as it is: no markup, no HTML, no mention, one line."""
+    one_line = " ".join(text.split())
+    escaped = SPECIAL.sub(r"\\\1", one_line)
+    return (
+        escaped.replace("&", "&amp;")
+        .replace("<", "&lt;")
+        .replace(">", "&gt;")
+        .replace("@", "&#64;")
+    )

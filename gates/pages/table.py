@@ -1,0 +1,135 @@
+"""The criteria as a reader needs them: grouped, counted, and what failed without deciding."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import groupby
+
+from gates.chain import limit_text, measured_text
+from gates.models import REQUIRED, Criterion, GateReport
+from gates.pages.guide import unit
+from gates.verdicts import first_unmet
+
+
+@dataclass(frozen=True)
+class Line:
+    """One judged criterion in the table.
+
+    Attributes:
+        criterion: What was judged.
+        waived: Why it does not count although it is not met; empty if it counts.
+    """
+
+    criterion: Criterion
+    waived: str
+
+
+@dataclass(frozen=True)
+class Group:
+    """One question, with a line for the gate or one for each candidate."""
+
+    question: str
+    id: str
+    route: str
+    reason: str
+    owner: str
+    unit: str
+    lines: tuple[Line, ...]
+
+
+def groups(report: GateReport) -> list[Group]:
+    """Criteria by question, in the order of diagnosis."""
+    found = []
+    for name, members in groupby(report.criteria, key=lambda c: c.id):
+        same = list(members)
+        first = same[0]
+        lines = tuple(Line(c, waived(c, report)) for c in same)
+        route = "" if first.route == REQUIRED else first.route
+        found.append(
+            Group(first.question, name, route, first.reason, first.owner, unit(name), lines)
+        )
+    return found
+
+
+def waived(criterion: Criterion, report: GateReport) -> str:
+    """Why an unmet criterion does not stand in the way; empty if it does."""
+    if criterion.verdict != "FAIL":
+        return ""
+    if criterion.route != REQUIRED and criterion.candidate is None:
+        for route in sorted({c.route for c in report.criteria} - {REQUIRED, criterion.route}):
+            if all(c.verdict == "PASS" for c in report.criteria if c.route == route):
+                return f"not needed: route {route.replace('_', ' ')} holds"
+    if criterion.candidate is not None and report.verdict == "PASS":
+        return f"stops {criterion.candidate} only"
+    return ""
+
+
+def tally(report: GateReport) -> str:
+    """How many criteria hold, and what the others are, in one sentence."""
+    texts = [f"{_count(report, 'PASS')} of {len(report.criteria)} hold"]
+    if failing := _count(report, "FAIL"):
+        spared = sum(bool(waived(c, report)) for c in report.criteria)
+        who = "" if spared == failing else f"{spared} of them "
+        aside = f" ({who}without weight for the verdict)" if spared else ""
+        texts.append(f"{failing} {'fails' if failing == 1 else 'fail'}{aside}")
+    if absent := _count(report, "INCONCLUSIVE"):
+        texts.append(f"{absent} not measured")
+    if waiting := _count(report, "PENDING_REVIEW"):
+        texts.append(f"{waiting} {'waits' if waiting == 1 else 'wait'} for a person")
+    return "; ".join(texts)
+
+
+def _count(report: GateReport, verdict: str) -> int:
+    return sum(c.verdict == verdict for c in report.criteria)
+
+
+def deciding(report: GateReport) -> str:
+    """What decided a verdict other than PASS, in one phrase; empty after PASS."""
+    decided = first_unmet(report.criteria, report.verdict)
+    if decided is None:
+        return ""
+    of = f" of {decided.candidate}" if decided.candidate else ""
+    return f"{decided.id}{of}: {against(decided)}"
+
+
+def against(criterion: Criterion) -> str:
+    """Measured against required, with the unit."""
+    text = unit(criterion.id)
+    after = f" {text}" if text else ""
+    found = measured_text(criterion)
+    if criterion.verdict == "PENDING_REVIEW" or criterion.measured is None:
+        return f"{found}, required {sign(limit_text(criterion))}{after}"
+    return f"{found}{after}, required {sign(limit_text(criterion))}{after}"
+
+
+def stops(report: GateReport) -> dict[str, str]:
+    """For each candidate that does not pass: the first criterion that it does not meet."""
+    found = {}
+    for name, verdict in report.candidates.items():
+        own: Sequence[Criterion] = [c for c in report.criteria if c.candidate == name]
+        unmet = next((c for c in own if c.verdict == verdict != "PASS"), None)
+        found[name] = f"{unmet.id}: {against(unmet)}" if unmet else ""
+    return found
+
+
+def passed_by(report: GateReport) -> str:
+    """What a PASS rests on, in one phrase; empty for other verdicts."""
+    if report.verdict != "PASS":
+        return ""
+    text = "every required criterion holds"
+    routes = sorted({c.route for c in report.criteria} - {REQUIRED})
+    whole = [
+        route.replace("_", " ")
+        for route in routes
+        if all(c.verdict == "PASS" for c in report.criteria if c.route == route)
+    ]
+    if whole:
+        text += f", by route {' and '.join(whole)}"
+    names = sorted(name for name, verdict in report.candidates.items() if verdict == "PASS")
+    if names:
+        text += f"; {', '.join(names)} {'pass' if len(names) > 1 else 'passes'} whole"
+    return text
+
+
+def sign(text: str) -> str:
+    """Comparisons as a reader writes them."""
+    return text.replace("<=", "≤").replace(">=", "≥")

@@ -1,1 +1,0 @@
-"""Studies on a task: matched training, reload, latency, shadow and stress evidence."""

@@ -1,1 +1,0 @@
-"""The contact controller of the simulated cell; a pinned fixture."""

@@ -1,0 +1,1 @@
+"""Recordings, datasets, and the formats of others: one contract, one way in."""

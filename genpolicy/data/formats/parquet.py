@@ -1,0 +1,107 @@
+"""Plain Parquet: a long table with a column of episodes, or one file per episode, or a folder."""
+
+from collections.abc import Generator, Iterator, Sequence
+from pathlib import Path
+
+from genpolicy.data.assemble import Refusal
+from genpolicy.data.formats.columns import labels_of
+from genpolicy.data.formats.contract import ImportContract
+from genpolicy.data.formats.segments import episode_label, episodes_of, find_segments
+from genpolicy.data.formats.source import (
+    MAXIMUM_EPISODE_ROWS,
+    Column,
+    RawEpisode,
+    check_columns,
+    refusal_of,
+    refuse,
+)
+from genpolicy.data.formats.tables import Table, open_table, read_columns
+from genpolicy.errors import BadInputError
+
+UUID_COLUMN = "uuid"
+
+
+class ParquetFiles:
+    """Parquet files as a source; see `genpolicy.data.formats.source.Source`."""
+
+    rate_hz: float | None = None
+    known: ImportContract | None = None
+
+    def __init__(self, path: Path) -> None:
+        """Describe the first readable file; its columns are those of all.
+
+        Raises:
+            BadInputError: No readable Parquet file.
+        """
+        self.name = path.name
+        self._root = path if path.is_dir() else path.parent
+        self._files = sorted(path.rglob("*.parquet")) if path.is_dir() else [path]
+        if not self._files:
+            refuse(str(path), "without a .parquet file", "a file, or a folder of them")
+        self._table = self._first()
+        self.columns: tuple[Column, ...] = tuple(self._table.columns.values())
+        self.labels = labels_of(self.columns)
+        skipped = ", ".join(self._table.skipped)
+        self.notes = (f"Not read: {skipped} (neither numbers nor text).",) if skipped else ()
+        self.count = None if self.labels.episode is not None else len(self._files)
+
+    def episodes(
+        self, wanted: Sequence[str], episode: str | None = None
+    ) -> Iterator[RawEpisode | Refusal]:
+        """Each episode of each file, files by name; an unreadable file is one refusal."""
+        done = 0
+        for path in self._files:
+            label = path.relative_to(self._root).as_posix()
+            try:
+                with open_table(path, label=label) as table:
+                    done += yield from self._of(table, wanted, episode, done)
+            except BadInputError as error:
+                yield refusal_of(label, error)
+
+    def _first(self) -> Table:
+        first: BadInputError | None = None
+        for path in self._files:
+            try:
+                with open_table(path, label=path.relative_to(self._root).as_posix()) as table:
+                    return table
+            except BadInputError as error:
+                first = first or error
+        raise first or AssertionError("no file was tried")
+
+    def _of(
+        self, table: Table, wanted: Sequence[str], episode: str | None, done: int
+    ) -> Generator[RawEpisode | Refusal, None, int]:
+        known = {column.name: column for column in self.columns}
+        names = list(dict.fromkeys(wanted))
+        if episode is None:
+            if table.rows > MAXIMUM_EPISODE_ROWS:
+                refuse(table.label, f"{table.rows} rows long", f"at most {MAXIMUM_EPISODE_ROWS}")
+            columns = read_columns(table, names)
+            check_columns(columns, label=table.label, known=known)
+            yield RawEpisode(table.label, table.digest, columns, first_row=done)
+            return table.rows
+        segments = find_segments(table, episode)
+        for segment, read in episodes_of(table, segments, names):
+            if isinstance(read, Refusal):
+                yield read
+                continue
+            label = episode_label(table.label, segment.key)
+            try:
+                check_columns(read, label=label, known=known)
+            except BadInputError as error:
+                yield refusal_of(label, error)
+                continue
+            uuid = UUID_COLUMN in episode.lower()
+            yield RawEpisode(
+                label=label,
+                digest=table.digest,
+                columns=read,
+                attributes={"episode_uuid": segment.key} if uuid else {},
+                first_row=done + segment.start,
+            )
+        return table.rows
+
+
+def open_source(path: Path) -> ParquetFiles:
+    """Parquet files, described; see `ParquetFiles`."""
+    return ParquetFiles(path)

@@ -1,0 +1,275 @@
+"""A contract proposed from the recordings: names as given, units and pairs guessed and marked."""
+
+from collections.abc import Sequence
+from itertools import islice, pairwise
+from pathlib import PurePath
+
+import numpy as np
+from numpy.typing import NDArray
+
+from genpolicy.data.assemble import Refusal
+from genpolicy.data.formats.columns import BOOKKEEPING
+from genpolicy.data.formats.contract import (
+    SI,
+    UNKNOWN_UNIT,
+    ActionSource,
+    ChannelSource,
+    Format,
+    Frozen,
+    ImportContract,
+    Labels,
+    contract_of,
+)
+from genpolicy.data.formats.pairing import are_differences, pair_by_name, pair_by_numbers
+from genpolicy.data.formats.sample import Sample, action_of, channels_of
+from genpolicy.data.formats.source import Column, RawEpisode, Source, as_float
+from genpolicy.data.formats.units import BULK, tokens
+from genpolicy.errors import BadInputError, ContractError
+
+Array = NDArray[np.float64]
+
+SAMPLE_EPISODES = 12
+SAMPLE_LOOKED_AT = 40
+DEFAULT_RATE_HZ = 10.0
+SHORTEST_DEMONSTRATION_S = 0.5
+FEWEST_ROWS, MOST_ROWS = 4, 16
+LONGEST_GAP_S = 0.25
+LONGEST_GAP_ROWS = 3.0
+FROZEN_S = 2.0
+FROZEN_SHARE = 0.1
+EPOCH_S = 1e6
+TIME_UNITS = {"ns": 1e9, "us": 1e6, "ms": 1e3}
+ACTION_WORDS = (("action", "actions"), ("command", "cmd", "commanded"), ("target", "goal"))
+
+
+def propose_contract(source: Source, kind: Format, *, task: str | None = None) -> ImportContract:
+    """What the recordings say of themselves, and a marked guess where they say nothing.
+
+    Raises:
+        BadInputError: No readable episode, or no action or no observation among the columns.
+    """
+    notes: list[str] = list(source.notes)
+    labels = _rows_numbered(source, source.labels, notes)
+    actions, observed = _roles(source, labels)
+    sample = _sample(source, [c.name for c in (*actions, *observed)], labels)
+    rate_hz, rate_guessed, unit = _rate(source, sample, labels, notes)
+    action = action_of(actions, sample, notes)
+    channels = channels_of(observed, sample, notes)
+    pairing, by_numbers = _pairing(channels, action, sample, notes)
+    action = _with_units_of(action, channels, pairing)
+    values = ImportContract(
+        format=kind,
+        task=task or _task(source),
+        rate_hz=rate_hz,
+        rate_guessed=rate_guessed,
+        channels=channels,
+        action=action,
+        pairing=pairing,
+        pairing_guessed=by_numbers,
+        labels=labels,
+        time_unit=unit,  # type: ignore[arg-type]  # one of TIME_UNITS or s
+        time_origin="recording" if _is_one_clock(sample, labels) else "episode",
+        minimum_rows=int(
+            np.clip(np.ceil(SHORTEST_DEMONSTRATION_S * rate_hz), FEWEST_ROWS, MOST_ROWS)
+        ),
+        maximum_gap_s=round(max(LONGEST_GAP_S, LONGEST_GAP_ROWS / rate_hz), 6),
+        frozen=_frozen(channels, action, pairing, sample),
+        notes=list(dict.fromkeys(notes)),
+    )
+    return contract_of(values.model_dump(), where="the proposed contract")
+
+
+def _roles(source: Source, labels: Labels) -> tuple[tuple[Column, ...], tuple[Column, ...]]:
+    """Which columns are the action, and which the observation."""
+    taken = set(labels.named().values())
+    numeric = [
+        c
+        for c in source.columns
+        if c.kind == "number" and not c.per_episode and c.name not in taken
+    ]
+    actions: list[Column] = []
+    for words in ACTION_WORDS:
+        actions = actions or [c for c in numeric if _is_action(c.name, words)]
+    exact = [c for c in actions if tokens(c.name)[-1:] in (["action"], ["actions"])]
+    actions = exact[:1] or actions
+    observed = [
+        c
+        for c in numeric
+        if c not in actions
+        and not _is_action(c.name, ACTION_WORDS[0])
+        and not BOOKKEEPING & {tokens(c.name)[0], tokens(c.name)[-1]}
+    ]
+    stated = [c for c in observed if {"observation", "obs", "state"} & set(tokens(c.name))]
+    observed = stated or observed
+    for found, what in ((actions, "an action"), (observed, "an observation")):
+        if not found:
+            raise ContractError(
+                where=source.name,
+                found=f"with the columns {[c.name for c in source.columns][:12]}",
+                expected=f"one that is {what}",
+                action="Write the contract by hand (docs/import.md) and give it with --contract.",
+            )
+    return tuple(actions), tuple(observed)
+
+
+def _is_action(name: str, words: tuple[str, ...]) -> bool:
+    parts = tokens(name) or [name]
+    return parts[0] in words or parts[-1] in words
+
+
+def _sample(source: Source, columns: Sequence[str], labels: Labels) -> Sample:
+    wanted = list(dict.fromkeys([*columns, *labels.named().values()]))
+    episodes: list[RawEpisode] = []
+    reason = "it holds no episode"
+    for item in islice(source.episodes(wanted, labels.episode), SAMPLE_LOOKED_AT):
+        if isinstance(item, Refusal):
+            reason = item.reason
+            continue
+        if len(item.columns[columns[0]]):
+            episodes.append(item)
+        if len(episodes) == SAMPLE_EPISODES:
+            break
+    # What the import will refuse must not decide what is proposed.
+    episodes = [e for e in episodes if _is_finite(e, columns)] or episodes
+    if not episodes:
+        raise BadInputError(
+            where=source.name,
+            found=f"without a readable episode (first: {reason})",
+            expected="at least one",
+            action="Correct the recordings.",
+        )
+    lengths = [len(episode.columns[columns[0]]) for episode in episodes]
+    return Sample(episodes, np.repeat(np.arange(len(lengths)), lengths))
+
+
+def _is_finite(episode: RawEpisode, columns: Sequence[str]) -> bool:
+    return all(bool(np.isfinite(as_float(episode.columns[name])).all()) for name in columns)
+
+
+def _pairing(
+    channels: Sequence[ChannelSource], action: ActionSource, sample: Sample, notes: list[str]
+) -> tuple[dict[str, str] | None, bool]:
+    observed, names = _matrix(channels, sample)
+    commanded = sample.selected(action.columns)
+    pairing = pair_by_name(channels, action)
+    if pairing is not None:
+        left = [action.components.index(name) for name in pairing]
+        right = [names.index(name) for name in pairing.values()]
+        if are_differences(observed[:, right], commanded[:, left], sample.number):
+            notes.append("The action follows the change of what bears its name, not its value.")
+            return None, False
+        if len(pairing) < len(action.components):
+            rest = [name for name in action.components if name not in pairing]
+            notes.append(f"Nothing observed bears the name of the action's {', '.join(rest)}.")
+        return pairing, False
+    pairs = pair_by_numbers(observed, commanded, sample.number)
+    units = _units(channels)
+    found = {
+        action.components[a]: names[o]
+        for a, o in pairs or ()
+        if action.units[a] in (units[names[o]], UNKNOWN_UNIT)
+    }
+    return found or None, bool(found)
+
+
+def _with_units_of(
+    action: ActionSource, channels: Sequence[ChannelSource], pairing: dict[str, str] | None
+) -> ActionSource:
+    """What commands a number has its unit, where nothing else tells it."""
+    units = _units(channels)
+    known = {name: units[observed] for name, observed in (pairing or {}).items()}
+    told = [
+        known.get(name, unit) if unit == UNKNOWN_UNIT else unit
+        for name, unit in zip(action.components, action.units, strict=True)
+    ]
+    return action.model_copy(update={"units": told})
+
+
+def _units(channels: Sequence[ChannelSource]) -> dict[str, str]:
+    return {f"{c.name}.{part}": c.unit for c in channels for part in c.components}
+
+
+def _matrix(channels: Sequence[ChannelSource], sample: Sample) -> tuple[Array, list[str]]:
+    """The observed numbers as recorded, angles that jump left out, and their names."""
+    plain = [channel for channel in channels if channel.transform == "none"]
+    if not plain:
+        return np.zeros((len(sample.number), 0)), []
+    names = [f"{c.name}.{component}" for c in plain for component in c.components]
+    return np.concatenate([sample.selected(c.columns) for c in plain], axis=1), names
+
+
+def _rate(
+    source: Source, sample: Sample, labels: Labels, notes: list[str]
+) -> tuple[float, bool, str]:
+    """Rate, whether it is a guess, and the unit of the clock."""
+    unit, measured = "s", None
+    if labels.time is not None:
+        times = as_float(sample.values(labels.time)).reshape(-1)
+        steps = np.diff(times)[np.diff(sample.number) == 0]
+        steps = steps[np.isfinite(steps) & (steps > 0)]
+        unit = _time_unit(labels.time, times, steps)
+        if len(steps):
+            measured = TIME_UNITS.get(unit, 1.0) / float(np.median(steps))
+    if source.rate_hz is not None:
+        if measured is not None and not abs(measured / source.rate_hz - 1.0) <= 0.05:
+            notes.append(
+                f"The recordings state {source.rate_hz:g} Hz, their clock says {measured:.4g} Hz."
+            )
+        return source.rate_hz, False, unit
+    if measured is not None:
+        return float(f"{measured:.4g}"), False, unit
+    return DEFAULT_RATE_HZ, True, unit
+
+
+def _time_unit(name: str, times: Array, steps: Array) -> str:
+    ends = tokens(name)[-1]
+    if ends in TIME_UNITS:
+        return ends
+    if not len(steps) or np.median(steps) < 20.0:
+        return "s"
+    # A row every 20 s and more would be no control: the clock counts smaller units.
+    return "ns" if np.median(steps) >= 1e5 else "ms"
+
+
+def _is_one_clock(sample: Sample, labels: Labels) -> bool:
+    """Whether each episode begins after the one before has ended: one clock for all."""
+    if labels.time is None or len(sample.episodes) < 2:
+        return False
+    times = [as_float(episode.columns[labels.time]) for episode in sample.episodes]
+    return all(after[0] > before[-1] for before, after in pairwise(times))
+
+
+def _rows_numbered(source: Source, labels: Labels, notes: list[str]) -> Labels:
+    """The labels without a column that only looks like row numbers."""
+    if labels.frame is None:
+        return labels
+    for item in islice(source.episodes([labels.frame], labels.episode), SAMPLE_LOOKED_AT):
+        if isinstance(item, Refusal) or len(item.columns[labels.frame]) < 2:
+            continue
+        if np.median(np.diff(as_float(item.columns[labels.frame]))) == 1.0:
+            return labels
+        break
+    notes.append(f"{labels.frame} does not count rows one by one; it was left aside.")
+    return labels.model_copy(update={"frame": None})
+
+
+def _frozen(
+    channels: Sequence[ChannelSource],
+    action: ActionSource,
+    pairing: dict[str, str] | None,
+    sample: Sample,
+) -> Frozen | None:
+    """Only a stream that holds what the action commands must move with it."""
+    paired = set((pairing or {}).values())
+    streams = [c.stream for c in channels if paired & {f"{c.name}.{part}" for part in c.components}]
+    factors = [SI.get(unit, (unit, 1.0))[1] for unit in action.units]
+    low, high = np.quantile(sample.selected(action.columns) * factors, BULK, axis=0)
+    spread = float(np.max(high - low))
+    if not streams or not (FROZEN_SHARE * spread > 0 and np.isfinite(spread)):
+        return None
+    motion = float(f"{FROZEN_SHARE * spread:.3g}")
+    return Frozen(streams=list(dict.fromkeys(streams)), seconds=FROZEN_S, motion=motion)
+
+
+def _task(source: Source) -> str:
+    return PurePath(source.name).stem or "unnamed"

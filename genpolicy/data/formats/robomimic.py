@@ -1,0 +1,286 @@
+"""robomimic HDF5: `data/demo_*` with `actions` and `obs/*`, attributes and masks.
+
+HDF5 can read other files: external links, external storage and virtual data sets reach out of
+the file, and a filter can load a library. All of them are refused before anything is read.
+"""
+
+import json
+import os
+import re
+import stat
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from genpolicy.data.assemble import Refusal
+from genpolicy.data.formats.columns import labels_of
+from genpolicy.data.formats.contract import ImportContract
+from genpolicy.data.formats.source import (
+    MAXIMUM_EPISODE_ROWS,
+    MAXIMUM_VALUE_BYTES,
+    Column,
+    RawEpisode,
+    check_columns,
+    refusal_of,
+    refuse,
+)
+from genpolicy.errors import BadInputError, IntegrityError
+
+DATA, OBSERVATIONS, MASK = "data", "obs", "mask"
+ACTIONS = "actions"
+PER_ROW = ("actions", "rewards", "dones")
+# Filters of the library itself: deflate, shuffle, fletcher32, szip, nbit, scale-offset, lzf.
+FILTERS = (1, 2, 3, 4, 5, 6, 32000)
+MAXIMUM_ATTRIBUTE = 1 << 20
+HASH_BYTES = 1 << 20
+REWRITE = "Write the file again with plain, internal data sets (h5repack)."
+READ_ERRORS = (OSError, KeyError, RuntimeError, ValueError, TypeError, MemoryError)
+
+
+class RobomimicFile:
+    """A robomimic file as a source; see `genpolicy.data.formats.source.Source`."""
+
+    known: ImportContract | None = None
+
+    def __init__(self, path: Path) -> None:
+        """Describe the first readable demonstration and list all.
+
+        Raises:
+            BadInputError: Not HDF5, without demonstrations, or with links to other places.
+        """
+        self.name = path.name
+        self._path = path
+        notes: list[str] = []
+        with _open(path) as (file, self._digest):
+            data = _group(file, DATA, self.name)
+            self._demos = sorted((name for name in data if name != MASK), key=_natural)
+            if not self._demos:
+                refuse(f"{self.name}: {DATA}", "empty", "demonstrations demo_0, demo_1, …")
+            self.rate_hz, self._delta = _environment(data, notes)
+            self._operators = _operators(file, self.name, set(self._demos), notes)
+            columns, attributes, skipped = self._describe(data)
+        if skipped:
+            notes.append(f"Not read: {', '.join(skipped)} (pictures, or no plain numbers).")
+        if self._delta:
+            notes.append("The controller takes differences: the action is no position.")
+        if self._operators:
+            notes.append("The operator was taken from the file's masks.")
+            attributes.add("operator")
+        extra = [Column(n, None, "text", per_episode=True) for n in sorted(attributes)]
+        self.columns: tuple[Column, ...] = (*columns, *extra)
+        self.labels = labels_of(self.columns, episode=None, frame=None)
+        self.notes = tuple(notes)
+        self.count = len(self._demos)
+
+    def episodes(
+        self, wanted: Sequence[str], episode: str | None = None
+    ) -> Iterator[RawEpisode | Refusal]:
+        """Each demonstration by number."""
+        per_episode = {column.name for column in self.columns if column.per_episode}
+        names = list(dict.fromkeys([*(n for n in wanted if n not in per_episode), ACTIONS]))
+        done = 0
+        with _open(self._path) as (file, digest):
+            if digest != self._digest:
+                refuse(self.name, "changed while it was read", "the bytes of before")
+            data = _group(file, DATA, self.name)
+            for demo in self._demos:
+                label = f"{self.name}#{demo}"
+                try:
+                    raw = self._read(data, demo, names, label, done)
+                    done += len(raw.columns[ACTIONS])
+                    yield raw
+                except BadInputError as error:
+                    yield refusal_of(label, error)
+                except READ_ERRORS as error:
+                    yield refusal_of(label, _unreadable(label, error))
+
+    def _read(
+        self, data: Any, demo: str, names: Sequence[str], label: str, done: int
+    ) -> RawEpisode:
+        group = _group(data, demo, label)
+        columns = {name: _values(group, name, label) for name in names}
+        check_columns(columns, label=label, known={c.name: c for c in self.columns})
+        attributes = _attributes(group)
+        if demo in self._operators:
+            attributes["operator"] = self._operators[demo]
+        return RawEpisode(label, self._digest, columns, attributes, first_row=done)
+
+    def _describe(self, data: Any) -> tuple[list[Column], set[str], list[str]]:
+        """Columns of the first demonstration that can be described."""
+        first: BadInputError | None = None
+        for demo in self._demos:
+            try:
+                return _columns(_group(data, demo, demo), f"{self.name}#{demo}")
+            except BadInputError as error:
+                first = first or error
+        raise first or AssertionError("no demonstration was tried")
+
+
+def open_source(path: Path) -> RobomimicFile:
+    """A robomimic file, described; see `RobomimicFile`."""
+    return RobomimicFile(path)
+
+
+@contextmanager
+def _open(path: Path) -> Iterator[tuple[Any, str]]:
+    """The file and the SHA-256 of the very bytes that are read; opened without following a link."""
+    try:
+        descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
+    except OSError as error:
+        raise _unreadable(path.name, error) from error
+    with os.fdopen(descriptor, "rb") as stream:
+        if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+            refuse(path.name, "a folder or a device", "a regular file", REWRITE)
+        digest = sha256()
+        while block := stream.read(HASH_BYTES):
+            digest.update(block)
+        stream.seek(0)
+        try:
+            file = h5py.File(stream, "r")
+        except READ_ERRORS as error:
+            raise _unreadable(path.name, error) from error
+        with file:
+            try:
+                yield file, digest.hexdigest()
+            except READ_ERRORS as error:  # what a damaged file makes the library raise
+                raise _unreadable(path.name, error) from error
+
+
+def _member(group: Any, name: str, where: str) -> Any:
+    """A member by a hard link, part by part; every other link is refused unresolved."""
+    found = group
+    for part in name.split("/"):
+        link = found.get(part, getlink=True) if isinstance(found, h5py.Group) else None
+        if link is None:
+            refuse(f"{where}: {name}", "missing", "as in the other demonstrations")
+        if not isinstance(link, h5py.HardLink):
+            refuse(f"{where}: {name}", f"a {type(link).__name__}", "data in this file", REWRITE)
+        found = found[part]
+    return found
+
+
+def _group(parent: Any, name: str, where: str) -> Any:
+    found = _member(parent, name, where)
+    if not isinstance(found, h5py.Group):
+        refuse(f"{where}: {name}", "no group", "a group")
+    return found
+
+
+def _values(group: Any, name: str, where: str) -> NDArray[Any]:
+    """A data set, whole, after everything that reaches out of the file has been refused."""
+    data = _member(group, name, where)
+    place = f"{where}: {name}"
+    if not isinstance(data, h5py.Dataset):
+        refuse(place, "no data set", "a data set")
+    _check_storage(data, place)
+    if data.ndim not in (1, 2) or data.dtype.kind not in "fiub":
+        refuse(place, f"of shape {data.shape} and type {data.dtype}", "numbers by row")
+    if (
+        data.shape[0] > MAXIMUM_EPISODE_ROWS
+        or data.size * data.dtype.itemsize > MAXIMUM_VALUE_BYTES
+    ):
+        refuse(place, f"of shape {data.shape}", f"at most {MAXIMUM_EPISODE_ROWS} rows")
+    return np.asarray(data[...])
+
+
+def _check_storage(data: Any, place: str) -> None:
+    properties = data.id.get_create_plist()
+    codes = [properties.get_filter(i)[0] for i in range(properties.get_nfilters())]
+    if data.external or properties.get_external_count():
+        refuse(place, "stored in another file", "data in this file", REWRITE)
+    if data.is_virtual:
+        refuse(place, "a virtual data set", "data in this file", REWRITE)
+    if not set(codes) <= set(FILTERS):
+        refuse(place, f"compressed by the filters {codes}", f"some of {FILTERS}", REWRITE)
+
+
+def _columns(demo: Any, where: str) -> tuple[list[Column], set[str], list[str]]:
+    # Listed, not asked for: `in` would follow a link out of the file.
+    present = set(demo)
+    names = [name for name in PER_ROW if name in present]
+    observations = _group(demo, OBSERVATIONS, where)
+    names += [f"{OBSERVATIONS}/{name}" for name in sorted(observations)]
+    columns: list[Column] = []
+    skipped: list[str] = []
+    for name in names:
+        data = _member(demo, name, where)
+        plain = isinstance(data, h5py.Dataset) and data.ndim in (1, 2) and data.dtype.kind in "fiub"
+        if not plain:
+            skipped.append(name)
+            continue
+        _check_storage(data, f"{where}: {name}")
+        columns.append(Column(name, int(data.shape[1]) if data.ndim == 2 else None))
+    if ACTIONS not in [column.name for column in columns]:
+        refuse(f"{where}: {ACTIONS}", "missing", "the actions of the demonstration")
+    return columns, set(_attributes(demo)), skipped
+
+
+def _attributes(group: Any) -> dict[str, str]:
+    """Short scalar attributes as text; models and states of a simulator are left out."""
+    result: dict[str, str] = {}
+    for name in sorted(group.attrs):
+        value = group.attrs[name]
+        if isinstance(value, bytes):
+            value = value.decode("utf-8", errors="replace")
+        if isinstance(value, str | bool | int | float | np.number | np.bool_):
+            text = str(value)
+            if len(text) <= 200 and name != "num_samples":
+                result[str(name)] = text
+    return result
+
+
+def _environment(data: Any, notes: list[str]) -> tuple[float | None, bool]:
+    """Control rate and whether the controller takes differences, from `env_args`."""
+    text = data.attrs.get("env_args", "")
+    if not isinstance(text, str) or not 0 < len(text) <= MAXIMUM_ATTRIBUTE:
+        return None, False
+    try:
+        arguments = json.loads(text)["env_kwargs"]
+        rate = arguments.get("control_freq")
+        delta = '"control_delta": true' in json.dumps(arguments.get("controller_configs"))
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        notes.append("The attribute env_args could not be read.")
+        return None, False
+    valid = isinstance(rate, int | float) and not isinstance(rate, bool) and 0 < rate <= 100_000
+    return (float(rate) if valid else None), delta
+
+
+def _operators(file: Any, where: str, demos: set[str], notes: list[str]) -> dict[str, str]:
+    """Operator by demonstration, where masks named after operators share all of them out."""
+    if MASK not in set(file):
+        return {}
+    masks = _group(file, MASK, where)
+    result: dict[str, str] = {}
+    unknown: set[str] = set()
+    for name in sorted(masks):
+        data = _member(masks, name, f"{where}: {MASK}")
+        if not isinstance(data, h5py.Dataset) or data.ndim != 1 or data.dtype.kind not in "SO":
+            continue
+        _check_storage(data, f"{where}: {MASK}/{name}")
+        members = {v.decode("utf-8", "replace") for v in data[...] if isinstance(v, bytes)}
+        unknown |= members - demos
+        if re.fullmatch(r".*operator[_ ]?\w*", name):
+            result |= dict.fromkeys(sorted(members & demos), name)
+    if unknown:
+        notes.append(f"Masks name {len(unknown)} demonstrations that are not there.")
+    return result if set(result) == demos else {}
+
+
+def _natural(name: str) -> tuple[int, str]:
+    digits = re.sub(r"\D", "", name)
+    return (int(digits[-12:]) if digits else -1, name)
+
+
+def _unreadable(where: str, error: Exception) -> IntegrityError:
+    return IntegrityError(
+        where=where,
+        found=f"not readable ({' '.join(str(error).split())[:160]})",
+        expected="a whole HDF5 file",
+        action="Fetch or write the file again.",
+    )

@@ -1,0 +1,41 @@
+"""What a contract leaves open, in sentences: they travel with the dataset into every verdict."""
+
+from genpolicy.data.formats.contract import UNKNOWN_UNIT, ImportContract
+
+ASKED = ("phase", "object", "operator", "calibration_epoch", "outcome", "is_recovery")
+
+
+def standing_notes(contract: ImportContract) -> list[str]:
+    """A sentence for each guess and each question that the recordings do not answer."""
+    notes: list[str] = []
+    guessed = [
+        f"{channel.name} ({channel.unit})"
+        for channel in contract.channels
+        if channel.guessed and channel.unit != UNKNOWN_UNIT
+    ]
+    if contract.action.guessed:
+        units = dict.fromkeys(unit for unit in contract.action.units if unit != UNKNOWN_UNIT)
+        guessed += [f"action ({', '.join(units)})"] if units else []
+    if guessed:
+        notes.append(f"Units were guessed: {', '.join(guessed)}.")
+    unknown = [c.name for c in contract.channels if c.unit == UNKNOWN_UNIT]
+    unknown += ["action"] if UNKNOWN_UNIT in contract.action.units else []
+    if unknown:
+        notes.append(f"Units are not recorded and could not be guessed: {', '.join(unknown)}.")
+    if contract.rate_guessed:
+        notes.append(f"The rate was guessed: {contract.rate_hz:g} Hz.")
+    if contract.pairing is None:
+        notes.append(
+            "The action commands nothing that is observed (other names, a velocity or a "
+            "difference): lag and calibration cannot be measured."
+        )
+    elif contract.pairing_guessed:
+        pairs = ", ".join(f"{a} with {o}" for a, o in contract.pairing.items())
+        notes.append(f"What the action commands was found in the numbers, not in names: {pairs}.")
+    if contract.format not in ("mcap", "dataset"):
+        missing = [name for name in ASKED if getattr(contract.labels, name) is None]
+        if missing:
+            notes.append(f"Not recorded: {', '.join(missing)}.")
+        if contract.labels.time is None:
+            notes.append("No clock was recorded: times are row / rate.")
+    return notes

@@ -1,0 +1,144 @@
+"""MCAP recordings to a dataset: each is accepted, or refused by name with row and reason."""
+
+import os
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from genpolicy.data.assemble import (
+    FLAGS,
+    STRATA,
+    AcceptedEpisode,
+    Description,
+    Refusal,
+    content_hash,
+    write_dataset,
+)
+from genpolicy.data.checks import check_metadata, check_recording, clock_offset_ns
+from genpolicy.data.contract import IngestContract, SplitRule
+from genpolicy.data.recording.episode import ACTION_STREAM, RecordedEpisode
+from genpolicy.data.recording.reader import read_hashed_episode
+from genpolicy.data.resample import remove_clock_offsets, resample
+from genpolicy.errors import BadInputError, ContractError
+
+CLOCK_NOTE = (
+    "event_time_s: exposure on the host's monotonic clock, after the declared offset of each "
+    "stream was subtracted; receive_time_s: arrival on the same clock"
+)
+
+
+def ingest_recordings(
+    files: Sequence[Path],
+    *,
+    contract: IngestContract,
+    out: Path,
+    split: SplitRule | None = None,
+    notes: tuple[str, ...] = (),
+    import_contract: dict[str, Any] | None = None,
+) -> None:
+    """Read recordings, hold each against the contract, write the dataset folder.
+
+    The order of `files` does not matter. Of two recordings with the same UUID or the same
+    samples, the first by name is kept and the other refused.
+
+    Args:
+        files: MCAP recordings, one episode each.
+        contract: What each must satisfy.
+        out: The dataset folder; whole or not at all, an old one is replaced.
+        split: Shares of the splits; 70 / 15 / 15 if absent.
+        notes: What was guessed or not recorded, for the manifest.
+        import_contract: The contract as a document, for the manifest.
+
+    Raises:
+        ContractError: No recording, or too few of them, were accepted.
+        BadInputError: The folder cannot be written.
+    """
+    accepted: list[AcceptedEpisode] = []
+    refused: list[Refusal] = []
+    names = _labels(files)
+    for name, path in sorted(zip(names, files, strict=True)):
+        try:
+            episode = accept_recording(path, contract=contract, label=name)
+            _refuse_duplicate(episode, accepted)
+            accepted.append(episode)
+        except BadInputError as error:
+            refused.append(Refusal(file=name, where=error.where, reason=str(error)))
+    write_dataset(
+        out,
+        accepted=accepted,
+        refused=refused,
+        found=len(files),
+        description=Description(
+            source_kind="mcap",
+            observation=contract.observation,
+            action=contract.action,
+            phases=contract.phases,
+            action_period_s=contract.action_period_s,
+            split=split or SplitRule(),
+            clock_note=CLOCK_NOTE,
+            notes=notes,
+            import_contract=import_contract,
+        ),
+    )
+
+
+def accept_recording(path: Path, *, contract: IngestContract, label: str) -> AcceptedEpisode:
+    """Read, check and resample one recording.
+
+    Args:
+        path: The MCAP file.
+        contract: What it must satisfy.
+        label: What texts and tables call it.
+
+    Raises:
+        BadInputError: It is not a recording, or it breaks the contract.
+    """
+    raw, digest = read_hashed_episode(path, where=label)
+    check_metadata(raw, contract, where=label)
+    episode = remove_clock_offsets(raw, where=label)
+    check_recording(episode, contract, where=label)
+    rows = resample(episode, contract, where=label)
+    metadata = raw.metadata
+    return AcceptedEpisode(
+        episode_uuid=raw.episode_uuid,
+        rows=rows,
+        strata={name: metadata[name] for name in STRATA},
+        flags={name: metadata[name].lower() == "true" for name in FLAGS},
+        scene_start=metadata["scene_start"],
+        source_file=label,
+        source_sha256=digest,
+        content_sha256=_samples_hash(raw),
+        recorded_at_ns=int(episode.streams[ACTION_STREAM].event_time_ns[0]),
+        clock_offsets_ns={
+            name: clock_offset_ns(raw, name, where=label) for name in sorted(raw.streams)
+        },
+    )
+
+
+def _samples_hash(episode: RecordedEpisode) -> str:
+    """Hash of the samples and their spacing, independent of the clock's origin."""
+    arrays = []
+    for name in sorted(episode.streams):
+        samples = episode.streams[name]
+        arrays += [samples.values, samples.event_time_ns - samples.event_time_ns[0]]
+    return content_hash(arrays)
+
+
+def _refuse_duplicate(episode: AcceptedEpisode, accepted: Sequence[AcceptedEpisode]) -> None:
+    for other in accepted:
+        for field in ("episode_uuid", "content_sha256"):
+            if getattr(other, field) == getattr(episode, field):
+                what = "its episode_uuid" if field == "episode_uuid" else "its samples"
+                raise ContractError(
+                    where=episode.source_file,
+                    found=f"a recording that shares {what} with {other.source_file}",
+                    expected="every episode once, under one name",
+                    action="Remove the copy.",
+                )
+
+
+def _labels(files: Sequence[Path]) -> list[str]:
+    """File names, so that the same recordings in another folder give the same dataset."""
+    counts = Counter(path.name for path in files)
+    return [path.name if counts[path.name] == 1 else os.fspath(path) for path in files]

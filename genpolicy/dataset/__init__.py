@@ -1,1 +1,0 @@
-"""Recordings to a verified dataset."""

@@ -1,0 +1,1 @@
+"""What the stages of each gate measure; nothing here decides."""

@@ -1,0 +1,1 @@
+"""Evidence of Gate A: held-out modes, baselines, factors."""

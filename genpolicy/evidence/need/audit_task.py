@@ -1,0 +1,93 @@
+"""The audit of a task's dataset: feasibility and replay come from the task itself."""
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from genpolicy.audit.run import AuditResult, audit
+from genpolicy.audit.settings import AuditSettings
+from genpolicy.audit.view import from_dataset
+from genpolicy.data.dataset import Dataset, load_dataset
+from genpolicy.evidence.admission_context import make_checker
+from genpolicy.evidence.need.held_out import admissible
+from genpolicy.feasibility.settings import FeasibilitySettings
+from genpolicy.tasks.api import Task, load_task
+
+Array = NDArray[np.float64]
+
+
+def audit_task(
+    dataset: Path,
+    *,
+    task_name: str,
+    settings: AuditSettings,
+    feasibility: FeasibilitySettings,
+    maximum_age_s: dict[str, float],
+    action_period_s: float,
+    root_seed: int,
+) -> AuditResult:
+    """Audit the dataset of a registered task.
+
+    Args:
+        dataset: Folder of the dataset.
+        task_name: Registered name.
+        settings: What counts as near, as two modes, as red.
+        feasibility: Thresholds of the six layers.
+        maximum_age_s: Largest action age by phase.
+        action_period_s: Time between actions, s.
+        root_seed: Root seed.
+    """
+    task = load_task(task_name)
+    data = load_dataset(dataset)
+    checker = make_checker(task, feasibility)
+
+    def is_admissible(actions: Array, observation: Array) -> tuple[bool, str]:
+        return admissible(
+            task,
+            checker,
+            actions,
+            observation,
+            action_period_s=action_period_s,
+            maximum_age_s=maximum_age_s,
+        )
+
+    return audit(
+        from_dataset(data, contract=task.observation, settings=settings, period_s=action_period_s),
+        settings,
+        admissible=is_admissible,
+        replay=lambda uuid: replay_episode(task, data, uuid),
+        root_seed=root_seed,
+    )
+
+
+def replay_episode(task: Task, data: Dataset, episode_uuid: str) -> str:
+    """Outcome of an episode's actions, replayed in simulation from its recorded start.
+
+    The actions before the first whole observation are no frames, but the robot executed them.
+    """
+    position = data.episodes["episode_uuid"].tolist().index(episode_uuid)
+    start = task.start_from_json(str(data.episodes["scene_start"].iloc[position]))
+    lead = data.episodes["lead_action"].iloc[position]
+    actions = data.frames.action[data.frames.episode == position]
+    before = np.array([np.asarray(row) for row in lead]).reshape(-1, actions.shape[1])
+    return task.replay(start, np.concatenate([before, actions]))
+
+
+def round_obstacles(task: Task, feasibility: FeasibilitySettings) -> list[dict[str, float]]:
+    """Standing cylinders of the scene file, as circles in the base frame's plane, m."""
+    shapes = make_checker(task, feasibility).collision.shapes
+    found = []
+    for shape in shapes.scene:
+        if shape.kind != "cylinder":
+            continue
+        origin, _ = shapes.nominal_bodies[shape.body]
+        centre = origin + shape.position_m
+        found.append(
+            {
+                "x_m": float(centre[0]),
+                "y_m": float(centre[1]),
+                "radius_m": float(shape.half_size_m[0]),
+            }
+        )
+    return found

@@ -1,0 +1,166 @@
+"""Held-out situations with several modes: which of them does a policy reach, and how well?"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from genpolicy.contract.action import POSITION
+from genpolicy.contract.horizons import HorizonConfig
+from genpolicy.data.dataset import Dataset
+from genpolicy.errors import ContractError
+from genpolicy.evidence.admission_context import context_at_rest, recorded_proposal
+from genpolicy.evidence.need.method_modes import (
+    ModeSituation,
+    one_per_episode,
+    read_situations,
+    sample_modes,
+)
+from genpolicy.feasibility.admission import FeasibilityChecker
+from genpolicy.policies.policy import NetworkPolicy
+from genpolicy.tasks.api import Task
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Situations and the observations that condition an invocation there.
+
+    Attributes:
+        situations: One per held-out episode and phase.
+        observations: Shape (S, H_o, D_o).
+    """
+
+    situations: tuple[ModeSituation, ...]
+    observations: Array
+
+
+def held_out_situations(audit: Path, dataset: Dataset, *, horizons: HorizonConfig) -> HeldOut:
+    """Persistent situations with several modes, from the audit, with their observations.
+
+    Raises:
+        ContractError: The audit names a row that the dataset does not have.
+    """
+    situations = tuple(one_per_episode(read_situations(audit)))
+    rows = _rows(dataset, [(s.episode_uuid, s.index) for s in situations])
+    first = rows - np.array([s.index for s in situations], dtype=np.int64)
+    back = np.arange(1 - horizons.observation_horizon, 1)
+    seen = np.maximum(rows[:, None] + back, first[:, None])
+    return HeldOut(situations, dataset.frames.observation[seen])
+
+
+def modes_of_policy(
+    policy: NetworkPolicy,
+    held_out: HeldOut,
+    *,
+    seed: int,
+    convention: str,
+    samples: int,
+    task: Task,
+    checker: FeasibilityChecker,
+    maximum_age_s: dict[str, float],
+) -> list[dict[str, Any]]:
+    """Rows of `modes.parquet`: modes reached and admissible samples, per situation."""
+    if not held_out.situations:
+        return []
+    names = [("modes", s.episode_uuid, s.index) for s in held_out.situations]
+    drawn = policy.sample(held_out.observations, noise_names=names, candidates=samples)
+    rows = []
+    for situation, observation, chunks in zip(
+        held_out.situations, held_out.observations[:, -1], drawn.actions, strict=True
+    ):
+        reached = sample_modes(chunks, situation.mode_paths, position=POSITION)
+        rows.append(
+            {
+                "method": policy.method,
+                "seed": seed,
+                "convention": convention,
+                "episode_uuid": situation.episode_uuid,
+                "index": situation.index,
+                "samples": len(chunks),
+                "modes_present": reached.modes_present,
+                "modes_covered": reached.modes_covered,
+                "between_modes": int(reached.between.sum()),
+                "admissible": admissible_count(
+                    task,
+                    checker,
+                    chunks,
+                    observation,
+                    action_period_s=policy.horizons.action_period_s,
+                    maximum_age_s=maximum_age_s,
+                ),
+                "nfe": drawn.nfe,
+                "spread_m": float(chunks[:, :, POSITION].std(axis=0).mean()),
+            }
+        )
+    return rows
+
+
+def admissible_count(
+    task: Task,
+    checker: FeasibilityChecker,
+    chunks: Array,
+    observation: Array,
+    *,
+    action_period_s: float,
+    maximum_age_s: dict[str, float],
+) -> int:
+    """How many chunks (S, K, D_a) pass all six layers at a recorded observation (D_o,)."""
+    return sum(
+        admissible(
+            task,
+            checker,
+            chunk,
+            observation,
+            action_period_s=action_period_s,
+            maximum_age_s=maximum_age_s,
+        )[0]
+        for chunk in chunks
+    )
+
+
+def admissible(
+    task: Task,
+    checker: FeasibilityChecker,
+    actions: Array,
+    observation: Array,
+    *,
+    action_period_s: float,
+    maximum_age_s: dict[str, float],
+) -> tuple[bool, str]:
+    """Whether a whole chunk (K, D_a) passes all six layers at a recorded observation, and why not.
+
+    Returns:
+        The verdict, and `layer: reason` where it is a no.
+    """
+    context = context_at_rest(
+        task, checker, observation, maximum_age_s=maximum_age_s, execution_horizon=None
+    )
+    proposal = recorded_proposal(
+        task, actions, observation, action_period_s=action_period_s, chunk_id="recorded"
+    )
+    verdict = checker.check(checker.project(proposal, context=context), context=context)
+    reason = f"{verdict.first_layer}: {verdict.first_reason}" if not verdict.passed else ""
+    return verdict.passed, reason
+
+
+def _rows(dataset: Dataset, wanted: Sequence[tuple[str, int]]) -> NDArray[np.int64]:
+    episodes = dataset.episodes["episode_uuid"].tolist()
+    lengths = dataset.episodes["rows"].to_numpy(dtype=np.int64)
+    starts = dict(zip(episodes, np.cumsum(lengths) - lengths, strict=True))
+    sizes = dict(zip(episodes, lengths, strict=True))
+    rows = np.zeros(len(wanted), dtype=np.int64)
+    for position, (uuid, index) in enumerate(wanted):
+        if uuid not in starts or not 0 <= index < sizes[uuid]:
+            raise ContractError(
+                where=f"situation {uuid}, row {index}",
+                found="not in the dataset",
+                expected="a row of the dataset that the audit looked at",
+                action="Run the audit on this dataset (`dvc repro audit`).",
+            )
+        rows[position] = starts[uuid] + index
+    return rows

@@ -1,0 +1,1 @@
+"""Evidence of Gate B: reload, sweep, latency."""

@@ -1,0 +1,146 @@
+"""Latency of each part of an invocation, cold and warm, on this machine.
+
+Warm: the same loaded policy again and again. Cold: the checkpoint loaded anew and the caches
+filled with other bytes before each invocation; the first cold one of a fresh process also pays
+for everything that the process does once.
+"""
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from genpolicy.contract.chunk import Candidate, ChunkMetadata, Proposal
+from genpolicy.contract.latency import Term
+from genpolicy.policies.policy import NetworkPolicy, load_policy
+from genpolicy.policies.selection import select
+from genpolicy.policies.settings import SamplerConfig
+
+Array = NDArray[np.float64]
+Projection = Callable[[Proposal], object]
+Temperature = Literal["cold", "warm"]
+
+CACHE_BYTES = 64 << 20
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """One timed component of one invocation.
+
+    Attributes:
+        component: Term of the latency.
+        temperature: `cold` or `warm`.
+        repeat: Which invocation of its temperature.
+        seconds: Wall time, s.
+    """
+
+    component: str
+    temperature: Temperature
+    repeat: int
+    seconds: float
+
+
+def measure_policy(
+    folder: Path,
+    observations: Array,
+    *,
+    expected_sha256: str | None,
+    sampler: SamplerConfig | None = None,
+    device: str = "cpu",
+    cold_repeats: int = 5,
+    warm_repeats: int = 200,
+    discarded_repeats: int = 10,
+    project: Projection | None = None,
+) -> list[Measurement]:
+    """Time one candidate per invocation, component by component.
+
+    Args:
+        folder: Checkpoint folder.
+        observations: Observations to take in turn, physical units. Shape (M, H_o, D_o).
+        expected_sha256: Identity of the checkpoint.
+        sampler: Sampler override.
+        device: `cpu` or a CUDA device; timed up to the result on the host.
+        cold_repeats: Cold invocations.
+        warm_repeats: Warm invocations.
+        discarded_repeats: Invocations between them that are not recorded.
+        project: Projection of a proposal; without it the term `project` stays unknown.
+
+    Returns:
+        One measurement per component and invocation; an invocation's components share a repeat.
+    """
+
+    def load() -> NetworkPolicy:
+        return load_policy(folder, expected_sha256=expected_sha256, sampler=sampler, device=device)
+
+    results = []
+    for repeat in range(cold_repeats):
+        policy = load()
+        _evict_caches(repeat)
+        row = observations[repeat % len(observations)][None]
+        spans = _invoke(policy, row, repeat=repeat, project=project)
+        results += [Measurement(name, "cold", repeat, value) for name, value in spans.items()]
+    policy = load()
+    for index in range(discarded_repeats + warm_repeats):
+        row = observations[index % len(observations)][None]
+        spans = _invoke(policy, row, repeat=index, project=project)
+        repeat = index - discarded_repeats
+        if repeat >= 0:
+            results += [Measurement(name, "warm", repeat, value) for name, value in spans.items()]
+    return results
+
+
+def _invoke(
+    policy: NetworkPolicy, row: Array, *, repeat: int, project: Projection | None
+) -> dict[str, float]:
+    """Spans of one invocation, s."""
+    spans: dict[str, float] = {}
+    with _timed(spans, Term.PREPROCESS):
+        normalised = policy.preprocess(row)
+    with _timed(spans, Term.ENCODE):
+        condition = policy.encode(normalised)
+        policy.synchronise()
+    with _timed(spans, Term.SAMPLE):
+        samples = policy.sample_encoded(condition, noise_names=[("latency", repeat)], candidates=1)
+    with _timed(spans, Term.SELECT):
+        metadata = _metadata(policy, repeat)
+        proposal = select([Candidate(metadata, actions) for actions in samples.actions[0]])
+    if project is not None:
+        with _timed(spans, Term.PROJECT):
+            project(proposal)
+    return spans
+
+
+@contextmanager
+def _timed(spans: dict[str, float], term: Term) -> Iterator[None]:
+    start = time.perf_counter()
+    yield
+    spans[str(term)] = time.perf_counter() - start
+
+
+def _evict_caches(fill: int) -> None:
+    """Fill the processor's caches with other bytes."""
+    np.full(CACHE_BYTES // 8, float(fill)).sum()
+
+
+def _metadata(policy: NetworkPolicy, repeat: int) -> ChunkMetadata:
+    period_s = policy.horizons.action_period_s
+    return ChunkMetadata(
+        chunk_id=f"latency-{repeat}",
+        condition_observation_event_time_s=0.0,
+        policy_checkpoint_hash=policy.checkpoint_hash,
+        sampler_config_hash=policy.sampler_config_hash,
+        action_start_time_s=0.0,
+        action_period_s=period_s,
+        valid_until_s=period_s * policy.prediction_horizon,
+        task_phase="approach",
+        calibration_epoch="benchmark",
+        predecessor_chunk_id="",
+        session_epoch=0,
+        method=policy.method,
+        candidate_index=0,
+    )

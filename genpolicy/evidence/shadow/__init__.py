@@ -1,0 +1,1 @@
+"""Evidence of Gate C: candidates down to the stub, corruptions, mutants."""

@@ -1,0 +1,1 @@
+"""Evidence of Gate D: matched closed-loop comparison on the virtual clock."""

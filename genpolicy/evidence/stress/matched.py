@@ -1,0 +1,228 @@
+"""The matched comparison: every method on the same starts under the same perturbations.
+
+A shard is one method under one perturbation on all starts. Its worlds are stepped in lockstep and
+share the network's batches; which batch a sample was drawn in changes no bit of it.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from genpolicy.contract.horizons import HorizonConfig
+from genpolicy.evidence.admission_context import make_checker
+from genpolicy.evidence.stress.latency import LatencyModel
+from genpolicy.evidence.stress.perturbations import PerturbationSettings
+from genpolicy.evidence.stress.rollout import Fixture, Outcome, Rollout
+from genpolicy.execution.cell import ExecutionSettings
+from genpolicy.execution.journal import write_journal
+from genpolicy.execution.ledger import Account
+from genpolicy.feasibility.settings import FeasibilitySettings
+from genpolicy.policies.policy import NetworkPolicy, load_policy
+from genpolicy.seeds import stream
+from genpolicy.tasks.api import Start, Task, load_task
+
+Array = NDArray[np.float64]
+
+NS_PER_S = 1e9
+
+
+@dataclass(frozen=True)
+class Shard:
+    """One method under one perturbation.
+
+    Attributes:
+        task: Registered name of the task.
+        method: Name of the method.
+        seed: Training seed.
+        checkpoint: Its folder.
+        sha256: Its identity.
+        perturbation: Name of the perturbation.
+        schedule: What it injects.
+        starts: Initial states as JSON texts, in order.
+        episode_limit_s: Longest rollout.
+        candidates: Candidates per invocation.
+        horizons: Common horizons.
+        execution: Executor, supervisor and recovery.
+        feasibility: Thresholds of the six layers.
+        latency: Latency of the method.
+        root_seed: Root seed.
+        journal: File to write the journal to.
+    """
+
+    task: str
+    method: str
+    seed: int
+    checkpoint: Path
+    sha256: str
+    perturbation: str
+    schedule: PerturbationSettings
+    starts: tuple[str, ...]
+    episode_limit_s: float
+    candidates: int
+    horizons: HorizonConfig
+    execution: ExecutionSettings
+    feasibility: FeasibilitySettings
+    latency: LatencyModel
+    root_seed: int
+    journal: Path
+
+
+@dataclass(frozen=True)
+class ShardResult:
+    """Rows of a shard.
+
+    Attributes:
+        rollouts: One row per start.
+        accounts: Balance of chunks, per rollout.
+        ages_s: Every action age, s.
+        stub: Arrivals, stale and invalid offers.
+    """
+
+    rollouts: list[dict[str, Any]]
+    accounts: list[Account]
+    ages_s: Array
+    stub: dict[str, int]
+
+
+def matched_starts(task: Task, *, root_seed: int, count: int) -> list[Start]:
+    """Initial states of the comparison; start i does not depend on how many there are."""
+    return [task.sample_start(stream(root_seed, "starts", index)) for index in range(count)]
+
+
+def run_shard(shard: Shard) -> ShardResult:
+    """All rollouts of a shard, in lockstep; writes its journal."""
+    task = load_task(shard.task)
+    policy = load_policy(shard.checkpoint, expected_sha256=shard.sha256)
+    fixture = Fixture(
+        task=task,
+        checker=make_checker(task, shard.feasibility),
+        horizons=shard.horizons,
+        execution=shard.execution,
+        latency=shard.latency,
+        perturbation=shard.perturbation,
+        schedule=shard.schedule,
+        root_seed=shard.root_seed,
+        method=shard.method,
+        checkpoint=policy.checkpoint_hash,
+        sampler=policy.sampler_config_hash,
+    )
+    epoch = task.calibration_epochs[-1]
+    rollouts = [
+        Rollout(fixture, task.start_from_json(text), index, calibration_epoch=epoch)
+        for index, text in enumerate(shard.starts)
+    ]
+    ticks = round(shard.episode_limit_s / shard.horizons.action_period_s)
+    for _ in range(ticks):
+        active = [rollout for rollout in rollouts if not rollout.done]
+        if not active:
+            break
+        _step(active, policy, shard)
+    for rollout in rollouts:
+        rollout.end(Outcome.TIMEOUT)
+    write_journal(shard.journal, [rollout.journal for rollout in rollouts])
+    parts = [rollout_row(shard, rollout) for rollout in rollouts]
+    return ShardResult(
+        rollouts=[row for row, _ in parts],
+        accounts=[rollout.executor.conservation().chunks for rollout in rollouts],
+        ages_s=np.concatenate([ages for _, ages in parts]),
+        stub={
+            "arrivals": sum(rollout.stub.arrivals for rollout in rollouts),
+            "stale": sum(rollout.stub.stale for rollout in rollouts),
+            "invalid": sum(rollout.stub.invalid for rollout in rollouts),
+        },
+    )
+
+
+def _step(active: Sequence[Rollout], policy: NetworkPolicy, shard: Shard) -> None:
+    for rollout in active:
+        rollout.sense()
+    _judge_deliveries(active)
+    for rollout in active:
+        if not rollout.done:
+            rollout.decide()
+    asking = [rollout for rollout in active if rollout.wanted is not None]
+    if asking:
+        drawn = policy.sample(
+            np.stack([rollout.conditioning() for rollout in asking]),
+            noise_names=[
+                ("stress", shard.perturbation, rollout.start_index, rollout.invocations)
+                for rollout in asking
+            ],
+            candidates=shard.candidates if policy.stochastic else 1,
+        )
+        for rollout, chunks in zip(asking, drawn.actions, strict=True):
+            assert rollout.wanted is not None
+            rollout.wanted.chunks = chunks
+    for rollout in active:
+        if not rollout.done:
+            rollout.act()
+
+
+def _judge_deliveries(active: Sequence[Rollout]) -> None:
+    """Feasibility of everything that arrived, one candidate per rollout and batch."""
+    checker = active[0].fixture.checker
+    while True:
+        asked = [(rollout, rollout.pending()) for rollout in active]
+        open_ones = [(rollout, question) for rollout, question in asked if question is not None]
+        if not open_ones:
+            return
+        results = checker.admit_many(
+            [proposal for _, (proposal, _) in open_ones], [context for _, (_, context) in open_ones]
+        )
+        for (rollout, _), result in zip(open_ones, results, strict=True):
+            rollout.settle(result)
+
+
+def rollout_row(shard: Shard, rollout: Rollout) -> tuple[dict[str, Any], Array]:
+    """One row of `rollouts.parquet`, and the ages of its actions, computed from the journal."""
+    events = rollout.journal.events()
+    ages = np.array(
+        [event.payload["age_ns"] / NS_PER_S for event in events if event.kind == "accept"]
+    )
+    balance = rollout.executor.conservation().chunks
+    tally, path = rollout.tally, np.stack(rollout.tally.path_m)
+    assert rollout.outcome is not None
+    row = {
+        "method": shard.method,
+        "seed": shard.seed,
+        "perturbation": shard.perturbation,
+        "start": rollout.start_index,
+        "start_sha256": rollout.start_sha256,
+        "outcome": str(rollout.outcome),
+        "success": rollout.outcome is Outcome.SUCCESS,
+        "duration_s": rollout.now_s,
+        "ticks": rollout.tick,
+        "action_ticks": tally.action_ticks,
+        "hold_ticks": tally.hold_ticks,
+        "fallback_ticks": tally.fallback_ticks,
+        "invocations": rollout.invocations,
+        "deadline_misses": tally.deadline_misses,
+        "discards": sum(balance.discarded.values()),
+        "rejections": tally.rejections,
+        "rejected_by": _most_common(tally.rejected_by),
+        "recovery_attempted": rollout.recovery.attempts > 0,
+        "recovered": rollout.recovery.attempts > 0 and rollout.outcome is Outcome.SUCCESS,
+        "interventions": tally.interventions,
+        "action_age_p50_s": _quantile(ages, 0.5),
+        "action_age_p95_s": _quantile(ages, 0.95),
+        "action_age_max_s": _quantile(ages, 1.0),
+        "latency_p95_s": _quantile(np.array(tally.latencies_s), 0.95),
+        "force_peak_n": tally.force_peak_n,
+        "mode": rollout.fixture.task.mode_of(path, rollout.history[-1]),
+    }
+    return row, ages
+
+
+def _quantile(values: Array, level: float) -> float | None:
+    """Order statistic; None where nothing was recorded, never 0."""
+    if len(values) == 0:
+        return None
+    return float(np.quantile(values, level, method="higher"))
+
+
+def _most_common(counts: Mapping[str, int]) -> str:
+    return max(sorted(counts), key=lambda name: counts[name], default="")

@@ -1,0 +1,501 @@
+"""One closed-loop rollout on the virtual clock: world, executor, stub, supervisor, recovery.
+
+The world goes on while the policy thinks: an invocation that begins at a tick is delivered at the
+first tick after its latency has passed. A rollout is advanced tick by tick from outside, so that
+many of them run in lockstep and share the network's batches; it never sees the others.
+"""
+
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from genpolicy.contract.chunk import Candidate, ChunkMetadata, DiscardReason, Proposal
+from genpolicy.contract.horizons import HorizonConfig
+from genpolicy.errors import ContractError
+from genpolicy.evidence.admission_context import COMMANDS_AT_THE_SEAM, Session, context_of
+from genpolicy.evidence.stress.latency import LatencyModel, draw_latency
+from genpolicy.evidence.stress.perturbations import PerturbationSettings, Push, injection, push
+from genpolicy.execution.cell import ExecutionSettings
+from genpolicy.execution.command import Command
+from genpolicy.execution.executor import Executor
+from genpolicy.execution.journal import Journal
+from genpolicy.execution.recovery import (
+    Primitive,
+    Recovery,
+    RecoveryState,
+    fallback_metadata,
+    step,
+)
+from genpolicy.execution.stub import ControllerStub
+from genpolicy.execution.supervisor import Supervisor
+from genpolicy.feasibility.admission import Admitted, FeasibilityChecker, Rejected
+from genpolicy.feasibility.context import Context
+from genpolicy.feasibility.settings import LAYERS
+from genpolicy.tasks.api import Start, Task, World, WorldSettings
+
+Array = NDArray[np.float64]
+
+SELECTOR = "first_admissible"
+FRESH = LAYERS[-1]
+
+
+class Outcome(StrEnum):
+    """How a rollout ended."""
+
+    SUCCESS = "success"
+    COLLISION = "collision"
+    FORCE_STOP = "force_stop"
+    INTERVENTION = "intervention"
+    TIMEOUT = "timeout"
+
+
+@dataclass(frozen=True)
+class Fixture:
+    """What all rollouts of one method under one perturbation share.
+
+    Attributes:
+        task: The task.
+        checker: The six layers.
+        horizons: H_o, K, H_e and the period.
+        execution: Executor, supervisor and recovery.
+        latency: Latency of the method.
+        perturbation: Name of the perturbation.
+        schedule: What it injects.
+        root_seed: Root seed.
+        method: Name of the method.
+        checkpoint: Its weights.
+        sampler: Its sampler settings.
+    """
+
+    task: Task
+    checker: FeasibilityChecker
+    horizons: HorizonConfig
+    execution: ExecutionSettings
+    latency: LatencyModel
+    perturbation: str
+    schedule: PerturbationSettings
+    root_seed: int
+    method: str
+    checkpoint: str
+    sampler: str
+
+
+@dataclass
+class InFlight:
+    """An invocation that has not been delivered yet.
+
+    Attributes:
+        number: Count of invocations in this rollout.
+        metadata: Of the chunk to come; candidate 0.
+        observation: What it is conditioned on; the newest of the history. Shape (D_o,).
+        begun_s: Tick at which it began.
+        arrival_s: When it is delivered.
+        terms: The eleven latency terms, s.
+        dropped: Lost on the way.
+        chunks: Sampled candidates, filled in by the batch. Shape (N, K, D_a).
+        given_up: Its deadline has passed.
+    """
+
+    number: int
+    metadata: ChunkMetadata
+    observation: Array
+    begun_s: float
+    arrival_s: float
+    terms: Mapping[str, float]
+    dropped: bool
+    chunks: Array | None = None
+    given_up: bool = False
+
+
+@dataclass
+class Tally:
+    """What a rollout counts while it runs."""
+
+    action_ticks: int = 0
+    hold_ticks: int = 0
+    fallback_ticks: int = 0
+    deadline_misses: int = 0
+    rejections: int = 0
+    interventions: int = 0
+    force_peak_n: float = 0.0
+    rejected_by: dict[str, int] = field(default_factory=dict)
+    latencies_s: list[float] = field(default_factory=list)
+    path_m: list[Array] = field(default_factory=list)
+
+
+class Rollout:
+    """One world under one policy, advanced from outside, tick by tick, until `outcome`.
+
+    A tick is: `sense`; while `pending` names a chunk, judge it and `settle` it; `decide`; fill the
+    `wanted` invocation with samples; `act`.
+
+    Args:
+        fixture: What it shares with the others.
+        start: Initial state.
+        start_index: Its number; keys of all draws.
+        calibration_epoch: Calibration in force.
+    """
+
+    def __init__(
+        self, fixture: Fixture, start: Start, start_index: int, *, calibration_epoch: str
+    ) -> None:
+        self.fixture = fixture
+        self.start_index = start_index
+        settings = WorldSettings(calibration_epoch=calibration_epoch)
+        self.world: World = fixture.task.make_world(start, settings=settings)
+        self.start_sha256 = self.world.state_sha256()
+        session = f"{fixture.method}/{fixture.perturbation}/{start_index}"
+        labels = {
+            "method": fixture.method, "perturbation": fixture.perturbation,
+            "start": str(start_index), "start_sha256": self.start_sha256,
+        }  # fmt: skip
+        self.journal = Journal(session, labels)
+        self.supervisor = Supervisor(fixture.execution.supervisor(fixture.horizons), self.journal)
+        executor_settings = fixture.execution.executor(fixture.horizons)
+        self.stub = ControllerStub(executor_settings, self.journal, self.supervisor)
+        self.executor = Executor(executor_settings, self.journal, self.stub)
+        self.recovery = Recovery(fixture.execution.recovery(), self.journal)
+        self.outcome: Outcome | None = None
+        self.tally = Tally()
+        self.tick = 0
+        self.invocations = 0
+        self.wanted: InFlight | None = None
+        self._flying: list[InFlight] = []
+        self._arrived: deque[tuple[InFlight, int]] = deque()
+        self._candidate = 0
+        self._not_fresh: DiscardReason | None = None
+        self._fallback_chunks = 0
+        self._primitive: tuple[tuple[str, int, int], Array, int] | None = None
+        self._newest_accepted_s: float | None = None
+        self._last_command_s: float | None = None
+        self._commanded: deque[Array] = deque(
+            [self.world.last_action] * COMMANDS_AT_THE_SEAM, maxlen=COMMANDS_AT_THE_SEAM
+        )
+        self.history: deque[Array] = deque(maxlen=fixture.horizons.observation_horizon)
+        self._push: Push | None = push(
+            fixture.schedule,
+            root_seed=fixture.root_seed,
+            name=fixture.perturbation,
+            start=start_index,
+        )
+        self.executor.set_active(0.0, fixture.checkpoint, fixture.sampler)
+
+    @property
+    def now_s(self) -> float:
+        """Virtual time, s."""
+        return self.tick * self.fixture.horizons.action_period_s
+
+    @property
+    def done(self) -> bool:
+        """Whether the rollout has ended."""
+        return self.outcome is not None
+
+    def conditioning(self) -> Array:
+        """The last H_o observations, oldest first, the first one repeated. Shape (H_o, D_o)."""
+        missing = self.fixture.horizons.observation_horizon - len(self.history)
+        return np.stack([self.history[0]] * missing + list(self.history))
+
+    def sense(self) -> None:
+        """Observe, supervise, and collect what has been delivered by now."""
+        now_s, world = self.now_s, self.world
+        observation = world.observe()
+        self.history.append(observation)
+        position, _ = world.tcp_pose
+        self.tally.path_m.append(np.array(position))
+        divergence_m = float(np.linalg.norm(position - world.last_action[:3]))
+        self.executor.observe(now_s, now_s, world.phase, world.calibration_epoch, divergence_m)
+        self._supervise(now_s)
+        if not self.done:
+            self._collect_deliveries(now_s)
+
+    def pending(self) -> tuple[Proposal, Context] | None:
+        """The next delivered candidate to be judged, or None if there is none (left)."""
+        if self.done or not self._arrived:
+            return None
+        flying, late = self._arrived[0]
+        if flying.chunks is None:
+            raise ContractError(
+                where=f"chunk {flying.metadata.chunk_id}",
+                found="delivered before it was sampled",
+                expected="the batch to fill in its candidates",
+                action="Sample every wanted invocation before `act`.",
+            )
+        metadata = replace(flying.metadata, candidate_index=self._candidate)
+        candidate = Candidate(metadata, flying.chunks[self._candidate])
+        proposal = Proposal(candidate.metadata, candidate.actions, selected_by=SELECTOR)
+        return proposal, self._delivery_context(late)
+
+    def settle(self, result: Admitted | Rejected) -> None:
+        """Take the verdict on `pending`: the selector takes the first that passes all layers."""
+        flying, _ = self._arrived[0]
+        verdict, now_s = result.verdict, self.now_s
+        self.journal.candidate(
+            now_s,
+            chunk_id=flying.metadata.chunk_id,
+            method=self.fixture.method,
+            index=self._candidate,
+            layers={layer.name: layer.passed for layer in verdict.layers},
+            first_reason=verdict.first_reason or None,
+        )
+        assert flying.chunks is not None
+        if isinstance(result, Admitted):
+            self._next_arrival()
+            if self.executor.deliver(result, now_s) is None:
+                self._newest_accepted_s = flying.metadata.condition_observation_event_time_s
+            return
+        counts = self.tally.rejected_by
+        counts[verdict.first_reason] = counts.get(verdict.first_reason, 0) + 1
+        # What made one candidate late or void holds for all of its invocation.
+        if verdict.first_layer == FRESH:
+            self._not_fresh = DiscardReason(verdict.first_reason)
+        self._candidate += 1
+        if self._candidate == len(flying.chunks):
+            reason = self._not_fresh or DiscardReason.INFEASIBLE
+            self._next_arrival()
+            self.tally.rejections += 1
+            self._write_off(flying, reason)
+
+    def decide(self) -> None:
+        """Recover where needed; sets `wanted` if the policy must sample."""
+        now_s = self.now_s
+        self.wanted = None
+        self._recover(now_s)
+        if not self.done and self._may_invoke(now_s):
+            self.wanted = self._begin_invocation(now_s, self.history[-1])
+
+    def act(self) -> None:
+        """One tick of the executor, one action period of the world."""
+        now_s = self.now_s
+        if self.wanted is not None:
+            self._flying.append(self.wanted)
+            self.wanted = None
+        command = self.executor.tick(now_s)
+        self._apply(command, now_s)
+        if self._push is not None and now_s >= self._push.time_s:
+            self.world.apply_force(np.array([0.0, self._push.force_n, 0.0]), self._push.duration_s)
+            self._push = None
+        self.world.advance()
+        self.tick += 1
+        self.tally.force_peak_n = max(self.tally.force_peak_n, self.world.contact_force_n)
+        if self.world.success:
+            self._end(Outcome.SUCCESS)
+
+    def end(self, outcome: Outcome) -> None:
+        """End from outside: the time is over."""
+        if not self.done:
+            self._end(outcome)
+
+    # -- inside -------------------------------------------------------------------------------
+
+    def _end(self, outcome: Outcome) -> None:
+        self.outcome = outcome
+        for flying in [*self._flying, *(item for item, _ in self._arrived)]:
+            self._write_off(flying, DiscardReason.END_OF_EPISODE)
+        self._flying.clear()
+        self._arrived.clear()
+        self.executor.end_episode(self.now_s)
+
+    def _supervise(self, now_s: float) -> None:
+        world = self.world
+        if self.supervisor.observe_collision(now_s, world.collision):
+            self.executor.collision_event(now_s)
+            self.recovery.stop(now_s, "collision")
+            self._end(Outcome.COLLISION)
+        elif self.supervisor.observe_force(now_s, world.contact_force_n, world.phase):
+            self.executor.force_event(now_s)
+            self.recovery.stop(now_s, "force")
+            self._end(Outcome.FORCE_STOP)
+
+    def _may_invoke(self, now_s: float) -> bool:
+        return self.recovery.state is RecoveryState.IDLE and self.executor.needs_invocation(now_s)
+
+    def _begin_invocation(self, now_s: float, observation: Array) -> InFlight:
+        fixture, horizons = self.fixture, self.fixture.horizons
+        number = self.invocations
+        self.invocations += 1
+        hit = injection(
+            fixture.schedule,
+            root_seed=fixture.root_seed,
+            name=fixture.perturbation,
+            start=self.start_index,
+            invocation=number,
+        )
+        draw = draw_latency(
+            fixture.latency,
+            root_seed=fixture.root_seed,
+            perturbation=fixture.perturbation,
+            start=self.start_index,
+            invocation=number,
+            extra_s=hit.extra_s,
+            compute_factor=hit.compute_factor,
+        )
+        metadata = ChunkMetadata(
+            chunk_id=f"{self.journal.session}/{number}",
+            condition_observation_event_time_s=now_s,
+            policy_checkpoint_hash=fixture.checkpoint,
+            sampler_config_hash=fixture.sampler,
+            action_start_time_s=now_s,
+            action_period_s=horizons.action_period_s,
+            valid_until_s=now_s + horizons.execution_horizon * horizons.action_period_s,
+            task_phase=self.world.phase,
+            calibration_epoch=self.world.calibration_epoch,
+            predecessor_chunk_id=self.executor.chain_head,
+            session_epoch=self.executor.session_epoch,
+            method=fixture.method,
+            candidate_index=0,
+        )
+        self.executor.begin_invocation(now_s, metadata.chunk_id)
+        self.tally.latencies_s.append(draw.total_s)
+        return InFlight(
+            number=number,
+            metadata=metadata,
+            observation=observation,
+            begun_s=now_s,
+            arrival_s=now_s + draw.total_s,
+            terms=draw.terms,
+            dropped=hit.dropped,
+        )
+
+    def _collect_deliveries(self, now_s: float) -> None:
+        for flying in sorted(self._flying, key=lambda item: (item.arrival_s, item.number)):
+            if flying.arrival_s <= now_s and not flying.dropped:
+                self._flying.remove(flying)
+                self._arrive(flying, now_s)
+            elif now_s - flying.begun_s >= self.fixture.execution.deadline_s - 1e-9:
+                self._miss(flying, now_s)
+
+    def _miss(self, flying: InFlight, now_s: float) -> None:
+        """The deadline has passed: the next invocation may begin; the chunk may still come."""
+        if not flying.given_up:
+            flying.given_up = True
+            self.tally.deadline_misses += 1
+            self.executor.end_invocation(now_s, flying.metadata.chunk_id, "deadline")
+        if flying.dropped:
+            self._flying.remove(flying)
+            self._write_off(flying, DiscardReason.EXPIRED)
+
+    def _arrive(self, flying: InFlight, now_s: float) -> None:
+        if not flying.given_up:
+            self.executor.end_invocation(now_s, flying.metadata.chunk_id, "answered")
+        horizons = self.fixture.horizons
+        late = round((now_s - flying.metadata.action_start_time_s) / horizons.action_period_s)
+        if late >= horizons.execution_horizon:
+            self._write_off(flying, DiscardReason.EXPIRED)
+        else:
+            self._arrived.append((flying, late))
+
+    def _next_arrival(self) -> None:
+        self._arrived.popleft()
+        self._candidate = 0
+        self._not_fresh = None
+
+    def _write_off(self, flying: InFlight, reason: DiscardReason) -> None:
+        rows = self.fixture.horizons.prediction_horizon
+        if flying.chunks is not None:
+            rows = int(flying.chunks.shape[1])
+        self.executor.write_off(flying.metadata, rows, reason, self.now_s)
+
+    def _delivery_context(self, late: int) -> Context:
+        """All rows from the first that is not late are judged, also those never executed."""
+        return context_of(
+            self.fixture.task,
+            self.fixture.checker,
+            observation=self.history[-1],
+            q_meas=self.world.q_meas,
+            commanded=list(self._commanded),
+            now_s=self.now_s,
+            phase=self.world.phase,
+            latest_observation_s=self.now_s,
+            session=self._session(self.fixture.checkpoint, self.fixture.sampler),
+            first_index=late,
+            end_index=None,
+            newest_accepted_observation_s=self._newest_accepted_s,
+        )
+
+    def _recover(self, now_s: float) -> None:
+        last_s = self._last_command_s if self._last_command_s is not None else 0.0
+        silent = now_s - last_s >= self.fixture.execution.hold_before_recovery_s - 1e-9
+        if not self.recovery.active and silent:
+            self.recovery.trigger(now_s, self.world.phase, "silence")
+        if not self.recovery.active:
+            return
+        state = step(
+            self.recovery,
+            self.executor,
+            now_s=now_s,
+            metadata=lambda: self._fallback_metadata(now_s),
+            plan=self._plan,
+            admit=lambda proposal: self._admit_fallback(proposal, now_s),
+        )
+        if state in (RecoveryState.ASK_HUMAN, RecoveryState.ABORT):
+            self.tally.interventions += 1
+            self.executor.intervene(now_s)
+            self._end(Outcome.INTERVENTION)
+        elif state is RecoveryState.IDLE:
+            self._last_command_s = now_s  # the silence is over; the policy gets its time
+
+    def _plan(self, state: RecoveryState) -> Primitive:
+        """The rest of the primitive's trajectory, which is planned once, from where it begins."""
+        key = (str(state), self.recovery.attempts, self.recovery.failures)
+        if self._primitive is None or self._primitive[0] != key:
+            planned = self.fixture.task.fallback(self.world, str(state))
+            self._primitive = (key, planned, self.tally.fallback_ticks)
+        _, actions, begun = self._primitive
+        rest = actions[self.tally.fallback_ticks - begun :]
+        return Primitive(rest[: self.fixture.horizons.prediction_horizon], reached=len(rest) == 0)
+
+    def _fallback_metadata(self, now_s: float) -> ChunkMetadata:
+        self._fallback_chunks += 1
+        return fallback_metadata(
+            self.executor,
+            now_s=now_s,
+            chunk_id=f"{self.journal.session}/fallback/{self._fallback_chunks}",
+            event_time_s=now_s,
+            phase=self.world.phase,
+            epoch=self.world.calibration_epoch,
+        )
+
+    def _admit_fallback(self, proposal: Proposal, now_s: float) -> Admitted | None:
+        identity = self.executor.settings.fallback_hash
+        context = context_of(
+            self.fixture.task,
+            self.fixture.checker,
+            observation=self.history[-1],
+            q_meas=self.world.q_meas,
+            commanded=list(self._commanded),
+            now_s=now_s,
+            phase=self.world.phase,
+            latest_observation_s=now_s,
+            session=self._session(identity, identity),
+            first_index=0,
+            end_index=self.fixture.horizons.execution_horizon,
+        )
+        result = self.fixture.checker.admit(proposal, context=context)
+        return result if isinstance(result, Admitted) else None
+
+    def _session(self, checkpoint: str, sampler: str) -> Session:
+        return Session(
+            calibration_epoch=self.world.calibration_epoch,
+            session_epoch=self.executor.session_epoch,
+            checkpoint=checkpoint,
+            sampler=sampler,
+            maximum_age_s=self.fixture.execution.maximum_age_s,
+        )
+
+    def _apply(self, command: Command, now_s: float) -> None:
+        if command.action is None:
+            self.world.hold()
+            self.tally.hold_ticks += 1
+            self._commanded.append(self._commanded[-1])
+            return
+        self.world.command(command.action)
+        self._commanded.append(np.array(command.action))
+        self._last_command_s = now_s
+        if command.kind == "fallback":
+            self.tally.fallback_ticks += 1
+        else:
+            self.tally.action_ticks += 1

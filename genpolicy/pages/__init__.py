@@ -1,0 +1,1 @@
+"""HTML pages: style, figures, and the page of the audit."""

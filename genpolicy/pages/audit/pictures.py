@@ -1,0 +1,140 @@
+"""The figures of the audit's page: each drawn from one table, or with the reason why it is not."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+from matplotlib.figure import Figure
+
+from genpolicy.pages.audit.evidence import AuditEvidence
+from genpolicy.pages.figures import captions, checks, situations
+from genpolicy.pages.figures.drawing import Picture, drawn
+from genpolicy.pages.figures.situations import NothingToDrawError
+
+CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True)
+class Plot:
+    """A figure that can be drawn from the evidence."""
+
+    title: str
+    caption: str
+    source: str
+    draw: Callable[[AuditEvidence], Figure]
+
+
+def draw_all(evidence: AuditEvidence) -> list[Picture]:
+    """Every figure; what is missing is said, never left out in silence."""
+    pictures = []
+    for number, plot in enumerate(PLOTS):
+        source = (f"evidence/{plot.source}.parquet",)
+        try:
+            shape = drawn(partial(plot.draw, evidence), plot.title, salt=f"audit{number}")
+        except NothingToDrawError as error:
+            pictures.append(Picture(plot.title, plot.caption, source, skipped=str(error)))
+        else:
+            pictures.append(Picture(plot.title, plot.caption, source, svg=shape))
+    return pictures
+
+
+def _clusters(evidence: AuditEvidence) -> Figure:
+    summary = evidence.summary
+    return situations.clusters(
+        evidence["examples"],
+        names=summary["position_names"],
+        unit=summary["position_unit"],
+        obstacles=summary["obstacles"],
+    )
+
+
+def _overlay(evidence: AuditEvidence) -> Figure:
+    frame, summary = evidence["neighbourhoods"], evidence.summary
+    return situations.mean_versus_modes(
+        frame[frame["two_mode"].astype(bool)],
+        names=summary["position_names"],
+        unit=summary["position_unit"],
+        obstacles=summary["obstacles"],
+    )
+
+
+def _strata(evidence: AuditEvidence) -> Figure:
+    settings = evidence.settings
+    return checks.strata_bars(
+        evidence["strata"], level=settings["strata_alpha"], limit=settings["strata_effect_limit"]
+    )
+
+
+def _modes(evidence: AuditEvidence) -> Figure:
+    limit = evidence.settings["mode_success_limit"]
+    return checks.mode_success(evidence["modes"], confidence=CONFIDENCE, limit=limit)
+
+
+def _realignment(evidence: AuditEvidence) -> Figure:
+    summary = evidence.summary
+    return checks.realignment(
+        evidence["alignment"],
+        limit_s=evidence.settings["clock_limit_s"],
+        modes_before=summary["modes_before_realignment"],
+        modes_after=summary["modes_after_realignment"],
+    )
+
+
+def _labels(evidence: AuditEvidence) -> Figure:
+    return checks.label_agreement(evidence["replay"])
+
+
+def _support(evidence: AuditEvidence) -> Figure:
+    summary = evidence.summary
+    return checks.support_map(
+        evidence["support"],
+        names=summary["position_names"],
+        unit=summary["position_unit"],
+        limit=evidence.settings["minimum_support_share"],
+    )
+
+
+PLOTS: tuple[Plot, ...] = (
+    Plot(
+        *captions.CLUSTERS,
+        "examples",
+        _clusters,
+    ),
+    Plot(
+        "The mean and the modes",
+        "Solid: the next chunk of nearest neighbours, one line per mode. Dashed: the mean of "
+        "the modes, which is what a policy trained by regression tends to. Lines are the "
+        "commanded position; what moves along them is wider.",
+        "neighbourhoods",
+        _overlay,
+    ),
+    Plot(
+        *captions.REALIGNMENT,
+        "alignment",
+        _realignment,
+    ),
+    Plot(
+        *captions.STRATA,
+        "strata",
+        _strata,
+    ),
+    Plot(
+        "Success of each mode",
+        "Point: share of successful episodes that took this mode. Line: exact interval; the "
+        "lower end is held against the limit.",
+        "modes",
+        _modes,
+    ),
+    Plot(
+        *captions.LABELS,
+        "replay",
+        _labels,
+    ),
+    Plot(
+        "Where the data can answer",
+        "Each mark is a held-out situation. Crosses: too few demonstrations came near, so "
+        "nothing is said about that place.",
+        "support",
+        _support,
+    ),
+)

@@ -1,1 +1,0 @@
-"""The virtual clock: latency, perturbations, rollouts, matched comparison."""

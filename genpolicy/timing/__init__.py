@@ -1,1 +1,0 @@
-"""The eleven terms of latency, measured and summarised."""

@@ -1,0 +1,133 @@
+"""A small recorded dataset of the real task, and barely trained checkpoints on it."""
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pyarrow as pa
+import pytest
+
+from genpolicy.contract.horizons import HorizonConfig
+from genpolicy.data.contract import TCP_ACTION, IngestContract, plausible_ranges
+from genpolicy.data.dataset import load_dataset
+from genpolicy.data.ingest import ingest_recordings
+from genpolicy.evidence.admission_context import make_checker
+from genpolicy.execution.cell import ExecutionSettings
+from genpolicy.feasibility.settings import FeasibilitySettings
+from genpolicy.integrity.documents import read_yaml
+from genpolicy.integrity.tables import write_table
+from genpolicy.policies.matched_training import PolicySettings, train_fleet
+from genpolicy.policies.policy import load_policy
+from genpolicy.policies.settings import HeadConfig, NetworkConfig, SamplerConfig, TrainingConfig
+from genpolicy.tasks.api import load_task
+from genpolicy.tasks.demonstrations import record_session
+
+PARAMS = read_yaml(Path(__file__).parents[1] / "params.yaml")
+HORIZONS = HorizonConfig(**PARAMS["horizons"])
+EXECUTION = ExecutionSettings(**PARAMS["execution"])
+FEASIBILITY = FeasibilitySettings(**PARAMS["feasibility"])
+EPISODES = 10
+SIDE_M = (0.0, 0.1, 0.0)
+SAMPLERS = {
+    "bc": SamplerConfig(name="direct"),
+    "chunked_bc": SamplerConfig(name="direct"),
+    "flow": SamplerConfig(name="euler", steps=2),
+}
+POLICY = PolicySettings(
+    network=NetworkConfig(
+        encoder_width=32, condition_dim=32, trunk_width=48, trunk_blocks=1, time_features=16,
+        head_parameters=40_000,
+    ),
+    head=HeadConfig(posterior_width=16),
+    training=TrainingConfig(steps=60, batch_size=64, learning_rate=3e-3, warmup_steps=5),
+    seeds=[0],
+)  # fmt: skip
+
+
+def write_situations(folder, rows):
+    """An audit folder whose situations are `(uuid, index, changes)`."""
+    folder.mkdir(exist_ok=True)
+    straight = np.zeros((16, 3))
+    left, right = straight + np.array(SIDE_M), straight - np.array(SIDE_M)
+    table = [
+        {
+            "split": "test", "phase": "approach", "episode_uuid": uuid, "index": index,
+            "two_mode": True, "persistent": True, "mean_path": straight.ravel().tolist(),
+            "mode_paths": [left.ravel().tolist(), right.ravel().tolist()], **changes,
+        }
+        for uuid, index, changes in rows
+    ]  # fmt: skip
+    write_table(folder / "neighbourhoods.parquet", pa.Table.from_pylist(table))
+    return folder
+
+
+def uuids(data):
+    return data.episodes["episode_uuid"].tolist()
+
+
+@pytest.fixture(scope="session")
+def kit():
+    """Settings in force, by name."""
+    return SimpleNamespace(
+        PARAMS=PARAMS, HORIZONS=HORIZONS, EXECUTION=EXECUTION, FEASIBILITY=FEASIBILITY,
+        POLICY=POLICY, SAMPLERS=SAMPLERS, write_situations=write_situations, uuids=uuids,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="session")
+def task():
+    return load_task("tabletop_insertion")
+
+
+@pytest.fixture(scope="session")
+def checker(task):
+    return make_checker(task, FEASIBILITY)
+
+
+@pytest.fixture(scope="session")
+def dataset(task, tmp_path_factory):
+    """Folder of an ingested dataset of ten plain successes."""
+    root = tmp_path_factory.mktemp("recorded")
+    (root / "episodes").mkdir()
+    names = record_session(
+        task.name, root_seed=4, episodes=EPISODES, shares={"nominal": 1.0},
+        folder=root / "episodes", workers=1, scheduler="local",
+    )  # fmt: skip
+    contract = IngestContract(
+        observation=task.observation,
+        phases=task.phases,
+        action_period_s=HORIZONS.action_period_s,
+        ranges=plausible_ranges(
+            task.observation,
+            TCP_ACTION,
+            workspace_lower_m=np.array(task.workspace.lower_m),
+            workspace_upper_m=np.array(task.workspace.upper_m),
+        ),
+    )
+    ingest_recordings(
+        [root / "episodes" / name for name in names], contract=contract, out=root / "dataset"
+    )
+    return root / "dataset"
+
+
+@pytest.fixture(scope="session")
+def data(dataset):
+    loaded = load_dataset(dataset)
+    assert loaded.episodes["outcome"].tolist() == ["success"] * EPISODES
+    return loaded
+
+
+@pytest.fixture(scope="session")
+def fleet(dataset, tmp_path_factory):
+    """Root folder of the checkpoints, and their hashes by method and seed."""
+    root = tmp_path_factory.mktemp("fleet")
+    trained = train_fleet(
+        dataset=dataset, folder=root, samplers=SAMPLERS, settings=POLICY, horizons=HORIZONS,
+        root_seed=1, device="cpu", workers=1, scheduler="local",
+    )  # fmt: skip
+    return root, trained
+
+
+@pytest.fixture(scope="session")
+def policy(fleet):
+    return load_policy(fleet[0] / "flow" / "seed_0")

@@ -1,0 +1,258 @@
+"""What each stage imports, and so what DVC must list: derived from the code, never by hand.
+
+`python tests/contracts/dependencies.py --write` puts the code dependencies of every stage into
+`dvc.yaml` and the table of what an edit re-runs into `docs/dependencies.md`; the contract tests
+hold both against the code.
+"""
+
+import re
+import sys
+import tomllib
+from collections.abc import Iterable
+from functools import cache
+from pathlib import Path, PurePosixPath
+
+import grimp
+import yaml
+
+ROOT = Path(__file__).parents[2]
+PACKAGES = ("genpolicy", "gates", "stages", "flows")
+CODE = ("genpolicy", "gates", "stages")
+TABLE = ROOT / "docs" / "dependencies.md"
+TASK_LOADER = "genpolicy.tasks.api"
+# Admission decides whether a stage may begin, never what it computes. Evidence stages depend on
+# what it decides about (`artifacts/gate_x/verdict.json`), so that an edit of a gate or of a report
+# template re-judges, and re-trains only if the verdict changed.
+ADMISSION = "gates.admission"
+NOT_CODE_DATA = {".py", ".pyc", ".pyi"}
+
+
+@cache
+def graph() -> grimp.ImportGraph:
+    """Imports between our modules; one for the type checker only changes nothing a stage does."""
+    built = grimp.build_graph(*PACKAGES, cache_dir=None, exclude_type_checking_imports=True)
+    built.remove_module(ADMISSION)
+    return built
+
+
+@cache
+def pipeline() -> dict:
+    return (yaml.safe_load((ROOT / "dvc.yaml").read_text()) or {}).get("stages") or {}
+
+
+def stage_names() -> list[str]:
+    """Every stage that either the pipeline or the folder of stages knows."""
+    files = {p.stem for p in (ROOT / "stages").glob("*.py") if not p.stem.startswith("_")}
+    return sorted(files | set(pipeline()))
+
+
+def reached_modules(module: str) -> set[str]:
+    """`module`, what it imports directly or not, the packages around them, and the plug-ins."""
+    found = {module} | graph().find_upstream_modules(module)
+    if TASK_LOADER in found:
+        with (ROOT / "pyproject.toml").open("rb") as stream:
+            points = tomllib.load(stream)["project"]["entry-points"]["genpolicy.tasks"]
+        for value in points.values():
+            plugin = value.split(":")[0]
+            found |= {plugin} | graph().find_upstream_modules(plugin)
+    parents = {
+        name.rsplit(".", depth)[0] for name in found for depth in range(1, name.count(".") + 1)
+    }
+    return found | parents
+
+
+def module_file(module: str) -> str:
+    path = PurePosixPath(*module.split("."))
+    package = path / "__init__.py"
+    return str(package if (ROOT / package).is_file() else path.with_suffix(".py"))
+
+
+def data_files(modules: Iterable[str]) -> set[str]:
+    """Files that are not Python in the folders of the modules (scenes, templates, schemas)."""
+    found = set()
+    for folder in {(ROOT / module_file(module)).parent for module in modules}:
+        for path in folder.rglob("*"):
+            inner = path.parent.relative_to(folder).parts
+            package_below = any(
+                (folder / Path(*inner[: n + 1]) / "__init__.py").is_file()
+                for n in range(len(inner))
+            )
+            if counts(path) and path.suffix not in NOT_CODE_DATA and not package_below:
+                found.add(path.relative_to(ROOT).as_posix())
+    return found
+
+
+def counts(path: Path) -> bool:
+    """Whether a path is a file that DVC would hash as part of its folder."""
+    return path.is_file() and "__pycache__" not in path.parts and ".tmp." not in path.name
+
+
+def reached_files(stage: str) -> set[str]:
+    modules = reached_modules(f"stages.{stage}")
+    return {module_file(module) for module in modules} | data_files(modules)
+
+
+def collapsed(files: set[str]) -> list[str]:
+    """The same files, a folder in place of all its files where every one of them is named."""
+    result: list[str] = []
+
+    def walk(folder: Path) -> bool:
+        """Whether all of `folder` is named; adds what is named of it otherwise."""
+        inside = sorted(p for p in folder.iterdir() if p.name != "__pycache__")
+        mark = len(result)
+        whole = True
+        for path in inside:
+            if path.is_dir():
+                if any(counts(p) for p in path.rglob("*")):
+                    whole &= walk(path)
+            elif counts(path):
+                name = path.relative_to(ROOT).as_posix()
+                if name in files:
+                    result.append(name)
+                else:
+                    whole = False
+        if whole:
+            del result[mark:]
+            result.append(folder.relative_to(ROOT).as_posix())
+        return whole
+
+    for top in CODE:
+        walk(ROOT / top)
+    return sorted(result)
+
+
+def code_deps(stage: str) -> list[str]:
+    """What `deps` of a stage must name of our code: what it reaches, no more and no less."""
+    return collapsed(reached_files(stage))
+
+
+def is_code(dep: str) -> bool:
+    return PurePosixPath(dep).parts[0] in CODE
+
+
+def covers(dep: str, file: str) -> bool:
+    return PurePosixPath(dep) in {PurePosixPath(file), *PurePosixPath(file).parents}
+
+
+@cache
+def consumers() -> dict[str, set[str]]:
+    """Stages that read something which a stage writes, by stage."""
+    outputs = {
+        name: [
+            out
+            for kind in ("outs", "metrics", "plots")
+            for entry in stage.get(kind) or ()
+            for out in ([entry] if isinstance(entry, str) else entry)
+        ]
+        for name, stage in pipeline().items()
+    }
+    return {
+        name: {
+            other
+            for other, stage in pipeline().items()
+            if any(covers(dep, out) or covers(out, dep) for dep in stage["deps"] for out in outs)
+        }
+        for name, outs in outputs.items()
+    }
+
+
+def rerun_after_edit(package: str) -> tuple[list[str], list[str]]:
+    """Stages that re-run after an edit of a package, and those behind them.
+
+    Args:
+        package: Folder below the root, such as `genpolicy/execution`.
+
+    Returns:
+        Stages of which a dependency changed, and stages that follow if their inputs then change,
+        both in the order of the pipeline. A stage behind a gate's verdict follows only if the
+        verdict or its evidence changed.
+    """
+    inside = PurePosixPath(package)
+    direct = {
+        name
+        for name, stage in pipeline().items()
+        if any(
+            is_code(dep) and (covers(package, dep) or inside.is_relative_to(dep))
+            for dep in stage["deps"]
+        )
+    }
+    behind, open_ones = set(direct), list(direct)
+    while open_ones:
+        for name in consumers()[open_ones.pop()] - behind:
+            behind.add(name)
+            open_ones.append(name)
+    order = list(pipeline())
+    return sorted(direct, key=order.index), sorted(behind - direct, key=order.index)
+
+
+def packages() -> list[str]:
+    """Every folder of code whose edit the table speaks of."""
+    own = [
+        path.parent.relative_to(ROOT).as_posix()
+        for path in sorted((ROOT / "genpolicy").glob("*/__init__.py"))
+    ]
+    rooms = [
+        path.parent.relative_to(ROOT).as_posix()
+        for parent in ("data", "evidence", "tasks")
+        for path in sorted((ROOT / "genpolicy" / parent).glob("*/__init__.py"))
+    ]
+    return sorted({*own, *rooms, "gates", *(["gates/pages"])})
+
+
+def table() -> str:
+    """The page of what an edit re-runs."""
+    lines = [
+        "# What re-runs after an edit",
+        "",
+        "Derived from `dvc.yaml` by `python tests/contracts/dependencies.py --write`; a",
+        "test holds it there. *Runs again*: a dependency of the stage lies in the package. *May",
+        "follow*: reads what one of those writes, and runs only if that came out different; behind",
+        "a gate, only if the verdict or the evidence under it did.",
+        "",
+        "| edit in | runs again | may follow |",
+        "|---|---|---|",
+    ]
+    for package in packages():
+        direct, behind = rerun_after_edit(package)
+        cells = [" ".join(names) or "nothing" for names in (direct, behind)]
+        lines.append(f"| `{package}/` | {cells[0]} | {cells[1]} |")
+    return "\n".join([*lines, ""])
+
+
+def rewritten(text: str) -> str:
+    """`dvc.yaml` with the code dependencies of every stage put right, comments kept."""
+    lines, result = text.split("\n"), []
+    stage, at_deps = "", False
+    for line in lines:
+        named = re.fullmatch(r"  (\w+):", line)
+        if named:
+            stage = named[1]
+        if at_deps and not line.startswith("      - "):
+            at_deps = False
+            result += [f"      - {dep}" for dep in code_deps(stage)]
+        if at_deps and is_code(line.removeprefix("      - ").strip()):
+            continue
+        result.append(line)
+        if line == "    deps:":
+            at_deps = True
+    return "\n".join(result)
+
+
+def main(arguments: list[str]) -> int:
+    """Write both, or say what would change."""
+    path = ROOT / "dvc.yaml"
+    new = rewritten(path.read_text())
+    if arguments == ["--write"]:
+        path.write_text(new)
+        pipeline.cache_clear()
+        consumers.cache_clear()
+        TABLE.write_text(table())
+        return 0
+    stale = new != path.read_text() or table() != TABLE.read_text()
+    print("stale; run with --write" if stale else "up to date")
+    return int(stale)
+
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(ROOT))
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,180 @@
+"""Any path: which layout it is, where it may be written, what the same data give again."""
+
+import json
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+import zarr
+
+from genpolicy.data.dataset import load_dataset
+from genpolicy.data.formats import FORMATS, open_dataset, propose
+from genpolicy.data.formats.detect import detect
+from genpolicy.errors import BadInputError
+
+
+def buffer(path, arrays, ends):
+    group = zarr.open_group(str(path), mode="w", zarr_format=2)
+    for name, values in arrays.items():
+        chunks = (16, *values.shape[1:])
+        group.create_array(f"data/{name}", data=values, chunks=chunks)
+    ends = np.array(ends, dtype="i8")
+    group.create_array("meta/episode_ends", data=ends, chunks=ends.shape)
+    return path
+
+
+def test_layouts_are_told_by_what_is_there(layouts, tmp_path):
+    assert detect(layouts.v2(tmp_path / "a")) == "lerobot"
+    assert detect(layouts.file(tmp_path / "a", 0)) == "parquet"
+    for name, data, kind in (
+        ("x.bin", b"\x89HDF\r\n\x1a\n", "robomimic"),
+        ("y.bin", b"PAR1", "parquet"),
+        ("z.bin", b"\x89MCAP0\r\n", "mcap"),
+    ):
+        (tmp_path / name).write_bytes(data)
+        assert detect(tmp_path / name) == kind
+    (tmp_path / "none").mkdir()
+    (tmp_path / "text.txt").write_text("hello")
+    for name in ("none", "text.txt", "absent"):
+        with pytest.raises(BadInputError, match=name):
+            detect(tmp_path / name)
+    (tmp_path / "none" / "a.mcap").touch()
+    (tmp_path / "none" / "b.parquet").touch()
+    with pytest.raises(BadInputError, match="several layouts"):
+        detect(tmp_path / "none")
+
+
+def test_a_buffer_of_any_width(layouts, tmp_path):
+    parts = [layouts.samples(i) for i in range(5)]
+    path = buffer(
+        tmp_path / "arm.zarr",
+        {
+            "state": np.concatenate([state for state, _ in parts]),
+            "action": np.concatenate([action for _, action in parts]),
+            "img": np.zeros((150, 2, 2, 3), "u1"),
+        },
+        np.arange(1, 6) * 30,
+    )
+    opened = open_dataset(path, out=tmp_path / "out")
+    assert opened.accepted == 5
+    assert opened.contract.pairing == {f"action_{i}": f"state.state_{i}" for i in range(3)}
+    notes = " ".join(opened.notes)
+    assert "Not read: img" in notes
+    assert "found in the numbers, not in names" in notes
+    assert "could not be guessed: state, action" in notes
+    assert "rate was guessed: 10 Hz" in notes
+    np.testing.assert_array_equal(
+        load_dataset(tmp_path / "out").frames.action[:30], layouts.samples(0)[1]
+    )
+
+
+def test_the_known_buffer_needs_no_guess(tmp_path):
+    rng = np.random.default_rng(0)
+    state = rng.uniform(100, 400, (60, 5)).astype("f4")
+    state[:, 4] = rng.uniform(0, 6.28, 60)
+    arrays = {"state": state, "action": state[:, :2] + 1, "n_contacts": state[:, :1]}
+    path = buffer(tmp_path / "p.zarr", arrays, [10, 22, 37, 60])
+    contract = propose(path)
+    assert contract.task == "pusht"
+    assert propose(path, task="mine").task == "mine"
+    assert not any(channel.guessed for channel in contract.channels)
+
+
+def test_a_dataset_is_used_as_it_is_and_brings_its_contract(layouts, tmp_path):
+    first = open_dataset(layouts.v2(tmp_path / "a"), out=tmp_path / "out")
+    again = open_dataset(tmp_path / "out", out=tmp_path / "other")
+    assert again.folder == tmp_path / "out"
+    assert again.contract == first.contract
+    assert (again.found, again.accepted, again.notes) == (6, 6, first.notes)
+    assert not (tmp_path / "other").exists()
+
+
+def test_a_dataset_of_the_ladder_implies_its_contract(factory, tmp_path):
+    folder = factory.build(tmp_path)
+    assert "import_contract" not in json.loads((folder / "manifest.json").read_text())
+    opened = open_dataset(folder, out=tmp_path / "other")
+    assert opened.contract.format == "dataset"
+    assert (opened.contract.pairing or {})["tcp_y_m"] == "tcp_position_m.y"
+    assert opened.contract.labels.phase is None  # a policy of this dataset sees the phase
+
+
+@pytest.mark.parametrize("place", ["inside", "around", "file", "foreign", "link"])
+def test_nothing_is_written_over(layouts, tmp_path, place):
+    root = layouts.v2(tmp_path / "a" / "recordings")
+    (tmp_path / "file").write_text("x")
+    (tmp_path / "foreign").mkdir()
+    (tmp_path / "foreign" / "thesis.tex").write_text("x")
+    (tmp_path / "link").symlink_to(tmp_path / "foreign")
+    out = {"inside": root / "out", "around": tmp_path / "a"}.get(place, tmp_path / place)
+    with pytest.raises(BadInputError, match="nothing was removed"):
+        open_dataset(root, out=out)
+    assert (tmp_path / "foreign" / "thesis.tex").exists()
+    assert layouts.file(root, 0).exists()
+
+
+def test_an_old_dataset_is_replaced(layouts, tmp_path):
+    for count in (6, 7):
+        layouts.v2(tmp_path / "a", count=count)
+        open_dataset(tmp_path / "a", out=tmp_path / "out")
+        assert len(load_dataset(tmp_path / "out").episodes) == count
+
+
+def test_the_format_must_fit(layouts, tmp_path):
+    root = layouts.v2(tmp_path / "a")
+    contract = propose(root)
+    with pytest.raises(BadInputError, match="--format"):
+        open_dataset(root, out=tmp_path / "out", format="rosbag")
+    with pytest.raises(BadInputError, match="lerobot"):
+        open_dataset(root, out=tmp_path / "out", format="parquet", contract=contract)
+    with pytest.raises(BadInputError, match="lerobot"):
+        open_dataset(layouts.file(root, 0), out=tmp_path / "out", contract=contract)
+    assert set(FORMATS) == {"auto", "mcap", "zarr", "lerobot", "robomimic", "parquet"}
+
+
+def test_progress_counts_every_episode(layouts, tmp_path):
+    calls = []
+    root = layouts.v2(tmp_path / "a")
+    layouts.file(root, 2).write_bytes(b"")
+    open_dataset(root, out=tmp_path / "out", progress=lambda *call: calls.append(call))
+    assert calls == [(i, 6) for i in range(1, 7)]
+
+
+def test_what_the_audit_must_see_is_imported(layouts, tmp_path):
+    """Repeated targets and episodes glued to themselves are findings, not faults of the file."""
+    folder = tmp_path / "rows"
+    folder.mkdir()
+    for i in range(6):
+        state, action = layouts.samples(i)
+        action[8:16] = action[8]
+        doubled = [np.concatenate([values, values]) for values in (state, action)]
+        table = pa.table({"state": doubled[0].tolist(), "action": doubled[1].tolist()})
+        pq.write_table(table, folder / f"{i}.parquet")
+    opened = open_dataset(folder, out=tmp_path / "out")
+    assert opened.accepted == 6
+    frames = load_dataset(tmp_path / "out").frames
+    np.testing.assert_array_equal(frames.action[:30], frames.action[30:60])
+
+
+def test_a_frozen_sensor_is_refused_and_a_resting_object_is_not(layouts, tmp_path):
+    root = layouts.v2(tmp_path / "a")
+    for i in range(6):
+        state, action = layouts.samples(i, 80)
+        if i == 3:
+            state[20:70] = state[20]
+        block = np.full((80, 2), 0.3)
+        table = layouts.table(
+            i, 80 * i, 80,
+            **{
+                "observation.state": layouts.vectors(state),
+                "action": layouts.vectors(action),
+                "observation.block": layouts.vectors(block),
+            },
+        )  # fmt: skip
+        layouts.write(layouts.file(root, i), table)
+    opened = open_dataset(root, out=tmp_path / "out")
+    assert [r.file for r in opened.refused] == ["data/chunk-000/episode_000003.parquet"]
+    assert "state, row 20 is constant for 2.450 s" in opened.refused[0].reason
+    frozen = opened.contract.frozen
+    assert frozen is not None
+    assert frozen.streams == ["state"]

@@ -1,0 +1,178 @@
+"""robomimic HDF5: read from inside the file only, refused by demonstration."""
+
+import json
+
+import h5py
+import numpy as np
+import pytest
+
+from genpolicy.data.dataset import load_dataset
+from genpolicy.data.formats import open_dataset, propose
+from genpolicy.errors import BadInputError
+
+ENV = {"env_name": "Lift", "env_kwargs": {"control_freq": 20, "controller_configs": {}}}
+
+
+@pytest.fixture
+def file(layouts, tmp_path):
+    path = tmp_path / "demo.hdf5"
+    with h5py.File(path, "w") as out:
+        data = out.create_group("data")
+        data.attrs["env_args"] = json.dumps(ENV)
+        for i in range(12):
+            state, action = layouts.samples(i)
+            demo = data.create_group(f"demo_{i}")
+            demo.attrs["num_samples"] = len(action)
+            demo.create_dataset("actions", data=action, compression="gzip")
+            demo.create_dataset("obs/robot0_joint_pos", data=state)
+            demo.create_dataset("obs/agentview_image", data=np.zeros((30, 4, 4, 3), "u1"))
+            demo.create_dataset("states", data=np.zeros((30, 2)))
+            demo.create_dataset("rewards", data=np.zeros(30))
+        for name, members in (("ann_operator", range(0, 12, 2)), ("bob_operator", range(1, 12, 2))):
+            out[f"mask/{name}"] = np.array([f"demo_{i}".encode() for i in members])
+    return path
+
+
+def test_demonstrations_in_order_of_their_number(file, layouts, tmp_path):
+    opened = open_dataset(file, out=tmp_path / "out")
+    assert (opened.found, opened.accepted) == (12, 12)
+    assert opened.contract.rate_hz == 20.0
+    dataset = load_dataset(tmp_path / "out")
+    assert dataset.episodes["source_file"].tolist()[10] == "demo.hdf5#demo_10"
+    state, action = layouts.samples(10)
+    rows = dataset.frames.episode == 10
+    np.testing.assert_array_equal(dataset.frames.observation[rows], state)
+    np.testing.assert_array_equal(dataset.frames.action[rows], action)
+    assert dataset.episodes["operator"].tolist()[:2] == ["ann_operator", "bob_operator"]
+    notes = " ".join(opened.notes)
+    assert "obs/agentview_image" in notes
+    assert "operator was taken from the file's masks" in notes
+    assert opened.contract.pairing_guessed  # robomimic names no number; they follow each other
+    assert len(opened.contract.pairing or {}) == 3
+
+
+def external_link(demo, outside):
+    del demo["actions"]
+    demo["actions"] = h5py.ExternalLink(outside, "secret")
+
+
+def soft_link(demo, _):
+    del demo["actions"]
+    demo["actions"] = h5py.SoftLink("/data/demo_0/actions")
+
+
+def external_storage(demo, _):
+    del demo["actions"]
+    demo.create_dataset("actions", (30, 3), "u1", external=[("/etc/passwd", 0, 90)])
+
+
+def virtual(demo, outside):
+    del demo["actions"]
+    layout = h5py.VirtualLayout(shape=(30, 3), dtype="f8")
+    layout[:] = h5py.VirtualSource(outside, "secret", shape=(30, 3))
+    demo.create_virtual_dataset("actions", layout)
+
+
+def objects(demo, _):
+    del demo["actions"]
+    demo["actions"] = np.array(["a"] * 30, dtype=h5py.string_dtype())
+
+
+def other_length(demo, _):
+    del demo["actions"]
+    demo["actions"] = np.zeros((29, 3))
+
+
+def other_width(demo, _):
+    del demo["actions"]
+    demo["actions"] = np.zeros((30, 4))
+
+
+def missing(demo, _):
+    del demo["obs/robot0_joint_pos"]
+
+
+def not_finite(demo, _):
+    demo["obs/robot0_joint_pos"][13, 2] = np.nan
+
+
+def bomb(demo, _):
+    del demo["actions"]
+    demo.create_dataset("actions", (10**9, 3), "f8", chunks=(1000, 3), compression="gzip")
+
+
+def foreign_filter(demo, _):
+    del demo["actions"]
+    properties = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    properties.set_chunk((30, 3))
+    properties.set_filter(307, h5py.h5z.FLAG_OPTIONAL, (9,))
+    space = h5py.h5s.create_simple((30, 3))
+    h5py.h5d.create(demo.id, b"actions", h5py.h5t.NATIVE_DOUBLE, space, properties)
+
+
+@pytest.mark.parametrize(
+    ("fault", "reason"),
+    [
+        (external_link, "a ExternalLink"),
+        (soft_link, "a SoftLink"),
+        (external_storage, "stored in another file"),
+        (virtual, "a virtual data set"),
+        (objects, "type object"),
+        (other_length, "rows long"),
+        (other_width, "of shape (30, 4)"),
+        (missing, "missing"),
+        (not_finite, "row 13, column obs/robot0_joint_pos[2] is nan"),
+        (bomb, "of shape (1000000000, 3)"),
+        (foreign_filter, "filters [307]"),
+    ],
+)
+def test_a_bad_demonstration_is_refused_by_name(file, tmp_path, fault, reason):
+    outside = tmp_path / "outside.hdf5"
+    with h5py.File(outside, "w") as other:
+        other["secret"] = np.full((30, 3), 7.0)
+    with h5py.File(file, "a") as edited:
+        fault(edited["data/demo_5"], str(outside))
+    opened = open_dataset(file, out=tmp_path / "out")
+    assert (opened.found, opened.accepted) == (12, 11)
+    assert opened.refused[0].file == "demo.hdf5#demo_5"
+    assert reason in opened.refused[0].reason
+
+
+@pytest.mark.parametrize("name", ["data", "mask"])
+def test_a_whole_group_elsewhere_is_refused(file, tmp_path, name):
+    outside = tmp_path / "outside.hdf5"
+    file.rename(outside)
+    with h5py.File(outside) as source, h5py.File(file, "w") as out:
+        for other in {"data", "mask"} - {name}:
+            source.copy(other, out)
+        out[name] = h5py.ExternalLink(str(outside), name)
+    with pytest.raises(BadInputError, match="ExternalLink"):
+        open_dataset(file, out=tmp_path / "out")
+
+
+@pytest.mark.parametrize("share", [0.0, 0.01, 0.3, 0.9])
+def test_truncated(file, tmp_path, share):
+    whole = file.read_bytes()
+    file.write_bytes(whole[: int(share * len(whole))])
+    with pytest.raises(BadInputError, match=r"demo\.hdf5"):
+        open_dataset(file, out=tmp_path / "out")
+
+
+def test_without_a_rate_it_is_guessed_and_said(file, tmp_path):
+    with h5py.File(file, "a") as edited:
+        edited["data"].attrs["env_args"] = "{"
+    opened = open_dataset(file, out=tmp_path / "out")
+    assert opened.contract.rate_guessed
+    assert any("rate was guessed" in note for note in opened.notes)
+    assert any("env_args could not be read" in note for note in opened.notes)
+
+
+def test_differences_pair_with_nothing(file, layouts, tmp_path):
+    """The action of an operational-space controller is a step, whatever it is called."""
+    with h5py.File(file, "a") as edited:
+        for i in range(12):
+            state = layouts.samples(i)[0]
+            steps = np.diff(state, axis=0, append=state[-1:])
+            edited[f"data/demo_{i}/actions"][...] = steps / np.abs(steps).max()
+    contract = propose(file)
+    assert contract.pairing is None

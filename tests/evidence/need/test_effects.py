@@ -1,0 +1,69 @@
+"""Effects: paired by episode, exact on hand-made rows, covering by simulation."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from genpolicy.evidence.need.effects import effect_rows, half_width, valid
+
+
+def error(variant, episode, value):
+    return {
+        "variant": variant, "convention": "direct", "episode_uuid": episode,
+        "chunk_error": value, "first_error": value / 2,
+    }  # fmt: skip
+
+
+def situation(variant, episode, covered, admissible, present=2):
+    return {
+        "variant": variant, "convention": "direct", "episode_uuid": episode, "samples": 4,
+        "modes_present": present, "modes_covered": covered, "admissible": admissible,
+    }  # fmt: skip
+
+
+def measured(errors, modes, kind="chunk_error"):
+    rows = effect_rows(errors, modes, own=("b", "direct"), reference=("a", "direct"), error=kind)
+    return {row["measure"]: row for row in rows}
+
+
+def test_pairs_by_episode_and_leaves_out_what_has_no_partner():
+    """Golden: differences 0.1 and 0.3, mean 0.2; half width by hand."""
+    errors = [
+        error("a", "e1", 1.0), error("a", "e2", 5.0), error("b", "e2", 5.3),
+        error("b", "e1", 1.1), error("b", "e3", 99.0),
+    ]  # fmt: skip
+    found = measured(errors, [])["chunk_error"]
+    half = stats.t.isf(0.025, 1) * np.std([0.1, 0.3], ddof=1) / math.sqrt(2)
+    assert found["effect"] == pytest.approx(0.2)
+    assert found["upper"] - found["lower"] == pytest.approx(2 * half)
+    assert (found["episodes"], found["reference"]) == (2, 3.0)
+    assert measured(errors, [], "first_error")["first_error"]["effect"] == pytest.approx(0.1)
+
+
+def test_situations_with_one_mode_do_not_count_and_nothing_measured_is_nan():
+    modes = [
+        situation("a", "e1", 1, 4), situation("b", "e1", 2, 4), situation("a", "e2", 1, 4),
+        situation("b", "e2", 1, 0), situation("a", "e3", 1, 4, present=1),
+        situation("b", "e3", 1, 4, present=1),
+    ]  # fmt: skip
+    found = measured([], modes)
+    assert (found["mode_coverage"]["value"], found["mode_coverage"]["effect"]) == (0.75, 0.25)
+    assert (found["valid_share"]["value"], found["valid_share"]["effect"]) == (0.5, -0.5)
+    assert math.isnan(found["chunk_error"]["effect"]) and found["chunk_error"]["episodes"] == 0
+
+
+@pytest.mark.parametrize(
+    ("covered", "admissible", "expected"), [(1, 4, 1.0), (1, 3, 0.75), (0, 4, 0.0), (2, 4, 1.0)]
+)
+def test_valid_needs_a_mode_and_counts_samples_that_pass_all_layers(covered, admissible, expected):
+    assert valid(situation("a", "e", covered, admissible)) == expected
+
+
+def test_intervals_cover_by_simulation():
+    """2000 draws of 30 normal differences around 1: the 95 % interval covers, within its noise."""
+    rng = np.random.default_rng(0)
+    draws = rng.normal(1.0, 2.0, (2000, 30))
+    covered = sum(abs(row.mean() - 1.0) <= half_width(row) for row in draws)
+    assert 0.935 < covered / 2000 < 0.965

@@ -1,0 +1,88 @@
+"""What a latent changes: dependent on the observation, the same everywhere, or noise."""
+
+import numpy as np
+import pytest
+
+from genpolicy.evidence.need.held_out import held_out_situations
+from genpolicy.evidence.need.latent import dependence, latent_dependence
+
+LATENTS, STEPS = 8, 4
+
+
+def paths_of(kind, observations, seed=0):
+    """Chunks of shared latents: a mean that follows the observation, and a change of some kind."""
+    rng = np.random.default_rng(seed)
+    count = len(observations)
+    latent = rng.normal(size=(1, LATENTS, 1, 1))
+    mean = observations[:, None, None, :3] * np.ones((1, 1, STEPS, 1))
+    if kind == "task":
+        change = 0.05 * latent * observations[:, None, None, :3]
+    elif kind == "style":
+        change = 0.05 * latent * np.ones((count, 1, STEPS, 3))
+    else:
+        change = 0.05 * rng.normal(size=(count, LATENTS, STEPS, 3))
+    return mean + change
+
+
+def held(kind, seed=0, count=60, permutations=199):
+    rng = np.random.default_rng(1000 + seed)
+    observations = rng.normal(size=(count, 5))
+    return dependence(
+        observations, paths_of(kind, observations, seed), permutations=permutations,
+        rng=np.random.default_rng(seed),
+    )  # fmt: skip
+
+
+def test_a_change_that_follows_the_observation_is_found():
+    found = held("task")
+    assert found.exceeding == 0
+    assert found.distance_correlation > 0.5
+    assert found.condition_share > 0.5
+
+
+def test_the_same_change_everywhere_is_style():
+    found = held("style")
+    assert found.exceeding == found.permutations
+    assert found.condition_share < 1e-12
+    assert found.distance_correlation == 0.0
+    assert found.spread_m > 0.03
+
+
+def test_noise_is_called_a_dependence_at_the_level_of_the_test_only():
+    """False positives by simulation: at 5 per cent, 200 draws, the exact 99.9 % band."""
+    wrong = sum(
+        (found.exceeding + 1) / (found.permutations + 1) <= 0.05
+        for found in (held("noise", seed, count=20, permutations=99) for seed in range(200))
+    )
+    assert wrong <= 22
+
+
+def test_a_latent_without_any_effect_is_no_dependence():
+    observations = np.random.default_rng(0).normal(size=(20, 3))
+    paths = np.repeat(observations[:, None, None, :], LATENTS, axis=1)
+    found = dependence(observations, paths, permutations=9, rng=np.random.default_rng(0))
+    assert found.spread_m < 1e-9
+    assert found.exceeding == found.permutations
+
+
+def test_the_unit_of_the_change_is_metres_and_nothing_else_depends_on_it():
+    observations = np.random.default_rng(0).normal(size=(30, 5))
+    paths = paths_of("task", observations)
+    one, ten = (
+        dependence(observations, f * paths, permutations=49, rng=np.random.default_rng(0))
+        for f in (1.0, 10.0)
+    )
+    assert ten.spread_m == pytest.approx(10 * one.spread_m)
+    assert ten.distance_correlation == pytest.approx(one.distance_correlation)
+    assert ten.exceeding == one.exceeding
+
+
+def test_a_trained_policy_is_asked_with_shared_latents(data, kit, tmp_path, policy):
+    names = kit.uuids(data)
+    audit = kit.write_situations(tmp_path / "audit", [(names[i], 4, {}) for i in range(6)])
+    found = held_out_situations(audit, data, horizons=kit.HORIZONS)
+    one, two = (
+        latent_dependence(policy, found, samples=4, permutations=19, root_seed=5) for _ in range(2)
+    )
+    assert one == two
+    assert one.situations == 6 and one.spread_m > 0.0

@@ -1,0 +1,72 @@
+"""From the measured table to the virtual clock's models."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from genpolicy.errors import ContractError
+from genpolicy.evidence.reproducibility.latency import DeclaredSettings, latency_models
+from genpolicy.evidence.stress.latency import DECLARED_TERMS, MEASURED_TERMS
+
+DECLARED = {name: DeclaredSettings(minimum_s=0.001, maximum_s=0.002) for name in DECLARED_TERMS}
+
+
+def table(methods=("a", "b"), *, warm=20, cold=2):
+    rows = []
+    for method in methods:
+        for run in (1, 2):
+            for temperature, repeats, scale in (("warm", warm, 1.0), ("cold", cold, 50.0)):
+                rows += [
+                    {
+                        "method": method, "run": run, "component": name,
+                        "temperature": temperature, "repeat": repeat,
+                        "seconds": scale * 1e-3 * (1 + (7 * repeat) % 5), "source": "measured",
+                    }
+                    for name in MEASURED_TERMS
+                    for repeat in range(repeats)
+                ]  # fmt: skip
+        rows.append(
+            {
+                "method": method, "run": 1, "component": "network", "temperature": "warm",
+                "repeat": 0, "seconds": 9.0, "source": "declared",
+            }
+        )  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+def test_models_hold_the_sorted_warm_times_of_both_runs():
+    models = latency_models(table(), DECLARED)
+    assert sorted(models) == ["a", "b"]
+    for model in models.values():
+        for name in MEASURED_TERMS:
+            values = model.measured[name]
+            assert len(values) == 40
+            assert np.all(np.diff(values) >= 0)
+            assert values.max() == pytest.approx(5e-3)  # no cold time among them
+        assert model.declared["network"].maximum_s == 0.002  # bounds, not the drawn 9 s
+
+
+def test_the_cold_extra_is_the_worst_first_invocation_beyond_a_typical_one():
+    (model,) = latency_models(table(("a",)), DECLARED).values()
+    # By hand: five components. Cold repeats 0 and 1 take 5 * 50 * 1 ms and 5 * 50 * 3 ms; warm
+    # sums are 5 ms times 1, 3, 5, 2, 4 in equal shares, median 15 ms.
+    assert model.cold_extra_s == pytest.approx(0.750 - 0.015)
+
+
+@pytest.mark.parametrize("term", MEASURED_TERMS)
+def test_a_missing_term_is_refused_by_method_and_name(term):
+    rows = table()
+    rows = rows[(rows["method"] != "b") | (rows["component"] != term)]
+    with pytest.raises(ContractError, match=rf"latency of b .*{term}"):
+        latency_models(rows, DECLARED)
+
+
+def test_a_missing_declared_term_is_refused():
+    short = {name: item for name, item in DECLARED.items() if name != "queue"}
+    with pytest.raises(ContractError, match="queue"):
+        latency_models(table(), short)
+
+
+def test_no_cold_invocation_is_refused():
+    with pytest.raises(ContractError, match="cold invocations"):
+        latency_models(table(cold=0), DECLARED)

@@ -1,0 +1,109 @@
+"""Every corruption: refused by the layer that owns it, admitted when its checks are off."""
+
+import numpy as np
+import pytest
+
+from genpolicy.evidence.admission_context import make_checker
+from genpolicy.evidence.shadow.corruption import CORRUPTIONS
+from genpolicy.evidence.shadow.shadow import Shadow, _admit, _case, held_out_observations
+from genpolicy.feasibility.admission import Admitted, Rejected
+from genpolicy.feasibility.settings import CHECKS, LAYERS
+from genpolicy.seeds import stream
+
+BY_NAME = {item.name: item for item in CORRUPTIONS}
+
+
+@pytest.fixture(scope="module")
+def shadow(task, checker, kit):
+    return Shadow(
+        task=task, checker=checker, horizons=kit.HORIZONS, execution=kit.EXECUTION, late_steps=1,
+        candidates=2,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def good(shadow, data, kit):
+    """Demonstrated chunks that are admitted as they are, with their phase."""
+    observations = held_out_observations(
+        data, horizons=kit.HORIZONS, count=60, generator=stream(1, "corruption")
+    )
+    cases = [
+        (item.phase, _case(shadow, None, item, number, 0, item.demonstrated))
+        for number, item in enumerate(observations)
+    ]
+    found = [(phase, case) for phase, case in cases if isinstance(_admit(shadow, case), Admitted)]
+    assert len(found) >= 0.8 * len(cases)
+    assert {phase for phase, _ in found} >= {"approach", "insert", "retreat"}
+    return found
+
+
+def broken(good, corruption, checker):
+    cases = [
+        corruption.apply(case, checker)
+        for phase, case in good
+        if not corruption.phases or phase in corruption.phases
+    ]
+    return [case for case in cases if case is not None]
+
+
+def test_the_list_names_existing_layers_and_checks_once():
+    assert len(BY_NAME) == len(CORRUPTIONS)
+    assert {item.layer for item in CORRUPTIONS} == set(LAYERS)
+    assert {check for item in CORRUPTIONS for check in item.checks} <= set(CHECKS)
+
+
+@pytest.mark.parametrize("name", BY_NAME)
+def test_refused_by_the_layer_that_owns_it(name, good, shadow):
+    corruption = BY_NAME[name]
+    cases = broken(good, corruption, shadow.checker)
+    assert cases, "the corruption could be applied nowhere"
+    layers = []
+    for case in cases:
+        result = _admit(shadow, case)
+        assert isinstance(result, Rejected), f"{name} was admitted"
+        layers.append(result.verdict.first_layer)
+        if corruption.checks and result.verdict.first_layer == corruption.layer:
+            assert result.verdict.first_reason in corruption.checks
+    assert set(layers) == {corruption.layer}
+
+
+@pytest.mark.parametrize("name", [item.name for item in CORRUPTIONS if item.checks])
+def test_admitted_without_its_checks(name, good, shadow, task, kit):
+    corruption = BY_NAME[name]
+    blind = make_checker(task, kit.FEASIBILITY, disabled_checks=frozenset(corruption.checks))
+    cases = broken(good, corruption, shadow.checker)
+    passed = [isinstance(blind.admit(c.proposal, context=c.context), Admitted) for c in cases]
+    assert any(passed)
+
+
+def test_roughness_alone_is_smoothed_and_is_no_corruption(good, shadow):
+    """4 mm from side to side is repaired by projection, so that it cannot stand as a fixture."""
+    case = next(case for phase, case in good if phase == "approach")
+    actions = np.array(case.proposal.actions)
+    actions[1::2, 1] += 0.004
+    actions[::2, 1] -= 0.004
+    result = _admit(shadow, case.with_actions(actions))
+    assert isinstance(result, Admitted)
+    assert 0.002 < result.projected.position_change_m < 0.02
+
+
+def test_the_obstacle_stands_where_the_projected_chunk_goes(good, shadow):
+    case = next(case for phase, case in good if phase == "approach")
+    actions = np.array(case.proposal.actions)
+    actions[:, 2] += 0.13  # above the workspace; projection brings it down by up to 5 cm
+    bad = BY_NAME["collision"].apply(case.with_actions(actions), shadow.checker)
+    assert isinstance(_admit(shadow, bad), Rejected)
+
+
+def test_the_obstacle_cannot_stand_where_nothing_goes(good, checker):
+    _, case = good[0]
+    nowhere = case.with_actions(np.full_like(case.proposal.actions, np.nan))
+    assert BY_NAME["collision"].apply(nowhere, checker) is None
+
+
+def test_a_corruption_leaves_the_good_case_alone(good, checker):
+    for _, case in good[:3]:
+        before = case.proposal.actions.copy()
+        for corruption in CORRUPTIONS:
+            corruption.apply(case, checker)
+        np.testing.assert_array_equal(case.proposal.actions, before)

@@ -1,0 +1,177 @@
+"""Shadow evidence on few observations: complete rows, a clean stub, balanced books."""
+
+from collections import Counter
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from genpolicy.evidence.admission_context import make_checker
+from genpolicy.evidence.shadow.corruption import CORRUPTIONS
+from genpolicy.evidence.shadow.shadow import (
+    HELD_OUT,
+    IN_FLIGHT_PHASE_CHANGE,
+    Shadow,
+    disabled_checks_evidence,
+    held_out_observations,
+    shadow_policy,
+)
+from genpolicy.execution.journal import write_journal
+from genpolicy.feasibility.settings import LAYERS
+from genpolicy.seeds import stream
+from genpolicy.verification.checker import check_journal
+
+
+@pytest.fixture(scope="module")
+def shadow(task, checker, kit):
+    return Shadow(
+        task=task, checker=checker, horizons=kit.HORIZONS, execution=kit.EXECUTION, late_steps=1,
+        candidates=3,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def observations(data, kit):
+    return held_out_observations(
+        data, horizons=kit.HORIZONS, count=20, generator=stream(1, "shadow")
+    )
+
+
+class Demonstrator:
+    """Answers with what the operator did, a NaN, and what the operator did again."""
+
+    method, checkpoint_hash, sampler_config_hash, stochastic = "operator", "w" * 64, "s" * 64, True
+    prediction_horizon = 16
+
+    def __init__(self, observations):
+        self.chunks = {(o.episode_uuid, o.index): o.demonstrated for o in observations}
+
+    def sample(self, seen, *, noise_names, candidates):
+        assert len(seen) == len(noise_names)
+        good = np.stack([self.chunks[name[1:]] for name in noise_names])
+        return SimpleNamespace(
+            actions=np.stack([good, np.full_like(good, np.nan), good], axis=1)[:, :candidates],
+            nfe=1,
+        )
+
+
+@pytest.fixture(scope="module")
+def evidence(shadow, observations):
+    return shadow_policy(shadow, Demonstrator(observations), observations, seed=4)
+
+
+def test_observations_come_from_the_test_split_in_equal_numbers(data, observations, kit):
+    split = dict(zip(data.episodes["episode_uuid"], data.episodes["split"], strict=True))
+    assert {split[item.episode_uuid] for item in observations} == {"test"}
+    assert set(Counter(item.phase for item in observations).values()) == {4}
+    for item in observations:
+        assert item.history.shape == (2, 24) and item.demonstrated.shape == (16, 10)
+        # The command at the observation's own tick is the first of what follows.
+        np.testing.assert_array_equal(item.commanded[-1], item.demonstrated[0])
+    again = held_out_observations(
+        data, horizons=kit.HORIZONS, count=20, generator=stream(1, "shadow")
+    )
+    assert [(o.episode_uuid, o.index) for o in again] == [
+        (o.episode_uuid, o.index) for o in observations
+    ]
+
+
+def test_every_candidate_has_its_row_and_its_verdict(evidence, observations):
+    rows = [row for row in evidence.candidates if row["fixture"] == HELD_OUT]
+    assert len(rows) == 3 * len(observations)
+    for row in rows:
+        assert row["seed"] == 4 and row["method"] == "operator"
+        verdicts = [row[layer] for layer in LAYERS]
+        if row["candidate"] == 1:
+            assert verdicts == [False, *[None] * 5] and row["first_reason"] == "finite"
+            assert row["mode"] == "none" and row["position_change_m"] is None
+        elif not row["first_reason"]:
+            assert verdicts == [True] * 6
+    passed = [not row["first_reason"] for row in rows if row["candidate"] == 0]
+    assert np.mean(passed) >= 0.8
+
+
+def test_every_corruption_is_refused_and_its_session_executes_nothing(evidence):
+    fixtures = {row["fixture"] for row in evidence.candidates}
+    assert fixtures >= {c.name for c in CORRUPTIONS}
+    for row in evidence.candidates:
+        if row["fixture"] != HELD_OUT:
+            assert row["first_reason"], row["fixture"]
+    for corruption in CORRUPTIONS:
+        key = ("operator", corruption.name)
+        assert evidence.stub[(*key, "delivered")] == evidence.stub[(*key, "arrivals")] == 0
+
+
+def test_the_stub_sees_good_actions_only(evidence, kit):
+    delivered = evidence.stub["operator", HELD_OUT, "delivered"]
+    arrivals = evidence.stub["operator", HELD_OUT, "arrivals"]
+    # One of eight rows is late.
+    assert arrivals == delivered * (kit.HORIZONS.execution_horizon - 1) > 0
+    for (_, _, name), count in evidence.stub.items():
+        assert count == 0 or name in ("arrivals", "delivered")
+    changed = evidence.stub["operator", IN_FLIGHT_PHASE_CHANGE, "arrivals"]
+    assert 0 < changed < arrivals
+
+
+def test_nothing_is_lost_and_the_reason_is_its_own(evidence, tmp_path):
+    reasons = Counter()
+    for (_, fixture), accounts in evidence.accounts.items():
+        for account in accounts:
+            assert account.queued == 0
+            assert account.generated == account.executed + sum(account.discarded.values())
+            reasons += Counter({(fixture, str(k)): n for k, n in account.discarded.items()})
+    path = tmp_path / "journal.mcap"
+    write_journal(path, evidence.sessions)
+    report = check_journal(path)
+    assert report.violations == [] and report.checked_actions > 0
+    expected = {
+        "reordered_chunk": "out_of_order", "stale_observation": "stale_observation",
+        "phase_change": "phase_transition", "expired": "expired", "earlier_session": "reset",
+        "calibration_change": "calibration_mismatch", "not_a_number": "infeasible",
+    }  # fmt: skip
+    for fixture, reason in expected.items():
+        assert reasons[fixture, reason] > 0, fixture
+    assert reasons[HELD_OUT, "superseded"] > 0
+
+
+def test_a_policy_that_answers_not_a_number_leaves_evidence(shadow, observations):
+    def sample(seen, *, noise_names, candidates):
+        return SimpleNamespace(actions=np.full((len(seen), candidates, 16, 10), np.nan), nfe=1)
+
+    policy = SimpleNamespace(
+        method="broken", checkpoint_hash="w", sampler_config_hash="s", sample=sample
+    )
+    found = shadow_policy(shadow, policy, observations[:2], seed=0)
+    assert {row["first_reason"] for row in found.candidates} == {"finite"}
+    assert set(found.stub.values()) == {0}
+
+
+def test_a_trained_policy_goes_the_same_way(shadow, observations, policy):
+    found = shadow_policy(shadow, policy, observations[:3], seed=0)
+    assert {row["method"] for row in found.candidates} == {"flow"}
+    for (_, _, name), count in found.stub.items():
+        assert count == 0 or name in ("arrivals", "delivered")
+
+
+def test_a_missing_check_is_noticed_by_exactly_its_fixture(shadow, observations, task, kit):
+    blind = {
+        item.checks: make_checker(task, kit.FEASIBILITY, disabled_checks=frozenset(item.checks))
+        for item in CORRUPTIONS
+        if item.checks
+    }
+    rows = disabled_checks_evidence(shadow, observations, without=blind)
+    assert {row["check"] for row in rows} == {"+".join(checks) for checks in blind}
+    assert all(row["detected"] and 0 < row["violations"] <= row["tried"] for row in rows)
+    # Where the check is not really off, the table must not claim that its absence shows.
+    seeing = dict.fromkeys(blind, shadow.checker)
+    rows = disabled_checks_evidence(shadow, observations[:5], without=seeing)
+    assert not any(row["detected"] for row in rows)
+    # And where everything is admitted anyway, nothing was refused that could be noticed.
+    late = replace(shadow, checker=blind["expired",])
+    (row,) = (
+        row
+        for row in disabled_checks_evidence(late, observations[:5], without=blind)
+        if row["fixture"] == "expired"
+    )
+    assert row["tried"] > 0 and not row["detected"]

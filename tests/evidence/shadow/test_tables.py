@@ -1,0 +1,103 @@
+"""The shadow evidence as files, and the checker that holds sessions to the settings in force."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pyarrow as pa
+import pytest
+
+from genpolicy.contract.chunk import DiscardReason
+from genpolicy.evidence.shadow.shadow import HELD_OUT, Shadow, held_out_observations, shadow_policy
+from genpolicy.evidence.shadow.tables import (
+    CANDIDATES,
+    account_rows,
+    checker_document,
+    write_shadow,
+)
+from genpolicy.execution.ledger import Account
+from genpolicy.integrity.documents import read_json
+from genpolicy.integrity.tables import read_table
+from genpolicy.seeds import stream
+
+
+@pytest.fixture(scope="module")
+def written(task, checker, data, policy, kit, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("shadow")
+    shadow = Shadow(
+        task=task, checker=checker, horizons=kit.HORIZONS, execution=kit.EXECUTION, late_steps=1,
+        candidates=2,
+    )  # fmt: skip
+    seen = held_out_observations(data, horizons=kit.HORIZONS, count=5, generator=stream(1, "s"))
+
+    def demonstrated(observations, *, noise_names, candidates):
+        chunks = {(o.episode_uuid, o.index): o.demonstrated for o in seen}
+        good = np.stack([chunks[name[1:]] for name in noise_names])
+        return SimpleNamespace(actions=np.stack([good] * candidates, axis=1), nfe=1)
+
+    operator = SimpleNamespace(
+        method="operator", checkpoint_hash="w", sampler_config_hash="s", sample=demonstrated
+    )
+    found = [shadow_policy(shadow, item, seen, seed=0) for item in (operator, policy)]
+    rows = [row for item in found for row in item.candidates]
+    mutants = [{"check": "expired", "layer": "fresh", "detected": True, "violations": 1}]
+    write_shadow(
+        folder, found, mutants, pa.Table.from_pylist(rows, CANDIDATES),
+        horizons=kit.HORIZONS, execution=kit.EXECUTION,
+    )  # fmt: skip
+    return folder
+
+
+def test_all_files_are_there_and_agree(written):
+    stub = read_table(written / "stub.parquet").to_pandas()
+    assert (stub["stale"] == 0).all() and (stub["invalid"] == 0).all()
+    assert set(stub["method"]) == {"operator", "flow"}
+    counts = read_table(written / "counts.parquet").to_pandas()
+    for _, part in counts.groupby(["method", "fixture"]):
+        totals = part.iloc[0]
+        ended = totals["executed"] + totals["queued"] + part["count"].sum()
+        assert totals["generated"] == ended
+    checked = read_json(written / "checker.json")
+    assert checked["violations"] == []
+    assert checked["checked_actions"] == stub["arrivals"].sum() > 0
+    candidates = read_table(written / "candidates.parquet").to_pandas()
+    assert (candidates["fixture"] == HELD_OUT).sum() == 2 * 5 * 2
+    mutants = read_json(written / "mutants.json")
+    assert mutants[0]["check"] == "expired"
+    assert all(row["layer"] == "execution" and row["detected"] for row in mutants[1:])
+    assert len(mutants) > 10
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("watchdog_s", 0.2), ("queue_capacity", 9), ("maximum_age_s", None)]
+)
+def test_sessions_under_other_settings_are_flagged(written, kit, name, value):
+    if value is None:
+        value = {phase: age + 1.0 for phase, age in kit.EXECUTION.maximum_age_s.items()}
+    execution = kit.EXECUTION.model_copy(update={name: value})
+    found = checker_document([written / "journal.mcap"], horizons=kit.HORIZONS, execution=execution)
+    rules = {violation["rule"] for violation in found["violations"]}
+    assert rules == {"settings.limits"}
+    assert all(violation["journal"] == "journal.mcap" for violation in found["violations"])
+
+
+def test_another_execution_horizon_is_flagged(written, kit):
+    horizons = kit.HORIZONS.model_copy(update={"execution_horizon": 4})
+    found = checker_document([written / "journal.mcap"], horizons=horizons, execution=kit.EXECUTION)
+    assert found["violations"]
+
+
+def test_accounts_add_up_over_sessions():
+    accounts = [
+        Account(generated=5, executed=2, discarded={DiscardReason.EXPIRED: 3}, queued=0),
+        Account(generated=4, executed=1, discarded={DiscardReason.RESET: 2}, queued=1),
+        Account(generated=1, executed=0, discarded={DiscardReason.EXPIRED: 1}, queued=0),
+    ]
+    # By hand: 10 generated, 3 executed, 1 queued; 4 expired, 2 reset.
+    assert account_rows(accounts) == [
+        {"generated": 10, "executed": 3, "queued": 1, "reason": "expired", "count": 4},
+        {"generated": 10, "executed": 3, "queued": 1, "reason": "reset", "count": 2},
+    ]
+    kept = [Account(generated=1, executed=1, discarded={}, queued=0)]
+    assert account_rows(kept) == [
+        {"generated": 1, "executed": 1, "queued": 0, "reason": "", "count": 0}
+    ]

@@ -1,0 +1,88 @@
+"""Perturbation schedules: pure functions of their key, the same for every method."""
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from genpolicy.evidence.stress.perturbations import Injection, PerturbationSettings, injection, push
+
+KINDS = {
+    "camera_delay": {"magnitude_s": 0.08},
+    "compute_contention": {"factor": 4.0},
+    "network_jitter": {"magnitude_s": 0.12},
+    "queue_reorder": {"magnitude_s": 0.3},
+    "chunk_drop": {},
+}
+
+
+def settings(kind, probability=1.0, **changes):
+    return PerturbationSettings(
+        kind=kind, probability=probability, **KINDS.get(kind, {}), **changes
+    )
+
+
+def at(item, *, start=0, invocation=0, root_seed=1, name="x"):
+    return injection(item, root_seed=root_seed, name=name, start=start, invocation=invocation)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_schedule_depends_on_its_key_alone(kind):
+    item = settings(kind, 0.5)
+    first = [at(item, invocation=n) for n in range(60)]
+    np.random.seed(1)
+    again = [at(item, invocation=n) for n in reversed(range(60))][::-1]
+    assert first == again
+    for change in ({"start": 1}, {"root_seed": 2}, {"name": "y"}):
+        assert [at(item, invocation=n, **change) for n in range(60)] != first
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_probability_none_and_one(kind):
+    never = [at(settings(kind, 0.0), invocation=n) for n in range(50)]
+    always = [at(settings(kind, 1.0), invocation=n) for n in range(50)]
+    assert never == [Injection()] * 50
+    assert all(hit != Injection() for hit in always)
+
+
+def test_the_share_of_hits_is_the_probability():
+    hits = [at(settings("chunk_drop", 0.15), start=n).dropped for n in range(2000)]
+    # Four standard deviations of a binomial with p = 0.15, n = 2000.
+    assert abs(np.mean(hits) - 0.15) < 4 * np.sqrt(0.15 * 0.85 / 2000)
+
+
+def test_each_kind_touches_what_it_names():
+    assert at(settings("camera_delay")).extra_s == {"capture": 0.08}
+    assert at(settings("queue_reorder")).extra_s == {"queue": 0.3}
+    assert at(settings("compute_contention")) == Injection(compute_factor=4.0)
+    assert at(settings("chunk_drop")) == Injection(dropped=True)
+    sizes = [at(settings("network_jitter"), invocation=n).extra_s["network"] for n in range(200)]
+    assert 0 <= min(sizes) < 0.01 and 0.11 < max(sizes) <= 0.12
+    for kind in ("nominal", "push"):
+        assert at(settings(kind, force_n=15.0)) == Injection()
+
+
+def test_a_push_is_drawn_once_per_start():
+    item = PerturbationSettings(kind="push", force_n=15.0)
+    drawn = [push(item, root_seed=1, name="push", start=n) for n in range(100)]
+    assert drawn == [push(item, root_seed=1, name="push", start=n) for n in range(100)]
+    assert {p.force_n for p in drawn} == {-15.0, 15.0}
+    assert all(0.3 <= p.time_s <= 1.5 and p.duration_s == 0.2 for p in drawn)
+    assert len({p.time_s for p in drawn}) == 100
+
+
+def test_nobody_else_pushes():
+    for item in (settings("nominal", force_n=15.0), PerturbationSettings(kind="push")):
+        assert push(item, root_seed=1, name="push", start=0) is None
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        {"kind": "earthquake"}, {"kind": "push", "probability": 1.5},
+        {"kind": "push", "probability": float("nan")}, {"kind": "push", "magnitude_s": -0.1},
+        {"kind": "compute_contention", "factor": 0.5}, {"kind": "push", "seed": 1},
+    ],
+)  # fmt: skip
+def test_bad_settings_are_refused(bad):
+    with pytest.raises(ValidationError):
+        PerturbationSettings(**bad)

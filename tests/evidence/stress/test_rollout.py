@@ -1,0 +1,284 @@
+"""Rollouts on the virtual clock under scripted policies, good, bad and slow."""
+
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from genpolicy.evidence.admission_context import make_checker
+from genpolicy.evidence.stress.perturbations import PerturbationSettings
+from genpolicy.evidence.stress.rollout import Outcome, Rollout
+from genpolicy.execution.journal import write_journal
+from genpolicy.seeds import stream
+
+
+def of_kind(rollout, kind):
+    return [event for event in rollout.journal.events() if event.kind == kind]
+
+
+def prove(rollouts, kit, folder):
+    """What must hold whatever the policy does: invariants from the file, balance, clean stub."""
+    report = kit.check(rollouts, folder)
+    assert report.violations == []
+    assert report.checked_actions == sum(r.tally.action_ticks for r in rollouts)
+    for rollout in rollouts:
+        balance = rollout.executor.conservation()
+        for account in (balance.chunks, balance.actions):
+            ended = account.executed + sum(account.discarded.values()) + account.queued
+            assert account.generated == ended
+        assert balance.chunks.queued == 0
+        assert rollout.stub.stale == rollout.stub.invalid == 0
+        assert rollout.stub.arrivals == rollout.tally.action_ticks + rollout.tally.fallback_ticks
+    return report
+
+
+def ages_s(rollout):
+    return np.array([event.payload["age_ns"] for event in of_kind(rollout, "accept")]) / 1e9
+
+
+def noisy(scale):
+    """Chunks that wander from the last command; equal for equal rollouts and invocations."""
+
+    def plan(rollout):
+        draw = stream(11, "random chunks", rollout.start_index, rollout.invocations)
+        chunk = np.tile(rollout.world.last_action, (3, 16, 1))
+        return chunk + scale * draw.normal(size=chunk.shape).cumsum(axis=1)
+
+    return plan
+
+
+# -- good -----------------------------------------------------------------------------------------
+
+
+def test_a_demonstrated_plan_succeeds_and_is_proved(run, kit, plans, tmp_path):
+    rollouts = run(kit.Replay(plans.actions), starts=(0, 1, 2))
+    assert [r.outcome for r in rollouts] == [Outcome.SUCCESS] * 3
+    report = prove(rollouts, kit, tmp_path)
+    assert report.checked_actions > 200
+    for rollout in rollouts:
+        assert rollout.tally.interventions == rollout.tally.deadline_misses == 0
+        assert rollout.world.success and not rollout.world.collision
+        ticks = rollout.tally.action_ticks + rollout.tally.hold_ticks
+        assert ticks + rollout.tally.fallback_ticks == rollout.tick
+
+
+def test_no_action_leaves_before_its_latency_has_passed(run, kit, plans):
+    (rollout,) = run(kit.Replay(plans.actions))
+    first = of_kind(rollout, "enqueue")[0]
+    # 36 to 42 ms of latency from tick 0: delivered at tick 1, and the row of tick 0 is skipped.
+    assert first.t == 50_000_000 and first.payload["checked_rows"][0] == 1
+    assert ages_s(rollout).min() >= 0.05 - 1e-9
+    assert max(rollout.tally.latencies_s) < 0.05
+
+
+def test_same_seed_same_bytes_whatever_the_global_generator(run, kit, plans, tmp_path):
+    schedule = PerturbationSettings(kind="network_jitter", probability=0.5, magnitude_s=0.12)
+    texts = []
+    for number, (root_seed, global_seed) in enumerate([(1, 0), (1, 99), (2, 0)]):
+        np.random.seed(global_seed)
+        rollouts = run(kit.Replay(plans.actions), root_seed=root_seed, schedule=schedule, ticks=60)
+        path = tmp_path / f"{number}.mcap"
+        write_journal(path, [rollout.journal for rollout in rollouts])
+        texts.append(path.read_bytes())
+    assert texts[0] == texts[1]
+    assert texts[0] != texts[2]
+
+
+def test_lockstep_changes_nothing(run, kit, plans):
+    schedule = PerturbationSettings(kind="network_jitter", probability=0.5, magnitude_s=0.12)
+    changes = {"schedule": schedule, "ticks": 70}
+    together = run(kit.Replay(plans.actions), starts=(2, 0, 1), **changes)
+    for rollout in together:
+        number = rollout.start_index
+        (alone,) = run(kit.Replay(plans.actions), starts=(number,), **changes)
+        assert alone.journal.events() == rollout.journal.events()
+        assert alone.world.state_sha256() == rollout.world.state_sha256()
+        assert alone.tally.rejected_by == rollout.tally.rejected_by
+
+
+def test_starts_match_by_hash_across_methods_and_perturbations(make_fixture, kit, plans):
+    def sha256(method, perturbation, number):
+        fixture = make_fixture(method=method, perturbation=perturbation)
+        return Rollout(
+            fixture, plans.starts[number], number, calibration_epoch=kit.EPOCH
+        ).start_sha256
+
+    assert sha256("a", "nominal", 0) == sha256("b", "push", 0)
+    assert sha256("a", "nominal", 0) != sha256("a", "nominal", 1)
+
+
+# -- bad ------------------------------------------------------------------------------------------
+
+
+def test_straight_at_the_post_is_stopped_by_feasibility(run, kit, tmp_path):
+    (rollout,) = run(kit.straight)
+    prove([rollout], kit, tmp_path)
+    assert rollout.outcome is not Outcome.COLLISION
+    assert not rollout.supervisor.stopped
+    assert set(rollout.tally.rejected_by) <= {"scene_collision", "swept_collision"}
+    assert rollout.tally.rejections > 0
+    assert rollout.recovery.attempts > 0
+    path = np.stack(rollout.tally.path_m)
+    assert path[:, 0].max() < 0.50
+
+
+def test_without_geometric_checks_the_supervisor_ends_it_in_collision(run, kit, task, tmp_path):
+    blind = make_checker(
+        task,
+        kit.FEASIBILITY,
+        disabled_checks=frozenset({"scene_collision", "swept_collision"}),
+    )
+    (rollout,) = run(kit.straight, checker=blind)
+    prove([rollout], kit, tmp_path)
+    assert rollout.outcome is Outcome.COLLISION
+    assert rollout.supervisor.stopped
+    assert str(rollout.recovery.state) == "stopped"
+    assert rollout.tally.interventions == 0
+
+
+def test_not_a_number_moves_nothing(run, kit, tmp_path):
+    (rollout,) = run(lambda r: np.full((2, 16, 10), np.nan))
+    prove([rollout], kit, tmp_path)
+    assert rollout.tally.action_ticks == 0
+    assert set(rollout.tally.rejected_by) == {"finite"}
+    # Every candidate of every delivered chunk was judged; none is left out.
+    assert rollout.tally.rejected_by["finite"] == 2 * rollout.tally.rejections
+    assert rollout.outcome is Outcome.INTERVENTION
+
+
+@pytest.mark.parametrize("scale", [0.5, 0.0005])
+def test_random_chunks_break_no_invariant(run, kit, tmp_path, scale):
+    rollouts = run(noisy(scale), starts=(0, 1), ticks=80)
+    report = prove(rollouts, kit, tmp_path)
+    if scale > 0.1:
+        assert report.checked_actions == 0
+    assert not any(rollout.world.collision for rollout in rollouts)
+
+
+def test_the_first_admissible_candidate_is_taken(run, kit, plans):
+    replay = kit.Replay(plans.actions)
+
+    def plan(rollout):
+        good = replay(rollout)
+        return np.concatenate([np.full_like(good, np.nan), good, good])
+
+    (rollout,) = run(plan, ticks=20)
+    accepted = {event.payload["chunk_id"] for event in of_kind(rollout, "enqueue")}
+    judged = [event.payload for event in of_kind(rollout, "candidate")]
+    assert accepted
+    for chunk in accepted:
+        verdicts = [row for row in judged if row["chunk_id"] == chunk]
+        assert [row["index"] for row in verdicts] == [0, 1]
+        assert [row["first_reason"] for row in verdicts] == ["finite", None]
+
+
+def test_an_executor_that_forgets_the_phase_is_caught(make_fixture, kit, plans):
+    """Injected fault: chunks of the old phase stay queued; the stub must refuse them."""
+    fixture = make_fixture()
+    rollout = Rollout(fixture, plans.starts[0], 0, calibration_epoch=kit.EPOCH)
+    blind = frozenset({"phase_transition"})
+    rollout.executor._disabled = rollout.executor._queue._disabled = blind
+    kit.drive([rollout], kit.Replay(plans.actions))
+    assert rollout.stub.stale + rollout.stub.invalid > 0
+    offered = {event.payload["reason"] for event in of_kind(rollout, "refuse")}
+    assert offered == {"phase_transition"}
+
+
+# -- slow -----------------------------------------------------------------------------------------
+
+
+def test_too_slow_executes_nothing_and_calls_a_person(run, kit, plans, tmp_path):
+    (rollout,) = run(kit.Replay(plans.actions), latency=kit.latency(0.5))
+    prove([rollout], kit, tmp_path)
+    assert rollout.tally.action_ticks == 0
+    assert rollout.tally.deadline_misses >= 3
+    assert rollout.recovery.attempts >= 1
+    assert rollout.outcome is Outcome.INTERVENTION and rollout.tally.interventions == 1
+    reasons = Counter(event.payload["reason"] for event in of_kind(rollout, "discard"))
+    assert reasons["expired"] >= 1
+    # Given up once each, and only ever after the deadline.
+    given_up = [e for e in of_kind(rollout, "invocation") if e.payload["detail"] == "deadline"]
+    assert len(given_up) == rollout.tally.deadline_misses
+
+
+def test_a_missed_deadline_is_counted_although_the_chunk_is_still_good(run, kit, plans, tmp_path):
+    (rollout,) = run(kit.Replay(plans.actions), latency=kit.latency(0.2), ticks=60)
+    prove([rollout], kit, tmp_path)
+    assert rollout.tally.deadline_misses > 0
+    assert rollout.tally.action_ticks > 0
+    assert ages_s(rollout).min() >= 0.2
+
+
+def test_a_slow_method_pays_with_age_and_holds(run, kit, plans):
+    (fast,) = run(kit.Replay(plans.actions), ticks=60)
+    (slow,) = run(kit.Replay(plans.actions), latency=kit.latency(0.12), ticks=60)
+    assert np.median(ages_s(slow)) > np.median(ages_s(fast))
+    assert slow.tally.hold_ticks > fast.tally.hold_ticks
+
+
+# -- disturbed ------------------------------------------------------------------------------------
+
+
+def test_camera_delay_shifts_every_latency_by_itself(run, kit, plans):
+    delay = PerturbationSettings(kind="camera_delay", magnitude_s=0.08)
+    (plain,) = run(kit.Replay(plans.actions), ticks=40)
+    (late,) = run(kit.Replay(plans.actions), schedule=delay, ticks=40)
+    both = min(len(plain.tally.latencies_s), len(late.tally.latencies_s))
+    assert both >= 3
+    shift = np.array(late.tally.latencies_s[:both]) - np.array(plain.tally.latencies_s[:both])
+    np.testing.assert_allclose(shift, 0.08, atol=1e-12)
+    # 36 to 42 ms and 80 ms more: from one tick to three.
+    assert ages_s(late).min() - ages_s(plain).min() == pytest.approx(0.10)
+
+
+def test_reordered_chunks_are_discarded_and_never_executed(run, kit, plans, tmp_path):
+    reorder = PerturbationSettings(kind="queue_reorder", probability=0.4, magnitude_s=0.25)
+    rollouts = run(kit.Replay(plans.actions), starts=(0, 1), schedule=reorder, perturbation="r")
+    prove(rollouts, kit, tmp_path)
+    counted = Counter()
+    for rollout in rollouts:
+        chunks = {e.payload["chunk_id"]: e.payload for e in of_kind(rollout, "enqueue")}
+        rested_on = [
+            chunks[e.payload["chunk_id"]]["condition_ns"] for e in of_kind(rollout, "accept")
+        ]
+        assert rested_on == sorted(rested_on)
+        counted += Counter(e.payload["reason"] for e in of_kind(rollout, "discard"))
+        # Overtaken is not infeasible: each has its own reason, once per chunk.
+        late = rollout.tally.rejected_by.get("out_of_order", 0)
+        assert rollout.executor.conservation().chunks.discarded.get("out_of_order", 0) == late
+    assert counted["out_of_order"] > 0
+
+
+def test_dropped_chunks_are_accounted_for(run, kit, plans, tmp_path):
+    drop = PerturbationSettings(kind="chunk_drop", probability=1.0)
+    (rollout,) = run(kit.Replay(plans.actions), schedule=drop)
+    prove([rollout], kit, tmp_path)
+    account = rollout.executor.conservation().chunks
+    assert rollout.tally.action_ticks == 0
+    expired = account.discarded["expired"]
+    assert expired == rollout.tally.deadline_misses > 0
+    # Whatever else was discarded was in flight at the end.
+    assert rollout.invocations == expired + account.discarded.get("end_of_episode", 0)
+
+
+def test_a_push_disturbs_the_hand_once(run, kit, plans, tmp_path):
+    push = PerturbationSettings(kind="push", force_n=15.0)
+    (plain,) = run(kit.Replay(plans.actions), ticks=60)
+    (pushed,) = run(kit.Replay(plans.actions), schedule=push, ticks=60)
+    prove([pushed], kit, tmp_path)
+    plain_m, pushed_m = np.stack(plain.tally.path_m), np.stack(pushed.tally.path_m)
+    both = min(len(plain_m), len(pushed_m))
+    away = np.linalg.norm(plain_m[:both] - pushed_m[:both], axis=1)
+    assert away[:6].max() == 0.0  # pushes begin at 0.3 s at the earliest
+    assert away.max() > 0.002
+
+
+def test_an_unsampled_invocation_is_a_fault_of_ours(make_fixture, kit, plans):
+    rollout = Rollout(make_fixture(), plans.starts[0], 0, calibration_epoch=kit.EPOCH)
+    with pytest.raises(Exception, match="delivered before it was sampled"):
+        for _ in range(4):
+            rollout.sense()
+            while (question := rollout.pending()) is not None:
+                rollout.settle(rollout.fixture.checker.admit(question[0], context=question[1]))
+            rollout.decide()
+            rollout.act()
