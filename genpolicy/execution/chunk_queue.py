@@ -3,15 +3,18 @@
 from typing import TYPE_CHECKING
 
 from genpolicy.contract.chunk import DiscardReason
-from genpolicy.execution.freshness import Situation, time_refusal
+from genpolicy.execution.checks import Checks, Chunk, Moment, Place, View, refusal
 from genpolicy.execution.journal import Journal, encode_actions
-from genpolicy.execution.ledger import ChunkTimes, Conservation, Ledger, QueuedChunk
+from genpolicy.execution.ledger import BEYOND_HORIZON, Conservation, Ledger, QueuedChunk
 from genpolicy.execution.settings import ExecutorSettings
 
 if TYPE_CHECKING:
     from genpolicy.feasibility.admission import Admitted
 
 Payload = dict[str, object]
+
+LOST_AS = {"execution_horizon": BEYOND_HORIZON}
+"""Rows that were never to be executed are no discarded ones; the ledger has its own word."""
 
 
 class ChunkQueue:
@@ -23,18 +26,20 @@ class ChunkQueue:
         last_due_ns: Begin of that action's window.
     """
 
-    def __init__(
-        self, settings: ExecutorSettings, journal: Journal, disabled: frozenset[str]
-    ) -> None:
+    def __init__(self, settings: ExecutorSettings, journal: Journal, checks: Checks) -> None:
         self.head: str | None = None
         self.last_accepted: QueuedChunk | None = None
         self.last_due_ns: int | None = None
         self._settings = settings
-        self._maximum_age_ns = settings.maximum_age_ns
         self._journal = journal
-        self._disabled = disabled
+        self._checks = checks
         self._chunks: list[QueuedChunk] = []
         self._ledger = Ledger()
+
+    @property
+    def arrivals(self) -> int:
+        """Number of arrivals so far."""
+        return self._ledger.generated_chunks
 
     def arrive(self, rows: int) -> int:
         """Count an arrival of K actions. Returns its number."""
@@ -50,43 +55,38 @@ class ChunkQueue:
         }  # fmt: skip
         self._journal.add("discard", now_ns, payload)
 
-    def enqueue(
-        self, now_ns: int, admitted: "Admitted", *, arrival: int, times: ChunkTimes, source: str
-    ) -> None:
+    def arrival_refusal(self, now_ns: int, about: Chunk, view: View) -> DiscardReason | None:
+        """Why a chunk may not enter the queue; None if it may."""
+        accepted = self.last_accepted.about.times if self.last_accepted is not None else None
+        waiting = [chunk.about.times for chunk in self._chunks]
+        moment = Moment(
+            now_ns=now_ns,
+            view=view,
+            about=about,
+            first_use_ns=max(now_ns, about.times.start_ns),
+            row=min(about.rows, view.execution_horizon) - 1,
+            head=self.head,
+            accepted_condition_ns=None if accepted is None else accepted.condition_ns,
+            accepted_start_ns=None if accepted is None else accepted.start_ns,
+            queued_condition_ns=max((times.condition_ns for times in waiting), default=None),
+            queued_start_ns=max((times.start_ns for times in waiting), default=None),
+        )
+        check = refusal(self._checks, Place.ARRIVAL, moment)
+        return None if check is None else check.reason
+
+    def enqueue(self, now_ns: int, admitted: "Admitted", about: Chunk, view: View) -> None:
         """Add a chunk; older ones lose their actions from its start on, and their place if full."""
-        rows = len(admitted.actions)
-        end_row = rows
-        if "execution_horizon" not in self._disabled:
-            end_row = min(end_row, self._settings.execution_horizon)
-        chunk = QueuedChunk(admitted, source, arrival, times, rows, end_row)
-        if "checked_rows" not in self._disabled:
-            first, last = admitted.verdict.rows
-            chunk.cut_at(last, DiscardReason.INFEASIBLE)
-            chunk.skip_to(first)
-        if "superseded" not in self._disabled:
-            for old in list(self._chunks):
-                started = times.start_ns <= now_ns
-                row = 0 if started else old.first_row_due_from(times.start_ns)
-                old.cut_at(row, DiscardReason.SUPERSEDED)
-                if old.open_rows == 0:
-                    self.close(now_ns, old, DiscardReason.SUPERSEDED)
+        chunk = QueuedChunk(admitted, about)
+        self._trim(now_ns, chunk, view, newer_start_ns=None)
+        for old in list(self._chunks):
+            self._trim(now_ns, old, view, newer_start_ns=about.times.start_ns)
+            if old.open_rows == 0:
+                self.close(now_ns, old, DiscardReason.SUPERSEDED)
         while len(self._chunks) >= self._settings.queue_capacity:
             self.close(now_ns, self._chunks[0], DiscardReason.QUEUE_OVERFLOW)
         self._journal.add("enqueue", now_ns, _enqueue_payload(chunk))
         self._chunks.append(chunk)
         self.head = chunk.chunk_id
-
-    def order_refusal(self, times: ChunkTimes, predecessor: str) -> DiscardReason | None:
-        """Behind a newer chunk, or not the continuation of the last one."""
-        if "out_of_order" not in self._disabled:
-            last = self.last_accepted
-            if last is not None and _older(times, last.times):
-                return DiscardReason.SUPERSEDED
-            if any(_older(times, chunk.times) for chunk in self._chunks):
-                return DiscardReason.OUT_OF_ORDER
-        if predecessor not in ("", self.head) and "predecessor" not in self._disabled:
-            return DiscardReason.BROKEN_PREDECESSOR
-        return None
 
     def remaining(self, now_ns: int) -> int:
         """Actions that can still be executed."""
@@ -95,55 +95,76 @@ class ChunkQueue:
             for chunk in self._chunks
         )
 
-    def sweep(self, now_ns: int, situation: Situation) -> None:
+    def sweep(self, now_ns: int, view: View) -> None:
         """Close what is stale, void or past; before any action is chosen."""
         for chunk in list(self._chunks):
-            reason = time_refusal(
-                chunk.times,
-                situation,
-                now_ns=now_ns,
-                first_use_ns=now_ns,
-                maximum_age_ns=self._maximum_age_ns,
-                disabled=self._disabled,
-            )
-            if reason is not None:
-                self.close(now_ns, chunk, reason)
+            check = self._ask(Place.QUEUE, now_ns, chunk, view)
+            if check is not None:
+                self.close(now_ns, chunk, check)
                 continue
-            if "window" not in self._disabled:
-                chunk.skip_to(chunk.row_at(now_ns))
+            while chunk.open_rows and self._ask(Place.PAST, now_ns, chunk, view):
+                chunk.skip()
             if chunk.open_rows == 0:
                 self.close(now_ns, chunk, None)
 
-    def due(self, now_ns: int) -> QueuedChunk | None:
-        """The newest started chunk, if its next row is due now and was not yet sent."""
-        oldest_first = "superseded" in self._disabled
-        for chunk in self._chunks if oldest_first else reversed(self._chunks):
-            row = chunk.row_at(now_ns)
-            if row < 0:
-                continue
-            if row < chunk.next_row:
-                return None
-            due_ns = chunk.due_ns(chunk.next_row)
-            again = self.last_due_ns is not None and due_ns <= self.last_due_ns
-            return None if again and "out_of_order" not in self._disabled else chunk
-        return None
+    def due(self, now_ns: int, view: View) -> QueuedChunk | None:
+        """The chunk whose next row is the command of this moment."""
+        newer_start_ns: int | None = None
+        found = None
+        for chunk in reversed(self._chunks):
+            if self._ask(Place.DUE, now_ns, chunk, view, newer_start_ns) is None:
+                found = chunk
+            start_ns = chunk.about.times.start_ns
+            newer_start_ns = start_ns if newer_start_ns is None else min(newer_start_ns, start_ns)
+        return found
 
-    def took(self, now_ns: int, chunk: QueuedChunk) -> None:
+    def accepted(self, now_ns: int, chunk: QueuedChunk) -> None:
         """The controller accepted the chunk's next row."""
-        self.last_accepted, self.last_due_ns = chunk, chunk.due_ns(chunk.next_row)
+        self.last_accepted = chunk
+        self.last_due_ns = chunk.about.times.due_ns(chunk.next_row)
         chunk.take()
         if chunk.open_rows == 0:
             self.close(now_ns, chunk, None)
 
-    def drop(
-        self, now_ns: int, reason: DiscardReason, check: str, source: str | None = None
-    ) -> None:
-        """Discard everything that is queued (of one source), unless `check` is disabled."""
-        if check in self._disabled:
-            return
+    def drop(self, now_ns: int, view: View, reason: DiscardReason) -> None:
+        """After an event: discard what the checks with this reason refuse now."""
+        checks = tuple(check for check in self._checks if check.reason is reason)
         for chunk in list(self._chunks):
-            if source in (None, chunk.source):
+            moment = Moment(now_ns=now_ns, view=view, about=chunk.about)
+            if refusal(checks, Place.QUEUE, moment) is not None:
                 self.close(now_ns, chunk, reason)
+
+    def _ask(
+        self,
+        place: Place,
+        now_ns: int,
+        chunk: QueuedChunk,
+        view: View,
+        newer_start_ns: int | None = None,
+    ) -> DiscardReason | None:
+        moment = Moment(
+            now_ns=now_ns, view=view, about=chunk.about, row=chunk.next_row,
+            newer_start_ns=newer_start_ns, last_due_ns=self.last_due_ns,
+        )  # fmt: skip
+        check = refusal(self._checks, place, moment)
+        return None if check is None else check.reason
+
+    def _trim(
+        self, now_ns: int, chunk: QueuedChunk, view: View, *, newer_start_ns: int | None
+    ) -> None:
+        """Take away rows that will never be executed: from the end, then from the front."""
+
+        def refused(row: int) -> str | None:
+            moment = Moment(
+                now_ns=now_ns, view=view, about=chunk.about, row=row, newer_start_ns=newer_start_ns
+            )
+            check = refusal(self._checks, Place.ROWS, moment)
+            return None if check is None else LOST_AS.get(check.name, str(check.reason))
+
+        while chunk.open_rows and (reason := refused(chunk.end_row - 1)) is not None:
+            chunk.cut_at(chunk.end_row - 1, reason)
+        while chunk.open_rows and refused(chunk.next_row) is not None:
+            chunk.skip()
 
     def close(
         self, now_ns: int, chunk: QueuedChunk, reason: DiscardReason | None, at: str = "queue"
@@ -160,7 +181,7 @@ class ChunkQueue:
         if self.head == chunk.chunk_id and not keeps_chain:
             self.head = None
         payload: Payload = {
-            "arrival": chunk.arrival, "chunk_id": chunk.chunk_id, "ended": ended,
+            "arrival": chunk.about.arrival, "chunk_id": chunk.chunk_id, "ended": ended,
             "rows": chunk.row_counts(),
         }  # fmt: skip
         if reason is None:
@@ -177,21 +198,18 @@ class ChunkQueue:
         return self._ledger.conservation(self._chunks)
 
 
-def _older(times: ChunkTimes, than: ChunkTimes) -> bool:
-    return times.condition_ns < than.condition_ns or times.start_ns < than.start_ns
-
-
 def _enqueue_payload(chunk: QueuedChunk) -> Payload:
-    metadata, times, admitted = chunk.admitted.metadata, chunk.times, chunk.admitted
+    admitted, about = chunk.admitted, chunk.about
+    metadata, times = about.metadata, about.times
     return {
-        "arrival": chunk.arrival, "chunk_id": chunk.chunk_id, "source": chunk.source,
+        "arrival": about.arrival, "chunk_id": chunk.chunk_id, "source": about.source,
         "method": metadata.method, "condition_ns": times.condition_ns,
         "start_ns": times.start_ns, "period_ns": times.period_ns,
         "valid_until_ns": times.valid_until_ns, "phase": metadata.task_phase,
         "calibration_epoch": metadata.calibration_epoch,
         "checkpoint": metadata.policy_checkpoint_hash, "sampler": metadata.sampler_config_hash,
         "session_epoch": metadata.session_epoch, "predecessor": metadata.predecessor_chunk_id,
-        "rows": chunk.rows, "actions": encode_actions(admitted.actions),
+        "rows": about.rows, "actions": encode_actions(admitted.actions),
         "actions_sha256": admitted.actions_sha256,
         "checked_rows": list(admitted.verdict.rows),
         "layers": {layer.name: bool(layer.passed) for layer in admitted.verdict.layers},

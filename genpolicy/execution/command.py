@@ -1,21 +1,11 @@
-"""Who commands, and what one tick of the executor hands on."""
+"""What one tick of the executor hands on."""
 
 from dataclasses import dataclass, field
-from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-
-
-class Mode(StrEnum):
-    """Who commands."""
-
-    RUN = "run"
-    FALLBACK = "fallback"
-    INTERVENTION = "intervention"
-    ENDED = "ended"
 
 
 @dataclass(frozen=True)

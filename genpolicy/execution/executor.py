@@ -7,21 +7,28 @@ ones from its start on. Whatever is doubtful is discarded with one reason, and t
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 from genpolicy.contract.chunk import ChunkMetadata, DiscardReason
-from genpolicy.execution.arrival import (
-    context_refusal,
-    is_whole,
-    issued_by_feasibility,
-    shape_of,
-    standing_refusal,
+from genpolicy.execution.arrival import issued_by_feasibility, read_chunk, shape_of
+from genpolicy.execution.checks import (
+    CHECKS,
+    FALLBACK,
+    POLICY,
+    Checks,
+    Mode,
+    Moment,
+    Place,
+    View,
+    missing,
+    refusal,
 )
 from genpolicy.execution.chunk_queue import ChunkQueue
-from genpolicy.execution.command import Command, Mode
-from genpolicy.execution.freshness import Situation
+from genpolicy.execution.command import Command
 from genpolicy.execution.journal import Journal, session_payload
-from genpolicy.execution.ledger import FALLBACK, POLICY, ChunkTimes, Conservation
-from genpolicy.execution.settings import NS_PER_S, ExecutorSettings, known_checks, to_ns
+from genpolicy.execution.ledger import Conservation
+from genpolicy.execution.nanoseconds import NEVER_NS, NS_PER_S, to_ns
+from genpolicy.execution.settings import ExecutorSettings
 from genpolicy.execution.stub import ControllerStub
 from genpolicy.feasibility.admission import Admitted
 
@@ -33,7 +40,7 @@ class Executor:
         settings: Horizons, periods, ages.
         journal: Where every event goes; one journal, one session.
         stub: The controller stub with its supervisor.
-        disabled_checks: For tests of the checker only; names of `CHECKS`.
+        checks: The table; a row that is missing is declared in the journal.
         genuine: Tells a chunk that feasibility issued from an imitation. Another rule than the
             default is for tests only and is declared in the journal.
 
@@ -51,7 +58,7 @@ class Executor:
         journal: Journal,
         stub: ControllerStub,
         *,
-        disabled_checks: frozenset[str] = frozenset(),
+        checks: Checks = CHECKS,
         genuine: Callable[[object], bool] = issued_by_feasibility,
     ) -> None:
         self.settings = settings
@@ -59,10 +66,14 @@ class Executor:
         self.observations_ignored = self.clock_faults = 0
         self.mode = Mode.RUN
         self._journal = journal
-        self._disabled = known_checks(disabled_checks)
+        self._checks = checks
         self._genuine = genuine
-        self._situation = Situation()
-        self._queue = ChunkQueue(settings, journal, self._disabled)
+        self._view = View(
+            fallback=settings.fallback_hash,
+            execution_horizon=settings.execution_horizon,
+            period_ns=settings.period_ns,
+        )
+        self._queue = ChunkQueue(settings, journal, checks)
         self._seen_ids: set[str] = set()
         self._in_flight: set[str] = set()
         self._sequence = 0
@@ -93,7 +104,7 @@ class Executor:
         """
         now_ns = self._begin(now_s)
         event_ns = to_ns(event_time_s) if math.isfinite(event_time_s * NS_PER_S) else now_ns + 1
-        newest_ns = self._situation.newest_observation_ns
+        newest_ns = self._view.newest_observation_ns
         ignored = "future" if event_ns > now_ns else ""
         if not ignored and newest_ns is not None and event_ns < newest_ns:
             ignored = "older"
@@ -106,20 +117,24 @@ class Executor:
         if ignored:
             self.observations_ignored += 1
             return False
-        first = newest_ns is None
-        self._situation.newest_observation_ns = event_ns
-        old_phase, old_epoch = self._situation.phase, self._situation.calibration_epoch
-        self._situation.phase, self._situation.calibration_epoch = phase, calibration_epoch
+        before = self._view
+        self._view = replace(
+            before,
+            newest_observation_ns=event_ns,
+            phase=phase,
+            calibration_epoch=calibration_epoch,
+            maximum_age_ns=self.settings.maximum_age_ns.get(phase),
+        )
         for kind, old, new, reason in (
-            ("phase", old_phase, phase, DiscardReason.PHASE_TRANSITION),
-            ("epoch", old_epoch, calibration_epoch, DiscardReason.CALIBRATION_MISMATCH),
-        ):
+            ("phase", before.phase, phase, DiscardReason.PHASE_TRANSITION),
+            ("epoch", before.calibration_epoch, calibration_epoch,
+             DiscardReason.CALIBRATION_MISMATCH),
+        ):  # fmt: skip
             if old != new:
                 change = {"event_time_ns": event_ns, "old": old, "new": new}
                 self._journal.add(kind, now_ns, change)
-                if not first:
-                    self._situation.void(reason, event_ns)
-                    self._queue.drop(now_ns, reason, str(reason))
+                if newest_ns is not None:
+                    self._void(now_ns, reason, event_ns)
         if divergence_m is not None and not self.settings.maximum_divergence_m - divergence_m >= 0:
             self._invalidate(now_ns, event_ns, DiscardReason.OBSERVATION_DIVERGENCE)
         return True
@@ -140,15 +155,9 @@ class Executor:
         active = {"checkpoint": checkpoint_hash, "sampler": sampler_hash}
         self._journal.add("active", now_ns, active)
         self.stub.hear_active(checkpoint_hash, sampler_hash)
-        situation = self._situation
-        old = (situation.checkpoint, situation.sampler)
-        situation.checkpoint, situation.sampler = checkpoint_hash, sampler_hash
-        if old[0] != checkpoint_hash:
-            reason = DiscardReason.CHECKPOINT_MISMATCH
-            self._queue.drop(now_ns, reason, "checkpoint_mismatch", source=POLICY)
-        if old[1] != sampler_hash:
-            reason = DiscardReason.SAMPLER_MISMATCH
-            self._queue.drop(now_ns, reason, "sampler_mismatch", source=POLICY)
+        self._view = replace(self._view, checkpoint=checkpoint_hash, sampler=sampler_hash)
+        self._drop(now_ns, DiscardReason.CHECKPOINT_MISMATCH)
+        self._drop(now_ns, DiscardReason.SAMPLER_MISMATCH)
 
     # -- who commands -------------------------------------------------------------------------
 
@@ -158,15 +167,13 @@ class Executor:
         It clears no stop of the supervisor; a person does.
         """
         now_ns = self._begin(now_s)
-        situation = self._situation
-        situation.session_epoch += 1
-        self._journal.add("reset", now_ns, {"session_epoch": situation.session_epoch})
-        self._queue.drop(now_ns, DiscardReason.RESET, "session_epoch")
-        situation.newest_observation_ns = None
-        situation.void(DiscardReason.RESET, now_ns)
+        epoch = self._view.session_epoch + 1
+        self._journal.add("reset", now_ns, {"session_epoch": epoch})
+        self._view = replace(self._view, session_epoch=epoch, newest_observation_ns=None)
+        self._void(now_ns, DiscardReason.RESET, now_ns)
         self._in_flight.clear()
         self._queue.forget()
-        self.stub.hear_reset(now_ns, situation.session_epoch)
+        self.stub.hear_reset(now_ns, epoch)
         if self.mode is not Mode.ENDED:
             self._enter(now_ns, Mode.RUN)
 
@@ -174,7 +181,7 @@ class Executor:
         """A person takes over: policy and fallback are discarded until `hand_back`."""
         now_ns = self._begin(now_s)
         self._enter(now_ns, Mode.INTERVENTION)
-        self._queue.drop(now_ns, DiscardReason.INTERVENTION, "intervention")
+        self._drop(now_ns, DiscardReason.INTERVENTION)
 
     def hand_back(self, now_s: float) -> None:
         """The person hands back; chunks conditioned before now stay void."""
@@ -188,7 +195,7 @@ class Executor:
         now_ns = self._begin(now_s)
         if self.mode is Mode.RUN:
             self._enter(now_ns, Mode.FALLBACK)
-            self._queue.drop(now_ns, DiscardReason.STOPPED, "stopped")
+            self._drop(now_ns, DiscardReason.STOPPED)
 
     def end_fallback(self, now_s: float) -> None:
         """The policy may command again, on observations from now on."""
@@ -200,7 +207,7 @@ class Executor:
     def end_episode(self, now_s: float) -> Conservation:
         """Discard what is left, write the balances down and accept nothing more."""
         now_ns = self._begin(now_s)
-        self._queue.drop(now_ns, DiscardReason.END_OF_EPISODE, "end_of_episode")
+        self._queue.drop(now_ns, replace(self._view, mode=Mode.ENDED), DiscardReason.END_OF_EPISODE)
         self._enter(now_ns, Mode.ENDED)
         balance = self.conservation()
         payload = {
@@ -216,7 +223,7 @@ class Executor:
     @property
     def session_epoch(self) -> int:
         """What a chunk made now must carry."""
-        return self._situation.session_epoch
+        return self._view.session_epoch
 
     @property
     def chain_head(self) -> str:
@@ -287,15 +294,11 @@ class Executor:
             return self._hold(now_ns, "clock_backwards")
         self.stub.poll(now_s)
         self._heed_supervisor(now_ns)
-        if self.stub.supervisor.stopped and "stopped" not in self._disabled:
-            self._hold(now_ns, "stopped")
-            return Command("stop", str(self.stub.supervisor.state))
-        self._queue.sweep(now_ns, self._situation)
-        if self.mode is Mode.ENDED and "end_of_episode" not in self._disabled:
-            return Command("hold", "ended")
-        chunk = self._queue.due(now_ns)
+        view = self._present()
+        self._queue.sweep(now_ns, view)
+        chunk = self._queue.due(now_ns, view)
         if chunk is None:
-            return self._hold(now_ns, "intervention" if self.mode is Mode.INTERVENTION else "empty")
+            return self._nothing(now_ns)
         row = chunk.next_row
         action = chunk.admitted.actions[row]
         self._sequence += 1
@@ -303,16 +306,16 @@ class Executor:
             chunk.admitted,
             action,
             row=row,
-            source=chunk.source,
-            arrival=chunk.arrival,
+            source=chunk.about.source,
+            arrival=chunk.about.arrival,
             sequence=self._sequence,
             now_ns=now_ns,
         )
         if reason is not None:
             self._queue.close(now_ns, chunk, reason, at="stub")
             return self._hold(now_ns, f"refused: {reason}")
-        self._queue.took(now_ns, chunk)
-        kind = "fallback" if chunk.source == FALLBACK else "action"
+        self._queue.accepted(now_ns, chunk)
+        kind = "fallback" if chunk.about.source == FALLBACK else "action"
         return Command(kind, "", action, chunk.chunk_id, row)
 
     # -- inside -------------------------------------------------------------------------------
@@ -327,7 +330,7 @@ class Executor:
             payload = session_payload(
                 self.settings,
                 labels=self._journal.labels,
-                disabled=self._disabled,
+                checks_missing=missing(self._checks, self.stub.checks, self.stub.supervisor.checks),
                 genuine=self._genuine is issued_by_feasibility,
             )
             self._journal.add("session", now_ns, payload)
@@ -338,40 +341,23 @@ class Executor:
         rows, chunk_id = shape_of(admitted)
         arrival = self._queue.arrive(rows)
         genuine = self._genuine(admitted)
-        reason = self._arrival_refusal(admitted, now_ns, source, genuine=genuine)
+        known = genuine and chunk_id in self._seen_ids
         if genuine:  # an imitation must not use up the name of a chunk to come
             self._seen_ids.add(chunk_id)
+        about = read_chunk(admitted, arrival=arrival, source=source) if genuine else None
+        view = self._present()
+        at_door = refusal(self._checks, Place.DOOR, Moment(now_ns=now_ns, view=view, known=known))
+        if at_door is not None:
+            reason = at_door.reason
+        elif about is None:
+            reason = DiscardReason.INFEASIBLE
+        else:
+            reason = self._queue.arrival_refusal(now_ns, about, view)
+            if reason is None:
+                self._queue.enqueue(now_ns, admitted, about, view)
         if reason is not None:
             self._refuse(now_ns, arrival, chunk_id, rows, reason)
-            return reason
-        times = ChunkTimes.of(admitted.metadata)
-        self._queue.enqueue(now_ns, admitted, arrival=arrival, times=times, source=source)
-        return None
-
-    def _arrival_refusal(
-        self, admitted: Admitted, now_ns: int, source: str, *, genuine: bool
-    ) -> DiscardReason | None:
-        reason = standing_refusal(
-            self.mode,
-            source,
-            known=genuine and admitted.metadata.chunk_id in self._seen_ids,
-            whole=genuine
-            and is_whole(admitted, period_ns=self.settings.period_ns, disabled=self._disabled),
-            stopped=self.stub.supervisor.stopped,
-            disabled=self._disabled,
-        )
-        if reason is not None:
-            return reason
-        return context_refusal(
-            admitted,
-            self._situation,
-            now_ns=now_ns,
-            source=source,
-            settings=self.settings,
-            disabled=self._disabled,
-        ) or self._queue.order_refusal(
-            ChunkTimes.of(admitted.metadata), admitted.metadata.predecessor_chunk_id
-        )
+        return reason
 
     def _refuse(
         self, now_ns: int, arrival: int, chunk_id: str, rows: int, reason: DiscardReason
@@ -380,25 +366,45 @@ class Executor:
             now_ns, arrival=arrival, chunk_id=chunk_id, rows=rows, reason=str(reason)
         )
 
+    def _present(self) -> View:
+        """The view with what the supervisor and the mode say now."""
+        return replace(self._view, mode=self.mode, stopped=self.stub.supervisor.stopped)
+
     def _heed_supervisor(self, now_ns: int) -> None:
         supervisor = self.stub.supervisor
         if supervisor.stops != self._stops_seen:
             self._stops_seen = supervisor.stops
-            self._queue.drop(now_ns, DiscardReason.STOPPED, "stopped")
-        self._situation.void(DiscardReason.STOPPED, supervisor.resumed_ns)
+            self._void(now_ns, DiscardReason.STOPPED, NEVER_NS)
+        self._view = self._view.voided(DiscardReason.STOPPED, supervisor.resumed_ns)
+
+    def _void(self, now_ns: int, reason: DiscardReason, before_ns: int) -> None:
+        """Nothing conditioned before this time, and nothing that is here, is used any more."""
+        self._view = self._view.voided(reason, before_ns, self._queue.arrivals)
+        self._drop(now_ns, reason)
+
+    def _drop(self, now_ns: int, reason: DiscardReason) -> None:
+        self._queue.drop(now_ns, self._present(), reason)
 
     def _invalidate(self, now_ns: int, before_ns: int, reason: DiscardReason) -> None:
         """Void what was conditioned before `before_ns`, here and at the stub."""
         self._journal.add("invalidate", now_ns, {"reason": str(reason), "before_ns": before_ns})
-        self._situation.void(reason, before_ns)
-        self.stub.void(str(reason), reason, before_ns)
-        self._queue.drop(now_ns, reason, str(reason))
+        self.stub.void(reason, before_ns)
+        self._void(now_ns, reason, before_ns)
 
     def _enter(self, now_ns: int, mode: Mode) -> None:
         if mode is not self.mode:
             self._journal.add("mode", now_ns, {"old": str(self.mode), "new": str(mode)})
             self.mode = mode
             self.stub.hear_mode(str(mode))
+
+    def _nothing(self, now_ns: int) -> Command:
+        """No chunk is due: stop, hold, or nothing more after the end."""
+        if self.stub.supervisor.stopped:
+            self._hold(now_ns, "stopped")
+            return Command("stop", str(self.stub.supervisor.state))
+        if self.mode is Mode.ENDED:
+            return Command("hold", "ended")
+        return self._hold(now_ns, "intervention" if self.mode is Mode.INTERVENTION else "empty")
 
     def _hold(self, now_ns: int, reason: str) -> Command:
         self.stub.hold(now_ns, reason)

@@ -8,7 +8,7 @@ of little-endian float64 rows, so that equality is equality of bits (`decode_act
 
 import io
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,20 +20,21 @@ from numpy.typing import NDArray
 
 from genpolicy.contract.action import ACTION_DIM
 from genpolicy.errors import BadInputError, ContractError
-from genpolicy.execution.settings import ExecutorSettings, to_ns
+from genpolicy.execution.nanoseconds import to_ns
+from genpolicy.execution.settings import ExecutorSettings
 from genpolicy.integrity.atomic import write_bytes
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_bytes_of
 
 Array = NDArray[np.float64]
 
-JOURNAL_VERSION = 1
+JOURNAL_VERSION = 2
 MAXIMUM_UNCOMPRESSED_BYTES = 8 << 30
 MAXIMUM_RECORD_BYTES = 64 << 20
 
 EVENT_FIELDS: dict[str, tuple[str, ...]] = {
     "session": ("version", "labels", "execution_horizon", "period_ns", "maximum_age_ns",
-                "watchdog_ns", "queue_capacity", "fallback_hash", "disabled_checks", "admission"),
+                "watchdog_ns", "queue_capacity", "fallback_hash", "checks_missing", "admission"),
     "observation": ("event_time_ns", "phase", "calibration_epoch", "used", "ignored_because"),
     "phase": ("event_time_ns", "old", "new"),
     "epoch": ("event_time_ns", "old", "new"),
@@ -132,7 +133,7 @@ def session_payload(
     settings: ExecutorSettings,
     *,
     labels: Mapping[str, str],
-    disabled: frozenset[str],
+    checks_missing: Sequence[str],
     genuine: bool,
 ) -> dict[str, Any]:
     """Payload of the first event: what the session is held to."""
@@ -145,7 +146,7 @@ def session_payload(
         "watchdog_ns": settings.watchdog_ns,
         "queue_capacity": settings.queue_capacity,
         "fallback_hash": settings.fallback_hash,
-        "disabled_checks": sorted(disabled),
+        "checks_missing": list(checks_missing),
         "admission": "feasibility" if genuine else "imitation",
     }
 

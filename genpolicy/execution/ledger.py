@@ -11,14 +11,13 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from genpolicy.contract.chunk import ChunkMetadata
-from genpolicy.execution.settings import BEYOND_HORIZON, LATE, to_ns
+from genpolicy.execution.checks import Chunk
 
 if TYPE_CHECKING:
     from genpolicy.feasibility.admission import Admitted
 
-POLICY = "policy"
-FALLBACK = "fallback"
+LATE = "late"
+BEYOND_HORIZON = "beyond_execution_horizon"
 
 
 @dataclass(frozen=True)
@@ -65,52 +64,24 @@ class Conservation:
         return abs(self.chunks.error) + abs(self.actions.error)
 
 
-@dataclass(frozen=True, slots=True)
-class ChunkTimes:
-    """The times of a chunk in ns."""
-
-    condition_ns: int
-    start_ns: int
-    period_ns: int
-    valid_until_ns: int
-
-    @classmethod
-    def of(cls, metadata: ChunkMetadata) -> "ChunkTimes":
-        """Times of a chunk.
-
-        Raises:
-            NonFiniteError: A time is too large to be one.
-        """
-        return cls(
-            condition_ns=to_ns(metadata.condition_observation_event_time_s),
-            start_ns=to_ns(metadata.action_start_time_s),
-            period_ns=to_ns(metadata.action_period_s),
-            valid_until_ns=to_ns(metadata.valid_until_s),
-        )
-
-
 @dataclass(slots=True)
 class QueuedChunk:
     """An enqueued chunk: `next_row` is the first action not yet decided, `end_row` the limit."""
 
     admitted: "Admitted"
-    source: str
-    arrival: int
-    times: ChunkTimes
-    rows: int
-    end_row: int
+    about: Chunk
+    end_row: int = field(init=False)
     next_row: int = 0
     executed: int = 0
     lost: Counter[str] = field(default_factory=Counter)
 
     def __post_init__(self) -> None:
-        if self.rows > self.end_row:
-            self.lost[BEYOND_HORIZON] += self.rows - self.end_row
+        self.end_row = self.about.rows
 
     @property
     def chunk_id(self) -> str:
         """Name of the chunk."""
-        return self.admitted.metadata.chunk_id
+        return self.about.metadata.chunk_id
 
     @property
     def open_rows(self) -> int:
@@ -119,18 +90,12 @@ class QueuedChunk:
 
     def row_at(self, now_ns: int) -> int:
         """Row that is due now; negative before the start."""
-        return (now_ns - self.times.start_ns) // self.times.period_ns
+        return (now_ns - self.about.times.start_ns) // self.about.times.period_ns
 
-    def due_ns(self, row: int) -> int:
-        """Begin of a row's window."""
-        return self.times.start_ns + row * self.times.period_ns
-
-    def skip_to(self, row: int) -> None:
-        """Count the rows before `row` as late."""
-        target = min(max(row, self.next_row), self.end_row)
-        if target > self.next_row:
-            self.lost[LATE] += target - self.next_row
-            self.next_row = target
+    def skip(self) -> None:
+        """Count the next row as late."""
+        self.lost[LATE] += 1
+        self.next_row += 1
 
     def cut_at(self, row: int, reason: str) -> None:
         """Drop the rows from `row` on."""
@@ -138,10 +103,6 @@ class QueuedChunk:
         if limit < self.end_row:
             self.lost[str(reason)] += self.end_row - limit
             self.end_row = limit
-
-    def first_row_due_from(self, time_ns: int) -> int:
-        """First row whose window begins at `time_ns` or later."""
-        return -((self.times.start_ns - time_ns) // self.times.period_ns)
 
     def take(self) -> None:
         """The controller accepted `next_row`."""

@@ -18,7 +18,7 @@ from genpolicy.contract.chunk import ChunkMetadata, Proposal
 from genpolicy.errors import ConfigError, ContractError
 from genpolicy.execution.executor import Executor
 from genpolicy.execution.journal import Journal
-from genpolicy.execution.settings import to_ns
+from genpolicy.execution.nanoseconds import to_ns
 
 if TYPE_CHECKING:
     from genpolicy.feasibility.admission import Admitted

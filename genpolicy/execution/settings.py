@@ -1,62 +1,12 @@
-"""Settings of the executor, its time arithmetic, and the names of its checks.
-
-All comparisons are made in whole nanoseconds: `n * 0.05` is not a multiple of 0.05 in floating
-point, but rounded to nanoseconds it is one of 50 000 000.
-"""
+"""Settings of the executor; times in s, in whole ns for those who compare."""
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-from genpolicy.errors import ConfigError, NonFiniteError
-
-NS_PER_S = 1_000_000_000
-LAYER_COUNT = 6
-LATE = "late"
-BEYOND_HORIZON = "beyond_execution_horizon"
-
-CHECKS = (
-    "calibration_mismatch",
-    "checked_rows",
-    "checkpoint_mismatch",
-    "collision_event",
-    "duplicate",
-    "end_of_episode",
-    "execution_horizon",
-    "expired",
-    "force_event",
-    "future_observation",
-    "action_hash",
-    "infeasible",
-    "intervention",
-    "observation_divergence",
-    "out_of_order",
-    "phase_transition",
-    "predecessor",
-    "sampler_mismatch",
-    "session_epoch",
-    "stale_observation",
-    "stopped",
-    "superseded",
-    "watchdog",
-    "window",
-)
-"""Names that `disabled_checks` understands; a mutant for each proves the checker is awake."""
-
-
-def to_ns(time_s: float) -> int:
-    """Whole nanoseconds of a time in s.
-
-    Raises:
-        NonFiniteError: NaN, infinite, or too large to convert.
-    """
-    scaled = time_s * NS_PER_S
-    if not math.isfinite(scaled):
-        raise NonFiniteError(
-            where="a time", found=repr(time_s), expected="finite, s", action="Hold; fix the clock."
-        )
-    return round(scaled)
+from genpolicy.errors import ConfigError
+from genpolicy.execution.nanoseconds import to_ns
 
 
 @dataclass(frozen=True)
@@ -119,19 +69,3 @@ class ExecutorSettings:
     def maximum_age_ns(self) -> dict[str, int]:
         """Largest action age per phase, ns."""
         return {phase: to_ns(age) for phase, age in self.maximum_age_s.items()}
-
-
-def known_checks(disabled: frozenset[str]) -> frozenset[str]:
-    """`disabled`, refused if it names a check that does not exist.
-
-    Raises:
-        ConfigError: A name is not in `CHECKS`.
-    """
-    for name in sorted(disabled - set(CHECKS)):
-        raise ConfigError(
-            where="disabled_checks",
-            found=repr(name),
-            expected="a name in CHECKS",
-            action="Disabling is for tests of the checker only.",
-        )
-    return disabled

@@ -1,18 +1,25 @@
 """The controller stub: the last check before a controller, and the end of the road.
 
-It asks every question about freshness again, with bookkeeping and code of its own, counts what
-arrives, and moves nothing: there is no controller behind it. A refusal means hold.
+It is a second look: it follows phase, calibration, weights, resets and voiding events by itself,
+reads the offered chunk by itself, and believes nothing of what the executor concluded. The
+questions are the executor's, from one table (`checks`): two wordings of "stale" would be two
+definitions, and the laxer one would hold. That the one wording is right is proved by another: the
+independent checker (`genpolicy.verification`) imports nothing of this. A refusal means hold; there
+is no controller behind it.
 """
 
 import hashlib
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from genpolicy.contract.chunk import ChunkMetadata, DiscardReason
+from genpolicy.contract.chunk import DiscardReason
+from genpolicy.execution.checks import CHECKS, Checks, Chunk, Moment, Place, View, refusal
 from genpolicy.execution.journal import Journal, encode_actions
-from genpolicy.execution.settings import ExecutorSettings, known_checks, to_ns
+from genpolicy.execution.nanoseconds import ChunkTimes
+from genpolicy.execution.settings import ExecutorSettings
 from genpolicy.execution.supervisor import Supervisor
 
 if TYPE_CHECKING:
@@ -28,7 +35,7 @@ class ControllerStub:
         settings: The same limits that the executor is held to.
         journal: Where arrivals go.
         supervisor: The independent gate; while it stops, nothing is accepted.
-        disabled_checks: For tests of the checker only; names of `CHECKS`.
+        checks: The table; its rows of the place `STUB` are asked.
 
     Attributes:
         arrivals: Actions offered.
@@ -43,20 +50,18 @@ class ControllerStub:
         journal: Journal,
         supervisor: Supervisor,
         *,
-        disabled_checks: frozenset[str] = frozenset(),
+        checks: Checks = CHECKS,
     ) -> None:
         self.supervisor = supervisor
         self.arrivals = self.accepted = self.stale = self.invalid = 0
-        self._settings = settings
+        self.checks = checks
         self._journal = journal
-        self._disabled = known_checks(disabled_checks)
         self._maximum_age_ns = settings.maximum_age_ns
-        self._seen_ns: int | None = None
-        self._phase = self._calibration = ""
-        self._identity = {"policy": ("", ""), "fallback": (settings.fallback_hash,) * 2}
-        self._session_epoch = 0
-        self._mode = "run"
-        self._not_before: list[tuple[str, DiscardReason, int]] = []
+        self._view = View(
+            fallback=settings.fallback_hash,
+            execution_horizon=settings.execution_horizon,
+            period_ns=settings.period_ns,
+        )
         self._last_due_ns: int | None = None
         self._last_sequence = -1
 
@@ -64,32 +69,38 @@ class ControllerStub:
         self, now_ns: int, event_ns: int, phase: str, calibration_epoch: str
     ) -> None:
         """Its own view of phase, calibration and newest observation."""
-        if event_ns > now_ns or (self._seen_ns is not None and event_ns < self._seen_ns):
+        old, seen_ns = self._view, self._view.newest_observation_ns
+        if event_ns > now_ns or (seen_ns is not None and event_ns < seen_ns):
             return
-        if self._phase != phase and self._seen_ns is not None:
-            self.void("phase_transition", DiscardReason.PHASE_TRANSITION, event_ns)
-        if self._calibration != calibration_epoch and self._seen_ns is not None:
-            self.void("calibration_mismatch", DiscardReason.CALIBRATION_MISMATCH, event_ns)
-        self._seen_ns, self._phase, self._calibration = event_ns, phase, calibration_epoch
+        if old.phase != phase and seen_ns is not None:
+            self.void(DiscardReason.PHASE_TRANSITION, event_ns)
+        if old.calibration_epoch != calibration_epoch and seen_ns is not None:
+            self.void(DiscardReason.CALIBRATION_MISMATCH, event_ns)
+        self._view = replace(
+            self._view,
+            newest_observation_ns=event_ns,
+            phase=phase,
+            calibration_epoch=calibration_epoch,
+            maximum_age_ns=self._maximum_age_ns.get(phase),
+        )
 
     def hear_active(self, checkpoint: str, sampler: str) -> None:
         """Which weights and sampler may command."""
-        self._identity["policy"] = (checkpoint, sampler)
+        self._view = replace(self._view, checkpoint=checkpoint, sampler=sampler)
 
     def hear_mode(self, mode: str) -> None:
         """Who may command: run (the policy), fallback, intervention or ended (nobody)."""
-        self._mode = mode
+        self._view = replace(self._view, mode=mode)
 
     def hear_reset(self, now_ns: int, session_epoch: int) -> None:
         """A new session: nothing from before is accepted."""
-        self._session_epoch = session_epoch
-        self._seen_ns = self._last_due_ns = None
-        self.void("session_epoch", DiscardReason.RESET, now_ns)
+        self._view = replace(self._view, session_epoch=session_epoch, newest_observation_ns=None)
+        self._last_due_ns = None
+        self.void(DiscardReason.RESET, now_ns)
 
-    def void(self, check: str, reason: DiscardReason, time_ns: int) -> None:
-        """Nothing conditioned before `time_ns` is accepted from now on."""
-        self._not_before = [item for item in self._not_before if item[0] != check]
-        self._not_before.append((check, reason, time_ns))
+    def void(self, reason: DiscardReason, before_ns: int) -> None:
+        """Nothing conditioned before `before_ns` is accepted from now on."""
+        self._view = self._view.voided(reason, before_ns)
 
     def poll(self, now_s: float) -> None:
         """The consumer's own clock: runs the watchdog also while the executor is paused."""
@@ -127,84 +138,57 @@ class ControllerStub:
             None when accepted.
         """
         self.arrivals += 1
-        reason = self._not_the_admitted_row(admitted, action, row)
-        if reason is not None:
-            self.invalid += 1
-        else:
-            reason = self._not_fresh(admitted.metadata, row, source, sequence, now_ns)
-            self.stale += reason is not None
-        place = {"arrival": arrival, "chunk_id": admitted.metadata.chunk_id, "row": row}
-        if reason is not None:
-            self._journal.add("refuse", now_ns, {**place, "reason": str(reason)})
-            return reason
+        about = self._read(admitted, source=source, arrival=arrival)
+        moment = Moment(
+            now_ns=now_ns,
+            view=self._present(),
+            about=about,
+            row=row,
+            same_action=_is_row(admitted, action, row),
+            last_due_ns=self._last_due_ns,
+            sequence=sequence,
+            last_sequence=self._last_sequence,
+        )
+        check = refusal(self.checks, Place.STUB, moment)
+        place = {"arrival": arrival, "chunk_id": about.metadata.chunk_id, "row": row}
+        if check is not None:
+            self.invalid += check.reason is DiscardReason.INFEASIBLE
+            self.stale += check.reason is not DiscardReason.INFEASIBLE
+            self._journal.add("refuse", now_ns, {**place, "reason": str(check.reason)})
+            return check.reason
         self.accepted += 1
         self._last_sequence = sequence
-        self._last_due_ns = self._due_ns(admitted.metadata, row)
+        self._last_due_ns = moment.due_ns
         self.supervisor.heard_accept(now_ns)
-        age_ns = now_ns - to_ns(admitted.metadata.condition_observation_event_time_s)
-        payload = {**place, "sequence": sequence, "age_ns": age_ns}
+        payload = {**place, "sequence": sequence, "age_ns": now_ns - about.times.condition_ns}
         payload["action"] = encode_actions(action)
         self._journal.add("fallback" if source == "fallback" else "accept", now_ns, payload)
         return None
 
-    def _not_the_admitted_row(
-        self, admitted: "Admitted", action: Array, row: int
-    ) -> DiscardReason | None:
-        rows = admitted.actions
-        allowed = len(rows)
-        if "execution_horizon" not in self._disabled:
-            allowed = min(allowed, self._settings.execution_horizon)
-        first, last = admitted.verdict.rows
-        unchecked = not first <= row < last and "checked_rows" not in self._disabled
-        if unchecked or not 0 <= row < allowed:
-            return DiscardReason.INFEASIBLE
-        whole = np.ascontiguousarray(rows, dtype="<f8")
-        if "action_hash" not in self._disabled:
-            if hashlib.sha256(whole.tobytes()).hexdigest() != admitted.actions_sha256:
-                return DiscardReason.INFEASIBLE
-            if np.asarray(action, dtype="<f8").tobytes() != whole[row].tobytes():
-                return DiscardReason.INFEASIBLE
-        return None
-
-    def _not_fresh(
-        self, chunk: ChunkMetadata, row: int, source: str, sequence: int, now_ns: int
-    ) -> DiscardReason | None:
-        seen_ns = to_ns(chunk.condition_observation_event_time_s)
-        due_ns = self._due_ns(chunk, row)
-        checkpoint, sampler = self._identity[source]
-        ahead = self._seen_ns is None or seen_ns > self._seen_ns or seen_ns > now_ns
-        old = now_ns - seen_ns > self._maximum_age_ns.get(self._phase, -1)
-        going_back = sequence <= self._last_sequence or (
-            self._last_due_ns is not None and due_ns <= self._last_due_ns
-        )
-        in_window = due_ns <= now_ns < due_ns + self._settings.period_ns
-        faults = (
-            ("stopped", self.supervisor.stopped, DiscardReason.STOPPED),
-            ("stopped", seen_ns < self.supervisor.resumed_ns, DiscardReason.STOPPED),
-            ("stopped", (source, self._mode) in (("policy", "fallback"), ("fallback", "run")),
-             DiscardReason.STOPPED),
-            ("intervention", self._mode == "intervention", DiscardReason.INTERVENTION),
-            ("end_of_episode", self._mode == "ended", DiscardReason.END_OF_EPISODE),
-            ("session_epoch", chunk.session_epoch != self._session_epoch, DiscardReason.RESET),
-            ("checkpoint_mismatch", chunk.policy_checkpoint_hash != checkpoint,
-             DiscardReason.CHECKPOINT_MISMATCH),
-            ("sampler_mismatch", chunk.sampler_config_hash != sampler,
-             DiscardReason.SAMPLER_MISMATCH),
-            ("phase_transition", chunk.task_phase != self._phase, DiscardReason.PHASE_TRANSITION),
-            ("calibration_mismatch", chunk.calibration_epoch != self._calibration,
-             DiscardReason.CALIBRATION_MISMATCH),
-            ("future_observation", ahead, DiscardReason.FUTURE_OBSERVATION),
-            ("stale_observation", old, DiscardReason.STALE_OBSERVATION),
-            ("expired", now_ns > to_ns(chunk.valid_until_s), DiscardReason.EXPIRED),
-            ("window", not in_window, DiscardReason.EXPIRED),
-            ("out_of_order", going_back, DiscardReason.OUT_OF_ORDER),
-            *((check, seen_ns < time_ns, reason) for check, reason, time_ns in self._not_before),
-        )  # fmt: skip
-        for check, faulty, reason in faults:
-            if faulty and check not in self._disabled:
-                return reason
-        return None
+    def _present(self) -> View:
+        """Its view, with what its supervisor says now."""
+        view = self._view.voided(DiscardReason.STOPPED, self.supervisor.resumed_ns)
+        return replace(view, stopped=self.supervisor.stopped)
 
     @staticmethod
-    def _due_ns(chunk: ChunkMetadata, row: int) -> int:
-        return to_ns(chunk.action_start_time_s) + row * to_ns(chunk.action_period_s)
+    def _read(admitted: "Admitted", *, source: str, arrival: int) -> Chunk:
+        """The offered chunk; whether it passed the layers was asked where it arrived."""
+        whole = np.ascontiguousarray(admitted.actions, dtype="<f8")
+        first, last = admitted.verdict.rows
+        return Chunk(
+            metadata=admitted.metadata,
+            times=ChunkTimes.of(admitted.metadata),
+            source=source,
+            arrival=arrival,
+            rows=len(whole),
+            checked_rows=(first, last),
+            hashed=hashlib.sha256(whole.tobytes()).hexdigest() == admitted.actions_sha256,
+        )
+
+
+def _is_row(admitted: "Admitted", action: Array, row: int) -> bool:
+    """The action is that row of the chunk, bit for bit."""
+    if not 0 <= row < len(admitted.actions):
+        return False
+    own = np.ascontiguousarray(admitted.actions[row], dtype="<f8")
+    return np.asarray(action, dtype="<f8").tobytes() == own.tobytes()

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from genpolicy.errors import ConfigError, ContractError
+from genpolicy.execution.checks import CHECKS, Checks, Moment, Place, refusal
 from genpolicy.execution.journal import Journal
-from genpolicy.execution.settings import to_ns
+from genpolicy.execution.nanoseconds import to_ns
 
 
 class SupervisorState(StrEnum):
@@ -63,22 +64,22 @@ class Supervisor:
     Args:
         settings: Its limits.
         journal: Where its events go.
-        watchdog_enabled: False only for the mutant that proves the checker sees a dead watchdog.
+        checks: The table; its rows of the place `SUPERVISOR` are asked.
     """
 
     def __init__(
-        self, settings: SupervisorSettings, journal: Journal, *, watchdog_enabled: bool = True
+        self, settings: SupervisorSettings, journal: Journal, *, checks: Checks = CHECKS
     ) -> None:
         self.settings = settings
         self.state = SupervisorState.RUN
         self.resumed_ns = -(1 << 62)
         self.stops = 0
+        self.checks = checks
         self._journal = journal
         self._watchdog_ns = to_ns(settings.watchdog_s)
         self._silence_ns = (
             to_ns(settings.silence_stop_s) if math.isfinite(settings.silence_stop_s) else None
         )
-        self._watchdog_enabled = watchdog_enabled
         self._last_accept_ns: int | None = None
 
     @property
@@ -155,13 +156,17 @@ class Supervisor:
 
     def poll(self, now_ns: int) -> bool:
         """Watchdog, on the consumer's clock. Returns whether it has just begun to hold."""
-        if self._last_accept_ns is None or self.stopped or not self._watchdog_enabled:
+        if self._last_accept_ns is None or self.stopped:
             return False
         silence_ns = now_ns - self._last_accept_ns
         if self._silence_ns is not None and not self._silence_ns - silence_ns >= 0:
             self._stop(now_ns, SupervisorState.PROTECTIVE_STOP, "silence", f"{silence_ns} ns")
             return False
-        if self.state is SupervisorState.RUN and not self._watchdog_ns - silence_ns >= 0:
+        moment = Moment(
+            now_ns=now_ns, last_accept_ns=self._last_accept_ns, watchdog_ns=self._watchdog_ns
+        )
+        silent = refusal(self.checks, Place.SUPERVISOR, moment) is not None
+        if self.state is SupervisorState.RUN and silent:
             self.state = SupervisorState.WATCHDOG_HOLD
             self._record(now_ns, "watchdog", f"{silence_ns} ns")
             return True

@@ -13,6 +13,7 @@ from genpolicy.contract.chunk import Projected, Proposal
 from genpolicy.errors import ConfigError
 from genpolicy.feasibility import layers
 from genpolicy.feasibility.context import Context, Workspace
+from genpolicy.feasibility.freshness import fresh
 from genpolicy.feasibility.geometric import geometric
 from genpolicy.feasibility.projection import project, smooth_rates
 from genpolicy.feasibility.settings import CHECKS, CHECKS_BY_LAYER, LAYERS, FeasibilitySettings
@@ -197,7 +198,7 @@ class LayerChecker:
             self._motion(group, evaluate_all)
         for state in states:
             if state.alive or evaluate_all:
-                state.margins |= layers.fresh(state.projected.metadata, state.context)
+                state.margins |= fresh(state.projected.metadata, state.context)
         return [self._verdict(state, evaluate_all) for state in states]
 
     def solve(self, projected: Projected, *, context: Context) -> Array:

@@ -232,6 +232,9 @@ class _Session:
         self.report.chunks += 1
         if chunk_id in self.chunks:
             self.flag("P3.duplicate", f"{chunk_id!r} was enqueued before.")
+        for other in self.open.values():
+            if m["condition_ns"] < other["condition_ns"] or m["start_ns"] < other["start_ns"]:
+                self.flag("P5.order", f"{chunk_id!r} is older than {other['chunk_id']!r}, queued.")
         self.chunks[chunk_id] = self.open[m["arrival"]] = m
         data = bytes.fromhex(m["actions"])
         if len(data) * 2 != m["rows"] * ROW_HEX_DIGITS:
@@ -274,9 +277,9 @@ class _Session:
         self.world.fallback_hash = m["fallback_hash"]
         if self.expected is not None and m["admission"] != "feasibility":
             self.flag("settings.admission", "Chunks were accepted that feasibility did not issue.")
-        if m["disabled_checks"]:
-            self.report.disabled_checks.update(m["disabled_checks"])
-            self.flag("settings.disabled", f"Checks are disabled: {m['disabled_checks']}.")
+        if m["checks_missing"]:
+            self.report.checks_missing.update(m["checks_missing"])
+            self.flag("settings.checks", f"Checks are missing: {m['checks_missing']}.")
         for key, value in (self.expected.declared() if self.expected else {}).items():
             if m[key] != value:
                 self.flag("settings.limits", f"{key} is {m[key]!r}, expected {value!r}.")

@@ -36,7 +36,7 @@ class CheckReport:
         discarded: Chunks discarded by reason.
         oldest_action_ns: Largest action age found.
         longest_silence_ns: Longest time from an accepted action to the next command or hold.
-        disabled_checks: Checks that a session ran without; anything here is a violation too.
+        checks_missing: Checks that a session ran without; anything here is a violation too.
     """
 
     violations: list[Violation] = field(default_factory=list)
@@ -48,7 +48,7 @@ class CheckReport:
     discarded: Counter[str] = field(default_factory=Counter)
     oldest_action_ns: int = 0
     longest_silence_ns: int = 0
-    disabled_checks: set[str] = field(default_factory=set)
+    checks_missing: set[str] = field(default_factory=set)
 
     def as_document(self) -> dict[str, Any]:
         """For `checker.json`."""

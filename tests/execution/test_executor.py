@@ -13,7 +13,7 @@ from genpolicy.errors import ConfigError, NonFiniteError
 from genpolicy.evidence.shadow.rig import CHECKPOINT, SAMPLER, SETTINGS, Rig, passing_verdict
 from genpolicy.execution.executor import Executor
 from genpolicy.execution.ledger import Account, Conservation
-from genpolicy.execution.settings import to_ns
+from genpolicy.execution.nanoseconds import to_ns
 from genpolicy.verification.checker import check_messages
 
 R = DiscardReason

@@ -4,18 +4,17 @@ import numpy as np
 import pytest
 
 from genpolicy.contract.chunk import DiscardReason
-from genpolicy.evidence.shadow.mutants import SCENARIOS
+from genpolicy.evidence.shadow.mutants import SCENARIOS, without
 from genpolicy.evidence.shadow.rig import CHECKPOINT, SAMPLER, SETTINGS, Rig, looks_admitted
+from genpolicy.execution.checks import CHECKS, Place
 from genpolicy.execution.executor import Executor
 from genpolicy.verification.checker import check_messages
 
-SEEN_BY_THE_STUB = (
-    "action_hash", "calibration_mismatch", "checked_rows", "checkpoint_mismatch",
-    "collision_event", "end_of_episode", "execution_horizon", "expired", "force_event",
-    "future_observation", "intervention", "observation_divergence", "phase_transition",
-    "sampler_mismatch", "session_epoch", "stale_observation", "stopped", "window",
-)  # fmt: skip
-ADMISSION = {"action_hash"}
+PAST_THE_EXECUTOR = {"same_action", "sequence"}
+SEEN_BY_THE_STUB = [
+    check.name for check in CHECKS
+    if Place.STUB in check.places and check.name not in PAST_THE_EXECUTOR
+]  # fmt: skip
 
 
 def half_asleep(check):
@@ -23,7 +22,7 @@ def half_asleep(check):
     rig = Rig()
     rig.executor = Executor(
         SETTINGS, rig.journal, rig.stub,
-        disabled_checks=frozenset({check}), genuine=looks_admitted,
+        checks=without(check), genuine=looks_admitted,
     )  # fmt: skip
     rig.executor.set_active(0.0, CHECKPOINT, SAMPLER)
     return rig
@@ -112,7 +111,7 @@ def test_the_stub_remembers_every_voiding_event():
     chunk = rig.chunk()
     rig.advance(0.01)
     rig.executor.force_event(rig.now_s)
-    rig.stub.void("collision_event", DiscardReason.COLLISION_EVENT, 0)  # an older event
+    rig.stub.void(DiscardReason.COLLISION_EVENT, 0)  # an older event
     offer = {"row": 0, "source": "policy", "arrival": 0, "sequence": 1, "now_ns": rig.now_ns}
     assert rig.stub.offer(chunk, chunk.actions[0], **offer) == "force_event"
 

@@ -12,7 +12,7 @@ from genpolicy.errors import ConfigError, ContractError
 from genpolicy.evidence.shadow.rig import SUPERVISION, Rig
 from genpolicy.execution import supervisor as module
 from genpolicy.execution.journal import Journal
-from genpolicy.execution.settings import to_ns
+from genpolicy.execution.nanoseconds import to_ns
 from genpolicy.execution.supervisor import Supervisor, SupervisorSettings, SupervisorState
 
 

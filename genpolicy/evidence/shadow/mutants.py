@@ -1,39 +1,39 @@
-"""Mutants: with one check disabled, a bad action passes, and the checker must say so.
+"""Mutants: with one row taken from the table of checks, the independent checker must say so.
 
-Each scenario is played twice: with every check, and then the checker must find nothing; with one
-check switched off in executor, stub and supervisor alike, and then it must find something. That is
-the evidence that the checker is awake, and that each check is needed.
+Each scenario is played twice: with the whole table, and then the checker must find nothing; with
+the tuple minus one row in executor, stub and supervisor alike, and then it must find something.
+That is the evidence that the checker is awake, and that each check is needed.
 """
 
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from genpolicy.evidence.shadow.rig import Rig, passing_verdict
+from genpolicy.execution.checks import CHECKS, POLICY, Checks
 from genpolicy.execution.journal import write_journal
-from genpolicy.execution.settings import CHECKS
 from genpolicy.verification.checker import check_journal
 from genpolicy.verification.report import Violation
 
 Scenario = Callable[[Rig], None]
-DECLARATION = "settings.disabled"
+DECLARATION = "settings.checks"
 
 
 def run_mutants() -> list[dict[str, Any]]:
     """Play every scenario with and without its check.
 
     Returns:
-        One entry per name in `CHECKS`: `check`, `detected` (the mutant was found and the unchanged
+        One entry per row of `CHECKS`: `check`, `detected` (the mutant was found and the unchanged
         executor was clean), `violations` (count of the mutant's), `rules` (which broke), and
         `violations_unchanged` (of the unchanged executor).
     """
     results = []
     for check in CHECKS:
-        unchanged = play(check, disabled=frozenset())
-        mutant = play(check, disabled=frozenset({check}))
+        unchanged = play(check.name, CHECKS)
+        mutant = play(check.name, without(check.name))
         results.append({
-            "check": check,
+            "check": check.name,
             "detected": bool(mutant) and not unchanged,
             "violations": len(mutant),
             "rules": sorted({violation.rule for violation in mutant}),
@@ -42,9 +42,14 @@ def run_mutants() -> list[dict[str, Any]]:
     return results
 
 
-def play(check: str, *, disabled: frozenset[str]) -> list[Violation]:
+def without(name: str) -> Checks:
+    """The table minus one row."""
+    return tuple(check for check in CHECKS if check.name != name)
+
+
+def play(check: str, checks: Checks) -> list[Violation]:
     """Violations that the checker finds in the scenario of `check`, declarations aside."""
-    rig = Rig(disabled=disabled, session=check)
+    rig = Rig(checks=checks, session=check)
     SCENARIOS[check](rig)
     if check != "end_of_episode":
         rig.executor.end_episode(rig.now_s)
@@ -75,6 +80,19 @@ def _bad(**changes: Any) -> Scenario:
     return lambda rig: _begin(rig, **changes)
 
 
+def _begun_before(event: Callable[[Rig], object]) -> Scenario:
+    """A new chunk after the event, made from an observation before it."""
+
+    def scenario(rig: Rig) -> None:
+        _begin(rig)
+        event(rig)
+        rig.observe()
+        rig.deliver(rig.chunk(condition_observation_event_time_s=0.0, predecessor_chunk_id=""))
+        rig.tick(2)
+
+    return scenario
+
+
 def _new_epoch(rig: Rig) -> None:
     rig.epoch = "epoch-2"
     rig.observe()
@@ -83,6 +101,24 @@ def _new_epoch(rig: Rig) -> None:
 def _new_phase(rig: Rig) -> None:
     rig.phase = "insert"
     rig.observe()
+
+
+def _person_takes_over_and_hands_back(rig: Rig) -> None:
+    rig.executor.intervene(rig.now_s)
+    rig.executor.hand_back(rig.now_s)
+
+
+def _stop_and_reset(rig: Rig) -> None:
+    rig.supervisor.emergency_stop(rig.now_s)
+    rig.supervisor.human_reset(rig.now_s, "spotter")
+
+
+def _new_chunk_while_stopped(rig: Rig) -> None:
+    _begin(rig)
+    rig.supervisor.emergency_stop(rig.now_s)
+    rig.observe()
+    rig.deliver(rig.chunk(predecessor_chunk_id=""))
+    rig.tick(2)
 
 
 def _same_chunk_twice(rig: Rig) -> None:
@@ -111,21 +147,37 @@ def _short_validity(rig: Rig) -> None:
     rig.tick(2)
 
 
-def _older_behind_newer(rig: Rig) -> None:
-    _begin(rig)
+def _starts_later(rig: Rig) -> None:
+    _begin(rig, action_start_time_s=rig.now_s + 0.2)
+
+
+def _older_behind_accepted(rig: Rig) -> None:
     rig.observe()
-    rig.deliver(rig.chunk())
+    rig.tick(2)
+    rig.observe()
+    rig.deliver(rig.chunk(verdict=passing_verdict(rows=(0, 1))))
     rig.tick(1)
     old = {"condition_observation_event_time_s": 0.0, "action_start_time_s": 0.0}
     rig.deliver(rig.chunk(**old, predecessor_chunk_id=""))
     rig.tick(1)
 
 
-def _after_a_reset(rig: Rig) -> None:
-    _begin(rig)
-    rig.executor.reset(rig.now_s)
+def _older_behind_queued(rig: Rig) -> None:
     rig.observe()
     rig.tick(2)
+    rig.observe()
+    rig.deliver(rig.chunk(action_start_time_s=rig.now_s + 0.2))
+    old = {"condition_observation_event_time_s": 0.0, "action_start_time_s": rig.now_s + 0.3}
+    rig.deliver(rig.chunk(**old, predecessor_chunk_id=""))
+    rig.tick(2)
+
+
+def _one_window_twice(rig: Rig) -> None:
+    _begin(rig)
+    rig.now_ns -= 20_000_000  # still in the window of the action accepted last
+    rig.observe()
+    rig.deliver(rig.chunk(action_start_time_s=0.05))
+    rig.tick(1)
 
 
 def _frozen_camera(rig: Rig) -> None:
@@ -150,28 +202,57 @@ def _diverged(rig: Rig) -> None:
     rig.observe(divergence_m=0.2)
 
 
+def _offered(*, sequence: int, altered: bool) -> Scenario:
+    """The second row comes to the stub past the executor."""
+
+    def scenario(rig: Rig) -> None:
+        rig.observe()
+        chunk = rig.chunk()
+        rig.deliver(chunk)
+        rig.tick(1)
+        action = chunk.actions[1] + (1.0 if altered else 0.0)
+        rig.stub.offer(
+            cast(Any, chunk), action, row=1, source=POLICY, arrival=0, sequence=sequence,
+            now_ns=rig.now_ns,
+        )  # fmt: skip
+
+    return scenario
+
+
 SCENARIOS: dict[str, Scenario] = {
     "action_hash": _bad(actions_sha256="0" * 64),
-    "calibration_mismatch": _then(_new_epoch),
+    "after_calibration_mismatch": _begun_before(_new_epoch),
+    "after_collision_event": _then(lambda rig: rig.executor.collision_event(rig.now_s)),
+    "after_force_event": _then(lambda rig: rig.executor.force_event(rig.now_s)),
+    "after_intervention": _begun_before(_person_takes_over_and_hands_back),
+    "after_observation_divergence": _then(_diverged),
+    "after_phase_transition": _begun_before(_new_phase),
+    "after_reset": _begun_before(lambda rig: rig.executor.reset(rig.now_s)),
+    "after_stop": _begun_before(_stop_and_reset),
+    "behind_accepted": _older_behind_accepted,
+    "behind_queued": _older_behind_queued,
+    "calibration_mismatch": _bad(calibration_epoch="epoch-2"),
     "checked_rows": _bad(verdict=passing_verdict(rows=(0, 1))),
     "checkpoint_mismatch": _bad(policy_checkpoint_hash="0" * 64),
-    "collision_event": _then(lambda rig: rig.executor.collision_event(rig.now_s)),
+    "commander": _then(lambda rig: rig.executor.begin_fallback(rig.now_s)),
     "duplicate": _same_chunk_twice,
+    "early": _starts_later,
     "end_of_episode": _after_the_end,
     "execution_horizon": _whole_chunk,
     "expired": _short_validity,
-    "force_event": _then(lambda rig: rig.executor.force_event(rig.now_s)),
     "future_observation": _bad(condition_observation_event_time_s=0.04),
     "infeasible": _bad(verdict=passing_verdict(failed=2)),
     "intervention": _then(lambda rig: rig.executor.intervene(rig.now_s)),
-    "observation_divergence": _then(_diverged),
-    "out_of_order": _older_behind_newer,
-    "phase_transition": _then(_new_phase),
+    "out_of_order": _one_window_twice,
+    "period": _bad(action_period_s=0.1),
+    "phase_transition": _bad(task_phase="insert"),
     "predecessor": _bad(predecessor_chunk_id="never seen"),
+    "same_action": _offered(sequence=2, altered=True),
     "sampler_mismatch": _bad(sampler_config_hash="0" * 64),
-    "session_epoch": _after_a_reset,
+    "sequence": _offered(sequence=1, altered=False),
+    "session_epoch": _bad(session_epoch=7),
     "stale_observation": _frozen_camera,
-    "stopped": _then(lambda rig: rig.supervisor.emergency_stop(rig.now_s)),
+    "stopped": _new_chunk_while_stopped,
     "superseded": _newer_chunk,
     "watchdog": _then(_paused),
     "window": _then(_paused),

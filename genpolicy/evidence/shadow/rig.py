@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 
 from genpolicy.contract.action import ACTION_DIM
 from genpolicy.contract.chunk import ChunkMetadata, DiscardReason, actions_sha256, frozen_array
+from genpolicy.execution.arrival import LAYER_COUNT
+from genpolicy.execution.checks import CHECKS, Checks
 from genpolicy.execution.command import Command
 from genpolicy.execution.executor import Executor
 from genpolicy.execution.journal import Event, Journal
-from genpolicy.execution.settings import LAYER_COUNT, ExecutorSettings
+from genpolicy.execution.settings import ExecutorSettings
 from genpolicy.execution.stub import ControllerStub
 from genpolicy.execution.supervisor import Supervisor, SupervisorSettings
 
@@ -82,7 +84,7 @@ class Rig:
     """One session: clock, supervisor, stub and executor.
 
     Args:
-        disabled: Names of `CHECKS` switched off in executor, stub and supervisor alike.
+        checks: The table of executor, stub and supervisor.
         settings: Replaces the standard settings.
         session: Name of the session.
     """
@@ -90,19 +92,15 @@ class Rig:
     def __init__(
         self,
         *,
-        disabled: frozenset[str] = frozenset(),
+        checks: Checks = CHECKS,
         settings: ExecutorSettings = SETTINGS,
         session: str = "rig",
     ) -> None:
         self.journal = Journal(session)
-        self.supervisor = Supervisor(
-            SUPERVISION, self.journal, watchdog_enabled="watchdog" not in disabled
-        )
-        self.stub = ControllerStub(
-            settings, self.journal, self.supervisor, disabled_checks=disabled
-        )
+        self.supervisor = Supervisor(SUPERVISION, self.journal, checks=checks)
+        self.stub = ControllerStub(settings, self.journal, self.supervisor, checks=checks)
         self.executor = Executor(
-            settings, self.journal, self.stub, disabled_checks=disabled, genuine=looks_admitted
+            settings, self.journal, self.stub, checks=checks, genuine=looks_admitted
         )
         self.now_ns = 0
         self.phase, self.epoch = "approach", "epoch-1"

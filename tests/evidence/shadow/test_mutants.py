@@ -1,15 +1,17 @@
-"""Each check, switched off, must turn the independent checker red; switched on, it stays silent."""
+"""Each row of the table, taken away, must turn the independent checker red; else it is silent."""
 
-import pytest
-
-from genpolicy.errors import ConfigError
-from genpolicy.evidence.shadow.mutants import SCENARIOS, play, run_mutants
-from genpolicy.execution.settings import CHECKS, known_checks
+from genpolicy.evidence.shadow.mutants import SCENARIOS, play, run_mutants, without
+from genpolicy.evidence.shadow.rig import Rig
+from genpolicy.execution.checks import CHECKS, missing
+from genpolicy.verification.checker import check_messages
+from genpolicy.verification.report import CheckReport
 
 
 def test_every_check_has_a_scenario_and_every_mutant_is_detected():
     results = run_mutants()
-    assert [result["check"] for result in results] == list(CHECKS) and set(SCENARIOS) == set(CHECKS)
+    names = [check.name for check in CHECKS]
+    assert [result["check"] for result in results] == names and set(SCENARIOS) == set(names)
+    assert len(set(names)) == len(names)
     assert [result["check"] for result in results if not result["detected"]] == []
     assert all(result["violations_unchanged"] == 0 for result in results)
 
@@ -24,11 +26,32 @@ def test_the_rule_that_breaks_is_the_one_that_the_check_guards():
     assert "P3.duplicate" in rules["duplicate"]
     assert "P4.chain" in rules["predecessor"]
     assert "P5.newest" in rules["superseded"]
+    assert "P5.order" in rules["behind_queued"]
+    assert "P3.start" in rules["behind_accepted"]
+    assert "P3.due" in rules["out_of_order"]
+    assert "P3.sequence" in rules["sequence"]
+    assert "P1.bits" in rules["same_action"]
+    assert "P1.state" in rules["commander"] & rules["intervention"]
+    assert all("P1.void" in rules[name] for name in rules if name.startswith("after_"))
     assert "P7.stop" in rules["stopped"]
 
 
-def test_a_run_without_checks_is_declared():
-    violations = play("stale_observation", disabled=frozenset({"duplicate"}))
-    assert violations == []
-    with pytest.raises(ConfigError, match="name in CHECKS"):
-        known_checks(frozenset({"no such check"}))
+def test_a_table_without_a_row_is_declared_and_a_table_with_another_row_too():
+    assert play("stale_observation", without("duplicate")) == []
+    assert missing(CHECKS, without("duplicate"), CHECKS) == ["duplicate"]
+    blind = tuple(c._replace(holds=lambda m: True) if c.name == "expired" else c for c in CHECKS)
+    assert missing(blind) == ["expired"]
+    for checks, names in ((CHECKS, []), (without("window"), ["window"])):
+        rig = Rig(checks=checks)
+        assert rig.journal.events()[0].payload["checks_missing"] == names
+        report = check_messages(
+            (e.kind, {"session": e.session, "n": e.n, "t": e.t, **e.payload}) for e in rig.end()
+        )
+        assert {v.rule for v in report.violations} == ({"settings.checks"} if names else set())
+
+
+def test_a_blind_checker_turns_the_evidence_red(monkeypatch):
+    monkeypatch.setattr(
+        "genpolicy.evidence.shadow.mutants.check_journal", lambda path: CheckReport()
+    )
+    assert not any(result["detected"] for result in run_mutants())

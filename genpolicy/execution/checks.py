@@ -1,0 +1,370 @@
+"""The table of checks: every question that is asked of a chunk before one of its actions moves.
+
+One row is one question, its answer (`True` holds) and the reason for discarding where it does not.
+Whoever asks (executor, controller stub, freshness layer, supervisor) brings a `Moment` from its
+own bookkeeping and the table it was built with; the rows that concern it are those of its place.
+There is no switch: a mutant is built with the tuple minus one row, and the independent checker
+(`genpolicy.verification`), which knows neither this table nor its words, must notice.
+
+All times are whole nanoseconds. A fact that is unknown does not hold.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from typing import NamedTuple
+
+from genpolicy.contract.chunk import ChunkMetadata, DiscardReason
+from genpolicy.execution.nanoseconds import NEVER_NS, ChunkTimes
+
+POLICY = "policy"
+FALLBACK = "fallback"
+
+
+class Mode(StrEnum):
+    """Who commands."""
+
+    RUN = "run"
+    FALLBACK = "fallback"
+    INTERVENTION = "intervention"
+    ENDED = "ended"
+
+
+MODE_OF_SOURCE = {POLICY: Mode.FALLBACK, FALLBACK: Mode.RUN}
+"""In which mode the other source commands, so that chunks of this one are refused."""
+
+
+class Place(StrEnum):
+    """Where a question is asked."""
+
+    DOOR = "door"
+    """Of whatever arrives, before it is read."""
+    ARRIVAL = "arrival"
+    QUEUE = "queue"
+    """Of every waiting chunk, on each event and before each command."""
+    ROWS = "rows"
+    """Of each row, when a chunk enters the queue: may it be executed at all?"""
+    PAST = "past"
+    """Of the next row, before each command: has its time gone by?"""
+    DUE = "due"
+    """Of the next row: is it the command of this moment?"""
+    STUB = "stub"
+    LAYER = "layer"
+    """In the freshness layer of feasibility."""
+    SUPERVISOR = "supervisor"
+
+
+class Voiding(NamedTuple):
+    """An event after which nothing from before it may be used.
+
+    Attributes:
+        before_ns: What was conditioned before this time is void.
+        arrivals: What arrived with a smaller number is void too; it was there at the event.
+    """
+
+    before_ns: int = NEVER_NS
+    arrivals: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """The present, as the asking place knows it.
+
+    Attributes:
+        phase: Task phase of the newest observation; empty before the first.
+        calibration_epoch: Calibration of the newest observation.
+        newest_observation_ns: Event time of the newest observation; None before the first.
+        maximum_age_ns: Largest action age in this phase; None where no age is allowed.
+        checkpoint: Active weights of the policy.
+        sampler: Active sampler settings.
+        fallback: Identity of the task's fallback planner, in place of both.
+        session_epoch: Number of resets.
+        mode: Who commands.
+        stopped: Whether the supervisor stops.
+        voidings: Per reason, the event that voided last.
+        execution_horizon: Actions of a chunk that may be executed.
+        period_ns: Time between actions.
+    """
+
+    phase: str = ""
+    calibration_epoch: str = ""
+    newest_observation_ns: int | None = None
+    maximum_age_ns: int | None = None
+    checkpoint: str = ""
+    sampler: str = ""
+    fallback: str = ""
+    session_epoch: int = 0
+    mode: str = Mode.RUN
+    stopped: bool = False
+    voidings: Mapping[DiscardReason, Voiding] = field(default_factory=dict)
+    execution_horizon: int = 0
+    period_ns: int = 0
+
+    def voided(self, reason: DiscardReason, before_ns: int, arrivals: int = 0) -> "View":
+        """The view after an event; a later event of the same reason covers an earlier one."""
+        old = self.voidings.get(reason, Voiding())
+        new = Voiding(max(before_ns, old.before_ns), max(arrivals, old.arrivals))
+        return self if new == old else replace(self, voidings={**self.voidings, reason: new})
+
+
+@dataclass(frozen=True, slots=True)
+class Chunk:
+    """What is asked about.
+
+    Attributes:
+        metadata: Who made it, for what.
+        times: Its times.
+        source: policy or fallback.
+        arrival: Its number among the arrivals.
+        rows: Its number of actions, K.
+        checked_rows: First row that feasibility checked, and the row behind the last one.
+        passed: All six layers passed and all actions are finite.
+        hashed: The actions have the hash that was taken when they passed.
+    """
+
+    metadata: ChunkMetadata
+    times: ChunkTimes
+    source: str = POLICY
+    arrival: int = 0
+    rows: int = 0
+    checked_rows: tuple[int, int] = (0, 0)
+    passed: bool = False
+    hashed: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Moment:
+    """One question: a chunk, or one row of it, at one time, in one view of the present.
+
+    Attributes:
+        now_ns: Time.
+        view: The present.
+        about: The chunk; None at the door and for the supervisor.
+        first_use_ns: When its first action can be used; age and validity are asked for then, since
+            a chunk that will be too old when it begins is too old now.
+        row: The row in question.
+        known: A chunk of this name was here before.
+        same_action: The offered action is the admitted row, bit for bit.
+        head: Chunk that the next one may name as predecessor.
+        accepted_condition_ns: Observation under the action accepted last; None before the first.
+        accepted_start_ns: Start of that action's chunk.
+        queued_condition_ns: Newest observation under a waiting chunk; None if none waits.
+        queued_start_ns: Latest start of a waiting chunk.
+        newer_start_ns: Earliest start of a chunk that arrived after this one.
+        last_due_ns: Begin of the window of the action accepted last.
+        sequence: Number of the offer.
+        last_sequence: Number of the offer accepted last.
+        last_accept_ns: When an action was accepted last; None before the first.
+        watchdog_ns: Longest silence.
+    """
+
+    now_ns: int
+    view: View = View()
+    about: Chunk | None = None
+    first_use_ns: int | None = None
+    row: int | None = None
+    known: bool | None = None
+    same_action: bool | None = None
+    head: str | None = None
+    accepted_condition_ns: int | None = None
+    accepted_start_ns: int | None = None
+    queued_condition_ns: int | None = None
+    queued_start_ns: int | None = None
+    newer_start_ns: int | None = None
+    last_due_ns: int | None = None
+    sequence: int | None = None
+    last_sequence: int = -1
+    last_accept_ns: int | None = None
+    watchdog_ns: int = 0
+
+    @property
+    def chunk(self) -> Chunk:
+        """The chunk in question."""
+        assert self.about is not None, "this place has no chunk to ask about"
+        return self.about
+
+    @property
+    def due_ns(self) -> int:
+        """Begin of the window of the row in question."""
+        assert self.row is not None, "this place has no row to ask about"
+        return self.chunk.times.due_ns(self.row)
+
+
+class Check(NamedTuple):
+    """One question.
+
+    Attributes:
+        name: Its name.
+        holds: Whether the answer is as it should be; False where a fact is unknown.
+        reason: Why a chunk is discarded where it does not; None: nothing is discarded, it holds.
+        places: Where it is asked.
+        margin_ns: Limit minus value, ns, where the question is one of time; None: no limit yet.
+    """
+
+    name: str
+    holds: Callable[[Moment], bool]
+    reason: DiscardReason | None
+    places: frozenset[Place]
+    margin_ns: Callable[[Moment], int | None] | None = None
+
+
+Checks = tuple[Check, ...]
+
+
+def refusal(checks: Checks, place: Place, moment: Moment) -> Check | None:
+    """The first row of this place that does not hold; None if all do."""
+    return next((c for c in checks if place in c.places and not c.holds(moment)), None)
+
+
+def at(checks: Checks, place: Place) -> Checks:
+    """The rows that are asked at a place, in their order."""
+    return tuple(check for check in checks if place in check.places)
+
+
+def missing(*tables: Checks) -> list[str]:
+    """Names of the rows of `CHECKS` that one of the tables lacks, for the journal to declare."""
+    return sorted({check.name for table in tables for check in set(CHECKS) - set(table)})
+
+
+# -- the questions, one definition each -------------------------------------------------------
+
+
+def _future_margin_ns(m: Moment) -> int:
+    condition_ns, newest_ns = m.chunk.times.condition_ns, m.view.newest_observation_ns
+    return min(m.now_ns, NEVER_NS if newest_ns is None else newest_ns) - condition_ns
+
+
+def _age_margin_ns(m: Moment) -> int:
+    limit_ns = m.view.maximum_age_ns
+    first_use_ns = m.now_ns if m.first_use_ns is None else m.first_use_ns
+    return (-1 if limit_ns is None else limit_ns) - (first_use_ns - m.chunk.times.condition_ns)
+
+
+def _validity_margin_ns(m: Moment) -> int:
+    first_use_ns = m.now_ns if m.first_use_ns is None else m.first_use_ns
+    return m.chunk.times.valid_until_ns - first_use_ns
+
+
+def _behind_margin_ns(m: Moment) -> int | None:
+    return _least_behind(m.chunk.times, m.accepted_condition_ns, m.accepted_start_ns)
+
+
+def _behind_queued_margin_ns(m: Moment) -> int | None:
+    return _least_behind(m.chunk.times, m.queued_condition_ns, m.queued_start_ns)
+
+
+def _least_behind(times: ChunkTimes, condition_ns: int | None, start_ns: int | None) -> int | None:
+    margins = [] if condition_ns is None else [times.condition_ns - condition_ns]
+    margins += [] if start_ns is None else [times.start_ns - start_ns]
+    return min(margins, default=None)
+
+
+def _maker_is(m: Moment, field_name: str, active: str) -> bool:
+    expected = m.view.fallback if m.chunk.source == FALLBACK else active
+    return bool(getattr(m.chunk.metadata, field_name) == expected)
+
+
+def _not_superseded(m: Moment) -> bool:
+    newer_ns = m.newer_start_ns
+    return newer_ns is None or (m.now_ns < newer_ns and m.due_ns < newer_ns)
+
+
+def _in_checked_rows(m: Moment) -> bool:
+    first, last = m.chunk.checked_rows
+    return m.row is not None and first <= m.row < last
+
+
+def _within_horizon(m: Moment) -> bool:
+    usable = min(m.chunk.rows, m.view.execution_horizon)
+    return m.row is not None and 0 <= m.row < usable
+
+
+def _awake(m: Moment) -> bool:
+    return m.last_accept_ns is None or m.watchdog_ns - (m.now_ns - m.last_accept_ns) >= 0
+
+
+def _after(reason: DiscardReason) -> Callable[[Moment], bool]:
+    def holds(m: Moment) -> bool:
+        event = m.view.voidings.get(reason)
+        if event is None:
+            return True
+        chunk = m.chunk
+        return chunk.times.condition_ns - event.before_ns >= 0 and chunk.arrival >= event.arrivals
+
+    return holds
+
+
+def _timed(
+    name: str, margin_ns: Callable[[Moment], int | None], reason: DiscardReason, *places: Place
+) -> Check:
+    def holds(m: Moment) -> bool:
+        margin = margin_ns(m)
+        return margin is None or margin >= 0
+
+    return Check(name, holds, reason, frozenset(places), margin_ns)
+
+
+def _row(
+    name: str, holds: Callable[[Moment], bool], reason: DiscardReason | None, *places: Place
+) -> Check:
+    return Check(name, holds, reason, frozenset(places))
+
+
+_R, _P = DiscardReason, Place
+_LIVE = (Place.ARRIVAL, Place.QUEUE, Place.STUB)
+
+CHECKS: Checks = (
+    _row("end_of_episode", lambda m: m.view.mode != Mode.ENDED,
+         _R.END_OF_EPISODE, _P.DOOR, _P.QUEUE, _P.STUB),
+    _row("duplicate", lambda m: m.known is False, _R.DUPLICATE, _P.DOOR),
+    _row("infeasible", lambda m: m.chunk.passed, _R.INFEASIBLE, _P.ARRIVAL),
+    _row("period", lambda m: m.chunk.times.period_ns == m.view.period_ns,
+         _R.INFEASIBLE, _P.ARRIVAL),
+    _row("action_hash", lambda m: m.chunk.hashed, _R.INFEASIBLE, _P.ARRIVAL, _P.STUB),
+    _row("same_action", lambda m: m.same_action is True, _R.INFEASIBLE, _P.STUB),
+    _row("execution_horizon", _within_horizon, _R.INFEASIBLE, _P.ROWS, _P.STUB),
+    _row("checked_rows", _in_checked_rows, _R.INFEASIBLE, _P.ROWS, _P.STUB),
+    _row("intervention", lambda m: m.view.mode != Mode.INTERVENTION, _R.INTERVENTION, *_LIVE),
+    _row("stopped", lambda m: not m.view.stopped, _R.STOPPED, *_LIVE),
+    _row("commander", lambda m: m.view.mode != MODE_OF_SOURCE[m.chunk.source], _R.STOPPED, *_LIVE),
+    _row("session_epoch", lambda m: m.chunk.metadata.session_epoch == m.view.session_epoch,
+         _R.RESET, *_LIVE, _P.LAYER),
+    _row("checkpoint_mismatch",
+         lambda m: _maker_is(m, "policy_checkpoint_hash", m.view.checkpoint),
+         _R.CHECKPOINT_MISMATCH, *_LIVE, _P.LAYER),
+    _row("sampler_mismatch", lambda m: _maker_is(m, "sampler_config_hash", m.view.sampler),
+         _R.SAMPLER_MISMATCH, *_LIVE, _P.LAYER),
+    _row("calibration_mismatch",
+         lambda m: m.chunk.metadata.calibration_epoch == m.view.calibration_epoch,
+         _R.CALIBRATION_MISMATCH, *_LIVE, _P.LAYER),
+    _row("phase_transition", lambda m: m.chunk.metadata.task_phase == m.view.phase,
+         _R.PHASE_TRANSITION, *_LIVE, _P.LAYER),
+    _timed("future_observation", _future_margin_ns, _R.FUTURE_OBSERVATION, *_LIVE, _P.LAYER),
+    _timed("stale_observation", _age_margin_ns, _R.STALE_OBSERVATION, *_LIVE, _P.LAYER),
+    _row("after_phase_transition", _after(_R.PHASE_TRANSITION), _R.PHASE_TRANSITION, *_LIVE),
+    _row("after_calibration_mismatch", _after(_R.CALIBRATION_MISMATCH),
+         _R.CALIBRATION_MISMATCH, *_LIVE),
+    _row("after_force_event", _after(_R.FORCE_EVENT), _R.FORCE_EVENT, *_LIVE),
+    _row("after_collision_event", _after(_R.COLLISION_EVENT), _R.COLLISION_EVENT, *_LIVE),
+    _row("after_observation_divergence", _after(_R.OBSERVATION_DIVERGENCE),
+         _R.OBSERVATION_DIVERGENCE, *_LIVE),
+    _row("after_intervention", _after(_R.INTERVENTION), _R.INTERVENTION, *_LIVE),
+    _row("after_stop", _after(_R.STOPPED), _R.STOPPED, *_LIVE),
+    _row("after_reset", _after(_R.RESET), _R.RESET, *_LIVE),
+    _timed("expired", _validity_margin_ns, _R.EXPIRED, *_LIVE, _P.LAYER),
+    _row("early", lambda m: m.due_ns <= m.now_ns, _R.EXPIRED, _P.DUE, _P.STUB),
+    _row("window", lambda m: m.now_ns < m.due_ns + m.view.period_ns,
+         _R.EXPIRED, _P.ARRIVAL, _P.PAST, _P.STUB),
+    _timed("behind_accepted", _behind_margin_ns, _R.SUPERSEDED, _P.ARRIVAL, _P.LAYER),
+    _timed("behind_queued", _behind_queued_margin_ns, _R.OUT_OF_ORDER, _P.ARRIVAL),
+    _row("predecessor",
+         lambda m: m.chunk.metadata.predecessor_chunk_id in ("", m.head),
+         _R.BROKEN_PREDECESSOR, _P.ARRIVAL),
+    _row("superseded", _not_superseded, _R.SUPERSEDED, _P.ROWS, _P.DUE),
+    _row("out_of_order", lambda m: m.last_due_ns is None or m.due_ns > m.last_due_ns,
+         _R.OUT_OF_ORDER, _P.DUE, _P.STUB),
+    _row("sequence", lambda m: m.sequence is not None and m.sequence > m.last_sequence,
+         _R.OUT_OF_ORDER, _P.STUB),
+    _row("watchdog", _awake, None, _P.SUPERVISOR),
+)  # fmt: skip
+"""In the order in which they decide: the first row that does not hold names the reason."""

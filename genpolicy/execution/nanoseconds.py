@@ -1,0 +1,52 @@
+"""Time in whole nanoseconds: `n * 0.05` is no multiple of 0.05 in floating point, in ns it is."""
+
+import math
+from dataclasses import dataclass
+
+from genpolicy.contract.chunk import ChunkMetadata
+from genpolicy.errors import NonFiniteError
+
+NS_PER_S = 1_000_000_000
+NEVER_NS = -(1 << 62)
+
+
+def to_ns(time_s: float) -> int:
+    """Whole nanoseconds of a time in s.
+
+    Raises:
+        NonFiniteError: NaN, infinite, or too large to convert.
+    """
+    scaled = time_s * NS_PER_S
+    if not math.isfinite(scaled):
+        raise NonFiniteError(
+            where="a time", found=repr(time_s), expected="finite, s", action="Hold; fix the clock."
+        )
+    return round(scaled)
+
+
+@dataclass(frozen=True, slots=True)
+class ChunkTimes:
+    """The times of a chunk in ns."""
+
+    condition_ns: int
+    start_ns: int
+    period_ns: int
+    valid_until_ns: int
+
+    @classmethod
+    def of(cls, metadata: ChunkMetadata) -> "ChunkTimes":
+        """Times of a chunk.
+
+        Raises:
+            NonFiniteError: A time is too large to be one.
+        """
+        return cls(
+            condition_ns=to_ns(metadata.condition_observation_event_time_s),
+            start_ns=to_ns(metadata.action_start_time_s),
+            period_ns=to_ns(metadata.action_period_s),
+            valid_until_ns=to_ns(metadata.valid_until_s),
+        )
+
+    def due_ns(self, row: int) -> int:
+        """Begin of a row's window."""
+        return self.start_ns + row * self.period_ns
