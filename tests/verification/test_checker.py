@@ -159,8 +159,9 @@ def test_a_damaged_file_is_refused_not_believed(tmp_path):
             report = check_journal(path)
         except BadInputError:
             continue
-        # A flip may hit bytes that carry no event; then exactly the same events were read.
-        silent += report.violations != [] or report.checked_actions != 160
+        # A flip may hit bytes that carry no event; then exactly the same events were read. In
+        # the index it renames a topic; then the events of that topic are refused one by one.
+        silent += report.violations == [] and report.checked_actions != 160
     assert silent == 0
 
 

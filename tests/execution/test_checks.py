@@ -1,0 +1,159 @@
+"""The table of checks: each question by itself, at and beside its limit; unknown never holds."""
+
+from dataclasses import replace
+
+import pytest
+
+from genpolicy.contract.chunk import ChunkMetadata, DiscardReason
+from genpolicy.execution.checks import (
+    CHECKS,
+    FALLBACK,
+    Chunk,
+    Mode,
+    Moment,
+    Place,
+    View,
+    at,
+    refusal,
+)
+from genpolicy.execution.nanoseconds import ChunkTimes
+
+MS = 1_000_000
+METADATA = ChunkMetadata(
+    chunk_id="a", condition_observation_event_time_s=0.1, policy_checkpoint_hash="w",
+    sampler_config_hash="s", action_start_time_s=0.2, action_period_s=0.05, valid_until_s=0.6,
+    task_phase="approach", calibration_epoch="e", predecessor_chunk_id="", session_epoch=1,
+    method="bc", candidate_index=0,
+)  # fmt: skip
+CHUNK = Chunk(
+    METADATA, ChunkTimes.of(METADATA), arrival=3, rows=16, checked_rows=(0, 16), passed=True,
+    hashed=True,
+)  # fmt: skip
+VIEW = View(
+    phase="approach", calibration_epoch="e", newest_observation_ns=150 * MS,
+    maximum_age_ns=300 * MS, checkpoint="w", sampler="s", fallback="f", session_epoch=1,
+    execution_horizon=8, period_ns=50 * MS,
+)  # fmt: skip
+GOOD = Moment(
+    now_ns=310 * MS, view=VIEW, about=CHUNK, row=2, known=False, same_action=True, sequence=5,
+    last_sequence=4, last_due_ns=250 * MS, watchdog_ns=100 * MS, last_accept_ns=260 * MS,
+    accepted_condition_ns=100 * MS, accepted_start_ns=200 * MS, queued_condition_ns=100 * MS,
+    queued_start_ns=200 * MS, newer_start_ns=350 * MS,
+)  # fmt: skip
+
+
+def chunk(**changes):
+    return replace(GOOD, about=replace(CHUNK, **changes))
+
+
+def metadata(**changes):
+    made = replace(METADATA, **changes)
+    return chunk(metadata=made, times=ChunkTimes.of(made))
+
+
+def view(**changes):
+    return replace(GOOD, view=replace(VIEW, **changes))
+
+
+def voided(reason, arrivals=0):
+    return replace(GOOD, view=VIEW.voided(reason, 100 * MS + 1, arrivals))
+
+
+BAD = {
+    "end_of_episode": view(mode=Mode.ENDED),
+    "duplicate": replace(GOOD, known=True),
+    "infeasible": chunk(passed=False),
+    "period": view(period_ns=50 * MS + 1),
+    "action_hash": chunk(hashed=False),
+    "same_action": replace(GOOD, same_action=False),
+    "execution_horizon": view(execution_horizon=2),
+    "checked_rows": chunk(checked_rows=(3, 16)),
+    "intervention": view(mode=Mode.INTERVENTION),
+    "stopped": view(stopped=True),
+    "commander": view(mode=Mode.FALLBACK),
+    "session_epoch": metadata(session_epoch=0),
+    "checkpoint_mismatch": view(checkpoint="other"),
+    "sampler_mismatch": view(sampler="other"),
+    "calibration_mismatch": view(calibration_epoch="other"),
+    "phase_transition": view(phase="insert"),
+    "future_observation": view(newest_observation_ns=100 * MS - 1),
+    "stale_observation": view(maximum_age_ns=210 * MS - 1),
+    "after_phase_transition": voided(DiscardReason.PHASE_TRANSITION),
+    "after_calibration_mismatch": voided(DiscardReason.CALIBRATION_MISMATCH),
+    "after_force_event": voided(DiscardReason.FORCE_EVENT),
+    "after_collision_event": voided(DiscardReason.COLLISION_EVENT),
+    "after_observation_divergence": voided(DiscardReason.OBSERVATION_DIVERGENCE),
+    "after_intervention": voided(DiscardReason.INTERVENTION),
+    "after_stop": voided(DiscardReason.STOPPED),
+    "after_reset": voided(DiscardReason.RESET),
+    "expired": metadata(valid_until_s=0.309),
+    "early": replace(GOOD, now_ns=300 * MS - 1),
+    "window": replace(GOOD, now_ns=350 * MS),
+    "behind_accepted": replace(GOOD, accepted_condition_ns=100 * MS + 1),
+    "behind_queued": replace(GOOD, queued_start_ns=200 * MS + 1),
+    "predecessor": metadata(predecessor_chunk_id="ghost"),
+    "superseded": replace(GOOD, newer_start_ns=300 * MS),
+    "out_of_order": replace(GOOD, last_due_ns=300 * MS),
+    "sequence": replace(GOOD, last_sequence=5),
+    "watchdog": replace(GOOD, last_accept_ns=210 * MS - 1),
+}
+
+
+def failing(moment):
+    return {check.name for check in CHECKS if not check.holds(moment)}
+
+
+def test_every_row_is_tried_and_all_hold_in_a_good_moment():
+    assert set(BAD) == {check.name for check in CHECKS}
+    assert failing(GOOD) == set()
+    assert all(refusal(CHECKS, place, GOOD) is None for place in Place)
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_the_row_alone_refuses_its_fault_and_without_it_the_fault_passes(name):
+    row = next(check for check in CHECKS if check.name == name)
+    assert name in failing(BAD[name]) and row.places
+    rest = tuple(check for check in CHECKS if check.name != name)
+    for place in row.places:
+        found = refusal(CHECKS, place, BAD[name])
+        assert found is not None and name in failing(BAD[name])
+        assert refusal((row,), place, BAD[name]) is row
+        assert row not in at(rest, place)
+
+
+def test_at_the_limit_it_holds():
+    assert failing(view(maximum_age_ns=210 * MS)) == set()
+    assert failing(metadata(valid_until_s=0.31)) == set()
+    assert failing(view(newest_observation_ns=100 * MS)) == set()
+    assert failing(replace(GOOD, now_ns=350 * MS - 1, newer_start_ns=None)) == set()
+    assert failing(replace(GOOD, last_accept_ns=210 * MS)) == set()
+
+
+def test_what_is_unknown_does_not_hold():
+    unknown = Moment(now_ns=310 * MS, about=Chunk(METADATA, CHUNK.times), row=2)
+    assert failing(unknown) >= {
+        "duplicate", "infeasible", "action_hash", "same_action", "execution_horizon",
+        "checked_rows", "future_observation", "stale_observation", "sequence", "period",
+    }  # fmt: skip
+
+
+def test_age_and_validity_are_asked_for_the_first_use():
+    late = replace(GOOD, first_use_ns=401 * MS)
+    assert failing(late) == {"stale_observation"}
+    assert failing(replace(GOOD, first_use_ns=601 * MS)) == {"stale_observation", "expired"}
+
+
+def test_the_fallback_has_an_identity_of_its_own():
+    fallback = replace(view(mode=Mode.FALLBACK), about=replace(CHUNK, source=FALLBACK))
+    assert failing(fallback) == {"checkpoint_mismatch", "sampler_mismatch"}
+    own = replace(METADATA, policy_checkpoint_hash="f", sampler_config_hash="f")
+    assert failing(replace(fallback, about=replace(CHUNK, source=FALLBACK, metadata=own))) == set()
+
+
+def test_a_voiding_event_covers_what_was_there_and_a_later_one_covers_an_earlier():
+    was_there = replace(GOOD, view=VIEW.voided(DiscardReason.FORCE_EVENT, 0, arrivals=4))
+    assert failing(was_there) == {"after_force_event"}
+    arrived_later = replace(GOOD, view=VIEW.voided(DiscardReason.FORCE_EVENT, 0, arrivals=3))
+    assert failing(arrived_later) == set()
+    both = VIEW.voided(DiscardReason.RESET, 200 * MS).voided(DiscardReason.RESET, 50 * MS)
+    assert failing(replace(GOOD, view=both)) == {"after_reset"}

@@ -1,0 +1,60 @@
+"""The freshness layer asks the rows of the table that concern it, in s, and NaN passes nothing."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from genpolicy.execution.checks import CHECKS, Place, at
+from genpolicy.feasibility.context import Context
+from genpolicy.feasibility.freshness import NAMES, fresh
+from genpolicy.feasibility.settings import CHECKS_BY_LAYER
+
+
+@pytest.fixture(scope="module")
+def moment(kit):
+    return Context(
+        q_meas=np.zeros(7), q_cmd=np.zeros(7), last_action=np.zeros(10), now_s=10.0,
+        phase="approach", calibration_epoch="e0", session_epoch=1,
+        latest_observation_event_time_s=9.95, maximum_age_s=0.3, active_checkpoint_hash="w",
+        active_sampler_hash="s", scene=None,
+    )  # fmt: skip
+
+
+FAULTS = {
+    "reset": {"session_epoch": 2},
+    "calibration_mismatch": {"calibration_epoch": "e1"},
+    "phase_transition": {"phase": "insert"},
+    "checkpoint_mismatch": {"active_checkpoint_hash": "v"},
+    "sampler_mismatch": {"active_sampler_hash": "t"},
+    "future_observation": {"latest_observation_event_time_s": 9.89},
+    "out_of_order": {"newest_accepted_observation_s": 9.91},
+    "stale_observation": {"maximum_age_s": 0.09},
+    "expired": {"now_s": 10.41, "maximum_age_s": 1.0},
+}
+
+
+def test_the_layer_asks_exactly_its_rows(kit, moment):
+    margins = fresh(kit.metadata(), moment)
+    assert set(margins) == set(CHECKS_BY_LAYER["fresh"]) == set(FAULTS)
+    assert all(margin >= 0 for margin in margins.values())
+    assert margins["stale_observation"] == pytest.approx(0.2, abs=1e-9)
+    assert margins["future_observation"] == pytest.approx(0.05, abs=1e-9)
+    assert margins["out_of_order"] == math.inf and margins["reset"] == 0.0
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_each_fault_is_named_alone_and_a_table_without_its_row_does_not_know_it(kit, moment, name):
+    faulty = replace(moment, **FAULTS[name])
+    margins = fresh(kit.metadata(), faulty)
+    assert [key for key, margin in margins.items() if not margin >= 0] == [name]
+    row = next(c for c in at(CHECKS, Place.LAYER) if NAMES.get(c.name, c.name) == name)
+    rest = fresh(kit.metadata(), faulty, checks=tuple(c for c in CHECKS if c is not row))
+    assert set(rest) == set(margins) - {name} and all(margin >= 0 for margin in rest.values())
+
+
+@pytest.mark.parametrize("field", ["now_s", "maximum_age_s", "latest_observation_event_time_s"])
+def test_a_time_that_is_no_number_passes_nothing(kit, moment, field):
+    margins = fresh(kit.metadata(), replace(moment, **{field: math.nan}))
+    assert margins and not any(margin >= 0 for margin in margins.values())
