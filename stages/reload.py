@@ -48,7 +48,11 @@ def work(params: Params) -> None:
             horizons=params.horizons,
             maximum_age_s=params.section("execution", ExecutionSettings).maximum_age_s,
         )
-        checker = make_checker(task, params.section("feasibility", FeasibilitySettings))
+        checker = make_checker(
+            task,
+            params.section("feasibility", FeasibilitySettings),
+            action_period_s=params.horizons.action_period_s,
+        )
         write_reload(plan, folder, task=task, checker=checker)
 
 
