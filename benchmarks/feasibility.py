@@ -9,23 +9,23 @@ configurations in the same run, and must agree on the actions.
 
 import time
 from collections.abc import Callable
-from pathlib import Path
+from dataclasses import replace
 from types import SimpleNamespace
 
 import fcl
 import numpy as np
 
-import genpolicy.tasks.tabletop_insertion as task_package
 from genpolicy.contract.action import GRIPPER, join_action
 from genpolicy.contract.chunk import ChunkMetadata, Proposal
 from genpolicy.feasibility.admission import Admitted, FeasibilityChecker
+from genpolicy.feasibility.cell import cell_of
 from genpolicy.feasibility.context import Context
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.robot.collision import CollisionModel, Paths
 from genpolicy.robot.scene_state import SceneState
 from genpolicy.robot.shapes import fcl_geometry
+from genpolicy.tasks.api import load_task
 
-SCENE = Path(task_package.__file__).with_name("scene.xml")
 WORKSPACE = SimpleNamespace(lower_m=(0.30, -0.22, 0.02), upper_m=(0.72, 0.22, 0.28))
 CANDIDATES, ACTIONS, PERIOD_S, JITTER_M = 32, 16, 0.05, 0.001
 DOWN = np.diag([1.0, -1.0, -1.0])
@@ -124,7 +124,9 @@ def median_ms(work: Callable[[], object], repeats: int) -> float:
 
 def main() -> None:
     """Print the figures."""
-    checker = FeasibilityChecker(SCENE, workspace=WORKSPACE, settings=FeasibilitySettings())
+    task = load_task("tabletop_insertion")
+    cell = cell_of(task, FeasibilitySettings(), action_period_s=PERIOD_S)
+    checker = FeasibilityChecker(replace(cell, workspace=WORKSPACE))
     ctx = context(checker)
     proposals = [proposal(a, i) for i, a in enumerate(chunks(np.random.default_rng(1)))]
     contexts = [ctx] * len(proposals)
@@ -146,7 +148,7 @@ def main() -> None:
     plain = [any(loop.hits(row) for row in chunk) for chunk in q]
     ours = [hit is not None for hit in checker.collision.check_samples(paths).hits]
     print(f"same verdicts at the actions: {plain == ours} ({sum(ours)} collide)")
-    flat = q.reshape(-1, 7)
+    flat = q.reshape(-1, q.shape[-1])
     figures = {
         "project": median_ms(lambda: checker.project_many(proposals, contexts), 7),
         "check, six layers": median_ms(lambda: checker.check_many(projected, contexts), 7),

@@ -184,7 +184,10 @@ def main() -> None:
     plans = {number: demonstrate(spec).actions for number, spec in enumerate(specs)}
     starts = [spec.start for spec in specs]
     fixture = Fixture(
-        task=task, checker=make_checker(task, FeasibilitySettings(**PARAMS["feasibility"])),
+        task=task, checker=make_checker(
+            task, FeasibilitySettings(**PARAMS["feasibility"]),
+            action_period_s=HORIZONS.action_period_s,
+        ),
         horizons=HORIZONS, execution=ExecutionSettings(**PARAMS["execution"]),
         latency=LatencyModel(
             {name: DeclaredTerm(0.001, 0.002) for name in DECLARED_TERMS},

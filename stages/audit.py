@@ -23,7 +23,7 @@ def work(params: Params) -> None:
             action_period_s=params.horizons.action_period_s,
             root_seed=params.seed,
         )
-        obstacles = round_obstacles(load_task(params.task.name), feasibility)
+        obstacles = round_obstacles(load_task(params.task.name))
         write_evidence(result, folder, settings=settings, obstacles=obstacles)
         write_bytes(folder / "scene.png", scene_png(params.task.name))
 

@@ -46,7 +46,11 @@ def work(params: Params) -> None:
             samples=section.samples,
             horizons=params.horizons,
         )
-        checker = make_checker(task, params.section("feasibility", FeasibilitySettings))
+        checker = make_checker(
+            task,
+            params.section("feasibility", FeasibilitySettings),
+            action_period_s=params.horizons.action_period_s,
+        )
         write_reload(plan, folder, task=task, checker=checker)
 
 

@@ -12,12 +12,13 @@ from genpolicy.evidence.admission_context import make_checker
 from genpolicy.evidence.shadow.corruption import CORRUPTIONS
 from genpolicy.evidence.shadow.shadow import (
     Shadow,
-    disabled_checks_evidence,
     held_out_observations,
+    missing_checks_evidence,
     shadow_policy,
 )
 from genpolicy.evidence.shadow.tables import CANDIDATES, write_shadow
 from genpolicy.execution.cell import ExecutionSettings
+from genpolicy.feasibility.checks import without
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import output_folder
 from genpolicy.policies.matched_training import PolicySettings
@@ -50,10 +51,11 @@ def work(params: Params) -> None:
     section = params.section("shadow", ShadowSection)
     feasibility = params.section("feasibility", FeasibilitySettings)
     seed = params.section("policy", PolicySettings).seeds[0]
+    period_s = params.horizons.action_period_s
     task, data = load_task(params.task.name), load_dataset(ARTIFACTS / "ingest")
     shadow = Shadow(
         task=task,
-        checker=make_checker(task, feasibility),
+        checker=make_checker(task, feasibility, action_period_s=period_s),
         horizons=params.horizons,
         execution=params.section("execution", ExecutionSettings),
         late_steps=section.late_steps,
@@ -75,11 +77,13 @@ def work(params: Params) -> None:
         for method in params.section("generators", StudySection).samplers
     ]
     spacing = max(1, len(observations) // section.mutant_observations)
-    mutants = disabled_checks_evidence(
+    mutants = missing_checks_evidence(
         shadow,
         observations[::spacing],
         without={
-            item.checks: make_checker(task, feasibility, disabled_checks=frozenset(item.checks))
+            item.checks: make_checker(
+                task, feasibility, action_period_s=period_s, checks=without(*item.checks)
+            )
             for item in CORRUPTIONS
             if item.checks
         },

@@ -60,8 +60,8 @@ def task_checks(dataset: Dataset, *, task: str | None, chunk_steps: int) -> Task
     if contract_hash(dataset.manifest) != plugin.observation.hash():
         return TaskChecks()
     period_s = float(dataset.manifest["action_contract"]["period_s"])
-    limits = FeasibilitySettings(action_period_s=period_s, maximum_actions=max(16, chunk_steps))
-    checker = make_checker(plugin, limits)
+    limits = FeasibilitySettings(maximum_actions=max(16, chunk_steps))
+    checker = make_checker(plugin, limits, action_period_s=period_s)
 
     def is_admissible(actions: Array, observation: Array) -> tuple[bool, str]:
         return admissible(plugin, checker, actions, observation, action_period_s=period_s)
@@ -71,7 +71,7 @@ def task_checks(dataset: Dataset, *, task: str | None, chunk_steps: int) -> Task
     return TaskChecks(
         admissible=is_admissible,
         replay=(lambda uuid: replay_episode(plugin, dataset, uuid)) if recorded else None,
-        obstacles=round_obstacles(plugin, limits),
+        obstacles=round_obstacles(plugin),
     )
 
 

@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 
 from genpolicy.contract.chunk import ChunkMetadata, Proposal
 from genpolicy.feasibility.admission import FeasibilityChecker
+from genpolicy.feasibility.cell import cell_of
+from genpolicy.feasibility.checks import CHECKS, Check
 from genpolicy.feasibility.context import Context
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.robot.scene_state import SceneState
@@ -41,15 +43,22 @@ class Session:
 
 
 def make_checker(
-    task: Task, settings: FeasibilitySettings, *, disabled_checks: frozenset[str] = frozenset()
+    task: Task,
+    settings: FeasibilitySettings,
+    *,
+    action_period_s: float,
+    checks: tuple[Check, ...] = CHECKS,
 ) -> FeasibilityChecker:
-    """The six layers for a task; `disabled_checks` only for the evidence on mutants."""
-    return FeasibilityChecker(
-        task.scene_path,
-        workspace=task.workspace,
-        settings=settings,
-        disabled_checks=disabled_checks,
-    )
+    """The six layers for a task.
+
+    Args:
+        task: Scene, workspace, robot and phases.
+        settings: Thresholds.
+        action_period_s: The controller's period, s.
+        checks: Rows of the table; a part of it only for the evidence on mutants.
+    """
+    cell = cell_of(task, settings, action_period_s=action_period_s)
+    return FeasibilityChecker(cell, checks=checks)
 
 
 def seam(

@@ -2,28 +2,29 @@
 
 from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.contract.action import POSITION, split_action
 from genpolicy.contract.chunk import Projected, Proposal
-from genpolicy.errors import ConfigError
-from genpolicy.feasibility import layers
-from genpolicy.feasibility.context import Context, Workspace
-from genpolicy.feasibility.freshness import fresh
-from genpolicy.feasibility.geometric import geometric
-from genpolicy.feasibility.projection import project, smooth_rates
-from genpolicy.feasibility.settings import CHECKS, CHECKS_BY_LAYER, LAYERS, FeasibilitySettings
-from genpolicy.feasibility.smoothing import rate_excess
+from genpolicy.feasibility.batch import Batch
+from genpolicy.feasibility.cell import Cell
+from genpolicy.feasibility.checks import CHECKS, Check, Measure, require_table
+from genpolicy.feasibility.context import Context
+from genpolicy.feasibility.inverse import solve_chunks, solved
+from genpolicy.feasibility.layers.representation import is_shaped
+from genpolicy.feasibility.projection import project_many
+from genpolicy.feasibility.settings import LAYERS, FeasibilitySettings
 from genpolicy.feasibility.verdict import Verdict, judge_layer, not_reached
 from genpolicy.robot.collision import CollisionModel
-from genpolicy.robot.kinematics import JOINTS, ArmKinematics
-from genpolicy.robot.limits import RobotLimits, limits_of
+from genpolicy.robot.kinematics import ArmKinematics
 
 Array = NDArray[np.float64]
+
+FIRST, *MOTION, LAST = LAYERS
+"""The first layer decides whether arrays may be made at all; the last looks at no action."""
 
 
 @dataclass
@@ -32,7 +33,8 @@ class _State:
 
     projected: Projected
     context: Context
-    margins: dict[str, float]
+    shaped: bool
+    margins: dict[str, float] = field(default_factory=dict)
     detail: str = ""
     alive: bool = True
 
@@ -41,6 +43,11 @@ class _State:
         rows = self.context.rows(len(self.projected.actions))
         return int(rows.stop) - int(rows.start)
 
+    @property
+    def computable(self) -> bool:
+        """The projected rows are numbers that kinematics and collision may be asked about."""
+        return self.shaped and bool(np.all(np.isfinite(self.projected.actions)))
+
 
 class LayerChecker:
     """Projects and checks chunks for one robot in one scene; holds no state between calls.
@@ -48,48 +55,40 @@ class LayerChecker:
     `FeasibilityChecker` in `admission` adds the decision to it.
 
     Args:
-        scene_path: MJCF of the task.
-        workspace: Where the TCP may be.
-        settings: Thresholds.
-        limits: Table of limits; the one that the settings name if None.
-        disabled_checks: Names out of `CHECKS` to leave out. For tests and for the evidence that
-            a missing check is noticed; never set it anywhere else.
+        cell: Robot, scene, phases and thresholds.
+        checks: Rows of the table that decide. Fewer than all of them are for the evidence that a
+            missing check is noticed.
 
     Raises:
-        ConfigError: An unknown check, limits of another robot, or position limits that differ
-            from those of the scene file.
+        ConfigError: The tuple is no table of checks.
     """
 
-    def __init__(
-        self,
-        scene_path: Path,
-        *,
-        workspace: Workspace,
-        settings: FeasibilitySettings,
-        limits: RobotLimits | None = None,
-        disabled_checks: frozenset[str] = frozenset(),
-    ) -> None:
-        self.settings = settings
-        self.workspace = workspace
-        self.limits = limits_of(settings.robot) if limits is None else limits
-        self.disabled_checks = disabled_checks
-        self.kinematics = ArmKinematics(scene_path)
-        self.collision = CollisionModel(scene_path, self.kinematics)
-        self._require_consistent()
+    def __init__(self, cell: Cell, *, checks: tuple[Check, ...] = CHECKS) -> None:
+        require_table(checks)
+        self.cell = cell
+        self.checks = checks
         self._scales = {
-            "projection_too_large": settings.position_change_limit_m,
-            "rotation_not_orthonormal": settings.orthonormality_tolerance,
-            "gripper_range": settings.gripper_upper_m,
-            "workspace": 0.1,
-            "unreachable": settings.position_tolerance_m,
-            "singular": settings.condition_limit,
-            "scene_collision": 0.1,
-            "self_collision": 0.1,
-            "swept_collision": 0.1,
-            "joint_velocity": float(self.limits.velocity_rad_s.min()),
-            "joint_acceleration": float(self.limits.acceleration_rad_s2.min()),
-            "joint_jerk": float(self.limits.jerk_rad_s3.min()),
+            layer: {check.name: check.scale(cell) for check in checks if check.layer == layer}
+            for layer in LAYERS
         }
+        self._measures: dict[str, dict[Measure, list[str]]] = {layer: {} for layer in LAYERS}
+        for check in checks:
+            self._measures[check.layer].setdefault(check.measure, []).append(check.name)
+
+    @property
+    def settings(self) -> FeasibilitySettings:
+        """Thresholds."""
+        return self.cell.settings
+
+    @property
+    def kinematics(self) -> ArmKinematics:
+        """The arm."""
+        return self.cell.kinematics
+
+    @property
+    def collision(self) -> CollisionModel:
+        """Collision queries in the scene."""
+        return self.cell.collision
 
     def project(self, proposal: Proposal, *, context: Context) -> Projected:
         """A chunk close by within rotations, workspace, gripper and rates; see `project_many`."""
@@ -102,65 +101,13 @@ class LayerChecker:
 
         What cannot be projected (not finite, of another shape, not reachable) is left for the
         layers to reject.
+
+        Raises:
+            ContractError: A context is of another task or robot.
         """
-        result = [
-            project(p, context=c, settings=self.settings, workspace=self.workspace)
-            for p, c in zip(proposals, contexts, strict=True)
-        ]
-        groups: dict[int, list[int]] = defaultdict(list)
-        for i, (chunk, context) in enumerate(zip(result, contexts, strict=True)):
-            rows = context.rows(len(chunk.actions))
-            if np.isfinite(chunk.position_change_m) and rows.stop > rows.start:
-                groups[rows.stop - rows.start].append(i)
-        for members in groups.values():
-            smoothed = self._smooth([result[i] for i in members], [contexts[i] for i in members])
-            for i, chunk in zip(members, smoothed, strict=True):
-                result[i] = chunk
-        return result
-
-    def _smooth(self, chunks: list[Projected], contexts: list[Context]) -> list[Projected]:
-        """Least smoothed chunks whose joint path keeps the rate limits; else as they were."""
-        limits = self._usable_limits()
-        path, reached = self._seeded(chunks, contexts)
-        options = {
-            i: smooth_rates(
-                chunk, path[i], context=contexts[i], settings=self.settings,
-                workspace=self.workspace, kinematics=self.kinematics, limits=limits,
-            )
-            for i, chunk in enumerate(chunks) if reached[i]
-        }  # fmt: skip
-        chosen = list(chunks)
-        while options:
-            trial = {i: chunk for i, it in options.items() if (chunk := next(it, None))}
-            if not trial:
-                break
-            rows = list(trial)
-            path, reached = self._seeded(list(trial.values()), [contexts[i] for i in rows])
-            for place, i in enumerate(rows):
-                fixed = np.concatenate([contexts[i].q_cmd_history[-2:], contexts[i].q_cmd[None]])
-                excess = rate_excess(
-                    np.concatenate([fixed, path[place]]), seam=len(fixed), limits=limits,
-                    period_s=self.settings.action_period_s,
-                )  # fmt: skip
-                if reached[place] and excess <= 1.0:
-                    chosen[i] = trial[i]
-                    del options[i]
-            options = {i: it for i, it in options.items() if i in trial}
-        return chosen
-
-    def _seeded(
-        self, chunks: list[Projected], contexts: list[Context]
-    ) -> tuple[Array, NDArray[np.bool_]]:
-        """Inverse kinematics from the last commands, without restarts: (B, n, 7) and (B,)."""
-        batch = layers.batch_of(chunks, contexts)
-        size, rows = batch.actions.shape[:2]
-        solved = self.kinematics.solve(
-            batch.actions[..., POSITION].reshape(-1, 3),
-            batch.rotation.reshape(-1, 3, 3),
-            q_seed_rad=np.repeat(batch.q_cmd_rad, rows, axis=0),
-        )
-        reached = np.array([part.all() for part in solved.converged.reshape(size, rows)])
-        return solved.q_rad.reshape(size, rows, JOINTS), reached
+        for context in contexts:
+            self.cell.require_known(context)
+        return project_many(proposals, contexts, self.cell)
 
     def check(
         self, projected: Projected, *, context: Context, evaluate_all: bool = False
@@ -182,29 +129,26 @@ class LayerChecker:
             contexts: One per chunk.
             evaluate_all: Also evaluate layers behind the first that rejects (where the chunk is
                 finite), for evidence; the first reason stays the same.
+
+        Raises:
+            ContractError: A context is of another task or robot.
         """
+        for context in contexts:
+            self.cell.require_known(context)
         states = [
-            _State(p, c, layers.representation(p, context=c, settings=self.settings))
+            _State(p, c, is_shaped(p, c, self.settings))
             for p, c in zip(projected, contexts, strict=True)
         ]
-        computable = [s for s in states if _computable(s)]
-        for state in states:
-            state.alive = self._passes(state, "representation")
+        self._measure(FIRST, states, _batch(states))
         groups: dict[int, list[_State]] = defaultdict(list)
-        for state in computable:
-            if state.alive or evaluate_all:
+        for state in states:
+            if (state.alive or evaluate_all) and state.computable:
                 groups[state.row_count].append(state)
         for group in groups.values():
             self._motion(group, evaluate_all)
-        for state in states:
-            if state.alive or evaluate_all:
-                state.margins |= fresh(state.projected.metadata, state.context)
+        asked = [state for state in states if state.alive or evaluate_all]
+        self._measure(LAST, asked, _batch(asked))
         return [self._verdict(state, evaluate_all) for state in states]
-
-    def solve(self, projected: Projected, *, context: Context) -> Array:
-        """Joint positions of the executable rows, as the kinematic layer sees them. (n, 7)."""
-        batch = layers.batch_of([projected], [context])
-        return self.ik_chunk(batch.actions[0], context.q_cmd)[0]
 
     def boundary_jerk_m_s3(self, projected: Projected, *, context: Context) -> float:
         """Largest jerk of the TCP over the seam, m/s^3; NaN where fewer than four points exist.
@@ -219,7 +163,7 @@ class LayerChecker:
         path = np.concatenate([earlier, context.last_action[None, POSITION], rows[:3, POSITION]])
         if len(path) < 4:
             return float("nan")
-        jerk = np.diff(path, n=3, axis=0) / self.settings.action_period_s**3
+        jerk = np.diff(path, n=3, axis=0) / self.cell.action_period_s**3
         return float(np.max(np.linalg.norm(jerk, axis=1)))
 
     def ik_chunk(self, actions: Array, q_start: Array) -> tuple[Array, NDArray[np.bool_]]:
@@ -227,124 +171,64 @@ class LayerChecker:
 
         Args:
             actions: Shape (n, D_a).
-            q_start: Where the arm stands, rad. Shape (7,).
+            q_start: Where the arm stands, rad. Shape (J,).
 
         Returns:
-            Joint positions, rad, shape (n, 7), and whether each row is reached, shape (n,).
+            Joint positions, rad, shape (n, J), and whether each row is reached, shape (n,).
         """
         position, rotation, _ = split_action(np.asarray(actions, dtype=float))
-        q, position_error, rotation_error = layers.solve_chunks(
+        found = solve_chunks(
             self.kinematics, position[None], rotation[None], q_start_rad=np.asarray(q_start)[None]
         )
-        reached = (position_error[0] <= self.settings.position_tolerance_m) & (
-            rotation_error[0] <= self.settings.rotation_tolerance_rad
+        reached = (found.position_error_m[0] <= self.settings.position_tolerance_m) & (
+            found.rotation_error_rad[0] <= self.settings.rotation_tolerance_rad
         )
-        return q[0], reached
-
-    def _usable_limits(self) -> RobotLimits:
-        """The robot's limits times the factors of the settings."""
-        return replace(
-            self.limits,
-            velocity_rad_s=self.limits.velocity_rad_s * self.settings.velocity_factor,
-            acceleration_rad_s2=self.limits.acceleration_rad_s2 * self.settings.acceleration_factor,
-            jerk_rad_s3=self.limits.jerk_rad_s3 * self.settings.jerk_factor,
-        )
+        return found.q_rad[0], reached
 
     def _motion(self, states: list[_State], evaluate_all: bool) -> None:
         """Kinematic, geometric, dynamic and contact layer of chunks with equally many rows."""
-        batch = layers.batch_of([s.projected for s in states], [s.context for s in states])
-        margins, q = layers.kinematic(
-            batch, kinematics=self.kinematics, settings=self.settings, workspace=self.workspace
-        )
-        self._record(states, margins, "kinematic")
-        usable = np.all(np.isfinite(q), axis=(1, 2))
-        chosen = [i for i, s in enumerate(states) if usable[i] and (s.alive or evaluate_all)]
-        if not chosen:
-            return
-        states = [states[i] for i in chosen]
-        q = q[chosen]
-        batch = layers.batch_of([s.projected for s in states], [s.context for s in states])
-        margins, details = geometric(
-            batch,
-            q,
-            collision=self.collision,
-            settings=self.settings,
-            disabled=self.disabled_checks,
-        )
-        for state, detail in zip(states, details, strict=True):
-            state.detail = detail
-        self._record(states, margins, "geometric")
-        chosen = [i for i, s in enumerate(states) if s.alive or evaluate_all]
-        if not chosen:
-            return
-        states, q = [states[i] for i in chosen], q[chosen]
-        batch = layers.batch_of([s.projected for s in states], [s.context for s in states])
-        self._record(
-            states,
-            layers.dynamic(batch, q, limits=self._usable_limits(), settings=self.settings),
-            "dynamic",
-        )
-        self._record(
-            states,
-            layers.contact(batch, settings=self.settings, shapes=self.collision.shapes),
-            "contact",
-        )
+        batch = solved(_batch(states), self.cell)
+        usable = np.all(np.isfinite(batch.solved.q_rad), axis=(1, 2))
+        for layer in MOTION:
+            self._measure(layer, states, batch)
+            left = [i for i, s in enumerate(states) if usable[i] and (s.alive or evaluate_all)]
+            if not left:
+                return
+            states, batch, usable = [states[i] for i in left], batch.take(left), usable[left]
 
-    def _record(self, states: list[_State], margins: layers.Margins, layer: str) -> None:
-        for name, values in margins.items():
-            for state, value in zip(states, values, strict=True):
-                state.margins[name] = float(value)
+    def _measure(self, layer: str, states: list[_State], batch: Batch) -> None:
+        """Margins of one layer; its second measure is made where the first rejected nothing."""
+        left = np.arange(len(states))
+        for measure, names in self._measures[layer].items():
+            if not len(left):
+                break
+            found = measure(batch.take(left), self.cell)
+            for name in names:
+                for i, value in zip(left, found.values[name], strict=True):
+                    states[i].margins[name] = float(value)
+            for i, detail in zip(left, found.details, strict=bool(found.details)):
+                states[i].detail = states[i].detail or detail
+            passed = np.all([found.values[name] >= 0 for name in names], axis=0)
+            left = left[passed]
         for state in states:
             state.alive = state.alive and self._passes(state, layer)
 
     def _passes(self, state: _State, layer: str) -> bool:
-        return bool(judge_layer(layer, state.margins, self._scales, self.disabled_checks).passed)
+        return bool(judge_layer(layer, state.margins, self._scales[layer]).passed)
 
     def _verdict(self, state: _State, evaluate_all: bool) -> Verdict:
         found, rejected = [], False
-        for name in LAYERS:
-            evaluated = any(check in state.margins for check in CHECKS_BY_LAYER[name])
+        for layer, scales in self._scales.items():
+            evaluated = any(check in state.margins for check in scales)
             if rejected and not (evaluate_all and evaluated):
-                found.append(not_reached(name))
+                found.append(not_reached(layer))
                 continue
-            verdict = judge_layer(name, state.margins, self._scales, self.disabled_checks)
+            verdict = judge_layer(layer, state.margins, scales)
             rejected = rejected or verdict.passed is not True
             found.append(verdict)
-        rows = state.context.rows(len(state.projected.actions)) if _shaped(state) else slice(0, 0)
+        rows = state.context.rows(len(state.projected.actions)) if state.shaped else slice(0, 0)
         return Verdict(tuple(found), dict(state.margins), (rows.start, rows.stop), state.detail)
 
-    def _require_consistent(self) -> None:
-        unknown = self.disabled_checks - set(CHECKS)
-        if unknown:
-            raise ConfigError(
-                where="disabled_checks",
-                found=f"holding {sorted(unknown)}",
-                expected=f"names out of {list(CHECKS)}",
-                action="Correct the name.",
-            )
-        if self.limits.robot != self.settings.robot:
-            raise ConfigError(
-                where="limits",
-                found=f"of the robot {self.limits.robot}",
-                expected=f"the table of {self.settings.robot}, as the settings say",
-                action="Never mix the limits of two robots.",
-            )
-        same = np.allclose(self.kinematics.lower_rad, self.limits.position_lower_rad, atol=1e-9)
-        same &= np.allclose(self.kinematics.upper_rad, self.limits.position_upper_rad, atol=1e-9)
-        if not same:
-            raise ConfigError(
-                where=f"{self.kinematics.scene_path.name}: joint ranges",
-                found="other than the position limits of the table",
-                expected=f"those of {self.limits.robot}",
-                action="Use the scene and the limits of one robot.",
-            )
 
-
-def _computable(state: _State) -> bool:
-    """The projected rows are numbers that kinematics and collision may be asked about."""
-    actions = state.projected.actions
-    return _shaped(state) and bool(np.all(np.isfinite(actions)))
-
-
-def _shaped(state: _State) -> bool:
-    return state.margins["shape"] >= 0
+def _batch(states: Sequence[_State]) -> Batch:
+    return Batch(tuple(s.projected for s in states), tuple(s.context for s in states))

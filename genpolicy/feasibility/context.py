@@ -1,7 +1,6 @@
 """What a chunk is checked against: the state of robot, scene and session at this moment."""
 
 from dataclasses import dataclass, field
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,24 +8,9 @@ from numpy.typing import NDArray
 from genpolicy.contract.action import ACTION_DIM
 from genpolicy.contract.chunk import frozen_array
 from genpolicy.errors import ContractError, NonFiniteError
-from genpolicy.robot.kinematics import JOINTS
 from genpolicy.robot.scene_state import SceneState
 
 Array = NDArray[np.float64]
-
-
-class Workspace(Protocol):
-    """Box that the TCP may not leave; base frame."""
-
-    @property
-    def lower_m(self) -> tuple[float, float, float]:
-        """Lowest x, y, z, m."""
-        ...
-
-    @property
-    def upper_m(self) -> tuple[float, float, float]:
-        """Highest x, y, z, m."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -34,8 +18,8 @@ class Context:
     """State at the moment of the check; all times in s on one monotonic clock.
 
     Attributes:
-        q_meas: Measured joint positions, rad. Shape (7,).
-        q_cmd: Joint positions of the last command, rad; the motion begins here. Shape (7,).
+        q_meas: Measured joint positions, rad. Shape (J,).
+        q_cmd: Joint positions of the last command, rad; the motion begins here. Shape (J,).
         last_action: Action commanded last. Shape (D_a,).
         now_s: Now.
         phase: Active task phase.
@@ -48,7 +32,7 @@ class Context:
         active_sampler_hash: Sampler settings in force.
         scene: Where the movable bodies of the scene stand.
         q_cmd_history: Commands before `q_cmd`, oldest first, one period apart, rad; what is not
-            given is not assumed: acceleration needs one of them at the seam, jerk two. (n, 7).
+            given is not assumed: acceleration needs one of them at the seam, jerk two. (n, J).
         newest_accepted_observation_s: Observation under the newest chunk accepted so far; an
             older one behind it is out of order. None before the first.
         first_index: Rows before it are late and will never be executed; the seam is there.
@@ -67,17 +51,24 @@ class Context:
     active_checkpoint_hash: str
     active_sampler_hash: str
     scene: SceneState
-    q_cmd_history: Array = field(default_factory=lambda: np.zeros((0, JOINTS)))
+    q_cmd_history: Array = field(default_factory=lambda: np.zeros((0, 0)))
     newest_accepted_observation_s: float | None = None
     first_index: int = 0
     end_index: int | None = None
 
     def __post_init__(self) -> None:
-        shapes = {"q_meas": (JOINTS,), "q_cmd": (JOINTS,), "last_action": (ACTION_DIM,)}
-        for name in (*shapes, "q_cmd_history"):
+        joints = np.size(self.q_cmd)
+        history = np.asarray(self.q_cmd_history)
+        if not history.size:
+            history = np.zeros((0, joints))
+            object.__setattr__(self, "q_cmd_history", history)
+        shapes = {
+            "q_meas": (joints,), "q_cmd": (joints,), "last_action": (ACTION_DIM,),
+            "q_cmd_history": (len(history), joints),
+        }  # fmt: skip
+        for name, expected in shapes.items():
             value = frozen_array(getattr(self, name))
             object.__setattr__(self, name, value)
-            expected = shapes.get(name, (len(value), JOINTS))
             if value.shape != expected:
                 raise ContractError(
                     where=f"Context.{name}",

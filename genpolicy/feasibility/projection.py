@@ -4,7 +4,8 @@ Projection repairs rounding and small excess, it does not make a bad chunk good:
 changed stands beside the result, and too much is a reason for rejection.
 """
 
-from collections.abc import Iterator
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,11 +13,10 @@ from numpy.typing import NDArray
 from genpolicy.contract.action import ACTION_DIM, GRIPPER, POSITION, ROTATION, join_action
 from genpolicy.contract.chunk import Projected, Proposal
 from genpolicy.contract.rotation import angle_between, rotation_from_6d, rotation_to_6d
-from genpolicy.feasibility.context import Context, Workspace
-from genpolicy.feasibility.settings import FeasibilitySettings
-from genpolicy.feasibility.smoothing import smoothed
-from genpolicy.robot.kinematics import ArmKinematics
-from genpolicy.robot.limits import RobotLimits
+from genpolicy.feasibility.batch import Batch
+from genpolicy.feasibility.cell import Cell
+from genpolicy.feasibility.context import Context
+from genpolicy.feasibility.smoothing import rate_excess, smoothed
 
 Array = NDArray[np.float64]
 
@@ -24,9 +24,7 @@ Array = NDArray[np.float64]
 ROUNDING = 1e-9
 
 
-def project(
-    proposal: Proposal, *, context: Context, settings: FeasibilitySettings, workspace: Workspace
-) -> Projected:
+def project(proposal: Proposal, *, context: Context, cell: Cell) -> Projected:
     """The geometric part of the projection; a proposal that is no chunk is left as it is.
 
     In this order: rotation columns to the rotation matrix (Gram-Schmidt), position into the
@@ -36,7 +34,7 @@ def project(
     Returns:
         Changes are infinite where nothing could be projected; the layers reject such a chunk.
     """
-    raw = proposal.actions
+    raw, settings, workspace = proposal.actions, cell.settings, cell.workspace
     shaped = raw.ndim == 2 and raw.shape[1] == ACTION_DIM and len(raw) > 0
     if not shaped or not np.all(np.isfinite(raw)):
         return Projected(proposal, raw, float("inf"), float("inf"))
@@ -49,7 +47,7 @@ def project(
     rows = context.rows(len(raw))
     last_position = context.last_action[POSITION]
     last_rotation = rotation_from_6d(context.last_action[ROTATION])
-    step_m, turn_rad = _step_limits(settings)
+    step_m, turn_rad = _step_limits(cell)
     if _too_fast(position[rows], last_position, step_m):
         position[rows] = _limit_steps(position[rows], last_position, step_m)
     if np.all(np.isfinite(last_rotation)) and _turns_too_fast(
@@ -62,37 +60,27 @@ def project(
 
 
 def smooth_rates(
-    projected: Projected,
-    q_rad: Array,
-    *,
-    context: Context,
-    settings: FeasibilitySettings,
-    workspace: Workspace,
-    kinematics: ArmKinematics,
-    limits: RobotLimits,
+    projected: Projected, q_rad: Array, *, context: Context, cell: Cell
 ) -> Iterator[Projected]:
     """The dynamic part: smoothing that keeps the joints within their rate limits, least first.
 
     Args:
         projected: Result of `project`.
-        q_rad: Its inverse kinematics, executable rows only. Shape (n, 7).
+        q_rad: Its inverse kinematics, executable rows only. Shape (n, J).
         context: State; its commands are the fixed beginning of the path.
-        settings: TCP speed limits.
-        workspace: Where the smoothed positions must be.
-        kinematics: The arm.
-        limits: Rate limits that may be used.
+        cell: Robot, workspace, and limits of joint and TCP rates.
 
     Yields:
         Chunks to choose from; none where no smoothing is needed. The joint path of a chunk is
         not quite the smoothed one (the elbow may differ), so whoever chooses solves it again.
     """
     rows = context.rows(len(projected.actions))
-    fixed = np.concatenate([context.q_cmd_history[-2:], context.q_cmd[None]])
-    step_m, turn_rad = _step_limits(settings)
+    workspace, fixed = cell.workspace, _before(context)
+    step_m, turn_rad = _step_limits(cell)
     last_rotation = rotation_from_6d(context.last_action[ROTATION])
     before = rotation_from_6d(projected.proposal.actions[:, ROTATION])
-    for path in smoothed(q_rad, fixed, limits=limits, period_s=settings.action_period_s):
-        position, rotation = kinematics.forward(path)
+    for path in smoothed(q_rad, fixed, limits=cell.usable_limits, period_s=cell.action_period_s):
+        position, rotation = cell.kinematics.forward(path)
         inside = np.all((position >= workspace.lower_m) & (position <= workspace.upper_m))
         fast = _too_fast(position, context.last_action[POSITION], step_m)
         if inside and not fast and not _turns_too_fast(rotation, last_rotation, turn_rad):
@@ -103,6 +91,70 @@ def smooth_rates(
             yield _projected(projected.proposal, actions, before=before, after=after)
 
 
+def project_many(
+    proposals: Sequence[Proposal], contexts: Sequence[Context], cell: Cell
+) -> list[Projected]:
+    """Both parts of the projection for many proposals, each with its own context."""
+    result = [project(p, context=c, cell=cell) for p, c in zip(proposals, contexts, strict=True)]
+    groups: dict[int, list[int]] = defaultdict(list)
+    for i, (chunk, context) in enumerate(zip(result, contexts, strict=True)):
+        rows = context.rows(len(chunk.actions))
+        if np.isfinite(chunk.position_change_m) and rows.stop > rows.start:
+            groups[rows.stop - rows.start].append(i)
+    for members in groups.values():
+        batch = Batch(tuple(result[i] for i in members), tuple(contexts[i] for i in members))
+        for i, chunk in zip(members, _smooth(batch, cell), strict=True):
+            result[i] = chunk
+    return result
+
+
+def _smooth(batch: Batch, cell: Cell) -> list[Projected]:
+    """Least smoothed chunks whose joint path keeps the rate limits; else as they were."""
+    path, reached = _seeded(batch, cell)
+    options = {
+        i: smooth_rates(chunk, path[i], context=batch.contexts[i], cell=cell)
+        for i, chunk in enumerate(batch.projected)
+        if reached[i]
+    }
+    chosen = list(batch.projected)
+    while options:
+        trial = {i: chunk for i, it in options.items() if (chunk := next(it, None))}
+        if not trial:
+            break
+        tried = Batch(tuple(trial.values()), tuple(batch.contexts[i] for i in trial))
+        path, reached = _seeded(tried, cell)
+        for place, (i, chunk) in enumerate(trial.items()):
+            fixed = _before(batch.contexts[i])
+            excess = rate_excess(
+                np.concatenate([fixed, path[place]]),
+                seam=len(fixed),
+                limits=cell.usable_limits,
+                period_s=cell.action_period_s,
+            )
+            if reached[place] and excess <= 1.0:
+                chosen[i] = chunk
+                del options[i]
+        options = {i: it for i, it in options.items() if i in trial}
+    return chosen
+
+
+def _seeded(batch: Batch, cell: Cell) -> tuple[Array, NDArray[np.bool_]]:
+    """Inverse kinematics from the last commands, without restarts: (B, n, J) and (B,)."""
+    size, rows = batch.actions.shape[:2]
+    found = cell.kinematics.solve(
+        batch.actions[..., POSITION].reshape(-1, 3),
+        batch.rotation.reshape(-1, 3, 3),
+        q_seed_rad=np.repeat(batch.q_cmd_rad, rows, axis=0),
+    )
+    reached = np.array([part.all() for part in found.converged.reshape(size, rows)])
+    return found.q_rad.reshape(size, rows, -1), reached
+
+
+def _before(context: Context) -> Array:
+    """The commands that the path goes on from, oldest first. Shape (s, J), 1 <= s <= 3."""
+    return np.concatenate([context.q_cmd_history[-2:], context.q_cmd[None]])
+
+
 def _projected(proposal: Proposal, actions: Array, *, before: Array, after: Array) -> Projected:
     """The projected chunk with its changes; `before` and `after` are its rotations."""
     moved = np.linalg.norm(actions[:, POSITION] - proposal.actions[:, POSITION], axis=1)
@@ -110,9 +162,9 @@ def _projected(proposal: Proposal, actions: Array, *, before: Array, after: Arra
     return Projected(proposal, actions, float(np.max(moved)), float(np.max(turned)))
 
 
-def _step_limits(settings: FeasibilitySettings) -> tuple[float, float]:
+def _step_limits(cell: Cell) -> tuple[float, float]:
     """Most that one action may move (m) and turn (rad)."""
-    period_s = settings.action_period_s
+    settings, period_s = cell.settings, cell.action_period_s
     return settings.tcp_speed_limit_m_s * period_s, settings.tcp_turn_limit_rad_s * period_s
 
 

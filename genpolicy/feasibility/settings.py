@@ -1,55 +1,19 @@
-"""Every threshold of the six layers, with its unit; and the names of layers and checks."""
+"""Every threshold of the six layers, with its unit; and the names of the layers.
 
-from typing import Literal
+What a task decides (phases, workspace, robot) and the controller's period are no thresholds: they
+come with the cell.
+"""
 
 from pydantic import BaseModel, ConfigDict, Field, PositiveFloat
 
 LAYERS = ("representation", "kinematic", "geometric", "dynamic", "contact", "fresh")
-
-CHECKS_BY_LAYER: dict[str, tuple[str, ...]] = {
-    "representation": (
-        "shape",
-        "finite",
-        "rotation_degenerate",
-        "rotation_not_orthonormal",
-        "gripper_range",
-        "projection_too_large",
-    ),
-    "kinematic": ("workspace", "unreachable", "joint_position", "singular"),
-    "geometric": ("scene_collision", "self_collision", "swept_collision"),
-    "dynamic": (
-        "action_period",
-        "joint_velocity",
-        "joint_acceleration",
-        "joint_jerk",
-        "tcp_speed",
-        "tcp_turn",
-    ),
-    "contact": ("approach_direction", "contact_speed", "gripper_opening"),
-    "fresh": (
-        "reset",
-        "calibration_mismatch",
-        "phase_transition",
-        "checkpoint_mismatch",
-        "sampler_mismatch",
-        "future_observation",
-        "out_of_order",
-        "stale_observation",
-        "expired",
-    ),
-}
-"""Checks in the order in which they decide; the name of a check is the reason it gives."""
-
-CHECKS: tuple[str, ...] = tuple(c for layer in LAYERS for c in CHECKS_BY_LAYER[layer])
-"""Names that `disabled_checks` understands; only tests and the mutant evidence disable one."""
+"""Layers, in the order in which they decide."""
 
 
 class FeasibilitySettings(BaseModel):
     """Thresholds of projection and layers; the unit ends the name.
 
     Attributes:
-        robot: Table of limits.
-        action_period_s: The controller's period.
         maximum_actions: Most actions in a chunk.
         orthonormality_tolerance: Most that raw rotation columns may miss length 1 and a right
             angle by.
@@ -69,8 +33,6 @@ class FeasibilitySettings(BaseModel):
         jerk_factor: The same for joint jerk.
         tcp_speed_limit_m_s: Most for the TCP's speed.
         tcp_turn_limit_rad_s: Most for the TCP's turning rate.
-        contact_phases: Phases in which the held object may touch the target.
-        opening_phases: Phases in which the gripper may let go.
         held_opening_m: Above this opening nothing is held any more.
         release_depth_m: In a contact phase the gripper may also let go once the held object's
             tip is this deep in the target.
@@ -81,8 +43,6 @@ class FeasibilitySettings(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
-    robot: Literal["panda", "fr3"] = "panda"
-    action_period_s: PositiveFloat = 0.05
     maximum_actions: int = Field(default=16, ge=1)
     orthonormality_tolerance: PositiveFloat = 0.2
     gripper_lower_m: float = 0.0
@@ -101,8 +61,6 @@ class FeasibilitySettings(BaseModel):
     jerk_factor: float = Field(default=0.5, gt=0, le=1)
     tcp_speed_limit_m_s: PositiveFloat = 0.5
     tcp_turn_limit_rad_s: PositiveFloat = 1.25
-    contact_phases: frozenset[str] = frozenset({"insert", "release"})
-    opening_phases: frozenset[str] = frozenset({"release", "retreat"})
     held_opening_m: PositiveFloat = 0.018
     release_depth_m: PositiveFloat = 0.02
     approach_cone_rad: float = Field(default=0.35, gt=0, lt=1.57)

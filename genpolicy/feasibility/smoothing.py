@@ -39,7 +39,7 @@ def rate_excess(path: Array, *, seam: int, limits: RobotLimits, period_s: float)
     """Largest share of a joint rate limit that a path uses; above 1 it breaks one.
 
     Args:
-        path: Fixed points and then the path, rad. Shape (..., s + n, 7).
+        path: Fixed points and then the path, rad. Shape (..., s + n, J).
         seam: How many of the points are fixed, >= 1.
         limits: Limits that may be used.
         period_s: Time between points.
@@ -63,13 +63,13 @@ def smoothed(path: Array, fixed: Array, *, limits: RobotLimits, period_s: float)
     """Paths within the limits, least smoothed first; none where the path needs no smoothing.
 
     Args:
-        path: Joint positions, rad. Shape (n, 7).
-        fixed: Commands before it, oldest first, at least one. Shape (s, 7).
+        path: Joint positions, rad. Shape (n, J).
+        fixed: Commands before it, oldest first, at least one. Shape (s, J).
         limits: Limits that may be used.
         period_s: Time between points.
 
     Yields:
-        Shape (n, 7).
+        Shape (n, J).
 
     Source:
         Whittaker's smoother (1922) with a fixed beginning.

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from genpolicy.feasibility.settings import CHECKS_BY_LAYER, LAYERS
+from genpolicy.feasibility.settings import LAYERS
 
 Array = NDArray[np.float64]
 
@@ -68,27 +68,25 @@ class Verdict:
 
 
 def judge_layer(
-    name: str, margins: Mapping[str, float], scales: Mapping[str, float], disabled: frozenset[str]
+    layer: str, margins: Mapping[str, float], scales: Mapping[str, float]
 ) -> LayerVerdict:
     """Verdict of one layer from the margins of its checks; a missing or NaN margin fails.
 
     Args:
-        name: Layer.
+        layer: Name of the layer.
         margins: Margin per check.
-        scales: Size of each check's limit, to find the tightest one; 1 where absent.
-        disabled: Checks to leave out.
+        scales: Checks of the layer in order, each with the size of its limit, which tells the
+            tightest one.
     """
     tightest, tightest_part, tightest_margin = "", float("inf"), float("nan")
-    for check in CHECKS_BY_LAYER[name]:
-        if check in disabled:
-            continue
+    for check, scale in scales.items():
         margin = margins.get(check, float("nan"))
         if not margin >= 0:
-            return LayerVerdict(name, False, check, margin, check)
-        part = margin / scales.get(check, 1.0)
+            return LayerVerdict(layer, False, check, margin, check)
+        part = margin / scale
         if part < tightest_part or not tightest:
             tightest, tightest_part, tightest_margin = check, part, margin
-    return LayerVerdict(name, True, "", tightest_margin, tightest)
+    return LayerVerdict(layer, True, "", tightest_margin, tightest)
 
 
 def not_reached(name: str) -> LayerVerdict:

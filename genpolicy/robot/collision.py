@@ -136,6 +136,11 @@ class CollisionModel:
         self.bodies = self._broad.bodies
         self._narrow = NarrowPhase(self.shapes, self._broad.columns, self.bodies)
 
+    @property
+    def self_pair_count(self) -> int:
+        """How many pairs of the robot's own shapes are tested against each other."""
+        return int(np.sum(self._broad.columns.body < 0))
+
     def check_samples(self, paths: Paths) -> CollisionReport:
         """Collision at the waypoints 1 to P - 1 of each path (0 is where the arm stands)."""
         batch, points = paths.q_rad.shape[:2]

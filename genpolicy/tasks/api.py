@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from genpolicy.contract.observation import ObservationContract
 from genpolicy.errors import ConfigError
+from genpolicy.robot.limits import RobotLimits
 
 if TYPE_CHECKING:
     from genpolicy.data.recording.episode import RecordedEpisode
@@ -212,6 +213,21 @@ class Task(Protocol):
     @property
     def contact_phases(self) -> frozenset[str]:
         """Phases in which the held object may touch the scene."""
+        ...
+
+    @property
+    def opening_phases(self) -> frozenset[str]:
+        """Phases in which the gripper may let go; empty for a task without a gripper."""
+        ...
+
+    @property
+    def obstacles(self) -> tuple[str, ...]:
+        """Movable bodies of the scene that are only in the way; empty where none is."""
+        ...
+
+    @property
+    def limits(self) -> RobotLimits:
+        """Table of limits of the robot in the scene."""
         ...
 
     @property

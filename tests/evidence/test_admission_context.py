@@ -12,6 +12,7 @@ from genpolicy.evidence.admission_context import (
     recorded_proposal,
     seam,
 )
+from genpolicy.feasibility.checks import CHECKS, without
 from genpolicy.tasks.api import WorldSettings
 from genpolicy.tasks.tabletop_insertion.episodes import demonstrate
 
@@ -64,7 +65,9 @@ def test_a_recorded_chunk_has_age_zero_and_may_not_be_older(task, checker, plan,
     assert late.verdict.margins["stale_observation"] < 0
 
 
-def test_a_disabled_check_is_left_out_by_name(task, kit):
-    blind = make_checker(task, kit.FEASIBILITY, disabled_checks=frozenset({"expired"}))
-    assert blind.disabled_checks == {"expired"}
-    assert make_checker(task, kit.FEASIBILITY).disabled_checks == frozenset()
+def test_a_checker_has_all_checks_unless_it_is_given_fewer(task, kit):
+    period_s = kit.HORIZONS.action_period_s
+    whole = make_checker(task, kit.FEASIBILITY, action_period_s=period_s)
+    assert whole.checks == CHECKS and whole.cell.action_period_s == period_s
+    less = make_checker(task, kit.FEASIBILITY, action_period_s=period_s, checks=without("expired"))
+    assert less.checks == without("expired")

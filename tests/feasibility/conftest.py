@@ -1,21 +1,23 @@
 """A tool that points down, straight chunks, and the context in which they are feasible."""
 
-from dataclasses import replace
-from pathlib import Path
+from dataclasses import dataclass, field, replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-import genpolicy.tasks.tabletop_insertion as task_package
 from genpolicy.contract.action import join_action
-from genpolicy.contract.chunk import ChunkMetadata, Proposal
+from genpolicy.contract.chunk import ChunkMetadata, Projected, Proposal
 from genpolicy.feasibility.admission import FeasibilityChecker
+from genpolicy.feasibility.batch import Batch
+from genpolicy.feasibility.cell import cell_of
+from genpolicy.feasibility.checks import CHECKS, without
 from genpolicy.feasibility.context import Context
-from genpolicy.feasibility.settings import FeasibilitySettings
+from genpolicy.feasibility.inverse import solved
+from genpolicy.feasibility.settings import LAYERS, FeasibilitySettings
 from genpolicy.robot.scene_state import SceneState
+from genpolicy.tasks.api import load_task
 
-SCENE = Path(task_package.__file__).with_name("scene.xml")
 WORKSPACE = SimpleNamespace(lower_m=(0.30, -0.22, 0.02), upper_m=(0.72, 0.22, 0.28))
 DOWN = np.diag([1.0, -1.0, -1.0])
 HOME = np.array([0.0, -0.3, 0.0, -2.2, 0.0, 1.9, 0.785])
@@ -92,22 +94,86 @@ def detour(side):
     return join_action(first, np.broadcast_to(DOWN, (n, 3, 3)), np.asarray(0.0))
 
 
-@pytest.fixture(scope="session")
-def checker():
-    return FeasibilityChecker(SCENE, workspace=WORKSPACE, settings=FeasibilitySettings())
+@dataclass(frozen=True)
+class Outside:
+    """A chunk that one check must refuse.
+
+    Attributes:
+        actions: The chunk. Shape (K, D_a).
+        context: State at the check.
+        metadata: Changes to its metadata.
+        changes: What projection is said to have changed, m and rad.
+        settings: Thresholds under which it is outside.
+        others: Checks to leave out as well, so that it alone decides; None where a later check
+            of the table refuses the chunk in any case.
+    """
+
+    actions: np.ndarray
+    context: Context
+    metadata: dict = field(default_factory=dict)
+    changes: tuple[float, float] = (0.0, 0.0)
+    settings: dict = field(default_factory=dict)
+    others: tuple[str, ...] | None = ()
+
+
+def judge(checker, actions, ctx, *, changes=(0.0, 0.0), **meta):
+    """Verdict on actions as they are, without projection."""
+    return checker.check(Projected(proposal(actions, **meta), actions, *changes), context=ctx)
+
+
+def batch_of(*pairs):
+    """Batch of actions and contexts, as they are."""
+    chunks = tuple(Projected(proposal(actions), actions, 0.0, 0.0) for actions, _ in pairs)
+    return Batch(chunks, tuple(ctx for _, ctx in pairs))
+
+
+def turns_red(build, name, case):
+    """Exactly this check refuses the case; a checker made without it does not."""
+    arguments = {"changes": case.changes, **case.metadata}
+    others = set(case.others or ()) - {name}
+    verdict = judge(build(*others, **case.settings), case.actions, case.context, **arguments)
+    assert verdict.first_reason == name, verdict.margins
+    assert not verdict.passed
+    layer = next(check.layer for check in CHECKS if check.name == name)
+    assert verdict.first_layer == layer
+    assert not verdict.layer(layer).margin >= 0
+    behind = LAYERS[LAYERS.index(layer) + 1 :]
+    assert [verdict.layer(n).passed for n in behind] == [None] * len(behind)
+    mutant = build(name, *others, **case.settings)
+    blind = judge(mutant, case.actions, case.context, **arguments)
+    assert name not in blind.margins
+    if case.others is None:  # a later barrier still stands: refused, but for another reason
+        assert not blind.passed
+        assert blind.first_reason != name
+    else:
+        assert blind.passed, (blind.first_reason, blind.detail)
+
+
+def names_of(layer):
+    """Checks of a layer."""
+    return [check.name for check in CHECKS if check.layer == layer]
 
 
 @pytest.fixture(scope="session")
-def build(checker):
-    """Checkers with other settings or disabled checks; the slow parts are shared."""
+def cell():
+    """The default task's cell, with a higher ceiling than the task's."""
+    task = load_task("tabletop_insertion")
+    default = cell_of(task, FeasibilitySettings(), action_period_s=PERIOD_S)
+    return replace(default, workspace=WORKSPACE)
 
-    def make(*disabled, **changes):
-        twin = object.__new__(FeasibilityChecker)
-        twin.__dict__.update(checker.__dict__)
-        twin.settings = FeasibilitySettings(**(checker.settings.model_dump() | changes))
-        twin.disabled_checks = frozenset(disabled)
-        twin._require_consistent()
-        return twin
+
+@pytest.fixture(scope="session")
+def checker(cell):
+    return FeasibilityChecker(cell)
+
+
+@pytest.fixture(scope="session")
+def build(cell):
+    """Checkers without some checks, or with other settings; the slow parts are shared."""
+
+    def make(*names, **changes):
+        settings = FeasibilitySettings(**(cell.settings.model_dump() | changes))
+        return FeasibilityChecker(replace(cell, settings=settings), checks=without(*names))
 
     return make
 
@@ -116,7 +182,8 @@ def build(checker):
 def kit():
     """The helpers of this file, by name."""
     return SimpleNamespace(
-        DOWN=DOWN, HOME=HOME, PERIOD_S=PERIOD_S, K=K, START=START, SIDE=SIDE, SCENE=SCENE,
-        WORKSPACE=WORKSPACE, metadata=metadata, smooth=smooth, line=line, proposal=proposal,
-        context=context, scene=scene, detour=detour,
+        DOWN=DOWN, HOME=HOME, PERIOD_S=PERIOD_S, K=K, START=START, SIDE=SIDE, WORKSPACE=WORKSPACE,
+        metadata=metadata, smooth=smooth, line=line, proposal=proposal, context=context,
+        scene=scene, detour=detour, judge=judge, batch_of=batch_of, turns_red=turns_red,
+        Outside=Outside, names_of=names_of, solved=solved,
     )  # fmt: skip

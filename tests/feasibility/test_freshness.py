@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from genpolicy.execution.checks import CHECKS, Place, at
+from genpolicy.feasibility.checks import CHECKS as TABLE
 from genpolicy.feasibility.context import Context
 from genpolicy.feasibility.freshness import NAMES, fresh
-from genpolicy.feasibility.settings import CHECKS_BY_LAYER
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +37,7 @@ FAULTS = {
 
 def test_the_layer_asks_exactly_its_rows(kit, moment):
     margins = fresh(kit.metadata(), moment)
-    assert set(margins) == set(CHECKS_BY_LAYER["fresh"]) == set(FAULTS)
+    assert set(margins) == {c.name for c in TABLE if c.layer == "fresh"} == set(FAULTS)
     assert all(margin >= 0 for margin in margins.values())
     assert margins["stale_observation"] == pytest.approx(0.2, abs=1e-9)
     assert margins["future_observation"] == pytest.approx(0.05, abs=1e-9)

@@ -12,6 +12,7 @@ from genpolicy.data.dataset import Dataset, load_dataset
 from genpolicy.evidence.admission_context import make_checker
 from genpolicy.evidence.need.held_out import admissible
 from genpolicy.feasibility.settings import FeasibilitySettings
+from genpolicy.robot.shapes import shapes_of
 from genpolicy.tasks.api import Task, load_task
 
 Array = NDArray[np.float64]
@@ -38,7 +39,7 @@ def audit_task(
     """
     task = load_task(task_name)
     data = load_dataset(dataset)
-    checker = make_checker(task, feasibility)
+    checker = make_checker(task, feasibility, action_period_s=action_period_s)
 
     def is_admissible(actions: Array, observation: Array) -> tuple[bool, str]:
         return admissible(
@@ -71,9 +72,9 @@ def replay_episode(task: Task, data: Dataset, episode_uuid: str) -> str:
     return task.replay(start, np.concatenate([before, actions]))
 
 
-def round_obstacles(task: Task, feasibility: FeasibilitySettings) -> list[dict[str, float]]:
+def round_obstacles(task: Task) -> list[dict[str, float]]:
     """Standing cylinders of the scene file, as circles in the base frame's plane, m."""
-    shapes = make_checker(task, feasibility).collision.shapes
+    shapes = shapes_of(task.scene_path)
     found = []
     for shape in shapes.scene:
         if shape.kind != "cylinder":

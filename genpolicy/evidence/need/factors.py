@@ -273,7 +273,9 @@ def _mode_rows(job: VariantJob, data: Dataset, policy: NetworkPolicy, convention
         convention=convention,
         samples=study.samples if policy.stochastic else 1,
         task=task,
-        checker=make_checker(task, study.feasibility),
+        checker=make_checker(
+            task, study.feasibility, action_period_s=study.horizons.action_period_s
+        ),
     )
 
 

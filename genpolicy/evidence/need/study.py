@@ -209,7 +209,7 @@ def mode_rows(job: Evaluation, data: Dataset, policy: NetworkPolicy) -> list[dic
     """Modes that one checkpoint reaches, under each sampling convention."""
     study = job.study
     task = load_task(study.task)
-    checker = make_checker(task, study.feasibility)
+    checker = make_checker(task, study.feasibility, action_period_s=study.horizons.action_period_s)
     held_out = held_out_situations(job.audit, data, horizons=study.horizons)
     conventions: dict[str, SamplerConfig] = {DEFAULT_CONVENTION: policy.sampler}
     conventions |= study.conventions.get(job.method, {})

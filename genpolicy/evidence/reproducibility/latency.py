@@ -111,7 +111,7 @@ def measure_job(job: LatencyJob) -> list[dict[str, Any]]:
     data = load_dataset(job.dataset)
     observations = fixture_observations(data, horizons=job.horizons, count=32)
     task = load_task(job.task)
-    checker = make_checker(task, job.feasibility)
+    checker = make_checker(task, job.feasibility, action_period_s=job.horizons.action_period_s)
     contexts = [
         context_at_rest(
             task,

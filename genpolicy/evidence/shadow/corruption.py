@@ -1,8 +1,10 @@
 """Corrupted fixtures: a good chunk with one thing wrong, and the check that must notice it.
 
 Each takes a good case (chunk, context) and returns it broken in one way. Where a fixture names a
-check, that check alone stands between it and admission: with the check disabled it passes, which
-is the evidence that the check is needed.
+check, that check alone stands between it and admission: a checker made without it admits the
+fixture, which is the evidence that the check is needed.
+
+What a task calls its phases and bodies is asked of the checker's cell and of the case.
 """
 
 from collections.abc import Callable
@@ -28,11 +30,13 @@ class Case:
         proposal: The chunk.
         context: State at the check.
         poses: Scene bodies by name, as observed.
+        obstacles: Those of them that are only in the way.
     """
 
     proposal: Proposal
     context: Context
     poses: dict[str, tuple[Array, Array]]
+    obstacles: tuple[str, ...] = ()
 
     def with_actions(self, actions: Array) -> "Case":
         """The case with other actions."""
@@ -56,15 +60,13 @@ class Corruption:
         name: Name of the fixture.
         apply: Breaks a case; None where it cannot be broken in this way.
         layer: Layer that must refuse it.
-        checks: Checks that, disabled together, let it through; empty where others cover it too.
-        phases: Phases whose chunks it is applied to; empty for all.
+        checks: Checks that, left out together, let it through; empty where others cover it too.
     """
 
     name: str
     apply: Callable[[Case, FeasibilityChecker], Case | None]
     layer: str
     checks: tuple[str, ...] = ()
-    phases: tuple[str, ...] = ()
 
 
 def stale_observation(case: Case, _: FeasibilityChecker) -> Case:
@@ -147,13 +149,14 @@ def not_a_number(case: Case, _: FeasibilityChecker) -> Case:
 def collision(case: Case, checker: FeasibilityChecker) -> Case | None:
     """The obstacle stands where the projected chunk goes; None without such a place or body."""
     actions, rows = case.proposal.actions, case.context.rows(len(case.proposal.actions))
-    if "post" not in case.poses or not np.all(np.isfinite(actions)):
+    name = next((body for body in case.obstacles if body in case.poses), None)
+    if name is None or not np.all(np.isfinite(actions)):
         return None
     actions = checker.project(case.proposal, context=case.context).actions
     middle = actions[(rows.start + min(rows.stop, len(actions)) - 1) // 2, POSITION]
-    position, quaternion = case.poses["post"]
+    position, quaternion = case.poses[name]
     at = np.array([middle[0], middle[1], position[2]])
-    return case.with_context(scene=SceneState({**case.poses, "post": (at, quaternion)}))
+    return case.with_context(scene=SceneState({**case.poses, name: (at, quaternion)}))
 
 
 def broken_seam(case: Case, _: FeasibilityChecker) -> Case:
@@ -168,15 +171,21 @@ def broken_seam(case: Case, _: FeasibilityChecker) -> Case:
     return case.with_context(q_cmd_history=history)
 
 
-def early_release(case: Case, _: FeasibilityChecker) -> Case:
-    """The gripper opens while the object is carried."""
+def early_release(case: Case, checker: FeasibilityChecker) -> Case | None:
+    """The gripper opens while the object is carried; None where nothing is."""
+    settings = checker.settings
+    carried = case.context.last_action[GRIPPER] <= settings.held_opening_m
+    if not (carried and _under_way(case, checker)):
+        return None
     actions = np.array(case.proposal.actions)
-    actions[:, GRIPPER] = 0.04
+    actions[:, GRIPPER] = settings.gripper_upper_m
     return case.with_actions(actions)
 
 
 def awkward_posture(case: Case, checker: FeasibilityChecker) -> Case | None:
     """The same hand pose, but the arm stands with a joint at its limit."""
+    if not _under_way(case, checker):
+        return None
     kinematics = checker.kinematics
     position, rotation = kinematics.forward(case.context.q_cmd[None])
     seeds = np.tile(case.context.q_cmd, (64, 1))
@@ -197,6 +206,11 @@ def awkward_posture(case: Case, checker: FeasibilityChecker) -> Case | None:
     return case.with_context(q_cmd=q, q_meas=q, q_cmd_history=np.zeros((0, len(q))))
 
 
+def _under_way(case: Case, checker: FeasibilityChecker) -> bool:
+    """The case is in the task's first free phase: far from the target, nothing to let go."""
+    return case.context.phase in checker.cell.free_phases[:1]
+
+
 CORRUPTIONS = (
     Corruption("stale_observation", stale_observation, "fresh", ("stale_observation",)),
     Corruption("future_observation", future_observation, "fresh", ("future_observation",)),
@@ -213,7 +227,7 @@ CORRUPTIONS = (
     Corruption("not_a_number", not_a_number, "representation"),
     Corruption("collision", collision, "geometric", ("scene_collision", "swept_collision")),
     Corruption("broken_seam", broken_seam, "dynamic", ("joint_acceleration", "joint_jerk")),
-    Corruption("early_release", early_release, "contact", ("gripper_opening",), ("approach",)),
-    Corruption("awkward_posture", awkward_posture, "kinematic", ("joint_position",), ("approach",)),
+    Corruption("early_release", early_release, "contact", ("gripper_opening",)),
+    Corruption("awkward_posture", awkward_posture, "kinematic", ("joint_position",)),
 )
 """Every corrupted fixture, with the layer that owns it."""

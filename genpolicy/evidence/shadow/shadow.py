@@ -164,7 +164,7 @@ def shadow_policy(
     return evidence
 
 
-def disabled_checks_evidence(
+def missing_checks_evidence(
     shadow: Shadow,
     observations: list[Observation],
     *,
@@ -175,7 +175,7 @@ def disabled_checks_evidence(
     Args:
         shadow: The shadow test, with all checks.
         observations: Held-out moments; what the operator did is the good chunk.
-        without: A checker for each group of disabled checks.
+        without: A checker for each group of checks, made without them.
 
     Returns:
         Rows of `mutants.json`: check, layer, detected, and how many cases showed it.
@@ -187,13 +187,9 @@ def disabled_checks_evidence(
         mutant = replace(shadow, checker=without[corruption.checks])
         tried = noticed = 0
         for number, item in enumerate(observations):
-            if corruption.phases and item.phase not in corruption.phases:
-                continue
             good = _case(shadow, None, item, number, 0, item.demonstrated)
-            if not isinstance(_admit(shadow, good), Admitted):
-                continue
             bad = corruption.apply(good, shadow.checker)
-            if bad is None:
+            if bad is None or not isinstance(_admit(shadow, good), Admitted):
                 continue
             tried += 1
             refused = isinstance(_admit(shadow, bad), Rejected)
@@ -262,6 +258,7 @@ def _case(  # noqa: PLR0917
         Proposal(metadata, actions, selected_by=SELECTOR),
         context,
         shadow.task.scene_poses(observation),
+        shadow.task.obstacles,
     )
 
 
@@ -309,8 +306,6 @@ def _corrupted(
     seed: int,
     number: int,
 ) -> None:
-    if corruption.phases and item.phase not in corruption.phases:
-        return
     broken = corruption.apply(case, shadow.checker)
     if broken is None:
         return

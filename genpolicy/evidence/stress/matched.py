@@ -99,7 +99,9 @@ def run_shard(shard: Shard) -> ShardResult:
     policy = load_policy(shard.checkpoint, expected_sha256=shard.sha256)
     fixture = Fixture(
         task=task,
-        checker=make_checker(task, shard.feasibility),
+        checker=make_checker(
+            task, shard.feasibility, action_period_s=shard.horizons.action_period_s
+        ),
         horizons=shard.horizons,
         execution=shard.execution,
         latency=shard.latency,

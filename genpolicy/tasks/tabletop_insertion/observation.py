@@ -9,6 +9,7 @@ Array = NDArray[np.float64]
 
 PHASES = ("approach", "align", "insert", "release", "retreat", "recover")
 CONTACT_PHASES = frozenset({"insert", "release"})
+OPENING_PHASES = frozenset({"release", "retreat"})
 
 OBSERVATION = ObservationContract(
     channels=(

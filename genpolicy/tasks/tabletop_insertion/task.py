@@ -11,10 +11,16 @@ from genpolicy.contract.observation import ObservationContract
 from genpolicy.data.recording.episode import RecordedEpisode
 from genpolicy.errors import ContractError
 from genpolicy.robot.impedance import POSTURE_RAD
+from genpolicy.robot.limits import PANDA, RobotLimits
 from genpolicy.tasks.api import EpisodeSpec, Start, Task, Workspace, World, WorldSettings
 from genpolicy.tasks.tabletop_insertion import episodes, fallback, scene, sessions
 from genpolicy.tasks.tabletop_insertion.experts import SIDES
-from genpolicy.tasks.tabletop_insertion.observation import CONTACT_PHASES, OBSERVATION, PHASES
+from genpolicy.tasks.tabletop_insertion.observation import (
+    CONTACT_PHASES,
+    OBSERVATION,
+    OPENING_PHASES,
+    PHASES,
+)
 from genpolicy.tasks.tabletop_insertion.probes import EPOCHS, PROBES
 from genpolicy.tasks.tabletop_insertion.start import InsertionStart, sample_start, start_from_json
 from genpolicy.tasks.tabletop_insertion.world import TabletopWorld
@@ -38,6 +44,9 @@ class TabletopInsertion:
     observation: ObservationContract = OBSERVATION
     phases: tuple[str, ...] = PHASES
     contact_phases: frozenset[str] = CONTACT_PHASES
+    opening_phases: frozenset[str] = OPENING_PHASES
+    obstacles: tuple[str, ...] = ("post",)
+    limits: RobotLimits = PANDA
     workspace: Workspace = WORKSPACE
     probes: tuple[str, ...] = tuple(name for name in PROBES if name != "nominal")
     calibration_epochs: tuple[str, ...] = tuple(EPOCHS)

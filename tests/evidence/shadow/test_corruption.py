@@ -1,13 +1,17 @@
-"""Every corruption: refused by the layer that owns it, admitted when its checks are off."""
+"""Every corruption: refused by the layer that owns it, admitted by a checker without its checks."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from genpolicy.contract.action import GRIPPER
 from genpolicy.evidence.admission_context import make_checker
 from genpolicy.evidence.shadow.corruption import CORRUPTIONS
 from genpolicy.evidence.shadow.shadow import Shadow, _admit, _case, held_out_observations
-from genpolicy.feasibility.admission import Admitted, Rejected
-from genpolicy.feasibility.settings import CHECKS, LAYERS
+from genpolicy.feasibility.admission import Admitted, FeasibilityChecker, Rejected
+from genpolicy.feasibility.checks import CHECKS, without
+from genpolicy.feasibility.settings import LAYERS
 from genpolicy.seeds import stream
 
 BY_NAME = {item.name: item for item in CORRUPTIONS}
@@ -38,18 +42,16 @@ def good(shadow, data, kit):
 
 
 def broken(good, corruption, checker):
-    cases = [
-        corruption.apply(case, checker)
-        for phase, case in good
-        if not corruption.phases or phase in corruption.phases
-    ]
+    cases = [corruption.apply(case, checker) for _, case in good]
     return [case for case in cases if case is not None]
 
 
 def test_the_list_names_existing_layers_and_checks_once():
     assert len(BY_NAME) == len(CORRUPTIONS)
     assert {item.layer for item in CORRUPTIONS} == set(LAYERS)
-    assert {check for item in CORRUPTIONS for check in item.checks} <= set(CHECKS)
+    assert {check for item in CORRUPTIONS for check in item.checks} <= {
+        check.name for check in CHECKS
+    }
 
 
 @pytest.mark.parametrize("name", BY_NAME)
@@ -70,7 +72,12 @@ def test_refused_by_the_layer_that_owns_it(name, good, shadow):
 @pytest.mark.parametrize("name", [item.name for item in CORRUPTIONS if item.checks])
 def test_admitted_without_its_checks(name, good, shadow, task, kit):
     corruption = BY_NAME[name]
-    blind = make_checker(task, kit.FEASIBILITY, disabled_checks=frozenset(corruption.checks))
+    blind = make_checker(
+        task,
+        kit.FEASIBILITY,
+        action_period_s=kit.HORIZONS.action_period_s,
+        checks=without(*corruption.checks),
+    )
     cases = broken(good, corruption, shadow.checker)
     passed = [isinstance(blind.admit(c.proposal, context=c.context), Admitted) for c in cases]
     assert any(passed)
@@ -99,6 +106,39 @@ def test_the_obstacle_cannot_stand_where_nothing_goes(good, checker):
     _, case = good[0]
     nowhere = case.with_actions(np.full_like(case.proposal.actions, np.nan))
     assert BY_NAME["collision"].apply(nowhere, checker) is None
+
+
+def test_what_a_task_calls_its_bodies_is_taken_from_it(good, shadow, checker):
+    """Another name for the obstacle, or none at all: the corruption follows, or does not apply."""
+    _, case = good[0]
+    assert case.obstacles == shadow.task.obstacles
+    (name,) = case.obstacles
+    renamed = {("pillar" if key == name else key): pose for key, pose in case.poses.items()}
+    moved = BY_NAME["collision"].apply(
+        replace(case, poses=renamed, obstacles=("pillar",)), shadow.checker
+    )
+    there, _ = moved.context.scene.bodies["pillar"]
+    assert np.linalg.norm(there[:2] - case.poses[name][0][:2]) > 0
+    assert name not in moved.context.scene.bodies
+    assert BY_NAME["collision"].apply(replace(case, obstacles=()), checker) is None
+    assert BY_NAME["collision"].apply(replace(case, obstacles=("absent",)), checker) is None
+
+
+@pytest.mark.parametrize("name", ["early_release", "awkward_posture"])
+def test_under_way_is_the_first_free_phase_of_the_task(name, good, checker):
+    applied = {phase for phase, case in good if BY_NAME[name].apply(case, checker) is not None}
+    assert applied == {"approach"} == {checker.cell.free_phases[0]}
+    other = FeasibilityChecker(replace(checker.cell, contact_phases=frozenset({"approach"})))
+    assert all(
+        BY_NAME[name].apply(case, other) is None for phase, case in good if phase == "approach"
+    )
+
+
+def test_nothing_is_let_go_by_a_hand_that_holds_nothing(good, checker):
+    case = next(case for phase, case in good if phase == "approach")
+    empty = np.array(case.context.last_action)
+    empty[GRIPPER] = checker.settings.gripper_upper_m
+    assert BY_NAME["early_release"].apply(case.with_context(last_action=empty), checker) is None
 
 
 def test_a_corruption_leaves_the_good_case_alone(good, checker):

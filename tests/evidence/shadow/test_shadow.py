@@ -13,11 +13,12 @@ from genpolicy.evidence.shadow.shadow import (
     HELD_OUT,
     IN_FLIGHT_PHASE_CHANGE,
     Shadow,
-    disabled_checks_evidence,
     held_out_observations,
+    missing_checks_evidence,
     shadow_policy,
 )
 from genpolicy.execution.journal import write_journal
+from genpolicy.feasibility.checks import without
 from genpolicy.feasibility.settings import LAYERS
 from genpolicy.seeds import stream
 from genpolicy.verification.checker import check_journal
@@ -156,22 +157,27 @@ def test_a_trained_policy_goes_the_same_way(shadow, observations, policy):
 
 def test_a_missing_check_is_noticed_by_exactly_its_fixture(shadow, observations, task, kit):
     blind = {
-        item.checks: make_checker(task, kit.FEASIBILITY, disabled_checks=frozenset(item.checks))
+        item.checks: make_checker(
+            task,
+            kit.FEASIBILITY,
+            action_period_s=kit.HORIZONS.action_period_s,
+            checks=without(*item.checks),
+        )
         for item in CORRUPTIONS
         if item.checks
     }
-    rows = disabled_checks_evidence(shadow, observations, without=blind)
+    rows = missing_checks_evidence(shadow, observations, without=blind)
     assert {row["check"] for row in rows} == {"+".join(checks) for checks in blind}
     assert all(row["detected"] and 0 < row["violations"] <= row["tried"] for row in rows)
     # Where the check is not really off, the table must not claim that its absence shows.
     seeing = dict.fromkeys(blind, shadow.checker)
-    rows = disabled_checks_evidence(shadow, observations[:5], without=seeing)
+    rows = missing_checks_evidence(shadow, observations[:5], without=seeing)
     assert not any(row["detected"] for row in rows)
     # And where everything is admitted anyway, nothing was refused that could be noticed.
     late = replace(shadow, checker=blind["expired",])
     (row,) = (
         row
-        for row in disabled_checks_evidence(late, observations[:5], without=blind)
+        for row in missing_checks_evidence(late, observations[:5], without=blind)
         if row["fixture"] == "expired"
     )
     assert row["tried"] > 0 and not row["detected"]

@@ -130,7 +130,7 @@ def task():
 
 @pytest.fixture(scope="session")
 def checker(task):
-    return make_checker(task, FEASIBILITY)
+    return make_checker(task, FEASIBILITY, action_period_s=HORIZONS.action_period_s)
 
 
 @pytest.fixture(scope="session")

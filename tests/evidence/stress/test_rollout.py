@@ -9,6 +9,7 @@ from genpolicy.evidence.admission_context import make_checker
 from genpolicy.evidence.stress.perturbations import PerturbationSettings
 from genpolicy.evidence.stress.rollout import Outcome, Rollout
 from genpolicy.execution.journal import write_journal
+from genpolicy.feasibility.checks import without
 from genpolicy.seeds import stream
 
 
@@ -122,11 +123,14 @@ def test_straight_at_the_post_is_stopped_by_feasibility(run, kit, tmp_path):
     assert path[:, 0].max() < 0.50
 
 
-def test_without_geometric_checks_the_supervisor_ends_it_in_collision(run, kit, task, tmp_path):
+def test_without_geometric_checks_the_supervisor_ends_it_in_collision(
+    run, kit, task, checker, tmp_path
+):
     blind = make_checker(
         task,
         kit.FEASIBILITY,
-        disabled_checks=frozenset({"scene_collision", "swept_collision"}),
+        action_period_s=checker.cell.action_period_s,
+        checks=without("scene_collision", "swept_collision"),
     )
     (rollout,) = run(kit.straight, checker=blind)
     prove([rollout], kit, tmp_path)

@@ -1,0 +1,71 @@
+"""The geometric layer: does arm, hand or held object touch anything, at or between the rows?"""
+
+import numpy as np
+
+from genpolicy.feasibility.batch import Batch, Margins
+from genpolicy.feasibility.cell import Cell
+from genpolicy.robot.collision import Hit, Paths
+
+TOUCH_M = 1e-9  # a touch without depth is still a collision
+
+
+def margins(batch: Batch, cell: Cell) -> Margins:
+    """Collisions of the rows themselves, with the scene and of the robot with itself.
+
+    ==================  =======================================================================
+    scene_collision     lower bound on distance - clearance, m; - depth (at least 1 nm) of a hit
+    self_collision      the same for pairs of the robot's own shapes
+    ==================  =======================================================================
+
+    The clearance is `contact_clearance_m` in contact phases and `clearance_m` elsewhere. Of a
+    chunk that hits, the check that did not notice it has the margin 0.
+    """
+    report = cell.collision.check_samples(_paths(batch, cell))
+    own_names = {shape.name for shape in cell.collision.shapes.robot}
+    values = {
+        "scene_collision": report.clearance_m.copy(),
+        "self_collision": report.clearance_m.copy(),
+    }
+    for i, hit in enumerate(report.hits):
+        if hit is not None:
+            name = "self_collision" if hit.second in own_names else "scene_collision"
+            values["scene_collision"][i] = values["self_collision"][i] = 0.0
+            values[name][i] = -_depth_m(hit)
+    return Margins(values, tuple(_detail(hit) for hit in report.hits))
+
+
+def swept_margins(batch: Batch, cell: Cell) -> Margins:
+    """Collisions of the motion from the last command through the rows.
+
+    ==================  =======================================================================
+    swept_collision     lower bound on distance - clearance, m; - depth (at least 1 nm) of a hit
+    ==================  =======================================================================
+
+    The most expensive of all questions, and therefore asked of those chunks only whose rows
+    passed.
+    """
+    report = cell.collision.check_swept(_paths(batch, cell))
+    pairs = zip(report.hits, report.clearance_m, strict=True)
+    left = [clearance if hit is None else -_depth_m(hit) for hit, clearance in pairs]
+    return Margins({"swept_collision": np.array(left)}, tuple(_detail(hit) for hit in report.hits))
+
+
+def _paths(batch: Batch, cell: Cell) -> Paths:
+    settings = cell.settings
+    contact = batch.in_phases(cell.contact_phases)
+    return Paths(
+        q_rad=np.concatenate([batch.q_cmd_rad[:, None], batch.solved.q_rad], axis=1),
+        opening_m=batch.openings_m,
+        held=batch.held(settings.held_opening_m),
+        scenes=tuple(c.scene for c in batch.contexts),
+        contact_allowed=contact,
+        clearance_m=np.where(contact, settings.contact_clearance_m, settings.clearance_m),
+    )
+
+
+def _depth_m(hit: Hit) -> float:
+    return max(hit.depth_m, TOUCH_M)
+
+
+def _detail(hit: Hit | None) -> str:
+    return "" if hit is None else f"{hit.first} and {hit.second} at row {hit.index}"

@@ -1,0 +1,100 @@
+"""The geometric layer: each of its checks alone, at the rows and between them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from genpolicy.contract.action import join_action
+from genpolicy.feasibility.admission import FeasibilityChecker
+from genpolicy.feasibility.checks import without
+from genpolicy.feasibility.layers.geometric import margins, swept_margins
+
+BESIDE, BEYOND = (0.5, -0.15, 0.15), (0.5, 0.15, 0.15)
+RATES = ("joint_velocity", "joint_acceleration", "joint_jerk", "tcp_speed", "tcp_turn")
+KINEMATIC = ("workspace", "joint_position", "singular", "unreachable")
+
+
+@pytest.fixture(scope="module")
+def cases(checker, kit):
+    start = kit.context(checker, kit.START)
+    return {
+        "scene_collision": kit.Outside(
+            kit.line(kit.START, (0.45, 0, 0.15)), start, others=("swept_collision",)
+        ),
+        "self_collision": folded(checker, kit),
+        "swept_collision": kit.Outside(
+            kit.line(BESIDE, BEYOND, n=1), kit.context(checker, BESIDE), others=RATES
+        ),
+    }
+
+
+def folded(checker, kit):
+    """The hand folded back onto the base; the kinematic layer would refuse that first."""
+    rng = np.random.default_rng(3)
+    arm, model = checker.kinematics, checker.collision
+    ctx = kit.context(checker, kit.START)
+    for q in rng.uniform(arm.lower_rad, arm.upper_rad, (6000, 7)):
+        hit = model.in_collision(q, ctx.scene)
+        if hit is not None and hit.second in {"link0", "link1", "link2", "link3"}:
+            break
+    action = join_action(*arm.forward(q), 0.0)[None]
+    there = replace(ctx, q_cmd=q, q_meas=q, last_action=action[0], q_cmd_history=np.tile(q, (2, 1)))
+    return kit.Outside(action, there, others=(*KINEMATIC, "swept_collision", "scene_collision"))
+
+
+@pytest.mark.parametrize("name", ["scene_collision", "self_collision", "swept_collision"])
+def test_outside_is_refused_by_exactly_this_check(name, cases, build, kit):
+    assert list(cases) == kit.names_of("geometric")
+    kit.turns_red(build, name, cases[name])
+
+
+def test_the_detail_says_what_touched_what(cases, build, kit):
+    for name, text in (("scene_collision", "post"), ("self_collision", " and link")):
+        case = cases[name]
+        verdict = kit.judge(build(*KINEMATIC), case.actions, case.context)
+        assert text in verdict.detail
+
+
+def test_the_check_that_noticed_carries_the_depth(cases, cell, kit):
+    case = cases["scene_collision"]
+    found = margins(kit.solved(kit.batch_of((case.actions, case.context)), cell), cell)
+    assert found.values["scene_collision"][0] < 0
+    assert found.values["self_collision"][0] == 0
+    assert "post" in found.details[0]
+
+
+def test_between_two_rows_only_the_swept_test_sees_it(cases, cell, kit):
+    case = cases["swept_collision"]
+    batch = kit.solved(kit.batch_of((case.actions, case.context)), cell)
+    assert margins(batch, cell).values["scene_collision"][0] >= 0
+    found = swept_margins(batch, cell)
+    assert found.values["swept_collision"][0] < 0
+    assert "post" in found.details[0]
+
+
+def test_what_no_check_asks_is_not_computed(cell, kit, checker, monkeypatch):
+    """The swept test is the expensive one; without its row it is never made."""
+    good, ctx = kit.line(kit.START, kit.SIDE), kit.context(checker, kit.START)
+
+    def never(*args, **kwargs):
+        raise AssertionError("a test that no check asked for")
+
+    monkeypatch.setattr(cell.collision, "check_swept", never)
+    blind = FeasibilityChecker(cell, checks=without("swept_collision"))
+    assert kit.judge(blind, good, ctx).passed
+    with pytest.raises(AssertionError, match="no check asked for"):
+        kit.judge(checker, good, ctx)
+    monkeypatch.setattr(cell.collision, "check_samples", never)
+    names = ("scene_collision", "self_collision", "swept_collision")
+    blind = FeasibilityChecker(cell, checks=without(*names))
+    assert kit.judge(blind, good, ctx).passed
+
+
+def test_the_swept_test_is_made_where_the_rows_are_free(checker, cases, kit):
+    """A chunk that hits at its rows costs no sweep, beside one that does not."""
+    hit, good = cases["scene_collision"], kit.line(kit.START, kit.SIDE)
+    chunks = kit.batch_of((hit.actions, hit.context), (good, hit.context))
+    bad, fine = checker.check_many(chunks.projected, chunks.contexts, evaluate_all=True)
+    assert bad.first_reason == "scene_collision" and "swept_collision" not in bad.margins
+    assert fine.passed and fine.margins["swept_collision"] > 0
