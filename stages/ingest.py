@@ -5,7 +5,6 @@ import numpy as np
 from genpolicy.contract.settings import Settings
 from genpolicy.data.contract import TCP_ACTION, IngestContract, SplitRule, plausible_ranges
 from genpolicy.data.ingest import ingest_recordings
-from genpolicy.robot.limits import limits_of
 from genpolicy.tasks.api import load_task
 from stages._stage import ARTIFACTS, Params, main
 
@@ -14,12 +13,10 @@ class IngestSection(Settings):
     """Section `ingest`.
 
     Attributes:
-        robot: Whose joint limits recorded joints must keep.
         train: Share of the training split.
         validation: Share of the validation split; the rest is the test.
     """
 
-    robot: str
     train: float
     validation: float
 
@@ -28,7 +25,7 @@ def work(params: Params) -> None:
     """Hold every recording against the task's contract and write the dataset."""
     section = params.section("ingest", IngestSection)
     task = load_task(params.task.name)
-    limits = limits_of(section.robot)
+    limits = task.limits
     contract = IngestContract(
         observation=task.observation,
         phases=task.phases,

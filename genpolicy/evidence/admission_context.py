@@ -48,6 +48,7 @@ def make_checker(
         task.scene_path,
         workspace=task.workspace,
         settings=settings,
+        limits=task.limits,
         disabled_checks=disabled_checks,
     )
 

@@ -19,7 +19,7 @@ from genpolicy.feasibility.settings import CHECKS, CHECKS_BY_LAYER, LAYERS, Feas
 from genpolicy.feasibility.smoothing import rate_excess
 from genpolicy.feasibility.verdict import Verdict, judge_layer, not_reached
 from genpolicy.robot.collision import CollisionModel
-from genpolicy.robot.kinematics import JOINTS, ArmKinematics
+from genpolicy.robot.kinematics import ArmKinematics
 from genpolicy.robot.limits import RobotLimits, limits_of
 
 Array = NDArray[np.float64]
@@ -159,7 +159,7 @@ class LayerChecker:
             q_seed_rad=np.repeat(batch.q_cmd_rad, rows, axis=0),
         )
         reached = np.array([part.all() for part in solved.converged.reshape(size, rows)])
-        return solved.q_rad.reshape(size, rows, JOINTS), reached
+        return solved.q_rad.reshape(size, rows, -1), reached
 
     def check(
         self, projected: Projected, *, context: Context, evaluate_all: bool = False

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from genpolicy.contract.action import ACTION_DIM
 from genpolicy.contract.chunk import frozen_array
 from genpolicy.errors import ContractError, NonFiniteError
-from genpolicy.robot.kinematics import JOINTS
 from genpolicy.robot.scene_state import SceneState
 
 Array = NDArray[np.float64]
@@ -67,17 +66,20 @@ class Context:
     active_checkpoint_hash: str
     active_sampler_hash: str
     scene: SceneState
-    q_cmd_history: Array = field(default_factory=lambda: np.zeros((0, JOINTS)))
+    q_cmd_history: Array = field(default_factory=lambda: np.zeros((0, 0)))
     newest_accepted_observation_s: float | None = None
     first_index: int = 0
     end_index: int | None = None
 
     def __post_init__(self) -> None:
-        shapes = {"q_meas": (JOINTS,), "q_cmd": (JOINTS,), "last_action": (ACTION_DIM,)}
+        joints = np.size(self.q_cmd)
+        if not len(self.q_cmd_history):
+            object.__setattr__(self, "q_cmd_history", np.zeros((0, joints)))
+        shapes = {"q_meas": (joints,), "q_cmd": (joints,), "last_action": (ACTION_DIM,)}
         for name in (*shapes, "q_cmd_history"):
             value = frozen_array(getattr(self, name))
             object.__setattr__(self, name, value)
-            expected = shapes.get(name, (len(value), JOINTS))
+            expected = shapes.get(name, (len(value), joints))
             if value.shape != expected:
                 raise ContractError(
                     where=f"Context.{name}",

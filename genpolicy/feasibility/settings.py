@@ -1,7 +1,5 @@
 """Every threshold of the six layers, with its unit; and the names of layers and checks."""
 
-from typing import Literal
-
 from pydantic import BaseModel, ConfigDict, Field, PositiveFloat
 
 LAYERS = ("representation", "kinematic", "geometric", "dynamic", "contact", "fresh")
@@ -81,7 +79,7 @@ class FeasibilitySettings(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
-    robot: Literal["panda", "fr3"] = "panda"
+    robot: str = "panda"
     action_period_s: PositiveFloat = 0.05
     maximum_actions: int = Field(default=16, ge=1)
     orthonormality_tolerance: PositiveFloat = 0.2

@@ -39,6 +39,7 @@ def audit_task(
         root_seed: Root seed.
     """
     task = load_task(task_name)
+    settings = with_channels(settings, task)
     data = load_dataset(dataset)
     checker = make_checker(task, feasibility)
 
@@ -61,6 +62,19 @@ def audit_task(
     )
 
 
+def with_channels(settings: AuditSettings, task: Task) -> AuditSettings:
+    """Settings that read the task's own channels, where they do not name others themselves."""
+    channels = task.audit_channels
+    values: dict[str, object] = {
+        "position_channel": channels.position,
+        "reference_channel": channels.reference,
+        "calibration_phase": channels.calibration_phase,
+        "context_channels": list(channels.context),
+    }
+    missing = {k: v for k, v in values.items() if k not in settings.model_fields_set}
+    return settings.model_copy(update=missing)
+
+
 def replay_episode(task: Task, data: Dataset, episode_uuid: str) -> str:
     """Outcome of an episode's actions, replayed in simulation from its recorded start.
 
@@ -75,11 +89,11 @@ def replay_episode(task: Task, data: Dataset, episode_uuid: str) -> str:
 
 
 def round_obstacles(task: Task, feasibility: FeasibilitySettings) -> list[dict[str, float]]:
-    """Standing cylinders of the scene file, as circles in the base frame's plane, m."""
+    """The task's obstacles that are cylinders, as circles in the base frame's plane, m."""
     shapes = make_checker(task, feasibility).collision.shapes
     found = []
     for shape in shapes.scene:
-        if shape.kind != "cylinder":
+        if shape.kind != "cylinder" or shape.body not in task.obstacles:
             continue
         origin, _ = shapes.nominal_bodies[shape.body]
         centre = origin + shape.position_m
