@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
@@ -317,8 +317,8 @@ class Task(Protocol):
         ...
 
 
-def load_task(name: str) -> Task:
-    """The task registered as `name`.
+def find_task(name: str) -> EntryPoint:
+    """The entry point of the task registered as `name`; loads nothing.
 
     Raises:
         ConfigError: No task has that name; the message lists the known ones.
@@ -331,5 +331,14 @@ def load_task(name: str) -> Task:
             expected=f"one of {sorted(found)}",
             action=f"Name a registered task, or register yours in the group {ENTRY_POINT_GROUP}.",
         )
-    task: Task = found[name].load()
+    return found[name]
+
+
+def load_task(name: str) -> Task:
+    """The task registered as `name`.
+
+    Raises:
+        ConfigError: No task has that name; the message lists the known ones.
+    """
+    task: Task = find_task(name).load()
     return task

@@ -9,6 +9,7 @@ from genpolicy.audit.run import AuditResult, audit
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.audit.view import from_dataset
 from genpolicy.data.dataset import Dataset, load_dataset
+from genpolicy.data.recording.episode import PHASE_STREAM
 from genpolicy.evidence.admission_context import make_checker
 from genpolicy.evidence.need.held_out import admissible
 from genpolicy.feasibility.settings import FeasibilitySettings
@@ -70,6 +71,7 @@ def with_channels(settings: AuditSettings, task: Task) -> AuditSettings:
         "reference_channel": channels.reference,
         "calibration_phase": channels.calibration_phase,
         "context_channels": list(channels.context),
+        "ignored_channels": [c.name for c in task.observation.channels if c.stream == PHASE_STREAM],
     }
     missing = {k: v for k, v in values.items() if k not in settings.model_fields_set}
     return settings.model_copy(update=missing)
