@@ -32,7 +32,7 @@ REPORTS = Path("reports")
 TIMES = Path("build/times")
 
 STAGES = (
-    "record", "ingest", "audit", "baselines", "factors", "gate_a", "generators", "reload",
+    "task", "record", "ingest", "audit", "baselines", "factors", "gate_a", "generators", "reload",
     "latency", "gate_b", "shadow", "gate_c", "stress", "gate_d", "card", "gate_e",
 )  # fmt: skip
 SHARED = ("seed", "task", "horizons", "compute", "policy", "feasibility", "execution")

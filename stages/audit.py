@@ -2,7 +2,7 @@
 
 from genpolicy.audit.evidence import write_evidence
 from genpolicy.audit.settings import AuditSettings
-from genpolicy.evidence.need.audit_task import audit_task, round_obstacles
+from genpolicy.evidence.need.audit_task import audit_task, round_obstacles, with_channels
 from genpolicy.evidence.need.pictures import scene_png
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import output_folder, write_bytes
@@ -12,7 +12,8 @@ from stages._stage import ARTIFACTS, Params, main
 
 def work(params: Params) -> None:
     """Audit the dataset and write the evidence."""
-    settings = params.section("audit", AuditSettings)
+    task = load_task(params.task.name)
+    settings = with_channels(params.section("audit", AuditSettings), task)
     feasibility = params.section("feasibility", FeasibilitySettings)
     with output_folder(ARTIFACTS / "audit") as folder:
         result = audit_task(
@@ -23,7 +24,7 @@ def work(params: Params) -> None:
             action_period_s=params.horizons.action_period_s,
             root_seed=params.seed,
         )
-        obstacles = round_obstacles(load_task(params.task.name))
+        obstacles = round_obstacles(task)
         write_evidence(result, folder, settings=settings, obstacles=obstacles)
         write_bytes(folder / "scene.png", scene_png(params.task.name))
 

@@ -1,5 +1,7 @@
 """A small recorded dataset of the real task, and barely trained checkpoints on it."""
 
+import shutil
+import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -131,3 +133,22 @@ def fleet(dataset, tmp_path_factory):
 @pytest.fixture(scope="session")
 def policy(fleet):
     return load_policy(fleet[0] / "flow" / "seed_0")
+
+
+@pytest.fixture(scope="session")
+def foreign_folder(tmp_path_factory):
+    """The package of a task that is installed outside the tree; free to be edited."""
+    site = tmp_path_factory.mktemp("site-packages") / "installed"
+    source = Path(__file__).parent / "foreign_task"
+    shutil.copytree(source, site, ignore=shutil.ignore_patterns("__pycache__"))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(site))
+        yield site / "ring_cell"
+    for name in [name for name in sys.modules if name.partition(".")[0] == "ring_cell"]:
+        del sys.modules[name]
+
+
+@pytest.fixture(scope="session")
+def foreign_task(foreign_folder):
+    """Registered name of that task: another arm, phases and bodies, and no gripper."""
+    return "ring_cell"

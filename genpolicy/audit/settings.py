@@ -97,9 +97,9 @@ class AuditSettings(BaseModel):
     position_components: list[str] | None = None
     action_components: list[str] | None = None
     phase_observed: bool = True
-    reference_channel: str | None = "hole_pose"
-    calibration_phase: str = "release"
-    context_channels: list[str] = ["hole_pose"]
+    reference_channel: str | None = None
+    calibration_phase: str = ""
+    context_channels: list[str] = []
     ignored_channels: list[str] = ["phase"]
     scale_m: float = Field(default=0.01, gt=0)
     scale_n: float = Field(default=5.0, gt=0)

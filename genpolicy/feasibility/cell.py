@@ -66,6 +66,11 @@ class CellTask(Protocol):
         """Phases in which the gripper may let go; empty for a task without a gripper."""
         ...
 
+    @property
+    def free_phases(self) -> frozenset[str]:
+        """Phases of motion in the open, with room around."""
+        ...
+
 
 @dataclass(frozen=True)
 class Cell:
@@ -81,6 +86,7 @@ class Cell:
         phases: Phases that the task knows, in order.
         contact_phases: Those in which the held object may touch the target.
         opening_phases: Those in which the gripper may let go.
+        free_phases: Those of motion in the open; faults that need room are planted there.
 
     Raises:
         ConfigError: A phase that the task does not know, no pair of the robot's own shapes to
@@ -96,6 +102,7 @@ class Cell:
     phases: tuple[str, ...]
     contact_phases: frozenset[str]
     opening_phases: frozenset[str]
+    free_phases: frozenset[str]
 
     def __post_init__(self) -> None:
         if not (self.action_period_s > 0 and math.isfinite(self.action_period_s)):
@@ -105,7 +112,7 @@ class Cell:
                 expected="a finite time above 0 s",
                 action="Correct horizons.action_period_s in params.yaml.",
             )
-        for name in ("contact_phases", "opening_phases"):
+        for name in ("contact_phases", "opening_phases", "free_phases"):
             unknown = getattr(self, name) - set(self.phases)
             if unknown:
                 raise ConfigError(
@@ -153,12 +160,6 @@ class Cell:
         """Joints of the arm."""
         return len(self.kinematics.lower_rad)
 
-    @property
-    def free_phases(self) -> tuple[str, ...]:
-        """Phases in which nothing may be touched and nothing let go, in the task's order."""
-        bound = self.contact_phases | self.opening_phases
-        return tuple(phase for phase in self.phases if phase not in bound)
-
     def require_known(self, context: Context) -> None:
         """Refuse a context that is of another task or another robot.
 
@@ -203,4 +204,5 @@ def cell_of(task: CellTask, settings: FeasibilitySettings, *, action_period_s: f
         phases=tuple(task.phases),
         contact_phases=frozenset(task.contact_phases),
         opening_phases=frozenset(task.opening_phases),
+        free_phases=frozenset(task.free_phases),
     )

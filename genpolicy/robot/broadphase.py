@@ -9,15 +9,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from genpolicy.robot.kinematics import JOINTS, Frames
-from genpolicy.robot.shapes import BASE_FRAME, HELD, SceneShapes, bounding_spheres
+from genpolicy.errors import ConfigError
+from genpolicy.robot.kinematics import Frames
+from genpolicy.robot.shapes import BASE_FRAME, HELD, SceneShapes, Shape, bounding_spheres
 
 Array = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
-# Bodies of the hand against bodies of the base; links beside each other always touch.
-SELF_MOVING = ("hand", "left_finger", "right_finger", HELD)
-SELF_FIXED = ("link0", "link1", "link2", "link3")
+# A shape of the tool is held against the links at least this many joints up the chain. Links
+# nearer to it touch it by design (housings of neighbouring joints overlap in a file of
+# primitives) or are kept off it by the joint ranges.
+SELF_CHAIN_JOINTS = 4
 
 
 @dataclass(frozen=True)
@@ -128,7 +130,7 @@ class BroadPhase:
             Per pair; of a self pair the sum over both shapes. Shape (N, C).
         """
         turn = np.linalg.norm(first.rotation - second.rotation, axis=(2, 3)) / np.sqrt(2.0)
-        turn = np.concatenate([turn[:, :JOINTS], np.zeros((len(turn), 1))], axis=1)  # -1: base
+        turn = np.concatenate([turn[:, :-1], np.zeros((len(turn), 1))], axis=1)  # -1: base
         chord = moved_m + turn[:, self._frame] * self._radius
         per_shape = np.maximum.reduceat(chord, self._starts, axis=1) / 2 + bend_m[:, None]
         total = per_shape[:, self.columns.shape]
@@ -194,16 +196,38 @@ class BroadPhase:
             if shape.frame != BASE_FRAME
             for body in range(len(self.bodies))
         ]
-        pairs += [
-            (i, -1, j)
-            for i, first in enumerate(robot)
-            if first.body in SELF_MOVING
-            for j, second in enumerate(robot)
-            if second.body in SELF_FIXED
-        ]
+        own = self_pairs(robot)
+        if not own:
+            raise ConfigError(
+                where="the collision model",
+                found="no pair of robot shapes that could meet",
+                expected=f"shapes on the tool and on a link {SELF_CHAIN_JOINTS} joints before it",
+                action="Give hand and links colliding geoms of the robot's group in the MJCF.",
+            )
+        pairs += [(i, -1, j) for i, j in own]
         shape, body, other = np.array(pairs, dtype=np.int64).T
         held = np.array([robot[i].body == HELD for i in shape])
         target = (
             np.array([b >= 0 and self.bodies[b] == self.shapes.target_body for b in body]) & held
         )
         return Columns(shape, body, other, held, target)
+
+
+def self_pairs(robot: tuple[Shape, ...]) -> list[tuple[int, int]]:
+    """Pairs of robot shapes that are held against each other: tool against links far up the chain.
+
+    The tool is what hangs behind the last link, or the last link itself where nothing does. Which
+    pairs follows from the kinematic tree alone, never from names.
+
+    Returns:
+        Indices of the tool's shape and of the link's shape.
+    """
+    last = max((shape.frame for shape in robot), default=BASE_FRAME)
+    behind = any(shape.tool and shape.name != HELD for shape in robot)
+    return [
+        (i, j)
+        for i, first in enumerate(robot)
+        if first.tool or (not behind and first.frame == last != BASE_FRAME)
+        for j, second in enumerate(robot)
+        if first.frame - second.frame >= SELF_CHAIN_JOINTS
+    ]

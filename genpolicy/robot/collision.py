@@ -65,7 +65,7 @@ class Paths:
     """Batch of joint paths with what each carries and where the scene stands.
 
     Attributes:
-        q_rad: Waypoints. Shape (B, P, 7).
+        q_rad: Waypoints. Shape (B, P, J).
         opening_m: Gripper opening at each waypoint, m. Shape (B, P).
         held: The held object is in the hand at the waypoint. Shape (B, P).
         scenes: Scene of each path.
@@ -88,7 +88,7 @@ class _Pieces:
     Attributes:
         row: Path of each piece. Shape (n,).
         segment: Segment of the path: 0 leads to the first action. Shape (n,).
-        q: Joint positions at both ends. Shape (n, 2, 7).
+        q: Joint positions at both ends. Shape (n, 2, J).
         opening: Finger opening at both ends, m. Shape (n, 2).
         held: The object is in the hand at either end of the segment. Shape (n,).
         open: Pairs that are undecided. Shape (n, C).
@@ -124,7 +124,9 @@ class CollisionModel:
 
     def __init__(self, scene_path: Path, kinematics: ArmKinematics) -> None:
         self.kinematics = kinematics
-        self.shapes: SceneShapes = shapes_of(scene_path)
+        self.shapes: SceneShapes = shapes_of(
+            scene_path, joints=kinematics.joint_count, tcp_site=kinematics.tcp_frame
+        )
         if not self.shapes.robot or not self.shapes.scene:
             raise ConfigError(
                 where=Path(scene_path).name,
@@ -218,7 +220,7 @@ class CollisionModel:
         contact_allowed: bool = False,
         clearance_m: float = 0.0,
     ) -> Hit | None:
-        """First collision of one configuration of shape (7,), or None."""
+        """First collision of one configuration of shape (J,), or None."""
         paths = Paths(
             q_rad=np.stack([q_rad, q_rad])[None],
             opening_m=np.full((1, 2), opening_m),
@@ -230,7 +232,7 @@ class CollisionModel:
         return self.check_samples(paths).hits[0]
 
     def placements(self, q_rad: Array, *, opening_m: float) -> list[tuple[Array, Array]]:
-        """Rotation and position (m) of every robot shape at one configuration of shape (7,)."""
+        """Rotation and position (m) of every robot shape at one configuration of shape (J,)."""
         frames = self.kinematics.frames(np.asarray(q_rad, dtype=float)[None])
         return [
             self._narrow.placement(frames, 0, opening_m, i) for i in range(len(self.shapes.robot))

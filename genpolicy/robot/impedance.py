@@ -10,13 +10,14 @@ Source: Hogan 1985 (impedance control); Khatib 1987 (operational space); the law
 libfranka's Cartesian impedance example, stiffness below the 3000 N/m that its maker allows.
 """
 
+from collections.abc import Sequence
+
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-ARM_JOINTS = 7
 STIFFNESS_N_M = 2500.0
 STIFFNESS_NM_RAD = 120.0
 # Damping ratio 0.8 to 1.4 (translation) for the effective TCP masses of 4 to 11 kg of this arm,
@@ -28,7 +29,6 @@ POSTURE_DAMPING_NM_S_RAD = 4.0
 # Saturation of the error: a far target pulls with at most 150 N and 60 N m per axis.
 MAXIMUM_ERROR_M = 0.06
 MAXIMUM_ERROR_RAD = 0.5
-POSTURE_RAD = (0.0, -0.17, 0.0, -2.60, 0.0, 2.45, 0.785398163397448)
 # Control steps between two updates of the null space projector (10 ms at 500 Hz).
 PROJECTOR_PERIOD_STEPS = 5
 
@@ -40,39 +40,48 @@ class ImpedanceController:
     `ctrl`, without allocating.
 
     Args:
-        model: Arm joints are its first seven degrees of freedom.
+        model: Arm joints are its first degrees of freedom, and drive its first actuators.
         data: State; must live as long as the controller.
         site: Name of the TCP site.
+        posture_rad: Where the null space pulls the arm to, one angle per joint of the arm.
     """
 
-    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, *, site: str) -> None:
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        *,
+        site: str,
+        posture_rad: Sequence[float],
+    ) -> None:
+        joints = len(posture_rad)
         self._model, self._data = model, data
         self._site = int(model.site(site).id)
         self._position = data.site_xpos[self._site]
         self._rotation_t = data.site_xmat[self._site].reshape(3, 3).T
-        self._q = data.qpos[:ARM_JOINTS]
-        self._dq = data.qvel[:ARM_JOINTS]
-        self._bias = data.qfrc_bias[:ARM_JOINTS]
-        self._passive = data.qfrc_passive[:ARM_JOINTS]
-        self._ctrl = data.ctrl[:ARM_JOINTS]
+        self._q = data.qpos[:joints]
+        self._dq = data.qvel[:joints]
+        self._bias = data.qfrc_bias[:joints]
+        self._passive = data.qfrc_passive[:joints]
+        self._ctrl = data.ctrl[:joints]
         self._jacobian_full = np.zeros((6, model.nv))
         self._jac_position = self._jacobian_full[:3]
         self._jac_rotation = self._jacobian_full[3:]
-        self._jacobian = self._jacobian_full[:, :ARM_JOINTS]
+        self._jacobian = self._jacobian_full[:, :joints]
         self._stiffness = np.repeat([STIFFNESS_N_M, STIFFNESS_NM_RAD], 3)
         self._damping = np.repeat([DAMPING_N_S_M, DAMPING_NM_S_RAD], 3)
         self._error_limit = np.repeat([MAXIMUM_ERROR_M, MAXIMUM_ERROR_RAD], 3)
-        self._posture = np.array(POSTURE_RAD)
-        self._torque_limit = np.abs(model.actuator_ctrlrange[:ARM_JOINTS]).max(axis=1)
+        self._posture = np.array(posture_rad)
+        self._torque_limit = np.abs(model.actuator_ctrlrange[:joints]).max(axis=1)
         self._error = np.zeros(6)
         self._wrench = np.zeros(6)
-        self._torque = np.zeros(ARM_JOINTS)
-        self._posture_torque = np.zeros(ARM_JOINTS)
-        self._scratch = np.zeros(ARM_JOINTS)
+        self._torque = np.zeros(joints)
+        self._posture_torque = np.zeros(joints)
+        self._scratch = np.zeros(joints)
         self._relative = np.zeros((3, 3))
         self._relative_flat = self._relative.reshape(9)
-        self._projector = np.zeros((ARM_JOINTS, ARM_JOINTS))
-        self._identity = np.eye(ARM_JOINTS)
+        self._projector = np.zeros((joints, joints))
+        self._identity = np.eye(joints)
         self._steps = 0
 
     def reset(self) -> None:
@@ -130,7 +139,9 @@ class ImpedanceController:
         np.subtract(self._identity, self._projector, out=self._projector)
 
 
-def effective_inertia(model: mujoco.MjModel, data: mujoco.MjData, *, site: str) -> Array:
+def effective_inertia(
+    model: mujoco.MjModel, data: mujoco.MjData, *, site: str, joints: int
+) -> Array:
     """Inertia that the TCP opposes to a force: (J M^-1 J^T)^-1, kg and kg m2. Shape (6, 6).
 
     The fingers and whatever is held are left out; the kinematics must be up to date.
@@ -139,6 +150,6 @@ def effective_inertia(model: mujoco.MjModel, data: mujoco.MjData, *, site: str) 
     mujoco.mj_jacSite(model, data, jacobian[:3], jacobian[3:], int(model.site(site).id))
     full = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, full)
-    arm = slice(0, ARM_JOINTS)
+    arm = slice(0, joints)
     compliance = jacobian[:, arm] @ np.linalg.solve(full[arm, arm], jacobian[:, arm].T)
     return np.asarray(np.linalg.inv(compliance))

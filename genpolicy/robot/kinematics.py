@@ -20,7 +20,7 @@ from genpolicy.errors import ConfigError
 Array = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
-JOINTS = 7
+TCP_SITE = "tcp"  # MJCF convention: the site at the tool centre point
 CONDITION_SLOW = 17.0  # MoveIt Servo default `lower_singularity_threshold`; a default, not "safe"
 CONDITION_HARD_STOP = 30.0  # MoveIt Servo default `hard_stop_singularity_threshold`
 DAMPING = 1e-3
@@ -28,16 +28,19 @@ STEP_LIMIT_RAD = 0.5
 ITERATIONS = 40
 POSITION_TOLERANCE_M = 1e-7
 ROTATION_TOLERANCE_RAD = 1e-7
+# Ratio of the additive recurrence that spreads restart seeds; any irrational one does, and
+# another one would move every restart.
+RESTART_RATIO = 1.0889670195
 _TINY = 1e-12
 
 
 @dataclass(frozen=True)
 class Frames:
-    """Placement of the seven joint frames and the TCP in the base frame.
+    """Placement of the J joint frames and the TCP in the base frame.
 
     Attributes:
-        rotation: Joints 1 to 7, then the TCP. Shape (N, 8, 3, 3).
-        position_m: Shape (N, 8, 3).
+        rotation: Joints 1 to J, then the TCP. Shape (N, J + 1, 3, 3).
+        position_m: Shape (N, J + 1, 3).
     """
 
     rotation: Array
@@ -49,7 +52,7 @@ class IkResult:
     """Inverse kinematics of N poses.
 
     Attributes:
-        q_rad: Last iterate, converged or not. Shape (N, 7).
+        q_rad: Last iterate, converged or not. Shape (N, J).
         converged: Both errors within tolerance. Shape (N,).
         position_error_m: Distance that is left; NaN where an input is not finite. Shape (N,).
         rotation_error_rad: Angle that is left. Shape (N,).
@@ -62,48 +65,56 @@ class IkResult:
 
 
 class ArmKinematics:
-    """A seven-joint revolute arm with a TCP frame, built from an MJCF file.
+    """A revolute arm with a TCP frame, built from an MJCF file.
 
     Args:
         scene_path: The MJCF; its first body tree is the arm.
-        tcp_frame: Name of the TCP's frame (site).
+        tcp_frame: Name of the TCP's site; the MJCF convention unless a scene has several.
+
+    Attributes:
+        joint_count: Joints between the base and the TCP.
 
     Raises:
-        ConfigError: The first tree is not seven z-axis revolute joints in a row (and what hangs
-            behind them), or the frame is missing.
+        ConfigError: The frame is missing, or what leads to it is not z-axis revolute joints in a
+            row.
     """
 
-    def __init__(self, scene_path: Path, *, tcp_frame: str = "tcp") -> None:
+    def __init__(self, scene_path: Path, *, tcp_frame: str = TCP_SITE) -> None:
         self.scene_path = Path(scene_path)
         self.model: Any = _read_model(self.scene_path)
         self.data: Any = self.model.createData()
-        self._check_structure(tcp_frame)
-        self.tcp_frame_id = int(self.model.getFrameId(tcp_frame))
-        placements = [self.model.jointPlacements[i + 1] for i in range(JOINTS)]
+        self.tcp_frame = tcp_frame
+        self.tcp_frame_id, self.joint_count = self._structure(tcp_frame)
+        joints = self.joint_count
+        placements = [self.model.jointPlacements[i + 1] for i in range(joints)]
         tcp = self.model.frames[self.tcp_frame_id].placement
         self._rotations = _frozen([np.array(p.rotation) for p in [*placements, tcp]])
         self._translations = _frozen([np.array(p.translation) for p in [*placements, tcp]])
-        self.lower_rad = _frozen(self.model.lowerPositionLimit[:JOINTS])
-        self.upper_rad = _frozen(self.model.upperPositionLimit[:JOINTS])
+        self.lower_rad = _frozen(self.model.lowerPositionLimit[:joints])
+        self.upper_rad = _frozen(self.model.upperPositionLimit[:joints])
 
-    def _check_structure(self, tcp_frame: str) -> None:
+    def _structure(self, tcp_frame: str) -> tuple[int, int]:
+        """Index of the TCP's frame, and how many joints lead to it."""
         model = self.model
-        names = [model.joints[i].shortname() for i in range(1, min(model.njoints, JOINTS + 1))]
-        chain = list(model.parents)[1 : JOINTS + 1]
-        if names != ["JointModelRZ"] * JOINTS or chain != list(range(JOINTS)):
-            raise ConfigError(
-                where=f"{self.scene_path.name}: first body tree",
-                found=f"joints {names} with parents {chain}",
-                expected="seven revolute joints about their own z axes, one behind the other",
-                action="Describe the arm first in the MJCF, one z axis per joint.",
-            )
         if not model.existFrame(tcp_frame):
             raise ConfigError(
                 where=f"{self.scene_path.name}: frame {tcp_frame}",
                 found="missing in the arm's tree",
-                expected="a site of that name behind the seventh joint",
+                expected="a site of that name behind the last joint of the arm",
                 action="Add the site to the hand.",
             )
+        frame = int(model.getFrameId(tcp_frame))
+        count = int(model.frames[frame].parentJoint)
+        names = [model.joints[i].shortname() for i in range(1, count + 1)]
+        chain = list(model.parents)[1 : count + 1]
+        if not count or names != ["JointModelRZ"] * count or chain != list(range(count)):
+            raise ConfigError(
+                where=f"{self.scene_path.name}: joints to the frame {tcp_frame}",
+                found=f"joints {names} with parents {chain}",
+                expected="revolute joints about their own z axes, one behind the other",
+                action="Describe the arm first in the MJCF, one z axis per joint.",
+            )
+        return frame, count
 
     @cached_property
     def reach_m(self) -> float:
@@ -115,7 +126,7 @@ class ArmKinematics:
         """Placements of the joints and the TCP.
 
         Args:
-            q_rad: Joint positions, rad. Shape (N, 7).
+            q_rad: Joint positions, rad. Shape (N, J).
 
         Returns:
             Frames of N configurations.
@@ -123,13 +134,13 @@ class ArmKinematics:
         Source:
             Product of the fixed joint placements and rotations about z.
         """
-        n = len(q_rad)
-        rotation = np.empty((n, JOINTS + 1, 3, 3))
-        position = np.empty((n, JOINTS + 1, 3))
+        n, joints = len(q_rad), self.joint_count
+        rotation = np.empty((n, joints + 1, 3, 3))
+        position = np.empty((n, joints + 1, 3))
         cosines, sines = np.cos(q_rad)[..., None], np.sin(q_rad)[..., None]
         position[:, 0] = self._translations[0]
         fixed = np.broadcast_to(self._rotations[0], (n, 3, 3))
-        for joint in range(JOINTS):
+        for joint in range(joints):
             if joint:
                 previous = rotation[:, joint - 1]
                 fixed = (previous.reshape(-1, 3) @ self._rotations[joint]).reshape(n, 3, 3)
@@ -138,61 +149,61 @@ class ArmKinematics:
             rotation[:, joint, :, 0] = fixed[:, :, 0] * c + fixed[:, :, 1] * s
             rotation[:, joint, :, 1] = fixed[:, :, 1] * c - fixed[:, :, 0] * s
             rotation[:, joint, :, 2] = fixed[:, :, 2]
-        last = rotation[:, JOINTS - 1]
-        rotation[:, JOINTS] = (last.reshape(-1, 3) @ self._rotations[JOINTS]).reshape(n, 3, 3)
-        position[:, JOINTS] = position[:, JOINTS - 1] + last @ self._translations[JOINTS]
+        last = rotation[:, joints - 1]
+        rotation[:, joints] = (last.reshape(-1, 3) @ self._rotations[joints]).reshape(n, 3, 3)
+        position[:, joints] = position[:, joints - 1] + last @ self._translations[joints]
         return Frames(rotation, position)
 
     def forward(self, q_rad: Array) -> tuple[Array, Array]:
         """TCP position (m) and rotation in the base frame.
 
         Args:
-            q_rad: Joint positions, rad. Shape (..., 7).
+            q_rad: Joint positions, rad. Shape (..., J).
 
         Returns:
             Position, shape (..., 3), and rotation matrix, shape (..., 3, 3).
         """
         shape = q_rad.shape[:-1]
-        frames = self.frames(np.asarray(q_rad, dtype=float).reshape(-1, JOINTS))
+        frames = self.frames(np.asarray(q_rad, dtype=float).reshape(-1, self.joint_count))
         return (
-            frames.position_m[:, JOINTS].reshape(*shape, 3),
-            frames.rotation[:, JOINTS].reshape(*shape, 3, 3),
+            frames.position_m[:, -1].reshape(*shape, 3),
+            frames.rotation[:, -1].reshape(*shape, 3, 3),
         )
 
     def jacobian(self, q_rad: Array) -> Array:
         """Jacobian of the TCP: linear (m/rad) over angular rows, in axes of the base frame.
 
         Args:
-            q_rad: Joint positions, rad. Shape (N, 7).
+            q_rad: Joint positions, rad. Shape (N, J).
 
         Returns:
-            Shape (N, 6, 7).
+            Shape (N, 6, J).
         """
         return _jacobian(self.frames(q_rad))
 
     def reference_forward(self, q_rad: Array) -> tuple[Array, Array]:
-        """What Pinocchio says for one configuration of shape (7,): position (m), rotation."""
+        """What Pinocchio says for one configuration of shape (J,): position (m), rotation."""
         pin.framesForwardKinematics(self.model, self.data, self._full(q_rad))
         placement = self.data.oMf[self.tcp_frame_id]
         return np.array(placement.translation), np.array(placement.rotation)
 
     def reference_jacobian(self, q_rad: Array) -> Array:
-        """What Pinocchio says for one configuration; base axes at the TCP. Shape (6, 7)."""
+        """What Pinocchio says for one configuration; base axes at the TCP. Shape (6, J)."""
         jacobian = pin.computeFrameJacobian(
             self.model, self.data, self._full(q_rad), self.tcp_frame_id, pin.LOCAL_WORLD_ALIGNED
         )
-        return np.array(jacobian)[:, :JOINTS]
+        return np.array(jacobian)[:, : self.joint_count]
 
     def _full(self, q_rad: Array) -> Array:
         full: Array = np.array(pin.neutral(self.model), dtype=float)
-        full[:JOINTS] = q_rad
+        full[: self.joint_count] = q_rad
         return full
 
     def condition_number(self, q_rad: Array) -> Array:
         """Largest over smallest singular value of the TCP Jacobian (m and rad mixed).
 
         Args:
-            q_rad: Joint positions, rad. Shape (N, 7).
+            q_rad: Joint positions, rad. Shape (N, J).
 
         Returns:
             Shape (N,); inf at a singular configuration.
@@ -221,7 +232,7 @@ class ArmKinematics:
         Args:
             position_m: TCP positions, m. Shape (N, 3).
             rotation: TCP rotations. Shape (N, 3, 3).
-            q_seed_rad: Where to start. Shape (N, 7).
+            q_seed_rad: Where to start. Shape (N, J).
             iterations: Most Newton steps.
 
         Returns:
@@ -268,7 +279,7 @@ class ArmKinematics:
         )
         q_again = self._wrapped(again.q_rad)
         usable = (again.converged & self.within_limits(q_again)).reshape(-1, restarts)
-        q_again = q_again.reshape(-1, restarts, JOINTS)
+        q_again = q_again.reshape(-1, restarts, self.joint_count)
         distance = np.linalg.norm(q_again - q_seed_rad[failed][:, None], axis=2)
         best = np.argmin(np.where(usable, distance, np.inf), axis=1)
         found = usable.any(1)
@@ -278,7 +289,7 @@ class ArmKinematics:
             result.position_error_m.copy(),
             result.rotation_error_rad.copy(),
         )
-        q[rows] = q_again.reshape(-1, JOINTS)[chosen]
+        q[rows] = q_again.reshape(-1, self.joint_count)[chosen]
         position_error[rows] = again.position_error_m[chosen]
         rotation_error[rows] = again.rotation_error_rad[chosen]
         return IkResult(q, _within(position_error, rotation_error), position_error, rotation_error)
@@ -294,9 +305,8 @@ class ArmKinematics:
         return q_rad - 2 * np.pi * np.round((q_rad - middle) / (2 * np.pi))
 
     def _restart_seeds(self, count: int) -> Array:
-        """Fixed, well spread seeds inside the limits: an additive recurrence. Shape (count, 7)."""
-        ratio = 1.0889670195  # root of x^8 = x + 1: the seven-dimensional golden ratio
-        steps = (1 / ratio) ** np.arange(1, JOINTS + 1)
+        """Fixed, well spread seeds inside the limits: an additive recurrence. Shape (count, J)."""
+        steps = (1 / RESTART_RATIO) ** np.arange(1, self.joint_count + 1)
         fractions = np.mod(0.5 + np.outer(np.arange(1, count + 1), steps), 1.0)
         return self.lower_rad + fractions * (self.upper_rad - self.lower_rad)
 
@@ -320,9 +330,9 @@ def _frozen(values: Any) -> Array:
 
 
 def _jacobian(frames: Frames) -> Array:
-    axes = frames.rotation[:, :JOINTS, :, 2]
-    arms = frames.position_m[:, JOINTS, None, :] - frames.position_m[:, :JOINTS]
-    jacobian = np.empty((len(axes), 6, JOINTS))
+    axes = frames.rotation[:, :-1, :, 2]
+    arms = frames.position_m[:, -1, None, :] - frames.position_m[:, :-1]
+    jacobian = np.empty((len(axes), 6, axes.shape[1]))
     jacobian[:, 0] = axes[..., 1] * arms[..., 2] - axes[..., 2] * arms[..., 1]
     jacobian[:, 1] = axes[..., 2] * arms[..., 0] - axes[..., 0] * arms[..., 2]
     jacobian[:, 2] = axes[..., 0] * arms[..., 1] - axes[..., 1] * arms[..., 0]
@@ -333,8 +343,8 @@ def _jacobian(frames: Frames) -> Array:
 def _pose_error(frames: Frames, position_m: Array, rotation: Array) -> Array:
     """Position (m) and rotation vector (rad) from the frames to the poses. Shape (N, 6)."""
     error = np.empty((len(position_m), 6))
-    error[:, :3] = position_m - frames.position_m[:, JOINTS]
-    relative = rotation @ frames.rotation[:, JOINTS].transpose(0, 2, 1)
+    error[:, :3] = position_m - frames.position_m[:, -1]
+    relative = rotation @ frames.rotation[:, -1].transpose(0, 2, 1)
     vector = np.stack(
         [
             relative[:, 2, 1] - relative[:, 1, 2],

@@ -1,11 +1,12 @@
-"""Limits of two robots, Panda (FER) and FR3: two tables with their sources, never mixed.
+"""Limits of a robot: tables with their sources, never mixed; Panda (FER) and FR3 are two.
+
+A task says which table its robot has (`Task.limits`) and may bring its own.
 
 A limit here is the maker's figure. What a check uses is `scaled(factor)` of it, with a factor
 of the settings that is at most one; nothing in the project raises a limit.
 """
 
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,31 +14,28 @@ from numpy.typing import NDArray
 from genpolicy.errors import ConfigError, ContractError, NonFiniteError
 
 Array = NDArray[np.float64]
-RobotName = Literal["panda", "fr3"]
-
-JOINTS = 7
 
 
 @dataclass(frozen=True)
 class RobotLimits:
-    """Limits of one seven-joint arm; per joint unless the name says otherwise.
+    """Limits of one arm of J joints; per joint unless the name says otherwise.
 
     Attributes:
         robot: Name of the robot that the figures belong to.
         source: Where the figures stand, with version or tag.
         notes: What is left out, and why.
-        position_lower_rad: Shape (7,).
-        position_upper_rad: Shape (7,).
-        velocity_rad_s: Shape (7,).
-        acceleration_rad_s2: Shape (7,).
-        jerk_rad_s3: Shape (7,).
-        torque_nm: Shape (7,).
+        position_lower_rad: Shape (J,).
+        position_upper_rad: Shape (J,).
+        velocity_rad_s: Shape (J,).
+        acceleration_rad_s2: Shape (J,).
+        jerk_rad_s3: Shape (J,).
+        torque_nm: Shape (J,).
         torque_rate_nm_s: One figure for all joints.
         tcp_speed_m_s, tcp_acceleration_m_s2, tcp_jerk_m_s3: Translation of the TCP.
         tcp_turn_rad_s, tcp_turn_rad_s2, tcp_turn_rad_s3: Rotation of the TCP.
     """
 
-    robot: RobotName
+    robot: str
     source: str
     notes: str
     position_lower_rad: Array
@@ -55,13 +53,14 @@ class RobotLimits:
     tcp_turn_rad_s3: float
 
     def __post_init__(self) -> None:
+        joints = np.size(self.position_lower_rad)
         for name in _ARRAYS:
             value = np.array(getattr(self, name), dtype=float)
-            if value.shape != (JOINTS,) or not np.all(np.isfinite(value)):
+            if value.shape != (joints,) or not joints or not np.all(np.isfinite(value)):
                 raise NonFiniteError(
                     where=f"limits of {self.robot}: {name}",
                     found=f"{value.tolist()}",
-                    expected=f"{JOINTS} finite numbers",
+                    expected=f"{joints or 'some'} finite numbers, as many as joints",
                     action="Correct the table of limits.",
                 )
             value.flags.writeable = False

@@ -61,7 +61,9 @@ class SceneState:
         return placed[name] if name in placed else shapes.nominal_bodies[name]
 
     def target_position_m(self, shapes: SceneShapes) -> Array:
-        """Centre of the target's opening in the base frame, m. Shape (3,)."""
+        """Centre of the target's opening in the base frame, m; NaN without a target. Shape (3,)."""
+        if not shapes.target_body:
+            return np.full(3, np.nan)
         position, yaw = self.placement(shapes, shapes.target_body)
         c, s = np.cos(yaw), np.sin(yaw)
         x, y, z = shapes.target_offset_m

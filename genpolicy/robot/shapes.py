@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.errors import ConfigError
-from genpolicy.robot.kinematics import JOINTS
+from genpolicy.robot.kinematics import TCP_SITE
 
 Array = NDArray[np.float64]
 Kind = Literal["box", "cylinder", "capsule", "sphere"]
@@ -22,7 +22,7 @@ Kind = Literal["box", "cylinder", "capsule", "sphere"]
 ROBOT_GROUP, HELD_GROUP, SCENE_GROUP = 1, 2, 3
 BASE_FRAME = -1
 HELD = "held"
-TARGET_SITE, TCP_SITE = "hole", "tcp"
+TARGET_SITE = "target"  # MJCF convention: where the body opens that the held object goes into
 _KINDS: dict[int, Kind] = {
     int(mujoco.mjtGeom.mjGEOM_BOX): "box",
     int(mujoco.mjtGeom.mjGEOM_CYLINDER): "cylinder",
@@ -42,11 +42,12 @@ class Shape:
         kind: Which primitive.
         half_size_m: Half edges of a box; radius, radius, half length of a cylinder (flat ends)
             or capsule (without its caps); radius three times of a sphere. Shape (3,).
-        frame: Joint frame 0 to 6 that carries it; `BASE_FRAME` for what stands in the base
+        frame: Joint frame, from 0, that carries it; `BASE_FRAME` for what stands in the base
             frame or on a movable scene body.
         rotation: In that frame (scene: in its body). Shape (3, 3).
         position_m: In that frame (scene: in its body), fingers closed. Shape (3,).
         slide: Direction in which the gripper's opening moves it, zero otherwise. Shape (3,).
+        tool: Hangs behind the arm's last link: hand, finger, held object.
     """
 
     name: str
@@ -57,6 +58,7 @@ class Shape:
     rotation: Array
     position_m: Array
     slide: Array
+    tool: bool = False
 
 
 @dataclass(frozen=True)
@@ -69,7 +71,7 @@ class SceneShapes:
         nominal_bodies: Position (3,), m, and yaw, rad, of the scene's bodies in the file.
         held_reach_m: How far the held object reaches below the TCP, m.
         held_half_width_m: Smallest opening of each finger around the held object, m.
-        target_body: Body with the site `hole`, which the held object may touch in contact
+        target_body: Body with the site `target`, which the held object may touch in contact
             phases; empty without one.
         target_offset_m: Where the site lies on that body, m. Shape (3,).
     """
@@ -83,8 +85,13 @@ class SceneShapes:
     target_offset_m: Array
 
 
-def shapes_of(scene_path: Path) -> SceneShapes:
+def shapes_of(scene_path: Path, *, joints: int, tcp_site: str = TCP_SITE) -> SceneShapes:
     """Read the shapes of an MJCF.
+
+    Args:
+        scene_path: The MJCF; the arm's joints come first in it.
+        joints: Joints of the arm, from its kinematics.
+        tcp_site: Site of the TCP.
 
     Raises:
         ConfigError: A colliding geom is of a kind without an exact collision test here.
@@ -93,7 +100,7 @@ def shapes_of(scene_path: Path) -> SceneShapes:
     data = mujoco.MjData(model)
     data.qpos[:] = 0.0
     mujoco.mj_kinematics(model, data)
-    links = [int(model.jnt_bodyid[j]) for j in range(JOINTS)]
+    links = [int(model.jnt_bodyid[j]) for j in range(joints)]
     held = _held_placement(model, data, links)
     robot, scene, held_shapes = [], [], []
     for geom in range(model.ngeom):
@@ -108,7 +115,7 @@ def shapes_of(scene_path: Path) -> SceneShapes:
         else:
             scene.append(_scene_shape(model, geom))
     target_body, target_offset = _target(model)
-    length, width = _held_size(model, data, links, held_shapes)
+    length, width = _held_size(model, data, links, held_shapes, tcp_site)
     return SceneShapes(
         robot=tuple(robot + held_shapes),
         scene=tuple(scene),
@@ -204,12 +211,13 @@ def _robot_shape(model: Any, data: Any, geom: int, links: list[int]) -> Shape:
     )  # fmt: skip
     slide = np.zeros(3)
     joint = int(model.body_jntadr[body])
-    if joint >= JOINTS and model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE:
+    if joint >= len(links) and model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE:
         world = body_rotation @ model.jnt_axis[joint]
         slide, _ = _relative(data, links, frame, world, np.zeros(3))
     kind, half = _half_size(model, geom)
     name = model.geom(geom).name
-    return Shape(name, model.body(body).name, kind, half, frame, rotation, position, slide)
+    tool = frame == len(links) - 1 and body != links[-1]
+    return Shape(name, model.body(body).name, kind, half, frame, rotation, position, slide, tool)
 
 
 def _held_placement(
@@ -237,7 +245,7 @@ def _held_shape(model: Any, geom: int, held: tuple[int, int, Array, Array]) -> S
     return Shape(
         HELD, HELD, kind, half, frame,
         rotation @ _matrix(model.geom_quat[geom]),
-        position + rotation @ model.geom_pos[geom], np.zeros(3),
+        position + rotation @ model.geom_pos[geom], np.zeros(3), tool=True,
     )  # fmt: skip
 
 
@@ -257,8 +265,10 @@ def _nominal_bodies(model: Any, scene: list[Shape]) -> dict[str, tuple[Array, fl
     return bodies
 
 
-def _held_size(model: Any, data: Any, links: list[int], held: list[Shape]) -> tuple[float, float]:
-    sites = [i for i in range(model.nsite) if model.site(i).name == TCP_SITE]
+def _held_size(
+    model: Any, data: Any, links: list[int], held: list[Shape], tcp_site: str
+) -> tuple[float, float]:
+    sites = [i for i in range(model.nsite) if model.site(i).name == tcp_site]
     if not held or not sites:
         return 0.0, 0.0
     frame = held[0].frame

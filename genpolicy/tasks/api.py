@@ -1,14 +1,18 @@
 """What a task must offer: scene, contract, world, phases, fallback, recordings.
 
 A task is a plug-in of the entry-point group `genpolicy.tasks`. Nothing outside a task's package
-knows what it manipulates.
+knows what it manipulates: the library asks.
+
+Conventions of the scene file: geom groups 1 robot, 2 held object, 3 scene; the arm's body tree
+first; a site `tcp` behind its last joint; a site `target` where the held object goes in, if
+anywhere; a weld from the hand to the held object, if there is one.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
@@ -23,6 +27,7 @@ if TYPE_CHECKING:
     from genpolicy.data.recording.episode import RecordedEpisode
 
 Array = NDArray[np.float64]
+Picture = NDArray[np.uint8]
 
 ENTRY_POINT_GROUP = "genpolicy.tasks"
 NOMINAL_PROBE = "nominal"
@@ -45,6 +50,23 @@ class Workspace:
         below = position_m - np.asarray(self.lower_m)
         above = np.asarray(self.upper_m) - position_m
         return np.asarray(np.minimum(below, above).min(axis=-1))
+
+
+@dataclass(frozen=True)
+class AuditChannels:
+    """Which of the task's observations the audit of its data reads, by name.
+
+    Attributes:
+        position: Position of the TCP, m.
+        reference: Observed pose of what the task ends at; None where there is none.
+        calibration_phase: Phase whose first row gives the calibration residual.
+        context: Channels that are held against the modes.
+    """
+
+    position: str
+    reference: str | None = None
+    calibration_phase: str = ""
+    context: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -96,18 +118,9 @@ class Start(Protocol):
         """Canonical JSON text, for replay."""
         ...
 
-    def variables(self) -> dict[str, float]:
-        """Each drawn number by name, SI units."""
-        ...
-
 
 class World(Protocol):
     """One simulated robot cell; knows nothing of policies."""
-
-    @property
-    def time_s(self) -> float:
-        """Simulated time since the start, s."""
-        ...
 
     @property
     def phase(self) -> str:
@@ -121,12 +134,7 @@ class World(Protocol):
 
     @property
     def q_meas(self) -> Array:
-        """Measured joint positions, rad. Shape (7,)."""
-        ...
-
-    @property
-    def dq_meas(self) -> Array:
-        """Measured joint velocities, rad/s. Shape (7,)."""
+        """Measured joint positions, rad. Shape (J,)."""
         ...
 
     @property
@@ -182,10 +190,6 @@ class World(Protocol):
         """Push the hand from now on. Force in the base frame, N, shape (3,)."""
         ...
 
-    def request_recovery(self, active: bool) -> None:
-        """Flag the phase `recover` (where the task allows it), or clear the flag."""
-        ...
-
 
 class Task(Protocol):
     """A manipulation task."""
@@ -212,32 +216,37 @@ class Task(Protocol):
 
     @property
     def contact_phases(self) -> frozenset[str]:
-        """Phases in which the held object may touch the scene."""
+        """Phases in which the held object may touch the target; empty without contact."""
         ...
 
     @property
     def opening_phases(self) -> frozenset[str]:
-        """Phases in which the gripper may let go; empty for a task without a gripper."""
+        """Phases in which the gripper may let go; empty without a gripper."""
+        ...
+
+    @property
+    def free_phases(self) -> frozenset[str]:
+        """Phases of motion in the open, with room around; faults that need room go there."""
         ...
 
     @property
     def obstacles(self) -> tuple[str, ...]:
-        """Movable bodies of the scene that are only in the way; empty where none is."""
+        """Movable bodies of the scene that stand free in the way, by name; the nearest first."""
         ...
 
     @property
     def limits(self) -> RobotLimits:
-        """Table of limits of the robot in the scene."""
+        """Limits of the task's robot, with their source; as many joints as the scene's arm."""
+        ...
+
+    @property
+    def audit_channels(self) -> AuditChannels:
+        """What the audit of the task's data reads."""
         ...
 
     @property
     def workspace(self) -> Workspace:
         """Where the TCP may be."""
-        ...
-
-    @property
-    def probes(self) -> tuple[str, ...]:
-        """Names of the out-of-distribution probes."""
         ...
 
     @property
@@ -263,7 +272,7 @@ class Task(Protocol):
 
     @property
     def posture_rad(self) -> Array:
-        """Joint positions from which inverse kinematics begins. Shape (7,)."""
+        """Joint positions from which inverse kinematics begins. Shape (J,)."""
         ...
 
     def action_at(self, observation: Array) -> Array:
@@ -280,6 +289,13 @@ class Task(Protocol):
 
     def scene_poses(self, observation: Array) -> dict[str, tuple[Array, Array]]:
         """Position (3,), m, and quaternion (4,), w x y z, of each movable body, as observed."""
+        ...
+
+    def picture(self, start: Start, *, width_px: int, height_px: int) -> Picture:
+        """Picture of the cell at a start, red, green, blue; shape (height_px, width_px, 3).
+
+        The same bytes every time, without a display.
+        """
         ...
 
     def fallback(self, world: World, kind: str) -> Array:
@@ -301,8 +317,8 @@ class Task(Protocol):
         ...
 
 
-def load_task(name: str) -> Task:
-    """The task registered as `name`.
+def find_task(name: str) -> EntryPoint:
+    """The entry point of the task registered as `name`; loads nothing.
 
     Raises:
         ConfigError: No task has that name; the message lists the known ones.
@@ -315,5 +331,14 @@ def load_task(name: str) -> Task:
             expected=f"one of {sorted(found)}",
             action=f"Name a registered task, or register yours in the group {ENTRY_POINT_GROUP}.",
         )
-    task: Task = found[name].load()
+    return found[name]
+
+
+def load_task(name: str) -> Task:
+    """The task registered as `name`.
+
+    Raises:
+        ConfigError: No task has that name; the message lists the known ones.
+    """
+    task: Task = find_task(name).load()
     return task

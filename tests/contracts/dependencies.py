@@ -20,6 +20,7 @@ PACKAGES = ("genpolicy", "gates", "stages", "flows")
 CODE = ("genpolicy", "gates", "stages")
 TABLE = ROOT / "docs" / "dependencies.md"
 TASK_LOADER = "genpolicy.tasks.api"
+TASK_STAGE, IDENTITY = "task", "artifacts/task/identity.json"
 # Admission decides whether a stage may begin, never what it computes. Evidence stages depend on
 # what it decides about (`artifacts/gate_x/verdict.json`), so that an edit of a gate or of a report
 # template re-judges, and re-trains only if the verdict changed.
@@ -46,15 +47,37 @@ def stage_names() -> list[str]:
     return sorted(files | set(pipeline()))
 
 
+@cache
+def plugins() -> set[str]:
+    """Modules of the tasks that this distribution registers."""
+    with (ROOT / "pyproject.toml").open("rb") as stream:
+        points = tomllib.load(stream)["project"]["entry-points"]["genpolicy.tasks"]
+    return {value.split(":")[0] for value in points.values()}
+
+
+def of_a_plugin(module: str) -> bool:
+    """Whether a module lies in the package of a task."""
+    packages = {plugin.rpartition(".")[0] for plugin in plugins()}
+    return any(module == package or module.startswith(f"{package}.") for package in packages)
+
+
+def loads_a_task(stage: str) -> bool:
+    """Whether a stage reaches what loads a task."""
+    module = f"stages.{stage}"
+    return TASK_LOADER in {module} | graph().find_upstream_modules(module)
+
+
 def reached_modules(module: str) -> set[str]:
-    """`module`, what it imports directly or not, the packages around them, and the plug-ins."""
+    """`module`, what it imports directly or not, the packages around them, and the plug-ins.
+
+    The modules of a plug-in itself are left out: a task may be installed outside the tree, so the
+    stages depend on its identity, which holds the hash of every file of it, in their place.
+    """
     found = {module} | graph().find_upstream_modules(module)
     if TASK_LOADER in found:
-        with (ROOT / "pyproject.toml").open("rb") as stream:
-            points = tomllib.load(stream)["project"]["entry-points"]["genpolicy.tasks"]
-        for value in points.values():
-            plugin = value.split(":")[0]
-            found |= {plugin} | graph().find_upstream_modules(plugin)
+        for plugin in plugins():
+            found |= graph().find_upstream_modules(plugin)
+    found = {name for name in found if not of_a_plugin(name)}
     parents = {
         name.rsplit(".", depth)[0] for name in found for depth in range(1, name.count(".") + 1)
     }
@@ -176,6 +199,8 @@ def rerun_after_edit(package: str) -> tuple[list[str], list[str]]:
             for dep in stage["deps"]
         )
     }
+    if of_a_plugin(package.replace("/", ".")):
+        direct.add(TASK_STAGE)  # it runs every time, and sees the edit
     behind, open_ones = set(direct), list(direct)
     while open_ones:
         for name in consumers()[open_ones.pop()] - behind:
@@ -230,11 +255,14 @@ def rewritten(text: str) -> str:
         if at_deps and not line.startswith("      - "):
             at_deps = False
             result += [f"      - {dep}" for dep in code_deps(stage)]
-        if at_deps and is_code(line.removeprefix("      - ").strip()):
+        dep = line.removeprefix("      - ").strip()
+        if at_deps and (is_code(dep) or dep == IDENTITY):
             continue
         result.append(line)
         if line == "    deps:":
             at_deps = True
+            if stage != TASK_STAGE and loads_a_task(stage):
+                result.append(f"      - {IDENTITY}")
     return "\n".join(result)
 
 

@@ -9,13 +9,18 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 
 from dependencies import (
+    IDENTITY,
     ROOT,
     TABLE,
+    TASK_STAGE,
     code_deps,
     data_files,
     is_code,
+    loads_a_task,
     module_file,
+    of_a_plugin,
     pipeline,
+    plugins,
     reached_files,
     reached_modules,
     stage_names,
@@ -88,11 +93,29 @@ def test_a_dependency_left_out_is_found() -> None:
 
 
 def test_the_walk_sees_indirect_imports_packages_and_data() -> None:
-    modules = reached_modules("genpolicy.tasks.api")
-    assert {"genpolicy", "genpolicy.errors", "genpolicy.tasks"} <= modules
+    modules = reached_modules("genpolicy.pages.audit.page")
+    assert {"genpolicy", "genpolicy.errors", "genpolicy.pages"} <= modules
     files = {module_file(module) for module in modules} | data_files(modules)
-    assert "genpolicy/tasks/tabletop_insertion/scene.xml" in files
+    assert "genpolicy/pages/style.css" in files
     assert all((ROOT / file).is_file() for file in files)
+
+
+@pytest.mark.parametrize("stage", stage_names())
+def test_a_stage_that_loads_a_task_depends_on_its_identity_not_on_its_files(stage: str) -> None:
+    deps = pipeline()[stage]["deps"]
+    assert (IDENTITY in deps) == (loads_a_task(stage) and stage != TASK_STAGE)
+    plugin_files = {module_file(plugin) for plugin in plugins()}
+    assert uncovered(plugin_files, deps) == sorted(plugin_files)
+
+
+def test_what_a_plugin_imports_from_the_library_stays_a_dependency() -> None:
+    reached = reached_modules("stages.record")
+    assert "genpolicy.robot.impedance" in reached
+    assert not any(of_a_plugin(module) for module in reached)
+
+
+def test_the_identity_is_written_every_time() -> None:
+    assert pipeline()[TASK_STAGE]["always_changed"] is True
 
 
 def _outputs() -> list[PurePosixPath]:

@@ -106,11 +106,22 @@ def test_condition_number_at_a_stretched_arm(arm):
     assert condition[0] == pytest.approx(singular[0] / singular[-1], rel=1e-9)
 
 
-def test_another_tree_is_refused(tmp_path):
+@pytest.mark.parametrize("joint", ["axis='1 0 0'", "axis='0 0 1' type='slide'"])
+def test_another_joint_on_the_way_to_the_tcp_is_refused(tmp_path, joint):
     scene = tmp_path / "scene.xml"
-    body = "<body name='b'><joint name='j' axis='1 0 0'/><geom size='.1' mass='1'/></body>"
+    site = "<site name='tcp'/>"
+    body = f"<body name='b'><joint name='j' {joint}/><geom size='.1' mass='1'/>{site}</body>"
     scene.write_text(f"<mujoco><worldbody>{body}</worldbody></mujoco>")
-    with pytest.raises(ConfigError, match="seven revolute joints"):
+    with pytest.raises(ConfigError, match="revolute joints about their own z axes"):
+        ArmKinematics(scene)
+
+
+def test_a_tcp_that_no_joint_moves_is_refused(tmp_path):
+    scene = tmp_path / "scene.xml"
+    child = "<body name='c'><joint name='j' axis='0 0 1'/><geom size='.1' mass='1'/></body>"
+    body = f"<body name='b'><geom size='.1' mass='1'/><site name='tcp'/>{child}</body>"
+    scene.write_text(f"<mujoco><worldbody>{body}</worldbody></mujoco>")
+    with pytest.raises(ConfigError, match="frame tcp"):
         ArmKinematics(scene)
 
 

@@ -57,3 +57,12 @@ def test_a_bad_table_is_refused():
         RobotLimits(**(fields | {"position_lower_rad": fields["position_upper_rad"]}))
     with pytest.raises(NonFiniteError, match="velocity_rad_s"):
         RobotLimits(**(fields | {"velocity_rad_s": np.full(7, np.nan)}))
+
+
+def test_a_table_has_as_many_joints_as_its_robot():
+    fields = {name: getattr(PANDA, name) for name in PANDA.__dataclass_fields__}
+    arrays = {name: value[:6] for name, value in fields.items() if isinstance(value, np.ndarray)}
+    six = RobotLimits(**(fields | arrays | {"robot": "six"}))
+    assert six.scaled(0.5).velocity_rad_s.shape == (6,)
+    with pytest.raises(NonFiniteError, match="7 finite numbers"):
+        RobotLimits(**(fields | {"jerk_rad_s3": fields["jerk_rad_s3"][:6]}))

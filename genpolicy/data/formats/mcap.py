@@ -38,18 +38,9 @@ from genpolicy.data.recording.episode import (
 from genpolicy.data.recording.reader import read_episode
 from genpolicy.errors import BadInputError, ConfigError
 from genpolicy.integrity.documents import read_json
-from genpolicy.robot.limits import RobotName, limits_of
+from genpolicy.robot.limits import LIMITS
 from genpolicy.tasks.api import ENTRY_POINT_GROUP, Task, load_task
 
-# What the audit holds modes against, where a recording has the channels of the insertion task.
-INSERTION_AUDIT = {
-    "position_channel": "tcp_position_m",
-    "position_components": None,
-    "action_components": None,
-    "reference_channel": "hole_pose",
-    "context_channels": ["hole_pose"],
-}
-ROBOTS: tuple[RobotName, ...] = ("panda", "fr3")
 LOOKED_AT = 5
 MAXIMUM_AGE_S = 0.3
 PHASE_AGE_S = 60.0
@@ -234,20 +225,34 @@ def _task_contract(task: Task, episode: RecordedEpisode) -> ImportContract:
             )
         )
     recorded = episode.metadata.get("robot", "").lower()
-    robot: RobotName | None = next((name for name in ROBOTS if name in recorded), None)
+    tables = {**LIMITS, task.limits.robot: task.limits}
+    limits = next((table for name, table in tables.items() if name in recorded), None)
     contract = _contract(
         task.name, channels, tuple(task.phases), _period_s([episode]), _tcp_action()
     )
     update: dict[str, object] = {
-        "ranges": {name: [low, high] for name, (low, high) in ranges.items()}
+        "ranges": {name: [low, high] for name, (low, high) in ranges.items()},
+        "audit": contract.audit | _audit_of(task),
     }
-    if robot is not None:
-        limits = limits_of(robot)
+    if limits is not None:
         update["joint_range_rad"] = [
             limits.position_lower_rad.tolist(),
             limits.position_upper_rad.tolist(),
         ]
     return contract_of(contract.model_copy(update=update).model_dump(), where="the task's contract")
+
+
+def _audit_of(task: Task) -> dict[str, Any]:
+    """What the audit holds modes against, as the task names it."""
+    channels = task.audit_channels
+    return {
+        "position_channel": channels.position,
+        "position_components": None,
+        "action_components": None,
+        "reference_channel": channels.reference,
+        "calibration_phase": channels.calibration_phase,
+        "context_channels": list(channels.context),
+    }
 
 
 def _stream_contract(episodes: Sequence[RecordedEpisode], task: str) -> ImportContract:
@@ -288,12 +293,9 @@ def _contract(
 ) -> ImportContract:
     streams = {channel.stream for channel in channels}
     moving = sorted(streams & {ROBOT_STREAM, JOINTS_STREAM})
-    seen = {channel.name for channel in channels}
     audit: dict[str, Any] = {}
     if PHASE_STREAM in streams:
         audit = {"phase_observed": True, "ignored_channels": ["phase"]}
-    if {"tcp_position_m", "hole_pose"} <= seen:
-        audit |= INSERTION_AUDIT
     values = ImportContract(
         format="mcap",
         task=task,

@@ -9,6 +9,7 @@ from genpolicy.audit.run import AuditResult, audit
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.audit.view import from_dataset
 from genpolicy.data.dataset import Dataset, load_dataset
+from genpolicy.data.recording.episode import PHASE_STREAM
 from genpolicy.evidence.admission_context import make_checker
 from genpolicy.evidence.need.held_out import admissible
 from genpolicy.feasibility.settings import FeasibilitySettings
@@ -38,6 +39,7 @@ def audit_task(
         root_seed: Root seed.
     """
     task = load_task(task_name)
+    settings = with_channels(settings, task)
     data = load_dataset(dataset)
     checker = make_checker(task, feasibility, action_period_s=action_period_s)
 
@@ -59,6 +61,20 @@ def audit_task(
     )
 
 
+def with_channels(settings: AuditSettings, task: Task) -> AuditSettings:
+    """Settings that read the task's own channels, where they do not name others themselves."""
+    channels = task.audit_channels
+    values: dict[str, object] = {
+        "position_channel": channels.position,
+        "reference_channel": channels.reference,
+        "calibration_phase": channels.calibration_phase,
+        "context_channels": list(channels.context),
+        "ignored_channels": [c.name for c in task.observation.channels if c.stream == PHASE_STREAM],
+    }
+    missing = {k: v for k, v in values.items() if k not in settings.model_fields_set}
+    return settings.model_copy(update=missing)
+
+
 def replay_episode(task: Task, data: Dataset, episode_uuid: str) -> str:
     """Outcome of an episode's actions, replayed in simulation from its recorded start.
 
@@ -74,10 +90,10 @@ def replay_episode(task: Task, data: Dataset, episode_uuid: str) -> str:
 
 def round_obstacles(task: Task) -> list[dict[str, float]]:
     """Standing cylinders of the scene file, as circles in the base frame's plane, m."""
-    shapes = shapes_of(task.scene_path)
+    shapes = shapes_of(task.scene_path, joints=len(task.posture_rad))
     found = []
     for shape in shapes.scene:
-        if shape.kind != "cylinder":
+        if shape.kind != "cylinder" or shape.body not in task.obstacles:
             continue
         origin, _ = shapes.nominal_bodies[shape.body]
         centre = origin + shape.position_m

@@ -137,7 +137,7 @@ def _metadata(policy: NetworkPolicy, repeat: int) -> ChunkMetadata:
         action_start_time_s=0.0,
         action_period_s=period_s,
         valid_until_s=period_s * policy.prediction_horizon,
-        task_phase="approach",
+        task_phase="benchmark",
         calibration_epoch="benchmark",
         predecessor_chunk_id="",
         session_epoch=0,

@@ -208,7 +208,7 @@ def awkward_posture(case: Case, checker: FeasibilityChecker) -> Case | None:
 
 def _under_way(case: Case, checker: FeasibilityChecker) -> bool:
     """The case is in the task's first free phase: far from the target, nothing to let go."""
-    return case.context.phase in checker.cell.free_phases[:1]
+    return case.context.phase in checker.cell.free_phases
 
 
 CORRUPTIONS = (

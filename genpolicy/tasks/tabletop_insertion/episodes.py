@@ -240,6 +240,7 @@ class _Recorder:
 
 
 def _camera(spec: EpisodeSpec, recorder: _Recorder, frames: int) -> Array:
+    assert isinstance(spec.start, InsertionStart), "`demonstrate` refuses any other"
     start, error = spec.start.variables(), find_epoch(spec.calibration_epoch).camera
     noise = recorder.noise(CAMERA_STREAM, (frames, 4))
     yaw = start["hole_yaw_rad"] + error.yaw_rad + CAMERA_NOISE_RAD * noise[:, 2]

@@ -9,13 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.errors import ContractError
-from genpolicy.robot.impedance import ARM_JOINTS, POSTURE_RAD
 from genpolicy.tasks.tabletop_insertion.start import InsertionStart
 
 Array = NDArray[np.float64]
 
 SCENE_PATH = Path(__file__).with_name("scene.xml")
 TCP_SITE = "tcp"
+POST = "post"
+ARM_JOINTS = 7
+# Where the controller's null space pulls the arm to.
+POSTURE_RAD = (0.0, -0.17, 0.0, -2.60, 0.0, 2.45, 0.785398163397448)
 ROBOT_GROUP, PEG_GROUP, SCENE_GROUP = 1, 2, 3
 
 POST_X_M = 0.50
@@ -77,7 +80,7 @@ def scene_poses(
     """Position (m) and quaternion (w, x, y, z) of every movable body of the scene, by name."""
     half = 0.5 * hole_yaw_rad
     return {
-        "post": (
+        POST: (
             np.array([POST_X_M, post_y_m, POST_HEIGHT_M / 2]),
             np.array([1.0, 0.0, 0.0, 0.0]),
         ),

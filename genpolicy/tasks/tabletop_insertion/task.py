@@ -10,18 +10,28 @@ from genpolicy.contract.action import GRIPPER, POSITION
 from genpolicy.contract.observation import ObservationContract
 from genpolicy.data.recording.episode import RecordedEpisode
 from genpolicy.errors import ContractError
-from genpolicy.robot.impedance import POSTURE_RAD
 from genpolicy.robot.limits import PANDA, RobotLimits
-from genpolicy.tasks.api import EpisodeSpec, Start, Task, Workspace, World, WorldSettings
+from genpolicy.tasks.api import (
+    AuditChannels,
+    EpisodeSpec,
+    Picture,
+    Start,
+    Task,
+    Workspace,
+    World,
+    WorldSettings,
+)
 from genpolicy.tasks.tabletop_insertion import episodes, fallback, scene, sessions
 from genpolicy.tasks.tabletop_insertion.experts import SIDES
 from genpolicy.tasks.tabletop_insertion.observation import (
     CONTACT_PHASES,
+    FREE_PHASES,
     OBSERVATION,
     OPENING_PHASES,
     PHASES,
 )
-from genpolicy.tasks.tabletop_insertion.probes import EPOCHS, PROBES
+from genpolicy.tasks.tabletop_insertion.picture import draw
+from genpolicy.tasks.tabletop_insertion.probes import EPOCHS
 from genpolicy.tasks.tabletop_insertion.start import InsertionStart, sample_start, start_from_json
 from genpolicy.tasks.tabletop_insertion.world import TabletopWorld
 
@@ -45,10 +55,16 @@ class TabletopInsertion:
     phases: tuple[str, ...] = PHASES
     contact_phases: frozenset[str] = CONTACT_PHASES
     opening_phases: frozenset[str] = OPENING_PHASES
-    obstacles: tuple[str, ...] = ("post",)
+    free_phases: frozenset[str] = FREE_PHASES
+    obstacles: tuple[str, ...] = (scene.POST,)
     limits: RobotLimits = PANDA
+    audit_channels: AuditChannels = AuditChannels(
+        position="tcp_position_m",
+        reference="hole_pose",
+        calibration_phase="release",
+        context=("hole_pose",),
+    )
     workspace: Workspace = WORKSPACE
-    probes: tuple[str, ...] = tuple(name for name in PROBES if name != "nominal")
     calibration_epochs: tuple[str, ...] = tuple(EPOCHS)
 
     def sample_start(self, rng: np.random.Generator) -> InsertionStart:
@@ -75,7 +91,7 @@ class TabletopInsertion:
     @property
     def posture_rad(self) -> Array:
         """The controller's posture."""
-        return np.array(POSTURE_RAD)
+        return np.array(scene.POSTURE_RAD)
 
     def action_at(self, observation: Array) -> Array:
         """The action that would keep the observed pose and opening."""
@@ -101,6 +117,11 @@ class TabletopInsertion:
         if not abs(widest) - CLEAR_SIDE_M >= 0:
             return UNASSIGNED
         return SIDES[0] if widest > 0 else SIDES[1]
+
+    def picture(self, start: Start, *, width_px: int, height_px: int) -> Picture:
+        """The cell at a start, ray cast."""
+        world = self.make_world(start, settings=WorldSettings(self.calibration_epochs[0]))
+        return draw(world.model, world.data, width=width_px, height=height_px)
 
     def fallback(self, world: World, kind: str) -> Array:
         """Classical plan from the last commanded pose; kinds `retreat`, `classical_return`."""

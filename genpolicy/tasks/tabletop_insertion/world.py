@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from genpolicy.contract.action import join_action, split_action
 from genpolicy.contract.rotation import rotation_to_6d
 from genpolicy.errors import NonFiniteError
-from genpolicy.robot.impedance import ARM_JOINTS, ImpedanceController
+from genpolicy.robot.impedance import ImpedanceController
 from genpolicy.seeds import stream
 from genpolicy.tasks.api import WorldSettings
 from genpolicy.tasks.tabletop_insertion import scene
@@ -23,6 +23,7 @@ from genpolicy.tasks.tabletop_insertion.contacts import ContactMonitor
 from genpolicy.tasks.tabletop_insertion.observation import CONTACT_PHASES, OBSERVATION, one_hot
 from genpolicy.tasks.tabletop_insertion.phases import Measured, PhaseLogic
 from genpolicy.tasks.tabletop_insertion.probes import find_epoch, find_probe
+from genpolicy.tasks.tabletop_insertion.scene import ARM_JOINTS
 from genpolicy.tasks.tabletop_insertion.start import InsertionStart
 
 Array = NDArray[np.float64]
@@ -63,7 +64,6 @@ class TabletopWorld:
         self._tcp = data.site_xpos[site]
         self._tcp_rotation = data.site_xmat[site].reshape(3, 3)
         self._q = data.qpos[:ARM_JOINTS]
-        self._dq = data.qvel[:ARM_JOINTS]
         self._fingers = data.qpos[ARM_JOINTS : ARM_JOINTS + 2]
         self._finger_ctrl = data.ctrl[ARM_JOINTS : ARM_JOINTS + 2]
         self._hand_force = data.xfrc_applied[int(model.body("hand").id)]
@@ -71,7 +71,9 @@ class TabletopWorld:
         self._peg_rotation = data.xmat[int(model.body("peg").id)].reshape(3, 3)
         self._grasp = int(model.equality("grasp").id)
         self._grasp_active = data.eq_active
-        self._controller = ImpedanceController(model, data, site=scene.TCP_SITE)
+        self._controller = ImpedanceController(
+            model, data, site=scene.TCP_SITE, posture_rad=scene.POSTURE_RAD
+        )
         self._contacts = ContactMonitor(model, data)
 
     def _reset(self) -> None:
@@ -128,11 +130,6 @@ class TabletopWorld:
     def q_meas(self) -> Array:
         """Measured joint positions, rad. Shape (7,)."""
         return np.array(self._q)
-
-    @property
-    def dq_meas(self) -> Array:
-        """Measured joint velocities, rad/s. Shape (7,)."""
-        return np.array(self._dq)
 
     @property
     def tcp_pose(self) -> tuple[Array, Array]:

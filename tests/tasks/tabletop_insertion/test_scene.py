@@ -41,7 +41,7 @@ def test_constants_are_those_of_the_scene():
     assert post.size[0] == scene.POST_RADIUS_M
     assert 2 * post.size[1] == pytest.approx(scene.POST_HEIGHT_M)
     assert data.body("post").xpos[0] == scene.POST_X_M
-    assert data.site("hole").xpos[2] == pytest.approx(scene.FIXTURE_TOP_M)
+    assert data.site("target").xpos[2] == pytest.approx(scene.FIXTURE_TOP_M)
     assert data.body("fixture").xpos[0] == RANGES["hole_x_m"][0]
     assert model.geom("peg").size[2] == scene.PEG_HALF_LENGTH_M
 

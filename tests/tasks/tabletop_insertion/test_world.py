@@ -66,7 +66,7 @@ def test_starts_at_rest_where_it_should(start):
     world = TabletopWorld(start, settings=SETTINGS)
     position, _ = world.tcp_pose
     np.testing.assert_allclose(position, [start.tcp_x_m, start.tcp_y_m, start.tcp_z_m], atol=5e-4)
-    assert np.abs(world.dq_meas).max() == 0.0
+    assert np.abs(world.data.qvel[:7]).max() == 0.0
     assert world.phase == "approach" and world.holding and not world.success
 
 
