@@ -47,7 +47,7 @@ class Decision:
 
 @dataclass(frozen=True)
 class Judged:
-    """Answers and verdicts, before the words for them are found."""
+    """Answers and verdicts, before the words for them are found; settings as the measures had."""
 
     evidence: Evidence
     settings: Any
@@ -127,7 +127,7 @@ def judge(
     Raises:
         IntegrityError: Evidence that is not what it claims to be.
     """
-    inputs = settings if given is None else given
+    inputs = settings.under(limits) if given is None else given
     answers = []
     for item in spec.criteria:
         if item.id in limits.waived:
@@ -137,7 +137,7 @@ def judge(
             answers.append(_answer(item, evidence, inputs, limit, name))
     verdict, verdicts = combine(answers, expects_candidates=spec.below is not None)
     evidence.bind(*spec.bind)
-    judged = Judged(evidence, settings, tuple(answers), verdict, verdicts)
+    judged = Judged(evidence, inputs, tuple(answers), verdict, verdicts)
     decision = (spec.decide or _decision(spec))(judged)
     note = spec.note(judged) if spec.note else ""
     return GateReport(
@@ -170,7 +170,7 @@ def _answer(
         value = rounded(value) if math.isfinite(value) else None
     if interval is not None:
         interval = (rounded(interval[0]), rounded(interval[1]))
-    threshold = limit.value if limit else None
+    threshold = limit.limit if limit else None
     if limit and item.derived:
         threshold = rounded(item.derived(inputs))
     verdict = judge_criterion(value, threshold, item.comparison)

@@ -17,7 +17,9 @@ import functools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar, NoReturn, TypeVar
+from typing import Any, ClassVar, NoReturn, Self, TypeVar
+
+from pydantic import PrivateAttr
 
 from gates.criterion import Criterion
 from gates.report import OWNERS, Gate, Owner, StrictModel, parse_section, stage_of
@@ -30,25 +32,11 @@ DERIVED = "derived"
 LIMITS, NOT_APPLICABLE = "limits", "not_applicable"
 
 
-class GateSettings(StrictModel):
-    """Base of a gate's settings other than limits.
-
-    Attributes:
-        homes: Where in `params.yaml` a field stands, if not in the gate's own section, as a dotted
-            path. Of a mapping there, the names are taken, in their order.
-    """
-
-    homes: ClassVar[Mapping[str, str]] = {}
-
-
-Settings = TypeVar("Settings", bound=StrictModel)
-
-
 @dataclass(frozen=True)
 class Limit:
     """A limit with the reason for it and the owner who answers for it; None is `derived`."""
 
-    value: float | None
+    limit: float | None
     reason: str
     owner: Owner
 
@@ -67,6 +55,33 @@ class Limits:
 
     of: Mapping[str, Limit] = field(default_factory=dict)
     waived: Mapping[str, Waiver] = field(default_factory=dict)
+
+
+class GateSettings(StrictModel):
+    """Base of a gate's settings other than limits.
+
+    Attributes:
+        homes: Where in `params.yaml` a field stands, if not in the gate's own section, as a dotted
+            path. Of a mapping there, the names are taken, in their order.
+    """
+
+    homes: ClassVar[Mapping[str, str]] = {}
+
+    _limits: Limits = PrivateAttr(default_factory=Limits)
+
+    @property
+    def limits(self) -> Limits:
+        """Limits that the gate judges by, for a measure that must know those of other questions."""
+        return self._limits
+
+    def under(self, limits: Limits) -> Self:
+        """The same settings, with the limits that the gate judges by."""
+        settings = self.model_copy()
+        settings._limits = limits
+        return settings
+
+
+Settings = TypeVar("Settings", bound=StrictModel)
 
 
 def read_params(root: Path) -> dict[str, Any]:

@@ -47,14 +47,14 @@ class CardSettings(GateSettings):
     Attributes:
         name: File name of the signed card: `cards/<name>.dsse.json`.
         author: Who made the candidate; may not review it.
-        robot_model: The one robot model that the card is for: the one whose limits were checked.
+        robot_model: The one robot model that the card is for.
         task: Name of the task.
         workspace_lower_m: Lower corner of the reduced workspace, base frame. Shape (3,).
         workspace_upper_m: Upper corner. Shape (3,).
         speed_limit_m_s: Reduced speed of the tool.
     """
 
-    homes: ClassVar[Mapping[str, str]] = {"robot_model": "feasibility.robot", "task": "task.name"}
+    homes: ClassVar[Mapping[str, str]] = {"task": "task.name"}
 
     name: CardName
     author: str = Field(min_length=1)

@@ -37,6 +37,7 @@ class NeedSettings(GateSettings):
     homes: ClassVar[Mapping[str, str]] = {
         "confidence": "confidence",
         "baselines": "train_baselines.samplers",
+        "latent_baseline": "measure_baselines.latent.method",
     }
 
     confidence: float = Field(gt=0.5, lt=1.0)

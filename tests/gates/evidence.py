@@ -50,8 +50,8 @@ def by_owner(**limits: tuple[Any, str]) -> dict[str, dict[str, list[Any]]]:
 PARAMS: dict[str, Any] = {
     "confidence": 0.95,
     "task": {"name": "tabletop_insertion"},
-    "feasibility": {"robot": "panda"},
     "train_baselines": {"samplers": {name: {} for name in (*BASELINES, DRAWN)}},
+    "measure_baselines": {"latent": {"method": "act"}},
     "train_generators": {"samplers": {name: {} for name in CANDIDATES}},
     "stress": {
         "starts": STARTS,
@@ -66,7 +66,6 @@ PARAMS: dict[str, Any] = {
         "deployed_conventions": ["direct", "z_zero"],
         "generative_baselines": [DRAWN],
         "chunked_baseline": "chunked_bc",
-        "latent_baseline": "act",
         "limits": by_owner(
             refused_recordings_accounted=(0, "perception"),
             clock_residual_s=(0.01, "perception"),
@@ -161,6 +160,7 @@ PARAMS: dict[str, Any] = {
     "card": {
         "name": "trial",
         "author": "Ada Author",
+        "robot_model": "panda",
         "workspace_lower_m": [0.35, -0.2, 0.03],
         "workspace_upper_m": [0.7, 0.2, 0.25],
         "speed_limit_m_s": 0.25,

@@ -27,7 +27,7 @@ def test_a_limit_has_its_reason_and_owner():
     limits = _limits(lambda params: None)
     assert set(limits.of) == evidence.limited("gate_a") and not limits.waived
     one = limits.of["clock_residual_s"]
-    assert (one.value, one.reason, one.owner) == (0.01, "test", "perception")
+    assert (one.limit, one.reason, one.owner) == (0.01, "test", "perception")
 
 
 @pytest.mark.parametrize(
@@ -132,4 +132,11 @@ def test_the_smoke_ladder_gives_its_own_limits_and_reasons(request):
         limits = read_limits(params, gate, spec.criteria)
         assert set(limits.of) == {item.id for item in spec.criteria}
     one = read_limits(params, "B", SPECS["B"].criteria).of["mode_coverage_lower"]
-    assert (one.value, one.owner) == (0.3, "model") and one.reason.startswith("smoke:")
+    assert (one.limit, one.owner) == (0.3, "model") and one.reason.startswith("smoke:")
+
+
+def test_a_measure_sees_the_limits_that_its_gate_judges_by():
+    limits = _limits(lambda params: None)
+    settings = read_settings(_params(), "gate_a", SPECS["A"].settings)
+    assert settings.limits.of == {} and settings.under(limits).limits is limits
+    assert settings.under(limits).model_dump() == settings.model_dump()
