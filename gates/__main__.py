@@ -13,14 +13,11 @@ from typing import Annotated, Any
 
 import typer
 
-from gates import gate_e
-from gates.admission import prove_chain
-from gates.chain import limit_text, measured_text
-from gates.ladder import Rung, decided_text, prove_all
-from gates.models import GATES, Gate, read_report
+from gates import proof
+from gates.card.signing import sign_card
 from gates.overview import as_text, overview
-from gates.registry import read_section
-from gates.signing import sign_card
+from gates.proof import Rung, decided_text, prove_all, prove_chain
+from gates.report import GATES, Gate, limit_text, measured_text, read_report
 from genpolicy.errors import BadInputError, GenpolicyError
 
 app = typer.Typer(
@@ -120,7 +117,7 @@ def show(letter: Letter, root: Root = Path(), as_json: AsJson = False) -> None:
 @_clean
 def judge(letter: Letter, root: Root = Path()) -> None:
     """Judge the evidence that lies here and write the report; a FAIL exits 0 like any verdict."""
-    from gates.reports import write_gate  # noqa: PLC0415 - loads the plotting library
+    from gates.writing import write_gate  # noqa: PLC0415 - loads the plotting library
 
     report = write_gate(root, _gate(letter))
     text = decided_text(report) or report.decision
@@ -149,10 +146,7 @@ def verify_card(
     as_json: AsJson = False,
 ) -> None:
     """Judge gate E without writing; exit 0 only for a valid, complete, signed card."""
-    thresholds, params = read_section(root, gate_e.SPEC, gate_e.Params)
-    assert isinstance(params, gate_e.Params)
-    day = _day(today) if today else None
-    report = gate_e.judge(root, thresholds, params, today=day)
+    report = proof.judge(root, "E", today=_day(today) if today else None)
     if as_json:
         typer.echo(report.model_dump_json(indent=2))
     else:

@@ -1,6 +1,6 @@
 """The judge that all gates share: measure each criterion, hold it against its limit, combine.
 
-Pure: the report is a function of the evidence, the thresholds and the settings.
+Pure: the report is a function of the evidence, the limits and the settings.
 """
 
 import importlib.metadata
@@ -8,28 +8,26 @@ import math
 import os
 import platform
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from gates.criterion import Criterion, Measured
 from gates.evidence import Evidence, MissingEvidenceError
-from gates.models import (
+from gates.report import (
     GATES,
-    REQUIRED,
     SCHEMA_VERSION,
-    Comparison,
-    Criterion,
+    Answer,
     Gate,
     GateReport,
-    Owner,
-    StrictModel,
-    Threshold,
     Verdict,
     parse_report,
     report_path,
+    stage_of,
 )
+from gates.settings import GateSettings, Limit, Limits, read_limits, read_params, read_settings
 from gates.verdicts import combine, first_unmet, judge_criterion, rounded
-from genpolicy.errors import ConfigError, IntegrityError
+from genpolicy.errors import IntegrityError
 from genpolicy.integrity.hashing import sha256_bytes_of
 
 LIBRARIES = ("numpy", "pandas", "pyarrow", "pydantic", "scipy")
@@ -40,45 +38,22 @@ REGIME = (
 
 
 @dataclass(frozen=True)
-class Measured:
-    """What a criterion found.
+class Decision:
+    """What follows from a verdict, and the method that is promoted, if one is."""
 
-    Attributes:
-        value: The number; None where nothing can be said.
-        interval: Its interval, if it has one.
-        caveat: What the reader must know about it.
-        pending: Set where only a person can supply the answer and has not yet.
-    """
-
-    value: float | None
-    interval: tuple[float, float] | None = None
-    caveat: str = ""
-    pending: bool = False
+    text: str
+    promoted: str | None = None
 
 
 @dataclass(frozen=True)
-class Case:
-    """What a measure may look at: evidence, settings, and the candidate it is about."""
+class Judged:
+    """Answers and verdicts, before the words for them are found; settings as the measures had."""
 
     evidence: Evidence
-    params: Any
-    candidate: str = ""
-    extra: Mapping[str, Any] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class CriterionSpec:
-    """A criterion of a gate: its question and how it is measured."""
-
-    id: str
-    question: str
-    comparison: Comparison
-    owner: Owner
-    evidence: tuple[str, ...]
-    measure: Callable[[Case], Measured]
-    look_at: str
-    per_candidate: bool = False
-    route: str = REQUIRED
+    settings: Any
+    answers: tuple[Answer, ...]
+    verdict: Verdict
+    candidates: dict[str, Verdict]
 
 
 @dataclass(frozen=True)
@@ -86,121 +61,166 @@ class GateSpec:
     """A gate: its criteria in the order in which a failure is diagnosed.
 
     Attributes:
+        gate: Letter.
+        settings: Model of its settings other than limits.
+        criteria: What it asks.
         bind: Glob patterns of files that the report binds without reading them.
         back_to: Where a failure sends the reader.
         go_on: What a pass allows.
         caveats: What the gate does not show.
+        below: Gate that candidates must have passed to stand here; None without candidates.
+        note: Text behind the diagnosis, where a gate has one.
+        decide: Own decision, where the common one does not do.
     """
 
     gate: Gate
-    criteria: tuple[CriterionSpec, ...]
+    settings: type[GateSettings]
+    criteria: tuple[Criterion, ...]
     bind: tuple[str, ...]
     back_to: str
     go_on: str
     caveats: tuple[str, ...]
-
-    @property
-    def has_candidates(self) -> bool:
-        """Whether methods stand for promotion here."""
-        return any(spec.per_candidate for spec in self.criteria)
+    below: Gate | None = None
+    note: Callable[[Judged], str] | None = None
+    decide: Callable[[Judged], Decision] | None = None
 
 
-def check_thresholds(spec: GateSpec, thresholds: Mapping[str, Threshold]) -> None:
-    """Refuse thresholds of criteria that the gate does not have.
+def judge_gate(spec: GateSpec, root: Path) -> GateReport:
+    """Report of a gate from the evidence and `params.yaml` below `root`; writes nothing.
 
     Raises:
-        ConfigError: An unknown identifier.
+        ConfigError: The section is missing or wrong.
+        IntegrityError: Evidence that is not what it claims to be.
     """
-    known = {item.id for item in spec.criteria}
-    for name in sorted(set(thresholds) - known):
-        raise ConfigError(
-            where=f"params.yaml: gate_{spec.gate.lower()}.thresholds.{name}",
-            found="a threshold of no criterion",
-            expected=f"one of {', '.join(sorted(known))}",
-            action="Correct the name; a misspelt threshold would judge nothing.",
-        )
+    params = read_params(root)
+    settings = read_settings(params, stage_of(spec.gate), spec.settings)
+    limits = read_limits(params, spec.gate, spec.criteria)
+    names: Sequence[str] = ()
+    caveats: Sequence[str] = ()
+    if spec.below is not None:
+        names, caveats = standing(root, spec.below, getattr(settings, "candidates", ()))
+    return judge(spec, Evidence(root), limits, settings, candidates=names, caveats=caveats)
 
 
-def judge_gate(
+def judge(
     spec: GateSpec,
     evidence: Evidence,
-    thresholds: Mapping[str, Threshold],
-    params: StrictModel,
+    limits: Limits,
+    settings: GateSettings,
     *,
+    given: object = None,
     candidates: Sequence[str] = (),
     caveats: Sequence[str] = (),
-    extra: Mapping[str, Any] | None = None,
-    diagnosis: Callable[[Sequence[Criterion], Verdict], str] | None = None,
-    decision: Callable[[Sequence[Criterion], Verdict, dict[str, Verdict]], str] | None = None,
 ) -> GateReport:
     """Report of one gate.
 
     Args:
         spec: The gate.
         evidence: What it may read.
-        thresholds: Limits by criterion; a criterion without one is INCONCLUSIVE.
-        params: The gate's other settings, recorded in the report.
+        limits: By criterion; a criterion without one is INCONCLUSIVE, one that is declared not
+            applicable is a caveat and is not asked.
+        settings: Recorded in the report.
+        given: What the measures take in place of the settings, where a gate knows more.
         candidates: Methods that stand for promotion.
         caveats: Caveats of this run, beside those of the gate.
-        extra: Further inputs of the measures.
-        diagnosis: Own text for what failed; the default names the first unmet criterion.
-        decision: Own text for what follows.
 
     Raises:
-        ConfigError: A threshold of no criterion.
         IntegrityError: Evidence that is not what it claims to be.
     """
-    check_thresholds(spec, thresholds)
-    criteria = []
+    inputs = settings.under(limits) if given is None else given
+    answers = []
     for item in spec.criteria:
-        for name in candidates if item.per_candidate else ("",):
-            case = Case(evidence, params, name, extra or {})
-            criteria.append(_judge(item, case, thresholds.get(item.id)))
-    verdict, verdicts = combine(criteria, expects_candidates=spec.has_candidates)
-    if not thresholds:
-        verdict = "INCONCLUSIVE"
+        if item.id in limits.waived:
+            continue
+        limit = limits.of.get(item.id)
+        for name in candidates if item.per_candidate else (None,):
+            answers.append(_answer(item, evidence, inputs, limit, name))
+    verdict, verdicts = combine(answers, expects_candidates=spec.below is not None)
     evidence.bind(*spec.bind)
-    text = (diagnosis or default_diagnosis(spec))(criteria, verdict)
-    decided = decision(criteria, verdict, verdicts) if decision else _decision(spec, verdict)
+    judged = Judged(evidence, inputs, tuple(answers), verdict, verdicts)
+    decision = (spec.decide or _decision(spec))(judged)
+    note = spec.note(judged) if spec.note else ""
     return GateReport(
         schema_version=SCHEMA_VERSION,
         gate=spec.gate,
         verdict=verdict,
         candidates=verdicts,
-        criteria=tuple(criteria),
+        criteria=judged.answers,
         materials=evidence.materials,
         upstream=upstream_hashes(evidence.root, spec.gate),
-        settings=params.model_dump(mode="json"),
+        settings=settings.model_dump(mode="json"),
         environment=environment(),
-        caveats=(*spec.caveats, *caveats),
-        diagnosis=text,
-        decision=decided,
+        caveats=(*spec.caveats, *_waivers(limits), *caveats),
+        diagnosis=f"{_diagnosis(spec, judged)} {note}".strip(),
+        decision=decision.text,
+        promoted=decision.promoted,
     )
 
 
-def default_diagnosis(spec: GateSpec) -> Callable[[Sequence[Criterion], Verdict], str]:
-    """Names the first unmet criterion in order of diagnosis, and where to look."""
-    texts = {item.id: item.look_at for item in spec.criteria}
+def _answer(
+    item: Criterion, evidence: Evidence, inputs: object, limit: Limit | None, candidate: str | None
+) -> Answer:
+    with evidence.recorded() as touched:
+        try:
+            measured = item.measure(evidence, inputs, *([] if candidate is None else [candidate]))
+        except MissingEvidenceError as error:
+            measured = Measured(None, caveat=f"not measured: {error}")
+    value, interval = measured.value, measured.interval
+    if value is not None:
+        value = rounded(value) if math.isfinite(value) else None
+    if interval is not None:
+        interval = (rounded(interval[0]), rounded(interval[1]))
+    threshold = limit.limit if limit else None
+    if limit and item.derived:
+        threshold = rounded(item.derived(inputs))
+    verdict = judge_criterion(value, threshold, item.comparison)
+    if measured.pending and verdict != "PASS" and limit is not None:
+        verdict = "PENDING_REVIEW"
+    return Answer(
+        id=item.id,
+        question=item.question,
+        owner=limit.owner if limit else None,
+        candidate=candidate,
+        route=item.route,
+        measured=value,
+        interval=interval,
+        threshold=threshold,
+        comparison=item.comparison,
+        reason=limit.reason if limit else "no limit in params.yaml",
+        verdict=verdict,
+        evidence=tuple(touched),
+        caveat=measured.caveat,
+    )
 
-    def text(criteria: Sequence[Criterion], verdict: Verdict) -> str:
-        decided = first_unmet(criteria, verdict)
-        if decided is None:
-            return "" if verdict == "PASS" else "Nothing was judged: criteria or thresholds lack."
-        of = f" of {decided.candidate}" if decided.candidate else ""
-        why = f" ({decided.caveat})" if decided.measured is None and decided.caveat else ""
-        return f"First unmet: {decided.id}{of}{why}. {texts[decided.id]}"
 
-    return text
+def _waivers(limits: Limits) -> list[str]:
+    return [
+        f"{name} was not asked: the {waiver.owner} owner says that it does not apply here "
+        f"({waiver.reason})."
+        for name, waiver in limits.waived.items()
+    ]
 
 
-def _decision(spec: GateSpec, verdict: Verdict) -> str:
-    if verdict == "PASS":
-        return spec.go_on
-    if verdict == "PENDING_REVIEW":
-        return "Wait for the independent reviewer and the four owners."
-    if verdict == "INCONCLUSIVE":
-        return "No decision: complete the evidence, then judge again."
-    return f"Return to {spec.back_to}."
+def _diagnosis(spec: GateSpec, judged: Judged) -> str:
+    """The first unmet criterion in order of diagnosis, and where to look."""
+    decided = first_unmet(judged.answers, judged.verdict)
+    if decided is None:
+        lacking = "Nothing was judged: criteria or limits lack."
+        return "" if judged.verdict == "PASS" else lacking
+    of = f" of {decided.candidate}" if decided.candidate else ""
+    why = f" ({decided.caveat})" if decided.measured is None and decided.caveat else ""
+    look_at = next(item.look_at for item in spec.criteria if item.id == decided.id)
+    return f"First unmet: {decided.id}{of}{why}. {look_at}"
+
+
+def _decision(spec: GateSpec) -> Callable[[Judged], Decision]:
+    texts: Mapping[Verdict, str] = {
+        "PASS": spec.go_on,
+        "PENDING_REVIEW": "Wait for the independent reviewer and the four owners.",
+        "INCONCLUSIVE": "No decision: complete the evidence, then judge again.",
+        "FAIL": f"Return to {spec.back_to}.",
+    }
+    return lambda judged: Decision(texts[judged.verdict])
 
 
 def upstream_hashes(root: Path, gate: Gate) -> dict[str, str]:
@@ -216,13 +236,16 @@ def upstream_hashes(root: Path, gate: Gate) -> dict[str, str]:
 def standing(root: Path, below: Gate, wanted: Sequence[str]) -> tuple[list[str], list[str]]:
     """The wanted methods that passed the gate below, and why the others do not stand.
 
-    A report that is missing or unreadable lets no method stand; admission proves the report.
+    Gate A judges no method, so all of them stand behind it. A report that is missing or unreadable
+    is a caveat, and lets no method stand; admission proves the report.
     """
-    path = root / report_path(below)
     try:
-        report = parse_report(sha256_bytes_of(path, keep=True)[1], gate=below)
+        report = parse_report(sha256_bytes_of(root / report_path(below), keep=True)[1], gate=below)
     except IntegrityError:
-        return [], [f"Gate {below} has no readable report, so no method stands here."]
+        passed = list(wanted) if below == "A" else []
+        return passed, [f"Gate {below} has no readable report, so nothing stands on it."]
+    if below == "A":
+        return list(wanted), []
     passed = [name for name in wanted if report.candidates.get(name) == "PASS"]
     left_out = [
         f"{name} does not stand here: gate {below} says {report.candidates.get(name, 'nothing')}."
@@ -239,34 +262,3 @@ def environment() -> dict[str, str]:
     found["threads"] = os.environ.get("OMP_NUM_THREADS", "not set")
     found["regime"] = REGIME
     return found
-
-
-def _judge(item: CriterionSpec, case: Case, threshold: Threshold | None) -> Criterion:
-    try:
-        measured = item.measure(case)
-    except MissingEvidenceError as error:
-        measured = Measured(None, caveat=f"not measured: {error}")
-    value, interval = measured.value, measured.interval
-    if value is not None:
-        value = rounded(value) if math.isfinite(value) else None
-    if interval is not None:
-        interval = (rounded(interval[0]), rounded(interval[1]))
-    limit = threshold.limit if threshold else None
-    verdict = judge_criterion(value, limit, item.comparison)
-    if measured.pending and verdict != "PASS" and limit is not None:
-        verdict = "PENDING_REVIEW"
-    return Criterion(
-        id=item.id,
-        question=item.question,
-        owner=threshold.owner if threshold else item.owner,
-        candidate=case.candidate or None,
-        route=item.route,
-        measured=value,
-        interval=interval,
-        threshold=limit,
-        comparison=item.comparison,
-        reason=threshold.reason if threshold else "no threshold in params.yaml",
-        verdict=verdict,
-        evidence=item.evidence,
-        caveat=measured.caveat,
-    )

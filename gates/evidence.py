@@ -1,9 +1,11 @@
 """Reading evidence: the bytes that are hashed are the bytes that are judged.
 
 A judge sees the repository only through an `Evidence`. What it read, or bound without reading,
-becomes the `materials` of its report.
+becomes the `materials` of its report, and what one criterion read becomes its `evidence`.
 """
 
+import contextlib
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +14,7 @@ import pandas as pd
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from genpolicy.evidence.rows import check_columns, columns_of
 from genpolicy.integrity.documents import parse_json
 from genpolicy.integrity.hashing import sha256_bytes_of, sha256_file
 from genpolicy.integrity.tables import table_of
@@ -30,40 +33,78 @@ class Evidence:
         self.root = root
         self._materials: dict[str, str] = {}
         self._tables: dict[str, pa.Table] = {}
+        self._frames: dict[str, pd.DataFrame] = {}
         self._documents: dict[str, Any] = {}
+        self._touched: dict[str, None] = {}
 
     @property
     def materials(self) -> dict[str, str]:
         """SHA-256 of every file read or bound, by path relative to the root."""
         return dict(sorted(self._materials.items()))
 
+    @contextlib.contextmanager
+    def recorded(self) -> Iterator[list[str]]:
+        """What is read inside: the list that is given holds the paths, in order, at the end."""
+        before, self._touched = self._touched, {}
+        paths: list[str] = []
+        try:
+            yield paths
+        finally:
+            paths += self._touched
+            self._touched = {**before, **self._touched}
+
+    def rows(self, path: str, row: type) -> pd.DataFrame:
+        """Rows of a table of the class `row`, at least one; columns that hold lists are left out.
+
+        The frame is kept and given again: do not write into it.
+
+        Raises:
+            MissingEvidenceError: No such file or row, or a column of `row` is missing.
+            IntegrityError: A column that `row` does not know: other code wrote it. Or the file
+                is not a whole table.
+        """
+        table = self._table(path)
+        wanted = columns_of(row)
+        if set(table.column_names) - set(wanted):
+            check_columns(row, table.column_names, where=path)
+        self._require(table, path, wanted)
+        if path not in self._frames:
+            plain = [field.name for field in table.schema if not pa.types.is_list(field.type)]
+            self._frames[path] = table.select(plain).to_pandas()
+        return self._frames[path]
+
+    def of(self, path: str, row: type, method: str) -> pd.DataFrame:
+        """Rows of one method; as `rows`.
+
+        Raises:
+            MissingEvidenceError: No such file, column or row.
+            IntegrityError: An unknown column, or no whole table.
+        """
+        frame = self.rows(path, row)
+        found = frame[frame["method"] == method]
+        if len(found) == 0:
+            raise MissingEvidenceError(f"{path} has no rows of {method}")
+        return found
+
     def frame(self, path: str, *columns: str) -> pd.DataFrame:
-        """Columns of a table, at least one row.
+        """Some columns of a table, at least one row.
 
         Raises:
             MissingEvidenceError: No such file, column or row.
             IntegrityError: The file is not a whole table.
         """
         table = self._table(path)
+        self._require(table, path, columns)
+        frame: pd.DataFrame = table.select(list(columns)).to_pandas()
+        return frame
+
+    @staticmethod
+    def _require(table: pa.Table, path: str, columns: Sequence[str]) -> None:
         absent = [name for name in columns if name not in table.column_names]
         if absent:
             raise MissingEvidenceError(f"{path} has no column {', '.join(absent)}")
         if table.num_rows == 0:
             raise MissingEvidenceError(f"{path} has no rows")
-        frame: pd.DataFrame = table.select(list(columns)).to_pandas()
-        return frame
-
-    def of(self, path: str, method: str, *columns: str) -> pd.DataFrame:
-        """Rows of one method; as `frame`.
-
-        Raises:
-            MissingEvidenceError: No such file, column or row.
-        """
-        frame = self.frame(path, "method", *columns)
-        rows = frame[frame["method"] == method]
-        if len(rows) == 0:
-            raise MissingEvidenceError(f"{path} has no rows of {method}")
-        return rows
 
     def document(self, path: str) -> dict[str, Any]:
         """A JSON document whose top is an object.
@@ -72,19 +113,14 @@ class Evidence:
             MissingEvidenceError: No such file, or not an object.
             BadInputError: Not strict JSON.
         """
-        if path not in self._documents:
-            data = self._read(path)
-            self._documents[path] = parse_json(data, where=path)
-        document = self._documents[path]
+        document = self._document(path)
         if not isinstance(document, dict):
             raise MissingEvidenceError(f"{path} holds no object")
         return document
 
     def listing(self, path: str) -> list[Any]:
         """A JSON document whose top is a list; otherwise as `document`."""
-        if path not in self._documents:
-            self._documents[path] = parse_json(self._read(path), where=path)
-        document = self._documents[path]
+        document = self._document(path)
         if not isinstance(document, list):
             raise MissingEvidenceError(f"{path} holds no list")
         return document
@@ -99,7 +135,19 @@ class Evidence:
                 bound.append(name)
         return bound
 
+    def digest(self, path: str) -> str:
+        """SHA-256 of one file, without reading it further; empty where it is missing."""
+        self._touched[path] = None
+        return self._materials[path] if self.bind(path) else ""
+
+    def _document(self, path: str) -> Any:
+        self._touched[path] = None
+        if path not in self._documents:
+            self._documents[path] = parse_json(self._read(path), where=path)
+        return self._documents[path]
+
     def _table(self, path: str) -> pa.Table:
+        self._touched[path] = None
         if path not in self._tables:
             self._tables[path] = table_of(self._read(path), where=path)
         return self._tables[path]

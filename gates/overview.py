@@ -7,9 +7,8 @@ are those of the last run of each stage in this workspace.
 from dataclasses import dataclass
 from pathlib import Path
 
-from gates.admission import STAGE_REQUIRES
-from gates.ladder import Rung
-from gates.models import stage_of
+from gates.proof import STAGE_REQUIRES, Rung
+from gates.report import stage_of
 from genpolicy.errors import GenpolicyError
 from genpolicy.integrity.documents import read_json
 
@@ -52,14 +51,15 @@ def overview(root: Path, rungs: list[Rung]) -> list[Line]:
 
 def as_text(lines: list[Line]) -> str:
     """The table for a terminal."""
-    rows = [f"{'stage':<11} {'verdict':<15} {'time':>8} {'memory':>8}  decided by"]
+    wide = max([len("stage"), *(len(line.stage) for line in lines)])
+    rows = [f"{'stage':<{wide}} {'verdict':<15} {'time':>8} {'memory':>8}  decided by"]
     for line in lines:
         time = "" if line.seconds is None else f"{line.seconds:.1f} s"
         memory = "" if line.peak_mib is None else f"{line.peak_mib} MiB"
-        text = f"{line.stage:<11} {line.verdict:<15} {time:>8} {memory:>8}  {line.decided_by}"
+        text = f"{line.stage:<{wide}} {line.verdict:<15} {time:>8} {memory:>8}  {line.decided_by}"
         rows.append(text.rstrip())
     total = sum(line.seconds for line in lines if line.seconds is not None)
-    rows.append(f"{'':<11} {'':<15} {total:>6.1f} s")
+    rows.append(f"{'':<{wide}} {'':<15} {total:>6.1f} s")
     return "\n".join(rows)
 
 

@@ -7,7 +7,7 @@ level and no correction is needed. Nothing that is missing can pass.
 import math
 from collections.abc import Iterable, Sequence
 
-from gates.models import REQUIRED, Comparison, Criterion, Verdict
+from gates.report import REQUIRED, Answer, Comparison, Verdict
 
 SEVERITY: dict[Verdict, int] = {"FAIL": 3, "INCONCLUSIVE": 2, "PENDING_REVIEW": 1, "PASS": 0}
 SIGNIFICANT_DIGITS = 12
@@ -43,7 +43,7 @@ def best(verdicts: Iterable[Verdict]) -> Verdict:
 
 
 def combine(
-    criteria: Sequence[Criterion], *, expects_candidates: bool
+    criteria: Sequence[Answer], *, expects_candidates: bool
 ) -> tuple[Verdict, dict[str, Verdict]]:
     """Verdict of a gate and of each candidate.
 
@@ -69,7 +69,7 @@ def combine(
     return worst(parts), candidates
 
 
-def first_unmet(criteria: Sequence[Criterion], verdict: Verdict) -> Criterion | None:
+def first_unmet(criteria: Sequence[Answer], verdict: Verdict) -> Answer | None:
     """The criterion that decided: the first one, in order of diagnosis, with the gate's verdict.
 
     Criteria of candidates count only if no gate-wide one decides.

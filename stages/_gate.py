@@ -1,14 +1,14 @@
 """What every gate stage does: judge, write the report, and leave the verdict for its successors.
 
 `artifacts/gate_x/verdict.json` changes only when the verdict or the evidence changes. The next
-stage depends on it and not on the report, so that a threshold moved within the same verdict
+stage depends on it and not on the report, so that a limit moved within the same verdict
 re-judges and re-trains nothing; admission still re-derives the verdict from the report.
 """
 
 from pathlib import Path
 
-from gates.models import Criterion
-from gates.reports import write_gate
+from gates.report import Answer
+from gates.writing import write_gate
 from genpolicy.integrity.atomic import output_folder, write_bytes
 from genpolicy.integrity.documents import canonical_json
 from stages._stage import ARTIFACTS, Params
@@ -38,7 +38,7 @@ def judge(letter: str, params: Params) -> None:
     print(f"gate {letter}: {report.verdict}; see reports/{name}.html")
 
 
-def _name(criterion: Criterion) -> str:
+def _name(criterion: Answer) -> str:
     return f"{criterion.candidate}.{criterion.id}" if criterion.candidate else criterion.id
 
 

@@ -35,7 +35,7 @@ STAGES = (
     "task", "record", "ingest", "audit", "baselines", "factors", "gate_a", "generators", "reload",
     "latency", "gate_b", "shadow", "gate_c", "stress", "gate_d", "card", "gate_e",
 )  # fmt: skip
-SHARED = ("seed", "task", "horizons", "compute", "policy", "feasibility", "execution")
+SHARED = ("seed", "confidence", "task", "horizons", "compute", "policy", "feasibility", "execution")
 
 
 class TaskSection(Settings):

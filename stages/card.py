@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from gates.admission import admit
-from gates.card import card_bytes
-from gates.drafting import draft
+from gates.card.card import card_bytes
+from gates.card.drafting import draft
+from gates.proof import admit
 from genpolicy.integrity.atomic import output_folder, write_bytes
 from stages._stage import ARTIFACTS, Params, main
 
@@ -14,7 +14,9 @@ def work(params: Params) -> None:
     del params  # parsed already; the section `card` is read by the draft itself
     admission = admit("card", Path.cwd())
     with output_folder(ARTIFACTS / "card") as folder:
-        write_bytes(folder / "card.json", card_bytes(draft(Path.cwd(), admission)))
+        write_bytes(
+            folder / "card.json", card_bytes(draft(Path.cwd(), admission.reports, admission.hashes))
+        )
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from gates.admission import admit
+from gates.proof import admit
 from genpolicy.evidence.need.study import run_study
 from genpolicy.integrity.atomic import output_folder
 from genpolicy.policies.matched_training import PolicySettings

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pyarrow as pa
 
-from gates.admission import admit
+from gates.proof import admit
 from genpolicy.evidence.reproducibility.latency import LATENCY, LatencyJob, latency_rows
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import output_folder

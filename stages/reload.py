@@ -4,7 +4,7 @@ from pathlib import Path
 
 from pydantic import Field
 
-from gates.admission import admit
+from gates.proof import admit
 from genpolicy.contract.settings import Settings
 from genpolicy.evidence.admission_context import make_checker
 from genpolicy.evidence.reproducibility.reload import ReloadPlan, write_reload

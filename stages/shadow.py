@@ -5,7 +5,7 @@ from pathlib import Path
 import pyarrow as pa
 from pydantic import Field
 
-from gates.admission import admit
+from gates.proof import admit
 from genpolicy.contract.settings import Settings
 from genpolicy.data.dataset import load_dataset
 from genpolicy.evidence.admission_context import make_checker

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from gates.admission import admit
+from gates.proof import admit
 from genpolicy.evidence.reproducibility.latency import latency_models
 from genpolicy.evidence.stress.matched import Shard, matched_starts
 from genpolicy.evidence.stress.tables import Entrant, StressSettings, plan_shards, write_stress

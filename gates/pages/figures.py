@@ -8,7 +8,7 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from gates.evidence import Evidence, MissingEvidenceError
-from gates.models import GateReport
+from gates.report import GateReport
 from genpolicy.integrity.hashing import sha256_bytes_of
 from genpolicy.pages.figures.drawing import (
     BLUE,

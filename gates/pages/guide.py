@@ -1,6 +1,6 @@
 """What a reader is told beside the numbers: the question, how to read the page, the words."""
 
-from gates.models import Gate
+from gates.report import Gate
 
 QUESTIONS: dict[Gate, str] = {
     "A": "Does one observation truly admit several valid actions that simpler policies lose?",

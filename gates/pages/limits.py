@@ -2,7 +2,7 @@
 
 from matplotlib.axes import Axes
 
-from gates.models import GateReport
+from gates.report import GateReport
 from genpolicy.pages.figures.limits import limit_line
 
 

@@ -11,17 +11,14 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from gates.card import DRAFT_PATH, TrialCard
+from gates.card.card import DRAFT_PATH, TrialCard
+from gates.card.judge import examine
 from gates.evidence import Evidence
-from gates.gate_e import Params as CardParams
-from gates.gate_e import examine
-from gates.ladder import NAMES
-from gates.models import GATES, Gate, GateReport, read_report, report_bytes
 from gates.pages import plots_feasibility, plots_need, plots_stress, plots_time
 from gates.pages.figures import Photo, Plot, draw_all
 from gates.pages.guide import BACK_TO, QUESTIONS, READING, label, words
 from gates.pages.table import deciding, groups, passed_by, stops, tally
-from gates.signing import utc_today
+from gates.report import GATES, NAMES, Gate, GateReport, read_report, report_bytes
 from genpolicy.errors import IntegrityError
 from genpolicy.integrity.hashing import sha256_bytes
 from genpolicy.pages.style import page_style
@@ -116,12 +113,11 @@ def _row(root: Path, gate: Gate) -> dict[str, Any]:
 def _card(root: Path, report: GateReport) -> tuple[str, list[tuple[str, list[str]]]]:
     if report.gate != "E" or not (root / DRAFT_PATH).is_file():
         return "", []
-    params = CardParams.model_validate_json(json.dumps(report.settings))
-    dossier = examine(root, params, today=utc_today())
-    card: TrialCard | None = dossier.signed.card if dossier.signed else dossier.draft
+    papers = examine(root, str(report.settings["card"]))
+    card: TrialCard | None = papers.signed.card if papers.signed else papers.draft
     if card is None:
         return "", []
-    state = "signed" if dossier.signed else "draft, not signed"
+    state = "signed" if papers.signed else "draft, not signed"
     return state, [(label(k), _lines(value)) for k, value in card.model_dump(mode="json").items()]
 
 

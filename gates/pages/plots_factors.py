@@ -5,12 +5,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from gates.evidence import Evidence, MissingEvidenceError, numbers
-from gates.models import GateReport
+from gates.need.settings import MEASURED_FACTORS
 from gates.pages.figures import Plot
-from gates.shortcuts import FACTORS
+from gates.report import GateReport
 from genpolicy.pages.figures.drawing import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, new_figure
 
-EFFECTS = f"{FACTORS}/effects.parquet"
+EFFECTS = f"{MEASURED_FACTORS}/effects.parquet"
 COLOURS = {
     "reference": GREY,
     "representation": BLUE,

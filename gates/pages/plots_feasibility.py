@@ -8,10 +8,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from gates.evidence import Evidence, MissingEvidenceError, flags
-from gates.gate_c import CANDIDATES, HELD_OUT, LAYERS, admissible
-from gates.models import GateReport
+from gates.feasibility import CANDIDATES, HELD_OUT, LAYERS, admissible
 from gates.pages.figures import Plot, colours, dashes, in_order
 from gates.pages.limits import draw_limit
+from gates.report import GateReport
 from genpolicy.pages.figures.drawing import GREY, HATCHES, new_figure
 
 

@@ -6,12 +6,12 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from gates.evidence import Evidence, MissingEvidenceError, count, flags, numbers
-from gates.models import GateReport
-from gates.need import AUDIT, BASELINES
+from gates.need.settings import AUDIT, MEASURED
 from gates.pages import plots_factors, plots_scene
 from gates.pages.figures import Photo, Plot, in_order
 from gates.pages.limits import draw_limit, limit_of
 from gates.pages.plots_scene import SUMMARY, obstacles
+from gates.report import GateReport
 from genpolicy.pages.figures import captions, checks, situations
 from genpolicy.pages.figures.drawing import BLUE, new_figure
 from genpolicy.statistics.intervals import clopper_pearson
@@ -94,7 +94,7 @@ def _mode_success(evidence: Evidence, report: GateReport) -> Figure:
 
 def _baselines(evidence: Evidence, report: GateReport) -> Figure:
     columns = ("method", "convention", "modes_present", "modes_covered")
-    frame = evidence.frame(f"{BASELINES}/modes.parquet", *columns)
+    frame = evidence.frame(f"{MEASURED}/modes.parquet", *columns)
     frame = frame[numbers(frame, "modes_present") >= 2]
     share = numbers(frame, "modes_covered") / numbers(frame, "modes_present")
     means = (
@@ -170,7 +170,7 @@ PLOTS: tuple[Plot | Photo, ...] = (
         "policy reaches one of two at most, which is 0.5; less means that it lands between them. "
         "Judged is the best baseline as it is deployed (solid bars); hatched bars draw at random, "
         "as a generator does.",
-        f"{BASELINES}/modes.parquet",
+        f"{MEASURED}/modes.parquet",
         _baselines,
     ),
     *plots_factors.PLOTS,

@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from gates.evidence import Array, Evidence, MissingEvidenceError
-from gates.models import GateReport
-from gates.need import AUDIT
+from gates.need.settings import AUDIT
 from gates.pages.figures import Photo, Plot
+from gates.report import GateReport
 from genpolicy.pages.figures.drawing import BLUE, GREY, ORANGE, RED, new_figure
 from genpolicy.pages.figures.situations import STONE, draw_obstacles
 

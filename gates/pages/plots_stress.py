@@ -4,10 +4,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from gates.evidence import Evidence, MissingEvidenceError, flags, numbers
-from gates.gain import ROLLOUTS
-from gates.models import GateReport
 from gates.pages.figures import Plot, colours, dashes, in_order
 from gates.pages.limits import draw_limit
+from gates.report import GateReport
+from gates.stress.rollouts import ROLLOUTS
 from genpolicy.pages.figures.drawing import (
     BLUE,
     GREEN,

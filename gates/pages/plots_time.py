@@ -4,10 +4,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from gates.evidence import Evidence, MissingEvidenceError, numbers
-from gates.gate_b import LATENCY, RELOAD, TERMS
-from gates.models import GateReport
 from gates.pages.figures import Plot, colours, dashes, in_order
 from gates.pages.limits import draw_limit
+from gates.report import GateReport
+from gates.reproducibility import LATENCY, RELOAD, TERMS
 from genpolicy.pages.figures.drawing import GREY, new_figure, plain_ticks
 
 MILLI = 1e3

@@ -2,11 +2,9 @@
 
 import re
 
-from gates.chain import limit_text, measured_text
-from gates.ladder import NAMES
-from gates.models import Criterion, GateReport, report_path
 from gates.pages.guide import unit
 from gates.pages.table import deciding, passed_by, sign, stops, tally, waived
+from gates.report import NAMES, Answer, GateReport, limit_text, measured_text, report_path
 
 SPECIAL = re.compile(r"([\\`*_\[\]()|#!~])")
 PROOF = "python -m gates verify"
@@ -57,7 +55,7 @@ def _candidates(report: GateReport) -> list[str]:
     return [*lines, ""]
 
 
-def _row(c: Criterion, report: GateReport) -> str:
+def _row(c: Answer, report: GateReport) -> str:
     interval = f"{c.interval[0]:.6g} to {c.interval[1]:.6g}" if c.interval else ""
     after = f" {unit(c.id)}" if unit(c.id) else ""
     measured = f"{c.measured:.6g}{after}" if c.measured is not None else measured_text(c)
@@ -69,7 +67,7 @@ def _row(c: Criterion, report: GateReport) -> str:
         measured,
         interval,
         f"{sign(limit_text(c))}{after}",
-        c.owner,
+        c.owner or "nobody",
     )
     return "| " + " | ".join(plain(cell) for cell in cells) + " |"
 

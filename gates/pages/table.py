@@ -4,9 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
-from gates.chain import limit_text, measured_text
-from gates.models import REQUIRED, Criterion, GateReport
 from gates.pages.guide import unit
+from gates.report import REQUIRED, Answer, GateReport, limit_text, measured_text
 from gates.verdicts import first_unmet
 
 
@@ -19,7 +18,7 @@ class Line:
         waived: Why it does not count although it is not met; empty if it counts.
     """
 
-    criterion: Criterion
+    criterion: Answer
     waived: str
 
 
@@ -45,12 +44,20 @@ def groups(report: GateReport) -> list[Group]:
         lines = tuple(Line(c, waived(c, report)) for c in same)
         route = "" if first.route == REQUIRED else first.route
         found.append(
-            Group(first.question, name, route, first.reason, first.owner, unit(name), lines)
+            Group(
+                first.question,
+                name,
+                route,
+                first.reason,
+                first.owner or "nobody",
+                unit(name),
+                lines,
+            )
         )
     return found
 
 
-def waived(criterion: Criterion, report: GateReport) -> str:
+def waived(criterion: Answer, report: GateReport) -> str:
     """Why an unmet criterion does not stand in the way; empty if it does."""
     if criterion.verdict != "FAIL":
         return ""
@@ -91,7 +98,7 @@ def deciding(report: GateReport) -> str:
     return f"{decided.id}{of}: {against(decided)}"
 
 
-def against(criterion: Criterion) -> str:
+def against(criterion: Answer) -> str:
     """Measured against required, with the unit."""
     text = unit(criterion.id)
     after = f" {text}" if text else ""
@@ -105,7 +112,7 @@ def stops(report: GateReport) -> dict[str, str]:
     """For each candidate that does not pass: the first criterion that it does not meet."""
     found = {}
     for name, verdict in report.candidates.items():
-        own: Sequence[Criterion] = [c for c in report.criteria if c.candidate == name]
+        own: Sequence[Answer] = [c for c in report.criteria if c.candidate == name]
         unmet = next((c for c in own if c.verdict == verdict != "PASS"), None)
         found[name] = f"{unmet.id}: {against(unmet)}" if unmet else ""
     return found

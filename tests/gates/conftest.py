@@ -10,11 +10,10 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 import evidence
 
-from gates.admission import admit
-from gates.card import card_bytes
-from gates.drafting import draft
-from gates.ladder import judge
-from gates.models import GATES, report_bytes, report_path
+from gates.card.card import card_bytes
+from gates.card.drafting import draft
+from gates.proof import admit, judge
+from gates.report import GATES, report_bytes, report_path
 from genpolicy.integrity.atomic import write_bytes
 
 
@@ -27,7 +26,9 @@ def judge_all(root: Path, gates: str = "ABCD") -> None:
 
 def write_draft(root: Path) -> None:
     """Write the draft card, as the card stage does."""
-    write_bytes(root / "artifacts/card/card.json", card_bytes(draft(root, admit("card", root))))
+    admission = admit("card", root)
+    card = draft(root, admission.reports, admission.hashes)
+    write_bytes(root / "artifacts/card/card.json", card_bytes(card))
 
 
 @pytest.fixture(scope="session")

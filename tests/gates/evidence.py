@@ -4,6 +4,7 @@ import base64
 import copy
 import hashlib
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +12,8 @@ import pandas as pd
 import pyarrow as pa
 import yaml
 
-from gates.gate_b import MEASURED_HERE, TERMS
-from gates.gate_c import LAYERS
+from gates.feasibility import LAYERS
+from gates.reproducibility import MEASURED_HERE, TERMS
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.tables import read_table, write_table
 
@@ -28,121 +29,138 @@ PNG = base64.b64decode(
 SPEED = {"diffusion": 0.02, "flow": 0.01}
 
 
-def _t(limit: float, owner: str) -> dict[str, Any]:
-    return {"limit": limit, "reason": "test", "owner": owner}
+FIXTURES = (
+    "held_out",
+    "stale_observation",
+    "infeasible_rotation",
+    "collision",
+    "phase_change",
+    "reordered_chunk",
+)
+
+
+def by_owner(**limits: tuple[Any, str]) -> dict[str, dict[str, list[Any]]]:
+    """Limits as `params.yaml` holds them, from criterion and (limit, owner)."""
+    found: dict[str, dict[str, list[Any]]] = {}
+    for name, (limit, owner) in limits.items():
+        found.setdefault(owner, {})[name] = [limit, "test"]
+    return found
 
 
 PARAMS: dict[str, Any] = {
+    "confidence": 0.95,
+    "task": {"name": "tabletop_insertion"},
+    "train_baselines": {"samplers": {name: {} for name in (*BASELINES, DRAWN)}},
+    "measure_baselines": {"latent": {"method": "act"}},
+    "train_generators": {"samplers": {name: {} for name in CANDIDATES}},
+    "stress": {
+        "starts": STARTS,
+        "baselines": list(BASELINES),
+        "perturbations": {name: {} for name in CONDITIONS},
+        "margin": 0.1,
+        "alpha": 0.1,
+    },
     "gate_a": {
-        "confidence": 0.95,
         "strata_level": 0.05,
         "held_out_splits": ["validation", "test"],
-        "baselines": [*BASELINES, DRAWN],
-        "thresholds": {
-            "refused_recordings_accounted": _t(0, "perception"),
-            "clock_residual_s": _t(0.01, "perception"),
-            "lag_spread_steps": _t(1, "controller"),
-            "calibration_residual_m": _t(0.005, "perception"),
-            "label_disagreement": _t(0.2, "model"),
-            "held_out_situations": _t(20, "model"),
-            "multimodal_situations": _t(10, "model"),
-            "persistence_margin": _t(0.05, "model"),
-            "mode_success_lower": _t(0.6, "model"),
-            "mode_feasible_share": _t(0.9, "controller"),
-            "mean_defeated_share": _t(0.5, "model"),
-            "recovery_benefit": _t(0.1, "model"),
-            "strata_effect": _t(0.3, "perception"),
-            "cause_accepted": _t(1, "model"),
-            "baselines_matched": _t(0, "model"),
-            "baseline_mode_coverage": _t(0.6, "model"),
-            "phase_collapse_share": _t(0.5, "perception"),
-            "chunking_valid_share": _t(0.5, "model"),
-            "latent_dependence_p": _t(0.05, "model"),
-            "factors_isolated": _t(0, "model"),
-            "factor_valid_share": _t(0.5, "model"),
-        },
+        "deployed_conventions": ["direct", "z_zero"],
+        "generative_baselines": [DRAWN],
+        "chunked_baseline": "chunked_bc",
+        "limits": by_owner(
+            refused_recordings_accounted=(0, "perception"),
+            clock_residual_s=(0.01, "perception"),
+            lag_spread_steps=(1, "controller"),
+            calibration_residual_m=(0.005, "perception"),
+            label_disagreement=(0.2, "model"),
+            held_out_situations=(20, "model"),
+            multimodal_situations=(10, "model"),
+            persistence_margin=(0.05, "model"),
+            mode_success_lower=(0.6, "model"),
+            mode_feasible_share=(0.9, "controller"),
+            mean_defeated_share=(0.5, "model"),
+            recovery_benefit=(0.1, "model"),
+            strata_effect=(0.3, "perception"),
+            cause_accepted=(1, "model"),
+            baselines_matched=(0, "model"),
+            baseline_mode_coverage=(0.6, "model"),
+            phase_collapse_share=(0.5, "perception"),
+            chunking_valid_share=(0.5, "model"),
+            latent_dependence_p=(0.05, "model"),
+            factors_isolated=(0, "model"),
+            factor_valid_share=(0.5, "model"),
+        ),
     },
     "gate_b": {
-        "confidence": 0.95,
-        "candidates": list(CANDIDATES),
         "budget_reference": "chunked_bc",
         "budget_parts": ["total"],
-        "thresholds": {
-            "unmatched_keys": _t(0, "model"),
-            "parameter_budget_deviation": _t(0.05, "model"),
-            "unpinned_items": _t(0, "model"),
-            "nonfinite_weights": _t(0, "model"),
-            "metadata_mismatches": _t(0, "model"),
-            "samples_difference": _t(0, "model"),
-            "nfe_mismatch": _t(0, "model"),
-            "mode_coverage_lower": _t(0.6, "model"),
-            "latency_terms_missing": _t(0, "perception"),
-            "latency_median_ratio": _t(1.5, "controller"),
-        },
+        "limits": by_owner(
+            unmatched_keys=(0, "model"),
+            parameter_budget_deviation=(0.05, "model"),
+            unpinned_items=(0, "model"),
+            nonfinite_weights=(0, "model"),
+            metadata_mismatches=(0, "model"),
+            samples_difference=(0, "model"),
+            nfe_mismatch=(0, "model"),
+            mode_coverage_lower=(0.6, "model"),
+            latency_terms_missing=(0, "perception"),
+            latency_median_ratio=(1.5, "controller"),
+        ),
     },
     "gate_c": {
-        "confidence": 0.95,
-        "candidates": list(CANDIDATES),
-        "thresholds": {
-            "mode_admissible_gap": _t(0.3, "controller"),
-            "admissible_share": _t(0.6, "model"),
-            "projection_p95_m": _t(0.02, "controller"),
-            "boundary_jerk_p95_m_s3": _t(500, "controller"),
-            "corrupted_refused_share": _t(1, "controller"),
-            "stub_stale": _t(0, "safety"),
-            "stub_invalid": _t(0, "safety"),
-            "stub_violation_upper": _t(0.01, "safety"),
-            "conservation_error": _t(0, "controller"),
-            "checker_violations": _t(0, "safety"),
-            "mutants_undetected": _t(0, "safety"),
-        },
+        "required_fixtures": list(FIXTURES[1:]),
+        "required_checks": list(LAYERS),
+        "unassigned_modes": ["", "none"],
+        "limits": by_owner(
+            mode_admissible_gap=(0.3, "controller"),
+            admissible_share=(0.6, "model"),
+            projection_p95_m=(0.02, "controller"),
+            boundary_jerk_p95_m_s3=(500, "controller"),
+            corrupted_refused_share=(1, "controller"),
+            stub_stale=(0, "safety"),
+            stub_invalid=(0, "safety"),
+            stub_violation_upper=(0.01, "safety"),
+            conservation_error=(0, "controller"),
+            checker_violations=(0, "safety"),
+            mutants_undetected=(0, "safety"),
+        ),
     },
     "gate_d": {
-        "confidence": 0.95,
-        "candidates": list(CANDIDATES),
-        "baselines": list(BASELINES),
-        "perturbations": list(CONDITIONS),
-        "margin": 0.1,
-        "alpha": 0.05,
-        "planned_starts": STARTS,
         "minimum_power": 0.8,
-        "thresholds": {
-            "unmatched_starts": _t(0, "model"),
-            "verdict_reachable": _t(1, "model"),
-            "nominal_success_lower": _t(0.7, "model"),
-            "deadline_miss_upper": _t(0.1, "controller"),
-            "action_age_p95_s": _t(0.5, "perception"),
-            "fallback_share_upper": _t(0.15, "safety"),
-            "intervention_upper": _t(0.1, "safety"),
-            "stub_violations": _t(0, "safety"),
-            "force_peak_p95_n": _t(20, "safety"),
-            "stress_success_lower": _t(0.6, "model"),
-            "conservation_error": _t(0, "controller"),
-            "checker_violations": _t(0, "safety"),
-            "promotion_e_value": _t(20, "model"),
-        },
+        "limits": by_owner(
+            unmatched_starts=(0, "model"),
+            verdict_reachable=(1, "model"),
+            nominal_success_lower=(0.7, "model"),
+            deadline_miss_upper=(0.1, "controller"),
+            action_age_p95_s=(0.5, "perception"),
+            fallback_share_upper=(0.15, "safety"),
+            intervention_upper=(0.1, "safety"),
+            stub_violations=(0, "safety"),
+            force_peak_p95_n=(20, "safety"),
+            stress_success_lower=(0.6, "model"),
+            conservation_error=(0, "controller"),
+            checker_violations=(0, "safety"),
+            promotion_e_value=("derived", "model"),
+        ),
     },
     "gate_e": {
-        "card": "trial",
         "workspace_lower_m": [0.3, -0.22, 0.02],
         "workspace_upper_m": [0.72, 0.22, 0.28],
         "speed_limit_m_s": 0.4,
         "maximum_days": 30,
-        "thresholds": {
-            "upstream_passed": _t(1, "safety"),
-            "draft_complete": _t(0, "safety"),
-            "signature_valid": _t(1, "safety"),
-            "reviewer_independent": _t(1, "safety"),
-            "owners_signed": _t(4, "safety"),
-            "envelope_within_limits": _t(0, "safety"),
-            "not_expired": _t(1, "safety"),
-        },
+        "limits": by_owner(
+            upstream_passed=(1, "safety"),
+            draft_complete=(0, "safety"),
+            signature_valid=(1, "safety"),
+            reviewer_independent=(1, "safety"),
+            owners_signed=(4, "safety"),
+            envelope_within_limits=(0, "safety"),
+            not_expired=(1, "safety"),
+        ),
     },
     "card": {
         "name": "trial",
         "author": "Ada Author",
         "robot_model": "panda",
-        "task": "tabletop_insertion",
         "workspace_lower_m": [0.35, -0.2, 0.03],
         "workspace_upper_m": [0.7, 0.2, 0.25],
         "speed_limit_m_s": 0.25,
@@ -150,9 +168,28 @@ PARAMS: dict[str, Any] = {
 }
 
 
-def write_params(root: Path, change: dict[str, Any] | None = None) -> None:
-    """params.yaml, with some sections replaced."""
-    (root / "params.yaml").write_text(yaml.safe_dump({**copy.deepcopy(PARAMS), **(change or {})}))
+def write_params(root: Path, change: Callable[[dict[str, Any]], Any] | None = None) -> None:
+    """params.yaml, as `change` leaves it (in place)."""
+    params = copy.deepcopy(PARAMS)
+    if change:
+        change(params)
+    (root / "params.yaml").write_text(yaml.safe_dump(params, sort_keys=False))
+
+
+def set_limit(gate: str, name: str, limit: Any) -> Callable[[dict[str, Any]], None]:
+    """A change for `write_params`: another limit of one criterion, by its owner and reason."""
+
+    def change(params: dict[str, Any]) -> None:
+        for entries in params[gate]["limits"].values():
+            if name in entries:
+                entries[name][0] = limit
+
+    return change
+
+
+def limited(gate: str) -> set[str]:
+    """Criteria of a gate that have a limit."""
+    return {name for entries in PARAMS[gate]["limits"].values() for name in entries}
 
 
 def table(root: Path, path: str, rows: list[dict[str, Any]]) -> None:
@@ -399,6 +436,8 @@ def _modes(methods: tuple[str, ...], covered: int) -> list[dict[str, Any]]:
             "modes_covered": covered,
             "between_modes": 0,
             "admissible": 16,
+            "nfe": 1,
+            "spread_m": 0.0,
         }
         for method in methods
         for i in range(30)
@@ -431,15 +470,15 @@ def _checkpoints(root: Path, stage: str, methods: tuple[str, ...]) -> None:
 def _baselines(root: Path) -> None:
     fixed = [{**row, "admissible": 0} for row in _modes(BASELINES, 1)]
     drawn = [{**row, "convention": "derivative_free"} for row in _modes((DRAWN,), 2)]
-    table(root, "baselines/modes.parquet", fixed + drawn)
-    document(root, "baselines/matched.json", _matched((*BASELINES, DRAWN)))
-    table(root, "baselines/offline.parquet", [{"method": "bc", "seed": 0}])
+    table(root, "measure_baselines/modes.parquet", fixed + drawn)
+    document(root, "train_baselines/matched.json", _matched((*BASELINES, DRAWN)))
+    table(root, "measure_baselines/offline.parquet", [{"method": "bc", "seed": 0}])
     latent = {
         "method": "act", "convention": "z_prior", "seed": 0, "situations": 30, "spread_m": 0.03,
         "condition_share": 0.4, "distance_correlation": 0.6, "exceeding": 0, "permutations": 999,
     }  # fmt: skip
-    document(root, "baselines/latent.json", [latent])
-    _checkpoints(root, "baselines", (*BASELINES, DRAWN))
+    document(root, "measure_baselines/latent.json", [latent])
+    _checkpoints(root, "train_baselines", (*BASELINES, DRAWN))
 
 
 VARIANTS = {
@@ -465,8 +504,8 @@ def _factors(root: Path) -> None:
             }
             for i in range(30)
         ]  # fmt: skip
-    table(root, "factors/modes.parquet", modes)
-    table(root, "factors/errors.parquet", errors)
+    table(root, "measure_factors/modes.parquet", modes)
+    table(root, "measure_factors/errors.parquet", errors)
     effects = [
         {
             "variant": name, "factor": factor, "convention": convention, "measure": measure,
@@ -476,7 +515,7 @@ def _factors(root: Path) -> None:
         for place, (name, (factor, convention, _, _)) in enumerate(VARIANTS.items())
         for measure in ("chunk_error", "mode_coverage", "valid_share")
     ]  # fmt: skip
-    table(root, "factors/effects.parquet", effects)
+    table(root, "measure_factors/effects.parquet", effects)
     variants = {
         name: {
             "factor": factor,
@@ -489,16 +528,18 @@ def _factors(root: Path) -> None:
         for name, (factor, _, horizon, changed) in VARIANTS.items()
     }
     document(
-        root, "factors/factors.json", {"reference": "reference", "steps": 10, "variants": variants}
+        root,
+        "train_factors/variants.json",
+        {"reference": "reference", "steps": 10, "variants": variants},
     )
-    _checkpoints(root, "factors", tuple(VARIANTS))
+    _checkpoints(root, "train_factors", tuple(VARIANTS))
 
 
 def _generators(root: Path) -> None:
-    table(root, "generators/modes.parquet", _modes(CANDIDATES, 2))
-    document(root, "generators/matched.json", _matched(CANDIDATES))
-    table(root, "generators/offline.parquet", [{"method": "flow", "seed": 0}])
-    _checkpoints(root, "generators", CANDIDATES)
+    table(root, "reload/modes.parquet", _modes(CANDIDATES, 2))
+    document(root, "train_generators/matched.json", _matched(CANDIDATES))
+    table(root, "reload/offline.parquet", [{"method": "flow", "seed": 0}])
+    _checkpoints(root, "train_generators", CANDIDATES)
 
 
 def _reload(root: Path) -> None:
@@ -530,11 +571,15 @@ def _reload(root: Path) -> None:
         [
             {
                 "method": m,
+                "seed": 0,
+                "steps": nfe,
                 "nfe": nfe,
                 "situations": 30,
                 "modes_covered_share": min(1.0, 0.7 + nfe / 30),
                 "coverage_lower": 0.8,
                 "spread_m": 0.1,
+                "admissible_share": 0.9,
+                "between_share": 0.0,
             }
             for m in CANDIDATES
             for nfe in (2, 4, 8, 16)
@@ -568,6 +613,7 @@ def _latency(root: Path) -> None:
                 "method": m,
                 "run": run,
                 "component": term,
+                "owner": "model",
                 "temperature": temperature,
                 "repeat": i,
                 "seconds": (SPEED[m] if term == "sample" else 0.001) * (1 + 0.01 * i + 0.02 * run),
@@ -591,7 +637,8 @@ def _candidate(method: str, fixture: str, observation: int, candidate: int) -> d
         "method": method,
         "seed": 0,
         "fixture": fixture,
-        "situation": "two_mode",
+        "situation": "e0:0",
+        "phase": "approach",
         "observation": observation,
         "candidate": candidate,
         "mode": ("left", "right")[candidate % 2],
@@ -604,16 +651,6 @@ def _candidate(method: str, fixture: str, observation: int, candidate: int) -> d
         "raw": [0.0, 1.0],
         "projected": [0.0, 1.0],
     }
-
-
-FIXTURES = (
-    "held_out",
-    "stale_observation",
-    "infeasible_rotation",
-    "collision",
-    "phase_change",
-    "reordered_chunk",
-)
 
 
 def _shadow(root: Path) -> None:
@@ -632,7 +669,7 @@ def _shadow(root: Path) -> None:
         root,
         "shadow/stub.parquet",
         [
-            {"method": m, "fixture": f, "arrivals": 200, "stale": 0, "invalid": 0}
+            {"method": m, "fixture": f, "delivered": 9, "arrivals": 200, "stale": 0, "invalid": 0}
             for m in CANDIDATES
             for f in FIXTURES
         ],
@@ -695,12 +732,14 @@ def _stress(root: Path) -> None:
                         "deadline_misses": 0,
                         "discards": 1,
                         "rejections": 1,
+                        "rejected_by": "",
                         "recovery_attempted": False,
                         "recovered": False,
                         "interventions": 0,
                         "action_age_p50_s": 0.1,
                         "action_age_p95_s": 0.2 + 0.001 * start,
                         "action_age_max_s": 0.3,
+                        "latency_p95_s": 0.05,
                         "force_peak_n": 5.0 + 0.1 * start,
                         "mode": "left",
                     }

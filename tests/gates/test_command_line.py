@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from gates.__main__ import app
-from gates.admission import STAGE_REQUIRES
+from gates.proof import STAGE_REQUIRES
 
 RUN = CliRunner()
 
@@ -90,7 +90,7 @@ def test_errors_are_one_sentence_with_their_exit_code(tmp_path, args, code):
 
 
 def test_a_bad_settings_file_is_exit_2(repo):
-    for text in ("gate_a: {thresholds: {x: 1}}", "gate_a: [", "gate_a: {a: 1, a: 2}", "x: 1"):
+    for text in ("gate_a: {limits: {x: 1}}", "gate_a: [", "gate_a: {a: 1, a: 2}", "x: 1"):
         (repo / "params.yaml").write_text(text)
         result = _run(repo, "judge", "A")
         _clean(result)

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gates.models import Criterion
+from gates.report import Answer
 from gates.verdicts import SEVERITY, combine, first_unmet, judge_criterion, rounded
 
 NUMBERS = st.floats(allow_nan=False, allow_infinity=False, width=64)
@@ -14,7 +14,7 @@ VERDICTS = st.sampled_from(sorted(SEVERITY))
 
 
 def criterion(verdict: str, candidate: str | None = None, route: str = "required", name: str = "x"):
-    return Criterion(
+    return Answer(
         id=name,
         question="?",
         owner="model",

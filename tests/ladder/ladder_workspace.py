@@ -13,7 +13,7 @@ import yaml
 
 from flows.reproduce import Outcome, reproduce, stage_environment
 from flows.workspace import make_workspace
-from gates.registry import LOWER
+from gates.proof import SPECS
 
 ROOT = Path(__file__).parents[2]
 OVERRIDES = Path(__file__).with_name("overrides.yaml")
@@ -35,14 +35,18 @@ DROPPED = {
 def make_small_ladder(target: Path) -> Path:
     """The checkout as a workspace with few of everything, and limits that nothing breaks."""
     overrides = yaml.safe_load(OVERRIDES.read_text())
-    for gate, judge in LOWER.items():
-        limits = {
-            item.id: {"limit": 1e9 if item.comparison == "<=" else -1e9, "reason": REASON}
-            for item in judge.spec.criteria
+    params = yaml.safe_load((ROOT / "params.yaml").read_text())
+    for gate in "ABCD":
+        widest = {
+            item.id: [1e9 if item.comparison == "<=" else -1e9, REASON]
+            for item in SPECS[gate].criteria
+            if item.derived is None
         }
-        overrides.setdefault(f"gate_{gate.lower()}", {})["thresholds"] = limits
-    gate_d = overrides["gate_d"]
-    gate_d["thresholds"]["promotion_e_value"]["limit"] = 1.0 / gate_d["alpha"]
+        name = f"gate_{gate.lower()}"
+        overrides.setdefault(name, {})["limits"] = {
+            owner: {key: widest[key] for key in entries if key in widest}
+            for owner, entries in params[name]["limits"].items()
+        }
     make_workspace(ROOT, target, overrides)
 
     def drop(params: dict[str, Any]) -> None:
@@ -64,10 +68,12 @@ def edit_params(workspace: Path, change: Callable[[dict[str, Any]], Any]) -> Non
 
 
 def set_limit(workspace: Path, gate: str, criterion: str, limit: float) -> None:
-    """Move one threshold."""
+    """Move one limit."""
 
     def change(params: dict[str, Any]) -> None:
-        params[gate]["thresholds"][criterion]["limit"] = limit
+        for entries in params[gate]["limits"].values():
+            if criterion in entries:
+                entries[criterion][0] = limit
 
     edit_params(workspace, change)
 

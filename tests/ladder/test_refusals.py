@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from ladder_workspace import edit_params, flip_a_bit, hashes, repro, run_stage, set_limit
 
-from gates.models import read_report, report_bytes
+from gates.report import read_report, report_bytes
 from genpolicy.integrity.tables import read_table, write_table
 
 Tamper = Callable[[Path], Any]
@@ -124,7 +124,7 @@ CASES: dict[str, tuple[Tamper, str, int, str]] = {
     ),
     "older schema version": (
         edit_report("gate_a", lambda d: d.update(schema_version=0)), "generators", 2,
-        r"reports/gate_a\.json: schema_version is 0, expected 1\. Run `dvc repro -f gate_a`",
+        r"reports/gate_a\.json: schema_version is 0, expected 2\. Run `dvc repro -f gate_a`",
     ),
     "report of another gate": (
         lambda w: shutil.copy(w / "reports" / "gate_a.json", w / "reports" / "gate_b.json"),
@@ -197,7 +197,7 @@ def test_a_failed_gate_stops_repro_and_the_report_says_why(copy: Path) -> None:
     [("gate_a", "generators"), ("gate_b", "shadow"), ("gate_c", "stress"), ("gate_d", "card")],
 )
 def test_an_empty_threshold_set_passes_nothing(copy: Path, gate: str, stage: str) -> None:
-    edit_params(copy, lambda params: params[gate]["thresholds"].clear())
+    edit_params(copy, lambda params: params[gate]["limits"].clear())
     outcome, ran = repro(copy, stage)
     assert (outcome.code, outcome.stage) == (3, stage)
     assert ran == [gate, stage]

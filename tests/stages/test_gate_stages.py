@@ -67,7 +67,7 @@ def test_the_verdict_file_moves_with_verdict_or_evidence_and_not_with_a_limit(
 ) -> None:
     def limit(value):
         def change(params):
-            params["gate_a"]["thresholds"]["clock_residual_s"]["limit"] = value
+            params["gate_a"]["limits"]["perception"]["clock_residual_s"][0] = value
 
         return change
 
@@ -95,7 +95,7 @@ def test_the_verdict_file_moves_with_verdict_or_evidence_and_not_with_a_limit(
 def test_a_failed_gate_ends_with_0_and_its_report_says_fail(evidence, stage, edit) -> None:
     edit(
         evidence,
-        lambda p: p["gate_a"]["thresholds"]["held_out_situations"].update(limit=1e9),
+        lambda p: p["gate_a"]["limits"]["model"].update(held_out_situations=[1e9, "test"]),
     )
     judge(stage, "gate_a")
     report = json.loads((evidence / "reports" / "gate_a.json").read_text())
@@ -117,20 +117,20 @@ def test_missing_evidence_is_inconclusive_never_a_pass(workspace, stage) -> None
     ("change", "sentence"),
     [
         (
-            lambda t: t.update(clock_residuall_s=dict(t["clock_residual_s"])),
-            "gate_a.thresholds.clock_residuall_s is a threshold of no criterion",
+            lambda t: t["perception"].update(clock_residuall_s=[1, "r"]),
+            "gate_a.limits.perception.clock_residuall_s is a limit of no criterion",
         ),
-        (lambda t: t["lag_spread_steps"].pop("reason"), "thresholds.lag_spread_steps.reason"),
-        (lambda t: t["lag_spread_steps"].update(owner="me"), "lag_spread_steps.owner is 'me'"),
-        (lambda t: t["lag_spread_steps"].update(limit="1"), "lag_spread_steps.limit is '1'"),
-        (lambda t: t["lag_spread_steps"].update(limit=float("nan")), "gate_a"),
+        (lambda t: t["controller"]["lag_spread_steps"].pop(), "controller.lag_spread_steps is [1]"),
+        (lambda t: t.update(me={"lag_spread_steps": [1, "r"]}), "gate_a.limits.me is no owner"),
+        (lambda t: t["controller"].update(lag_spread_steps=["1", "r"]), "lag_spread_steps.limit"),
+        (lambda t: t["controller"].update(lag_spread_steps=[float("nan"), "r"]), "lag_spread"),
     ],
 )  # fmt: skip
-def test_a_bad_threshold_is_a_bad_setting_and_leaves_no_verdict(
+def test_a_bad_limit_is_a_bad_setting_and_leaves_no_verdict(
     evidence, stage, edit, change, sentence
 ) -> None:
     judge(stage, "gate_a")
-    edit(evidence, lambda params: change(params["gate_a"]["thresholds"]))
+    edit(evidence, lambda params: change(params["gate_a"]["limits"]))
     code, said = stage("gate_a")
     assert (code, said.count("\n")) == (2, 1), said
     assert sentence in said

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from gates.evidence import Evidence, MissingEvidenceError
-from gates.ladder import judge
 from gates.pages import plots_scene
 from gates.pages.figures import LARGEST_PHOTO_BYTES, METHODS, colours, dashes, draw_all, in_order
 from gates.pages.plots_scene import BETWEEN, LEFT, RIGHT, SCENE, paths, side
-from gates.reports import write_gate
+from gates.proof import judge
+from gates.writing import write_gate
 from genpolicy.evidence.need.pictures import HEIGHT_PX, WIDTH_PX, scene_png
 
 SHOWN = re.compile(r'<img src="data:image/png;base64,([A-Za-z0-9+/=]*)"')

@@ -7,7 +7,7 @@ from gates.pages.guide import QUESTIONS, READING, USED, WORDS, label, unit
 from gates.pages.page import index_page
 from gates.pages.summary import markdown
 from gates.pages.table import deciding, groups, passed_by, stops, tally, waived
-from gates.reports import write_gate
+from gates.writing import write_gate
 
 
 def _no_recovery(ladder):

@@ -20,8 +20,8 @@ from securesystemslib.dsse import Envelope as DsseEnvelope
 from securesystemslib.exceptions import VerificationError
 from securesystemslib.signer import CryptoSigner, SSlibKey  # type: ignore[attr-defined]
 
-from gates.card import FIXED, TrialCard, draft_path, missing_fields, read_card
-from gates.models import OWNERS, StrictModel, parse_section
+from gates.card.card import FIXED, TrialCard, draft_path, missing_fields, read_card
+from gates.report import OWNERS, StrictModel, parse_section
 from genpolicy.errors import BadInputError, ConfigError, IntegrityError
 from genpolicy.integrity.atomic import write_bytes
 from genpolicy.integrity.documents import canonical_json, parse_json, read_yaml

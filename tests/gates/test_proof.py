@@ -6,9 +6,8 @@ import shutil
 import evidence
 import pytest
 
-from gates.admission import STAGE_REQUIRES, admit
-from gates.ladder import judge, prove_all
-from gates.models import report_bytes, report_path
+from gates.proof import STAGE_REQUIRES, admit, judge, prove_all
+from gates.report import report_bytes, report_path
 from genpolicy.errors import ConfigError, IntegrityError, RefusedError
 from genpolicy.integrity.atomic import write_bytes
 
@@ -39,7 +38,7 @@ def test_unknown_stage_is_a_configuration_error(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("stage", "gate"), [("generators", "A"), ("shadow", "B"), ("stress", "C"), ("card", "D")]
+    ("stage", "gate"), [("train_generators", "A"), ("shadow", "B"), ("stress", "C"), ("card", "D")]
 )
 def test_a_missing_report_refuses(ladder, stage, gate):
     (ladder / report_path(gate)).unlink()
@@ -50,19 +49,16 @@ def test_a_missing_report_refuses(ladder, stage, gate):
 
 
 def test_the_sentence_names_gate_criterion_numbers_report_and_next_step(ladder):
-    section = evidence.PARAMS["gate_a"]
-    strict = {**section["thresholds"]["clock_residual_s"], "limit": 0.001}
-    thresholds = {**section["thresholds"], "clock_residual_s": strict}
-    evidence.write_params(ladder, {"gate_a": {**section, "thresholds": thresholds}})
+    evidence.write_params(ladder, evidence.set_limit("gate_a", "clock_residual_s", 0.001))
     with pytest.raises(RefusedError, match="derived again"):
-        admit("generators", ladder)
+        admit("train_generators", ladder)
     _judge_again(ladder, "A")
     with pytest.raises(
         RefusedError,
         match=r"Gate A refuses: clock_residual_s is 0\.002, required <= 0\.001; "
         r"see reports/gate_a\.json\. Return to",
     ):
-        admit("generators", ladder)
+        admit("train_generators", ladder)
 
 
 def _judge_again(root, gates):
@@ -74,8 +70,8 @@ FILES = (
     "audit/clocks.parquet",
     "audit/summary.json",
     "ingest/frames.parquet",
-    "baselines/act/seed_0/model.safetensors",
-    "generators/flow/seed_0/config.json",
+    "train_baselines/act/seed_0/model.safetensors",
+    "train_generators/flow/seed_0/config.json",
     "reload/identity.json",
     "shadow/journal.mcap",
     "stress/rollouts.parquet",
@@ -94,8 +90,8 @@ def test_one_flipped_bit_in_any_material_refuses(ladder, name):
 
 
 def test_a_removed_or_added_material_refuses(ladder):
-    file = ladder / "artifacts/generators/flow/seed_0/model.safetensors"
-    other = ladder / "artifacts/generators/flow/seed_1/model.safetensors"
+    file = ladder / "artifacts/train_generators/flow/seed_0/model.safetensors"
+    other = ladder / "artifacts/train_generators/flow/seed_1/model.safetensors"
     other.parent.mkdir()
     shutil.copy(file, other)
     with pytest.raises(RefusedError, match="seed_1"):
@@ -111,7 +107,7 @@ def test_a_link_in_place_of_a_material_refuses(ladder):
     file.rename(file.with_suffix(".moved"))
     file.symlink_to(file.with_suffix(".moved"))
     with pytest.raises((RefusedError, IntegrityError), match="clocks"):
-        admit("generators", ladder)
+        admit("train_generators", ladder)
 
 
 def _failing_a(root):
@@ -140,7 +136,7 @@ def test_an_edited_report_refuses(ladder, forge):
     _failing_a(ladder)
     _edit_report(ladder, "A", forge)
     with pytest.raises(RefusedError):
-        admit("generators", ladder)
+        admit("train_generators", ladder)
 
 
 def test_a_promotion_written_by_hand_refuses(ladder):
@@ -148,46 +144,48 @@ def test_a_promotion_written_by_hand_refuses(ladder):
         ladder, "stress/rollouts.parquet", lambda f: f.assign(success=f["method"] == "bc")
     )
     _judge_again(ladder, "D")
-    _edit_report(ladder, "D", lambda r: r.update(verdict="PASS", decision="promote flow"))
+    _edit_report(
+        ladder, "D", lambda r: r.update(verdict="PASS", decision="promote flow", promoted="flow")
+    )
     with pytest.raises(RefusedError, match="derived again"):
         admit("card", ladder)
 
 
 def test_the_environment_is_recorded_but_not_compared(ladder):
     _edit_report(ladder, "A", lambda r: r["environment"].update(threads="64"))
-    admit("generators", ladder)
+    admit("train_generators", ladder)
 
 
-@pytest.mark.parametrize("version", [0, 2, "1", True, None])
+@pytest.mark.parametrize("version", [0, 1, "2", True, None])
 def test_another_schema_version_asks_to_judge_again(ladder, version):
     _edit_report(ladder, "A", lambda r: r.update(schema_version=version))
     with pytest.raises(IntegrityError, match=r"dvc repro -f gate_a") as caught:
-        admit("generators", ladder)
+        admit("train_generators", ladder)
     assert caught.value.exit_code == 2
 
 
 @pytest.mark.parametrize(
     "text",
     [
-        '{"schema_version": 1, "schema_version": 1}',
-        '{"schema_version": 1, "verdict": NaN}',
+        '{"schema_version": 2, "schema_version": 2}',
+        '{"schema_version": 2, "verdict": NaN}',
         "[]",
         "",
         "{",
-        '{"schema_version": 1}',
+        '{"schema_version": 2}',
     ],
 )
 def test_a_malformed_report_is_an_integrity_error(ladder, text):
     (ladder / report_path("A")).write_text(text)
     with pytest.raises(IntegrityError, match="gate_a"):
-        admit("generators", ladder)
+        admit("train_generators", ladder)
 
 
 def test_a_duplicate_key_in_a_true_report_is_refused(ladder):
     path = ladder / report_path("A")
     path.write_text(path.read_text().replace('"gate": "A"', '"gate": "B", "gate": "A"'))
     with pytest.raises(IntegrityError, match="twice"):
-        admit("generators", ladder)
+        admit("train_generators", ladder)
 
 
 def test_a_report_of_another_gate_or_another_run_refuses(ladder, repo):

@@ -8,11 +8,11 @@ import shutil
 import evidence
 import pytest
 
-from gates.ladder import judge
-from gates.models import report_bytes, report_path
 from gates.pages.page import gate_page, index_page
 from gates.pages.summary import markdown, plain
-from gates.reports import write_gate
+from gates.proof import judge
+from gates.report import report_bytes, report_path
+from gates.writing import write_gate
 from genpolicy.errors import GenpolicyError
 
 EVIL = '<script>alert("x")</script>'

@@ -6,9 +6,9 @@ import pandas as pd
 import pytest
 
 from gates.evidence import MissingEvidenceError
-from gates.ladder import judge
-from gates.reports import write_gate
-from gates.shortcuts import valid_share
+from gates.need.simpler import valid_share
+from gates.proof import judge
+from gates.writing import write_gate
 from genpolicy.statistics.intervals import clopper_pearson
 
 
@@ -49,7 +49,7 @@ def test_valid_share_counts_episodes_and_only_situations_with_two_modes():
 def test_a_chunk_that_reaches_a_mode_but_is_refused_has_removed_nothing(ladder):
     assert found(ladder, "chunking_valid_share").verdict == "PASS"
     evidence.edit_table(
-        ladder, "baselines/modes.parquet",
+        ladder, "measure_baselines/modes.parquet",
         lambda f: f.assign(admissible=np.where(f["method"] == "chunked_bc", 16, f["admissible"])),
     )  # fmt: skip
     criterion = found(ladder, "chunking_valid_share")
@@ -78,11 +78,15 @@ def test_a_latent_is_judged_by_its_worst_seed(ladder):
         clopper_pearson(0, 999)[1], abs=1e-6
     )
     evidence.edit_document(
-        ladder, "baselines/latent.json", lambda d: [*d, {**d[0], "seed": 1, "exceeding": 300}]
+        ladder,
+        "measure_baselines/latent.json",
+        lambda d: [*d, {**d[0], "seed": 1, "exceeding": 300}],
     )
     criterion = found(ladder, "latent_dependence_p")
     assert criterion.verdict == "FAIL" and criterion.measured > 0.3
-    evidence.edit_document(ladder, "baselines/latent.json", lambda d: [{**d[0], "method": "other"}])
+    evidence.edit_document(
+        ladder, "measure_baselines/latent.json", lambda d: [{**d[0], "method": "other"}]
+    )
     assert found(ladder, "latent_dependence_p").verdict == "INCONCLUSIVE"
 
 
@@ -92,7 +96,7 @@ def test_a_factor_that_no_variant_changes_is_missing(ladder, factor):
         variants = document["variants"]
         document["variants"] = {k: v for k, v in variants.items() if v["factor"] != factor}
 
-    evidence.edit_document(ladder, "factors/factors.json", drop)
+    evidence.edit_document(ladder, "train_factors/variants.json", drop)
     criterion = found(ladder, "factors_isolated")
     assert criterion.verdict == "INCONCLUSIVE" and factor in criterion.caveat
 
@@ -101,7 +105,7 @@ def test_only_conditioning_factors_can_remove_the_mean(ladder):
     for name, verdict in (("energy_head", "PASS"), ("single_action", "PASS"),
                           ("linear_encoder", "FAIL")):  # fmt: skip
         evidence.edit_table(
-            ladder, "factors/modes.parquet",
+            ladder, "measure_factors/modes.parquet",
             lambda f, n=name: f.assign(
                 admissible=np.where(f["variant"] == n, f["samples"], f["admissible"])
             ),
@@ -114,10 +118,11 @@ def test_ibc_is_reported_beside_the_deployed_baselines_and_not_judged(ladder):
     assert criterion.measured == 0.5 and criterion.verdict == "PASS"
     assert "ibc, derivative_free 1 (100% of samples admissible)" in criterion.caveat
     # A convention under which others are deployed does not make an energy deterministic.
-    evidence.edit_table(ladder, "baselines/modes.parquet", lambda f: f.assign(convention="direct"))
+    evidence.edit_table(
+        ladder, "measure_baselines/modes.parquet", lambda f: f.assign(convention="direct")
+    )
     assert found(ladder, "baseline_mode_coverage").measured == 0.5
-    section = {**evidence.PARAMS["gate_a"], "generative_baselines": []}
-    evidence.write_params(ladder, {"gate_a": section})
+    evidence.write_params(ladder, lambda p: p["gate_a"].update(generative_baselines=[]))
     assert found(ladder, "baseline_mode_coverage").measured == 1.0
 
 
@@ -126,9 +131,9 @@ def test_the_page_draws_the_factors_and_says_what_ibc_is(ladder):
     page = (ladder / "reports/gate_a.html").read_text()
     assert "What each part earns, changed alone" in page
     assert "transformer" in page and "An energy policy (IBC)" in page
-    (ladder / "artifacts/factors/effects.parquet").unlink()
+    (ladder / "artifacts/measure_factors/effects.parquet").unlink()
     write_gate(ladder, "A")
     assert (
-        "Not drawn: artifacts/factors/effects.parquet is missing"
+        "Not drawn: artifacts/measure_factors/effects.parquet is missing"
         in (ladder / "reports/gate_a.html").read_text()
     )

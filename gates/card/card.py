@@ -6,18 +6,20 @@ measured for this cell would look like a safe one. An empty field keeps the card
 
 import datetime
 import re
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
-from gates.models import GateReport, Point, StrictModel, parse_section
+from gates.report import Gate, GateReport, Point, StrictModel, parse_section
+from gates.settings import GateSettings
 from genpolicy.errors import RefusedError
 from genpolicy.integrity.documents import canonical_json, parse_json
 
 CARD_SCHEMA_VERSION = 1
 DRAFT_PATH = "artifacts/card/card.json"
-
+CardName = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]{0,63}$")]
 
 # What the draft fixes; a signed card may not differ here from the draft of this very chain.
 FIXED = (
@@ -39,7 +41,7 @@ ABORT_FROM = {
 }
 
 
-class CardSettings(StrictModel):
+class CardSettings(GateSettings):
     """Section `card` of `params.yaml`: what the draft starts from.
 
     Attributes:
@@ -52,7 +54,9 @@ class CardSettings(StrictModel):
         speed_limit_m_s: Reduced speed of the tool.
     """
 
-    name: str = Field(pattern=r"^[a-z0-9][a-z0-9_-]{0,63}$")
+    homes: ClassVar[Mapping[str, str]] = {"task": "task.name"}
+
+    name: CardName
     author: str = Field(min_length=1)
     robot_model: str = Field(min_length=1)
     task: str = Field(min_length=1)
@@ -104,13 +108,16 @@ class TrialCard(StrictModel):
 
 
 def draft_card(
-    settings: CardSettings, reports: dict[str, GateReport], hashes: dict[str, str], checkpoint: str
+    settings: CardSettings,
+    reports: Mapping[Gate, GateReport],
+    hashes: Mapping[Gate, str],
+    checkpoint: str,
 ) -> TrialCard:
     """Draft from the passed reports, with the fields of the reviewer left empty.
 
     Args:
         settings: Section `card`.
-        reports: Passed reports of gates A to D, as `gates.admission.admit` gives them.
+        reports: Passed reports of gates A to D, as `gates.proof.admit` gives them.
         hashes: Their SHA-256.
         checkpoint: Hash of the promoted candidate's checkpoint, as Gate B pinned it.
 
@@ -129,7 +136,7 @@ def draft_card(
         candidate_checkpoint_sha256=checkpoint,
         robot_model=settings.robot_model,
         author=settings.author,
-        reports=dict(sorted(hashes.items())),
+        reports={str(gate): digest for gate, digest in sorted(hashes.items())},
         workspace_lower_m=settings.workspace_lower_m,
         workspace_upper_m=settings.workspace_upper_m,
         speed_limit_m_s=settings.speed_limit_m_s,
@@ -155,13 +162,13 @@ def promoted(report: GateReport) -> str:
     Raises:
         RefusedError: None.
     """
-    verb, _, name = report.decision.partition(" ")
-    if report.verdict != "PASS" or verb != "promote" or report.candidates.get(name) != "PASS":
+    name = report.promoted
+    if report.verdict != "PASS" or name is None or report.candidates.get(name) != "PASS":
         raise RefusedError(
             gate="D",
-            criterion="decision",
-            measured=report.decision or "none",
-            limit="promote <method>",
+            criterion="promoted",
+            measured=name or "none",
+            limit="a method that passed",
             report="reports/gate_d.json",
             action="Keep the simpler policy; there is nothing to put on a card.",
         )

@@ -1,31 +1,32 @@
 """Drafting the trial card from the passed ladder: what the card stage calls."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
-from gates.admission import Admission
-from gates.card import CardSettings, TrialCard, draft_card, promoted
-from gates.models import parse_section
-from gates.registry import plain_section
+from gates.card.card import CardSettings, TrialCard, draft_card, promoted
+from gates.report import Gate, GateReport
+from gates.settings import read_params, read_settings
 from genpolicy.errors import IntegrityError
 from genpolicy.integrity.documents import read_json
 
 IDENTITY = "artifacts/reload/identity.json"
 
 
-def draft(root: Path, admission: Admission) -> TrialCard:
+def draft(root: Path, reports: Mapping[Gate, GateReport], hashes: Mapping[Gate, str]) -> TrialCard:
     """The draft of an admitted card stage; the fields of the reviewer stay empty.
 
     Args:
         root: Repository root.
-        admission: What `admit("card", root)` returned: gates A to D, proved and passed.
+        reports: Of gates A to D, proved and passed, as `admit("card", root)` returns them.
+        hashes: SHA-256 of those reports.
 
     Raises:
         ConfigError: Section `card` is missing or wrong.
         IntegrityError: Gate B pinned no checkpoint of the promoted candidate.
         RefusedError: Gate D promotes no one.
     """
-    settings = parse_section(CardSettings, plain_section(root, "card"), where="params.yaml: card")
-    candidate = promoted(admission.reports["D"])
+    settings = read_settings(read_params(root), "card", CardSettings)
+    candidate = promoted(reports["D"])
     identity = read_json(root / IDENTITY)
     entry = identity.get(candidate) if isinstance(identity, dict) else None
     checkpoint = entry.get("checkpoint") if isinstance(entry, dict) else None
@@ -36,4 +37,4 @@ def draft(root: Path, admission: Admission) -> TrialCard:
             expected="the hash of the promoted checkpoint",
             action="Run `dvc repro reload`.",
         )
-    return draft_card(settings, admission.reports, admission.hashes, checkpoint)
+    return draft_card(settings, reports, hashes, checkpoint)

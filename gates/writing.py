@@ -7,10 +7,10 @@ one.
 import contextlib
 from pathlib import Path
 
-from gates.ladder import judge
-from gates.models import Gate, GateReport, report_bytes, report_path
 from gates.pages.page import gate_page, index_page
 from gates.pages.summary import markdown
+from gates.proof import judge
+from gates.report import Gate, GateReport, report_bytes, report_path
 from genpolicy.errors import BadInputError
 from genpolicy.integrity.atomic import write_bytes
 

@@ -11,11 +11,9 @@ from cryptography.hazmat.primitives import serialization
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 from securesystemslib.signer import SSlibKey
 
-from gates import gate_e
-from gates.admission import prove_chain
-from gates.card import Envelope, TrialCard, envelope_violations, missing_fields
-from gates.registry import read_section
-from gates.signing import PAYLOAD_TYPE, load_allow_list, read_draft, sign_card
+from gates import proof
+from gates.card.card import Envelope, TrialCard, envelope_violations, missing_fields
+from gates.card.signing import PAYLOAD_TYPE, load_allow_list, read_draft, sign_card
 from genpolicy.errors import BadInputError, ConfigError
 from genpolicy.integrity.documents import canonical_json
 
@@ -112,19 +110,18 @@ class Team:
         )
 
     def judge(self, today=TODAY):
-        thresholds, params = read_section(self.root, gate_e.SPEC, gate_e.Params)
-        return gate_e.judge(self.root, thresholds, params, today=today)
+        return proof.judge(self.root, "E", today=today)
 
 
 @pytest.fixture(scope="session")
 def _chain(_ladder):
-    return prove_chain(_ladder, "D")
+    return proof.prove_chain(_ladder, "D")
 
 
 @pytest.fixture
 def quick_chain(_chain, monkeypatch):
     """The chain as proved once: for tests that change nothing below the card."""
-    monkeypatch.setattr(gate_e, "prove_chain", lambda root, through: _chain)
+    monkeypatch.setattr(proof, "prove_chain", lambda root, through: _chain)
 
 
 @pytest.fixture

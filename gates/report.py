@@ -6,13 +6,13 @@ Reports are canonical JSON without a timestamp, so that equal evidence gives equ
 from pathlib import Path
 from typing import Any, ClassVar, Literal, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError
 
 from genpolicy.errors import BadInputError, ConfigError, IntegrityError
 from genpolicy.integrity.documents import canonical_json, parse_json
 from genpolicy.integrity.hashing import sha256_bytes_of
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 
 Gate = Literal["A", "B", "C", "D", "E"]
 Owner = Literal["model", "perception", "controller", "safety"]
@@ -21,6 +21,13 @@ Verdict = Literal["PASS", "FAIL", "INCONCLUSIVE", "PENDING_REVIEW"]
 
 GATES: tuple[Gate, ...] = ("A", "B", "C", "D", "E")
 OWNERS: tuple[Owner, ...] = ("model", "perception", "controller", "safety")
+NAMES: dict[Gate, str] = {
+    "A": "need",
+    "B": "reproducibility",
+    "C": "feasibility and time",
+    "D": "matched simulation and stress",
+    "E": "trial card",
+}
 REQUIRED = "required"
 
 Point = tuple[float, float, float]
@@ -37,19 +44,12 @@ class StrictModel(BaseModel):
 Model = TypeVar("Model", bound=StrictModel)
 
 
-class Threshold(StrictModel):
-    """A limit with the reason for it and the owner who answers for it."""
-
-    limit: float
-    reason: str = Field(min_length=1)
-    owner: Owner
-
-
-class Criterion(StrictModel):
-    """One question of a gate, answered.
+class Answer(StrictModel):
+    """One criterion of a gate, answered.
 
     Attributes:
-        id: Name of the criterion; the key of its threshold in `params.yaml`.
+        id: Name of the criterion; the key of its limit in `params.yaml`.
+        owner: Who answers for the limit; None where `params.yaml` has none.
         candidate: Method it speaks of; None for the whole gate.
         route: `required`, or the name of the alternative it belongs to: of several routes, one
             that passes whole is enough.
@@ -58,13 +58,13 @@ class Criterion(StrictModel):
         threshold: The limit; None where `params.yaml` has none.
         comparison: How `measured` must stand to `threshold`.
         reason: Why the limit is what it is.
-        evidence: Files that the number comes from, relative to the repository.
+        evidence: Files that were read for the number, relative to the repository.
         caveat: What the reader must know about this number.
     """
 
     id: str
     question: str
-    owner: Owner
+    owner: Owner | None
     candidate: str | None
     route: str
     measured: float | None
@@ -87,18 +87,19 @@ class GateReport(StrictModel):
         criteria: In the order in which a failure is diagnosed.
         materials: SHA-256 of every file read or bound, by path relative to the repository.
         upstream: SHA-256 of the reports below this one, by gate.
-        settings: The gate's parameters other than thresholds (levels, margins, candidates).
+        settings: The gate's parameters other than limits (levels, margins, candidates).
         environment: Library versions, threads and regime; not part of what is re-derived.
         caveats: What this gate does not show.
         diagnosis: Where to look first; empty after PASS.
         decision: What to do next.
+        promoted: The method that the gate promotes; only Gate D promotes, and only after PASS.
     """
 
     schema_version: int
     gate: Gate
     verdict: Verdict
     candidates: dict[str, Verdict]
-    criteria: tuple[Criterion, ...]
+    criteria: tuple[Answer, ...]
     materials: dict[str, str]
     upstream: dict[str, str]
     settings: dict[str, Any]
@@ -106,6 +107,21 @@ class GateReport(StrictModel):
     caveats: tuple[str, ...]
     diagnosis: str
     decision: str
+    promoted: str | None
+
+
+def measured_text(answer: Answer) -> str:
+    """What was measured, for a sentence."""
+    if answer.verdict == "PENDING_REVIEW":
+        return "pending review"
+    return "not measured" if answer.measured is None else f"{answer.measured:.6g}"
+
+
+def limit_text(answer: Answer) -> str:
+    """The limit, for a sentence."""
+    if answer.threshold is None:
+        return "a limit in params.yaml"
+    return f"{answer.comparison} {answer.threshold:.6g}"
 
 
 def report_path(gate: str) -> str:

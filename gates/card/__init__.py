@@ -1,0 +1,1 @@
+"""Gate E: the trial card, its draft, its signatures and its judge."""

@@ -1,0 +1,331 @@
+"""Gate E, trial card: has an independent person read all this and signed for it?
+
+Without a signed card the verdict is PENDING_REVIEW. Only people's signatures lead to PASS.
+"""
+
+import datetime
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
+
+from pydantic import Field
+
+from gates.card.card import (
+    DRAFT_PATH,
+    CardName,
+    Envelope,
+    TrialCard,
+    envelope_violations,
+    missing_fields,
+    promoted,
+    read_card,
+    validity,
+)
+from gates.card.drafting import IDENTITY
+from gates.card.signing import (
+    ALLOW_LIST,
+    CARDS,
+    SignedCard,
+    conflicting_cards,
+    independence,
+    load_allow_list,
+    open_envelope,
+    utc_today,
+)
+from gates.criterion import Measured, criteria_of, criterion
+from gates.engine import GateSpec, judge
+from gates.evidence import Evidence, MissingEvidenceError
+from gates.report import OWNERS, Gate, GateReport, Point, stage_of
+from gates.settings import GateSettings, read_limits, read_params, read_settings
+from genpolicy.errors import BadInputError, GenpolicyError
+from genpolicy.integrity.hashing import sha256_bytes_of
+
+
+class CardGateSettings(GateSettings):
+    """Settings of Gate E other than limits.
+
+    Attributes:
+        card: Name of the signed card: `cards/<card>.dsse.json`.
+        workspace_lower_m: Lower corner of the simulated workspace, base frame. Shape (3,).
+        workspace_upper_m: Upper corner. Shape (3,).
+        speed_limit_m_s: Simulated speed limit of the tool.
+        maximum_days: Longest validity of a card.
+    """
+
+    homes: ClassVar[Mapping[str, str]] = {"card": "card.name"}
+
+    card: CardName
+    workspace_lower_m: Point
+    workspace_upper_m: Point
+    speed_limit_m_s: float = Field(gt=0.0)
+    maximum_days: int = Field(gt=0)
+
+    @property
+    def envelope(self) -> Envelope:
+        """What was simulated."""
+        return Envelope(
+            workspace_lower_m=self.workspace_lower_m,
+            workspace_upper_m=self.workspace_upper_m,
+            speed_limit_m_s=self.speed_limit_m_s,
+            maximum_days=self.maximum_days,
+        )
+
+
+@dataclass(frozen=True)
+class Chain:
+    """Gates A to D as proved: their reports and SHA-256, or why they do not hold."""
+
+    reports: Mapping[Gate, GateReport]
+    hashes: Mapping[Gate, str]
+    error: str = ""
+
+
+@dataclass(frozen=True)
+class Papers:
+    """The draft and the envelope as they lie there.
+
+    Attributes:
+        draft: The draft card, if it can be read.
+        present: Whether an envelope lies in `cards/`.
+        signed: The verified card; None if there is none or it is refused.
+        refusal: Why the envelope is refused; empty if it is not.
+    """
+
+    draft: TrialCard | None
+    present: bool
+    signed: SignedCard | None
+    refusal: str
+
+
+@dataclass(frozen=True)
+class Dossier:
+    """What Gate E knows before it asks its questions.
+
+    Attributes:
+        settings: Section `gate_e`.
+        papers: The draft and the envelope.
+        chain_error: Why gates A to D, or the draft, do not hold; empty if they do.
+        today: Day of the judgement, UTC.
+    """
+
+    settings: CardGateSettings
+    papers: Papers
+    chain_error: str
+    today: datetime.date
+
+
+def judge_card(root: Path, chain: Chain, *, today: datetime.date | None = None) -> GateReport:
+    """Report of Gate E from the chain and the card below `root`.
+
+    Args:
+        root: Repository root.
+        chain: Gates A to D, proved just now.
+        today: Day of the judgement; today (UTC) if not given.
+
+    Raises:
+        ConfigError: The section is missing or wrong, or a malformed allow-list.
+        IntegrityError: A file of the chain that is not what it claims to be.
+    """
+    params = read_params(root)
+    settings = read_settings(params, stage_of("E"), CardGateSettings)
+    papers = examine(root, settings.card)
+    error = chain.error or _chain_error(root, chain, papers.draft)
+    dossier = Dossier(settings, papers, error, today or utc_today())
+    limits = read_limits(params, "E", GATE.criteria)
+    return judge(GATE, Evidence(root), limits, settings, given=dossier)
+
+
+def examine(root: Path, name: str) -> Papers:
+    """Read the draft and verify the envelope of that name, if there is one."""
+    draft = _draft(root)
+    path = root / CARDS / f"{name}.dsse.json"
+    present = path.exists() or path.is_symlink()
+    signed, refusal = None, ""
+    if present:
+        try:
+            others = conflicting_cards(root, name)
+            if others:
+                raise BadInputError(
+                    where=CARDS,
+                    found=f"holding {', '.join(others)} as well",
+                    expected="one card",
+                    action="Retire the others.",
+                )
+            data = sha256_bytes_of(path, keep=True)[1]
+            allowed = load_allow_list(root)
+            signed = open_envelope(root, data, where=path.name, allowed=allowed)
+            if signed.card.name != name:
+                signed, refusal = None, "the card has another name than its file"
+        except GenpolicyError as error:
+            signed, refusal = None, str(error)
+    return Papers(draft, present, signed, refusal)
+
+
+def _draft(root: Path) -> TrialCard | None:
+    try:
+        data = sha256_bytes_of(root / DRAFT_PATH, keep=True)[1]
+        return read_card(data, where=DRAFT_PATH)
+    except BadInputError:
+        return None
+
+
+def _chain_error(root: Path, chain: Chain, draft: TrialCard | None) -> str:
+    try:
+        candidate = promoted(chain.reports["D"])
+        if draft is None:
+            return f"{DRAFT_PATH} is missing or malformed"
+        entry = Evidence(root).document(IDENTITY).get(candidate)
+    except (MissingEvidenceError, GenpolicyError) as error:
+        return str(error)
+    pinned = entry.get("checkpoint") if isinstance(entry, dict) else None
+    if draft.reports != chain.hashes:
+        return "the draft names other reports than lie here; run `dvc repro card`"
+    if draft.candidate != candidate or draft.candidate_checkpoint_sha256 != pinned:
+        return "the draft is for another candidate than gate D promotes; run `dvc repro card`"
+    return ""
+
+
+def _waiting(what: str) -> Measured:
+    return Measured(None, caveat=f"waits for a person: {what}", pending=True)
+
+
+def _signed(papers: Papers, what: str) -> SignedCard | Measured:
+    if papers.signed is not None:
+        return papers.signed
+    if papers.present:
+        return Measured(0.0, caveat=f"the card is refused: {papers.refusal}")
+    return _waiting(what)
+
+
+def _draft_of(papers: Papers) -> TrialCard:
+    if papers.draft is None:
+        raise MissingEvidenceError(f"{DRAFT_PATH} is missing or malformed")
+    return papers.draft
+
+
+@criterion(
+    ">=",
+    question="Do gates A to D still hold, proved again from the bytes?",
+    look_at="Something below has changed; start at the first gate that refuses.",
+    always=True,
+)
+def upstream_passed(evidence: Evidence, dossier: Dossier) -> Measured:
+    """1 if the chain below holds and the draft is of this chain, else 0."""
+    error = dossier.chain_error
+    return Measured(float(not error), caveat=error or "gates A to D proved again: PASS")
+
+
+@criterion(
+    "<=",
+    question="How many fields of the card are empty?",
+    look_at="The reviewer completes the draft; a force limit is measured, never assumed.",
+    always=True,
+)
+def draft_complete(evidence: Evidence, dossier: Dossier) -> Measured:
+    """Empty fields of the signed card, or of the draft while there is none."""
+    evidence.digest(DRAFT_PATH)
+    papers = dossier.papers
+    if papers.signed is not None:
+        missing = missing_fields(papers.signed.card)
+        return Measured(float(len(missing)), caveat=_listed(missing))
+    missing = missing_fields(_draft_of(papers))
+    text = f"to be filled by the reviewer: {_listed(missing)}"
+    return Measured(float(len(missing)), caveat=text, pending=not papers.present)
+
+
+def _listed(missing: list[str]) -> str:
+    return ", ".join(missing) or "no field is empty"
+
+
+@criterion(
+    ">=",
+    question="Do valid signatures cover this very chain?",
+    look_at="Sign the current draft; a card for other bytes, robots or candidates is void.",
+    always=True,
+)
+def signature_valid(evidence: Evidence, dossier: Dossier) -> Measured:
+    """1 if every signature verifies over this chain, else 0."""
+    found = _signed(dossier.papers, "sign the card")
+    if isinstance(found, Measured):
+        return found
+    names = ", ".join(f"{p.name} ({p.role})" for p in found.signers)
+    return Measured(1.0, caveat=f"signed by {names}, over this chain")
+
+
+@criterion(
+    ">=",
+    question="Is the reviewer someone other than the author?",
+    look_at="Find a reviewer who did not make the candidate.",
+    always=True,
+)
+def reviewer_independent(evidence: Evidence, dossier: Dossier) -> Measured:
+    """1 if the named reviewer signed and is not the author, else 0."""
+    found = _signed(dossier.papers, "review by someone who is not the author")
+    if isinstance(found, Measured):
+        return found
+    independent, text = independence(found)
+    return Measured(float(independent), caveat=text)
+
+
+@criterion(
+    ">=",
+    question="How many of the four owners signed off?",
+    look_at="Model, perception, controller and safety each answer for their part.",
+    always=True,
+)
+def owners_signed(evidence: Evidence, dossier: Dossier) -> Measured:
+    """Owners whose signatures verified."""
+    found = _signed(dossier.papers, "sign-off by model, perception, controller and safety owner")
+    if isinstance(found, Measured):
+        return found
+    roles = {person.role for person in found.signers} & set(OWNERS)
+    missing = [role for role in OWNERS if role not in roles]
+    return Measured(float(len(roles)), caveat=f"missing: {', '.join(missing)}" if missing else "")
+
+
+@criterion(
+    "<=",
+    question="How many limits are looser than what was simulated?",
+    look_at="Tighten the card; what was not simulated is not allowed.",
+    always=True,
+)
+def envelope_within_limits(evidence: Evidence, dossier: Dossier) -> Measured:
+    """Limits of the card beyond the simulated envelope or the draft."""
+    found = _signed(dossier.papers, "complete the envelope")
+    if isinstance(found, Measured):
+        return found if found.pending else Measured(None, caveat=found.caveat)
+    draft = _draft_of(dossier.papers)
+    bad = envelope_violations(found.card, draft, dossier.settings.envelope)
+    return Measured(float(len(bad)), caveat=", ".join(bad) or "inside what was simulated")
+
+
+@criterion(
+    ">=",
+    question="Is the card valid today?",
+    look_at="The card is not yet or no longer valid; review again.",
+    always=True,
+)
+def not_expired(evidence: Evidence, dossier: Dossier) -> Measured:
+    """1 if today lies in the days of the card and they are not too many, else 0."""
+    found = _signed(dossier.papers, "give the days of validity")
+    if isinstance(found, Measured):
+        return found
+    days = dossier.settings.maximum_days
+    valid, text = validity(found.card, today=dossier.today, maximum_days=days)
+    return Measured(float(valid), caveat=text)
+
+
+GATE = GateSpec(
+    gate="E",
+    settings=CardGateSettings,
+    criteria=criteria_of(globals()),
+    bind=(DRAFT_PATH, f"{CARDS}/*.dsse.json", ALLOW_LIST, "reports/gate_[a-d].json"),
+    back_to="the reviewer",
+    go_on="The card is valid. What happens on hardware is outside this project.",
+    caveats=(
+        "A signature says who answers for the card; it does not make the trial safe.",
+        "One person under two names on the allow-list is not detected; review that file.",
+        "Revocation is by removing a key from the allow-list and judging again.",
+    ),
+)

@@ -1,0 +1,319 @@
+"""Gate C, feasibility and time: does anything invalid or stale ever reach the controller?"""
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+import pandas as pd
+from pydantic import Field
+
+from gates.bounds import counted_interval, share_interval, upper_quantile
+from gates.criterion import Measured, criteria_of, criterion
+from gates.engine import GateSpec
+from gates.evidence import Array, Evidence, MissingEvidenceError, count, flags, number, numbers
+from gates.settings import GateSettings
+from genpolicy.evidence.rows import CandidateRow, ShadowCountRow, ShadowStubRow
+
+SHADOW = "artifacts/shadow"
+CANDIDATES = f"{SHADOW}/candidates.parquet"
+LAYERS = ("representation", "kinematic", "geometric", "dynamic", "contact", "fresh")
+HELD_OUT = "held_out"
+
+
+class FeasibilitySettings(GateSettings):
+    """Settings of Gate C other than limits.
+
+    Attributes:
+        confidence: Coverage of every interval.
+        candidates: Methods that stand for promotion.
+        required_fixtures: Corrupted fixtures that must have been tried.
+        required_checks: Checks, or layers of checks, each of which must have been disabled once.
+        unassigned_modes: Labels of candidates that belong to no mode.
+    """
+
+    homes: ClassVar[Mapping[str, str]] = {
+        "confidence": "confidence",
+        "candidates": "train_generators.samplers",
+    }
+
+    confidence: float = Field(gt=0.5, lt=1.0)
+    candidates: tuple[str, ...]
+    required_fixtures: tuple[str, ...]
+    required_checks: tuple[str, ...]
+    unassigned_modes: tuple[str, ...]
+
+
+def _rows(evidence: Evidence, candidate: str) -> pd.DataFrame:
+    return evidence.of(CANDIDATES, CandidateRow, candidate)
+
+
+def _held_out(evidence: Evidence, candidate: str) -> pd.DataFrame:
+    rows = _rows(evidence, candidate)
+    rows = rows[rows["fixture"] == HELD_OUT]
+    if len(rows) == 0:
+        raise MissingEvidenceError("no held-out observation was sampled")
+    return rows
+
+
+def admissible(rows: pd.DataFrame) -> Array:
+    """1.0 where a candidate passed all six layers; a layer not reached is not passed."""
+    passed = np.ones(len(rows), dtype=np.bool_)
+    for layer in LAYERS:
+        passed &= flags(rows, layer)
+    return passed.astype(np.float64)
+
+
+@criterion(
+    "<=",
+    question="Do the checks treat the modes alike, or remove one?",
+    look_at="Conditioning: one mode is outside the feasible set; look at raw samples by mode.",
+    per_candidate=True,
+)
+def mode_admissible_gap(
+    evidence: Evidence, settings: FeasibilitySettings, candidate: str
+) -> Measured:
+    """Largest difference between modes in the share that is admissible."""
+    rows = _held_out(evidence, candidate)
+    rows = rows.assign(admissible=admissible(rows), mode=rows["mode"].fillna("").astype(str))
+    rows = rows[~rows["mode"].isin(settings.unassigned_modes)]
+    sampled = rows.groupby("observation")["mode"].transform("nunique")
+    rows = rows[sampled >= 2]
+    shares = rows.groupby("mode")["admissible"].mean()
+    if len(shares) < 2:
+        raise MissingEvidenceError("no observation was answered in two modes")
+    text = ", ".join(f"{mode} {float(share):.4g}" for mode, share in shares.items())
+    text += f" over {rows['observation'].nunique()} observations answered in several modes"
+    return Measured(float(shares.max() - shares.min()), caveat=text)
+
+
+@criterion(
+    ">=",
+    question="What share of held-out candidates passes all six layers?",
+    look_at="Feasibility: read the rejection waterfall from the first layer down.",
+    per_candidate=True,
+)
+def admissible_share(evidence: Evidence, settings: FeasibilitySettings, candidate: str) -> Measured:
+    """Lower bound of the share of held-out candidates that pass all six layers."""
+    rows = _held_out(evidence, candidate)
+    share, lower, upper = share_interval(
+        admissible(rows),
+        rows["observation"].to_numpy(),
+        confidence=settings.confidence,
+        favourable=True,
+    )
+    text = (
+        f"share {share:.4g} of {len(rows)} candidates; lower bound over "
+        f"{rows['observation'].nunique()} observations"
+    )
+    return Measured(lower, (lower, upper), text)
+
+
+@criterion(
+    "<=",
+    question="How far does projection move an admitted chunk?",
+    look_at="Feasibility: projection repairs too much; compare raw samples with the limits.",
+    per_candidate=True,
+)
+def projection_p95_m(evidence: Evidence, settings: FeasibilitySettings, candidate: str) -> Measured:
+    """Largest move by projection that 95 % of the admissible candidates keep, m."""
+    return _of_admissible(evidence, settings, candidate, "position_change_m")
+
+
+@criterion(
+    "<=",
+    question="How hard is the seam between two chunks?",
+    look_at="Timing: look at H_e, re-planning, blending and normalisation.",
+    per_candidate=True,
+)
+def boundary_jerk_p95_m_s3(
+    evidence: Evidence, settings: FeasibilitySettings, candidate: str
+) -> Measured:
+    """Jerk at the seam that 95 % of the admissible candidates keep, m/s^3."""
+    return _of_admissible(evidence, settings, candidate, "boundary_jerk_m_s3")
+
+
+def _of_admissible(
+    evidence: Evidence, settings: FeasibilitySettings, candidate: str, column: str
+) -> Measured:
+    rows = _held_out(evidence, candidate)
+    rows = rows[admissible(rows) == 1.0]
+    if len(rows) == 0:
+        raise MissingEvidenceError("no candidate is admissible")
+    values = np.abs(numbers(rows, column))
+    point, interval = upper_quantile(values, 0.95, confidence=settings.confidence)
+    text = f"{len(rows)} admissible held-out candidates, largest {values.max():.4g}"
+    return Measured(point, interval, text)
+
+
+@criterion(
+    ">=",
+    question="Is every corrupted fixture refused, with a reason?",
+    look_at="Feasibility: a layer lets a corrupted input through; see which fixture.",
+    per_candidate=True,
+)
+def corrupted_refused_share(
+    evidence: Evidence, settings: FeasibilitySettings, candidate: str
+) -> Measured:
+    """Share of corrupted candidates that are refused with a reason."""
+    rows = _rows(evidence, candidate)
+    rows = rows[rows["fixture"] != HELD_OUT]
+    absent = sorted(set(settings.required_fixtures) - set(rows["fixture"]))
+    if absent:
+        raise MissingEvidenceError(f"corrupted fixtures not tried: {', '.join(absent)}")
+    named = rows["first_reason"].fillna("").astype(str).str.len().to_numpy() > 0
+    refused = (admissible(rows) == 0.0) & named
+    interval = counted_interval(
+        float(refused.sum()), float(len(rows)), confidence=settings.confidence
+    )
+    through = sorted(set(rows.loc[~refused, "fixture"]))
+    text = f"{len(rows)} candidates of {rows['fixture'].nunique()} corrupted fixtures" + (
+        f"; let through or refused without reason: {', '.join(through)}" if through else ""
+    )
+    return Measured(float(refused.mean()), interval, text)
+
+
+@criterion(
+    "<=",
+    question="How many stale actions arrived at the stub?",
+    look_at="Timing: freshness is not enforced before the controller.",
+    per_candidate=True,
+    always=True,
+)
+def stub_stale(evidence: Evidence, settings: FeasibilitySettings, candidate: str) -> Measured:
+    """Stale actions that arrived at the stub."""
+    bad, arrivals = _stub(evidence, candidate, "stale")
+    return Measured(bad, caveat=f"of {arrivals:g} arrivals")
+
+
+def _stub(evidence: Evidence, candidate: str, column: str) -> tuple[float, float]:
+    rows = evidence.of(f"{SHADOW}/stub.parquet", ShadowStubRow, candidate)
+    arrivals = float(numbers(rows, "arrivals").sum())
+    if arrivals <= 0:
+        raise MissingEvidenceError("nothing arrived at the stub")
+    return float(numbers(rows, column).sum()), arrivals
+
+
+@criterion(
+    "<=",
+    question="How many invalid actions arrived at the stub?",
+    look_at="Feasibility: something bypasses admission.",
+    per_candidate=True,
+    always=True,
+)
+def stub_invalid(evidence: Evidence, settings: FeasibilitySettings, candidate: str) -> Measured:
+    """Actions of no admitted chunk that arrived at the stub."""
+    bad, arrivals = _stub(evidence, candidate, "invalid")
+    return Measured(bad, caveat=f"of {arrivals:g} arrivals")
+
+
+@criterion(
+    "<=",
+    question="How high can the true rate of bad arrivals still be?",
+    look_at="Evaluator: too few arrivals for this bound; run more shadow invocations.",
+    per_candidate=True,
+    always=True,
+)
+def stub_violation_upper(
+    evidence: Evidence, settings: FeasibilitySettings, candidate: str
+) -> Measured:
+    """Exact upper bound of the rate of bad arrivals."""
+    stale, arrivals = _stub(evidence, candidate, "stale")
+    bad = min(stale + _stub(evidence, candidate, "invalid")[0], arrivals)
+    interval = counted_interval(bad, arrivals, confidence=settings.confidence)
+    return Measured(interval[1], interval, f"{bad:g} of {arrivals:g} arrivals; exact upper bound")
+
+
+@criterion(
+    "<=",
+    question="Is every generated action executed, discarded by reason, or queued?",
+    look_at="Evaluator: actions vanish or appear; read the counts per fixture.",
+    per_candidate=True,
+    always=True,
+)
+def conservation_error(
+    evidence: Evidence, settings: FeasibilitySettings, candidate: str
+) -> Measured:
+    """Actions unaccounted for, over all fixtures."""
+    rows = evidence.of(f"{SHADOW}/counts.parquet", ShadowCountRow, candidate)
+    error = unaccounted(rows, ["fixture"])
+    if float(rows["generated"].sum()) <= 0:
+        raise MissingEvidenceError("nothing was generated")
+    return Measured(error, caveat="generated = executed + discarded by reason + still queued")
+
+
+def unaccounted(frame: pd.DataFrame, keys: list[str]) -> float:
+    """Sum over runs of |generated - executed - queued - discarded|.
+
+    Raises:
+        MissingEvidenceError: A run states its totals differently in different rows.
+    """
+    error = 0.0
+    for name in ("generated", "executed", "queued", "count"):
+        frame = frame.assign(**{name: numbers(frame, name)})
+    for run, rows in frame.groupby(keys):
+        totals = rows[["generated", "executed", "queued"]].drop_duplicates()
+        if len(totals) != 1:
+            raise MissingEvidenceError(f"{run} states several totals")
+        generated, executed, queued = (float(value) for value in totals.iloc[0])
+        error += abs(generated - executed - queued - float(rows["count"].sum()))
+    return error
+
+
+@criterion(
+    "<=",
+    question="What does the independent checker find in the journal?",
+    look_at="Evaluator: executor and independent checker disagree; read the violations.",
+    always=True,
+)
+def checker_violations(evidence: Evidence, settings: FeasibilitySettings) -> Measured:
+    """Violations that the independent checker found in the journal."""
+    return checked_violations(evidence, f"{SHADOW}/checker.json")
+
+
+def checked_violations(evidence: Evidence, path: str) -> Measured:
+    """Violations that the independent checker found; none counts only if it checked something.
+
+    Raises:
+        MissingEvidenceError: It checked nothing.
+    """
+    document = evidence.document(path)
+    checked = number(document, "checked_actions")
+    if checked <= 0:
+        raise MissingEvidenceError("the checker saw no action")
+    return Measured(count(document, "violations"), caveat=f"{checked:g} actions re-proved")
+
+
+@criterion(
+    "<=",
+    question="Does disabling any one check turn the checker red?",
+    look_at="Evaluator: a disabled check goes unnoticed, so its green means nothing.",
+    always=True,
+)
+def mutants_undetected(evidence: Evidence, settings: FeasibilitySettings) -> Measured:
+    """Checks whose absence the independent checker did not notice, or that were not tried."""
+    entries = evidence.listing(f"{SHADOW}/mutants.json")
+    silent, covered = [], set()
+    for entry in entries:
+        if not isinstance(entry, dict) or not isinstance(entry.get("detected"), bool):
+            raise MissingEvidenceError("mutants.json has an entry without check or detected")
+        covered |= {str(entry.get("check")), str(entry.get("layer"))}
+        if not entry["detected"]:
+            silent.append(str(entry.get("check")))
+    silent += [f"{name} (not tried)" for name in settings.required_checks if name not in covered]
+    text = f"not detected: {', '.join(silent)}" if silent else f"all {len(entries)} detected"
+    return Measured(float(len(silent)), caveat=text)
+
+
+GATE = GateSpec(
+    gate="C",
+    settings=FeasibilitySettings,
+    criteria=criteria_of(globals()),
+    bind=(f"{SHADOW}/journal.mcap",),
+    back_to="the generator or the projection",
+    go_on="Compare every passing candidate with the simpler policies on identical starts.",
+    caveats=(
+        "Shadow runs execute nothing; closed-loop effects are the matter of gate D.",
+        "Corrupted fixtures are those listed; another corruption is not covered.",
+    ),
+    below="B",
+)

@@ -1,0 +1,1 @@
+"""Gate A, need: does one observation truly admit several valid actions?"""

@@ -1,0 +1,63 @@
+"""Conditioning: does something that was, or could have been, recorded explain the modes?"""
+
+import numpy as np
+
+from gates.bounds import counted_interval
+from gates.criterion import Measured, criterion
+from gates.evidence import Evidence, MissingEvidenceError, number, numbers
+from gates.need.settings import AUDIT, VALID_CAUSE, NeedSettings
+
+
+@criterion(
+    "<=",
+    question="Does phase, object, operator or epoch explain the modes?",
+    look_at="Conditioning: a recorded variable explains the modes; give it to the policy.",
+)
+def strata_effect(evidence: Evidence, settings: NeedSettings) -> Measured:
+    """Largest effect among strata that are significant after correction; 0 if none is."""
+    columns = ("variable", "phase", "p_adjusted", "effect", "effect_lower", "effect_upper")
+    frame = evidence.frame(f"{AUDIT}/strata.parquet", *columns)
+    effects = np.abs(numbers(frame, "effect"))
+    significant = numbers(frame, "p_adjusted") <= settings.strata_level
+    if not significant.any():
+        return Measured(0.0, caveat=f"none of {len(frame)} strata is significant after Holm")
+    row = int(np.argmax(np.where(significant, effects, -np.inf)))
+    chosen = frame.iloc[row]
+    ends = (chosen["effect_lower"], chosen["effect_upper"])
+    interval = (float(ends[0]), float(ends[1])) if np.all(np.isfinite(ends)) else None
+    text = f"{chosen['variable']} in {chosen['phase']} explains modes"
+    return Measured(float(effects[row]), interval, text)
+
+
+@criterion(
+    ">=",
+    question="Does the audit attribute the modes to the task itself?",
+    look_at="Conditioning: the audit found another cause than valid modes; remove it first.",
+    route=VALID_CAUSE,
+)
+def cause_accepted(evidence: Evidence, settings: NeedSettings) -> Measured:
+    """1 if the audit attributes the modes to the task itself, else 0."""
+    cause = evidence.document(f"{AUDIT}/summary.json").get("cause")
+    if not isinstance(cause, str) or not cause:
+        raise MissingEvidenceError("the audit names no cause")
+    return Measured(float(cause == VALID_CAUSE), caveat=f"cause: {cause}")
+
+
+@criterion(
+    "<=",
+    question="Do the modes collapse when the phase is seen?",
+    look_at="Conditioning: the phase explains the modes; give it to the policy.",
+)
+def phase_collapse_share(evidence: Evidence, settings: NeedSettings) -> Measured:
+    """Upper bound of the share of episodes whose modes the task phase takes away."""
+    document = evidence.document(f"{AUDIT}/summary.json")
+    without, seen = number(document, "modes_without_phase"), number(document, "modes_with_phase")
+    if without == 0:
+        return Measured(0.0, caveat="no episode has modes without the phase")
+    lost = max(0.0, without - seen)
+    interval = counted_interval(lost, without, confidence=settings.confidence)
+    text = (
+        f"episodes with modes: {without:g} without the phase, {seen:g} with it; upper bound. With "
+        "one phase only both are the same, because there is nothing to look at"
+    )
+    return Measured(interval[1], interval, text)

@@ -1,0 +1,153 @@
+"""Modes: how many situations have two that persist, succeed, are feasible, and defeat the mean?"""
+
+import numpy as np
+import pandas as pd
+
+from gates.bounds import counted_interval, share_interval
+from gates.criterion import Measured, criterion
+from gates.evidence import Evidence, MissingEvidenceError, flags, number, numbers
+from gates.need.settings import AUDIT, VALID_CAUSE, NeedSettings
+from genpolicy.statistics.intervals import clopper_pearson
+
+
+def _held_out(evidence: Evidence, settings: NeedSettings, *columns: str) -> pd.DataFrame:
+    path = f"{AUDIT}/neighbourhoods.parquet"
+    frame = evidence.frame(path, "split", "episode_uuid", "two_mode", *columns)
+    return frame[frame["split"].isin(settings.held_out_splits)]
+
+
+@criterion(
+    ">=",
+    question="Were enough held-out situations examined?",
+    look_at="Multimodality: too little support; record more episodes of the same task.",
+)
+def held_out_situations(evidence: Evidence, settings: NeedSettings) -> Measured:
+    """Held-out situations that were examined."""
+    rows = _held_out(evidence, settings)
+    return Measured(float(len(rows)), caveat=f"from {rows['episode_uuid'].nunique()} episodes")
+
+
+@criterion(
+    ">=",
+    question="In how many do two persistent modes exist?",
+    look_at="Multimodality: the actions are unimodal here; keep the simpler policy.",
+    route=VALID_CAUSE,
+)
+def multimodal_situations(evidence: Evidence, settings: NeedSettings) -> Measured:
+    """Held-out situations with two clusters that persist."""
+    rows = _held_out(evidence, settings, "persistent")
+    kept = rows[flags(rows, "two_mode") & flags(rows, "persistent")]
+    text = f"from {kept['episode_uuid'].nunique()} episodes; two clusters that persist"
+    return Measured(float(len(kept)), caveat=text)
+
+
+@criterion(
+    ">=",
+    question="Does mode identity persist over steps, beyond a shuffled-time null?",
+    look_at="Multimodality: this is pointwise noise (tremor, quantisation), not a mode.",
+    route=VALID_CAUSE,
+)
+def persistence_margin(evidence: Evidence, settings: NeedSettings) -> Measured:
+    """Persistence of mode identity above the 95 % quantile of the shuffled-time null."""
+    document = evidence.document(f"{AUDIT}/persistence.json")
+    observed, null = number(document, "observed"), number(document, "null_q95")
+    text = f"observed {observed:.4g}, 95 % quantile of the shuffled-time null {null:.4g}"
+    return Measured(observed - null, caveat=text)
+
+
+@criterion(
+    ">=",
+    question="Does each mode succeed?",
+    look_at="Multimodality: a mode fails; separate failed and intervention targets.",
+    route=VALID_CAUSE,
+)
+def mode_success_lower(evidence: Evidence, settings: NeedSettings) -> Measured:
+    """Lowest exact lower bound of success over the modes."""
+    columns = ("mode", "episodes", "successes")
+    frame = evidence.frame(f"{AUDIT}/modes.parquet", *columns)
+    bounds = [
+        (counted_interval(hits, trials, confidence=settings.confidence), str(mode))
+        for mode, trials, hits in zip(
+            frame["mode"],
+            numbers(frame, "episodes"),
+            numbers(frame, "successes"),
+            strict=True,
+        )
+    ]
+    interval, mode = min(bounds)
+    text = f"lowest over {len(bounds)} modes, at {mode}; exact lower bound"
+    return Measured(interval[0], interval, text)
+
+
+@criterion(
+    ">=",
+    question="Is each mode feasible in all layers?",
+    look_at="Multimodality: a mode breaks limits or collides; it is no valid target.",
+    route=VALID_CAUSE,
+)
+def mode_feasible_share(evidence: Evidence, settings: NeedSettings) -> Measured:
+    """Lowest share of admissible modal chunks over the modes."""
+    columns = ("mode", "admissible", "checked")
+    frame = evidence.frame(f"{AUDIT}/modes.parquet", *columns)
+    checked = numbers(frame, "checked")
+    if not np.all(checked > 0):
+        raise MissingEvidenceError("a mode has no checked chunk")
+    shares = numbers(frame, "admissible") / checked
+    worst = int(np.argmin(shares))
+    text = f"lowest over {len(shares)} modes, at {frame['mode'].iloc[worst]}"
+    return Measured(float(shares[worst]), caveat=text)
+
+
+@criterion(
+    ">=",
+    question="Is the mean rejected where every mode passes?",
+    look_at="Multimodality: the mean action is admissible, so a point policy loses nothing.",
+    route=VALID_CAUSE,
+)
+def mean_defeated_share(evidence: Evidence, settings: NeedSettings) -> Measured:
+    """Lower bound of the share of two-mode situations in which only the mean is rejected."""
+    rows = _held_out(evidence, settings, "clusters", "mean_admissible", "modes_admissible")
+    rows = rows[flags(rows, "two_mode")]
+    if len(rows) == 0:
+        return Measured(0.0, caveat="no held-out situation has two modes")
+    if rows["mean_admissible"].isna().any():
+        raise MissingEvidenceError("the mean was not checked in every two-mode situation")
+    valid = numbers(rows, "modes_admissible") >= numbers(rows, "clusters")
+    defeated = valid & ~flags(rows, "mean_admissible")
+    share, lower, upper = share_interval(
+        defeated,
+        list(rows["episode_uuid"]),
+        confidence=settings.confidence,
+        favourable=True,
+    )
+    text = (
+        f"share {share:.4g} of {len(rows)} situations; lower bound over "
+        f"{rows['episode_uuid'].nunique()} episodes, whose situations are not independent"
+    )
+    return Measured(lower, (lower, upper), text)
+
+
+@criterion(
+    ">=",
+    question="Does a mode matter for recovery?",
+    look_at="Multimodality: no mode is better at recovering.",
+    route="recovery",
+)
+def recovery_benefit(evidence: Evidence, settings: NeedSettings) -> Measured:
+    """Lower bound of recovery by the best mode minus recovery by the worst other one."""
+    columns = ("split", "mode", "episodes", "successes")
+    frame = evidence.frame(f"{AUDIT}/recovery.parquet", *columns)
+    frame = frame.assign(episodes=numbers(frame, "episodes"), successes=numbers(frame, "successes"))
+    by_mode = frame.groupby("mode")[["episodes", "successes"]].sum()
+    bounds = {
+        str(mode): clopper_pearson(int(row["successes"]), int(row["episodes"]), settings.confidence)
+        for mode, row in by_mode.iterrows()
+    }
+    best = max(bounds, key=lambda mode: bounds[mode])
+    others = {mode: ends for mode, ends in bounds.items() if mode != best}
+    if not others:
+        return Measured(0.0, caveat=f"only {best} was seen to recover, so there is no comparison")
+    other = min(others, key=lambda mode: others[mode][1])
+    interval = (bounds[best][0] - others[other][1], bounds[best][1] - others[other][0])
+    text = f"recovery by {best} against recovery by {other}; lower bound"
+    return Measured(interval[0], interval, text)

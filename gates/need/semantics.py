@@ -1,0 +1,74 @@
+"""Data semantics: is what was recorded what it claims to be, before anything is made of it?"""
+
+import numpy as np
+
+from gates.bounds import counted_interval
+from gates.criterion import Measured, criterion
+from gates.evidence import Evidence, MissingEvidenceError, count, number, numbers
+from gates.need.settings import AUDIT, NeedSettings
+
+REFUSALS = "artifacts/ingest/refusals.json"
+
+
+@criterion(
+    "<=",
+    question="Is every recording either accepted or refused by name?",
+    look_at="Data semantics: a recording vanished at ingest; read the refusals.",
+)
+def refused_recordings_accounted(evidence: Evidence, settings: NeedSettings) -> Measured:
+    """Recordings that ingest neither accepted nor refused: |accepted + refused - found|."""
+    document = evidence.document(REFUSALS)
+    found, accepted = number(document, "found"), number(document, "accepted")
+    refused = count(document, "refused")
+    if found == 0:
+        raise MissingEvidenceError("no recordings were found")
+    text = f"{found:g} found, {accepted:g} accepted, {refused:g} refused"
+    return Measured(abs(accepted + refused - found), caveat=text)
+
+
+@criterion(
+    "<=",
+    question="Do the clocks of all streams agree after realignment?",
+    look_at="Data semantics: recheck timestamps per stream and epoch before anything else.",
+)
+def clock_residual_s(evidence: Evidence, settings: NeedSettings) -> Measured:
+    """Largest clock offset left after realignment over streams and epochs, s."""
+    frame = evidence.frame(f"{AUDIT}/clocks.parquet", "stream", "epoch", "offset_after_s")
+    return Measured(float(np.abs(numbers(frame, "offset_after_s")).max()))
+
+
+@criterion(
+    "<=",
+    question="Is the lag from action to state the same in every epoch?",
+    look_at="Data semantics: actions and states are shifted against each other in some epochs.",
+)
+def lag_spread_steps(evidence: Evidence, settings: NeedSettings) -> Measured:
+    """Largest spread over epochs of the lag of one stream, action steps."""
+    frame = evidence.frame(f"{AUDIT}/clocks.parquet", "stream", "epoch", "lag_steps")
+    lags = frame.assign(lag_steps=numbers(frame, "lag_steps")).groupby("stream")["lag_steps"]
+    return Measured(float((lags.max() - lags.min()).max()), caveat="largest over streams")
+
+
+@criterion(
+    "<=",
+    question="Are the calibration epochs consistent?",
+    look_at="Data semantics: an epoch's frames drifted; recalibrate or exclude it by name.",
+)
+def calibration_residual_m(evidence: Evidence, settings: NeedSettings) -> Measured:
+    """Largest calibration residual over epochs, m."""
+    frame = evidence.frame(f"{AUDIT}/calibration.parquet", "epoch", "residual_m")
+    return Measured(float(np.abs(numbers(frame, "residual_m")).max()), caveat="largest over epochs")
+
+
+@criterion(
+    "<=",
+    question="Do outcome labels agree with replay?",
+    look_at="Data semantics: failed episodes are labelled successful; correct labels first.",
+)
+def label_disagreement(evidence: Evidence, settings: NeedSettings) -> Measured:
+    """Upper exact bound of the share of labels that replay contradicts."""
+    frame = evidence.frame(f"{AUDIT}/replay.parquet", "episode_uuid", "label", "replayed")
+    wrong = int((frame["label"] != frame["replayed"]).sum())
+    interval = counted_interval(wrong, len(frame), confidence=settings.confidence)
+    text = f"{wrong} of {len(frame)} replayed episodes disagree; judged by the upper bound"
+    return Measured(interval[1], interval, text)

@@ -1,0 +1,52 @@
+"""Settings of Gate A other than limits, and where its evidence lies."""
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+from pydantic import Field
+
+from gates.settings import GateSettings
+
+AUDIT = "artifacts/audit"
+TRAINED = "artifacts/train_baselines"
+MEASURED = "artifacts/measure_baselines"
+TRAINED_FACTORS = "artifacts/train_factors"
+MEASURED_FACTORS = "artifacts/measure_factors"
+VALID_CAUSE = "valid_modes"
+
+
+class NeedSettings(GateSettings):
+    """Section `gate_a` without its limits.
+
+    Attributes:
+        confidence: Coverage of every interval.
+        strata_level: Adjusted p-value at which a stratum counts as explaining the modes.
+        held_out_splits: Splits whose situations are judged.
+        baselines: Simpler policies that must be there, frozen and matched.
+        deployed_conventions: Sampling conventions under which a baseline is deployed; drawing
+            from a latent is a generator's way and is reported beside them.
+        generative_baselines: Baselines that are drawn at random under every convention (an
+            energy's candidates are), so that they are reported beside the deployed ones.
+        chunked_baseline: Baseline that shows what chunking alone does.
+        latent_baseline: Baseline whose latent must answer the observation.
+        factors: Factors of which each must have been changed alone.
+        conditioning_factors: Factors that could make a density unnecessary; a head is what the
+            gate is about, and a single action commits to no mode.
+    """
+
+    homes: ClassVar[Mapping[str, str]] = {
+        "confidence": "confidence",
+        "baselines": "train_baselines.samplers",
+        "latent_baseline": "measure_baselines.latent.method",
+    }
+
+    confidence: float = Field(gt=0.5, lt=1.0)
+    strata_level: float = Field(gt=0.0, lt=1.0)
+    held_out_splits: tuple[str, ...]
+    baselines: tuple[str, ...]
+    deployed_conventions: tuple[str, ...]
+    generative_baselines: tuple[str, ...]
+    chunked_baseline: str
+    latent_baseline: str
+    factors: tuple[str, ...] = ("reference", "representation", "trunk", "head", "temporal")
+    conditioning_factors: tuple[str, ...] = ("representation", "trunk")

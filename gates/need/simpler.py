@@ -1,0 +1,224 @@
+"""Simpler policies: would one of them, or one changed factor, have done without a generator?
+
+Chunking alone removes the mean action; a latent answers no observation; another encoder, trunk or
+history would have done; a simple policy covers the modes. Each is one number with its interval.
+"""
+
+from collections.abc import Sequence
+
+import pandas as pd
+
+from gates.bounds import counted_interval, share_interval
+from gates.criterion import Measured, criterion
+from gates.evidence import Evidence, MissingEvidenceError, number, numbers
+from gates.need.settings import (
+    MEASURED,
+    MEASURED_FACTORS,
+    TRAINED,
+    TRAINED_FACTORS,
+    NeedSettings,
+)
+from genpolicy.evidence.rows import FactorModeRow, ModeRow
+
+LATENT = f"{MEASURED}/latent.json"
+VARIANTS = f"{TRAINED_FACTORS}/variants.json"
+MODES = f"{MEASURED}/modes.parquet"
+
+
+@criterion(
+    "<=",
+    question="Are BC, chunked BC, ACT and IBC frozen under one configuration?",
+    look_at="Baselines: configurations differ in more than the head; retrain them matched.",
+)
+def baselines_matched(evidence: Evidence, settings: NeedSettings) -> Measured:
+    """Settings in which the baselines differ although no whitelist allows it."""
+    return unmatched(evidence, f"{TRAINED}/matched.json", settings.baselines)
+
+
+def unmatched(evidence: Evidence, path: str, methods: Sequence[str]) -> Measured:
+    """Settings in which methods differ although no whitelist allows it.
+
+    Raises:
+        MissingEvidenceError: A method is not compared.
+    """
+    document = evidence.document(path)
+    differing, allowed = document.get("differing_keys"), document.get("whitelist")
+    if not isinstance(differing, dict) or not isinstance(allowed, list):
+        raise MissingEvidenceError(f"{path} has no differing_keys or no whitelist")
+    bad = []
+    for method in methods:
+        if not isinstance(differing.get(method), list):
+            raise MissingEvidenceError(f"{path} does not compare {method}")
+        bad += [f"{method}.{key}" for key in differing[method] if key not in allowed]
+    text = "; ".join(bad) or f"only whitelisted keys differ ({', '.join(map(str, allowed))})"
+    return Measured(float(len(bad)), caveat=text)
+
+
+@criterion(
+    "<=",
+    question="Does chunking alone remove the mean action?",
+    look_at="Baselines: temporal context was missing, not a density; keep chunked BC.",
+)
+def chunking_valid_share(evidence: Evidence, settings: NeedSettings) -> Measured:
+    """Upper bound of the share of situations in which the chunked baseline acts validly."""
+    method = settings.chunked_baseline
+    rows = evidence.of(MODES, ModeRow, method)
+    rows = rows[rows["convention"].isin(settings.deployed_conventions)]
+    share, lower, upper, count = valid_share(rows, confidence=settings.confidence)
+    text = (
+        f"{method} reaches a mode with an admissible chunk in {share:.4g} of {count} situations; "
+        "upper bound over episodes"
+    )
+    return Measured(upper, (lower, upper), text)
+
+
+def valid_share(rows: pd.DataFrame, *, confidence: float) -> tuple[float, float, float, int]:
+    """Share of two-mode situations with valid samples only, its interval, and how many there are.
+
+    Valid: every sample passes all six layers, none lies between modes, some mode is reached.
+
+    Raises:
+        MissingEvidenceError: No situation with two modes.
+    """
+    rows = rows[numbers(rows, "modes_present") >= 2]
+    if len(rows) == 0:
+        raise MissingEvidenceError("no situation with two modes was given to the policy")
+    passed = numbers(rows, "admissible") >= numbers(rows, "samples")
+    valid = passed & (numbers(rows, "modes_covered") >= 1)
+    share, lower, upper = share_interval(
+        valid, list(rows["episode_uuid"]), confidence=confidence, favourable=False
+    )
+    return share, lower, upper, len(rows)
+
+
+@criterion(
+    "<=",
+    question="Do ACT's samples depend on the observation beyond chance?",
+    look_at="Baselines: the latent encodes style or noise; clean the demonstrations first.",
+)
+def latent_dependence_p(evidence: Evidence, settings: NeedSettings) -> Measured:
+    """Upper end of the p-value that a latent's effect is unrelated to the observation."""
+    method = settings.latent_baseline
+    entries = [
+        entry
+        for entry in evidence.listing(LATENT)
+        if isinstance(entry, dict) and entry.get("method") == method
+    ]
+    if not entries:
+        raise MissingEvidenceError(f"{LATENT} has no test of {method}")
+    found = []
+    for entry in entries:
+        trials, exceeding = number(entry, "permutations"), number(entry, "exceeding")
+        ends = counted_interval(exceeding, trials, confidence=settings.confidence)
+        found.append((ends, entry))
+    interval, worst = max(found, key=lambda item: item[0][1])
+    unit = 1000.0 * number(worst, "spread_m")
+    text = (
+        f"{method} drawn by {worst.get('convention')}: its latent moves chunks by {unit:.3g} mm, "
+        f"of which {100 * number(worst, 'condition_share'):.3g} % (squared) differs between "
+        f"{number(worst, 'situations'):g} situations; distance correlation with the observation "
+        f"{number(worst, 'distance_correlation'):.3g}; p-value with the interval of "
+        f"{number(worst, 'permutations'):g} permutations"
+    )
+    return Measured(interval[1], interval, text)
+
+
+@criterion(
+    "<=",
+    question="Was each factor changed alone?",
+    look_at="Baselines: a variant changes more than its factor, so nothing is separated.",
+)
+def factors_isolated(evidence: Evidence, settings: NeedSettings) -> Measured:
+    """Settings in which a variant differs from the reference beyond its own factor."""
+    variants = _variants(evidence)
+    bad, factors = [], set()
+    for name, item in variants.items():
+        changed, allowed = item.get("changed"), item.get("allowed")
+        if not isinstance(changed, list) or not isinstance(allowed, list):
+            raise MissingEvidenceError(f"{VARIANTS} does not compare {name}")
+        factors.add(str(item.get("factor")))
+        bad += [f"{name}.{key}" for key in changed if key not in allowed]
+    missing = sorted(set(settings.factors) - factors)
+    if missing:
+        raise MissingEvidenceError(f"no variant changes {', '.join(missing)}")
+    text = "; ".join(bad) or f"{len(variants)} variants, each with one factor changed"
+    return Measured(float(len(bad)), caveat=text)
+
+
+@criterion(
+    "<=",
+    question="Does another encoder, history or trunk alone remove the mean action?",
+    look_at="Baselines: the conditioning was too poor; take that encoder, history or trunk.",
+)
+def factor_valid_share(evidence: Evidence, settings: NeedSettings) -> Measured:
+    """Upper bound of the best valid share of a variant that changes no head and no horizon."""
+    frame = evidence.rows(f"{MEASURED_FACTORS}/modes.parquet", FactorModeRow)
+    names = [
+        name
+        for name, item in _variants(evidence).items()
+        if item.get("factor") in settings.conditioning_factors
+    ]
+    if not names:
+        raise MissingEvidenceError("no variant changes the encoder, the history or the trunk")
+    # As many chances to look valid as there are variants: the level is divided among them.
+    confidence = 1.0 - (1.0 - settings.confidence) / len(names)
+    bounds = []
+    for name in names:
+        rows = frame[frame["variant"] == name]
+        share, lower, upper, _ = valid_share(rows, confidence=confidence)
+        bounds.append((upper, lower, share, name))
+    upper, lower, share, name = max(bounds)
+    text = (
+        f"largest of {len(names)} variants ({', '.join(names)}), {name} with {share:.4g}; upper "
+        "bound over episodes, level divided among the variants; short training"
+    )
+    return Measured(upper, (lower, upper), text)
+
+
+def _variants(evidence: Evidence) -> dict[str, dict[str, object]]:
+    variants = evidence.document(VARIANTS).get("variants")
+    if not isinstance(variants, dict) or not variants:
+        raise MissingEvidenceError(f"{VARIANTS} lists no variants")
+    return variants
+
+
+@criterion(
+    "<=",
+    question="Does the best simple policy lose modes?",
+    look_at="Baselines: a simple policy already covers the modes; keep it.",
+)
+def baseline_mode_coverage(evidence: Evidence, settings: NeedSettings) -> Measured:
+    """Mode coverage of the best baseline as it is deployed, which is without drawing at random.
+
+    What a baseline covers when its latent is drawn stands in the caveat: drawn from, it is a
+    generator itself and has to pass the gates like any other candidate. Wide scatter reaches
+    modes by chance, so the share of its samples that pass all six layers stands beside it.
+    """
+    deployed: list[tuple[float, str]] = []
+    drawn: list[tuple[float, str]] = []
+    admissible: dict[str, float] = {}
+    for method in settings.baselines:
+        rows = evidence.of(MODES, ModeRow, method)
+        rows = rows[numbers(rows, "modes_present") >= 2]
+        generative = method in settings.generative_baselines
+        if not (generative or rows["convention"].isin(settings.deployed_conventions).any()):
+            raise MissingEvidenceError(f"no two-mode situation was given to {method} as deployed")
+        share = numbers(rows, "modes_covered") / numbers(rows, "modes_present")
+        means = rows.assign(share=share).groupby("convention")["share"].mean()
+        for name, value in means.items():
+            fixed = name in settings.deployed_conventions and not generative
+            into = deployed if fixed else drawn
+            into.append((float(value), f"{method}, {name}"))
+            own = rows[rows["convention"] == name]
+            passed = numbers(own, "admissible").sum() / numbers(own, "samples").sum()
+            admissible[f"{method}, {name}"] = float(passed)
+    if not deployed:
+        raise MissingEvidenceError("no baseline is deployed without drawing at random")
+    best, name = max(deployed)
+    text = f"best of {len(deployed)} deployed conventions, by {name}"
+    if drawn:
+        text += "; drawn at random, as a generator: " + ", ".join(
+            f"{who} {value:.3g} ({admissible[who]:.0%} of samples admissible)"
+            for value, who in sorted(drawn, reverse=True)
+        )
+    return Measured(best, caveat=text)

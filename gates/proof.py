@@ -1,0 +1,339 @@
+"""Proof of reports, and admission: what a stage calls before its first line of work.
+
+A `verdict` field is never believed: every material is hashed, the judge runs again over the
+evidence, and the whole report must come out the same, apart from the environment it was judged
+in. Stages, command line, Gate E and bundles all prove by this one implementation.
+"""
+
+import datetime
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from gates import feasibility, reproducibility
+from gates.card import judge as card
+from gates.engine import GateSpec, judge_gate
+from gates.need import gate as need
+from gates.report import (
+    GATES,
+    NAMES,
+    Gate,
+    GateReport,
+    limit_text,
+    measured_text,
+    read_report,
+    report_path,
+    stage_of,
+)
+from gates.stress import gate as stress
+from gates.verdicts import first_unmet
+from genpolicy.errors import ConfigError, GenpolicyError, IntegrityError, RefusedError
+from genpolicy.integrity.hashing import sha256_file
+
+SPECS: dict[Gate, GateSpec] = {
+    "A": need.GATE,
+    "B": reproducibility.GATE,
+    "C": feasibility.GATE,
+    "D": stress.GATE,
+    "E": card.GATE,
+}
+STAGE_REQUIRES: dict[str, Gate | None] = {
+    "record": None,
+    "ingest": None,
+    "audit": None,
+    "train_baselines": None,
+    "measure_baselines": None,
+    "train_factors": None,
+    "measure_factors": None,
+    "gate_a": None,
+    "train_generators": "A",
+    "reload": "A",
+    "latency": "A",
+    "gate_b": None,
+    "shadow": "B",
+    "gate_c": None,
+    "stress": "C",
+    "gate_d": None,
+    "card": "D",
+    "gate_e": None,
+}
+NOT_COMPARED = {"environment"}
+
+
+@dataclass(frozen=True)
+class Admission:
+    """Why a stage may begin.
+
+    Attributes:
+        stage: The stage.
+        reports: Proved and passed report of each gate below it.
+        hashes: SHA-256 of those reports.
+    """
+
+    stage: str
+    reports: dict[Gate, GateReport]
+    hashes: dict[Gate, str]
+
+    @property
+    def candidates(self) -> tuple[str, ...]:
+        """Methods that passed the highest gate below the stage; empty before Gate B.
+
+        They are what the stage runs: a method that failed goes no further.
+        """
+        if not self.reports:
+            return ()
+        last = self.reports[max(self.reports)]
+        return tuple(name for name, verdict in last.candidates.items() if verdict == "PASS")
+
+
+@dataclass(frozen=True)
+class Rung:
+    """One gate as proved now.
+
+    Attributes:
+        gate: Letter.
+        name: What it asks for.
+        verdict: Verdict of the proved report; `NOT JUDGED` without a report, `REFUSED` if the
+            report is not what the files say.
+        decided_by: The criterion that decided, measured against its limit; empty after PASS.
+        note: Decision of the report, or why it is refused.
+        report: Path of the report.
+        exit_code: Exit code that this state stands for.
+    """
+
+    gate: Gate
+    name: str
+    verdict: str
+    decided_by: str
+    note: str
+    report: str
+    exit_code: int
+
+
+def judge(root: Path, gate: Gate, *, today: datetime.date | None = None) -> GateReport:
+    """Report of a gate from the files below `root`; writes nothing.
+
+    Args:
+        root: Repository root.
+        gate: Which gate.
+        today: Day on which a card is judged (Gate E); today (UTC) if not given.
+
+    Raises:
+        ConfigError: The section of `params.yaml` is missing or wrong.
+        IntegrityError: Evidence that is not what it claims to be.
+    """
+    if gate != "E":
+        return judge_gate(SPECS[gate], root)
+    try:
+        chain = card.Chain(*prove_chain(root, "D"))
+    except GenpolicyError as error:
+        chain = card.Chain({}, {}, str(error))
+    return card.judge_card(root, chain, today=today)
+
+
+def admit(stage: str, root: Path) -> Admission:
+    """Let a stage begin, or refuse.
+
+    Args:
+        stage: Name of the stage; gate stages and those before Gate A need no gate.
+        root: Repository root.
+
+    Raises:
+        ConfigError: No such stage, or `params.yaml` is wrong.
+        IntegrityError: A report is malformed or of another schema version; run its gate again.
+        RefusedError: A report is missing, untrue, or not PASS.
+    """
+    if stage not in STAGE_REQUIRES:
+        raise ConfigError(
+            where="stage",
+            found=repr(stage),
+            expected=f"one of {', '.join(STAGE_REQUIRES)}",
+            action="Register the stage in gates.proof.STAGE_REQUIRES.",
+        )
+    needed = STAGE_REQUIRES[stage]
+    return Admission(stage, *(prove_chain(root, needed) if needed else ({}, {})))
+
+
+def prove_chain(root: Path, through: Gate) -> tuple[dict[Gate, GateReport], dict[Gate, str]]:
+    """Prove every gate up to `through` and require PASS of each.
+
+    Returns:
+        Report and SHA-256 by gate.
+
+    Raises:
+        IntegrityError: A report is malformed or of another schema version.
+        RefusedError: A report is missing, untrue, or not PASS.
+    """
+    reports: dict[Gate, GateReport] = {}
+    hashes: dict[Gate, str] = {}
+    for gate in GATES[: GATES.index(through) + 1]:
+        reports[gate], hashes[gate] = verify_report(root, gate, upstream=hashes)
+        require_pass(gate, reports[gate])
+    return reports, hashes
+
+
+def prove_all(root: Path) -> list[Rung]:
+    """State of every gate, each proved again from the bytes up."""
+    rungs = []
+    reports: dict[Gate, GateReport] = {}
+    hashes: dict[Gate, str] = {}
+
+    def card_again(_root: Path, _gate: Gate) -> GateReport:
+        """Gate E over the chain that was proved just now."""
+        return card.judge_card(root, card.Chain(reports, hashes))
+
+    for gate in GATES:
+        path = report_path(gate)
+        if not (root / path).is_file():
+            rungs.append(Rung(gate, NAMES[gate], "NOT JUDGED", "", f"no {path}", path, 3))
+            continue
+        passed = gate == "E" and [r.verdict for r in reports.values()] == ["PASS"] * 4
+        again = card_again if passed else judge
+        try:
+            report, digest = verify_report(root, gate, upstream=hashes, judging=again)
+        except GenpolicyError as error:
+            code = error.exit_code if isinstance(error, RefusedError | IntegrityError) else 2
+            rungs.append(Rung(gate, NAMES[gate], "REFUSED", "", str(error), path, code))
+            continue
+        reports[gate], hashes[gate] = report, digest
+        code = 0 if report.verdict == "PASS" else 3
+        text = decided_text(report)
+        rungs.append(Rung(gate, NAMES[gate], report.verdict, text, report.decision, path, code))
+    return rungs
+
+
+def decided_text(report: GateReport) -> str:
+    """The criterion that decided, in one phrase; empty after PASS."""
+    decided = first_unmet(report.criteria, report.verdict)
+    if decided is None:
+        return ""
+    of = f" ({decided.candidate})" if decided.candidate else ""
+    return f"{decided.id}{of}: {measured_text(decided)}, required {limit_text(decided)}"
+
+
+def verify_report(
+    root: Path,
+    gate: Gate,
+    *,
+    upstream: Mapping[Gate, str],
+    judging: Callable[[Path, Gate], GateReport] = judge,
+) -> tuple[GateReport, str]:
+    """A report that is proved true, whatever its verdict, and the SHA-256 of its bytes.
+
+    Args:
+        root: Repository root.
+        gate: Which gate.
+        upstream: SHA-256 of the reports below, as proved before.
+        judging: The judge to run again.
+
+    Raises:
+        IntegrityError: The report is malformed or of another schema version.
+        RefusedError: It is missing, or what it says is not what the files say.
+    """
+    path = root / report_path(gate)
+    if not path.exists() and not path.is_symlink():
+        raise _refused(gate, "report", "missing", "a report", f"Run `dvc repro {stage_of(gate)}`.")
+    report, digest = read_report(root, gate)
+    _check_materials(root, gate, report)
+    _check_upstream(gate, report, upstream)
+    _check_same(gate, report, judging(root, gate))
+    return report, digest
+
+
+def require_pass(gate: Gate, report: GateReport) -> None:
+    """Let only PASS through.
+
+    Raises:
+        RefusedError: Any other verdict; names the criterion that decided.
+    """
+    if report.verdict == "PASS":
+        return
+    decided = first_unmet(report.criteria, report.verdict)
+    if decided is None:
+        raise _refused(gate, "verdict", report.verdict, "PASS", report.decision)
+    name = f"{decided.id}({decided.candidate})" if decided.candidate else decided.id
+    action = f"{report.decision.rstrip('.')}. {report.diagnosis}".strip()
+    raise _refused(gate, name, measured_text(decided), limit_text(decided), action)
+
+
+def _check_materials(root: Path, gate: Gate, report: GateReport) -> None:
+    for name, expected in report.materials.items():
+        try:
+            if ".." in Path(name).parts or Path(name).is_absolute():
+                raise _refused(gate, f"material {name}", "outside the repository", "inside", "")
+            found = sha256_file(root / name)
+        except IntegrityError as error:
+            found = error.found
+        if found != expected:
+            stage = Path(name).parts[1] if len(Path(name).parts) > 2 else stage_of(gate)
+            raise _refused(
+                gate,
+                f"sha256 of {name}",
+                f"{found[:16]}…",
+                f"{expected[:16]}…",
+                f"Run `dvc repro {stage}` and judge again, or restore the original bytes.",
+            )
+
+
+def _check_upstream(gate: Gate, report: GateReport, upstream: Mapping[Gate, str]) -> None:
+    for below in GATES:
+        found, expected = upstream.get(below, "none"), report.upstream.get(below, "none")
+        if found != expected:
+            raise _refused(
+                gate,
+                f"sha256 of {report_path(below)}",
+                f"{found[:16]}…",
+                f"{expected[:16]}…",
+                f"Run `dvc repro -f {stage_of(gate)}`: the gate below was judged again since.",
+            )
+
+
+def _check_same(gate: Gate, report: GateReport, again: GateReport) -> None:
+    old, new = _comparable(report), _comparable(again)
+    if old == new:
+        return
+    place, stated, derived = _first_difference(old, new, "")
+    raise _refused(
+        gate,
+        f"{report_path(gate)}{place}",
+        _short(stated),
+        f"{_short(derived)} as derived again from evidence and params.yaml",
+        f"Run `dvc repro -f {stage_of(gate)}`; never edit a report.",
+    )
+
+
+def _comparable(report: GateReport) -> Any:
+    return json.loads(report.model_dump_json(exclude=NOT_COMPARED))
+
+
+def _first_difference(old: Any, new: Any, place: str) -> tuple[str, Any, Any]:
+    if isinstance(old, dict) and isinstance(new, dict):
+        order = sorted(set(old) | set(new), key=lambda key: (key == "verdict", key))
+        for key in order:
+            if old.get(key) != new.get(key) or (key in old) != (key in new):
+                return _first_difference(old.get(key), new.get(key), f"{place}.{key}")
+    if isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
+        for index, (one, other) in enumerate(zip(old, new, strict=True)):
+            if one != other:
+                return _first_difference(one, other, f"{place}[{index}]")
+    return place, old, new
+
+
+def _short(value: Any) -> str:
+    if isinstance(value, list):
+        return f"a list of {len(value)}"
+    text = json.dumps(value, ensure_ascii=False)
+    return text if len(text) <= 60 else f"{text[:59]}…"
+
+
+def _refused(gate: Gate, criterion: str, measured: str, limit: str, action: str) -> RefusedError:
+    return RefusedError(
+        gate=gate,
+        criterion=criterion,
+        measured=measured,
+        limit=limit,
+        report=report_path(gate),
+        action=action,
+    )

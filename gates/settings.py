@@ -1,0 +1,232 @@
+"""What `params.yaml` says to a gate: limits by owner, what does not apply, and other settings.
+
+```yaml
+gate_a:
+  limits:
+    perception:
+      clock_residual_s: [0.01, a fifth of an action period]
+  not_applicable:
+    perception:
+      calibration_residual_m: this cell has no camera to calibrate
+```
+
+A number has one home. What another section says already is read from there (`GateSettings.homes`).
+"""
+
+import functools
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar, NoReturn, Self, TypeVar
+
+from pydantic import PrivateAttr
+
+from gates.criterion import Criterion
+from gates.report import OWNERS, Gate, Owner, StrictModel, parse_section, stage_of
+from genpolicy.errors import ConfigError, IntegrityError
+from genpolicy.integrity.documents import parse_yaml
+from genpolicy.integrity.hashing import sha256_bytes_of
+
+PARAMS_FILE = "params.yaml"
+DERIVED = "derived"
+LIMITS, NOT_APPLICABLE = "limits", "not_applicable"
+
+
+@dataclass(frozen=True)
+class Limit:
+    """A limit with the reason for it and the owner who answers for it; None is `derived`."""
+
+    limit: float | None
+    reason: str
+    owner: Owner
+
+
+@dataclass(frozen=True)
+class Waiver:
+    """Why a criterion does not apply here, and who says so."""
+
+    reason: str
+    owner: Owner
+
+
+@dataclass(frozen=True)
+class Limits:
+    """The limits of a gate, by criterion, and the criteria that are declared not applicable."""
+
+    of: Mapping[str, Limit] = field(default_factory=dict)
+    waived: Mapping[str, Waiver] = field(default_factory=dict)
+
+
+class GateSettings(StrictModel):
+    """Base of a gate's settings other than limits.
+
+    Attributes:
+        homes: Where in `params.yaml` a field stands, if not in the gate's own section, as a dotted
+            path. Of a mapping there, the names are taken, in their order.
+    """
+
+    homes: ClassVar[Mapping[str, str]] = {}
+
+    _limits: Limits = PrivateAttr(default_factory=Limits)
+
+    @property
+    def limits(self) -> Limits:
+        """Limits that the gate judges by, for a measure that must know those of other questions."""
+        return self._limits
+
+    def under(self, limits: Limits) -> Self:
+        """The same settings, with the limits that the gate judges by."""
+        settings = self.model_copy()
+        settings._limits = limits
+        return settings
+
+
+Settings = TypeVar("Settings", bound=StrictModel)
+
+
+def read_params(root: Path) -> dict[str, Any]:
+    """`params.yaml` below `root`, not yet checked against any model.
+
+    Raises:
+        ConfigError: Missing, malformed, or no mapping.
+    """
+    try:
+        data = sha256_bytes_of(root / PARAMS_FILE, keep=True)[1]
+    except IntegrityError as error:
+        raise ConfigError(
+            where=PARAMS_FILE,
+            found=error.found,
+            expected=error.expected,
+            action="Restore the settings file.",
+        ) from error
+    document = _parsed(data)
+    return document if isinstance(document, dict) else {}
+
+
+@functools.lru_cache(maxsize=4)
+def _parsed(data: bytes) -> Any:
+    return parse_yaml(data, where=PARAMS_FILE)
+
+
+def section_of(params: Mapping[str, Any], name: str) -> dict[str, Any]:
+    """One section.
+
+    Raises:
+        ConfigError: It is missing.
+    """
+    section = params.get(name)
+    if not isinstance(section, dict):
+        _refuse(name, "missing", "a section of settings", "Add the section.")
+    return dict(section)
+
+
+def read_settings(params: Mapping[str, Any], name: str, model: type[Settings]) -> Settings:
+    """Section `name` as its model; fields with a home elsewhere are read from there.
+
+    Raises:
+        ConfigError: Missing, an unknown key, a key that has its home elsewhere, or a wrong value.
+    """
+    own = section_of(params, name)
+    values = {key: own[key] for key in own if key not in (LIMITS, NOT_APPLICABLE)}
+    homes: Mapping[str, str] = getattr(model, "homes", {})
+    for key, home in homes.items():
+        if key in values:
+            _refuse(f"{name}.{key}", "a second home", home, f"Remove it; `{home}` says it.")
+        values[key] = _at(params, home)
+    return parse_section(model, values, where=f"{PARAMS_FILE}: {name}")
+
+
+def _at(params: Mapping[str, Any], path: str) -> Any:
+    value: Any = params
+    for part in path.split("."):
+        if not isinstance(value, dict) or part not in value:
+            _refuse(path, "missing", "a setting", "Add it.")
+        value = value[part]
+    return list(value) if isinstance(value, dict) else value
+
+
+def read_limits(params: Mapping[str, Any], gate: Gate, criteria: Sequence[Criterion]) -> Limits:
+    """The limits of a gate and what it declares not applicable.
+
+    Raises:
+        ConfigError: An unknown criterion or owner, a criterion under two owners or both limited
+            and not applicable, an empty reason, a limit that is no finite number, a `derived`
+            one where none follows from the settings, or a waiver of what always applies.
+    """
+    section = section_of(params, stage_of(gate))
+    known = {item.id: item for item in criteria}
+    place = f"{stage_of(gate)}.{LIMITS}"
+    limits: dict[str, Limit] = {}
+    for owner, name, value in _by_owner(section, place, known):
+        where = f"{place}.{owner}.{name}"
+        _once(where, name in limits)
+        limits[name] = _limit(value, owner, known[name], where)
+    place = f"{stage_of(gate)}.{NOT_APPLICABLE}"
+    waived: dict[str, Waiver] = {}
+    for owner, name, value in _by_owner(section, place, known):
+        where = f"{place}.{owner}.{name}"
+        _once(where, name in limits or name in waived)
+        if known[name].always:
+            _refuse(where, "declared not applicable", "a limit", "It applies to every cell.")
+        waived[name] = Waiver(_reason(value, where), owner)
+    return Limits(limits, waived)
+
+
+def _by_owner(
+    section: Mapping[str, Any], place: str, known: Mapping[str, Criterion]
+) -> Iterator[tuple[Owner, str, Any]]:
+    for owner, entries in _mapping(section.get(place.split(".")[1]), place).items():
+        if owner not in OWNERS:
+            _refuse(f"{place}.{owner}", "no owner", f"one of {', '.join(OWNERS)}", "Correct it.")
+        for name, value in _mapping(entries, f"{place}.{owner}").items():
+            if name not in known:
+                _refuse(
+                    f"{place}.{owner}.{name}",
+                    "a limit of no criterion",
+                    f"one of {', '.join(sorted(known))}",
+                    "Correct the name; a misspelt limit would judge nothing.",
+                )
+            yield owner, name, value
+
+
+def _mapping(value: Any, where: str) -> Mapping[str, Any]:
+    if value is None:
+        return {}
+    if not isinstance(value, dict):
+        _refuse(where, type(value).__name__, "owners, and under each its criteria", "Correct it.")
+    return value
+
+
+def _once(where: str, again: bool) -> None:
+    if again:
+        _refuse(where, "a second entry", "one owner and one place", "Remove one of the two.")
+
+
+def _limit(value: Any, owner: Owner, item: Criterion, where: str) -> Limit:
+    if not isinstance(value, list) or len(value) != 2:
+        _refuse(where, repr(value)[:60], "[limit, reason]", "Give both.")
+    found, reason = value
+    derives = item.derived is not None
+    if derives != (found == DERIVED):
+        expected = f"`{DERIVED}`, because it follows from settings" if derives else "a number"
+        _refuse(where, repr(found)[:60], expected, "Correct the limit.")
+    number = None if derives else parse_section(_Number, {"limit": found}, where=_full(where)).limit
+    return Limit(number, _reason(reason, where), owner)
+
+
+class _Number(StrictModel):
+    limit: float
+
+
+def _reason(value: Any, where: str) -> str:
+    if not isinstance(value, str) or not value.strip():
+        _refuse(where, f"{value!r} as reason", "a reason in words", "Say why.")
+    return value
+
+
+def _full(where: str) -> str:
+    return f"{PARAMS_FILE}: {where}"
+
+
+def _refuse(where: str, found: str, expected: str, action: str) -> NoReturn:
+    raise ConfigError(where=_full(where), found=found, expected=expected, action=action)

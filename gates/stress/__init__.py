@@ -1,0 +1,1 @@
+"""Gate D, matched simulation and stress: is the gain larger than its cost?"""

@@ -1,0 +1,66 @@
+"""The trial itself: are starts matched, can the test come out either way, does it succeed?"""
+
+import math
+from typing import Any
+
+from gates.criterion import Measured, criterion
+from gates.evidence import Evidence, MissingEvidenceError, number
+from gates.stress.rollouts import NOMINAL, STRESS, StressSettings, rollouts, success_lower
+
+
+@criterion(
+    "<=",
+    question="Did all methods begin from identical states?",
+    look_at="Evaluator: starts differ, so the methods cannot be compared; fix the resets.",
+    per_candidate=True,
+)
+def unmatched_starts(evidence: Evidence, settings: StressSettings, candidate: str) -> Measured:
+    """Starts, by hash of the state after reset, that the candidate and a baseline do not share."""
+    own = _starts(evidence, settings, candidate)
+    unmatched = {name: len(own ^ _starts(evidence, settings, name)) for name in settings.baselines}
+    text = f"{len(own)} starts by state hash; " + ", ".join(
+        f"{name} {n}" for name, n in unmatched.items()
+    )
+    return Measured(float(sum(unmatched.values())), caveat=text)
+
+
+def _starts(evidence: Evidence, settings: StressSettings, method: str) -> set[tuple[str, int, str]]:
+    rows = rollouts(evidence, settings, method)
+    if rows[["seed", "perturbation", "start"]].duplicated().any():
+        raise MissingEvidenceError(f"{method} has two rows of one seed, condition and start")
+    if rows["start_sha256"].fillna("").astype(str).eq("").any():
+        raise MissingEvidenceError(f"{method} has a start without hash")
+    return set(zip(rows["perturbation"], rows["start"], rows["start_sha256"], strict=True))
+
+
+@criterion(
+    ">=",
+    question="Could the test have come out either way at this size?",
+    look_at="Evaluator: too few starts for this margin; plan more before looking at results.",
+)
+def verdict_reachable(evidence: Evidence, settings: StressSettings) -> Measured:
+    """1 if the pre-registered test reaches both verdicts often enough, else 0."""
+    document = evidence.document(f"{STRESS}/power.json")
+    stated = {"margin": settings.margin, "alpha": settings.alpha, "pairs": settings.planned_starts}
+    for key, value in stated.items():
+        if not math.isclose(number(document, key), value, rel_tol=1e-9):
+            raise MissingEvidenceError(f"the power table is for another {key}")
+    rows: Any = document.get("rows")
+    if not isinstance(rows, list) or not rows:
+        raise MissingEvidenceError("the power table has no rows")
+    promote = max(number(row, "promote_share") for row in rows)
+    back = max(number(row, "return_share") for row in rows)
+    reachable = min(promote, back) >= settings.minimum_power
+    text = f"promote reached in {promote:.3g} of simulated trials, return in {back:.3g}"
+    return Measured(float(reachable), caveat=text)
+
+
+@criterion(
+    ">=",
+    question="Does it succeed undisturbed?",
+    look_at="Generator training: it fails undisturbed; look at samples before stress.",
+    per_candidate=True,
+)
+def nominal_success_lower(evidence: Evidence, settings: StressSettings, candidate: str) -> Measured:
+    """Lower bound of success without perturbation."""
+    return success_lower(evidence, settings, candidate, (NOMINAL,))

@@ -1,0 +1,142 @@
+"""Limits by owner, waivers, and numbers that have one home."""
+
+import copy
+
+import evidence
+import pytest
+
+from flows.workspace import merged
+from gates.card.card import CardSettings
+from gates.proof import SPECS, judge
+from gates.settings import read_limits, read_settings
+from genpolicy.errors import ConfigError
+from genpolicy.integrity.documents import read_yaml
+
+
+def _params(change=lambda params: None):
+    params = copy.deepcopy(evidence.PARAMS)
+    change(params)
+    return params
+
+
+def _limits(change, gate="A"):
+    return read_limits(_params(change), gate, SPECS[gate].criteria)
+
+
+def test_a_limit_has_its_reason_and_owner():
+    limits = _limits(lambda params: None)
+    assert set(limits.of) == evidence.limited("gate_a") and not limits.waived
+    one = limits.of["clock_residual_s"]
+    assert (one.limit, one.reason, one.owner) == (0.01, "test", "perception")
+
+
+@pytest.mark.parametrize(
+    ("owner", "entry", "text"),
+    [
+        ("perception", {"clock_residul_s": [1, "r"]}, "limit of no criterion"),
+        ("nobody", {"held_out_situations": [1, "r"]}, "no owner"),
+        ("controller", {"clock_residual_s": [1, "r"]}, "a second entry"),
+        ("perception", {"clock_residual_s": [1, ""]}, "a reason in words"),
+        ("perception", {"clock_residual_s": [1, "  "]}, "a reason in words"),
+        ("perception", {"clock_residual_s": [1]}, r"\[limit, reason\]"),
+        ("perception", {"clock_residual_s": 1}, r"\[limit, reason\]"),
+        ("perception", {"clock_residual_s": ["1", "r"]}, "limit"),
+        ("perception", {"clock_residual_s": [True, "r"]}, "limit"),
+        ("perception", {"clock_residual_s": [float("nan"), "r"]}, "clock_residual_s"),
+        ("perception", {"clock_residual_s": ["derived", "r"]}, "a number"),
+        ("perception", [1], "owners, and under each"),
+    ],
+)
+def test_a_malformed_limit_is_a_configuration_error(owner, entry, text):
+    def change(params):
+        limits = params["gate_a"]["limits"]
+        limits[owner] = {**limits.get(owner, {}), **entry} if isinstance(entry, dict) else entry
+
+    with pytest.raises(ConfigError, match=text):
+        _limits(change)
+
+
+def test_a_limit_that_follows_from_settings_is_not_written_as_a_number(ladder):
+    evidence.write_params(ladder, evidence.set_limit("gate_d", "promotion_e_value", 5))
+    with pytest.raises(ConfigError, match="`derived`, because it follows from settings"):
+        judge(ladder, "D")
+
+
+def test_the_promotion_limit_is_one_over_the_alpha_of_one_candidate(ladder):
+    found = [c for c in judge(ladder, "D").criteria if c.id == "promotion_e_value"]
+    assert {c.threshold for c in found} == {len(evidence.CANDIDATES) / 0.1}
+
+
+def _waive(owner, name, reason="no such thing in this cell", gate="gate_a"):
+    def change(params):
+        for entries in params[gate]["limits"].values():
+            entries.pop(name, None)
+        params[gate]["not_applicable"] = {owner: {name: reason}}
+
+    return change
+
+
+def test_a_criterion_that_does_not_apply_is_said_and_not_asked(ladder):
+    evidence.write_params(ladder, _waive("perception", "calibration_residual_m"))
+    (ladder / "artifacts/audit/calibration.parquet").unlink()
+    report = judge(ladder, "A")
+    assert report.verdict == "PASS"
+    assert "calibration_residual_m" not in {c.id for c in report.criteria}
+    assert any("calibration_residual_m" in c and "no such thing" in c for c in report.caveats)
+
+
+@pytest.mark.parametrize(
+    ("gate", "name"), [(g, i.id) for g, s in SPECS.items() for i in s.criteria if i.always]
+)
+def test_what_always_applies_cannot_be_waived(gate, name):
+    change = _waive("safety", name, gate=f"gate_{gate.lower()}")
+    with pytest.raises(ConfigError, match="It applies to every cell"):
+        _limits(change, gate)
+
+
+def test_a_waiver_needs_a_reason_and_excludes_a_limit():
+    with pytest.raises(ConfigError, match="a reason in words"):
+        _limits(_waive("perception", "calibration_residual_m", ""))
+    with pytest.raises(ConfigError, match="a second entry"):
+        _limits(
+            lambda p: p["gate_a"].update(not_applicable={"model": {"cause_accepted": "because"}})
+        )
+
+
+def test_a_number_has_one_home():
+    settings = read_settings(_params(), "gate_d", SPECS["D"].settings)
+    assert settings.candidates == evidence.CANDIDATES
+    assert (settings.margin, settings.planned_starts) == (0.1, evidence.STARTS)
+    assert settings.alpha == 0.05
+    with pytest.raises(ConfigError, match=r"gate_d\.margin is a second home.*stress\.margin"):
+        read_settings(
+            _params(lambda p: p["gate_d"].update(margin=0.2)), "gate_d", SPECS["D"].settings
+        )
+    with pytest.raises(ConfigError, match=r"stress\.margin is missing"):
+        read_settings(_params(lambda p: p["stress"].pop("margin")), "gate_d", SPECS["D"].settings)
+    card = read_settings(_params(), "card", CardSettings)
+    assert (card.task, card.robot_model) == ("tabletop_insertion", "panda")
+
+
+def test_conditions_are_the_undisturbed_one_and_more():
+    for left in ({"push": {}}, {"nominal": {}}):
+        params = _params(lambda p, n=left: p["stress"].update(perturbations=n))
+        with pytest.raises(ConfigError, match="at least one more"):
+            read_settings(params, "gate_d", SPECS["D"].settings)
+
+
+def test_the_smoke_ladder_gives_its_own_limits_and_reasons(request):
+    root = request.config.rootpath
+    params = merged(read_yaml(root / "params.yaml"), read_yaml(root / "params.smoke.yaml"))
+    for gate, spec in SPECS.items():
+        limits = read_limits(params, gate, spec.criteria)
+        assert set(limits.of) == {item.id for item in spec.criteria}
+    one = read_limits(params, "B", SPECS["B"].criteria).of["mode_coverage_lower"]
+    assert (one.limit, one.owner) == (0.3, "model") and one.reason.startswith("smoke:")
+
+
+def test_a_measure_sees_the_limits_that_its_gate_judges_by():
+    limits = _limits(lambda params: None)
+    settings = read_settings(_params(), "gate_a", SPECS["A"].settings)
+    assert settings.limits.of == {} and settings.under(limits).limits is limits
+    assert settings.under(limits).model_dump() == settings.model_dump()
