@@ -240,17 +240,17 @@ class _Recorder:
 
 
 def _camera(spec: EpisodeSpec, recorder: _Recorder, frames: int) -> Array:
-    assert isinstance(spec.start, InsertionStart), "`demonstrate` refuses any other"
-    start, error = spec.start.variables(), find_epoch(spec.calibration_epoch).camera
+    start, error = spec.start, find_epoch(spec.calibration_epoch).camera
+    assert isinstance(start, InsertionStart)  # `demonstrate` has refused any other
     noise = recorder.noise(CAMERA_STREAM, (frames, 4))
-    yaw = start["hole_yaw_rad"] + error.yaw_rad + CAMERA_NOISE_RAD * noise[:, 2]
+    yaw = start.hole_yaw_rad + error.yaw_rad + CAMERA_NOISE_RAD * noise[:, 2]
     return np.stack(
         [
-            start["hole_x_m"] + error.x_m + CAMERA_NOISE_M * noise[:, 0],
-            start["hole_y_m"] + error.y_m + CAMERA_NOISE_M * noise[:, 1],
+            start.hole_x_m + error.x_m + CAMERA_NOISE_M * noise[:, 0],
+            start.hole_y_m + error.y_m + CAMERA_NOISE_M * noise[:, 1],
             np.cos(yaw),
             np.sin(yaw),
-            start["post_y_m"] + error.y_m + CAMERA_NOISE_M * noise[:, 3],
+            start.post_y_m + error.y_m + CAMERA_NOISE_M * noise[:, 3],
         ],
         axis=1,
     )

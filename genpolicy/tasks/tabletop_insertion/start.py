@@ -48,10 +48,6 @@ class InsertionStart:
         """Canonical JSON text, for replay."""
         return canonical_json(asdict(self)).decode()
 
-    def variables(self) -> dict[str, float]:
-        """Each drawn number by name."""
-        return asdict(self)
-
 
 def sample_start(rng: np.random.Generator) -> InsertionStart:
     """Draw a start; each number uniform in its range, independent of the others."""

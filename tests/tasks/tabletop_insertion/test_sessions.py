@@ -1,3 +1,5 @@
+from dataclasses import asdict
+
 import numpy as np
 import pytest
 from scipy.stats import chi2_contingency
@@ -15,7 +17,7 @@ def test_the_side_is_a_fair_coin():
 
 
 def test_the_side_depends_on_no_start_variable():
-    starts = np.array([list(spec.start.variables().values()) for spec in SPECS])
+    starts = np.array([list(asdict(spec.start).values()) for spec in SPECS])
     standard = (starts - starts.mean(axis=0)) / starts.std(axis=0)
     design = np.column_stack([np.ones(len(SPECS)), standard, standard**2])
     coefficients, *_ = np.linalg.lstsq(design, SIDE.astype(float), rcond=None)
