@@ -4,7 +4,6 @@ from pydantic import Field
 
 from genpolicy.contract.settings import Settings
 from genpolicy.evidence.need.study import LatentTest, Study
-from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.policies.matched_training import PolicySettings
 from genpolicy.policies.settings import SamplerConfig
@@ -38,7 +37,6 @@ def study_of(params: Params, section: StudySection) -> Study:
         settings=params.section("policy", PolicySettings),
         horizons=params.horizons,
         feasibility=params.section("feasibility", FeasibilitySettings),
-        maximum_age_s=params.section("execution", ExecutionSettings).maximum_age_s,
         latent=section.latent,
         samples=section.samples,
         fixtures=section.fixtures,

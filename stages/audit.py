@@ -4,7 +4,6 @@ from genpolicy.audit.evidence import write_evidence
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.evidence.need.audit_task import audit_task, round_obstacles
 from genpolicy.evidence.need.pictures import scene_png
-from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import output_folder, write_bytes
 from genpolicy.tasks.api import load_task
@@ -21,7 +20,6 @@ def work(params: Params) -> None:
             task_name=params.task.name,
             settings=settings,
             feasibility=feasibility,
-            maximum_age_s=params.section("execution", ExecutionSettings).maximum_age_s,
             action_period_s=params.horizons.action_period_s,
             root_seed=params.seed,
         )

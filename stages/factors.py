@@ -4,7 +4,6 @@ from pydantic import Field
 
 from genpolicy.contract.settings import Settings
 from genpolicy.evidence.need.factors import FactorStudy, Variant, run_factors
-from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import output_folder
 from genpolicy.policies.matched_training import PolicySettings
@@ -42,7 +41,6 @@ def work(params: Params) -> None:
         settings=shared.model_copy(update={"training": training, "seeds": section.seeds}),
         horizons=params.horizons,
         feasibility=params.section("feasibility", FeasibilitySettings),
-        maximum_age_s=params.section("execution", ExecutionSettings).maximum_age_s,
         samples=section.samples,
         stride=section.stride,
         root_seed=params.seed,

@@ -9,7 +9,6 @@ import pyarrow as pa
 
 from gates.admission import admit
 from genpolicy.evidence.reproducibility.latency import LATENCY, LatencyJob, latency_rows
-from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import output_folder
 from genpolicy.integrity.tables import write_table
@@ -38,7 +37,6 @@ def work(params: Params) -> None:
             dataset=ARTIFACTS / "ingest",
             task=params.task.name,
             feasibility=params.section("feasibility", FeasibilitySettings),
-            maximum_age_s=params.section("execution", ExecutionSettings).maximum_age_s,
             horizons=params.horizons,
             warm=section.warm,
             cold=section.cold,

@@ -8,7 +8,6 @@ from gates.admission import admit
 from genpolicy.contract.settings import Settings
 from genpolicy.evidence.admission_context import make_checker
 from genpolicy.evidence.reproducibility.reload import ReloadPlan, write_reload
-from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import output_folder
 from genpolicy.policies.matched_training import PolicySettings
@@ -46,7 +45,6 @@ def work(params: Params) -> None:
             sweep=section.sweep,
             samples=section.samples,
             horizons=params.horizons,
-            maximum_age_s=params.section("execution", ExecutionSettings).maximum_age_s,
         )
         checker = make_checker(task, params.section("feasibility", FeasibilitySettings))
         write_reload(plan, folder, task=task, checker=checker)

@@ -17,9 +17,6 @@ from genpolicy.tasks.api import ENTRY_POINT_GROUP, load_task
 
 Array = NDArray[np.float64]
 
-ANY_AGE_S = 1.0
-"""Recorded chunks are checked at the age 0; any positive limit of the age lets them pass."""
-
 
 @dataclass(frozen=True)
 class TaskChecks:
@@ -65,12 +62,9 @@ def task_checks(dataset: Dataset, *, task: str | None, chunk_steps: int) -> Task
     period_s = float(dataset.manifest["action_contract"]["period_s"])
     limits = FeasibilitySettings(action_period_s=period_s, maximum_actions=max(16, chunk_steps))
     checker = make_checker(plugin, limits)
-    ages = dict.fromkeys(dataset.manifest["phases"], ANY_AGE_S)
 
     def is_admissible(actions: Array, observation: Array) -> tuple[bool, str]:
-        return admissible(
-            plugin, checker, actions, observation, action_period_s=period_s, maximum_age_s=ages
-        )
+        return admissible(plugin, checker, actions, observation, action_period_s=period_s)
 
     starts = dataset.episodes["scene_start"].tolist()
     recorded = all(isinstance(start, str) and start not in ("", "null", "{}") for start in starts)

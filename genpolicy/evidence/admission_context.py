@@ -111,19 +111,18 @@ def context_at_rest(
     checker: FeasibilityChecker,
     observation: Array,
     *,
-    maximum_age_s: dict[str, float],
     execution_horizon: int | None,
 ) -> Context:
     """Context of a recorded observation, for chunks that begin at it.
 
     Where the robot stands follows from the observed TCP pose; commands before it are not
-    assumed, so that the seam is judged by speed alone.
+    assumed, so that the seam is judged by speed alone. The chunk begins at the observation: its
+    age is 0, and 0 is what it may be.
 
     Args:
         task: The task.
         checker: Does the inverse kinematics.
         observation: Newest observation. Shape (D_o,).
-        maximum_age_s: By phase.
         execution_horizon: Rows that would be executed; None checks the whole chunk.
     """
     action = task.action_at(observation)
@@ -138,7 +137,7 @@ def context_at_rest(
         now_s=0.0,
         phase=phase,
         latest_observation_s=0.0,
-        session=Session(RECORDED, 0, RECORDED, RECORDED, maximum_age_s),
+        session=Session(RECORDED, 0, RECORDED, RECORDED, {phase: 0.0}),
         first_index=0,
         end_index=execution_horizon,
     )

@@ -1,5 +1,8 @@
 """What feasibility is told of a moment: seam, scene, freshness."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -10,15 +13,23 @@ from genpolicy.evidence.admission_context import (
     seam,
 )
 from genpolicy.tasks.api import WorldSettings
+from genpolicy.tasks.tabletop_insertion.episodes import demonstrate
 
 
 @pytest.fixture(scope="module")
-def world(task, plans, kit):
-    return task.make_world(plans.starts[0], settings=WorldSettings(kit.EPOCH))
+def plan(task):
+    """One demonstration without incident: where it starts and what the operator commanded."""
+    spec = task.episode_specs(5, 1, shares={"nominal": 1.0})[0]
+    return SimpleNamespace(start=spec.start, actions=demonstrate(spec).actions)
 
 
-def test_the_seam_continues_the_commands(checker, plans, world):
-    commands = list(plans.actions[0][:3])
+@pytest.fixture(scope="module")
+def world(task, plan):
+    return task.make_world(plan.start, settings=WorldSettings("epoch_1"))
+
+
+def test_the_seam_continues_the_commands(checker, plan, world):
+    commands = list(plan.actions[:3])
     q_cmd, before = seam(checker, commands, world.q_meas)
     assert q_cmd.shape == (7,) and before.shape == (2, 7)
     position, _ = checker.kinematics.forward(np.concatenate([before, q_cmd[None]]))
@@ -27,14 +38,14 @@ def test_the_seam_continues_the_commands(checker, plans, world):
     assert np.abs(np.diff(np.concatenate([before, q_cmd[None]]), axis=0)).max() < 0.1
 
 
-def test_a_recorded_chunk_at_rest_is_fresh_and_admissible(task, checker, plans, world, kit):
+def test_a_recorded_chunk_at_rest_is_fresh_and_admissible(task, checker, plan, world, kit):
     observation = world.observe()
     context = context_at_rest(
         task, checker, observation,
-        maximum_age_s=kit.EXECUTION.maximum_age_s, execution_horizon=8,
+        execution_horizon=8,
     )  # fmt: skip
     chunk = recorded_proposal(
-        task, plans.actions[0][:16], observation, action_period_s=0.05, chunk_id="a"
+        task, plan.actions[:16], observation, action_period_s=0.05, chunk_id="a"
     )
     assert context.rows(16) == slice(0, 8)
     assert context.phase == chunk.metadata.task_phase == "approach"
@@ -43,9 +54,14 @@ def test_a_recorded_chunk_at_rest_is_fresh_and_admissible(task, checker, plans, 
     assert result.verdict.passed, result.verdict.first_reason
 
 
-def test_a_phase_without_an_age_is_an_error(task, checker, world):
-    with pytest.raises(KeyError, match="approach"):
-        context_at_rest(task, checker, world.observe(), maximum_age_s={}, execution_horizon=None)
+def test_a_recorded_chunk_has_age_zero_and_may_not_be_older(task, checker, plan, world):
+    context = context_at_rest(task, checker, world.observe(), execution_horizon=None)
+    assert context.maximum_age_s == 0.0 and context.now_s == 0.0
+    chunk = recorded_proposal(
+        task, plan.actions[:16], world.observe(), action_period_s=0.05, chunk_id="a"
+    )
+    late = checker.admit(chunk, context=replace(context, now_s=0.01))
+    assert late.verdict.margins["stale_observation"] < 0
 
 
 def test_a_disabled_check_is_left_out_by_name(task, kit):

@@ -23,7 +23,6 @@ def audit_task(
     task_name: str,
     settings: AuditSettings,
     feasibility: FeasibilitySettings,
-    maximum_age_s: dict[str, float],
     action_period_s: float,
     root_seed: int,
 ) -> AuditResult:
@@ -34,7 +33,6 @@ def audit_task(
         task_name: Registered name.
         settings: What counts as near, as two modes, as red.
         feasibility: Thresholds of the six layers.
-        maximum_age_s: Largest action age by phase.
         action_period_s: Time between actions, s.
         root_seed: Root seed.
     """
@@ -49,7 +47,6 @@ def audit_task(
             actions,
             observation,
             action_period_s=action_period_s,
-            maximum_age_s=maximum_age_s,
         )
 
     return audit(

@@ -91,7 +91,6 @@ class FactorStudy:
         settings: What all share; training steps are those of this study.
         horizons: Common horizons.
         feasibility: Thresholds of the six layers.
-        maximum_age_s: Largest action age by phase.
         samples: Candidates per situation of a convention that draws.
         stride: Every so many held-out windows are compared.
         root_seed: Root seed.
@@ -105,7 +104,6 @@ class FactorStudy:
     settings: PolicySettings
     horizons: HorizonConfig
     feasibility: FeasibilitySettings
-    maximum_age_s: Mapping[str, float]
     samples: int
     stride: int
     root_seed: int
@@ -276,7 +274,6 @@ def _mode_rows(job: VariantJob, data: Dataset, policy: NetworkPolicy, convention
         samples=study.samples if policy.stochastic else 1,
         task=task,
         checker=make_checker(task, study.feasibility),
-        maximum_age_s=dict(study.maximum_age_s),
     )
 
 

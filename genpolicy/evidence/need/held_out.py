@@ -62,7 +62,6 @@ def modes_of_policy(
     samples: int,
     task: Task,
     checker: FeasibilityChecker,
-    maximum_age_s: dict[str, float],
 ) -> list[dict[str, Any]]:
     """Rows of `modes.parquet`: modes reached and admissible samples, per situation."""
     if not held_out.situations:
@@ -91,7 +90,6 @@ def modes_of_policy(
                     chunks,
                     observation,
                     action_period_s=policy.horizons.action_period_s,
-                    maximum_age_s=maximum_age_s,
                 ),
                 "nfe": drawn.nfe,
                 "spread_m": float(chunks[:, :, POSITION].std(axis=0).mean()),
@@ -107,7 +105,6 @@ def admissible_count(
     observation: Array,
     *,
     action_period_s: float,
-    maximum_age_s: dict[str, float],
 ) -> int:
     """How many chunks (S, K, D_a) pass all six layers at a recorded observation (D_o,)."""
     return sum(
@@ -117,7 +114,6 @@ def admissible_count(
             chunk,
             observation,
             action_period_s=action_period_s,
-            maximum_age_s=maximum_age_s,
         )[0]
         for chunk in chunks
     )
@@ -130,16 +126,13 @@ def admissible(
     observation: Array,
     *,
     action_period_s: float,
-    maximum_age_s: dict[str, float],
 ) -> tuple[bool, str]:
     """Whether a whole chunk (K, D_a) passes all six layers at a recorded observation, and why not.
 
     Returns:
         The verdict, and `layer: reason` where it is a no.
     """
-    context = context_at_rest(
-        task, checker, observation, maximum_age_s=maximum_age_s, execution_horizon=None
-    )
+    context = context_at_rest(task, checker, observation, execution_horizon=None)
     proposal = recorded_proposal(
         task, actions, observation, action_period_s=action_period_s, chunk_id="recorded"
     )

@@ -64,7 +64,6 @@ class Study:
         settings: What the methods share.
         horizons: Common horizons.
         feasibility: Thresholds of the six layers.
-        maximum_age_s: Largest action age by phase.
         latent: Method whose latent is tested; None tests none.
         samples: Candidates per situation.
         fixtures: Observations whose samples must be reproduced after reload.
@@ -80,7 +79,6 @@ class Study:
     settings: PolicySettings
     horizons: HorizonConfig
     feasibility: FeasibilitySettings
-    maximum_age_s: Mapping[str, float]
     latent: LatentTest | None
     samples: int
     fixtures: int
@@ -225,7 +223,6 @@ def mode_rows(job: Evaluation, data: Dataset, policy: NetworkPolicy) -> list[dic
             samples=study.samples,
             task=task,
             checker=checker,
-            maximum_age_s=dict(study.maximum_age_s),
         )
     return rows
 

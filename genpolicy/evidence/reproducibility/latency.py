@@ -59,7 +59,6 @@ class LatencyJob:
         dataset: Folder of the dataset, for realistic observations.
         task: Registered name of the task.
         feasibility: Thresholds of the six layers; their run time is the term `project`.
-        maximum_age_s: Largest action age by phase.
         horizons: Common horizons.
         warm: Warm invocations.
         cold: Cold invocations.
@@ -70,7 +69,6 @@ class LatencyJob:
     dataset: Path
     task: str
     feasibility: FeasibilitySettings
-    maximum_age_s: Mapping[str, float]
     horizons: HorizonConfig
     warm: int
     cold: int
@@ -114,13 +112,11 @@ def measure_job(job: LatencyJob) -> list[dict[str, Any]]:
     observations = fixture_observations(data, horizons=job.horizons, count=32)
     task = load_task(job.task)
     checker = make_checker(task, job.feasibility)
-    ages = dict(job.maximum_age_s)
     contexts = [
         context_at_rest(
             task,
             checker,
             row[-1],
-            maximum_age_s=ages,
             execution_horizon=job.horizons.execution_horizon,
         )
         for row in observations

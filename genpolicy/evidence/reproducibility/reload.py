@@ -38,7 +38,6 @@ class ReloadPlan:
         sweep: Sampler steps to try, by method.
         samples: Candidates per situation in the sweep.
         horizons: Common horizons.
-        maximum_age_s: Largest action age by phase.
     """
 
     checkpoints: Path
@@ -50,7 +49,6 @@ class ReloadPlan:
     sweep: Mapping[str, Sequence[int]]
     samples: int
     horizons: HorizonConfig
-    maximum_age_s: Mapping[str, float]
 
 
 def write_reload(
@@ -126,7 +124,6 @@ def _sweep(
             samples=plan.samples,
             task=task,
             checker=checker,
-            maximum_age_s=dict(plan.maximum_age_s),
         )
         if not found:
             continue

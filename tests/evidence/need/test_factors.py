@@ -36,7 +36,6 @@ def study_of(kit, variants):
         settings=kit.POLICY.model_copy(update={"training": training}),
         horizons=kit.HORIZONS,
         feasibility=kit.FEASIBILITY,
-        maximum_age_s=kit.EXECUTION.maximum_age_s,
         samples=3,
         stride=16,
         root_seed=2,

@@ -58,7 +58,6 @@ def test_no_situation_gives_no_row(data, kit, tmp_path, policy, task, checker):
     found = held_out_situations(audit, data, horizons=kit.HORIZONS)
     rows = modes_of_policy(
         policy, found, seed=0, convention="x", samples=2, task=task, checker=checker,
-        maximum_age_s=kit.EXECUTION.maximum_age_s,
     )  # fmt: skip
     assert rows == []
 
@@ -70,7 +69,6 @@ def test_rows_count_modes_and_samples(data, kit, tmp_path, policy, task, checker
     found = held_out_situations(audit, data, horizons=kit.HORIZONS)
     rows = modes_of_policy(
         policy, found, seed=3, convention="euler", samples=4, task=task, checker=checker,
-        maximum_age_s=kit.EXECUTION.maximum_age_s,
     )  # fmt: skip
     assert len(rows) == 2
     for row in rows:
@@ -92,7 +90,7 @@ def demonstrated(data, number, index, steps=16):
 
 def test_a_demonstrated_chunk_is_admissible_and_its_damage_is_named(data, kit, task, checker):
     actions, observation = demonstrated(data, 9, 0)
-    keywords = {"action_period_s": 0.05, "maximum_age_s": kit.EXECUTION.maximum_age_s}
+    keywords = {"action_period_s": 0.05}
     assert admissible(task, checker, actions, observation, **keywords) == (True, "")
     broken = np.array(actions)
     broken[3, 0] = np.nan
