@@ -9,8 +9,8 @@ from genpolicy.integrity.documents import canonical_json, read_json
 from genpolicy.policies.checkpoint import CONFIG_FILE
 from genpolicy.policies.matched_training import (
     ALLOWED_DIFFERENCES,
-    matched_configuration,
     TrainingPlan,
+    matched_configuration,
     seed_folders,
     train_methods,
 )

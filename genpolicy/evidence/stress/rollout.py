@@ -15,9 +15,8 @@ from genpolicy.contract.chunk import Candidate, ChunkMetadata, DiscardReason, Pr
 from genpolicy.errors import ContractError
 from genpolicy.evidence.admission_context import COMMANDS_AT_THE_SEAM, Moment, Session, context_of
 from genpolicy.evidence.stress.fallback import PlannedFallback
-from genpolicy.evidence.stress.latency import draw_latency
-from genpolicy.evidence.stress.perturbations import Push, injection, push
-from genpolicy.evidence.stress.state import Fixture, InFlight, Outcome, Tally
+from genpolicy.evidence.stress.perturbations import Push, push
+from genpolicy.evidence.stress.state import Fixture, InFlight, Outcome, Tally, in_flight
 from genpolicy.execution.command import Command
 from genpolicy.execution.executor import Executor
 from genpolicy.execution.journal import Journal
@@ -178,7 +177,7 @@ class Rollout:
         self.wanted = None
         self._recover(now_s)
         if not self.done and self._may_invoke(now_s):
-            self.wanted = self._begin_invocation(now_s, self.history[-1])
+            self.wanted = self._begin_invocation(now_s)
 
     def act(self) -> None:
         """One tick of the executor, one action period of the world."""
@@ -226,31 +225,14 @@ class Rollout:
     def _may_invoke(self, now_s: float) -> bool:
         return self.recovery.state is RecoveryState.IDLE and self.executor.needs_invocation(now_s)
 
-    def _begin_invocation(self, now_s: float, observation: Array) -> InFlight:
-        fixture, horizons = self.fixture, self.fixture.horizons
-        number = self.invocations
+    def _begin_invocation(self, now_s: float) -> InFlight:
+        horizons, number = self.fixture.horizons, self.invocations
         self.invocations += 1
-        hit = injection(
-            fixture.schedule,
-            root_seed=fixture.root_seed,
-            name=fixture.perturbation,
-            start=self.start_index,
-            invocation=number,
-        )
-        draw = draw_latency(
-            fixture.latency,
-            root_seed=fixture.root_seed,
-            perturbation=fixture.perturbation,
-            start=self.start_index,
-            invocation=number,
-            extra_s=hit.extra_s,
-            compute_factor=hit.compute_factor,
-        )
         metadata = ChunkMetadata(
             chunk_id=f"{self.journal.session}/{number}",
             condition_observation_event_time_s=now_s,
-            policy_checkpoint_hash=fixture.checkpoint,
-            sampler_config_hash=fixture.sampler,
+            policy_checkpoint_hash=self.fixture.checkpoint,
+            sampler_config_hash=self.fixture.sampler,
             action_start_time_s=now_s,
             action_period_s=horizons.action_period_s,
             valid_until_s=now_s + horizons.execution_horizon * horizons.action_period_s,
@@ -258,20 +240,15 @@ class Rollout:
             calibration_epoch=self.world.calibration_epoch,
             predecessor_chunk_id=self.executor.chain_head,
             session_epoch=self.executor.session_epoch,
-            method=fixture.method,
+            method=self.fixture.method,
             candidate_index=0,
         )
-        self.executor.begin_invocation(now_s, metadata.chunk_id)
-        self.tally.latencies_s.append(draw.total_s)
-        return InFlight(
-            number=number,
-            metadata=metadata,
-            observation=observation,
-            begun_s=now_s,
-            arrival_s=now_s + draw.total_s,
-            terms=draw.terms,
-            dropped=hit.dropped,
+        flying = in_flight(
+            self.fixture, metadata, self.history[-1], start=self.start_index, number=number
         )
+        self.executor.begin_invocation(now_s, metadata.chunk_id)
+        self.tally.latencies_s.append(flying.total_s)
+        return flying
 
     def _collect_deliveries(self, now_s: float) -> None:
         for flying in sorted(self._flying, key=lambda item: (item.arrival_s, item.number)):

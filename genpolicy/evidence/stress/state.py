@@ -1,6 +1,5 @@
 """What rollouts share, and what one of them carries along."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -9,8 +8,8 @@ from numpy.typing import NDArray
 
 from genpolicy.contract.chunk import ChunkMetadata
 from genpolicy.contract.horizons import HorizonConfig
-from genpolicy.evidence.stress.latency import LatencyModel
-from genpolicy.evidence.stress.perturbations import Perturbation
+from genpolicy.evidence.stress.latency import LatencyModel, draw_latency
+from genpolicy.evidence.stress.perturbations import Perturbation, injection
 from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.feasibility.admission import FeasibilityChecker
 from genpolicy.tasks.api import Task
@@ -69,7 +68,7 @@ class InFlight:
         observation: What it is conditioned on; the newest of the history. Shape (D_o,).
         begun_s: Tick at which it began.
         arrival_s: When it is delivered.
-        terms: The eleven latency terms, s.
+        total_s: Its end-to-end latency, the sum of the eleven terms, s.
         dropped: Lost on the way.
         chunks: Sampled candidates, filled in by the batch. Shape (N, K, D_a).
         given_up: Its deadline has passed.
@@ -80,7 +79,7 @@ class InFlight:
     observation: Array
     begun_s: float
     arrival_s: float
-    terms: Mapping[str, float]
+    total_s: float
     dropped: bool
     chunks: Array | None = None
     given_up: bool = False
@@ -100,3 +99,43 @@ class Tally:
     rejected_by: dict[str, int] = field(default_factory=dict)
     latencies_s: list[float] = field(default_factory=list)
     path_m: list[Array] = field(default_factory=list)
+
+
+def in_flight(
+    fixture: Fixture, metadata: ChunkMetadata, observation: Array, *, start: int, number: int
+) -> InFlight:
+    """An invocation that begins now: how long it takes, and what it suffers.
+
+    Args:
+        fixture: What all rollouts share.
+        metadata: Of the chunk to come; it begins at `action_start_time_s`.
+        observation: What it is conditioned on. Shape (D_o,).
+        start: Index of the initial state; key of the draws.
+        number: Count of invocations in this rollout; key of the draws.
+    """
+    hit = injection(
+        fixture.schedule,
+        root_seed=fixture.root_seed,
+        name=fixture.perturbation,
+        start=start,
+        invocation=number,
+    )
+    draw = draw_latency(
+        fixture.latency,
+        root_seed=fixture.root_seed,
+        perturbation=fixture.perturbation,
+        start=start,
+        invocation=number,
+        extra_s=hit.extra_s,
+        compute_factor=hit.compute_factor,
+    )
+    begun_s = metadata.action_start_time_s
+    return InFlight(
+        number=number,
+        metadata=metadata,
+        observation=observation,
+        begun_s=begun_s,
+        arrival_s=begun_s + draw.total_s,
+        total_s=draw.total_s,
+        dropped=hit.dropped,
+    )
