@@ -15,7 +15,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from types import SimpleNamespace
 from typing import Any
 from unittest.mock import patch
 
@@ -26,15 +25,17 @@ from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.contract.normalisation import MinMax, Normalisation
 from genpolicy.evidence.admission_context import make_checker
 from genpolicy.evidence.stress import rollout as rollout_module
+from genpolicy.evidence.stress import state as state_module
 from genpolicy.evidence.stress.latency import (
     DECLARED_TERMS,
     MEASURED_TERMS,
     DeclaredTerm,
     LatencyModel,
 )
-from genpolicy.evidence.stress.matched import _step
-from genpolicy.evidence.stress.perturbations import PerturbationSettings
-from genpolicy.evidence.stress.rollout import Fixture, Outcome, Rollout
+from genpolicy.evidence.stress.matched import step
+from genpolicy.evidence.stress.perturbations import Nominal
+from genpolicy.evidence.stress.rollout import Rollout
+from genpolicy.evidence.stress.state import Fixture, Outcome
 from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.execution.executor import Executor
 from genpolicy.feasibility.admission import FeasibilityChecker
@@ -55,7 +56,7 @@ from genpolicy.tasks.tabletop_insertion.world import SUB_STEPS, TabletopWorld
 PARAMS = read_yaml(Path(__file__).parents[1] / "params.yaml")
 HORIZONS = HorizonConfig(**PARAMS["horizons"])
 ROLLOUTS, CANDIDATES, TICKS = 16, 4, 240
-SAMPLER = SamplerConfig(**PARAMS["generators"]["samplers"]["flow"])
+SAMPLER = SamplerConfig(**PARAMS["train_generators"]["samplers"]["flow"])
 
 
 class Rehearsed:
@@ -156,13 +157,12 @@ def closed_loop(policy: Rehearsed, fixture: Fixture, starts: Sequence[Any]) -> t
         for number, start in enumerate(starts)
     ]
     policy.rollouts, policy.memory = {r.start_index: r for r in rollouts}, {}
-    shard: Any = SimpleNamespace(perturbation=fixture.perturbation, candidates=CANDIDATES)
     begin = time.process_time()
     for _ in range(TICKS):
         active = [rollout for rollout in rollouts if not rollout.done]
         if not active:
             break
-        _step(active, policy, shard)  # type: ignore[arg-type]
+        step(active, policy, samples=CANDIDATES)  # type: ignore[arg-type]
     seconds = time.process_time() - begin
     for rollout in rollouts:
         rollout.end(Outcome.TIMEOUT)
@@ -194,7 +194,7 @@ def main() -> None:
             {name: np.full(4, 0.006) for name in MEASURED_TERMS},
             0.0,
         ),
-        perturbation="nominal", schedule=PerturbationSettings(kind="nominal"), root_seed=1,
+        perturbation="nominal", schedule=Nominal(), root_seed=1,
         method="bench", checkpoint="w", sampler="s",
     )  # fmt: skip
     with TemporaryDirectory() as scratch:
@@ -228,7 +228,7 @@ def profile(policy: Rehearsed, fixture: Fixture, starts: Sequence[Any]) -> None:
         "network sample": (NetworkPolicy, "sample"),
         "executor tick": (Executor, "tick"),
         "executor observe": (Executor, "observe"),
-        "latency draws": (rollout_module, "draw_latency"),
+        "latency draws": (state_module, "draw_latency"),
         "observation": (TabletopWorld, "observe"),
     }
     with timer.over(parts):

@@ -27,7 +27,7 @@ class FeasibilitySettings(GateSettings):
         confidence: Coverage of every interval.
         candidates: Methods that stand for promotion.
         required_fixtures: Corrupted fixtures that must have been tried.
-        required_checks: Checks, or layers of checks, each of which must have been disabled once.
+        required_checks: Checks, or layers of checks, each of which must have been left out once.
         unassigned_modes: Labels of candidates that belong to no mode.
     """
 
@@ -286,7 +286,7 @@ def checked_violations(evidence: Evidence, path: str) -> Measured:
 @criterion(
     "<=",
     question="Does disabling any one check turn the checker red?",
-    look_at="Evaluator: a disabled check goes unnoticed, so its green means nothing.",
+    look_at="Evaluator: a check left out goes unnoticed, so its green means nothing.",
     always=True,
 )
 def mutants_undetected(evidence: Evidence, settings: FeasibilitySettings) -> Measured:

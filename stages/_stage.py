@@ -32,10 +32,11 @@ REPORTS = Path("reports")
 TIMES = Path("build/times")
 
 STAGES = (
-    "task", "record", "ingest", "audit", "baselines", "factors", "gate_a", "generators", "reload",
-    "latency", "gate_b", "shadow", "gate_c", "stress", "gate_d", "card", "gate_e",
+    "task", "record", "ingest", "audit", "train_baselines", "measure_baselines", "train_factors",
+    "measure_factors", "gate_a", "train_generators", "reload", "latency", "gate_b", "shadow",
+    "gate_c", "stress", "gate_d", "card", "gate_e",
 )  # fmt: skip
-SHARED = ("seed", "confidence", "task", "horizons", "compute", "policy", "feasibility", "execution")
+SHARED = ("seed", "task", "horizons", "compute", "policy", "feasibility", "execution")
 
 
 class TaskSection(Settings):

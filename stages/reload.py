@@ -1,19 +1,18 @@
-"""Stage `reload`: every candidate comes back in a fresh process; spread and modes against NFE."""
+"""Stage `reload`: every candidate comes back in a fresh process; errors, modes against NFE."""
 
 from pathlib import Path
 
 from pydantic import Field
 
 from gates.proof import admit
+from genpolicy.candidates.judged import trained
 from genpolicy.contract.settings import Settings
-from genpolicy.evidence.admission_context import make_checker
 from genpolicy.evidence.reproducibility.reload import ReloadPlan, write_reload
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import output_folder
 from genpolicy.policies.matched_training import PolicySettings
-from genpolicy.tasks.api import load_task
 from stages._stage import ARTIFACTS, Params, main
-from stages._study import StudySection
+from stages._training import MethodsSection
 
 
 class ReloadSection(Settings):
@@ -32,26 +31,21 @@ def work(params: Params) -> None:
     """Admit through gate A, then reload, compare, sweep."""
     admit("reload", Path.cwd())
     section = params.section("reload", ReloadSection)
-    generators = params.section("generators", StudySection)
-    task = load_task(params.task.name)
+    names = params.section("train_generators", MethodsSection).samplers
+    seeds = params.section("policy", PolicySettings).seeds
+    plan = ReloadPlan(
+        task=params.task.name,
+        feasibility=params.section("feasibility", FeasibilitySettings),
+        dataset=ARTIFACTS / "ingest",
+        audit=ARTIFACTS / "audit",
+        sweep=section.sweep,
+        samples=section.samples,
+        horizons=params.horizons,
+    )
+    root = ARTIFACTS / "train_generators"
+    candidates = trained(root, names, seeds=seeds)
     with output_folder(ARTIFACTS / "reload") as folder:
-        plan = ReloadPlan(
-            checkpoints=ARTIFACTS / "generators",
-            dataset=ARTIFACTS / "ingest",
-            audit=ARTIFACTS / "audit",
-            methods=list(generators.samplers),
-            seeds=params.section("policy", PolicySettings).seeds,
-            fixtures=generators.fixtures,
-            sweep=section.sweep,
-            samples=section.samples,
-            horizons=params.horizons,
-        )
-        checker = make_checker(
-            task,
-            params.section("feasibility", FeasibilitySettings),
-            action_period_s=params.horizons.action_period_s,
-        )
-        write_reload(plan, folder, task=task, checker=checker)
+        write_reload(plan, candidates, root / "fixtures.parquet", folder)
 
 
 if __name__ == "__main__":

@@ -3,70 +3,58 @@
 from pathlib import Path
 
 from gates.proof import admit
+from genpolicy.candidates.judged import compared
 from genpolicy.evidence.reproducibility.latency import latency_models
-from genpolicy.evidence.stress.matched import Shard, matched_starts
-from genpolicy.evidence.stress.tables import Entrant, StressSettings, plan_shards, write_stress
+from genpolicy.evidence.shadow.session import Cell
+from genpolicy.evidence.stress.matched import Comparison, matched_starts
+from genpolicy.evidence.stress.settings import StressSettings
+from genpolicy.evidence.stress.tables import plan_shards, power_document, write_stress
 from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.feasibility.settings import FeasibilitySettings
-from genpolicy.integrity.atomic import output_folder
+from genpolicy.integrity.atomic import output_folder, write_bytes
+from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.tables import read_table
 from genpolicy.policies.matched_training import PolicySettings
-from genpolicy.policies.policy import load_policy
 from genpolicy.tasks.api import load_task
+from stages._latency import LatencySection
 from stages._stage import ARTIFACTS, Params, main
-from stages._study import StudySection
-from stages._timing import LatencySection
+from stages._training import MethodsSection
 
 
 def work(params: Params) -> None:
     """Admit through gate C, then run every method under every perturbation."""
-    admit("stress", Path.cwd())
+    admitted = admit("stress", Path.cwd()).candidates
     section = params.section("stress", StressSettings)
-    seed = params.section("policy", PolicySettings).seeds[0]
-    roots = {name: ARTIFACTS / "baselines" for name in section.baselines}
-    generators = params.section("generators", StudySection).samplers
-    roots |= {name: ARTIFACTS / "generators" for name in generators}
-    entrants = []
-    for method, root in roots.items():
-        checkpoint = root / method / f"seed_{seed}"
-        entrants.append(Entrant(method, checkpoint, load_policy(checkpoint).checkpoint_hash))
-    models = latency_models(
-        read_table(ARTIFACTS / "latency" / "latency.parquet").to_pandas(),
-        params.section("latency", LatencySection).declared,
-    )
+    timing = params.section("latency", LatencySection)
+    table = read_table(ARTIFACTS / "latency" / "latency.parquet").to_pandas()
     task = load_task(params.task.name)
     starts = matched_starts(task, root_seed=params.seed, count=section.starts)
-    texts = tuple(start.to_json() for start in starts)
+    comparison = Comparison(
+        task=params.task.name,
+        starts=tuple(start.to_json() for start in starts),
+        episode_limit_s=section.episode_limit_s,
+        samples=section.samples,
+        cell=Cell(params.horizons, params.section("execution", ExecutionSettings)),
+        feasibility=params.section("feasibility", FeasibilitySettings),
+        root_seed=params.seed,
+    )
+    seed = params.section("policy", PolicySettings).seeds[0]
+    judged = compared(ARTIFACTS, baselines=section.baselines, generators=admitted, seed=seed)
+    # Alpha is shared between all that were registered, not between those that came this far.
+    registered = len(params.section("train_generators", MethodsSection).samplers)
+    power = power_document(section, candidates=registered, root_seed=params.seed)
     with output_folder(ARTIFACTS / "stress") as folder:
-        shards = [
-            Shard(
-                task=params.task.name,
-                method=entrant.method,
-                seed=seed,
-                checkpoint=entrant.checkpoint,
-                sha256=entrant.sha256,
-                perturbation=name,
-                schedule=schedule,
-                starts=texts,
-                episode_limit_s=section.episode_limit_s,
-                candidates=section.candidates,
-                horizons=params.horizons,
-                execution=params.section("execution", ExecutionSettings),
-                feasibility=params.section("feasibility", FeasibilitySettings),
-                latency=models[entrant.method],
-                root_seed=params.seed,
-                journal=folder / "journals" / f"{entrant.method}__{name}.mcap",
-            )
-            for entrant, name, schedule in plan_shards(entrants, section.perturbations)
-        ]
-        write_stress(
-            folder,
-            shards,
-            section,
-            workers=params.compute.workers,
-            scheduler=params.compute.scheduler,
-            root_seed=params.seed,
+        shards = plan_shards(
+            comparison,
+            judged,
+            section.perturbations,
+            latency=latency_models(table, timing.declared),
+            journals=folder / "journals",
         )
+        write_stress(
+            folder, shards, workers=params.compute.workers, scheduler=params.compute.scheduler
+        )
+        write_bytes(folder / "power.json", canonical_json(power))
 
 
 if __name__ == "__main__":

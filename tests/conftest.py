@@ -18,7 +18,7 @@ from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.documents import read_yaml
 from genpolicy.integrity.tables import write_table
-from genpolicy.policies.matched_training import PolicySettings, train_fleet
+from genpolicy.policies.matched_training import PolicySettings, TrainingPlan, train_methods
 from genpolicy.policies.policy import load_policy
 from genpolicy.policies.settings import HeadConfig, NetworkConfig, SamplerConfig, TrainingConfig
 from genpolicy.tasks.api import load_task
@@ -43,6 +43,7 @@ POLICY = PolicySettings(
     head=HeadConfig(posterior_width=16),
     training=TrainingConfig(steps=60, batch_size=64, learning_rate=3e-3, warmup_steps=5),
     seeds=[0],
+    fixtures=5,
 )  # fmt: skip
 
 
@@ -123,10 +124,11 @@ def data(dataset):
 def fleet(dataset, tmp_path_factory):
     """Root folder of the checkpoints, and their hashes by method and seed."""
     root = tmp_path_factory.mktemp("fleet")
-    trained = train_fleet(
-        dataset=dataset, folder=root, samplers=SAMPLERS, settings=POLICY, horizons=HORIZONS,
-        root_seed=1, device="cpu", workers=1, scheduler="local",
+    plan = TrainingPlan(
+        dataset=dataset, settings=POLICY, horizons=HORIZONS, root_seed=1, device="cpu", workers=1,
+        scheduler="local",
     )  # fmt: skip
+    trained, _ = train_methods(plan, SAMPLERS, folder=root)
     return root, trained
 
 

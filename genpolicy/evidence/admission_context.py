@@ -1,4 +1,8 @@
-"""What feasibility must know of a moment: scene from the observation, commands in joint space."""
+"""What feasibility must know of a moment: scene from the observation, commands in joint space.
+
+Which rows are checked is one rule, everywhere: all from the first that is not late to the end of
+the chunk, also those behind the execution horizon, which no controller will see (decision 16).
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -78,50 +82,65 @@ def seam(
     return q[-1], q[:-1]
 
 
+@dataclass(frozen=True)
+class Moment:
+    """Where robot and scene stand when a chunk is checked.
+
+    Attributes:
+        observation: Newest observation, received now. Shape (D_o,).
+        q_meas: Measured joint positions, rad. Shape (J,).
+        commanded: Commanded actions, oldest first, at least one. Shape (10,) each.
+        now_s: Now, s.
+        phase: Active task phase.
+    """
+
+    observation: Array
+    q_meas: Array
+    commanded: Sequence[Array]
+    now_s: float
+    phase: str
+
+
 def context_of(
     task: Task,
     checker: FeasibilityChecker,
+    moment: Moment,
     *,
-    observation: Array,
-    q_meas: Array,
-    commanded: Sequence[Array],
-    now_s: float,
-    phase: str,
-    latest_observation_s: float,
     session: Session,
-    first_index: int,
-    end_index: int | None,
+    late_rows: int = 0,
     newest_accepted_observation_s: float | None = None,
 ) -> Context:
-    """Context of a check at `now_s`; see `genpolicy.feasibility.context.Context`."""
-    q_cmd, history = seam(checker, commanded[-COMMANDS_AT_THE_SEAM:], q_meas)
+    """Context of a check; see `genpolicy.feasibility.context.Context`.
+
+    Args:
+        task: Says where the scene stands.
+        checker: Does the inverse kinematics.
+        moment: Robot and scene.
+        session: What is in force.
+        late_rows: Rows that are late and will never be executed; all behind them are checked.
+        newest_accepted_observation_s: Observation under the newest chunk accepted so far, s.
+    """
+    q_cmd, history = seam(checker, moment.commanded[-COMMANDS_AT_THE_SEAM:], moment.q_meas)
     return Context(
-        q_meas=q_meas,
+        q_meas=moment.q_meas,
         q_cmd=q_cmd,
-        last_action=commanded[-1],
-        now_s=now_s,
-        phase=phase,
+        last_action=moment.commanded[-1],
+        now_s=moment.now_s,
+        phase=moment.phase,
         calibration_epoch=session.calibration_epoch,
         session_epoch=session.session_epoch,
-        latest_observation_event_time_s=latest_observation_s,
-        maximum_age_s=session.maximum_age_s[phase],
+        latest_observation_event_time_s=moment.now_s,
+        maximum_age_s=session.maximum_age_s[moment.phase],
         active_checkpoint_hash=session.checkpoint,
         active_sampler_hash=session.sampler,
-        scene=SceneState(task.scene_poses(observation)),
+        scene=SceneState(task.scene_poses(moment.observation)),
         q_cmd_history=history,
         newest_accepted_observation_s=newest_accepted_observation_s,
-        first_index=first_index,
-        end_index=end_index,
+        first_index=late_rows,
     )
 
 
-def context_at_rest(
-    task: Task,
-    checker: FeasibilityChecker,
-    observation: Array,
-    *,
-    execution_horizon: int | None,
-) -> Context:
+def context_at_rest(task: Task, checker: FeasibilityChecker, observation: Array) -> Context:
     """Context of a recorded observation, for chunks that begin at it.
 
     Where the robot stands follows from the observed TCP pose; commands before it are not
@@ -132,24 +151,12 @@ def context_at_rest(
         task: The task.
         checker: Does the inverse kinematics.
         observation: Newest observation. Shape (D_o,).
-        execution_horizon: Rows that would be executed; None checks the whole chunk.
     """
-    action = task.action_at(observation)
-    phase = task.phase_of(observation)
+    action, phase = task.action_at(observation), task.phase_of(observation)
     q, _ = checker.ik_chunk(action[None], task.posture_rad)
-    return context_of(
-        task,
-        checker,
-        observation=observation,
-        q_meas=q[0],
-        commanded=[action],
-        now_s=0.0,
-        phase=phase,
-        latest_observation_s=0.0,
-        session=Session(RECORDED, 0, RECORDED, RECORDED, {phase: 0.0}),
-        first_index=0,
-        end_index=execution_horizon,
-    )
+    moment = Moment(observation, q[0], [action], now_s=0.0, phase=phase)
+    session = Session(RECORDED, 0, RECORDED, RECORDED, {phase: 0.0})
+    return context_of(task, checker, moment, session=session)
 
 
 def recorded_proposal(

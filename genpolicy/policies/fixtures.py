@@ -1,10 +1,10 @@
 """Evaluation fixtures: samples that a checkpoint must reproduce after save and reload."""
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import pyarrow as pa
 from numpy.typing import NDArray
 
 from genpolicy.contract.chunk import actions_sha256
@@ -17,14 +17,52 @@ Array = NDArray[np.float64]
 
 CANDIDATES = 2
 
-FIXTURES = pa.schema(
-    [
-        ("method", pa.string()), ("seed", pa.int64()), ("row", pa.int64()),
-        ("checkpoint", pa.string()), ("sampler", pa.string()), ("nfe", pa.int64()),
-        ("prediction_horizon", pa.int64()), ("sha256", pa.string()),
-        ("samples", pa.list_(pa.float64())),
-    ]
-)  # fmt: skip
+
+@dataclass(frozen=True)
+class FixtureRow:
+    """`fixtures.parquet`: samples of one checkpoint at one observation, drawn at training.
+
+    Attributes:
+        method: The method.
+        seed: Number of its training seed.
+        row: Which observation.
+        checkpoint: Identity of the weights.
+        sampler: Hash of the sampler settings.
+        nfe: Network evaluations of one invocation, counted.
+        prediction_horizon: Actions of a chunk.
+        sha256: Of the samples.
+        samples: Every number of them, candidate by candidate.
+    """
+
+    method: str
+    seed: int
+    row: int
+    checkpoint: str
+    sampler: str
+    nfe: int
+    prediction_horizon: int
+    sha256: str
+    samples: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Compared:
+    """One fixture, before and after reload.
+
+    Attributes:
+        row: Which observation.
+        sha256_trained: Of the samples drawn at training.
+        sha256_reloaded: Of those drawn from the files.
+        max_abs_difference: Largest difference of a number; NaN where one is no number.
+    """
+
+    row: int
+    sha256_trained: str
+    sha256_reloaded: str
+    max_abs_difference: float
+
+
+METADATA = ("checkpoint", "sampler", "nfe", "prediction_horizon")
 
 
 def fixture_observations(data: Dataset, *, horizons: HorizonConfig, count: int) -> Array:
@@ -42,38 +80,38 @@ def fixture_observations(data: Dataset, *, horizons: HorizonConfig, count: int) 
 
 def fixture_rows(
     policy: NetworkPolicy, observations: Array, *, method: str, seed: int
-) -> list[dict[str, Any]]:
+) -> list[FixtureRow]:
     """Rows of `fixtures.parquet` for one checkpoint."""
     names = [("fixture", row) for row in range(len(observations))]
     drawn = policy.sample(observations, noise_names=names, candidates=CANDIDATES)
     return [
-        {
-            "method": method,
-            "seed": seed,
-            "row": row,
-            "checkpoint": policy.checkpoint_hash,
-            "sampler": policy.sampler_config_hash,
-            "nfe": drawn.nfe,
-            "prediction_horizon": policy.prediction_horizon,
-            "sha256": actions_sha256(chunks),
-            "samples": chunks.ravel().tolist(),
-        }
+        FixtureRow(
+            method=method,
+            seed=seed,
+            row=row,
+            checkpoint=policy.checkpoint_hash,
+            sampler=policy.sampler_config_hash,
+            nfe=drawn.nfe,
+            prediction_horizon=policy.prediction_horizon,
+            sha256=actions_sha256(chunks),
+            samples=tuple(chunks.ravel().tolist()),
+        )
         for row, chunks in enumerate(drawn.actions)
     ]
 
 
 def reload_fixture(
     folder: Path, dataset: Path, *, horizons: HorizonConfig, method: str, seed: int, count: int
-) -> list[dict[str, Any]]:
+) -> list[FixtureRow]:
     """The fixtures again, from the files alone; to be called in a fresh process."""
     observations = fixture_observations(load_dataset(dataset), horizons=horizons, count=count)
     return fixture_rows(load_policy(folder), observations, method=method, seed=seed)
 
 
 def compare_fixtures(
-    trained: list[dict[str, Any]], reloaded: list[dict[str, Any]]
-) -> tuple[list[dict[str, Any]], int]:
-    """Rows of `samples.parquet`, and how many metadata fields differ.
+    trained: Sequence[FixtureRow], reloaded: Sequence[FixtureRow]
+) -> tuple[list[Compared], int]:
+    """Each fixture before and after, and how many metadata fields differ.
 
     Raises:
         ContractError: One side has rows that the other lacks.
@@ -83,25 +121,15 @@ def compare_fixtures(
             where="fixtures after reload",
             found=f"{len(reloaded)} rows",
             expected=f"the {len(trained)} rows written at training",
-            action="Run the generators stage again (`dvc repro generators`).",
+            action="Train the generators again (`dvc repro train_generators`).",
         )
     rows, mismatches = [], 0
     for before, after in zip(trained, reloaded, strict=True):
-        difference = np.abs(np.asarray(before["samples"]) - np.asarray(after["samples"]))
-        rows.append(
-            {
-                "method": before["method"],
-                "seed": before["seed"],
-                "row": before["row"],
-                "sha256_trained": before["sha256"],
-                "sha256_reloaded": after["sha256"],
-                "max_abs_difference": float(difference.max()),
-            }
-        )
-        fields = ("checkpoint", "sampler", "nfe", "prediction_horizon")
-        mismatches += sum(before[name] != after[name] for name in fields)
+        difference = np.abs(np.asarray(before.samples) - np.asarray(after.samples))
+        rows.append(Compared(before.row, before.sha256, after.sha256, float(difference.max())))
+        mismatches += sum(getattr(before, name) != getattr(after, name) for name in METADATA)
     return rows, mismatches
 
 
-def _key(row: dict[str, Any]) -> tuple[str, int, int]:
-    return row["method"], row["seed"], row["row"]
+def _key(row: FixtureRow) -> tuple[str, int, int]:
+    return row.method, row.seed, row.row

@@ -1,7 +1,8 @@
 """Training of several methods and seeds on one dataset, and how they differ.
 
 All methods get the same windows, the same encoder and trunk, the same optimisation. What may
-differ is named (`ALLOWED_DIFFERENCES`); every other difference is listed for the gate.
+differ is named (`ALLOWED_DIFFERENCES`); every other difference is listed for the gate. Each
+checkpoint leaves fixtures: samples that it must give again after reload.
 """
 
 from collections.abc import Mapping, Sequence
@@ -9,12 +10,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from pydantic import Field
+
 from genpolicy.compute import map_shards
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.contract.settings import Settings
 from genpolicy.data.dataset import Dataset, load_dataset
-from genpolicy.integrity.documents import read_json
+from genpolicy.integrity.atomic import write_bytes
+from genpolicy.integrity.documents import canonical_json, read_json
+from genpolicy.integrity.rows import write_rows
 from genpolicy.policies.checkpoint import CONFIG_FILE, Provenance
+from genpolicy.policies.fixtures import FixtureRow, fixture_observations, fixture_rows
+from genpolicy.policies.policy import load_policy
 from genpolicy.policies.settings import HeadConfig, NetworkConfig, SamplerConfig, TrainingConfig
 from genpolicy.policies.training import TrainingRequest, train
 from genpolicy.policies.windows import Windows
@@ -34,94 +41,161 @@ class PolicySettings(Settings):
         network: Sizes of encoder, trunk and head.
         head: Head settings.
         training: Optimisation.
-        seeds: Training seeds, by number.
+        seeds: Training seeds, by number; the first is the one that is promoted.
+        fixtures: Observations whose samples must be reproduced after reload.
     """
 
     network: NetworkConfig
     head: HeadConfig
     training: TrainingConfig
-    seeds: list[int]
+    seeds: list[int] = Field(min_length=1)
+    fixtures: int = Field(ge=1)
+
+
+@dataclass(frozen=True)
+class TrainingPlan:
+    """What all trainings of a stage share.
+
+    Attributes:
+        dataset: Folder of the ingested dataset.
+        settings: What the methods share.
+        horizons: Common horizons.
+        root_seed: Root seed.
+        device: Torch device.
+        workers: Local processes.
+        scheduler: `local` or the address of a Dask scheduler.
+    """
+
+    dataset: Path
+    settings: PolicySettings
+    horizons: HorizonConfig
+    root_seed: int
+    device: str
+    workers: int
+    scheduler: str
+
+    def request(
+        self,
+        data: Dataset,
+        *,
+        method: str,
+        sampler: SamplerConfig,
+        seed: int,
+        network: NetworkConfig | None = None,
+        observation_horizon: int | None = None,
+    ) -> TrainingRequest:
+        """One training; network and observation horizon are the common ones where None."""
+        seen = observation_horizon or self.horizons.observation_horizon
+        return TrainingRequest(
+            method=method,
+            horizons=self.horizons.model_copy(update={"observation_horizon": seen}),
+            normalisation=data.normalisation,
+            network=network or self.settings.network,
+            head=self.settings.head,
+            training=self.settings.training,
+            sampler=sampler,
+            provenance=Provenance(
+                dataset_manifest_sha256=data.manifest_sha256,
+                action_contract_sha256=data.manifest["action_contract"]["sha256"],
+                observation_contract_sha256=data.manifest["observation_contract"]["sha256"],
+            ),
+            seed=integer_seed(self.root_seed, "training", seed),
+        )
 
 
 @dataclass(frozen=True)
 class TrainingJob:
-    """One method and seed, for one process.
+    """One checkpoint, for one process.
 
     Attributes:
         dataset: Folder of the ingested dataset.
         folder: Checkpoint folder to write.
         request: What decides the checkpoint's bytes.
         device: Torch device.
+        seed: Number of the training seed.
+        fixtures: Observations to draw fixtures at; 0 draws none.
     """
 
     dataset: Path
     folder: Path
     request: TrainingRequest
     device: str
+    seed: int
+    fixtures: int
 
 
-def train_fleet(
-    *,
-    dataset: Path,
-    folder: Path,
+def train_matched(
+    plan: TrainingPlan,
     samplers: Mapping[str, SamplerConfig],
-    settings: PolicySettings,
-    horizons: HorizonConfig,
-    root_seed: int,
-    device: str,
-    workers: int,
-    scheduler: str,
-) -> dict[str, dict[int, str]]:
+    *,
+    folder: Path,
+    reference: Path | None = None,
+    reference_method: str = "chunked_bc",
+) -> None:
+    """Train every method with every seed; write checkpoints, fixtures and `matched.json`.
+
+    Args:
+        plan: What all share.
+        samplers: Methods, and the sampler of each.
+        folder: Existing folder to write into.
+        reference: Checkpoint folder that configurations are held against; the reference
+            method's own where None.
+        reference_method: The method of that checkpoint.
+    """
+    _, fixtures = train_methods(plan, samplers, folder=folder)
+    write_rows(folder / "fixtures.parquet", FixtureRow, fixtures)
+    folders = seed_folders(folder, list(samplers), plan.settings.seeds[0])
+    if reference is not None:
+        folders = {reference_method: reference, **folders}
+    matched = matched_configuration(folders, reference=reference_method)
+    write_bytes(folder / "matched.json", canonical_json(matched))
+
+
+def train_methods(
+    plan: TrainingPlan, samplers: Mapping[str, SamplerConfig], *, folder: Path
+) -> tuple[dict[str, dict[int, str]], list[FixtureRow]]:
     """Train every method of `samplers` with every seed into `folder/<method>/seed_<n>`.
 
     Returns:
-        SHA-256 of the checkpoint by method and seed.
+        SHA-256 of the checkpoint by method and seed, and the fixtures of all of them.
     """
-    data = load_dataset(dataset)
-    provenance = Provenance(
-        dataset_manifest_sha256=data.manifest_sha256,
-        action_contract_sha256=data.manifest["action_contract"]["sha256"],
-        observation_contract_sha256=data.manifest["observation_contract"]["sha256"],
-    )
+    data = load_dataset(plan.dataset)
+    keys = [(method, seed) for method in samplers for seed in plan.settings.seeds]
     jobs = [
         TrainingJob(
-            dataset=dataset,
+            dataset=plan.dataset,
             folder=folder / method / f"seed_{seed}",
-            request=TrainingRequest(
-                method=method,
-                horizons=horizons,
-                normalisation=data.normalisation,
-                network=settings.network,
-                head=settings.head,
-                training=settings.training,
-                sampler=sampler,
-                provenance=provenance,
-                seed=integer_seed(root_seed, "training", seed),
-            ),
-            device=device,
+            request=plan.request(data, method=method, sampler=samplers[method], seed=seed),
+            device=plan.device,
+            seed=seed,
+            fixtures=plan.settings.fixtures,
         )
-        for method, sampler in samplers.items()
-        for seed in settings.seeds
+        for method, seed in keys
     ]
-    hashes = map_shards(train_job, jobs, workers=workers, scheduler=scheduler)
-    result: dict[str, dict[int, str]] = {}
-    keys = [(method, seed) for method in samplers for seed in settings.seeds]
-    for (method, seed), digest in zip(keys, hashes, strict=True):
-        result.setdefault(method, {})[seed] = digest
-    return result
+    trained = map_shards(train_job, jobs, workers=plan.workers, scheduler=plan.scheduler)
+    hashes: dict[str, dict[int, str]] = {}
+    for (method, seed), (digest, _) in zip(keys, trained, strict=True):
+        hashes.setdefault(method, {})[seed] = digest
+    return hashes, [row for _, rows in trained for row in rows]
 
 
-def train_job(job: TrainingJob) -> str:
-    """Train one checkpoint; returns its SHA-256."""
+def train_job(job: TrainingJob) -> tuple[str, list[FixtureRow]]:
+    """Train one checkpoint; returns its SHA-256 and the fixtures drawn from its files."""
     data = load_dataset(job.dataset)
+    horizons = job.request.horizons
     job.folder.parent.mkdir(parents=True, exist_ok=True)
-    return train(
+    digest = train(
         job.folder,
         job.request,
-        windows=training_windows(data, "train", job.request.horizons),
-        validation=training_windows(data, "validation", job.request.horizons),
+        windows=training_windows(data, "train", horizons),
+        validation=training_windows(data, "validation", horizons),
         device=job.device,
     )
+    if job.fixtures == 0:
+        return digest, []
+    seen = fixture_observations(data, horizons=horizons, count=job.fixtures)
+    policy = load_policy(job.folder, expected_sha256=digest)
+    return digest, fixture_rows(policy, seen, method=job.request.method, seed=job.seed)
 
 
 def training_windows(data: Dataset, split: str, horizons: HorizonConfig) -> Windows:

@@ -1,5 +1,6 @@
 """DVC re-runs a stage for what `deps` lists: what the stage reaches, no more and no less."""
 
+import re
 import sys
 from collections.abc import Iterable
 from pathlib import Path, PurePosixPath
@@ -23,6 +24,7 @@ from dependencies import (
     plugins,
     reached_files,
     reached_modules,
+    rerun_after_edit,
     stage_names,
     table,
 )
@@ -64,12 +66,67 @@ def test_no_stage_imports_another(stage: str) -> None:
 
 
 def test_a_stage_that_asks_for_admission_depends_on_the_verdict_before_it() -> None:
-    verdicts = {"generators": "a", "shadow": "b", "stress": "c", "card": "d"}
+    verdicts = {"train_generators": "a", "shadow": "b", "stress": "c", "card": "d"}
     for stage, gate in verdicts.items():
         assert f"artifacts/gate_{gate}/verdict.json" in pipeline()[stage]["deps"]
     for stage in stage_names():
         asks = f'admit("{stage}"' in (ROOT / "stages" / f"{stage}.py").read_text()
         assert asks == (stage in {*verdicts, "reload", "latency"}), stage
+
+
+EVIDENCE = (
+    "record", "ingest", "audit", "train_baselines", "measure_baselines", "train_factors",
+    "measure_factors", "train_generators", "reload", "latency", "shadow", "stress",
+)  # fmt: skip
+TRAINING = ("train_baselines", "train_factors", "train_generators")
+JUDGING = ("gate_a", "gate_b", "gate_c", "gate_d", "card", "gate_e")
+
+
+def test_an_edit_of_the_executor_runs_shadow_and_stress_again_and_no_other_evidence() -> None:
+    direct, behind = rerun_after_edit("genpolicy/execution")
+    assert [name for name in (*direct, *behind) if name in EVIDENCE] == ["shadow", "stress"]
+
+
+@pytest.mark.parametrize("package", ["feasibility", "execution", "robot", "tasks", "evidence"])
+def test_an_edit_of_what_judges_actions_trains_nothing_again(package: str) -> None:
+    direct, _ = rerun_after_edit(f"genpolicy/{package}")
+    # Gates take the names of columns from the evidence, and admission proves gates.
+    assert not set(direct) & set(TRAINING)
+
+
+def test_an_edit_of_a_gate_judges_again_and_measures_nothing() -> None:
+    for package in ("gates", "gates/pages"):
+        direct, _ = rerun_after_edit(package)
+        assert set(direct) <= set(JUDGING)
+
+
+NEVER = {
+    "train_baselines": {"task", "feasibility", "execution"},
+    "train_factors": {"task", "feasibility", "execution"},
+    "train_generators": {"task", "feasibility", "execution"},
+    "audit": {"execution", "policy"},
+    "measure_baselines": {"execution", "policy"},
+    "measure_factors": {"execution", "policy"},
+    "reload": {"execution", "policy"},
+    "latency": {"execution", "policy", "stress"},
+    "shadow": {"policy", "train_generators", "stress"},
+    "stress": {"policy", "train_generators", "latency", "shadow"},
+}
+
+
+@pytest.mark.parametrize("stage", NEVER)
+def test_a_stage_lists_only_the_parameters_that_it_reads(stage: str) -> None:
+    assert not set(pipeline()[stage]["params"]) & NEVER[stage]
+
+
+@pytest.mark.parametrize("stage", stage_names())
+def test_every_section_that_a_stage_parses_is_among_its_parameters(stage: str) -> None:
+    text = (ROOT / "stages" / f"{stage}.py").read_text()
+    listed = {name.split(".")[0] for name in pipeline()[stage]["params"]}
+    assert set(re.findall(r'params\.section\("(\w+)"', text)) <= listed
+    assert ("params.seed" not in text) or "seed" in listed
+    assert ("params.horizons" not in text) or "horizons" in listed
+    assert ("params.task" not in text) or "task" in listed
 
 
 def test_the_pipeline_has_stages_at_all() -> None:

@@ -41,14 +41,11 @@ def test_the_seam_continues_the_commands(checker, plan, world):
 
 def test_a_recorded_chunk_at_rest_is_fresh_and_admissible(task, checker, plan, world, kit):
     observation = world.observe()
-    context = context_at_rest(
-        task, checker, observation,
-        execution_horizon=8,
-    )  # fmt: skip
+    context = context_at_rest(task, checker, observation)
     chunk = recorded_proposal(
         task, plan.actions[:16], observation, action_period_s=0.05, chunk_id="a"
     )
-    assert context.rows(16) == slice(0, 8)
+    assert context.rows(16) == slice(0, 16)
     assert context.phase == chunk.metadata.task_phase == "approach"
     np.testing.assert_allclose(context.last_action[:3], observation[:3])
     result = checker.admit(chunk, context=context)
@@ -56,7 +53,7 @@ def test_a_recorded_chunk_at_rest_is_fresh_and_admissible(task, checker, plan, w
 
 
 def test_a_recorded_chunk_has_age_zero_and_may_not_be_older(task, checker, plan, world):
-    context = context_at_rest(task, checker, world.observe(), execution_horizon=None)
+    context = context_at_rest(task, checker, world.observe())
     assert context.maximum_age_s == 0.0 and context.now_s == 0.0
     chunk = recorded_proposal(
         task, plan.actions[:16], world.observe(), action_period_s=0.05, chunk_id="a"

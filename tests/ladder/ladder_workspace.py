@@ -24,7 +24,7 @@ DROPPED = {
         "variants.newest_only", "variants.longer_history", "variants.l1_head",
         "variants.act_head",
     ),
-    "generators": ("samplers.cvae",),
+    "train_generators": ("samplers.cvae",),
     "stress": tuple(
         f"perturbations.{name}"
         for name in ("compute_contention", "network_jitter", "queue_reorder", "push")

@@ -1,6 +1,6 @@
 """Samples that must come back after reload."""
 
-from copy import deepcopy
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -32,10 +32,10 @@ def test_observations_are_spread_over_the_test_split(data, kit):
 
 
 def test_a_row_holds_every_number_of_its_samples(rows):
-    assert [row["row"] for row in rows] == list(range(5))
-    assert all(len(row["samples"]) == CANDIDATES * 16 * 10 for row in rows)
-    assert len({row["sha256"] for row in rows}) == 5
-    assert {row["nfe"] for row in rows} == {2}  # Euler with two steps, counted at the network
+    assert [row.row for row in rows] == list(range(5))
+    assert all(len(row.samples) == CANDIDATES * 16 * 10 for row in rows)
+    assert len({row.sha256 for row in rows}) == 5
+    assert {row.nfe for row in rows} == {2}  # Euler with two steps, counted at the network
 
 
 def test_the_files_alone_give_the_same_samples(rows, fleet, dataset, kit):
@@ -45,30 +45,30 @@ def test_the_files_alone_give_the_same_samples(rows, fleet, dataset, kit):
     compared, mismatches = compare_fixtures(rows, again)
     assert mismatches == 0
     for row in compared:
-        assert row["max_abs_difference"] == 0.0
-        assert row["sha256_trained"] == row["sha256_reloaded"]
+        assert row.max_abs_difference == 0.0
+        assert row.sha256_trained == row.sha256_reloaded
 
 
 def test_one_changed_number_is_seen_with_its_size(rows):
-    changed = deepcopy(rows)
-    changed[3]["samples"][17] += 1e-9
-    differences = [row["max_abs_difference"] for row in compare_fixtures(rows, changed)[0]]
+    samples = list(rows[3].samples)
+    samples[17] += 1e-9
+    changed = [*rows[:3], replace(rows[3], samples=tuple(samples)), rows[4]]
+    differences = [row.max_abs_difference for row in compare_fixtures(rows, changed)[0]]
     assert differences[3] == pytest.approx(1e-9, rel=1e-3)
     assert [d for n, d in enumerate(differences) if n != 3] == [0.0] * 4
 
 
 @pytest.mark.parametrize("field", ["checkpoint", "sampler", "nfe", "prediction_horizon"])
 def test_each_metadata_field_counts(rows, field):
-    changed = deepcopy(rows)
-    changed[0][field] = changed[2][field] = "other"
+    changed = [replace(row, **{field: "other"}) if row.row in (0, 2) else row for row in rows]
     assert compare_fixtures(rows, changed)[1] == 2
 
 
 def test_a_number_that_is_none_is_no_equality(rows):
-    changed = deepcopy(rows)
-    changed[1]["samples"][0] = float("nan")
+    samples = (float("nan"), *rows[1].samples[1:])
+    changed = [rows[0], replace(rows[1], samples=samples), *rows[2:]]
     compared, _ = compare_fixtures(rows, changed)
-    assert np.isnan(compared[1]["max_abs_difference"])
+    assert np.isnan(compared[1].max_abs_difference)
 
 
 @pytest.mark.parametrize("damage", ["missing", "reordered", "extra"])

@@ -9,9 +9,10 @@ from genpolicy.integrity.documents import canonical_json, read_json
 from genpolicy.policies.checkpoint import CONFIG_FILE
 from genpolicy.policies.matched_training import (
     ALLOWED_DIFFERENCES,
+    TrainingPlan,
     matched_configuration,
     seed_folders,
-    train_fleet,
+    train_methods,
 )
 
 SINGLE = {
@@ -90,10 +91,14 @@ def test_parameters_are_reported_per_part(folders):
 
 
 def test_training_again_gives_the_same_checkpoints(fleet, dataset, kit, tmp_path):
-    again = train_fleet(
-        dataset=dataset, folder=tmp_path, samplers={"flow": kit.SAMPLERS["flow"]},
-        settings=kit.POLICY, horizons=kit.HORIZONS, root_seed=1, device="cpu", workers=1,
-        scheduler="local",
+    plan = TrainingPlan(
+        dataset=dataset, settings=kit.POLICY, horizons=kit.HORIZONS, root_seed=1, device="cpu",
+        workers=1, scheduler="local",
     )  # fmt: skip
+    again, fixtures = train_methods(plan, {"flow": kit.SAMPLERS["flow"]}, folder=tmp_path)
+    assert [(row.method, row.seed, row.row) for row in fixtures] == [
+        ("flow", 0, n) for n in range(5)
+    ]
+    assert {row.checkpoint for row in fixtures} == {again["flow"][0]}
     assert again["flow"] == fleet[1]["flow"]
     assert len({seeds[0] for seeds in fleet[1].values()}) == 3

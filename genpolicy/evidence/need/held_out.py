@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +18,7 @@ from genpolicy.evidence.need.method_modes import (
     read_situations,
     sample_modes,
 )
+from genpolicy.evidence.rows import ModeRow
 from genpolicy.feasibility.admission import FeasibilityChecker
 from genpolicy.policies.policy import NetworkPolicy
 from genpolicy.tasks.api import Task
@@ -62,7 +62,7 @@ def modes_of_policy(
     samples: int,
     task: Task,
     checker: FeasibilityChecker,
-) -> list[dict[str, Any]]:
+) -> list[ModeRow]:
     """Rows of `modes.parquet`: modes reached and admissible samples, per situation."""
     if not held_out.situations:
         return []
@@ -74,26 +74,26 @@ def modes_of_policy(
     ):
         reached = sample_modes(chunks, situation.mode_paths, position=POSITION)
         rows.append(
-            {
-                "method": policy.method,
-                "seed": seed,
-                "convention": convention,
-                "episode_uuid": situation.episode_uuid,
-                "index": situation.index,
-                "samples": len(chunks),
-                "modes_present": reached.modes_present,
-                "modes_covered": reached.modes_covered,
-                "between_modes": int(reached.between.sum()),
-                "admissible": admissible_count(
+            ModeRow(
+                method=policy.method,
+                seed=seed,
+                convention=convention,
+                episode_uuid=situation.episode_uuid,
+                index=situation.index,
+                samples=len(chunks),
+                modes_present=reached.modes_present,
+                modes_covered=reached.modes_covered,
+                between_modes=int(reached.between.sum()),
+                admissible=admissible_count(
                     task,
                     checker,
                     chunks,
                     observation,
                     action_period_s=policy.horizons.action_period_s,
                 ),
-                "nfe": drawn.nfe,
-                "spread_m": float(chunks[:, :, POSITION].std(axis=0).mean()),
-            }
+                nfe=drawn.nfe,
+                spread_m=float(chunks[:, :, POSITION].std(axis=0).mean()),
+            )
         )
     return rows
 
@@ -132,7 +132,7 @@ def admissible(
     Returns:
         The verdict, and `layer: reason` where it is a no.
     """
-    context = context_at_rest(task, checker, observation, execution_horizon=None)
+    context = context_at_rest(task, checker, observation)
     proposal = recorded_proposal(
         task, actions, observation, action_period_s=action_period_s, chunk_id="recorded"
     )

@@ -1,45 +1,33 @@
 """Measured latency of every method, twice in fresh processes; and the virtual clock's models."""
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
-import pyarrow as pa
 from numpy.typing import NDArray
 
+from genpolicy.candidates.judged import JudgedPolicy
 from genpolicy.contract.chunk import Proposal
 from genpolicy.contract.horizons import HorizonConfig
+from genpolicy.contract.latency import DECLARED_TERMS, MEASURED_TERMS, OWNERS, Term
 from genpolicy.contract.settings import Settings
 from genpolicy.data.dataset import load_dataset
 from genpolicy.errors import ContractError
 from genpolicy.evidence.admission_context import context_at_rest, make_checker, recorded_proposal
-from genpolicy.evidence.reproducibility.benchmark import measure_policy
+from genpolicy.evidence.reproducibility.benchmark import Measurement, measure_policy
 from genpolicy.evidence.reproducibility.measure import in_fresh_process
-from genpolicy.evidence.stress.latency import (
-    DECLARED_TERMS,
-    MEASURED_TERMS,
-    DeclaredTerm,
-    LatencyModel,
-)
+from genpolicy.evidence.rows import LatencyRow
+from genpolicy.evidence.stress.latency import DeclaredTerm, LatencyModel
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.policies.fixtures import fixture_observations
-from genpolicy.policies.policy import load_policy
 from genpolicy.tasks.api import load_task
 
 Array = NDArray[np.float64]
 
 RUNS = (1, 2)
-
-LATENCY = pa.schema(
-    [
-        ("method", pa.string()), ("run", pa.int64()), ("component", pa.string()),
-        ("temperature", pa.string()), ("repeat", pa.int64()), ("seconds", pa.float64()),
-        ("source", pa.string()),
-    ]
-)  # fmt: skip
+OBSERVATIONS = 32
 
 
 class DeclaredSettings(Settings):
@@ -50,12 +38,10 @@ class DeclaredSettings(Settings):
 
 
 @dataclass(frozen=True)
-class LatencyJob:
-    """One method, measured by one fresh process.
+class LatencyPlan:
+    """How every method is timed.
 
     Attributes:
-        checkpoint: Checkpoint folder.
-        sha256: Its identity.
         dataset: Folder of the dataset, for realistic observations.
         task: Registered name of the task.
         feasibility: Thresholds of the six layers; their run time is the term `project`.
@@ -64,8 +50,6 @@ class LatencyJob:
         cold: Cold invocations.
     """
 
-    checkpoint: Path
-    sha256: str
     dataset: Path
     task: str
     feasibility: FeasibilitySettings
@@ -74,54 +58,78 @@ class LatencyJob:
     cold: int
 
 
-def latency_rows(
-    jobs: Mapping[str, LatencyJob],
+def measured_rows(plan: LatencyPlan, policies: Sequence[JudgedPolicy]) -> list[LatencyRow]:
+    """Terms measured on this machine: two independent runs per method."""
+    return [
+        LatencyRow(
+            method=judged.name,
+            run=run,
+            component=item.component,
+            owner=str(OWNERS[Term(item.component)]),
+            temperature=item.temperature,
+            repeat=item.repeat,
+            seconds=item.seconds,
+            source="measured",
+        )
+        for judged in policies
+        for run in RUNS
+        for item in in_fresh_process(measure_terms, plan, judged)
+    ]
+
+
+def declared_rows(
+    names: Sequence[str],
     declared: Mapping[str, DeclaredSettings],
     *,
-    declared_draws: int,
+    draws: int,
     generator: np.random.Generator,
-) -> list[dict[str, Any]]:
-    """Rows of `latency.parquet`: two independent runs per method, and the declared terms."""
-    rows: list[dict[str, Any]] = []
-    for method, job in jobs.items():
-        for run in RUNS:
-            measured = in_fresh_process(measure_job, job)
-            rows += [{"method": method, "run": run, "source": "measured", **m} for m in measured]
-    for name in DECLARED_TERMS:
-        bounds = declared[name]
-        drawn = generator.uniform(bounds.minimum_s, bounds.maximum_s, size=declared_draws)
+) -> list[LatencyRow]:
+    """Terms that this machine cannot measure, drawn between their bounds, equal for all methods.
+
+    Args:
+        names: Methods.
+        declared: Bounds of every such term.
+        draws: Values drawn of each.
+        generator: Draws them.
+
+    Raises:
+        ContractError: A term without bounds, or bounds of no term.
+    """
+    if set(declared) != set(DECLARED_TERMS):
+        raise ContractError(
+            where="latency.declared",
+            found=f"bounds of {', '.join(sorted(declared))}",
+            expected=f"of {', '.join(DECLARED_TERMS)}",
+            action="Declare each term that no benchmark here can measure; unknown is not zero.",
+        )
+    rows = []
+    for term in DECLARED_TERMS:
+        bounds = declared[term]
+        drawn = generator.uniform(bounds.minimum_s, bounds.maximum_s, size=draws)
         rows += [
-            {
-                "method": method,
-                "run": RUNS[0],
-                "component": name,
-                "temperature": "warm",
-                "repeat": repeat,
-                "seconds": float(value),
-                "source": "declared",
-            }
-            for method in jobs
+            LatencyRow(
+                method=name,
+                run=RUNS[0],
+                component=str(term),
+                owner=str(OWNERS[term]),
+                temperature="warm",
+                repeat=repeat,
+                seconds=float(value),
+                source="declared",
+            )
+            for name in names
             for repeat, value in enumerate(drawn)
         ]
     return rows
 
 
-def measure_job(job: LatencyJob) -> list[dict[str, Any]]:
+def measure_terms(plan: LatencyPlan, judged: JudgedPolicy) -> list[Measurement]:
     """Cold and warm spans of one method, with the six layers timed as `project`."""
-    data = load_dataset(job.dataset)
-    observations = fixture_observations(data, horizons=job.horizons, count=32)
-    task = load_task(job.task)
-    checker = make_checker(task, job.feasibility, action_period_s=job.horizons.action_period_s)
-    contexts = [
-        context_at_rest(
-            task,
-            checker,
-            row[-1],
-            execution_horizon=job.horizons.execution_horizon,
-        )
-        for row in observations
-    ]
-    policy = load_policy(job.checkpoint, expected_sha256=job.sha256)
+    data, task = load_dataset(plan.dataset), load_task(plan.task)
+    observations = fixture_observations(data, horizons=plan.horizons, count=OBSERVATIONS)
+    checker = make_checker(task, plan.feasibility, action_period_s=plan.horizons.action_period_s)
+    contexts = [context_at_rest(task, checker, row[-1]) for row in observations]
+    period_s = judged.load().horizons.action_period_s
     calls = 0
 
     def project(proposal: Proposal) -> object:
@@ -132,20 +140,19 @@ def measure_job(job: LatencyJob) -> list[dict[str, Any]]:
             task,
             proposal.actions,
             observations[row][-1],
-            action_period_s=policy.horizons.action_period_s,
+            action_period_s=period_s,
             chunk_id=proposal.metadata.chunk_id,
         )
         return checker.admit(recorded, context=contexts[row])
 
-    measured = measure_policy(
-        job.checkpoint,
+    return measure_policy(
+        judged.folder,
         observations,
-        expected_sha256=job.sha256,
-        cold_repeats=job.cold,
-        warm_repeats=job.warm,
+        expected_sha256=judged.sha256,
+        cold_repeats=plan.cold,
+        warm_repeats=plan.warm,
         project=project,
     )
-    return [asdict(measurement) for measurement in measured]
 
 
 def latency_models(
@@ -165,7 +172,7 @@ def latency_models(
             str(name): np.sort(part["seconds"].to_numpy(dtype=np.float64))
             for name, part in warm.groupby("component", sort=True)
         }
-        missing = [name for name in MEASURED_TERMS if name not in terms]
+        missing = [str(name) for name in MEASURED_TERMS if name not in terms]
         if missing or len(cold) == 0:
             raise ContractError(
                 where=f"latency of {method}",

@@ -1,27 +1,39 @@
 """Gate B's evidence: does a checkpoint come back the same, and what does fewer NFE cost?"""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 
+from genpolicy.candidates.judged import JudgedPolicy
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.data.dataset import load_dataset
+from genpolicy.errors import ContractError
+from genpolicy.evidence.admission_context import make_checker
 from genpolicy.evidence.need.held_out import HeldOut, held_out_situations, modes_of_policy
+from genpolicy.evidence.need.offline import offline_rows
 from genpolicy.evidence.reproducibility.measure import in_fresh_process
+from genpolicy.evidence.rows import (
+    CoverageRow,
+    ModeRow,
+    NfeRow,
+    OfflineRow,
+    SampleRow,
+    read_rows,
+    write_rows,
+)
 from genpolicy.feasibility.admission import FeasibilityChecker
+from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import write_bytes
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_bytes, sha256_file
-from genpolicy.integrity.tables import read_table, write_table
 from genpolicy.policies.checkpoint import CONFIG_FILE
-from genpolicy.policies.fixtures import compare_fixtures, reload_fixture
-from genpolicy.policies.policy import NetworkPolicy, load_policy
+from genpolicy.policies.fixtures import FixtureRow, compare_fixtures, reload_fixture
+from genpolicy.policies.policy import NetworkPolicy
 from genpolicy.statistics.intervals import clopper_pearson
-from genpolicy.tasks.api import Task
+from genpolicy.tasks.api import Task, load_task
 
 
 @dataclass(frozen=True)
@@ -29,71 +41,73 @@ class ReloadPlan:
     """What is reloaded and swept.
 
     Attributes:
-        checkpoints: Root folder of the trained methods.
+        task: Registered name of the task.
+        feasibility: Thresholds of the six layers.
         dataset: Folder of the dataset.
         audit: Folder of the audit.
-        methods: Candidates.
-        seeds: Training seeds.
-        fixtures: Observations per fixture.
-        sweep: Sampler steps to try, by method.
-        samples: Candidates per situation in the sweep.
+        sweep: Sampler steps to try besides the chosen ones, by method.
+        samples: Candidates per situation.
         horizons: Common horizons.
     """
 
-    checkpoints: Path
+    task: str
+    feasibility: FeasibilitySettings
     dataset: Path
     audit: Path
-    methods: Sequence[str]
-    seeds: Sequence[int]
-    fixtures: int
     sweep: Mapping[str, Sequence[int]]
     samples: int
     horizons: HorizonConfig
 
 
+@dataclass
+class ReloadRows:
+    """Rows of the tables of `reload`."""
+
+    samples: list[SampleRow] = field(default_factory=list)
+    nfe: list[NfeRow] = field(default_factory=list)
+    coverage: list[CoverageRow] = field(default_factory=list)
+    offline: list[OfflineRow] = field(default_factory=list)
+    modes: list[ModeRow] = field(default_factory=list)
+
+    def write(self, folder: Path) -> None:
+        """Write every table."""
+        write_rows(folder / "samples.parquet", SampleRow, self.samples)
+        write_rows(folder / "nfe.parquet", NfeRow, self.nfe)
+        write_rows(folder / "coverage.parquet", CoverageRow, self.coverage)
+        write_rows(folder / "offline.parquet", OfflineRow, self.offline)
+        write_rows(folder / "modes.parquet", ModeRow, self.modes)
+
+
 def write_reload(
-    plan: ReloadPlan, folder: Path, *, task: Task, checker: FeasibilityChecker
+    plan: ReloadPlan, candidates: Sequence[JudgedPolicy], fixtures: Path, folder: Path
 ) -> None:
-    """Reload every checkpoint in a fresh process, compare, sweep the NFE, write the evidence."""
-    data = load_dataset(plan.dataset)
+    """Reload every candidate in a fresh process, compare, sweep the NFE, write the evidence.
+
+    Args:
+        plan: What is reloaded and swept.
+        candidates: Every candidate and training seed.
+        fixtures: The table of fixtures that training wrote.
+        folder: Existing folder to write into.
+
+    Raises:
+        ContractError: Training left no fixture of a candidate.
+    """
+    data, task = load_dataset(plan.dataset), load_task(plan.task)
+    checker = make_checker(task, plan.feasibility)
     held_out = held_out_situations(plan.audit, data, horizons=plan.horizons)
-    written = read_table(plan.checkpoints / "fixtures.parquet").to_pylist()
-    samples, nfe, coverage, identity = [], [], [], {}
-    for method in plan.methods:
-        mismatches = nonfinite = 0
-        for seed in plan.seeds:
-            source = plan.checkpoints / method / f"seed_{seed}"
-            before = [row for row in written if (row["method"], row["seed"]) == (method, seed)]
-            after = in_fresh_process(
-                reload_fixture,
-                source,
-                plan.dataset,
-                horizons=plan.horizons,
-                method=method,
-                seed=seed,
-                count=plan.fixtures,
-            )
-            rows, differing = compare_fixtures(before, after)
-            samples += rows
-            mismatches += differing
-            policy = load_policy(source)
-            nonfinite += nonfinite_weights(policy)
-            nfe.append(
-                {
-                    "method": method,
-                    "seed": seed,
-                    "recorded": before[0]["nfe"],
-                    "counted": after[0]["nfe"],
-                }
-            )
-            coverage += _sweep(plan, policy, held_out, seed, task=task, checker=checker)
-        identity[method] = _identity(plan, method) | {
-            "metadata_mismatches": mismatches,
-            "nonfinite_weights": nonfinite,
-        }
-    write_table(folder / "samples.parquet", pa.Table.from_pylist(samples, SAMPLES))
-    write_table(folder / "nfe.parquet", pa.Table.from_pylist(nfe, NFE))
-    write_table(folder / "coverage.parquet", pa.Table.from_pylist(coverage, COVERAGE))
+    written = read_rows(fixtures, FixtureRow)
+    rows, identity = ReloadRows(), _identities(candidates)
+    for candidate in candidates:
+        before = [r for r in written if (r.method, r.seed) == (candidate.name, candidate.seed)]
+        policy = candidate.load()
+        entry = identity[candidate.name]
+        entry["metadata_mismatches"] += _reloaded(plan, candidate, before, rows)
+        entry["nonfinite_weights"] += nonfinite_weights(policy)
+        rows.offline += offline_rows(policy, data, seed=candidate.seed, horizons=plan.horizons)
+        own, swept = _sweep(plan, policy, held_out, candidate.seed, task=task, checker=checker)
+        rows.modes += own
+        rows.coverage += swept
+    rows.write(folder)
     write_bytes(folder / "identity.json", canonical_json(identity))
 
 
@@ -101,6 +115,34 @@ def nonfinite_weights(policy: NetworkPolicy) -> int:
     """Weights that are NaN or infinite."""
     state = policy.checkpoint.network.state_dict()
     return sum(int((~values.isfinite()).sum()) for values in state.values())
+
+
+def _reloaded(
+    plan: ReloadPlan, candidate: JudgedPolicy, before: Sequence[FixtureRow], rows: ReloadRows
+) -> int:
+    """Fixtures again, in a fresh process; returns how many metadata fields differ."""
+    if not before:
+        raise ContractError(
+            where=f"fixtures of {candidate.name}, seed {candidate.seed}",
+            found="none",
+            expected="samples drawn at training",
+            action="Train the generators again (`dvc repro train_generators`).",
+        )
+    after = in_fresh_process(
+        reload_fixture,
+        candidate.folder,
+        plan.dataset,
+        horizons=plan.horizons,
+        method=candidate.name,
+        seed=candidate.seed,
+        count=len(before),
+    )
+    compared, differing = compare_fixtures(before, after)
+    rows.samples += [
+        SampleRow(candidate.name, candidate.seed, **asdict(fixture)) for fixture in compared
+    ]
+    rows.nfe.append(NfeRow(candidate.name, candidate.seed, before[0].nfe, after[0].nfe))
+    return differing
 
 
 def _sweep(
@@ -111,10 +153,12 @@ def _sweep(
     *,
     task: Task,
     checker: FeasibilityChecker,
-) -> list[dict[str, Any]]:
-    own = policy.sampler.steps
+) -> tuple[list[ModeRow], list[CoverageRow]]:
+    """Modes at the candidate's own sampler steps, and coverage at these and the swept ones."""
+    own_steps = policy.sampler.steps
+    own: list[ModeRow] = []
     rows = []
-    for steps in sorted({own, *plan.sweep.get(policy.method, ())}):
+    for steps in sorted({own_steps, *plan.sweep.get(policy.method, ())}):
         sampler = policy.sampler.model_copy(update={"steps": steps})
         found = modes_of_policy(
             NetworkPolicy(policy.checkpoint, sampler=sampler),
@@ -125,61 +169,47 @@ def _sweep(
             task=task,
             checker=checker,
         )
-        if not found:
-            continue
-        whole = sum(row["modes_covered"] == row["modes_present"] for row in found)
-        drawn = sum(row["samples"] for row in found)
-        rows.append(
-            {
-                "method": policy.method,
-                "seed": seed,
-                "steps": steps,
-                "nfe": found[0]["nfe"],
-                "situations": len(found),
-                "modes_covered_share": whole / len(found),
-                "coverage_lower": clopper_pearson(whole, len(found))[0],
-                "spread_m": float(np.mean([row["spread_m"] for row in found])),
-                "admissible_share": sum(row["admissible"] for row in found) / drawn,
-                "between_share": sum(row["between_modes"] for row in found) / drawn,
-            }
-        )
-    return rows
+        if steps == own_steps:
+            own = found
+        if found:
+            rows.append(coverage_row(found, steps=steps))
+    return own, rows
 
 
-def _identity(plan: ReloadPlan, method: str) -> dict[str, Any]:
+def coverage_row(found: Sequence[ModeRow], *, steps: int) -> CoverageRow:
+    """One row of `coverage.parquet` from the modes of every situation, at least one."""
+    whole = sum(row.modes_covered == row.modes_present for row in found)
+    drawn = sum(row.samples for row in found)
+    return CoverageRow(
+        method=found[0].method,
+        seed=found[0].seed,
+        steps=steps,
+        nfe=found[0].nfe,
+        situations=len(found),
+        modes_covered_share=whole / len(found),
+        coverage_lower=clopper_pearson(whole, len(found))[0],
+        spread_m=float(np.mean([row.spread_m for row in found])),
+        admissible_share=sum(row.admissible for row in found) / drawn,
+        between_share=sum(row.between_modes for row in found) / drawn,
+    )
+
+
+def _identities(candidates: Sequence[JudgedPolicy]) -> dict[str, dict[str, Any]]:
     """Everything that pins a candidate, by hash; the first seed is the one that is promoted."""
-    folders = [plan.checkpoints / method / f"seed_{seed}" for seed in plan.seeds]
-    policies = [load_policy(folder) for folder in folders]
-    first = policies[0].checkpoint.config
-    return {
-        "checkpoint": policies[0].checkpoint_hash,
-        "checkpoints": [policy.checkpoint_hash for policy in policies],
-        "config": [sha256_file(folder / CONFIG_FILE) for folder in folders],
-        "dataset": first.provenance.dataset_manifest_sha256,
-        "normalisation": sha256_bytes(canonical_json(first.normalisation.model_dump())),
-        "seed": [policy.checkpoint.config.training_seed for policy in policies],
-        "sampler": policies[0].sampler_config_hash,
-    }
-
-
-SAMPLES = pa.schema(
-    [
-        ("method", pa.string()), ("seed", pa.int64()), ("row", pa.int64()),
-        ("sha256_trained", pa.string()), ("sha256_reloaded", pa.string()),
-        ("max_abs_difference", pa.float64()),
-    ]
-)  # fmt: skip
-NFE = pa.schema(
-    [
-        ("method", pa.string()), ("seed", pa.int64()), ("recorded", pa.int64()),
-        ("counted", pa.int64()),
-    ]
-)  # fmt: skip
-COVERAGE = pa.schema(
-    [
-        ("method", pa.string()), ("seed", pa.int64()), ("steps", pa.int64()),
-        ("nfe", pa.int64()), ("situations", pa.int64()), ("modes_covered_share", pa.float64()),
-        ("coverage_lower", pa.float64()), ("spread_m", pa.float64()),
-        ("admissible_share", pa.float64()), ("between_share", pa.float64()),
-    ]
-)  # fmt: skip
+    result = {}
+    for name in dict.fromkeys(candidate.name for candidate in candidates):
+        own = [candidate for candidate in candidates if candidate.name == name]
+        policies = [candidate.load() for candidate in own]
+        first = policies[0].checkpoint.config
+        result[name] = {
+            "checkpoint": own[0].sha256,
+            "checkpoints": [candidate.sha256 for candidate in own],
+            "config": [sha256_file(candidate.folder / CONFIG_FILE) for candidate in own],
+            "dataset": first.provenance.dataset_manifest_sha256,
+            "normalisation": sha256_bytes(canonical_json(first.normalisation.model_dump())),
+            "seed": [policy.checkpoint.config.training_seed for policy in policies],
+            "sampler": policies[0].sampler_config_hash,
+            "metadata_mismatches": 0,
+            "nonfinite_weights": 0,
+        }
+    return result

@@ -4,53 +4,23 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import pyarrow as pa
-
-from genpolicy.contract.horizons import HorizonConfig
+from genpolicy.evidence.rows import CandidateRow, ShadowCountRow, ShadowStubRow, write_rows
 from genpolicy.evidence.shadow.mutants import run_mutants
+from genpolicy.evidence.shadow.session import Cell
 from genpolicy.evidence.shadow.shadow import ShadowEvidence
-from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.execution.journal import write_journal
 from genpolicy.execution.ledger import Account
-from genpolicy.feasibility.settings import LAYERS
 from genpolicy.integrity.atomic import write_bytes
 from genpolicy.integrity.documents import canonical_json
-from genpolicy.integrity.tables import write_table
 from genpolicy.verification.checker import ExpectedSettings, check_journal
-
-TEXT, WHOLE, REAL, FLAG = pa.string(), pa.int64(), pa.float64(), pa.bool_()
-
-CANDIDATES = pa.schema(
-    [
-        ("method", TEXT), ("seed", WHOLE), ("fixture", TEXT), ("situation", TEXT),
-        ("phase", TEXT), ("observation", WHOLE), ("candidate", WHOLE), ("mode", TEXT),
-        *((layer, FLAG) for layer in LAYERS), ("first_reason", TEXT), ("layer_margin", REAL),
-        ("position_change_m", REAL), ("rotation_change_rad", REAL), ("boundary_jerk_m_s3", REAL),
-        ("raw", pa.list_(REAL)), ("projected", pa.list_(REAL)),
-    ]
-)  # fmt: skip
-STUB = pa.schema(
-    [
-        ("method", TEXT), ("fixture", TEXT), ("delivered", WHOLE), ("arrivals", WHOLE),
-        ("stale", WHOLE), ("invalid", WHOLE),
-    ]
-)  # fmt: skip
-COUNTS = pa.schema(
-    [
-        ("method", TEXT), ("fixture", TEXT), ("generated", WHOLE), ("executed", WHOLE),
-        ("queued", WHOLE), ("reason", TEXT), ("count", WHOLE),
-    ]
-)  # fmt: skip
 
 
 def write_shadow(
     folder: Path,
     found: Sequence[ShadowEvidence],
     mutants: list[dict[str, Any]],
-    candidates: pa.Table,
     *,
-    horizons: HorizonConfig,
-    execution: ExecutionSettings,
+    cell: Cell,
 ) -> None:
     """Write everything; the checker reads the journal back from the file.
 
@@ -58,23 +28,22 @@ def write_shadow(
         folder: Existing folder.
         found: Evidence of each method.
         mutants: Disabled checks of the six layers.
-        candidates: Table of the schema `CANDIDATES`.
-        horizons: What every session must have run under.
-        execution: The same.
+        cell: What every session must have run under.
     """
-    write_table(folder / "candidates.parquet", candidates)
+    candidates = [row for item in found for row in item.candidates]
+    write_rows(folder / "candidates.parquet", CandidateRow, candidates)
     stub = [row for item in found for row in _stub_rows(item)]
-    write_table(folder / "stub.parquet", pa.Table.from_pylist(stub, STUB))
+    write_rows(folder / "stub.parquet", ShadowStubRow, stub)
     counts = [
-        {"method": method, "fixture": fixture, **row}
+        ShadowCountRow(method=method, fixture=fixture, **row)
         for item in found
         for (method, fixture), accounts in sorted(item.accounts.items())
         for row in account_rows(accounts)
     ]
-    write_table(folder / "counts.parquet", pa.Table.from_pylist(counts, COUNTS))
+    write_rows(folder / "counts.parquet", ShadowCountRow, counts)
     journal = folder / "journal.mcap"
     write_journal(journal, [session for item in found for session in item.sessions])
-    checked = checker_document([journal], horizons=horizons, execution=execution)
+    checked = checker_document([journal], cell=cell)
     write_bytes(folder / "checker.json", canonical_json(checked))
     # The executor's checks are owned by freshness and hand-over, layer six and beyond.
     executor = [{**row, "layer": "execution"} for row in run_mutants()]
@@ -96,14 +65,13 @@ def account_rows(accounts: Sequence[Account]) -> list[dict[str, Any]]:
     return [{**totals, "reason": reason, "count": count} for reason, count in reasons]
 
 
-def checker_document(
-    journals: Sequence[Path], *, horizons: HorizonConfig, execution: ExecutionSettings
-) -> dict[str, Any]:
+def checker_document(journals: Sequence[Path], *, cell: Cell) -> dict[str, Any]:
     """What the independent checker says of journal files; content of `checker.json`.
 
     The settings that every session must have run under come from `params.yaml`, not from the
     journal.
     """
+    horizons, execution = cell.horizons, cell.execution
     expected = ExpectedSettings(
         execution_horizon=horizons.execution_horizon,
         action_period_s=horizons.action_period_s,
@@ -123,16 +91,16 @@ def checker_document(
     }
 
 
-def _stub_rows(evidence: ShadowEvidence) -> list[dict[str, Any]]:
-    keys = sorted({(method, fixture) for method, fixture, _ in evidence.stub})
+def _stub_rows(evidence: ShadowEvidence) -> list[ShadowStubRow]:
+    seen = evidence.stub
     return [
-        {
-            "method": method,
-            "fixture": fixture,
-            **{
-                name: evidence.stub[(method, fixture, name)]
-                for name in ("delivered", "arrivals", "stale", "invalid")
-            },
-        }
-        for method, fixture in keys
+        ShadowStubRow(
+            method=method,
+            fixture=fixture,
+            delivered=seen[(method, fixture, "delivered")],
+            arrivals=seen[(method, fixture, "arrivals")],
+            stale=seen[(method, fixture, "stale")],
+            invalid=seen[(method, fixture, "invalid")],
+        )
+        for method, fixture in sorted({(method, fixture) for method, fixture, _ in seen})
     ]

@@ -12,13 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from genpolicy.contract.latency import DECLARED_TERMS, MEASURED_TERMS
 from genpolicy.errors import ContractError
 from genpolicy.seeds import stream
 
 Array = NDArray[np.float64]
-
-DECLARED_TERMS = ("exposure", "capture", "decode", "transfer", "network", "queue")
-MEASURED_TERMS = ("preprocess", "encode", "sample", "select", "project")
 
 
 @dataclass(frozen=True)
@@ -50,7 +48,7 @@ class LatencyModel:
 
     def __post_init__(self) -> None:
         for names, have in ((DECLARED_TERMS, self.declared), (MEASURED_TERMS, self.measured)):
-            missing = [name for name in names if name not in have]
+            missing = [str(name) for name in names if name not in have]
             if missing:
                 raise ContractError(
                     where="latency model",
@@ -97,7 +95,7 @@ def draw_latency(
         The eleven terms, s.
     """
     terms: dict[str, float] = {}
-    for name in (*DECLARED_TERMS, *MEASURED_TERMS):
+    for name in map(str, (*DECLARED_TERMS, *MEASURED_TERMS)):
         uniform = float(
             stream(root_seed, "latency", perturbation, start, invocation, name).random()
         )

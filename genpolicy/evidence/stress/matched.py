@@ -7,21 +7,22 @@ share the network's batches; which batch a sample was drawn in changes no bit of
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from genpolicy.contract.horizons import HorizonConfig
+from genpolicy.candidates.judged import JudgedPolicy
 from genpolicy.evidence.admission_context import make_checker
+from genpolicy.evidence.rows import RolloutRow, StressStubRow
+from genpolicy.evidence.shadow.session import Cell
 from genpolicy.evidence.stress.latency import LatencyModel
-from genpolicy.evidence.stress.perturbations import PerturbationSettings
-from genpolicy.evidence.stress.rollout import Fixture, Outcome, Rollout
-from genpolicy.execution.cell import ExecutionSettings
+from genpolicy.evidence.stress.perturbations import Perturbation
+from genpolicy.evidence.stress.rollout import Rollout
+from genpolicy.evidence.stress.state import Fixture, Outcome
 from genpolicy.execution.journal import write_journal
 from genpolicy.execution.ledger import Account
 from genpolicy.feasibility.settings import FeasibilitySettings
-from genpolicy.policies.policy import NetworkPolicy, load_policy
+from genpolicy.policies.policy import Policy
 from genpolicy.seeds import stream
 from genpolicy.tasks.api import Start, Task, load_task
 
@@ -31,43 +32,46 @@ NS_PER_S = 1e9
 
 
 @dataclass(frozen=True)
+class Comparison:
+    """What all shards share.
+
+    Attributes:
+        task: Registered name of the task.
+        starts: Initial states as JSON texts, in order.
+        episode_limit_s: Longest rollout.
+        samples: Candidates per invocation of a stochastic method.
+        cell: Horizons, executor, supervisor and recovery.
+        feasibility: Thresholds of the six layers.
+        root_seed: Root seed.
+    """
+
+    task: str
+    starts: tuple[str, ...]
+    episode_limit_s: float
+    samples: int
+    cell: Cell
+    feasibility: FeasibilitySettings
+    root_seed: int
+
+
+@dataclass(frozen=True)
 class Shard:
     """One method under one perturbation.
 
     Attributes:
-        task: Registered name of the task.
-        method: Name of the method.
-        seed: Training seed.
-        checkpoint: Its folder.
-        sha256: Its identity.
+        comparison: What all shards share.
+        judged: The method's policy.
+        latency: Latency of the method.
         perturbation: Name of the perturbation.
         schedule: What it injects.
-        starts: Initial states as JSON texts, in order.
-        episode_limit_s: Longest rollout.
-        candidates: Candidates per invocation.
-        horizons: Common horizons.
-        execution: Executor, supervisor and recovery.
-        feasibility: Thresholds of the six layers.
-        latency: Latency of the method.
-        root_seed: Root seed.
         journal: File to write the journal to.
     """
 
-    task: str
-    method: str
-    seed: int
-    checkpoint: Path
-    sha256: str
-    perturbation: str
-    schedule: PerturbationSettings
-    starts: tuple[str, ...]
-    episode_limit_s: float
-    candidates: int
-    horizons: HorizonConfig
-    execution: ExecutionSettings
-    feasibility: FeasibilitySettings
+    comparison: Comparison
+    judged: JudgedPolicy
     latency: LatencyModel
-    root_seed: int
+    perturbation: str
+    schedule: Perturbation
     journal: Path
 
 
@@ -82,10 +86,10 @@ class ShardResult:
         stub: Arrivals, stale and invalid offers.
     """
 
-    rollouts: list[dict[str, Any]]
+    rollouts: list[RolloutRow]
     accounts: list[Account]
     ages_s: Array
-    stub: dict[str, int]
+    stub: StressStubRow
 
 
 def matched_starts(task: Task, *, root_seed: int, count: int) -> list[Start]:
@@ -95,34 +99,35 @@ def matched_starts(task: Task, *, root_seed: int, count: int) -> list[Start]:
 
 def run_shard(shard: Shard) -> ShardResult:
     """All rollouts of a shard, in lockstep; writes its journal."""
-    task = load_task(shard.task)
-    policy = load_policy(shard.checkpoint, expected_sha256=shard.sha256)
+    comparison = shard.comparison
+    horizons = comparison.cell.horizons
+    task, policy = load_task(comparison.task), shard.judged.load()
     fixture = Fixture(
         task=task,
         checker=make_checker(
-            task, shard.feasibility, action_period_s=shard.horizons.action_period_s
+            task, comparison.feasibility, action_period_s=horizons.action_period_s
         ),
-        horizons=shard.horizons,
-        execution=shard.execution,
+        horizons=horizons,
+        execution=comparison.cell.execution,
         latency=shard.latency,
         perturbation=shard.perturbation,
         schedule=shard.schedule,
-        root_seed=shard.root_seed,
-        method=shard.method,
+        root_seed=comparison.root_seed,
+        method=shard.judged.name,
         checkpoint=policy.checkpoint_hash,
         sampler=policy.sampler_config_hash,
     )
     epoch = task.calibration_epochs[-1]
     rollouts = [
         Rollout(fixture, task.start_from_json(text), index, calibration_epoch=epoch)
-        for index, text in enumerate(shard.starts)
+        for index, text in enumerate(comparison.starts)
     ]
-    ticks = round(shard.episode_limit_s / shard.horizons.action_period_s)
+    ticks = round(comparison.episode_limit_s / horizons.action_period_s)
     for _ in range(ticks):
         active = [rollout for rollout in rollouts if not rollout.done]
         if not active:
             break
-        _step(active, policy, shard)
+        step(active, policy, samples=comparison.samples)
     for rollout in rollouts:
         rollout.end(Outcome.TIMEOUT)
     write_journal(shard.journal, [rollout.journal for rollout in rollouts])
@@ -131,15 +136,24 @@ def run_shard(shard: Shard) -> ShardResult:
         rollouts=[row for row, _ in parts],
         accounts=[rollout.executor.conservation().chunks for rollout in rollouts],
         ages_s=np.concatenate([ages for _, ages in parts]),
-        stub={
-            "arrivals": sum(rollout.stub.arrivals for rollout in rollouts),
-            "stale": sum(rollout.stub.stale for rollout in rollouts),
-            "invalid": sum(rollout.stub.invalid for rollout in rollouts),
-        },
+        stub=StressStubRow(
+            method=shard.judged.name,
+            perturbation=shard.perturbation,
+            arrivals=sum(rollout.stub.arrivals for rollout in rollouts),
+            stale=sum(rollout.stub.stale for rollout in rollouts),
+            invalid=sum(rollout.stub.invalid for rollout in rollouts),
+        ),
     )
 
 
-def _step(active: Sequence[Rollout], policy: NetworkPolicy, shard: Shard) -> None:
+def step(active: Sequence[Rollout], policy: Policy, *, samples: int) -> None:
+    """One tick of rollouts in lockstep; what they ask for is sampled in one batch.
+
+    Args:
+        active: Rollouts that have not ended, of one method and perturbation.
+        policy: Their policy.
+        samples: Candidates per invocation, if it is stochastic.
+    """
     for rollout in active:
         rollout.sense()
     _judge_deliveries(active)
@@ -151,10 +165,10 @@ def _step(active: Sequence[Rollout], policy: NetworkPolicy, shard: Shard) -> Non
         drawn = policy.sample(
             np.stack([rollout.conditioning() for rollout in asking]),
             noise_names=[
-                ("stress", shard.perturbation, rollout.start_index, rollout.invocations)
+                ("stress", rollout.fixture.perturbation, rollout.start_index, rollout.invocations)
                 for rollout in asking
             ],
-            candidates=shard.candidates if policy.stochastic else 1,
+            candidates=samples if policy.stochastic else 1,
         )
         for rollout, chunks in zip(asking, drawn.actions, strict=True):
             assert rollout.wanted is not None
@@ -179,7 +193,7 @@ def _judge_deliveries(active: Sequence[Rollout]) -> None:
             rollout.settle(result)
 
 
-def rollout_row(shard: Shard, rollout: Rollout) -> tuple[dict[str, Any], Array]:
+def rollout_row(shard: Shard, rollout: Rollout) -> tuple[RolloutRow, Array]:
     """One row of `rollouts.parquet`, and the ages of its actions, computed from the journal."""
     events = rollout.journal.events()
     ages = np.array(
@@ -188,34 +202,34 @@ def rollout_row(shard: Shard, rollout: Rollout) -> tuple[dict[str, Any], Array]:
     balance = rollout.executor.conservation().chunks
     tally, path = rollout.tally, np.stack(rollout.tally.path_m)
     assert rollout.outcome is not None
-    row = {
-        "method": shard.method,
-        "seed": shard.seed,
-        "perturbation": shard.perturbation,
-        "start": rollout.start_index,
-        "start_sha256": rollout.start_sha256,
-        "outcome": str(rollout.outcome),
-        "success": rollout.outcome is Outcome.SUCCESS,
-        "duration_s": rollout.now_s,
-        "ticks": rollout.tick,
-        "action_ticks": tally.action_ticks,
-        "hold_ticks": tally.hold_ticks,
-        "fallback_ticks": tally.fallback_ticks,
-        "invocations": rollout.invocations,
-        "deadline_misses": tally.deadline_misses,
-        "discards": sum(balance.discarded.values()),
-        "rejections": tally.rejections,
-        "rejected_by": _most_common(tally.rejected_by),
-        "recovery_attempted": rollout.recovery.attempts > 0,
-        "recovered": rollout.recovery.attempts > 0 and rollout.outcome is Outcome.SUCCESS,
-        "interventions": tally.interventions,
-        "action_age_p50_s": _quantile(ages, 0.5),
-        "action_age_p95_s": _quantile(ages, 0.95),
-        "action_age_max_s": _quantile(ages, 1.0),
-        "latency_p95_s": _quantile(np.array(tally.latencies_s), 0.95),
-        "force_peak_n": tally.force_peak_n,
-        "mode": rollout.fixture.task.mode_of(path, rollout.history[-1]),
-    }
+    row = RolloutRow(
+        method=shard.judged.name,
+        seed=shard.judged.seed,
+        perturbation=shard.perturbation,
+        start=rollout.start_index,
+        start_sha256=rollout.start_sha256,
+        outcome=str(rollout.outcome),
+        success=rollout.outcome is Outcome.SUCCESS,
+        duration_s=rollout.now_s,
+        ticks=rollout.tick,
+        action_ticks=tally.action_ticks,
+        hold_ticks=tally.hold_ticks,
+        fallback_ticks=tally.fallback_ticks,
+        invocations=rollout.invocations,
+        deadline_misses=tally.deadline_misses,
+        discards=sum(balance.discarded.values()),
+        rejections=tally.rejections,
+        rejected_by=_most_common(tally.rejected_by),
+        recovery_attempted=rollout.recovery.attempts > 0,
+        recovered=rollout.recovery.attempts > 0 and rollout.outcome is Outcome.SUCCESS,
+        interventions=tally.interventions,
+        action_age_p50_s=_quantile(ages, 0.5),
+        action_age_p95_s=_quantile(ages, 0.95),
+        action_age_max_s=_quantile(ages, 1.0),
+        latency_p95_s=_quantile(np.array(tally.latencies_s), 0.95),
+        force_peak_n=tally.force_peak_n,
+        mode=rollout.fixture.task.mode_of(path, rollout.history[-1]),
+    )
     return row, ages
 
 

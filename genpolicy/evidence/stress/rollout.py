@@ -6,20 +6,17 @@ many of them run in lockstep and share the network's batches; it never sees the 
 """
 
 from collections import deque
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from enum import StrEnum
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.contract.chunk import Candidate, ChunkMetadata, DiscardReason, Proposal
-from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.errors import ContractError
-from genpolicy.evidence.admission_context import COMMANDS_AT_THE_SEAM, Session, context_of
-from genpolicy.evidence.stress.latency import LatencyModel, draw_latency
-from genpolicy.evidence.stress.perturbations import PerturbationSettings, Push, injection, push
-from genpolicy.execution.cell import ExecutionSettings
+from genpolicy.evidence.admission_context import COMMANDS_AT_THE_SEAM, Moment, Session, context_of
+from genpolicy.evidence.stress.fallback import PlannedFallback
+from genpolicy.evidence.stress.perturbations import Push, push
+from genpolicy.evidence.stress.state import Fixture, InFlight, Outcome, Tally, in_flight
 from genpolicy.execution.command import Command
 from genpolicy.execution.executor import Executor
 from genpolicy.execution.journal import Journal
@@ -32,99 +29,15 @@ from genpolicy.execution.recovery import (
 )
 from genpolicy.execution.stub import ControllerStub
 from genpolicy.execution.supervisor import Supervisor
-from genpolicy.feasibility.admission import Admitted, FeasibilityChecker, Rejected
+from genpolicy.feasibility.admission import Admitted, Rejected
 from genpolicy.feasibility.context import Context
 from genpolicy.feasibility.settings import LAYERS
-from genpolicy.tasks.api import Start, Task, World, WorldSettings
+from genpolicy.tasks.api import Start, World, WorldSettings
 
 Array = NDArray[np.float64]
 
 SELECTOR = "first_admissible"
 FRESH = LAYERS[-1]
-
-
-class Outcome(StrEnum):
-    """How a rollout ended."""
-
-    SUCCESS = "success"
-    COLLISION = "collision"
-    FORCE_STOP = "force_stop"
-    INTERVENTION = "intervention"
-    TIMEOUT = "timeout"
-
-
-@dataclass(frozen=True)
-class Fixture:
-    """What all rollouts of one method under one perturbation share.
-
-    Attributes:
-        task: The task.
-        checker: The six layers.
-        horizons: H_o, K, H_e and the period.
-        execution: Executor, supervisor and recovery.
-        latency: Latency of the method.
-        perturbation: Name of the perturbation.
-        schedule: What it injects.
-        root_seed: Root seed.
-        method: Name of the method.
-        checkpoint: Its weights.
-        sampler: Its sampler settings.
-    """
-
-    task: Task
-    checker: FeasibilityChecker
-    horizons: HorizonConfig
-    execution: ExecutionSettings
-    latency: LatencyModel
-    perturbation: str
-    schedule: PerturbationSettings
-    root_seed: int
-    method: str
-    checkpoint: str
-    sampler: str
-
-
-@dataclass
-class InFlight:
-    """An invocation that has not been delivered yet.
-
-    Attributes:
-        number: Count of invocations in this rollout.
-        metadata: Of the chunk to come; candidate 0.
-        observation: What it is conditioned on; the newest of the history. Shape (D_o,).
-        begun_s: Tick at which it began.
-        arrival_s: When it is delivered.
-        terms: The eleven latency terms, s.
-        dropped: Lost on the way.
-        chunks: Sampled candidates, filled in by the batch. Shape (N, K, D_a).
-        given_up: Its deadline has passed.
-    """
-
-    number: int
-    metadata: ChunkMetadata
-    observation: Array
-    begun_s: float
-    arrival_s: float
-    terms: Mapping[str, float]
-    dropped: bool
-    chunks: Array | None = None
-    given_up: bool = False
-
-
-@dataclass
-class Tally:
-    """What a rollout counts while it runs."""
-
-    action_ticks: int = 0
-    hold_ticks: int = 0
-    fallback_ticks: int = 0
-    deadline_misses: int = 0
-    rejections: int = 0
-    interventions: int = 0
-    force_peak_n: float = 0.0
-    rejected_by: dict[str, int] = field(default_factory=dict)
-    latencies_s: list[float] = field(default_factory=list)
-    path_m: list[Array] = field(default_factory=list)
 
 
 class Rollout:
@@ -168,8 +81,7 @@ class Rollout:
         self._arrived: deque[tuple[InFlight, int]] = deque()
         self._candidate = 0
         self._not_fresh: DiscardReason | None = None
-        self._fallback_chunks = 0
-        self._primitive: tuple[tuple[str, int, int], Array, int] | None = None
+        self._fallback = PlannedFallback()
         self._newest_accepted_s: float | None = None
         self._last_command_s: float | None = None
         self._commanded: deque[Array] = deque(
@@ -265,7 +177,7 @@ class Rollout:
         self.wanted = None
         self._recover(now_s)
         if not self.done and self._may_invoke(now_s):
-            self.wanted = self._begin_invocation(now_s, self.history[-1])
+            self.wanted = self._begin_invocation(now_s)
 
     def act(self) -> None:
         """One tick of the executor, one action period of the world."""
@@ -313,31 +225,14 @@ class Rollout:
     def _may_invoke(self, now_s: float) -> bool:
         return self.recovery.state is RecoveryState.IDLE and self.executor.needs_invocation(now_s)
 
-    def _begin_invocation(self, now_s: float, observation: Array) -> InFlight:
-        fixture, horizons = self.fixture, self.fixture.horizons
-        number = self.invocations
+    def _begin_invocation(self, now_s: float) -> InFlight:
+        horizons, number = self.fixture.horizons, self.invocations
         self.invocations += 1
-        hit = injection(
-            fixture.schedule,
-            root_seed=fixture.root_seed,
-            name=fixture.perturbation,
-            start=self.start_index,
-            invocation=number,
-        )
-        draw = draw_latency(
-            fixture.latency,
-            root_seed=fixture.root_seed,
-            perturbation=fixture.perturbation,
-            start=self.start_index,
-            invocation=number,
-            extra_s=hit.extra_s,
-            compute_factor=hit.compute_factor,
-        )
         metadata = ChunkMetadata(
             chunk_id=f"{self.journal.session}/{number}",
             condition_observation_event_time_s=now_s,
-            policy_checkpoint_hash=fixture.checkpoint,
-            sampler_config_hash=fixture.sampler,
+            policy_checkpoint_hash=self.fixture.checkpoint,
+            sampler_config_hash=self.fixture.sampler,
             action_start_time_s=now_s,
             action_period_s=horizons.action_period_s,
             valid_until_s=now_s + horizons.execution_horizon * horizons.action_period_s,
@@ -345,20 +240,15 @@ class Rollout:
             calibration_epoch=self.world.calibration_epoch,
             predecessor_chunk_id=self.executor.chain_head,
             session_epoch=self.executor.session_epoch,
-            method=fixture.method,
+            method=self.fixture.method,
             candidate_index=0,
         )
-        self.executor.begin_invocation(now_s, metadata.chunk_id)
-        self.tally.latencies_s.append(draw.total_s)
-        return InFlight(
-            number=number,
-            metadata=metadata,
-            observation=observation,
-            begun_s=now_s,
-            arrival_s=now_s + draw.total_s,
-            terms=draw.terms,
-            dropped=hit.dropped,
+        flying = in_flight(
+            self.fixture, metadata, self.history[-1], start=self.start_index, number=number
         )
+        self.executor.begin_invocation(now_s, metadata.chunk_id)
+        self.tally.latencies_s.append(flying.total_s)
+        return flying
 
     def _collect_deliveries(self, now_s: float) -> None:
         for flying in sorted(self._flying, key=lambda item: (item.arrival_s, item.number)):
@@ -400,19 +290,12 @@ class Rollout:
         self.executor.write_off(flying.metadata, rows, reason, self.now_s)
 
     def _delivery_context(self, late: int) -> Context:
-        """All rows from the first that is not late are judged, also those never executed."""
         return context_of(
             self.fixture.task,
             self.fixture.checker,
-            observation=self.history[-1],
-            q_meas=self.world.q_meas,
-            commanded=list(self._commanded),
-            now_s=self.now_s,
-            phase=self.world.phase,
-            latest_observation_s=self.now_s,
+            self._moment(),
             session=self._session(self.fixture.checkpoint, self.fixture.sampler),
-            first_index=late,
-            end_index=None,
+            late_rows=late,
             newest_accepted_observation_s=self._newest_accepted_s,
         )
 
@@ -429,7 +312,7 @@ class Rollout:
             now_s=now_s,
             metadata=lambda: self._fallback_metadata(now_s),
             plan=self._plan,
-            admit=lambda proposal: self._admit_fallback(proposal, now_s),
+            admit=self._admit_fallback,
         )
         if state in (RecoveryState.ASK_HUMAN, RecoveryState.ABORT):
             self.tally.interventions += 1
@@ -439,43 +322,40 @@ class Rollout:
             self._last_command_s = now_s  # the silence is over; the policy gets its time
 
     def _plan(self, state: RecoveryState) -> Primitive:
-        """The rest of the primitive's trajectory, which is planned once, from where it begins."""
-        key = (str(state), self.recovery.attempts, self.recovery.failures)
-        if self._primitive is None or self._primitive[0] != key:
-            planned = self.fixture.task.fallback(self.world, str(state))
-            self._primitive = (key, planned, self.tally.fallback_ticks)
-        _, actions, begun = self._primitive
-        rest = actions[self.tally.fallback_ticks - begun :]
+        rest = self._fallback.rest(
+            self.fixture.task, self.world, self.recovery, state, ticks=self.tally.fallback_ticks
+        )
         return Primitive(rest[: self.fixture.horizons.prediction_horizon], reached=len(rest) == 0)
 
     def _fallback_metadata(self, now_s: float) -> ChunkMetadata:
-        self._fallback_chunks += 1
         return fallback_metadata(
             self.executor,
             now_s=now_s,
-            chunk_id=f"{self.journal.session}/fallback/{self._fallback_chunks}",
+            chunk_id=f"{self.journal.session}/fallback/{self._fallback.next_chunk()}",
             event_time_s=now_s,
             phase=self.world.phase,
             epoch=self.world.calibration_epoch,
         )
 
-    def _admit_fallback(self, proposal: Proposal, now_s: float) -> Admitted | None:
+    def _admit_fallback(self, proposal: Proposal) -> Admitted | None:
         identity = self.executor.settings.fallback_hash
         context = context_of(
             self.fixture.task,
             self.fixture.checker,
-            observation=self.history[-1],
-            q_meas=self.world.q_meas,
-            commanded=list(self._commanded),
-            now_s=now_s,
-            phase=self.world.phase,
-            latest_observation_s=now_s,
+            self._moment(),
             session=self._session(identity, identity),
-            first_index=0,
-            end_index=self.fixture.horizons.execution_horizon,
         )
         result = self.fixture.checker.admit(proposal, context=context)
         return result if isinstance(result, Admitted) else None
+
+    def _moment(self) -> Moment:
+        return Moment(
+            observation=self.history[-1],
+            q_meas=self.world.q_meas,
+            commanded=list(self._commanded),
+            now_s=self.now_s,
+            phase=self.world.phase,
+        )
 
     def _session(self, checkpoint: str, sampler: str) -> Session:
         return Session(

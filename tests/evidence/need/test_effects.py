@@ -6,26 +6,25 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from genpolicy.evidence.need.effects import effect_rows, half_width, valid
+from genpolicy.evidence.need.effects import Compared, effect_rows, half_width, valid
+from genpolicy.evidence.rows import FactorErrorRow, FactorModeRow
 
 
 def error(variant, episode, value):
-    return {
-        "variant": variant, "convention": "direct", "episode_uuid": episode,
-        "chunk_error": value, "first_error": value / 2,
-    }  # fmt: skip
+    return FactorErrorRow(variant, "trunk", 0, "direct", "test", episode, 3, value, value / 2)
 
 
 def situation(variant, episode, covered, admissible, present=2):
-    return {
-        "variant": variant, "convention": "direct", "episode_uuid": episode, "samples": 4,
-        "modes_present": present, "modes_covered": covered, "admissible": admissible,
-    }  # fmt: skip
+    return FactorModeRow(
+        variant=variant, factor="trunk", method="chunked_bc", seed=0, convention="direct",
+        episode_uuid=episode, index=0, samples=4, modes_present=present, modes_covered=covered,
+        between_modes=0, admissible=admissible, nfe=1, spread_m=0.0,
+    )  # fmt: skip
 
 
 def measured(errors, modes, kind="chunk_error"):
-    rows = effect_rows(errors, modes, own=("b", "direct"), reference=("a", "direct"), error=kind)
-    return {row["measure"]: row for row in rows}
+    compared = Compared("b", "direct", "trunk", reference=("a", "direct"), error=kind)
+    return {row.measure: row for row in effect_rows(errors, modes, compared)}
 
 
 def test_pairs_by_episode_and_leaves_out_what_has_no_partner():
@@ -36,10 +35,10 @@ def test_pairs_by_episode_and_leaves_out_what_has_no_partner():
     ]  # fmt: skip
     found = measured(errors, [])["chunk_error"]
     half = stats.t.isf(0.025, 1) * np.std([0.1, 0.3], ddof=1) / math.sqrt(2)
-    assert found["effect"] == pytest.approx(0.2)
-    assert found["upper"] - found["lower"] == pytest.approx(2 * half)
-    assert (found["episodes"], found["reference"]) == (2, 3.0)
-    assert measured(errors, [], "first_error")["first_error"]["effect"] == pytest.approx(0.1)
+    assert found.effect == pytest.approx(0.2)
+    assert found.upper - found.lower == pytest.approx(2 * half)
+    assert (found.episodes, found.reference) == (2, 3.0)
+    assert measured(errors, [], "first_error")["first_error"].effect == pytest.approx(0.1)
 
 
 def test_situations_with_one_mode_do_not_count_and_nothing_measured_is_nan():
@@ -49,9 +48,9 @@ def test_situations_with_one_mode_do_not_count_and_nothing_measured_is_nan():
         situation("b", "e3", 1, 4, present=1),
     ]  # fmt: skip
     found = measured([], modes)
-    assert (found["mode_coverage"]["value"], found["mode_coverage"]["effect"]) == (0.75, 0.25)
-    assert (found["valid_share"]["value"], found["valid_share"]["effect"]) == (0.5, -0.5)
-    assert math.isnan(found["chunk_error"]["effect"]) and found["chunk_error"]["episodes"] == 0
+    assert (found["mode_coverage"].value, found["mode_coverage"].effect) == (0.75, 0.25)
+    assert (found["valid_share"].value, found["valid_share"].effect) == (0.5, -0.5)
+    assert math.isnan(found["chunk_error"].effect) and found["chunk_error"].episodes == 0
 
 
 @pytest.mark.parametrize(

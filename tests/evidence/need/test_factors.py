@@ -1,48 +1,50 @@
-"""One factor at a time: what each may change, what is measured, and on which rows."""
-
-import dataclasses
+"""One factor at a time: what is measured of each variant, and on which rows."""
 
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from genpolicy.candidates.judged import trained
 from genpolicy.errors import ConfigError
-from genpolicy.evidence.need.factors import FactorStudy, Variant, run_factors
+from genpolicy.evidence.need.factors import FactorPlan, write_factors
 from genpolicy.integrity.documents import read_json
+from genpolicy.policies.matched_training import TrainingPlan
 from genpolicy.policies.settings import SamplerConfig
+from genpolicy.policies.variants import Variant, train_variants
 
+SAMPLERS = {
+    "bc": SamplerConfig(name="direct"),
+    "chunked_bc": SamplerConfig(name="direct"),
+    "act": SamplerConfig(name="z_zero"),
+    "ibc": SamplerConfig(name="derivative_free", steps=2, population=16),
+}
 VARIANTS = {
     "reference": Variant(factor="reference"),
     "linear_encoder": Variant(factor="representation", encoder="linear"),
     "longer_history": Variant(factor="representation", observation_horizon=3),
     "transformer": Variant(factor="trunk", trunk="transformer"),
-    "act_head": Variant(
-        factor="head", method="act", sampler=SamplerConfig(name="z_zero"),
-        conventions={"z_prior": SamplerConfig(name="z_prior")},
-    ),
-    "energy_head": Variant(
-        factor="head", method="ibc",
-        sampler=SamplerConfig(name="derivative_free", steps=2, population=16),
-    ),
+    "act_head": Variant(factor="head", method="act"),
+    "energy_head": Variant(factor="head", method="ibc"),
     "single_action": Variant(factor="temporal", method="bc"),
-}  # fmt: skip
+}
 
 
-def study_of(kit, variants):
-    training = kit.POLICY.training.model_copy(update={"steps": 10, "validation_every": 10})
-    return FactorStudy(
-        task="tabletop_insertion",
-        variants=variants,
-        settings=kit.POLICY.model_copy(update={"training": training}),
-        horizons=kit.HORIZONS,
-        feasibility=kit.FEASIBILITY,
-        samples=3,
-        stride=16,
-        root_seed=2,
-        device="cpu",
-        workers=1,
-        scheduler="local",
-    )
+def measure(variants, folder, *, dataset, audit, kit):
+    """Train and measure variants below one folder."""
+    steps = {"steps": 10, "validation_every": 10}
+    training = kit.POLICY.training.model_copy(update=steps)
+    plan = TrainingPlan(
+        dataset=dataset, settings=kit.POLICY.model_copy(update={"training": training}),
+        horizons=kit.HORIZONS, root_seed=2, device="cpu", workers=1, scheduler="local",
+    )  # fmt: skip
+    train_variants(plan, variants, SAMPLERS, folder=folder)
+    study = FactorPlan(
+        task="tabletop_insertion", dataset=dataset, audit=audit, horizons=kit.HORIZONS,
+        feasibility=kit.FEASIBILITY, variants=variants, samplers=SAMPLERS,
+        conventions={"act": {"z_prior": SamplerConfig(name="z_prior")}}, samples=3, stride=16,
+    )  # fmt: skip
+    checkpoints = trained(folder, variants, seeds=[0])
+    write_factors(study, checkpoints, folder, workers=1, scheduler="local")
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +56,7 @@ def audit(data, kit, tmp_path_factory):
 @pytest.fixture(scope="module")
 def measured(dataset, audit, kit, tmp_path_factory):
     folder = tmp_path_factory.mktemp("factors")
-    run_factors(study_of(kit, VARIANTS), dataset=dataset, audit=audit, folder=folder)
+    measure(VARIANTS, folder, dataset=dataset, audit=audit, kit=kit)
     return folder
 
 
@@ -63,7 +65,7 @@ def frame(folder, name):
 
 
 def test_each_variant_changes_only_its_factor(measured):
-    found = read_json(measured / "factors.json")
+    found = read_json(measured / "variants.json")
     assert found["reference"] == "reference"
     for name, item in found["variants"].items():
         assert set(item["changed"]) <= set(item["allowed"]), name
@@ -75,8 +77,8 @@ def test_each_variant_changes_only_its_factor(measured):
 def test_two_factors_at_once_are_seen(dataset, audit, kit, tmp_path):
     both = Variant(factor="trunk", trunk="transformer", encoder="linear")
     variants = {"reference": VARIANTS["reference"], "both": both}
-    run_factors(study_of(kit, variants), dataset=dataset, audit=audit, folder=tmp_path)
-    item = read_json(tmp_path / "factors.json")["variants"]["both"]
+    measure(variants, tmp_path, dataset=dataset, audit=audit, kit=kit)
+    item = read_json(tmp_path / "variants.json")["variants"]["both"]
     assert sorted(set(item["changed"]) - set(item["allowed"])) == ["network.encoder"]
 
 
@@ -120,7 +122,7 @@ def test_errors_are_finite_and_one_action_has_one_error(measured):
 
 def test_the_same_study_gives_the_same_bytes(measured, dataset, audit, kit, tmp_path):
     some = {name: VARIANTS[name] for name in ("reference", "energy_head")}
-    run_factors(study_of(kit, some), dataset=dataset, audit=audit, folder=tmp_path)
+    measure(some, tmp_path, dataset=dataset, audit=audit, kit=kit)
     for name in some:
         weights = f"{name}/seed_0/model.safetensors"
         assert (tmp_path / weights).read_bytes() == (measured / weights).read_bytes()
@@ -133,10 +135,19 @@ def test_the_same_study_gives_the_same_bytes(measured, dataset, audit, kit, tmp_
 def test_exactly_one_reference(dataset, audit, kit, tmp_path, factors):
     variants = {str(i): Variant(factor=factor) for i, factor in enumerate(factors)}
     with pytest.raises(ConfigError, match="references"):
-        run_factors(study_of(kit, variants), dataset=dataset, audit=audit, folder=tmp_path)
+        measure(variants, tmp_path, dataset=dataset, audit=audit, kit=kit)
 
 
-def test_steps_are_equal_for_all(measured, kit):
+def test_a_variant_without_any_sampler_is_refused(dataset, audit, kit, tmp_path):
+    variants = {
+        "reference": VARIANTS["reference"],
+        "l1": Variant(factor="head", method="chunked_l1"),
+    }
+    with pytest.raises(ConfigError, match=r"variants\.l1 is without a sampler"):
+        measure(variants, tmp_path, dataset=dataset, audit=audit, kit=kit)
+
+
+def test_steps_are_equal_for_all(measured):
     configs = [read_json(measured / name / "seed_0" / "config.json") for name in VARIANTS]
     assert {config["training"]["steps"] for config in configs} == {10}
-    assert dataclasses.asdict(study_of(kit, VARIANTS))["stride"] == 16
+    assert read_json(measured / "variants.json")["steps"] == 10

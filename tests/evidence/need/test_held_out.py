@@ -72,11 +72,11 @@ def test_rows_count_modes_and_samples(data, kit, tmp_path, policy, task, checker
     )  # fmt: skip
     assert len(rows) == 2
     for row in rows:
-        assert (row["method"], row["seed"], row["convention"]) == ("flow", 3, "euler")
-        assert row["samples"] == 4 and row["nfe"] == 2 and row["modes_present"] == 2
-        assert 0 <= row["modes_covered"] <= 2
-        assert 0 <= row["between_modes"] + row["admissible"] <= 8
-        assert row["spread_m"] > 0
+        assert (row.method, row.seed, row.convention) == ("flow", 3, "euler")
+        assert row.samples == 4 and row.nfe == 2 and row.modes_present == 2
+        assert 0 <= row.modes_covered <= 2
+        assert 0 <= row.between_modes + row.admissible <= 8
+        assert row.spread_m > 0
 
 
 def demonstrated(data, number, index, steps=16):

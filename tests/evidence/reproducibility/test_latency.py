@@ -4,9 +4,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from genpolicy.contract.latency import DECLARED_TERMS, MEASURED_TERMS, OWNERS
 from genpolicy.errors import ContractError
-from genpolicy.evidence.reproducibility.latency import DeclaredSettings, latency_models
-from genpolicy.evidence.stress.latency import DECLARED_TERMS, MEASURED_TERMS
+from genpolicy.evidence.reproducibility.latency import (
+    DeclaredSettings,
+    declared_rows,
+    latency_models,
+)
+from genpolicy.seeds import stream
 
 DECLARED = {name: DeclaredSettings(minimum_s=0.001, maximum_s=0.002) for name in DECLARED_TERMS}
 
@@ -70,3 +75,20 @@ def test_a_missing_declared_term_is_refused():
 def test_no_cold_invocation_is_refused():
     with pytest.raises(ContractError, match="cold invocations"):
         latency_models(table(cold=0), DECLARED)
+
+
+def test_declared_terms_are_drawn_within_their_bounds_alike_for_all_methods_with_an_owner():
+    rows = declared_rows(["a", "b"], DECLARED, draws=30, generator=stream(1, "declared"))
+    assert {row.component for row in rows} == set(DECLARED_TERMS)
+    assert all(row.owner == OWNERS[row.component] and row.source == "declared" for row in rows)
+    assert all(0.001 <= row.seconds <= 0.002 for row in rows)
+    own = {name: [r.seconds for r in rows if r.method == name] for name in ("a", "b")}
+    assert own["a"] == own["b"] and len(own["a"]) == 30 * len(DECLARED_TERMS)
+
+
+def test_a_term_without_bounds_or_bounds_of_no_term_are_refused():
+    short = {name: item for name, item in DECLARED.items() if name != "queue"}
+    more = {**DECLARED, "sample": DECLARED["queue"]}
+    for declared in (short, more):
+        with pytest.raises(ContractError, match=r"latency\.declared is bounds of"):
+            declared_rows(["a"], declared, draws=1, generator=stream(1, "declared"))

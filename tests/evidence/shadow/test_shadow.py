@@ -9,14 +9,10 @@ import pytest
 
 from genpolicy.evidence.admission_context import make_checker
 from genpolicy.evidence.shadow.corruption import CORRUPTIONS
-from genpolicy.evidence.shadow.shadow import (
-    HELD_OUT,
-    IN_FLIGHT_PHASE_CHANGE,
-    Shadow,
-    held_out_observations,
-    missing_checks_evidence,
-    shadow_policy,
-)
+from genpolicy.evidence.shadow.layer_mutants import missing_checks_evidence
+from genpolicy.evidence.shadow.observations import held_out_observations, spread
+from genpolicy.evidence.shadow.session import IN_FLIGHT_PHASE_CHANGE, Cell
+from genpolicy.evidence.shadow.shadow import HELD_OUT, Shadow, case_of, shadow_policy
 from genpolicy.execution.journal import write_journal
 from genpolicy.feasibility.checks import without
 from genpolicy.feasibility.settings import LAYERS
@@ -27,8 +23,8 @@ from genpolicy.verification.checker import check_journal
 @pytest.fixture(scope="module")
 def shadow(task, checker, kit):
     return Shadow(
-        task=task, checker=checker, horizons=kit.HORIZONS, execution=kit.EXECUTION, late_steps=1,
-        candidates=3,
+        task=task, checker=checker, cell=Cell(kit.HORIZONS, kit.EXECUTION), late_steps=1,
+        samples=3,
     )  # fmt: skip
 
 
@@ -79,26 +75,26 @@ def test_observations_come_from_the_test_split_in_equal_numbers(data, observatio
 
 
 def test_every_candidate_has_its_row_and_its_verdict(evidence, observations):
-    rows = [row for row in evidence.candidates if row["fixture"] == HELD_OUT]
+    rows = [row for row in evidence.candidates if row.fixture == HELD_OUT]
     assert len(rows) == 3 * len(observations)
     for row in rows:
-        assert row["seed"] == 4 and row["method"] == "operator"
-        verdicts = [row[layer] for layer in LAYERS]
-        if row["candidate"] == 1:
-            assert verdicts == [False, *[None] * 5] and row["first_reason"] == "finite"
-            assert row["mode"] == "none" and row["position_change_m"] is None
-        elif not row["first_reason"]:
+        assert row.seed == 4 and row.method == "operator"
+        verdicts = [getattr(row, layer) for layer in LAYERS]
+        if row.candidate == 1:
+            assert verdicts == [False, *[None] * 5] and row.first_reason == "finite"
+            assert row.mode == "none" and row.position_change_m is None
+        elif not row.first_reason:
             assert verdicts == [True] * 6
-    passed = [not row["first_reason"] for row in rows if row["candidate"] == 0]
+    passed = [not row.first_reason for row in rows if row.candidate == 0]
     assert np.mean(passed) >= 0.8
 
 
 def test_every_corruption_is_refused_and_its_session_executes_nothing(evidence):
-    fixtures = {row["fixture"] for row in evidence.candidates}
+    fixtures = {row.fixture for row in evidence.candidates}
     assert fixtures >= {c.name for c in CORRUPTIONS}
     for row in evidence.candidates:
-        if row["fixture"] != HELD_OUT:
-            assert row["first_reason"], row["fixture"]
+        if row.fixture != HELD_OUT:
+            assert row.first_reason, row.fixture
     for corruption in CORRUPTIONS:
         key = ("operator", corruption.name)
         assert evidence.stub[(*key, "delivered")] == evidence.stub[(*key, "arrivals")] == 0
@@ -144,13 +140,13 @@ def test_a_policy_that_answers_not_a_number_leaves_evidence(shadow, observations
         method="broken", checkpoint_hash="w", sampler_config_hash="s", sample=sample
     )
     found = shadow_policy(shadow, policy, observations[:2], seed=0)
-    assert {row["first_reason"] for row in found.candidates} == {"finite"}
+    assert {row.first_reason for row in found.candidates} == {"finite"}
     assert set(found.stub.values()) == {0}
 
 
 def test_a_trained_policy_goes_the_same_way(shadow, observations, policy):
     found = shadow_policy(shadow, policy, observations[:3], seed=0)
-    assert {row["method"] for row in found.candidates} == {"flow"}
+    assert {row.method for row in found.candidates} == {"flow"}
     for (_, _, name), count in found.stub.items():
         assert count == 0 or name in ("arrivals", "delivered")
 
@@ -181,3 +177,22 @@ def test_a_missing_check_is_noticed_by_exactly_its_fixture(shadow, observations,
         if row["fixture"] == "expired"
     )
     assert row["tried"] > 0 and not row["detected"]
+
+
+def test_all_rows_that_are_not_late_are_judged(shadow, observations):
+    """Decision 16: also behind the execution horizon, where nothing of the chunk is executed."""
+    item = next(o for o in observations if o.phase == "approach")
+    bad = np.array(item.demonstrated)
+    bad[-1, 0] += 0.5
+    case = case_of(shadow, item, bad, number=0)
+    assert case.context.rows(16) == slice(1, 16)
+    good = case_of(shadow, item, item.demonstrated, number=0)
+    admitted, refused = (
+        shadow.checker.admit(c.proposal, context=c.context).verdict.passed for c in (good, case)
+    )
+    assert admitted and not refused
+
+
+def test_a_spread_keeps_the_order_and_about_the_count(observations):
+    assert spread(observations, 5) == observations[::4]
+    assert spread(observations, 100) == observations

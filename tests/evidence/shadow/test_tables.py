@@ -3,13 +3,13 @@
 from types import SimpleNamespace
 
 import numpy as np
-import pyarrow as pa
 import pytest
 
 from genpolicy.contract.chunk import DiscardReason
-from genpolicy.evidence.shadow.shadow import HELD_OUT, Shadow, held_out_observations, shadow_policy
+from genpolicy.evidence.shadow.observations import held_out_observations
+from genpolicy.evidence.shadow.session import Cell
+from genpolicy.evidence.shadow.shadow import HELD_OUT, Shadow, shadow_policy
 from genpolicy.evidence.shadow.tables import (
-    CANDIDATES,
     account_rows,
     checker_document,
     write_shadow,
@@ -24,8 +24,8 @@ from genpolicy.seeds import stream
 def written(task, checker, data, policy, kit, tmp_path_factory):
     folder = tmp_path_factory.mktemp("shadow")
     shadow = Shadow(
-        task=task, checker=checker, horizons=kit.HORIZONS, execution=kit.EXECUTION, late_steps=1,
-        candidates=2,
+        task=task, checker=checker, cell=Cell(kit.HORIZONS, kit.EXECUTION), late_steps=1,
+        samples=2,
     )  # fmt: skip
     seen = held_out_observations(data, horizons=kit.HORIZONS, count=5, generator=stream(1, "s"))
 
@@ -38,12 +38,8 @@ def written(task, checker, data, policy, kit, tmp_path_factory):
         method="operator", checkpoint_hash="w", sampler_config_hash="s", sample=demonstrated
     )
     found = [shadow_policy(shadow, item, seen, seed=0) for item in (operator, policy)]
-    rows = [row for item in found for row in item.candidates]
     mutants = [{"check": "expired", "layer": "fresh", "detected": True, "violations": 1}]
-    write_shadow(
-        folder, found, mutants, pa.Table.from_pylist(rows, CANDIDATES),
-        horizons=kit.HORIZONS, execution=kit.EXECUTION,
-    )  # fmt: skip
+    write_shadow(folder, found, mutants, cell=shadow.cell)
     return folder
 
 
@@ -74,7 +70,7 @@ def test_sessions_under_other_settings_are_flagged(written, kit, name, value):
     if value is None:
         value = {phase: age + 1.0 for phase, age in kit.EXECUTION.maximum_age_s.items()}
     execution = kit.EXECUTION.model_copy(update={name: value})
-    found = checker_document([written / "journal.mcap"], horizons=kit.HORIZONS, execution=execution)
+    found = checker_document([written / "journal.mcap"], cell=Cell(kit.HORIZONS, execution))
     rules = {violation["rule"] for violation in found["violations"]}
     assert rules == {"settings.limits"}
     assert all(violation["journal"] == "journal.mcap" for violation in found["violations"])
@@ -82,7 +78,7 @@ def test_sessions_under_other_settings_are_flagged(written, kit, name, value):
 
 def test_another_execution_horizon_is_flagged(written, kit):
     horizons = kit.HORIZONS.model_copy(update={"execution_horizon": 4})
-    found = checker_document([written / "journal.mcap"], horizons=horizons, execution=kit.EXECUTION)
+    found = checker_document([written / "journal.mcap"], cell=Cell(horizons, kit.EXECUTION))
     assert found["violations"]
 
 

@@ -15,9 +15,10 @@ from genpolicy.evidence.stress.latency import (
     DeclaredTerm,
     LatencyModel,
 )
-from genpolicy.evidence.stress.matched import _step
-from genpolicy.evidence.stress.perturbations import PerturbationSettings
-from genpolicy.evidence.stress.rollout import Fixture, Outcome, Rollout
+from genpolicy.evidence.stress.matched import step
+from genpolicy.evidence.stress.perturbations import Nominal
+from genpolicy.evidence.stress.rollout import Rollout
+from genpolicy.evidence.stress.state import Fixture, Outcome
 from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.execution.journal import write_journal
 from genpolicy.feasibility.settings import FeasibilitySettings
@@ -60,12 +61,11 @@ class Scripted:
 def drive(rollouts, plan, *, ticks=300):
     """Advance rollouts in lockstep under a scripted policy until all have ended."""
     policy = Scripted(plan, {rollout.start_index: rollout for rollout in rollouts})
-    shard = SimpleNamespace(perturbation=rollouts[0].fixture.perturbation, candidates=1)
     for _ in range(ticks):
         active = [rollout for rollout in rollouts if not rollout.done]
         if not active:
             break
-        _step(active, policy, shard)
+        step(active, policy, samples=1)
     for rollout in rollouts:
         rollout.end(Outcome.TIMEOUT)
     return rollouts
@@ -154,7 +154,7 @@ def make_fixture(task, checker):
         parts = {
             "task": task, "checker": checker, "horizons": HORIZONS, "execution": EXECUTION,
             "latency": latency(), "perturbation": "nominal",
-            "schedule": PerturbationSettings(kind="nominal"), "root_seed": ROOT_SEED,
+            "schedule": Nominal(), "root_seed": ROOT_SEED,
             "method": "scripted", "checkpoint": "w" * 64, "sampler": "s" * 64,
         }  # fmt: skip
         return Fixture(**(parts | changes))

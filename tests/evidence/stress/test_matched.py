@@ -5,10 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from genpolicy.candidates.judged import JudgedPolicy
 from genpolicy.contract.normalisation import MinMax, Normalisation
 from genpolicy.errors import IntegrityError
-from genpolicy.evidence.stress.matched import Shard, matched_starts, run_shard
-from genpolicy.evidence.stress.perturbations import PerturbationSettings
+from genpolicy.evidence.shadow.session import Cell
+from genpolicy.evidence.stress.matched import Comparison, Shard, matched_starts, run_shard
+from genpolicy.evidence.stress.perturbations import NetworkJitter, Nominal
 from genpolicy.execution.journal import read_journal
 from genpolicy.policies.checkpoint import Provenance
 from genpolicy.policies.settings import HeadConfig, NetworkConfig, SamplerConfig, TrainingConfig
@@ -70,15 +72,18 @@ def shard(checkpoints, plans, kit, tmp_path_factory):
     def make(method="flow", **changes):
         nonlocal count
         count += 1
-        checkpoint, sha256 = checkpoints[method]
+        folder_of, sha256 = checkpoints[method]
+        shared = {
+            "task": "tabletop_insertion", "episode_limit_s": 1.5, "samples": 2,
+            "starts": tuple(start.to_json() for start in plans.starts),
+            "cell": Cell(kit.HORIZONS, kit.EXECUTION), "feasibility": kit.FEASIBILITY,
+            "root_seed": 5,
+        }  # fmt: skip
+        shared["starts"] = changes.pop("starts", shared["starts"])
         parts = {
-            "task": "tabletop_insertion", "method": method, "seed": 0, "checkpoint": checkpoint,
-            "sha256": sha256, "perturbation": "nominal",
-            "schedule": PerturbationSettings(kind="nominal"),
-            "starts": tuple(start.to_json() for start in plans.starts), "episode_limit_s": 1.5,
-            "candidates": 2, "horizons": kit.HORIZONS, "execution": kit.EXECUTION,
-            "feasibility": kit.FEASIBILITY, "latency": kit.latency(), "root_seed": 5,
-            "journal": folder / f"{count}.mcap",
+            "comparison": Comparison(**shared),
+            "judged": JudgedPolicy(method, 0, folder_of, sha256), "perturbation": "nominal",
+            "schedule": Nominal(), "latency": kit.latency(), "journal": folder / f"{count}.mcap",
         }  # fmt: skip
         return Shard(**(parts | changes))
 
@@ -100,9 +105,9 @@ def test_a_shard_is_deterministic_and_proved(shard):
     assert first.journal.read_bytes() == second.journal.read_bytes()
     report = check_journal(first.journal)
     assert report.violations == [] and report.sessions == 3
-    assert report.checked_actions == sum(row["action_ticks"] for row in one.rollouts) > 0
-    assert one.stub["stale"] == one.stub["invalid"] == 0
-    assert one.stub["arrivals"] == len(one.ages_s)
+    assert report.checked_actions == sum(row.action_ticks for row in one.rollouts) > 0
+    assert one.stub.stale == one.stub.invalid == 0
+    assert one.stub.arrivals == len(one.ages_s)
     for account in one.accounts:
         assert account.generated == account.executed + sum(account.discarded.values())
 
@@ -112,19 +117,19 @@ def test_a_row_says_what_its_journal_says(shard):
     result = run_shard(plan)
     sessions = read_journal(plan.journal)
     for row in result.rollouts:
-        events = sessions[f"flow/nominal/{row['start']}"]
+        events = sessions[f"flow/nominal/{row.start}"]
         ages = np.sort([e.payload["age_ns"] / 1e9 for e in events if e.kind == "accept"])
-        assert row["action_ticks"] == len(ages)
-        assert row["action_age_max_s"] == ages[-1] <= 0.45
+        assert row.action_ticks == len(ages)
+        assert row.action_age_max_s == ages[-1] <= 0.45
         # Order statistic by hand: the smallest age with at least 95 % at or below it.
         place = int(np.ceil(0.95 * (len(ages) - 1)))
-        assert row["action_age_p95_s"] == ages[place]
+        assert row.action_age_p95_s == ages[place]
         begun = [e for e in events if e.kind == "invocation" and e.payload["stage"] == "begin"]
-        assert row["invocations"] == len(begun)
-        assert row["ticks"] == 30 and row["duration_s"] == pytest.approx(1.5)
-        assert row["outcome"] == "timeout" and row["success"] is False
-        moved = row["action_ticks"] + row["hold_ticks"] + row["fallback_ticks"]
-        assert moved == row["ticks"]
+        assert row.invocations == len(begun)
+        assert row.ticks == 30 and row.duration_s == pytest.approx(1.5)
+        assert row.outcome == "timeout" and row.success is False
+        moved = row.action_ticks + row.hold_ticks + row.fallback_ticks
+        assert moved == row.ticks
 
 
 def test_company_changes_no_rollout(shard, plans):
@@ -135,27 +140,27 @@ def test_company_changes_no_rollout(shard, plans):
 
 
 def test_methods_meet_the_same_starts(shard):
-    jitter = PerturbationSettings(kind="network_jitter", probability=1.0, magnitude_s=0.1)
+    jitter = NetworkJitter(probability=1.0, magnitude_s=0.1)
     rows = {
         method: run_shard(shard(method, perturbation="jitter", schedule=jitter)).rollouts
         for method in METHODS
     }
     for one, two in zip(*rows.values(), strict=True):
-        assert one["start_sha256"] == two["start_sha256"]
-        assert one["method"] != two["method"]
+        assert one.start_sha256 == two.start_sha256
+        assert one.method != two.method
 
 
 def test_a_method_that_never_delivers_has_unknown_ages_not_zero(shard, kit):
     result = run_shard(shard(latency=kit.latency(0.6)))
     for row in result.rollouts:
-        assert row["action_ticks"] == 0
-        assert row["action_age_p50_s"] is row["action_age_p95_s"] is row["action_age_max_s"] is None
-        assert row["deadline_misses"] > 0
+        assert row.action_ticks == 0
+        assert row.action_age_p50_s is row.action_age_p95_s is row.action_age_max_s is None
+        assert row.deadline_misses > 0
     assert len(result.ages_s) == 0
 
 
 def test_another_checkpoint_is_refused(shard):
     plan = shard()
     with pytest.raises(IntegrityError):
-        run_shard(replace(plan, sha256="0" * 64))
+        run_shard(replace(plan, judged=replace(plan.judged, sha256="0" * 64)))
     assert not plan.journal.exists()

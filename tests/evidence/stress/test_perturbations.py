@@ -2,9 +2,17 @@
 
 import numpy as np
 import pytest
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 
-from genpolicy.evidence.stress.perturbations import Injection, PerturbationSettings, injection, push
+from genpolicy.evidence.stress.perturbations import (
+    ChunkDrop,
+    Injection,
+    Nominal,
+    Perturbation,
+    SidewaysPush,
+    injection,
+    push,
+)
 
 KINDS = {
     "camera_delay": {"magnitude_s": 0.08},
@@ -15,10 +23,12 @@ KINDS = {
 }
 
 
-def settings(kind, probability=1.0, **changes):
-    return PerturbationSettings(
-        kind=kind, probability=probability, **KINDS.get(kind, {}), **changes
-    )
+def settings(kind, probability=1.0):
+    return parsed({"kind": kind, "probability": probability, **KINDS[kind]})
+
+
+def parsed(values):
+    return TypeAdapter(Perturbation).validate_python(values)
 
 
 def at(item, *, start=0, invocation=0, root_seed=1, name="x"):
@@ -57,12 +67,12 @@ def test_each_kind_touches_what_it_names():
     assert at(settings("chunk_drop")) == Injection(dropped=True)
     sizes = [at(settings("network_jitter"), invocation=n).extra_s["network"] for n in range(200)]
     assert 0 <= min(sizes) < 0.01 and 0.11 < max(sizes) <= 0.12
-    for kind in ("nominal", "push"):
-        assert at(settings(kind, force_n=15.0)) == Injection()
+    for other in (Nominal(), SidewaysPush(force_n=15.0)):
+        assert at(other) == Injection()
 
 
 def test_a_push_is_drawn_once_per_start():
-    item = PerturbationSettings(kind="push", force_n=15.0)
+    item = SidewaysPush(force_n=15.0)
     drawn = [push(item, root_seed=1, name="push", start=n) for n in range(100)]
     assert drawn == [push(item, root_seed=1, name="push", start=n) for n in range(100)]
     assert {p.force_n for p in drawn} == {-15.0, 15.0}
@@ -71,18 +81,20 @@ def test_a_push_is_drawn_once_per_start():
 
 
 def test_nobody_else_pushes():
-    for item in (settings("nominal", force_n=15.0), PerturbationSettings(kind="push")):
+    for item in (Nominal(), ChunkDrop()):
         assert push(item, root_seed=1, name="push", start=0) is None
 
 
 @pytest.mark.parametrize(
     "bad",
     [
-        {"kind": "earthquake"}, {"kind": "push", "probability": 1.5},
-        {"kind": "push", "probability": float("nan")}, {"kind": "push", "magnitude_s": -0.1},
-        {"kind": "compute_contention", "factor": 0.5}, {"kind": "push", "seed": 1},
+        {"kind": "earthquake"}, {"kind": "chunk_drop", "probability": 1.5},
+        {"kind": "chunk_drop", "probability": float("nan")},
+        {"kind": "camera_delay", "magnitude_s": -0.1}, {"kind": "camera_delay"},
+        {"kind": "compute_contention", "factor": 0.5}, {"kind": "push", "force_n": 0.0},
+        {"kind": "push", "force_n": 1.0, "probability": 0.5}, {"kind": "nominal", "factor": 2.0},
     ],
 )  # fmt: skip
 def test_bad_settings_are_refused(bad):
     with pytest.raises(ValidationError):
-        PerturbationSettings(**bad)
+        parsed(bad)

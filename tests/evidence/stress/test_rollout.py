@@ -6,8 +6,15 @@ import numpy as np
 import pytest
 
 from genpolicy.evidence.admission_context import make_checker
-from genpolicy.evidence.stress.perturbations import PerturbationSettings
-from genpolicy.evidence.stress.rollout import Outcome, Rollout
+from genpolicy.evidence.stress.perturbations import (
+    CameraDelay,
+    ChunkDrop,
+    NetworkJitter,
+    QueueReorder,
+    SidewaysPush,
+)
+from genpolicy.evidence.stress.rollout import Rollout
+from genpolicy.evidence.stress.state import Outcome
 from genpolicy.execution.journal import write_journal
 from genpolicy.feasibility.checks import without
 from genpolicy.seeds import stream
@@ -73,7 +80,7 @@ def test_no_action_leaves_before_its_latency_has_passed(run, kit, plans):
 
 
 def test_same_seed_same_bytes_whatever_the_global_generator(run, kit, plans, tmp_path):
-    schedule = PerturbationSettings(kind="network_jitter", probability=0.5, magnitude_s=0.12)
+    schedule = NetworkJitter(probability=0.5, magnitude_s=0.12)
     texts = []
     for number, (root_seed, global_seed) in enumerate([(1, 0), (1, 99), (2, 0)]):
         np.random.seed(global_seed)
@@ -86,7 +93,7 @@ def test_same_seed_same_bytes_whatever_the_global_generator(run, kit, plans, tmp
 
 
 def test_lockstep_changes_nothing(run, kit, plans):
-    schedule = PerturbationSettings(kind="network_jitter", probability=0.5, magnitude_s=0.12)
+    schedule = NetworkJitter(probability=0.5, magnitude_s=0.12)
     changes = {"schedule": schedule, "ticks": 70}
     together = run(kit.Replay(plans.actions), starts=(2, 0, 1), **changes)
     for rollout in together:
@@ -224,7 +231,7 @@ def test_a_slow_method_pays_with_age_and_holds(run, kit, plans):
 
 
 def test_camera_delay_shifts_every_latency_by_itself(run, kit, plans):
-    delay = PerturbationSettings(kind="camera_delay", magnitude_s=0.08)
+    delay = CameraDelay(magnitude_s=0.08)
     (plain,) = run(kit.Replay(plans.actions), ticks=40)
     (late,) = run(kit.Replay(plans.actions), schedule=delay, ticks=40)
     both = min(len(plain.tally.latencies_s), len(late.tally.latencies_s))
@@ -236,7 +243,7 @@ def test_camera_delay_shifts_every_latency_by_itself(run, kit, plans):
 
 
 def test_reordered_chunks_are_discarded_and_never_executed(run, kit, plans, tmp_path):
-    reorder = PerturbationSettings(kind="queue_reorder", probability=0.4, magnitude_s=0.25)
+    reorder = QueueReorder(probability=0.4, magnitude_s=0.25)
     rollouts = run(kit.Replay(plans.actions), starts=(0, 1), schedule=reorder, perturbation="r")
     prove(rollouts, kit, tmp_path)
     counted = Counter()
@@ -254,7 +261,7 @@ def test_reordered_chunks_are_discarded_and_never_executed(run, kit, plans, tmp_
 
 
 def test_dropped_chunks_are_accounted_for(run, kit, plans, tmp_path):
-    drop = PerturbationSettings(kind="chunk_drop", probability=1.0)
+    drop = ChunkDrop(probability=1.0)
     (rollout,) = run(kit.Replay(plans.actions), schedule=drop)
     prove([rollout], kit, tmp_path)
     account = rollout.executor.conservation().chunks
@@ -266,7 +273,7 @@ def test_dropped_chunks_are_accounted_for(run, kit, plans, tmp_path):
 
 
 def test_a_push_disturbs_the_hand_once(run, kit, plans, tmp_path):
-    push = PerturbationSettings(kind="push", force_n=15.0)
+    push = SidewaysPush(force_n=15.0)
     (plain,) = run(kit.Replay(plans.actions), ticks=60)
     (pushed,) = run(kit.Replay(plans.actions), schedule=push, ticks=60)
     prove([pushed], kit, tmp_path)

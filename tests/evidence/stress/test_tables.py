@@ -3,18 +3,19 @@
 import numpy as np
 import pytest
 
+from genpolicy.candidates.judged import JudgedPolicy
+from genpolicy.evidence.shadow.session import Cell
 from genpolicy.evidence.stress.latency import (
     DECLARED_TERMS,
     MEASURED_TERMS,
     DeclaredTerm,
     LatencyModel,
 )
-from genpolicy.evidence.stress.matched import Shard, matched_starts
-from genpolicy.evidence.stress.perturbations import PerturbationSettings
+from genpolicy.evidence.stress.matched import Comparison, matched_starts
+from genpolicy.evidence.stress.perturbations import Nominal, QueueReorder
+from genpolicy.evidence.stress.settings import StressSettings
 from genpolicy.evidence.stress.tables import (
     AGE_LEVELS,
-    Entrant,
-    StressSettings,
     plan_shards,
     power_document,
     write_stress,
@@ -23,14 +24,14 @@ from genpolicy.integrity.documents import canonical_json, read_json
 from genpolicy.integrity.tables import read_table
 
 PERTURBATIONS = {
-    "nominal": PerturbationSettings(kind="nominal"),
-    "queue_reorder": PerturbationSettings(kind="queue_reorder", probability=0.5, magnitude_s=0.25),
+    "nominal": Nominal(),
+    "queue_reorder": QueueReorder(probability=0.5, magnitude_s=0.25),
 }
 
 
 def settings(*, starts=2, margin=0.05, alpha=0.05):
     return StressSettings(
-        starts=starts, episode_limit_s=1.5, candidates=2, baselines=["chunked_bc"],
+        starts=starts, episode_limit_s=1.5, samples=2, baselines=["chunked_bc"],
         perturbations=PERTURBATIONS, margin=margin, alpha=alpha,
     )  # fmt: skip
 
@@ -39,8 +40,8 @@ def settings(*, starts=2, margin=0.05, alpha=0.05):
 def written(task, fleet, kit, tmp_path_factory):
     folder = tmp_path_factory.mktemp("stress")
     root, trained = fleet
-    entrants = [
-        Entrant(method, root / method / "seed_0", trained[method][0])
+    judged = [
+        JudgedPolicy(method, 0, root / method / "seed_0", trained[method][0])
         for method in ("chunked_bc", "flow")
     ]
     starts = tuple(s.to_json() for s in matched_starts(task, root_seed=1, count=2))
@@ -49,27 +50,27 @@ def written(task, fleet, kit, tmp_path_factory):
         {name: np.full(4, 0.006) for name in MEASURED_TERMS},
         0.0,
     )
-    shards = [
-        Shard(
-            task=task.name, method=entrant.method, seed=0, checkpoint=entrant.checkpoint,
-            sha256=entrant.sha256, perturbation=name, schedule=schedule, starts=starts,
-            episode_limit_s=1.5, candidates=2, horizons=kit.HORIZONS, execution=kit.EXECUTION,
-            feasibility=kit.FEASIBILITY, latency=latency, root_seed=1,
-            journal=folder / "journals" / f"{entrant.method}__{name}.mcap",
-        )
-        for entrant, name, schedule in plan_shards(entrants, PERTURBATIONS)
-    ]  # fmt: skip
-    write_stress(folder, shards, settings(), workers=1, scheduler="local", root_seed=1)
+    comparison = Comparison(
+        task=task.name, starts=starts, episode_limit_s=1.5, samples=2,
+        cell=Cell(kit.HORIZONS, kit.EXECUTION), feasibility=kit.FEASIBILITY, root_seed=1,
+    )  # fmt: skip
+    models = dict.fromkeys(("chunked_bc", "flow"), latency)
+    shards = plan_shards(
+        comparison, judged, PERTURBATIONS, latency=models, journals=folder / "journals"
+    )
+    write_stress(folder, shards, workers=1, scheduler="local")
     return folder
 
 
-def test_every_method_meets_every_perturbation():
-    entrants = [Entrant(name, None, "") for name in ("a", "b", "c")]
-    plan = plan_shards(entrants, PERTURBATIONS)
-    assert [(name, entrant.method) for entrant, name, _ in plan] == [
+def test_every_method_meets_every_perturbation(tmp_path):
+    judged = [JudgedPolicy(name, 0, tmp_path, "") for name in "abc"]
+    models = dict.fromkeys("abc")
+    plan = plan_shards(None, judged, PERTURBATIONS, latency=models, journals=tmp_path)
+    assert [(shard.perturbation, shard.judged.name) for shard in plan] == [
         (name, method) for name in PERTURBATIONS for method in "abc"
     ]
-    assert all(schedule is PERTURBATIONS[name] for _, name, schedule in plan)
+    assert all(shard.schedule is PERTURBATIONS[shard.perturbation] for shard in plan)
+    assert len({shard.journal for shard in plan}) == len(plan)
 
 
 def test_starts_are_matched_by_hash(written):
@@ -115,8 +116,13 @@ def test_ages_are_quantiles_of_all_rollouts(written):
 
 
 def test_power_is_reproducible_and_grows_with_the_starts():
-    few, many = power_document(settings(starts=10), 1), power_document(settings(starts=100), 1)
-    assert canonical_json(few) == canonical_json(power_document(settings(starts=10), 1))
+    few, many = (
+        power_document(settings(starts=10), candidates=1, root_seed=1),
+        power_document(settings(starts=100), candidates=1, root_seed=1),
+    )
+    assert canonical_json(few) == canonical_json(
+        power_document(settings(starts=10), candidates=1, root_seed=1)
+    )
     assert (few["pairs"], many["pairs"], few["margin"]) == (10, 100, 0.05)
 
     def promoted(document):
@@ -134,6 +140,13 @@ def test_power_is_reproducible_and_grows_with_the_starts():
 def test_too_few_starts_can_never_promote():
     # An e-value can at most grow by a factor of (1 + wager * (1 - margin)) < 2 per pair:
     # two pairs give less than 4, and alpha = 0.05 asks for 20.
-    document = power_document(settings(starts=2), 1)
+    document = power_document(settings(starts=2), candidates=1, root_seed=1)
     assert [row["promote_share"] for row in document["rows"]] == [0.0] * 5
     assert [row["median_pairs"] for row in document["rows"]] == [None] * 5
+
+
+def test_alpha_is_shared_between_the_registered_candidates():
+    document = power_document(settings(starts=10, alpha=0.06), candidates=3, root_seed=1)
+    assert document["alpha"] == pytest.approx(0.02)
+    alone = power_document(settings(starts=10, alpha=0.02), candidates=1, root_seed=1)
+    assert document["rows"] == alone["rows"]

@@ -14,11 +14,9 @@ class LatencySection(Settings):
         cold: Cold invocations per run.
         declared: Bounds of the terms that this machine cannot measure.
         declared_draws: Values drawn from each of them for the report.
-        baselines: Baselines that are compared with the candidates later.
     """
 
     warm: int = Field(ge=20)
     cold: int = Field(ge=2)
     declared: dict[str, DeclaredSettings]
     declared_draws: int = Field(ge=20)
-    baselines: list[str]

@@ -1,0 +1,1 @@
+"""What is judged: one interface for everything that stands in a comparison."""

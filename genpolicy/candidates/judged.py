@@ -1,0 +1,74 @@
+"""What is judged: a policy by name, with the files that are it and their identity."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from genpolicy.policies.policy import NetworkPolicy, load_policy
+
+BASELINES = "train_baselines"
+GENERATORS = "train_generators"
+
+
+@dataclass(frozen=True)
+class JudgedPolicy:
+    """One policy that is measured, compared or promoted.
+
+    Attributes:
+        name: Its name in every table.
+        seed: Number of its training seed.
+        folder: Its files.
+        sha256: Its identity; `load` refuses other files.
+        kind: Where it comes from; `trained` here, with the training in `folder`'s config.
+    """
+
+    name: str
+    seed: int
+    folder: Path
+    sha256: str
+    kind: Literal["trained"] = "trained"
+
+    def load(self) -> NetworkPolicy:
+        """The policy, from its files.
+
+        Raises:
+            IntegrityError: The files are not those of the identity.
+            BadInputError: The files are missing or malformed.
+        """
+        return load_policy(self.folder, expected_sha256=self.sha256)
+
+
+def trained(root: Path, names: Iterable[str], *, seeds: Iterable[int]) -> list[JudgedPolicy]:
+    """Checkpoints `<name>/seed_<n>` below a root, names outermost.
+
+    Raises:
+        BadInputError: A checkpoint is missing or malformed.
+    """
+    numbers = list(seeds)
+    found = []
+    for name in names:
+        for seed in numbers:
+            folder = root / name / f"seed_{seed}"
+            found.append(JudgedPolicy(name, seed, folder, load_policy(folder).checkpoint_hash))
+    return found
+
+
+def compared(
+    artifacts: Path, *, baselines: Sequence[str], generators: Iterable[str], seed: int
+) -> list[JudgedPolicy]:
+    """Baselines, then generators, of one training seed: who stands in the comparison.
+
+    Args:
+        artifacts: Folder of the stages' outputs.
+        baselines: Simpler methods in it.
+        generators: Candidates in it.
+        seed: The training seed that is promoted.
+
+    Raises:
+        BadInputError: A checkpoint is missing or malformed.
+    """
+    return [
+        *trained(artifacts / BASELINES, baselines, seeds=[seed]),
+        *trained(artifacts / GENERATORS, generators, seeds=[seed]),
+    ]

@@ -1,0 +1,136 @@
+"""What the baselines reach on held-out data: errors, modes, and what a latent depends on."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from genpolicy.candidates.judged import JudgedPolicy
+from genpolicy.compute import map_shards
+from genpolicy.contract.horizons import HorizonConfig
+from genpolicy.contract.settings import Settings
+from genpolicy.data.dataset import load_dataset
+from genpolicy.evidence.admission_context import make_checker
+from genpolicy.evidence.need.held_out import HeldOut, held_out_situations, modes_of_policy
+from genpolicy.evidence.need.latent import as_row, latent_dependence
+from genpolicy.evidence.need.offline import offline_rows
+from genpolicy.evidence.rows import ModeRow, OfflineRow, write_rows
+from genpolicy.feasibility.settings import FeasibilitySettings
+from genpolicy.integrity.atomic import write_bytes
+from genpolicy.integrity.documents import canonical_json
+from genpolicy.policies.policy import NetworkPolicy
+from genpolicy.policies.settings import SamplerConfig
+from genpolicy.tasks.api import load_task
+
+Measured = tuple[list[OfflineRow], list[ModeRow], list[dict[str, Any]]]
+
+
+class LatentTest(Settings):
+    """What is asked of a latent: whether its samples depend on the observation.
+
+    Attributes:
+        method: Method with a latent.
+        convention: The convention of `conventions` that draws it.
+        permutations: Permutations of the test.
+    """
+
+    method: str
+    convention: str
+    permutations: int
+
+
+@dataclass(frozen=True)
+class BaselinePlan:
+    """What is measured of every baseline.
+
+    Attributes:
+        task: Registered name of the task.
+        dataset: Folder of the dataset.
+        audit: Folder of the audit, which names the situations with several modes.
+        horizons: Common horizons.
+        feasibility: Thresholds of the six layers.
+        conventions: Further samplers to count modes with, by method and name.
+        samples: Candidates per situation; of the latent's test, latents.
+        latent: Method whose latent is tested; None tests none.
+        root_seed: Root seed.
+    """
+
+    task: str
+    dataset: Path
+    audit: Path
+    horizons: HorizonConfig
+    feasibility: FeasibilitySettings
+    conventions: Mapping[str, Mapping[str, SamplerConfig]]
+    samples: int
+    latent: LatentTest | None
+    root_seed: int
+
+
+def write_baselines(
+    plan: BaselinePlan,
+    baselines: Sequence[JudgedPolicy],
+    folder: Path,
+    *,
+    workers: int,
+    scheduler: str,
+) -> None:
+    """Measure every baseline in a process of its own; write the tables and `latent.json`."""
+    jobs = [(plan, baseline) for baseline in baselines]
+    parts = map_shards(measure_baseline, jobs, workers=workers, scheduler=scheduler)
+    offline = [row for part in parts for row in part[0]]
+    modes = [row for part in parts for row in part[1]]
+    latent = [row for part in parts for row in part[2]]
+    write_rows(folder / "offline.parquet", OfflineRow, offline)
+    write_rows(folder / "modes.parquet", ModeRow, modes)
+    write_bytes(folder / "latent.json", canonical_json(latent))
+
+
+def measure_baseline(job: tuple[BaselinePlan, JudgedPolicy]) -> Measured:
+    """Rows of `offline.parquet`, `modes.parquet` and `latent.json` of one baseline."""
+    plan, baseline = job
+    data, policy = load_dataset(plan.dataset), baseline.load()
+    held_out = held_out_situations(plan.audit, data, horizons=plan.horizons)
+    return (
+        offline_rows(policy, data, seed=baseline.seed, horizons=plan.horizons),
+        mode_rows(plan, policy, held_out, seed=baseline.seed),
+        latent_rows(plan, policy, held_out, seed=baseline.seed),
+    )
+
+
+def mode_rows(
+    plan: BaselinePlan, policy: NetworkPolicy, held_out: HeldOut, *, seed: int
+) -> list[ModeRow]:
+    """Modes that one checkpoint reaches, under each sampling convention."""
+    task = load_task(plan.task)
+    checker = make_checker(task, plan.feasibility)
+    conventions = {policy.sampler.name: policy.sampler, **plan.conventions.get(policy.method, {})}
+    return [
+        row
+        for convention, sampler in conventions.items()
+        for row in modes_of_policy(
+            NetworkPolicy(policy.checkpoint, sampler=sampler),
+            held_out,
+            seed=seed,
+            convention=convention,
+            samples=plan.samples,
+            task=task,
+            checker=checker,
+        )
+    ]
+
+
+def latent_rows(
+    plan: BaselinePlan, policy: NetworkPolicy, held_out: HeldOut, *, seed: int
+) -> list[dict[str, Any]]:
+    """Whether the tested method's latent depends on the observation; nothing for the others."""
+    test = plan.latent
+    if test is None or test.method != policy.method or len(held_out.situations) < 2:
+        return []
+    found = latent_dependence(
+        NetworkPolicy(policy.checkpoint, sampler=plan.conventions[test.method][test.convention]),
+        held_out,
+        samples=plan.samples,
+        permutations=test.permutations,
+        root_seed=plan.root_seed,
+    )
+    return [as_row(found, method=policy.method, convention=test.convention, seed=seed)]

@@ -1,0 +1,141 @@
+"""What rollouts share, and what one of them carries along."""
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from genpolicy.contract.chunk import ChunkMetadata
+from genpolicy.contract.horizons import HorizonConfig
+from genpolicy.evidence.stress.latency import LatencyModel, draw_latency
+from genpolicy.evidence.stress.perturbations import Perturbation, injection
+from genpolicy.execution.cell import ExecutionSettings
+from genpolicy.feasibility.admission import FeasibilityChecker
+from genpolicy.tasks.api import Task
+
+Array = NDArray[np.float64]
+
+
+class Outcome(StrEnum):
+    """How a rollout ended."""
+
+    SUCCESS = "success"
+    COLLISION = "collision"
+    FORCE_STOP = "force_stop"
+    INTERVENTION = "intervention"
+    TIMEOUT = "timeout"
+
+
+@dataclass(frozen=True)
+class Fixture:
+    """What all rollouts of one method under one perturbation share.
+
+    Attributes:
+        task: The task.
+        checker: The six layers.
+        horizons: H_o, K, H_e and the period.
+        execution: Executor, supervisor and recovery.
+        latency: Latency of the method.
+        perturbation: Name of the perturbation.
+        schedule: What it injects.
+        root_seed: Root seed.
+        method: Name of the method.
+        checkpoint: Its weights.
+        sampler: Its sampler settings.
+    """
+
+    task: Task
+    checker: FeasibilityChecker
+    horizons: HorizonConfig
+    execution: ExecutionSettings
+    latency: LatencyModel
+    perturbation: str
+    schedule: Perturbation
+    root_seed: int
+    method: str
+    checkpoint: str
+    sampler: str
+
+
+@dataclass
+class InFlight:
+    """An invocation that has not been delivered yet.
+
+    Attributes:
+        number: Count of invocations in this rollout.
+        metadata: Of the chunk to come; candidate 0.
+        observation: What it is conditioned on; the newest of the history. Shape (D_o,).
+        begun_s: Tick at which it began.
+        arrival_s: When it is delivered.
+        total_s: Its end-to-end latency, the sum of the eleven terms, s.
+        dropped: Lost on the way.
+        chunks: Sampled candidates, filled in by the batch. Shape (N, K, D_a).
+        given_up: Its deadline has passed.
+    """
+
+    number: int
+    metadata: ChunkMetadata
+    observation: Array
+    begun_s: float
+    arrival_s: float
+    total_s: float
+    dropped: bool
+    chunks: Array | None = None
+    given_up: bool = False
+
+
+@dataclass
+class Tally:
+    """What a rollout counts while it runs."""
+
+    action_ticks: int = 0
+    hold_ticks: int = 0
+    fallback_ticks: int = 0
+    deadline_misses: int = 0
+    rejections: int = 0
+    interventions: int = 0
+    force_peak_n: float = 0.0
+    rejected_by: dict[str, int] = field(default_factory=dict)
+    latencies_s: list[float] = field(default_factory=list)
+    path_m: list[Array] = field(default_factory=list)
+
+
+def in_flight(
+    fixture: Fixture, metadata: ChunkMetadata, observation: Array, *, start: int, number: int
+) -> InFlight:
+    """An invocation that begins now: how long it takes, and what it suffers.
+
+    Args:
+        fixture: What all rollouts share.
+        metadata: Of the chunk to come; it begins at `action_start_time_s`.
+        observation: What it is conditioned on. Shape (D_o,).
+        start: Index of the initial state; key of the draws.
+        number: Count of invocations in this rollout; key of the draws.
+    """
+    hit = injection(
+        fixture.schedule,
+        root_seed=fixture.root_seed,
+        name=fixture.perturbation,
+        start=start,
+        invocation=number,
+    )
+    draw = draw_latency(
+        fixture.latency,
+        root_seed=fixture.root_seed,
+        perturbation=fixture.perturbation,
+        start=start,
+        invocation=number,
+        extra_s=hit.extra_s,
+        compute_factor=hit.compute_factor,
+    )
+    begun_s = metadata.action_start_time_s
+    return InFlight(
+        number=number,
+        metadata=metadata,
+        observation=observation,
+        begun_s=begun_s,
+        arrival_s=begun_s + draw.total_s,
+        total_s=draw.total_s,
+        dropped=hit.dropped,
+    )

@@ -1,0 +1,23 @@
+"""Stage `train_generators`: the candidates, on the network and budget of the baselines."""
+
+from pathlib import Path
+
+from gates.proof import admit
+from genpolicy.integrity.atomic import output_folder
+from genpolicy.policies.matched_training import train_matched
+from stages._stage import ARTIFACTS, Params, main
+from stages._training import MethodsSection, training_plan
+
+
+def work(params: Params) -> None:
+    """Admit through gate A, then train every candidate."""
+    admit("train_generators", Path.cwd())
+    section = params.section("train_generators", MethodsSection)
+    plan = training_plan(params)
+    reference = ARTIFACTS / "train_baselines" / "chunked_bc" / f"seed_{plan.settings.seeds[0]}"
+    with output_folder(ARTIFACTS / "train_generators") as folder:
+        train_matched(plan, section.samplers, folder=folder, reference=reference)
+
+
+if __name__ == "__main__":
+    main("train_generators", work)
