@@ -102,7 +102,7 @@ def mode_rows(
 ) -> list[ModeRow]:
     """Modes that one checkpoint reaches, under each sampling convention."""
     task = load_task(plan.task)
-    checker = make_checker(task, plan.feasibility)
+    checker = make_checker(task, plan.feasibility, action_period_s=plan.horizons.action_period_s)
     conventions = {policy.sampler.name: policy.sampler, **plan.conventions.get(policy.method, {})}
     return [
         row

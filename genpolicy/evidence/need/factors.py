@@ -121,7 +121,7 @@ def measure_variant(job: tuple[FactorPlan, JudgedPolicy]) -> FactorRows:
     plan, trained = job
     data, own = load_dataset(plan.dataset), trained.load()
     task = load_task(plan.task)
-    checker = make_checker(task, plan.feasibility)
+    checker = make_checker(task, plan.feasibility, action_period_s=plan.horizons.action_period_s)
     # Not the checkpoint's own: a policy of one action is compared on the same windows.
     seen = {"observation_horizon": own.horizons.observation_horizon}
     horizons = plan.horizons.model_copy(update=seen)

@@ -93,7 +93,7 @@ def write_reload(
         ContractError: Training left no fixture of a candidate.
     """
     data, task = load_dataset(plan.dataset), load_task(plan.task)
-    checker = make_checker(task, plan.feasibility)
+    checker = make_checker(task, plan.feasibility, action_period_s=plan.horizons.action_period_s)
     held_out = held_out_situations(plan.audit, data, horizons=plan.horizons)
     written = read_rows(fixtures, FixtureRow)
     rows, identity = ReloadRows(), _identities(candidates)

@@ -111,8 +111,6 @@ def shadow_policy(
         if any(isinstance(result, Admitted) for _, result in judged):
             seen.play(judged, fixture=IN_FLIGHT_PHASE_CHANGE)
         for corruption in CORRUPTIONS:
-            if corruption.phases and item.phase not in corruption.phases:
-                continue
             broken = corruption.apply(cases[0], shadow.checker)
             if broken is not None:
                 seen.play(seen.judge([broken], fixture=corruption.name), fixture=corruption.name)
