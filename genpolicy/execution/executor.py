@@ -10,18 +10,15 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from genpolicy.contract.chunk import ChunkMetadata, DiscardReason
-from genpolicy.execution.arrival import issued_by_feasibility, read_chunk, shape_of
+from genpolicy.execution.arrival import Arrivals, issued_by_feasibility
 from genpolicy.execution.checks import (
     CHECKS,
     FALLBACK,
     POLICY,
     Checks,
     Mode,
-    Moment,
-    Place,
     View,
     missing,
-    refusal,
 )
 from genpolicy.execution.chunk_queue import ChunkQueue
 from genpolicy.execution.command import Command
@@ -67,14 +64,13 @@ class Executor:
         self.mode = Mode.RUN
         self._journal = journal
         self._checks = checks
-        self._genuine = genuine
         self._view = View(
             fallback=settings.fallback_hash,
             execution_horizon=settings.execution_horizon,
             period_ns=settings.period_ns,
         )
         self._queue = ChunkQueue(settings, journal, checks)
-        self._seen_ids: set[str] = set()
+        self._arrivals = Arrivals(self._queue, checks, genuine)
         self._in_flight: set[str] = set()
         self._sequence = 0
         self._stops_seen = 0
@@ -276,11 +272,7 @@ class Executor:
             reason: `infeasible` if a layer rejected it; `expired` if it was lost or cancelled.
             now_s: Time, s.
         """
-        now_ns = self._begin(now_s)
-        if metadata.chunk_id in self._seen_ids:
-            reason = DiscardReason.DUPLICATE
-        self._seen_ids.add(metadata.chunk_id)
-        self._refuse(now_ns, self._queue.arrive(rows), metadata.chunk_id, rows, reason)
+        self._arrivals.write_off(self._begin(now_s), metadata.chunk_id, rows, reason)
 
     def conservation(self) -> Conservation:
         """`generated = executed + discarded by reason + still queued`, chunks and actions."""
@@ -331,40 +323,14 @@ class Executor:
                 self.settings,
                 labels=self._journal.labels,
                 checks_missing=missing(self._checks, self.stub.checks, self.stub.supervisor.checks),
-                genuine=self._genuine is issued_by_feasibility,
+                genuine=self._arrivals.genuine is issued_by_feasibility,
             )
             self._journal.add("session", now_ns, payload)
         return now_ns
 
     def _arrive(self, admitted: Admitted, now_ns: int, source: str) -> DiscardReason | None:
         self._heed_supervisor(now_ns)
-        rows, chunk_id = shape_of(admitted)
-        arrival = self._queue.arrive(rows)
-        genuine = self._genuine(admitted)
-        known = genuine and chunk_id in self._seen_ids
-        if genuine:  # an imitation must not use up the name of a chunk to come
-            self._seen_ids.add(chunk_id)
-        about = read_chunk(admitted, arrival=arrival, source=source) if genuine else None
-        view = self._present()
-        at_door = refusal(self._checks, Place.DOOR, Moment(now_ns=now_ns, view=view, known=known))
-        if at_door is not None:
-            reason = at_door.reason
-        elif about is None:
-            reason = DiscardReason.INFEASIBLE
-        else:
-            reason = self._queue.arrival_refusal(now_ns, about, view)
-            if reason is None:
-                self._queue.enqueue(now_ns, admitted, about, view)
-        if reason is not None:
-            self._refuse(now_ns, arrival, chunk_id, rows, reason)
-        return reason
-
-    def _refuse(
-        self, now_ns: int, arrival: int, chunk_id: str, rows: int, reason: DiscardReason
-    ) -> None:
-        self._queue.refuse(
-            now_ns, arrival=arrival, chunk_id=chunk_id, rows=rows, reason=str(reason)
-        )
+        return self._arrivals.arrive(admitted, now_ns, self._present(), source)
 
     def _present(self) -> View:
         """The view with what the supervisor and the mode say now."""
