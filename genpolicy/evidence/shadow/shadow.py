@@ -90,6 +90,9 @@ class Shadow:
     late_steps: int
     candidates: int
 
+    def __post_init__(self) -> None:
+        self.execution.require_phases(self.task.phases)
+
 
 def held_out_observations(
     data: Dataset, *, horizons: HorizonConfig, count: int, generator: np.random.Generator
