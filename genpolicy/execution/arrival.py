@@ -1,11 +1,14 @@
 """What claims to be an admitted chunk is read here; nothing is asked of what cannot be read."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from genpolicy.contract.action import ACTION_DIM
-from genpolicy.contract.chunk import ChunkMetadata, actions_sha256
+from genpolicy.contract.chunk import ChunkMetadata, DiscardReason, actions_sha256
 from genpolicy.errors import GenpolicyError, IntegrityError
-from genpolicy.execution.checks import Chunk
+from genpolicy.execution.checks import Checks, Chunk, Moment, Place, View, refusal
+from genpolicy.execution.chunk_queue import ChunkQueue
 from genpolicy.execution.nanoseconds import ChunkTimes
 from genpolicy.feasibility.admission import Admitted
 
@@ -54,3 +57,53 @@ def read_chunk(admitted: Admitted, *, arrival: int, source: str) -> Chunk | None
         )
     except (AttributeError, TypeError, ValueError, GenpolicyError):
         return None
+
+
+class Arrivals:
+    """Everything that arrives is counted, and enters the queue or is discarded for one reason.
+
+    Args:
+        queue: Where it goes.
+        checks: The table.
+        genuine: Tells a chunk that feasibility issued from an imitation.
+    """
+
+    def __init__(
+        self, queue: ChunkQueue, checks: Checks, genuine: Callable[[object], bool]
+    ) -> None:
+        self.genuine = genuine
+        self._queue = queue
+        self._checks = checks
+        self._names: set[str] = set()
+
+    def arrive(
+        self, admitted: Admitted, now_ns: int, view: View, source: str
+    ) -> DiscardReason | None:
+        """Enqueue a chunk of this source, or discard it and say why."""
+        rows, name = shape_of(admitted)
+        arrival = self._queue.arrive(rows)
+        genuine = self.genuine(admitted)
+        known = genuine and name in self._names
+        if genuine:  # an imitation must not use up the name of a chunk to come
+            self._names.add(name)
+        about = read_chunk(admitted, arrival=arrival, source=source) if genuine else None
+        at_door = refusal(self._checks, Place.DOOR, Moment(now_ns=now_ns, view=view, known=known))
+        if at_door is not None:
+            reason = at_door.reason
+        elif about is None:
+            reason = DiscardReason.INFEASIBLE
+        else:
+            reason = self._queue.arrival_refusal(now_ns, about, view)
+            if reason is None:
+                self._queue.enqueue(now_ns, admitted, about, view)
+                return None
+        self._queue.refuse(now_ns, arrival=arrival, chunk_id=name, rows=rows, reason=str(reason))
+        return reason
+
+    def write_off(self, now_ns: int, name: str, rows: int, reason: DiscardReason) -> None:
+        """Account for a chunk that never became deliverable; twice is a duplicate."""
+        if name in self._names:
+            reason = DiscardReason.DUPLICATE
+        self._names.add(name)
+        arrival = self._queue.arrive(rows)
+        self._queue.refuse(now_ns, arrival=arrival, chunk_id=name, rows=rows, reason=str(reason))

@@ -10,19 +10,8 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from genpolicy.contract.chunk import ChunkMetadata, DiscardReason
-from genpolicy.execution.arrival import issued_by_feasibility, read_chunk, shape_of
-from genpolicy.execution.checks import (
-    CHECKS,
-    FALLBACK,
-    POLICY,
-    Checks,
-    Mode,
-    Moment,
-    Place,
-    View,
-    missing,
-    refusal,
-)
+from genpolicy.execution.arrival import Arrivals, issued_by_feasibility
+from genpolicy.execution.checks import CHECKS, FALLBACK, POLICY, Checks, Mode, View, missing
 from genpolicy.execution.chunk_queue import ChunkQueue
 from genpolicy.execution.command import Command
 from genpolicy.execution.journal import Journal, session_payload
@@ -67,14 +56,9 @@ class Executor:
         self.mode = Mode.RUN
         self._journal = journal
         self._checks = checks
-        self._genuine = genuine
-        self._view = View(
-            fallback=settings.fallback_hash,
-            execution_horizon=settings.execution_horizon,
-            period_ns=settings.period_ns,
-        )
+        self._view = settings.first_view()
         self._queue = ChunkQueue(settings, journal, checks)
-        self._seen_ids: set[str] = set()
+        self._arrivals = Arrivals(self._queue, checks, genuine)
         self._in_flight: set[str] = set()
         self._sequence = 0
         self._stops_seen = 0
@@ -119,20 +103,17 @@ class Executor:
             return False
         before = self._view
         self._view = replace(
-            before,
-            newest_observation_ns=event_ns,
-            phase=phase,
+            before, newest_observation_ns=event_ns, phase=phase,
             calibration_epoch=calibration_epoch,
             maximum_age_ns=self.settings.maximum_age_ns.get(phase),
-        )
+        )  # fmt: skip
         for kind, old, new, reason in (
             ("phase", before.phase, phase, DiscardReason.PHASE_TRANSITION),
             ("epoch", before.calibration_epoch, calibration_epoch,
              DiscardReason.CALIBRATION_MISMATCH),
         ):  # fmt: skip
             if old != new:
-                change = {"event_time_ns": event_ns, "old": old, "new": new}
-                self._journal.add(kind, now_ns, change)
+                self._journal.add(kind, now_ns, {"event_time_ns": event_ns, "old": old, "new": new})
                 if newest_ns is not None:
                     self._void(now_ns, reason, event_ns)
         if divergence_m is not None and not self.settings.maximum_divergence_m - divergence_m >= 0:
@@ -152,8 +133,9 @@ class Executor:
     def set_active(self, now_s: float, checkpoint_hash: str, sampler_hash: str) -> None:
         """Name the weights and the sampler that may command; what others made is discarded."""
         now_ns = self._begin(now_s)
-        active = {"checkpoint": checkpoint_hash, "sampler": sampler_hash}
-        self._journal.add("active", now_ns, active)
+        self._journal.add(
+            "active", now_ns, {"checkpoint": checkpoint_hash, "sampler": sampler_hash}
+        )
         self.stub.hear_active(checkpoint_hash, sampler_hash)
         self._view = replace(self._view, checkpoint=checkpoint_hash, sampler=sampler_hash)
         self._drop(now_ns, DiscardReason.CHECKPOINT_MISMATCH)
@@ -210,12 +192,7 @@ class Executor:
         self._queue.drop(now_ns, replace(self._view, mode=Mode.ENDED), DiscardReason.END_OF_EPISODE)
         self._enter(now_ns, Mode.ENDED)
         balance = self.conservation()
-        payload = {
-            "chunks": balance.chunks.as_dict(),
-            "actions": balance.actions.as_dict(),
-            "events": len(self._journal),
-        }
-        self._journal.add("end", now_ns, payload)
+        self._journal.add("end", now_ns, {**balance.as_dict(), "events": len(self._journal)})
         return balance
 
     # -- invocations and chunks ---------------------------------------------------------------
@@ -241,17 +218,15 @@ class Executor:
 
     def begin_invocation(self, now_s: float, invocation_id: str) -> None:
         """An invocation is in flight until `end_invocation` or a reset."""
-        now_ns = self._begin(now_s)
+        self._begin(now_s)
         self._in_flight.add(invocation_id)
-        payload = {"id": invocation_id, "stage": "begin", "detail": ""}
-        self._journal.add("invocation", now_ns, payload)
+        self._journal.invocation(now_s, invocation_id=invocation_id, stage="begin")
 
     def end_invocation(self, now_s: float, invocation_id: str, detail: str = "") -> None:
         """The invocation answered, failed or was given up; `detail` says which."""
-        now_ns = self._begin(now_s)
+        self._begin(now_s)
         self._in_flight.discard(invocation_id)
-        payload = {"id": invocation_id, "stage": "end", "detail": detail}
-        self._journal.add("invocation", now_ns, payload)
+        self._journal.invocation(now_s, invocation_id=invocation_id, stage="end", detail=detail)
 
     def deliver(self, admitted: Admitted, now_s: float) -> DiscardReason | None:
         """Enqueue a chunk of the policy, or discard it.
@@ -276,11 +251,7 @@ class Executor:
             reason: `infeasible` if a layer rejected it; `expired` if it was lost or cancelled.
             now_s: Time, s.
         """
-        now_ns = self._begin(now_s)
-        if metadata.chunk_id in self._seen_ids:
-            reason = DiscardReason.DUPLICATE
-        self._seen_ids.add(metadata.chunk_id)
-        self._refuse(now_ns, self._queue.arrive(rows), metadata.chunk_id, rows, reason)
+        self._arrivals.write_off(self._begin(now_s), metadata.chunk_id, rows, reason)
 
     def conservation(self) -> Conservation:
         """`generated = executed + discarded by reason + still queued`, chunks and actions."""
@@ -299,18 +270,12 @@ class Executor:
         chunk = self._queue.due(now_ns, view)
         if chunk is None:
             return self._nothing(now_ns)
-        row = chunk.next_row
-        action = chunk.admitted.actions[row]
+        row, action = chunk.next_row, chunk.admitted.actions[chunk.next_row]
         self._sequence += 1
         reason = self.stub.offer(
-            chunk.admitted,
-            action,
-            row=row,
-            source=chunk.about.source,
-            arrival=chunk.about.arrival,
-            sequence=self._sequence,
-            now_ns=now_ns,
-        )
+            chunk.admitted, action, row=row, source=chunk.about.source,
+            arrival=chunk.about.arrival, sequence=self._sequence, now_ns=now_ns,
+        )  # fmt: skip
         if reason is not None:
             self._queue.close(now_ns, chunk, reason, at="stub")
             return self._hold(now_ns, f"refused: {reason}")
@@ -331,40 +296,14 @@ class Executor:
                 self.settings,
                 labels=self._journal.labels,
                 checks_missing=missing(self._checks, self.stub.checks, self.stub.supervisor.checks),
-                genuine=self._genuine is issued_by_feasibility,
+                genuine=self._arrivals.genuine is issued_by_feasibility,
             )
             self._journal.add("session", now_ns, payload)
         return now_ns
 
     def _arrive(self, admitted: Admitted, now_ns: int, source: str) -> DiscardReason | None:
         self._heed_supervisor(now_ns)
-        rows, chunk_id = shape_of(admitted)
-        arrival = self._queue.arrive(rows)
-        genuine = self._genuine(admitted)
-        known = genuine and chunk_id in self._seen_ids
-        if genuine:  # an imitation must not use up the name of a chunk to come
-            self._seen_ids.add(chunk_id)
-        about = read_chunk(admitted, arrival=arrival, source=source) if genuine else None
-        view = self._present()
-        at_door = refusal(self._checks, Place.DOOR, Moment(now_ns=now_ns, view=view, known=known))
-        if at_door is not None:
-            reason = at_door.reason
-        elif about is None:
-            reason = DiscardReason.INFEASIBLE
-        else:
-            reason = self._queue.arrival_refusal(now_ns, about, view)
-            if reason is None:
-                self._queue.enqueue(now_ns, admitted, about, view)
-        if reason is not None:
-            self._refuse(now_ns, arrival, chunk_id, rows, reason)
-        return reason
-
-    def _refuse(
-        self, now_ns: int, arrival: int, chunk_id: str, rows: int, reason: DiscardReason
-    ) -> None:
-        self._queue.refuse(
-            now_ns, arrival=arrival, chunk_id=chunk_id, rows=rows, reason=str(reason)
-        )
+        return self._arrivals.arrive(admitted, now_ns, self._present(), source)
 
     def _present(self) -> View:
         """The view with what the supervisor and the mode say now."""

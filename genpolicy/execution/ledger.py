@@ -58,6 +58,10 @@ class Conservation:
     actions: Account
     rest_discarded: dict[str, int]
 
+    def as_dict(self) -> dict[str, object]:
+        """Both balances, for the journal."""
+        return {"chunks": self.chunks.as_dict(), "actions": self.actions.as_dict()}
+
     @property
     def error(self) -> int:
         """Sum of the two absolute errors; 0 when both balances close."""

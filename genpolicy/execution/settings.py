@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from genpolicy.errors import ConfigError
+from genpolicy.execution.checks import View
 from genpolicy.execution.nanoseconds import to_ns
 
 
@@ -69,3 +70,11 @@ class ExecutorSettings:
     def maximum_age_ns(self) -> dict[str, int]:
         """Largest action age per phase, ns."""
         return {phase: to_ns(age) for phase, age in self.maximum_age_s.items()}
+
+    def first_view(self) -> View:
+        """The view of whoever is held to these settings, before anything is observed."""
+        return View(
+            fallback=self.fallback_hash,
+            execution_horizon=self.execution_horizon,
+            period_ns=self.period_ns,
+        )

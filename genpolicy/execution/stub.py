@@ -57,11 +57,7 @@ class ControllerStub:
         self.checks = checks
         self._journal = journal
         self._maximum_age_ns = settings.maximum_age_ns
-        self._view = View(
-            fallback=settings.fallback_hash,
-            execution_horizon=settings.execution_horizon,
-            period_ns=settings.period_ns,
-        )
+        self._view = settings.first_view()
         self._last_due_ns: int | None = None
         self._last_sequence = -1
 

@@ -3,6 +3,7 @@
 import pytest
 from pydantic import ValidationError
 
+from genpolicy.errors import ConfigError
 from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.execution.recovery import RecoveryState
 
@@ -21,6 +22,29 @@ def test_every_phase_has_an_age_a_force_limit_and_a_plan(kit, task):
     section = kit.EXECUTION
     for table in (section.maximum_age_s, section.force_limit_n, section.recovery_plans):
         assert set(table) == set(task.phases)
+
+
+def test_a_number_a_default_and_an_exception_are_read_as_one_entry_per_phase(kit):
+    raw = kit.PARAMS["execution"]
+    table = {"default": 0.4, "insert": 0.3}
+    section = ExecutionSettings(**(raw | {"maximum_age_s": table}))
+    assert section.maximum_age_s == dict.fromkeys(raw["force_limit_n"], 0.4) | {"insert": 0.3}
+    bare = ExecutionSettings(**(raw | {"maximum_age_s": {"insert": 0.3}, "recovery_plans": {}}))
+    assert bare.maximum_age_s == {"insert": 0.3} and bare.recovery_plans == {}
+    assert ExecutionSettings(**section.model_dump()) == section
+
+
+@pytest.mark.parametrize("name", ["maximum_age_s", "recovery_plans"])
+def test_a_phase_that_nothing_else_knows_is_refused(kit, name):
+    change = {name: {"levitate": 0.3 if name == "maximum_age_s" else ["retreat"]}}
+    with pytest.raises(ConfigError, match="levitate"):
+        ExecutionSettings(**(kit.PARAMS["execution"] | change))
+
+
+def test_the_phases_must_be_those_of_the_task(kit, task):
+    kit.EXECUTION.require_phases(task.phases)
+    with pytest.raises(ConfigError, match="expected the task"):
+        kit.EXECUTION.require_phases([*task.phases, "levitate"])
 
 
 @pytest.mark.parametrize("change", [{"unknown": 1}, {"watchdog_s": "0.1"}])

@@ -89,6 +89,9 @@ class Shadow:
     late_steps: int
     samples: int
 
+    def __post_init__(self) -> None:
+        self.cell.execution.require_phases(self.task.phases)
+
 
 def shadow_policy(
     shadow: Shadow, policy: Policy, observations: list[Observation], *, seed: int

@@ -68,6 +68,7 @@ class Rollout:
         }  # fmt: skip
         self.journal = Journal(session, labels)
         self.supervisor = Supervisor(fixture.execution.supervisor(fixture.horizons), self.journal)
+        fixture.execution.require_phases(fixture.task.phases)
         executor_settings = fixture.execution.executor(fixture.horizons)
         self.stub = ControllerStub(executor_settings, self.journal, self.supervisor)
         self.executor = Executor(executor_settings, self.journal, self.stub)
