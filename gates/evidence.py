@@ -53,6 +53,15 @@ class Evidence:
         frame: pd.DataFrame = table.select(list(columns)).to_pandas()
         return frame
 
+    def rows(self, path: str) -> list[dict[str, Any]]:
+        """All rows of a table, possibly none.
+
+        Raises:
+            MissingEvidenceError: No such file.
+            IntegrityError: The file is not a whole table.
+        """
+        return list(self._table(path).to_pylist())
+
     def of(self, path: str, method: str, *columns: str) -> pd.DataFrame:
         """Rows of one method; as `frame`.
 

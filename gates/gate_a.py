@@ -10,11 +10,17 @@ from pathlib import Path
 from pydantic import Field
 
 from gates import need, shortcuts
+from gates.cause import CauseLimits, limits_of
 from gates.engine import CriterionSpec, GateSpec, default_diagnosis, judge_gate
 from gates.evidence import Evidence, MissingEvidenceError
 from gates.models import Criterion, GateReport, StrictModel, Threshold, Verdict
 from gates.need import AUDIT, BASELINES, REFUSALS, VALID_CAUSE
 from gates.shortcuts import FACTORS, LATENT, VARIANTS
+
+CAUSE_EVIDENCE = (
+    "summary.json", "persistence.json", "findings.parquet", "strata.parquet", "modes.parquet",
+    "resamples.parquet",
+)  # fmt: skip
 
 
 class Params(StrictModel):
@@ -34,6 +40,8 @@ class Params(StrictModel):
         factors: Factors of which each must have been changed alone.
         conditioning_factors: Factors that could make a density unnecessary; a head is what the
             gate is about, and a single action commits to no mode.
+        cause: Limits of the questions that only the audit's cause asks, by owner: limit and
+            reason; the others stand in the thresholds.
     """
 
     confidence: float = Field(default=0.95, gt=0.5, lt=1.0)
@@ -46,6 +54,7 @@ class Params(StrictModel):
     latent_baseline: str = "act"
     factors: tuple[str, ...] = ("reference", "representation", "trunk", "head", "temporal")
     conditioning_factors: tuple[str, ...] = ("representation", "trunk")
+    cause: dict[str, dict[str, tuple[float, str]]] = Field(default_factory=dict)
 
 
 def judge(root: Path, thresholds: Mapping[str, Threshold], params: Params) -> GateReport:
@@ -56,23 +65,27 @@ def judge(root: Path, thresholds: Mapping[str, Threshold], params: Params) -> Ga
         IntegrityError: Evidence that is not what it claims to be.
     """
     evidence = Evidence(root)
+    limits = (
+        limits_of(params.cause, thresholds, where="params.yaml: gate_a.cause")
+        if params.cause
+        else None
+    )
 
     def diagnosis(criteria: Sequence[Criterion], verdict: Verdict) -> str:
         text = default_diagnosis(SPEC)(criteria, verdict)
-        return f"{text} {_cause(evidence, passed=verdict == 'PASS')}".strip()
+        return f"{text} {_cause(evidence, limits, passed=verdict == 'PASS')}".strip()
 
-    return judge_gate(SPEC, evidence, thresholds, params, diagnosis=diagnosis)
+    extra = {"cause_limits": limits}
+    return judge_gate(SPEC, evidence, thresholds, params, extra=extra, diagnosis=diagnosis)
 
 
-def _cause(evidence: Evidence, *, passed: bool) -> str:
+def _cause(evidence: Evidence, limits: CauseLimits | None, *, passed: bool) -> str:
     try:
-        summary = evidence.document(f"{AUDIT}/summary.json")
+        cause = need.found_cause(evidence, limits)
     except MissingEvidenceError as error:
         return f"Cause unknown: {error}."
-    detail = next((str(summary[key]) for key in ("variable", "kind") if summary.get(key)), "")
-    cause = f"{summary.get('cause')}({detail})" if detail else str(summary.get("cause"))
-    text = f"Cause found by the audit: {cause}."
-    return text if passed else f"{text} Next: {summary.get('next_action') or 'none'}"
+    text = f"Cause found by the audit: {cause.text}."
+    return text if passed else f"{text} Next: {cause.next_action}"
 
 
 SPEC = GateSpec(
@@ -231,7 +244,7 @@ SPEC = GateSpec(
             "Does the audit attribute the modes to the task itself?",
             ">=",
             "model",
-            (f"{AUDIT}/summary.json",),
+            tuple(f"{AUDIT}/{name}" for name in CAUSE_EVIDENCE),
             need.cause_accepted,
             "Conditioning: the audit found another cause than valid modes; remove it first.",
             route=VALID_CAUSE,

@@ -9,8 +9,10 @@ import numpy as np
 import pandas as pd
 
 from gates.bounds import counted_interval, share_interval
+from gates.cause import Cause, CauseLimits, name_cause, read_numbers
 from gates.engine import Case, Measured
 from gates.evidence import Evidence, MissingEvidenceError, count, flags, number, numbers
+from genpolicy.errors import BadInputError
 from genpolicy.statistics.intervals import clopper_pearson
 
 AUDIT = "artifacts/audit"
@@ -180,10 +182,27 @@ def recovery_benefit(case: Case) -> Measured:
 
 def cause_accepted(case: Case) -> Measured:
     """1 if the audit attributes the modes to the task itself, else 0."""
-    cause = case.evidence.document(f"{AUDIT}/summary.json").get("cause")
-    if not isinstance(cause, str) or not cause:
-        raise MissingEvidenceError("the audit names no cause")
-    return Measured(float(cause == VALID_CAUSE), caveat=f"cause: {cause}")
+    cause = found_cause(case.evidence, case.extra["cause_limits"])
+    return Measured(float(cause.name == VALID_CAUSE), caveat=f"cause: {cause.text}")
+
+
+def found_cause(evidence: Evidence, limits: CauseLimits | None) -> Cause:
+    """The cause that the audit's numbers name under the limits of this gate.
+
+    Raises:
+        MissingEvidenceError: Numbers or limits are missing.
+        ConfigError: A limit lies below what the audit looked for.
+    """
+    if limits is None:
+        raise MissingEvidenceError("params.yaml: gate_a.cause has no limits")
+    try:
+        numbers, draws = read_numbers(
+            lambda name: evidence.document(f"{AUDIT}/{name}"),
+            lambda name: evidence.rows(f"{AUDIT}/{name}"),
+        )
+    except BadInputError as error:
+        raise MissingEvidenceError(str(error)) from error
+    return name_cause(numbers, draws, limits)
 
 
 def baselines_matched(case: Case) -> Measured:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from gates import gate_a, gate_b, gate_c, gate_d
+from gates.cause import CauseLimits, limits_of
 from gates.engine import GateSpec, check_thresholds
 from gates.models import Gate, GateReport, StrictModel, Threshold, parse_section, stage_of
 from genpolicy.errors import ConfigError, IntegrityError
@@ -59,6 +60,37 @@ def read_section(
     }
     check_thresholds(spec, thresholds)
     return thresholds, parse_section(model, rest, where=where)
+
+
+def read_cause_limits(path: Path) -> CauseLimits:
+    """Limits of the cause from the `gate_a` section of a `params.yaml`.
+
+    Raises:
+        ConfigError: The file, the section or a limit is missing or wrong.
+    """
+    where = f"{path}: gate_a"
+    try:
+        document = parse_yaml(sha256_bytes_of(path, keep=True)[1], where=str(path))
+    except IntegrityError as error:
+        raise ConfigError(
+            where=str(path),
+            found=error.found,
+            expected=error.expected,
+            action="Name a file of settings.",
+        ) from error
+    section = document.get("gate_a") if isinstance(document, dict) else None
+    if not isinstance(section, dict) or not isinstance(section.get("thresholds"), dict):
+        raise ConfigError(
+            where=where,
+            found="missing",
+            expected="a section with `cause` and `thresholds`",
+            action="Name a file of settings of the ladder.",
+        )
+    thresholds = {
+        str(key): parse_section(Threshold, value, where=f"{where}.thresholds.{key}")
+        for key, value in section["thresholds"].items()
+    }
+    return limits_of(section.get("cause"), thresholds, where=f"{where}.cause")
 
 
 def plain_section(root: Path, name: str) -> dict[str, Any]:

@@ -13,7 +13,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "audit"))
 
 from planar import planar
 
-from genpolicy.cli import audit as command
+from gates.audit import command
 from genpolicy.cli.main import main
 from genpolicy.cli.resume import work_folder
 from genpolicy.cli.task_checks import contract_hash, task_checks

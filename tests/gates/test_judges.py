@@ -416,7 +416,7 @@ def test_a_lax_promotion_limit_contradicts_alpha(ladder):
 
 
 def test_recovery_benefit_is_a_second_route_but_waives_no_data_check(repo):
-    evidence.edit_document(repo, "audit/summary.json", _set("cause", "unimodal"))
+    evidence.edit_document(repo, "audit/persistence.json", _set("observed", 0.55))
     assert judge(repo, "A").verdict == "PASS"
     evidence.edit_table(repo, "audit/clocks.parquet", _cells("offset_after_s", 0.5))
     report = judge(repo, "A")
