@@ -59,7 +59,7 @@ class CauseLimits:
         return result
 
 
-def limits_of(cause: Mapping[str, Any], criteria: Mapping[str, Any], *, where: str) -> CauseLimits:
+def limits_of(cause: Any, criteria: Mapping[str, Any], *, where: str) -> CauseLimits:
     """Limits from the settings of Gate A.
 
     Args:

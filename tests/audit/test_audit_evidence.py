@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 from planar import LIMITS, SETTINGS, admissible, planar, shuffled
 
-from genpolicy.audit.data import AuditInput, canonical
 from gates.cause import cause_of
+from genpolicy.audit.data import AuditInput, canonical
 from genpolicy.audit.evidence import write_evidence
 from genpolicy.audit.run import audit
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.errors import ContractError, NonFiniteError
 from genpolicy.evidence.need.method_modes import one_per_episode, read_situations, sample_modes
-from genpolicy.integrity.documents import read_json
 from genpolicy.integrity.tables import read_table
 
 FILES = {

@@ -105,7 +105,7 @@ WORSE = {
             lambda s: lambda f: _cells("effect", s)(_cells("p_adjusted", 0.001)(f)),
         ),
         "cause_accepted": _document(
-            AUDIT + "summary.json", lambda s: _set("cause", "hidden_state" if s else "valid_modes")
+            AUDIT + "summary.json", lambda s: _set("label_disagreement_upper", 0.06 + s)
         ),
         "baselines_matched": _document(
             BASE + "matched.json",
