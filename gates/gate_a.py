@@ -11,6 +11,7 @@ from pydantic import Field
 
 from gates import need, shortcuts
 from gates.cause import CauseLimits, limits_of
+from gates.cause.limits import SHARED
 from gates.engine import CriterionSpec, GateSpec, default_diagnosis, judge_gate
 from gates.evidence import Evidence, MissingEvidenceError
 from gates.models import Criterion, GateReport, StrictModel, Threshold, Verdict
@@ -67,7 +68,7 @@ def judge(root: Path, thresholds: Mapping[str, Threshold], params: Params) -> Ga
     evidence = Evidence(root)
     limits = (
         limits_of(params.cause, thresholds, where="params.yaml: gate_a.cause")
-        if params.cause
+        if params.cause and set(SHARED) <= set(thresholds)
         else None
     )
 

@@ -194,7 +194,7 @@ def found_cause(evidence: Evidence, limits: CauseLimits | None) -> Cause:
         ConfigError: A limit lies below what the audit looked for.
     """
     if limits is None:
-        raise MissingEvidenceError("params.yaml: gate_a.cause has no limits")
+        raise MissingEvidenceError("params.yaml: gate_a lacks limits of the cause")
     try:
         numbers, draws = read_numbers(
             lambda name: evidence.document(f"{AUDIT}/{name}"),
