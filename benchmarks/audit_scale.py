@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.audit.runner import judged
 from genpolicy.audit import audit, propose_settings
 from genpolicy.contract.observation import Channel, ObservationContract
 from genpolicy.data.assemble import FLAGS, AcceptedEpisode, Description, write_dataset
@@ -86,7 +87,7 @@ def measure(episodes: int) -> None:
     print(
         json.dumps({
             "frames": episodes * STEPS, "load_s": loaded - begin, "audit_s": done - loaded,
-            "peak_mib": peak, "verdict": report.verdict,
+            "peak_mib": peak, "verdict": judged(report.result, report.settings).name.value,
         })
     )  # fmt: skip
 

@@ -106,6 +106,15 @@ class Evidence:
         if table.num_rows == 0:
             raise MissingEvidenceError(f"{path} has no rows")
 
+    def records(self, path: str) -> list[dict[str, Any]]:
+        """All rows of a table, possibly none, as they stand.
+
+        Raises:
+            MissingEvidenceError: No such file.
+            IntegrityError: The file is not a whole table.
+        """
+        return list(self._table(path).to_pylist())
+
     def document(self, path: str) -> dict[str, Any]:
         """A JSON document whose top is an object.
 

@@ -84,17 +84,17 @@ class GateSettings(StrictModel):
 Settings = TypeVar("Settings", bound=StrictModel)
 
 
-def read_params(root: Path) -> dict[str, Any]:
-    """`params.yaml` below `root`, not yet checked against any model.
+def read_params(root: Path, *, name: str = PARAMS_FILE) -> dict[str, Any]:
+    """`params.yaml` (or a file of another name) below `root`, not yet checked by any model.
 
     Raises:
         ConfigError: Missing, malformed, or no mapping.
     """
     try:
-        data = sha256_bytes_of(root / PARAMS_FILE, keep=True)[1]
+        data = sha256_bytes_of(root / name, keep=True)[1]
     except IntegrityError as error:
         raise ConfigError(
-            where=PARAMS_FILE,
+            where=name,
             found=error.found,
             expected=error.expected,
             action="Restore the settings file.",

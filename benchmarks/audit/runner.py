@@ -1,15 +1,20 @@
 """One data set: recorded, audited, and compared with what was planted."""
 
 import sys
+import tempfile
 import time
 from dataclasses import asdict, dataclass
+from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
 from benchmarks.audit.cases import CAUSES
 from benchmarks.audit.recorder import TASKS, record
 from benchmarks.audit.settings import SETTINGS
-from genpolicy.audit.run import audit
+from gates.cause import Cause, cause_of, default_limits
+from genpolicy.audit.evidence import write_evidence
+from genpolicy.audit.run import AuditResult, audit
+from genpolicy.audit.settings import AuditSettings
 
 
 @dataclass(frozen=True)
@@ -67,7 +72,22 @@ class Result:
         return row
 
 
-def run(job: Job) -> Result:
+def judged(result: AuditResult, settings: AuditSettings, *, keep: Path | None = None) -> Cause:
+    """The cause from the written evidence, under the packaged limits.
+
+    Args:
+        result: The audit.
+        settings: What it was made with.
+        keep: Folder for the evidence; None keeps none.
+    """
+    with tempfile.TemporaryDirectory() as name:
+        folder = keep or Path(name)
+        folder.mkdir(parents=True, exist_ok=True)
+        write_evidence(result, folder, settings=settings)
+        return cause_of(folder, default_limits())
+
+
+def run(job: Job, *, keep: Path | None = None) -> Result:
     """Record and audit one data set; a wrong answer is said at once."""
     cause = CAUSES[job.cause]
     begin = time.process_time()
@@ -81,8 +101,8 @@ def run(job: Job) -> Result:
             replay=labelled.outcomes.__getitem__,
             root_seed=job.seed,
         )
-    verdict = result.verdict
-    said = (str(verdict.cause.value), verdict.variable, verdict.kind)
+    verdict = judged(result, SETTINGS[job.task], keep=keep)
+    said = (verdict.name.value, verdict.variable, verdict.kind)
     named = any(answer.fits(*said) for answer in cause.answers)
     strong = cause.strong(job.strength)
     weak = not strong and any(answer.fits(*said) for answer in cause.weaker)
@@ -94,7 +114,7 @@ def run(job: Job) -> Result:
         verdict=said[0], variable=said[1], kind=said[2], named=named, right=named or weak,
         detail={
             "layer": str(verdict.layer.value), "action": verdict.next_action,
-            "confidence": result.confidence, **asdict(result.counts),
+            "confidence": verdict.confidence, **asdict(result.counts),
         },
         cpu_s=time.process_time() - begin,
     )  # fmt: skip

@@ -4,7 +4,8 @@ import numpy as np
 
 from gates.bounds import counted_interval
 from gates.criterion import Measured, criterion
-from gates.evidence import Evidence, MissingEvidenceError, number, numbers
+from gates.evidence import Evidence, number, numbers
+from gates.need.cause import found_cause
 from gates.need.settings import AUDIT, VALID_CAUSE, NeedSettings
 
 
@@ -37,10 +38,8 @@ def strata_effect(evidence: Evidence, settings: NeedSettings) -> Measured:
 )
 def cause_accepted(evidence: Evidence, settings: NeedSettings) -> Measured:
     """1 if the audit attributes the modes to the task itself, else 0."""
-    cause = evidence.document(f"{AUDIT}/summary.json").get("cause")
-    if not isinstance(cause, str) or not cause:
-        raise MissingEvidenceError("the audit names no cause")
-    return Measured(float(cause == VALID_CAUSE), caveat=f"cause: {cause}")
+    cause = found_cause(evidence, settings)
+    return Measured(float(cause.name == VALID_CAUSE), caveat=f"cause: {cause.text}")
 
 
 @criterion(

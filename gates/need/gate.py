@@ -4,10 +4,14 @@ Either the modes are valid (route `valid_modes`) or a mode is shown to matter fo
 (route `recovery`); data semantics, strata and matched baselines must hold in both cases.
 """
 
+from pathlib import Path
+
+from gates.cause import CauseLimits, limits_of
 from gates.criterion import criteria_of
 from gates.engine import GateSpec, Judged
 from gates.evidence import MissingEvidenceError
 from gates.need import conditioning, modes, semantics, simpler
+from gates.need.cause import found_cause
 from gates.need.settings import (
     AUDIT,
     MEASURED,
@@ -16,20 +20,18 @@ from gates.need.settings import (
     TRAINED_FACTORS,
     NeedSettings,
 )
+from gates.report import stage_of
+from gates.settings import read_limits, read_params, read_settings
 
 
 def _cause(judged: Judged) -> str:
     """The cause that the audit found, and after a verdict other than PASS what it asks for."""
     try:
-        summary = judged.evidence.document(f"{AUDIT}/summary.json")
+        cause = found_cause(judged.evidence, judged.settings)
     except MissingEvidenceError as error:
         return f"Cause unknown: {error}."
-    detail = next((str(summary[key]) for key in ("variable", "kind") if summary.get(key)), "")
-    cause = f"{summary.get('cause')}({detail})" if detail else str(summary.get("cause"))
-    text = f"Cause found by the audit: {cause}."
-    if judged.verdict == "PASS":
-        return text
-    return f"{text} Next: {summary.get('next_action') or 'none'}"
+    text = f"Cause found by the audit: {cause.text}."
+    return text if judged.verdict == "PASS" else f"{text} Next: {cause.next_action}"
 
 
 GATE = GateSpec(
@@ -63,3 +65,15 @@ GATE = GateSpec(
     ),
     note=_cause,
 )
+
+
+def read_cause_limits(path: Path) -> CauseLimits:
+    """Limits of the cause as the `gate_a` section of a file of settings gives them.
+
+    Raises:
+        ConfigError: The file, the section or a limit is missing or wrong.
+    """
+    params = read_params(path.parent, name=path.name)
+    settings = read_settings(params, stage_of(GATE.gate), NeedSettings)
+    limits = read_limits(params, GATE.gate, GATE.criteria)
+    return limits_of(settings.cause, limits.of, where=f"{path}: gate_a.cause")

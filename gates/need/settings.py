@@ -32,6 +32,8 @@ class NeedSettings(GateSettings):
         factors: Factors of which each must have been changed alone.
         conditioning_factors: Factors that could make a density unnecessary; a head is what the
             gate is about, and a single action commits to no mode.
+        cause: Limits of the questions that only the cause asks, by owner: limit and reason; those
+            that a criterion asks as well stand among the limits.
     """
 
     homes: ClassVar[Mapping[str, str]] = {
@@ -50,3 +52,4 @@ class NeedSettings(GateSettings):
     latent_baseline: str
     factors: tuple[str, ...] = ("reference", "representation", "trunk", "head", "temporal")
     conditioning_factors: tuple[str, ...] = ("representation", "trunk")
+    cause: dict[str, dict[str, tuple[float, str]]]

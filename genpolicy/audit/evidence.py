@@ -61,10 +61,10 @@ STRATA = pa.schema(
 REPLAY = pa.schema([("episode_uuid", TEXT), ("label", TEXT), ("replayed", TEXT), ("mode", TEXT)])
 RECOVERY = pa.schema([("split", TEXT), ("mode", TEXT), ("episodes", WHOLE), ("successes", WHOLE)])
 
-DEFECTS = pa.schema(
+FINDINGS = pa.schema(
     [
-        ("kind", TEXT), ("variable", TEXT), ("where", TEXT), ("measured", REAL), ("limit", REAL),
-        ("unit", TEXT), ("action", TEXT),
+        ("kind", TEXT), ("variable", TEXT), ("where", TEXT), ("question", TEXT),
+        ("measured", REAL), ("floor", REAL), ("unit", TEXT), ("action", TEXT),
     ]
 )  # fmt: skip
 EXAMPLES = pa.schema(
@@ -72,6 +72,16 @@ EXAMPLES = pa.schema(
         ("example", WHOLE), ("phase", TEXT), ("two_mode", FLAG), ("query_uuid", TEXT),
         ("query_index", WHOLE), ("episode_uuid", TEXT), ("is_query", FLAG), ("distance", REAL),
         ("cluster", WHOLE), ("coordinate", REAL), ("path", pa.list_(REAL)),
+    ]
+)  # fmt: skip
+RESAMPLES = pa.schema(
+    [
+        ("disagreements", WHOLE), ("disagreement_upper", REAL), ("two_mode", WHOLE),
+        ("two_mode_episodes", WHOLE), ("incoherent", WHOLE), ("persistent", WHOLE),
+        ("kept", REAL), ("kept_null_q95", REAL), ("kept_n", WHOLE),
+        ("p_adjusted", pa.list_(REAL)), ("effect", pa.list_(REAL)),
+        ("effect_lower", pa.list_(REAL)), ("success_lower", pa.list_(REAL)),
+        ("admissible", pa.list_(WHOLE)),
     ]
 )  # fmt: skip
 ALIGNMENT = pa.schema(
@@ -100,7 +110,7 @@ def write_evidence(
     Args:
         result: The audit.
         folder: Existing folder.
-        settings: What the audit was made with; its limits stand beside the numbers.
+        settings: What the audit was made with; its floors stand beside the numbers.
         obstacles: Round obstacles in the base frame, for plots: `x_m`, `y_m`, `radius_m`.
 
     Raises:
@@ -116,7 +126,8 @@ def write_evidence(
         "strata": _table(result.strata, STRATA),
         "replay": pa.Table.from_pylist(_replays(result), REPLAY),
         "recovery": _table(result.recovery, RECOVERY),
-        "defects": _table(result.semantics.defects, DEFECTS),
+        "findings": _table(result.semantics.findings, FINDINGS),
+        "resamples": _table(result.resamples, RESAMPLES),
         "examples": _table(example_chunks(result, settings), EXAMPLES),
         "alignment": _table(alignment(result, settings), ALIGNMENT),
         "support": _table(support_points(result), SUPPORT),
@@ -127,25 +138,22 @@ def write_evidence(
     write_bytes(folder / "settings.json", canonical_json(settings.model_dump(mode="json")))
     write_bytes(
         folder / "summary.json",
-        canonical_json(summary(result) | {"obstacles": [dict(o) for o in obstacles]}),
+        canonical_json(summary(result, settings) | {"obstacles": [dict(o) for o in obstacles]}),
     )
 
 
-def summary(result: AuditResult) -> dict[str, Any]:
-    """Cause and counts, as written to `summary.json`."""
+def summary(result: AuditResult, settings: AuditSettings) -> dict[str, Any]:
+    """Counts and floors, as written to `summary.json`."""
     wrong, replays, upper = disagreement(result.replayed)
     several = [item for item in result.situations if item.two_mode]
     checked = [item for item in several if item.chunks.mean_admissible is not None]
     return {
-        "cause": result.verdict.cause.value,
-        "variable": result.verdict.variable,
-        "kind": result.verdict.kind,
-        "layer": result.verdict.layer.value,
-        "confidence": result.confidence,
-        "next_action": result.verdict.next_action,
         "modes_before_realignment": result.counts.two_mode_episodes,
         "modes_after_realignment": result.modes_after_realignment,
         "episodes": len(result.data.episodes),
+        "floors": settings.floors,
+        "metre": settings.metre,
+        "primary_phase": result.primary_phase,
         "rows": len(result.data.observation),
         "counts": asdict(result.counts),
         **_by_phase(result),
@@ -216,9 +224,7 @@ def _situation(data: AuditInput, item: Situation) -> dict[str, Any]:
 
 def _replays(result: AuditResult) -> list[dict[str, Any]]:
     """Replayed episodes with the mode that each followed, in the phase with most situations."""
-    several = [item.phase for item in result.situations if item.two_mode]
-    primary = max(sorted(set(several)), key=several.count, default="")
-    linked = result.links.get(primary)
+    linked = result.links.get(result.primary_phase)
     places = {str(uuid): place for place, uuid in enumerate(result.data.episodes.uuid)}
     return [
         asdict(item) | {"mode": _mode(linked, places[item.episode_uuid])}

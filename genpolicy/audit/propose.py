@@ -15,11 +15,11 @@ from genpolicy.contract.observation import Channel, ObservationContract
 from genpolicy.contract.settings import parse_settings
 from genpolicy.data.dataset import Dataset
 
-# Length that makes another observation; another mode is three of them, noise a
-# fifth of one, a calibration is off by half of one.
+# Length that makes another observation; another mode is three of them, and a
+# calibration is off from three tenths of one on.
 SCALES = {"m": 0.01, "px": 10.0, "rad": 0.05, "N": 5.0}
 SPREAD_SHARE = 0.05
-APART, NOISE, SHIFTED = 3.0, 0.2, 0.5
+APART, SHIFTED = 3.0, 0.3
 # The radius grows with the root of the number of components: 1.4 scales in each (RMS).
 RADIUS_PER_COMPONENT = 1.4
 OWN_BODY = {
@@ -143,7 +143,7 @@ def _spread_scale(values: np.ndarray) -> float:
 
 
 def _separations(dataset: Dataset, names: list[str] | None) -> dict[str, float]:
-    """Least distance of two modes and noise floor, in the unit of what is commanded."""
+    """Least distance of two modes and of epochs, and the metre, in the unit commanded."""
     stated = dataset.manifest["action_contract"]
     columns = _columns(dataset, names)
     units = {stated["units"][k] for k in columns}
@@ -152,6 +152,6 @@ def _separations(dataset: Dataset, names: list[str] | None) -> dict[str, float]:
     scale = SCALES.get(unit, _spread_scale(commanded))
     return {
         "minimum_separation_m": APART * scale,
-        "noise_floor_m": NOISE * scale,
-        "calibration_limit_m": SHIFTED * scale,
+        "calibration_floor_m": SHIFTED * scale,
+        "metre": scale / SCALES["m"],
     }

@@ -1,11 +1,10 @@
-"""The whole audit: from rows to a cause, every number on the way kept as evidence."""
+"""The whole audit: from rows to numbers, each kept as evidence. It measures and names no cause."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from genpolicy.audit.confidence import confidence
-from genpolicy.audit.counts import count
+from genpolicy.audit.counts import Counts, count
 from genpolicy.audit.data import AuditInput, Integers, canonical
 from genpolicy.audit.labels import ModeOutcome, Replay, Replayed, mode_outcomes, replay_sample
 from genpolicy.audit.linking import link
@@ -14,6 +13,7 @@ from genpolicy.audit.neighbourhoods import Support
 from genpolicy.audit.persistence import Persistence, summarise
 from genpolicy.audit.progress import Progress, silent
 from genpolicy.audit.recovery import RecoveryOutcome, recovery_outcomes
+from genpolicy.audit.resamples import Measures, Resample, resamples
 from genpolicy.audit.semantics import Semantics, measure, realigned
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.audit.situations import (
@@ -29,7 +29,6 @@ from genpolicy.audit.situations import (
     primary_phase,
 )
 from genpolicy.audit.strata import Stratum, examine_strata
-from genpolicy.audit.verdict import AuditVerdict, Counts, Layers, decide
 
 
 @dataclass(frozen=True)
@@ -51,8 +50,7 @@ class AuditResult:
         modes_after_realignment: Held-out episodes with two modes on realigned data.
         modes_other_phases: The same with the phase looked at the other way: across phases if the
             policy sees the phase, inside each if not; None with one phase only.
-        verdict: The cause.
-        confidence: Share of resampled audits that name the same cause.
+        resamples: The measures on resampled data.
     """
 
     data: AuditInput
@@ -68,8 +66,12 @@ class AuditResult:
     counts: Counts
     modes_after_realignment: int
     modes_other_phases: int | None
-    verdict: AuditVerdict
-    confidence: float
+    resamples: tuple[Resample, ...]
+
+    @property
+    def primary_phase(self) -> str:
+        """The phase with most situations of several modes; empty where there is none."""
+        return primary_phase(by_phase(self.situations))
 
 
 def audit(
@@ -85,7 +87,7 @@ def audit(
 
     Args:
         data: Rows and episodes, in any order.
-        settings: What counts as near, as two modes, as red.
+        settings: What counts as near, as two modes, and from where on deviations are reported.
         admissible: Feasibility of a chunk, `(actions (K, D_a), observation (D_o,)) -> (bool,
             reason)`; None leaves the columns empty.
         replay: Outcome of a replayed episode, by identifier; None leaves labels unproven.
@@ -93,7 +95,7 @@ def audit(
         progress: Called as `progress(what, done, total)` after every situation and replay.
 
     Returns:
-        The evidence and the cause; the same for every order of episodes.
+        The evidence; the same for every order of episodes.
     """
     data = canonical(data)
     semantics = measure(data, settings)
@@ -113,24 +115,19 @@ def audit(
     links = _links(data, settings, several)
     modes = _modes(data, situations, links, replayed)
     strata = examine_strata(data, settings, several, links, root_seed=root_seed)
-    counts = count(data, settings, situations, support, incoherent)
+    counts = count(data, situations, support, incoherent)
     primary = primary_phase(several)
-    layers = Layers(
-        semantics=semantics,
-        replayed=replayed,
-        counts=counts,
-        persistence=summarise([item.identity for item in situations if item.two_mode]),
-        strata=strata,
-        modes=tuple(mode for mode in modes if mode.phase == primary),
+    persistence = summarise([item.identity for item in situations if item.two_mode])
+    measured = Measures(
+        replayed, persistence, strata, tuple(mode for mode in modes if mode.phase == primary)
     )
-    verdict = decide(settings, layers)
     before = counts.two_mode_episodes
     return AuditResult(
         data=data,
         semantics=semantics,
         support=support,
         situations=situations,
-        persistence=layers.persistence,
+        persistence=persistence,
         modes=modes,
         links=links,
         strata=strata,
@@ -139,8 +136,7 @@ def audit(
         counts=counts,
         modes_after_realignment=_after_realignment(data, settings, semantics, before, root_seed),
         modes_other_phases=_other_phases(data, settings, root_seed),
-        verdict=verdict,
-        confidence=confidence(data, settings, layers, claims, verdict, root_seed=root_seed),
+        resamples=resamples(data, settings, measured, claims, root_seed=root_seed),
     )
 
 

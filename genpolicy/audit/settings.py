@@ -1,4 +1,9 @@
-"""Settings of the audit: what counts as near, as two modes, and as red. One section of params."""
+"""Settings of the audit: what counts as near and as two modes, and from where on it reports.
+
+Nothing here decides a cause: limits stand in `params.yaml: gate_a`, with owner and reason. A
+`floor` is the smallest deviation that is looked for; a limit below it cannot be held against the
+evidence.
+"""
 
 import math
 from typing import Literal
@@ -30,7 +35,6 @@ class AuditSettings(BaseModel):
         scale_rad: The same for an angle, rad.
         scale_unit: The same for a pure number (direction cosines and the like).
         channel_scale: The same by channel, in its unit; overrides the rules above.
-        noise_floor_m: Spread below which action-to-action noise does not matter.
         radius: Furthest neighbour, in units of the scales (Euclidean over the history).
         neighbours: Training episodes per neighbourhood, at most.
         minimum_neighbours: Fewer inside the radius: the situation is not analysed.
@@ -47,31 +51,29 @@ class AuditSettings(BaseModel):
         persistence_lag_steps: How much later the clusters must still be there.
         maximum_lag_steps: Search range of the action-to-state lag.
         declared_lag_steps: Lag that the contract states; None takes the median of the episodes.
-        clock_limit_s: Red above: clock residual of an epoch.
-        clock_limit_steps: No lag is believed finer than this, action steps; red above both.
-        significance: An offset is red only beyond this many of its standard errors: with some
+        clock_floor_s: Offsets of a clock are reported from here on.
+        clock_resolution_steps: No lag is believed finer than this, action steps.
+        significance: An offset is reported only beyond this many of its standard errors: with some
             twenty of them per data set one in 10,000 clean ones is called defective by chance.
         outlier_share: Share of single episodes with one fault (and two of them at least) that
-            makes it a defect of the data; below it is a mishap without weight.
-        drift_limit_steps: Red above: growth of the lag from the first to the last row of an
+            makes it worth reporting; below it is a mishap without weight.
+        drift_floor_steps: Reported from: growth of the lag from the first to the last row of an
             episode, action steps. Plants differ by up to a step between slow and fast motion.
-        gain_limit: Red above: factor between commanded and observed motion. No arm follows that
-            badly, and units differ by more.
-        gain_epoch_limit: Red above: the same between one epoch and all.
-        frame_limit_rad: Red above: angle between commanded and observed motion. An arm that
+        gain_floor: Reported from: factor between commanded and observed motion. No arm follows
+            that badly, and units differ by more.
+        gain_epoch_floor: Reported from: the same between one epoch and all.
+        frame_floor_rad: Reported from: angle between commanded and observed motion. An arm that
             follows its axes unequally stays below it.
-        gap_share_limit: Red above: share of rows that follow a gap. At 1 % every sixth chunk of 16
-            holds one.
-        jitter_limit_share: Red above: deviation of every tenth row from the period, as its share.
+        gap_share_floor: Reported from: share of rows that follow a gap. At 1 % every sixth chunk
+            of 16 holds one.
+        jitter_floor_share: Reported from: deviation of every tenth row from the period, as its
+            share.
         negative_delay_tolerance_s: A sample may be received this much before it happened (what the
-            correction of a clock leaves); beyond it is counted and red.
-        calibration_limit_m: Red above: calibration residual of an epoch.
-        label_disagreement_limit: Red above: exact upper bound of label against replay.
+            correction of a clock leaves); beyond it is counted.
+        calibration_floor_m: Reported from: calibration residual of an epoch.
+        metre: How much of the position's unit stands for a metre, so that limits in m hold for
+            pixels and joint angles as well.
         replay_episodes: Episodes to replay, drawn at random, at most.
-        minimum_situations: Fewer analysed held-out episodes: insufficient support.
-        minimum_support_share: Share of held-out situations with enough neighbours, at least.
-        minimum_absence_share: The same before it may be said that there are no modes: where half
-            of the situations cannot be looked at, modes may be there.
         minimum_two_mode_situations: Held-out episodes of a phase with several modes, below which
             the phase is said to have one.
         minimum_two_mode_share: The same as a share of its analysed held-out episodes. Where the
@@ -79,14 +81,10 @@ class AuditSettings(BaseModel):
             looked at in ten situations an episode up to a tenth of them.
         minimum_persistent_share: Share of a phase's situations with clusters that must keep them,
             each beyond its own shuffled-time null, for the clusters to be modes: most of them.
-        strata_alpha: Family-wise error of the strata tests.
-        strata_effect_limit: Red above: explained share of a significant stratum.
-        strata_lower_limit: The lower end of its interval must reach this as well: among a dozen
-            variables one shows a large share by luck, and then a wide interval.
-        mode_success_limit: Lower bound of a mode's success that makes it valid.
-        mode_feasible_limit: Share of a mode's chunks that must be admissible.
+        strata_resolution: Smallest adjusted p-value that the permutations must be able to reach,
+            doubled.
         permutations: Permutations per test.
-        resamples: Draws of the resampling that gives the confidence of the verdict.
+        resamples: Draws of the resampling that shows how stable the cause is.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
@@ -107,7 +105,6 @@ class AuditSettings(BaseModel):
     scale_rad: float = Field(default=0.05, gt=0)
     scale_unit: float = Field(default=0.1, gt=0)
     channel_scale: dict[str, float] = Field(default_factory=dict)
-    noise_floor_m: float = Field(default=0.002, gt=0)
     radius: float = Field(default=6.0, gt=0)
     neighbours: int = Field(default=20, ge=4)
     minimum_neighbours: int = Field(default=12, ge=4)
@@ -122,33 +119,41 @@ class AuditSettings(BaseModel):
     persistence_lag_steps: int = Field(default=16, ge=1)
     maximum_lag_steps: int = Field(default=12, ge=1)
     declared_lag_steps: float | None = None
-    clock_limit_s: float = Field(default=0.02, gt=0)
-    clock_limit_steps: float = Field(default=0.25, gt=0)
+    clock_floor_s: float = Field(default=0.01, gt=0)
+    clock_resolution_steps: float = Field(default=0.25, gt=0)
     significance: float = Field(default=4.5, gt=0)
     outlier_share: float = Field(default=0.02, gt=0, lt=1)
-    drift_limit_steps: float = Field(default=1.5, gt=0)
-    gain_limit: float = Field(default=3.0, gt=1)
-    gain_epoch_limit: float = Field(default=1.15, gt=1)
-    frame_limit_rad: float = Field(default=0.14, gt=0)
-    gap_share_limit: float = Field(default=0.01, gt=0, lt=1)
-    jitter_limit_share: float = Field(default=0.5, gt=0)
+    drift_floor_steps: float = Field(default=1.5, gt=0)
+    gain_floor: float = Field(default=3.0, gt=1)
+    gain_epoch_floor: float = Field(default=1.15, gt=1)
+    frame_floor_rad: float = Field(default=0.14, gt=0)
+    gap_share_floor: float = Field(default=0.01, gt=0, lt=1)
+    jitter_floor_share: float = Field(default=0.5, gt=0)
     negative_delay_tolerance_s: float = Field(default=0.001, ge=0)
-    calibration_limit_m: float = Field(default=0.005, gt=0)
-    label_disagreement_limit: float = Field(default=0.08, gt=0, lt=1)
+    calibration_floor_m: float = Field(default=0.003, gt=0)
+    metre: float = Field(default=1.0, gt=0)
     replay_episodes: int = Field(default=60, ge=0)
-    minimum_situations: int = Field(default=20, ge=1)
-    minimum_support_share: float = Field(default=0.2, gt=0, lt=1)
-    minimum_absence_share: float = Field(default=0.5, gt=0, lt=1)
     minimum_two_mode_situations: int = Field(default=5, ge=1)
     minimum_two_mode_share: float = Field(default=0.2, gt=0, lt=1)
     minimum_persistent_share: float = Field(default=0.5, gt=0, le=1)
-    strata_alpha: float = Field(default=0.05, gt=0, lt=1)
-    strata_effect_limit: float = Field(default=0.3, gt=0, lt=1)
-    strata_lower_limit: float = Field(default=0.1, ge=0, lt=1)
-    mode_success_limit: float = Field(default=0.5, gt=0, lt=1)
-    mode_feasible_limit: float = Field(default=0.8, gt=0, le=1)
+    strata_resolution: float = Field(default=0.05, gt=0, lt=1)
     permutations: int = Field(default=999, ge=99)
     resamples: int = Field(default=200, ge=20)
+
+    @property
+    def floors(self) -> dict[str, float]:
+        """Where reporting begins, by the question whose limit may not lie below it."""
+        return {
+            "clock_residual_s": self.clock_floor_s,
+            "lag_drift_steps": self.drift_floor_steps,
+            "gain_factor": self.gain_floor,
+            "gain_epoch_factor": self.gain_epoch_floor,
+            "frame_angle_rad": self.frame_floor_rad,
+            "gap_share": self.gap_share_floor,
+            "jitter_share": self.jitter_floor_share,
+            "calibration_residual_m": self.calibration_floor_m / self.metre,
+            "faulty_episodes_share": self.outlier_share,
+        }
 
     def least_two_mode_episodes(self, analysed: int) -> int:
         """Held-out episodes with several modes that it takes among so many analysed ones."""

@@ -1,4 +1,4 @@
-"""The audit of any ingested dataset, as one value: the verdict and all that it rests on."""
+"""The audit of any ingested dataset, as one value: what was measured and all that it rests on."""
 
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -14,39 +14,27 @@ from genpolicy.audit.strata import EPISODE_VARIABLES, HISTORY
 from genpolicy.audit.view import from_dataset
 from genpolicy.data.dataset import Dataset
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 
 
 @dataclass(frozen=True)
 class AuditReport:
-    """What `audit.json` says.
+    """What `audit.json` says, all but the cause: that is named where the limits are.
 
     Attributes:
-        verdict: The cause, one of `genpolicy.audit.verdict.Cause`.
-        variable: The variable or stream that it names; empty where it names none.
-        kind: The kind of defect or of evidence; empty where there is none.
-        layer: First red layer of the diagnosis, `none` where all are green.
-        confidence: Share of resampled audits that name the same cause, 0 to 1.
         modes: Episodes, successes and feasibility of each mode.
         support: How far the data reach.
         evidence: What each layer measured, a sentence each.
         rests_on: What was guessed, not recorded or not checked, a sentence each.
-        next_action: What to do.
         settings: The settings of the audit, proposed ones included.
         dataset: Hash of the dataset's manifest.
         result: All evidence; not part of the document.
     """
 
-    verdict: str
-    variable: str
-    kind: str
-    layer: str
-    confidence: float
     modes: tuple[dict[str, Any], ...]
     support: dict[str, Any]
     evidence: tuple[str, ...]
     rests_on: tuple[str, ...]
-    next_action: str
     settings: AuditSettings
     dataset: str
     result: AuditResult
@@ -55,16 +43,10 @@ class AuditReport:
         """The document, ready for `canonical_json`."""
         return {
             "schema_version": SCHEMA_VERSION,
-            "verdict": self.verdict,
-            "variable": self.variable,
-            "kind": self.kind,
-            "layer": self.layer,
-            "confidence": self.confidence,
             "modes": list(self.modes),
             "support": self.support,
             "evidence": list(self.evidence),
             "rests_on": list(self.rests_on),
-            "next_action": self.next_action,
             "settings": self.settings.model_dump(),
             "dataset_manifest_sha256": self.dataset,
         }
@@ -83,8 +65,8 @@ def audit(
 
     Args:
         dataset: A verified dataset, see `genpolicy.data.dataset.load_dataset`.
-        config: What counts as near, as two modes, as red; proposed from the data where None, see
-            `genpolicy.audit.propose.propose_settings`.
+        config: What counts as near, as two modes, and from where on deviations are reported;
+            proposed from the data where None, see `genpolicy.audit.propose.propose_settings`.
         admissible: Feasibility of a chunk, `(actions (K, D_a), observation (D_o,)) -> (bool,
             reason)`; None: no mean and no mode is checked.
         replay: Outcome of a replayed episode, by identifier; None: labels are taken as they are.
@@ -92,7 +74,7 @@ def audit(
         progress: Called as `progress(what, done, total)`.
 
     Returns:
-        Verdict and evidence; the same for every order of episodes.
+        The evidence; the same for every order of episodes.
 
     Raises:
         ContractError: The settings name what the dataset does not have.
@@ -112,13 +94,8 @@ def audit(
         root_seed=root_seed,
         progress=progress or silent,
     )
-    verdict, counts = result.verdict, result.counts
+    counts = result.counts
     return AuditReport(
-        verdict=verdict.cause.value,
-        variable=verdict.variable,
-        kind=verdict.kind,
-        layer=verdict.layer.value,
-        confidence=result.confidence,
         modes=tuple(asdict(mode) for mode in result.modes),
         support={
             "episodes": len(result.data.episodes),
@@ -133,7 +110,6 @@ def audit(
         },
         evidence=tuple(_evidence(result, settings)),
         rests_on=tuple(_rests_on(dataset, result, admissible, replay)),
-        next_action=verdict.next_action,
         settings=settings,
         dataset=dataset.manifest_sha256,
         result=result,
@@ -144,9 +120,12 @@ def _evidence(result: AuditResult, settings: AuditSettings) -> list[str]:
     """What the layers measured, in the order of the diagnosis."""
     counts, persistence = result.counts, result.persistence
     wrong, replays, upper = disagreement(result.replayed)
-    defects = [f"{item.kind} {item.variable}".strip() for item in result.semantics.defects]
+    found = [
+        f"{item.kind} {item.variable}".strip() + f" {item.measured:.3g} {item.unit}"
+        for item in result.semantics.findings
+    ]
     lines = [
-        f"data: {', '.join(defects)}" if defects else "data: no defect found",
+        f"data: {', '.join(found)}" if found else "data: nothing stands out of the noise",
         f"labels: {wrong} of {replays} replayed episodes disagree, at most {upper:.1%}"
         if replays
         else "labels: not replayed",

@@ -113,7 +113,7 @@ def _enough_permutations(data: AuditInput, settings: AuditSettings, phases: int)
     """So many permutations that the smallest p-value survives the correction for all tests."""
     context = sum(part.stop - part.start for part in data.context.values())
     tests = phases * (len(EPISODE_VARIABLES) + 5 + data.position.shape[1] + context)
-    least = int(np.ceil(2 * tests / settings.strata_alpha))
+    least = int(np.ceil(2 * tests / settings.strata_resolution))
     if settings.permutations >= least:
         return settings
     return settings.model_copy(update={"permutations": least})

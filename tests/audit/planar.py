@@ -4,16 +4,44 @@ Observation: x, y, goal x, goal y (m), phase flag. Action: commanded x, y. The p
 command with a lag of one step.
 """
 
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 
+from gates.cause import CauseLimits, cause_of, default_limits
 from genpolicy.audit.data import AuditInput, Episodes
+from genpolicy.audit.evidence import write_evidence
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.seeds import stream
 
 SETTINGS = AuditSettings(
-    position_channel="tcp", reference_channel=None, minimum_situations=15,
-    replay_episodes=80, permutations=199, query_stride=4,
+    position_channel="tcp", reference_channel=None, replay_episodes=80, permutations=199,
+    query_stride=4,
 )  # fmt: skip
+
+
+def limits_with(**changes):
+    """The packaged limits of the cause, some of them changed."""
+    found = default_limits().by_question
+    assert not set(changes) - set(found)
+    return CauseLimits({
+        question: replace(item, limit=changes.get(question, item.limit))
+        for question, item in found.items()
+    })  # fmt: skip
+
+
+LIMITS = limits_with(supported_episodes=15)
+
+
+def named(result, settings=SETTINGS, limits=LIMITS):
+    """The cause from the evidence as it is written."""
+    with tempfile.TemporaryDirectory() as folder:
+        write_evidence(result, Path(folder), settings=settings)
+        return cause_of(Path(folder), limits)
+
+
 POST = np.array([0.15, 0.0])
 
 
@@ -93,8 +121,6 @@ def shuffled(data, seed):
         name: getattr(data, name)[rows]
         for name in ("observation", "action", "phase", "index", "event_time_s")
     }
-    from dataclasses import replace
-
     return replace(data, **arrays, episode=rank[data.episode[rows]], episodes=Episodes(**fields))
 
 

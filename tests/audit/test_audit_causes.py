@@ -1,11 +1,11 @@
 """Planted causes on the planar task: each must be named, and none for another's reason."""
 
 import pytest
-from planar import SETTINGS, admissible, planar
+from planar import SETTINGS, admissible, limits_with, named, planar
 
+from gates.cause import CauseName
 from genpolicy.audit.evidence import summary
 from genpolicy.audit.run import audit
-from genpolicy.audit.verdict import Cause
 
 
 def run(settings=SETTINGS, check=admissible, **planted):
@@ -19,7 +19,7 @@ def valid():
 
 
 def test_valid_modes_are_found(valid):
-    assert valid.verdict.cause is Cause.VALID_MODES
+    assert named(valid).name is CauseName.VALID_MODES
     assert valid.counts.two_mode_episodes >= 30
     assert valid.counts.persistent >= 0.95 * valid.counts.two_mode
     assert valid.persistence.observed - valid.persistence.null_q95 > 0.3
@@ -28,7 +28,7 @@ def test_valid_modes_are_found(valid):
 
 
 def test_the_mean_hits_the_post_and_the_modes_do_not(valid):
-    numbers = summary(valid)
+    numbers = summary(valid, SETTINGS)
     assert numbers["mean_checked"] == valid.counts.two_mode
     several = [item for item in valid.situations if item.two_mode]
     assert all(all(item.chunks.mode_admissible) for item in several)
@@ -60,39 +60,40 @@ def test_neighbours_are_independent_training_episodes(valid):
 
 
 def test_a_hidden_operator_is_named():
-    verdict = run(modes="operator").verdict
-    assert (verdict.cause, verdict.variable) == (Cause.HIDDEN_STATE, "operator")
+    verdict = named(run(modes="operator"))
+    assert (verdict.name, verdict.variable) == (CauseName.HIDDEN_STATE, "operator")
     assert "operator explains" in verdict.next_action
 
 
 def test_modes_of_an_epoch_are_a_data_defect():
-    verdict = run(modes="epoch").verdict
-    assert (verdict.cause, verdict.variable) == (Cause.DATA_DEFECT, "calibration_epoch")
+    verdict = named(run(modes="epoch"))
+    assert (verdict.name, verdict.variable) == (CauseName.DATA_DEFECT, "calibration_epoch")
 
 
 def test_what_the_policy_sees_is_no_hidden_state():
     # The goal's side decides, by less than the scale that makes another observation.
-    verdict = run(modes="goal", episodes=200).verdict
-    assert (verdict.cause, verdict.kind) == (Cause.UNIMODAL, "observed_variable")
+    verdict = named(run(modes="goal", episodes=200))
+    assert (verdict.name, verdict.kind) == (CauseName.UNIMODAL, "observed_variable")
     assert verdict.variable == "goal.y_m"
 
 
 def test_one_side_only_is_unimodal():
     result = run(modes="none")
-    assert result.verdict.cause is Cause.UNIMODAL
+    assert named(result).name is CauseName.UNIMODAL
     assert result.counts.two_mode == 0
 
 
 def test_tremor_is_not_a_mode():
-    settings = SETTINGS.model_copy(update={"calibration_limit_m": 0.03})
-    verdict = run(modes="none", tremor_m=0.02, settings=settings).verdict
-    assert verdict.cause is Cause.POINTWISE_NOISE
+    limits = limits_with(supported_episodes=15, calibration_residual_m=0.03)
+    verdict = named(run(modes="none", tremor_m=0.02), limits=limits)
+    assert verdict.name is CauseName.POINTWISE_NOISE
 
 
 @pytest.mark.parametrize("modes", ["free", "none"])
 def test_a_clock_offset_is_named_before_its_modes(modes):
     result = run(modes=modes, clock_steps=3)
-    assert (result.verdict.cause, result.verdict.kind) == (Cause.DATA_DEFECT, "clock")
+    verdict = named(result)
+    assert (verdict.name, verdict.kind) == (CauseName.DATA_DEFECT, "clock")
     offsets = {clock.epoch: clock.offset_before_s for clock in result.semantics.clocks}
     assert abs(offsets["e1"] - offsets["e0"]) == pytest.approx(0.3, abs=0.02)
     assert all(abs(clock.offset_after_s) < 0.02 for clock in result.semantics.clocks)
@@ -106,30 +107,30 @@ def test_false_modes_of_a_clock_offset_vanish_after_realignment():
 
 
 def test_a_shifted_calibration_is_a_data_defect():
-    verdict = run(epoch_shift_m=0.01).verdict
-    assert (verdict.cause, verdict.kind) == (Cause.DATA_DEFECT, "calibration")
+    verdict = named(run(epoch_shift_m=0.01))
+    assert (verdict.name, verdict.kind) == (CauseName.DATA_DEFECT, "calibration")
 
 
 def test_wrong_labels_are_contamination():
-    verdict = run(wrong_labels=0.2).verdict
-    assert verdict.cause is Cause.LABEL_CONTAMINATION
+    verdict = named(run(wrong_labels=0.2))
+    assert verdict.name is CauseName.LABEL_CONTAMINATION
 
 
 def test_a_mode_that_fails_honestly_leaves_one():
-    verdict = run(side_fails=True).verdict
-    assert (verdict.cause, verdict.kind) == (Cause.UNIMODAL, "one_valid_mode")
+    verdict = named(run(side_fails=True))
+    assert (verdict.name, verdict.kind) == (CauseName.UNIMODAL, "one_valid_mode")
 
 
 def test_an_infeasible_mode_leaves_one():
-    verdict = run(check=lambda a, o: (a[:, 1].min() > -0.03, "collision")).verdict
-    assert (verdict.cause, verdict.kind) == (Cause.UNIMODAL, "one_valid_mode")
+    verdict = named(run(check=lambda a, o: (a[:, 1].min() > -0.03, "collision")))
+    assert (verdict.name, verdict.kind) == (CauseName.UNIMODAL, "one_valid_mode")
 
 
 def test_few_data_support_nothing():
-    settings = SETTINGS.model_copy(update={"label_disagreement_limit": 0.5})
-    verdict = run(episodes=20, settings=settings).verdict
-    assert (verdict.cause, verdict.kind) == (Cause.INSUFFICIENT_SUPPORT, "neighbourhoods")
-    assert run(episodes=20).verdict.kind == "replay"
+    limits = limits_with(label_disagreement=0.5)
+    verdict = named(run(episodes=20), limits=limits)
+    assert (verdict.name, verdict.kind) == (CauseName.INSUFFICIENT_SUPPORT, "neighbourhoods")
+    assert named(run(episodes=20)).kind == "replay"
 
 
 def test_without_outcomes_no_mode_is_valid():
@@ -138,5 +139,5 @@ def test_without_outcomes_no_mode_is_valid():
     data, _ = planar()
     data = replace(data, episodes=replace(data.episodes, outcome=data.episodes.split.astype("<U1")))
     data.episodes.outcome[:] = ""
-    verdict = audit(data, SETTINGS, admissible=None, replay=None, root_seed=3).verdict
-    assert (verdict.cause, verdict.kind) == (Cause.INSUFFICIENT_SUPPORT, "not_recorded")
+    verdict = named(audit(data, SETTINGS, admissible=None, replay=None, root_seed=3))
+    assert (verdict.name, verdict.kind) == (CauseName.INSUFFICIENT_SUPPORT, "not_recorded")

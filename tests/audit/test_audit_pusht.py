@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from gates.cause import CauseName, cause_of, default_limits
 from genpolicy.audit.evidence import write_evidence
 from genpolicy.audit.run import audit
 from genpolicy.audit.settings import AuditSettings
-from genpolicy.audit.verdict import Cause
 from genpolicy.audit.view import from_dataset
 from genpolicy.data.dataset import load_dataset
 from genpolicy.data.formats.zarr_buffer import PUSHT, ingest_zarr_replay_buffer
@@ -20,7 +20,7 @@ BUFFER = Path(__file__).parents[3] / "shared/data/pusht_v7/pusht_cchi_v7_replay.
 SETTINGS = AuditSettings(
     position_channel="agent_position_px", reference_channel=None,
     context_channels=["block_position_px", "block_angle"], ignored_channels=[],
-    minimum_separation_m=30.0, noise_floor_m=5.0, radius=3.0, permutations=199, query_stride=4,
+    minimum_separation_m=30.0, metre=1000.0, radius=3.0, permutations=199, query_stride=4,
 )  # fmt: skip
 
 pytestmark = pytest.mark.skipif(not BUFFER.exists(), reason="the PushT replay buffer is not here")
@@ -33,8 +33,6 @@ def test_pusht_has_too_little_support_to_claim_modes(tmp_path):
         period_s=0.1,
     )  # fmt: skip
     result = audit(data, SETTINGS, admissible=None, replay=None, root_seed=1)
-    assert result.verdict.cause is Cause.INSUFFICIENT_SUPPORT
-    assert result.verdict.kind == "neighbourhoods"
     assert result.counts.analysed < 0.2 * result.counts.queries
     (clock,) = result.semantics.clocks
     assert 1.0 < clock.lag_steps < 4.0  # the agent trails its target by some tenths of a second
@@ -42,6 +40,8 @@ def test_pusht_has_too_little_support_to_claim_modes(tmp_path):
     folder = tmp_path / "evidence"
     folder.mkdir()
     write_evidence(result, folder, settings=SETTINGS)
+    cause = cause_of(folder, default_limits())
+    assert (cause.name, cause.kind) == (CauseName.INSUFFICIENT_SUPPORT, "neighbourhoods")
     recorded = {
         row["variable"]: row["recorded"]
         for row in read_table(folder / "strata.parquet").to_pylist()

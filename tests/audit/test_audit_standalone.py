@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from planar import SETTINGS, admissible, planar
+from planar import SETTINGS, admissible, named, planar
 
+from gates.cause import Layer
 from genpolicy.audit import AuditReport, audit, propose_settings
 from genpolicy.audit.run import audit as audit_rows
 from genpolicy.contract.normalisation import Normalisation, statistics_of
@@ -67,32 +68,31 @@ def test_it_says_what_the_audit_of_the_rows_says(valid):
         data, settings, admissible=admissible, replay=replayed.__getitem__, root_seed=3
     )
     assert isinstance(report, AuditReport)
-    assert (report.verdict, report.layer) == (
-        direct.verdict.cause.value,
-        direct.verdict.layer.value,
-    )
-    assert report.verdict == "valid_modes"
-    assert report.confidence > 0.9
+    cause = named(report.result, settings)
+    assert cause == named(direct, settings)
+    assert cause.name == "valid_modes" and cause.layer is Layer.NONE
+    assert cause.confidence > 0.9
     assert len(report.modes) == 2
     document = report.as_json()
     required = {
-        "verdict", "variable", "kind", "confidence", "modes", "support", "evidence", "next_action",
+        "modes", "support", "evidence", "rests_on", "settings", "dataset_manifest_sha256",
     }  # fmt: skip
     assert required <= set(document)
+    assert not {"verdict", "confidence", "next_action"} & set(document)
     assert parse_json(canonical_json(document), where="audit.json") == document
 
 
 def test_settings_are_proposed_from_units_and_pairing(valid):
     contract = {
         "pairing": {"x": "tcp.x", "y": "tcp.y"}, "labels": {"phase": "phase"},
-        "audit": {"minimum_situations": 7, "channel_scale": {"goal": 0.02}},
+        "audit": {"minimum_neighbours": 7, "channel_scale": {"goal": 0.02}},
     }  # fmt: skip
     settings = propose_settings(dataset_of(valid[0], manifest={"import_contract": contract}))
     assert settings.position_components == ["tcp.x", "tcp.y"]
     assert settings.action_components == ["x", "y"]
     assert settings.channel_scale["tcp"] == 0.01 and settings.channel_scale["goal"] == 0.02
     assert settings.minimum_separation_m == pytest.approx(0.03)
-    assert settings.minimum_situations == 7
+    assert settings.minimum_neighbours == 7
     assert settings.context_channels == ["goal", "flag"]  # of one stream with the position
     assert not settings.phase_observed
     assert 8 <= settings.chunk_steps <= 10  # 3 x 3 cm at 1 cm a step
@@ -126,7 +126,8 @@ def test_it_says_what_it_rests_on(valid):
     assert report.rests_on[0] == "tcp: unit m was guessed."
     for what in ("operator: not recorded", "outcome: not recorded", "feasibility: not checked"):
         assert what in text
-    assert (report.verdict, report.variable) == ("insufficient_support", "outcome")
+    cause = named(report.result, report.settings)
+    assert (cause.name, cause.variable) == ("insufficient_support", "outcome")
     assert any(line.startswith("labels: not replayed") for line in report.evidence)
 
 

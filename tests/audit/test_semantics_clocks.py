@@ -7,15 +7,15 @@ import pytest
 from arms import SETTINGS, arms, last_epoch, late, parts, rebuilt, some
 
 from genpolicy.audit.semantics import episode_lags, measure, realigned
-from genpolicy.audit.semantics.clocks import offset_defects
-from genpolicy.audit.semantics.drift import drift_defects
+from genpolicy.audit.semantics.clocks import offset_findings
+from genpolicy.audit.semantics.drift import drift_findings
 from genpolicy.audit.semantics.lags import segment_lags
 from genpolicy.audit.semantics.robust import densest_half
 from genpolicy.seeds import stream
 
 
 def kinds(data, settings=SETTINGS):
-    return [defect.kind for defect in measure(data, settings).defects]
+    return [finding.kind for finding in measure(data, settings).findings]
 
 
 def walk(n, width, seed=1):
@@ -72,11 +72,11 @@ def test_an_episode_is_off_only_beyond_its_own_error():
     offsets = 0.1 + 0.001 * stream(7, "offsets").normal(size=60)
     offsets[[3, 9, 27, 40]] += 0.08
     limits = {"declared_s": None, "finest_s": 0.0125, "episode_limit_s": 0.0375}
-    sure, taken = offset_defects(
+    sure, taken = offset_findings(
         "robot", offsets, data, SETTINGS, **limits, errors_s=np.full(60, 0.002)
     )
     assert [d.kind for d in sure] == ["clock"] and np.flatnonzero(taken).tolist() == [3, 9, 27, 40]
-    unsure, taken = offset_defects(
+    unsure, taken = offset_findings(
         "robot", offsets, data, SETTINGS, **limits, errors_s=np.full(60, 0.03)
     )
     assert unsure == [] and not taken.any()
@@ -95,7 +95,7 @@ def test_an_epoch_that_is_late_by_a_row_is_named_at_any_rate_and_in_any_unit(rat
     data = arms(11, rate_hz=rate_hz, width=width, unit=unit)
     assert kinds(data) == []
     found = measure(late(data, 1.0, last_epoch(data)), SETTINGS)
-    assert found.defects[0].kind == "clock" and "epoch e" in found.defects[0].where
+    assert found.findings[0].kind == "clock" and "epoch e" in found.findings[0].where
     offsets = {clock.epoch: clock.offset_before_s for clock in found.clocks}
     assert offsets["e1"] - offsets["e0"] == pytest.approx(1 / rate_hz, abs=0.2 / rate_hz)
 
@@ -104,8 +104,8 @@ def test_a_minority_of_late_episodes_is_named_and_put_right():
     data = arms(12)
     chosen = some(data, 0.15)
     found = measure(late(data, 2.0, chosen), SETTINGS)
-    assert [defect.kind for defect in found.defects] == ["clock"]
-    assert f"{chosen.sum()} of" in found.defects[0].action
+    assert [finding.kind for finding in found.findings] == ["clock"]
+    assert f"{chosen.sum()} of" in found.findings[0].action
     assert found.shift_steps.tolist() == (2 * chosen).tolist()
     shifted, moved = realigned(late(data, 2.0, chosen), found)
     assert moved and kinds(shifted) == []
@@ -120,7 +120,7 @@ def test_one_late_episode_is_no_defect_of_the_data_set():
 def test_a_drift_along_the_episode_is_named():
     data = arms(14, epochs=1)
     drifting = late(data, lambda n: np.linspace(-2, 2, n), np.ones(60, dtype=bool))
-    found = measure(drifting, SETTINGS).defects
+    found = measure(drifting, SETTINGS).findings
     assert found[0].kind == "clock_drift" and found[0].unit == "s per episode"
     assert found[0].measured == pytest.approx(4 / 20, rel=0.3)
 
@@ -128,8 +128,8 @@ def test_a_drift_along_the_episode_is_named():
 def test_a_drift_within_the_spread_of_episodes_is_the_way_of_moving():
     data = arms(22, epochs=1, episodes=400)
     rng = stream(8, "drifts")
-    assert drift_defects(2.0 + 0.3 * rng.normal(size=400), data, SETTINGS)
-    assert not drift_defects(2.0 + 3.0 * rng.normal(size=400), data, SETTINGS)
+    assert drift_findings(2.0 + 0.3 * rng.normal(size=400), data, SETTINGS)
+    assert not drift_findings(2.0 + 3.0 * rng.normal(size=400), data, SETTINGS)
 
 
 @pytest.mark.parametrize("shape", ["step", "trend"])
@@ -141,7 +141,7 @@ def test_a_lag_that_changes_over_the_recordings_is_named(shape):
         n = len(seen[k])
         at = np.clip(np.arange(n) - steps, 0, n - 1)
         seen[k] = np.stack([np.interp(at, np.arange(n), c) for c in seen[k].T], axis=1)
-    found = measure(rebuilt(data, commands, seen), SETTINGS).defects
+    found = measure(rebuilt(data, commands, seen), SETTINGS).findings
     assert found[0].kind in ("clock", "clock_drift")
 
 
@@ -177,7 +177,7 @@ def test_a_camera_that_sees_the_arm_is_judged_by_that_motion():
     data = arms(17)
     assert kinds(with_camera(data, 0.0)) == []
     found = measure(with_camera(data, 2.0), SETTINGS)
-    assert {(d.kind, d.variable) for d in found.defects} == {("clock", "camera")}
+    assert {(d.kind, d.variable) for d in found.findings} == {("clock", "camera")}
     shifted, moved = realigned(with_camera(data, 2.0), found)
     assert moved and kinds(shifted) == []
 
@@ -189,7 +189,7 @@ def test_an_offset_of_the_robot_is_not_said_of_the_camera():
     shifted = late(data, 2.0, last_epoch(data))
     seen = true.observation.copy()
     seen[:, :3] = shifted.observation
-    found = measure(replace(true, observation=seen), SETTINGS).defects
+    found = measure(replace(true, observation=seen), SETTINGS).findings
     assert {d.variable for d in found} == {"robot"}
 
 
@@ -200,17 +200,17 @@ def test_receive_delays_judge_a_stream_that_does_not_move():
     quiet = replace(data, delay_s={"camera": delay})
     assert kinds(quiet) == []
     ahead = np.where(last_epoch(data)[data.episode], 0.06, 0.0)
-    found = measure(replace(data, delay_s={"camera": delay + 0.06 - ahead}), SETTINGS).defects
+    found = measure(replace(data, delay_s={"camera": delay + 0.06 - ahead}), SETTINGS).findings
     assert (found[0].kind, found[0].variable) == ("clock", "camera")
     ramp = delay + 0.08 * data.index / 70
     assert kinds(replace(data, delay_s={"camera": ramp})) == ["clock_drift"] * 2
     assert kinds(replace(data, delay_s={"camera": delay - 0.03})) == ["clock"]
 
 
-def test_an_unpaired_action_has_no_lag_and_no_defect():
+def test_an_unpaired_action_has_no_lag_and_no_finding():
     data = arms(20)
     nothing = np.zeros(0, dtype=np.int64)
     leader = replace(data, paired=False, observation_position=nothing)
     found = measure(leader, SETTINGS)
-    assert found.defects == () and np.isnan(episode_lags(leader, 12)).all()
+    assert found.findings == () and np.isnan(episode_lags(leader, 12)).all()
     assert all(clock.lag_steps is None for clock in found.clocks)

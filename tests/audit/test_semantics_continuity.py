@@ -11,7 +11,7 @@ from genpolicy.seeds import stream
 
 
 def kinds(data):
-    return [defect.kind for defect in measure(data, SETTINGS).defects]
+    return [finding.kind for finding in measure(data, SETTINGS).findings]
 
 
 def joined(data, chosen, other):
@@ -41,8 +41,8 @@ def copied(data, share, *, late=0, keep=1.0, noise=0.0):
 )
 def test_copies_are_named(how):
     found = measure(copied(arms(50), 0.1, **how), SETTINGS)
-    assert [defect.kind for defect in found.defects] == ["duplicate"]
-    assert "6 of 66 episodes are copies" in found.defects[0].action
+    assert [finding.kind for finding in found.findings] == ["duplicate"]
+    assert "6 of 66 episodes are copies" in found.findings[0].action
 
 
 def test_a_single_copy_is_a_mishap_and_a_repeated_demonstration_no_copy():
@@ -99,7 +99,7 @@ def test_stubs_under_success_are_named_and_honest_failures_are_not():
     commands[3], commands[17] = parts(data)[0][3], parts(data)[0][17]
     seen[3], seen[17] = parts(data)[1][3], parts(data)[1][17]
     lone = measure(rebuilt(data, commands, seen), SETTINGS)
-    assert lone.defects == () and "1 of 60 episodes hold no demonstration" in lone.notes[0]
+    assert lone.findings == () and "1 of 60 episodes hold no demonstration" in lone.notes[0]
 
 
 def test_a_constant_command_is_no_demonstration():
@@ -132,7 +132,7 @@ def test_uneven_time_is_named(spoil, kind):
     data = arms(59)
     times = spoil(data.event_time_s + 100.0 * data.episode, stream(12, "time"))
     found = measure(replace(data, event_time_s=times), SETTINGS)
-    assert found.defects[0].kind == kind
+    assert found.findings[0].kind == kind
     assert kinds(data) == []
 
 
@@ -142,7 +142,7 @@ def test_a_few_gaps_and_usual_jitter_are_none():
     times = data.event_time_s + 0.05 * rng.uniform(-0.1, 0.1, len(data.index))
     times += 0.2 * np.cumsum(rng.random(len(times)) < 0.002)
     found = measure(replace(data, event_time_s=times), SETTINGS)
-    assert found.defects == () and found.gaps > 0
+    assert found.findings == () and found.gaps > 0
 
 
 def test_wandering_starts_are_a_note():
@@ -155,4 +155,4 @@ def test_wandering_starts_are_a_note():
         [s + a for s, a in zip(seen, away, strict=True)],
     )
     found = measure(moved, SETTINGS)
-    assert found.defects == () and any("Starts wander" in note for note in found.notes)
+    assert found.findings == () and any("Starts wander" in note for note in found.notes)

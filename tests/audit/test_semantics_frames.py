@@ -18,8 +18,8 @@ def mapped(data, chosen, change):
 
 
 def first(data, settings=SETTINGS):
-    defects = measure(data, settings).defects
-    return (defects[0].kind, defects[0].where) if defects else ("", "")
+    findings = measure(data, settings).findings
+    return (findings[0].kind, findings[0].where) if findings else ("", "")
 
 
 @pytest.mark.parametrize("factor", [1000.0, 180 / np.pi, 10.0, 1 / 25.4, 0.001])
@@ -27,14 +27,14 @@ def first(data, settings=SETTINGS):
 def test_a_unit_is_named_wherever_it_is(factor, share):
     data = arms(30)
     chosen = {"epoch": last_epoch(data), "all": np.ones(60, dtype=bool), "some": some(data, 0.1)}
-    found = measure(mapped(data, chosen[share], lambda part: factor * part), SETTINGS).defects
-    assert {defect.kind for defect in found} == {"unit"}
+    found = measure(mapped(data, chosen[share], lambda part: factor * part), SETTINGS).findings
+    assert {finding.kind for finding in found} == {"unit"}
     assert any(d.measured == pytest.approx(max(factor, 1 / factor), rel=0.1) for d in found)
 
 
 def test_the_action_names_the_units_it_may_be():
     data = arms(31)
-    found = measure(mapped(data, last_epoch(data), lambda part: 1000 * part), SETTINGS).defects
+    found = measure(mapped(data, last_epoch(data), lambda part: 1000 * part), SETTINGS).findings
     assert "as between m and mm" in found[0].action
 
 
@@ -43,7 +43,7 @@ def test_one_joint_in_degrees_is_named():
     scale = np.ones(7)
     scale[4] = 180 / np.pi
     found = measure(mapped(data, np.ones(60, dtype=bool), lambda part: part * scale), SETTINGS)
-    assert {d.kind for d in found.defects} == {"unit"}
+    assert {d.kind for d in found.findings} == {"unit"}
 
 
 def test_episodes_that_are_wholly_in_another_unit_are_named():
@@ -65,7 +65,7 @@ def test_a_context_channel_in_another_unit_is_named(factor):
     assert first(quiet) == ("", "")
     off = np.where(last_epoch(data)[data.episode][:, None], factor, 1.0)
     spoiled = np.hstack([data.observation, goal * off])
-    found = measure(replace(quiet, observation=spoiled), SETTINGS).defects
+    found = measure(replace(quiet, observation=spoiled), SETTINGS).findings
     assert (found[0].kind, found[0].variable) == ("unit", "goal")
 
 
@@ -84,7 +84,7 @@ def test_an_object_that_stands_elsewhere_or_near_zero_is_no_unit():
         observation_scale=np.full(5, 0.01),
         context={"goal": slice(3, 4), "angle": slice(4, 5)},
     ), SETTINGS)  # fmt: skip
-    assert found.defects == ()
+    assert found.findings == ()
 
 
 def turned(degrees, width=3):
@@ -101,15 +101,15 @@ def test_a_turned_frame_is_named_with_its_angle(width, degrees, everywhere):
     data = arms(35, width=width)
     chosen = np.ones(60, dtype=bool) if everywhere else last_epoch(data)
     spoiled = mapped(data, chosen, lambda part: part @ turned(degrees, width).T)
-    found = measure(spoiled, SETTINGS).defects
-    assert {defect.kind for defect in found} == {"frame"}
+    found = measure(spoiled, SETTINGS).findings
+    assert {finding.kind for finding in found} == {"frame"}
     assert np.degrees(found[0].measured) == pytest.approx(degrees, abs=2)
 
 
 def test_a_small_turn_is_no_frame_and_no_clock():
     data = arms(36, width=2)
-    found = measure(mapped(data, last_epoch(data), lambda p: p @ turned(3, 2).T), SETTINGS).defects
-    assert {defect.kind for defect in found} <= {"calibration"}
+    found = measure(mapped(data, last_epoch(data), lambda p: p @ turned(3, 2).T), SETTINGS).findings
+    assert {finding.kind for finding in found} <= {"calibration"}
 
 
 @pytest.mark.parametrize("share", [0.1, 0.3, 1.0])
@@ -146,14 +146,14 @@ def test_joints_that_move_together_are_not_swapped():
     commands, seen = parts(data)
     blend = 0.8 * np.ones((7, 7)) / 7 + 0.2 * np.eye(7)
     together = rebuilt(data, [c @ blend for c in commands], [s @ blend for s in seen])
-    assert measure(together, SETTINGS).defects == ()
+    assert measure(together, SETTINGS).findings == ()
 
 
-def test_an_arm_that_sags_or_falls_short_has_no_defect():
+def test_an_arm_that_sags_or_falls_short_has_no_finding():
     data = arms(40)
     gains = np.array([0.95, 0.9, 0.8])
     weak = mapped(data, np.ones(60, dtype=bool), lambda part: part * gains - [0, 0, 0.02])
-    assert measure(weak, SETTINGS).defects == ()
+    assert measure(weak, SETTINGS).findings == ()
 
 
 def test_jumps_by_a_turn_are_a_note_and_no_motion():
@@ -171,7 +171,7 @@ def test_jumps_by_a_turn_are_a_note_and_no_motion():
     inside = wrapped.episode[1:] == wrapped.episode[:-1]
     assert np.abs(np.diff(motion.observed, axis=0))[inside].max() < 2.2
     found = measure(wrapped, SETTINGS)
-    assert found.defects == () and "whole turn" in found.notes[0]
+    assert found.findings == () and "whole turn" in found.notes[0]
 
 
 def test_a_shift_at_rest_is_a_calibration():
@@ -179,11 +179,11 @@ def test_a_shift_at_rest_is_a_calibration():
     shift = np.array([0.02, 0.0, 0.0])
     assert first(mapped(data, last_epoch(data), lambda part: part + shift))[0] == "calibration"
     everywhere = mapped(data, np.ones(60, dtype=bool), lambda part: part + shift)
-    assert measure(everywhere, SETTINGS).defects == ()
+    assert measure(everywhere, SETTINGS).findings == ()
 
 
 def test_a_unit_comes_before_a_clock_and_both_are_seen():
     data = late(arms(43), 3.0, last_epoch(arms(43)))
     kinds = [d.kind for d in measure(
-        mapped(data, some(data, 0.2), lambda part: 1000 * part), SETTINGS).defects]  # fmt: skip
+        mapped(data, some(data, 0.2), lambda part: 1000 * part), SETTINGS).findings]  # fmt: skip
     assert kinds[0] == "unit" and "clock" in kinds

@@ -25,11 +25,11 @@ def any_arm(number):
     )  # fmt: skip
 
 
-def test_clean_data_have_no_defect():
-    # 500 others, seen while it was written, gave one false defect.
-    found = [measure(any_arm(31_000 + number), SETTINGS).defects for number in range(CLEAN)]
-    false = sum(bool(defects) for defects in found)
-    assert false <= 1, [defects for defects in found if defects]
+def test_clean_data_have_no_finding():
+    # 500 others, seen while it was written, gave one false finding.
+    found = [measure(any_arm(31_000 + number), SETTINGS).findings for number in range(CLEAN)]
+    false = sum(bool(findings) for findings in found)
+    assert false <= 1, [findings for findings in found if findings]
     assert clopper_pearson(false, CLEAN, 0.95)[1] <= 0.05
 
 
@@ -68,7 +68,7 @@ def test_detection_rises_with_the_strength(name):
     plant, kind, weak, strong = FAULTS[name]
     for strength, expected in (weak, strong):
         seen = [
-            kind in {d.kind for d in measure(plant(arms(32_000 + k), strength), SETTINGS).defects}
+            kind in {d.kind for d in measure(plant(arms(32_000 + k), strength), SETTINGS).findings}
             for k in range(8)
         ]
         assert abs(np.mean(seen) - expected) <= 0.13, strength

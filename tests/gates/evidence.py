@@ -12,8 +12,11 @@ import pandas as pd
 import pyarrow as pa
 import yaml
 
+from gates.cause import default_limits
+from gates.cause.limits import OWN
 from gates.feasibility import LAYERS
 from gates.reproducibility import MEASURED_HERE, TERMS
+from genpolicy.audit.evidence import FINDINGS
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.tables import read_table, write_table
 
@@ -47,6 +50,14 @@ def by_owner(**limits: tuple[Any, str]) -> dict[str, dict[str, list[Any]]]:
     return found
 
 
+def _cause() -> dict[str, Any]:
+    """The packaged limits of the questions that only the cause asks."""
+    return {
+        owner: {name: value for name, value in questions.items() if name in OWN}
+        for owner, questions in default_limits().as_json().items()
+    }
+
+
 PARAMS: dict[str, Any] = {
     "confidence": 0.95,
     "task": {"name": "tabletop_insertion"},
@@ -61,6 +72,7 @@ PARAMS: dict[str, Any] = {
         "alpha": 0.1,
     },
     "gate_a": {
+        "cause": _cause(),
         "strata_level": 0.05,
         "held_out_splits": ["validation", "test"],
         "deployed_conventions": ["direct", "z_zero"],
@@ -320,6 +332,8 @@ def _audit(root: Path) -> None:
                 "effect_upper": 0.2,
                 "n": 100,
                 "recorded": True,
+                "observed": False,
+                "detail": "",
             }
             for variable in ("operator", "object", "epoch")
         ],
@@ -352,6 +366,8 @@ def _audit(root: Path) -> None:
             for i in range(10)
         ],
     )
+    write_table(root / "artifacts/audit/findings.parquet", FINDINGS.empty_table())
+    table(root, "audit/resamples.parquet", [_draw() for _ in range(4)])
     document(
         root,
         "audit/persistence.json",
@@ -369,10 +385,25 @@ def _audit(root: Path) -> None:
         root,
         "audit/summary.json",
         {
-            "cause": "valid_modes",
-            "variable": None,
-            "kind": None,
-            "next_action": "train generators",
+            "floors": {},
+            "metre": 1.0,
+            "primary_phase": "approach",
+            "label_replays": 60,
+            "label_disagreements": 0,
+            "label_disagreement_upper": 0.06,
+            "counts": {
+                "queries": 100,
+                "analysed": 90,
+                "analysed_episodes": 40,
+                "two_mode": 50,
+                "two_mode_episodes": 30,
+                "primary_episodes": 40,
+                "resolved": 0,
+                "incoherent": 0,
+                "persistent": 45,
+                "noise_ratio": 0.1,
+                "noise_spread": 0.01,
+            },
             "modes_before_realignment": 3,
             "modes_after_realignment": 2,
             "modes_with_phase": 40,
@@ -382,6 +413,25 @@ def _audit(root: Path) -> None:
             "obstacles": [{"x_m": 0.5, "y_m": 0.0, "radius_m": 0.025}],
         },
     )
+
+
+def _draw() -> dict[str, Any]:
+    return {
+        "disagreements": 0,
+        "disagreement_upper": 0.06,
+        "two_mode": 50,
+        "two_mode_episodes": 30,
+        "incoherent": 0,
+        "persistent": 45,
+        "kept": 0.95,
+        "kept_null_q95": 0.6,
+        "kept_n": 200,
+        "p_adjusted": [0.9] * 3,
+        "effect": [0.05] * 3,
+        "effect_lower": [0.0] * 3,
+        "success_lower": [0.8] * 2,
+        "admissible": [49] * 2,
+    }
 
 
 def _example(i: int) -> dict[str, Any]:

@@ -109,7 +109,7 @@ WORSE = {
             lambda s: lambda f: _cells("effect", s)(_cells("p_adjusted", 0.001)(f)),
         ),
         "cause_accepted": _document(
-            AUDIT + "summary.json", lambda s: _set("cause", "hidden_state" if s else "valid_modes")
+            AUDIT + "summary.json", lambda s: _set("label_disagreement_upper", 0.06 + s)
         ),
         "baselines_matched": _document(
             TRAINED + "matched.json",
@@ -394,7 +394,7 @@ def test_each_removed_limit_is_not_pass(gate, _ladder):
 
 
 def test_recovery_benefit_is_a_second_route_but_waives_no_data_check(repo):
-    evidence.edit_document(repo, "audit/summary.json", _set("cause", "unimodal"))
+    evidence.edit_document(repo, "audit/persistence.json", _set("observed", 0.55))
     assert judge(repo, "A").verdict == "PASS"
     evidence.edit_table(repo, "audit/clocks.parquet", _cells("offset_after_s", 0.5))
     report = judge(repo, "A")

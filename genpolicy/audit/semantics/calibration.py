@@ -8,7 +8,7 @@ import numpy as np
 
 from genpolicy.audit.data import Array, AuditInput, Integers, Text
 from genpolicy.audit.semantics.motion import Motion
-from genpolicy.audit.semantics.report import Calibration, Defect
+from genpolicy.audit.semantics.report import Calibration, Finding
 from genpolicy.audit.semantics.robust import densest_half, episode_deviation, episode_medians
 from genpolicy.audit.settings import AuditSettings
 
@@ -40,67 +40,69 @@ def calibrations(data: AuditInput, settings: AuditSettings) -> tuple[Calibration
     )
 
 
-def release_defects(
+def release_findings(
     data: AuditInput, found: tuple[Calibration, ...], settings: AuditSettings
-) -> list[Defect]:
-    """Epochs that release elsewhere, beyond the limit and beyond what their scatter allows."""
+) -> list[Finding]:
+    """Epochs that release elsewhere, beyond what their scatter allows."""
     if data.reference is None:
         return []
     residual, epochs = _releases(data, settings)
     spread = _scatter(residual, epochs)
-    defects = []
+    findings = []
     for row in found:
         if not np.isfinite(row.residual_m):
             continue
         error = 1.2533 * spread * np.sqrt(2.0 / max(row.episodes, 1))
-        limit = max(settings.calibration_limit_m, settings.significance * float(error))
+        limit = max(settings.calibration_floor_m, settings.significance * float(error))
         if not limit - row.residual_m >= 0:
-            defects.append(
-                Defect(
+            findings.append(
+                Finding(
                     kind="calibration",
                     variable=row.epoch,
                     where=f"epoch {row.epoch or '-'}",
+                    question="calibration_residual_m",
                     measured=row.residual_m,
-                    limit=limit,
+                    floor=limit,
                     unit="unit of the position",
                     action=f"Recalibrate or leave out epoch {row.epoch or '-'}: its releases lie "
                     f"{row.residual_m:.4g} (unit of the position) from those of the others.",
                 )
             )
-    return defects
+    return findings
 
 
-def offset_defects(data: AuditInput, motion: Motion, settings: AuditSettings) -> list[Defect]:
+def offset_findings(data: AuditInput, motion: Motion, settings: AuditSettings) -> list[Finding]:
     """Epochs in which the observed position stands beside its command as in no other."""
     if motion.commanded.shape[1] == 0 or len(np.unique(motion.epoch)) < 2:
         return []
     offsets = _rest_offsets(motion)
     travel = np.median(np.linalg.norm(episode_deviation(motion.commanded, motion.starts), axis=1))
-    floor = max(settings.calibration_limit_m, MOTION_SHARE * float(travel))
+    floor = max(settings.calibration_floor_m, MOTION_SHARE * float(travel))
     names = np.unique(motion.epoch)
     medians = {str(name): np.median(offsets[motion.epoch == name], axis=0) for name in names}
     spread = _scatter(offsets, motion.epoch)
-    defects = []
+    findings = []
     for name in names:
         count = int(np.count_nonzero(motion.epoch == name))
         gap = _epoch_residual(str(name), medians)
         error = 1.2533 * spread * np.sqrt(2.0 / count)
         limit = max(floor, settings.significance * float(error))
         if count >= LEAST_EPISODES and not limit - gap >= 0:
-            defects.append(
-                Defect(
+            findings.append(
+                Finding(
                     kind="calibration",
                     variable=str(name),
                     where=f"epoch {name or '-'}",
+                    question="calibration_residual_m",
                     measured=gap,
-                    limit=limit,
+                    floor=limit,
                     unit="unit of the position",
                     action=f"Recalibrate or leave out epoch {name or '-'}: at rest its observed "
                     f"position stands {gap:.4g} (unit of the position) further from the command "
                     "than that of the others.",
                 )
             )
-    return defects
+    return findings
 
 
 def start_drift(data: AuditInput) -> float:
@@ -114,7 +116,7 @@ def start_drift(data: AuditInput) -> float:
 
 
 def start_note(data: AuditInput) -> str | None:
-    """A sentence where starts wander over the recordings; empty starts are no defect of the data.
+    """A sentence where starts wander over the recordings; wandering starts are no fault.
 
     A drifting start makes the held-out episodes unlike the training ones: that is a matter of
     support, which the neighbourhoods measure, and never makes a mode.

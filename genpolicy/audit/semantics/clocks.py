@@ -11,7 +11,7 @@ from genpolicy.audit.data import Array, AuditInput, Flags, Integers, Text
 from genpolicy.audit.semantics.lags import Lags
 from genpolicy.audit.semantics.lags import episode_lags as piecewise_lags
 from genpolicy.audit.semantics.motion import Motion, make_motion
-from genpolicy.audit.semantics.report import Clock, Defect, listed
+from genpolicy.audit.semantics.report import Clock, Finding, listed
 from genpolicy.audit.semantics.robust import (
     episode_medians,
     group_medians,
@@ -100,7 +100,7 @@ def delay_clocks(data: AuditInput, stream: str, starts: Integers) -> list[Clock]
     return rows
 
 
-def offset_defects(
+def offset_findings(
     stream: str,
     offsets_s: Array,
     data: AuditInput,
@@ -110,7 +110,7 @@ def offset_defects(
     finest_s: float,
     episode_limit_s: float,
     errors_s: Array | None = None,
-) -> tuple[list[Defect], Array]:
+) -> tuple[list[Finding], Array]:
     """Epochs and single episodes of a stream that are off.
 
     Args:
@@ -124,12 +124,12 @@ def offset_defects(
         errors_s: Standard error of each episode's lag, where it is known. Shape (E,).
 
     Returns:
-        Defects, and the offset to take out of each episode, s. Shape (E,).
+        Findings, and the offset to take out of each episode, s. Shape (E,).
     """
-    table, defects = data.episodes, []
+    table, findings = data.episodes, []
     taken = np.zeros(len(table))
     deviations, spread = within_groups(offsets_s, table.calibration_epoch, LEAST_EPISODES)
-    floor = max(finest_s, settings.clock_limit_s, EPOCH_SPREADS * float(np.nan_to_num(spread)))
+    floor = max(finest_s, settings.clock_floor_s, EPOCH_SPREADS * float(np.nan_to_num(spread)))
     for name, count, gap, error in group_medians(
         offsets_s, table.calibration_epoch, reference=declared_s, least=LEAST_EPISODES
     ):
@@ -137,7 +137,7 @@ def offset_defects(
         member = table.calibration_epoch == name
         if count >= LEAST_EPISODES and not limit - abs(gap) >= 0:
             taken[member] = gap
-            defects.append(_epoch_defect(stream, name, gap, limit))
+            findings.append(_epoch_finding(stream, name, gap, limit))
     least = max(episode_limit_s, EPISODE_SPREADS * spread)
     off = np.isfinite(deviations) & (np.abs(np.nan_to_num(deviations)) > least)
     if errors_s is not None:
@@ -146,8 +146,8 @@ def offset_defects(
     known = int(np.count_nonzero(np.isfinite(offsets_s)))
     if some(off, known, settings.outlier_share):
         taken[off] += deviations[off]
-        defects.append(_episode_defect(stream, table.uuid[off], deviations[off], known, least))
-    return defects, taken
+        findings.append(_episode_finding(stream, table.uuid[off], deviations[off], known, least))
+    return findings, taken
 
 
 def shift_steps(taken_s: Array, period_s: float) -> Integers:
@@ -155,24 +155,25 @@ def shift_steps(taken_s: Array, period_s: float) -> Integers:
     return np.asarray(np.round(taken_s / period_s), dtype=np.int64)
 
 
-def leading_defects(lags: Array, data: AuditInput, settings: AuditSettings) -> list[Defect]:
+def leading_findings(lags: Array, data: AuditInput, settings: AuditSettings) -> list[Finding]:
     """A response that comes before its command, everywhere: no arm does that."""
     known = lags[np.isfinite(lags)]
     if settings.declared_lag_steps is not None or len(known) < LEAST_EPISODES:
         return []
     median, limit = (
         float(np.median(known)),
-        max(EPISODE_STEPS, settings.clock_limit_s / data.period_s),
+        max(EPISODE_STEPS, settings.clock_floor_s / data.period_s),
     )
     if limit + median >= 0:
         return []
     return [
-        Defect(
+        Finding(
             kind="clock",
             variable=data.position_stream,
             where="all episodes",
+            question="clock_residual_s",
             measured=-median * data.period_s,
-            limit=limit * data.period_s,
+            floor=limit * data.period_s,
             unit="s",
             action=f"The observed position moves {-median * data.period_s:.3f} s before its "
             f"command: put stream {data.position_stream} and the actions on one clock, ingest "
@@ -181,29 +182,31 @@ def leading_defects(lags: Array, data: AuditInput, settings: AuditSettings) -> l
     ]
 
 
-def _epoch_defect(stream: str, epoch: str, gap_s: float, limit_s: float) -> Defect:
-    return Defect(
+def _epoch_finding(stream: str, epoch: str, gap_s: float, limit_s: float) -> Finding:
+    return Finding(
         kind="clock",
         variable=stream,
         where=f"epoch {epoch or '-'}",
+        question="clock_residual_s",
         measured=abs(gap_s),
-        limit=limit_s,
+        floor=limit_s,
         unit="s",
         action=f"Correct the clock of stream {stream} in epoch {epoch or '-'} ({gap_s:+.3f} s), "
         "ingest again and repeat the audit.",
     )
 
 
-def _episode_defect(
+def _episode_finding(
     stream: str, names: Text, deviations_s: Array, known: int, limit_s: float
-) -> Defect:
+) -> Finding:
     typical = float(np.median(np.abs(deviations_s)))
-    return Defect(
+    return Finding(
         kind="clock",
         variable=stream,
         where=listed(names),
+        question="clock_residual_s",
         measured=typical,
-        limit=limit_s,
+        floor=limit_s,
         unit="s",
         action=f"Correct the clock of stream {stream} in {len(names)} of {known} episodes, which "
         f"stand {typical:.3f} s beside the others ({listed(names)}), or leave them out, and "

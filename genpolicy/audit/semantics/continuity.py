@@ -4,13 +4,15 @@ import numpy as np
 
 from genpolicy.audit.data import Array, AuditInput, Flags
 from genpolicy.audit.semantics.motion import Motion
-from genpolicy.audit.semantics.report import Defect, listed
+from genpolicy.audit.semantics.report import Finding, listed
 from genpolicy.audit.semantics.robust import episode_deviation, episode_sums, some
 from genpolicy.audit.settings import AuditSettings
 
 GAP_PERIODS = 1.5
-# The declared period must be that of the rows within this share.
-RATE_TOLERANCE = 0.1
+# Two times on two clocks, or rows out of order: counted, and held against this limit.
+DISORDER = "clock_disorder"
+# A period is reported as another one than declared beyond this share of it.
+RATE_FLOOR = 0.1
 # An episode shorter than this share of the usual one, whose command never changes, is none.
 STUB_SHARE = 0.1
 # Rows whose command repeats while the arm moves, worth a note from this share on.
@@ -31,7 +33,7 @@ def negative_delays(data: AuditInput, settings: AuditSettings) -> int:
     )
 
 
-def negative_defects(negative: int) -> list[Defect]:
+def negative_findings(negative: int) -> list[Finding]:
     """Samples from the future: two times on two clocks."""
     if not negative:
         return []
@@ -39,10 +41,12 @@ def negative_defects(negative: int) -> list[Defect]:
         f"{negative} samples were received before they happened: put both times on one clock and "
         "ingest again."
     )
-    return [Defect("clock", "", "receive times", float(negative), 0.0, "samples", action)]
+    return [
+        Finding("clock", "", "receive times", DISORDER, float(negative), 0.0, "samples", action)
+    ]
 
 
-def time_defects(data: AuditInput, settings: AuditSettings) -> list[Defect]:
+def time_findings(data: AuditInput, settings: AuditSettings) -> list[Finding]:
     """Times that do not rise, another rate than declared, too many gaps, too much jitter."""
     steps, inside = _steps(data)
     spans = steps[inside]
@@ -51,42 +55,44 @@ def time_defects(data: AuditInput, settings: AuditSettings) -> list[Defect]:
     back = int(np.count_nonzero(spans <= 0.0))
     if back:
         action = f"{back} rows do not come after the row before: sort or repair the times."
-        return [Defect("clock", "", "event times", float(back), 0.0, "rows", action)]
+        return [Finding("clock", "", "event times", DISORDER, float(back), 0.0, "rows", action)]
     median = float(np.median(spans))
     off = abs(median / data.period_s - 1.0)
-    if not RATE_TOLERANCE - off >= 0:
+    if not RATE_FLOOR - off >= 0:
         action = (
             f"Rows come every {median:.4g} s where {data.period_s:.4g} s is declared: correct the "
             "declared rate, or resample."
         )
-        return [Defect("rate", "", "all episodes", off, RATE_TOLERANCE, "share", action)]
-    defects = []
+        return [
+            Finding("rate", "", "all episodes", "rate_deviation", off, RATE_FLOOR, "share", action)
+        ]
+    findings = []
     gaps = float(np.mean(spans > GAP_PERIODS * data.period_s))
-    if not settings.gap_share_limit - gaps >= 0:
+    if not settings.gap_share_floor - gaps >= 0:
         action = (
             f"{gaps:.1%} of the rows follow a gap in time: split the episodes there or resample, "
             "and repeat the audit."
         )
-        defects.append(
-            Defect("gaps", "", "event times", gaps, settings.gap_share_limit, "share", action)
-        )
+        findings.append(_share("gaps", "gap_share", gaps, settings.gap_share_floor, action))
     jitter = float(np.quantile(np.abs(spans - median), 0.9)) / median
-    if not settings.jitter_limit_share - jitter >= 0:
+    if not settings.jitter_floor_share - jitter >= 0:
         action = (
             f"Every tenth row comes {jitter:.0%} of a period or more beside its time: resample by "
             "event time, ingest again and repeat the audit."
         )
-        defects.append(
-            Defect(
-                "jitter", "", "event times", jitter, settings.jitter_limit_share, "share", action
-            )
+        findings.append(
+            _share("jitter", "jitter_share", jitter, settings.jitter_floor_share, action)
         )
-    return defects
+    return findings
 
 
-def stub_defects(
+def _share(kind: str, question: str, measured: float, floor: float, action: str) -> Finding:
+    return Finding(kind, "", "event times", question, measured, floor, "share", action)
+
+
+def stub_findings(
     data: AuditInput, motion: Motion, settings: AuditSettings
-) -> tuple[list[Defect], list[str]]:
+) -> tuple[list[Finding], list[str]]:
     """Recordings in which nothing was done, filed under success; and notes on frozen commands."""
     length = np.diff(motion.starts)
     moved = episode_deviation(data.action, motion.starts).max(axis=1)
@@ -99,12 +105,13 @@ def stub_defects(
         text = f"{int(stub.sum())} of {len(stub)} episodes hold no demonstration ({names})"
         if some(stub, len(stub), settings.outlier_share):
             return [
-                Defect(
+                Finding(
                     kind="stub",
                     variable="outcome",
                     where=names,
+                    question="faulty_episodes_share",
                     measured=float(np.mean(stub)),
-                    limit=settings.outlier_share,
+                    floor=settings.outlier_share,
                     unit="share",
                     action=f"{text}: their command never changes or they end at once. Leave them "
                     "out and repeat the audit.",

@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 
 from genpolicy.audit.data import Array, AuditInput, Flags, Integers, Text
 from genpolicy.audit.semantics.motion import Motion
-from genpolicy.audit.semantics.report import Defect, listed
+from genpolicy.audit.semantics.report import Finding, listed
 from genpolicy.audit.semantics.robust import episode_sums, some
 from genpolicy.audit.settings import AuditSettings
 
@@ -65,22 +65,23 @@ def find_copies(data: AuditInput, motion: Motion) -> Copies:
     return result
 
 
-def copy_defects(copies: Copies, data: AuditInput, settings: AuditSettings) -> list[Defect]:
-    """Duplicates and self-repeating episodes as defects."""
+def copy_findings(copies: Copies, data: AuditInput, settings: AuditSettings) -> list[Finding]:
+    """Duplicates and self-repeating episodes as findings."""
     names, total = data.episodes.uuid, len(data.episodes)
-    defects = []
+    findings = []
     if some(copies.duplicate, total, settings.outlier_share):
         pairs = [
             f"{names[k]} of {names[copies.of[k]]}" for k in np.flatnonzero(copies.duplicate)[:3]
         ]
         count = int(copies.duplicate.sum())
-        defects.append(
-            Defect(
+        findings.append(
+            Finding(
                 kind="duplicate",
                 variable="episode",
                 where=listed(names[copies.duplicate]),
+                question="faulty_episodes_share",
                 measured=count / total,
-                limit=settings.outlier_share,
+                floor=settings.outlier_share,
                 unit="share",
                 action=f"{count} of {total} episodes are copies of others ({'; '.join(pairs)}): "
                 "keep one of each and repeat the audit.",
@@ -88,13 +89,13 @@ def copy_defects(copies: Copies, data: AuditInput, settings: AuditSettings) -> l
         )
     if some(copies.repeats_itself, total, settings.outlier_share):
         count = int(copies.repeats_itself.sum())
-        defects.append(
+        findings.append(
             _glued(names[copies.repeats_itself], count, total, settings, "hold the same rows twice")
         )
-    return defects
+    return findings
 
 
-def seam_defects(data: AuditInput, motion: Motion, settings: AuditSettings) -> list[Defect]:
+def seam_findings(data: AuditInput, motion: Motion, settings: AuditSettings) -> list[Finding]:
     """Episodes that jump in their middle as no motion of this data set does."""
     total = len(motion.starts) - 1
     jumps = np.zeros(total, dtype=bool)
@@ -105,13 +106,14 @@ def seam_defects(data: AuditInput, motion: Motion, settings: AuditSettings) -> l
     return [_glued(names, int(jumps.sum()), total, settings, "jump in their middle")]
 
 
-def _glued(names: Text, count: int, total: int, settings: AuditSettings, what: str) -> Defect:
-    return Defect(
+def _glued(names: Text, count: int, total: int, settings: AuditSettings, what: str) -> Finding:
+    return Finding(
         kind="glued",
         variable="episode",
         where=listed(names),
+        question="faulty_episodes_share",
         measured=count / total,
-        limit=settings.outlier_share,
+        floor=settings.outlier_share,
         unit="share",
         action=f"{count} of {total} episodes {what} ({listed(names)}): several recordings were "
         "joined. Split them where they meet and repeat the audit.",

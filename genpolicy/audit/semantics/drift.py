@@ -10,7 +10,7 @@ from genpolicy.audit.data import Array, AuditInput, Integers
 from genpolicy.audit.semantics.clocks import EPOCH_SPREADS, LEAST_EPISODES
 from genpolicy.audit.semantics.lags import segment_lags
 from genpolicy.audit.semantics.motion import Motion
-from genpolicy.audit.semantics.report import Defect
+from genpolicy.audit.semantics.report import Finding
 from genpolicy.audit.semantics.robust import (
     densest_half,
     episode_sums,
@@ -51,67 +51,69 @@ def episode_drifts(motion: Motion, lags: Array, settings: AuditSettings) -> Arra
     return result
 
 
-def drift_defects(drifts: Array, data: AuditInput, settings: AuditSettings) -> list[Defect]:
+def drift_findings(drifts: Array, data: AuditInput, settings: AuditSettings) -> list[Finding]:
     """Drift along the episodes of an epoch, from the growth of the lag."""
-    defects = []
+    findings = []
     _, spread = within_groups(drifts, data.episodes.calibration_epoch, LEAST_EPISODES)
-    floor = max(settings.drift_limit_steps, settings.clock_limit_s / data.period_s)
+    floor = max(settings.drift_floor_steps, settings.clock_floor_s / data.period_s)
     floor = max(floor, EPOCH_SPREADS * float(np.nan_to_num(spread)))
     for name, count, growth, error in group_medians(
         drifts, data.episodes.calibration_epoch, reference=0.0, least=LEAST_EPISODES
     ):
         limit = max(floor, settings.significance * error)
         if count >= LEAST_EPISODES and not limit - abs(growth) >= 0:
-            defects.append(
-                Defect(
+            findings.append(
+                Finding(
                     kind="clock_drift",
                     variable=data.position_stream,
                     where=f"epoch {name or '-'}",
-                    measured=abs(growth) * data.period_s,
-                    limit=limit * data.period_s,
-                    unit="s per episode",
+                    question="lag_drift_steps",
+                    measured=abs(growth),
+                    floor=limit,
+                    unit="steps per episode",
                     action=f"The lag of stream {data.position_stream} behind the actions changes "
                     f"by {growth * data.period_s:+.3f} s within an episode of epoch "
                     f"{name or '-'}: put both on one clock, ingest again and repeat the audit.",
                 )
             )
-    return defects
+    return findings
 
 
-def delay_drift_defects(
+def delay_drift_findings(
     stream: str, data: AuditInput, starts: Integers, settings: AuditSettings
-) -> list[Defect]:
+) -> list[Finding]:
     """Drift of a stream's clock along the episodes, from the growth of its receive delay."""
     length = np.diff(starts)
     centred = np.arange(len(data.episode)) - np.repeat(starts[:-1] + (length - 1) / 2, length)
     power = episode_sums(np.asarray(centred**2, dtype=np.float64), starts)
     slope = episode_sums(centred * data.delay_s[stream], starts) / np.maximum(power, 1.0)
     growth = np.where(length >= LEAST_SIDE, slope * length, np.nan)
-    defects = []
+    findings = []
     for name, count, gap, error in group_medians(
         growth, data.episodes.calibration_epoch, reference=0.0, least=LEAST_EPISODES
     ):
-        limit = max(settings.clock_limit_s, settings.significance * error)
+        limit = max(settings.clock_floor_s, settings.significance * error)
         if count >= LEAST_EPISODES and not limit - abs(gap) >= 0:
-            defects.append(
-                Defect(
+            findings.append(
+                Finding(
                     kind="clock_drift",
                     variable=stream,
                     where=f"epoch {name or '-'}",
+                    question="clock_residual_s",
                     measured=abs(gap),
-                    limit=limit,
+                    floor=limit,
                     unit="s per episode",
                     action=f"The receive delay of stream {stream} changes by {gap:+.3f} s within "
                     f"an episode of epoch {name or '-'}: its clock runs at another rate; "
                     "synchronise it, ingest again and repeat the audit.",
                 )
             )
-    return defects
+    return findings
 
 
-def order_defects(
+def order_findings(
     stream: str, offsets_s: Array, data: AuditInput, settings: AuditSettings, *, limit_s: float
-) -> list[Defect]:
+) -> list[Finding]:
     """A change of a stream's lag over the recordings."""
     order = data.episodes.order
     known = np.flatnonzero(np.isfinite(offsets_s) & np.isfinite(order))
@@ -135,12 +137,13 @@ def order_defects(
         return []
     first = str(data.episodes.uuid[ordered[cut]])
     return [
-        Defect(
+        Finding(
             kind="clock_drift",
             variable=stream,
             where=f"from episode {first} on, in order of recording",
+            question="clock_residual_s",
             measured=abs(change),
-            limit=limit,
+            floor=limit,
             unit="s",
             action=f"The lag of stream {stream} changes by {change:+.3f} s over the recordings, "
             f"most about episode {first}: put its clock right from there on, ingest again and "

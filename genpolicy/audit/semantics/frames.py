@@ -12,7 +12,7 @@ from scipy.optimize import linear_sum_assignment
 
 from genpolicy.audit.data import Array, AuditInput, Flags, Integers
 from genpolicy.audit.semantics.motion import Motion
-from genpolicy.audit.semantics.report import Defect, listed
+from genpolicy.audit.semantics.report import Finding, listed
 from genpolicy.audit.semantics.robust import densest_half, episode_sums, some
 from genpolicy.audit.settings import AuditSettings
 
@@ -72,20 +72,20 @@ class Displacements:
         return Displacements(self.x[chosen], self.y[:, chosen], self.group[chosen])
 
 
-def frame_defects(
+def frame_findings(
     data: AuditInput, motion: Motion, settings: AuditSettings
-) -> tuple[list[Defect], Array]:
+) -> tuple[list[Finding], Array]:
     """Swapped columns and turned frames by epoch.
 
     Returns:
-        Defects, and the commanded motion as it is answered, so that clocks can be measured in
+        Findings, and the commanded motion as it is answered, so that clocks can be measured in
         spite of them. Shape (N, P).
     """
     width = motion.commanded.shape[1]
     commanded = motion.commanded
-    defects: list[Defect] = []
+    findings: list[Finding] = []
     if width < 2:
-        return defects, commanded
+        return findings, commanded
     commanded = commanded.copy()
     clean = np.zeros(len(motion.epoch), dtype=bool)
     for name in np.unique(motion.epoch):
@@ -99,7 +99,7 @@ def frame_defects(
         if not found.kind:
             continue
         where = f"epoch {name or '-'}"
-        defects.append(_defect(data, motion, where, found, settings))
+        findings.append(_finding(data, motion, where, found, settings))
     # A few episodes inside an epoch: those that follow worst, read on their own.
     odd = _follow_badly(motion, clean, settings.maximum_lag_steps)
     if some(np.isin(np.arange(len(clean)), odd), len(clean), settings.outlier_share):
@@ -107,8 +107,8 @@ def frame_defects(
         if found is not None and found.kind:
             _answer(commanded, motion, odd, found)
             where = f"{len(odd)} episodes ({listed(data.episodes.uuid[odd])})"
-            defects.append(_defect(data, motion, where, found, settings))
-    return defects, commanded
+            findings.append(_finding(data, motion, where, found, settings))
+    return findings, commanded
 
 
 def _answer(commanded: Array, motion: Motion, episodes: Integers, found: Frame) -> None:
@@ -172,7 +172,7 @@ def _read(moves: Displacements, settings: AuditSettings) -> Frame:
         angle = _angle(turn)
         if not better:
             return clean
-        beyond = np.linalg.det(turn) < 0 or not settings.frame_limit_rad - angle >= 0
+        beyond = np.linalg.det(turn) < 0 or not settings.frame_floor_rad - angle >= 0
         return Frame(np.arange(width), turn, angle, "frame" if beyond else "")
     flipped = np.diag(correlation) <= -FOLLOWS
     if flipped.any():
@@ -295,22 +295,23 @@ def _unexplained(x: Array, y: Array) -> float:
     return float(np.mean(1.0 - explained[moving] / power[moving])) if moving.any() else 1.0
 
 
-def _defect(
+def _finding(
     data: AuditInput, motion: Motion, where: str, found: Frame, settings: AuditSettings
-) -> Defect:
+) -> Finding:
     if found.kind == "swapped_columns":
         changed = np.flatnonzero(found.swapped != np.arange(len(found.swapped)))
         names = ", ".join(
             f"{motion.names[i]} answers the command of {motion.names[found.swapped[i]]}"
             for i in changed
         )
-        return Defect(
+        return Finding(
             kind="swapped_columns",
             variable=motion.names[changed[0]],
             where=where,
+            question="swapped_columns",
             measured=float(len(changed)),
-            limit=0.0,
-            unit="swapped_columns",
+            floor=0.0,
+            unit="columns",
             action=f"Put the columns of {where} in order ({names}), ingest again and repeat the "
             "audit.",
         )
@@ -321,12 +322,13 @@ def _defect(
         if mirrored
         else f"turned by {np.degrees(found.angle_rad):.0f} degrees"
     )
-    return Defect(
+    return Finding(
         kind="frame",
         variable=data.position_stream,
         where=where,
+        question="frame_angle_rad",
         measured=found.angle_rad,
-        limit=settings.frame_limit_rad,
+        floor=settings.frame_floor_rad,
         unit="rad",
         action=f"In {where} the observed motion is the commanded one {what}: express both in one "
         "frame, ingest again and repeat the audit.",

@@ -1,8 +1,8 @@
-"""All measures of data semantics, and the defects in the order of diagnosis.
+"""All measures of data semantics, and the findings in the order of diagnosis.
 
 Units and frames come first: clocks are then measured on the motion as it is answered, so that a
-turned frame is not taken for a lag. Each defect must be beyond a physical limit and beyond what the
-spread of the episodes explains.
+turned frame is not taken for a lag. What is reported stands out of what the spread of the episodes
+explains, and of a floor below which nothing is looked for; whether it is a fault is not said here.
 """
 
 from dataclasses import replace
@@ -15,24 +15,24 @@ from genpolicy.audit.semantics.clocks import (
     EPISODE_DELAYS,
     EPISODE_STEPS,
     delay_clocks,
-    leading_defects,
+    leading_findings,
     measure_lags,
-    offset_defects,
+    offset_findings,
     position_clocks,
     shift_steps,
 )
 from genpolicy.audit.semantics.drift import (
-    delay_drift_defects,
-    drift_defects,
+    delay_drift_findings,
+    drift_findings,
     episode_drifts,
-    order_defects,
+    order_findings,
 )
-from genpolicy.audit.semantics.frames import frame_defects
+from genpolicy.audit.semantics.frames import frame_findings
 from genpolicy.audit.semantics.motion import Motion, make_motion
-from genpolicy.audit.semantics.report import Clock, Defect, Semantics, in_order
+from genpolicy.audit.semantics.report import Clock, Finding, Semantics, in_order
 from genpolicy.audit.semantics.robust import episode_medians
 from genpolicy.audit.semantics.streams import stream_lags
-from genpolicy.audit.semantics.units import component_defects, gain_defects, magnitude_defects
+from genpolicy.audit.semantics.units import component_findings, gain_findings, magnitude_findings
 from genpolicy.audit.settings import AuditSettings
 
 # A change of the lag over the recordings below this is no clock, steps.
@@ -45,31 +45,31 @@ def measure(data: AuditInput, settings: AuditSettings) -> Semantics:
     notes: list[str] = []
     if motion.wraps:
         notes.append(f"{motion.wraps} jumps by a whole turn were taken out of angles.")
-    defects, factors = gain_defects(data, motion, settings)
-    defects += magnitude_defects(data, motion, settings)
-    turned, answered = frame_defects(data, motion, settings)
-    defects += turned
+    findings, factors = gain_findings(data, motion, settings)
+    findings += magnitude_findings(data, motion, settings)
+    turned, answered = frame_findings(data, motion, settings)
+    findings += turned
     repeated = np.repeat(factors, np.diff(motion.starts))[:, None]
     recorded, motion = motion, replace(motion, commanded=answered * repeated)
-    if not defects:
-        defects += component_defects(data, motion, settings)
+    if not findings:
+        findings += component_findings(data, motion, settings)
     clocks, shift, found = _position(data, motion, settings)
-    defects += found
+    findings += found
     others, stream_shift, found = _others(data, motion, shift, settings)
-    defects += found
-    stubs, remarks = continuity.stub_defects(data, motion, settings)
+    findings += found
+    stubs, remarks = continuity.stub_findings(data, motion, settings)
     releases = calibration.calibrations(data, settings)
     negative = continuity.negative_delays(data, settings)
-    defects += [
-        *continuity.negative_defects(negative),
-        *continuity.time_defects(data, settings),
+    findings += [
+        *continuity.negative_findings(negative),
+        *continuity.time_findings(data, settings),
         *stubs,
-        *copies.seam_defects(data, motion, settings),
-        *copies.copy_defects(copies.find_copies(data, motion), data, settings),
-        *calibration.release_defects(data, releases, settings),
+        *copies.seam_findings(data, motion, settings),
+        *copies.copy_findings(copies.find_copies(data, motion), data, settings),
+        *calibration.release_findings(data, releases, settings),
     ]
-    if not any(defect.kind in ("unit", "frame", "swapped_columns") for defect in defects):
-        defects += calibration.offset_defects(data, recorded, settings)
+    if not any(finding.kind in ("unit", "frame", "swapped_columns") for finding in findings):
+        findings += calibration.offset_findings(data, recorded, settings)
     wander = calibration.start_note(data)
     return Semantics(
         clocks=(*clocks, *others),
@@ -77,7 +77,7 @@ def measure(data: AuditInput, settings: AuditSettings) -> Semantics:
         gaps=continuity.gap_count(data),
         negative_delays=negative,
         start_drift=calibration.start_drift(data),
-        defects=in_order(defects),
+        findings=in_order(findings),
         notes=(*notes, *remarks, *([wander] if wander else [])),
         shift_steps=shift,
         stream_shift_steps=stream_shift,
@@ -86,41 +86,41 @@ def measure(data: AuditInput, settings: AuditSettings) -> Semantics:
 
 def _position(
     data: AuditInput, motion: Motion, settings: AuditSettings
-) -> tuple[list[Clock], Integers, list[Defect]]:
-    """Clocks, shift and defects of the stream of the position."""
+) -> tuple[list[Clock], Integers, list[Finding]]:
+    """Clocks, shift and findings of the stream of the position."""
     stream, period = data.position_stream, data.period_s
     lags = measure_lags(motion, settings)
     offsets = lags.steps * period
     declared = settings.declared_lag_steps
-    defects, taken = offset_defects(
+    findings, taken = offset_findings(
         stream,
         offsets,
         data,
         settings,
         declared_s=None if declared is None else declared * period,
-        finest_s=settings.clock_limit_steps * period,
-        episode_limit_s=max(EPISODE_STEPS * period, settings.clock_limit_s),
+        finest_s=settings.clock_resolution_steps * period,
+        episode_limit_s=max(EPISODE_STEPS * period, settings.clock_floor_s),
         errors_s=lags.error * period,
     )
-    if not defects:
-        defects += leading_defects(lags.steps, data, settings)
-        defects += order_defects(
+    if not findings:
+        findings += leading_findings(lags.steps, data, settings)
+        findings += order_findings(
             stream,
             offsets,
             data,
             settings,
-            limit_s=max(ORDER_STEPS * period, settings.clock_limit_s),
+            limit_s=max(ORDER_STEPS * period, settings.clock_floor_s),
         )
-    defects += drift_defects(episode_drifts(motion, lags.steps, settings), data, settings)
-    return position_clocks(data, lags.steps, settings), shift_steps(taken, period), defects
+    findings += drift_findings(episode_drifts(motion, lags.steps, settings), data, settings)
+    return position_clocks(data, lags.steps, settings), shift_steps(taken, period), findings
 
 
 def _others(
     data: AuditInput, motion: Motion, shift: Integers, settings: AuditSettings
-) -> tuple[list[Clock], dict[str, Integers], list[Defect]]:
-    """Clocks, shifts and defects of all other streams: by delay, and by motion where they move."""
+) -> tuple[list[Clock], dict[str, Integers], list[Finding]]:
+    """Clocks, shifts and findings of all other streams: by delay, and by motion where they move."""
     clocks: list[Clock] = []
-    defects: list[Defect] = []
+    findings: list[Finding] = []
     shifts: dict[str, Integers] = {}
     names = sorted({*data.delay_s, *data.streams} - {data.position_stream})
     for stream in names:
@@ -128,56 +128,56 @@ def _others(
         if stream in data.delay_s:
             clocks += delay_clocks(data, stream, motion.starts)
             found, taken = _by_delay(data, stream, motion, settings)
-            defects += found
+            findings += found
         if stream in data.streams:
             found, moved = _by_motion(data, stream, motion, shift, settings)
             # One fault shows in both: it is said once.
-            if found and not any(item.variable == stream for item in defects):
-                defects += found
+            if found and not any(item.variable == stream for item in findings):
+                findings += found
                 taken = moved
         shifts[stream] = shift_steps(taken, data.period_s)
-    return clocks, shifts, defects
+    return clocks, shifts, findings
 
 
 def _by_delay(
     data: AuditInput, stream: str, motion: Motion, settings: AuditSettings
-) -> tuple[list[Defect], Array]:
+) -> tuple[list[Finding], Array]:
     # A stream whose clock runs ahead seems to arrive too early: the sign is turned.
     offsets = -episode_medians(data.delay_s[stream], motion.starts)
-    defects, taken = offset_defects(
+    findings, taken = offset_findings(
         stream,
         offsets,
         data,
         settings,
         declared_s=None,
-        finest_s=settings.clock_limit_s,
-        episode_limit_s=EPISODE_DELAYS * settings.clock_limit_s,
+        finest_s=settings.clock_floor_s,
+        episode_limit_s=EPISODE_DELAYS * settings.clock_floor_s,
     )
-    if not defects:
-        defects += order_defects(stream, offsets, data, settings, limit_s=settings.clock_limit_s)
-    return defects + delay_drift_defects(stream, data, motion.starts, settings), taken
+    if not findings:
+        findings += order_findings(stream, offsets, data, settings, limit_s=settings.clock_floor_s)
+    return findings + delay_drift_findings(stream, data, motion.starts, settings), taken
 
 
 def _by_motion(
     data: AuditInput, stream: str, motion: Motion, shift: Integers, settings: AuditSettings
-) -> tuple[list[Defect], Array]:
+) -> tuple[list[Finding], Array]:
     columns = np.arange(data.observation.shape[1])[data.streams[stream]]
     lags = stream_lags(data, motion, columns, settings)
     if lags is None:
         return [], np.zeros(len(data.episodes))
     # What is late against a late position is late by both.
     offsets = (lags.steps + shift) * data.period_s
-    defects, taken = offset_defects(
+    findings, taken = offset_findings(
         stream,
         offsets,
         data,
         settings,
         declared_s=None,
-        finest_s=settings.clock_limit_steps * data.period_s,
-        episode_limit_s=max(EPISODE_STEPS * data.period_s, settings.clock_limit_s),
+        finest_s=settings.clock_resolution_steps * data.period_s,
+        episode_limit_s=max(EPISODE_STEPS * data.period_s, settings.clock_floor_s),
         errors_s=lags.error * data.period_s,
     )
-    if not defects:
-        limit = max(ORDER_STEPS * data.period_s, settings.clock_limit_s)
-        defects = order_defects(stream, offsets, data, settings, limit_s=limit)
-    return defects, taken
+    if not findings:
+        limit = max(ORDER_STEPS * data.period_s, settings.clock_floor_s)
+        findings = order_findings(stream, offsets, data, settings, limit_s=limit)
+    return findings, taken

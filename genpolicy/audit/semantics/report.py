@@ -1,4 +1,4 @@
-"""What the layer of data semantics says: clocks, calibration, and the defects it found."""
+"""What the layer of data semantics says: clocks, calibration, and what stands out of the noise."""
 
 from dataclasses import dataclass, field
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from genpolicy.audit.data import Integers, Text
 
-# In the order of diagnosis; the first defect found names the verdict. Units and frames are measured
+# In the order of diagnosis. Units and frames are measured
 # whatever the lag is, but a lag is not worth much in a turned frame: so they stand before clocks.
 KINDS = (
     "unit", "swapped_columns", "frame", "clock", "rate", "jitter", "gaps", "clock_drift", "glued",
@@ -53,15 +53,16 @@ class Calibration:
 
 
 @dataclass(frozen=True)
-class Defect:
-    """One fault of the data.
+class Finding:
+    """One deviation that stands out of the noise; whether it is a fault, a limit says elsewhere.
 
     Attributes:
         kind: One of `KINDS`.
         variable: What it is a fault of: a stream, an epoch or a component.
         where: Which episodes, epochs or rows.
-        measured: The number that is beyond the limit.
-        limit: The limit.
+        question: Which limit it is to be held against.
+        measured: The number.
+        floor: From where on it is reported: what noise explains, or the floor of the settings.
         unit: Unit of both.
         action: What to do about it, a sentence.
     """
@@ -69,8 +70,9 @@ class Defect:
     kind: str
     variable: str
     where: str
+    question: str
     measured: float
-    limit: float
+    floor: float
     unit: str
     action: str
 
@@ -86,8 +88,8 @@ class Semantics:
         negative_delays: Samples received before they happened, beyond the tolerance.
         start_drift: Largest difference of the median start position between training and held-out
             episodes, unit of the position.
-        defects: Faults beyond their limits, the first red one first.
-        notes: Sentences on what is worth knowing and no defect.
+        findings: Deviations beyond the noise, in the order of diagnosis.
+        notes: Sentences on what is worth knowing and no deviation.
         shift_steps: By how many rows the commands of each episode are to be moved so that all
             episodes are aligned. Shape (E,).
         stream_shift_steps: The same for the columns of each other stream that was measured.
@@ -98,15 +100,15 @@ class Semantics:
     gaps: int
     negative_delays: int
     start_drift: float
-    defects: tuple[Defect, ...] = ()
+    findings: tuple[Finding, ...] = ()
     notes: tuple[str, ...] = ()
     shift_steps: Integers = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     stream_shift_steps: dict[str, Integers] = field(default_factory=dict)
 
 
-def in_order(defects: list[Defect]) -> tuple[Defect, ...]:
-    """The defects in the order of diagnosis."""
-    return tuple(sorted(defects, key=lambda defect: KINDS.index(defect.kind)))
+def in_order(findings: list[Finding]) -> tuple[Finding, ...]:
+    """In the order of diagnosis."""
+    return tuple(sorted(findings, key=lambda finding: KINDS.index(finding.kind)))
 
 
 def listed(names: Text) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 
 from genpolicy.audit.data import Array, AuditInput, Flags
 from genpolicy.audit.semantics.motion import Motion
-from genpolicy.audit.semantics.report import Defect, listed
+from genpolicy.audit.semantics.report import Finding, listed
 from genpolicy.audit.semantics.robust import (
     densest_half,
     episode_deviation,
@@ -28,9 +28,9 @@ MAGNITUDE_SPREADS = 8.0
 # that stands elsewhere scatters as before.
 SCATTER = 2.0
 LEAST_SCATTER = 5
-# Fewer episodes are a defect beyond this only.
+# Fewer episodes are a finding beyond this only.
 LONE_MAGNITUDE = 100.0
-# One episode is enough to be a defect where its gain is beyond this.
+# One episode is enough to be a finding where its gain is beyond this.
 LONE_FACTOR = 10.0
 FACTORS = (
     (1000.0, "m and mm"), (100.0, "m and cm"), (180.0 / np.pi, "degrees and radians"),
@@ -38,13 +38,13 @@ FACTORS = (
 )  # fmt: skip
 
 
-def gain_defects(
+def gain_findings(
     data: AuditInput, motion: Motion, settings: AuditSettings
-) -> tuple[list[Defect], Array]:
+) -> tuple[list[Finding], Array]:
     """Factors between commanded and observed motion.
 
     Returns:
-        Defects, and the usual factor of each episode, which is taken out before clocks are
+        Findings, and the usual factor of each episode, which is taken out before clocks are
         measured. Shape (E,).
     """
     factors = np.ones(len(data.episodes))
@@ -53,39 +53,39 @@ def gain_defects(
     asked = episode_deviation(motion.commanded, motion.starts)
     seen = episode_deviation(motion.observed, motion.starts)
     gains = _log_gain(np.linalg.norm(seen, axis=1), np.linalg.norm(asked, axis=1))
-    defects = _epochs(data, gains, "position", settings, factors)
-    defects += _episodes(data, gains, settings, factors)
-    return defects, factors
+    findings = _epochs(data, gains, "position", settings, factors)
+    findings += _episodes(data, gains, settings, factors)
+    return findings, factors
 
 
-def component_defects(data: AuditInput, motion: Motion, settings: AuditSettings) -> list[Defect]:
+def component_findings(data: AuditInput, motion: Motion, settings: AuditSettings) -> list[Finding]:
     """The same for single components, once no frame is turned and no column swapped."""
     asked = episode_deviation(motion.commanded, motion.starts)
     seen = episode_deviation(motion.observed, motion.starts)
-    defects = []
+    findings = []
     for column, name in enumerate(motion.names):
         gains = _log_gain(seen[:, column], asked[:, column])
-        defects += _epochs(data, gains, name, settings, None)
-    return defects
+        findings += _epochs(data, gains, name, settings, None)
+    return findings
 
 
-def magnitude_defects(data: AuditInput, motion: Motion, settings: AuditSettings) -> list[Defect]:
+def magnitude_findings(data: AuditInput, motion: Motion, settings: AuditSettings) -> list[Finding]:
     """Episodes whose positions or channels are larger or smaller than all others by a unit."""
-    defects = []
+    findings = []
     if motion.commanded.shape[1]:
         size = np.linalg.norm(episode_medians(np.abs(motion.commanded), motion.starts), axis=1)
         travel = np.linalg.norm(episode_deviation(motion.commanded, motion.starts), axis=1)
         both = np.stack([_off(size), _off(travel)])
         # Both must say the same factor: a start elsewhere or an arm that stands is no unit.
         same = np.abs(both[0] - both[1]) <= np.log(2.0)
-        defects += _magnitude(data, "position", np.where(same, both[0], 0.0))
+        findings += _magnitude(data, "position", np.where(same, both[0], 0.0))
     for name, part in data.context.items():
         # Component by component: beside a direction cosine a length hardly counts.
         medians = episode_medians(data.observation[:, part], motion.starts)
         off = np.stack([_off(np.abs(values)) * _clear(values) for values in medians.T])
         worst = off[np.argmax(np.abs(off), axis=0), np.arange(off.shape[1])]
-        defects += _magnitude(data, name, worst)
-    return defects
+        findings += _magnitude(data, name, worst)
+    return findings
 
 
 def _clear(values: Array) -> Array:
@@ -105,29 +105,33 @@ def _log_gain(seen: Array, asked: Array) -> Array:
 
 def _epochs(
     data: AuditInput, gains: Array, name: str, settings: AuditSettings, factors: Array | None
-) -> list[Defect]:
+) -> list[Finding]:
     """Epochs whose gain is no arm's, or another than that of the other epochs."""
     groups = data.episodes.calibration_epoch
     absolute = group_medians(gains, groups, reference=0.0, least=LEAST_EPISODES)
     relative = group_medians(gains, groups, reference=None, least=LEAST_EPISODES)
-    ratio = settings.gain_epoch_limit if factors is not None else settings.gain_limit
-    defects = []
+    ratio = settings.gain_epoch_floor if factors is not None else settings.gain_floor
+    findings = []
     for (epoch, count, gain, error), (_, _, gap, _) in zip(absolute, relative, strict=True):
         noise = settings.significance * error
-        beyond = abs(gain) > max(np.log(settings.gain_limit), noise)
+        beyond = abs(gain) > max(np.log(settings.gain_floor), noise)
         beside = abs(gap) > max(np.log(ratio), noise)
         if factors is not None:
             factors[groups == epoch] = np.exp(gain)
         if count < LEAST_EPISODES or not (beyond or beside):
             continue
-        limit = settings.gain_limit if beyond else ratio
-        defects.append(_gain(name, f"epoch {epoch or '-'}", gain if beyond else gap, limit))
-    return defects
+        where = f"epoch {epoch or '-'}"
+        if beyond or factors is None:
+            shown = gain if beyond else gap
+            findings.append(_gain(name, where, shown, "gain_factor", settings.gain_floor))
+        else:
+            findings.append(_gain(name, where, gap, "gain_epoch_factor", ratio))
+    return findings
 
 
 def _episodes(
     data: AuditInput, gains: Array, settings: AuditSettings, factors: Array
-) -> list[Defect]:
+) -> list[Finding]:
     """Single episodes whose gain is another than that of all."""
     left = gains - np.log(factors)
     known = np.isfinite(left)
@@ -135,14 +139,16 @@ def _episodes(
         return []
     centre, spread = densest_half(left[known])
     gap = np.where(known, left - centre, 0.0)
-    off = np.abs(gap) > max(np.log(settings.gain_limit), settings.significance * 2.0 * spread)
+    off = np.abs(gap) > max(np.log(settings.gain_floor), settings.significance * 2.0 * spread)
     lone = off & (np.abs(gap) > np.log(LONE_FACTOR))
     total = int(np.count_nonzero(known))
     if not (lone.any() or some(off, total, settings.outlier_share)):
         return []
     factors[off] *= np.exp(gap[off])
     names = data.episodes.uuid[off]
-    return [_gain("position", listed(names), float(np.median(gap[off])), settings.gain_limit)]
+    # Episodes may be off both ways: the size is the usual one, the side that of most.
+    size = float(np.copysign(np.median(np.abs(gap[off])), np.median(gap[off])))
+    return [_gain("position", listed(names), size, "gain_factor", settings.gain_floor)]
 
 
 def _off(size: Array) -> Array:
@@ -172,19 +178,20 @@ def _off(size: Array) -> Array:
     return result
 
 
-def _magnitude(data: AuditInput, name: str, off: Array) -> list[Defect]:
+def _magnitude(data: AuditInput, name: str, off: Array) -> list[Finding]:
     chosen: Flags = off != 0.0
     if not chosen.any():
         return []
     factor = float(np.exp(np.median(np.abs(off[chosen]))))
     names = data.episodes.uuid[chosen]
     return [
-        Defect(
+        Finding(
             kind="unit",
             variable=name,
             where=listed(names),
+            question="magnitude_factor",
             measured=factor,
-            limit=MAGNITUDE,
+            floor=MAGNITUDE,
             unit="factor",
             action=f"{name} is {'larger' if np.median(off[chosen]) > 0 else 'smaller'} by a "
             f"factor of {factor:.4g}{_named(factor)} in {len(names)} episodes ({listed(names)}): "
@@ -193,15 +200,16 @@ def _magnitude(data: AuditInput, name: str, off: Array) -> list[Defect]:
     ]
 
 
-def _gain(name: str, where: str, gain: float, limit: float) -> Defect:
+def _gain(name: str, where: str, gain: float, question: str, floor: float) -> Finding:
     factor = float(np.exp(abs(gain)))
     side = "larger" if gain > 0 else "smaller"
-    return Defect(
+    return Finding(
         kind="unit",
         variable=name,
         where=where,
+        question=question,
         measured=factor,
-        limit=limit,
+        floor=floor,
         unit="factor",
         action=f"In {where} the observed motion of {name} is {side} by a factor of {factor:.4g}"
         f"{_named(factor)}: convert both to one unit, ingest again and repeat the audit.",

@@ -12,7 +12,7 @@ from genpolicy.integrity.hashing import sha256_file
 from genpolicy.integrity.tables import read_table
 
 TABLES = (
-    "alignment", "calibration", "clocks", "defects", "examples", "modes", "neighbourhoods",
+    "alignment", "calibration", "clocks", "examples", "findings", "modes", "neighbourhoods",
     "recovery", "replay", "strata", "support",
 )  # fmt: skip
 

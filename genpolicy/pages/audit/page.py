@@ -29,7 +29,7 @@ def audit_page(document: Mapping[str, Any], evidence: AuditEvidence, *, name: st
     """HTML of one audit; the same inputs give the same bytes.
 
     Args:
-        document: `audit.json`.
+        document: `audit.json`, with the cause, its questions and its limits.
         evidence: The evidence beside it.
         name: What the dataset is called.
     """
@@ -41,7 +41,7 @@ def audit_page(document: Mapping[str, Any], evidence: AuditEvidence, *, name: st
         lstrip_blocks=True,
     )
     own, _, _ = PackageLoader("genpolicy.pages.audit").get_source(environment, "audit.css")
-    cause = str(document["verdict"])
+    cause, limits = str(document["verdict"]), _limits(document["limits"])
     summary = evidence.summary
     return environment.get_template("audit.html").render(
         style=page_style() + Markup(own),
@@ -53,7 +53,8 @@ def audit_page(document: Mapping[str, Any], evidence: AuditEvidence, *, name: st
         named=_named(document),
         marks=MARKS,
         layers=ladder(document, evidence),
-        pictures=draw_all(evidence),
+        pictures=draw_all(evidence, {row["question"]: row["limit"] for row in limits}),
+        limits=limits,
         labels=label_table(evidence),
         wrong=_wrong(evidence["replay"]),
         recovery=recovery_table(evidence["recovery"]),
@@ -68,6 +69,16 @@ def audit_page(document: Mapping[str, Any], evidence: AuditEvidence, *, name: st
         exact=json.dumps,
         plain=lambda value: json.dumps(value, ensure_ascii=False),
     )
+
+
+def _limits(by_owner: Mapping[str, Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Every limit of the cause with its owner and reason, by question."""
+    rows = [
+        {"question": question, "limit": value[0], "reason": value[1], "owner": owner}
+        for owner, questions in by_owner.items()
+        for question, value in questions.items()
+    ]
+    return sorted(rows, key=lambda row: str(row["question"]))
 
 
 def label_table(evidence: AuditEvidence) -> list[dict[str, Any]]:

@@ -1,6 +1,6 @@
 """The figures of the audit's page: each drawn from one table, or with the reason why it is not."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 
@@ -12,6 +12,7 @@ from genpolicy.pages.figures.drawing import Picture, drawn
 from genpolicy.pages.figures.situations import NothingToDrawError
 
 CONFIDENCE = 0.95
+Limits = Mapping[str, float]
 
 
 @dataclass(frozen=True)
@@ -21,16 +22,21 @@ class Plot:
     title: str
     caption: str
     source: str
-    draw: Callable[[AuditEvidence], Figure]
+    draw: Callable[[AuditEvidence, Limits], Figure]
 
 
-def draw_all(evidence: AuditEvidence) -> list[Picture]:
-    """Every figure; what is missing is said, never left out in silence."""
+def draw_all(evidence: AuditEvidence, limits: Limits) -> list[Picture]:
+    """Every figure; what is missing is said, never left out in silence.
+
+    Args:
+        evidence: What is drawn.
+        limits: Limits of the cause, by question.
+    """
     pictures = []
     for number, plot in enumerate(PLOTS):
         source = (f"evidence/{plot.source}.parquet",)
         try:
-            shape = drawn(partial(plot.draw, evidence), plot.title, salt=f"audit{number}")
+            shape = drawn(partial(plot.draw, evidence, limits), plot.title, salt=f"audit{number}")
         except NothingToDrawError as error:
             pictures.append(Picture(plot.title, plot.caption, source, skipped=str(error)))
         else:
@@ -38,7 +44,7 @@ def draw_all(evidence: AuditEvidence) -> list[Picture]:
     return pictures
 
 
-def _clusters(evidence: AuditEvidence) -> Figure:
+def _clusters(evidence: AuditEvidence, limits: Limits) -> Figure:
     summary = evidence.summary
     return situations.clusters(
         evidence["examples"],
@@ -48,7 +54,7 @@ def _clusters(evidence: AuditEvidence) -> Figure:
     )
 
 
-def _overlay(evidence: AuditEvidence) -> Figure:
+def _overlay(evidence: AuditEvidence, limits: Limits) -> Figure:
     frame, summary = evidence["neighbourhoods"], evidence.summary
     return situations.mean_versus_modes(
         frame[frame["two_mode"].astype(bool)],
@@ -58,39 +64,38 @@ def _overlay(evidence: AuditEvidence) -> Figure:
     )
 
 
-def _strata(evidence: AuditEvidence) -> Figure:
-    settings = evidence.settings
+def _strata(evidence: AuditEvidence, limits: Limits) -> Figure:
     return checks.strata_bars(
-        evidence["strata"], level=settings["strata_alpha"], limit=settings["strata_effect_limit"]
+        evidence["strata"], level=limits["strata_p"], limit=limits["strata_effect"]
     )
 
 
-def _modes(evidence: AuditEvidence) -> Figure:
-    limit = evidence.settings["mode_success_limit"]
+def _modes(evidence: AuditEvidence, limits: Limits) -> Figure:
+    limit = limits["mode_success_lower"]
     return checks.mode_success(evidence["modes"], confidence=CONFIDENCE, limit=limit)
 
 
-def _realignment(evidence: AuditEvidence) -> Figure:
+def _realignment(evidence: AuditEvidence, limits: Limits) -> Figure:
     summary = evidence.summary
     return checks.realignment(
         evidence["alignment"],
-        limit_s=evidence.settings["clock_limit_s"],
+        limit_s=limits["clock_residual_s"],
         modes_before=summary["modes_before_realignment"],
         modes_after=summary["modes_after_realignment"],
     )
 
 
-def _labels(evidence: AuditEvidence) -> Figure:
+def _labels(evidence: AuditEvidence, limits: Limits) -> Figure:
     return checks.label_agreement(evidence["replay"])
 
 
-def _support(evidence: AuditEvidence) -> Figure:
+def _support(evidence: AuditEvidence, limits: Limits) -> Figure:
     summary = evidence.summary
     return checks.support_map(
         evidence["support"],
         names=summary["position_names"],
         unit=summary["position_unit"],
-        limit=evidence.settings["minimum_support_share"],
+        limit=limits["supported_share"],
     )
 
 

@@ -9,11 +9,12 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "audit"))
+sys.path.insert(0, str(Path(__file__).parents[2] / "audit"))
 
 from planar import planar
 
-from genpolicy.cli import audit as command
+from gates.audit import command
+from gates.cause import cause_of, default_limits
 from genpolicy.cli.main import main
 from genpolicy.cli.resume import work_folder
 from genpolicy.cli.task_checks import contract_hash, task_checks
@@ -80,6 +81,12 @@ def test_everything_is_written_and_again_the_same(recordings, tmp_path, capsys):
     assert document["next_action"] in printed.out and str(out / "audit.html") in printed.out
     assert all(line in printed.out for line in document["rests_on"])
     assert "60 episodes accepted, 0 refused" in printed.err
+    limits = default_limits()
+    assert document["limits"] == limits.as_json()
+    assert all(f"{name} {item.limit:g}" in printed.out for name, item in limits.by_question.items())
+    cause = cause_of(out / "evidence", limits)
+    assert document["questions"] == [answer.as_json() for answer in cause.answers]
+    assert (document["verdict"], document["confidence"]) == (cause.name.value, cause.confidence)
     assert load_dataset(out / "dataset").manifest_sha256 == document["dataset_manifest_sha256"]
     assert not work_folder(out).exists()
     first = files(out)
@@ -95,6 +102,13 @@ def test_everything_is_written_and_again_the_same(recordings, tmp_path, capsys):
     assert run(tmp_path / "dataset", again) == 0
     assert {path.name for path in again.iterdir()} == OUTPUTS - {"dataset"}
     assert read_json(again / "audit.json")["verdict"] == document["verdict"]
+
+
+@pytest.mark.usefixtures("unaudited")
+def test_limits_that_are_none_are_refused_before_the_audit(recordings, tmp_path, capsys):
+    (tmp_path / "params.yaml").write_text("gate_a: {thresholds: {}, cause: {}}\n")
+    assert run(recordings, tmp_path / "a", "--limits", str(tmp_path / "params.yaml")) == 2
+    assert "clock_residual_s is missing" in capsys.readouterr().err
 
 
 @pytest.mark.usefixtures("unaudited")

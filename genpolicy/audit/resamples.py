@@ -1,27 +1,79 @@
-"""How sure is the verdict? The share of resampled audits that name the same cause.
+"""How stable are the numbers? The audit's measures on resampled data, one row for each draw.
 
 Held-out episodes are drawn again with replacement, labels and outcomes again from their measured
-shares, effects and p-values again from their sampling distributions, and the same rules decide.
-A verdict that hangs on a handful of episodes near a limit gets a low number. It says how stable
-the verdict is under the sampling of the data, not how likely a cause is that the audit cannot see.
+shares, effects and p-values again from their sampling distributions. The rows are evidence; which
+cause each of them names, and so how often it is the same, is judged where the limits are.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import norm
 
 from genpolicy.audit.data import Array, AuditInput, Integers
-from genpolicy.audit.labels import ModeOutcome, Replayed
-from genpolicy.audit.persistence import NULL_QUANTILE, Persistence
+from genpolicy.audit.labels import ModeOutcome, Replayed, disagreement
+from genpolicy.audit.persistence import NULL_QUANTILE, Persistence, persistent
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.audit.situations import Claim, Situation, claims_of, coherent_phases
 from genpolicy.audit.strata import Stratum
-from genpolicy.audit.verdict import AuditVerdict, Counts, Layers, decide
 from genpolicy.seeds import stream
 from genpolicy.statistics.intervals import clopper_pearson
 
 TWO_SIDED_95 = 1.96
+
+
+@dataclass(frozen=True)
+class Measures:
+    """What is drawn again; all else stays as it was measured.
+
+    Attributes:
+        replayed: Labels and replays.
+        persistence: Identity over time.
+        strata: Tests of variables, in the order of `strata.parquet`.
+        modes: Modes of the phase with most situations, in the order of `modes.parquet`.
+    """
+
+    replayed: tuple[Replayed, ...]
+    persistence: Persistence
+    strata: tuple[Stratum, ...]
+    modes: tuple[ModeOutcome, ...]
+
+
+@dataclass(frozen=True)
+class Resample:
+    """The numbers of one draw.
+
+    Attributes:
+        disagreements: Labels that a replay contradicts.
+        disagreement_upper: Exact upper bound of their share.
+        two_mode: Situations with several modes.
+        two_mode_episodes: Held-out episodes with at least one of them.
+        incoherent: Situations with clusters that do not persist.
+        persistent: Situations with several modes that persist.
+        kept: Share of episodes that keep their mode.
+        kept_null_q95: What chance reaches in 95 of 100.
+        kept_n: Situations in which it could be measured.
+        p_adjusted: One for each stratum; None where it was not tested.
+        effect: The same.
+        effect_lower: The same.
+        success_lower: One for each mode of the phase with most situations.
+        admissible: The same.
+    """
+
+    disagreements: int
+    disagreement_upper: float
+    two_mode: int
+    two_mode_episodes: int
+    incoherent: int
+    persistent: int
+    kept: float
+    kept_null_q95: float
+    kept_n: int
+    p_adjusted: tuple[float | None, ...]
+    effect: tuple[float | None, ...]
+    effect_lower: tuple[float | None, ...]
+    success_lower: tuple[float, ...]
+    admissible: tuple[int, ...]
 
 
 @dataclass(frozen=True)
@@ -34,6 +86,7 @@ class Table:
         phases: Phase of each situation. Length n.
         claims: What speaks for the modes of those claimed, before phases were held to persist.
         claimed: Several clusters claimed as modes, per situation. Shape (n,).
+        persists: The same, and they persist. Shape (n,).
         identity: Situation, identity kept, and its null, of those measured.
     """
 
@@ -42,38 +95,30 @@ class Table:
     phases: list[str]
     claims: list[Claim]
     claimed: Array
+    persists: Array
     identity: tuple[Integers, Array, Array]
 
 
-def confidence(
+def resamples(
     data: AuditInput,
     settings: AuditSettings,
-    layers: Layers,
+    measured: Measures,
     situations: tuple[Situation, ...],
-    verdict: AuditVerdict,
     *,
     root_seed: int,
-) -> float:
-    """Share of resampled audits with the same cause and variable.
+) -> tuple[Resample, ...]:
+    """Measures of resampled data, `settings.resamples` of them.
 
     Args:
         data: Canonical audit input.
-        settings: Limits and number of draws.
-        layers: What was measured.
+        settings: Number of draws, and what makes modes persist.
+        measured: What was measured.
         situations: Every analysed situation, before phases were held to persist.
-        verdict: What was decided.
         root_seed: Seed of the draws.
-
-    Returns:
-        Between 0 and 1.
     """
     rng = stream(root_seed, "audit", "confidence")
     table = _table(data, situations)
-    same = 0
-    for _ in range(settings.resamples):
-        drawn = decide(settings, _draw(settings, layers, table, rng))
-        same += (drawn.cause, drawn.variable) == (verdict.cause, verdict.variable)
-    return same / settings.resamples
+    return tuple(_draw(settings, measured, table, rng) for _ in range(settings.resamples))
 
 
 def _table(data: AuditInput, situations: tuple[Situation, ...]) -> Table:
@@ -86,6 +131,7 @@ def _table(data: AuditInput, situations: tuple[Situation, ...]) -> Table:
         phases=[item.phase for item in situations],
         claims=claims_of(situations),
         claimed=np.array([item.two_mode for item in situations], dtype=np.float64),
+        persists=np.array([persistent(item.identity) for item in situations], dtype=np.float64),
         identity=(
             np.array([n for n, _ in known], dtype=np.int64),
             np.array([value[0] for _, value in known]),
@@ -95,31 +141,33 @@ def _table(data: AuditInput, situations: tuple[Situation, ...]) -> Table:
 
 
 def _draw(
-    settings: AuditSettings, layers: Layers, table: Table, rng: np.random.Generator
-) -> Layers:
+    settings: AuditSettings, measured: Measures, table: Table, rng: np.random.Generator
+) -> Resample:
     count = len(table.episodes)
     times = np.bincount(rng.integers(0, count, count), minlength=count) if count else table.episodes
     weights = times[table.place].astype(np.float64)
     good = coherent_phases(settings, table.claims, weights)
     kept = table.claimed * np.array([phase in good for phase in table.phases])
-    return replace(
-        layers,
-        replayed=_replayed(layers.replayed, rng),
-        counts=_counts(layers.counts, table, times, kept),
-        persistence=_persistence(layers.persistence, table, weights * kept),
-        strata=tuple(_stratum(row, rng) for row in layers.strata),
-        modes=tuple(_mode(mode, rng) for mode in layers.modes),
-    )
-
-
-def _counts(counts: Counts, table: Table, times: Integers, kept: Array) -> Counts:
-    weights = times[table.place]
     two_mode = np.bincount(table.place, weights=kept, minlength=len(times)) > 0
-    return replace(
-        counts,
+    wrong, _, upper = disagreement(_replayed(measured.replayed, rng))
+    identity = _persistence(measured.persistence, table, weights * kept)
+    strata = [_stratum(row, rng) for row in measured.strata]
+    modes = [_mode(mode, rng) for mode in measured.modes]
+    return Resample(
+        disagreements=wrong,
+        disagreement_upper=upper,
         two_mode=int(np.sum(weights * kept)),
         two_mode_episodes=int(np.sum(times * two_mode)),
         incoherent=int(np.sum(weights * (table.claimed - kept))),
+        persistent=int(np.sum(weights * kept * table.persists)),
+        kept=identity.observed,
+        kept_null_q95=identity.null_q95,
+        kept_n=identity.n,
+        p_adjusted=tuple(row[0] for row in strata),
+        effect=tuple(row[1] for row in strata),
+        effect_lower=tuple(row[2] for row in strata),
+        success_lower=tuple(mode[0] for mode in modes),
+        admissible=tuple(mode[1] for mode in modes),
     )
 
 
@@ -129,10 +177,9 @@ def _persistence(measured: Persistence, table: Table, weight: Array) -> Persiste
         return measured
     weights = weight[numbers]
     if weights.sum() <= 0.0:
-        return replace(measured, n=0)
+        return Persistence(measured.observed, measured.null_q95, measured.null_mean, 0)
     expected = weights @ null / weights.sum()
-    return replace(
-        measured,
+    return Persistence(
         observed=float(np.average(shares, weights=weights)),
         null_q95=float(np.quantile(expected, NULL_QUANTILE)),
         null_mean=float(expected.mean()),
@@ -144,25 +191,24 @@ def _replayed(replayed: tuple[Replayed, ...], rng: np.random.Generator) -> tuple
     return tuple(replayed[k] for k in rng.integers(0, len(replayed), len(replayed)))
 
 
-def _stratum(row: Stratum, rng: np.random.Generator) -> Stratum:
-    """Effect and p-value drawn from their sampling distributions."""
+def _stratum(
+    row: Stratum, rng: np.random.Generator
+) -> tuple[float | None, float | None, float | None]:
+    """Adjusted p-value, effect and its lower end, drawn from their sampling distributions."""
     if row.p_adjusted is None or row.effect is None:
-        return row
+        return row.p_adjusted, row.effect, row.effect_lower
     wide = (row.effect_upper or 0.0) - (row.effect_lower or 0.0)
     shock = float(rng.normal())
     effect = min(1.0, max(0.0, row.effect + shock * wide / (2 * TWO_SIDED_95)))
     p_value = float(norm.sf(norm.isf(min(max(row.p_adjusted, 1e-12), 1.0 - 1e-12)) + shock))
-    lower = max(0.0, effect - (row.effect - (row.effect_lower or 0.0)))
-    return replace(row, effect=effect, effect_lower=lower, p_adjusted=p_value)
+    return p_value, effect, max(0.0, effect - (row.effect - (row.effect_lower or 0.0)))
 
 
-def _mode(mode: ModeOutcome, rng: np.random.Generator) -> ModeOutcome:
+def _mode(mode: ModeOutcome, rng: np.random.Generator) -> tuple[float, int]:
+    """Lower end of the success, and admissible chunks."""
     successes, admissible = mode.successes, mode.admissible
     if mode.episodes:
         successes = int(rng.binomial(mode.episodes, mode.successes / mode.episodes))
     if mode.checked:
         admissible = int(rng.binomial(mode.checked, mode.admissible / mode.checked))
-    lower, upper = clopper_pearson(successes, mode.episodes)
-    return replace(
-        mode, successes=successes, success_lower=lower, success_upper=upper, admissible=admissible
-    )
+    return clopper_pearson(successes, mode.episodes)[0], admissible

@@ -1,0 +1,288 @@
+"""`genpolicy audit`: is there a need for a generator in these data, and if not, why?
+
+The audit measures; the cause is named by `gates.cause`, the same function as in Gate A, under the
+limits of a `params.yaml` or the packaged ones.
+"""
+
+import argparse
+import os
+import shutil
+import sys
+import time
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from gates.cause import Answer, Cause, CauseLimits, Layer, cause_of, default_limits
+from gates.need.gate import read_cause_limits
+from genpolicy.audit.evidence import write_evidence
+from genpolicy.audit.propose import propose_settings
+from genpolicy.audit.settings import AuditSettings
+from genpolicy.audit.standalone import AuditReport, audit
+from genpolicy.cli.ingest import add_input, given_contract
+from genpolicy.cli.progress import ProgressLine
+from genpolicy.cli.remember import Answers, remembered_admissible, remembered_replay
+from genpolicy.cli.resume import DATASET, fingerprint, kept_or_new, work_folder
+from genpolicy.cli.task_checks import TaskChecks, task_checks
+from genpolicy.data.dataset import Dataset, load_dataset
+from genpolicy.data.formats import Opened, open_dataset
+from genpolicy.data.formats.contract import write_contract
+from genpolicy.errors import BadInputError
+from genpolicy.integrity.atomic import output_folder, write_bytes
+from genpolicy.integrity.documents import canonical_json
+from genpolicy.integrity.hashing import sha256_bytes
+from genpolicy.pages.audit.evidence import read_evidence
+from genpolicy.pages.audit.page import audit_page
+from genpolicy.pages.audit.words import TITLES
+
+EXAMPLES = """examples:
+  genpolicy audit recordings/ --out audit/              # whatever they are
+  genpolicy audit recordings/ --contract contract.yaml --out audit/
+  genpolicy audit dataset/ --out audit/                 # what `genpolicy ingest` wrote
+
+writes audit.html (read this), audit.json, contract.yaml (what was guessed; correct it and give
+it back), evidence/ and dataset/. The exit code is 0 whatever the verdict: it was measured.
+"""
+DOCUMENT, PAGE, CONTRACT, EVIDENCE = "audit.json", "audit.html", "contract.yaml", "evidence"
+SHOWN_REFUSALS = 5
+
+
+def add(verbs: "argparse._SubParsersAction[Any]") -> None:
+    """Add the verb `audit`."""
+    parser = verbs.add_parser(
+        "audit",
+        help="name the cause of different actions under one observation",
+        description="Audit recordings: do they hold several valid actions under one observation, "
+        "or is a variable hidden, the data broken, a label wrong?",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    add_input(parser)
+    parser.add_argument("--out", type=Path, required=True, help="folder to write, or to replace")
+    parser.add_argument(
+        "--limits",
+        type=Path,
+        metavar="PARAMS",
+        help="params.yaml whose gate_a section holds the limits (default: the packaged ones)",
+    )
+    parser.add_argument("--seed", type=int, default=0, help="root of all random draws (default: 0)")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Import, audit, write everything or nothing, and print the verdict."""
+    began_s = time.monotonic()
+    out: Path = options.out
+    check_output(options.path, out)
+    limits = given_limits(options.limits)
+    work = work_folder(out)
+    opened = _opened(options, work)
+    _say(f"{opened.accepted} episodes accepted, {len(opened.refused)} refused; auditing")
+    dataset = load_dataset(opened.folder)
+    settings = propose_settings(dataset, source=opened.contract.model_dump(mode="json"))
+    checks = task_checks(dataset, task=options.task, chunk_steps=settings.chunk_steps)
+    report = _audited(options, dataset, settings, checks, work)
+    _say("writing the evidence and the page")
+    with output_folder(out) as folder:
+        write_contract(folder / CONTRACT, opened.contract)
+        name = name_of(dataset, options.path)
+        cause = write_report(report, folder, limits=limits, name=name, obstacles=checks.obstacles)
+        if opened.folder == work / DATASET:
+            os.replace(opened.folder, folder / DATASET)
+    shutil.rmtree(work, ignore_errors=True)
+    print(as_text(report, cause, opened, out))
+    print(limits_text(limits, options.limits))
+    _say(f"{time.monotonic() - began_s:.1f} s")
+    return 0
+
+
+def given_limits(path: Path | None) -> CauseLimits:
+    """Limits of the cause from a `params.yaml`; the packaged ones where none is given.
+
+    Raises:
+        ConfigError: A limit is missing or wrong.
+    """
+    return default_limits() if path is None else read_cause_limits(path)
+
+
+def write_report(
+    report: AuditReport,
+    folder: Path,
+    *,
+    limits: CauseLimits,
+    name: str,
+    obstacles: list[dict[str, float]],
+) -> Cause:
+    """Write audit.json, audit.html and the evidence into an existing folder.
+
+    Args:
+        report: What the audit measured.
+        folder: Existing folder.
+        limits: Limits of the cause.
+        name: What the dataset is called on the page.
+        obstacles: Round obstacles of the scene plane, for figures.
+
+    Returns:
+        The cause, named from what was written.
+    """
+    evidence = folder / EVIDENCE
+    evidence.mkdir()
+    write_evidence(report.result, evidence, settings=report.settings, obstacles=obstacles)
+    cause = cause_of(evidence, limits)
+    document = judged(report, cause, limits)
+    write_bytes(folder / DOCUMENT, canonical_json(document))
+    page = audit_page(document, read_evidence(evidence), name=name)
+    write_bytes(folder / PAGE, page.encode())
+    return cause
+
+
+def judged(report: AuditReport, cause: Cause, limits: CauseLimits) -> dict[str, Any]:
+    """`audit.json`: what was measured, the cause, and every question with its limit."""
+    return report.as_json() | {
+        "verdict": cause.name.value,
+        "variable": cause.variable,
+        "kind": cause.kind,
+        "layer": cause.layer.value,
+        "confidence": cause.confidence,
+        "next_action": cause.next_action,
+        "questions": [answer.as_json() for answer in cause.answers],
+        "limits": limits.as_json(),
+    }
+
+
+def check_output(path: Path, out: Path) -> None:
+    """Refuse an output that would overwrite the recordings or something that is no audit.
+
+    Raises:
+        BadInputError: It would.
+    """
+    source, target = path.resolve(), out.resolve()
+    if source.is_relative_to(target) or target.is_relative_to(source):
+        raise BadInputError(
+            where="--out",
+            found=f"{out}, in or around the recordings {path}",
+            expected="a place apart from them",
+            action="Name another folder; recordings are never written to.",
+        )
+    if out.is_symlink() or (out.exists() and not out.is_dir()):
+        raise BadInputError(
+            where="--out",
+            found=f"{out}, not a folder",
+            expected="a new folder, or that of an earlier audit",
+            action="Name another folder.",
+        )
+    if out.is_dir() and any(out.iterdir()) and not (out / DOCUMENT).is_file():
+        raise BadInputError(
+            where="--out",
+            found=f"{out}, which holds something else than an audit",
+            expected="a new folder, or that of an earlier audit, which is replaced",
+            action="Name another folder; nothing was removed.",
+        )
+
+
+def name_of(dataset: Dataset, path: Path) -> str:
+    """The task's name where the data state one, else that of the file or folder."""
+    tasks = [str(task) for task in dataset.manifest["tasks"]]
+    return tasks[0] if len(tasks) == 1 and tasks[0] != "unnamed" else path.resolve().name
+
+
+def as_text(report: AuditReport, cause: Cause, opened: Opened, out: Path) -> str:
+    """The verdict for a person at a terminal."""
+    named = [part.replace("_", " ") for part in (cause.variable, cause.kind) if part]
+    said = f"{cause.name} ({', '.join(dict.fromkeys(named))})" if named else cause.name.value
+    red = "no layer is red" if cause.layer is Layer.NONE else f"first red layer: {cause.layer}"
+    beyond = tuple(_beyond(answer) for answer in cause.answers if answer.layer is cause.layer)
+    sure = "unknown" if cause.confidence is None else f"{cause.confidence:.2f}"
+    lines = [
+        *_block("verdict", (said, f"{TITLES[cause.name]}; confidence {sure}; {red}")),
+        *_block("judged", beyond),
+        *_block("evidence", report.evidence),
+        *_block("rests on", report.rests_on),
+        *_block("next", (cause.next_action,)),
+    ]
+    refused = tuple(refusal.reason for refusal in opened.refused)
+    shown, more = refused[:SHOWN_REFUSALS], len(refused) - SHOWN_REFUSALS
+    lines += _block("refused", (*shown, f"and {more} more") if more > 0 else shown)
+    lines.append(f"page        {out / PAGE}")
+    return "\n".join(lines)
+
+
+def limits_text(limits: CauseLimits, path: Path | None) -> str:
+    """Every limit of the cause in one line each, and where they are from."""
+    origin = "packaged; --limits gives others" if path is None else str(path)
+    lines = [
+        f"{question} {item.limit:g} ({item.owner})" for question, item in limits.by_question.items()
+    ]
+    return "\n".join(_block("limits", (origin, *lines)))
+
+
+def _beyond(answer: Answer) -> str:
+    measured = "unknown" if answer.measured is None else f"{answer.measured:.3g}"
+    limit = "no limit" if answer.limit is None else f"{answer.comparison} {answer.limit:.3g}"
+    return f"{answer.what}: {measured}, {limit}{', red' if answer.red else ''}"
+
+
+def _block(title: str, texts: tuple[str, ...]) -> list[str]:
+    return [f"{title if number == 0 else '':<12}{text}" for number, text in enumerate(texts)]
+
+
+def _audited(
+    options: argparse.Namespace,
+    dataset: Dataset,
+    settings: AuditSettings,
+    checks: TaskChecks,
+    work: Path,
+) -> AuditReport:
+    """The audit, with a progress line; slow checks are remembered beside the output."""
+    rests = [dataset.manifest_sha256, settings.model_dump(mode="json"), version("genpolicy")]
+    answers = Answers(work / f"answers-{sha256_bytes(canonical_json(rests))[:16]}.jsonl")
+    lines: dict[str, ProgressLine] = {}
+
+    def progress(what: str, done: int, total: int) -> None:
+        if what not in lines:
+            for line in lines.values():
+                line.close()
+            lines[what] = ProgressLine(what)
+        lines[what](done, total)
+
+    replay, admissible = checks.replay, checks.admissible
+    try:
+        return audit(
+            dataset,
+            settings,
+            admissible=None if admissible is None else remembered_admissible(admissible, answers),
+            replay=None if replay is None else remembered_replay(replay, answers),
+            root_seed=options.seed,
+            progress=progress,
+        )
+    finally:
+        for line in lines.values():
+            line.close()
+
+
+def _opened(options: argparse.Namespace, work: Path) -> Opened:
+    """The recordings as a dataset: kept from an interrupted audit, or imported now."""
+    contract = given_contract(options)
+    progress = ProgressLine("episodes")
+
+    def make(folder: Path) -> Opened:
+        return open_dataset(
+            options.path,
+            out=folder,
+            format=options.format,
+            contract=contract,
+            task=options.task,
+            progress=progress,
+        )
+
+    if not options.path.exists():
+        return make(work / DATASET)  # which says what is missing
+    key = fingerprint(options.path, format=options.format, contract=contract, task=options.task)
+    try:
+        return kept_or_new(work, key, make)
+    finally:
+        progress.close()
+
+
+def _say(text: str) -> None:
+    print(f"genpolicy audit: {text}", file=sys.stderr, flush=True)

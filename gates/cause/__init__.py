@@ -1,0 +1,13 @@
+"""Why demonstrations differ where the observation does not: named here, from the audit's numbers.
+
+One function and one set of limits for Gate A, the command `genpolicy audit` and the audit's page.
+"""
+
+from gates.cause.limits import CauseLimits, Limit, default_limits, limits_of
+from gates.cause.naming import Answer, Cause, CauseName, Layer, cause_of, name_cause
+from gates.cause.numbers import Numbers, read_numbers
+
+__all__ = [
+    "Answer", "Cause", "CauseLimits", "CauseName", "Layer", "Limit", "Numbers", "cause_of",
+    "default_limits", "limits_of", "name_cause", "read_numbers",
+]  # fmt: skip

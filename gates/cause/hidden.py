@@ -1,0 +1,108 @@
+"""Does a recorded variable, the order of recording or the past explain the modes?"""
+
+from gates.cause.answers import Answer, CauseName, Layer, Named, Verdict
+from gates.cause.limits import CauseLimits
+from gates.cause.numbers import Numbers, Stratum
+
+DATA_VARIABLES = ("calibration_epoch",)
+HISTORY, SEQUENCE = "history", "recording_sequence"
+# Which variable to name when several explain the modes equally well, most concrete first; all
+# others (observed ones) come before the last three, which anything else may shine through.
+CONCRETE = (
+    "phase", "object", "operator", "calibration_epoch", "episode_order", SEQUENCE,
+    "time_in_episode", HISTORY,
+)  # fmt: skip
+VAGUE = 3
+# Time and the past show whatever else was recorded: they must explain more to be named.
+EVERYTHING = ("time_in_episode", HISTORY)
+SHOWN = 8
+
+
+def hidden(numbers: Numbers, limits: CauseLimits) -> Named:
+    """Every variable that is significant after correction, and what the foremost one says."""
+    clear = [row for row in numbers.strata if _clear(row, limits)]
+    clear.sort(key=lambda row: (-(row.effect or 0.0), row.variable))
+    answers = [_answer(row, limits) for row in clear[:SHOWN]]
+    tested = [row for row in numbers.strata if row.p_adjusted is not None and row.n > 0]
+    if tested and not clear:
+        row = min(tested, key=lambda item: (item.p_adjusted or 0.0, item.variable))
+        answers = [
+            Answer(
+                "strata_effect", Layer.HIDDEN,
+                "largest share that a variable explains beyond chance", 0.0,
+                limits["strata_effect"],
+                note=f"smallest adjusted p {row.p_adjusted or 0.0:.3g} ({_plain(row.variable)})",
+            )
+        ]  # fmt: skip
+    found = [row for row in clear if _wide_of(row, limits)]
+    return answers, _said(_foremost(found, limits)) if found else None
+
+
+def _clear(row: Stratum, limits: CauseLimits) -> bool:
+    known = row.p_adjusted is not None and row.effect is not None
+    return known and limits["strata_p"] - (row.p_adjusted or 0.0) >= 0
+
+
+def _wide_of(row: Stratum, limits: CauseLimits) -> bool:
+    """Whether the share that it explains is too large, and its interval clear of chance."""
+    large = not limits["strata_effect"] - (row.effect or 0.0) >= 0
+    return large and (row.effect_lower or 0.0) - limits["strata_effect_lower"] >= 0
+
+
+def _answer(row: Stratum, limits: CauseLimits) -> Answer:
+    """A large share whose interval reaches down to chance is shown without a limit."""
+    limit = limits["strata_effect"]
+    sure = (row.effect_lower or 0.0) - limits["strata_effect_lower"] >= 0
+    seen = ", which the policy sees" if row.observed else ""
+    detail = f"{row.detail}; " if row.detail else ""
+    unsure = "" if sure else f", its interval begins at {row.effect_lower or 0.0:.2f}"
+    return Answer(
+        "strata_effect", Layer.HIDDEN,
+        f"share of the modes that {_plain(row.variable)} explains{seen}", row.effect,
+        limit if sure or limit - (row.effect or 0.0) >= 0 else None,
+        note=f"{detail}{row.phase}, adjusted p {row.p_adjusted or 0.0:.3g}{unsure}",
+    )  # fmt: skip
+
+
+def _said(row: Stratum) -> Verdict:
+    effect = row.effect or 0.0
+    share = f"{row.variable} explains {effect:.0%} of the modes in {row.phase}"
+    if row.variable in DATA_VARIABLES:
+        text = f"{share}: correct the epochs."
+        return Verdict(CauseName.DATA_DEFECT, row.variable, row.variable, text)
+    if row.variable == SEQUENCE:
+        text = (
+            f"The mode of {row.phase} follows from those of the episodes recorded just before and "
+            f"after ({effect:.0%}): find out what was decided per session or in turns, record it, "
+            "or draw it anew for every episode, then repeat the audit."
+        )
+        return Verdict(CauseName.HIDDEN_STATE, "unrecorded", SEQUENCE, text)
+    if row.variable == HISTORY:
+        text = (
+            f"The past explains {effect:.0%} of the modes in {row.phase} ({row.detail}): record "
+            "what was decided there, or lengthen the observation history, then repeat the audit."
+        )
+        return Verdict(CauseName.HIDDEN_STATE, "unrecorded", HISTORY, text)
+    if row.observed:
+        text = f"{share}, and the policy sees it: use the simple baselines."
+        return Verdict(CauseName.UNIMODAL, row.variable, "observed_variable", text)
+    text = f"{share}: add it to the observation or standardise it, then repeat the audit."
+    return Verdict(CauseName.HIDDEN_STATE, row.variable, "stratum", text)
+
+
+def _foremost(found: list[Stratum], limits: CauseLimits) -> Stratum:
+    """The variable to name: the strongest, and of nearly equal ones the most concrete."""
+    handicap = limits["everything_handicap"]
+    best = max((row.effect or 0.0) - handicap * (row.variable in EVERYTHING) for row in found)
+    near = [row for row in found if (row.effect or 0.0) >= best - limits["nearly_equal_effect"]]
+
+    def rank(row: Stratum) -> tuple[int, float, str]:
+        name = row.variable
+        place = CONCRETE.index(name) if name in CONCRETE else len(CONCRETE) - VAGUE
+        return place, -(row.effect or 0.0), name
+
+    return min(near, key=rank)
+
+
+def _plain(variable: str) -> str:
+    return "the past" if variable == HISTORY else variable.replace("_", " ")

@@ -1,0 +1,205 @@
+"""The audit's numbers, read from its evidence: only what a cause is named from."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from genpolicy.errors import BadInputError
+from genpolicy.integrity.documents import read_json
+from genpolicy.integrity.tables import read_table
+
+Rows = list[dict[str, Any]]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A deviation of the data that stands out of the noise; `question` names its limit."""
+
+    kind: str
+    variable: str
+    where: str
+    question: str
+    measured: float
+    unit: str
+    action: str
+
+
+@dataclass(frozen=True)
+class Labels:
+    """Labels against replay; `upper` is the exact upper bound of the share that disagrees."""
+
+    replays: int
+    disagreements: int
+    upper: float
+
+
+@dataclass(frozen=True)
+class Counts:
+    """Situations and distinct held-out episodes; meanings as in `genpolicy.audit.counts`."""
+
+    queries: int
+    analysed: int
+    analysed_episodes: int
+    two_mode: int
+    two_mode_episodes: int
+    primary_episodes: int
+    resolved: int
+    incoherent: int
+    persistent: int
+    noise_ratio: float
+    noise_spread: float
+
+    @property
+    def share(self) -> float:
+        """Share of the situations with enough neighbours."""
+        return self.analysed / self.queries if self.queries else 0.0
+
+
+@dataclass(frozen=True)
+class Kept:
+    """Share of episodes that keep their mode, what chance reaches, and in how many situations."""
+
+    observed: float
+    null_q95: float
+    n: int
+
+
+@dataclass(frozen=True)
+class Stratum:
+    """One variable in one phase; None where it was not tested."""
+
+    variable: str
+    phase: str
+    p_adjusted: float | None
+    effect: float | None
+    effect_lower: float | None
+    n: int
+    recorded: bool
+    observed: bool
+    detail: str
+
+
+@dataclass(frozen=True)
+class Mode:
+    """Success and feasibility of one mode of the phase with most situations."""
+
+    mode: str
+    episodes: int
+    successes: int
+    success_lower: float
+    admissible: int
+    checked: int
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """All that a cause is named from.
+
+    Attributes:
+        findings: Deviations of the data, in the order of diagnosis.
+        floors: Where the audit begins to report, by question.
+        metre: How much of the position's unit stands for a metre.
+        unit: Unit of the position.
+        labels: Labels against replay.
+        counts: Support and modes.
+        kept: Identity over time.
+        strata: Tests of variables.
+        modes: Modes of the phase with most situations.
+    """
+
+    findings: tuple[Finding, ...]
+    floors: Mapping[str, float]
+    metre: float
+    unit: str
+    labels: Labels
+    counts: Counts
+    kept: Kept
+    strata: tuple[Stratum, ...]
+    modes: tuple[Mode, ...]
+
+
+def read_numbers(
+    document: Callable[[str], Mapping[str, Any]], rows: Callable[[str], Rows]
+) -> tuple[Numbers, tuple[Numbers, ...]]:
+    """The numbers of an audit, and those of its resamples.
+
+    Args:
+        document: A JSON document of the evidence by name.
+        rows: A table of the evidence by name, as rows.
+
+    Raises:
+        BadInputError: A document or table lacks something.
+    """
+    summary, kept = document("summary.json"), document("persistence.json")
+    try:
+        numbers = Numbers(
+            findings=tuple(_of(Finding, row) for row in rows("findings.parquet")),
+            floors={str(key): float(value) for key, value in summary["floors"].items()},
+            metre=float(summary["metre"]),
+            unit=str(summary["position_unit"]),
+            labels=Labels(
+                int(summary["label_replays"]),
+                int(summary["label_disagreements"]),
+                float(summary["label_disagreement_upper"]),
+            ),
+            counts=_of(Counts, summary["counts"]),
+            kept=_of(Kept, kept),
+            strata=tuple(_of(Stratum, row) for row in rows("strata.parquet")),
+            modes=tuple(
+                _of(Mode, row)
+                for row in rows("modes.parquet")
+                if row["phase"] == summary["primary_phase"]
+            ),
+        )
+        return numbers, tuple(_draws(numbers, rows("resamples.parquet")))
+    except (KeyError, TypeError, ValueError) as error:
+        raise BadInputError(
+            where="the audit's evidence",
+            found=f"{type(error).__name__}: {error}",
+            expected="what this version of the audit writes",
+            action="Run the audit again.",
+        ) from error
+
+
+def folder_numbers(folder: Path) -> tuple[Numbers, tuple[Numbers, ...]]:
+    """`read_numbers` of an evidence folder.
+
+    Raises:
+        BadInputError: A file is missing or damaged.
+    """
+    return read_numbers(
+        lambda name: read_json(folder / name),
+        lambda name: read_table(folder / name).to_pylist(),
+    )
+
+
+def _draws(measured: Numbers, rows: Rows) -> Iterator[Numbers]:
+    """What was measured, with the numbers of each resample in their places."""
+    for row in rows:
+        tests = zip(row["p_adjusted"], row["effect"], row["effect_lower"], strict=True)
+        outcomes = zip(row["success_lower"], row["admissible"], strict=True)
+        counted = ("two_mode", "two_mode_episodes", "incoherent", "persistent")
+        yield replace(
+            measured,
+            labels=replace(
+                measured.labels,
+                disagreements=row["disagreements"],
+                upper=row["disagreement_upper"],
+            ),
+            counts=replace(measured.counts, **{name: row[name] for name in counted}),
+            kept=Kept(row["kept"], row["kept_null_q95"], row["kept_n"]),
+            strata=tuple(
+                replace(stratum, p_adjusted=p, effect=effect, effect_lower=lower)
+                for stratum, (p, effect, lower) in zip(measured.strata, tests, strict=True)
+            ),
+            modes=tuple(
+                replace(mode, success_lower=lower, admissible=admissible)
+                for mode, (lower, admissible) in zip(measured.modes, outcomes, strict=True)
+            ),
+        )
+
+
+def _of(kind: Any, row: Mapping[str, Any]) -> Any:
+    """A result class from the values of its fields; others are left out."""
+    return kind(**{name: row[name] for name in kind.__dataclass_fields__})

@@ -1,0 +1,32 @@
+"""The cause behind the modes: named from the audit's numbers, under the limits of this gate."""
+
+from gates.cause import Cause, limits_of, name_cause, read_numbers
+from gates.cause.limits import SHARED
+from gates.evidence import Evidence, MissingEvidenceError
+from gates.need.settings import AUDIT, NeedSettings
+from gates.settings import PARAMS_FILE
+from genpolicy.errors import BadInputError
+
+PLACE = f"{PARAMS_FILE}: gate_a.cause"
+
+
+def found_cause(evidence: Evidence, settings: NeedSettings) -> Cause:
+    """The cause that the audit's numbers name under the limits of this gate.
+
+    Raises:
+        MissingEvidenceError: Numbers, or limits of shared questions, are missing.
+        ConfigError: A limit lies below what the audit looked for, or a question has none.
+    """
+    shared = settings.limits.of
+    absent = [question for question in SHARED if question not in shared]
+    if absent:
+        raise MissingEvidenceError(f"params.yaml: gate_a has no limit of {', '.join(absent)}")
+    limits = limits_of(settings.cause, shared, where=PLACE)
+    try:
+        numbers, draws = read_numbers(
+            lambda name: evidence.document(f"{AUDIT}/{name}"),
+            lambda name: evidence.records(f"{AUDIT}/{name}"),
+        )
+    except BadInputError as error:
+        raise MissingEvidenceError(str(error)) from error
+    return name_cause(numbers, draws, limits)
