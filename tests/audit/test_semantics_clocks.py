@@ -121,7 +121,7 @@ def test_a_drift_along_the_episode_is_named():
     data = arms(14, epochs=1)
     drifting = late(data, lambda n: np.linspace(-2, 2, n), np.ones(60, dtype=bool))
     found = measure(drifting, SETTINGS).findings
-    assert found[0].kind == "clock_drift" and found[0].unit == "s per episode"
+    assert found[0].kind == "clock_drift" and found[0].unit == "steps per episode"
     assert found[0].measured == pytest.approx(4 / 20, rel=0.3)
 
 
