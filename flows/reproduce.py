@@ -5,7 +5,6 @@ so that a refusal (3), a bad input (2) and a fault (1) stay apart. `python -m fl
 runs the whole ladder, or the stages named, without any server.
 """
 
-import argparse
 import contextlib
 import os
 import re
@@ -17,6 +16,9 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+
+from genpolicy.cli.shell import run_program
+from genpolicy.errors import BadInputError
 
 EXIT_DONE, EXIT_FAULT, EXIT_BAD_INPUT, EXIT_REFUSED = 0, 1, 2, 3
 KEPT_LINES = 400
@@ -141,33 +143,24 @@ def stop_all() -> None:
         stop_group(process)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Bring the ladder, or some stages of it, up to date; returns the exit code."""
-    parser = argparse.ArgumentParser(
-        prog="python -m flows.reproduce",
-        description="Run `dvc repro` and leave with 0 done, 1 a fault of ours, 2 bad input, "
-        "3 refused by a gate.",
-        epilog="Example: python -m flows.reproduce --workspace build/smoke gate_c",
-    )
-    parser.add_argument("stages", nargs="*", help="stages to bring up to date; default: all")
-    parser.add_argument("--workspace", type=Path, default=Path(), help="folder with dvc.yaml")
-    parser.add_argument("--single-item", action="store_true", help="not what they depend on")
-    parser.add_argument("--force", action="store_true", help="run also where nothing changed")
-    options = parser.parse_args(arguments)
-    if not (options.workspace / "dvc.yaml").is_file():
-        print(
-            f"{options.workspace} is a folder without dvc.yaml, expected a workspace of the "
-            "ladder. Name one with --workspace.",
-            file=sys.stderr,
+def reproduce_here(
+    workspace: Path, *, stages: Sequence[str] = (), single_item: bool = False, force: bool = False
+) -> int:
+    """`reproduce` for a person at a terminal: prints as it goes, ends with the exit code."""
+    if not (workspace / "dvc.yaml").is_file():
+        raise BadInputError(
+            where=str(workspace),
+            found="a folder without dvc.yaml",
+            expected="a workspace of the ladder",
+            action="Name one with --workspace.",
         )
-        return EXIT_BAD_INPUT
     signal.signal(signal.SIGTERM, _interrupt)
     try:
         outcome = reproduce(
-            options.workspace,
-            stages=options.stages,
-            single_item=options.single_item,
-            force=options.force,
+            workspace,
+            stages=stages,
+            single_item=single_item,
+            force=force,
             echo=lambda line: print(line, flush=True),
         )
     except KeyboardInterrupt:
@@ -208,4 +201,4 @@ def _outcome(dvc_code: int, lines: list[str], duration_s: float) -> Outcome:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run_program("flows.commands:reproduce", "python -m flows.reproduce"))

@@ -5,13 +5,16 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from typing import get_args
 
 import pytest
 import yaml
 
+from genpolicy.cli.commands import Format
 from genpolicy.cli.main import main
 from genpolicy.cli.progress import ProgressLine
 from genpolicy.data.dataset import load_dataset
+from genpolicy.data.formats import FORMATS
 
 
 @pytest.fixture(scope="session")
@@ -102,10 +105,13 @@ def test_a_fault_of_ours_is_code_one(tmp_path, capsys, monkeypatch):
     assert "fault of genpolicy" in capsys.readouterr().err
 
 
-def test_without_a_verb_it_says_how():
-    with pytest.raises(SystemExit) as caught:
-        main([])
-    assert caught.value.code == 2
+def test_without_a_command_it_says_how(capsys):
+    assert main([]) == 2
+    assert "Commands:" in capsys.readouterr().err
+
+
+def test_the_layouts_of_the_option_are_those_that_are_known():
+    assert get_args(get_args(Format)[0]) == FORMATS
 
 
 def test_the_module_runs():
@@ -114,7 +120,7 @@ def test_the_module_runs():
         capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0
-    assert "examples:" in done.stdout
+    assert "Examples:" in done.stdout
 
 
 def test_progress_prints_few_lines_in_a_log(capsys):
