@@ -42,7 +42,7 @@ _running: set["subprocess.Popen[str]"] = set()
 
 
 @dataclass(frozen=True)
-class Outcome:
+class RunEnd:
     """How a `dvc repro` ended.
 
     Attributes:
@@ -67,7 +67,7 @@ def reproduce(
     single_item: bool = False,
     force: bool = False,
     echo: Callable[[str], None] = print,
-) -> Outcome:
+) -> RunEnd:
     """Run `dvc repro` in `workspace` and say how it ended.
 
     Args:
@@ -78,7 +78,7 @@ def reproduce(
         echo: Called with every line that DVC and the stages print.
 
     Returns:
-        The outcome. Nothing is raised for a stage that fails: that is an answer.
+        How it ended. Nothing is raised for a stage that fails: that is an answer.
     """
     command = [sys.executable, "-m", "dvc", "repro", *stages]
     command += ["--single-item"] if single_item else []
@@ -175,9 +175,9 @@ def _interrupt(number: int, frame: object) -> None:
     raise KeyboardInterrupt
 
 
-def _outcome(dvc_code: int, lines: list[str], duration_s: float) -> Outcome:
+def _outcome(dvc_code: int, lines: list[str], duration_s: float) -> RunEnd:
     if dvc_code == 0:
-        return Outcome(EXIT_DONE, "", "", infrastructure=False, duration_s=duration_s)
+        return RunEnd(EXIT_DONE, "", "", infrastructure=False, duration_s=duration_s)
     text = "\n".join(lines)
     match = next(reversed(list(FAILED_STAGE.finditer(text))), None)
     errors = [line.removeprefix("ERROR: ") for line in lines if line.startswith("ERROR: ")]
@@ -188,16 +188,16 @@ def _outcome(dvc_code: int, lines: list[str], duration_s: float) -> Outcome:
         rejected = not transient and DVC_REJECTS.search("\n".join(errors)) is not None
         sentence = errors[-1] if errors else f"dvc repro ended with code {dvc_code}"
         code = EXIT_BAD_INPUT if rejected else EXIT_FAULT
-        return Outcome(code, "", sentence, infrastructure=transient, duration_s=duration_s)
+        return RunEnd(code, "", sentence, infrastructure=transient, duration_s=duration_s)
     stage, stage_code = match["stage"], int(match["code"])
     said = [line for line in lines if line.startswith(f"{stage}: ")]
     sentence = said[-1] if said else f"{stage} ended with code {stage_code}"
     if stage_code in (EXIT_BAD_INPUT, EXIT_REFUSED):
         full_disk = stage_code == EXIT_BAD_INPUT and INFRASTRUCTURE.search(sentence) is not None
-        return Outcome(stage_code, stage, sentence, full_disk, duration_s)
+        return RunEnd(stage_code, stage, sentence, full_disk, duration_s)
     # A shell reports a process that a signal ended as 128 + signal (137: killed for memory).
     transient = stage_code < 0 or stage_code > 128 or INFRASTRUCTURE.search(text) is not None
-    return Outcome(EXIT_FAULT, stage, sentence, transient, duration_s)
+    return RunEnd(EXIT_FAULT, stage, sentence, transient, duration_s)
 
 
 if __name__ == "__main__":

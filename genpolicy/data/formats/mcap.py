@@ -52,7 +52,6 @@ INSERTION_AUDIT = {
 ROBOTS: tuple[RobotName, ...] = ("panda", "fr3")
 LOOKED_AT = 5
 MAXIMUM_AGE_S = 0.3
-PHASE_AGE_S = 60.0
 FROZEN = {"seconds": 0.5, "motion": 0.01}
 # Metadata that every recording carries; see genpolicy.data.recording.episode.REQUIRED_METADATA.
 LABELS = Labels(
