@@ -60,12 +60,12 @@ env:
 	echo "$(WANTED)" > $(VENV)/.ok
 
 ladder: env
-	@code=0; genpolicy reproduce || code=$$?; genpolicy gates summary || true; exit $$code
+	@code=0; python -m genpolicy reproduce || code=$$?; python -m genpolicy gates summary || true; exit $$code
 
 smoke: env
-	@genpolicy workspace build/smoke --overrides params.smoke.yaml; \
-	code=0; genpolicy reproduce --workspace build/smoke || code=$$?; \
-	(cd build/smoke && genpolicy gates summary) || true; \
+	@python -m genpolicy workspace build/smoke --overrides params.smoke.yaml; \
+	code=0; python -m genpolicy reproduce --workspace build/smoke || code=$$?; \
+	(cd build/smoke && python -m genpolicy gates summary) || true; \
 	echo "This was the smoke ladder, in build/smoke; open build/smoke/reports/index.html"; exit $$code
 
 test: env
@@ -77,7 +77,7 @@ lint: env
 	mypy || code=1; lint-imports --no-logo || code=1; exit $$code
 
 doctor: env
-	@genpolicy doctor
+	@python -m genpolicy doctor
 
 clean:
 	rm -rf build artifacts .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

@@ -5,16 +5,12 @@ import json
 import subprocess
 import sys
 from pathlib import Path
-from typing import get_args
 
 import pytest
 import yaml
 
-from genpolicy.cli.commands import Format
 from genpolicy.cli.main import main
-from genpolicy.cli.progress import ProgressLine
 from genpolicy.data.dataset import load_dataset
-from genpolicy.data.formats import FORMATS
 
 
 @pytest.fixture(scope="session")
@@ -105,15 +101,6 @@ def test_a_fault_of_ours_is_code_one(tmp_path, capsys, monkeypatch):
     assert "fault of genpolicy" in capsys.readouterr().err
 
 
-def test_without_a_command_it_says_how(capsys):
-    assert main([]) == 2
-    assert "Commands:" in capsys.readouterr().err
-
-
-def test_the_layouts_of_the_option_are_those_that_are_known():
-    assert get_args(get_args(Format)[0]) == FORMATS
-
-
 def test_the_module_runs():
     done = subprocess.run(
         [sys.executable, "-m", "genpolicy", "ingest", "--help"],
@@ -121,15 +108,3 @@ def test_the_module_runs():
     )  # fmt: skip
     assert done.returncode == 0
     assert "Examples:" in done.stdout
-
-
-def test_progress_prints_few_lines_in_a_log(capsys):
-    now = [0.0]
-    line = ProgressLine("episodes", clock=lambda: now[0])
-    for done in range(1, 101):
-        now[0] += 0.5
-        line(done, 100)
-    line.close()
-    printed = capsys.readouterr().err.splitlines()
-    assert 3 <= len(printed) <= 6
-    assert printed[0] == "episodes: 20 of 100"

@@ -18,6 +18,7 @@ from genpolicy.cli.main import main
 from genpolicy.cli.shell import GROUP, loaded
 
 COLUMNS = 80
+NAMED = r"(?:^|[`(&] ?|@|-m )genpolicy ([a-z][a-z -]*)"
 OWN = {"propose", "ingest", "doctor"}
 # Not pydantic: the library of the command line reads options with it.
 HEAVY = {
@@ -122,7 +123,9 @@ def test_the_documents_name_only_commands_that_there_are() -> None:
     known = {" ".join(words) for words in every_command()}
     groups = {"gates", "verify"}
     for path in (ROOT / "README.md", ROOT / "Makefile", *(ROOT / "docs").glob("*.md")):
-        for line in re.findall(r"(?:^|[`(&] ?|@)genpolicy ([a-z][a-z -]*)", path.read_text(), re.M):
+        for line in re.findall(
+            r"(?:^|[`(&] ?|@|-m )genpolicy ([a-z][a-z -]*)", path.read_text(), re.M
+        ):
             words = line.split()
             name = " ".join(words[:2]) if words[0] in groups and len(words) > 1 else words[0]
             assert name in known, f"{path.name}: genpolicy {line}"
