@@ -14,7 +14,7 @@
 # An end of `make ladder`: 0 the ladder ran to its end, gate E's report included; otherwise make
 # prints "Error 3" (refused by a gate, the table says which), "Error 2" (bad configuration or
 # input) or "Error 1" (a fault of ours). make itself always turns these into its own code 2;
-# scripts that need the code call `python -m flows.reproduce`.
+# scripts that need the code call `genpolicy reproduce`.
 
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
@@ -60,12 +60,12 @@ env:
 	echo "$(WANTED)" > $(VENV)/.ok
 
 ladder: env
-	@code=0; python -m flows.reproduce || code=$$?; python -m gates summary || true; exit $$code
+	@code=0; python -m genpolicy reproduce || code=$$?; python -m genpolicy gates summary || true; exit $$code
 
 smoke: env
-	@python -m flows.workspace build/smoke --overrides params.smoke.yaml; \
-	code=0; python -m flows.reproduce --workspace build/smoke || code=$$?; \
-	(cd build/smoke && python -m gates summary) || true; \
+	@python -m genpolicy workspace build/smoke --overrides params.smoke.yaml; \
+	code=0; python -m genpolicy reproduce --workspace build/smoke || code=$$?; \
+	(cd build/smoke && python -m genpolicy gates summary) || true; \
 	echo "This was the smoke ladder, in build/smoke; open build/smoke/reports/index.html"; exit $$code
 
 test: env
@@ -77,7 +77,7 @@ lint: env
 	mypy || code=1; lint-imports --no-logo || code=1; exit $$code
 
 doctor: env
-	@python -m genpolicy.doctor
+	@python -m genpolicy doctor
 
 clean:
 	rm -rf build artifacts .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

@@ -5,12 +5,11 @@ judge. So no verdict depends on a server, and `dvc repro` alone ends at the same
 are for faults of the machine only: a refusal or a bad input does not become better by itself.
 """
 
-import argparse
 import os
 import sys
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -39,7 +38,8 @@ from flows.reproduce import (  # noqa: E402
     reproduce,
     stop_all,
 )
-from genpolicy.errors import GenpolicyError  # noqa: E402
+from genpolicy.cli.shell import run_program  # noqa: E402
+from genpolicy.errors import ConfigError  # noqa: E402
 from genpolicy.integrity.documents import read_yaml  # noqa: E402
 
 GATES = ("a", "b", "c", "d", "e")
@@ -108,7 +108,7 @@ def stages_by_gate(pipeline: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
         Stages by letter of the gate that judges them; the gate's own stage is the last.
 
     Raises:
-        ValueError: A stage follows the last gate, so that no gate would judge it.
+        ConfigError: A stage follows the last gate, so that no gate would judge it.
     """
     result: dict[str, tuple[str, ...]] = {}
     pending: list[str] = []
@@ -118,7 +118,12 @@ def stages_by_gate(pipeline: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
             result[name.removeprefix("gate_")] = tuple(pending)
             pending = []
     if pending:
-        raise ValueError(f"dvc.yaml lists {', '.join(pending)} behind the last gate")
+        raise ConfigError(
+            where="dvc.yaml",
+            found=f"with {', '.join(pending)} behind the last gate",
+            expected="every stage before the gate that judges it",
+            action="Move them, or add the gate.",
+        )
     return result
 
 
@@ -230,16 +235,8 @@ def server_answers(url: str, *, timeout_s: float = FIRST_ANSWER_S) -> bool:
         return False
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def run_ladder(workspace: Path) -> int:
     """Run the ladder as a flow, here and now; returns the exit code."""
-    parser = argparse.ArgumentParser(
-        prog="python -m flows.ladder",
-        description="Run the ladder as Prefect flows. Without PREFECT_API_URL a temporary server "
-        "is started. Exit codes: 0 done, 1 a fault, 2 bad input, 3 refused by a gate.",
-        epilog="Example: python -m flows.ladder --workspace build/smoke",
-    )
-    parser.add_argument("--workspace", type=Path, default=Path(), help="folder with dvc.yaml")
-    options = parser.parse_args(arguments)
     url = server_url()
     if url and not server_answers(url):
         print(
@@ -249,16 +246,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
             file=sys.stderr,
         )
         return EXIT_FAULT
-    try:
-        plan = stages_by_gate(read_yaml(options.workspace / "dvc.yaml"))
-    except (GenpolicyError, ValueError) as error:
-        print(error, file=sys.stderr)
-        return EXIT_BAD_INPUT
+    plan = stages_by_gate(read_yaml(workspace / "dvc.yaml"))
     if unknown := sorted(set(plan) - set(GATES)):
-        print(f"dvc.yaml has the gates {unknown}, expected only {GATES}.", file=sys.stderr)
-        return EXIT_BAD_INPUT
+        raise ConfigError(
+            where="dvc.yaml",
+            found=f"with the gates {', '.join(unknown)}",
+            expected=f"only {', '.join(GATES)}",
+            action="Correct the names of the stages.",
+        )
     try:
-        state = ladder(str(options.workspace.resolve()), return_state=True)
+        state = ladder(str(workspace.resolve()), return_state=True)
     finally:
         stop_all()
     if state.is_completed():
@@ -305,4 +302,4 @@ def _leave(url: str) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run_program("flows.commands:ladder", "python -m flows.ladder"))

@@ -5,7 +5,6 @@ so that a refusal (3), a bad input (2) and a fault (1) stay apart. `python -m fl
 runs the whole ladder, or the stages named, without any server.
 """
 
-import argparse
 import contextlib
 import os
 import re
@@ -17,6 +16,9 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+
+from genpolicy.cli.shell import run_program
+from genpolicy.errors import BadInputError
 
 EXIT_DONE, EXIT_FAULT, EXIT_BAD_INPUT, EXIT_REFUSED = 0, 1, 2, 3
 KEPT_LINES = 400
@@ -40,7 +42,7 @@ _running: set["subprocess.Popen[str]"] = set()
 
 
 @dataclass(frozen=True)
-class Outcome:
+class RunEnd:
     """How a `dvc repro` ended.
 
     Attributes:
@@ -65,7 +67,7 @@ def reproduce(
     single_item: bool = False,
     force: bool = False,
     echo: Callable[[str], None] = print,
-) -> Outcome:
+) -> RunEnd:
     """Run `dvc repro` in `workspace` and say how it ended.
 
     Args:
@@ -76,7 +78,7 @@ def reproduce(
         echo: Called with every line that DVC and the stages print.
 
     Returns:
-        The outcome. Nothing is raised for a stage that fails: that is an answer.
+        How it ended. Nothing is raised for a stage that fails: that is an answer.
     """
     command = [sys.executable, "-m", "dvc", "repro", *stages]
     command += ["--single-item"] if single_item else []
@@ -141,33 +143,24 @@ def stop_all() -> None:
         stop_group(process)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Bring the ladder, or some stages of it, up to date; returns the exit code."""
-    parser = argparse.ArgumentParser(
-        prog="python -m flows.reproduce",
-        description="Run `dvc repro` and leave with 0 done, 1 a fault of ours, 2 bad input, "
-        "3 refused by a gate.",
-        epilog="Example: python -m flows.reproduce --workspace build/smoke gate_c",
-    )
-    parser.add_argument("stages", nargs="*", help="stages to bring up to date; default: all")
-    parser.add_argument("--workspace", type=Path, default=Path(), help="folder with dvc.yaml")
-    parser.add_argument("--single-item", action="store_true", help="not what they depend on")
-    parser.add_argument("--force", action="store_true", help="run also where nothing changed")
-    options = parser.parse_args(arguments)
-    if not (options.workspace / "dvc.yaml").is_file():
-        print(
-            f"{options.workspace} is a folder without dvc.yaml, expected a workspace of the "
-            "ladder. Name one with --workspace.",
-            file=sys.stderr,
+def reproduce_here(
+    workspace: Path, *, stages: Sequence[str] = (), single_item: bool = False, force: bool = False
+) -> int:
+    """`reproduce` for a person at a terminal: prints as it goes, ends with the exit code."""
+    if not (workspace / "dvc.yaml").is_file():
+        raise BadInputError(
+            where=str(workspace),
+            found="a folder without dvc.yaml",
+            expected="a workspace of the ladder",
+            action="Name one with --workspace.",
         )
-        return EXIT_BAD_INPUT
     signal.signal(signal.SIGTERM, _interrupt)
     try:
         outcome = reproduce(
-            options.workspace,
-            stages=options.stages,
-            single_item=options.single_item,
-            force=options.force,
+            workspace,
+            stages=stages,
+            single_item=single_item,
+            force=force,
             echo=lambda line: print(line, flush=True),
         )
     except KeyboardInterrupt:
@@ -182,9 +175,9 @@ def _interrupt(number: int, frame: object) -> None:
     raise KeyboardInterrupt
 
 
-def _outcome(dvc_code: int, lines: list[str], duration_s: float) -> Outcome:
+def _outcome(dvc_code: int, lines: list[str], duration_s: float) -> RunEnd:
     if dvc_code == 0:
-        return Outcome(EXIT_DONE, "", "", infrastructure=False, duration_s=duration_s)
+        return RunEnd(EXIT_DONE, "", "", infrastructure=False, duration_s=duration_s)
     text = "\n".join(lines)
     match = next(reversed(list(FAILED_STAGE.finditer(text))), None)
     errors = [line.removeprefix("ERROR: ") for line in lines if line.startswith("ERROR: ")]
@@ -195,17 +188,17 @@ def _outcome(dvc_code: int, lines: list[str], duration_s: float) -> Outcome:
         rejected = not transient and DVC_REJECTS.search("\n".join(errors)) is not None
         sentence = errors[-1] if errors else f"dvc repro ended with code {dvc_code}"
         code = EXIT_BAD_INPUT if rejected else EXIT_FAULT
-        return Outcome(code, "", sentence, infrastructure=transient, duration_s=duration_s)
+        return RunEnd(code, "", sentence, infrastructure=transient, duration_s=duration_s)
     stage, stage_code = match["stage"], int(match["code"])
     said = [line for line in lines if line.startswith(f"{stage}: ")]
     sentence = said[-1] if said else f"{stage} ended with code {stage_code}"
     if stage_code in (EXIT_BAD_INPUT, EXIT_REFUSED):
         full_disk = stage_code == EXIT_BAD_INPUT and INFRASTRUCTURE.search(sentence) is not None
-        return Outcome(stage_code, stage, sentence, full_disk, duration_s)
+        return RunEnd(stage_code, stage, sentence, full_disk, duration_s)
     # A shell reports a process that a signal ended as 128 + signal (137: killed for memory).
     transient = stage_code < 0 or stage_code > 128 or INFRASTRUCTURE.search(text) is not None
-    return Outcome(EXIT_FAULT, stage, sentence, transient, duration_s)
+    return RunEnd(EXIT_FAULT, stage, sentence, transient, duration_s)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run_program("flows.commands:reproduce", "python -m flows.reproduce"))

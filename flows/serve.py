@@ -1,26 +1,15 @@
 """Serve the ladder as a Prefect deployment: start it from the interface, or by a schedule."""
 
-import argparse
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 
 from flows.ladder import FIRST_ANSWER_S, ladder, server_answers, server_url
 from flows.reproduce import EXIT_FAULT
+from genpolicy.cli.shell import run_program
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def serve_ladder(name: str, *, workspace: Path, cron: str | None) -> int:
     """Serve until interrupted; returns the exit code."""
-    parser = argparse.ArgumentParser(
-        prog="python -m flows.serve",
-        description="Serve the ladder as a deployment of a running Prefect server "
-        "(PREFECT_API_URL). One run at a time: a workspace has one writer.",
-        epilog="Example: python -m flows.serve --cron '0 3 * * *'",
-    )
-    parser.add_argument("--name", default="ladder", help="name of the deployment")
-    parser.add_argument("--workspace", type=Path, default=Path(), help="folder with dvc.yaml")
-    parser.add_argument("--cron", default=None, help="schedule; default: started by hand")
-    options = parser.parse_args(arguments)
     url = server_url()
     if not url or not server_answers(url):
         print(
@@ -31,9 +20,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         )
         return EXIT_FAULT
     ladder.serve(
-        name=options.name,
-        parameters={"workspace": str(options.workspace.resolve())},
-        cron=options.cron,
+        name=name,
+        parameters={"workspace": str(workspace.resolve())},
+        cron=cron,
         limit=1,
         print_starting_message=True,
     )
@@ -41,4 +30,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run_program("flows.commands:serve", "python -m flows.serve"))

@@ -5,20 +5,19 @@ nothing in the code asks whether it runs "small", and the outputs of the checkou
 are. Making it again brings only differences over: what did not change stays up to date for DVC.
 """
 
-import argparse
 import configparser
 import io
 import json
-import os
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-from genpolicy.errors import BadInputError, ConfigError, GenpolicyError
+from genpolicy.cli.shell import run_program
+from genpolicy.errors import BadInputError, ConfigError
 from genpolicy.integrity.atomic import write_bytes
 from genpolicy.integrity.documents import read_json, read_yaml
 
@@ -102,26 +101,6 @@ def declared_outputs(pipeline: Mapping[str, Any]) -> tuple[str, ...]:
             for entry in stage.get(kind) or ():
                 names += [entry] if isinstance(entry, str) else list(entry)
     return tuple(names)
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Make or refresh a workspace; returns the exit code."""
-    parser = argparse.ArgumentParser(
-        prog="python -m flows.workspace",
-        description="Make or refresh a separate workspace of the ladder.",
-        epilog="Example: python -m flows.workspace build/smoke --overrides params.smoke.yaml",
-    )
-    parser.add_argument("target", type=Path, help="folder to make or refresh")
-    parser.add_argument("--overrides", type=Path, required=True, help="YAML with other values")
-    parser.add_argument("--source", type=Path, default=Path(), help="the checkout; default: here")
-    options = parser.parse_args(arguments)
-    try:
-        target = make_workspace(options.source, options.target, options.overrides)
-    except GenpolicyError as error:
-        print(error, file=sys.stderr)
-        return error.exit_code
-    print(f"Workspace {os.path.relpath(target)} is up to date with {options.overrides}.")
-    return 0
 
 
 def _mapping(path: Path) -> dict[str, Any]:
@@ -209,4 +188,4 @@ def _is_inside(folder: Path, name: str) -> bool:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run_program("flows.commands:workspace", "python -m flows.workspace"))

@@ -40,6 +40,7 @@ SPECS: dict[Gate, GateSpec] = {
     "E": card.GATE,
 }
 STAGE_REQUIRES: dict[str, Gate | None] = {
+    "task": None,
     "record": None,
     "ingest": None,
     "audit": None,

@@ -1,4 +1,4 @@
-"""`python -m genpolicy.doctor`: is this machine, and this environment, fit to run the ladder?
+"""`genpolicy doctor`: is this machine, and this environment, fit to run the ladder?
 
 Standard library only, so that it can still speak when the environment is broken. Every finding
 says what to do. Exit code 0 when nothing is wrong (a warning is not wrong), else 2.
@@ -231,18 +231,10 @@ def examine(root: Path) -> list[Finding]:
     return findings
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Print the findings; returns the exit code."""
-    parser = argparse.ArgumentParser(
-        prog="python -m genpolicy.doctor",
-        description="Check this machine and environment. Exit codes: 0 fit, 2 something is wrong.",
-        epilog="Example: python -m genpolicy.doctor --json",
-    )
-    parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
-    parser.add_argument("--root", type=Path, default=Path(), help="the checkout; default: here")
-    options = parser.parse_args(arguments)
-    findings = examine(options.root)
-    if options.json:
+def report(root: Path, *, as_json: bool) -> int:
+    """Print the findings on the checkout `root`; returns the exit code."""
+    findings = examine(root)
+    if as_json:
         print(json.dumps([asdict(finding) for finding in findings], indent=2, ensure_ascii=False))
     else:
         width = max(len(finding.item) for finding in findings)
@@ -251,6 +243,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
             if finding.action:
                 print(f"{'':{width + 10}}{finding.action}")
     return 2 if any(finding.state == WRONG for finding in findings) else 0
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """`genpolicy doctor` without the library of the command line, which may be what is broken."""
+    parser = argparse.ArgumentParser(
+        prog="python -m genpolicy.doctor",
+        description="Check this machine and environment. Exit codes: 0 fit, 2 something is wrong.",
+        epilog="Example: python -m genpolicy.doctor --json",
+    )
+    parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
+    parser.add_argument("--root", type=Path, default=Path(), help="the checkout; default: here")
+    options = parser.parse_args(arguments)
+    return report(options.root, as_json=options.json)
 
 
 def _versions(root: Path, installed: Mapping[str, str]) -> Finding:

@@ -1,9 +1,14 @@
+import importlib
 import json
+import re
+import sys
 from pathlib import Path
 
 import pytest
 
 from genpolicy import doctor
+from genpolicy.cli import commands
+from genpolicy.cli.shell import run_program
 
 
 def test_pins_are_read_in_one_spelling() -> None:
@@ -101,3 +106,26 @@ def test_the_table_the_json_and_the_exit_code_agree(
     assert doctor.main(["--root", str(tmp_path)]) == 2
     table = capsys.readouterr().out
     assert all(finding["item"] in table for finding in findings)
+
+
+def test_with_or_without_the_library_of_the_command_line_it_is_one_command(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    printed = []
+    for run in (doctor.main, lambda words: run_program(commands.doctor, "doctor", words)):
+        for words in (["--json"], []):
+            assert run([*words, "--root", str(tmp_path)]) == 2
+            printed.append(re.sub(r"[\d.]+ GiB", "GiB", capsys.readouterr().out))
+    assert printed[:2] == printed[2:]
+
+
+def test_the_program_without_its_library_still_examines(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in [name for name in sys.modules if name.startswith(("typer", "genpolicy.cli."))]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "typer", None)
+    assert importlib.import_module("genpolicy.cli.main").main(["doctor"]) == 2
+    printed = capsys.readouterr()
+    assert "the environment is not whole" in printed.err
+    assert "python" in printed.out

@@ -4,11 +4,11 @@ The audit measures; the cause is named by `gates.cause`, the same function as in
 limits of a `params.yaml` or the packaged ones.
 """
 
-import argparse
 import os
 import shutil
 import sys
 import time
+from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ from genpolicy.audit.evidence import write_evidence
 from genpolicy.audit.propose import propose_settings
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.audit.standalone import AuditReport, audit
-from genpolicy.cli.ingest import add_input, given_contract
+from genpolicy.cli.ingest import Recordings, given_contract
 from genpolicy.cli.progress import ProgressLine
 from genpolicy.cli.remember import Answers, remembered_admissible, remembered_replay
 from genpolicy.cli.resume import DATASET, fingerprint, kept_or_new, work_folder
@@ -35,44 +35,23 @@ from genpolicy.pages.audit.evidence import read_evidence
 from genpolicy.pages.audit.page import audit_page
 from genpolicy.pages.audit.words import TITLES
 
-EXAMPLES = """examples:
-  genpolicy audit recordings/ --out audit/              # whatever they are
-  genpolicy audit recordings/ --contract contract.yaml --out audit/
-  genpolicy audit dataset/ --out audit/                 # what `genpolicy ingest` wrote
-
-writes audit.html (read this), audit.json, contract.yaml (what was guessed; correct it and give
-it back), evidence/ and dataset/. The exit code is 0 whatever the verdict: it was measured.
-"""
 DOCUMENT, PAGE, CONTRACT, EVIDENCE = "audit.json", "audit.html", "contract.yaml", "evidence"
 SHOWN_REFUSALS = 5
 
 
-def add(verbs: "argparse._SubParsersAction[Any]") -> None:
-    """Add the verb `audit`."""
-    parser = verbs.add_parser(
-        "audit",
-        help="name the cause of different actions under one observation",
-        description="Audit recordings: do they hold several valid actions under one observation, "
-        "or is a variable hidden, the data broken, a label wrong?",
-        epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    add_input(parser)
-    parser.add_argument("--out", type=Path, required=True, help="folder to write, or to replace")
-    parser.add_argument(
-        "--limits",
-        type=Path,
-        metavar="PARAMS",
-        help="params.yaml whose gate_a section holds the limits (default: the packaged ones)",
-    )
-    parser.add_argument("--seed", type=int, default=0, help="root of all random draws (default: 0)")
-    parser.set_defaults(run=run)
+@dataclass(frozen=True)
+class AuditOptions(Recordings):
+    """What the command takes: recordings, where to write, limits, and the root of all draws."""
+
+    out: Path = Path("audit")
+    limits: Path | None = None
+    seed: int = 0
 
 
-def run(options: argparse.Namespace) -> int:
+def run_audit(options: AuditOptions) -> int:
     """Import, audit, write everything or nothing, and print the verdict."""
     began_s = time.monotonic()
-    out: Path = options.out
+    out = options.out
     check_output(options.path, out)
     limits = given_limits(options.limits)
     work = work_folder(out)
@@ -227,7 +206,7 @@ def _block(title: str, texts: tuple[str, ...]) -> list[str]:
 
 
 def _audited(
-    options: argparse.Namespace,
+    options: AuditOptions,
     dataset: Dataset,
     settings: AuditSettings,
     checks: TaskChecks,
@@ -260,7 +239,7 @@ def _audited(
             line.close()
 
 
-def _opened(options: argparse.Namespace, work: Path) -> Opened:
+def _opened(options: AuditOptions, work: Path) -> Opened:
     """The recordings as a dataset: kept from an interrupted audit, or imported now."""
     contract = given_contract(options)
     progress = ProgressLine("episodes")

@@ -1,21 +1,7 @@
-"""The command `genpolicy`: one verb per step, one line per error, one meaning per exit code.
+"""The program `genpolicy`: the commands of this package, and those that others register."""
 
-0 done, 1 a fault of ours, 2 bad configuration or bad input, 3 refused by a gate.
-"""
-
-import argparse
 import sys
-import traceback
 from collections.abc import Sequence
-
-from genpolicy.cli.registry import COMMANDS
-from genpolicy.errors import GenpolicyError
-
-DESCRIPTION = (
-    "Import recordings of one's own and audit them: is there a need for a generator, and if not, "
-    "what is wrong with the data?"
-)
-INTERRUPTED = 130
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -27,24 +13,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         The exit code.
     """
-    parser = argparse.ArgumentParser(prog="genpolicy", description=DESCRIPTION)
-    verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
-    for command in COMMANDS:
-        command.add(verbs)
-    options = parser.parse_args(arguments)
+    words = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        return int(options.run(options))
-    except GenpolicyError as error:
-        print(f"genpolicy {options.verb}: {error}", file=sys.stderr)
-        return error.exit_code
-    except KeyboardInterrupt:
-        print(f"genpolicy {options.verb}: interrupted; nothing was written", file=sys.stderr)
-        return INTERRUPTED
-    except Exception:
-        traceback.print_exc()
-        print(
-            f"genpolicy {options.verb}: this is a fault of genpolicy, not of your input. "
-            "Report the lines above.",
-            file=sys.stderr,
-        )
-        return 1
+        from genpolicy.cli.commands import program  # noqa: PLC0415 - typer may be what is broken
+    except ImportError as error:
+        if error.name is not None and error.name.startswith("genpolicy"):
+            raise
+        from genpolicy import doctor  # noqa: PLC0415
+
+        print(f"genpolicy: {error}; the environment is not whole:", file=sys.stderr)
+        doctor.main(["--json"] if "--json" in words else [])
+        return 2
+    return program(words)

@@ -21,8 +21,6 @@ Array = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
 TCP_SITE = "tcp"  # MJCF convention: the site at the tool centre point
-CONDITION_SLOW = 17.0  # MoveIt Servo default `lower_singularity_threshold`; a default, not "safe"
-CONDITION_HARD_STOP = 30.0  # MoveIt Servo default `hard_stop_singularity_threshold`
 DAMPING = 1e-3
 STEP_LIMIT_RAD = 0.5
 ITERATIONS = 40

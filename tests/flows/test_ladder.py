@@ -9,13 +9,14 @@ import pytest
 
 from flows import ladder
 from flows.workspace import make_workspace
+from genpolicy.errors import ConfigError
 
 
 def test_stages_are_cut_behind_every_gate() -> None:
     names = ("record", "audit", "gate_a", "shadow", "gate_b")
     plan = ladder.stages_by_gate({"stages": dict.fromkeys(names)})
     assert plan == {"a": ("record", "audit", "gate_a"), "b": ("shadow", "gate_b")}
-    with pytest.raises(ValueError, match="stress behind the last gate"):
+    with pytest.raises(ConfigError, match="stress behind the last gate"):
         ladder.stages_by_gate({"stages": dict.fromkeys((*names, "stress"))})
 
 

@@ -7,8 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from flows.reproduce import _outcome, main, reproduce, stop_group
+from flows import commands
+from flows.reproduce import _outcome, reproduce, stop_group
 from flows.workspace import make_workspace
+from genpolicy.cli.shell import run_program
+
+
+def main(arguments: list[str]) -> int:
+    return run_program(commands.reproduce, "reproduce", arguments)
 
 
 def runs(workspace: Path) -> list[str]:
@@ -116,5 +122,6 @@ def test_a_stop_ends_the_stage_that_dvc_started_too(tmp_path: Path) -> None:
 
 def test_driving_the_ladder_without_a_server_does_not_load_prefect() -> None:
     assert importlib.util.find_spec("prefect") is not None
-    code = "import sys, flows.reproduce, flows.workspace; sys.exit('prefect' in sys.modules)"
+    modules = "flows.reproduce, flows.workspace, flows.commands"
+    code = f"import sys, {modules}; sys.exit('prefect' in sys.modules)"
     subprocess.run([sys.executable, "-c", code], env=dict(os.environ), check=True)

@@ -4,7 +4,9 @@ from pathlib import Path
 import pytest
 import yaml
 
-from flows.workspace import declared_outputs, main, make_workspace, merged
+from flows import commands
+from flows.workspace import declared_outputs, make_workspace, merged
+from genpolicy.cli.shell import run_program
 from genpolicy.errors import BadInputError, ConfigError
 
 
@@ -83,6 +85,6 @@ def test_the_command_names_the_bad_key_and_ends_with_2(
     overrides.write_text("record: {valeu: 1}\n")
     target = tmp_path / "target"
     arguments = [str(target), "--overrides", str(overrides), "--source", str(checkout)]
-    assert main(arguments) == 2
+    assert run_program(commands.workspace, "workspace", arguments) == 2
     assert "override record.valeu is not a key of params.yaml" in capsys.readouterr().err
     assert not target.exists()

@@ -43,7 +43,6 @@ from genpolicy.tasks.api import ENTRY_POINT_GROUP, Task, load_task
 
 LOOKED_AT = 5
 MAXIMUM_AGE_S = 0.3
-PHASE_AGE_S = 60.0
 FROZEN = {"seconds": 0.5, "motion": 0.01}
 # Metadata that every recording carries; see genpolicy.data.recording.episode.REQUIRED_METADATA.
 LABELS = Labels(

@@ -37,7 +37,6 @@ LONGEST_GAP_S = 0.25
 LONGEST_GAP_ROWS = 3.0
 FROZEN_S = 2.0
 FROZEN_SHARE = 0.1
-EPOCH_S = 1e6
 TIME_UNITS = {"ns": 1e9, "us": 1e6, "ms": 1e3}
 ACTION_WORDS = (("action", "actions"), ("command", "cmd", "commanded"), ("target", "goal"))
 

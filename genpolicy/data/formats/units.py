@@ -1,8 +1,6 @@
 """Which unit is this number in? A guess from its name and its range, never more than a guess."""
 
 import re
-from collections.abc import Sequence
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,12 +100,6 @@ def _angle(largest: float) -> str:
     if largest <= TURNS_RAD:
         return "rad"
     return "deg" if largest <= DEGREES else UNKNOWN_UNIT
-
-
-def runs_of_one_unit(units: Sequence[str]) -> list[tuple[int, int]]:
-    """Half-open runs of equal neighbours: what may stand in one channel."""
-    edges = [0, *(i for i in range(1, len(units)) if units[i] != units[i - 1]), len(units)]
-    return list(pairwise(edges))
 
 
 def is_wrapped_angle(values: Array, episode: NDArray[np.int64]) -> bool:

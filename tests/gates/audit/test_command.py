@@ -8,6 +8,7 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+import yaml
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "audit"))
 
@@ -24,6 +25,7 @@ from genpolicy.data.formats.contract import load_contract
 from genpolicy.integrity.documents import read_json
 from genpolicy.tasks.api import load_task
 
+ROOT = Path(__file__).parents[3]
 OUTPUTS = {"audit.json", "audit.html", "contract.yaml", "evidence", "dataset"}
 
 
@@ -106,7 +108,9 @@ def test_everything_is_written_and_again_the_same(recordings, tmp_path, capsys):
 
 @pytest.mark.usefixtures("unaudited")
 def test_limits_that_are_none_are_refused_before_the_audit(recordings, tmp_path, capsys):
-    (tmp_path / "params.yaml").write_text("gate_a: {thresholds: {}, cause: {}}\n")
+    params = yaml.safe_load((ROOT / "params.yaml").read_text())
+    del params["gate_a"]["limits"]["perception"]["clock_residual_s"]
+    (tmp_path / "params.yaml").write_text(yaml.safe_dump(params))
     assert run(recordings, tmp_path / "a", "--limits", str(tmp_path / "params.yaml")) == 2
     assert "clock_residual_s is missing" in capsys.readouterr().err
 

@@ -1,34 +1,44 @@
 """The command line: exit codes, one-sentence errors, no traceback."""
 
 import json
+from dataclasses import dataclass
 
 import evidence
 import pytest
-from typer.testing import CliRunner
 
-from gates.__main__ import app
+from gates.commands import gates
 from gates.proof import STAGE_REQUIRES
+from genpolicy.cli.shell import run_program
 
-RUN = CliRunner()
+
+@dataclass(frozen=True)
+class Result:
+    exit_code: int
+    output: str
 
 
-def _run(root, *args):
-    return RUN.invoke(app, [*args, "--root", str(root)])
+@pytest.fixture
+def _run(capsys):
+    def run(root, *args):
+        code = run_program(gates, "gates", [*args, "--root", str(root)])
+        printed = capsys.readouterr()
+        return Result(code, printed.out + printed.err)
+
+    return run
 
 
 def _clean(result):
     assert "Traceback" not in result.output
-    assert result.exception is None or isinstance(result.exception, SystemExit)
 
 
-def test_check_passes_through_d_and_not_through_e(ladder):
+def test_check_passes_through_d_and_not_through_e(ladder, _run):
     assert _run(ladder, "check").exit_code == 0
     result = _run(ladder, "check", "--through", "E")
     assert result.exit_code == 1
     assert "NOT JUDGED" in result.output
 
 
-def test_summary_prints_one_line_per_stage_and_exits_0(ladder):
+def test_summary_prints_one_line_per_stage_and_exits_0(ladder, _run):
     result = _run(ladder, "summary")
     assert result.exit_code == 0
     stages = [line.split()[0] for line in result.output.splitlines()[1 : 1 + len(STAGE_REQUIRES)]]
@@ -41,7 +51,7 @@ def test_summary_prints_one_line_per_stage_and_exits_0(ladder):
     assert [verdicts[f"gate_{letter}"] for letter in "abcd"] == ["PASS"] * 4
 
 
-def test_verify_finds_a_changed_byte(ladder):
+def test_verify_finds_a_changed_byte(ladder, _run):
     assert _run(ladder, "verify").exit_code == 0
     file = ladder / "artifacts/reload/identity.json"
     file.write_bytes(file.read_bytes() + b" ")
@@ -51,21 +61,21 @@ def test_verify_finds_a_changed_byte(ladder):
     assert "identity.json" in result.output
 
 
-def test_show_and_judge(ladder):
+def test_show_and_judge(ladder, _run):
     assert "Gate C: PASS" in _run(ladder, "show", "C").output
     result = _run(ladder, "judge", "A")
     assert result.exit_code == 0 and "Gate A: PASS" in result.output
     assert json.loads(_run(ladder, "show", "A", "--json").output)["gate"] == "A"
 
 
-def test_judge_exits_0_on_fail(ladder):
+def test_judge_exits_0_on_fail(ladder, _run):
     evidence.edit_table(ladder, "audit/clocks.parquet", lambda f: f.assign(offset_after_s=0.5))
     result = _run(ladder, "judge", "A")
     assert result.exit_code == 0
     assert "Gate A: FAIL. clock_residual_s: 0.5, required <= 0.01" in result.output
 
 
-def test_verify_card_waits_for_people(ladder):
+def test_verify_card_waits_for_people(ladder, _run):
     result = _run(ladder, "verify-card")
     assert result.exit_code == 3
     assert "PENDING_REVIEW" in result.output
@@ -82,14 +92,14 @@ def test_verify_card_waits_for_people(ladder):
         (("sign", "--card", "c.json", "--key", "k", "--reviewer", "Eve"), 3),
     ],
 )
-def test_errors_are_one_sentence_with_their_exit_code(tmp_path, args, code):
+def test_errors_are_one_sentence_with_their_exit_code(tmp_path, args, code, _run):
     result = _run(tmp_path, *args)
     _clean(result)
     assert result.exit_code == code
     assert len(result.output.strip().splitlines()) == 1
 
 
-def test_a_bad_settings_file_is_exit_2(repo):
+def test_a_bad_settings_file_is_exit_2(repo, _run):
     for text in ("gate_a: {limits: {x: 1}}", "gate_a: [", "gate_a: {a: 1, a: 2}", "x: 1"):
         (repo / "params.yaml").write_text(text)
         result = _run(repo, "judge", "A")

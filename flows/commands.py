@@ -1,0 +1,77 @@
+"""Commands that drive the ladder; registered in `genpolicy.commands`.
+
+`python -m flows.<name>` is the same as `genpolicy <name>`. Nothing heavy is imported here.
+"""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from genpolicy.cli.shell import with_examples
+
+Workspace = Annotated[Path, typer.Option(help="Folder with dvc.yaml.")]
+
+
+@with_examples("genpolicy reproduce gate_b", "genpolicy reproduce --workspace build/smoke gate_c")
+def reproduce(
+    stages: Annotated[
+        list[str] | None, typer.Argument(help="Stages to bring up to date; default: all.")
+    ] = None,
+    workspace: Workspace = Path(),
+    single_item: Annotated[
+        bool, typer.Option("--single-item", help="Not what they depend on.")
+    ] = False,
+    force: Annotated[bool, typer.Option("--force", help="Run also where nothing changed.")] = False,
+) -> int:
+    """Run `dvc repro`, and leave with a code that says why it ended.
+
+    0 done, 1 a fault of ours, 2 bad input, 3 refused by a gate.
+    """
+    from flows.reproduce import reproduce_here
+
+    return reproduce_here(workspace, stages=stages or (), single_item=single_item, force=force)
+
+
+@with_examples("genpolicy ladder --workspace build/smoke")
+def ladder(workspace: Workspace = Path()) -> int:
+    """Run the ladder as Prefect flows.
+
+    Without PREFECT_API_URL a temporary server is started. Exit codes: 0 done,
+    1 a fault, 2 bad input, 3 refused by a gate.
+    """
+    from flows.ladder import run_ladder
+
+    return run_ladder(workspace)
+
+
+@with_examples("genpolicy serve --cron '0 3 * * *'")
+def serve(
+    name: Annotated[str, typer.Option(help="Name of the deployment.")] = "ladder",
+    workspace: Workspace = Path(),
+    cron: Annotated[str | None, typer.Option(help="Schedule; default: started by hand.")] = None,
+) -> int:
+    """Serve the ladder as a deployment of a running Prefect server.
+
+    The server is that of PREFECT_API_URL. One run at a time: a workspace has
+    one writer.
+    """
+    from flows.serve import serve_ladder
+
+    return serve_ladder(name, workspace=workspace, cron=cron)
+
+
+@with_examples("genpolicy workspace build/smoke --overrides params.smoke.yaml")
+def workspace(
+    target: Annotated[Path, typer.Argument(help="Folder to make or refresh.")],
+    overrides: Annotated[Path, typer.Option(help="YAML with other values.")],
+    source: Annotated[Path, typer.Option(help="The checkout.")] = Path(),
+) -> int:
+    """Make or refresh a workspace with parameters of its own."""
+    import os
+
+    from flows.workspace import make_workspace
+
+    made = make_workspace(source, target, overrides)
+    print(f"Workspace {os.path.relpath(made)} is up to date with {overrides}.")
+    return 0

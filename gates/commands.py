@@ -1,0 +1,213 @@
+"""Commands of the gates: judge evidence, prove reports, sign and verify trial cards.
+
+Registered in `genpolicy.commands`. Exit codes: 0 done, 1 not every gate passes (`check`) or a
+fault of ours, 2 bad usage or input, 3 refused.
+"""
+
+import dataclasses
+import datetime
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from genpolicy.cli.commands import Contract, Format, Recordings, TaskName
+from genpolicy.cli.shell import AsJson, examples, new_app, with_examples
+from genpolicy.errors import BadInputError
+
+if TYPE_CHECKING:
+    from gates.proof import Rung
+    from gates.report import Gate
+
+INDEX = "reports/index.html"
+Root = Annotated[Path, typer.Option(help="Repository root.")]
+Letter = Annotated[str, typer.Argument(help="Gate: A, B, C, D or E.")]
+
+gates = new_app("Judge evidence, prove reports, sign and verify trial cards.")
+verify = new_app("Prove the reports that lie here, or judge the trial card.")
+
+
+@with_examples(
+    "genpolicy audit recordings/ --out audit/",
+    "genpolicy audit recordings/ --contract contract.yaml --out audit/",
+    "genpolicy audit dataset/ --out audit/",
+)
+def audit(
+    path: Recordings,
+    out: Annotated[Path, typer.Option(help="Folder to write, or to replace.")],
+    layout: Format = "auto",
+    contract: Contract = None,
+    task: TaskName = None,
+    limits: Annotated[
+        Path | None,
+        typer.Option(metavar="PARAMS", help="params.yaml whose gate_a holds the limits."),
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Root of all random draws.")] = 0,
+) -> int:
+    """Name the cause of different actions under one observation.
+
+    Do the recordings hold several valid actions under one observation, or is a
+    variable hidden, the data broken, a label wrong?
+
+    Writes audit.html (read this), audit.json, contract.yaml (what was guessed;
+    correct it and give it back), evidence/ and dataset/. The exit code is 0
+    whatever the verdict: it was measured.
+    """
+    from gates.audit.command import AuditOptions, run_audit
+
+    options = AuditOptions(path, layout, contract, task, out=out, limits=limits, seed=seed)
+    return run_audit(options)
+
+
+@gates.command(epilog=examples("genpolicy gates check --through C"))
+def check(
+    through: Annotated[str, typer.Option(help="Last gate that must pass.")] = "D",
+    root: Root = Path(),
+    as_json: AsJson = False,
+) -> int:
+    """Prove the chain. Exit 0 if every gate up to `--through` passes, else 1."""
+    from gates.proof import prove_all
+    from gates.report import GATES
+
+    last = _gate(through)
+    rungs = prove_all(root)[: GATES.index(last) + 1]
+    _print_rungs(rungs, as_json)
+    return int(any(rung.verdict != "PASS" for rung in rungs))
+
+
+@gates.command("verify", epilog=examples("genpolicy gates verify --json"))
+@verify.command("report", epilog=examples("genpolicy verify report --json"))
+def verify_reports(root: Root = Path(), as_json: AsJson = False) -> int:
+    """Hash all evidence, derive all verdicts again. Exit 2 or 3 if a report is untrue."""
+    from gates.proof import prove_all
+
+    rungs = [rung for rung in prove_all(root) if rung.verdict != "NOT JUDGED"]
+    if not rungs:
+        print("No report lies here. Run `dvc repro gate_a`.", file=sys.stderr)
+        return 3
+    _print_rungs(rungs, as_json)
+    return max((rung.exit_code for rung in rungs if rung.verdict == "REFUSED"), default=0)
+
+
+@gates.command(epilog=examples("genpolicy gates show C"))
+def show(letter: Letter, root: Root = Path(), as_json: AsJson = False) -> int:
+    """Print one report as it lies there, not proved."""
+    from gates.report import limit_text, measured_text, read_report
+
+    report, digest = read_report(root, _gate(letter))
+    if as_json:
+        print(report.model_dump_json(indent=2))
+        return 0
+    print(f"Gate {report.gate}: {report.verdict}  (report {digest[:12]}, not proved)")
+    print(f"Decision: {report.decision}")
+    if report.diagnosis:
+        print(f"Diagnosis: {report.diagnosis}")
+    for c in report.criteria:
+        name = f"{c.id} ({c.candidate})" if c.candidate else c.id
+        print(f"  {c.verdict:<14} {name}: {measured_text(c)}, required {limit_text(c)}")
+    return 0
+
+
+@gates.command(epilog=examples("genpolicy gates judge A"))
+def judge(letter: Letter, root: Root = Path()) -> int:
+    """Judge the evidence here, write the report. A FAIL exits 0 like any verdict."""
+    from gates.proof import decided_text
+    from gates.writing import write_gate
+
+    report = write_gate(root, _gate(letter))
+    print(f"Gate {report.gate}: {report.verdict}. {decided_text(report) or report.decision}")
+    return 0
+
+
+SIGN_EXAMPLE = "sign --card card.json --key my_key.pem --reviewer 'My Name'"
+
+
+@gates.command(epilog=examples(f"genpolicy gates {SIGN_EXAMPLE}"))
+@with_examples(f"genpolicy {SIGN_EXAMPLE}")
+def sign(
+    card: Annotated[Path, typer.Option(help="Completed card, or an envelope to sign as well.")],
+    key: Annotated[Path, typer.Option(help="Your private key, PEM, Ed25519.")],
+    reviewer: Annotated[str, typer.Option(help="Your name as on reviewers.yaml.")],
+    root: Root = Path(),
+) -> int:
+    """Add your signature to a trial card. Gates A to D are proved again before."""
+    from gates.card.signing import sign_card
+    from gates.proof import prove_chain
+
+    prove_chain(root, "D")
+    path = sign_card(root, card_file=card, key_file=key, reviewer=reviewer)
+    print(f"Signed {path.name} as {reviewer}. Judge gate E again to see what is missing.")
+    return 0
+
+
+@gates.command("verify-card", epilog=examples("genpolicy gates verify-card --today 2027-01-31"))
+@verify.command("card", epilog=examples("genpolicy verify card --today 2027-01-31"))
+def verify_card(
+    root: Root = Path(),
+    today: Annotated[str, typer.Option(help="Day to judge for, YYYY-MM-DD; default today.")] = "",
+    as_json: AsJson = False,
+) -> int:
+    """Judge gate E without writing. Exit 0 only for a valid, complete, signed card."""
+    from gates.proof import judge
+
+    report = judge(root, "E", today=_day(today) if today else None)
+    if as_json:
+        print(report.model_dump_json(indent=2))
+    else:
+        print(f"{report.verdict}: {report.decision}")
+        for c in report.criteria:
+            print(f"  {c.verdict:<14} {c.id}: {c.caveat}")
+    return 0 if report.verdict == "PASS" else 3
+
+
+@gates.command(epilog=examples("genpolicy gates summary --json"))
+def summary(root: Root = Path(), as_json: AsJson = False) -> int:
+    """The ladder in one table, each report proved; always exits 0."""
+    from gates.overview import as_text, overview
+    from gates.proof import prove_all
+
+    lines = overview(root, prove_all(root))
+    if as_json:
+        _print_rows(lines)
+        return 0
+    print(as_text(lines))
+    if (root / INDEX).is_file():
+        print(f"Reports: {INDEX}")
+    return 0
+
+
+def _gate(letter: str) -> "Gate":
+    from gates.report import GATES
+
+    for gate in GATES:
+        if letter.upper() in {gate, f"GATE_{gate}"}:
+            return gate
+    raise BadInputError(
+        where="gate", found=repr(letter), expected="A, B, C, D or E", action="Name one gate."
+    )
+
+
+def _print_rungs(rungs: "Sequence[Rung]", as_json: bool) -> None:
+    if as_json:
+        _print_rows(rungs)
+        return
+    wide = max(len(rung.name) for rung in rungs)
+    for rung in rungs:
+        name = f"{rung.gate}  {rung.name:<{wide}}  {rung.verdict:<14}"
+        print(f"{name}  {rung.decided_by or rung.note}".rstrip())
+
+
+def _print_rows(rows: Sequence[Any]) -> None:
+    print(json.dumps([dataclasses.asdict(row) for row in rows], indent=2, ensure_ascii=False))
+
+
+def _day(text: str) -> datetime.date:
+    try:
+        return datetime.date.fromisoformat(text)
+    except ValueError as error:
+        raise BadInputError(
+            where="--today", found=repr(text), expected="YYYY-MM-DD", action="Give a day."
+        ) from error

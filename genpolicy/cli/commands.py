@@ -1,0 +1,86 @@
+"""The commands of this package: what each one takes, and the help that says so."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from genpolicy.cli.shell import AsJson, Registered, examples, new_app, run_program
+
+DESCRIPTION = """A promotion ladder for generative robot policies.
+
+Import recordings, audit them, run the ladder of five gates, prove its reports,
+sign and verify trial cards.
+
+Exit codes: 0 done, 1 a fault of ours, 2 bad usage, configuration or input,
+3 refused by a gate.
+"""
+
+# Named here once more, because their home loads every table library; a test holds both together.
+Format = Annotated[
+    Literal["auto", "mcap", "zarr", "lerobot", "robomimic", "parquet"],
+    typer.Option("--format", help="Layout of the recordings."),
+]
+Recordings = Annotated[Path, typer.Argument(help="File or folder of recordings.", metavar="PATH")]
+Contract = Annotated[
+    Path | None, typer.Option(help="contract.yaml; proposed from the data if absent.")
+]
+TaskName = Annotated[
+    str | None, typer.Option("--task", help="Name of the task; for MCAP, of a registered one.")
+]
+IMPORT_EXAMPLES = examples(
+    "genpolicy propose recordings/ --out contract.yaml",
+    "genpolicy ingest recordings/ --contract contract.yaml --out dataset/",
+    "genpolicy ingest pusht_cchi_v7_replay.zarr --out dataset/",
+)
+
+
+def program(arguments: Sequence[str]) -> int:
+    """Run `genpolicy`; returns the exit code."""
+    app = new_app(DESCRIPTION, cls=Registered)
+    app.command("propose", epilog=IMPORT_EXAMPLES)(propose)
+    app.command("ingest", epilog=IMPORT_EXAMPLES)(ingest)
+    app.command("doctor", epilog=examples("genpolicy doctor --json"))(doctor)
+    return run_program(app, "genpolicy", arguments)
+
+
+def propose(
+    path: Recordings,
+    out: Annotated[Path, typer.Option(help="contract.yaml to write.")],
+    layout: Format = "auto",
+    task: TaskName = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace an old contract.yaml.")] = False,
+) -> int:
+    """Propose the contract of an import, for a person to correct."""
+    from genpolicy.cli.ingest import run_propose
+
+    return run_propose(path, out=out, format=layout, task=task, force=force)
+
+
+def ingest(
+    path: Recordings,
+    out: Annotated[Path, typer.Option(help="Dataset folder to write.")],
+    layout: Format = "auto",
+    contract: Contract = None,
+    task: TaskName = None,
+    as_json: AsJson = False,
+) -> int:
+    """Convert recordings to a verified dataset.
+
+    Every episode is accepted, or refused by name with row and reason.
+    """
+    from genpolicy.cli.ingest import Recordings, run_ingest
+
+    source = Recordings(path, format=layout, contract=contract, task=task)
+    return run_ingest(source, out=out, as_json=as_json)
+
+
+def doctor(
+    as_json: AsJson = False,
+    root: Annotated[Path, typer.Option(help="The checkout.")] = Path(),
+) -> int:
+    """Check this machine and this environment. Exit 2 if something is wrong."""
+    from genpolicy.doctor import report
+
+    return report(root, as_json=as_json)

@@ -1,0 +1,126 @@
+"""One set of words: the glossary is short, and what it bans names nothing."""
+
+import ast
+import re
+import sys
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from test_dead_code import ROOT, definitions
+
+GLOSSARY = ROOT / "docs" / "glossary.md"
+PRODUCT = ("genpolicy", "gates", "stages", "flows")
+MOST_LINES = 40
+# Words of the design that the glossary must explain.
+WORDS = ("action step", "sampler step", "NFE", "invocation", "candidate", "proposal", "event time",
+         "action age", "mode", "calibration epoch", "evidence", "criterion", "verdict", "situation",
+         "layer", "session", "phase", "cause", "promotion", "mutant")  # fmt: skip
+
+# To be renamed; an entry that is not found any more is an error, so that the list ends.
+STILL_THERE: set[str] = {
+    "gates.engine:standing",
+    "genpolicy.audit.semantics.copies:seam_defects",
+    "genpolicy.audit.semantics.motion:SEAM_STEP",
+    "genpolicy.audit.semantics.units:STANDING",
+    "genpolicy.audit.verdict:NEARLY",
+    "genpolicy.audit.verdict:SHINES",
+    "genpolicy.audit.verdict:VAGUE",
+    "genpolicy.data.formats.standing:standing_notes",
+    "genpolicy.evidence.admission_context:COMMANDS_AT_THE_SEAM",
+    "genpolicy.evidence.admission_context:seam",
+    "genpolicy.evidence.shadow.corruption:broken_seam",
+    "genpolicy.evidence.stress.tables:Entrant",
+    "genpolicy.execution.arrival:standing_refusal",
+    "genpolicy.execution.chunk_queue:ChunkQueue.took",
+    "genpolicy.execution.stub:ControllerStub.hear_active",
+    "genpolicy.execution.stub:ControllerStub.hear_mode",
+    "genpolicy.execution.stub:ControllerStub.hear_observation",
+    "genpolicy.execution.stub:ControllerStub.hear_reset",
+    "genpolicy.policies.matched_training:train_fleet",
+}
+STILL_SEVERAL: dict[str, int] = {"Situation": 2, "Case": 2, "Layer": 2, "Params": 6}
+
+
+def listed(start: str) -> list[str]:
+    """Names in backticks on the line of the glossary that begins with `start`."""
+    line = next(row for row in GLOSSARY.read_text().splitlines() if row.startswith(start))
+    return re.findall(r"`(\w+)`", line)
+
+
+def parts(name: str) -> list[str]:
+    """The words of an identifier, `broken_seam` or `EntrantTable`, in small letters."""
+    return [part.lower() for part in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+", name)]
+
+
+@cache
+def defined() -> dict[str, str]:
+    """Name by `module:place` of every public definition of the product."""
+    return {
+        f"{path.relative_to(ROOT).with_suffix('').as_posix().replace('/', '.')}:{place}": name
+        for folder in PRODUCT
+        for path in sorted((ROOT / folder).rglob("*.py"))
+        for name, place in definitions(path.read_text())
+    }
+
+
+def banned_names() -> set[str]:
+    banned = {word.strip("_").lower() for word in listed("Not used as names")}
+    return {place for place, name in defined().items() if banned & set(parts(name))}
+
+
+def classes_of_one_name() -> dict[str, int]:
+    """How many classes have each name that may stand for one thing only, where several do."""
+    counts = dict.fromkeys(listed("One class each"), 0)
+    for folder in PRODUCT:
+        for path in (ROOT / folder).rglob("*.py"):
+            for node in ast.walk(ast.parse(path.read_text())):
+                if isinstance(node, ast.ClassDef) and node.name in counts:
+                    counts[node.name] += 1
+    return {name: count for name, count in counts.items() if count > 1}
+
+
+def test_the_glossary_is_short_and_explains_the_words() -> None:
+    text = GLOSSARY.read_text()
+    assert len(text.splitlines()) <= MOST_LINES
+    terms = [row.split("|")[1] for row in text.splitlines() if row.startswith("| ")]
+    for word in WORDS:
+        assert any(re.search(rf"\b{word}\b", term) for term in terms), word
+
+
+def test_no_word_is_explained_twice() -> None:
+    rows = [row for row in GLOSSARY.read_text().splitlines() if row.startswith("| ")]
+    terms = [term.strip() for row in rows for term in row.split("|")[1].split(",")]
+    assert len(terms) == len(set(terms))
+
+
+def test_banned_words_name_nothing() -> None:
+    found = banned_names()
+    print(f"still to be renamed: {sorted(found)}")
+    assert found == STILL_THERE
+
+
+def test_a_word_names_one_class() -> None:
+    found = classes_of_one_name()
+    print(f"still several: {found}")
+    assert found == STILL_SEVERAL
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("broken_seam", ["broken", "seam"]),
+        ("EntrantTable", ["entrant", "table"]),
+        ("HTTPCase2", ["http", "case", "2"]),
+        ("understanding", ["understanding"]),
+    ],
+)
+def test_identifiers_are_read_word_by_word(name: str, words: list[str]) -> None:
+    assert parts(name) == words
+
+
+if __name__ == "__main__":
+    sys.stdout.write("\n".join([*sorted(banned_names()), str(classes_of_one_name()), ""]))
