@@ -7,14 +7,14 @@ re-judges and re-trains nothing; admission still re-derives the verdict from the
 
 from pathlib import Path
 
-from gates.report import Answer
+from gates.report import Answer, Gate
 from gates.writing import write_gate
 from genpolicy.integrity.atomic import output_folder, write_bytes
 from genpolicy.integrity.documents import canonical_json
 from stages._stage import ARTIFACTS, Params
 
 
-def judge(letter: str, params: Params) -> None:
+def judge(letter: Gate, params: Params) -> None:
     """Judge one gate; the verdict is an artifact like any other, whatever it says."""
     del params  # parsed already: unknown sections and keys are refused before anything is judged
     name = f"gate_{letter.lower()}"

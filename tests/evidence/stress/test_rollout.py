@@ -15,6 +15,7 @@ from genpolicy.evidence.stress.perturbations import (
 )
 from genpolicy.evidence.stress.rollout import Rollout
 from genpolicy.evidence.stress.state import Outcome
+from genpolicy.execution.checks import CHECKS
 from genpolicy.execution.journal import write_journal
 from genpolicy.feasibility.checks import without
 from genpolicy.seeds import stream
@@ -187,8 +188,8 @@ def test_an_executor_that_forgets_the_phase_is_caught(make_fixture, kit, plans):
     """Injected fault: chunks of the old phase stay queued; the stub must refuse them."""
     fixture = make_fixture()
     rollout = Rollout(fixture, plans.starts[0], 0, calibration_epoch=kit.EPOCH)
-    blind = frozenset({"phase_transition"})
-    rollout.executor._disabled = rollout.executor._queue._disabled = blind
+    blind = tuple(check for check in CHECKS if check.reason != "phase_transition")
+    rollout.executor._queue._checks = rollout.executor._arrivals._checks = blind
     kit.drive([rollout], kit.Replay(plans.actions))
     assert rollout.stub.stale + rollout.stub.invalid > 0
     offered = {event.payload["reason"] for event in of_kind(rollout, "refuse")}
