@@ -153,12 +153,6 @@ class Cell:
         """Joints of the arm."""
         return len(self.kinematics.lower_rad)
 
-    @property
-    def free_phases(self) -> tuple[str, ...]:
-        """Phases in which nothing may be touched and nothing let go, in the task's order."""
-        bound = self.contact_phases | self.opening_phases
-        return tuple(phase for phase in self.phases if phase not in bound)
-
     def require_known(self, context: Context) -> None:
         """Refuse a context that is of another task or another robot.
 

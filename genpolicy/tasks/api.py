@@ -217,17 +217,22 @@ class Task(Protocol):
 
     @property
     def opening_phases(self) -> frozenset[str]:
-        """Phases in which the gripper may let go; empty for a task without a gripper."""
+        """Phases in which the gripper may let go; empty without a gripper."""
+        ...
+
+    @property
+    def free_phases(self) -> frozenset[str]:
+        """Phases of motion in the open, with room around; faults that need room go there."""
         ...
 
     @property
     def obstacles(self) -> tuple[str, ...]:
-        """Movable bodies of the scene that are only in the way; empty where none is."""
+        """Movable bodies of the scene that stand free in the way, by name; the nearest first."""
         ...
 
     @property
     def limits(self) -> RobotLimits:
-        """Table of limits of the robot in the scene."""
+        """Limits of the task's robot, with their source; as many joints as the scene's arm."""
         ...
 
     @property

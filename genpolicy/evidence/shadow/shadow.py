@@ -259,6 +259,7 @@ def _case(  # noqa: PLR0917
         context,
         shadow.task.scene_poses(observation),
         shadow.task.obstacles,
+        shadow.task.free_phases,
     )
 
 

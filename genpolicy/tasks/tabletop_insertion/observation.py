@@ -10,6 +10,7 @@ Array = NDArray[np.float64]
 PHASES = ("approach", "align", "insert", "release", "retreat", "recover")
 CONTACT_PHASES = frozenset({"insert", "release"})
 OPENING_PHASES = frozenset({"release", "retreat"})
+FREE_PHASES = frozenset({"approach"})
 
 OBSERVATION = ObservationContract(
     channels=(

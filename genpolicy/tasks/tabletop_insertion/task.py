@@ -17,6 +17,7 @@ from genpolicy.tasks.tabletop_insertion import episodes, fallback, scene, sessio
 from genpolicy.tasks.tabletop_insertion.experts import SIDES
 from genpolicy.tasks.tabletop_insertion.observation import (
     CONTACT_PHASES,
+    FREE_PHASES,
     OBSERVATION,
     OPENING_PHASES,
     PHASES,
@@ -45,6 +46,7 @@ class TabletopInsertion:
     phases: tuple[str, ...] = PHASES
     contact_phases: frozenset[str] = CONTACT_PHASES
     opening_phases: frozenset[str] = OPENING_PHASES
+    free_phases: frozenset[str] = FREE_PHASES
     obstacles: tuple[str, ...] = ("post",)
     limits: RobotLimits = PANDA
     workspace: Workspace = WORKSPACE
