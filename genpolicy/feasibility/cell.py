@@ -66,11 +66,6 @@ class CellTask(Protocol):
         """Phases in which the gripper may let go; empty for a task without a gripper."""
         ...
 
-    @property
-    def free_phases(self) -> frozenset[str]:
-        """Phases of motion in the open, with room around."""
-        ...
-
 
 @dataclass(frozen=True)
 class Cell:
@@ -86,7 +81,6 @@ class Cell:
         phases: Phases that the task knows, in order.
         contact_phases: Those in which the held object may touch the target.
         opening_phases: Those in which the gripper may let go.
-        free_phases: Those of motion in the open; faults that need room are planted there.
 
     Raises:
         ConfigError: A phase that the task does not know, no pair of the robot's own shapes to
@@ -102,7 +96,6 @@ class Cell:
     phases: tuple[str, ...]
     contact_phases: frozenset[str]
     opening_phases: frozenset[str]
-    free_phases: frozenset[str]
 
     def __post_init__(self) -> None:
         if not (self.action_period_s > 0 and math.isfinite(self.action_period_s)):
@@ -112,7 +105,7 @@ class Cell:
                 expected="a finite time above 0 s",
                 action="Correct horizons.action_period_s in params.yaml.",
             )
-        for name in ("contact_phases", "opening_phases", "free_phases"):
+        for name in ("contact_phases", "opening_phases"):
             unknown = getattr(self, name) - set(self.phases)
             if unknown:
                 raise ConfigError(
@@ -204,5 +197,4 @@ def cell_of(task: CellTask, settings: FeasibilitySettings, *, action_period_s: f
         phases=tuple(task.phases),
         contact_phases=frozenset(task.contact_phases),
         opening_phases=frozenset(task.opening_phases),
-        free_phases=frozenset(task.free_phases),
     )

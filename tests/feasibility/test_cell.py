@@ -19,7 +19,6 @@ def test_it_takes_from_the_task_what_the_task_decides(kit):
     assert cell.phases == task.phases
     assert (cell.contact_phases, cell.opening_phases) == (task.contact_phases, task.opening_phases)
     assert cell.limits is task.limits and cell.workspace is task.workspace
-    assert cell.free_phases == {"approach"}
     assert cell.joint_count == len(task.posture_rad)
 
 

@@ -13,7 +13,6 @@ from genpolicy.data.recording.episode import PHASE_STREAM
 from genpolicy.evidence.admission_context import make_checker
 from genpolicy.evidence.need.held_out import admissible
 from genpolicy.feasibility.settings import FeasibilitySettings
-from genpolicy.robot.shapes import shapes_of
 from genpolicy.tasks.api import Task, load_task
 
 Array = NDArray[np.float64]

@@ -4,7 +4,7 @@ Each takes a good case (chunk, context) and returns it broken in one way. Where 
 check, that check alone stands between it and admission: a checker made without it admits the
 fixture, which is the evidence that the check is needed.
 
-What a task calls its phases and bodies is asked of the checker's cell and of the case.
+What a task calls its phases and bodies stands in the case.
 """
 
 from collections.abc import Callable
@@ -31,12 +31,14 @@ class Case:
         context: State at the check.
         poses: Scene bodies by name, as observed.
         obstacles: Those of them that are only in the way.
+        free_phases: The task's phases of motion in the open.
     """
 
     proposal: Proposal
     context: Context
     poses: dict[str, tuple[Array, Array]]
     obstacles: tuple[str, ...] = ()
+    free_phases: frozenset[str] = frozenset()
 
     def with_actions(self, actions: Array) -> "Case":
         """The case with other actions."""
@@ -175,7 +177,7 @@ def early_release(case: Case, checker: FeasibilityChecker) -> Case | None:
     """The gripper opens while the object is carried; None where nothing is."""
     settings = checker.settings
     carried = case.context.last_action[GRIPPER] <= settings.held_opening_m
-    if not (carried and _under_way(case, checker)):
+    if not carried or case.context.phase not in case.free_phases:
         return None
     actions = np.array(case.proposal.actions)
     actions[:, GRIPPER] = settings.gripper_upper_m
@@ -183,8 +185,8 @@ def early_release(case: Case, checker: FeasibilityChecker) -> Case | None:
 
 
 def awkward_posture(case: Case, checker: FeasibilityChecker) -> Case | None:
-    """The same hand pose, but the arm stands with a joint at its limit."""
-    if not _under_way(case, checker):
+    """The same hand pose, but with a joint at its limit; None where the arm has no such way."""
+    if case.context.phase not in case.free_phases:
         return None
     kinematics = checker.kinematics
     position, rotation = kinematics.forward(case.context.q_cmd[None])
@@ -204,11 +206,6 @@ def awkward_posture(case: Case, checker: FeasibilityChecker) -> Case | None:
         return None
     q = found.q_rad[int(np.flatnonzero(usable)[0])]
     return case.with_context(q_cmd=q, q_meas=q, q_cmd_history=np.zeros((0, len(q))))
-
-
-def _under_way(case: Case, checker: FeasibilityChecker) -> bool:
-    """The case is in the task's first free phase: far from the target, nothing to let go."""
-    return case.context.phase in checker.cell.free_phases
 
 
 CORRUPTIONS = (

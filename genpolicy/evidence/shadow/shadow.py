@@ -228,7 +228,7 @@ def case_of(
     moment = Moment(observation, q[0], list(item.commanded), now_s=now_s, phase=item.phase)
     context = context_of(task, shadow.checker, moment, session=session, late_rows=shadow.late_steps)
     proposal = Proposal(metadata, actions, selected_by=SELECTOR)
-    return Case(proposal, context, task.scene_poses(observation), task.obstacles)
+    return Case(proposal, context, task.scene_poses(observation), task.obstacles, task.free_phases)
 
 
 def admit(shadow: Shadow, case: Case) -> Admitted | Rejected:

@@ -9,7 +9,7 @@ from genpolicy.contract.action import GRIPPER
 from genpolicy.evidence.admission_context import make_checker
 from genpolicy.evidence.shadow.corruption import CORRUPTIONS
 from genpolicy.evidence.shadow.shadow import Shadow, _admit, _case, held_out_observations
-from genpolicy.feasibility.admission import Admitted, FeasibilityChecker, Rejected
+from genpolicy.feasibility.admission import Admitted, Rejected
 from genpolicy.feasibility.checks import CHECKS, without
 from genpolicy.feasibility.settings import LAYERS
 from genpolicy.seeds import stream
@@ -125,13 +125,11 @@ def test_what_a_task_calls_its_bodies_is_taken_from_it(good, shadow, checker):
 
 
 @pytest.mark.parametrize("name", ["early_release", "awkward_posture"])
-def test_under_way_is_a_free_phase_of_the_task(name, good, checker):
+def test_what_needs_room_is_tried_in_the_free_phases_of_the_task(name, good, checker, task):
     applied = {phase for phase, case in good if BY_NAME[name].apply(case, checker) is not None}
-    assert applied == {"approach"} == checker.cell.free_phases
-    other = FeasibilityChecker(replace(checker.cell, free_phases=frozenset({"align"})))
-    assert all(
-        BY_NAME[name].apply(case, other) is None for phase, case in good if phase == "approach"
-    )
+    assert applied == {"approach"} == task.free_phases
+    without_room = [replace(case, free_phases=frozenset()) for _, case in good]
+    assert all(BY_NAME[name].apply(case, checker) is None for case in without_room)
 
 
 def test_nothing_is_let_go_by_a_hand_that_holds_nothing(good, checker):
