@@ -19,8 +19,8 @@ ROOT = Path(__file__).parents[2]
 OVERRIDES = Path(__file__).with_name("overrides.yaml")
 REASON = "test: proves only that the pipeline runs"
 DROPPED = {
-    "baselines": ("samplers.bc", "samplers.ibc"),
-    "factors": (
+    "train_baselines": ("samplers.bc", "samplers.ibc"),
+    "train_factors": (
         "variants.newest_only", "variants.longer_history", "variants.l1_head",
         "variants.act_head",
     ),

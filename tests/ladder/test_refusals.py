@@ -68,27 +68,27 @@ def swap_rollouts(workspace: Path) -> None:
 
 
 def copy_checkpoint(workspace: Path) -> None:
-    generators = workspace / "artifacts" / "generators"
+    generators = workspace / "artifacts" / "train_generators"
     shutil.copytree(generators / "diffusion", generators / "flow", dirs_exist_ok=True)
 
 
 DERIVED = "as derived again from evidence and params.yaml"
 CASES: dict[str, tuple[Tamper, str, int, str]] = {
     "bit in the dataset": (
-        flip("ingest/frames.parquet"), "generators", 3,
+        flip("ingest/frames.parquet"), "train_generators", 3,
         r"Gate A refuses: sha256 of artifacts/ingest/frames\.parquet is \w{16}…, required",
     ),
     "bit in the audit": (
-        flip("audit/neighbourhoods.parquet"), "generators", 3,
+        flip("audit/neighbourhoods.parquet"), "train_generators", 3,
         r"Gate A refuses: sha256 of artifacts/audit/neighbourhoods\.parquet is",
     ),
     "bit in a baseline": (
-        flip("baselines/chunked_bc/seed_0/model.safetensors"), "latency", 3,
-        r"Gate A refuses: sha256 of artifacts/baselines/chunked_bc/seed_0/model\.safetensors is",
+        flip("train_baselines/chunked_bc/seed_0/model.safetensors"), "latency", 3,
+        r"Gate A refuses: sha256 of artifacts/train_baselines/chunked_bc/seed_0/model\.\w+ is",
     ),
     "bit in a generator": (
-        flip("generators/flow/seed_0/model.safetensors"), "shadow", 3,
-        r"Gate B refuses: sha256 of artifacts/generators/flow/seed_0/model\.safetensors is",
+        flip("train_generators/flow/seed_0/model.safetensors"), "shadow", 3,
+        r"Gate B refuses: sha256 of artifacts/train_generators/flow/seed_0/model\.safetensors is",
     ),
     "bit in the measured times": (
         flip("latency/latency.parquet"), "shadow", 3,
@@ -103,7 +103,7 @@ CASES: dict[str, tuple[Tamper, str, int, str]] = {
         r"Gate D refuses: sha256 of artifacts/stress/journals/\S+\.mcap is",
     ),
     "verdict edited": (
-        forge_a_pass, "generators", 3,
+        forge_a_pass, "train_generators", 3,
         rf'Gate A refuses: reports/gate_a\.json\.verdict is "PASS", required "FAIL" {DERIVED}',
     ),
     "criterion deleted": (
@@ -123,7 +123,7 @@ CASES: dict[str, tuple[Tamper, str, int, str]] = {
         r"Gate B refuses: report is missing, required a report",
     ),
     "older schema version": (
-        edit_report("gate_a", lambda d: d.update(schema_version=0)), "generators", 2,
+        edit_report("gate_a", lambda d: d.update(schema_version=0)), "train_generators", 2,
         r"reports/gate_a\.json: schema_version is 0, expected 2\. Run `dvc repro -f gate_a`",
     ),
     "report of another gate": (
@@ -136,7 +136,7 @@ CASES: dict[str, tuple[Tamper, str, int, str]] = {
     ),
     "checkpoint of another candidate": (
         copy_checkpoint, "shadow", 3,
-        r"Gate B refuses: sha256 of artifacts/generators/flow/seed_0/\S+ is",
+        r"Gate B refuses: sha256 of artifacts/train_generators/flow/seed_0/\S+ is",
     ),
     "evidence of another candidate": (
         swap_rollouts, "card", 3,
@@ -167,26 +167,41 @@ def test_the_untouched_ladder_admits_every_stage(copy: Path) -> None:
 def test_a_flipped_bit_stops_repro_where_direct_calls_stop(copy: Path) -> None:
     """DVC does not see it (size, time and inode are the same); admission does."""
     flip("audit/summary.json")(copy)
-    before = hashes(copy, "artifacts", leave=("artifacts/generators/",))
-    outcome, ran = repro(copy, "generators", single_item=True, force=True)
-    assert (outcome.code, outcome.stage, ran) == (3, "generators", ["generators"])
+    before = hashes(copy, "artifacts", leave=("artifacts/train_generators/",))
+    outcome, ran = repro(copy, "train_generators", single_item=True, force=True)
+    assert (outcome.code, outcome.stage, ran) == (3, "train_generators", ["train_generators"])
     assert "Gate A refuses: sha256 of artifacts/audit/summary.json" in outcome.sentence
-    assert not (copy / "artifacts" / "generators").exists()
+    assert not (copy / "artifacts" / "train_generators").exists()
     assert hashes(copy, "artifacts") == before
 
 
 def test_a_failed_gate_stops_repro_and_the_report_says_why(copy: Path) -> None:
     set_limit(copy, "gate_a", "held_out_situations", 1e9)
-    evidence = hashes(copy, "artifacts/ingest", "artifacts/audit", "artifacts/baselines")
+    evidence = hashes(
+        copy,
+        "artifacts/ingest",
+        "artifacts/audit",
+        "artifacts/train_baselines",
+        "artifacts/measure_baselines",
+    )
     outcome, ran = repro(copy)
-    assert (outcome.code, outcome.stage) == (3, "generators")
-    assert ran == ["gate_a", "generators"]
+    assert (outcome.code, outcome.stage) == (3, "train_generators")
+    assert ran == ["gate_a", "train_generators"]
     assert re.search(
         r"Gate A refuses: held_out_situations is \d+, required >= 1e\+09; see reports/gate_a\.json",
         outcome.sentence,
     ), outcome.sentence
-    assert not (copy / "artifacts" / "generators").exists()
-    assert hashes(copy, "artifacts/ingest", "artifacts/audit", "artifacts/baselines") == evidence
+    assert not (copy / "artifacts" / "train_generators").exists()
+    assert (
+        hashes(
+            copy,
+            "artifacts/ingest",
+            "artifacts/audit",
+            "artifacts/train_baselines",
+            "artifacts/measure_baselines",
+        )
+        == evidence
+    )
     report = json.loads((copy / "reports" / "gate_a.json").read_text())
     assert report["verdict"] == "FAIL"
     assert report["diagnosis"].startswith("First unmet: held_out_situations")
@@ -194,7 +209,12 @@ def test_a_failed_gate_stops_repro_and_the_report_says_why(copy: Path) -> None:
 
 @pytest.mark.parametrize(
     ("gate", "stage"),
-    [("gate_a", "generators"), ("gate_b", "shadow"), ("gate_c", "stress"), ("gate_d", "card")],
+    [
+        ("gate_a", "train_generators"),
+        ("gate_b", "shadow"),
+        ("gate_c", "stress"),
+        ("gate_d", "card"),
+    ],
 )
 def test_an_empty_threshold_set_passes_nothing(copy: Path, gate: str, stage: str) -> None:
     edit_params(copy, lambda params: params[gate]["limits"].clear())

@@ -7,7 +7,8 @@ from ladder_workspace import edit_params, hashes, repro, set_limit
 
 GATES = [f"gate_{letter}" for letter in "abcde"]
 EVIDENCE = [
-    "record", "ingest", "audit", "baselines", "factors", "generators", "reload", "latency",
+    "record", "ingest", "audit", "train_baselines", "measure_baselines", "train_factors",
+    "measure_factors", "train_generators", "reload", "latency",
     "shadow", "stress",
 ]  # fmt: skip
 

@@ -10,24 +10,24 @@ from ladder_workspace import edit_params, hashes, repro, run_stage, set_limit
 def test_more_sampler_steps_than_training_levels_is_a_bad_setting(copy: Path) -> None:
     def too_many(params: dict) -> None:
         levels = params["policy"]["head"]["diffusion_levels"]
-        params["generators"]["samplers"]["diffusion"]["steps"] = levels + 1
+        params["train_generators"]["samplers"]["diffusion"]["steps"] = levels + 1
 
     edit_params(copy, too_many)
-    before = hashes(copy, "artifacts", "reports", leave=("artifacts/generators/",))
-    code, said = run_stage(copy, "generators")
+    before = hashes(copy, "artifacts", "reports", leave=("artifacts/train_generators/",))
+    code, said = run_stage(copy, "train_generators")
     assert code == 2, said
-    assert said.startswith("generators: ") and "101" in said and "100" in said
+    assert said.startswith("train_generators: ") and "101" in said and "100" in said
     assert hashes(copy, "artifacts", "reports") == before
 
 
 def test_a_sampler_of_another_method_is_a_bad_setting(copy: Path) -> None:
     def swapped(params: dict) -> None:
-        params["generators"]["samplers"]["flow"] = {"name": "ddim", "steps": 4}
+        params["train_generators"]["samplers"]["flow"] = {"name": "ddim", "steps": 4}
 
     edit_params(copy, swapped)
-    code, said = run_stage(copy, "generators")
+    code, said = run_stage(copy, "train_generators")
     assert code == 2, said
-    assert said.startswith("generators: ") and "ddim" in said
+    assert said.startswith("train_generators: ") and "ddim" in said
 
 
 @pytest.mark.parametrize(("key", "value"), [("starts", 4), ("margin", -0.8)])

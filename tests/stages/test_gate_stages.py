@@ -100,7 +100,7 @@ def test_a_failed_gate_ends_with_0_and_its_report_says_fail(evidence, stage, edi
     judge(stage, "gate_a")
     report = json.loads((evidence / "reports" / "gate_a.json").read_text())
     assert report["verdict"] == "FAIL"
-    code, said = stage("generators")
+    code, said = stage("train_generators")
     assert code == 3
     assert "Gate A refuses: held_out_situations is" in said
 

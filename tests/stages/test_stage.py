@@ -125,8 +125,8 @@ def test_every_stage_refuses_a_section_that_nobody_reads(workspace, edit, stage,
 @pytest.mark.parametrize(
     ("name", "gate"),
     [
-        ("generators", "A"), ("reload", "A"), ("latency", "A"), ("shadow", "A"), ("stress", "A"),
-        ("card", "A"),
+        ("train_generators", "A"), ("reload", "A"), ("latency", "A"), ("shadow", "A"),
+        ("stress", "A"), ("card", "A"),
     ],
 )  # fmt: skip
 def test_a_stage_behind_a_gate_refuses_where_no_gate_was_judged(
@@ -139,7 +139,7 @@ def test_a_stage_behind_a_gate_refuses_where_no_gate_was_judged(
     assert not (workspace / "artifacts").exists()
 
 
-@pytest.mark.parametrize("name", ["ingest", "audit", "baselines"])
+@pytest.mark.parametrize("name", ["ingest", "audit", "train_baselines", "measure_baselines"])
 def test_a_stage_without_its_input_is_bad_input(workspace, stage, name) -> None:
     code, said = stage(name)
     assert (code, said.count("\n")) == (2, 1), said

@@ -13,6 +13,8 @@ from genpolicy.data.recording.episode import PHASE_STREAM
 from genpolicy.evidence.admission_context import make_checker
 from genpolicy.evidence.need.held_out import admissible
 from genpolicy.feasibility.settings import FeasibilitySettings
+from genpolicy.robot.collision import CollisionModel
+from genpolicy.robot.kinematics import ArmKinematics
 from genpolicy.tasks.api import Task, load_task
 
 Array = NDArray[np.float64]
@@ -89,7 +91,7 @@ def replay_episode(task: Task, data: Dataset, episode_uuid: str) -> str:
 
 def round_obstacles(task: Task) -> list[dict[str, float]]:
     """Standing cylinders of the scene file, as circles in the base frame's plane, m."""
-    shapes = shapes_of(task.scene_path, joints=len(task.posture_rad))
+    shapes = CollisionModel(task.scene_path, ArmKinematics(task.scene_path)).shapes
     found = []
     for shape in shapes.scene:
         if shape.kind != "cylinder" or shape.body not in task.obstacles:

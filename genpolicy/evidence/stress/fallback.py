@@ -1,43 +1,60 @@
-"""The primitive of the fallback in a rollout: planned once, from where it begins."""
+"""The fallback in a rollout: its primitive is planned once, from where it begins."""
 
 import numpy as np
 from numpy.typing import NDArray
 
-from genpolicy.execution.recovery import Recovery, RecoveryState
-from genpolicy.tasks.api import Task, World
+from genpolicy.contract.chunk import ChunkMetadata
+from genpolicy.evidence.stress.state import Fixture
+from genpolicy.execution.executor import Executor
+from genpolicy.execution.recovery import Primitive, Recovery, RecoveryState, fallback_metadata
+from genpolicy.tasks.api import World
 
 Array = NDArray[np.float64]
 
 
-class PlannedFallback:
-    """Trajectory of the primitive in force, and how much of it has been commanded."""
+class Fallback:
+    """Trajectory of the primitive in force, and how much of it has been commanded.
 
-    def __init__(self) -> None:
+    Args:
+        fixture: What all rollouts share.
+        world: From where a primitive begins.
+        executor: Holds the epochs.
+        recovery: Counts the attempts.
+    """
+
+    def __init__(
+        self, fixture: Fixture, world: World, executor: Executor, recovery: Recovery
+    ) -> None:
+        self._fixture = fixture
+        self._world = world
+        self._executor = executor
+        self._recovery = recovery
         self._chunks = 0
         self._planned: tuple[tuple[str, int, int], Array, int] | None = None
 
-    def next_chunk(self) -> int:
-        """Number of the next chunk of this rollout, from 1."""
+    def metadata(self, session: str, now_s: float) -> ChunkMetadata:
+        """Metadata of the next chunk of the fallback in a session, counted from 1."""
         self._chunks += 1
-        return self._chunks
+        return fallback_metadata(
+            self._executor,
+            now_s=now_s,
+            chunk_id=f"{session}/fallback/{self._chunks}",
+            event_time_s=now_s,
+            phase=self._world.phase,
+            epoch=self._world.calibration_epoch,
+        )
 
-    def rest(
-        self, task: Task, world: World, recovery: Recovery, state: RecoveryState, *, ticks: int
-    ) -> Array:
+    def plan(self, state: RecoveryState, *, ticks: int) -> Primitive:
         """What is left of the primitive; another attempt or state plans anew.
 
         Args:
-            task: Plans the primitive.
-            world: From where it begins.
-            recovery: Counts the attempts.
             state: Names the primitive.
             ticks: Fallback actions commanded so far in this rollout.
-
-        Returns:
-            Actions, none when it is done. Shape (n, 10).
         """
-        key = (str(state), recovery.attempts, recovery.failures)
+        key = (str(state), self._recovery.attempts, self._recovery.failures)
         if self._planned is None or self._planned[0] != key:
-            self._planned = (key, task.fallback(world, str(state)), ticks)
+            planned = self._fixture.task.fallback(self._world, str(state))
+            self._planned = (key, planned, ticks)
         _, actions, begun = self._planned
-        return actions[ticks - begun :]
+        rest = actions[ticks - begun :]
+        return Primitive(rest[: self._fixture.horizons.prediction_horizon], reached=len(rest) == 0)

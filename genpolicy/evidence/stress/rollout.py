@@ -14,19 +14,12 @@ from numpy.typing import NDArray
 from genpolicy.contract.chunk import Candidate, ChunkMetadata, DiscardReason, Proposal
 from genpolicy.errors import ContractError
 from genpolicy.evidence.admission_context import COMMANDS_AT_THE_SEAM, Moment, Session, context_of
-from genpolicy.evidence.stress.fallback import PlannedFallback
+from genpolicy.evidence.stress.fallback import Fallback
 from genpolicy.evidence.stress.perturbations import Push, push
 from genpolicy.evidence.stress.state import Fixture, InFlight, Outcome, Tally, in_flight
 from genpolicy.execution.command import Command
 from genpolicy.execution.executor import Executor
-from genpolicy.execution.journal import Journal
-from genpolicy.execution.recovery import (
-    Primitive,
-    Recovery,
-    RecoveryState,
-    fallback_metadata,
-    step,
-)
+from genpolicy.execution.recovery import Recovery, RecoveryState, step
 from genpolicy.execution.stub import ControllerStub
 from genpolicy.execution.supervisor import Supervisor
 from genpolicy.feasibility.admission import Admitted, Rejected
@@ -58,20 +51,15 @@ class Rollout:
     ) -> None:
         self.fixture = fixture
         self.start_index = start_index
-        settings = WorldSettings(calibration_epoch=calibration_epoch)
-        self.world: World = fixture.task.make_world(start, settings=settings)
+        epoch = WorldSettings(calibration_epoch=calibration_epoch)
+        self.world: World = fixture.task.make_world(start, settings=epoch)
         self.start_sha256 = self.world.state_sha256()
-        session = f"{fixture.method}/{fixture.perturbation}/{start_index}"
-        labels = {
-            "method": fixture.method, "perturbation": fixture.perturbation,
-            "start": str(start_index), "start_sha256": self.start_sha256,
-        }  # fmt: skip
-        self.journal = Journal(session, labels)
+        self.journal = fixture.journal(start_index, self.start_sha256)
         self.supervisor = Supervisor(fixture.execution.supervisor(fixture.horizons), self.journal)
         fixture.execution.require_phases(fixture.task.phases)
-        executor_settings = fixture.execution.executor(fixture.horizons)
-        self.stub = ControllerStub(executor_settings, self.journal, self.supervisor)
-        self.executor = Executor(executor_settings, self.journal, self.stub)
+        settings = fixture.execution.executor(fixture.horizons)
+        self.stub = ControllerStub(settings, self.journal, self.supervisor)
+        self.executor = Executor(settings, self.journal, self.stub)
         self.recovery = Recovery(fixture.execution.recovery(), self.journal)
         self.outcome: Outcome | None = None
         self.tally = Tally()
@@ -82,7 +70,7 @@ class Rollout:
         self._arrived: deque[tuple[InFlight, int]] = deque()
         self._candidate = 0
         self._not_fresh: DiscardReason | None = None
-        self._fallback = PlannedFallback()
+        self._fallback = Fallback(fixture, self.world, self.executor, self.recovery)
         self._newest_accepted_s: float | None = None
         self._last_command_s: float | None = None
         self._commanded: deque[Array] = deque(
@@ -174,8 +162,7 @@ class Rollout:
 
     def decide(self) -> None:
         """Recover where needed; sets `wanted` if the policy must sample."""
-        now_s = self.now_s
-        self.wanted = None
+        now_s, self.wanted = self.now_s, None
         self._recover(now_s)
         if not self.done and self._may_invoke(now_s):
             self.wanted = self._begin_invocation(now_s)
@@ -201,8 +188,6 @@ class Rollout:
         """End from outside: the time is over."""
         if not self.done:
             self._end(outcome)
-
-    # -- inside -------------------------------------------------------------------------------
 
     def _end(self, outcome: Outcome) -> None:
         self.outcome = outcome
@@ -311,8 +296,8 @@ class Rollout:
             self.recovery,
             self.executor,
             now_s=now_s,
-            metadata=lambda: self._fallback_metadata(now_s),
-            plan=self._plan,
+            metadata=lambda: self._fallback.metadata(self.journal.session, now_s),
+            plan=lambda state: self._fallback.plan(state, ticks=self.tally.fallback_ticks),
             admit=self._admit_fallback,
         )
         if state in (RecoveryState.ASK_HUMAN, RecoveryState.ABORT):
@@ -321,22 +306,6 @@ class Rollout:
             self._end(Outcome.INTERVENTION)
         elif state is RecoveryState.IDLE:
             self._last_command_s = now_s  # the silence is over; the policy gets its time
-
-    def _plan(self, state: RecoveryState) -> Primitive:
-        rest = self._fallback.rest(
-            self.fixture.task, self.world, self.recovery, state, ticks=self.tally.fallback_ticks
-        )
-        return Primitive(rest[: self.fixture.horizons.prediction_horizon], reached=len(rest) == 0)
-
-    def _fallback_metadata(self, now_s: float) -> ChunkMetadata:
-        return fallback_metadata(
-            self.executor,
-            now_s=now_s,
-            chunk_id=f"{self.journal.session}/fallback/{self._fallback.next_chunk()}",
-            event_time_s=now_s,
-            phase=self.world.phase,
-            epoch=self.world.calibration_epoch,
-        )
 
     def _admit_fallback(self, proposal: Proposal) -> Admitted | None:
         identity = self.executor.settings.fallback_hash

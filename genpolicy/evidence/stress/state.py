@@ -11,6 +11,7 @@ from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.evidence.stress.latency import LatencyModel, draw_latency
 from genpolicy.evidence.stress.perturbations import Perturbation, injection
 from genpolicy.execution.cell import ExecutionSettings
+from genpolicy.execution.journal import Journal
 from genpolicy.feasibility.admission import FeasibilityChecker
 from genpolicy.tasks.api import Task
 
@@ -56,6 +57,14 @@ class Fixture:
     method: str
     checkpoint: str
     sampler: str
+
+    def journal(self, start: int, start_sha256: str) -> Journal:
+        """The empty journal of one rollout."""
+        labels = {
+            "method": self.method, "perturbation": self.perturbation, "start": str(start),
+            "start_sha256": start_sha256,
+        }  # fmt: skip
+        return Journal(f"{self.method}/{self.perturbation}/{start}", labels)
 
 
 @dataclass

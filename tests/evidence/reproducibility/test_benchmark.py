@@ -1,22 +1,25 @@
-"""The latency benchmark on a tiny policy, and its command line in a fresh process."""
+"""The latency benchmark on a tiny policy, and fresh processes."""
 
-import subprocess
-import sys
+import os
 
-import numpy as np
 import pytest
 
 from genpolicy.evidence.reproducibility.benchmark import measure_policy
-from genpolicy.integrity.tables import read_table
-from genpolicy.policies.checkpoint import load_checkpoint
+from genpolicy.evidence.reproducibility.measure import in_fresh_process
+from genpolicy.policies.fixtures import fixture_observations
+
+
+@pytest.fixture(scope="module")
+def observations(data, kit):
+    return fixture_observations(data, horizons=kit.HORIZONS, count=4)
 
 
 @pytest.mark.parametrize("method", ["bc", "flow"])
-def test_components_and_temperatures(folders, method, two_mode_windows):
+def test_components_and_temperatures(fleet, method, observations):
     projected = []
     rows = measure_policy(
-        folders[method],
-        two_mode_windows(4).observations,
+        fleet[0] / method / "seed_0",
+        observations,
         expected_sha256=None,
         cold_repeats=2,
         warm_repeats=3,
@@ -35,28 +38,13 @@ def test_components_and_temperatures(folders, method, two_mode_windows):
     assert projected[0].selected_by == "first"
 
 
-def test_without_a_projection_the_term_stays_unknown(folders, two_mode_windows):
+def test_without_a_projection_the_term_stays_unknown(fleet, observations):
     rows = measure_policy(
-        folders["bc"], two_mode_windows(4).observations, expected_sha256=None,
+        fleet[0] / "bc" / "seed_0", observations, expected_sha256=None,
         cold_repeats=1, warm_repeats=1,
     )  # fmt: skip
     assert "project" not in {row.component for row in rows}
 
 
-def test_command_line_in_a_fresh_process(folders, tmp_path, two_mode_windows):
-    np.save(tmp_path / "observations.npy", two_mode_windows(4).observations)
-    command = [
-        sys.executable, "-m", "genpolicy.evidence.reproducibility.measure",
-        "--checkpoint", str(folders["flow"]),
-        "--observations", str(tmp_path / "observations.npy"), "--cold", "1", "--warm", "2",
-        "--out", str(tmp_path / "latency.parquet"), "--expected-sha256",
-    ]  # fmt: skip
-    identity = load_checkpoint(folders["flow"]).sha256
-    assert subprocess.run([*command, identity], check=False).returncode == 0
-    table = read_table(tmp_path / "latency.parquet")
-    assert table.column_names == ["component", "temperature", "repeat", "seconds"]
-    assert table.num_rows == 3 * 4
-    refused = subprocess.run([*command, "0" * 64], check=False, capture_output=True, text=True)
-    assert refused.returncode == 2
-    assert "sha256" in refused.stderr
-    assert "Traceback" not in refused.stderr
+def test_a_fresh_process_is_another_one():
+    assert in_fresh_process(os.getpid) != os.getpid()

@@ -1,0 +1,33 @@
+"""Who is judged: listed from their folders, and refused when their files are others."""
+
+from dataclasses import replace
+
+import pytest
+
+from genpolicy.candidates.judged import BASELINES, GENERATORS, compared, trained
+from genpolicy.errors import IntegrityError
+
+
+def test_checkpoints_are_listed_with_their_identity(fleet):
+    root, hashes = fleet
+    found = trained(root, ["bc", "flow"], seeds=[0])
+    assert [(item.name, item.seed, item.kind) for item in found] == [
+        ("bc", 0, "trained"), ("flow", 0, "trained"),
+    ]  # fmt: skip
+    assert all(item.sha256 == hashes[item.name][0] for item in found)
+    assert all(item.load().method == item.name for item in found)
+
+
+def test_other_files_are_refused(fleet):
+    (flow,) = trained(fleet[0], ["flow"], seeds=[0])
+    with pytest.raises(IntegrityError, match="sha256"):
+        replace(flow, sha256="0" * 64).load()
+
+
+def test_baselines_come_before_generators_from_their_own_folders(fleet, tmp_path):
+    for name in (BASELINES, GENERATORS):
+        (tmp_path / name).symlink_to(fleet[0])
+    found = compared(tmp_path, baselines=["chunked_bc"], generators=("flow",), seed=0)
+    assert [(item.name, item.folder.parents[1].name) for item in found] == [
+        ("chunked_bc", BASELINES), ("flow", GENERATORS),
+    ]  # fmt: skip

@@ -1,0 +1,58 @@
+"""Reload and sweep of a barely trained candidate: equal samples, modes counted once."""
+
+import pytest
+
+from genpolicy.candidates.judged import trained
+from genpolicy.errors import ContractError
+from genpolicy.evidence.reproducibility.reload import ReloadPlan, coverage_row, write_reload
+from genpolicy.evidence.rows import CoverageRow, ModeRow, NfeRow, OfflineRow, SampleRow, read_rows
+from genpolicy.integrity.documents import read_json
+from genpolicy.integrity.rows import write_rows
+from genpolicy.policies.fixtures import FixtureRow, fixture_observations, fixture_rows
+
+
+@pytest.fixture(scope="module")
+def reloaded(fleet, dataset, data, policy, kit, tmp_path_factory):
+    root = tmp_path_factory.mktemp("reload")
+    situations = [(name, 4, {}) for name in kit.uuids(data)[8:]]
+    plan = ReloadPlan(
+        task="tabletop_insertion", feasibility=kit.FEASIBILITY, dataset=dataset,
+        audit=kit.write_situations(root / "audit", situations), sweep={"flow": [1, 2]}, samples=3,
+        horizons=kit.HORIZONS,
+    )  # fmt: skip
+    seen = fixture_observations(data, horizons=kit.HORIZONS, count=3)
+    rows = fixture_rows(policy, seen, method="flow", seed=0)
+    write_rows(root / "fixtures.parquet", FixtureRow, rows)
+    (root / "out").mkdir()
+    candidates = trained(fleet[0], ["flow"], seeds=[0])
+    write_reload(plan, candidates, root / "fixtures.parquet", root / "out")
+    return plan, candidates, root / "out"
+
+
+def test_what_comes_back_is_equal_and_pinned(reloaded):
+    _, (flow,), folder = reloaded
+    samples = read_rows(folder / "samples.parquet", SampleRow)
+    assert len(samples) == 3 and {row.max_abs_difference for row in samples} == {0.0}
+    assert read_rows(folder / "nfe.parquet", NfeRow) == [NfeRow("flow", 0, 2, 2)]
+    identity = read_json(folder / "identity.json")["flow"]
+    assert identity["checkpoint"] == flow.sha256
+    assert identity["metadata_mismatches"] == identity["nonfinite_weights"] == 0
+
+
+def test_modes_of_the_chosen_steps_are_those_of_the_sweep(reloaded):
+    _, _, folder = reloaded
+    modes = read_rows(folder / "modes.parquet", ModeRow)
+    coverage = read_rows(folder / "coverage.parquet", CoverageRow)
+    assert [row.steps for row in coverage] == [1, 2]
+    assert {row.convention for row in modes} == {"euler"} and len(modes) == 2
+    assert coverage_row(modes, steps=2) == coverage[1]
+    assert {row.split for row in read_rows(folder / "offline.parquet", OfflineRow)} == {
+        "validation", "test",
+    }  # fmt: skip
+
+
+def test_a_candidate_without_fixtures_is_refused(reloaded, tmp_path):
+    plan, candidates, _ = reloaded
+    write_rows(tmp_path / "fixtures.parquet", FixtureRow, [])
+    with pytest.raises(ContractError, match="fixtures of flow, seed 0 is none"):
+        write_reload(plan, candidates, tmp_path / "fixtures.parquet", tmp_path)
