@@ -21,6 +21,8 @@ from genpolicy.robot.scene_state import SceneState
 
 Array = NDArray[np.float64]
 
+OVERLAP_M = 0.02  # an obstacle in the way reaches at least this far above the tip of the tool
+
 
 @dataclass(frozen=True)
 class Case:
@@ -149,7 +151,7 @@ def not_a_number(case: Case, _: FeasibilityChecker) -> Case:
 
 
 def collision(case: Case, checker: FeasibilityChecker) -> Case | None:
-    """The obstacle stands where the projected chunk goes; None without such a place or body."""
+    """The obstacle stands where the projected chunk goes, lifted if too low; None without one."""
     actions, rows = case.proposal.actions, case.context.rows(len(case.proposal.actions))
     name = next((body for body in case.obstacles if body in case.poses), None)
     if name is None or not np.all(np.isfinite(actions)):
@@ -157,8 +159,17 @@ def collision(case: Case, checker: FeasibilityChecker) -> Case | None:
     actions = checker.project(case.proposal, context=case.context).actions
     middle = actions[(rows.start + min(rows.stop, len(actions)) - 1) // 2, POSITION]
     position, quaternion = case.poses[name]
-    at = np.array([middle[0], middle[1], position[2]])
+    tip_m = middle[2] - checker.collision.shapes.held_reach_m
+    lift_m = max(0.0, tip_m + OVERLAP_M - _top_m(name, position, checker))
+    at = np.array([middle[0], middle[1], position[2] + lift_m])
     return case.with_context(scene=SceneState({**case.poses, name: (at, quaternion)}))
+
+
+def _top_m(body: str, position: Array, checker: FeasibilityChecker) -> float:
+    """Height of a body's highest shape where it stands at a position, m; inf without a shape."""
+    own = [s for s in checker.collision.shapes.scene if s.body == body]
+    tops = [position[2] + s.position_m[2] + s.half_size_m[2] for s in own]
+    return float(max(tops, default=np.inf))
 
 
 def broken_seam(case: Case, _: FeasibilityChecker) -> Case:

@@ -108,6 +108,17 @@ def test_the_obstacle_cannot_stand_where_nothing_goes(good, checker):
     assert BY_NAME["collision"].apply(nowhere, checker) is None
 
 
+def test_an_obstacle_that_is_too_low_is_lifted_into_the_way(good, shadow):
+    """As in a cell whose robot passes over what stands in it."""
+    case = next(case for phase, case in good if phase == "approach")
+    (name,) = case.obstacles
+    at, turn = case.poses[name]
+    low = replace(case, poses={**case.poses, name: (at - np.array([0.0, 0.0, 0.15]), turn)})
+    bad = BY_NAME["collision"].apply(low, shadow.checker)
+    assert bad.context.scene.bodies[name][0][2] > at[2] - 0.15
+    assert _admit(shadow, bad).verdict.first_layer == "geometric"
+
+
 def test_what_a_task_calls_its_bodies_is_taken_from_it(good, shadow, checker):
     """Another name for the obstacle, or none at all: the corruption follows, or does not apply."""
     _, case = good[0]
