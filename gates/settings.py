@@ -67,17 +67,17 @@ class GateSettings(StrictModel):
 
     homes: ClassVar[Mapping[str, str]] = {}
 
-    _limits: Limits = PrivateAttr(default_factory=Limits)
+    _held_to: Limits = PrivateAttr(default_factory=Limits)
 
     @property
     def limits(self) -> Limits:
         """Limits that the gate judges by, for a measure that must know those of other questions."""
-        return self._limits
+        return self._held_to
 
     def under(self, limits: Limits) -> Self:
         """The same settings, with the limits that the gate judges by."""
         settings = self.model_copy()
-        settings._limits = limits
+        settings._held_to = limits
         return settings
 
 

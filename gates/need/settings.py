@@ -20,7 +20,6 @@ class NeedSettings(GateSettings):
 
     Attributes:
         confidence: Coverage of every interval.
-        strata_level: Adjusted p-value at which a stratum counts as explaining the modes.
         held_out_splits: Splits whose situations are judged.
         baselines: Simpler policies that must be there, frozen and matched.
         deployed_conventions: Sampling conventions under which a baseline is deployed; drawing
@@ -43,7 +42,6 @@ class NeedSettings(GateSettings):
     }
 
     confidence: float = Field(gt=0.5, lt=1.0)
-    strata_level: float = Field(gt=0.0, lt=1.0)
     held_out_splits: tuple[str, ...]
     baselines: tuple[str, ...]
     deployed_conventions: tuple[str, ...]
@@ -53,3 +51,11 @@ class NeedSettings(GateSettings):
     factors: tuple[str, ...] = ("reference", "representation", "trunk", "head", "temporal")
     conditioning_factors: tuple[str, ...] = ("representation", "trunk")
     cause: dict[str, dict[str, tuple[float, str]]]
+
+    @property
+    def strata_level(self) -> float:
+        """Adjusted p-value at which a stratum explains modes; the cause asks by the same limit."""
+        found = [
+            questions["strata_p"][0] for questions in self.cause.values() if "strata_p" in questions
+        ]
+        return found[0] if found else 0.0

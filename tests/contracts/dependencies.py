@@ -25,6 +25,13 @@ TASK_STAGE, IDENTITY = "task", "artifacts/task/identity.json"
 # what it decides about (`artifacts/gate_x/verdict.json`), so that an edit of a gate or of a report
 # template re-judges, and re-trains only if the verdict changed.
 ADMISSION = "gates.proof"
+# The table of checks is read by feasibility too (decision 30), so it stands below it: an edit of
+# these files has a row of its own.
+BELOW = {
+    "genpolicy/execution/__init__.py",
+    "genpolicy/execution/checks.py",
+    "genpolicy/execution/nanoseconds.py",
+}
 NOT_CODE_DATA = {".py", ".pyc", ".pyi"}
 
 
@@ -197,7 +204,9 @@ def rerun_after_edit(package: str) -> tuple[list[str], list[str]]:
         name
         for name, stage in pipeline().items()
         if any(
-            is_code(dep) and (covers(package, dep) or inside.is_relative_to(dep))
+            is_code(dep)
+            and (covers(package, dep) or inside.is_relative_to(dep))
+            and (dep not in BELOW or dep == package)
             for dep in stage["deps"]
         )
     }
@@ -223,7 +232,9 @@ def packages() -> list[str]:
         for parent in ("data", "evidence", "tasks")
         for path in sorted((ROOT / "genpolicy" / parent).glob("*/__init__.py"))
     ]
-    return sorted({*own, *rooms, "gates", *(["gates/pages"])})
+    return sorted(
+        {*own, *rooms, "gates", "gates/pages", *(BELOW & {"genpolicy/execution/checks.py"})}
+    )
 
 
 def table() -> str:
@@ -242,7 +253,8 @@ def table() -> str:
     for package in packages():
         direct, behind = rerun_after_edit(package)
         cells = [" ".join(names) or "nothing" for names in (direct, behind)]
-        lines.append(f"| `{package}/` | {cells[0]} | {cells[1]} |")
+        shown = package if package.endswith(".py") else f"{package}/"
+        lines.append(f"| `{shown}` | {cells[0]} | {cells[1]} |")
     return "\n".join([*lines, ""])
 
 

@@ -73,7 +73,6 @@ PARAMS: dict[str, Any] = {
     },
     "gate_a": {
         "cause": _cause(),
-        "strata_level": 0.05,
         "held_out_splits": ["validation", "test"],
         "deployed_conventions": ["direct", "z_zero"],
         "generative_baselines": [DRAWN],
