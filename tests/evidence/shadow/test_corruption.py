@@ -8,7 +8,9 @@ import pytest
 from genpolicy.contract.action import GRIPPER
 from genpolicy.evidence.admission_context import make_checker
 from genpolicy.evidence.shadow.corruption import CORRUPTIONS
-from genpolicy.evidence.shadow.shadow import Shadow, _admit, _case, held_out_observations
+from genpolicy.evidence.shadow.observations import held_out_observations
+from genpolicy.evidence.shadow.session import Cell
+from genpolicy.evidence.shadow.shadow import Shadow, admit, case_of
 from genpolicy.feasibility.admission import Admitted, Rejected
 from genpolicy.feasibility.checks import CHECKS, without
 from genpolicy.feasibility.settings import LAYERS
@@ -20,8 +22,8 @@ BY_NAME = {item.name: item for item in CORRUPTIONS}
 @pytest.fixture(scope="module")
 def shadow(task, checker, kit):
     return Shadow(
-        task=task, checker=checker, horizons=kit.HORIZONS, execution=kit.EXECUTION, late_steps=1,
-        candidates=2,
+        task=task, checker=checker, cell=Cell(kit.HORIZONS, kit.EXECUTION), late_steps=1,
+        samples=2,
     )  # fmt: skip
 
 
@@ -32,10 +34,10 @@ def good(shadow, data, kit):
         data, horizons=kit.HORIZONS, count=60, generator=stream(1, "corruption")
     )
     cases = [
-        (item.phase, _case(shadow, None, item, number, 0, item.demonstrated))
+        (item.phase, case_of(shadow, item, item.demonstrated, number=number))
         for number, item in enumerate(observations)
     ]
-    found = [(phase, case) for phase, case in cases if isinstance(_admit(shadow, case), Admitted)]
+    found = [(phase, case) for phase, case in cases if isinstance(admit(shadow, case), Admitted)]
     assert len(found) >= 0.8 * len(cases)
     assert {phase for phase, _ in found} >= {"approach", "insert", "retreat"}
     return found
@@ -61,7 +63,7 @@ def test_refused_by_the_layer_that_owns_it(name, good, shadow):
     assert cases, "the corruption could be applied nowhere"
     layers = []
     for case in cases:
-        result = _admit(shadow, case)
+        result = admit(shadow, case)
         assert isinstance(result, Rejected), f"{name} was admitted"
         layers.append(result.verdict.first_layer)
         if corruption.checks and result.verdict.first_layer == corruption.layer:
@@ -89,7 +91,7 @@ def test_roughness_alone_is_smoothed_and_is_no_corruption(good, shadow):
     actions = np.array(case.proposal.actions)
     actions[1::2, 1] += 0.004
     actions[::2, 1] -= 0.004
-    result = _admit(shadow, case.with_actions(actions))
+    result = admit(shadow, case.with_actions(actions))
     assert isinstance(result, Admitted)
     assert 0.002 < result.projected.position_change_m < 0.02
 
@@ -99,7 +101,7 @@ def test_the_obstacle_stands_where_the_projected_chunk_goes(good, shadow):
     actions = np.array(case.proposal.actions)
     actions[:, 2] += 0.13  # above the workspace; projection brings it down by up to 5 cm
     bad = BY_NAME["collision"].apply(case.with_actions(actions), shadow.checker)
-    assert isinstance(_admit(shadow, bad), Rejected)
+    assert isinstance(admit(shadow, bad), Rejected)
 
 
 def test_the_obstacle_cannot_stand_where_nothing_goes(good, checker):
