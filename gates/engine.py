@@ -30,6 +30,8 @@ from gates.verdicts import combine, first_unmet, judge_criterion, rounded
 from genpolicy.errors import IntegrityError
 from genpolicy.integrity.hashing import sha256_bytes_of
 
+TASK_IDENTITY = "artifacts/task/identity.json"
+"""What the task is, by hash: material of every gate."""
 LIBRARIES = ("numpy", "pandas", "pyarrow", "pydantic", "scipy")
 REGIME = (
     "bit-equal for the same wheels, CPU capability, one thread and one batch shape; "
@@ -99,7 +101,24 @@ def judge_gate(spec: GateSpec, root: Path) -> GateReport:
     caveats: Sequence[str] = ()
     if spec.below is not None:
         names, caveats = standing(root, spec.below, getattr(settings, "candidates", ()))
-    return judge(spec, Evidence(root), limits, settings, candidates=names, caveats=caveats)
+    return judge(spec, evidence_of(root), limits, settings, candidates=names, caveats=caveats)
+
+
+def evidence_of(root: Path) -> Evidence:
+    """The evidence below `root`, with the identity of its task bound.
+
+    Raises:
+        IntegrityError: Nobody wrote which task the evidence is about.
+    """
+    evidence = Evidence(root)
+    if not evidence.bind(TASK_IDENTITY):
+        raise IntegrityError(
+            where=TASK_IDENTITY,
+            found="missing",
+            expected="the identity of the task that the evidence is about",
+            action="Run `dvc repro task`.",
+        )
+    return evidence
 
 
 def judge(

@@ -230,6 +230,7 @@ def edit_document(root: Path, path: str, change: Any) -> None:
 def build(root: Path) -> None:
     """All evidence and settings, without any report."""
     write_params(root)
+    document(root, "task/identity.json", {"name": "tabletop_insertion"})
     _dataset(root)
     _audit(root)
     _baselines(root)

@@ -118,7 +118,7 @@ def test_an_obstacle_that_is_too_low_is_lifted_into_the_way(good, shadow):
     low = replace(case, poses={**case.poses, name: (at - np.array([0.0, 0.0, 0.15]), turn)})
     bad = BY_NAME["collision"].apply(low, shadow.checker)
     assert bad.context.scene.bodies[name][0][2] > at[2] - 0.15
-    assert _admit(shadow, bad).verdict.first_layer == "geometric"
+    assert admit(shadow, bad).verdict.first_layer == "geometric"
 
 
 def test_what_a_task_calls_its_bodies_is_taken_from_it(good, shadow, checker):
