@@ -100,7 +100,7 @@ def judge_gate(spec: GateSpec, root: Path) -> GateReport:
     names: Sequence[str] = ()
     caveats: Sequence[str] = ()
     if spec.below is not None:
-        names, caveats = standing(root, spec.below, getattr(settings, "candidates", ()))
+        names, caveats = promoted_below(root, spec.below, getattr(settings, "candidates", ()))
     report = judge(spec, Evidence(root), limits, settings, candidates=names, caveats=caveats)
     return about_a_task(root, report)
 
@@ -254,7 +254,7 @@ def upstream_hashes(root: Path, gate: Gate) -> dict[str, str]:
     return found
 
 
-def standing(root: Path, below: Gate, wanted: Sequence[str]) -> tuple[list[str], list[str]]:
+def promoted_below(root: Path, below: Gate, wanted: Sequence[str]) -> tuple[list[str], list[str]]:
     """The wanted methods that passed the gate below, and why the others do not stand.
 
     Gate A judges no method, so all of them stand behind it. A report that is missing or unreadable
