@@ -12,7 +12,7 @@ from gates.criterion import Measured, criteria_of, criterion
 from gates.engine import GateSpec
 from gates.evidence import Array, Evidence, MissingEvidenceError, count, flags, number, numbers
 from gates.settings import GateSettings
-from genpolicy.evidence.rows import CandidateRow, ShadowCountRow, ShadowStubRow
+from genpolicy.evidence.rows.shadow import CandidateRow, ShadowCountRow, ShadowStubRow
 
 SHADOW = "artifacts/shadow"
 CANDIDATES = f"{SHADOW}/candidates.parquet"

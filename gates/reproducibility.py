@@ -14,7 +14,7 @@ from gates.evidence import Evidence, MissingEvidenceError, count, number, number
 from gates.need.settings import TRAINED as BASELINES
 from gates.need.simpler import unmatched
 from gates.settings import GateSettings
-from genpolicy.evidence.rows import CoverageRow, LatencyRow, NfeRow, SampleRow
+from genpolicy.evidence.rows.reproducibility import CoverageRow, LatencyRow, NfeRow, SampleRow
 
 RELOAD = "artifacts/reload"
 LATENCY = "artifacts/latency/latency.parquet"

@@ -10,7 +10,7 @@ from gates.bounds import share_interval
 from gates.criterion import Measured
 from gates.evidence import Evidence, MissingEvidenceError, flags
 from gates.settings import GateSettings
-from genpolicy.evidence.rows import RolloutRow
+from genpolicy.evidence.rows.stress import RolloutRow
 
 STRESS = "artifacts/stress"
 ROLLOUTS = f"{STRESS}/rollouts.parquet"
