@@ -11,11 +11,12 @@ from dataclasses import replace
 
 from genpolicy.contract.chunk import ChunkMetadata, DiscardReason
 from genpolicy.execution.arrival import Arrivals, issued_by_feasibility
-from genpolicy.execution.checks import CHECKS, FALLBACK, POLICY, Checks, ExecutorMode, View, missing
+from genpolicy.execution.checks import CHECKS, Checks, missing
 from genpolicy.execution.chunk_queue import ChunkQueue
 from genpolicy.execution.command import Command
 from genpolicy.execution.journal import Journal, session_payload
 from genpolicy.execution.ledger import Conservation
+from genpolicy.execution.moment import FALLBACK, POLICY, ExecutorMode, View
 from genpolicy.execution.nanoseconds import NEVER_NS, NS_PER_S, to_ns
 from genpolicy.execution.settings import ExecutorSettings
 from genpolicy.execution.stub import ControllerStub
@@ -133,9 +134,8 @@ class Executor:
     def set_active(self, now_s: float, checkpoint_hash: str, sampler_hash: str) -> None:
         """Name the weights and the sampler that may command; what others made is discarded."""
         now_ns = self._begin(now_s)
-        self._journal.add(
-            "active", now_ns, {"checkpoint": checkpoint_hash, "sampler": sampler_hash}
-        )
+        payload = {"checkpoint": checkpoint_hash, "sampler": sampler_hash}
+        self._journal.add("active", now_ns, payload)
         self.stub.note_active(checkpoint_hash, sampler_hash)
         self._view = replace(self._view, checkpoint=checkpoint_hash, sampler=sampler_hash)
         self._drop(now_ns, DiscardReason.CHECKPOINT_MISMATCH)

@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.contract.chunk import DiscardReason
-from genpolicy.execution.checks import CHECKS, Checks, Chunk, Moment, Place, View, refusal
+from genpolicy.execution.checks import CHECKS, Checks, Place, refusal
 from genpolicy.execution.journal import Journal, encode_actions
+from genpolicy.execution.moment import Chunk, Moment, View
 from genpolicy.execution.nanoseconds import ChunkTimes
 from genpolicy.execution.settings import ExecutorSettings
 from genpolicy.execution.supervisor import Supervisor

@@ -11,7 +11,8 @@ from gates.cause import Layer
 from genpolicy.audit import AuditReport, audit, propose_settings
 from genpolicy.audit.run import audit as audit_rows
 from genpolicy.contract.normalisation import Normalisation, statistics_of
-from genpolicy.data.dataset import Dataset, Frames
+from genpolicy.data.dataset import Dataset
+from genpolicy.data.frames import Frames
 from genpolicy.errors import ConfigError, ContractError
 from genpolicy.integrity.documents import canonical_json, parse_json
 

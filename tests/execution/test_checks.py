@@ -5,17 +5,8 @@ from dataclasses import replace
 import pytest
 
 from genpolicy.contract.chunk import ChunkMetadata, DiscardReason
-from genpolicy.execution.checks import (
-    CHECKS,
-    FALLBACK,
-    Chunk,
-    ExecutorMode,
-    Moment,
-    Place,
-    View,
-    at,
-    refusal,
-)
+from genpolicy.execution.checks import CHECKS, Place, at, refusal
+from genpolicy.execution.moment import FALLBACK, Chunk, ExecutorMode, Moment, View
 from genpolicy.execution.nanoseconds import ChunkTimes
 
 MS = 1_000_000

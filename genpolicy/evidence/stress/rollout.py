@@ -169,7 +169,8 @@ class Rollout:
         """Recover where needed; sets `wanted` if the policy must sample."""
         now_s, self.wanted = self.now_s, None
         self._recover(now_s)
-        if not self.done and self._may_invoke(now_s):
+        idle = not self.done and self.recovery.state is RecoveryState.IDLE
+        if idle and self.executor.needs_invocation(now_s):
             self.wanted = self._begin_invocation(now_s)
 
     def act(self) -> None:
@@ -212,9 +213,6 @@ class Rollout:
             self.executor.force_event(now_s)
             self.recovery.stop(now_s, "force")
             self._end(Outcome.FORCE_STOP)
-
-    def _may_invoke(self, now_s: float) -> bool:
-        return self.recovery.state is RecoveryState.IDLE and self.executor.needs_invocation(now_s)
 
     def _begin_invocation(self, now_s: float) -> InFlight:
         horizons, number = self.fixture.horizons, self.invocations
