@@ -121,14 +121,14 @@ def projection_p95_m(evidence: Evidence, settings: FeasibilitySettings, candidat
 
 @criterion(
     "<=",
-    question="How hard is the seam between two chunks?",
+    question="How hard is the boundary between two chunks?",
     look_at="Timing: look at H_e, re-planning, blending and normalisation.",
     per_candidate=True,
 )
 def boundary_jerk_p95_m_s3(
     evidence: Evidence, settings: FeasibilitySettings, candidate: str
 ) -> Measured:
-    """Jerk at the seam that 95 % of the admissible candidates keep, m/s^3."""
+    """Jerk at the boundary that 95 % of the admissible candidates keep, m/s^3."""
     return _of_admissible(evidence, settings, candidate, "boundary_jerk_m_s3")
 
 

@@ -79,7 +79,7 @@ class Answer:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class Diagnosis:
     """What a red layer says: a cause, the variable and kind that it names, and what to do."""
 
     name: CauseName
@@ -88,7 +88,7 @@ class Verdict:
     next_action: str
 
 
-Named = tuple[list[Answer], Verdict | None]
+Named = tuple[list[Answer], Diagnosis | None]
 """The answers of a layer, and what it says where it is red."""
 
 

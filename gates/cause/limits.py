@@ -21,6 +21,8 @@ SHARED = (
     "mode_feasible_share",
 )  # fmt: skip
 """Questions whose limit stands among the criteria of Gate A."""
+AT_MOST = ("clock_residual_s", "calibration_residual_m", "label_disagreement", "strata_effect")
+"""Those of them whose number must not exceed the limit; the others must reach it."""
 OWN = (
     "clock_disorder", "rate_deviation", "gap_share", "jitter_share", "lag_drift_steps",
     "gain_factor", "gain_epoch_factor", "magnitude_factor", "frame_angle_rad", "swapped_columns",

@@ -21,7 +21,7 @@ POLICY = "policy"
 FALLBACK = "fallback"
 
 
-class Mode(StrEnum):
+class ExecutorMode(StrEnum):
     """Who commands."""
 
     RUN = "run"
@@ -30,7 +30,7 @@ class Mode(StrEnum):
     ENDED = "ended"
 
 
-MODE_OF_SOURCE = {POLICY: Mode.FALLBACK, FALLBACK: Mode.RUN}
+MODE_OF_SOURCE = {POLICY: ExecutorMode.FALLBACK, FALLBACK: ExecutorMode.RUN}
 """In which mode the other source commands, so that chunks of this one are refused."""
 
 
@@ -94,7 +94,7 @@ class View:
     sampler: str = ""
     fallback: str = ""
     session_epoch: int = 0
-    mode: str = Mode.RUN
+    mode: str = ExecutorMode.RUN
     stopped: bool = False
     voidings: Mapping[DiscardReason, Voiding] = field(default_factory=dict)
     execution_horizon: int = 0
@@ -314,7 +314,7 @@ _R, _P = DiscardReason, Place
 _LIVE = (Place.ARRIVAL, Place.QUEUE, Place.STUB)
 
 CHECKS: Checks = (
-    _row("end_of_episode", lambda m: m.view.mode != Mode.ENDED,
+    _row("end_of_episode", lambda m: m.view.mode != ExecutorMode.ENDED,
          _R.END_OF_EPISODE, _P.DOOR, _P.QUEUE, _P.STUB),
     _row("duplicate", lambda m: m.known is False, _R.DUPLICATE, _P.DOOR),
     _row("infeasible", lambda m: m.chunk.passed, _R.INFEASIBLE, _P.ARRIVAL),
@@ -324,7 +324,8 @@ CHECKS: Checks = (
     _row("same_action", lambda m: m.same_action is True, _R.INFEASIBLE, _P.STUB),
     _row("execution_horizon", _within_horizon, _R.INFEASIBLE, _P.ROWS, _P.STUB),
     _row("checked_rows", _in_checked_rows, _R.INFEASIBLE, _P.ROWS, _P.STUB),
-    _row("intervention", lambda m: m.view.mode != Mode.INTERVENTION, _R.INTERVENTION, *_LIVE),
+    _row("intervention", lambda m: m.view.mode != ExecutorMode.INTERVENTION,
+         _R.INTERVENTION, *_LIVE),
     _row("stopped", lambda m: not m.view.stopped, _R.STOPPED, *_LIVE),
     _row("commander", lambda m: m.view.mode != MODE_OF_SOURCE[m.chunk.source], _R.STOPPED, *_LIVE),
     _row("session_epoch", lambda m: m.chunk.metadata.session_epoch == m.view.session_epoch,

@@ -179,24 +179,6 @@ class ArmKinematics:
         """
         return _jacobian(self.frames(q_rad))
 
-    def reference_forward(self, q_rad: Array) -> tuple[Array, Array]:
-        """What Pinocchio says for one configuration of shape (J,): position (m), rotation."""
-        pin.framesForwardKinematics(self.model, self.data, self._full(q_rad))
-        placement = self.data.oMf[self.tcp_frame_id]
-        return np.array(placement.translation), np.array(placement.rotation)
-
-    def reference_jacobian(self, q_rad: Array) -> Array:
-        """What Pinocchio says for one configuration; base axes at the TCP. Shape (6, J)."""
-        jacobian = pin.computeFrameJacobian(
-            self.model, self.data, self._full(q_rad), self.tcp_frame_id, pin.LOCAL_WORLD_ALIGNED
-        )
-        return np.array(jacobian)[:, : self.joint_count]
-
-    def _full(self, q_rad: Array) -> Array:
-        full: Array = np.array(pin.neutral(self.model), dtype=float)
-        full[: self.joint_count] = q_rad
-        return full
-
     def condition_number(self, q_rad: Array) -> Array:
         """Largest over smallest singular value of the TCP Jacobian (m and rad mixed).
 

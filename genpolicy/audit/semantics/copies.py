@@ -95,7 +95,7 @@ def copy_findings(copies: Copies, data: AuditInput, settings: AuditSettings) -> 
     return findings
 
 
-def seam_findings(data: AuditInput, motion: Motion, settings: AuditSettings) -> list[Finding]:
+def splice_findings(data: AuditInput, motion: Motion, settings: AuditSettings) -> list[Finding]:
     """Episodes that jump in their middle as no motion of this data set does."""
     total = len(motion.starts) - 1
     jumps = np.zeros(total, dtype=bool)

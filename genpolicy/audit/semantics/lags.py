@@ -152,7 +152,7 @@ def _around(
 def episode_lags(
     leading: Array, trailing: Array, starts: Integers, pieces: Integers, maximum_steps: int
 ) -> Lags:
-    """Lag of each episode, from its longest piece without a seam. Shapes (E,)."""
+    """Lag of each episode, from its longest piece without a splice. Shapes (E,)."""
     found = segment_lags(leading, trailing, pieces, maximum_steps)
     if len(pieces) == len(starts):
         return found

@@ -20,7 +20,7 @@ from genpolicy.audit.settings import AuditSettings
 
 LEAST_EPISODES = 4
 # Motion below this share of the usual one has no gain.
-STANDING = 0.1
+MOVING_SHARE = 0.1
 # A factor between episodes that may be one of units, if it is also this many spreads...
 MAGNITUDE = 5.0
 MAGNITUDE_SPREADS = 8.0
@@ -98,7 +98,7 @@ def _clear(values: Array) -> Array:
 def _log_gain(seen: Array, asked: Array) -> Array:
     """Logarithm of the gain; NaN where next to nothing is commanded. Shape (E,)."""
     typical = np.median(asked)
-    valid = (asked > STANDING * typical) & (seen > 0)
+    valid = (asked > MOVING_SHARE * typical) & (seen > 0)
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(valid, np.log(seen) - np.log(asked), np.nan)
 

@@ -13,7 +13,12 @@ from numpy.typing import NDArray
 
 from genpolicy.contract.chunk import Candidate, ChunkMetadata, DiscardReason, Proposal
 from genpolicy.errors import ContractError
-from genpolicy.evidence.admission_context import COMMANDS_AT_THE_SEAM, Moment, Session, context_of
+from genpolicy.evidence.admission_context import (
+    COMMANDS_AT_THE_BOUNDARY,
+    Moment,
+    Session,
+    context_of,
+)
 from genpolicy.evidence.stress.fallback import Fallback
 from genpolicy.evidence.stress.perturbations import Push, push
 from genpolicy.evidence.stress.state import Fixture, InFlight, Outcome, Tally, in_flight
@@ -74,7 +79,7 @@ class Rollout:
         self._newest_accepted_s: float | None = None
         self._last_command_s: float | None = None
         self._commanded: deque[Array] = deque(
-            [self.world.last_action] * COMMANDS_AT_THE_SEAM, maxlen=COMMANDS_AT_THE_SEAM
+            [self.world.last_action] * COMMANDS_AT_THE_BOUNDARY, maxlen=COMMANDS_AT_THE_BOUNDARY
         )
         self.history: deque[Array] = deque(maxlen=fixture.horizons.observation_horizon)
         self._push: Push | None = push(

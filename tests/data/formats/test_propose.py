@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from genpolicy.data.formats.contract import ActionSource, ChannelSource
+from genpolicy.data.formats.open_questions import open_questions
 from genpolicy.data.formats.pairing import are_differences, pair_by_name, pair_by_numbers
 from genpolicy.data.formats.sample import Sample, action_of, channels_of
 from genpolicy.data.formats.source import Column, RawEpisode
-from genpolicy.data.formats.standing import standing_notes
 from genpolicy.data.formats.units import guess_unit, is_wrapped_angle, tokens
 
 
@@ -159,7 +159,7 @@ def test_notes_say_what_is_open(layouts, tmp_path):
     from genpolicy.data.formats import propose
 
     contract = propose(layouts.v2(tmp_path / "a"))
-    text = " ".join(standing_notes(contract))
+    text = " ".join(open_questions(contract))
     assert "Units were guessed" in text
     assert "operator" in text
     sure = contract.model_copy(
@@ -169,6 +169,6 @@ def test_notes_say_what_is_open(layouts, tmp_path):
             "pairing": None,
         }
     )
-    text = " ".join(standing_notes(sure))
+    text = " ".join(open_questions(sure))
     assert "guessed" not in text
     assert "commands nothing that is observed" in text
