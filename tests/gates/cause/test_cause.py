@@ -143,9 +143,18 @@ def test_confidence_is_the_share_of_draws_that_name_the_same():
     assert named(VALID).confidence is None
 
 
-def test_a_limit_below_what_the_audit_looked_for_is_refused():
-    with pytest.raises(ConfigError, match=r"limit of clock_residual_s is 0\.005, expected at l"):
-        named(VALID, limit(clock_residual_s=0.005))
+@pytest.mark.parametrize("question", sorted(AuditSettings().floors))
+def test_a_limit_below_what_the_audit_looked_for_is_refused(question):
+    below = 0.5 * AuditSettings().floors[question]
+    with pytest.raises(ConfigError, match=rf"limit of {question} is .*, expected at least"):
+        named(VALID, limit(**{question: below}))
+
+
+def test_every_deviation_above_zero_that_is_looked_for_has_a_floor():
+    # A finding is made beyond its floor only: without one a lower limit would be without effect.
+    zero = {"clock_disorder", "swapped_columns"}
+    assert all(LIMITS[question] == 0 for question in zero)
+    assert set(AuditSettings().floors) >= _of_findings() - zero
 
 
 class Watched(CauseLimits):
@@ -159,14 +168,19 @@ class Watched(CauseLimits):
 ASKED: set[str] = set()
 
 
+def _of_findings() -> set[str]:
+    """Questions that the layer of data semantics reports a deviation for."""
+    sources = (ROOT / "genpolicy/audit/semantics").glob("*.py")
+    words = set(re.findall(r'"(\w+)"', "".join(path.read_text() for path in sources)))
+    return words & {*SHARED, *OWN}
+
+
 def test_every_limit_is_asked_for_and_every_finding_has_one():
     watched = Watched(LIMITS.by_question)
     others = (counts(two_mode_episodes=0), counts(two_mode_episodes=0, noise_ratio=0.9))
     for numbers in (VALID, *others, *(item[0] for item in BROKEN.values())):
         named(numbers, watched)
-    sources = (ROOT / "genpolicy/audit/semantics").glob("*.py")
-    words = set(re.findall(r'"(\w+)"', "".join(path.read_text() for path in sources)))
-    of_findings = words & {*SHARED, *OWN}
+    of_findings = _of_findings()
     assert {"clock_disorder", "gain_epoch_factor", "calibration_residual_m"} <= of_findings
     assert ASKED | of_findings == {*SHARED, *OWN}
 
