@@ -75,7 +75,7 @@ class Executor:
         calibration_epoch: str,
         divergence_m: float | None = None,
     ) -> bool:
-        """Take note of an observation; one older than the newest is ignored and counted.
+        """Whether an observation is used; one older than the newest is ignored and counted.
 
         Args:
             now_s: Time, s.
@@ -83,9 +83,6 @@ class Executor:
             phase: Task phase.
             calibration_epoch: Calibration of its sensors.
             divergence_m: Distance of measured from commanded TCP, if known, m.
-
-        Returns:
-            Whether it was used.
         """
         now_ns = self._begin(now_s)
         event_ns = to_ns(event_time_s) if math.isfinite(event_time_s * NS_PER_S) else now_ns + 1
@@ -231,11 +228,7 @@ class Executor:
         self._journal.invocation(now_s, invocation_id=invocation_id, stage="end", detail=detail)
 
     def deliver(self, admitted: Admitted, now_s: float) -> DiscardReason | None:
-        """Enqueue a chunk of the policy, or discard it.
-
-        Returns:
-            None if enqueued, else why not.
-        """
+        """Enqueue a chunk of the policy, or discard it; None if enqueued, else why not."""
         return self._arrive(admitted, self._begin(now_s), POLICY)
 
     def deliver_fallback(self, admitted: Admitted, now_s: float) -> DiscardReason | None:
