@@ -32,6 +32,7 @@ OWN = (
     "everything_handicap",
 )  # fmt: skip
 """Questions that only the cause asks."""
+NOT_APPLICABLE = "not applicable"
 OWNERS = ("model", "perception", "controller", "safety")
 
 
@@ -57,7 +58,8 @@ class CauseLimits:
         """In the form of `params.yaml`: by owner, limit and reason of each question."""
         result: dict[str, dict[str, list[Any]]] = {}
         for question, item in self.by_question.items():
-            result.setdefault(item.owner, {})[question] = [item.limit, item.reason]
+            limit = item.limit if isfinite(item.limit) else NOT_APPLICABLE
+            result.setdefault(item.owner, {})[question] = [limit, item.reason]
         return result
 
 

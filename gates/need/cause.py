@@ -19,7 +19,7 @@ def found_cause(evidence: Evidence, settings: NeedSettings) -> Cause:
         MissingEvidenceError: Numbers, or limits of shared questions, are missing.
         ConfigError: A limit lies below what the audit looked for, or a question has none.
     """
-    shared = {**_waived(settings.limits), **settings.limits.of}
+    shared = asked(settings.limits)
     absent = [question for question in SHARED if question not in shared]
     if absent:
         raise MissingEvidenceError(f"params.yaml: gate_a has no limit of {', '.join(absent)}")
@@ -34,10 +34,11 @@ def found_cause(evidence: Evidence, settings: NeedSettings) -> Cause:
     return name_cause(numbers, draws, limits)
 
 
-def _waived(limits: Limits) -> dict[str, Limit]:
-    """Shared questions that are declared not applicable: limits that every number keeps."""
-    return {
+def asked(limits: Limits) -> dict[str, Limit]:
+    """Limits of the gate; a question that does not apply gets one that every number keeps."""
+    waived = {
         name: Limit(math.inf if name in AT_MOST else -math.inf, waiver.reason, waiver.owner)
         for name, waiver in limits.waived.items()
         if name in SHARED
     }
+    return {**waived, **limits.of}

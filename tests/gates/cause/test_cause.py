@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+import yaml
 
 from gates.cause import (
     Cause,
@@ -201,3 +202,18 @@ def test_the_packaged_limits_are_those_of_the_ladder():
 def test_a_limit_without_reason_or_question_is_refused(cause, match):
     with pytest.raises(ConfigError, match=match):
         limits_of(cause, {}, where="params.yaml: gate_a.cause")
+
+
+def test_a_shared_question_that_does_not_apply_turns_nothing_red_and_is_written_as_such(tmp_path):
+    params = yaml.safe_load((ROOT / "params.yaml").read_text())
+    del params["gate_a"]["limits"]["perception"]["clock_residual_s"]
+    params["gate_a"]["not_applicable"] = {"perception": {"clock_residual_s": "one clock only"}}
+    path = tmp_path / "params.yaml"
+    path.write_text(yaml.safe_dump(params))
+    limits = read_cause_limits(path)
+    late = replace(VALID, findings=(OFFSET,))
+    assert named(late).name is CauseName.DATA_DEFECT
+    assert named(late, limits).name is CauseName.VALID_MODES
+    written = limits.as_json()["perception"]["clock_residual_s"]
+    assert written == ["not applicable", "one clock only"]
+    json.dumps([answer.as_json() for answer in named(late, limits).answers], allow_nan=False)
