@@ -51,7 +51,8 @@ class Cell:
 def make_cell(plan: Plan) -> Cell:
     """The plant of one data set."""
     if plan.exact:
-        return Cell(dead_steps=SUB_STEPS, constant_s=INSTANT_S)
+        # The plant moves to a target in the course of a period: at its end it is there.
+        return Cell(dead_steps=0, constant_s=INSTANT_S)
     rng = stream(plan.seed, "cell")
     return Cell(int(rng.integers(1, 6)), rng.uniform(0.02, 0.05))
 
