@@ -30,7 +30,8 @@ class Faults:
         self.period_s = period_s
         self.n = n
         rng = stream(plan.seed, "faults")
-        self.sign = rng.choice([-1.0, 1.0], size=len(plan.defects))
+        sign = rng.choice([-1.0, 1.0], size=len(plan.defects))
+        self.sign = np.abs(sign) if plan.exact else sign
         self.angle = rng.uniform(0.0, 2.0 * np.pi, size=len(plan.defects))
         self.hit: list[tuple[int, Defect, np.ndarray]] = []
         for number, defect in enumerate(plan.defects):

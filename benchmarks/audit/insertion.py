@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from benchmarks.audit.plan import OPERATORS, Array, Plan, Roster
-from benchmarks.audit.truth import SUB_STEPS, Truth
+from benchmarks.audit.truth import INSTANT_S, SUB_STEPS, Truth
 from genpolicy.seeds import stream
 from genpolicy.tasks.tabletop_insertion import scene
 from genpolicy.tasks.tabletop_insertion.experts import STYLES, Operator, Order
@@ -50,6 +50,9 @@ class Cell:
 
 def make_cell(plan: Plan) -> Cell:
     """The plant of one data set."""
+    if plan.exact:
+        # The plant moves to a target in the course of a period: at its end it is there.
+        return Cell(dead_steps=0, constant_s=INSTANT_S)
     rng = stream(plan.seed, "cell")
     return Cell(int(rng.integers(1, 6)), rng.uniform(0.02, 0.05))
 

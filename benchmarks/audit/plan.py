@@ -65,6 +65,11 @@ class Plan:
         failing: Share of the last mode's episodes that fail.
         wrong_labels: Share of labels that are wrong.
         episodes: Number of episodes; None draws 100 to 200.
+        recoveries: How many of them, the last ones, are disturbed beside those by chance.
+        exact: Nothing but what is planted, for tests that need exact numbers. The plant follows one
+            action period later and goes at once; sensors and clocks have no error, and a clock
+            fault makes the samples late; there are two epochs; every stratum is recorded, receive
+            times are not; no episode fails or is disturbed by chance.
         defects: Faults of the recording.
     """
 
@@ -83,11 +88,18 @@ class Plan:
     failing: float = 0.0
     wrong_labels: float = 0.0
     episodes: int | None = None
+    recoveries: int = 0
+    exact: bool = False
     defects: tuple[Defect, ...] = field(default=())
 
     def __post_init__(self) -> None:
         if self.decided_by not in DECIDERS or abs(sum(self.shares) - 1.0) > 1e-9:
             raise ValueError(f"{self.decided_by} decides, shares {self.shares}")
+
+    @property
+    def by_chance(self) -> float:
+        """Factor of every error and mishap that is not planted."""
+        return 0.0 if self.exact else 1.0
 
 
 @dataclass(frozen=True)
@@ -127,18 +139,20 @@ def draw_roster(plan: Plan, goal_half_width_m: float) -> Roster:
     turns = np.arange(n) // int(rng.integers(5, 16)) if blocks else rng.integers(0, 1000, n)
     operator = np.array(OPERATORS)[turns % len(OPERATORS)]
     objects = np.array(OBJECTS)[rng.integers(0, 2, n)]
-    epochs = int(rng.integers(2, 4))
+    epochs = 2 if plan.exact else int(rng.integers(2, 4))
     epoch = np.arange(n) * epochs // n
     context = rng.integers(0, plan.contexts, n)
     wide = goal_half_width_m if plan.goal_half_width_m is None else plan.goal_half_width_m
     goal = wide * rng.uniform(-1.0, 1.0, n)
     mode, cue = _modes(plan, operator, objects, epoch, goal, rng)
-    failure = rng.random(n) < FAILURE_SHARE
+    failure = rng.random(n) < FAILURE_SHARE * plan.by_chance
     if plan.failing:
         failure |= (mode == len(plan.shares) - 1) & (rng.random(n) < plan.failing)
+    recovery = rng.random(n) < RECOVERY_SHARE * plan.by_chance
+    recovery |= np.arange(n) >= n - plan.recoveries
     return Roster(
         operator=operator, object=objects, epoch=epoch, mode=mode, cue=cue, context=context,
-        goal_lateral_m=goal, recovery=rng.random(n) < RECOVERY_SHARE, failure=failure,
+        goal_lateral_m=goal, recovery=recovery, failure=failure,
         split=_splits(n, rng),
     )  # fmt: skip
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.audit.plan import OPERATORS, Array, Plan, Roster
-from benchmarks.audit.truth import SUB_STEPS, Truth, follow
+from benchmarks.audit.truth import INSTANT_S, SUB_STEPS, Truth, follow
 from genpolicy.seeds import stream
 from genpolicy.tasks.tabletop_insertion.plans import travel
 
@@ -41,6 +41,8 @@ class Cell:
 
 def make_cell(plan: Plan) -> Cell:
     """The plant of one data set."""
+    if plan.exact:
+        return Cell(delay_s=PERIOD_S, constant_s=INSTANT_S)
     rng = stream(plan.seed, "cell")
     return Cell(rng.uniform(0.02, 0.15), rng.uniform(0.05, 0.12))
 
@@ -63,7 +65,7 @@ def demonstrate(plan: Plan, roster: Roster, number: int, cell: Cell) -> Truth:
         pieces += [rest(start, rng.integers(0, 4)), move([start, gate], speed), rest(gate, 2)]
         here = gate
     else:
-        pieces.append(rest(start, rng.integers(1, 6)))
+        pieces.append(rest(start, 1 if plan.exact else rng.integers(1, 6)))
         here = start
     if plan.station_dwell_s:
         dwell = round(plan.station_dwell_s / PERIOD_S)

@@ -69,16 +69,17 @@ def _observe(
     epoch = int(roster.epoch[number])
     ticks = world.PERIOD_S * np.arange(len(truth.command))
     healthy = stream(plan.seed, "cell", "epoch", epoch)
-    clock = {name: CLOCK_ERROR_S * healthy.uniform(-1.0, 1.0) for name in DELAY_S}
-    shift = CAMERA_ERROR_M * healthy.normal(size=2)
+    share = plan.by_chance
+    clock = {name: share * CLOCK_ERROR_S * healthy.uniform(-1.0, 1.0) for name in DELAY_S}
+    shift = share * CAMERA_ERROR_M * healthy.normal(size=2)
     ahead = {name: clock[name] + faults.clock(name, number, len(ticks)) for name in DELAY_S}
-    sampled = ticks - rng.uniform(0.0, ROBOT_PERIOD_S, len(ticks))
+    sampled = ticks - share * rng.uniform(0.0, ROBOT_PERIOD_S, len(ticks))
     position = truth.position(sampled - ahead["robot"])
-    position = position + POSITION_NOISE_M * rng.normal(size=position.shape)
+    position = position + share * POSITION_NOISE_M * rng.normal(size=position.shape)
     scene = np.tile(truth.scene, (len(ticks), 1))
     scene[:, :2] += shift
-    scene[:, world.SCENE_LENGTHS] += CAMERA_NOISE_M * rng.normal(
-        size=(len(ticks), len(world.SCENE_LENGTHS))
+    scene[:, world.SCENE_LENGTHS] += (
+        share * CAMERA_NOISE_M * rng.normal(size=(len(ticks), len(world.SCENE_LENGTHS)))
     )
     columns = {
         "position": position,
@@ -111,10 +112,11 @@ def _table(plan: Plan, roster: Roster, label) -> dict[str, np.ndarray]:
 def _assemble(world, plan, episodes, table, task) -> AuditInput:
     rng = stream(plan.seed, "recorded")
     for name in ("operator", "object"):
-        if rng.random() >= RECORDED_SHARE and plan.decided_by != name:
+        known = rng.random() < RECORDED_SHARE or plan.exact
+        if not known and plan.decided_by != name:
             table[name] = np.full(len(table["uuid"]), "")
     needs_delay = any(d.kind == "camera_clock" for d in plan.defects)
-    delays = bool(rng.random() < RECORDED_SHARE) or needs_delay
+    delays = (bool(rng.random() < RECORDED_SHARE) and not plan.exact) or needs_delay
     joined = {name: np.concatenate([item[name] for item in episodes]) for name in episodes[0]}
     lengths = [len(item["time"]) for item in episodes]
     layout = world.layout(joined)

@@ -9,6 +9,8 @@ from scipy.signal import lfilter
 Array = NDArray[np.float64]
 
 SUB_STEPS = 5
+# Time constant of a plant without inertia.
+INSTANT_S = 1e-9
 
 
 @dataclass(frozen=True)

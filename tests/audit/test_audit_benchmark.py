@@ -62,6 +62,22 @@ def test_a_clock_fault_moves_the_lag_of_its_episodes_only(task):
     assert np.array_equal(before.action, after.action)
 
 
+@pytest.mark.parametrize("task", list(TASKS))
+def test_an_exact_data_set_holds_what_is_planted_and_nothing_else(task):
+    period, plan = TASKS[task].PERIOD_S, Plan(6, episodes=SMALL, recoveries=3, exact=True)
+    data = record(task, plan).data
+    same = data.episode[1:] == data.episode[:-1]
+    assert data.position[1:][same] == pytest.approx(
+        data.action[:-1, data.action_position][same], abs=1e-12
+    )
+    assert data.episodes.is_recovery.tolist() == [False] * (SMALL - 3) + [True] * 3
+    assert set(data.episodes.outcome.tolist()) == {"success"} and not data.delay_s
+    late = replace(plan, defects=(Defect("robot_clock", 2 * period),))
+    moved = lags(record(task, late).data) - lags(data)
+    epochs = data.episodes.calibration_epoch
+    assert np.array_equal(moved, 2 * (epochs == epochs[-1]))
+
+
 def test_a_decider_decides_as_often_as_it_is_said_to():
     plan = Plan(7, shares=(0.5, 0.5), decided_by="operator", fidelity=0.8, episodes=4000)
     roster = draw_roster(plan, 0.01)

@@ -95,7 +95,7 @@ def test_a_clock_offset_is_named_before_its_modes(modes):
     verdict = named(result)
     assert (verdict.name, verdict.kind) == (CauseName.DATA_DEFECT, "clock")
     offsets = {clock.epoch: clock.offset_before_s for clock in result.semantics.clocks}
-    assert abs(offsets["e1"] - offsets["e0"]) == pytest.approx(0.3, abs=0.02)
+    assert abs(offsets["epoch_2"] - offsets["epoch_1"]) == pytest.approx(0.3, abs=0.02)
     assert all(abs(clock.offset_after_s) < 0.02 for clock in result.semantics.clocks)
 
 

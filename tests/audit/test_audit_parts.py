@@ -91,7 +91,7 @@ def test_split_gain_golden():
 def test_lag_is_recovered(steps):
     data = canonical(planar(episodes=20, clock_steps=steps)[0])
     lags = episode_lags(data, 12)
-    late = data.episodes.calibration_epoch == "e1"
+    late = data.episodes.calibration_epoch == "epoch_2"
     assert np.nanmedian(lags[late]) == pytest.approx(1 + steps, abs=0.15)
     assert np.nanmedian(lags[~late]) == pytest.approx(1, abs=0.15)
 

@@ -16,7 +16,7 @@ from genpolicy.data.frames import Frames
 from genpolicy.errors import ConfigError, ContractError
 from genpolicy.integrity.documents import canonical_json, parse_json
 
-NAMES = {"ignored_channels": ["flag"], "context_channels": ["goal"], "reference_channel": "goal"}
+NAMES = {"ignored_channels": [], "context_channels": ["goal", "lamp"], "reference_channel": "goal"}
 
 
 def dataset_of(data, *, unit="m", manifest=None):
@@ -25,12 +25,12 @@ def dataset_of(data, *, unit="m", manifest=None):
     channels = [
         {"name": "tcp", "components": ["x", "y"]},
         {"name": "goal", "components": ["x_m", "y_m"]},
-        {"name": "flag", "components": ["phase"]},
+        {"name": "lamp", "components": ["on"]},
     ]
     stored = {
         "observation_contract": {
             "channels": [
-                {**c, "unit": unit if c["name"] != "flag" else "1", "stream": "robot",
+                {**c, "unit": unit if c["name"] != "lamp" else "1", "stream": "robot",
                  "maximum_age_s": 0.5} for c in channels
             ],
         },
@@ -94,7 +94,7 @@ def test_settings_are_proposed_from_units_and_pairing(valid):
     assert settings.channel_scale["tcp"] == 0.01 and settings.channel_scale["goal"] == 0.02
     assert settings.minimum_separation_m == pytest.approx(0.03)
     assert settings.minimum_neighbours == 7
-    assert settings.context_channels == ["goal", "flag"]  # of one stream with the position
+    assert settings.context_channels == ["goal", "lamp"]  # of one stream with the position
     assert not settings.phase_observed
     assert 8 <= settings.chunk_steps <= 10  # 3 x 3 cm at 1 cm a step
 
