@@ -78,16 +78,11 @@ class Rollout:
         self._fallback = Fallback(fixture, self.world, self.executor, self.recovery)
         self._newest_accepted_s: float | None = None
         self._last_command_s: float | None = None
-        self._commanded: deque[Array] = deque(
-            [self.world.last_action] * COMMANDS_AT_THE_BOUNDARY, maxlen=COMMANDS_AT_THE_BOUNDARY
-        )
+        before = [self.world.last_action] * COMMANDS_AT_THE_BOUNDARY
+        self._commanded: deque[Array] = deque(before, maxlen=COMMANDS_AT_THE_BOUNDARY)
         self.history: deque[Array] = deque(maxlen=fixture.horizons.observation_horizon)
-        self._push: Push | None = push(
-            fixture.schedule,
-            root_seed=fixture.root_seed,
-            name=fixture.perturbation,
-            start=start_index,
-        )
+        schedule, seed, name = fixture.schedule, fixture.root_seed, fixture.perturbation
+        self._push: Push | None = push(schedule, root_seed=seed, name=name, start=start_index)
         self.executor.set_active(0.0, fixture.checkpoint, fixture.sampler)
 
     @property
