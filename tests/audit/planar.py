@@ -13,6 +13,7 @@ import numpy as np
 from gates.cause import CauseLimits, cause_of, default_limits
 from genpolicy.audit.data import AuditInput, Episodes
 from genpolicy.audit.evidence import write_evidence
+from genpolicy.audit.run import audit
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.seeds import stream
 
@@ -40,6 +41,13 @@ def named(result, settings=SETTINGS, limits=LIMITS):
     with tempfile.TemporaryDirectory() as folder:
         write_evidence(result, Path(folder), settings=settings)
         return cause_of(Path(folder), limits)
+
+
+def audited(settings=SETTINGS, check=None, **planted):
+    """The audit of planted data, checked and replayed."""
+    data, replayed = planar(**planted)
+    check = check or admissible
+    return audit(data, settings, admissible=check, replay=replayed.__getitem__, root_seed=3)
 
 
 POST = np.array([0.15, 0.0])

@@ -7,14 +7,12 @@ import pytest
 
 from genpolicy.errors import ContractError, NonFiniteError
 from genpolicy.seeds import stream
-from genpolicy.statistics.conformal import conformal_threshold
 from genpolicy.statistics.intervals import (
     bootstrap_interval,
     clopper_pearson,
     order_statistic_interval,
     wilson,
 )
-from genpolicy.statistics.multiplicity import holm
 
 
 def test_clopper_pearson_golden():
@@ -77,26 +75,3 @@ def test_bootstrap_covers_and_never_answers_nan():
     assert bootstrap_interval(np.ones(5), np.mean, rng=rng) == (1.0, 1.0)
     low, high = bootstrap_interval(np.array([0.0, 0, 0, 0, 1]), np.median, rng=rng, resamples=200)
     assert math.isfinite(low) and math.isfinite(high)
-
-
-def test_holm_golden_and_order():
-    # Worked by hand: sorted .01 .02 .03 .04 -> factors 4 3 2 1, running maximum.
-    assert holm(np.array([0.04, 0.01, 0.03, 0.02])) == pytest.approx([0.06, 0.04, 0.06, 0.06])
-    assert holm(np.array([])).shape == (0,)
-    with pytest.raises(ContractError):
-        holm(np.array([np.nan]))
-
-
-def test_holm_controls_the_family_error():
-    rng = stream(3, "holm")
-    wrong = np.mean([np.any(holm(rng.random(8)) <= 0.05) for _ in range(2000)])
-    assert wrong <= 0.065
-
-
-def test_conformal_rank_rule():
-    assert conformal_threshold(np.arange(1.0, 20.0), 0.05) == 19.0
-    assert conformal_threshold(np.arange(1.0, 19.0), 0.05) == math.inf
-    rng = stream(4, "conformal")
-    scores = rng.normal(size=(4000, 51))
-    alarms = [s[-1] > conformal_threshold(s[:-1], 0.05) for s in scores]
-    assert np.mean(alarms) <= 0.05 + 3 * math.sqrt(0.05 * 0.95 / 4000)

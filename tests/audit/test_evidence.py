@@ -7,11 +7,9 @@ import pytest
 from planar import LIMITS, SETTINGS, admissible, planar, shuffled
 
 from gates.cause import cause_of
-from genpolicy.audit.data import AuditInput, canonical
 from genpolicy.audit.evidence import write_evidence
 from genpolicy.audit.run import audit
-from genpolicy.audit.settings import AuditSettings
-from genpolicy.errors import ContractError, NonFiniteError
+from genpolicy.errors import ContractError
 from genpolicy.evidence.need.method_modes import one_per_episode, read_situations, sample_modes
 from genpolicy.integrity.tables import read_table
 
@@ -101,37 +99,3 @@ def test_samples_between_modes_cover_none(evidence):
     assert wild.modes_covered == 0
     with pytest.raises(ContractError, match="at least two modes"):
         sample_modes(means, item.mode_paths[:1], position=slice(0, 2))
-
-
-def test_equal_observations_are_broken_at_random_not_by_order():
-    # All starts equal: which 20 of 48 training episodes are taken must not follow the identifier.
-    from genpolicy.audit.neighbourhoods import find
-
-    data, _ = planar(episodes=80)
-    data = canonical(replace(data, observation=data.observation * 0.0))
-    taken = []
-    for seed in range(40):
-        items, _ = find(data, SETTINGS, phase="approach", root_seed=seed)
-        taken += data.episode[items[0].rows].tolist()
-    counts = np.bincount(taken, minlength=80)[data.episodes.split == "train"]
-    assert counts.min() > 0 and counts.max() < 40
-
-
-def test_broken_input_is_refused():
-    data, _ = planar(episodes=10)
-    action = data.action.copy()
-    action[3, 0] = np.nan
-    with pytest.raises(NonFiniteError, match="audit input: action"):
-        replace(data, action=action)
-    with pytest.raises(ContractError, match="one identifier twice"):
-        replace(data, episodes=replace(data.episodes, uuid=np.full(10, "same")))
-    assert isinstance(data, AuditInput)
-
-
-def test_settings_are_strict():
-    from pydantic import ValidationError
-
-    with pytest.raises(ValidationError):
-        AuditSettings(radius="6")
-    with pytest.raises(ValidationError):
-        AuditSettings(neighbors=10)

@@ -1,15 +1,10 @@
-"""Parts: split test, clustering, linking, lag, type I error of the whole strata test."""
+"""Modes of a cloud of chunks: none where there are none, features without time or order."""
 
 import numpy as np
 import pytest
-from planar import SETTINGS, planar
+from planar import SETTINGS
 
-from genpolicy.audit.data import canonical
-from genpolicy.audit.linking import link
 from genpolicy.audit.modes import cluster_chunks, features, progress, split_gain
-from genpolicy.audit.semantics import episode_lags
-from genpolicy.audit.situations import find_situations
-from genpolicy.audit.strata import examine_strata
 from genpolicy.seeds import stream
 
 TIMES = np.linspace(0.0, 1.0, 16)
@@ -85,29 +80,6 @@ def test_split_gain_golden():
     assert split_gain(np.array([-3.0, -1, 1, 3]), 2)[0] == pytest.approx(
         4 * np.log(5) - 8 * np.log(2) - 2 * np.log(4)
     )
-
-
-@pytest.mark.parametrize("steps", [0, 2, 5])
-def test_lag_is_recovered(steps):
-    data = canonical(planar(episodes=20, clock_steps=steps)[0])
-    lags = episode_lags(data, 12)
-    late = data.episodes.calibration_epoch == "e1"
-    assert np.nanmedian(lags[late]) == pytest.approx(1 + steps, abs=0.15)
-    assert np.nanmedian(lags[~late]) == pytest.approx(1, abs=0.15)
-
-
-def test_family_wise_error_of_the_strata_test():
-    wrong = 0
-    for seed in range(40):
-        data = canonical(planar(episodes=80, seed=100 + seed)[0])
-        settings = SETTINGS.model_copy(update={"query_stride": 40})
-        several = [(i, c) for _, i, c in find_situations(data, settings, seed)[0] if c.count > 1]
-        members = [(data.episode[item.members], split.labels) for item, split in several]
-        links = {"approach": link(members, len(data.episodes), 6)}
-        rows = examine_strata(data, settings, {"approach": several}, links, root_seed=seed)
-        assert {"history", "recording_sequence", "operator"} <= {row.variable for row in rows}
-        wrong += any(r.p_adjusted is not None and r.p_adjusted <= 0.05 for r in rows)
-    assert wrong / 40 <= 0.05 + 3 * np.sqrt(0.05 * 0.95 / 40)
 
 
 def test_resampling_by_arc_length_agrees_with_interpolation():

@@ -1,21 +1,10 @@
 """Planted causes on the planar task: each must be named, and none for another's reason."""
 
 import pytest
-from planar import SETTINGS, admissible, limits_with, named, planar
+from planar import SETTINGS, audited, limits_with, named, planar
 
 from gates.cause import CauseName
-from genpolicy.audit.evidence import summary
 from genpolicy.audit.run import audit
-
-
-def run(settings=SETTINGS, check=admissible, **planted):
-    data, replayed = planar(**planted)
-    return audit(data, settings, admissible=check, replay=replayed.__getitem__, root_seed=3)
-
-
-@pytest.fixture(scope="module")
-def valid():
-    return run(recoveries=20, episodes=160)
 
 
 def test_valid_modes_are_found(valid):
@@ -27,71 +16,39 @@ def test_valid_modes_are_found(valid):
     assert min(mode.success_lower for mode in valid.modes) > 0.85
 
 
-def test_the_mean_hits_the_post_and_the_modes_do_not(valid):
-    numbers = summary(valid, SETTINGS)
-    assert numbers["mean_checked"] == valid.counts.two_mode
-    several = [item for item in valid.situations if item.two_mode]
-    assert all(all(item.chunks.mode_admissible) for item in several)
-    # Where the sides are even the mean must hit; where one side rules it may pass by it.
-    even = [item for item in several if min(item.clustering.sizes) >= 0.4 * 21]
-    assert len(even) >= 5
-    assert not any(item.chunks.mean_admissible for item in even)
-    assert {item.chunks.mean_reason for item in even} == {"collision"}
-    assert numbers["modes_before_realignment"] == numbers["modes_after_realignment"]
-
-
-def test_disturbed_episodes_stand_on_their_own(valid):
-    assert sum(row.episodes for row in valid.recovery) == 20
-    assert {row.mode for row in valid.recovery} <= {"m0", "m1", "unassigned"}
-    used = {
-        int(e) for item in valid.situations for e in valid.data.episode[item.neighbourhood.members]
-    }
-    assert not any(valid.data.episodes.is_recovery[e] for e in used)
-
-
-def test_neighbours_are_independent_training_episodes(valid):
-    data = valid.data
-    for item in valid.situations:
-        episodes = data.episode[item.neighbourhood.rows]
-        assert len(set(episodes.tolist())) == len(episodes)
-        assert set(data.episodes.split[episodes]) == {"train"}
-        assert set(data.phase[item.neighbourhood.members]) == {item.phase}
-        assert data.episodes.split[data.episode[item.neighbourhood.query]] != "train"
-
-
 def test_a_hidden_operator_is_named():
-    verdict = named(run(modes="operator"))
+    verdict = named(audited(modes="operator"))
     assert (verdict.name, verdict.variable) == (CauseName.HIDDEN_STATE, "operator")
     assert "operator explains" in verdict.next_action
 
 
 def test_modes_of_an_epoch_are_a_data_defect():
-    verdict = named(run(modes="epoch"))
+    verdict = named(audited(modes="epoch"))
     assert (verdict.name, verdict.variable) == (CauseName.DATA_DEFECT, "calibration_epoch")
 
 
 def test_what_the_policy_sees_is_no_hidden_state():
     # The goal's side decides, by less than the scale that makes another observation.
-    verdict = named(run(modes="goal", episodes=200))
+    verdict = named(audited(modes="goal", episodes=200))
     assert (verdict.name, verdict.kind) == (CauseName.UNIMODAL, "observed_variable")
     assert verdict.variable == "goal.y_m"
 
 
 def test_one_side_only_is_unimodal():
-    result = run(modes="none")
+    result = audited(modes="none")
     assert named(result).name is CauseName.UNIMODAL
     assert result.counts.two_mode == 0
 
 
 def test_tremor_is_not_a_mode():
     limits = limits_with(supported_episodes=15, calibration_residual_m=0.03)
-    verdict = named(run(modes="none", tremor_m=0.02), limits=limits)
+    verdict = named(audited(modes="none", tremor_m=0.02), limits=limits)
     assert verdict.name is CauseName.POINTWISE_NOISE
 
 
 @pytest.mark.parametrize("modes", ["free", "none"])
 def test_a_clock_offset_is_named_before_its_modes(modes):
-    result = run(modes=modes, clock_steps=3)
+    result = audited(modes=modes, clock_steps=3)
     verdict = named(result)
     assert (verdict.name, verdict.kind) == (CauseName.DATA_DEFECT, "clock")
     offsets = {clock.epoch: clock.offset_before_s for clock in result.semantics.clocks}
@@ -100,37 +57,37 @@ def test_a_clock_offset_is_named_before_its_modes(modes):
 
 
 def test_false_modes_of_a_clock_offset_vanish_after_realignment():
-    result = run(modes="none", clock_steps=6, settings=SETTINGS.model_copy(
+    result = audited(modes="none", clock_steps=6, settings=SETTINGS.model_copy(
         update={"representation": "time"}))  # fmt: skip
     assert result.counts.two_mode_episodes > 10
     assert result.modes_after_realignment <= result.counts.two_mode_episodes / 4
 
 
 def test_a_shifted_calibration_is_a_data_defect():
-    verdict = named(run(epoch_shift_m=0.01))
+    verdict = named(audited(epoch_shift_m=0.01))
     assert (verdict.name, verdict.kind) == (CauseName.DATA_DEFECT, "calibration")
 
 
 def test_wrong_labels_are_contamination():
-    verdict = named(run(wrong_labels=0.2))
+    verdict = named(audited(wrong_labels=0.2))
     assert verdict.name is CauseName.LABEL_CONTAMINATION
 
 
 def test_a_mode_that_fails_honestly_leaves_one():
-    verdict = named(run(side_fails=True))
+    verdict = named(audited(side_fails=True))
     assert (verdict.name, verdict.kind) == (CauseName.UNIMODAL, "one_valid_mode")
 
 
 def test_an_infeasible_mode_leaves_one():
-    verdict = named(run(check=lambda a, o: (a[:, 1].min() > -0.03, "collision")))
+    verdict = named(audited(check=lambda a, o: (a[:, 1].min() > -0.03, "collision")))
     assert (verdict.name, verdict.kind) == (CauseName.UNIMODAL, "one_valid_mode")
 
 
 def test_few_data_support_nothing():
     limits = limits_with(label_disagreement=0.5)
-    verdict = named(run(episodes=20), limits=limits)
+    verdict = named(audited(episodes=20), limits=limits)
     assert (verdict.name, verdict.kind) == (CauseName.INSUFFICIENT_SUPPORT, "neighbourhoods")
-    assert named(run(episodes=20)).kind == "replay"
+    assert named(audited(episodes=20)).kind == "replay"
 
 
 def test_without_outcomes_no_mode_is_valid():
