@@ -43,11 +43,13 @@ def named(result, settings=SETTINGS, limits=LIMITS):
         return cause_of(Path(folder), limits)
 
 
-def audited(settings=SETTINGS, check=None, **planted):
+def audited(settings=SETTINGS, check=None, seed_of_audit=3, **planted):
     """The audit of planted data, checked and replayed."""
     data, replayed = planar(**planted)
     check = check or admissible
-    return audit(data, settings, admissible=check, replay=replayed.__getitem__, root_seed=3)
+    return audit(
+        data, settings, admissible=check, replay=replayed.__getitem__, root_seed=seed_of_audit
+    )
 
 
 POST = np.array([0.15, 0.0])

@@ -2,7 +2,7 @@
 
 import pytest
 from planar import SETTINGS, admissible, planar
-from whole import dataset_of
+from planar_dataset import dataset_of
 
 from genpolicy.audit import audit
 

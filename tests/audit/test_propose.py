@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from planar import SETTINGS, planar
-from whole import dataset_of
+from planar_dataset import dataset_of
 
 from genpolicy.audit import audit, propose_settings
 from genpolicy.errors import ConfigError, ContractError

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from planar import SETTINGS, admissible, named, planar
-from whole import dataset_of
+from planar_dataset import dataset_of
 
 from gates.cause import Layer
 from genpolicy.audit import AuditReport, audit

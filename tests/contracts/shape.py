@@ -1,7 +1,8 @@
 """The shape of the code in numbers: `python tests/contracts/shape.py` prints the table.
 
 Sizes of files and functions, parameters, lines by package, and how many source files have tests
-of their own beside them (`genpolicy/x/y.py` is mirrored by `tests/x/test_y*.py` or `tests/x/y/`).
+of their own beside them: `genpolicy/x/y.py` is mirrored by `tests/x/test_y.py`, by
+`tests/x/test_y_*.py` or by tests in `tests/x/y/`.
 """
 
 import ast
@@ -115,9 +116,9 @@ def is_mirrored(path: Path) -> bool:
     inner = path.relative_to(ROOT)
     parts = inner.parts[1:] if inner.parts[0] == "genpolicy" else inner.parts
     folder = ROOT.joinpath("tests", *parts[:-1])
-    return bool(list(folder.glob(f"test_{path.stem}*.py"))) or any(
-        (folder / path.stem).glob("test_*.py")
-    )
+    if (folder / f"test_{path.stem}.py").is_file():
+        return True
+    return any(folder.glob(f"test_{path.stem}_*.py")) or any((folder / path.stem).glob("test_*.py"))
 
 
 def table() -> str:

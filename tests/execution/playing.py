@@ -1,4 +1,4 @@
-"""What the tests of the executor do again and again: begin a chunk, change the cell, judge the end."""
+"""What the tests of the executor do again and again: begin a chunk, judge the end."""
 
 from genpolicy.verification.checker import check_messages
 

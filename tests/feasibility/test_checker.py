@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 
 from genpolicy.contract.chunk import Projected
-from genpolicy.errors import ContractError, NonFiniteError
 from genpolicy.feasibility.checks import CHECKS
-from genpolicy.feasibility.settings import FeasibilitySettings
 
 
 def test_inside_passes_every_layer(checker, kit):
@@ -97,18 +95,3 @@ def test_late_rows_and_rows_beyond_the_horizon_are_not_checked(checker, kit):
     verdict = kit.judge(checker, tail, replace(ctx, end_index=8))
     assert verdict.passed
     assert verdict.rows == (0, 8)
-
-
-def test_settings_are_strict():
-    with pytest.raises(ValueError, match="extra"):
-        FeasibilitySettings(speed=1.0)
-    with pytest.raises(ValueError, match="finite"):
-        FeasibilitySettings(clearance_m=float("nan"))
-
-
-def test_a_context_with_nan_or_without_rows_is_refused(checker, kit):
-    ctx = kit.context(checker, kit.START)
-    with pytest.raises(NonFiniteError, match="state of the robot is unknown"):
-        replace(ctx, q_cmd=np.full(7, np.nan))
-    with pytest.raises(ContractError, match="no row of it"):
-        replace(ctx, first_index=4, end_index=4)

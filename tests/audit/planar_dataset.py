@@ -1,4 +1,4 @@
-"""What several tests of this folder share."""
+"""The planar rows as an ingested dataset."""
 
 import numpy as np
 import pandas as pd

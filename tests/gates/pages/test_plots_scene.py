@@ -9,11 +9,10 @@ import pytest
 
 from gates.evidence import Evidence, MissingEvidenceError
 from gates.pages import plots_scene
-from gates.pages.figures import LARGEST_PHOTO_BYTES, METHODS, colours, dashes, draw_all, in_order
+from gates.pages.figures import LARGEST_PHOTO_BYTES, draw_all
 from gates.pages.plots_scene import BETWEEN, LEFT, RIGHT, SCENE, paths, side
 from gates.proof import judge
 from gates.writing import write_gate
-from genpolicy.evidence.need.pictures import HEIGHT_PX, WIDTH_PX, scene_png
 
 SHOWN = re.compile(r'<img src="data:image/png;base64,([A-Za-z0-9+/=]*)"')
 
@@ -87,20 +86,3 @@ def test_an_action_that_is_nan_is_named_and_not_drawn(ladder):
     )
     with pytest.raises(MissingEvidenceError, match="finite position"):
         paths(Evidence(ladder))
-
-
-def test_a_method_keeps_its_colour_in_every_figure():
-    assert in_order(["flow", "zeta", "act", "bc", "act"]) == ["bc", "act", "flow", "zeta"]
-    few, many = colours(["flow", "act"]), colours([*METHODS, "zeta", "eta"])
-    assert all(many[name] == METHODS[name] for name in METHODS)
-    assert few == {name: METHODS[name] for name in ("act", "flow")}
-    assert len(set(colours([*METHODS, "zeta"]).values())) == len(METHODS) + 1
-    assert len({str(look) for look in dashes(["act", "flow", "cvae"]).values()}) == 3
-
-
-def test_the_picture_of_the_cell_is_the_same_twice_and_says_nothing_else():
-    data = scene_png("tabletop_insertion")
-    assert data == scene_png("tabletop_insertion")
-    assert data.startswith(b"\x89PNG") and len(data) < LARGEST_PHOTO_BYTES
-    assert int.from_bytes(data[16:20]) == WIDTH_PX and int.from_bytes(data[20:24]) == HEIGHT_PX
-    assert b"tEXt" not in data and b"tIME" not in data
