@@ -55,10 +55,9 @@ def test_without_a_recorded_order_episodes_are_numbered(late):
 
 
 def test_what_pairs_with_nothing_has_no_clock(late):
-    unpaired = replace(late, observation_position=None)
-    assert not unpaired.paired
+    unpaired = replace(late, paired=False)
     assert alignment(SimpleNamespace(data=unpaired, semantics=None), SETTINGS) == []
-    assert position_unit(unpaired) == ""
+    assert position_unit(unpaired) == "" and position_names(unpaired)[0] == "action 0"
 
 
 def test_every_query_is_a_point_analysed_or_not(late):

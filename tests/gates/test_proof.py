@@ -33,7 +33,7 @@ def test_stages_before_a_gate_and_gate_stages_need_nothing(tmp_path):
 
 
 def test_unknown_stage_is_a_configuration_error(tmp_path):
-    with pytest.raises(ConfigError, match="one of record"):
+    with pytest.raises(ConfigError, match="one of task, record"):
         admit("deploy", tmp_path)
 
 
