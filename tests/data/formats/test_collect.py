@@ -42,9 +42,10 @@ class Recordings:
 
 
 def contract(state="state[0:2]", **labels):
+    components = ["x", "y"] if state.endswith("]") else ["x"]
     return contract_of({
         "format": "parquet", "task": "push", "rate_hz": 10.0,
-        "channels": [{"name": "hand_m", "columns": [state], "components": ["x", "y"],
+        "channels": [{"name": "hand_m", "columns": [state], "components": components,
                       "unit": "m", "stream": "state"}],
         "action": {"columns": ["action[0:2]"], "components": ["x", "y"], "units": ["m", "m"]},
         "labels": labels,
