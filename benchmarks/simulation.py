@@ -224,7 +224,7 @@ def profile(policy: Rehearsed, fixture: Fixture, starts: Sequence[Any]) -> None:
         "  inverse kinematics": (ArmKinematics, "solve"),
         "  collision, actions": (CollisionModel, "check_samples"),
         "  collision, swept": (CollisionModel, "check_swept"),
-        "seam and context": (rollout_module, "context_of"),
+        "boundary and context": (rollout_module, "context_of"),
         "network sample": (NetworkPolicy, "sample"),
         "executor tick": (Executor, "tick"),
         "executor observe": (Executor, "observe"),

@@ -28,7 +28,7 @@ from gates.report import (
 from gates.settings import GateSettings, Limit, Limits, read_limits, read_params, read_settings
 from gates.verdicts import combine, first_unmet, judge_criterion, rounded
 from genpolicy.errors import IntegrityError
-from genpolicy.integrity.hashing import sha256_bytes_of
+from genpolicy.integrity.hashing import sha256_bytes_of, sha256_file
 
 TASK_IDENTITY = "artifacts/task/identity.json"
 """What the task is, by hash: material of every gate."""
@@ -100,25 +100,27 @@ def judge_gate(spec: GateSpec, root: Path) -> GateReport:
     names: Sequence[str] = ()
     caveats: Sequence[str] = ()
     if spec.below is not None:
-        names, caveats = standing(root, spec.below, getattr(settings, "candidates", ()))
-    return judge(spec, evidence_of(root), limits, settings, candidates=names, caveats=caveats)
+        names, caveats = promoted_below(root, spec.below, getattr(settings, "candidates", ()))
+    report = judge(spec, Evidence(root), limits, settings, candidates=names, caveats=caveats)
+    return about_a_task(root, report)
 
 
-def evidence_of(root: Path) -> Evidence:
-    """The evidence below `root`, with the identity of its task bound.
-
-    Raises:
-        IntegrityError: Nobody wrote which task the evidence is about.
-    """
-    evidence = Evidence(root)
-    if not evidence.bind(TASK_IDENTITY):
-        raise IntegrityError(
-            where=TASK_IDENTITY,
-            found="missing",
-            expected="the identity of the task that the evidence is about",
-            action="Run `dvc repro task`.",
+def about_a_task(root: Path, report: GateReport) -> GateReport:
+    """The report with the identity of the task among its materials; without one nothing passes."""
+    found = {name: sha256_file(root / name) for name in (TASK_IDENTITY,) if (root / name).is_file()}
+    if found or report.verdict != "PASS":
+        return report.model_copy(
+            update={"materials": dict(sorted({**report.materials, **found}.items()))}
         )
-    return evidence
+    caveat = f"{TASK_IDENTITY} is missing: nobody wrote which task this is about."
+    return report.model_copy(
+        update={
+            "verdict": "INCONCLUSIVE",
+            "promoted": None,
+            "caveats": (*report.caveats, caveat),
+            "decision": "No decision: run `dvc repro task`, then judge again.",
+        }
+    )
 
 
 def judge(
@@ -252,7 +254,7 @@ def upstream_hashes(root: Path, gate: Gate) -> dict[str, str]:
     return found
 
 
-def standing(root: Path, below: Gate, wanted: Sequence[str]) -> tuple[list[str], list[str]]:
+def promoted_below(root: Path, below: Gate, wanted: Sequence[str]) -> tuple[list[str], list[str]]:
     """The wanted methods that passed the gate below, and why the others do not stand.
 
     Gate A judges no method, so all of them stand behind it. A report that is missing or unreadable

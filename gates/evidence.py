@@ -14,9 +14,9 @@ import pandas as pd
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from genpolicy.evidence.rows import check_columns, columns_of
 from genpolicy.integrity.documents import parse_json
 from genpolicy.integrity.hashing import sha256_bytes_of, sha256_file
+from genpolicy.integrity.rows import check_columns, columns_of
 from genpolicy.integrity.tables import table_of
 
 Array = NDArray[np.float64]

@@ -1,18 +1,14 @@
 """Gate C, feasibility and time: does anything invalid or stale ever reach the controller?"""
 
-from collections.abc import Mapping
-from typing import ClassVar
-
 import numpy as np
 import pandas as pd
-from pydantic import Field
 
 from gates.bounds import counted_interval, share_interval, upper_quantile
 from gates.criterion import Measured, criteria_of, criterion
 from gates.engine import GateSpec
 from gates.evidence import Array, Evidence, MissingEvidenceError, count, flags, number, numbers
-from gates.settings import GateSettings
-from genpolicy.evidence.rows import CandidateRow, ShadowCountRow, ShadowStubRow
+from gates.settings import CandidateSettings
+from genpolicy.evidence.rows.shadow import CandidateRow, ShadowCountRow, ShadowStubRow
 
 SHADOW = "artifacts/shadow"
 CANDIDATES = f"{SHADOW}/candidates.parquet"
@@ -20,24 +16,15 @@ LAYERS = ("representation", "kinematic", "geometric", "dynamic", "contact", "fre
 HELD_OUT = "held_out"
 
 
-class FeasibilitySettings(GateSettings):
+class FeasibilitySettings(CandidateSettings):
     """Settings of Gate C other than limits.
 
     Attributes:
-        confidence: Coverage of every interval.
-        candidates: Methods that stand for promotion.
         required_fixtures: Corrupted fixtures that must have been tried.
         required_checks: Checks, or layers of checks, each of which must have been left out once.
         unassigned_modes: Labels of candidates that belong to no mode.
     """
 
-    homes: ClassVar[Mapping[str, str]] = {
-        "confidence": "confidence",
-        "candidates": "train_generators.samplers",
-    }
-
-    confidence: float = Field(gt=0.5, lt=1.0)
-    candidates: tuple[str, ...]
     required_fixtures: tuple[str, ...]
     required_checks: tuple[str, ...]
     unassigned_modes: tuple[str, ...]
@@ -121,14 +108,14 @@ def projection_p95_m(evidence: Evidence, settings: FeasibilitySettings, candidat
 
 @criterion(
     "<=",
-    question="How hard is the seam between two chunks?",
+    question="How hard is the boundary between two chunks?",
     look_at="Timing: look at H_e, re-planning, blending and normalisation.",
     per_candidate=True,
 )
 def boundary_jerk_p95_m_s3(
     evidence: Evidence, settings: FeasibilitySettings, candidate: str
 ) -> Measured:
-    """Jerk at the seam that 95 % of the admissible candidates keep, m/s^3."""
+    """Jerk at the boundary that 95 % of the admissible candidates keep, m/s^3."""
     return _of_admissible(evidence, settings, candidate, "boundary_jerk_m_s3")
 
 

@@ -1,11 +1,9 @@
 """Gate B, reproducibility: is a candidate pinned, and does it come back the same?"""
 
-from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import pandas as pd
-from pydantic import Field
 
 from gates.bounds import counted_interval
 from gates.criterion import Measured, criteria_of, criterion
@@ -13,8 +11,8 @@ from gates.engine import GateSpec
 from gates.evidence import Evidence, MissingEvidenceError, count, number, numbers
 from gates.need.settings import TRAINED as BASELINES
 from gates.need.simpler import unmatched
-from gates.settings import GateSettings
-from genpolicy.evidence.rows import CoverageRow, LatencyRow, NfeRow, SampleRow
+from gates.settings import CandidateSettings
+from genpolicy.evidence.rows.reproducibility import CoverageRow, LatencyRow, NfeRow, SampleRow
 
 RELOAD = "artifacts/reload"
 LATENCY = "artifacts/latency/latency.parquet"
@@ -37,23 +35,14 @@ TERMS = (
 MEASURED_HERE = ("preprocess", "encode", "sample", "select", "project")
 
 
-class ReproducibilitySettings(GateSettings):
+class ReproducibilitySettings(CandidateSettings):
     """Settings of Gate B other than limits.
 
     Attributes:
-        confidence: Coverage of every interval.
-        candidates: Methods that stand for promotion.
         budget_reference: Method whose parameter count is the budget.
         budget_parts: Parts of the model whose parameters are compared, summed.
     """
 
-    homes: ClassVar[Mapping[str, str]] = {
-        "confidence": "confidence",
-        "candidates": "train_generators.samplers",
-    }
-
-    confidence: float = Field(gt=0.5, lt=1.0)
-    candidates: tuple[str, ...]
     budget_reference: str
     budget_parts: tuple[str, ...]
 

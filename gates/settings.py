@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar, NoReturn, Self, TypeVar
 
-from pydantic import PrivateAttr
+from pydantic import Field, PrivateAttr
 
 from gates.criterion import Criterion
 from gates.report import OWNERS, Gate, Owner, StrictModel, parse_section, stage_of
@@ -79,6 +79,23 @@ class GateSettings(StrictModel):
         settings = self.model_copy()
         settings._held_to = limits
         return settings
+
+
+class CandidateSettings(GateSettings):
+    """What every gate after training is told of the candidates, beside its own settings.
+
+    Attributes:
+        confidence: Coverage of every interval.
+        candidates: Methods that stand for promotion.
+    """
+
+    homes: ClassVar[Mapping[str, str]] = {
+        "confidence": "confidence",
+        "candidates": "train_generators.samplers",
+    }
+
+    confidence: float = Field(gt=0.5, lt=1.0)
+    candidates: tuple[str, ...]
 
 
 Settings = TypeVar("Settings", bound=StrictModel)

@@ -28,7 +28,6 @@ Model = TypeVar("Model", bound=BaseModel)
 
 PARAMS = Path("params.yaml")
 ARTIFACTS = Path("artifacts")
-REPORTS = Path("reports")
 TIMES = Path("build/times")
 
 STAGES = (

@@ -8,10 +8,11 @@ from pathlib import Path
 from gates.proof import admit
 from genpolicy.candidates.judged import compared
 from genpolicy.evidence.reproducibility.latency import LatencyPlan, declared_rows, measured_rows
-from genpolicy.evidence.rows import LatencyRow, write_rows
+from genpolicy.evidence.rows.reproducibility import LatencyRow
 from genpolicy.evidence.stress.settings import StressSettings
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import output_folder
+from genpolicy.integrity.rows import write_rows
 from genpolicy.policies.matched_training import PolicySettings
 from genpolicy.seeds import stream
 from stages._latency import LatencySection

@@ -1,5 +1,6 @@
 """What a cause is made of: its name, and every question with its number and its limit."""
 
+import math
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Literal
@@ -57,8 +58,8 @@ class Answer:
 
     @property
     def holds(self) -> bool | None:
-        """Whether the number keeps its limit, NaN never; None where that is not to be said."""
-        if self.measured is None or self.limit is None:
+        """Whether the number keeps its limit, NaN never; None where nothing is known or asked."""
+        if self.measured is None or self.limit is None or math.isinf(self.limit):
             return None
         margin = self.limit - self.measured
         return bool(margin >= 0 if self.comparison == "<=" else -margin >= 0)
@@ -73,13 +74,14 @@ class Answer:
         return {
             "question": self.question, "layer": self.layer.value, "what": self.what,
             "measured": None if self.measured is None else float(self.measured),
-            "limit": self.limit, "comparison": self.comparison, "unit": self.unit,
+            "limit": None if self.limit is None or math.isinf(self.limit) else self.limit,
+            "comparison": self.comparison, "unit": self.unit,
             "note": self.note, "holds": self.holds,
         }  # fmt: skip
 
 
 @dataclass(frozen=True)
-class Verdict:
+class Diagnosis:
     """What a red layer says: a cause, the variable and kind that it names, and what to do."""
 
     name: CauseName
@@ -88,7 +90,7 @@ class Verdict:
     next_action: str
 
 
-Named = tuple[list[Answer], Verdict | None]
+Named = tuple[list[Answer], Diagnosis | None]
 """The answers of a layer, and what it says where it is red."""
 
 

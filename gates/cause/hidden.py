@@ -1,6 +1,6 @@
 """Does a recorded variable, the order of recording or the past explain the modes?"""
 
-from gates.cause.answers import Answer, CauseName, Layer, Named, Verdict
+from gates.cause.answers import Answer, CauseName, Diagnosis, Layer, Named
 from gates.cause.limits import CauseLimits
 from gates.cause.numbers import Numbers, Stratum
 
@@ -12,7 +12,7 @@ CONCRETE = (
     "phase", "object", "operator", "calibration_epoch", "episode_order", SEQUENCE,
     "time_in_episode", HISTORY,
 )  # fmt: skip
-VAGUE = 3
+LEAST_CONCRETE = 3
 # Time and the past show whatever else was recorded: they must explain more to be named.
 EVERYTHING = ("time_in_episode", HISTORY)
 SHOWN = 8
@@ -64,30 +64,30 @@ def _answer(row: Stratum, limits: CauseLimits) -> Answer:
     )  # fmt: skip
 
 
-def _said(row: Stratum) -> Verdict:
+def _said(row: Stratum) -> Diagnosis:
     effect = row.effect or 0.0
     share = f"{row.variable} explains {effect:.0%} of the modes in {row.phase}"
     if row.variable in DATA_VARIABLES:
         text = f"{share}: correct the epochs."
-        return Verdict(CauseName.DATA_DEFECT, row.variable, row.variable, text)
+        return Diagnosis(CauseName.DATA_DEFECT, row.variable, row.variable, text)
     if row.variable == SEQUENCE:
         text = (
             f"The mode of {row.phase} follows from those of the episodes recorded just before and "
             f"after ({effect:.0%}): find out what was decided per session or in turns, record it, "
             "or draw it anew for every episode, then repeat the audit."
         )
-        return Verdict(CauseName.HIDDEN_STATE, "unrecorded", SEQUENCE, text)
+        return Diagnosis(CauseName.HIDDEN_STATE, "unrecorded", SEQUENCE, text)
     if row.variable == HISTORY:
         text = (
             f"The past explains {effect:.0%} of the modes in {row.phase} ({row.detail}): record "
             "what was decided there, or lengthen the observation history, then repeat the audit."
         )
-        return Verdict(CauseName.HIDDEN_STATE, "unrecorded", HISTORY, text)
+        return Diagnosis(CauseName.HIDDEN_STATE, "unrecorded", HISTORY, text)
     if row.observed:
         text = f"{share}, and the policy sees it: use the simple baselines."
-        return Verdict(CauseName.UNIMODAL, row.variable, "observed_variable", text)
+        return Diagnosis(CauseName.UNIMODAL, row.variable, "observed_variable", text)
     text = f"{share}: add it to the observation or standardise it, then repeat the audit."
-    return Verdict(CauseName.HIDDEN_STATE, row.variable, "stratum", text)
+    return Diagnosis(CauseName.HIDDEN_STATE, row.variable, "stratum", text)
 
 
 def _foremost(found: list[Stratum], limits: CauseLimits) -> Stratum:
@@ -98,7 +98,7 @@ def _foremost(found: list[Stratum], limits: CauseLimits) -> Stratum:
 
     def rank(row: Stratum) -> tuple[int, float, str]:
         name = row.variable
-        place = CONCRETE.index(name) if name in CONCRETE else len(CONCRETE) - VAGUE
+        place = CONCRETE.index(name) if name in CONCRETE else len(CONCRETE) - LEAST_CONCRETE
         return place, -(row.effect or 0.0), name
 
     return min(near, key=rank)

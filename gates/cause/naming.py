@@ -7,7 +7,7 @@ variables, validity of each mode. A later layer is not believed while an earlier
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from gates.cause.answers import NEXT, Answer, Cause, CauseName, Layer, Named, Verdict
+from gates.cause.answers import NEXT, Answer, Cause, CauseName, Diagnosis, Layer, Named
 from gates.cause.hidden import hidden
 from gates.cause.limits import CauseLimits
 from gates.cause.numbers import Counts, Mode, Numbers, folder_numbers
@@ -44,7 +44,7 @@ def name_cause(numbers: Numbers, draws: Sequence[Numbers], limits: CauseLimits) 
     """
     _check_floors(numbers, limits)
     answers: list[Answer] = []
-    verdict = Verdict(CauseName.VALID_MODES, "", "", NEXT)
+    verdict = Diagnosis(CauseName.VALID_MODES, "", "", NEXT)
     red = Layer.NONE
     for layer, judge in LAYERS.items():
         found, said = judge(numbers, limits)
@@ -63,16 +63,16 @@ def name_cause(numbers: Numbers, draws: Sequence[Numbers], limits: CauseLimits) 
     )
 
 
-def _all(draws: Sequence[Numbers], limits: CauseLimits) -> list[Verdict]:
+def _all(draws: Sequence[Numbers], limits: CauseLimits) -> list[Diagnosis]:
     return [_first_red(draw, limits) for draw in draws]
 
 
-def _first_red(numbers: Numbers, limits: CauseLimits) -> Verdict:
+def _first_red(numbers: Numbers, limits: CauseLimits) -> Diagnosis:
     for judge in LAYERS.values():
         said = judge(numbers, limits)[1]
         if said is not None:
             return said
-    return Verdict(CauseName.VALID_MODES, "", "", NEXT)
+    return Diagnosis(CauseName.VALID_MODES, "", "", NEXT)
 
 
 def _check_floors(numbers: Numbers, limits: CauseLimits) -> None:
@@ -102,7 +102,7 @@ def _data(numbers: Numbers, limits: CauseLimits) -> Named:
         )
         answers.append(answer)
         if answer.red and verdict is None:
-            verdict = Verdict(CauseName.DATA_DEFECT, item.variable, item.kind, item.action)
+            verdict = Diagnosis(CauseName.DATA_DEFECT, item.variable, item.kind, item.action)
     return answers, verdict
 
 
@@ -126,12 +126,12 @@ def _labels(numbers: Numbers, limits: CauseLimits) -> Named:
             f"Replay more episodes: {labels.replays} without a disagreement only show a share "
             f"below {labels.upper:.3f}."
         )
-        return [answer], Verdict(CauseName.INSUFFICIENT_SUPPORT, "outcome", "replay", text)
+        return [answer], Diagnosis(CauseName.INSUFFICIENT_SUPPORT, "outcome", "replay", text)
     text = (
         f"{labels.disagreements} of {labels.replays} labels disagree with the replay: label again "
         "from the replay and repeat the audit."
     )
-    return [answer], Verdict(CauseName.LABEL_CONTAMINATION, "outcome", "replay", text)
+    return [answer], Diagnosis(CauseName.LABEL_CONTAMINATION, "outcome", "replay", text)
 
 
 def _support(numbers: Numbers, limits: CauseLimits) -> Named:
@@ -220,7 +220,7 @@ def _structure(numbers: Numbers, limits: CauseLimits) -> Named:
     return answers, _noise("Clusters do not persist over a chunk") if margin.red else None
 
 
-def _absent(counts: Counts, limits: CauseLimits, *, white: bool) -> tuple[Answer, Verdict]:
+def _absent(counts: Counts, limits: CauseLimits, *, white: bool) -> tuple[Answer, Diagnosis]:
     """No modes were found; is that enough to say that there are none?"""
     answer = Answer(
         "denial_share", Layer.STRUCTURE,
@@ -241,7 +241,7 @@ def _absent(counts: Counts, limits: CauseLimits, *, white: bool) -> tuple[Answer
     decided = counts.resolved > counts.two_mode
     text = "Use the simple baselines: one observation has one action here."
     kind = "observation_decides" if decided else ""
-    return answer, Verdict(CauseName.UNIMODAL, "", kind, text)
+    return answer, Diagnosis(CauseName.UNIMODAL, "", kind, text)
 
 
 def _validity(numbers: Numbers, limits: CauseLimits) -> Named:
@@ -262,7 +262,7 @@ def _validity(numbers: Numbers, limits: CauseLimits) -> Named:
         return answers, _thin(text, kind="linking")
     if all(mode.episodes == 0 for mode in modes):
         text = "Record whether each episode succeeded: without it no mode can be called valid."
-        return answers, Verdict(CauseName.INSUFFICIENT_SUPPORT, "outcome", "not_recorded", text)
+        return answers, Diagnosis(CauseName.INSUFFICIENT_SUPPORT, "outcome", "not_recorded", text)
     if len(valid) >= 2:
         return answers, None
     weak = ", ".join(mode.mode for mode in modes if mode not in valid)
@@ -270,7 +270,7 @@ def _validity(numbers: Numbers, limits: CauseLimits) -> Named:
         f"Leave out the episodes of {weak}, which do not succeed or are not feasible often "
         "enough; what remains has one mode."
     )
-    return answers, Verdict(CauseName.UNIMODAL, weak, "one_valid_mode", text)
+    return answers, Diagnosis(CauseName.UNIMODAL, weak, "one_valid_mode", text)
 
 
 def _success(mode: Mode, limits: CauseLimits) -> Answer:
@@ -292,13 +292,13 @@ def _feasible(mode: Mode, limits: CauseLimits) -> Answer | None:
     )  # fmt: skip
 
 
-def _thin(text: str, *, kind: str = "neighbourhoods") -> Verdict:
-    return Verdict(CauseName.INSUFFICIENT_SUPPORT, "", kind, text)
+def _thin(text: str, *, kind: str = "neighbourhoods") -> Diagnosis:
+    return Diagnosis(CauseName.INSUFFICIENT_SUPPORT, "", kind, text)
 
 
-def _noise(what: str) -> Verdict:
+def _noise(what: str) -> Diagnosis:
     text = f"{what}: use chunked behaviour cloning, which averages it out."
-    return Verdict(CauseName.POINTWISE_NOISE, "", "", text)
+    return Diagnosis(CauseName.POINTWISE_NOISE, "", "", text)
 
 
 LAYERS: dict[Layer, Callable[[Numbers, CauseLimits], Named]] = {

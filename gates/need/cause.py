@@ -1,10 +1,12 @@
 """The cause behind the modes: named from the audit's numbers, under the limits of this gate."""
 
+import math
+
 from gates.cause import Cause, limits_of, name_cause, read_numbers
-from gates.cause.limits import SHARED
+from gates.cause.limits import AT_MOST, SHARED
 from gates.evidence import Evidence, MissingEvidenceError
 from gates.need.settings import AUDIT, NeedSettings
-from gates.settings import PARAMS_FILE
+from gates.settings import PARAMS_FILE, Limit, Limits
 from genpolicy.errors import BadInputError
 
 PLACE = f"{PARAMS_FILE}: gate_a.cause"
@@ -17,7 +19,7 @@ def found_cause(evidence: Evidence, settings: NeedSettings) -> Cause:
         MissingEvidenceError: Numbers, or limits of shared questions, are missing.
         ConfigError: A limit lies below what the audit looked for, or a question has none.
     """
-    shared = settings.limits.of
+    shared = asked(settings.limits)
     absent = [question for question in SHARED if question not in shared]
     if absent:
         raise MissingEvidenceError(f"params.yaml: gate_a has no limit of {', '.join(absent)}")
@@ -30,3 +32,13 @@ def found_cause(evidence: Evidence, settings: NeedSettings) -> Cause:
     except BadInputError as error:
         raise MissingEvidenceError(str(error)) from error
     return name_cause(numbers, draws, limits)
+
+
+def asked(limits: Limits) -> dict[str, Limit]:
+    """Limits of the gate; a question that does not apply gets one that every number keeps."""
+    waived = {
+        name: Limit(math.inf if name in AT_MOST else -math.inf, waiver.reason, waiver.owner)
+        for name, waiver in limits.waived.items()
+        if name in SHARED
+    }
+    return {**waived, **limits.of}

@@ -11,7 +11,7 @@ from gates.criterion import criteria_of
 from gates.engine import GateSpec, Judged
 from gates.evidence import MissingEvidenceError
 from gates.need import conditioning, modes, semantics, simpler
-from gates.need.cause import found_cause
+from gates.need.cause import asked, found_cause
 from gates.need.settings import (
     AUDIT,
     MEASURED,
@@ -76,4 +76,4 @@ def read_cause_limits(path: Path) -> CauseLimits:
     params = read_params(path.parent, name=path.name)
     settings = read_settings(params, stage_of(GATE.gate), NeedSettings)
     limits = read_limits(params, GATE.gate, GATE.criteria)
-    return limits_of(settings.cause, limits.of, where=f"{path}: gate_a.cause")
+    return limits_of(settings.cause, asked(limits), where=f"{path}: gate_a.cause")

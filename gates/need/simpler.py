@@ -18,7 +18,7 @@ from gates.need.settings import (
     TRAINED_FACTORS,
     NeedSettings,
 )
-from genpolicy.evidence.rows import FactorModeRow, ModeRow
+from genpolicy.evidence.rows.need import FactorModeRow, ModeRow
 
 LATENT = f"{MEASURED}/latent.json"
 VARIANTS = f"{TRAINED_FACTORS}/variants.json"

@@ -32,11 +32,11 @@ def _waterfall(evidence: Evidence, report: GateReport) -> Figure:
             part = rows[rows["method"] == method]
             if len(part) == 0:
                 continue
-            standing = np.ones(len(part), dtype=bool)
+            kept = np.ones(len(part), dtype=bool)
             shares = [1.0]
             for layer in LAYERS:
-                standing &= flags(part, layer)
-                shares.append(float(standing.mean()))
+                kept &= flags(part, layer)
+                shares.append(float(kept.mean()))
             places = np.arange(len(shares)) - 0.4 + width * (rank + 0.5)
             axes.bar(
                 places,
@@ -135,7 +135,7 @@ PLOTS = (
         _projection,
     ),
     Plot(
-        "Jerk at the seam",
+        "Jerk at the boundary",
         "Admissible chunks of held-out observations: jerk that the first action asks for after the "
         "last command. Share with at most this much.",
         CANDIDATES,

@@ -9,7 +9,7 @@ from gates.criterion import Measured, criterion
 from gates.evidence import Evidence, MissingEvidenceError, numbers
 from gates.feasibility import checked_violations
 from gates.stress.rollouts import NOMINAL, STRESS, StressSettings, rollouts, success_lower
-from genpolicy.evidence.rows import ConservationRow, StressCountRow, StressStubRow
+from genpolicy.evidence.rows.stress import ConservationRow, StressCountRow, StressStubRow
 
 
 @criterion(

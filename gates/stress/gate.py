@@ -15,7 +15,7 @@ from gates.engine import Decision, GateSpec, Judged
 from gates.evidence import Array, Evidence, MissingEvidenceError, flags
 from gates.stress import cost, trial
 from gates.stress.rollouts import ROLLOUTS, STRESS, StressSettings, rollouts
-from genpolicy.evidence.rows import RolloutRow
+from genpolicy.evidence.rows.stress import RolloutRow
 from genpolicy.statistics.eprocess import paired_e_value
 
 

@@ -9,20 +9,18 @@ from pydantic import Field, field_validator
 from gates.bounds import share_interval
 from gates.criterion import Measured
 from gates.evidence import Evidence, MissingEvidenceError, flags
-from gates.settings import GateSettings
-from genpolicy.evidence.rows import RolloutRow
+from gates.settings import CandidateSettings
+from genpolicy.evidence.rows.stress import RolloutRow
 
 STRESS = "artifacts/stress"
 ROLLOUTS = f"{STRESS}/rollouts.parquet"
 NOMINAL = "nominal"
 
 
-class StressSettings(GateSettings):
+class StressSettings(CandidateSettings):
     """Settings of Gate D other than limits; all are fixed before the run.
 
     Attributes:
-        confidence: Coverage of every interval.
-        candidates: Methods that stand for promotion.
         baselines: Simpler methods; a candidate must beat each of them.
         perturbations: Conditions that every method must have met; `nominal` is one.
         margin: Gain in success share to be shown.
@@ -32,8 +30,7 @@ class StressSettings(GateSettings):
     """
 
     homes: ClassVar[Mapping[str, str]] = {
-        "confidence": "confidence",
-        "candidates": "train_generators.samplers",
+        **CandidateSettings.homes,
         "baselines": "stress.baselines",
         "perturbations": "stress.perturbations",
         "margin": "stress.margin",
@@ -41,7 +38,6 @@ class StressSettings(GateSettings):
         "planned_starts": "stress.starts",
     }
 
-    confidence: float = Field(gt=0.5, lt=1.0)
     candidates: tuple[str, ...] = Field(min_length=1)
     baselines: tuple[str, ...]
     perturbations: tuple[str, ...]

@@ -100,15 +100,9 @@ def audit(
     data = canonical(data)
     semantics = measure(data, settings)
     found, support = find_situations(data, settings, root_seed, progress=progress)
-    chosen = claimed(data, settings, found)
-    examined: list[Situation] = []
-    for number, entry in enumerate(found):
-        split = number in chosen
-        item = examine(data, settings, entry, split, admissible=admissible, seed=root_seed)
-        examined.append(item)
-        progress("situations examined", number + 1, len(found))
-    situations = tuple(examined)
-    claims = situations
+    claims = _examined(
+        data, settings, found, admissible=admissible, root_seed=root_seed, progress=progress
+    )
     situations, incoherent = coherent(settings, claims)
     several = by_phase(situations)
     replayed = replay_sample(data, settings, replay=replay, root_seed=root_seed, progress=progress)
@@ -138,6 +132,26 @@ def audit(
         modes_other_phases=_other_phases(data, settings, root_seed),
         resamples=resamples(data, settings, measured, claims, root_seed=root_seed),
     )
+
+
+def _examined(
+    data: AuditInput,
+    settings: AuditSettings,
+    found: list[Found],
+    *,
+    admissible: Admissible | None,
+    root_seed: int,
+    progress: Progress,
+) -> tuple[Situation, ...]:
+    """Every situation, looked at in turn; those of a claim are split into modes."""
+    chosen = claimed(data, settings, found)
+    examined: list[Situation] = []
+    for number, entry in enumerate(found):
+        split = number in chosen
+        item = examine(data, settings, entry, split, admissible=admissible, seed=root_seed)
+        examined.append(item)
+        progress("situations examined", number + 1, len(found))
+    return tuple(examined)
 
 
 def _after_realignment(

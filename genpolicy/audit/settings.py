@@ -64,6 +64,10 @@ class AuditSettings(BaseModel):
         gain_epoch_floor: Reported from: the same between one epoch and all.
         frame_floor_rad: Reported from: angle between commanded and observed motion. An arm that
             follows its axes unequally stays below it.
+        magnitude_floor: Reported from: factor between an episode and the usual one that may be a
+            unit. No object stands five times further away.
+        rate_floor: Reported from: deviation of the period of the rows from the declared one, as its
+            share.
         gap_share_floor: Reported from: share of rows that follow a gap. At 1 % every sixth chunk
             of 16 holds one.
         jitter_floor_share: Reported from: deviation of every tenth row from the period, as its
@@ -75,7 +79,7 @@ class AuditSettings(BaseModel):
             pixels and joint angles as well.
         replay_episodes: Episodes to replay, drawn at random, at most.
         minimum_two_mode_situations: Held-out episodes of a phase with several modes, below which
-            the phase is said to have one.
+            the phase is said to have one: the floor of the limit on their number.
         minimum_two_mode_share: The same as a share of its analysed held-out episodes. Where the
             task has modes, most episodes come by; chance gives a cloud without modes that is
             looked at in ten situations an episode up to a tenth of them.
@@ -127,6 +131,8 @@ class AuditSettings(BaseModel):
     gain_floor: float = Field(default=3.0, gt=1)
     gain_epoch_floor: float = Field(default=1.15, gt=1)
     frame_floor_rad: float = Field(default=0.14, gt=0)
+    magnitude_floor: float = Field(default=5.0, gt=1)
+    rate_floor: float = Field(default=0.1, gt=0, lt=1)
     gap_share_floor: float = Field(default=0.01, gt=0, lt=1)
     jitter_floor_share: float = Field(default=0.5, gt=0)
     negative_delay_tolerance_s: float = Field(default=0.001, ge=0)
@@ -149,10 +155,14 @@ class AuditSettings(BaseModel):
             "gain_factor": self.gain_floor,
             "gain_epoch_factor": self.gain_epoch_floor,
             "frame_angle_rad": self.frame_floor_rad,
+            "magnitude_factor": self.magnitude_floor,
+            "rate_deviation": self.rate_floor,
             "gap_share": self.gap_share_floor,
             "jitter_share": self.jitter_floor_share,
             "calibration_residual_m": self.calibration_floor_m / self.metre,
             "faulty_episodes_share": self.outlier_share,
+            "two_mode_episodes": self.minimum_two_mode_situations,
+            "two_mode_share": self.minimum_two_mode_share,
         }
 
     def least_two_mode_episodes(self, analysed: int) -> int:

@@ -94,26 +94,31 @@ def audit(
         root_seed=root_seed,
         progress=progress or silent,
     )
-    counts = result.counts
     return AuditReport(
         modes=tuple(asdict(mode) for mode in result.modes),
-        support={
-            "episodes": len(result.data.episodes),
-            "rows": len(result.data.observation),
-            "situations": counts.queries,
-            "situations_with_support": counts.analysed,
-            "held_out_episodes_with_support": counts.analysed_episodes,
-            "by_phase": [
-                {"phase": item.phase, "situations": item.queries, "with_support": item.analysed}
-                for item in result.support
-            ],
-        },
+        support=_support(result),
         evidence=tuple(_evidence(result, settings)),
         rests_on=tuple(_rests_on(dataset, result, admissible, replay)),
         settings=settings,
         dataset=dataset.manifest_sha256,
         result=result,
     )
+
+
+def _support(result: AuditResult) -> dict[str, Any]:
+    """How far the data reach, in all and by phase."""
+    counts = result.counts
+    return {
+        "episodes": len(result.data.episodes),
+        "rows": len(result.data.observation),
+        "situations": counts.queries,
+        "situations_with_support": counts.analysed,
+        "held_out_episodes_with_support": counts.analysed_episodes,
+        "by_phase": [
+            {"phase": item.phase, "situations": item.queries, "with_support": item.analysed}
+            for item in result.support
+        ],
+    }
 
 
 def _evidence(result: AuditResult, settings: AuditSettings) -> list[str]:

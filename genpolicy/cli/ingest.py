@@ -8,7 +8,7 @@ from typing import Any
 from genpolicy.cli.progress import ProgressLine
 from genpolicy.data.formats import Opened, open_dataset, propose
 from genpolicy.data.formats.contract import ImportContract, load_contract, write_contract
-from genpolicy.data.formats.standing import standing_notes
+from genpolicy.data.formats.open_questions import open_questions
 from genpolicy.errors import ConfigError
 
 SHOWN_REFUSALS = 20
@@ -79,7 +79,7 @@ def run_propose(path: Path, *, out: Path, format: str, task: str | None, force: 
     print(f"contract  {out}")
     print(f"channels  {', '.join(f'{c.name} ({len(c.components)})' for c in contract.channels)}")
     print(f"action    {len(contract.action.components)} numbers at {contract.rate_hz:g} Hz")
-    for note in dict.fromkeys([*contract.notes, *standing_notes(contract)]):
+    for note in dict.fromkeys([*contract.notes, *open_questions(contract)]):
         print(f"note      {note}")
     return 0
 

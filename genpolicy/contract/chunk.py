@@ -4,14 +4,13 @@ Every chunk names the observation it rests on, who made it, and until when it ma
 A step of its life is a new type; there is no way back and none can be skipped.
 """
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.errors import ContractError, NonFiniteError
-from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_bytes
 
 Array = NDArray[np.float64]
@@ -168,8 +167,3 @@ def frozen_array(values: Array) -> Array:
 def actions_sha256(actions: Array) -> str:
     """SHA-256 of the little-endian float64 bytes of an action array."""
     return sha256_bytes(np.ascontiguousarray(actions, dtype="<f8").tobytes())
-
-
-def metadata_hash(metadata: ChunkMetadata) -> str:
-    """SHA-256 of a chunk's metadata."""
-    return sha256_bytes(canonical_json(asdict(metadata)))

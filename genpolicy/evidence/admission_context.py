@@ -23,8 +23,8 @@ Array = NDArray[np.float64]
 
 RECORDED = "recorded"
 
-COMMANDS_AT_THE_SEAM = 3
-"""Acceleration at the seam needs one command before the last one, jerk two."""
+COMMANDS_AT_THE_BOUNDARY = 3
+"""Acceleration at the boundary needs one command before the last one, jerk two."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ def make_checker(
     return FeasibilityChecker(cell, checks=checks)
 
 
-def seam(
+def commands_in_joints(
     checker: FeasibilityChecker, commanded: Sequence[Array], q_near: Array
 ) -> tuple[Array, Array]:
     """Joint positions of the last command and of those before it.
@@ -120,7 +120,9 @@ def context_of(
         late_rows: Rows that are late and will never be executed; all behind them are checked.
         newest_accepted_observation_s: Observation under the newest chunk accepted so far, s.
     """
-    q_cmd, history = seam(checker, moment.commanded[-COMMANDS_AT_THE_SEAM:], moment.q_meas)
+    q_cmd, history = commands_in_joints(
+        checker, moment.commanded[-COMMANDS_AT_THE_BOUNDARY:], moment.q_meas
+    )
     return Context(
         q_meas=moment.q_meas,
         q_cmd=q_cmd,
@@ -144,7 +146,7 @@ def context_at_rest(task: Task, checker: FeasibilityChecker, observation: Array)
     """Context of a recorded observation, for chunks that begin at it.
 
     Where the robot stands follows from the observed TCP pose; commands before it are not
-    assumed, so that the seam is judged by speed alone. The chunk begins at the observation: its
+    assumed, so that the boundary is judged by speed alone. The chunk begins at the observation: its
     age is 0, and 0 is what it may be.
 
     Args:

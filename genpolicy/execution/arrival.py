@@ -7,8 +7,9 @@ import numpy as np
 from genpolicy.contract.action import ACTION_DIM
 from genpolicy.contract.chunk import ChunkMetadata, DiscardReason, actions_sha256
 from genpolicy.errors import GenpolicyError, IntegrityError
-from genpolicy.execution.checks import Checks, Chunk, Moment, Place, View, refusal
+from genpolicy.execution.checks import Checks, Place, refusal
 from genpolicy.execution.chunk_queue import ChunkQueue
+from genpolicy.execution.moment import Chunk, Moment, View
 from genpolicy.execution.nanoseconds import ChunkTimes
 from genpolicy.feasibility.admission import Admitted
 

@@ -3,9 +3,10 @@
 from typing import TYPE_CHECKING
 
 from genpolicy.contract.chunk import DiscardReason
-from genpolicy.execution.checks import Checks, Chunk, Moment, Place, View, refusal
+from genpolicy.execution.checks import Checks, Place, refusal
 from genpolicy.execution.journal import Journal, encode_actions
 from genpolicy.execution.ledger import BEYOND_HORIZON, Conservation, Ledger, QueuedChunk
+from genpolicy.execution.moment import Chunk, Moment, View
 from genpolicy.execution.settings import ExecutorSettings
 
 if TYPE_CHECKING:

@@ -11,11 +11,12 @@ from dataclasses import replace
 
 from genpolicy.contract.chunk import ChunkMetadata, DiscardReason
 from genpolicy.execution.arrival import Arrivals, issued_by_feasibility
-from genpolicy.execution.checks import CHECKS, FALLBACK, POLICY, Checks, Mode, View, missing
+from genpolicy.execution.checks import CHECKS, Checks, missing
 from genpolicy.execution.chunk_queue import ChunkQueue
 from genpolicy.execution.command import Command
 from genpolicy.execution.journal import Journal, session_payload
 from genpolicy.execution.ledger import Conservation
+from genpolicy.execution.moment import FALLBACK, POLICY, ExecutorMode, View
 from genpolicy.execution.nanoseconds import NEVER_NS, NS_PER_S, to_ns
 from genpolicy.execution.settings import ExecutorSettings
 from genpolicy.execution.stub import ControllerStub
@@ -53,7 +54,7 @@ class Executor:
         self.settings = settings
         self.stub = stub
         self.observations_ignored = self.clock_faults = 0
-        self.mode = Mode.RUN
+        self.mode = ExecutorMode.RUN
         self._journal = journal
         self._checks = checks
         self._view = settings.first_view()
@@ -74,7 +75,7 @@ class Executor:
         calibration_epoch: str,
         divergence_m: float | None = None,
     ) -> bool:
-        """Take note of an observation; one older than the newest is ignored and counted.
+        """Whether an observation is used; one older than the newest is ignored and counted.
 
         Args:
             now_s: Time, s.
@@ -82,9 +83,6 @@ class Executor:
             phase: Task phase.
             calibration_epoch: Calibration of its sensors.
             divergence_m: Distance of measured from commanded TCP, if known, m.
-
-        Returns:
-            Whether it was used.
         """
         now_ns = self._begin(now_s)
         event_ns = to_ns(event_time_s) if math.isfinite(event_time_s * NS_PER_S) else now_ns + 1
@@ -97,7 +95,7 @@ class Executor:
             "used": not ignored, "ignored_because": ignored,
         }  # fmt: skip
         self._journal.add("observation", now_ns, payload)
-        self.stub.hear_observation(now_ns, event_ns, phase, calibration_epoch)
+        self.stub.note_observation(now_ns, event_ns, phase, calibration_epoch)
         if ignored:
             self.observations_ignored += 1
             return False
@@ -133,10 +131,9 @@ class Executor:
     def set_active(self, now_s: float, checkpoint_hash: str, sampler_hash: str) -> None:
         """Name the weights and the sampler that may command; what others made is discarded."""
         now_ns = self._begin(now_s)
-        self._journal.add(
-            "active", now_ns, {"checkpoint": checkpoint_hash, "sampler": sampler_hash}
-        )
-        self.stub.hear_active(checkpoint_hash, sampler_hash)
+        payload = {"checkpoint": checkpoint_hash, "sampler": sampler_hash}
+        self._journal.add("active", now_ns, payload)
+        self.stub.note_active(checkpoint_hash, sampler_hash)
         self._view = replace(self._view, checkpoint=checkpoint_hash, sampler=sampler_hash)
         self._drop(now_ns, DiscardReason.CHECKPOINT_MISMATCH)
         self._drop(now_ns, DiscardReason.SAMPLER_MISMATCH)
@@ -155,42 +152,44 @@ class Executor:
         self._void(now_ns, DiscardReason.RESET, now_ns)
         self._in_flight.clear()
         self._queue.forget()
-        self.stub.hear_reset(now_ns, epoch)
-        if self.mode is not Mode.ENDED:
-            self._enter(now_ns, Mode.RUN)
+        self.stub.note_reset(now_ns, epoch)
+        if self.mode is not ExecutorMode.ENDED:
+            self._enter(now_ns, ExecutorMode.RUN)
 
     def intervene(self, now_s: float) -> None:
         """A person takes over: policy and fallback are discarded until `hand_back`."""
         now_ns = self._begin(now_s)
-        self._enter(now_ns, Mode.INTERVENTION)
+        self._enter(now_ns, ExecutorMode.INTERVENTION)
         self._drop(now_ns, DiscardReason.INTERVENTION)
 
     def hand_back(self, now_s: float) -> None:
         """The person hands back; chunks conditioned before now stay void."""
         now_ns = self._begin(now_s)
-        if self.mode is Mode.INTERVENTION:
-            self._enter(now_ns, Mode.RUN)
+        if self.mode is ExecutorMode.INTERVENTION:
+            self._enter(now_ns, ExecutorMode.RUN)
             self._invalidate(now_ns, now_ns, DiscardReason.INTERVENTION)
 
     def begin_fallback(self, now_s: float) -> None:
         """The task's classical fallback commands; the policy's chunks are discarded."""
         now_ns = self._begin(now_s)
-        if self.mode is Mode.RUN:
-            self._enter(now_ns, Mode.FALLBACK)
+        if self.mode is ExecutorMode.RUN:
+            self._enter(now_ns, ExecutorMode.FALLBACK)
             self._drop(now_ns, DiscardReason.STOPPED)
 
     def end_fallback(self, now_s: float) -> None:
         """The policy may command again, on observations from now on."""
         now_ns = self._begin(now_s)
-        if self.mode is Mode.FALLBACK:
-            self._enter(now_ns, Mode.RUN)
+        if self.mode is ExecutorMode.FALLBACK:
+            self._enter(now_ns, ExecutorMode.RUN)
             self._invalidate(now_ns, now_ns, DiscardReason.STOPPED)
 
     def end_episode(self, now_s: float) -> Conservation:
         """Discard what is left, write the balances down and accept nothing more."""
         now_ns = self._begin(now_s)
-        self._queue.drop(now_ns, replace(self._view, mode=Mode.ENDED), DiscardReason.END_OF_EPISODE)
-        self._enter(now_ns, Mode.ENDED)
+        self._queue.drop(
+            now_ns, replace(self._view, mode=ExecutorMode.ENDED), DiscardReason.END_OF_EPISODE
+        )
+        self._enter(now_ns, ExecutorMode.ENDED)
         balance = self.conservation()
         self._journal.add("end", now_ns, {**balance.as_dict(), "events": len(self._journal)})
         return balance
@@ -211,7 +210,7 @@ class Executor:
         """Whether to start an invocation: few executable actions left and none in flight."""
         if self._in_flight or self.stub.supervisor.stopped:
             return False
-        if self.mode not in (Mode.RUN, Mode.FALLBACK):
+        if self.mode not in (ExecutorMode.RUN, ExecutorMode.FALLBACK):
             return False
         now_ns = self._journal.clock(now_s)
         return self._queue.remaining(now_ns) <= self.settings.replan_lead_steps
@@ -229,11 +228,7 @@ class Executor:
         self._journal.invocation(now_s, invocation_id=invocation_id, stage="end", detail=detail)
 
     def deliver(self, admitted: Admitted, now_s: float) -> DiscardReason | None:
-        """Enqueue a chunk of the policy, or discard it.
-
-        Returns:
-            None if enqueued, else why not.
-        """
+        """Enqueue a chunk of the policy, or discard it; None if enqueued, else why not."""
         return self._arrive(admitted, self._begin(now_s), POLICY)
 
     def deliver_fallback(self, admitted: Admitted, now_s: float) -> DiscardReason | None:
@@ -330,20 +325,22 @@ class Executor:
         self.stub.void(reason, before_ns)
         self._void(now_ns, reason, before_ns)
 
-    def _enter(self, now_ns: int, mode: Mode) -> None:
+    def _enter(self, now_ns: int, mode: ExecutorMode) -> None:
         if mode is not self.mode:
             self._journal.add("mode", now_ns, {"old": str(self.mode), "new": str(mode)})
             self.mode = mode
-            self.stub.hear_mode(str(mode))
+            self.stub.note_mode(str(mode))
 
     def _nothing(self, now_ns: int) -> Command:
         """No chunk is due: stop, hold, or nothing more after the end."""
         if self.stub.supervisor.stopped:
             self._hold(now_ns, "stopped")
             return Command("stop", str(self.stub.supervisor.state))
-        if self.mode is Mode.ENDED:
+        if self.mode is ExecutorMode.ENDED:
             return Command("hold", "ended")
-        return self._hold(now_ns, "intervention" if self.mode is Mode.INTERVENTION else "empty")
+        return self._hold(
+            now_ns, "intervention" if self.mode is ExecutorMode.INTERVENTION else "empty"
+        )
 
     def _hold(self, now_ns: int, reason: str) -> Command:
         self.stub.hold(now_ns, reason)

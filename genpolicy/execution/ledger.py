@@ -11,7 +11,7 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from genpolicy.execution.checks import Chunk
+from genpolicy.execution.moment import Chunk
 
 if TYPE_CHECKING:
     from genpolicy.feasibility.admission import Admitted

@@ -39,7 +39,6 @@ class RecoveryState(StrEnum):
 
 
 PRIMITIVES = (RecoveryState.RETREAT, RecoveryState.CLASSICAL_RETURN)
-TERMINAL = frozenset({RecoveryState.ABORT, RecoveryState.STOPPED})
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from genpolicy.errors import ConfigError
-from genpolicy.execution.checks import View
+from genpolicy.execution.moment import View
 from genpolicy.execution.nanoseconds import to_ns
 
 

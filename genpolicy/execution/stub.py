@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.contract.chunk import DiscardReason
-from genpolicy.execution.checks import CHECKS, Checks, Chunk, Moment, Place, View, refusal
+from genpolicy.execution.checks import CHECKS, Checks, Place, refusal
 from genpolicy.execution.journal import Journal, encode_actions
+from genpolicy.execution.moment import Chunk, Moment, View
 from genpolicy.execution.nanoseconds import ChunkTimes
 from genpolicy.execution.settings import ExecutorSettings
 from genpolicy.execution.supervisor import Supervisor
@@ -61,7 +62,7 @@ class ControllerStub:
         self._last_due_ns: int | None = None
         self._last_sequence = -1
 
-    def hear_observation(
+    def note_observation(
         self, now_ns: int, event_ns: int, phase: str, calibration_epoch: str
     ) -> None:
         """Its own view of phase, calibration and newest observation."""
@@ -80,15 +81,15 @@ class ControllerStub:
             maximum_age_ns=self._maximum_age_ns.get(phase),
         )
 
-    def hear_active(self, checkpoint: str, sampler: str) -> None:
+    def note_active(self, checkpoint: str, sampler: str) -> None:
         """Which weights and sampler may command."""
         self._view = replace(self._view, checkpoint=checkpoint, sampler=sampler)
 
-    def hear_mode(self, mode: str) -> None:
+    def note_mode(self, mode: str) -> None:
         """Who may command: run (the policy), fallback, intervention or ended (nobody)."""
         self._view = replace(self._view, mode=mode)
 
-    def hear_reset(self, now_ns: int, session_epoch: int) -> None:
+    def note_reset(self, now_ns: int, session_epoch: int) -> None:
         """A new session: nothing from before is accepted."""
         self._view = replace(self._view, session_epoch=session_epoch, newest_observation_ns=None)
         self._last_due_ns = None

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from genpolicy.errors import ConfigError, ContractError
-from genpolicy.execution.checks import CHECKS, Checks, Moment, Place, refusal
+from genpolicy.execution.checks import CHECKS, Checks, Place, refusal
 from genpolicy.execution.journal import Journal
+from genpolicy.execution.moment import Moment
 from genpolicy.execution.nanoseconds import to_ns
 
 

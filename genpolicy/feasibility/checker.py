@@ -151,7 +151,7 @@ class LayerChecker:
         return [self._verdict(state, evaluate_all) for state in states]
 
     def boundary_jerk_m_s3(self, projected: Projected, *, context: Context) -> float:
-        """Largest jerk of the TCP over the seam, m/s^3; NaN where fewer than four points exist.
+        """Largest jerk of the TCP over the boundary, m/s^3; NaN where fewer than four points exist.
 
         The points are the earlier commands of the context, its last action, and the first three
         executable rows.

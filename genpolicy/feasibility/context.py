@@ -32,11 +32,10 @@ class Context:
         active_sampler_hash: Sampler settings in force.
         scene: Where the movable bodies of the scene stand.
         q_cmd_history: Commands before `q_cmd`, oldest first, one period apart, rad; what is not
-            given is not assumed: acceleration needs one of them at the seam, jerk two. (n, J).
+            given is not assumed: acceleration needs one of them at the boundary, jerk two. (n, J).
         newest_accepted_observation_s: Observation under the newest chunk accepted so far; an
             older one behind it is out of order. None before the first.
-        first_index: Rows before it are late and will never be executed; the seam is there.
-        end_index: Rows from here on will never be executed (execution horizon); None: all.
+        first_index: Rows before it are late and will never be executed; the boundary is there.
     """
 
     q_meas: Array
@@ -54,7 +53,6 @@ class Context:
     q_cmd_history: Array = field(default_factory=lambda: np.zeros((0, 0)))
     newest_accepted_observation_s: float | None = None
     first_index: int = 0
-    end_index: int | None = None
 
     def __post_init__(self) -> None:
         joints = np.size(self.q_cmd)
@@ -83,17 +81,14 @@ class Context:
                     expected="finite numbers",
                     action="Hold; the state of the robot is unknown.",
                 )
-        if self.first_index < 0 or (
-            self.end_index is not None and self.end_index <= self.first_index
-        ):
+        if not self.first_index >= 0:
             raise ContractError(
-                where="Context.first_index and end_index",
-                found=f"{self.first_index} and {self.end_index}",
-                expected="0 <= first_index < end_index",
-                action="Discard the chunk: no row of it can be executed.",
+                where="Context.first_index",
+                found=str(self.first_index),
+                expected="at least 0",
+                action="Count the late rows of the chunk from its first row.",
             )
 
     def rows(self, actions: int) -> slice:
-        """Which rows of a chunk of that many actions can be executed, and are checked."""
-        end = actions if self.end_index is None else min(self.end_index, actions)
-        return slice(self.first_index, end)
+        """Which rows of a chunk of that many actions are checked: all that are not late."""
+        return slice(self.first_index, actions)

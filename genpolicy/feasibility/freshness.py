@@ -4,7 +4,8 @@ import math
 
 from genpolicy.contract.chunk import ChunkMetadata
 from genpolicy.errors import NonFiniteError
-from genpolicy.execution.checks import CHECKS, Check, Checks, Chunk, Moment, Place, View, at
+from genpolicy.execution.checks import CHECKS, Check, Checks, Place, at
+from genpolicy.execution.moment import Chunk, Moment, View
 from genpolicy.execution.nanoseconds import NS_PER_S, ChunkTimes, to_ns
 from genpolicy.feasibility.context import Context
 

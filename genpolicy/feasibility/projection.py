@@ -127,7 +127,7 @@ def _smooth(batch: Batch, cell: Cell) -> list[Projected]:
             fixed = _before(batch.contexts[i])
             excess = rate_excess(
                 np.concatenate([fixed, path[place]]),
-                seam=len(fixed),
+                fixed_points=len(fixed),
                 limits=cell.usable_limits,
                 period_s=cell.action_period_s,
             )

@@ -22,25 +22,25 @@ TIGHTENED = 0.97  # a smoothed path keeps this part of its limits, so that it is
 
 
 @lru_cache(maxsize=64)
-def _ladder(points: int, seam: int) -> tuple[Array, Array]:
+def _ladder(points: int, fixed_points: int) -> tuple[Array, Array]:
     """Per penalty, matrices on the path (L, n, n) and on the fixed points before it (L, n, s)."""
-    total = points + seam
+    total = points + fixed_points
     differences = np.diff(np.eye(total), n=ORDER, axis=0) if total > ORDER else np.zeros((0, total))
-    fixed, free = differences[:, :seam], differences[:, seam:]
-    on_path, on_seam = [], []
+    fixed, free = differences[:, :fixed_points], differences[:, fixed_points:]
+    on_path, on_fixed = [], []
     for penalty in PENALTIES:
         inverse = np.linalg.inv(np.eye(points) + penalty * free.T @ free)
         on_path.append(inverse)
-        on_seam.append(-penalty * inverse @ free.T @ fixed)
-    return np.stack(on_path), np.stack(on_seam)
+        on_fixed.append(-penalty * inverse @ free.T @ fixed)
+    return np.stack(on_path), np.stack(on_fixed)
 
 
-def rate_excess(path: Array, *, seam: int, limits: RobotLimits, period_s: float) -> Array:
+def rate_excess(path: Array, *, fixed_points: int, limits: RobotLimits, period_s: float) -> Array:
     """Largest share of a joint rate limit that a path uses; above 1 it breaks one.
 
     Args:
         path: Fixed points and then the path, rad. Shape (..., s + n, J).
-        seam: How many of the points are fixed, >= 1.
+        fixed_points: How many of the points are fixed, >= 1.
         limits: Limits that may be used.
         period_s: Time between points.
 
@@ -53,7 +53,7 @@ def rate_excess(path: Array, *, seam: int, limits: RobotLimits, period_s: float)
     for order, bound in enumerate(bounds, start=1):
         rates = np.diff(rates, axis=-2) / period_s
         # Differences among the fixed points alone are past; nothing can change them.
-        own = rates[..., max(seam - order, 0) :, :]
+        own = rates[..., max(fixed_points - order, 0) :, :]
         if own.shape[-2]:
             used = np.maximum(used, np.max(np.abs(own) / bound, axis=(-2, -1)))
     return used
@@ -74,14 +74,14 @@ def smoothed(path: Array, fixed: Array, *, limits: RobotLimits, period_s: float)
     Source:
         Whittaker's smoother (1922) with a fixed beginning.
     """
-    seam = len(fixed)
+    fixed_points = len(fixed)
     whole = np.concatenate([fixed, path])
-    if rate_excess(whole, seam=seam, limits=limits, period_s=period_s) <= 1.0:
+    if rate_excess(whole, fixed_points=fixed_points, limits=limits, period_s=period_s) <= 1.0:
         return
-    on_path, on_seam = _ladder(len(path), seam)
-    candidates = on_path @ path + on_seam @ fixed
+    on_path, on_fixed = _ladder(len(path), fixed_points)
+    candidates = on_path @ path + on_fixed @ fixed
     beginnings = np.broadcast_to(fixed, (len(PENALTIES), *fixed.shape))
     whole = np.concatenate([beginnings, candidates], axis=1)
-    used = rate_excess(whole, seam=seam, limits=limits, period_s=period_s)
+    used = rate_excess(whole, fixed_points=fixed_points, limits=limits, period_s=period_s)
     for rung in np.flatnonzero(used <= TIGHTENED):
         yield candidates[rung]

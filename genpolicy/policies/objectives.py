@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import torch
 from torch import Tensor, nn
-from torch.nn import functional
 
 from genpolicy.policies.networks import Dimensions, PolicyNetwork
 from genpolicy.policies.schedules import squared_cosine, straight_path
@@ -148,11 +147,6 @@ def flow_matching(dimensions: Dimensions, network: NetworkConfig, head: HeadConf
 def masked_mean(values: Tensor, weight: Tensor) -> Tensor:
     """Mean of (B, K, D) over the entries with weight 1; weights have shape (B, K, 1)."""
     return (values * weight).sum() / (weight.sum() * values.shape[-1]).clamp(min=1.0)
-
-
-def masked_absolute_error(predicted: Tensor, batch: Batch) -> Tensor:
-    """Masked L1 distance of predictions to a batch, normalised units."""
-    return masked_mean(functional.l1_loss(predicted, batch.actions, reduction="none"), batch.weight)
 
 
 def _normal_like(values: Tensor, generator: torch.Generator) -> Tensor:

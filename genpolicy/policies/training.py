@@ -105,18 +105,10 @@ def train(
     check_sampler(method, request.sampler, request.head)
     horizons = method.horizons(request.horizons)
     with deterministic(device):
-        data, held_out = (
-            as_batch(
-                split.shortened(horizons),
-                request.normalisation,
-                mask_padding=request.training.mask_padding,
-                device=device,
-            )
-            if split is not None
-            else None
-            for split in (windows, validation)
+        data = _batch_of(windows, horizons, request, device)
+        held_out = (
+            _batch_of(validation, horizons, request, device) if validation is not None else None
         )
-        assert data is not None
         network, objective = _build(method, _dimensions(horizons, request), request, device)
         objective.prepare(network, data)
         averaged = copy.deepcopy(network)
@@ -175,6 +167,17 @@ def _write(
             temporary / TRAINING_FILE, canonical_json({**summary, "checkpoint_sha256": identity})
         )
     return identity
+
+
+def _batch_of(
+    windows: Windows, horizons: HorizonConfig, request: TrainingRequest, device: str
+) -> Batch:
+    return as_batch(
+        windows.shortened(horizons),
+        request.normalisation,
+        mask_padding=request.training.mask_padding,
+        device=device,
+    )
 
 
 def _dimensions(horizons: HorizonConfig, request: TrainingRequest) -> Dimensions:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.errors import ConfigError
-from genpolicy.robot.kinematics import Frames
+from genpolicy.robot.frames import Frames
 from genpolicy.robot.shapes import BASE_FRAME, HELD, SceneShapes, Shape, bounding_spheres
 
 Array = NDArray[np.float64]

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from genpolicy.errors import ConfigError
 from genpolicy.robot.broadphase import BroadPhase
-from genpolicy.robot.kinematics import ArmKinematics, Frames
+from genpolicy.robot.frames import Frames
+from genpolicy.robot.kinematics import ArmKinematics
 from genpolicy.robot.narrowphase import NarrowPhase, require_finite
 from genpolicy.robot.scene_state import SceneState
 from genpolicy.robot.shapes import SceneShapes, shapes_of

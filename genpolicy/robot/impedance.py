@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 STIFFNESS_N_M = 2500.0
 STIFFNESS_NM_RAD = 120.0
 # Damping ratio 0.8 to 1.4 (translation) for the effective TCP masses of 4 to 11 kg of this arm,
-# 0.7 to 2 (rotation) for its 0.1 to 0.8 kg m2; see `effective_inertia`.
+# 0.7 to 2 (rotation) for its 0.1 to 0.8 kg m2, both (J M^-1 J^T)^-1.
 DAMPING_N_S_M = 280.0
 DAMPING_NM_S_RAD = 14.0
 POSTURE_STIFFNESS_NM_RAD = 10.0
@@ -137,19 +137,3 @@ class ImpedanceController:
         gram.flat[::7] += 1e-9
         np.dot(jacobian.T, np.linalg.solve(gram, jacobian), out=self._projector)
         np.subtract(self._identity, self._projector, out=self._projector)
-
-
-def effective_inertia(
-    model: mujoco.MjModel, data: mujoco.MjData, *, site: str, joints: int
-) -> Array:
-    """Inertia that the TCP opposes to a force: (J M^-1 J^T)^-1, kg and kg m2. Shape (6, 6).
-
-    The fingers and whatever is held are left out; the kinematics must be up to date.
-    """
-    jacobian = np.zeros((6, model.nv))
-    mujoco.mj_jacSite(model, data, jacobian[:3], jacobian[3:], int(model.site(site).id))
-    full = np.zeros((model.nv, model.nv))
-    mujoco.mj_fullM(model, data, full)
-    arm = slice(0, joints)
-    compliance = jacobian[:, arm] @ np.linalg.solve(full[arm, arm], jacobian[:, arm].T)
-    return np.asarray(np.linalg.inv(compliance))

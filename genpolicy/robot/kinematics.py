@@ -16,6 +16,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from genpolicy.errors import ConfigError
+from genpolicy.robot.frames import TINY, Frames, jacobian_of, pose_error
 
 Array = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -29,20 +30,6 @@ ROTATION_TOLERANCE_RAD = 1e-7
 # Ratio of the additive recurrence that spreads restart seeds; any irrational one does, and
 # another one would move every restart.
 RESTART_RATIO = 1.0889670195
-_TINY = 1e-12
-
-
-@dataclass(frozen=True)
-class Frames:
-    """Placement of the J joint frames and the TCP in the base frame.
-
-    Attributes:
-        rotation: Joints 1 to J, then the TCP. Shape (N, J + 1, 3, 3).
-        position_m: Shape (N, J + 1, 3).
-    """
-
-    rotation: Array
-    position_m: Array
 
 
 @dataclass(frozen=True)
@@ -177,25 +164,7 @@ class ArmKinematics:
         Returns:
             Shape (N, 6, J).
         """
-        return _jacobian(self.frames(q_rad))
-
-    def reference_forward(self, q_rad: Array) -> tuple[Array, Array]:
-        """What Pinocchio says for one configuration of shape (J,): position (m), rotation."""
-        pin.framesForwardKinematics(self.model, self.data, self._full(q_rad))
-        placement = self.data.oMf[self.tcp_frame_id]
-        return np.array(placement.translation), np.array(placement.rotation)
-
-    def reference_jacobian(self, q_rad: Array) -> Array:
-        """What Pinocchio says for one configuration; base axes at the TCP. Shape (6, J)."""
-        jacobian = pin.computeFrameJacobian(
-            self.model, self.data, self._full(q_rad), self.tcp_frame_id, pin.LOCAL_WORLD_ALIGNED
-        )
-        return np.array(jacobian)[:, : self.joint_count]
-
-    def _full(self, q_rad: Array) -> Array:
-        full: Array = np.array(pin.neutral(self.model), dtype=float)
-        full[: self.joint_count] = q_rad
-        return full
+        return jacobian_of(self.frames(q_rad))
 
     def condition_number(self, q_rad: Array) -> Array:
         """Largest over smallest singular value of the TCP Jacobian (m and rad mixed).
@@ -246,14 +215,14 @@ class ArmKinematics:
         active = np.flatnonzero(finite & np.isfinite(q).all(1))
         for iteration in range(iterations + 1):
             frames = self.frames(q[active])
-            error = _pose_error(frames, position_m[active], rotation[active])
+            error = pose_error(frames, position_m[active], rotation[active])
             position_error[active] = np.linalg.norm(error[:, :3], axis=1)
             rotation_error[active] = np.linalg.norm(error[:, 3:], axis=1)
             left = ~_within(position_error[active], rotation_error[active])
             if iteration == iterations or not left.any():
                 break
             active = active[left]
-            q[active] += _step(_jacobian(frames)[left], error[left])
+            q[active] += _step(jacobian_of(frames)[left], error[left])
         return IkResult(q, _within(position_error, rotation_error), position_error, rotation_error)
 
     def solve_with_restarts(
@@ -327,45 +296,12 @@ def _frozen(values: Any) -> Array:
     return array
 
 
-def _jacobian(frames: Frames) -> Array:
-    axes = frames.rotation[:, :-1, :, 2]
-    arms = frames.position_m[:, -1, None, :] - frames.position_m[:, :-1]
-    jacobian = np.empty((len(axes), 6, axes.shape[1]))
-    jacobian[:, 0] = axes[..., 1] * arms[..., 2] - axes[..., 2] * arms[..., 1]
-    jacobian[:, 1] = axes[..., 2] * arms[..., 0] - axes[..., 0] * arms[..., 2]
-    jacobian[:, 2] = axes[..., 0] * arms[..., 1] - axes[..., 1] * arms[..., 0]
-    jacobian[:, 3:] = axes.transpose(0, 2, 1)
-    return jacobian
-
-
-def _pose_error(frames: Frames, position_m: Array, rotation: Array) -> Array:
-    """Position (m) and rotation vector (rad) from the frames to the poses. Shape (N, 6)."""
-    error = np.empty((len(position_m), 6))
-    error[:, :3] = position_m - frames.position_m[:, -1]
-    relative = rotation @ frames.rotation[:, -1].transpose(0, 2, 1)
-    vector = np.stack(
-        [
-            relative[:, 2, 1] - relative[:, 1, 2],
-            relative[:, 0, 2] - relative[:, 2, 0],
-            relative[:, 1, 0] - relative[:, 0, 1],
-        ],
-        axis=1,
-    )
-    double_sine = np.linalg.norm(vector, axis=1)
-    angle = np.arctan2(double_sine, np.trace(relative, axis1=1, axis2=2) - 1.0)
-    scale = np.where(double_sine > _TINY, angle / np.maximum(double_sine, _TINY), 0.5)
-    error[:, 3:] = vector * scale[:, None]
-    half_turn = (double_sine <= 1e-9) & (angle > 1.0)  # the axis is lost: push off it
-    error[half_turn, 3:] = [0.5, 0.5, 0.5]
-    return error
-
-
 def _step(jacobian: Array, error: Array) -> Array:
     transposed = jacobian.transpose(0, 2, 1)
     gram = jacobian @ transposed + DAMPING**2 * np.eye(6)
     step: Array = (transposed @ np.linalg.solve(gram, error[..., None]))[..., 0]
     largest = np.max(np.abs(step), axis=1, keepdims=True)
-    step *= np.minimum(1.0, STEP_LIMIT_RAD / np.maximum(largest, _TINY))
+    step *= np.minimum(1.0, STEP_LIMIT_RAD / np.maximum(largest, TINY))
     return step
 
 

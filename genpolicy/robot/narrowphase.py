@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from genpolicy.errors import ContractError, NonFiniteError
 from genpolicy.robot.broadphase import Columns
-from genpolicy.robot.kinematics import Frames
+from genpolicy.robot.frames import Frames
 from genpolicy.robot.scene_state import SceneState
 from genpolicy.robot.shapes import BASE_FRAME, SceneShapes, fcl_geometry
 

@@ -19,7 +19,7 @@ from genpolicy.robot.kinematics import TCP_SITE
 Array = NDArray[np.float64]
 Kind = Literal["box", "cylinder", "capsule", "sphere"]
 
-ROBOT_GROUP, HELD_GROUP, SCENE_GROUP = 1, 2, 3
+ROBOT_GROUP, HELD_GROUP = 1, 2
 BASE_FRAME = -1
 HELD = "held"
 TARGET_SITE = "target"  # MJCF convention: where the body opens that the held object goes into

@@ -1,13 +1,10 @@
-"""Intervals for shares, quantiles and statistics of small samples.
+"""Exact intervals for shares and quantiles of small samples.
 
 Shares never get a bootstrap (an all-success cell has none); quantiles never get a normal
-approximation. Sources: Clopper and Pearson 1934; Wilson 1927; David and Nagaraja, Order
-Statistics, 7.1; Efron 1987 (BCa).
+approximation. Sources: Clopper and Pearson 1934; David and Nagaraja, Order Statistics, 7.1.
 """
 
 import math
-import warnings
-from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,24 +31,6 @@ def clopper_pearson(successes: int, n: int, confidence: float = 0.95) -> tuple[f
     tail = (1.0 - confidence) / 2.0
     lower = 0.0 if successes == 0 else float(stats.beta.ppf(tail, successes, n - successes + 1))
     upper = 1.0 if successes == n else float(stats.beta.isf(tail, successes + 1, n - successes))
-    return lower, upper
-
-
-def wilson(successes: int, n: int, confidence: float = 0.95) -> tuple[float, float]:
-    """Wilson score interval: for plots; gates use `clopper_pearson`.
-
-    Raises:
-        ContractError: Counts that cannot be.
-    """
-    _check_counts(successes, n, confidence)
-    if n == 0:
-        return 0.0, 1.0
-    z = float(stats.norm.isf((1.0 - confidence) / 2.0))
-    share = successes / n
-    centre = (share + z * z / (2 * n)) / (1 + z * z / n)
-    half = z * math.sqrt(share * (1 - share) / n + z * z / (4 * n * n)) / (1 + z * z / n)
-    lower = 0.0 if successes == 0 else max(0.0, centre - half)
-    upper = 1.0 if successes == n else min(1.0, centre + half)
     return lower, upper
 
 
@@ -87,58 +66,6 @@ def order_statistic_interval(
     lower = float(ordered[low - 1]) if low >= 1 else -math.inf
     upper = float(ordered[high - 1]) if high <= n else math.inf
     return lower, upper
-
-
-def bootstrap_interval(
-    values: Array,
-    statistic: Callable[..., Array],
-    *,
-    rng: np.random.Generator,
-    confidence: float = 0.95,
-    resamples: int = 2000,
-) -> tuple[float, float]:
-    """BCa bootstrap interval of a statistic; percentile where BCa has no answer.
-
-    Args:
-        values: Independent draws. Shape (n,), n >= 1.
-        statistic: Called as `statistic(sample, axis=-1)`.
-        rng: Generator of the resampling.
-        confidence: Nominal coverage.
-        resamples: Bootstrap samples.
-
-    Returns:
-        Lower and upper end; both equal the statistic for a constant sample.
-
-    Raises:
-        ContractError: Fewer than one value.
-        NonFiniteError: A value is NaN or infinite.
-    """
-    _check_finite(values, "the sample of a bootstrap interval")
-    _check_share(confidence, "confidence")
-    if len(values) == 0:
-        raise ContractError(
-            where="the sample of a bootstrap interval",
-            found="empty",
-            expected="at least one value",
-            action="Report the cell as not measured.",
-        )
-    if np.ptp(values) == 0.0:
-        point = float(statistic(values, axis=-1))
-        return point, point
-    for method in ("BCa", "percentile"):
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            interval = stats.bootstrap(
-                (values,),
-                statistic,
-                confidence_level=confidence,
-                n_resamples=resamples,
-                method=method,
-                rng=np.random.Generator(np.random.PCG64(int(rng.integers(1 << 62)))),
-            ).confidence_interval
-        if math.isfinite(interval.low) and math.isfinite(interval.high):
-            return float(interval.low), float(interval.high)
-    return -math.inf, math.inf
 
 
 def _check_counts(successes: int, n: int, confidence: float) -> None:

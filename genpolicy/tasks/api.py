@@ -45,12 +45,6 @@ class Workspace:
     lower_m: tuple[float, float, float]
     upper_m: tuple[float, float, float]
 
-    def margin_m(self, position_m: Array) -> Array:
-        """Distance to the nearest face, m; negative outside. Shapes (..., 3) to (...)."""
-        below = position_m - np.asarray(self.lower_m)
-        above = np.asarray(self.upper_m) - position_m
-        return np.asarray(np.minimum(below, above).min(axis=-1))
-
 
 @dataclass(frozen=True)
 class AuditChannels:

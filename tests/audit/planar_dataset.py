@@ -4,7 +4,8 @@ import numpy as np
 import pandas as pd
 
 from genpolicy.contract.normalisation import Normalisation, statistics_of
-from genpolicy.data.dataset import Dataset, Frames
+from genpolicy.data.dataset import Dataset
+from genpolicy.data.frames import Frames
 
 
 def dataset_of(data, *, unit="m", manifest=None):

@@ -12,8 +12,10 @@ from genpolicy.audit.evidence import write_evidence
 from genpolicy.audit.run import audit
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.audit.view import from_dataset
+from genpolicy.data.contract import SplitRule
 from genpolicy.data.dataset import load_dataset
-from genpolicy.data.formats.zarr_buffer import PUSHT, ingest_zarr_replay_buffer
+from genpolicy.data.formats.collect import import_source
+from genpolicy.data.formats.zarr_buffer import PUSHT, open_source
 from genpolicy.integrity.tables import read_table
 
 BUFFER = Path(__file__).parents[3] / "shared/data/pusht_v7/pusht_cchi_v7_replay.zarr"
@@ -27,7 +29,7 @@ pytestmark = pytest.mark.skipif(not BUFFER.exists(), reason="the PushT replay bu
 
 
 def test_pusht_has_too_little_support_to_claim_modes(tmp_path):
-    ingest_zarr_replay_buffer(BUFFER, out=tmp_path / "dataset")
+    import_source(open_source(BUFFER), PUSHT, out=tmp_path / "dataset", split=SplitRule())
     data = from_dataset(
         load_dataset(tmp_path / "dataset"), contract=PUSHT.observation, settings=SETTINGS,
         period_s=0.1,

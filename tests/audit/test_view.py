@@ -13,7 +13,8 @@ from genpolicy.errors import ContractError
 def small_dataset():
     import pandas as pd
 
-    from genpolicy.data.dataset import Dataset, Frames
+    from genpolicy.data.dataset import Dataset
+    from genpolicy.data.frames import Frames
 
     times = np.array([0.0, 0.05, 0.1, 9.0, 9.05])
     frames = Frames(

@@ -30,6 +30,7 @@ ADMISSION = "gates.proof"
 BELOW = {
     "genpolicy/execution/__init__.py",
     "genpolicy/execution/checks.py",
+    "genpolicy/execution/moment.py",
     "genpolicy/execution/nanoseconds.py",
 }
 NOT_CODE_DATA = {".py", ".pyc", ".pyi"}

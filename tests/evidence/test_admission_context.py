@@ -1,4 +1,4 @@
-"""What feasibility is told of a moment: seam, scene, freshness."""
+"""What feasibility is told of a moment: boundary, scene, freshness."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from genpolicy.evidence.admission_context import (
+    commands_in_joints,
     context_at_rest,
     make_checker,
     recorded_proposal,
-    seam,
 )
 from genpolicy.feasibility.checks import CHECKS, without
 from genpolicy.tasks.api import WorldSettings
@@ -29,9 +29,9 @@ def world(task, plan):
     return task.make_world(plan.start, settings=WorldSettings("epoch_1"))
 
 
-def test_the_seam_continues_the_commands(checker, plan, world):
+def test_the_boundary_continues_the_commands(checker, plan, world):
     commands = list(plan.actions[:3])
-    q_cmd, before = seam(checker, commands, world.q_meas)
+    q_cmd, before = commands_in_joints(checker, commands, world.q_meas)
     assert q_cmd.shape == (7,) and before.shape == (2, 7)
     position, _ = checker.kinematics.forward(np.concatenate([before, q_cmd[None]]))
     np.testing.assert_allclose(position, np.stack(commands)[:, :3], atol=1e-6)

@@ -5,17 +5,8 @@ from dataclasses import replace
 import pytest
 
 from genpolicy.contract.chunk import ChunkMetadata, DiscardReason
-from genpolicy.execution.checks import (
-    CHECKS,
-    FALLBACK,
-    Chunk,
-    Mode,
-    Moment,
-    Place,
-    View,
-    at,
-    refusal,
-)
+from genpolicy.execution.checks import CHECKS, Place, at, refusal
+from genpolicy.execution.moment import FALLBACK, Chunk, ExecutorMode, Moment, View
 from genpolicy.execution.nanoseconds import ChunkTimes
 
 MS = 1_000_000
@@ -60,7 +51,7 @@ def voided(reason, arrivals=0):
 
 
 BAD = {
-    "end_of_episode": view(mode=Mode.ENDED),
+    "end_of_episode": view(mode=ExecutorMode.ENDED),
     "duplicate": replace(GOOD, known=True),
     "infeasible": chunk(passed=False),
     "period": view(period_ns=50 * MS + 1),
@@ -68,9 +59,9 @@ BAD = {
     "same_action": replace(GOOD, same_action=False),
     "execution_horizon": view(execution_horizon=2),
     "checked_rows": chunk(checked_rows=(3, 16)),
-    "intervention": view(mode=Mode.INTERVENTION),
+    "intervention": view(mode=ExecutorMode.INTERVENTION),
     "stopped": view(stopped=True),
-    "commander": view(mode=Mode.FALLBACK),
+    "commander": view(mode=ExecutorMode.FALLBACK),
     "session_epoch": metadata(session_epoch=0),
     "checkpoint_mismatch": view(checkpoint="other"),
     "sampler_mismatch": view(sampler="other"),
@@ -144,7 +135,7 @@ def test_age_and_validity_are_asked_for_the_first_use():
 
 
 def test_the_fallback_has_an_identity_of_its_own():
-    fallback = replace(view(mode=Mode.FALLBACK), about=replace(CHUNK, source=FALLBACK))
+    fallback = replace(view(mode=ExecutorMode.FALLBACK), about=replace(CHUNK, source=FALLBACK))
     assert failing(fallback) == {"checkpoint_mismatch", "sampler_mismatch"}
     own = replace(METADATA, policy_checkpoint_hash="f", sampler_config_hash="f")
     assert failing(replace(fallback, about=replace(CHUNK, source=FALLBACK, metadata=own))) == set()

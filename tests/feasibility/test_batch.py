@@ -9,7 +9,7 @@ from genpolicy.feasibility.batch import Solution
 
 @pytest.fixture(scope="module")
 def two(kit, checker):
-    """A chunk forward with a closed hand, and one that opens at row 5, of which rows 3..9 count."""
+    """A chunk forward with a closed hand, and one that opens at row 5."""
     opening = np.where(np.arange(16) >= 5, 0.03, 0.0)
     still = kit.context(checker, kit.START)
     ahead = kit.line(kit.START, (0.40, 0.0, 0.15))
@@ -38,12 +38,12 @@ def test_what_was_let_go_once_is_not_held_again(kit, checker):
 
 
 def test_only_rows_that_can_be_executed_are_seen(kit, checker):
-    ctx = kit.context(checker, kit.START, first_index=3, end_index=9)
+    ctx = kit.context(checker, kit.START, first_index=3)
     actions = kit.line(kit.START, kit.SIDE)
     batch = kit.batch_of((actions, ctx))
-    np.testing.assert_array_equal(batch.actions[0], actions[3:9])
-    assert batch.rotation.shape == (1, 6, 3, 3)
-    np.testing.assert_allclose(batch.rotation[0], np.broadcast_to(kit.DOWN, (6, 3, 3)), atol=1e-12)
+    np.testing.assert_array_equal(batch.actions[0], actions[3:])
+    assert batch.rotation.shape == (1, 13, 3, 3)
+    np.testing.assert_allclose(batch.rotation[0], np.broadcast_to(kit.DOWN, (13, 3, 3)), atol=1e-12)
 
 
 def test_phases_and_parts_of_a_batch_stay_together(kit, two):

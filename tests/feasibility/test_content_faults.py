@@ -112,7 +112,7 @@ def test_31_collision_only_between_two_actions(build, kit, checker):
     assert "post" in verdict.detail
 
 
-def test_32_jerk_at_the_seam(build, kit, ctx, good, checker):
+def test_32_jerk_at_the_boundary(build, kit, ctx, good, checker):
     """The chunk itself is smooth; the motion before it was another one."""
     moving = ctx.q_cmd_history.copy()
     moving[0, 3] += 0.008

@@ -8,9 +8,9 @@ import pytest
 from genpolicy.errors import ContractError, NonFiniteError
 
 
-def test_a_context_with_nan_or_without_rows_is_refused(checker, kit):
+def test_a_context_with_nan_or_a_negative_first_row_is_refused(checker, kit):
     ctx = kit.context(checker, kit.START)
     with pytest.raises(NonFiniteError, match="state of the robot is unknown"):
         replace(ctx, q_cmd=np.full(7, np.nan))
-    with pytest.raises(ContractError, match="no row of it"):
-        replace(ctx, first_index=4, end_index=4)
+    with pytest.raises(ContractError, match="first_index is -1"):
+        replace(ctx, first_index=-1)

@@ -18,7 +18,7 @@ def test_jitter_is_smoothed_into_the_joint_limits(checker, kit):
     q, reached = checker.ik_chunk(raw, ctx.q_cmd)
     assert reached.all()
     whole = np.concatenate([ctx.q_cmd_history, ctx.q_cmd[None], q])
-    assert rate_excess(whole, seam=3, limits=PANDA.scaled(0.5), period_s=0.05) > 1
+    assert rate_excess(whole, fixed_points=3, limits=PANDA.scaled(0.5), period_s=0.05) > 1
 
 
 def test_smoothing_keeps_the_fixed_beginning_and_the_order_of_the_ladder():

@@ -11,7 +11,7 @@ import pytest
 from editing import cells
 
 from gates.engine import judge as judge_spec
-from gates.engine import standing
+from gates.engine import promoted_below
 from gates.evidence import Evidence
 from gates.proof import SPECS, judge
 from gates.report import report_bytes, report_path
@@ -375,7 +375,7 @@ def test_each_removed_limit_is_not_pass(gate, _ladder):
     spec = SPECS[gate]
     settings = read_settings(params, f"gate_{gate.lower()}", spec.settings)
     limits = read_limits(params, gate, spec.criteria)
-    found, _ = standing(_ladder, spec.below, settings.candidates) if spec.below else ((), ())
+    found, _ = promoted_below(_ladder, spec.below, settings.candidates) if spec.below else ((), ())
     evidence_of = Evidence(_ladder)
     for name in limits.of:
         left = Limits({key: value for key, value in limits.of.items() if key != name})

@@ -5,7 +5,8 @@ import pytest
 
 from gates.evidence import Evidence, MissingEvidenceError
 from genpolicy.errors import IntegrityError
-from genpolicy.evidence.rows import CandidateRow, NfeRow
+from genpolicy.evidence.rows.reproducibility import NfeRow
+from genpolicy.evidence.rows.shadow import CandidateRow
 
 NFE = "artifacts/reload/nfe.parquet"
 

@@ -7,7 +7,6 @@ from genpolicy.robot.impedance import (
     DAMPING_N_S_M,
     STIFFNESS_N_M,
     ImpedanceController,
-    effective_inertia,
 )
 from genpolicy.seeds import stream
 from genpolicy.tasks.api import WorldSettings
@@ -48,6 +47,16 @@ def test_a_constant_push_moves_the_tcp_like_a_spring(world):
     displacement = world.tcp_pose[0] - begin
     assert displacement[1] == pytest.approx(25.0 / STIFFNESS_N_M, rel=0.05)
     assert np.abs(displacement[[0, 2]]).max() < 0.002
+
+
+def effective_inertia(model, data, *, site, joints):
+    """Inertia that the TCP opposes to a force: (J M^-1 J^T)^-1, kg and kg m2. Shape (6, 6)."""
+    jacobian = np.zeros((6, model.nv))
+    mujoco.mj_jacSite(model, data, jacobian[:3], jacobian[3:], int(model.site(site).id))
+    full = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, full)
+    arm = slice(0, joints)
+    return np.linalg.inv(jacobian[:, arm] @ np.linalg.solve(full[arm, arm], jacobian[:, arm].T))
 
 
 def test_damping_ratio_is_about_one(world):

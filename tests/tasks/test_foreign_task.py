@@ -15,16 +15,19 @@ from genpolicy.evidence.need.audit_task import audit_task, round_obstacles
 from genpolicy.evidence.need.pictures import scene_png
 from genpolicy.evidence.shadow.corruption import CORRUPTIONS
 from genpolicy.evidence.shadow.mutants import run_mutants
-from genpolicy.evidence.shadow.shadow import Shadow, _admit, _case, held_out_observations
+from genpolicy.evidence.shadow.observations import held_out_observations
+from genpolicy.evidence.shadow.session import Cell
+from genpolicy.evidence.shadow.shadow import Shadow, admit, case_of
 from genpolicy.evidence.stress.latency import (
     DECLARED_TERMS,
     MEASURED_TERMS,
     DeclaredTerm,
     LatencyModel,
 )
-from genpolicy.evidence.stress.matched import _step
-from genpolicy.evidence.stress.perturbations import PerturbationSettings
-from genpolicy.evidence.stress.rollout import Fixture, Outcome, Rollout
+from genpolicy.evidence.stress.matched import step
+from genpolicy.evidence.stress.perturbations import Nominal
+from genpolicy.evidence.stress.rollout import Rollout
+from genpolicy.evidence.stress.state import Fixture, Outcome
 from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.execution.journal import write_journal
 from genpolicy.feasibility.admission import Admitted, Rejected
@@ -64,23 +67,15 @@ def cell(foreign_task, kit, tmp_path_factory):
     ingest_recordings(
         [root / "episodes" / name for name in names], contract=contract, out=root / "dataset"
     )
-    feasibility = FeasibilitySettings(
-        **kit.PARAMS["feasibility"]
-        | {
-            "robot": limits.robot,
-            "contact_phases": task.contact_phases,
-            "opening_phases": task.opening_phases,
-        }
-    )
+    feasibility = FeasibilitySettings(**kit.PARAMS["feasibility"])
     execution = ExecutionSettings(
         **kit.PARAMS["execution"]
         | {
-            "maximum_age_s": dict.fromkeys(task.phases, 0.45),
             "force_limit_n": dict.fromkeys(task.phases, 40.0),
-            "recovery_plans": {phase: ["retreat"] for phase in task.phases},
+            "recovery_plans": {"default": ["retreat"]},
         }
     )
-    checker = make_checker(task, feasibility)
+    checker = make_checker(task, feasibility, action_period_s=kit.HORIZONS.action_period_s)
     return SimpleNamespace(
         task=task, root=root, names=names, data=load_dataset(root / "dataset"), checker=checker,
         feasibility=feasibility, execution=execution, horizons=kit.HORIZONS,
@@ -90,8 +85,8 @@ def cell(foreign_task, kit, tmp_path_factory):
 @pytest.fixture(scope="module")
 def shadow(cell):
     return Shadow(
-        task=cell.task, checker=cell.checker, horizons=cell.horizons, execution=cell.execution,
-        late_steps=1, candidates=2,
+        task=cell.task, checker=cell.checker, cell=Cell(cell.horizons, cell.execution),
+        late_steps=1, samples=2,
     )  # fmt: skip
 
 
@@ -102,9 +97,10 @@ def good(shadow, cell):
         cell.data, horizons=cell.horizons, count=45, generator=stream(1, "foreign")
     )
     cases = [
-        (it.phase, _case(shadow, None, it, n, 0, it.demonstrated)) for n, it in enumerate(items)
+        (item.phase, case_of(shadow, item, item.demonstrated, number=number))
+        for number, item in enumerate(items)
     ]
-    found = [(phase, case) for phase, case in cases if isinstance(_admit(shadow, case), Admitted)]
+    found = [(phase, case) for phase, case in cases if isinstance(admit(shadow, case), Admitted)]
     assert {phase for phase, _ in found} == set(cell.task.phases)
     assert len(found) >= 0.8 * len(cases)
     return found
@@ -127,7 +123,7 @@ def test_a_robot_without_a_gripper_has_a_constant_zero_there(cell):
 def test_the_robot_is_read_from_the_scene(cell):
     assert cell.checker.kinematics.joint_count == 6
     assert cell.checker.collision.shapes.target_body == "pad"
-    assert cell.checker.limits is cell.task.limits
+    assert cell.checker.cell.limits is cell.task.limits
     held, scene = cell.checker.collision.shapes.held_reach_m, cell.checker.collision.shapes.scene
     assert held == 0.0
     assert {shape.body for shape in scene} == {"world", "pillar", "pad"}
@@ -137,11 +133,10 @@ def test_the_audit_reads_the_tasks_own_channels(cell, kit):
     result = audit_task(
         cell.root / "dataset", task_name=cell.task.name,
         settings=AuditSettings(neighbours=4, minimum_neighbours=4, query_stride=8),
-        feasibility=cell.feasibility, maximum_age_s=cell.execution.maximum_age_s,
-        action_period_s=cell.horizons.action_period_s, root_seed=SEED,
+        feasibility=cell.feasibility, action_period_s=cell.horizons.action_period_s, root_seed=SEED,
     )  # fmt: skip
     assert result is not None
-    (pillar,) = round_obstacles(cell.task, cell.feasibility)
+    (pillar,) = round_obstacles(cell.task)
     assert pillar == pytest.approx({"x_m": 0.44, "y_m": 0.0, "radius_m": 0.02})
 
 
@@ -152,21 +147,12 @@ def test_its_picture_is_its_own_and_the_same_every_time(cell):
     assert first != scene_png("tabletop_insertion")
 
 
-def corruptions():
-    """Every corruption; the one that needs an obstacle does not ask the task for it yet."""
-    marks = pytest.mark.xfail(reason="names the default task's obstacle", strict=False)
-    return [
-        pytest.param(item, id=item.name, marks=[marks] if item.name == "collision" else [])
-        for item in CORRUPTIONS
-    ]
-
-
-@pytest.mark.parametrize("corruption", corruptions())
+@pytest.mark.parametrize("corruption", CORRUPTIONS, ids=lambda item: item.name)
 def test_every_corruption_is_refused_by_the_layer_that_owns_it(corruption, good, shadow):
     cases = [corruption.apply(case, shadow.checker) for _, case in good]
     cases = [case for case in cases if case is not None]
     assert cases, "the corruption could be applied nowhere"
-    results = [_admit(shadow, case) for case in cases]
+    results = [admit(shadow, case) for case in cases]
     assert all(isinstance(result, Rejected) for result in results)
     assert corruption.layer in {result.verdict.first_layer for result in results}
 
@@ -183,7 +169,7 @@ def test_ten_rollouts_of_the_scripted_operator(cell, tmp_path):
     fixture = Fixture(
         task=cell.task, checker=cell.checker, horizons=cell.horizons, execution=cell.execution,
         latency=LatencyModel(declared, terms, 0.0), perturbation="nominal",
-        schedule=PerturbationSettings(kind="nominal"), root_seed=SEED, method="scripted",
+        schedule=Nominal(), root_seed=SEED, method="scripted",
         checkpoint="w" * 64, sampler="s" * 64,
     )  # fmt: skip
     rollouts = [
@@ -195,7 +181,7 @@ def test_ten_rollouts_of_the_scripted_operator(cell, tmp_path):
         active = [rollout for rollout in rollouts if not rollout.done]
         if not active:
             break
-        _step(active, policy, SimpleNamespace(perturbation="nominal", candidates=1))
+        step(active, policy, samples=1)
     for rollout in rollouts:
         rollout.end(Outcome.TIMEOUT)
     modes = [cell.task.mode_of(np.array(r.tally.path_m), r.world.observe()) for r in rollouts]

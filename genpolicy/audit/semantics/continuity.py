@@ -11,8 +11,6 @@ from genpolicy.audit.settings import AuditSettings
 GAP_PERIODS = 1.5
 # Two times on two clocks, or rows out of order: counted, and held against this limit.
 DISORDER = "clock_disorder"
-# A period is reported as another one than declared beyond this share of it.
-RATE_FLOOR = 0.1
 # An episode shorter than this share of the usual one, whose command never changes, is none.
 STUB_SHARE = 0.1
 # Rows whose command repeats while the arm moves, worth a note from this share on.
@@ -58,14 +56,13 @@ def time_findings(data: AuditInput, settings: AuditSettings) -> list[Finding]:
         return [Finding("clock", "", "event times", DISORDER, float(back), 0.0, "rows", action)]
     median = float(np.median(spans))
     off = abs(median / data.period_s - 1.0)
-    if not RATE_FLOOR - off >= 0:
+    if not settings.rate_floor - off >= 0:
         action = (
             f"Rows come every {median:.4g} s where {data.period_s:.4g} s is declared: correct the "
             "declared rate, or resample."
         )
-        return [
-            Finding("rate", "", "all episodes", "rate_deviation", off, RATE_FLOOR, "share", action)
-        ]
+        where, question = "all episodes", "rate_deviation"
+        return [Finding("rate", "", where, question, off, settings.rate_floor, "share", action)]
     findings = []
     gaps = float(np.mean(spans > GAP_PERIODS * data.period_s))
     if not settings.gap_share_floor - gaps >= 0:

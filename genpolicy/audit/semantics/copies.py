@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 from genpolicy.audit.data import Array, AuditInput, Flags, Integers, Text
 from genpolicy.audit.semantics.motion import Motion
 from genpolicy.audit.semantics.report import Finding, listed
-from genpolicy.audit.semantics.robust import episode_sums, some
+from genpolicy.audit.semantics.robust import episode_centred, episode_sums, some
 from genpolicy.audit.settings import AuditSettings
 
 WINDOW = 8
@@ -95,7 +95,7 @@ def copy_findings(copies: Copies, data: AuditInput, settings: AuditSettings) -> 
     return findings
 
 
-def seam_findings(data: AuditInput, motion: Motion, settings: AuditSettings) -> list[Finding]:
+def splice_findings(data: AuditInput, motion: Motion, settings: AuditSettings) -> list[Finding]:
     """Episodes that jump in their middle as no motion of this data set does."""
     total = len(motion.starts) - 1
     jumps = np.zeros(total, dtype=bool)
@@ -124,8 +124,7 @@ def _signal(data: AuditInput, motion: Motion) -> Array | None:
     """Scaled columns that move inside episodes, action and observation. Shape (N, D)."""
     columns = np.concatenate([data.action, data.observation], axis=1)
     length = np.maximum(np.diff(motion.starts), 1)[:, None]
-    means = episode_sums(columns, motion.starts) / length
-    inside = columns - np.repeat(means, np.diff(motion.starts), axis=0)
+    inside = episode_centred(columns, motion.starts)
     power = np.sqrt(np.median(episode_sums(inside**2, motion.starts) / length, axis=0))
     total = np.std(columns, axis=0)
     moving = np.flatnonzero(power > 0.05 * np.where(total > 0, total, np.inf))

@@ -260,7 +260,7 @@ def _displacements(
         rows.append(inner)
         numbers.append(np.full(len(inner), number))
     at, group = np.concatenate(rows), np.concatenate(numbers)
-    # No displacement reaches over a seam.
+    # No displacement reaches over a splice.
     piece = np.repeat(np.arange(len(motion.pieces) - 1), np.diff(motion.pieces))
     if len(at):
         whole = piece[at - maximum_steps - 1] == piece[at + reach + 1]

@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 
 from genpolicy.audit.data import Array, Integers
-from genpolicy.audit.semantics.robust import episode_sums
+from genpolicy.audit.semantics.robust import episode_centred, episode_sums
 
 BLOCK_ROWS = 50_000
 LEAST_ROWS = 12
@@ -47,7 +47,7 @@ def segment_lags(leading: Array, trailing: Array, starts: Integers, maximum_step
     steps, error = np.full(count, np.nan), np.full(count, np.nan)
     if leading.shape[1] == 0 or count == 0:
         return Lags(steps, error)
-    leading, trailing = _centred(leading, starts), _centred(trailing, starts)
+    leading, trailing = episode_centred(leading, starts), episode_centred(trailing, starts)
     shifts = np.arange(-maximum_steps, maximum_steps + 1)
     gaps = np.concatenate(
         [
@@ -73,13 +73,6 @@ def segment_lags(leading: Array, trailing: Array, starts: Integers, maximum_step
     steps[usable] = (best + offset)[usable]
     error[usable] = spread[usable]
     return Lags(steps, error)
-
-
-def _centred(values: Array, starts: Integers) -> Array:
-    """Values without the mean of their segment."""
-    length = np.diff(starts)
-    means = episode_sums(values, starts) / np.maximum(length, 1)[:, None]
-    return np.asarray(values - np.repeat(means, length, axis=0))
 
 
 def _blocks(starts: Integers) -> list[tuple[int, int]]:
@@ -152,7 +145,7 @@ def _around(
 def episode_lags(
     leading: Array, trailing: Array, starts: Integers, pieces: Integers, maximum_steps: int
 ) -> Lags:
-    """Lag of each episode, from its longest piece without a seam. Shapes (E,)."""
+    """Lag of each episode, from its longest piece without a splice. Shapes (E,)."""
     found = segment_lags(leading, trailing, pieces, maximum_steps)
     if len(pieces) == len(starts):
         return found

@@ -64,7 +64,7 @@ def measure(data: AuditInput, settings: AuditSettings) -> Semantics:
         *continuity.negative_findings(negative),
         *continuity.time_findings(data, settings),
         *stubs,
-        *copies.seam_findings(data, motion, settings),
+        *copies.splice_findings(data, motion, settings),
         *copies.copy_findings(copies.find_copies(data, motion), data, settings),
         *calibration.release_findings(data, releases, settings),
     ]

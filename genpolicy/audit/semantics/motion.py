@@ -11,9 +11,9 @@ TURNS = (2.0 * np.pi, 360.0)  # rad, degrees
 # A wrapped angle spans its turn, within this share, and steps either little or nearly by a turn.
 TURN_TOLERANCE = 0.1
 SMALL_STEP = 0.35
-# A seam is a step this many times as large as the fast steps of all motion, and as its neighbours:
-# a fast motion is fast in its neighbours too.
-SEAM_STEP = 5.0
+# A splice is a step this many times as large as the fast steps of all motion, and as its
+# neighbours: a fast motion is fast in its neighbours too.
+SPLICE_STEP = 5.0
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class Motion:
         observed: Shape (N, P), angles unwrapped.
         names: Name of each component.
         starts: First row of each episode, and the number of rows. Shape (E + 1,).
-        pieces: The same, with the seams at which command and response jump together. A jump
+        pieces: The same, with the splices at which command and response jump together. A jump
             looks like a response without lag.
         epoch: Calibration epoch of each episode. Shape (E,).
         wraps: Jumps by a whole turn that were taken out.
@@ -92,9 +92,9 @@ def _unwrapped(values: Array, inside: Flags, episode: Integers) -> tuple[Array, 
 
 
 def _pieces(commanded: Array, observed: Array, episode: Integers, starts: Integers) -> Integers:
-    """First rows of the pieces without a seam, and the number of rows."""
+    """First rows of the pieces without a splice, and the number of rows."""
     inside = episode[1:] == episode[:-1]
-    seam = np.full(len(inside), commanded.shape[1] > 0)
+    splice = np.full(len(inside), commanded.shape[1] > 0)
     for values in (commanded, observed):
         scale = np.std(values, axis=0)
         scaled = values / np.where(scale > 0, scale, np.inf)
@@ -102,8 +102,8 @@ def _pieces(commanded: Array, observed: Array, episode: Integers, starts: Intege
         moving = steps[inside & (steps > 0)]
         usual = float(np.quantile(moving, 0.95)) if len(moving) else np.inf
         beside = np.maximum(np.append(0.0, steps[:-1]), np.append(steps[1:], 0.0))
-        seam &= (steps > SEAM_STEP * usual) & (steps > SEAM_STEP * beside)
-    return np.union1d(starts, np.flatnonzero(seam) + 1).astype(np.int64)
+        splice &= (steps > SPLICE_STEP * usual) & (steps > SPLICE_STEP * beside)
+    return np.union1d(starts, np.flatnonzero(splice) + 1).astype(np.int64)
 
 
 def _repeated_medians(values: Array, starts: Integers) -> Array:

@@ -100,9 +100,17 @@ def episode_sums(values: Array, starts: Integers) -> Array:
 
 def episode_deviation(values: Array, starts: Integers) -> Array:
     """Standard deviation inside each episode. Shape (E,) or (E, D)."""
+    return np.sqrt(_means(episode_centred(values, starts) ** 2, starts))
+
+
+def episode_centred(values: Array, starts: Integers) -> Array:
+    """Values without the mean of their episode. Shape of `values`."""
+    return values - np.repeat(_means(values, starts), np.diff(starts), axis=0)
+
+
+def _means(values: Array, starts: Integers) -> Array:
     count = np.maximum(np.diff(starts), 1).reshape(-1, *[1] * (values.ndim - 1))
-    centred = values - np.repeat(episode_sums(values, starts) / count, np.diff(starts), axis=0)
-    return np.asarray(np.sqrt(episode_sums(centred**2, starts) / count))
+    return np.asarray(episode_sums(values, starts) / count)
 
 
 def some(chosen: Flags, total: int, share: float) -> bool:

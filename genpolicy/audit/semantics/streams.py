@@ -10,7 +10,7 @@ import numpy as np
 from genpolicy.audit.data import Array, AuditInput, Integers
 from genpolicy.audit.semantics.lags import Lags, episode_lags
 from genpolicy.audit.semantics.motion import Motion
-from genpolicy.audit.semantics.robust import episode_sums
+from genpolicy.audit.semantics.robust import episode_centred
 from genpolicy.audit.settings import AuditSettings
 
 LARGEST_SAMPLE = 20_000
@@ -24,8 +24,8 @@ def stream_lags(
     data: AuditInput, motion: Motion, columns: Integers, settings: AuditSettings
 ) -> Lags | None:
     """Lag of a stream's columns behind the observed position, by episode; None if unknown."""
-    leading = _inside(motion.observed, motion.starts)
-    trailing = _inside(data.observation[:, columns], motion.starts)
+    leading = episode_centred(motion.observed, motion.starts)
+    trailing = episode_centred(data.observation[:, columns], motion.starts)
     if leading.shape[1] == 0 or len(columns) == 0:
         return None
     total = np.std(data.observation[:, columns], axis=0)
@@ -43,13 +43,6 @@ def stream_lags(
     return episode_lags(
         shown, trailing[:, followed], motion.starts, motion.pieces, settings.maximum_lag_steps
     )
-
-
-def _inside(values: Array, starts: Integers) -> Array:
-    """Values without the mean of their episode."""
-    length = np.diff(starts)
-    means = episode_sums(values, starts) / np.maximum(length, 1)[:, None]
-    return np.asarray(values - np.repeat(means, length, axis=0))
 
 
 def _mapped(

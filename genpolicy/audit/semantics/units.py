@@ -20,9 +20,8 @@ from genpolicy.audit.settings import AuditSettings
 
 LEAST_EPISODES = 4
 # Motion below this share of the usual one has no gain.
-STANDING = 0.1
-# A factor between episodes that may be one of units, if it is also this many spreads...
-MAGNITUDE = 5.0
+MOVING_SHARE = 0.1
+# A factor between episodes may be one of units if it is also this many spreads...
 MAGNITUDE_SPREADS = 8.0
 # ...and if the scatter of the episodes is larger by that factor too, within another one: an object
 # that stands elsewhere scatters as before.
@@ -75,16 +74,16 @@ def magnitude_findings(data: AuditInput, motion: Motion, settings: AuditSettings
     if motion.commanded.shape[1]:
         size = np.linalg.norm(episode_medians(np.abs(motion.commanded), motion.starts), axis=1)
         travel = np.linalg.norm(episode_deviation(motion.commanded, motion.starts), axis=1)
-        both = np.stack([_off(size), _off(travel)])
+        both = np.stack([_off(size, settings), _off(travel, settings)])
         # Both must say the same factor: a start elsewhere or an arm that stands is no unit.
         same = np.abs(both[0] - both[1]) <= np.log(2.0)
-        findings += _magnitude(data, "position", np.where(same, both[0], 0.0))
+        findings += _magnitude(data, "position", np.where(same, both[0], 0.0), settings)
     for name, part in data.context.items():
         # Component by component: beside a direction cosine a length hardly counts.
         medians = episode_medians(data.observation[:, part], motion.starts)
-        off = np.stack([_off(np.abs(values)) * _clear(values) for values in medians.T])
+        off = np.stack([_off(np.abs(values), settings) * _clear(values) for values in medians.T])
         worst = off[np.argmax(np.abs(off), axis=0), np.arange(off.shape[1])]
-        findings += _magnitude(data, name, worst)
+        findings += _magnitude(data, name, worst, settings)
     return findings
 
 
@@ -98,7 +97,7 @@ def _clear(values: Array) -> Array:
 def _log_gain(seen: Array, asked: Array) -> Array:
     """Logarithm of the gain; NaN where next to nothing is commanded. Shape (E,)."""
     typical = np.median(asked)
-    valid = (asked > STANDING * typical) & (seen > 0)
+    valid = (asked > MOVING_SHARE * typical) & (seen > 0)
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(valid, np.log(seen) - np.log(asked), np.nan)
 
@@ -151,7 +150,7 @@ def _episodes(
     return [_gain("position", listed(names), size, "gain_factor", settings.gain_floor)]
 
 
-def _off(size: Array) -> Array:
+def _off(size: Array, settings: AuditSettings) -> Array:
     """Logarithm of each episode's size against the usual one; 0 where it may be no unit."""
     known = np.isfinite(size)
     result = np.zeros(len(size))
@@ -162,7 +161,7 @@ def _off(size: Array) -> Array:
         return result
     gap = np.log(np.maximum(np.where(known, size, centre), 1e-12 * centre) / centre)
     beyond = np.abs(size - centre) > MAGNITUDE_SPREADS * spread
-    far = known & beyond & (np.abs(gap) > np.log(MAGNITUDE))
+    far = known & beyond & (np.abs(gap) > np.log(settings.magnitude_floor))
     scattered = densest_half(size[known & ~far])[1]
     for side in (far & (gap > 0), far & (gap < 0)):
         if np.count_nonzero(side) >= LEAST_SCATTER:
@@ -178,7 +177,7 @@ def _off(size: Array) -> Array:
     return result
 
 
-def _magnitude(data: AuditInput, name: str, off: Array) -> list[Finding]:
+def _magnitude(data: AuditInput, name: str, off: Array, settings: AuditSettings) -> list[Finding]:
     chosen: Flags = off != 0.0
     if not chosen.any():
         return []
@@ -191,7 +190,7 @@ def _magnitude(data: AuditInput, name: str, off: Array) -> list[Finding]:
             where=listed(names),
             question="magnitude_factor",
             measured=factor,
-            floor=MAGNITUDE,
+            floor=settings.magnitude_floor,
             unit="factor",
             action=f"{name} is {'larger' if np.median(off[chosen]) > 0 else 'smaller'} by a "
             f"factor of {factor:.4g}{_named(factor)} in {len(names)} episodes ({listed(names)}): "

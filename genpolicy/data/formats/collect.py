@@ -8,9 +8,9 @@ from genpolicy.data.assemble import AcceptedEpisode, Description, Refusal, write
 from genpolicy.data.contract import SplitRule
 from genpolicy.data.formats.accept import PHASE_ALL, accept, wanted_columns
 from genpolicy.data.formats.contract import ImportContract, selectors
+from genpolicy.data.formats.open_questions import open_questions
 from genpolicy.data.formats.result import Opened
 from genpolicy.data.formats.source import Column, Progress, Source, refusal_of, refuse
-from genpolicy.data.formats.standing import standing_notes
 from genpolicy.errors import BadInputError, ConfigError
 
 SOURCE_KINDS = {"zarr": "zarr_replay_buffer"}
@@ -56,7 +56,7 @@ def import_source(
         if progress is not None:
             progress(len(accepted) + len(refused), source.count)
     phases = contract.phases or sorted({str(p) for e in accepted for p in set(e.rows.phase)})
-    notes = tuple(dict.fromkeys([*contract.notes, *source.notes, *standing_notes(contract)]))
+    notes = tuple(dict.fromkeys([*contract.notes, *source.notes, *open_questions(contract)]))
     write_dataset(
         out,
         accepted=accepted,

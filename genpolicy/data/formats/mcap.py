@@ -22,9 +22,9 @@ from genpolicy.data.formats.contract import (
     contract_of,
     selectors,
 )
+from genpolicy.data.formats.open_questions import open_questions
 from genpolicy.data.formats.pairing import pair_by_name
 from genpolicy.data.formats.result import Opened
-from genpolicy.data.formats.standing import standing_notes
 from genpolicy.data.ingest import ingest_recordings
 from genpolicy.data.recording.episode import (
     ACTION_STREAM,
@@ -111,7 +111,7 @@ def import_recordings(
     Raises:
         BadInputError: The contract cannot be applied to MCAP, or too few were accepted.
     """
-    notes = tuple(dict.fromkeys([*contract.notes, *standing_notes(contract)]))
+    notes = tuple(dict.fromkeys([*contract.notes, *open_questions(contract)]))
     ingest_recordings(
         recordings(path),
         contract=ingest_contract(contract),

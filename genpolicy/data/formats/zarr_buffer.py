@@ -15,8 +15,6 @@ import zarr
 from numpy.typing import NDArray
 
 from genpolicy.data.assemble import Refusal
-from genpolicy.data.contract import SplitRule
-from genpolicy.data.formats.collect import import_source
 from genpolicy.data.formats.contract import (
     ActionSource,
     ChannelSource,
@@ -135,27 +133,6 @@ class ReplayBuffer:
 def open_source(path: Path) -> ReplayBuffer:
     """A replay buffer, described; see `ReplayBuffer`."""
     return ReplayBuffer(path)
-
-
-def ingest_zarr_replay_buffer(
-    path: Path,
-    *,
-    out: Path,
-    contract: ImportContract = PUSHT,
-    split: SplitRule | None = None,
-) -> None:
-    """Read a replay buffer, hold each episode against the contract, write the dataset folder.
-
-    Args:
-        path: The `.zarr` folder with arrays in `data` and `meta/episode_ends`.
-        out: The dataset folder; whole or not at all, an old one is replaced.
-        contract: How its arrays become observations and actions.
-        split: Shares of the splits, in the order of the buffer; 70 / 15 / 15 if absent.
-
-    Raises:
-        BadInputError: Not such a buffer, a chunk is missing, or too few episodes were accepted.
-    """
-    import_source(ReplayBuffer(path), contract, out=out, split=split or SplitRule())
 
 
 def _column(folder: Path) -> Column | None:

@@ -14,10 +14,11 @@ from genpolicy.evidence.admission_context import make_checker
 from genpolicy.evidence.need.held_out import HeldOut, held_out_situations, modes_of_policy
 from genpolicy.evidence.need.latent import as_row, latent_dependence
 from genpolicy.evidence.need.offline import offline_rows
-from genpolicy.evidence.rows import ModeRow, OfflineRow, write_rows
+from genpolicy.evidence.rows.need import ModeRow, OfflineRow
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import write_bytes
 from genpolicy.integrity.documents import canonical_json
+from genpolicy.integrity.rows import write_rows
 from genpolicy.policies.policy import NetworkPolicy
 from genpolicy.policies.settings import SamplerConfig
 from genpolicy.tasks.api import load_task

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from genpolicy.evidence.rows import EffectRow, FactorErrorRow, FactorModeRow
+from genpolicy.evidence.rows.need import EffectRow, FactorErrorRow, FactorModeRow
 
 Array = NDArray[np.float64]
 Measured = TypeVar("Measured", FactorErrorRow, FactorModeRow)

@@ -17,8 +17,9 @@ from genpolicy.evidence.admission_context import make_checker
 from genpolicy.evidence.need.effects import Compared, effect_rows
 from genpolicy.evidence.need.held_out import held_out_situations, modes_of_policy
 from genpolicy.evidence.need.offline import SPLITS
-from genpolicy.evidence.rows import EffectRow, FactorErrorRow, FactorModeRow, write_rows
+from genpolicy.evidence.rows.need import EffectRow, FactorErrorRow, FactorModeRow
 from genpolicy.feasibility.settings import FeasibilitySettings
+from genpolicy.integrity.rows import write_rows
 from genpolicy.policies.matched_training import training_windows
 from genpolicy.policies.policy import NetworkPolicy
 from genpolicy.policies.settings import SamplerConfig

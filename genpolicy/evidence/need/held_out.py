@@ -18,7 +18,7 @@ from genpolicy.evidence.need.method_modes import (
     read_situations,
     sample_modes,
 )
-from genpolicy.evidence.rows import ModeRow
+from genpolicy.evidence.rows.need import ModeRow
 from genpolicy.feasibility.admission import FeasibilityChecker
 from genpolicy.policies.policy import NetworkPolicy
 from genpolicy.tasks.api import Task

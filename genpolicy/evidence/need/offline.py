@@ -4,7 +4,7 @@ from dataclasses import asdict
 
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.data.dataset import Dataset
-from genpolicy.evidence.rows import OfflineRow
+from genpolicy.evidence.rows.need import OfflineRow
 from genpolicy.policies.matched_training import training_windows
 from genpolicy.policies.offline import masked_errors
 from genpolicy.policies.policy import NetworkPolicy, NoiseName

@@ -18,7 +18,7 @@ from genpolicy.errors import ContractError
 from genpolicy.evidence.admission_context import context_at_rest, make_checker, recorded_proposal
 from genpolicy.evidence.reproducibility.benchmark import Measurement, measure_policy
 from genpolicy.evidence.reproducibility.measure import in_fresh_process
-from genpolicy.evidence.rows import LatencyRow
+from genpolicy.evidence.rows.reproducibility import LatencyRow
 from genpolicy.evidence.stress.latency import DeclaredTerm, LatencyModel
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.policies.fixtures import fixture_observations

@@ -15,20 +15,14 @@ from genpolicy.evidence.admission_context import make_checker
 from genpolicy.evidence.need.held_out import HeldOut, held_out_situations, modes_of_policy
 from genpolicy.evidence.need.offline import offline_rows
 from genpolicy.evidence.reproducibility.measure import in_fresh_process
-from genpolicy.evidence.rows import (
-    CoverageRow,
-    ModeRow,
-    NfeRow,
-    OfflineRow,
-    SampleRow,
-    read_rows,
-    write_rows,
-)
+from genpolicy.evidence.rows.need import ModeRow, OfflineRow
+from genpolicy.evidence.rows.reproducibility import CoverageRow, NfeRow, SampleRow
 from genpolicy.feasibility.admission import FeasibilityChecker
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import write_bytes
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_bytes, sha256_file
+from genpolicy.integrity.rows import read_rows, write_rows
 from genpolicy.policies.checkpoint import CONFIG_FILE
 from genpolicy.policies.fixtures import FixtureRow, compare_fixtures, reload_fixture
 from genpolicy.policies.policy import NetworkPolicy

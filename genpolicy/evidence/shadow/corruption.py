@@ -172,7 +172,7 @@ def _top_m(body: str, position: Array, checker: FeasibilityChecker) -> float:
     return float(max(tops, default=np.inf))
 
 
-def broken_seam(case: Case, _: FeasibilityChecker) -> Case:
+def broken_boundary(case: Case, _: FeasibilityChecker) -> Case:
     """The commands before came in so fast that nothing can go on from them without a jolt.
 
     A chunk that is merely rough is no such case: projection smooths it.
@@ -234,7 +234,7 @@ CORRUPTIONS = (
     Corruption("scaled_rotation", scaled_rotation, "representation", ("rotation_not_orthonormal",)),
     Corruption("not_a_number", not_a_number, "representation"),
     Corruption("collision", collision, "geometric", ("scene_collision", "swept_collision")),
-    Corruption("broken_seam", broken_seam, "dynamic", ("joint_acceleration", "joint_jerk")),
+    Corruption("broken_seam", broken_boundary, "dynamic", ("joint_acceleration", "joint_jerk")),
     Corruption("early_release", early_release, "contact", ("gripper_opening",)),
     Corruption("awkward_posture", awkward_posture, "kinematic", ("joint_position",)),
 )

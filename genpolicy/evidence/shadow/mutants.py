@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import Any, cast
 
 from genpolicy.evidence.shadow.rig import Rig, passing_verdict
-from genpolicy.execution.checks import CHECKS, POLICY, Checks
+from genpolicy.execution.checks import CHECKS, Checks
 from genpolicy.execution.journal import write_journal
+from genpolicy.execution.moment import POLICY
 from genpolicy.verification.checker import check_journal
 from genpolicy.verification.report import Violation
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.data.dataset import Dataset
-from genpolicy.evidence.admission_context import COMMANDS_AT_THE_SEAM
+from genpolicy.evidence.admission_context import COMMANDS_AT_THE_BOUNDARY
 
 Array = NDArray[np.float64]
 
@@ -57,7 +57,7 @@ def held_out_observations(
     result = []
     for window in chosen:
         row, begin = int(rows[window]), int(first[window])
-        back = np.arange(row - COMMANDS_AT_THE_SEAM + 1, row + 1)
+        back = np.arange(row - COMMANDS_AT_THE_BOUNDARY + 1, row + 1)
         episode = data.episodes.iloc[int(cut.episode[window])]
         result.append(
             Observation(

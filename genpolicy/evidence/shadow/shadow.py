@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from genpolicy.contract.action import POSITION
 from genpolicy.contract.chunk import ChunkMetadata, Proposal
 from genpolicy.evidence.admission_context import Moment, Session, context_of
-from genpolicy.evidence.rows import CandidateRow
+from genpolicy.evidence.rows.shadow import CandidateRow
 from genpolicy.evidence.shadow.corruption import CORRUPTIONS, Case
 from genpolicy.evidence.shadow.observations import Observation
 from genpolicy.evidence.shadow.session import IN_FLIGHT_PHASE_CHANGE, Cell, Judged, play

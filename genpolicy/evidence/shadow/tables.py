@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from genpolicy.evidence.rows import CandidateRow, ShadowCountRow, ShadowStubRow, write_rows
+from genpolicy.evidence.rows.shadow import CandidateRow, ShadowCountRow, ShadowStubRow
 from genpolicy.evidence.shadow.mutants import run_mutants
 from genpolicy.evidence.shadow.session import Cell
 from genpolicy.evidence.shadow.shadow import ShadowEvidence
@@ -12,6 +12,7 @@ from genpolicy.execution.journal import write_journal
 from genpolicy.execution.ledger import Account
 from genpolicy.integrity.atomic import write_bytes
 from genpolicy.integrity.documents import canonical_json
+from genpolicy.integrity.rows import write_rows
 from genpolicy.verification.checker import ExpectedSettings, check_journal
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from genpolicy.candidates.judged import JudgedPolicy
 from genpolicy.evidence.admission_context import make_checker
-from genpolicy.evidence.rows import RolloutRow, StressStubRow
+from genpolicy.evidence.rows.stress import RolloutRow, StressStubRow
 from genpolicy.evidence.shadow.session import Cell
 from genpolicy.evidence.stress.latency import LatencyModel
 from genpolicy.evidence.stress.perturbations import Perturbation

@@ -13,7 +13,12 @@ from numpy.typing import NDArray
 
 from genpolicy.contract.chunk import Candidate, ChunkMetadata, DiscardReason, Proposal
 from genpolicy.errors import ContractError
-from genpolicy.evidence.admission_context import COMMANDS_AT_THE_SEAM, Moment, Session, context_of
+from genpolicy.evidence.admission_context import (
+    COMMANDS_AT_THE_BOUNDARY,
+    Moment,
+    Session,
+    context_of,
+)
 from genpolicy.evidence.stress.fallback import Fallback
 from genpolicy.evidence.stress.perturbations import Push, push
 from genpolicy.evidence.stress.state import Fixture, InFlight, Outcome, Tally, in_flight
@@ -74,7 +79,7 @@ class Rollout:
         self._newest_accepted_s: float | None = None
         self._last_command_s: float | None = None
         self._commanded: deque[Array] = deque(
-            [self.world.last_action] * COMMANDS_AT_THE_SEAM, maxlen=COMMANDS_AT_THE_SEAM
+            [self.world.last_action] * COMMANDS_AT_THE_BOUNDARY, maxlen=COMMANDS_AT_THE_BOUNDARY
         )
         self.history: deque[Array] = deque(maxlen=fixture.horizons.observation_horizon)
         self._push: Push | None = push(
@@ -164,7 +169,8 @@ class Rollout:
         """Recover where needed; sets `wanted` if the policy must sample."""
         now_s, self.wanted = self.now_s, None
         self._recover(now_s)
-        if not self.done and self._may_invoke(now_s):
+        idle = not self.done and self.recovery.state is RecoveryState.IDLE
+        if idle and self.executor.needs_invocation(now_s):
             self.wanted = self._begin_invocation(now_s)
 
     def act(self) -> None:
@@ -207,9 +213,6 @@ class Rollout:
             self.executor.force_event(now_s)
             self.recovery.stop(now_s, "force")
             self._end(Outcome.FORCE_STOP)
-
-    def _may_invoke(self, now_s: float) -> bool:
-        return self.recovery.state is RecoveryState.IDLE and self.executor.needs_invocation(now_s)
 
     def _begin_invocation(self, now_s: float) -> InFlight:
         horizons, number = self.fixture.horizons, self.invocations

@@ -10,13 +10,12 @@ import numpy as np
 
 from genpolicy.candidates.judged import JudgedPolicy
 from genpolicy.compute import map_shards
-from genpolicy.evidence.rows import (
+from genpolicy.evidence.rows.stress import (
     AgeRow,
     ConservationRow,
     RolloutRow,
     StressCountRow,
     StressStubRow,
-    write_rows,
 )
 from genpolicy.evidence.shadow.tables import account_rows, checker_document
 from genpolicy.evidence.stress.latency import LatencyModel
@@ -25,6 +24,7 @@ from genpolicy.evidence.stress.perturbations import Perturbation
 from genpolicy.evidence.stress.settings import StressSettings
 from genpolicy.integrity.atomic import write_bytes
 from genpolicy.integrity.documents import canonical_json
+from genpolicy.integrity.rows import write_rows
 from genpolicy.seeds import stream
 from genpolicy.statistics.eprocess import power_table
 

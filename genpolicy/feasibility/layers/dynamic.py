@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 PERIOD_TOLERANCE_S = 1e-9
 ROUNDING = 1e-6  # relative; a step that was limited to its limit must not fail by rounding
-SEAM = 2  # commands before the last one that jerk rests on
+JERK_HISTORY = 2  # commands before the last one that jerk rests on
 
 
 def margins(batch: Batch, cell: Cell) -> Margins:
@@ -31,7 +31,7 @@ def margins(batch: Batch, cell: Cell) -> Margins:
 
     Source:
         Backward differences D. They rest on given commands only: what is not known before the
-        seam is not assumed, and the margin is inf where there are too few points.
+        boundary is not assumed, and the margin is inf where there are too few points.
     """
     settings, period_s = cell.settings, cell.action_period_s
     off = np.array([abs(p.metadata.action_period_s - period_s) for p in batch.projected])
@@ -54,9 +54,9 @@ def _joint_rates(batch: Batch, cell: Cell) -> dict[str, Array]:
         "joint_acceleration": limits.acceleration_rad_s2,
         "joint_jerk": limits.jerk_rad_s3,
     }
-    seams = [c.q_cmd_history for c in batch.contexts]
-    path = np.concatenate([_history(seams, q.shape[-1]), batch.q_cmd_rad[:, None], q], axis=1)
-    known = np.array([min(len(s), SEAM) for s in seams]) + 1 + q.shape[1]
+    histories = [c.q_cmd_history for c in batch.contexts]
+    path = np.concatenate([_history(histories, q.shape[-1]), batch.q_cmd_rad[:, None], q], axis=1)
+    known = np.array([min(len(s), JERK_HISTORY) for s in histories]) + 1 + q.shape[1]
     result = {}
     for order, (name, bound) in enumerate(bounds.items(), start=1):
         path = np.diff(path, axis=1) / cell.action_period_s
@@ -70,11 +70,11 @@ def _joint_rates(batch: Batch, cell: Cell) -> dict[str, Array]:
     return result
 
 
-def _history(seams: Sequence[Array], joints: int) -> Array:
-    """The commands before `q_cmd`, padded in front; padding is never used. Shape (B, SEAM, J)."""
-    result = np.zeros((len(seams), SEAM, joints))
-    for chunk, seam in enumerate(seams):
-        last = seam[-SEAM:]
+def _history(histories: Sequence[Array], joints: int) -> Array:
+    """The commands before `q_cmd`, padded in front; padding is never used. Shape (B, 2, J)."""
+    result = np.zeros((len(histories), JERK_HISTORY, joints))
+    for chunk, history in enumerate(histories):
+        last = history[-JERK_HISTORY:]
         if len(last):
             result[chunk, -len(last) :] = last
     return result

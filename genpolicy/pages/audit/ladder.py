@@ -42,7 +42,7 @@ class Check:
 
 
 @dataclass(frozen=True)
-class Layer:
+class LayerRow:
     """One layer of the diagnosis.
 
     Attributes:
@@ -58,7 +58,7 @@ class Layer:
     state: str
 
 
-def ladder(document: Mapping[str, Any], evidence: AuditEvidence) -> list[Layer]:
+def ladder(document: Mapping[str, Any], evidence: AuditEvidence) -> list[LayerRow]:
     """The six layers in the order in which they are believed.
 
     Args:
@@ -77,7 +77,7 @@ def ladder(document: Mapping[str, Any], evidence: AuditEvidence) -> list[Layer]:
             # That no fault of the data was found is an answer; elsewhere no number is none.
             known = name == "data" or any(check.holds is not None for check in judged)
             state = HOLDS if known else OPEN
-        result.append(Layer(name, question, checks, state))
+        result.append(LayerRow(name, question, checks, state))
     return result
 
 

@@ -20,7 +20,6 @@ Array = NDArray[np.float64]
 
 KINDS = ("nominal", "pushed", "wander", "missed", "dropped")
 RECOVERY_KINDS = frozenset({"pushed", "wander"})
-FAILURE_KINDS = frozenset({"missed", "dropped"})
 SIDES = ("left", "right")
 
 HOVER_HEIGHT_M = 0.030

@@ -19,7 +19,7 @@ POST = "post"
 ARM_JOINTS = 7
 # Where the controller's null space pulls the arm to.
 POSTURE_RAD = (0.0, -0.17, 0.0, -2.60, 0.0, 2.45, 0.785398163397448)
-ROBOT_GROUP, PEG_GROUP, SCENE_GROUP = 1, 2, 3
+ROBOT_GROUP, PEG_GROUP = 1, 2
 
 POST_X_M = 0.50
 POST_RADIUS_M = 0.025

@@ -1,8 +1,11 @@
 """The layer's own error rates, by simulation: quiet on clean data, and what strength it sees."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from arms import SETTINGS, arms, last_epoch, late, parts, rebuilt, some
+from planar import planar
 
 from genpolicy.audit.semantics import measure
 from genpolicy.seeds import stream
@@ -72,3 +75,16 @@ def test_detection_rises_with_the_strength(name):
             for k in range(8)
         ]
         assert abs(np.mean(seen) - expected) <= 0.13, strength
+
+
+def test_another_rate_and_another_magnitude_are_reported_from_their_floors_on():
+    data = planar(episodes=40)[0]
+    slow = replace(data, event_time_s=data.event_time_s * 1.3)
+    tall = data.observation.copy()
+    tall[:, data.context["goal"]] *= np.where(data.episode < 3, 1000.0, 1.0)[:, None]
+    tall = replace(data, observation=tall)
+    raised = SETTINGS.model_copy(update={"rate_floor": 0.4, "magnitude_floor": 2000.0})
+    for spoilt, question in ((slow, "rate_deviation"), (tall, "magnitude_factor")):
+        found = {f.question: f for f in measure(spoilt, SETTINGS).findings}
+        assert found[question].floor == SETTINGS.floors[question] < found[question].measured
+        assert question not in {f.question for f in measure(spoilt, raised).findings}

@@ -8,11 +8,17 @@ import numpy as np
 import pytest
 import zarr
 
+from genpolicy.data.contract import SplitRule
 from genpolicy.data.dataset import load_dataset
-from genpolicy.data.formats.zarr_buffer import PUSHT, ingest_zarr_replay_buffer
+from genpolicy.data.formats.collect import import_source
+from genpolicy.data.formats.zarr_buffer import PUSHT, open_source
 from genpolicy.errors import BadInputError, ContractError
 
 REAL = Path(__file__).parents[4] / "shared/data/pusht_v7/pusht_cchi_v7_replay.zarr"
+
+
+def ingest(path, *, out):
+    import_source(open_source(path), PUSHT, out=out, split=SplitRule())
 
 
 @pytest.fixture
@@ -34,7 +40,7 @@ def buffer(tmp_path):
 
 
 def test_small_buffer(buffer, tmp_path):
-    ingest_zarr_replay_buffer(buffer, out=tmp_path / "out")
+    ingest(buffer, out=tmp_path / "out")
     dataset = load_dataset(tmp_path / "out")
     assert dataset.frames.action.shape == (60, 2)
     assert dataset.frames.observation.shape == (60, PUSHT.observation.dim)
@@ -51,7 +57,7 @@ def test_small_buffer(buffer, tmp_path):
 def test_missing_chunk_is_not_read_as_zeros(buffer, tmp_path):
     (buffer / "data" / "state" / "1.0").unlink()
     with pytest.raises(ContractError, match="expected all 4"):
-        ingest_zarr_replay_buffer(buffer, out=tmp_path / "out")
+        ingest(buffer, out=tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 
@@ -77,26 +83,26 @@ def edit(buffer, **changes):
 def test_descriptions_that_are_refused_before_decoding(buffer, tmp_path, changes):
     edit(buffer, **changes)
     with pytest.raises(BadInputError, match="state"):
-        ingest_zarr_replay_buffer(buffer, out=tmp_path / "out")
+        ingest(buffer, out=tmp_path / "out")
 
 
 @pytest.mark.parametrize("name", ["compressor", "filters"])
 def test_a_codec_that_runs_code_is_named_before_it_is_asked_for(buffer, tmp_path, name):
     edit(buffer, **{name: {"id": "pickle"} if name == "compressor" else [{"id": "pickle"}]})
     with pytest.raises(ContractError, match="expected plain numbers"):
-        ingest_zarr_replay_buffer(buffer, out=tmp_path / "out")
+        ingest(buffer, out=tmp_path / "out")
 
 
 def test_changed_chunk_and_missing_array(buffer, tmp_path):
     chunk = buffer / "data" / "state" / "0.0"
     chunk.write_bytes(chunk.read_bytes()[:20])
     with pytest.raises(BadInputError, match="state"):
-        ingest_zarr_replay_buffer(buffer, out=tmp_path / "out")
+        ingest(buffer, out=tmp_path / "out")
     shutil.rmtree(buffer / "data" / "action")
     with pytest.raises(BadInputError):
-        ingest_zarr_replay_buffer(buffer, out=tmp_path / "out")
+        ingest(buffer, out=tmp_path / "out")
     with pytest.raises(BadInputError, match="missing"):
-        ingest_zarr_replay_buffer(tmp_path / "nowhere.zarr", out=tmp_path / "out")
+        ingest(tmp_path / "nowhere.zarr", out=tmp_path / "out")
 
 
 def rewrite(buffer, name, values):
@@ -109,13 +115,13 @@ def test_bad_episodes_are_refused_by_name(buffer, tmp_path):
     state[40, 0] = 90000.0
     rewrite(buffer, "data/state", state)
     with pytest.raises(ContractError, match="2 accepted episodes"):
-        ingest_zarr_replay_buffer(buffer, out=tmp_path / "out")
+        ingest(buffer, out=tmp_path / "out")
     rewrite(buffer, "meta/episode_ends", np.array([5, 10, 22, 60]))
     with pytest.raises(ContractError, match="2 accepted"):
-        ingest_zarr_replay_buffer(buffer, out=tmp_path / "out")
+        ingest(buffer, out=tmp_path / "out")
     state[40, 0] = 100.0
     rewrite(buffer, "data/state", state)
-    ingest_zarr_replay_buffer(buffer, out=tmp_path / "out")
+    ingest(buffer, out=tmp_path / "out")
     listed = json.loads((tmp_path / "out" / "refusals.json").read_text())
     assert [item["file"] for item in listed["refused"]] == ["small.zarr#episode_000002"]
     assert "row 2, column state[2] is nan" in listed["refused"][0]["reason"]
@@ -125,13 +131,13 @@ def test_bad_episodes_are_refused_by_name(buffer, tmp_path):
 def test_episode_ends(buffer, tmp_path, ends):
     rewrite(buffer, "meta/episode_ends", np.array(ends))
     with pytest.raises(ContractError, match="episode_ends"):
-        ingest_zarr_replay_buffer(buffer, out=tmp_path / "out")
+        ingest(buffer, out=tmp_path / "out")
 
 
 @pytest.mark.skipif(not REAL.is_dir(), reason="PushT recordings are not on this machine")
 def test_pusht(tmp_path):
     """Golden: 206 episodes and 25,650 rows at 10 Hz (data/README of the recordings)."""
-    ingest_zarr_replay_buffer(REAL, out=tmp_path / "out")
+    ingest(REAL, out=tmp_path / "out")
     dataset = load_dataset(tmp_path / "out")
     assert len(dataset.episodes) == 206
     assert len(dataset.frames) == 25_650

@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from genpolicy.evidence.need.effects import Compared, effect_rows, half_width, valid
-from genpolicy.evidence.rows import FactorErrorRow, FactorModeRow
+from genpolicy.evidence.rows.need import FactorErrorRow, FactorModeRow
 
 
 def error(variant, episode, value):

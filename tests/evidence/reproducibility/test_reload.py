@@ -5,9 +5,10 @@ import pytest
 from genpolicy.candidates.judged import trained
 from genpolicy.errors import ContractError
 from genpolicy.evidence.reproducibility.reload import ReloadPlan, coverage_row, write_reload
-from genpolicy.evidence.rows import CoverageRow, ModeRow, NfeRow, OfflineRow, SampleRow, read_rows
+from genpolicy.evidence.rows.need import ModeRow, OfflineRow
+from genpolicy.evidence.rows.reproducibility import CoverageRow, NfeRow, SampleRow
 from genpolicy.integrity.documents import read_json
-from genpolicy.integrity.rows import write_rows
+from genpolicy.integrity.rows import read_rows, write_rows
 from genpolicy.policies.fixtures import FixtureRow, fixture_observations, fixture_rows
 
 

@@ -81,7 +81,7 @@ def test_without_a_history_higher_rates_are_not_assumed(checker, cell, kit):
 
 
 def test_a_missing_history_is_not_invented(checker, kit):
-    """Without earlier commands the seam's acceleration is not judged; with them it is."""
+    """Without earlier commands the boundary's acceleration is not judged; with them it is."""
     good, ctx = kit.line(kit.START, kit.SIDE), kit.context(checker, kit.START)
     moved = ctx.q_cmd_history.copy()
     moved[-1, 0] -= 0.05

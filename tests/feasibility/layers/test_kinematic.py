@@ -49,6 +49,6 @@ def test_the_margins_are_distances_to_the_limits(checker, cell, kit):
     assert found["workspace"][0] == pytest.approx(room, abs=1e-8)
     room = min(np.min(q - arm.lower_rad), np.min(arm.upper_rad - q))
     assert found["joint_position"][0] == pytest.approx(room - 0.1)
-    worst = max(np.linalg.cond(arm.reference_jacobian(row)) for row in q)
+    worst = max(np.linalg.cond(jacobian) for jacobian in arm.jacobian(q))
     assert found["singular"][0] == pytest.approx(30 - worst, rel=1e-6)
     assert 0 <= found["unreachable"][0] <= 1e-6

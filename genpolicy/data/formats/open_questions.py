@@ -5,7 +5,7 @@ from genpolicy.data.formats.contract import UNKNOWN_UNIT, ImportContract
 ASKED = ("phase", "object", "operator", "calibration_epoch", "outcome", "is_recovery")
 
 
-def standing_notes(contract: ImportContract) -> list[str]:
+def open_questions(contract: ImportContract) -> list[str]:
     """A sentence for each guess and each question that the recordings do not answer."""
     notes: list[str] = []
     guessed = [

@@ -1,0 +1,95 @@
+"""Rows of reload and latency: samples, evaluations, coverage and times."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class SampleRow:
+    """`samples.parquet` of reload: one fixture, sampled at training and after reload.
+
+    Attributes:
+        method: The candidate.
+        seed: Number of its training seed.
+        row: Which fixture.
+        sha256_trained: Of the samples drawn at training.
+        sha256_reloaded: Of those drawn by a fresh process from the files.
+        max_abs_difference: Largest difference of an action component, in its own unit.
+    """
+
+    method: str
+    seed: int
+    row: int
+    sha256_trained: str
+    sha256_reloaded: str
+    max_abs_difference: float
+
+
+@dataclass(frozen=True)
+class NfeRow:
+    """`nfe.parquet` of reload: network evaluations of one invocation.
+
+    Attributes:
+        method: The candidate.
+        seed: Number of its training seed.
+        recorded: As written at training.
+        counted: As counted at the network after reload.
+    """
+
+    method: str
+    seed: int
+    recorded: int
+    counted: int
+
+
+@dataclass(frozen=True)
+class CoverageRow:
+    """`coverage.parquet` of reload: modes against sampler steps.
+
+    Attributes:
+        method: The candidate.
+        seed: Number of its training seed.
+        steps: Sampler steps.
+        nfe: Network evaluations of one invocation, counted.
+        situations: Held-out situations.
+        modes_covered_share: Share of them of which every mode is reached.
+        coverage_lower: Lower end of its interval (Clopper-Pearson).
+        spread_m: Mean over situations of the samples' spread, m.
+        admissible_share: Share of the samples that pass the six layers.
+        between_share: Share of the samples in the middle between two modes.
+    """
+
+    method: str
+    seed: int
+    steps: int
+    nfe: int
+    situations: int
+    modes_covered_share: float
+    coverage_lower: float
+    spread_m: float
+    admissible_share: float
+    between_share: float
+
+
+@dataclass(frozen=True)
+class LatencyRow:
+    """`latency.parquet`: one term of one invocation.
+
+    Attributes:
+        method: The method.
+        run: Which fresh process, from 1; a declared term belongs to the first.
+        component: Term of the latency (`genpolicy.contract.latency.Term`).
+        owner: Who answers for the term.
+        temperature: `cold` or `warm`.
+        repeat: Which invocation of its temperature.
+        seconds: Duration, s.
+        source: `measured` on this machine, or `declared`.
+    """
+
+    method: str
+    run: int
+    component: str
+    owner: str
+    temperature: str
+    repeat: int
+    seconds: float
+    source: str

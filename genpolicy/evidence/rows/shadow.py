@@ -1,0 +1,98 @@
+"""Rows of shadow: candidates, the stub and the balance of actions."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class CandidateRow:
+    """`candidates.parquet` of shadow: one candidate at one observation, intact or corrupted.
+
+    Attributes:
+        method: The method.
+        seed: Number of its training seed.
+        fixture: `held_out`, or the corruption.
+        situation: Episode and row.
+        phase: Task phase.
+        observation: Number of the observation.
+        candidate: Number of the candidate.
+        mode: Mode of the path, as the task names it.
+        representation: Whether the layer passed; None where it was not reached.
+        kinematic: Likewise.
+        geometric: Likewise.
+        dynamic: Likewise.
+        contact: Likewise.
+        fresh: Likewise.
+        first_reason: Why the first failing layer failed; empty where all passed.
+        layer_margin: Margin of that layer, else the smallest one, in the layer's own unit.
+        position_change_m: Largest move of a position by projection, m.
+        rotation_change_rad: Largest turn by projection, rad.
+        boundary_jerk_m_s3: Jerk at the boundary to the previous command, m/s^3.
+        raw: Actions as sampled, row by row.
+        projected: Actions as projected, row by row.
+    """
+
+    method: str
+    seed: int
+    fixture: str
+    situation: str
+    phase: str
+    observation: int
+    candidate: int
+    mode: str
+    representation: bool | None
+    kinematic: bool | None
+    geometric: bool | None
+    dynamic: bool | None
+    contact: bool | None
+    fresh: bool | None
+    first_reason: str
+    layer_margin: float | None
+    position_change_m: float | None
+    rotation_change_rad: float | None
+    boundary_jerk_m_s3: float | None
+    raw: tuple[float, ...]
+    projected: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class ShadowStubRow:
+    """`stub.parquet` of shadow: what reached the controller stub.
+
+    Attributes:
+        method: The method.
+        fixture: `held_out`, or the corruption.
+        delivered: Chunks handed to the executor.
+        arrivals: Actions that reached the stub.
+        stale: Of these, older than allowed.
+        invalid: Of these, not of a chunk that passed.
+    """
+
+    method: str
+    fixture: str
+    delivered: int
+    arrivals: int
+    stale: int
+    invalid: int
+
+
+@dataclass(frozen=True)
+class ShadowCountRow:
+    """`counts.parquet` of shadow: balance of actions, one row a reason of discard.
+
+    Attributes:
+        method: The method.
+        fixture: `held_out`, or the corruption.
+        generated: Actions generated.
+        executed: Actions executed.
+        queued: Actions left in a queue.
+        reason: Why actions were discarded; empty where none was.
+        count: How many.
+    """
+
+    method: str
+    fixture: str
+    generated: int
+    executed: int
+    queued: int
+    reason: str
+    count: int

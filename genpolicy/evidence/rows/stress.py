@@ -1,0 +1,140 @@
+"""Rows of stress: rollouts, the stub, ages and the balance of actions."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class RolloutRow:
+    """`rollouts.parquet` of stress: one rollout.
+
+    Attributes:
+        method: The method.
+        seed: Number of its training seed.
+        perturbation: What was injected.
+        start: Number of the initial state.
+        start_sha256: Hash of the state after reset.
+        outcome: How it ended.
+        success: Whether it succeeded.
+        duration_s: Virtual time, s.
+        ticks: Ticks of it.
+        action_ticks: Ticks with an action of the policy.
+        hold_ticks: Ticks that held.
+        fallback_ticks: Ticks with an action of the fallback.
+        invocations: Invocations begun.
+        deadline_misses: Of these, not answered by their deadline.
+        discards: Actions discarded.
+        rejections: Invocations of which no candidate passed.
+        rejected_by: Most common reason; empty where none was rejected.
+        recovery_attempted: Whether a recovery began.
+        recovered: Whether it succeeded after one.
+        interventions: Calls for a person.
+        action_age_p50_s: Median age of the accepted actions, s; None without any.
+        action_age_p95_s: 95 % quantile, s.
+        action_age_max_s: Oldest, s.
+        latency_p95_s: 95 % quantile of the drawn latencies, s.
+        force_peak_n: Largest contact force, N.
+        mode: Mode of the path, as the task names it.
+    """
+
+    method: str
+    seed: int
+    perturbation: str
+    start: int
+    start_sha256: str
+    outcome: str
+    success: bool
+    duration_s: float
+    ticks: int
+    action_ticks: int
+    hold_ticks: int
+    fallback_ticks: int
+    invocations: int
+    deadline_misses: int
+    discards: int
+    rejections: int
+    rejected_by: str
+    recovery_attempted: bool
+    recovered: bool
+    interventions: int
+    action_age_p50_s: float | None
+    action_age_p95_s: float | None
+    action_age_max_s: float | None
+    latency_p95_s: float | None
+    force_peak_n: float
+    mode: str
+
+
+@dataclass(frozen=True)
+class StressCountRow:
+    """`counts.parquet` of stress: actions discarded, by reason.
+
+    Attributes:
+        method: The method.
+        perturbation: What was injected.
+        reason: Why; empty where none was discarded.
+        count: How many.
+    """
+
+    method: str
+    perturbation: str
+    reason: str
+    count: int
+
+
+@dataclass(frozen=True)
+class ConservationRow:
+    """`conservation.parquet` of stress: balance of actions.
+
+    Attributes:
+        method: The method.
+        perturbation: What was injected.
+        generated: Actions generated.
+        executed: Actions executed.
+        queued: Actions left in a queue.
+        discarded: Actions discarded.
+    """
+
+    method: str
+    perturbation: str
+    generated: int
+    executed: int
+    queued: int
+    discarded: int
+
+
+@dataclass(frozen=True)
+class StressStubRow:
+    """`stub.parquet` of stress: what reached the controller stub.
+
+    Attributes:
+        method: The method.
+        perturbation: What was injected.
+        arrivals: Actions that reached the stub.
+        stale: Of these, older than allowed.
+        invalid: Of these, not of a chunk that passed.
+    """
+
+    method: str
+    perturbation: str
+    arrivals: int
+    stale: int
+    invalid: int
+
+
+@dataclass(frozen=True)
+class AgeRow:
+    """`ages.parquet` of stress: quantiles of the action age over all rollouts of a shard.
+
+    Attributes:
+        method: The method.
+        perturbation: What was injected.
+        level: Quantile level, 0 to 1.
+        action_age_s: The order statistic, s.
+        actions: Accepted actions.
+    """
+
+    method: str
+    perturbation: str
+    level: float
+    action_age_s: float
+    actions: int

@@ -1,0 +1,164 @@
+"""What a question of `execution/checks.py` is asked about: a chunk, at a moment, in a view.
+
+All times are whole nanoseconds; a fact that the asking place does not know is None.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from typing import NamedTuple
+
+from genpolicy.contract.chunk import ChunkMetadata, DiscardReason
+from genpolicy.execution.nanoseconds import NEVER_NS, ChunkTimes
+
+POLICY = "policy"
+FALLBACK = "fallback"
+
+
+class ExecutorMode(StrEnum):
+    """Who commands."""
+
+    RUN = "run"
+    FALLBACK = "fallback"
+    INTERVENTION = "intervention"
+    ENDED = "ended"
+
+
+MODE_OF_SOURCE = {POLICY: ExecutorMode.FALLBACK, FALLBACK: ExecutorMode.RUN}
+"""In which mode the other source commands, so that chunks of this one are refused."""
+
+
+class Voiding(NamedTuple):
+    """An event after which nothing from before it may be used.
+
+    Attributes:
+        before_ns: What was conditioned before this time is void.
+        arrivals: What arrived with a smaller number is void too; it was there at the event.
+    """
+
+    before_ns: int = NEVER_NS
+    arrivals: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """The present, as the asking place knows it.
+
+    Attributes:
+        phase: Task phase of the newest observation; empty before the first.
+        calibration_epoch: Calibration of the newest observation.
+        newest_observation_ns: Event time of the newest observation; None before the first.
+        maximum_age_ns: Largest action age in this phase; None where no age is allowed.
+        checkpoint: Active weights of the policy.
+        sampler: Active sampler settings.
+        fallback: Identity of the task's fallback planner, in place of both.
+        session_epoch: Number of resets.
+        mode: Who commands.
+        stopped: Whether the supervisor stops.
+        voidings: Per reason, the event that voided last.
+        execution_horizon: Actions of a chunk that may be executed.
+        period_ns: Time between actions.
+    """
+
+    phase: str = ""
+    calibration_epoch: str = ""
+    newest_observation_ns: int | None = None
+    maximum_age_ns: int | None = None
+    checkpoint: str = ""
+    sampler: str = ""
+    fallback: str = ""
+    session_epoch: int = 0
+    mode: str = ExecutorMode.RUN
+    stopped: bool = False
+    voidings: Mapping[DiscardReason, Voiding] = field(default_factory=dict)
+    execution_horizon: int = 0
+    period_ns: int = 0
+
+    def voided(self, reason: DiscardReason, before_ns: int, arrivals: int = 0) -> "View":
+        """The view after an event; a later event of the same reason covers an earlier one."""
+        old = self.voidings.get(reason, Voiding())
+        new = Voiding(max(before_ns, old.before_ns), max(arrivals, old.arrivals))
+        return self if new == old else replace(self, voidings={**self.voidings, reason: new})
+
+
+@dataclass(frozen=True, slots=True)
+class Chunk:
+    """What is asked about.
+
+    Attributes:
+        metadata: Who made it, for what.
+        times: Its times.
+        source: policy or fallback.
+        arrival: Its number among the arrivals.
+        rows: Its number of actions, K.
+        checked_rows: First row that feasibility checked, and the row behind the last one.
+        passed: All six layers passed and all actions are finite.
+        hashed: The actions have the hash that was taken when they passed.
+    """
+
+    metadata: ChunkMetadata
+    times: ChunkTimes
+    source: str = POLICY
+    arrival: int = 0
+    rows: int = 0
+    checked_rows: tuple[int, int] = (0, 0)
+    passed: bool = False
+    hashed: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Moment:
+    """One question: a chunk, or one row of it, at one time, in one view of the present.
+
+    Attributes:
+        now_ns: Time.
+        view: The present.
+        about: The chunk; None at the door and for the supervisor.
+        first_use_ns: When its first action can be used; age and validity are asked for then, since
+            a chunk that will be too old when it begins is too old now.
+        row: The row in question.
+        known: A chunk of this name was here before.
+        same_action: The offered action is the admitted row, bit for bit.
+        head: Chunk that the next one may name as predecessor.
+        accepted_condition_ns: Observation under the action accepted last; None before the first.
+        accepted_start_ns: Start of that action's chunk.
+        queued_condition_ns: Newest observation under a waiting chunk; None if none waits.
+        queued_start_ns: Latest start of a waiting chunk.
+        newer_start_ns: Earliest start of a chunk that arrived after this one.
+        last_due_ns: Begin of the window of the action accepted last.
+        sequence: Number of the offer.
+        last_sequence: Number of the offer accepted last.
+        last_accept_ns: When an action was accepted last; None before the first.
+        watchdog_ns: Longest silence.
+    """
+
+    now_ns: int
+    view: View = View()
+    about: Chunk | None = None
+    first_use_ns: int | None = None
+    row: int | None = None
+    known: bool | None = None
+    same_action: bool | None = None
+    head: str | None = None
+    accepted_condition_ns: int | None = None
+    accepted_start_ns: int | None = None
+    queued_condition_ns: int | None = None
+    queued_start_ns: int | None = None
+    newer_start_ns: int | None = None
+    last_due_ns: int | None = None
+    sequence: int | None = None
+    last_sequence: int = -1
+    last_accept_ns: int | None = None
+    watchdog_ns: int = 0
+
+    @property
+    def chunk(self) -> Chunk:
+        """The chunk in question."""
+        assert self.about is not None, "this place has no chunk to ask about"
+        return self.about
+
+    @property
+    def due_ns(self) -> int:
+        """Begin of the window of the row in question."""
+        assert self.row is not None, "this place has no row to ask about"
+        return self.chunk.times.due_ns(self.row)
