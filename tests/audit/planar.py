@@ -17,6 +17,7 @@ from benchmarks.audit.recorder import record
 from gates.cause import CauseLimits, cause_of, default_limits
 from genpolicy.audit.data import Episodes
 from genpolicy.audit.evidence import write_evidence
+from genpolicy.audit.run import audit
 from genpolicy.audit.settings import AuditSettings
 
 SETTINGS = AuditSettings(
@@ -45,6 +46,15 @@ def named(result, settings=SETTINGS, limits=LIMITS):
     with tempfile.TemporaryDirectory() as folder:
         write_evidence(result, Path(folder), settings=settings)
         return cause_of(Path(folder), limits)
+
+
+def audited(settings=SETTINGS, check=None, seed_of_audit=3, **planted):
+    """The audit of planted data, checked and replayed."""
+    data, replayed = planar(**planted)
+    check = check or admissible
+    return audit(
+        data, settings, admissible=check, replay=replayed.__getitem__, root_seed=seed_of_audit
+    )
 
 
 def planar(

@@ -13,3 +13,8 @@ def factory():
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
+
+
+@pytest.fixture(scope="module")
+def built(factory, tmp_path_factory):
+    return factory.build(tmp_path_factory.mktemp("good"))

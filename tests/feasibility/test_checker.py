@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 
 from genpolicy.contract.chunk import Projected
-from genpolicy.errors import ContractError, NonFiniteError
 from genpolicy.feasibility.checks import CHECKS
-from genpolicy.feasibility.settings import FeasibilitySettings
 
 
 def test_inside_passes_every_layer(checker, kit):
@@ -94,18 +92,3 @@ def test_late_rows_are_not_checked_and_all_behind_them_are(checker, kit):
     tail = good.copy()
     tail[10:, :3] = (0.45, 0.0, 0.15)
     assert not kit.judge(checker, tail, ctx).passed
-
-
-def test_settings_are_strict():
-    with pytest.raises(ValueError, match="extra"):
-        FeasibilitySettings(speed=1.0)
-    with pytest.raises(ValueError, match="finite"):
-        FeasibilitySettings(clearance_m=float("nan"))
-
-
-def test_a_context_with_nan_or_a_negative_first_row_is_refused(checker, kit):
-    ctx = kit.context(checker, kit.START)
-    with pytest.raises(NonFiniteError, match="state of the robot is unknown"):
-        replace(ctx, q_cmd=np.full(7, np.nan))
-    with pytest.raises(ContractError, match="first_index is -1"):
-        replace(ctx, first_index=-1)

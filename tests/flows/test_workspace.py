@@ -1,12 +1,12 @@
+"""None"""
+
 import os
 from pathlib import Path
 
 import pytest
 import yaml
 
-from flows import commands
 from flows.workspace import declared_outputs, make_workspace, merged
-from genpolicy.cli.shell import run_program
 from genpolicy.errors import BadInputError, ConfigError
 
 
@@ -76,15 +76,3 @@ def test_a_folder_with_other_things_is_left_alone(checkout: Path, tmp_path: Path
 def test_outputs_of_every_kind_are_found() -> None:
     stage = {"outs": ["a", {"b": {"cache": False}}], "metrics": [{"m.json": {}}], "plots": ["p"]}
     assert declared_outputs({"stages": {"s": stage}}) == ("a", "b", "m.json", "p")
-
-
-def test_the_command_names_the_bad_key_and_ends_with_2(
-    checkout: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    overrides = tmp_path / "overrides.yaml"
-    overrides.write_text("record: {valeu: 1}\n")
-    target = tmp_path / "target"
-    arguments = [str(target), "--overrides", str(overrides), "--source", str(checkout)]
-    assert run_program(commands.workspace, "workspace", arguments) == 2
-    assert "override record.valeu is not a key of params.yaml" in capsys.readouterr().err
-    assert not target.exists()

@@ -8,6 +8,7 @@ import shutil
 import evidence
 import numpy as np
 import pytest
+from editing import cells
 
 from gates.engine import judge as judge_spec
 from gates.engine import promoted_below
@@ -17,21 +18,6 @@ from gates.report import report_bytes, report_path
 from gates.settings import Limits, read_limits, read_params, read_settings
 from genpolicy.errors import IntegrityError
 from genpolicy.integrity.atomic import write_bytes
-
-
-def _cells(column, value, *, where=None, share=1.0):
-    """Set `share` of the chosen rows of a column, spread evenly so that all clusters are hit."""
-
-    def change(frame):
-        mask = np.ones(len(frame), bool) if where is None else where(frame).to_numpy()
-        chosen = np.flatnonzero(mask)
-        chosen = chosen[: max(1, int(np.ceil(share * len(chosen))))]
-        series = frame[column].astype(object)
-        series.iloc[chosen] = value
-        frame[column] = series.tolist()
-        return frame
-
-    return change
 
 
 def _of(method):
@@ -67,46 +53,50 @@ def _collapse(frame, share):
 
 
 AUDIT, SHADOW, STRESS = "audit/", "shadow/", "stress/"
+
+
 TRAINED, BASE, GEN = "train_baselines/", "measure_baselines/", "train_generators/"
+
+
 ROLL = STRESS + "rollouts.parquet"
+
+
 WORSE = {
     "A": {
         "refused_recordings_accounted": _document(
             "ingest/refusals.json", lambda s: _set("accepted", 48 - int(9 * s))
         ),
-        "clock_residual_s": _table(
-            AUDIT + "clocks.parquet", lambda s: _cells("offset_after_s", -s)
-        ),
+        "clock_residual_s": _table(AUDIT + "clocks.parquet", lambda s: cells("offset_after_s", -s)),
         "lag_spread_steps": _table(
-            AUDIT + "clocks.parquet", lambda s: _cells("lag_steps", 2 + 4 * s, share=0.25)
+            AUDIT + "clocks.parquet", lambda s: cells("lag_steps", 2 + 4 * s, share=0.25)
         ),
         "calibration_residual_m": _table(
-            AUDIT + "calibration.parquet", lambda s: _cells("residual_m", s)
+            AUDIT + "calibration.parquet", lambda s: cells("residual_m", s)
         ),
         "label_disagreement": _table(
-            AUDIT + "replay.parquet", lambda s: _cells("replayed", "failure", share=s)
+            AUDIT + "replay.parquet", lambda s: cells("replayed", "failure", share=s)
         ),
         "held_out_situations": _table(
-            AUDIT + "neighbourhoods.parquet", lambda s: _cells("split", "train", share=s)
+            AUDIT + "neighbourhoods.parquet", lambda s: cells("split", "train", share=s)
         ),
         "multimodal_situations": _table(
-            AUDIT + "neighbourhoods.parquet", lambda s: _cells("persistent", False, share=s)
+            AUDIT + "neighbourhoods.parquet", lambda s: cells("persistent", False, share=s)
         ),
         "persistence_margin": _document(
             AUDIT + "persistence.json", lambda s: _set("observed", 0.95 - 0.5 * s)
         ),
         "mode_success_lower": _table(
-            AUDIT + "modes.parquet", lambda s: _cells("successes", 24 - int(20 * s), share=0.5)
+            AUDIT + "modes.parquet", lambda s: cells("successes", 24 - int(20 * s), share=0.5)
         ),
         "mode_feasible_share": _table(
-            AUDIT + "modes.parquet", lambda s: _cells("admissible", 49 - int(40 * s), share=0.5)
+            AUDIT + "modes.parquet", lambda s: cells("admissible", 49 - int(40 * s), share=0.5)
         ),
         "mean_defeated_share": _table(
-            AUDIT + "neighbourhoods.parquet", lambda s: _cells("mean_admissible", True, share=s)
+            AUDIT + "neighbourhoods.parquet", lambda s: cells("mean_admissible", True, share=s)
         ),
         "strata_effect": _table(
             AUDIT + "strata.parquet",
-            lambda s: lambda f: _cells("effect", s)(_cells("p_adjusted", 0.001)(f)),
+            lambda s: lambda f: cells("effect", s)(cells("p_adjusted", 0.001)(f)),
         ),
         "cause_accepted": _document(
             AUDIT + "summary.json", lambda s: _set("label_disagreement_upper", 0.06 + s)
@@ -117,14 +107,14 @@ WORSE = {
         ),
         "baseline_mode_coverage": _table(
             BASE + "modes.parquet",
-            lambda s: _cells("modes_covered", 2, where=_of("act"), share=s),
+            lambda s: cells("modes_covered", 2, where=_of("act"), share=s),
         ),
         "phase_collapse_share": _document(
             AUDIT + "summary.json", lambda s: _set("modes_with_phase", 40 - int(40 * s))
         ),
         "chunking_valid_share": _table(
             BASE + "modes.parquet",
-            lambda s: _cells("admissible", 16, where=_of("chunked_bc"), share=s),
+            lambda s: cells("admissible", 16, where=_of("chunked_bc"), share=s),
         ),
         "latent_dependence_p": _document(
             BASE + "latent.json",
@@ -138,7 +128,7 @@ WORSE = {
         ),
         "factor_valid_share": _table(
             "measure_factors/modes.parquet",
-            lambda s: _cells("admissible", 16, where=_of("transformer"), share=s),
+            lambda s: cells("admissible", 16, where=_of("transformer"), share=s),
         ),
     },
     "B": {
@@ -173,17 +163,15 @@ WORSE = {
             "reload/samples.parquet",
             lambda s: (
                 lambda f: (
-                    _cells("sha256_reloaded", "other")(_cells("max_abs_difference", s)(f))
-                    if s
-                    else f
+                    cells("sha256_reloaded", "other")(cells("max_abs_difference", s)(f)) if s else f
                 )
             ),
         ),
         "nfe_mismatch": _table(
-            "reload/nfe.parquet", lambda s: _cells("counted", 8 + int(8 * s) + 1)
+            "reload/nfe.parquet", lambda s: cells("counted", 8 + int(8 * s) + 1)
         ),
         "mode_coverage_lower": _table(
-            "reload/coverage.parquet", lambda s: _cells("modes_covered_share", 1 - s)
+            "reload/coverage.parquet", lambda s: cells("modes_covered_share", 1 - s)
         ),
         "latency_terms_missing": _table(
             "latency/latency.parquet",
@@ -203,14 +191,14 @@ WORSE = {
             SHADOW + "candidates.parquet", lambda s: lambda f: _collapse(f, s)
         ),
         "admissible_share": _table(
-            SHADOW + "candidates.parquet", lambda s: _cells("kinematic", False, share=s)
+            SHADOW + "candidates.parquet", lambda s: cells("kinematic", False, share=s)
         ),
         "projection_p95_m": _table(
-            SHADOW + "candidates.parquet", lambda s: _cells("position_change_m", s, where=_held)
+            SHADOW + "candidates.parquet", lambda s: cells("position_change_m", s, where=_held)
         ),
         "boundary_jerk_p95_m_s3": _table(
             SHADOW + "candidates.parquet",
-            lambda s: _cells("boundary_jerk_m_s3", 9000 * s, where=_held),
+            lambda s: cells("boundary_jerk_m_s3", 9000 * s, where=_held),
         ),
         "corrupted_refused_share": _table(
             SHADOW + "candidates.parquet",
@@ -220,15 +208,13 @@ WORSE = {
                 )
             ),
         ),
-        "stub_stale": _table(SHADOW + "stub.parquet", lambda s: _cells("stale", int(9 * s) + 1)),
-        "stub_invalid": _table(
-            SHADOW + "stub.parquet", lambda s: _cells("invalid", int(9 * s) + 1)
-        ),
+        "stub_stale": _table(SHADOW + "stub.parquet", lambda s: cells("stale", int(9 * s) + 1)),
+        "stub_invalid": _table(SHADOW + "stub.parquet", lambda s: cells("invalid", int(9 * s) + 1)),
         "stub_violation_upper": _table(
-            SHADOW + "stub.parquet", lambda s: _cells("stale", int(100 * s))
+            SHADOW + "stub.parquet", lambda s: cells("stale", int(100 * s))
         ),
         "conservation_error": _table(
-            SHADOW + "counts.parquet", lambda s: _cells("executed", 81 + int(9 * s))
+            SHADOW + "counts.parquet", lambda s: cells("executed", 81 + int(9 * s))
         ),
         "checker_violations": _document(
             SHADOW + "checker.json", lambda s: _set("violations", ["v"] * (1 + int(3 * s)))
@@ -242,7 +228,7 @@ WORSE = {
     },
     "D": {
         "unmatched_starts": _table(
-            ROLL, lambda s: _cells("start_sha256", "x", where=_of("act"), share=max(s, 0.02))
+            ROLL, lambda s: cells("start_sha256", "x", where=_of("act"), share=max(s, 0.02))
         ),
         "verdict_reachable": _document(
             STRESS + "power.json",
@@ -250,39 +236,43 @@ WORSE = {
         ),
         "nominal_success_lower": _table(
             ROLL,
-            lambda s: _cells(
+            lambda s: cells(
                 "success", False, where=lambda f: f["perturbation"] == "nominal", share=s
             ),
         ),
-        "deadline_miss_upper": _table(ROLL, lambda s: _cells("deadline_misses", int(20 * s))),
-        "action_age_p95_s": _table(ROLL, lambda s: _cells("action_age_p95_s", 0.3 + s)),
-        "fallback_share_upper": _table(ROLL, lambda s: _cells("fallback_ticks", int(160 * s))),
-        "intervention_upper": _table(ROLL, lambda s: _cells("interventions", 1, share=s)),
+        "deadline_miss_upper": _table(ROLL, lambda s: cells("deadline_misses", int(20 * s))),
+        "action_age_p95_s": _table(ROLL, lambda s: cells("action_age_p95_s", 0.3 + s)),
+        "fallback_share_upper": _table(ROLL, lambda s: cells("fallback_ticks", int(160 * s))),
+        "intervention_upper": _table(ROLL, lambda s: cells("interventions", 1, share=s)),
         "stub_violations": _table(
-            STRESS + "stub.parquet", lambda s: _cells("stale", 1 + int(9 * s))
+            STRESS + "stub.parquet", lambda s: cells("stale", 1 + int(9 * s))
         ),
-        "force_peak_p95_n": _table(ROLL, lambda s: _cells("force_peak_n", 10 + 40 * s)),
+        "force_peak_p95_n": _table(ROLL, lambda s: cells("force_peak_n", 10 + 40 * s)),
         "stress_success_lower": _table(
             ROLL,
-            lambda s: _cells(
+            lambda s: cells(
                 "success", False, where=lambda f: f["perturbation"] != "nominal", share=s
             ),
         ),
         "conservation_error": _table(
-            STRESS + "conservation.parquet", lambda s: _cells("executed", 89 + int(9 * s))
+            STRESS + "conservation.parquet", lambda s: cells("executed", 89 + int(9 * s))
         ),
         "checker_violations": _document(
             STRESS + "checker.json", lambda s: _set("violations", ["v"] * (1 + int(3 * s)))
         ),
         "promotion_e_value": _table(
             ROLL,
-            lambda s: _cells(
+            lambda s: cells(
                 "success", False, share=s, where=lambda f: f["method"].isin(evidence.CANDIDATES)
             ),
         ),
     },
 }
+
+
 CASES = [(gate, name) for gate, cases in WORSE.items() for name in cases]
+
+
 TABLES = {
     "A": [
         "audit/clocks",
@@ -328,7 +318,7 @@ def test_worse_evidence_is_red_and_measured_moves_one_way(gate, name, _ladder, t
         WORSE[gate][name](copy, severity)
         # Gate A may still pass by its second route: take that away.
         if gate == "A":
-            evidence.edit_table(copy, "audit/recovery.parquet", _cells("successes", 20))
+            evidence.edit_table(copy, "audit/recovery.parquet", cells("successes", 20))
         report = judge(copy, gate)
         found = _found(report, name)
         values.append([c.measured for c in found])
@@ -367,7 +357,7 @@ def test_empty_table_is_inconclusive_never_pass(gate, path, ladder):
     ],
 )
 def test_nan_is_inconclusive_never_pass(gate, path, column, ladder):
-    evidence.edit_table(ladder, f"{path}.parquet", _cells(column, float("nan")))
+    evidence.edit_table(ladder, f"{path}.parquet", cells(column, float("nan")))
     assert judge(ladder, gate).verdict == "INCONCLUSIVE"
 
 
@@ -393,21 +383,12 @@ def test_each_removed_limit_is_not_pass(gate, _ladder):
         assert report.verdict == "INCONCLUSIVE", name
 
 
-def test_recovery_benefit_is_a_second_route_but_waives_no_data_check(repo):
-    evidence.edit_document(repo, "audit/persistence.json", _set("observed", 0.55))
-    assert judge(repo, "A").verdict == "PASS"
-    evidence.edit_table(repo, "audit/clocks.parquet", _cells("offset_after_s", 0.5))
-    report = judge(repo, "A")
-    assert report.verdict == "FAIL"
-    assert "clock_residual_s" in report.diagnosis
-
-
 def test_a_method_that_failed_below_does_not_stand(ladder):
     evidence.edit_table(
         ladder,
         "reload/samples.parquet",
-        lambda f: _cells("sha256_reloaded", "x", where=_of("flow"))(
-            _cells("max_abs_difference", 0.1, where=_of("flow"))(f)
+        lambda f: cells("sha256_reloaded", "x", where=_of("flow"))(
+            cells("max_abs_difference", 0.1, where=_of("flow"))(f)
         ),
     )
     for gate in "BC":
@@ -415,37 +396,6 @@ def test_a_method_that_failed_below_does_not_stand(ladder):
     report = judge(ladder, "C")
     assert set(report.candidates) == {"diffusion"}
     assert any("flow does not stand" in caveat for caveat in report.caveats)
-
-
-def test_a_candidate_of_another_dataset_is_not_pinned(ladder):
-    evidence.document(ladder, "ingest/manifest.json", {"schema_version": 2})
-    report = judge(ladder, "B")
-    assert report.verdict == "FAIL"
-    assert "another one than the audited" in _found(report, "unpinned_items")[0].caveat
-
-
-def test_a_check_that_was_never_disabled_is_undetected(ladder):
-    evidence.edit_document(ladder, "shadow/mutants.json", lambda d: d[1:])
-    report = judge(ladder, "C")
-    assert report.verdict == "FAIL"
-    assert "representation (not tried)" in _found(report, "mutants_undetected")[0].caveat
-
-
-def test_no_gain_returns_to_the_best_baseline(ladder):
-    evidence.edit_table(
-        ladder, "stress/rollouts.parquet", _cells("success", True, where=_of("chunked_bc"))
-    )
-    report = judge(ladder, "D")
-    assert (report.verdict, report.decision) == ("FAIL", "return to chunked_bc")
-    assert report.promoted is None
-    assert "promotion_e_value" in report.diagnosis
-
-
-def test_fewer_starts_than_planned_gives_no_verdict(ladder):
-    evidence.edit_table(ladder, "stress/rollouts.parquet", lambda f: f[f["start"] < 30])
-    report = judge(ladder, "D")
-    assert report.verdict == "INCONCLUSIVE"
-    assert report.decision.startswith("No decision")
 
 
 def test_corrupt_table_is_an_integrity_error(repo):
@@ -460,9 +410,3 @@ def test_corrupt_table_is_an_integrity_error(repo):
 def test_same_evidence_same_bytes(ladder):
     for gate in "ABCD":
         assert report_bytes(judge(ladder, gate)) == report_bytes(judge(ladder, gate))
-
-
-def test_golden_exact_bound_of_label_disagreement(repo):
-    """0 of 40: upper end 1 - 0.025^(1/40) = 0.0881, Clopper and Pearson 1934."""
-    found = _found(judge(repo, "A"), "label_disagreement")[0]
-    assert found.measured == pytest.approx(1 - 0.025 ** (1 / 40), abs=1e-12)

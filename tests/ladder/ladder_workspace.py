@@ -11,7 +11,7 @@ from typing import Any
 
 import yaml
 
-from flows.reproduce import Outcome, reproduce, stage_environment
+from flows.reproduce import RunEnd, reproduce, stage_environment
 from flows.workspace import make_workspace
 from gates.proof import SPECS
 
@@ -84,7 +84,7 @@ def copy_of(workspace: Path, target: Path) -> Path:
     return target
 
 
-def repro(workspace: Path, *stages: str, **options: Any) -> tuple[Outcome, list[str]]:
+def repro(workspace: Path, *stages: str, **options: Any) -> tuple[RunEnd, list[str]]:
     """A real `dvc repro`; the outcome, and the stages that ran."""
     lines: list[str] = []
     outcome = reproduce(workspace, stages=stages, echo=lines.append, **options)

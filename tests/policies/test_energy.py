@@ -2,18 +2,11 @@
 
 import math
 
-import numpy as np
 import pytest
 import torch
 
 from genpolicy.errors import ConfigError, ContractError
 from genpolicy.policies.checkpoint import load_checkpoint
-from genpolicy.policies.derivative_free import (
-    FIRST_JITTER,
-    LAST_JITTER,
-    jitter,
-    search_codes,
-)
 from genpolicy.policies.energy import (
     CODE_BOUND,
     NEGATIVE_SCALES,
@@ -27,6 +20,8 @@ from genpolicy.policies.policy import NetworkPolicy
 from genpolicy.policies.settings import HeadConfig, NetworkConfig, SamplerConfig
 
 SIZES = Dimensions(observation_horizon=2, observation_dim=3, prediction_horizon=4, action_dim=2)
+
+
 NETWORK = NetworkConfig(
     encoder_width=16, condition_dim=16, trunk_width=48, trunk_blocks=1, time_features=16,
     head_parameters=6000,
@@ -38,14 +33,6 @@ def chunks_of_rank(rank, count=300, seed=0):
     generator = torch.Generator().manual_seed(seed)
     directions = torch.randn(rank, 8, generator=generator)
     return (torch.randn(count, rank, generator=generator) @ directions + 0.7).reshape(count, 4, 2)
-
-
-def noise_of(rows, population, length, seed=0):
-    def draw(step):
-        generator = torch.Generator().manual_seed(1000 * seed + step)
-        return torch.randn(rows, population, 2 * length + 2, generator=generator)
-
-    return draw
 
 
 def test_a_code_as_long_as_the_data_varies_loses_nothing():
@@ -150,68 +137,6 @@ def test_negatives_differ_along_random_axes_by_every_scale():
         assert int(((width - scale).abs() < 0.2 * scale).sum()) > 500
     uniform = (width - CODE_BOUND / 3**0.5).abs() < 0.07
     assert 0.05 < float(uniform.float().mean()) < 0.1
-
-
-def test_search_finds_the_maximum_of_a_known_energy():
-    peak = torch.tensor([0.4, -0.7, 0.1])
-
-    def score(codes, time):
-        return -0.5 * ((codes - peak) / 0.05).square().sum(dim=-1)
-
-    found = search_codes(score, noise_of(6, 256, 3), iterations=8, bound=CODE_BOUND)
-    assert float((found - peak).abs().max()) < 0.05
-
-
-def test_search_keeps_both_modes_over_samples():
-    def score(codes, time):
-        return torch.logsumexp(
-            torch.stack([-(codes - p).square().sum(-1) / 0.02 for p in (-0.5, 0.5)]), dim=0
-        )
-
-    found = search_codes(score, noise_of(400, 32, 2), iterations=8, bound=CODE_BOUND)
-    assert float((found.abs() - 0.5).abs().median()) < 0.05
-    assert 0.35 < float((found[:, 0] > 0).float().mean()) < 0.65
-
-
-def test_search_stays_in_its_box_and_repeats():
-    def score(codes, time):
-        return 100.0 * codes.sum(dim=-1)
-
-    one, two = (search_codes(score, noise_of(3, 16, 2), iterations=5, bound=1.0) for _ in range(2))
-    assert torch.equal(one, two)
-    assert float(one.max()) == 1.0
-    other = search_codes(score, noise_of(3, 16, 2, seed=1), iterations=0, bound=1.0)
-    assert not torch.equal(one, other)
-
-
-def test_parents_are_drawn_in_proportion_to_their_scores():
-    """Golden: with probabilities 0.8 and 0.2 the share of the first parent is 0.8."""
-    codes_seen = []
-
-    def score(codes, time):
-        codes_seen.append(codes)
-        return torch.where(codes[..., 0] > 0, math.log(4.0), 0.0)
-
-    rows = 400
-    noise = noise_of(rows, 64, 1)
-
-    def start_at_ends(step):
-        drawn = noise(step)
-        if step == 0:
-            half = torch.where(torch.arange(64) % 2 == 0, 6.0, -6.0)
-            drawn[..., 0] = half
-        return drawn * torch.tensor([float(step == 0), 1.0, 1.0, 1.0])
-
-    search_codes(score, start_at_ends, iterations=1, bound=1.0)
-    assert float((codes_seen[1][..., 0] > 0).float().mean()) == pytest.approx(0.8, abs=0.01)
-
-
-def test_jitter_halves_with_six_iterations():
-    """Golden: the original halves 0.33; six geometric steps to 0.01 are nearly that."""
-    widths = [jitter(i, 6) for i in range(6)]
-    assert widths[0] == FIRST_JITTER
-    assert widths[-1] == pytest.approx(LAST_JITTER)
-    assert np.allclose(np.divide(widths[1:], widths[:-1]), 0.5, atol=0.01)
 
 
 def test_an_energy_without_candidates_is_refused():

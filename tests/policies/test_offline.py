@@ -1,14 +1,11 @@
-"""Offline errors and selection."""
+"""Offline errors: by phase, without padding."""
 
 import numpy as np
 import pytest
 
-from genpolicy.contract.chunk import Candidate, ChunkMetadata
-from genpolicy.errors import ConfigError, ContractError
 from genpolicy.policies.normalisation import MinMax, Normalisation
 from genpolicy.policies.offline import masked_errors
 from genpolicy.policies.policy import Samples
-from genpolicy.policies.selection import select
 from genpolicy.policies.windows import Windows
 
 
@@ -49,22 +46,3 @@ def test_errors_by_phase_leave_padding_out(horizon, counted):
     assert insert.windows == 2
     assert insert.masked_mae == pytest.approx(0.03 / 10 / counted)
     assert insert.position_rmse_m == pytest.approx(0.03 / counted**0.5)
-
-
-def candidate(index):
-    metadata = ChunkMetadata(
-        chunk_id=f"c{index}", condition_observation_event_time_s=0.0, policy_checkpoint_hash="",
-        sampler_config_hash="", action_start_time_s=0.0, action_period_s=0.05, valid_until_s=1.0,
-        task_phase="align", calibration_epoch="e", predecessor_chunk_id="", session_epoch=0,
-        method="m", candidate_index=index,
-    )  # fmt: skip
-    return Candidate(metadata, np.full((2, 10), float(index)))
-
-
-def test_selection():
-    proposal = select([candidate(0), candidate(1)])
-    assert (proposal.metadata.candidate_index, proposal.selected_by) == (0, "first")
-    with pytest.raises(ContractError):
-        select([])
-    with pytest.raises(ConfigError, match="selector"):
-        select([candidate(0)], selector="best")

@@ -1,5 +1,6 @@
 """The default task's scene, its kinematics and its collision model."""
 
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,8 @@ import genpolicy.tasks.tabletop_insertion as task_package
 from genpolicy.robot.collision import CollisionModel
 from genpolicy.robot.kinematics import ArmKinematics
 from genpolicy.robot.scene_state import SceneState
+
+sys.path.insert(0, str(Path(__file__).parent))
 
 SCENE = Path(task_package.__file__).with_name("scene.xml")
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)

@@ -11,7 +11,6 @@ from genpolicy.statistics.intervals import (
     clopper_pearson,
     order_statistic_interval,
 )
-from genpolicy.statistics.multiplicity import holm
 
 
 def test_clopper_pearson_golden():
@@ -61,17 +60,3 @@ def test_order_statistic_interval_says_when_the_sample_is_too_small():
     assert order_statistic_interval(np.array([]), 0.5) == (-math.inf, math.inf)
     with pytest.raises(NonFiniteError):
         order_statistic_interval(np.array([1.0, np.nan]), 0.5)
-
-
-def test_holm_golden_and_order():
-    # Worked by hand: sorted .01 .02 .03 .04 -> factors 4 3 2 1, running maximum.
-    assert holm(np.array([0.04, 0.01, 0.03, 0.02])) == pytest.approx([0.06, 0.04, 0.06, 0.06])
-    assert holm(np.array([])).shape == (0,)
-    with pytest.raises(ContractError):
-        holm(np.array([np.nan]))
-
-
-def test_holm_controls_the_family_error():
-    rng = stream(3, "holm")
-    wrong = np.mean([np.any(holm(rng.random(8)) <= 0.05) for _ in range(2000)])
-    assert wrong <= 0.065

@@ -1,7 +1,5 @@
 """Any path: which layout it is, where it may be written, what the same data give again."""
 
-import json
-
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -9,8 +7,7 @@ import pytest
 import zarr
 
 from genpolicy.data.dataset import load_dataset
-from genpolicy.data.formats import FORMATS, open_dataset, propose
-from genpolicy.data.formats.detect import detect
+from genpolicy.data.formats import open_dataset
 from genpolicy.errors import BadInputError
 
 
@@ -22,27 +19,6 @@ def buffer(path, arrays, ends):
     ends = np.array(ends, dtype="i8")
     group.create_array("meta/episode_ends", data=ends, chunks=ends.shape)
     return path
-
-
-def test_layouts_are_told_by_what_is_there(layouts, tmp_path):
-    assert detect(layouts.v2(tmp_path / "a")) == "lerobot"
-    assert detect(layouts.file(tmp_path / "a", 0)) == "parquet"
-    for name, data, kind in (
-        ("x.bin", b"\x89HDF\r\n\x1a\n", "robomimic"),
-        ("y.bin", b"PAR1", "parquet"),
-        ("z.bin", b"\x89MCAP0\r\n", "mcap"),
-    ):
-        (tmp_path / name).write_bytes(data)
-        assert detect(tmp_path / name) == kind
-    (tmp_path / "none").mkdir()
-    (tmp_path / "text.txt").write_text("hello")
-    for name in ("none", "text.txt", "absent"):
-        with pytest.raises(BadInputError, match=name):
-            detect(tmp_path / name)
-    (tmp_path / "none" / "a.mcap").touch()
-    (tmp_path / "none" / "b.parquet").touch()
-    with pytest.raises(BadInputError, match="several layouts"):
-        detect(tmp_path / "none")
 
 
 def test_a_buffer_of_any_width(layouts, tmp_path):
@@ -69,36 +45,6 @@ def test_a_buffer_of_any_width(layouts, tmp_path):
     )
 
 
-def test_the_known_buffer_needs_no_guess(tmp_path):
-    rng = np.random.default_rng(0)
-    state = rng.uniform(100, 400, (60, 5)).astype("f4")
-    state[:, 4] = rng.uniform(0, 6.28, 60)
-    arrays = {"state": state, "action": state[:, :2] + 1, "n_contacts": state[:, :1]}
-    path = buffer(tmp_path / "p.zarr", arrays, [10, 22, 37, 60])
-    contract = propose(path)
-    assert contract.task == "pusht"
-    assert propose(path, task="mine").task == "mine"
-    assert not any(channel.guessed for channel in contract.channels)
-
-
-def test_a_dataset_is_used_as_it_is_and_brings_its_contract(layouts, tmp_path):
-    first = open_dataset(layouts.v2(tmp_path / "a"), out=tmp_path / "out")
-    again = open_dataset(tmp_path / "out", out=tmp_path / "other")
-    assert again.folder == tmp_path / "out"
-    assert again.contract == first.contract
-    assert (again.found, again.accepted, again.notes) == (6, 6, first.notes)
-    assert not (tmp_path / "other").exists()
-
-
-def test_a_dataset_of_the_ladder_implies_its_contract(factory, tmp_path):
-    folder = factory.build(tmp_path)
-    assert "import_contract" not in json.loads((folder / "manifest.json").read_text())
-    opened = open_dataset(folder, out=tmp_path / "other")
-    assert opened.contract.format == "dataset"
-    assert (opened.contract.pairing or {})["tcp_y_m"] == "tcp_position_m.y"
-    assert opened.contract.labels.phase is None  # a policy of this dataset sees the phase
-
-
 @pytest.mark.parametrize("place", ["inside", "around", "file", "foreign", "link"])
 def test_nothing_is_written_over(layouts, tmp_path, place):
     root = layouts.v2(tmp_path / "a" / "recordings")
@@ -118,18 +64,6 @@ def test_an_old_dataset_is_replaced(layouts, tmp_path):
         layouts.v2(tmp_path / "a", count=count)
         open_dataset(tmp_path / "a", out=tmp_path / "out")
         assert len(load_dataset(tmp_path / "out").episodes) == count
-
-
-def test_the_format_must_fit(layouts, tmp_path):
-    root = layouts.v2(tmp_path / "a")
-    contract = propose(root)
-    with pytest.raises(BadInputError, match="--format"):
-        open_dataset(root, out=tmp_path / "out", format="rosbag")
-    with pytest.raises(BadInputError, match="lerobot"):
-        open_dataset(root, out=tmp_path / "out", format="parquet", contract=contract)
-    with pytest.raises(BadInputError, match="lerobot"):
-        open_dataset(layouts.file(root, 0), out=tmp_path / "out", contract=contract)
-    assert set(FORMATS) == {"auto", "mcap", "zarr", "lerobot", "robomimic", "parquet"}
 
 
 def test_progress_counts_every_episode(layouts, tmp_path):

@@ -1,11 +1,8 @@
 """The latency benchmark on a tiny policy, and fresh processes."""
 
-import os
-
 import pytest
 
 from genpolicy.evidence.reproducibility.benchmark import measure_policy
-from genpolicy.evidence.reproducibility.measure import in_fresh_process
 from genpolicy.policies.fixtures import fixture_observations
 
 
@@ -44,7 +41,3 @@ def test_without_a_projection_the_term_stays_unknown(fleet, observations):
         cold_repeats=1, warm_repeats=1,
     )  # fmt: skip
     assert "project" not in {row.component for row in rows}
-
-
-def test_a_fresh_process_is_another_one():
-    assert in_fresh_process(os.getpid) != os.getpid()

@@ -1,38 +1,17 @@
 """Shadow evidence on few observations: complete rows, a clean stub, balanced books."""
 
 from collections import Counter
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from genpolicy.evidence.admission_context import make_checker
 from genpolicy.evidence.shadow.corruption import CORRUPTIONS
-from genpolicy.evidence.shadow.layer_mutants import missing_checks_evidence
-from genpolicy.evidence.shadow.observations import held_out_observations, spread
-from genpolicy.evidence.shadow.session import IN_FLIGHT_PHASE_CHANGE, Cell
-from genpolicy.evidence.shadow.shadow import HELD_OUT, Shadow, case_of, shadow_policy
+from genpolicy.evidence.shadow.session import IN_FLIGHT_PHASE_CHANGE
+from genpolicy.evidence.shadow.shadow import HELD_OUT, case_of, shadow_policy
 from genpolicy.execution.journal import write_journal
-from genpolicy.feasibility.checks import without
 from genpolicy.feasibility.settings import LAYERS
-from genpolicy.seeds import stream
 from genpolicy.verification.checker import check_journal
-
-
-@pytest.fixture(scope="module")
-def shadow(task, checker, kit):
-    return Shadow(
-        task=task, checker=checker, cell=Cell(kit.HORIZONS, kit.EXECUTION), late_steps=1,
-        samples=3,
-    )  # fmt: skip
-
-
-@pytest.fixture(scope="module")
-def observations(data, kit):
-    return held_out_observations(
-        data, horizons=kit.HORIZONS, count=20, generator=stream(1, "shadow")
-    )
 
 
 class Demonstrator:
@@ -56,22 +35,6 @@ class Demonstrator:
 @pytest.fixture(scope="module")
 def evidence(shadow, observations):
     return shadow_policy(shadow, Demonstrator(observations), observations, seed=4)
-
-
-def test_observations_come_from_the_test_split_in_equal_numbers(data, observations, kit):
-    split = dict(zip(data.episodes["episode_uuid"], data.episodes["split"], strict=True))
-    assert {split[item.episode_uuid] for item in observations} == {"test"}
-    assert set(Counter(item.phase for item in observations).values()) == {4}
-    for item in observations:
-        assert item.history.shape == (2, 24) and item.demonstrated.shape == (16, 10)
-        # The command at the observation's own tick is the first of what follows.
-        np.testing.assert_array_equal(item.commanded[-1], item.demonstrated[0])
-    again = held_out_observations(
-        data, horizons=kit.HORIZONS, count=20, generator=stream(1, "shadow")
-    )
-    assert [(o.episode_uuid, o.index) for o in again] == [
-        (o.episode_uuid, o.index) for o in observations
-    ]
 
 
 def test_every_candidate_has_its_row_and_its_verdict(evidence, observations):
@@ -151,34 +114,6 @@ def test_a_trained_policy_goes_the_same_way(shadow, observations, policy):
         assert count == 0 or name in ("arrivals", "delivered")
 
 
-def test_a_missing_check_is_noticed_by_exactly_its_fixture(shadow, observations, task, kit):
-    blind = {
-        item.checks: make_checker(
-            task,
-            kit.FEASIBILITY,
-            action_period_s=kit.HORIZONS.action_period_s,
-            checks=without(*item.checks),
-        )
-        for item in CORRUPTIONS
-        if item.checks
-    }
-    rows = missing_checks_evidence(shadow, observations, without=blind)
-    assert {row["check"] for row in rows} == {"+".join(checks) for checks in blind}
-    assert all(row["detected"] and 0 < row["violations"] <= row["tried"] for row in rows)
-    # Where the check is not really off, the table must not claim that its absence shows.
-    seeing = dict.fromkeys(blind, shadow.checker)
-    rows = missing_checks_evidence(shadow, observations[:5], without=seeing)
-    assert not any(row["detected"] for row in rows)
-    # And where everything is admitted anyway, nothing was refused that could be noticed.
-    late = replace(shadow, checker=blind["expired",])
-    (row,) = (
-        row
-        for row in missing_checks_evidence(late, observations[:5], without=blind)
-        if row["fixture"] == "expired"
-    )
-    assert row["tried"] > 0 and not row["detected"]
-
-
 def test_all_rows_that_are_not_late_are_judged(shadow, observations):
     """Decision 16: also behind the execution horizon, where nothing of the chunk is executed."""
     item = next(o for o in observations if o.phase == "approach")
@@ -191,8 +126,3 @@ def test_all_rows_that_are_not_late_are_judged(shadow, observations):
         shadow.checker.admit(c.proposal, context=c.context).verdict.passed for c in (good, case)
     )
     assert admitted and not refused
-
-
-def test_a_spread_keeps_the_order_and_about_the_count(observations):
-    assert spread(observations, 5) == observations[::4]
-    assert spread(observations, 100) == observations

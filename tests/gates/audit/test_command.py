@@ -1,6 +1,5 @@
 """`genpolicy audit`: whole or nothing, never over the recordings, going on where it was."""
 
-import json
 import shutil
 import sys
 from pathlib import Path
@@ -9,23 +8,23 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 import yaml
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "audit"))
-
 from planar import planar
 
 from gates.audit import command
 from gates.cause import cause_of, default_limits
 from genpolicy.cli.main import main
 from genpolicy.cli.resume import work_folder
-from genpolicy.cli.task_checks import contract_hash, task_checks
-from genpolicy.contract.observation import ObservationContract
+from genpolicy.cli.task_checks import task_checks
 from genpolicy.data.dataset import load_dataset
 from genpolicy.data.formats.contract import load_contract
 from genpolicy.integrity.documents import read_json
-from genpolicy.tasks.api import load_task
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "audit"))
+
 
 ROOT = Path(__file__).parents[3]
+
+
 OUTPUTS = {"audit.json", "audit.html", "contract.yaml", "evidence", "dataset"}
 
 
@@ -199,14 +198,3 @@ def test_only_the_task_of_the_data_checks_them(recordings, tmp_path, monkeypatch
     for name in (None, "no such task", "tabletop_insertion"):
         checks = task_checks(dataset, task=name, chunk_steps=16)
         assert checks.admissible is None and checks.replay is None and checks.obstacles == []
-
-
-def test_a_contract_in_a_manifest_has_the_hash_of_the_contract():
-    contract: ObservationContract = load_task("tabletop_insertion").observation
-    channels = [
-        {"name": c.name, "components": list(c.components), "unit": c.unit, "stream": c.stream,
-         "maximum_age_s": c.maximum_age_s}
-        for c in contract.channels
-    ]  # fmt: skip
-    manifest = json.loads(json.dumps({"observation_contract": {"channels": channels, "dim": 1}}))
-    assert contract_hash(manifest) == contract.hash()

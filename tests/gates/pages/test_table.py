@@ -3,7 +3,6 @@
 import evidence
 import pytest
 
-from gates.pages.guide import QUESTIONS, READING, USED, WORDS, label, unit
 from gates.pages.page import index_page
 from gates.pages.summary import markdown
 from gates.pages.table import deciding, groups, passed_by, stops, tally, waived
@@ -66,35 +65,3 @@ def test_groups_hold_every_criterion_once_in_order(ladder, gate):
     lines = [line.criterion for group in groups(report) for line in group.lines]
     assert lines == list(report.criteria)
     assert len({group.id for group in groups(report)}) == len(groups(report))
-
-
-@pytest.mark.parametrize(
-    ("name", "text"),
-    [
-        ("clock_residual_s", "s"),
-        ("lag_spread_steps", "action steps"),
-        ("projection_p95_m", "m"),
-        ("boundary_jerk_p95_m_s3", "m/s³"),
-        ("force_peak_p95_n", "N"),
-        ("mode_success_lower", ""),
-        ("unmatched_starts", ""),
-        ("held_out_situations", ""),
-    ],
-)
-def test_units_follow_the_suffix(name, text):
-    assert unit(name) == text
-
-
-def test_every_gate_has_a_reading_guide_whose_words_exist():
-    assert set(QUESTIONS) == set(READING) == set(USED) == set("ABCDE")
-    assert {word for used in USED.values() for word in used} == set(WORDS)
-
-
-def test_fields_of_the_card_carry_their_unit(ladder):
-    assert label("speed_limit_m_s") == "speed limit, m/s"
-    assert label("force_limit_n") == "force limit, N"
-    assert label("stop_path") == "stop path"
-    write_gate(ladder, "E")
-    page = (ladder / "reports/gate_e.html").read_text()
-    assert "speed limit, m/s" in page and "<div>0.35, -0.2, 0.03</div>" in page
-    assert page.index("The card (draft, not signed)") < page.index("<h2>Criteria</h2>")

@@ -1,35 +1,25 @@
+"""None"""
+
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from driving import drive
 
 from genpolicy.contract.action import GRIPPER
 from genpolicy.errors import ConfigError
 from genpolicy.seeds import stream
 from genpolicy.tasks.api import WorldSettings
-from genpolicy.tasks.tabletop_insertion.observation import OBSERVATION
-from genpolicy.tasks.tabletop_insertion.plans import travel
 from genpolicy.tasks.tabletop_insertion.start import InsertionStart, sample_start
 from genpolicy.tasks.tabletop_insertion.world import TabletopWorld
 
 SETTINGS = WorldSettings("epoch_1")
+
+
 BESIDE = InsertionStart(
     tcp_x_m=0.65, tcp_y_m=0.07, tcp_z_m=0.15, yaw_rad=0.0,
     hole_x_m=0.65, hole_y_m=0.0, hole_yaw_rad=0.0, post_y_m=0.0,
 )  # fmt: skip
-
-
-def drive(world, target_m, *, opening_m=0.01, speed_m_s=0.2):
-    action = world.last_action
-    collision = False
-    for position in travel(
-        np.array([action[:3], target_m]), speed_m_s=speed_m_s, acceleration_m_s2=0.8
-    ):
-        action[:3], action[GRIPPER] = position, opening_m
-        world.command(action)
-        world.advance()
-        collision = collision or world.collision
-    return collision
 
 
 def wait(world, periods, *, opening_m):
@@ -68,35 +58,6 @@ def test_starts_at_rest_where_it_should(start):
     np.testing.assert_allclose(position, [start.tcp_x_m, start.tcp_y_m, start.tcp_z_m], atol=5e-4)
     assert np.abs(world.data.qvel[:7]).max() == 0.0
     assert world.phase == "approach" and world.holding and not world.success
-
-
-def test_observation_holds_what_the_contract_names(start):
-    world = TabletopWorld(start, settings=SETTINGS)
-    observation = world.observe()
-    assert observation.shape == (OBSERVATION.dim,)
-    np.testing.assert_array_equal(observation[:3], world.tcp_pose[0])
-    assert observation[OBSERVATION.slices["phase"]].tolist() == [1, 0, 0, 0, 0, 0]
-    hole = observation[OBSERVATION.slices["hole_pose"]]
-    assert np.hypot(hole[0] - start.hole_x_m, hole[1] - start.hole_y_m) < 0.002
-
-
-def test_driving_straight_at_the_hole_hits_the_post(start):
-    world = TabletopWorld(start, settings=SETTINGS)
-    assert drive(world, np.array([0.48, 0.0, 0.15]))
-    assert not world.success
-
-
-def test_passing_the_post_on_one_side_does_not(start):
-    world = TabletopWorld(start, settings=SETTINGS)
-    assert not drive(world, np.array([0.40, 0.135, 0.15]))
-    assert not drive(world, np.array([0.58, 0.135, 0.15]))
-
-
-def test_pressing_the_peg_on_the_fixture_is_a_collision_with_a_force():
-    world = TabletopWorld(replace(BESIDE, tcp_y_m=0.025), settings=SETTINGS)
-    assert drive(world, np.array([0.65, 0.025, 0.10]))
-    assert world.contact_force_n > 10.0
-    assert world.wrench_n[2] > 10.0
 
 
 def test_a_peg_dropped_beside_the_hole_is_no_success():
@@ -156,14 +117,3 @@ def test_hold_keeps_the_target(start):
 def test_unknown_settings_are_refused(start, settings):
     with pytest.raises(ConfigError, match="expected one of"):
         TabletopWorld(start, settings=settings)
-
-
-def test_each_probe_changes_the_world_or_what_is_seen(start):
-    nominal = TabletopWorld(start, settings=SETTINGS)
-    for probe in ("calibration_shift", "lighting"):
-        world = TabletopWorld(start, settings=WorldSettings("epoch_1", probe))
-        assert not np.array_equal(world.observe()[14:19], nominal.observe()[14:19])
-        assert world.state_sha256() == nominal.state_sha256()
-    for probe in ("unseen_object", "contact_anomaly"):
-        world = TabletopWorld(start, settings=WorldSettings("epoch_1", probe))
-        assert world.model is not nominal.model

@@ -1,0 +1,52 @@
+"""Clocks: lag by episode, offsets of epochs and single episodes, drift, streams, realignment."""
+
+import numpy as np
+import pytest
+from arms import SETTINGS, arms, last_epoch, late
+
+from genpolicy.audit.semantics import measure
+from genpolicy.audit.semantics.clocks import offset_findings
+from genpolicy.seeds import stream
+
+
+def kinds(data, settings=SETTINGS):
+    return [finding.kind for finding in measure(data, settings).findings]
+
+
+def test_an_episode_is_off_only_beyond_its_own_error():
+    data = arms(21)
+    offsets = 0.1 + 0.001 * stream(7, "offsets").normal(size=60)
+    offsets[[3, 9, 27, 40]] += 0.08
+    limits = {"declared_s": None, "finest_s": 0.0125, "episode_limit_s": 0.0375}
+    sure, taken = offset_findings(
+        "robot", offsets, data, SETTINGS, **limits, errors_s=np.full(60, 0.002)
+    )
+    assert [d.kind for d in sure] == ["clock"] and np.flatnonzero(taken).tolist() == [3, 9, 27, 40]
+    unsure, taken = offset_findings(
+        "robot", offsets, data, SETTINGS, **limits, errors_s=np.full(60, 0.03)
+    )
+    assert unsure == [] and not taken.any()
+
+
+@pytest.mark.parametrize(("rate_hz", "width", "unit"), [(5, 2, 1.0), (20, 3, 500.0), (40, 7, 1.0)])
+def test_an_epoch_that_is_late_by_a_row_is_named_at_any_rate_and_in_any_unit(rate_hz, width, unit):
+    data = arms(11, rate_hz=rate_hz, width=width, unit=unit)
+    assert kinds(data) == []
+    found = measure(late(data, 1.0, last_epoch(data)), SETTINGS)
+    assert found.findings[0].kind == "clock" and "epoch e" in found.findings[0].where
+    offsets = {clock.epoch: clock.offset_before_s for clock in found.clocks}
+    assert offsets["epoch_2"] - offsets["epoch_1"] == pytest.approx(1 / rate_hz, abs=0.2 / rate_hz)
+
+
+def test_one_late_episode_is_no_defect_of_the_data_set():
+    data = arms(13, episodes=100)
+    one = np.arange(100) == 41
+    assert kinds(late(data, 3.0, one)) == []
+
+
+def test_a_response_before_its_command_is_named_everywhere():
+    data = arms(16, epochs=1, lag_s=0.01)
+    assert kinds(data) == []
+    assert kinds(late(data, -3.0, np.ones(60, dtype=bool))) == ["clock"]
+    declared = SETTINGS.model_copy(update={"declared_lag_steps": 4.0})
+    assert "clock" in kinds(data, declared)

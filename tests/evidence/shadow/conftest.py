@@ -1,0 +1,23 @@
+"""A shadow test of the default task, and held-out moments for it."""
+
+import pytest
+
+from genpolicy.evidence.shadow.observations import held_out_observations
+from genpolicy.evidence.shadow.session import Cell
+from genpolicy.evidence.shadow.shadow import Shadow
+from genpolicy.seeds import stream
+
+
+@pytest.fixture(scope="session")
+def shadow(task, checker, kit):
+    return Shadow(
+        task=task, checker=checker, cell=Cell(kit.HORIZONS, kit.EXECUTION), late_steps=1,
+        samples=3,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="session")
+def observations(data, kit):
+    return held_out_observations(
+        data, horizons=kit.HORIZONS, count=20, generator=stream(1, "shadow")
+    )

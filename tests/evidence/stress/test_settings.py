@@ -1,0 +1,31 @@
+"""The comparison is registered before it runs: strict, and alpha is shared by the candidates."""
+
+import pytest
+from pydantic import ValidationError
+
+from genpolicy.evidence.stress.settings import StressSettings
+
+PLAIN = {
+    "starts": 10, "episode_limit_s": 20.0, "samples": 2, "baselines": ["bc"],
+    "perturbations": {"nominal": {"kind": "nominal"}}, "margin": 0.1, "alpha": 0.05,
+}  # fmt: skip
+
+
+def test_candidates_share_alpha_in_equal_parts():
+    settings = StressSettings(**PLAIN)
+    assert settings.alpha_of_each(1) == 0.05
+    assert settings.alpha_of_each(4) * 4 == pytest.approx(0.05)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"starts": 0}, {"episode_limit_s": 0.0}, {"samples": 0}, {"alpha": 0.0}, {"alpha": 1.0},
+     {"perturbations": {"nominal": {"kind": "earthquake"}}}, {"retries": 3}],
+)  # fmt: skip
+def test_what_is_out_of_range_or_unknown_is_refused(change):
+    with pytest.raises(ValidationError):
+        StressSettings(**{**PLAIN, **change})
+
+
+def test_the_ladder_s_own_section_fits(kit):
+    assert StressSettings(**kit.PARAMS["stress"]).starts >= 1

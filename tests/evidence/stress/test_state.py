@@ -1,0 +1,64 @@
+"""An invocation in flight: what it suffers is a function of its key, and it arrives after it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from genpolicy.contract.chunk import ChunkMetadata
+from genpolicy.evidence.stress.perturbations import CameraDelay, ChunkDrop
+from genpolicy.evidence.stress.state import Tally, in_flight
+
+METADATA = ChunkMetadata(
+    chunk_id="c", condition_observation_event_time_s=1.95, policy_checkpoint_hash="w",
+    sampler_config_hash="s", action_start_time_s=2.0, action_period_s=0.05, valid_until_s=2.8,
+    task_phase="approach", calibration_epoch="e0", predecessor_chunk_id="", session_epoch=1,
+    method="scripted", candidate_index=0,
+)  # fmt: skip
+SEEN = np.arange(3.0)
+
+
+@pytest.fixture
+def begin(make_fixture):
+    def make(*, start=0, number=1, metadata=METADATA, **changes):
+        return in_flight(make_fixture(**changes), metadata, SEEN, start=start, number=number)
+
+    return make
+
+
+def test_it_begins_with_its_chunk_and_arrives_after_its_latency(begin):
+    found = begin()
+    assert found.begun_s == 2.0 and found.arrival_s == 2.0 + found.total_s
+    # Compute terms sum to 30 ms, six declared terms to 6 to 12 ms.
+    assert 0.03 + 0.005 <= found.total_s <= 0.03 + 0.013
+    assert not found.dropped and not found.given_up and found.chunks is None
+    later = begin(metadata=replace(METADATA, action_start_time_s=3.0))
+    assert later.arrival_s == 3.0 + found.total_s
+
+
+def test_the_same_key_suffers_the_same_and_each_part_of_it_counts(begin):
+    found = begin().total_s
+    assert begin().total_s == found == begin(method="another").total_s
+    others = {begin(start=1).total_s, begin(number=2).total_s, begin(root_seed=8).total_s,
+              begin(perturbation="other").total_s}  # fmt: skip
+    assert len(others | {found}) == 5
+
+
+def test_what_is_injected_is_added_or_lost(begin):
+    late = begin(schedule=CameraDelay(kind="camera_delay", probability=1.0, magnitude_s=0.2))
+    assert late.total_s == pytest.approx(begin().total_s + 0.2)
+    assert begin(schedule=ChunkDrop(kind="chunk_drop", probability=1.0)).dropped
+
+
+def test_the_journal_of_a_rollout_is_named_by_its_start(make_fixture):
+    fixture = make_fixture(perturbation="storm")
+    journal = fixture.journal(3, "f" * 64)
+    assert journal.session == "scripted/storm/3"
+    assert journal.session != fixture.journal(4, "f" * 64).session
+
+
+def test_tallies_share_nothing():
+    one, other = Tally(), Tally()
+    one.rejected_by["finite"] = 1
+    one.latencies_s.append(0.1)
+    assert other.rejected_by == {} and other.latencies_s == []

@@ -1,0 +1,55 @@
+"""Numbers on which all is well, the same with one thing wrong, and limits that can be moved."""
+
+from dataclasses import replace
+
+from gates.cause import Cause, CauseLimits, default_limits, name_cause
+from gates.cause.numbers import Counts, Finding, Kept, Labels, Mode, Numbers, Stratum
+from genpolicy.audit.settings import AuditSettings
+
+LIMITS = default_limits()
+
+
+def named(numbers: Numbers, limits: CauseLimits = LIMITS, draws=()) -> Cause:
+    return name_cause(numbers, draws, limits)
+
+
+def limit(**changes: float) -> CauseLimits:
+    found = dict(LIMITS.by_question)
+    for question, value in changes.items():
+        found[question] = replace(found[question], limit=value)
+    return CauseLimits(found)
+
+
+STRATUM = Stratum("operator", "approach", 0.9, 0.05, 0.0, 100, True, False, "")
+
+
+HIDDEN = replace(STRATUM, p_adjusted=0.001, effect=0.8, effect_lower=0.6)
+
+
+VALID = Numbers(
+    findings=(), floors=AuditSettings().floors, metre=1.0, unit="m",
+    labels=Labels(60, 0, 0.06),
+    counts=Counts(200, 180, 50, 120, 45, 50, 0, 0, 110, 0.1, 0.01),
+    kept=Kept(0.95, 0.6, 118), strata=(STRATUM,),
+    modes=(Mode("m0", 40, 40, 0.91, 50, 50), Mode("m1", 40, 39, 0.87, 48, 50)),
+)  # fmt: skip
+
+
+OFFSET = Finding("clock", "robot", "epoch e1", "clock_residual_s", 0.05, "s", "Correct it.")
+
+
+def counts(**changes) -> Numbers:
+    return replace(VALID, counts=replace(VALID.counts, **changes))
+
+
+BROKEN = {
+    "data": (replace(VALID, findings=(OFFSET,)), "data_defect", "clock"),
+    "labels": (replace(VALID, labels=Labels(60, 12, 0.32)), "label_contamination", "replay"),
+    "support": (counts(analysed_episodes=19), "insufficient_support", "neighbourhoods"),
+    "structure": (counts(two_mode_episodes=9), "unimodal", ""),
+    "hidden": (replace(VALID, strata=(HIDDEN,)), "hidden_state", "stratum"),
+    "validity": (
+        replace(VALID, modes=(VALID.modes[0], replace(VALID.modes[1], success_lower=0.69))),
+        "unimodal", "one_valid_mode",
+    ),
+}  # fmt: skip

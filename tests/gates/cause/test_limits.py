@@ -1,0 +1,94 @@
+"""Limits of the cause: complete, with reasons, packaged as the ladder has them."""
+
+import json
+import math
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import yaml
+from planted import BROKEN, LIMITS, OFFSET, VALID, counts, limit, named
+
+from gates.cause import CauseLimits, CauseName, limits_of
+from gates.cause.limits import OWN, SHARED
+from gates.need.gate import read_cause_limits
+from genpolicy.audit.settings import AuditSettings
+from genpolicy.errors import ConfigError
+
+ROOT = Path(__file__).parents[3]
+
+
+@pytest.mark.parametrize("question", sorted(AuditSettings().floors))
+def test_a_limit_below_what_the_audit_looked_for_is_refused(question):
+    below = 0.5 * AuditSettings().floors[question]
+    with pytest.raises(ConfigError, match=rf"limit of {question} is .*, expected at least"):
+        named(VALID, limit(**{question: below}))
+
+
+def test_every_deviation_above_zero_that_is_looked_for_has_a_floor():
+    # A finding is made beyond its floor only: without one a lower limit would be without effect.
+    zero = {"clock_disorder", "swapped_columns"}
+    assert all(LIMITS[question] == 0 for question in zero)
+    assert set(AuditSettings().floors) >= _of_findings() - zero
+
+
+class Watched(CauseLimits):
+    """Notes which limits are asked for."""
+
+    def __getitem__(self, question: str) -> float:
+        ASKED.add(question)
+        return super().__getitem__(question)
+
+
+ASKED: set[str] = set()
+
+
+def _of_findings() -> set[str]:
+    """Questions that the layer of data semantics reports a deviation for."""
+    sources = (ROOT / "genpolicy/audit/semantics").glob("*.py")
+    words = set(re.findall(r'"(\w+)"', "".join(path.read_text() for path in sources)))
+    return words & {*SHARED, *OWN}
+
+
+def test_every_limit_is_asked_for_and_every_finding_has_one():
+    watched = Watched(LIMITS.by_question)
+    others = (counts(two_mode_episodes=0), counts(two_mode_episodes=0, noise_ratio=0.9))
+    for numbers in (VALID, *others, *(item[0] for item in BROKEN.values())):
+        named(numbers, watched)
+    of_findings = _of_findings()
+    assert {"clock_disorder", "gain_epoch_factor", "calibration_residual_m"} <= of_findings
+    assert ASKED | of_findings == {*SHARED, *OWN}
+
+
+def test_the_packaged_limits_are_those_of_the_ladder():
+    ladder = read_cause_limits(ROOT / "params.yaml")
+    assert ladder == LIMITS
+    assert not set(SHARED) & set(OWN)
+
+
+@pytest.mark.parametrize(
+    ("cause", "match"),
+    [({"model": {"noise": [1, "x"]}}, "a limit of no question"),
+     ({"nobody": {}}, "no owner"), ({"model": {"noise_ratio": [1, ""]}}, "a number and a sentence"),
+     ({"model": {"noise_ratio": [math.nan, "x"]}}, "a number and a sentence"),
+     ({}, "missing"), (None, "NoneType")],
+)  # fmt: skip
+def test_a_limit_without_reason_or_question_is_refused(cause, match):
+    with pytest.raises(ConfigError, match=match):
+        limits_of(cause, {}, where="params.yaml: gate_a.cause")
+
+
+def test_a_shared_question_that_does_not_apply_turns_nothing_red_and_is_written_as_such(tmp_path):
+    params = yaml.safe_load((ROOT / "params.yaml").read_text())
+    del params["gate_a"]["limits"]["perception"]["clock_residual_s"]
+    params["gate_a"]["not_applicable"] = {"perception": {"clock_residual_s": "one clock only"}}
+    path = tmp_path / "params.yaml"
+    path.write_text(yaml.safe_dump(params))
+    limits = read_cause_limits(path)
+    late = replace(VALID, findings=(OFFSET,))
+    assert named(late).name is CauseName.DATA_DEFECT
+    assert named(late, limits).name is CauseName.VALID_MODES
+    written = limits.as_json()["perception"]["clock_residual_s"]
+    assert written == ["not applicable", "one clock only"]
+    json.dumps([answer.as_json() for answer in named(late, limits).answers], allow_nan=False)

@@ -1,0 +1,59 @@
+"""The cause from numbers alone: first red layer first, one limit each, NaN never holds."""
+
+import json
+from dataclasses import replace
+
+import pytest
+from planted import BROKEN, OFFSET, VALID, counts, limit, named
+
+from gates.cause import (
+    CauseName,
+    Layer,
+)
+from gates.cause.numbers import Kept, Labels
+
+
+def test_all_green_is_valid_modes():
+    cause = named(VALID)
+    assert (cause.name, cause.layer, cause.text) == ("valid_modes", Layer.NONE, "valid_modes")
+    assert all(answer.holds for answer in cause.answers)
+    assert json.loads(json.dumps([a.as_json() for a in cause.answers]))
+
+
+def test_an_earlier_red_layer_is_believed_before_a_later_one():
+    both = replace(BROKEN["hidden"][0], findings=(OFFSET,))
+    assert named(both).name is CauseName.DATA_DEFECT
+    # Below its limit the offset is no fault, and the next red layer decides.
+    assert named(both, limit(clock_residual_s=0.05)).name is CauseName.HIDDEN_STATE
+
+
+@pytest.mark.parametrize(
+    ("numbers", "kind"),
+    [(counts(analysed=99), "neighbourhoods"), (counts(queries=2000), "neighbourhoods"),
+     (replace(VALID, kept=Kept(0.95, 0.6, 29)), "persistence"),
+     (counts(persistent=29), "persistence"),
+     (counts(two_mode_episodes=0, queries=500), "neighbourhoods"),
+     (replace(VALID, labels=Labels(10, 0, 0.31)), "replay"),
+     (replace(VALID, modes=VALID.modes[:1]), "linking")],
+)  # fmt: skip
+def test_too_little_is_said_to_be_too_little(numbers, kind):
+    cause = named(numbers)
+    assert (cause.name, cause.kind) == (CauseName.INSUFFICIENT_SUPPORT, kind)
+
+
+def test_clusters_that_do_not_persist_and_white_spread_are_noise():
+    fading = replace(VALID, kept=Kept(0.65, 0.6, 118))
+    assert named(fading).name is CauseName.POINTWISE_NOISE
+    assert named(fading, limit(persistence_margin=0.04)).name is CauseName.VALID_MODES
+    white = counts(two_mode_episodes=0, noise_ratio=0.9)
+    assert named(white).name is CauseName.POINTWISE_NOISE
+    quiet = counts(two_mode_episodes=0, noise_ratio=0.9, noise_spread=0.001)
+    assert named(quiet).name is CauseName.UNIMODAL
+    # In pixels a metre is a thousand of them, and a spread of a hundredth of one is nothing.
+    assert named(replace(white, metre=1000.0)).name is CauseName.UNIMODAL
+
+
+def test_confidence_is_the_share_of_draws_that_name_the_same():
+    draws = [VALID] * 3 + [BROKEN["hidden"][0]]
+    assert named(VALID, draws=draws).confidence == 0.75
+    assert named(VALID).confidence is None

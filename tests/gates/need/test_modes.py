@@ -1,0 +1,73 @@
+"""Modes: only held-out situations count, bounds are exact, what was not checked is missing."""
+
+import evidence
+import pytest
+from asked import asked, settings_of
+from editing import cells
+
+from gates.evidence import MissingEvidenceError
+from gates.need import modes
+from genpolicy.statistics.intervals import clopper_pearson
+
+SITUATIONS = "audit/neighbourhoods.parquet"
+
+
+def value(ladder, criterion):
+    return asked(ladder, criterion, gate="A").value
+
+
+def test_situations_of_training_episodes_do_not_count(ladder):
+    everything = value(ladder, modes.held_out_situations)
+    assert value(ladder, modes.multimodal_situations) == everything > 0
+    first = lambda frame: frame["split"] == "validation"  # noqa: E731
+    evidence.edit_table(ladder, SITUATIONS, cells("split", "train", where=first))
+    left = value(ladder, modes.held_out_situations)
+    assert 0 < left < everything
+
+
+@pytest.mark.parametrize("column", ["two_mode", "persistent"])
+def test_a_situation_needs_two_modes_that_persist(ladder, column):
+    test = lambda frame: frame["split"] == "test"  # noqa: E731
+    before = value(ladder, modes.multimodal_situations)
+    evidence.edit_table(ladder, SITUATIONS, cells(column, False, where=test))
+    assert 0 < value(ladder, modes.multimodal_situations) < before
+    assert value(ladder, modes.held_out_situations) == before
+
+
+def test_the_worst_mode_decides_by_its_exact_lower_bound(ladder):
+    def change(frame):
+        return frame.assign(episodes=40, successes=[40] * (len(frame) - 1) + [30],
+                            checked=50, admissible=[50] * (len(frame) - 1) + [45])  # fmt: skip
+
+    evidence.edit_table(ladder, "audit/modes.parquet", change)
+    confidence = settings_of(ladder, "A").confidence
+    assert value(ladder, modes.mode_success_lower) == clopper_pearson(30, 40, confidence)[0]
+    assert value(ladder, modes.mode_feasible_share) == 0.9
+
+
+def test_a_mode_without_a_checked_chunk_is_missing_evidence(ladder):
+    evidence.edit_table(ladder, "audit/modes.parquet", cells("checked", 0, share=0.01))
+    with pytest.raises(MissingEvidenceError, match="no checked chunk"):
+        value(ladder, modes.mode_feasible_share)
+
+
+def test_persistence_counts_beyond_its_null(ladder):
+    evidence.edit_document(
+        ladder, "audit/persistence.json", lambda d: {**d, "observed": 0.9, "null_q95": 0.65}
+    )
+    assert value(ladder, modes.persistence_margin) == pytest.approx(0.25)
+
+
+def test_the_mean_is_defeated_only_where_every_mode_passes(ladder):
+    whole = value(ladder, modes.mean_defeated_share)
+    evidence.edit_table(ladder, SITUATIONS, cells("modes_admissible", 1))
+    assert value(ladder, modes.mean_defeated_share) == 0.0 < whole
+    evidence.edit_table(ladder, SITUATIONS, cells("mean_admissible", None, share=1.0))
+    with pytest.raises(MissingEvidenceError, match="the mean was not checked"):
+        value(ladder, modes.mean_defeated_share)
+
+
+def test_one_mode_alone_shows_no_benefit_for_recovery(ladder):
+    evidence.edit_table(ladder, "audit/recovery.parquet", lambda f: f.assign(mode="m0"))
+    found = asked(ladder, modes.recovery_benefit, gate="A")
+    assert found.value == 0.0 and "no comparison" in found.caveat

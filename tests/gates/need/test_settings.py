@@ -1,0 +1,25 @@
+"""Settings of Gate A: the level of the strata is that of the cause, numbers have one home."""
+
+import evidence
+from asked import settings_of
+
+
+def test_the_level_of_the_strata_has_one_home(ladder):
+    def lower(params):
+        for questions in params["gate_a"]["cause"].values():
+            if "strata_p" in questions:
+                questions["strata_p"][0] = 0.01
+
+    evidence.write_params(ladder, lower)
+    assert settings_of(ladder, "A").strata_level == 0.01
+
+
+def test_without_a_level_no_stratum_is_significant(ladder):
+    settings = settings_of(ladder, "A").model_copy(update={"cause": {"model": {}}})
+    assert settings.strata_level == 0.0
+
+
+def test_the_ladder_s_baselines_and_latent_are_read_from_their_homes(ladder):
+    settings = settings_of(ladder, "A")
+    assert set(settings.baselines) == {*evidence.BASELINES, evidence.DRAWN}
+    assert settings.latent_baseline == "act" and settings.confidence == 0.95

@@ -1,0 +1,71 @@
+"""Pages: whole, offline, escaped."""
+
+import html
+import json
+import re
+import shutil
+
+import evidence
+import pytest
+
+from gates.pages.summary import markdown
+from gates.report import report_path
+from gates.writing import write_gate
+
+EVIL = '<script>alert("x")</script>'
+
+
+@pytest.fixture(scope="module")
+def pages(tmp_path_factory, _ladder):
+    root = tmp_path_factory.mktemp("pages") / "repo"
+    shutil.copytree(_ladder, root)
+    for gate in "ABCDE":
+        write_gate(root, gate)
+    return root
+
+
+def _page(root, gate):
+    return (root / f"reports/gate_{gate.lower()}.html").read_text()
+
+
+@pytest.mark.parametrize("gate", "ABCDE")
+def test_the_page_is_offline_small_and_whole(pages, gate):
+    text = _page(pages, gate)
+    assert "http:" not in text.replace("http-equiv", "") and "https:" not in text
+    assert "<script" not in text and "xlink" not in text
+    assert "default-src 'none'" in text
+    assert len(text.encode()) < 2_000_000
+    assert "Not drawn" not in text
+    report = json.loads((pages / report_path(gate)).read_bytes())
+    assert all(
+        html.escape(c, quote=False) in html.unescape(text).replace("&", "&amp;")
+        or c in html.unescape(text)
+        for c in report["caveats"]
+    )
+    assert text.index(report["verdict"].replace("_", " ")) < text.index("<h2>Criteria</h2>")
+
+
+def test_the_front_page_names_every_gate(pages):
+    text = (pages / "reports/index.html").read_text()
+    for gate in "ABCDE":
+        assert f"gate_{gate.lower()}.html" in text
+    assert "PENDING REVIEW" in text and "http:" not in text.replace("http-equiv", "")
+
+
+def test_names_cannot_break_out_of_page_figure_or_table(ladder):
+    for name in ("audit/modes.parquet", "audit/recovery.parquet"):
+        evidence.edit_table(ladder, name, lambda f: f.assign(mode=EVIL + f["mode"] + "|@all"))
+    report = write_gate(ladder, "A")
+    text = _page(ladder, "A")
+    assert "<script" not in text and "&lt;script&gt;" in text
+    lines = markdown(report).splitlines()
+    assert not any("<script" in line or "@all" in line for line in lines)
+    widths = {len(re.findall(r"(?<!\\)\|", line)) for line in lines if line.startswith("| ")}
+    assert widths == {8}
+
+
+def test_a_missing_table_is_said_in_place_of_its_figure(ladder):
+    (ladder / "artifacts/audit/strata.parquet").unlink()
+    report = write_gate(ladder, "A")
+    assert report.verdict == "INCONCLUSIVE"
+    assert "Not drawn: artifacts/audit/strata.parquet is missing." in _page(ladder, "A")

@@ -1,0 +1,65 @@
+"""Rollouts of the comparison: every planned condition and start, or no verdict."""
+
+import evidence
+import pandas as pd
+import pytest
+from asked import settings_of
+from editing import cells
+
+from gates.evidence import Evidence, MissingEvidenceError
+from gates.stress.rollouts import rollouts, success_lower
+from genpolicy.statistics.intervals import clopper_pearson
+
+TABLE = "stress/rollouts.parquet"
+
+
+def of(root, method="flow"):
+    return rollouts(Evidence(root), settings_of(root, "D"), method)
+
+
+def test_all_planned_conditions_of_one_method_and_no_others(ladder):
+    evidence.edit_table(
+        ladder, TABLE, lambda f: pd.concat([f, f[:10].assign(method="flow", perturbation="storm")])
+    )
+    rows = of(ladder)
+    assert len(rows) == evidence.STARTS * len(evidence.CONDITIONS)
+    assert set(rows["method"]) == {"flow"} and set(rows["perturbation"]) == set(evidence.CONDITIONS)
+
+
+def test_a_condition_that_was_not_met_is_named(ladder):
+    evidence.edit_table(ladder, TABLE, lambda f: f[f["perturbation"] != "camera_delay"])
+    with pytest.raises(MissingEvidenceError, match="flow did not meet camera_delay"):
+        of(ladder)
+
+
+def test_one_start_less_in_one_condition_is_named(ladder):
+    def less(frame):
+        gone = (frame["perturbation"] == "camera_delay") & (frame["start"] == 3)
+        return frame[~gone]
+
+    evidence.edit_table(ladder, TABLE, less)
+    with pytest.raises(MissingEvidenceError, match="39 starts in camera_delay, planned 40"):
+        of(ladder)
+
+
+def test_the_lowest_bound_over_the_conditions_decides_and_the_starts_are_the_trials(ladder):
+    settings = settings_of(ladder, "D")
+
+    def spoil(frame):
+        hit = (frame["perturbation"] == "camera_delay") & (frame["method"] == "flow")
+        ten = hit & (frame["start"] < 30)
+        return frame.assign(success=(frame["success"] | hit) & ~ten)
+
+    evidence.edit_table(ladder, TABLE, spoil)
+    found = success_lower(Evidence(ladder), settings, "flow", evidence.CONDITIONS)
+    assert (found.value, found.interval[1]) == clopper_pearson(10, 40, settings.confidence)
+    assert found.caveat.startswith("camera_delay: share 0.25")
+    undisturbed = success_lower(Evidence(ladder), settings, "flow", ("nominal",))
+    assert undisturbed.value > found.value
+
+
+def test_a_rollout_without_outcome_is_missing_evidence(ladder):
+    first = lambda frame: (frame["method"] == "flow") & (frame["start"] == 0)  # noqa: E731
+    evidence.edit_table(ladder, TABLE, cells("success", None, where=first))
+    with pytest.raises(MissingEvidenceError, match="no outcome"):
+        success_lower(Evidence(ladder), settings_of(ladder, "D"), "flow", ("nominal",))

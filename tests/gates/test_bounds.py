@@ -1,0 +1,54 @@
+"""Bounds over clusters: rounded to the unfavourable side, and nothing is no share."""
+
+import numpy as np
+import pytest
+
+from gates.bounds import counted_interval, share_interval, upper_quantile
+from gates.evidence import MissingEvidenceError
+from genpolicy.statistics.intervals import clopper_pearson
+
+
+def share(hits, clusters, favourable):
+    return share_interval(np.array(hits), clusters, confidence=0.95, favourable=favourable)
+
+
+def test_the_trials_are_the_clusters_and_not_the_rows():
+    hits = [True] * 30 + [False] * 10
+    found = share(hits, list("aabb" * 10), favourable=True)
+    assert found == (0.75, *clopper_pearson(1, 2, 0.95))
+    alone = share(hits, [str(n) for n in range(40)], favourable=True)
+    assert alone == (0.75, *clopper_pearson(30, 40, 0.95))
+
+
+def test_a_count_between_two_is_rounded_to_the_unfavourable_side():
+    hits, clusters = [True, True, False, False], ["a", "a", "b", "c"]
+    assert share(hits, clusters, favourable=True)[1:] == clopper_pearson(1, 3, 0.95)
+    assert share(hits, clusters, favourable=False)[1:] == clopper_pearson(2, 3, 0.95)
+
+
+def test_rounding_noise_does_not_cost_a_trial():
+    # 0.1 + 0.2 in floating point is a little more than 0.3.
+    hits = [0.1 + 0.2] * 10
+    clusters = [str(n) for n in range(10)]
+    for favourable in (True, False):
+        assert share(hits, clusters, favourable)[1:] == clopper_pearson(3, 10, 0.95)
+
+
+@pytest.mark.parametrize(("hits", "trials"), [(0, 0), (3, 2), (-1, 2), (float("nan"), 2)])
+def test_counts_that_cannot_be_are_missing_evidence(hits, trials):
+    with pytest.raises(MissingEvidenceError, match="is no share"):
+        counted_interval(hits, trials, confidence=0.95)
+
+
+def test_no_rows_are_missing_evidence():
+    with pytest.raises(MissingEvidenceError):
+        share([], [], favourable=True)
+    with pytest.raises(MissingEvidenceError):
+        upper_quantile(np.zeros(0), 0.95, confidence=0.95)
+
+
+def test_a_quantile_is_a_value_that_occurred_and_few_values_have_no_interval():
+    values = np.arange(1.0, 11.0)
+    assert upper_quantile(values, 0.95, confidence=0.95) == (10.0, None)
+    point, interval = upper_quantile(np.arange(1000.0), 0.95, confidence=0.95)
+    assert point in np.arange(1000.0) and interval[0] < point < interval[1]

@@ -1,0 +1,26 @@
+"""Audits of planted causes, and their evidence."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(0, str(Path(__file__).parents[2] / "audit"))
+
+
+@pytest.fixture(scope="session")
+def audits(tmp_path_factory):
+    """Folder of the evidence by name of the case."""
+    from audited_cases import CASES
+    from planar import SETTINGS, audited
+
+    from genpolicy.audit.evidence import write_evidence
+
+    made = {}
+    for name, options in CASES.items():
+        made[name] = tmp_path_factory.mktemp(name)
+        obstacles = [{"x_m": 0.15, "y_m": 0.0, "radius_m": 0.04}]
+        result = audited(seed_of_audit=1, **options)
+        write_evidence(result, made[name], settings=SETTINGS, obstacles=obstacles)
+    return made

@@ -1,0 +1,113 @@
+"""The checker's own picture of the present: each objection alone, and stops that stay."""
+
+import pytest
+
+from genpolicy.verification.world_view import WorldView
+
+MS = 1_000_000
+SETTINGS = {"maximum_age_ns": {"approach": 600 * MS}}
+CHUNK = {
+    "condition_ns": 1000 * MS, "phase": "approach", "calibration_epoch": "e1",
+    "checkpoint": "w", "sampler": "s", "session_epoch": 0, "source": "policy",
+}  # fmt: skip
+
+
+def observed(view, t_ms, phase="approach", epoch="e1", used=True, event_ms=None):
+    event_ms = t_ms if event_ms is None else event_ms
+    return list(view.follow("observation", {
+        "t": t_ms * MS, "event_time_ns": event_ms * MS, "used": used, "phase": phase,
+        "calibration_epoch": epoch,
+    }))  # fmt: skip
+
+
+@pytest.fixture
+def view():
+    made = WorldView()
+    made.fallback_hash = "f"
+    assert list(made.follow("active", {"checkpoint": "w", "sampler": "s"})) == []
+    assert observed(made, 1000) == []
+    return made
+
+
+def rules(view, t_ms=1200, kind="accept", **changes):
+    return [rule for rule, _ in view.objections({**CHUNK, **changes}, kind, t_ms * MS, SETTINGS)]
+
+
+def test_a_chunk_in_order_meets_no_objection_up_to_its_age(view):
+    assert rules(view) == [] and rules(view, t_ms=1600) == []
+    assert rules(view, t_ms=1601) == ["P1.age"]
+
+
+@pytest.mark.parametrize(
+    ("change", "rule"),
+    [
+        ({"condition_ns": 1001 * MS}, "P1.future"), ({"phase": "insert"}, "P1.phase"),
+        ({"calibration_epoch": "e2"}, "P1.calibration"), ({"checkpoint": "x"}, "P1.checkpoint"),
+        ({"sampler": "x"}, "P1.sampler"), ({"session_epoch": 1}, "P1.session"),
+        ({"source": "fallback"}, "P1.state"),
+    ],
+)  # fmt: skip
+def test_each_difference_has_its_own_rule(view, change, rule):
+    assert rules(view, **change) == [rule]
+
+
+def test_a_phase_without_an_age_accepts_nothing(view):
+    observed(view, 1050, phase="insert")
+    fresh = {"phase": "insert", "condition_ns": 1050 * MS}
+    assert rules(view, t_ms=1050, **fresh) == ["P1.age"]
+
+
+def test_a_change_of_phase_voids_what_was_seen_before(view):
+    observed(view, 1100, phase="insert")
+    observed(view, 1150, phase="approach")
+    assert rules(view) == ["P1.void"]
+    assert rules(view, condition_ns=1150 * MS) == []
+
+
+def test_an_older_observation_is_used_by_nobody(view):
+    assert observed(view, 1100, phase="insert", event_ms=900, used=False) == []
+    assert view.phase == "approach"
+    ((rule, _),) = observed(view, 1200, event_ms=900, used=True)
+    assert rule == "journal.observation"
+
+
+def test_a_stop_stays_until_a_person_clears_it(view):
+    def supervise(event, state, detail=""):
+        message = {"event": event, "state": state, "detail": detail, "t": 1100 * MS}
+        return [rule for rule, _ in view.follow("supervisor", message)]
+
+    assert supervise("force", "protective_stop") == []
+    assert "P7.stop" in rules(view)
+    assert supervise("watchdog", "run") == ["P7.sticky"]
+    assert supervise("force", "protective_stop") == []
+    assert supervise("human_reset", "run", " ") == ["P7.reset"]
+    assert rules(view) == ["P1.void"]  # seen before the stop
+    observed(view, 1150)
+    assert rules(view, condition_ns=1150 * MS) == []
+
+
+def test_modes_are_left_as_they_were_entered_and_the_fallback_has_its_own_weights(view):
+    assert list(view.follow("mode", {"old": "run", "new": "fallback", "t": 1100 * MS})) == []
+    own = {"source": "fallback", "checkpoint": "f", "sampler": "f"}
+    assert rules(view, kind="fallback", **own) == [] and "P1.state" in rules(view)
+    ((rule, _),) = view.follow("mode", {"old": "run", "new": "run", "t": 1150 * MS})
+    assert rule == "journal.mode"
+
+
+def test_session_epochs_only_grow_and_a_reset_forgets(view):
+    assert list(view.follow("reset", {"session_epoch": 1, "t": 1100 * MS})) == []
+    assert rules(view, session_epoch=1) == ["P1.future", "P1.void"]
+    ((rule, _),) = view.follow("reset", {"session_epoch": 1, "t": 1200 * MS})
+    assert rule == "P3.session"
+
+
+@pytest.mark.parametrize(
+    ("kind", "message", "rule"),
+    [
+        ("gossip", {}, "journal.kind"),
+        ("phase", {"new": "insert"}, "journal.phase"),
+        ("epoch", {"new": "e2"}, "journal.epoch"),
+    ],
+)
+def test_events_that_contradict_what_was_observed_are_named(view, kind, message, rule):
+    assert [found for found, _ in view.follow(kind, message)] == [rule]
