@@ -35,7 +35,7 @@ def test_an_epoch_that_is_late_by_a_row_is_named_at_any_rate_and_in_any_unit(rat
     found = measure(late(data, 1.0, last_epoch(data)), SETTINGS)
     assert found.findings[0].kind == "clock" and "epoch e" in found.findings[0].where
     offsets = {clock.epoch: clock.offset_before_s for clock in found.clocks}
-    assert offsets["epoch_2"] - offsets["epoch_1"] == pytest.approx(1 / rate_hz, abs=0.2 / rate_hz)
+    assert offsets["e1"] - offsets["e0"] == pytest.approx(1 / rate_hz, abs=0.2 / rate_hz)
 
 
 def test_one_late_episode_is_no_defect_of_the_data_set():
