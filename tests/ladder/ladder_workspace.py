@@ -31,6 +31,12 @@ DROPPED = {
     ),
 }  # fmt: skip
 
+LEFT_ALONE = {
+    "energy_head": {"name": "derivative_free", "steps": 16, "population": 64},
+    "single_action": {"name": "direct"},
+}
+"""Samplers of variants whose baseline is dropped: they can take none from it."""
+
 
 def make_small_ladder(target: Path) -> Path:
     """The checkout as a workspace with few of everything, and limits that nothing breaks."""
@@ -54,6 +60,8 @@ def make_small_ladder(target: Path) -> Path:
             for place in places:
                 name, key = place.split(".")
                 del params[section][name][key]
+        for name, sampler in LEFT_ALONE.items():
+            params["train_factors"]["variants"][name]["sampler"] = sampler
 
     edit_params(target, drop)
     return target
