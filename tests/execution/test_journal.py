@@ -3,7 +3,6 @@
 import io
 import json
 import math
-import time
 
 import numpy as np
 import pytest
@@ -94,12 +93,3 @@ def test_damage_is_refused(tmp_path):
 def test_time_never_goes_back_within_a_session():
     journal = Journal("s")
     assert [journal.clock(t) for t in (1.0, 0.5, 2.0)] == [10**9, 10**9, 2 * 10**9]
-
-
-def test_collecting_is_fast_enough():
-    """Target 100 000 events/s; the bound is a third of it because the machine is shared."""
-    journal = Journal("s")
-    begin = time.perf_counter()
-    for n in range(30_000):
-        journal.add("hold", n, {"reason": "empty"})
-    assert 30_000 / (time.perf_counter() - begin) > 33_000
