@@ -221,7 +221,7 @@ def test_an_empty_threshold_set_passes_nothing(copy: Path, gate: str, stage: str
     outcome, ran = repro(copy, stage)
     assert (outcome.code, outcome.stage) == (3, stage)
     assert ran == [gate, stage]
-    assert "required a threshold in params.yaml" in outcome.sentence, outcome.sentence
+    assert "required a limit in params.yaml" in outcome.sentence, outcome.sentence
     assert not (copy / "artifacts" / stage).exists()
     report = json.loads((copy / "reports" / f"{gate}.json").read_text())
     assert report["verdict"] == "INCONCLUSIVE"
