@@ -34,7 +34,8 @@ def test_everything_that_is_required_is_pinned_exactly() -> None:
 
 
 def test_the_environment_is_the_one_that_is_pinned() -> None:
-    own = {"genpolicy", "pip"}
+    # The foreign task of the tests is on the path once a test of this process has asked for it.
+    own = {"genpolicy", "pip", "ring-cell"}
     installed = doctor.installed_versions()
     wrong = {n: (installed[n], v) for n, v in pinned().items() if installed.get(n, v) != v}
     assert wrong == {}
