@@ -28,7 +28,7 @@ from gates.report import (
 from gates.settings import GateSettings, Limit, Limits, read_limits, read_params, read_settings
 from gates.verdicts import combine, first_unmet, judge_criterion, rounded
 from genpolicy.errors import IntegrityError
-from genpolicy.integrity.hashing import sha256_bytes_of, sha256_file
+from genpolicy.integrity.hashing import sha256_bytes_of
 
 TASK_IDENTITY = "artifacts/task/identity.json"
 """What the task is, by hash: material of every gate."""
@@ -101,26 +101,7 @@ def judge_gate(spec: GateSpec, root: Path) -> GateReport:
     caveats: Sequence[str] = ()
     if spec.below is not None:
         names, caveats = promoted_below(root, spec.below, getattr(settings, "candidates", ()))
-    report = judge(spec, Evidence(root), limits, settings, candidates=names, caveats=caveats)
-    return about_a_task(root, report)
-
-
-def about_a_task(root: Path, report: GateReport) -> GateReport:
-    """The report with the identity of the task among its materials; without one nothing passes."""
-    found = {name: sha256_file(root / name) for name in (TASK_IDENTITY,) if (root / name).is_file()}
-    if found or report.verdict != "PASS":
-        return report.model_copy(
-            update={"materials": dict(sorted({**report.materials, **found}.items()))}
-        )
-    caveat = f"{TASK_IDENTITY} is missing: nobody wrote which task this is about."
-    return report.model_copy(
-        update={
-            "verdict": "INCONCLUSIVE",
-            "promoted": None,
-            "caveats": (*report.caveats, caveat),
-            "decision": "No decision: run `dvc repro task`, then judge again.",
-        }
-    )
+    return judge(spec, Evidence(root), limits, settings, candidates=names, caveats=caveats)
 
 
 def judge(
@@ -158,6 +139,9 @@ def judge(
             answers.append(_answer(item, evidence, inputs, limit, name))
     verdict, verdicts = combine(answers, expects_candidates=spec.below is not None)
     evidence.bind(*spec.bind)
+    if not evidence.bind(TASK_IDENTITY) and verdict == "PASS":
+        verdict = "INCONCLUSIVE"
+        caveats = (*caveats, f"{TASK_IDENTITY} is missing: nobody wrote which task this is about.")
     judged = Judged(evidence, inputs, tuple(answers), verdict, verdicts)
     decision = (spec.decide or _decision(spec))(judged)
     note = spec.note(judged) if spec.note else ""
@@ -226,7 +210,7 @@ def _diagnosis(spec: GateSpec, judged: Judged) -> str:
     """The first unmet criterion in order of diagnosis, and where to look."""
     decided = first_unmet(judged.answers, judged.verdict)
     if decided is None:
-        lacking = "Nothing was judged: criteria or limits lack."
+        lacking = "No criterion decided: criteria, limits or the task's identity lack."
         return "" if judged.verdict == "PASS" else lacking
     of = f" of {decided.candidate}" if decided.candidate else ""
     why = f" ({decided.caveat})" if decided.measured is None and decided.caveat else ""

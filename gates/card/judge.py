@@ -34,7 +34,7 @@ from gates.card.signing import (
     utc_today,
 )
 from gates.criterion import Measured, criteria_of, criterion
-from gates.engine import GateSpec, about_a_task, judge
+from gates.engine import GateSpec, judge
 from gates.evidence import Evidence, MissingEvidenceError
 from gates.report import OWNERS, Gate, GateReport, Point, stage_of
 from gates.settings import GateSettings, read_limits, read_params, read_settings
@@ -133,7 +133,7 @@ def judge_card(root: Path, chain: Chain, *, today: datetime.date | None = None) 
     error = chain.error or _chain_error(root, chain, papers.draft)
     dossier = Dossier(settings, papers, error, today or utc_today())
     limits = read_limits(params, "E", GATE.criteria)
-    return about_a_task(root, judge(GATE, Evidence(root), limits, settings, given=dossier))
+    return judge(GATE, Evidence(root), limits, settings, given=dossier)
 
 
 def examine(root: Path, name: str) -> Papers:

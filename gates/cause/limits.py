@@ -11,6 +11,7 @@ from importlib.resources import files
 from math import isfinite
 from typing import Any
 
+from gates.report import OWNERS
 from genpolicy.errors import ConfigError
 from genpolicy.integrity.documents import parse_yaml
 
@@ -33,7 +34,6 @@ OWN = (
 )  # fmt: skip
 """Questions that only the cause asks."""
 NOT_APPLICABLE = "not applicable"
-OWNERS = ("model", "perception", "controller", "safety")
 
 
 @dataclass(frozen=True)

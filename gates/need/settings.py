@@ -6,6 +6,7 @@ from typing import ClassVar
 from pydantic import Field
 
 from gates.settings import GateSettings
+from genpolicy.errors import ConfigError
 
 AUDIT = "artifacts/audit"
 TRAINED = "artifacts/train_baselines"
@@ -55,7 +56,12 @@ class NeedSettings(GateSettings):
     @property
     def strata_level(self) -> float:
         """Adjusted p-value at which a stratum explains modes; the cause asks by the same limit."""
-        found = [
-            questions["strata_p"][0] for questions in self.cause.values() if "strata_p" in questions
-        ]
-        return found[0] if found else 0.0
+        for questions in self.cause.values():
+            if "strata_p" in questions:
+                return questions["strata_p"][0]
+        raise ConfigError(
+            where="params.yaml: gate_a.cause.strata_p",
+            found="missing",
+            expected="a limit, a reason and an owner",
+            action="Add it; without a level no stratum would ever explain modes.",
+        )

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from editing import cells
 
+from gates.engine import TASK_IDENTITY, promoted_below
 from gates.engine import judge as judge_spec
-from gates.engine import promoted_below
 from gates.evidence import Evidence
 from gates.proof import SPECS, judge
 from gates.report import report_bytes, report_path
@@ -359,6 +359,16 @@ def test_empty_table_is_inconclusive_never_pass(gate, path, ladder):
 def test_nan_is_inconclusive_never_pass(gate, path, column, ladder):
     evidence.edit_table(ladder, f"{path}.parquet", cells(column, float("nan")))
     assert judge(ladder, gate).verdict == "INCONCLUSIVE"
+
+
+@pytest.mark.parametrize("gate", "ABCD")
+def test_the_task_is_material_and_without_its_identity_nothing_passes(gate, ladder):
+    assert TASK_IDENTITY in judge(ladder, gate).materials
+    (ladder / TASK_IDENTITY).unlink()
+    report = judge(ladder, gate)
+    assert (report.verdict, report.promoted) == ("INCONCLUSIVE", None)
+    assert any(TASK_IDENTITY in caveat for caveat in report.caveats)
+    assert "identity" in report.diagnosis
 
 
 @pytest.mark.parametrize("gate", "ABCD")

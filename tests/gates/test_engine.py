@@ -5,7 +5,7 @@ import json
 import pytest
 from asking import SPEC
 
-from gates.engine import judge
+from gates.engine import TASK_IDENTITY, judge
 from gates.evidence import Evidence
 from gates.settings import GateSettings, Limit, Limits, Waiver
 
@@ -14,13 +14,15 @@ def _judge(tmp_path, a, b, **limits):
     (tmp_path / "a.json").write_text(json.dumps({"n": a}))
     (tmp_path / "b.json").write_text(json.dumps({"n": b}))
     (tmp_path / "c.json").write_text("{}")
+    (tmp_path / TASK_IDENTITY).parent.mkdir(parents=True, exist_ok=True)
+    (tmp_path / TASK_IDENTITY).write_text("{}")
     return judge(SPEC, Evidence(tmp_path), Limits(**limits), GateSettings())
 
 
 def test_evidence_is_what_was_read_and_materials_are_all(tmp_path):
     report = _judge(tmp_path, 1, 1)
     assert [answer.evidence for answer in report.criteria] == [("a.json",), ("a.json", "b.json")]
-    assert set(report.materials) == {"a.json", "b.json", "c.json"}
+    assert set(report.materials) == {"a.json", "b.json", "c.json", TASK_IDENTITY}
 
 
 def test_evidence_that_is_missing_is_named(tmp_path):

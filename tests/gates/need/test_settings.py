@@ -1,7 +1,10 @@
 """Settings of Gate A: the level of the strata is that of the cause, numbers have one home."""
 
 import evidence
+import pytest
 from asked import settings_of
+
+from genpolicy.errors import ConfigError
 
 
 def test_the_level_of_the_strata_has_one_home(ladder):
@@ -14,9 +17,10 @@ def test_the_level_of_the_strata_has_one_home(ladder):
     assert settings_of(ladder, "A").strata_level == 0.01
 
 
-def test_without_a_level_no_stratum_is_significant(ladder):
+def test_without_a_level_nothing_is_judged_rather_than_every_stratum_let_through(ladder):
     settings = settings_of(ladder, "A").model_copy(update={"cause": {"model": {}}})
-    assert settings.strata_level == 0.0
+    with pytest.raises(ConfigError, match=r"gate_a\.cause\.strata_p is missing"):
+        _ = settings.strata_level
 
 
 def test_the_ladder_s_baselines_and_latent_are_read_from_their_homes(ladder):
