@@ -145,6 +145,11 @@ class FeasibilityChecker(LayerChecker):
             for chunk, verdict, context in zip(projected, verdicts, contexts, strict=True)
         ]
 
+    def admit_as_it_is(self, proposal: Proposal, *, context: Context) -> Admitted | Rejected:
+        """Check and decide on a proposal without repairing anything in it."""
+        projected = Projected(proposal, proposal.actions, 0.0, 0.0)
+        return _decide(projected, self.check(projected, context=context), context.now_s)
+
 
 def _decide(projected: Projected, verdict: Verdict, now_s: float) -> Admitted | Rejected:
     if verdict.passed:

@@ -45,8 +45,11 @@ class _State:
 
     @property
     def computable(self) -> bool:
-        """The projected rows are numbers that kinematics and collision may be asked about."""
-        return self.shaped and bool(np.all(np.isfinite(self.projected.actions)))
+        """The executable rows are numbers that kinematics and collision may be asked about."""
+        if not self.shaped:
+            return False
+        actions = self.projected.actions
+        return bool(np.all(np.isfinite(actions[self.context.rows(len(actions))])))
 
 
 class LayerChecker:
@@ -135,10 +138,7 @@ class LayerChecker:
         """
         for context in contexts:
             self.cell.require_known(context)
-        states = [
-            _State(p, c, is_shaped(p, c, self.settings))
-            for p, c in zip(projected, contexts, strict=True)
-        ]
+        states = [_State(p, c, is_shaped(p, c)) for p, c in zip(projected, contexts, strict=True)]
         self._measure(FIRST, states, _batch(states))
         groups: dict[int, list[_State]] = defaultdict(list)
         for state in states:

@@ -15,7 +15,8 @@ from genpolicy.contract.action import POSITION
 from genpolicy.contract.chunk import ChunkMetadata, Proposal
 from genpolicy.evidence.admission_context import Moment, Session, context_of
 from genpolicy.evidence.rows.shadow import CandidateRow
-from genpolicy.evidence.shadow.corruption import CORRUPTIONS, Case
+from genpolicy.evidence.shadow.case import Case, decide
+from genpolicy.evidence.shadow.corruption import CORRUPTIONS
 from genpolicy.evidence.shadow.observations import Observation
 from genpolicy.evidence.shadow.session import IN_FLIGHT_PHASE_CHANGE, Cell, Judged, play
 from genpolicy.execution.journal import Journal
@@ -31,6 +32,7 @@ Array = NDArray[np.float64]
 HELD_OUT = "held_out"
 SELECTOR = "first_admissible"
 DEMONSTRATION = "demonstration"
+BUILT_EVERY = 6  # observations; a fixture without anything of the candidate's chunk
 
 
 class Identity(Protocol):
@@ -114,6 +116,8 @@ def shadow_policy(
         if any(isinstance(result, Admitted) for _, result in judged):
             seen.play(judged, fixture=IN_FLIGHT_PHASE_CHANGE)
         for corruption in CORRUPTIONS:
+            if corruption.built and number % BUILT_EVERY:
+                continue
             broken = corruption.apply(cases[0], shadow.checker)
             if broken is not None:
                 seen.play(seen.judge([broken], fixture=corruption.name), fixture=corruption.name)
@@ -233,7 +237,7 @@ def case_of(
 
 def admit(shadow: Shadow, case: Case) -> Admitted | Rejected:
     """The verdict of the six layers."""
-    return shadow.checker.admit(case.proposal, context=case.context)
+    return decide(shadow.checker, case)
 
 
 def _smallest(verdict: Verdict) -> float | None:
