@@ -20,6 +20,8 @@ from genpolicy.audit.evidence import FINDINGS
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.tables import read_table, write_table
 
+CHECKS = (*((layer, "first") for layer in LAYERS), ("fresh", "expired"), ("execution", "expired"))
+
 BASELINES = ("bc", "chunked_bc", "act")
 DRAWN = "ibc"
 CANDIDATES = ("diffusion", "flow")
@@ -119,7 +121,7 @@ PARAMS: dict[str, Any] = {
     },
     "gate_c": {
         "required_fixtures": list(FIXTURES[1:]),
-        "required_checks": list(LAYERS),
+        "required_checks": [f"{layer}.{name}" for layer, name in CHECKS],
         "unassigned_modes": ["", "none"],
         "limits": by_owner(
             mode_admissible_gap=(0.3, "controller"),
@@ -746,7 +748,10 @@ def _shadow(root: Path) -> None:
     document(
         root,
         "shadow/mutants.json",
-        [{"check": name, "detected": True, "violations": 3} for name in LAYERS],
+        [
+            {"check": name, "layer": layer, "detected": True, "tried": 3, "violations": 3}
+            for layer, name in CHECKS
+        ],
     )
     (root / "artifacts/shadow/journal.mcap").write_bytes(b"journal")
 

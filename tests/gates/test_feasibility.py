@@ -1,7 +1,12 @@
 """Gate C in particular: checks that were never left out are undetected."""
 
-import evidence
+import json
 
+import evidence
+import pytest
+
+from gates.evidence import Evidence
+from gates.feasibility import SHADOW, FeasibilitySettings, mutants_undetected
 from gates.proof import judge
 
 
@@ -9,8 +14,48 @@ def _found(report, name):
     return [c for c in report.criteria if c.id == name]
 
 
+ROWS = [
+    {"check": name, "layer": layer, "detected": True, "tried": 3, "violations": 3}
+    for layer, name in evidence.CHECKS
+]
+
+
+def _undetected(root, rows):
+    """What the criterion says of these rows of `mutants.json`."""
+    (root / SHADOW).mkdir(parents=True)
+    (root / SHADOW / "mutants.json").write_text(json.dumps(rows))
+    settings = FeasibilitySettings.model_construct(
+        required_checks=tuple(f"{layer}.{name}" for layer, name in evidence.CHECKS)
+    )
+    return mutants_undetected.measure(Evidence(root), settings)
+
+
 def test_a_check_that_was_never_disabled_is_undetected(ladder):
-    evidence.edit_document(ladder, "shadow/mutants.json", lambda d: d[1:])
+    evidence.edit_document(ladder, "shadow/mutants.json", lambda rows: rows[1:])
     report = judge(ladder, "C")
     assert report.verdict == "FAIL"
-    assert "representation (not tried)" in _found(report, "mutants_undetected")[0].caveat
+    assert "representation.first (not tried)" in _found(report, "mutants_undetected")[0].caveat
+
+
+@pytest.mark.parametrize("row", range(len(ROWS)))
+def test_every_row_counts_under_its_own_layer(row, tmp_path):
+    """`expired` of the layers does not stand for `expired` of the executor."""
+    found = _undetected(tmp_path, ROWS[:row] + ROWS[row + 1 :])
+    assert found.value == 1 and ".".join(evidence.CHECKS[row]) in found.caveat
+
+
+def test_all_of_them_are_enough(tmp_path):
+    assert _undetected(tmp_path, ROWS).value == 0
+
+
+EXCUSED = {**ROWS[0], "detected": False, "tried": 0, "not_applicable": "no gripper"}
+
+
+def test_a_check_that_a_task_has_no_chunk_for_is_named_with_its_reason(tmp_path):
+    found = _undetected(tmp_path, [EXCUSED, *ROWS[1:]])
+    assert found.value == 0 and "representation.first (no gripper)" in found.caveat
+
+
+@pytest.mark.parametrize("changes", [{"not_applicable": ""}, {"tried": 3}])
+def test_no_reason_or_a_tried_fixture_excuses_nothing(changes, tmp_path):
+    assert _undetected(tmp_path, [EXCUSED | changes, *ROWS[1:]]).value == 1
