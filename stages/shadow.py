@@ -66,7 +66,7 @@ def work(params: Params) -> None:
             for candidate in trained(ARTIFACTS / GENERATORS, admitted, seeds=[seed])
         ]
         mutants = missing_checks_evidence(shadow, spread(observations, section.mutant_observations))
-        write_shadow(folder, found, mutants, cell=shadow.cell)
+        write_shadow(folder, found, mutants, cell=shadow.cell, robot=shadow.checker.cell)
 
 
 if __name__ == "__main__":

@@ -37,6 +37,7 @@ class _State:
     margins: dict[str, float] = field(default_factory=dict)
     detail: str = ""
     alive: bool = True
+    q_rad: Array | None = None
 
     @property
     def row_count(self) -> int:
@@ -189,6 +190,8 @@ class LayerChecker:
         """Kinematic, geometric, dynamic and contact layer of chunks with equally many rows."""
         batch = solved(_batch(states), self.cell)
         usable = np.all(np.isfinite(batch.solved.q_rad), axis=(1, 2))
+        for state, q_rad in zip(states, batch.solved.q_rad, strict=True):
+            state.q_rad = q_rad
         for layer in MOTION:
             self._measure(layer, states, batch)
             left = [i for i, s in enumerate(states) if usable[i] and (s.alive or evaluate_all)]
@@ -227,7 +230,8 @@ class LayerChecker:
             rejected = rejected or verdict.passed is not True
             found.append(verdict)
         rows = state.context.rows(len(state.projected.actions)) if state.shaped else slice(0, 0)
-        return Verdict(tuple(found), dict(state.margins), (rows.start, rows.stop), state.detail)
+        place = (rows.start, rows.stop)
+        return Verdict(tuple(found), dict(state.margins), place, state.detail, state.q_rad)
 
 
 def _batch(states: Sequence[_State]) -> Batch:
