@@ -258,16 +258,20 @@ def checker_violations(evidence: Evidence, settings: FeasibilitySettings) -> Mea
 
 
 def checked_violations(evidence: Evidence, path: str) -> Measured:
-    """Violations that the independent checker found; none counts only if it checked something.
+    """Violations that the independent checker found; none counts only if it proved every action.
 
     Raises:
-        MissingEvidenceError: It checked nothing.
+        MissingEvidenceError: It checked nothing, or did not prove the motion of what it checked.
     """
     document = evidence.document(path)
     checked = number(document, "checked_actions")
+    proved = number(document, "reproved_actions")
     if checked <= 0:
         raise MissingEvidenceError("the checker saw no action")
-    return Measured(count(document, "violations"), caveat=f"{checked:g} actions re-proved")
+    if not proved >= checked:
+        raise MissingEvidenceError(f"the motion of {proved:g} of {checked:g} actions was proved")
+    text = f"{checked:g} actions proved again, their motion by other geometry"
+    return Measured(count(document, "violations"), caveat=text)
 
 
 @criterion(

@@ -34,8 +34,9 @@ def test_it_cannot_be_constructed(admitted):
     for seal in (None, object(), "seal"):
         with pytest.raises(TypeError, match="admission only"):
             Admitted(
-                projected=admitted.projected, verdict=admitted.verdict, admitted_at_s=0.0, seal=seal
-            )
+                projected=admitted.projected, verdict=admitted.verdict, context=admitted.context,
+                seal=seal,
+            )  # fmt: skip
 
 
 def test_it_cannot_be_copied_replaced_pickled_or_subclassed(admitted):
@@ -54,7 +55,7 @@ def test_it_cannot_be_copied_replaced_pickled_or_subclassed(admitted):
 
 def test_a_forgery_behind_the_seal_is_recognised(admitted):
     forged = object.__new__(Admitted)
-    for name in ("projected", "actions_sha256", "verdict", "admitted_at_s"):
+    for name in ("projected", "actions_sha256", "verdict", "context"):
         object.__setattr__(forged, name, getattr(admitted, name))
     with pytest.raises(IntegrityError, match="not issued by the feasibility module"):
         forged.verify()

@@ -744,7 +744,7 @@ def _shadow(root: Path) -> None:
             for reason, n in (("expired", 10), ("phase", 5))
         ],
     )
-    document(root, "shadow/checker.json", {"violations": [], "checked_actions": 1000})
+    document(root, "shadow/checker.json", {"violations": [], "checked_actions": 1000, "reproved_actions": 1000})
     document(
         root,
         "shadow/mutants.json",

@@ -32,7 +32,7 @@ Array = NDArray[np.float64]
 HELD_OUT = "held_out"
 SELECTOR = "first_admissible"
 DEMONSTRATION = "demonstration"
-BUILT_EVERY = 6  # observations; a fixture without anything of the candidate's chunk
+BUILT_EVERY = 6  # observations of a phase; fixtures without anything of the candidate's chunk
 
 
 class Identity(Protocol):
@@ -105,6 +105,7 @@ def shadow_policy(
         noise_names=[("shadow", item.episode_uuid, item.index) for item in observations],
         candidates=shadow.samples,
     )
+    of_phase: Counter[str] = Counter()
     for number, (item, chunks) in enumerate(zip(observations, drawn.actions, strict=True)):
         cases = [
             case_of(shadow, item, chunk, number=number, candidate=k, of=policy)
@@ -115,8 +116,10 @@ def shadow_policy(
         seen.play(judged, fixture=HELD_OUT)
         if any(isinstance(result, Admitted) for _, result in judged):
             seen.play(judged, fixture=IN_FLIGHT_PHASE_CHANGE)
+        skip_built = of_phase[item.phase] % BUILT_EVERY > 0
+        of_phase[item.phase] += 1
         for corruption in CORRUPTIONS:
-            if corruption.built and number % BUILT_EVERY:
+            if corruption.built and skip_built:
                 continue
             broken = corruption.apply(cases[0], shadow.checker)
             if broken is not None:
