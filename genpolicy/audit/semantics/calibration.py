@@ -7,8 +7,8 @@ stands beside its command where both rest.
 import numpy as np
 
 from genpolicy.audit.data import Array, AuditInput, Integers, Text
+from genpolicy.audit.rows import Calibration, Finding
 from genpolicy.audit.semantics.motion import Motion
-from genpolicy.audit.semantics.report import Calibration, Finding
 from genpolicy.audit.semantics.robust import densest_half, episode_deviation, episode_medians
 from genpolicy.audit.settings import AuditSettings
 
@@ -50,7 +50,7 @@ def release_findings(
     spread = _scatter(residual, epochs)
     findings = []
     for row in found:
-        if not np.isfinite(row.residual_m):
+        if row.residual_m is None or not np.isfinite(row.residual_m):
             continue
         error = 1.2533 * spread * np.sqrt(2.0 / max(row.episodes, 1))
         limit = max(settings.calibration_floor_m, settings.significance * float(error))
@@ -178,10 +178,10 @@ def _rest_offsets(motion: Motion) -> Array:
     return result
 
 
-def _epoch_residual(name: str, medians: dict[str, Array]) -> float:
-    """Distance to the median epoch; with two epochs to the other one; NaN without a release."""
+def _epoch_residual(name: str, medians: dict[str, Array]) -> float | None:
+    """Distance to the median epoch; with two epochs to the other one; None without a release."""
     if name not in medians:
-        return float("nan")
+        return None
     others = [value for key, value in medians.items() if key != name]
     if not others:
         return 0.0
