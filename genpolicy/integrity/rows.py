@@ -74,6 +74,13 @@ def read_rows(path: Path, row: type[Row]) -> list[Row]:
     return rows_of_table(read_table(path), row, where=str(path))
 
 
+def read_columns(path: Path, row: type) -> pa.Table:
+    """The table of a file that `write_rows` wrote, for who computes by columns; as `read_rows`."""
+    table = read_table(path)
+    check_columns(row, table.column_names, where=str(path))
+    return table
+
+
 def rows_of_table(table: pa.Table, row: type[Row], *, where: str) -> list[Row]:
     """The rows of a table as their class, lists as tuples.
 
