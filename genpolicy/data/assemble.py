@@ -182,8 +182,7 @@ def episodes_table(episodes: Sequence[AcceptedEpisode], splits: Sequence[str]) -
         EpisodeRow(
             episode_uuid=e.episode_uuid,
             split=split,
-            **e.strata,
-            **e.flags,
+            **_recorded(e),
             source_file=e.source_file,
             source_sha256=e.source_sha256,
             content_sha256=e.content_sha256,
@@ -196,6 +195,11 @@ def episodes_table(episodes: Sequence[AcceptedEpisode], splits: Sequence[str]) -
         for e, split in zip(episodes, splits, strict=True)
     ]
     return table_of_rows(EpisodeRow, rows)
+
+
+def _recorded(episode: AcceptedEpisode) -> dict[str, Any]:
+    """What the recording says of its episode, by column."""
+    return {**episode.strata, **episode.flags}
 
 
 def seal(manifest: dict[str, Any]) -> bytes:

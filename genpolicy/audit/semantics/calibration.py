@@ -34,7 +34,7 @@ def calibrations(data: AuditInput, settings: AuditSettings) -> tuple[Calibration
         Calibration(
             epoch=str(name),
             episodes=int(np.count_nonzero(epochs == name)),
-            residual_m=_epoch_residual(str(name), medians),
+            residual_m=_epoch_residual(str(name), medians) if str(name) in medians else None,
         )
         for name in names
     )
@@ -178,10 +178,8 @@ def _rest_offsets(motion: Motion) -> Array:
     return result
 
 
-def _epoch_residual(name: str, medians: dict[str, Array]) -> float | None:
-    """Distance to the median epoch; with two epochs to the other one; None without a release."""
-    if name not in medians:
-        return None
+def _epoch_residual(name: str, medians: dict[str, Array]) -> float:
+    """Distance to the median epoch; with two epochs to the other one."""
     others = [value for key, value in medians.items() if key != name]
     if not others:
         return 0.0
