@@ -829,7 +829,8 @@ def _shadow(root: Path) -> None:
             for reason, n in (("expired", 10), ("phase", 5))
         ],
     )
-    document(root, "shadow/checker.json", {"violations": [], "checked_actions": 1000, "reproved_actions": 1000})
+    proved = {"violations": [], "checked_actions": 1000, "reproved_actions": 1000}
+    document(root, "shadow/checker.json", proved)
     document(
         root,
         "shadow/mutants.json",
@@ -920,7 +921,12 @@ def _stress(root: Path) -> None:
     document(
         root,
         "stress/checker.json",
-        {"violations": [], "checked_actions": 5000, "journals": ["a.mcap"]},
+        {
+            "violations": [],
+            "checked_actions": 5000,
+            "reproved_actions": 5000,
+            "journals": ["a.mcap"],
+        },
     )
     power = {"margin": 0.1, "alpha": 0.05, "pairs": STARTS}
     row = {"baseline_success": 0.5, "correlation": 0.6, "margin": 0.1, "pairs": STARTS}

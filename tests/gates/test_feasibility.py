@@ -5,8 +5,13 @@ import json
 import evidence
 import pytest
 
-from gates.evidence import Evidence
-from gates.feasibility import SHADOW, FeasibilitySettings, mutants_undetected
+from gates.evidence import Evidence, MissingEvidenceError
+from gates.feasibility import (
+    SHADOW,
+    FeasibilitySettings,
+    checked_violations,
+    mutants_undetected,
+)
 from gates.proof import judge
 
 
@@ -59,3 +64,15 @@ def test_a_check_that_a_task_has_no_chunk_for_is_named_with_its_reason(tmp_path)
 @pytest.mark.parametrize("changes", [{"not_applicable": ""}, {"tried": 3}])
 def test_no_reason_or_a_tried_fixture_excuses_nothing(changes, tmp_path):
     assert _undetected(tmp_path, [EXCUSED | changes, *ROWS[1:]]).value == 1
+
+
+@pytest.mark.parametrize("path", ["shadow/checker.json", "stress/checker.json"])
+@pytest.mark.parametrize(("proved", "counts"), [(7, True), (6, False), (0, False), (None, False)])
+def test_an_action_whose_motion_was_not_proved_is_not_proved(path, proved, counts, tmp_path):
+    document = {"violations": [], "checked_actions": 7, "reproved_actions": proved}
+    evidence.document(tmp_path, path, document)
+    if counts:
+        assert checked_violations(Evidence(tmp_path), f"artifacts/{path}").value == 0
+    else:
+        with pytest.raises(MissingEvidenceError):
+            checked_violations(Evidence(tmp_path), f"artifacts/{path}")
