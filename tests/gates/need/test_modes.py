@@ -67,7 +67,11 @@ def test_the_mean_is_defeated_only_where_every_mode_passes(ladder):
         value(ladder, modes.mean_defeated_share)
 
 
-def test_one_mode_alone_shows_no_benefit_for_recovery(ladder):
-    evidence.edit_table(ladder, "audit/recovery.parquet", lambda f: f.assign(mode="m0"))
-    found = asked(ladder, modes.recovery_benefit, gate="A")
-    assert found.value == 0.0 and "no comparison" in found.caveat
+def test_what_disturbed_demonstrations_did_is_shown_and_never_judged(ladder):
+    before = asked(ladder, modes.mode_success_lower, gate="A")
+    assert "(shown, not judged): left 38 of 40, right 8 of 40" in before.caveat
+    evidence.edit_table(ladder, "audit/recovery.parquet", lambda f: f.assign(successes=0))
+    assert asked(ladder, modes.mode_success_lower, gate="A").value == before.value
+    (ladder / "artifacts/audit/recovery.parquet").unlink()
+    found = asked(ladder, modes.mode_success_lower, gate="A")
+    assert found.value == before.value and "no disturbed demonstration" in found.caveat
