@@ -41,7 +41,7 @@ def work(params: Params) -> None:
     with output_folder(ARTIFACTS / "latency") as folder:
         declared = declared_rows(
             [policy.name for policy in policies],
-            section.declared,
+            section.declared_terms,
             draws=section.declared_draws,
             generator=stream(params.seed, "latency", "declared"),
         )

@@ -48,7 +48,7 @@ def work(params: Params) -> None:
             comparison,
             judged,
             section.perturbations,
-            latency=latency_models(table, timing.declared),
+            latency=latency_models(table, timing.declared_terms),
             journals=folder / "journals",
         )
         write_stress(
