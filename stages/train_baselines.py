@@ -10,7 +10,8 @@ def work(params: Params) -> None:
     """Train every baseline."""
     section = params.section("train_baselines", MethodsSection)
     with output_folder(ARTIFACTS / "train_baselines") as folder:
-        train_matched(training_plan(params), section.samplers, folder=folder)
+        plan = training_plan(params, demonstrated=ARTIFACTS / "audit" / "demonstrated.parquet")
+        train_matched(plan, section.samplers, folder=folder)
 
 
 if __name__ == "__main__":

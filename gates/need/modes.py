@@ -115,12 +115,9 @@ def mode_feasible_share(evidence: Evidence, settings: NeedSettings) -> Measured:
 )
 def mean_defeated_share(evidence: Evidence, settings: NeedSettings) -> Measured:
     """Lower bound of the share of two-mode situations in which only the mean is rejected."""
-    rows = _held_out(evidence, settings, "clusters", "mean_admissible", "modes_admissible")
-    rows = rows[flags(rows, "two_mode")]
+    rows = _compared(evidence, settings, "mean")
     if len(rows) == 0:
         return Measured(0.0, caveat="no held-out situation has two modes")
-    if rows["mean_admissible"].isna().any():
-        raise MissingEvidenceError("the mean was not checked in every two-mode situation")
     valid = numbers(rows, "modes_admissible") >= numbers(rows, "clusters")
     defeated = valid & ~flags(rows, "mean_admissible")
     share, lower, upper = share_interval(
@@ -134,3 +131,44 @@ def mean_defeated_share(evidence: Evidence, settings: NeedSettings) -> Measured:
         f"{rows['episode_uuid'].nunique()} episodes, whose situations are not independent"
     )
     return Measured(lower, (lower, upper), text)
+
+
+@criterion(
+    "<=",
+    question="Is the point-wise median a plan of its own?",
+    look_at="Multimodality: the median of the demonstrations is admissible; regress on it.",
+)
+def median_valid_share(evidence: Evidence, settings: NeedSettings) -> Measured:
+    """Upper bound of the share of two-mode situations in which the median passes all layers.
+
+    Of an odd number of plans on two sides, or of unequal sides, the median lies on one of them.
+    """
+    rows = _compared(evidence, settings, "median")
+    if len(rows) == 0:
+        raise MissingEvidenceError("no held-out situation has two modes")
+    share, lower, upper = share_interval(
+        flags(rows, "median_admissible"),
+        list(rows["episode_uuid"]),
+        confidence=settings.confidence,
+        favourable=False,
+    )
+    text = (
+        f"share {share:.4g} of {len(rows)} situations; upper bound over "
+        f"{rows['episode_uuid'].nunique()} episodes. The median of recorded neighbours: what a "
+        "regression of absolute error tends to, not what one has learned"
+    )
+    return Measured(upper, (lower, upper), text)
+
+
+def _compared(evidence: Evidence, settings: NeedSettings, which: str) -> pd.DataFrame:
+    """Held-out two-mode situations in which the mean or the median was checked.
+
+    Raises:
+        MissingEvidenceError: It was not, in one of them.
+    """
+    column = f"{which}_admissible"
+    rows = _held_out(evidence, settings, "clusters", "modes_admissible", column)
+    rows = rows[flags(rows, "two_mode")]
+    if rows[column].isna().any():
+        raise MissingEvidenceError(f"the {which} was not checked in every two-mode situation")
+    return rows

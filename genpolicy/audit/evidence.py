@@ -40,8 +40,9 @@ NEIGHBOURHOODS = pa.schema(
         ("split", TEXT), ("phase", TEXT), ("episode_uuid", TEXT), ("index", WHOLE),
         ("neighbours", WHOLE), ("clusters", WHOLE), ("cluster_sizes", pa.list_(WHOLE)),
         ("two_mode", FLAG), ("separation_m", REAL), ("mean_admissible", FLAG),
-        ("mean_reason", TEXT), ("modes_admissible", WHOLE), ("mean_path", pa.list_(REAL)),
-        ("mode_paths", pa.list_(pa.list_(REAL))), ("persistent", FLAG),
+        ("mean_reason", TEXT), ("median_admissible", FLAG), ("modes_admissible", WHOLE),
+        ("mean_path", pa.list_(REAL)), ("mode_paths", pa.list_(pa.list_(REAL))),
+        ("persistent", FLAG),
     ]
 )  # fmt: skip
 MODES = pa.schema(
@@ -59,6 +60,7 @@ STRATA = pa.schema(
     ]
 )  # fmt: skip
 REPLAY = pa.schema([("episode_uuid", TEXT), ("label", TEXT), ("replayed", TEXT), ("mode", TEXT)])
+DEMONSTRATED = pa.schema([("episode_uuid", TEXT), ("phase", TEXT), ("mode", TEXT)])
 RECOVERY = pa.schema([("split", TEXT), ("mode", TEXT), ("episodes", WHOLE), ("successes", WHOLE)])
 
 FINDINGS = pa.schema(
@@ -126,6 +128,7 @@ def write_evidence(
         "strata": _table(result.strata, STRATA),
         "replay": pa.Table.from_pylist(_replays(result), REPLAY),
         "recovery": _table(result.recovery, RECOVERY),
+        "demonstrated": pa.Table.from_pylist(_demonstrated(result), DEMONSTRATED),
         "findings": _table(result.semantics.findings, FINDINGS),
         "resamples": _table(result.resamples, RESAMPLES),
         "examples": _table(example_chunks(result, settings), EXAMPLES),
@@ -215,6 +218,7 @@ def _situation(data: AuditInput, item: Situation) -> dict[str, Any]:
         "separation_m": item.clustering.separation,
         "mean_admissible": item.chunks.mean_admissible,
         "mean_reason": item.chunks.mean_reason,
+        "median_admissible": item.chunks.median_admissible,
         "modes_admissible": sum(item.chunks.mode_admissible),
         "mean_path": item.chunks.mean[:, position].ravel().tolist(),
         "mode_paths": [mode[:, position].ravel().tolist() for mode in item.chunks.modes],
@@ -229,6 +233,16 @@ def _replays(result: AuditResult) -> list[dict[str, Any]]:
     return [
         asdict(item) | {"mode": _mode(linked, places[item.episode_uuid])}
         for item in result.replayed
+    ]
+
+
+def _demonstrated(result: AuditResult) -> list[dict[str, Any]]:
+    """The mode that each episode followed, in the phase with most situations; unknown left out."""
+    uuids = result.data.episodes.uuid
+    return [
+        {"episode_uuid": str(uuids[place]), "phase": result.primary_phase, "mode": f"m{mode}"}
+        for place, mode in enumerate(result.demonstrated)
+        if mode >= 0
     ]
 
 

@@ -21,6 +21,7 @@ from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.tables import read_table, write_table
 
 BASELINES = ("bc", "chunked_bc", "act")
+REMEDIES = {"chunked_l1": "direct", "one_mode_bc": "direct", "bc_noise": "offset"}
 DRAWN = "ibc"
 CANDIDATES = ("diffusion", "flow")
 CONDITIONS = ("nominal", "camera_delay", "compute_contention")
@@ -61,7 +62,7 @@ def _cause() -> dict[str, Any]:
 PARAMS: dict[str, Any] = {
     "confidence": 0.95,
     "task": {"name": "tabletop_insertion"},
-    "train_baselines": {"samplers": {name: {} for name in (*BASELINES, DRAWN)}},
+    "train_baselines": {"samplers": {name: {} for name in (*BASELINES, *REMEDIES, DRAWN)}},
     "measure_baselines": {"latent": {"method": "act"}},
     "train_generators": {"samplers": {name: {} for name in CANDIDATES}},
     "stress": {
@@ -70,11 +71,12 @@ PARAMS: dict[str, Any] = {
         "perturbations": {name: {} for name in CONDITIONS},
         "margin": 0.1,
         "alpha": 0.1,
+        "samples": 4,
     },
     "gate_a": {
         "cause": _cause(),
         "held_out_splits": ["validation", "test"],
-        "deployed_conventions": ["direct", "z_zero"],
+        "deployed_conventions": ["direct", "z_zero", "offset"],
         "generative_baselines": [DRAWN],
         "chunked_baseline": "chunked_bc",
         "limits": by_owner(
@@ -89,6 +91,8 @@ PARAMS: dict[str, Any] = {
             mode_success_lower=(0.6, "model"),
             mode_feasible_share=(0.9, "controller"),
             mean_defeated_share=(0.5, "model"),
+            median_valid_share=(0.5, "model"),
+            remedy_valid_share=(0.5, "model"),
             data_defects=(0, "perception"),
             strata_effect=(0.3, "perception"),
             cause_accepted=(1, "model"),
@@ -466,6 +470,7 @@ def _situation(i: int) -> dict[str, Any]:
         "separation_m": 0.2,
         "mean_admissible": False,
         "mean_reason": "collision",
+        "median_admissible": False,
         "modes_admissible": 2,
         "mean_path": mean,
         "mode_paths": [left, right],
@@ -486,6 +491,8 @@ def _modes(methods: tuple[str, ...], covered: int) -> list[dict[str, Any]]:
             "modes_covered": covered,
             "between_modes": 0,
             "admissible": 16,
+            "valid": 16 if covered else 0,
+            "modes_valid": covered,
             "nfe": 1,
             "spread_m": 0.0,
         }
@@ -518,17 +525,22 @@ def _checkpoints(root: Path, stage: str, methods: tuple[str, ...]) -> None:
 
 
 def _baselines(root: Path) -> None:
-    fixed = [{**row, "admissible": 0} for row in _modes(BASELINES, 1)]
+    refused = {"admissible": 0, "valid": 0, "modes_valid": 0}
+    fixed = [{**row, **refused} for row in _modes(BASELINES, 1)]
+    fixed += [
+        {**row, **refused, "convention": REMEDIES[row["method"]]}
+        for row in _modes(tuple(REMEDIES), 1)
+    ]
     drawn = [{**row, "convention": "derivative_free"} for row in _modes((DRAWN,), 2)]
     table(root, "measure_baselines/modes.parquet", fixed + drawn)
-    document(root, "train_baselines/matched.json", _matched((*BASELINES, DRAWN)))
+    document(root, "train_baselines/matched.json", _matched((*BASELINES, *REMEDIES, DRAWN)))
     table(root, "measure_baselines/offline.parquet", [{"method": "bc", "seed": 0}])
     latent = {
         "method": "act", "convention": "z_prior", "seed": 0, "situations": 30, "spread_m": 0.03,
         "condition_share": 0.4, "distance_correlation": 0.6, "exceeding": 0, "permutations": 999,
     }  # fmt: skip
     document(root, "measure_baselines/latent.json", [latent])
-    _checkpoints(root, "train_baselines", (*BASELINES, DRAWN))
+    _checkpoints(root, "train_baselines", (*BASELINES, *REMEDIES, DRAWN))
 
 
 VARIANTS = {
@@ -545,7 +557,8 @@ def _factors(root: Path) -> None:
     for place, (name, (factor, convention, _, _)) in enumerate(VARIANTS.items()):
         named = {"variant": name, "factor": factor, "convention": convention}
         covered = 2 if factor == "head" else 1
-        modes += [{**row, **named, "admissible": 0} for row in _modes((name,), covered)]
+        refused = {"admissible": 0, "valid": 0, "modes_valid": 0}
+        modes += [{**row, **named, **refused} for row in _modes((name,), covered)]
         errors += [
             {
                 **named, "seed": 0, "split": "test", "episode_uuid": f"e{i}", "windows": 9,

@@ -110,7 +110,7 @@ WORSE = {
         ),
         "baseline_mode_coverage": _table(
             BASE + "modes.parquet",
-            lambda s: cells("modes_covered", 2, where=_of("act"), share=s),
+            lambda s: cells("modes_valid", 2, where=_of("act"), share=s),
         ),
         "phase_collapse_share": _document(
             AUDIT + "summary.json", lambda s: _set("modes_with_phase", 40 - int(40 * s))
@@ -118,6 +118,17 @@ WORSE = {
         "chunking_valid_share": _table(
             BASE + "modes.parquet",
             lambda s: cells("admissible", 16, where=_of("chunked_bc"), share=s),
+        ),
+        "median_valid_share": _table(
+            AUDIT + "neighbourhoods.parquet", lambda s: cells("median_admissible", True, share=s)
+        ),
+        "remedy_valid_share": _table(
+            BASE + "modes.parquet",
+            lambda s: (
+                lambda f: cells("valid", 16, where=_of("one_mode_bc"), share=s)(
+                    cells("admissible", 16, where=_of("one_mode_bc"), share=s)(f)
+                )
+            ),
         ),
         "latent_dependence_p": _document(
             BASE + "latent.json",

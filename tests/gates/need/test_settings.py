@@ -25,5 +25,6 @@ def test_without_a_level_nothing_is_judged_rather_than_every_stratum_let_through
 
 def test_the_ladder_s_baselines_and_latent_are_read_from_their_homes(ladder):
     settings = settings_of(ladder, "A")
-    assert set(settings.baselines) == {*evidence.BASELINES, evidence.DRAWN}
+    assert set(settings.baselines) == {*evidence.BASELINES, *evidence.REMEDIES, evidence.DRAWN}
+    assert settings.redraws == evidence.PARAMS["stress"]["samples"]
     assert settings.latent_baseline == "act" and settings.confidence == 0.95
