@@ -76,6 +76,7 @@ def test_rows_count_modes_and_samples(data, kit, tmp_path, policy, task, checker
         assert row.samples == 4 and row.nfe == 2 and row.modes_present == 2
         assert 0 <= row.modes_covered <= 2
         assert 0 <= row.between_modes + row.admissible <= 8
+        assert 0 <= row.modes_valid <= row.valid <= row.admissible
         assert row.spread_m > 0
 
 
