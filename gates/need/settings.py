@@ -23,8 +23,8 @@ class NeedSettings(GateSettings):
         confidence: Coverage of every interval.
         held_out_splits: Splits whose situations are judged.
         baselines: Simpler policies that must be there, frozen and matched.
-        deployed_conventions: Sampling conventions under which a baseline is deployed; drawing
-            from a latent is a generator's way and is reported beside them.
+        deployed_conventions: Sampling conventions under which a baseline is deployed, an unlearned
+            offset among them; drawing from a latent is a generator's way, reported beside them.
         generative_baselines: Baselines that are drawn at random under every convention (an
             energy's candidates are), so that they are reported beside the deployed ones.
         chunked_baseline: Baseline that shows what chunking alone does.
