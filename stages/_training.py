@@ -1,6 +1,6 @@
 """Sections that say what is trained, read by the stages that train and by those that measure."""
 
-from pathlib import Path
+from collections.abc import Mapping
 
 from pydantic import Field
 
@@ -34,9 +34,9 @@ class FactorsSection(Settings):
 
 
 def training_plan(
-    params: Params, *, steps: int | None = None, demonstrated: Path | None = None
+    params: Params, *, steps: int | None = None, followed: Mapping[str, str] | None = None
 ) -> TrainingPlan:
-    """What all trainings share; `steps` shortens them, `demonstrated` is the audit's table."""
+    """What all trainings share; `steps` shortens them, `followed` is the mode of each episode."""
     settings = params.section("policy", PolicySettings)
     if steps is not None:
         training = settings.training.model_copy(update={"steps": steps, "validation_every": steps})
@@ -49,5 +49,5 @@ def training_plan(
         device=params.compute.device,
         workers=params.compute.workers,
         scheduler=params.compute.scheduler,
-        demonstrated=demonstrated,
+        followed=followed,
     )

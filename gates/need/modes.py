@@ -7,11 +7,11 @@ from gates.bounds import counted_interval, share_interval
 from gates.criterion import Measured, criterion
 from gates.evidence import Evidence, MissingEvidenceError, flags, number, numbers
 from gates.need.settings import AUDIT, NeedSettings
+from genpolicy.audit.rows import ModeOutcome, RecoveryOutcome, SituationRow
 
 
-def _held_out(evidence: Evidence, settings: NeedSettings, *columns: str) -> pd.DataFrame:
-    path = f"{AUDIT}/neighbourhoods.parquet"
-    frame = evidence.frame(path, "split", "episode_uuid", "two_mode", *columns)
+def _held_out(evidence: Evidence, settings: NeedSettings) -> pd.DataFrame:
+    frame = evidence.rows(f"{AUDIT}/neighbourhoods.parquet", SituationRow)
     return frame[frame["split"].isin(settings.held_out_splits)]
 
 
@@ -33,7 +33,7 @@ def held_out_situations(evidence: Evidence, settings: NeedSettings) -> Measured:
 )
 def multimodal_situations(evidence: Evidence, settings: NeedSettings) -> Measured:
     """Held-out situations with two clusters that persist."""
-    rows = _held_out(evidence, settings, "persistent")
+    rows = _held_out(evidence, settings)
     kept = rows[flags(rows, "two_mode") & flags(rows, "persistent")]
     text = f"from {kept['episode_uuid'].nunique()} episodes; two clusters that persist"
     return Measured(float(len(kept)), caveat=text)
@@ -59,8 +59,7 @@ def persistence_margin(evidence: Evidence, settings: NeedSettings) -> Measured:
 )
 def mode_success_lower(evidence: Evidence, settings: NeedSettings) -> Measured:
     """Lowest exact lower bound of success over the modes."""
-    columns = ("mode", "episodes", "successes")
-    frame = evidence.frame(f"{AUDIT}/modes.parquet", *columns)
+    frame = evidence.rows(f"{AUDIT}/modes.parquet", ModeOutcome)
     bounds = [
         (counted_interval(hits, trials, confidence=settings.confidence), str(mode))
         for mode, trials, hits in zip(
@@ -77,9 +76,8 @@ def mode_success_lower(evidence: Evidence, settings: NeedSettings) -> Measured:
 
 def _recovered(evidence: Evidence) -> str:
     """What the disturbed demonstrations did, by mode: shown, never judged."""
-    columns = ("mode", "episodes", "successes")
     try:
-        frame = evidence.frame(f"{AUDIT}/recovery.parquet", *columns)
+        frame = evidence.rows(f"{AUDIT}/recovery.parquet", RecoveryOutcome)
     except MissingEvidenceError:
         return "no disturbed demonstration is known"
     counts = frame.groupby("mode")[["successes", "episodes"]].sum()
@@ -97,8 +95,7 @@ def _recovered(evidence: Evidence) -> str:
 )
 def mode_feasible_share(evidence: Evidence, settings: NeedSettings) -> Measured:
     """Lowest share of admissible modal chunks over the modes."""
-    columns = ("mode", "admissible", "checked")
-    frame = evidence.frame(f"{AUDIT}/modes.parquet", *columns)
+    frame = evidence.rows(f"{AUDIT}/modes.parquet", ModeOutcome)
     checked = numbers(frame, "checked")
     if not np.all(checked > 0):
         raise MissingEvidenceError("a mode has no checked chunk")
@@ -167,7 +164,7 @@ def _compared(evidence: Evidence, settings: NeedSettings, which: str) -> pd.Data
         MissingEvidenceError: It was not, in one of them.
     """
     column = f"{which}_admissible"
-    rows = _held_out(evidence, settings, "clusters", "modes_admissible", column)
+    rows = _held_out(evidence, settings)
     rows = rows[flags(rows, "two_mode")]
     if rows[column].isna().any():
         raise MissingEvidenceError(f"the {which} was not checked in every two-mode situation")

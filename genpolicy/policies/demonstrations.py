@@ -1,33 +1,29 @@
 """What a training takes from the data beside the windows: demonstrations of one mode, the phase."""
 
 from collections import Counter
-from pathlib import Path
+from collections.abc import Mapping
 
 from genpolicy.data.dataset import Dataset
 from genpolicy.data.recording.episode import PHASE_STREAM
-from genpolicy.integrity.tables import read_table
 
 
-def episodes_of_one_mode(table: Path, data: Dataset) -> list[str]:
+def episodes_of_one_mode(followed: Mapping[str, str], data: Dataset) -> list[str]:
     """Training episodes that followed the mode most of them followed; all where none is known.
 
     Which mode is right in a situation is not asked: a policy of one mode is used everywhere.
 
     Args:
-        table: The audit's `demonstrated.parquet`.
+        followed: Mode by episode, as the audit saw it.
         data: The dataset.
-
-    Raises:
-        BadInputError: The table is missing or changed.
     """
     episodes = data.episodes
     training = set(episodes["episode_uuid"][episodes["split"] == "train"])
-    rows = [row for row in read_table(table).to_pylist() if row["episode_uuid"] in training]
-    counts = Counter(row["mode"] for row in rows)
+    own = {uuid: mode for uuid, mode in followed.items() if uuid in training}
+    counts = Counter(own.values())
     if not counts:
         return sorted(training)
     largest = min(counts, key=lambda mode: (-counts[mode], mode))
-    return sorted(row["episode_uuid"] for row in rows if row["mode"] == largest)
+    return sorted(uuid for uuid, mode in own.items() if mode == largest)
 
 
 def phase_columns(data: Dataset) -> tuple[int, ...]:

@@ -70,8 +70,7 @@ class TrainingPlan:
         device: Torch device.
         workers: Local processes.
         scheduler: `local` or the address of a Dask scheduler.
-        demonstrated: The audit's table of the mode that each episode followed; None where no
-            method asks.
+        followed: Mode that each episode followed, as the audit saw it; None where no method asks.
     """
 
     dataset: Path
@@ -81,7 +80,7 @@ class TrainingPlan:
     device: str
     workers: int
     scheduler: str
-    demonstrated: Path | None = None
+    followed: Mapping[str, str] | None = None
 
     def request(
         self,
@@ -122,14 +121,14 @@ class TrainingPlan:
         """
         if not method_named(method).one_mode:
             return None
-        if self.demonstrated is None:
+        if self.followed is None:
             raise ConfigError(
                 where=f"training of {method}",
-                found="no table of the modes that the demonstrations followed",
+                found="no word of the modes that the demonstrations followed",
                 expected="the audit's `demonstrated.parquet`",
                 action="Train it in the stage `train_baselines`, behind the audit.",
             )
-        return episodes_of_one_mode(self.demonstrated, data)
+        return episodes_of_one_mode(self.followed, data)
 
 
 @dataclass(frozen=True)

@@ -3,12 +3,10 @@
 from dataclasses import replace
 
 import numpy as np
-import pyarrow as pa
 import pytest
 
 from genpolicy.errors import ConfigError
 from genpolicy.integrity.documents import read_json
-from genpolicy.integrity.tables import write_table
 from genpolicy.policies.checkpoint import CONFIG_FILE
 from genpolicy.policies.demonstrations import episodes_of_one_mode, phase_columns
 from genpolicy.policies.matched_training import (
@@ -28,34 +26,26 @@ def training_episodes(data):
     return sorted(data.episodes["episode_uuid"][data.episodes["split"] == "train"])
 
 
-def write_modes(path, modes):
-    rows = [{"episode_uuid": u, "phase": "approach", "mode": m} for u, m in modes.items()]
-    schema = pa.schema([(name, pa.string()) for name in ("episode_uuid", "phase", "mode")])
-    write_table(path, pa.Table.from_pylist(rows, schema))
-    return path
-
-
 @pytest.fixture
-def plan(dataset, data, kit, tmp_path):
+def plan(dataset, data, kit):
     training = training_episodes(data)
     modes = {name: ("m1" if k < 2 else "m0") for k, name in enumerate(training[:5])}
-    table = write_modes(tmp_path / "demonstrated.parquet", modes)
     return TrainingPlan(
         dataset=dataset, settings=kit.POLICY, horizons=kit.HORIZONS, root_seed=1, device="cpu",
-        workers=1, scheduler="local", demonstrated=table,
+        workers=1, scheduler="local", followed=modes,
     )  # fmt: skip
 
 
-def test_the_mode_that_most_training_episodes_followed_is_kept(data, tmp_path):
-    training, path = training_episodes(data), tmp_path / "t.parquet"
+def test_the_mode_that_most_training_episodes_followed_is_kept(data):
+    training = training_episodes(data)
     held_out = sorted(set(data.episodes["episode_uuid"]) - set(training))
     modes = dict.fromkeys(training[:2], "m0") | dict.fromkeys(training[2:5], "m1")
     # Held-out episodes have no say, however many they are.
-    found = episodes_of_one_mode(write_modes(path, modes | dict.fromkeys(held_out, "m0")), data)
+    found = episodes_of_one_mode(modes | dict.fromkeys(held_out, "m0"), data)
     assert found == training[2:5]
     even = dict.fromkeys(training[:2], "m1") | dict.fromkeys(training[2:4], "m0")
-    assert episodes_of_one_mode(write_modes(path, even), data) == training[2:4]
-    assert episodes_of_one_mode(write_modes(path, {}), data) == training
+    assert episodes_of_one_mode(even, data) == training[2:4]
+    assert episodes_of_one_mode({}, data) == training
 
 
 def test_only_their_windows_are_trained_on(data, kit):
@@ -89,8 +79,8 @@ def test_one_mode_differs_in_its_demonstrations_by_definition_and_nobody_else_ma
 
 
 def test_without_an_audit_nobody_says_which_mode(plan, data):
-    with pytest.raises(ConfigError, match="no table of the modes"):
-        replace(plan, demonstrated=None).episodes(data, "one_mode_bc")
+    with pytest.raises(ConfigError, match="no word of the modes"):
+        replace(plan, followed=None).episodes(data, "one_mode_bc")
     assert plan.episodes(data, "chunked_bc") is None
 
 

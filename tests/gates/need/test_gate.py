@@ -1,12 +1,11 @@
 """Gate A as a whole: nothing waives the cause, and every red number of the data stops it."""
 
 import evidence
-import pyarrow as pa
 import pytest
 
 from gates.proof import judge
-from genpolicy.audit.evidence import FINDINGS
-from genpolicy.integrity.tables import write_table
+from genpolicy.audit.rows import Finding
+from genpolicy.integrity.rows import write_rows
 
 DEFECTS = {
     "units": ("unit", "hole_pose", "magnitude_factor", 1000.0),
@@ -24,12 +23,11 @@ def _set(key, value):
 
 def find(root, kind, variable, question, measured):
     """A finding of the audit, as it writes one."""
-    row = {
-        "kind": kind, "variable": variable, "where": "somewhere", "question": question,
-        "measured": measured, "floor": 0.0, "unit": "", "action": "Repair it.",
-    }  # fmt: skip
-    table = pa.Table.from_pylist([row], FINDINGS)
-    write_table(root / "artifacts/audit/findings.parquet", table)
+    row = Finding(
+        kind=kind, variable=variable, where="somewhere", question=question, measured=measured,
+        floor=0.0, unit="", action="Repair it.",
+    )  # fmt: skip
+    write_rows(root / "artifacts/audit/findings.parquet", Finding, [row])
 
 
 def contaminated(root):
