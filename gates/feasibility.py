@@ -225,6 +225,12 @@ def stub_violation_upper(
         raise MissingEvidenceError("no observation delivered a chunk")
     bad = min(bad, observations)
     interval = counted_interval(bad, observations, confidence=settings.confidence)
+    limit = settings.limits.of.get("stub_violation_upper")
+    if bad == 0 and limit and limit.limit is not None and not interval[1] <= limit.limit:
+        raise MissingEvidenceError(
+            f"none bad of {observations:g} observations that delivered bounds it by "
+            f"{interval[1]:.4g} only"
+        )
     text = f"{bad:g} of {observations:g} observations that delivered; exact upper bound"
     return Measured(interval[1], interval, text)
 

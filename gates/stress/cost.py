@@ -201,8 +201,8 @@ def force_peak_p95_n(evidence: Evidence, settings: StressSettings, candidate: st
     fewest = draws_for_quantile(0.95, settings.confidence)
     if touched < fewest:
         raise MissingEvidenceError(
-            f"never exercised: contact on {touched} of {rows['start'].nunique()} starts, in any "
-            f"condition; {fewest} bound a 95% quantile"
+            f"hardly exercised: contact on {touched} of {rows['start'].nunique()} starts, in any "
+            f"condition; {fewest} are needed to bound a 95% quantile"
         )
 
     def measure(part: pd.DataFrame, condition: str) -> Interval:

@@ -297,7 +297,13 @@ TABLES = {
     ],
     "B": ["reload/samples", "reload/nfe", "reload/coverage", "latency/latency"],
     "C": ["shadow/candidates", "shadow/stub", "shadow/counts"],
-    "D": ["stress/rollouts", "stress/invocations", "stress/stub", "stress/conservation", "stress/counts"],
+    "D": [
+        "stress/rollouts",
+        "stress/invocations",
+        "stress/stub",
+        "stress/conservation",
+        "stress/counts",
+    ],
 }
 
 

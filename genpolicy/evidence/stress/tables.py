@@ -139,9 +139,9 @@ def power_worlds(settings: StressSettings) -> list[tuple[float, float]]:
 
     A start is one draw, as if all its conditions ended alike: the world with most noise.
     """
-    baseline, _ = settings.planned_effect
-    at_margin = min(1.0, max(0.0, baseline + settings.margin))
-    worlds = [(baseline, baseline), (0.9, 0.9), (baseline, at_margin), settings.planned_effect]
+    baseline, margin = settings.planned_effect[0], settings.margin
+    lowest = min(max(baseline, -margin), 1.0 - margin)  # so that both are shares
+    worlds = [(baseline, baseline), (0.9, 0.9), (lowest, lowest + margin), settings.planned_effect]
     return list(dict.fromkeys([*worlds, (0.3, 0.9), (0.1, 0.9)]))
 
 

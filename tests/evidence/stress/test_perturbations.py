@@ -96,7 +96,9 @@ def test_a_push_in_contact_is_a_second_one_and_leaves_the_first_as_it_was():
 
 def test_a_drill_is_drawn_once_per_start_and_nobody_else_drills():
     drawn = [drill_s(RecoveryDrill(), root_seed=1, name="drill", start=n) for n in range(100)]
-    assert drawn == [drill_s(RecoveryDrill(), root_seed=1, name="drill", start=n) for n in range(100)]
+    assert drawn == [
+        drill_s(RecoveryDrill(), root_seed=1, name="drill", start=n) for n in range(100)
+    ]
     assert all(0.5 <= time_s <= 3.0 for time_s in drawn) and len(set(drawn)) == 100
     for item in (Nominal(), SidewaysPush(force_n=15.0)):
         assert drill_s(item, root_seed=1, name="drill", start=0) is None
