@@ -186,7 +186,6 @@ def _answer(
         question=item.question,
         owner=limit.owner if limit else None,
         candidate=candidate,
-        route=item.route,
         measured=value,
         interval=interval,
         threshold=threshold,

@@ -93,11 +93,6 @@ class Admitted:
         raise TypeError("Admitted cannot be copied or pickled; admit the chunk where it is used.")
 
     @property
-    def admitted_at_s(self) -> float:
-        """When."""
-        return self.context.now_s
-
-    @property
     def actions(self) -> Array:
         """Projected actions, read-only. Shape (K, D_a)."""
         return self.projected.actions

@@ -21,7 +21,7 @@ from genpolicy.verification.journal_source import Message
 Array = NDArray[np.float64]
 Finding = tuple[str, str]
 
-ROBOT, HELD, SCENE = 1, 2, 3  # geom groups of a scene file
+HELD, SCENE = 2, 3  # geom groups of a scene file; 1 is the robot's
 POSE_TOLERANCE_M = POSE_TOLERANCE_RAD = 1e-5  # ten times what feasibility lets a pose be missed by
 CONTACT_TOLERANCE_M = 1e-4  # less than this deep, two libraries may disagree whether shapes touch
 ROUNDING = 1e-6  # relative: a step that was limited to its limit is within it

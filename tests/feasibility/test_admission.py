@@ -26,7 +26,7 @@ def test_it_carries_what_passed(admitted):
     assert [layer.name for layer in admitted.verdict.layers] == list(LAYERS)
     assert all(layer.passed is True for layer in admitted.verdict.layers)
     assert admitted.metadata.chunk_id == "c0"
-    assert admitted.admitted_at_s == 10.0
+    assert admitted.context.now_s == 10.0
     admitted.verify()
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from genpolicy.errors import ContractError, RefusedError
+from stages._latency import LatencySection
 from stages._stage import SHARED, STAGES, load_params, main
 
 BAD_SETTINGS = {
@@ -198,3 +199,8 @@ def test_times_that_cannot_be_written_fail_no_stage(workspace, capsys) -> None:
         main("record", lambda _: None)
     assert end.value.code == 0
     assert "time not recorded" in capsys.readouterr().err
+
+
+def test_the_declared_bounds_of_the_ladder_are_read(workspace):
+    section = load_params().section("latency", LatencySection)
+    assert section.declared_terms["queue"].minimum_s == 0.0
