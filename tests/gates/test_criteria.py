@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 from editing import cells
 
-from gates.engine import TASK_IDENTITY, promoted_below
 from gates.engine import judge as judge_spec
+from gates.engine import promoted_below
 from gates.evidence import Evidence
+from gates.pipeline import TASK_IDENTITY
 from gates.proof import SPECS, judge
 from gates.report import report_bytes, report_path
 from gates.settings import Limits, read_limits, read_params, read_settings

@@ -5,8 +5,9 @@ import json
 import pytest
 from asking import SPEC
 
-from gates.engine import TASK_IDENTITY, judge
+from gates.engine import judge
 from gates.evidence import Evidence
+from gates.pipeline import TASK_IDENTITY
 from gates.settings import GateSettings, Limit, Limits, Waiver
 
 
