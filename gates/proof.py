@@ -194,7 +194,7 @@ def prove_all(root: Path) -> list[Rung]:
         try:
             report, digest = verify_report(root, gate, upstream=hashes, judging=again)
         except GenpolicyError as error:
-            code = error.exit_code if isinstance(error, RefusedError | IntegrityError) else 2
+            code = error.exit_code
             rungs.append(Rung(gate, NAMES[gate], "REFUSED", "", str(error), path, code))
             continue
         reports[gate], hashes[gate] = report, digest

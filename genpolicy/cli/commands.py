@@ -14,7 +14,7 @@ Import recordings, audit them, run the ladder of five gates, prove its reports,
 sign and verify trial cards.
 
 Exit codes: 0 done, 1 a fault of ours, 2 bad usage, configuration or input,
-3 refused by a gate.
+3 refused by a gate (it does not pass, or its report is untrue), 130 interrupted.
 """
 
 # Named here once more, because their home loads every table library; a test holds both together.

@@ -34,8 +34,17 @@ def _clean(result):
 def test_check_passes_through_d_and_not_through_e(ladder, _run):
     assert _run(ladder, "check").exit_code == 0
     result = _run(ladder, "check", "--through", "E")
-    assert result.exit_code == 1
+    assert result.exit_code == 3
     assert "NOT JUDGED" in result.output
+
+
+def test_check_says_3_for_a_verdict_2_for_what_cannot_be_read_and_never_1(ladder, _run):
+    evidence.edit_table(ladder, "audit/clocks.parquet", lambda f: f.assign(offset_after_s=0.5))
+    assert _run(ladder, "judge", "A").exit_code == 0
+    assert _run(ladder, "check", "--through", "A").exit_code == 3
+    (ladder / "reports" / "gate_a.json").write_text("{")
+    assert _run(ladder, "check", "--through", "A").exit_code == 2
+    assert _run(ladder, "verify").exit_code == 2
 
 
 def test_summary_prints_one_line_per_stage_and_exits_0(ladder, _run):
