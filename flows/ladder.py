@@ -2,7 +2,8 @@
 
 Prefect decides when to go on, shows and schedules it; DVC knows what is up to date; the gates
 judge. So no verdict depends on a server, and `dvc repro` alone ends at the same place. A gate that
-does not pass is a failed task and a failed flow, named by its verdict. Retries are for faults of the machine only: a refusal or a bad input does not become better by itself.
+does not pass is a failed task and a failed flow, named by its verdict. Retries are for faults of
+the machine only: a refusal or a bad input does not become better by itself.
 """
 
 import os
@@ -65,9 +66,7 @@ class StageStoppedError(Exception):
         verdict: Verdict of the gate that has judged and does not pass; empty before a judgement.
     """
 
-    def __init__(
-        self, code: int, sentence: str, infrastructure: bool, verdict: str = ""
-    ) -> None:
+    def __init__(self, code: int, sentence: str, infrastructure: bool, verdict: str = "") -> None:
         super().__init__(code, sentence, infrastructure, verdict)
         self.verdict = verdict
         self.code = code

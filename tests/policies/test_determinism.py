@@ -3,6 +3,8 @@
 import pytest
 import torch
 
+from genpolicy.errors import ConfigError
+from genpolicy.policies import determinism
 from genpolicy.policies.determinism import deterministic
 from genpolicy.policies.methods import METHODS
 from genpolicy.policies.networks import (
