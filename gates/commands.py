@@ -88,14 +88,17 @@ def check(
 def verify_reports(root: Root = Path(), as_json: AsJson = False) -> int:
     """Hash all evidence, derive all verdicts again.
 
-    Exit 3 if a report is untrue, 2 if one cannot be read.
+    The independent checker reads every journal again, and each rollout must be
+    what its journal says. Exit 3 if a report is untrue, 2 if one cannot be read.
     """
     from gates.proof import prove_all
+    from gates.rederive import rederived
 
     rungs = [rung for rung in prove_all(root) if rung.verdict != "NOT JUDGED"]
     if not rungs:
         print("No report lies here. Run `dvc repro gate_a`.", file=sys.stderr)
         return 3
+    rungs = rederived(root, rungs)
     _print_rungs(rungs, as_json)
     codes = {rung.exit_code for rung in rungs if rung.verdict == "REFUSED"}
     return 2 if 2 in codes else max(codes, default=0)

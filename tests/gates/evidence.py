@@ -233,6 +233,13 @@ def edit_document(root: Path, path: str, change: Any) -> None:
     record(root)
 
 
+def replace(root: Path, path: str, data: bytes | None) -> None:
+    """Other bytes in place of a file, as if its stage had written them; None removes it."""
+    file = root / "artifacts" / path
+    file.write_bytes(data) if data is not None else file.unlink()
+    record(root)
+
+
 def build(root: Path) -> None:
     """All evidence and settings, without any report."""
     write_params(root)

@@ -9,6 +9,7 @@ import pytest
 from gates.commands import gates
 from gates.proof import STAGE_REQUIRES
 from genpolicy.cli.shell import run_program
+from genpolicy.errors import RefusedError
 
 
 @dataclass(frozen=True)
@@ -58,6 +59,25 @@ def test_summary_prints_one_line_per_stage_and_exits_0(ladder, _run):
     rows = json.loads(_run(ladder, "summary", "--json").output)
     verdicts = {row["stage"]: row["verdict"] for row in rows}
     assert [verdicts[f"gate_{letter}"] for letter in "abcd"] == ["PASS"] * 4
+
+
+@pytest.fixture(autouse=True)
+def _no_journals(monkeypatch):
+    """The journals of this evidence are no journals; tests/gates/test_rederive.py has some."""
+    monkeypatch.setattr("gates.rederive.rederive", lambda root, gate: None)
+
+
+def test_verify_asks_the_journals_too(ladder, _run, monkeypatch):
+    def differs(root, gate):
+        if gate == "D":
+            raise RefusedError(
+                gate="D", criterion="rollout", measured="1", limit="0", report="r", action="Stop."
+            )
+
+    monkeypatch.setattr("gates.rederive.rederive", differs)
+    result = _run(ladder, "verify")
+    assert result.exit_code == 3
+    assert "Gate D refuses: rollout is 1" in result.output
 
 
 def test_verify_finds_a_changed_byte(ladder, _run):
