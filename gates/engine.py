@@ -191,6 +191,8 @@ def _answer(
             measured = item.measure(evidence, inputs, *([] if candidate is None else [candidate]))
         except MissingEvidenceError as error:
             measured = Measured(None, caveat=f"not measured: {error}")
+        except KeyError as error:  # a document of another form; never a traceback, never a pass
+            measured = Measured(None, caveat=f"not measured: the evidence has no {error}")
     value, interval = measured.value, measured.interval
     if value is not None:
         value = rounded(value) if math.isfinite(value) else None

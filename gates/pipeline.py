@@ -114,8 +114,14 @@ def check_record(root: Path, gate: Gate, materials: Mapping[str, str]) -> None:
         for entry in (*(run.get("outs") or ()), *(run.get("deps") or ())):
             disk.check(name, entry)
         _same_parameters(name, (run.get("params") or {}).get(PARAMS) or {}, stage, params)
-    if gate == "A":
-        _check_task(root)
+    changed = changed_task(root) if gate == "A" else ""
+    if changed:
+        raise IntegrityError(
+            where=changed,
+            found="other than the one measured on",
+            expected=f"the file that {TASK_IDENTITY} names",
+            action="Run `dvc repro`: everything is measured on the task.",
+        )
 
 
 def changed_pages(root: Path, gate: Gate) -> str:
@@ -260,24 +266,18 @@ def _equal(recorded: Any, now: Any) -> bool:
     return bool(recorded == now) and isinstance(recorded, bool) == isinstance(now, bool)
 
 
-def _check_task(root: Path) -> None:
-    """The task's package must be the one whose identity was written, wherever it is installed."""
+def changed_task(root: Path) -> str:
+    """File of the task's package that is not the one measured on, wherever it is installed."""
     file = root / TASK_IDENTITY
     if not file.is_file():
-        return
+        return ""
     identity = parse_json(sha256_bytes_of(file, keep=True)[1], where=TASK_IDENTITY)
     package = identity.get("package") if isinstance(identity, dict) else None
     if not isinstance(package, dict):
-        return
+        return ""
     found = _package(root, str(identity.get("entry_point")))
-    other = sorted(name for name in {*package, *found} if package.get(name) != found.get(name))
-    if other:
-        raise IntegrityError(
-            where=f"the task {identity.get('name')}: {other[0]}",
-            found="missing" if other[0] not in found else "other than the one measured on",
-            expected=f"the file that {TASK_IDENTITY} names",
-            action="Run `dvc repro`: everything is measured on the task.",
-        )
+    other = [name for name in {*package, *found} if package.get(name) != found.get(name)]
+    return f"the task {identity.get('name')}: {min(other)}" if other else ""
 
 
 def _package(root: Path, entry_point: str) -> dict[str, str]:

@@ -15,7 +15,7 @@ from gates.card import judge as card
 from gates.differences import first_difference
 from gates.engine import GateSpec, judge_gate
 from gates.need import gate as need
-from gates.pipeline import basis_of, changed_pages, outputs_of
+from gates.pipeline import basis_of, changed_pages, changed_task, outputs_of
 from gates.report import (
     GATES,
     NAMES,
@@ -301,6 +301,9 @@ def _check_upstream(gate: Gate, report: GateReport, upstream: Mapping[Gate, str]
 
 
 def _check_basis(root: Path, gate: Gate, report: GateReport) -> None:
+    changed = changed_task(root) if gate == "A" else ""
+    if changed:
+        raise _refused(gate, changed, "another file", "the one measured on", "Run `dvc repro`.")
     now = basis_of(root, gate)
     for kind, stated, found in (
         ("code", report.code, now.code),

@@ -128,8 +128,16 @@ def test_a_task_whose_package_has_changed_refuses(ladder):
     with pytest.raises(IntegrityError, match=r"the task t: scene\.xml is other than"):
         judge(ladder, "A")
     (package / "scene.xml").unlink()
-    with pytest.raises(IntegrityError, match=r"the task t: scene\.xml is missing"):
+    with pytest.raises(IntegrityError, match=r"the task t: scene\.xml is other than"):
         judge(ladder, "A")
+
+
+def test_a_report_about_another_task_refuses(ladder):
+    identity = {"name": "t", "entry_point": "no_task:TASK", "package": {"task.py": "0" * 64}}
+    _judge_again(ladder, "A")
+    evidence.edit_document(ladder, "task/identity.json", lambda _: identity)
+    with pytest.raises(RefusedError):
+        admit("train_generators", ladder)
 
 
 def test_a_printed_page_that_was_changed_refuses(ladder):
