@@ -88,7 +88,7 @@ class GateReport(StrictModel):
         materials: SHA-256 of every file read or bound, by path relative to the repository.
         upstream: SHA-256 of the reports below this one, by gate.
         code: SHA-256 of the code that the gate and its evidence stages depend on, by package.
-        parameters: SHA-256 of what they read of `params.yaml`, by key.
+        parameters: SHA-256 of what the evidence stages read of `params.yaml`, by key.
         pipeline: SHA-256 of the recorded run (`dvc.lock`) of each evidence stage.
         settings: The gate's parameters other than limits (levels, margins, candidates).
         environment: Library versions and regime.
