@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from gates import feasibility, reproducibility
+from gates import feasibility
 from gates.card import judge as card
 from gates.engine import GateSpec, judge_gate
 from gates.need import gate as need
@@ -27,6 +27,7 @@ from gates.report import (
     report_path,
     stage_of,
 )
+from gates.reproducibility import gate as reproducibility
 from gates.stress import gate as stress
 from gates.verdicts import first_unmet
 from genpolicy.errors import ConfigError, GenpolicyError, IntegrityError, RefusedError

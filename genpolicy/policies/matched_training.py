@@ -205,7 +205,8 @@ def training_windows(data: Dataset, split: str, horizons: HorizonConfig) -> Wind
         observation_horizon=horizons.observation_horizon,
         prediction_horizon=horizons.prediction_horizon,
     )
-    return Windows(cut.observations, cut.actions, cut.is_pad)
+    episodes = data.episodes["episode_uuid"].to_numpy(dtype=str)[cut.episode]
+    return Windows(cut.observations, cut.actions, cut.is_pad, episodes)
 
 
 def matched_configuration(folders: Mapping[str, Path], *, reference: str) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gates.bounds import counted_interval, share_interval, upper_quantile
+from gates.bounds import counted_interval, share_interval, upper_quantile, widest_gap
 from gates.evidence import MissingEvidenceError
 from genpolicy.statistics.intervals import clopper_pearson
 
@@ -52,3 +52,38 @@ def test_a_quantile_is_a_value_that_occurred_and_few_values_have_no_interval():
     assert upper_quantile(values, 0.95, confidence=0.95) == (10.0, None)
     point, interval = upper_quantile(np.arange(1000.0), 0.95, confidence=0.95)
     assert point in np.arange(1000.0) and interval[0] < point < interval[1]
+
+
+def test_the_widest_gap_by_hand():
+    """Shares 1 of 30 and .5 of 30: ends from Clopper and Pearson, squared and added."""
+    clusters = [str(i) for i in range(30)]
+    shares = {"a": (np.ones(30), clusters), "b": (np.repeat([1.0, 0.0], 15), clusters)}
+    (lower, upper), more, less = widest_gap(shares, confidence=0.95)
+    a, b = clopper_pearson(30, 30), clopper_pearson(15, 30)
+    assert (more, less) == ("a", "b")
+    assert upper == pytest.approx(0.5 + (0.5 - b[0]))
+    assert lower == pytest.approx(0.5 - np.hypot(1 - a[0], b[1] - 0.5))
+
+
+def test_equal_shares_may_still_differ_and_the_widest_of_three_is_told():
+    clusters = [str(i) for i in range(40)]
+    same = {name: (np.ones(40), clusters) for name in "ab"}
+    (lower, upper), _, _ = widest_gap(same, confidence=0.95)
+    assert lower == 0.0 and 0.05 < upper < 0.15
+    third = {**same, "c": (np.repeat([1.0, 0.0], [10, 30]), clusters)}
+    assert widest_gap(third, confidence=0.95)[2] == "c"
+
+
+def test_the_gap_covers_the_true_difference():
+    """Four samples each of 60 observations, alike in an observation: .8 against .65."""
+    generator = np.random.default_rng(1)
+    clusters = [str(i) for i in range(60) for _ in range(4)]
+    covered = 0
+    for _ in range(400):
+        shares = {}
+        for name, mean in (("a", 0.8), ("b", 0.65)):
+            own = generator.beta(4 * mean, 4 * (1 - mean), 60)
+            shares[name] = (generator.random((60, 4)) < own[:, None]).ravel(), clusters
+        (lower, upper), _, _ = widest_gap(shares, confidence=0.95)
+        covered += lower <= 0.15 <= upper
+    assert covered / 400 >= 0.95
