@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from gates.claim import CHECKPOINT_ONLY
 from gates.criterion import Measured, criteria_of, criterion
 from gates.engine import GateSpec
 from gates.evidence import Array, Evidence, MissingEvidenceError, count, number, numbers
@@ -177,6 +178,7 @@ GATE = GateSpec(
     back_to="training",
     go_on="Sample every passing candidate in shadow, on held-out and corrupted observations.",
     caveats=(
+        CHECKPOINT_ONLY,
         "Bit equality holds for the same wheels, CPU capability, thread count and batch shape.",
         "Latency was measured on one machine; sensor and network terms are declared, not measured.",
         "Mode coverage is counted on recorded two-mode situations, not on a likelihood.",

@@ -10,6 +10,7 @@ import math
 import numpy as np
 import pandas as pd
 
+from gates.claim import CHECKPOINT_ONLY, IN_SHORT
 from gates.criterion import Measured, criteria_of, criterion
 from gates.engine import Decision, GateSpec, Judged
 from gates.evidence import Array, Evidence, MissingEvidenceError, flags
@@ -100,7 +101,7 @@ def _decide(judged: Judged) -> Decision:
             (name for name, one in judged.candidates.items() if one == "PASS"),
             key=lambda name: (-values.get(name, -math.inf), name),
         )
-        return Decision(f"promote {passed[0]}", promoted=passed[0])
+        return Decision(f"promote {passed[0]}, {IN_SHORT}", promoted=passed[0])
     try:
         return Decision(f"return to {best_baseline(judged.evidence, judged.settings)}")
     except MissingEvidenceError as error:
@@ -115,6 +116,7 @@ GATE = GateSpec(
     back_to="the simpler policy",
     go_on="Draft the trial card.",
     caveats=(
+        CHECKPOINT_ONLY,
         "Simulation: contact, sensing and delays are models; nothing here was seen on hardware.",
         "Starts are the unit of independence; conditions and seeds of one start are averaged.",
         "Only methods matched in data, encoder, horizons, resets and deadlines are compared.",

@@ -367,7 +367,7 @@ def test_empty_table_is_inconclusive_never_pass(gate, path, ladder):
         ("A", "audit/strata", "p_adjusted"),
         ("B", "reload/samples", "max_abs_difference"),
         ("B", "reload/modes", "fewest_admissible"),
-        ("B", "train_generators/flow/seed_0/validation", "loss"),
+        ("B", "train_baselines/chunked_bc/seed_0/validation", "loss"),
         ("C", "shadow/candidates", "position_change_m"),
         ("D", "stress/rollouts", "action_age_p95_s"),
         ("D", "stress/rollouts", "force_peak_n"),

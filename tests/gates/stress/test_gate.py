@@ -77,7 +77,7 @@ def test_of_two_that_pass_the_one_with_more_evidence_is_promoted(ladder):
     passed = [name for name, verdict in report.candidates.items() if verdict == "PASS"]
     found = {c.candidate: c.measured for c in report.criteria if c.id == promotion_e_value.id}
     best = min(passed, key=lambda name: (-found[name], name))
-    assert report.promoted == best and report.decision == f"promote {best}"
+    assert report.promoted == best and report.decision == f"promote {best}, this checkpoint only"
 
 
 def test_starts_that_are_not_shared_are_missing_evidence(ladder):
