@@ -11,7 +11,7 @@ from gates.criterion import Measured, criterion
 from gates.evidence import Evidence, MissingEvidenceError, number, numbers
 from gates.need.settings import TRAINED as BASELINES
 from gates.reproducibility.settings import GENERATORS, ReproducibilitySettings
-from genpolicy.policies.validation import ValidationRow, three_quarters
+from genpolicy.policies.validation_row import ValidationRow, three_quarters
 from genpolicy.statistics.ratios import ratio_of_sums
 
 

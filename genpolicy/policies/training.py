@@ -42,12 +42,8 @@ from genpolicy.policies.networks import (
 from genpolicy.policies.normalisation import Normalisation
 from genpolicy.policies.objectives import Batch, Objective
 from genpolicy.policies.settings import HeadConfig, NetworkConfig, SamplerConfig, TrainingConfig
-from genpolicy.policies.validation import (
-    VALIDATION_FILE,
-    Validation,
-    ValidationRow,
-    moments,
-)
+from genpolicy.policies.validation import Validation, moments
+from genpolicy.policies.validation_row import VALIDATION_FILE, ValidationRow
 from genpolicy.policies.windows import Windows, as_batch
 from genpolicy.seeds import integer_seed, stream
 

@@ -5,8 +5,6 @@ so are the noise, the noise levels and the flow times drawn for them. Nothing is
 stopped by it.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -14,33 +12,11 @@ from numpy.typing import NDArray
 from genpolicy.policies.networks import PolicyNetwork
 from genpolicy.policies.objectives import Batch, Objective
 from genpolicy.policies.settings import TrainingConfig
+from genpolicy.policies.validation_row import ValidationRow, three_quarters
 from genpolicy.seeds import integer_seed
 
 VALIDATION_WINDOWS = 1024
 EPISODE_WINDOWS = 32
-VALIDATION_FILE = "validation.parquet"
-
-
-@dataclass(frozen=True)
-class ValidationRow:
-    """`validation.parquet` of a checkpoint: loss of the averaged weights on a held-out episode.
-
-    Attributes:
-        step: Updates so far.
-        episode_uuid: The episode.
-        windows: Windows of it, at equal distances.
-        loss: Mean loss over them; each method has its own loss.
-    """
-
-    step: int
-    episode_uuid: str
-    windows: int
-    loss: float
-
-
-def three_quarters(steps: int) -> int:
-    """The update with which the last quarter of a training begins."""
-    return steps - steps // 4
 
 
 def moments(config: TrainingConfig) -> frozenset[int]:

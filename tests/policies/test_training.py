@@ -13,7 +13,7 @@ from genpolicy.policies.methods import METHODS
 from genpolicy.policies.objectives import Batch
 from genpolicy.policies.settings import TrainingConfig
 from genpolicy.policies.training import averaging_decay, learning_rate, train
-from genpolicy.policies.validation import VALIDATION_FILE, ValidationRow
+from genpolicy.policies.validation_row import VALIDATION_FILE, ValidationRow
 from genpolicy.policies.windows import Windows
 
 

@@ -10,7 +10,8 @@ from genpolicy.errors import ContractError
 from genpolicy.policies.checkpoint import load_checkpoint
 from genpolicy.policies.methods import METHODS, method_named
 from genpolicy.policies.settings import TrainingConfig
-from genpolicy.policies.validation import EPISODE_WINDOWS, Validation, moments, three_quarters
+from genpolicy.policies.validation import EPISODE_WINDOWS, Validation, moments
+from genpolicy.policies.validation_row import three_quarters
 from genpolicy.policies.windows import as_batch
 
 NAMES = np.repeat(["long", "short", "one"], [460, 51, 1])
