@@ -81,12 +81,14 @@ def last_quarter(evidence: Evidence, root: str, method: str, *, confidence: floa
     for table in tables:
         rows = evidence.rows(table, ValidationRow)
         rows = rows.assign(total=numbers(rows, "loss") * numbers(rows, "windows"))
+        if rows.duplicated(["episode_uuid", "step"]).any():
+            raise MissingEvidenceError(f"{table} states a loss twice")
         by_step = rows.pivot(index="episode_uuid", columns="step", values=["total", "windows"])
         moments = (three_quarters(updates), updates)
         if any(("total", moment) not in by_step.columns for moment in moments):
             raise MissingEvidenceError(f"{table} lacks the loss after {moments[0]} or {updates}")
         kept = by_step.loc[:, [(name, m) for name in ("total", "windows") for m in moments]]
-        if bool(kept.isna().any(axis=None)) or not bool((kept["total"] > 0).all(axis=None)):
+        if bool(kept.isna().any(axis=None)) or not (kept["total"].to_numpy() > 0).all():
             raise MissingEvidenceError(f"{table} lacks the loss of an episode")
         if not (kept["windows"][moments[0]] == kept["windows"][updates]).all() or len(kept) < 2:
             raise MissingEvidenceError(f"{table} compares different windows, or one episode")

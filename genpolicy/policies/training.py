@@ -109,10 +109,7 @@ def train(
     horizons = method.horizons(request.horizons)
     with deterministic(device):
         data = _batch_of(windows, horizons, request, device)
-        followed = None
-        if validation is not None:
-            held_out = _batch_of(validation, horizons, request, device)
-            followed = Validation(held_out, validation.episodes, seed=request.seed, device=device)
+        followed = _follow(validation, horizons, request, device) if validation else None
         network, objective = _build(method, _dimensions(horizons, request), request, device)
         objective.prepare(network, data)
         averaged = copy.deepcopy(network)
@@ -140,7 +137,7 @@ def train(
     }
     measured = followed.rows if followed else []
     return _write(
-        folder, weights=weights, config=config, records=records, summary=summary, measured=measured
+        folder, measured, weights=weights, config=config, records=records, summary=summary
     )
 
 
@@ -159,12 +156,12 @@ def averaging_decay(step: int, config: TrainingConfig) -> float:
 
 def _write(
     folder: Path,
+    measured: list[ValidationRow],
     *,
     weights: bytes,
     config: CheckpointConfig,
     records: list[dict[str, float | int | None]],
     summary: dict[str, object],
-    measured: list[ValidationRow],
 ) -> str:
     """Write all files, whole or not at all; returns the checkpoint's SHA-256."""
     lines = "".join(json.dumps(record, sort_keys=True) + "\n" for record in records)
@@ -188,6 +185,13 @@ def _batch_of(
         mask_padding=request.training.mask_padding,
         device=device,
     )
+
+
+def _follow(
+    windows: Windows, horizons: HorizonConfig, request: TrainingRequest, device: str
+) -> Validation:
+    held_out = _batch_of(windows, horizons, request, device)
+    return Validation(held_out, windows.episodes, seed=request.seed, device=device)
 
 
 def _dimensions(horizons: HorizonConfig, request: TrainingRequest) -> Dimensions:

@@ -126,8 +126,17 @@ def test_the_worse_end_over_episodes_decides(ladder):
         lambda rows: [{**row, "windows": 32 + (row["step"] == 4000)} for row in rows],
         lambda rows: [row for row in rows if row["episode_uuid"] == "e3"],
         lambda rows: [{**row, "loss": 0.0} for row in rows],
+        lambda rows: [*rows, rows[-1]],
     ],
-    ids=["no middle", "no end", "an episode less", "other windows", "one episode", "no loss"],
+    ids=[
+        "no middle",
+        "no end",
+        "an episode less",
+        "other windows",
+        "one episode",
+        "no loss",
+        "twice",
+    ],
 )
 def test_a_training_that_was_not_followed_is_inconclusive(ladder, change):
     for method in evidence.CANDIDATES:

@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.contract.horizons import HorizonConfig
-from genpolicy.data.dataset import Dataset, Windows
+from genpolicy.data.dataset import Dataset
+from genpolicy.data.frames import Windows
 from genpolicy.errors import ContractError
 from genpolicy.evidence.admission_context import COMMANDS_AT_THE_BOUNDARY
 from genpolicy.evidence.need.method_modes import one_per_episode, read_situations

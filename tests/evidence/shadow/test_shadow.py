@@ -102,7 +102,8 @@ def test_situations_with_modes_are_judged_neither_corrupted_nor_executed(shadow,
     assert len(rows) == 3 * len(more) and {row.observation for row in rows} == {1, 2, 3}
     assert [row.situation for row in rows[::3]] == [f"{o.episode_uuid}:{o.index}" for o in more]
     alone = shadow_policy(shadow, Demonstrator(observations), few, seed=0)
-    assert [r for r in found.candidates if r.fixture != TWO_MODES] == alone.candidates
+    rest = [row for row in found.candidates if row.fixture != TWO_MODES]
+    assert repr(rest) == repr(alone.candidates)
     assert found.stub == alone.stub and len(found.sessions) == len(alone.sessions)
 
 
