@@ -135,10 +135,8 @@ def train(
         "final": records[-1],
         "regime": regime(device),
     }
-    measured = followed.rows if followed else []
-    return _write(
-        folder, measured, weights=weights, config=config, records=records, summary=summary
-    )
+    rows = followed.rows if followed else []
+    return _write(folder, rows, weights=weights, config=config, records=records, summary=summary)
 
 
 def learning_rate(step: int, config: TrainingConfig) -> float:
