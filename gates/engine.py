@@ -205,7 +205,6 @@ def _answer(
         question=item.question,
         owner=limit.owner if limit else None,
         candidate=candidate,
-        route=item.route,
         measured=value,
         interval=interval,
         threshold=threshold,

@@ -42,6 +42,7 @@ from genpolicy.evidence.rows.reproducibility import CoverageRow, LatencyRow, Nfe
 from genpolicy.evidence.rows.shadow import CandidateRow, ShadowCountRow, ShadowStubRow
 from genpolicy.evidence.rows.stress import (
     ConservationRow,
+    InvocationRow,
     RolloutRow,
     StressCountRow,
     StressStubRow,
@@ -53,10 +54,12 @@ from genpolicy.integrity.tables import read_table, write_table
 CODE = "genpolicy/robot/impedance.py"
 """A file of code in the repository of the tests."""
 BASELINES = ("bc", "chunked_bc", "act")
+REMEDIES = {"chunked_l1": "direct", "one_mode_bc": "direct", "bc_noise": "offset"}
 DRAWN = "ibc"
 CANDIDATES = ("diffusion", "flow")
-CONDITIONS = ("nominal", "camera_delay", "compute_contention")
-STARTS = 40
+CONDITIONS = ("nominal", "camera_delay", "recovery_drill")
+STARTS = 80
+INVOCATIONS = 20
 PNG = base64.b64decode(
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAAAAAA6fptVAAAACklEQVR4nGNgAAAAAgABSK+kcQAAAABJRU5ErkJggg=="
 )
@@ -91,9 +94,11 @@ def _cause() -> dict[str, Any]:
 
 
 PARAMS: dict[str, Any] = {
+    "seed": 1,
     "confidence": 0.95,
+    "horizons": {"execution_horizon": 8, "action_period_s": 0.05},
     "task": {"name": "tabletop_insertion"},
-    "train_baselines": {"samplers": {name: {} for name in (*BASELINES, DRAWN)}},
+    "train_baselines": {"samplers": {name: {} for name in (*BASELINES, *REMEDIES, DRAWN)}},
     "measure_baselines": {"latent": {"method": "act"}},
     "train_generators": {"samplers": {name: {} for name in CANDIDATES}},
     "stress": {
@@ -102,11 +107,13 @@ PARAMS: dict[str, Any] = {
         "perturbations": {name: {} for name in CONDITIONS},
         "margin": 0.1,
         "alpha": 0.1,
+        "samples": 4,
+        "planned_effect": [0.5, 0.95],
     },
     "gate_a": {
         "cause": _cause(),
         "held_out_splits": ["validation", "test"],
-        "deployed_conventions": ["direct", "z_zero"],
+        "deployed_conventions": ["direct", "z_zero", "offset"],
         "generative_baselines": [DRAWN],
         "chunked_baseline": "chunked_bc",
         "limits": by_owner(
@@ -121,7 +128,9 @@ PARAMS: dict[str, Any] = {
             mode_success_lower=(0.6, "model"),
             mode_feasible_share=(0.9, "controller"),
             mean_defeated_share=(0.5, "model"),
-            recovery_benefit=(0.1, "model"),
+            median_valid_share=(0.5, "model"),
+            remedy_valid_share=(0.5, "model"),
+            data_defects=(0, "perception"),
             strata_effect=(0.3, "perception"),
             cause_accepted=(1, "model"),
             baselines_matched=(0, "model"),
@@ -168,13 +177,16 @@ PARAMS: dict[str, Any] = {
         ),
     },
     "gate_d": {
-        "minimum_power": 0.8,
         "limits": by_owner(
             unmatched_starts=(0, "model"),
-            verdict_reachable=(1, "model"),
+            verdict_reachable=(0.8, "model"),
             nominal_success_lower=(0.7, "model"),
             deadline_miss_upper=(0.1, "controller"),
-            action_age_p95_s=(0.5, "perception"),
+            latency_p95_s=("derived", "controller"),
+            hold_share_upper=(0.25, "controller"),
+            rejection_share_upper=(0.2, "model"),
+            reset_upper=(0.1, "safety"),
+            recovery_success_lower=(0.5, "safety"),
             fallback_share_upper=(0.15, "safety"),
             intervention_upper=(0.1, "safety"),
             stub_violations=(0, "safety"),
@@ -572,6 +584,7 @@ def _situation(i: int) -> dict[str, Any]:
         "separation_m": 0.2,
         "mean_admissible": False,
         "mean_reason": "collision",
+        "median_admissible": False,
         "modes_admissible": 2,
         "mean_path": mean,
         "mode_paths": [left, right],
@@ -592,6 +605,8 @@ def _modes(methods: tuple[str, ...], covered: int) -> list[dict[str, Any]]:
             "modes_covered": covered,
             "between_modes": 0,
             "admissible": 16,
+            "valid": 16 if covered else 0,
+            "modes_valid": covered,
             "nfe": 1,
             "spread_m": 0.0,
         }
@@ -636,17 +651,22 @@ def _checkpoints(root: Path, stage: str, methods: tuple[str, ...]) -> None:
 
 
 def _baselines(root: Path) -> None:
-    fixed = [{**row, "admissible": 0} for row in _modes(BASELINES, 1)]
+    refused = {"admissible": 0, "valid": 0, "modes_valid": 0}
+    fixed = [{**row, **refused} for row in _modes(BASELINES, 1)]
+    fixed += [
+        {**row, **refused, "convention": REMEDIES[row["method"]]}
+        for row in _modes(tuple(REMEDIES), 1)
+    ]
     drawn = [{**row, "convention": "derivative_free"} for row in _modes((DRAWN,), 2)]
     table(root, "measure_baselines/modes.parquet", ModeRow, fixed + drawn)
-    document(root, "train_baselines/matched.json", _matched((*BASELINES, DRAWN)))
+    document(root, "train_baselines/matched.json", _matched((*BASELINES, *REMEDIES, DRAWN)))
     table(root, "measure_baselines/offline.parquet", OfflineRow, [_offline("bc")])
     latent = {
         "method": "act", "convention": "z_prior", "seed": 0, "situations": 30, "spread_m": 0.03,
         "condition_share": 0.4, "distance_correlation": 0.6, "exceeding": 0, "permutations": 999,
     }  # fmt: skip
     document(root, "measure_baselines/latent.json", [latent])
-    _checkpoints(root, "train_baselines", (*BASELINES, DRAWN))
+    _checkpoints(root, "train_baselines", (*BASELINES, *REMEDIES, DRAWN))
 
 
 VARIANTS = {
@@ -663,7 +683,8 @@ def _factors(root: Path) -> None:
     for place, (name, (factor, convention, _, _)) in enumerate(VARIANTS.items()):
         named = {"variant": name, "factor": factor, "convention": convention}
         covered = 2 if factor == "head" else 1
-        modes += [{**row, **named, "admissible": 0} for row in _modes((name,), covered)]
+        refused = {"admissible": 0, "valid": 0, "modes_valid": 0}
+        modes += [{**row, **named, **refused} for row in _modes((name,), covered)]
         errors += [
             {
                 **named, "seed": 0, "split": "test", "episode_uuid": f"e{i}", "windows": 9,
@@ -843,7 +864,7 @@ def _shadow(root: Path) -> None:
         "shadow/stub.parquet",
         ShadowStubRow,
         [
-            {"method": m, "fixture": f, "delivered": 9, "arrivals": 200, "stale": 0, "invalid": 0}
+            {"method": m, "fixture": f, "delivered": 400, "arrivals": 900, "stale": 0, "invalid": 0}
             for m in CANDIDATES
             for f in FIXTURES
         ],
@@ -882,6 +903,11 @@ def _succeeds(method: str, start: int) -> bool:
     return not (method == "flow" and start == 7)
 
 
+def _answer_s(method: str, lot: int) -> float:
+    """Between 0.05 and 0.06 s; of diffusion, 0.02 s more."""
+    return 0.05 + 0.0001 * (lot % 100) + (0.02 if method == "diffusion" else 0.0)
+
+
 def _stress(root: Path) -> None:
     methods = (*BASELINES, *CANDIDATES)
     rows = []
@@ -903,13 +929,13 @@ def _stress(root: Path) -> None:
                         "action_ticks": 150,
                         "hold_ticks": 8,
                         "fallback_ticks": 2,
-                        "invocations": 20,
+                        "invocations": INVOCATIONS,
                         "deadline_misses": 0,
                         "discards": 1,
                         "rejections": 1,
                         "rejected_by": "",
-                        "recovery_attempted": False,
-                        "recovered": False,
+                        "recovery_attempted": condition == "recovery_drill",
+                        "recovered": success and condition == "recovery_drill",
                         "interventions": 0,
                         "action_age_p50_s": 0.1,
                         "action_age_p95_s": 0.2 + 0.001 * start,
@@ -920,6 +946,25 @@ def _stress(root: Path) -> None:
                     }
                 )
     table(root, "stress/rollouts.parquet", RolloutRow, rows)
+    table(
+        root,
+        "stress/invocations.parquet",
+        InvocationRow,
+        [
+            {
+                "method": method,
+                "seed": 0,
+                "perturbation": condition,
+                "start": start,
+                "invocation": number,
+                "latency_s": 0.9 if number == 0 else _answer_s(method, start + 7 * number),
+            }
+            for method in methods
+            for condition in CONDITIONS
+            for start in range(STARTS)
+            for number in range(INVOCATIONS)
+        ],
+    )
     cells = [(m, c) for m in methods for c in CONDITIONS]
     table(
         root,

@@ -13,6 +13,7 @@ from genpolicy.evidence.stress.matched import Comparison, Shard, matched_starts,
 from genpolicy.evidence.stress.perturbations import NetworkJitter, Nominal
 from genpolicy.execution.journal import read_journal
 from genpolicy.policies.checkpoint import Provenance
+from genpolicy.policies.policy import NetworkPolicy
 from genpolicy.policies.settings import HeadConfig, NetworkConfig, SamplerConfig, TrainingConfig
 from genpolicy.policies.training import TrainingRequest, train
 from genpolicy.policies.windows import Windows
@@ -21,7 +22,11 @@ from genpolicy.tasks.api import WorldSettings
 from genpolicy.verification.checker import check_journal
 from genpolicy.verification.rollouts import derived_rollouts, differences
 
-METHODS = {"chunked_bc": SamplerConfig(name="direct"), "flow": SamplerConfig(name="euler", steps=2)}
+METHODS = {
+    "chunked_bc": SamplerConfig(name="direct"),
+    "bc_noise": SamplerConfig(name="offset"),
+    "flow": SamplerConfig(name="euler", steps=2),
+}
 
 
 @pytest.fixture(scope="module")
@@ -97,6 +102,22 @@ def test_starts_do_not_depend_on_how_many_there_are(task):
     assert [s.to_json() for s in few] == [s.to_json() for s in many[:3]]
     assert len({s.to_json() for s in many}) == 10
     assert matched_starts(task, root_seed=10, count=1)[0].to_json() != few[0].to_json()
+
+
+def test_noise_is_redrawn_as_often_as_every_other_method_that_draws(shard, monkeypatch):
+    asked = {}
+    drawn = NetworkPolicy.sample
+
+    def sample(policy, observations, *, noise_names, candidates):
+        asked.setdefault(policy.method, set()).add(candidates)
+        return drawn(policy, observations, noise_names=noise_names, candidates=candidates)
+
+    monkeypatch.setattr(NetworkPolicy, "sample", sample)
+    for method in METHODS:
+        made = shard(method)
+        run_shard(made)
+        assert check_journal(made.journal).violations == []
+    assert asked == {"chunked_bc": {1}, "bc_noise": {2}, "flow": {2}}
 
 
 def test_a_shard_is_deterministic_and_proved(shard):
