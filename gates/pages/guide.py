@@ -63,8 +63,8 @@ WORDS: dict[str, str] = {
     "fallback": "the classical motion that drives while no admissible action is there",
     "e-value": "evidence that the gain exceeds the margin; above 1/alpha it is promoted",
     "p95": "the value that 95 of 100 do not exceed",
-    "interval": "interval at the confidence under Settings, exact or over whole starts drawn again; "
-    "limits are held against its worse end",
+    "interval": "interval at the confidence under Settings, exact or over whole starts drawn "
+    "again; limits are held against its worse end",
 }
 USED: dict[Gate, tuple[str, ...]] = {
     "A": ("situation", "chunk", "mode", "held-out", "admissible", "interval"),

@@ -56,6 +56,8 @@ EVENT_FIELDS: dict[str, tuple[str, ...]] = {
     "invalidate": ("reason", "before_ns"),
     "mode": ("old", "new"),
     "reset": ("session_epoch",),
+    "force": ("force_n",),
+    "outcome": ("outcome", "mode"),
     "end": ("chunks", "actions", "events"),
 }  # fmt: skip
 """Payload of each kind of event; `session`, `n` and `t` (ns) are in every message."""
