@@ -52,9 +52,10 @@ from genpolicy.integrity.rows import write_rows
 from genpolicy.integrity.tables import read_table, write_table
 from genpolicy.policies.validation_row import ValidationRow
 
-CHECKS = (*((layer, "first") for layer in LAYERS), ("fresh", "expired"), ("execution", "expired"))
 CODE = "genpolicy/robot/impedance.py"
 """A file of code in the repository of the tests."""
+CHECKS = (*((layer, "first") for layer in LAYERS), ("fresh", "expired"), ("execution", "expired"))
+
 BASELINES = ("bc", "chunked_bc", "act")
 REMEDIES = {"chunked_l1": "direct", "one_mode_bc": "direct", "bc_noise": "offset"}
 DRAWN = "ibc"
