@@ -118,27 +118,22 @@ def train(
         network, objective = _build(method, _dimensions(horizons, request), request, device)
         objective.prepare(network, data)
         averaged = copy.deepcopy(network)
-        if weights_of is not None:
-            records = [take_over(averaged, weights_of, request)]
-        else:
-            records = list(
+        records = (
+            [take_over(averaged, weights_of, request)]
+            if weights_of is not None
+            else list(
                 _optimise(
-                    network,
-                    averaged,
-                    objective,
-                    data=data,
-                    held_out=held_out,
-                    request=request,
-                    device=device,
+                    network, averaged, objective,
+                    data=data, held_out=held_out, request=request, device=device,
                 )
             )
+        )  # fmt: skip
         objective.finish(averaged, data)
     weights = serialise_weights(averaged, method=request.method)
     config = _checkpoint_config(request, averaged, objective, weights=weights)
+    rule = f"weights of {weights_of.parent.name}" if weights_of else "fixed number of steps"
     summary = {
-        "stopping_rule": f"weights of {weights_of.parent.name}"
-        if weights_of is not None
-        else "fixed number of steps",
+        "stopping_rule": rule,
         "steps": request.training.steps,
         "evaluated_weights": "exponential moving average",
         "windows": len(windows.observations),
