@@ -112,9 +112,7 @@ def train(
     horizons = method.horizons(request.horizons)
     with deterministic(device):
         data = _batch_of(windows, horizons, request, device)
-        held_out = (
-            _batch_of(validation, horizons, request, device) if validation is not None else None
-        )
+        held_out = _batch_of(validation, horizons, request, device) if validation else None
         network, objective = _build(method, _dimensions(horizons, request), request, device)
         objective.prepare(network, data)
         averaged = copy.deepcopy(network)
@@ -131,9 +129,8 @@ def train(
         objective.finish(averaged, data)
     weights = serialise_weights(averaged, method=request.method)
     config = _checkpoint_config(request, averaged, objective, weights=weights)
-    rule = f"weights of {weights_of.parent.name}" if weights_of else "fixed number of steps"
     summary = {
-        "stopping_rule": rule,
+        "stopping_rule": _stopping_rule(weights_of),
         "steps": request.training.steps,
         "evaluated_weights": "exponential moving average",
         "windows": len(windows.observations),
@@ -142,6 +139,10 @@ def train(
         "regime": regime(device),
     }
     return _write(folder, weights=weights, config=config, records=records, summary=summary)
+
+
+def _stopping_rule(weights_of: Path | None) -> str:
+    return f"weights of {weights_of.parent.name}" if weights_of else "fixed number of steps"
 
 
 def take_over(
