@@ -116,11 +116,7 @@ def train(
     horizons = method.horizons(request.horizons)
     with deterministic(device):
         data = _batch_of(windows, horizons, request, device)
-<<<<<<< HEAD
-        held_out = _batch_of(validation, horizons, request, device) if validation else None
-=======
         followed = _follow(validation, horizons, request, device) if validation else None
->>>>>>> main
         network, objective = _build(method, _dimensions(horizons, request), request, device)
         objective.prepare(network, data)
         averaged = copy.deepcopy(network)
@@ -129,18 +125,8 @@ def train(
             if weights_of is not None
             else list(
                 _optimise(
-<<<<<<< HEAD
                     network, averaged, objective,
-                    data=data, held_out=held_out, request=request, device=device,
-=======
-                    network,
-                    averaged,
-                    objective,
-                    data=data,
-                    followed=followed,
-                    request=request,
-                    device=device,
->>>>>>> main
+                    data=data, followed=followed, request=request, device=device,
                 )
             )
         )  # fmt: skip
@@ -156,11 +142,18 @@ def train(
         "final": records[-1],
         "regime": regime(device),
     }
-    rows = followed.rows if followed else []
-    if weights_of is not None and followed:  # the weights' own training is what converged or not
-        path = weights_of / VALIDATION_FILE
-        rows = rows_of_table(read_table(path), ValidationRow, where=str(path))
+    rows = _validation_rows(followed, weights_of)
     return _write(folder, rows, weights=weights, config=config, records=records, summary=summary)
+
+
+def _validation_rows(followed: Validation | None, weights_of: Path | None) -> list[ValidationRow]:
+    """Rows of `validation.parquet`; of taken over weights those of their own training."""
+    if followed is None:
+        return []
+    if weights_of is None:
+        return followed.rows
+    path = weights_of / VALIDATION_FILE
+    return rows_of_table(read_table(path), ValidationRow, where=str(path))
 
 
 def _stopping_rule(weights_of: Path | None) -> str:
