@@ -120,16 +120,15 @@ def train(
         network, objective = _build(method, _dimensions(horizons, request), request, device)
         objective.prepare(network, data)
         averaged = copy.deepcopy(network)
-        records = (
-            [take_over(averaged, weights_of, request)]
-            if weights_of is not None
-            else list(
+        if weights_of is not None:
+            records = [take_over(averaged, weights_of, request)]
+        else:
+            records = list(
                 _optimise(
                     network, averaged, objective,
                     data=data, followed=followed, request=request, device=device,
                 )
-            )
-        )  # fmt: skip
+            )  # fmt: skip
         objective.finish(averaged, data)
     weights = serialise_weights(averaged, method=request.method)
     config = _checkpoint_config(request, averaged, objective, weights=weights)
@@ -153,6 +152,8 @@ def _validation_rows(followed: Validation | None, weights_of: Path | None) -> li
     if weights_of is None:
         return followed.rows
     path = weights_of / VALIDATION_FILE
+    if not path.is_file():
+        return []
     return rows_of_table(read_table(path), ValidationRow, where=str(path))
 
 
