@@ -94,8 +94,7 @@ def train(
     """Train one method and write its checkpoint folder, whole or not at all.
 
     Args:
-        folder: Folder to write: weights, config, `training.json`, `metrics.jsonl`, and
-            `validation.parquet` where the validation windows name their episodes.
+        folder: Folder to write: weights, config, records; of named episodes `validation.parquet`.
         request: What decides the result.
         windows: Training split.
         validation: Validation split, for the record only; it stops and selects nothing.
