@@ -93,6 +93,21 @@ class Mode:
 
 
 @dataclass(frozen=True)
+class Component:
+    """Modes in one component of the action; meanings as in `genpolicy.audit.looks`."""
+
+    component: str
+    state: str
+    unit: str
+    separation: float
+    spread: float | None
+    situations: int
+    two_mode: int
+    two_mode_episodes: int
+    followed: bool
+
+
+@dataclass(frozen=True)
 class Numbers:
     """All that a cause is named from.
 
@@ -106,6 +121,8 @@ class Numbers:
         kept: Identity over time.
         strata: Tests of variables.
         modes: Modes of the phase with most situations.
+        components: Where in the action modes were looked for; counts, strata and modes are about
+            the one followed.
     """
 
     findings: tuple[Finding, ...]
@@ -117,6 +134,7 @@ class Numbers:
     kept: Kept
     strata: tuple[Stratum, ...]
     modes: tuple[Mode, ...]
+    components: tuple[Component, ...]
 
 
 def read_numbers(
@@ -151,6 +169,7 @@ def read_numbers(
                 for row in rows("modes.parquet")
                 if row["phase"] == summary["primary_phase"]
             ),
+            components=tuple(_of(Component, row) for row in rows("components.parquet")),
         )
         return numbers, tuple(_draws(numbers, rows("resamples.parquet")))
     except (KeyError, TypeError, ValueError) as error:

@@ -1,7 +1,7 @@
 """The audit's evidence as files: the tables that the gate reads, and nothing that decides."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ from genpolicy.audit.examples import (
     support_points,
 )
 from genpolicy.audit.labels import disagreement
+from genpolicy.audit.looks import ComponentModes
 from genpolicy.audit.persistence import persistent
 from genpolicy.audit.run import AuditResult
 from genpolicy.audit.settings import AuditSettings
@@ -42,6 +43,14 @@ NEIGHBOURHOODS = pa.schema(
         ("two_mode", FLAG), ("separation_m", REAL), ("mean_admissible", FLAG),
         ("mean_reason", TEXT), ("modes_admissible", WHOLE), ("mean_path", pa.list_(REAL)),
         ("mode_paths", pa.list_(pa.list_(REAL))), ("persistent", FLAG),
+    ]
+)  # fmt: skip
+COMPONENTS = pa.schema(
+    [
+        ("component", TEXT), ("state", TEXT), ("unit", TEXT), ("separation", REAL),
+        ("scale", REAL), ("spread", REAL), ("situations", WHOLE), ("clusters", WHOLE),
+        ("two_mode", WHOLE), ("two_mode_episodes", WHOLE), ("incoherent", WHOLE),
+        ("persistent", WHOLE), ("followed", FLAG),
     ]
 )  # fmt: skip
 MODES = pa.schema(
@@ -122,6 +131,7 @@ def write_evidence(
         "neighbourhoods": pa.Table.from_pylist(
             [_situation(result.data, item) for item in result.situations], NEIGHBOURHOODS
         ),
+        "components": _table(_components(result), COMPONENTS),
         "modes": _table(result.modes, MODES),
         "strata": _table(result.strata, STRATA),
         "replay": pa.Table.from_pylist(_replays(result), REPLAY),
@@ -178,6 +188,12 @@ def summary(result: AuditResult, settings: AuditSettings) -> dict[str, Any]:
         "start_drift": result.semantics.start_drift,
         "notes": list(result.semantics.notes),
     }
+
+
+def _components(result: AuditResult) -> list[ComponentModes]:
+    """Modes in every component; lengths along the path are in the unit of the position."""
+    unit = position_unit(result.data)
+    return [replace(item, unit=item.unit or unit) for item in result.components]
 
 
 def _by_phase(result: AuditResult) -> dict[str, int | None]:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from genpolicy.audit.components import vectors
 from genpolicy.audit.data import Array, AuditInput, Integers, origin, relative_paths
-from genpolicy.audit.modes import features
 from genpolicy.audit.run import AuditResult
 from genpolicy.audit.semantics import episode_lags, realigned
 from genpolicy.audit.settings import AuditSettings
@@ -33,7 +33,7 @@ class ExampleChunk:
         distance: How far its observation lies from the query's, in scales.
         cluster: Mode, 0 the largest.
         coordinate: Where the chunk lies along the direction in which the chunks differ most
-            between clusters, RMS distance in the unit of the position.
+            between clusters, RMS distance in the unit of the component followed.
         path: Commanded positions, moved to the query's place. K times P numbers.
     """
 
@@ -87,7 +87,7 @@ def example_chunks(result: AuditResult, settings: AuditSettings) -> list[Example
     """Chunks of a few situations, chosen evenly over how far apart their chunks lie."""
     rows: list[ExampleChunk] = []
     for number, item in enumerate(_chosen(result, settings)):
-        rows += _chunks(result.data, settings, number, item)
+        rows += _chunks(result, settings, number, item)
     return rows
 
 
@@ -171,25 +171,26 @@ def _chosen(result: AuditResult, settings: AuditSettings) -> list[Situation]:
     primary = max(sorted(set(phases)), key=phases.count)
     pool = [item for item in pool if item.phase == primary]
     spread = [
-        item.clustering.separation if several else _spread(result.data, settings, item)
-        for item in pool
+        item.clustering.separation if several else _spread(result, settings, item) for item in pool
     ]
     order = np.argsort(spread, kind="stable")
     places = (np.arange(EXAMPLES) + 0.5) / EXAMPLES * len(pool)
     return [pool[int(order[place])] for place in np.unique(places.astype(int))]
 
 
-def _spread(data: AuditInput, settings: AuditSettings, item: Situation) -> float:
-    paths = relative_paths(data, item.neighbourhood.members, settings.chunk_steps)
-    return float(features(paths, settings).var(axis=0).sum())
+def _spread(result: AuditResult, settings: AuditSettings, item: Situation) -> float:
+    members = item.neighbourhood.members
+    return float(vectors(result.data, settings, result.component, members).var(axis=0).sum())
 
 
 def _chunks(
-    data: AuditInput, settings: AuditSettings, number: int, item: Situation
+    result: AuditResult, settings: AuditSettings, number: int, item: Situation
 ) -> list[ExampleChunk]:
+    data = result.data
     members, query = item.neighbourhood.members, item.neighbourhood.query
     paths = relative_paths(data, members, settings.chunk_steps)
-    coordinate = _coordinate(features(paths, settings), item.clustering.labels)
+    parts = vectors(data, settings, result.component, members)
+    coordinate = _coordinate(parts, item.clustering.labels)
     placed = paths + origin(data, np.array([query], dtype=np.int64))[:, None, :]
     distance = np.append(item.neighbourhood.distance, 0.0)
     return [

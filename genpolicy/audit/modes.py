@@ -83,10 +83,23 @@ def cluster_chunks(paths: Array, settings: AuditSettings) -> Clustering:
     Returns:
         The modes; a single one unless both opinions agree on more.
     """
-    vectors = features(paths, settings)
+    return cluster(features(paths, settings), settings, settings.minimum_separation_m)
+
+
+def cluster(vectors: Array, settings: AuditSettings, separation: float) -> Clustering:
+    """Modes of chunks given as vectors.
+
+    Args:
+        vectors: Euclidean distances between them are RMS distances of chunks. Shape (n, d).
+        settings: Sizes and gain.
+        separation: Modes nearer than this are one, unit of the vectors.
+
+    Returns:
+        The modes; a single one unless both opinions agree on more.
+    """
     n = len(vectors)
     labels = np.zeros(n, dtype=np.int64)
-    _bisect(vectors, np.arange(n), labels, settings)
+    _bisect(vectors, np.arange(n), labels, settings, separation=separation)
     labels = by_size(labels)
     count = int(labels.max()) + 1
     gaps = np.linalg.norm(vectors[:, None] - vectors[None], axis=2)
@@ -137,24 +150,33 @@ def _cuts(n: int, least: int, groups: int) -> Integers:
     return np.stack([a[keep], b[keep]], axis=1)
 
 
+def reach(vectors: Array, least: int) -> float:
+    """Furthest that the centres of two groups, each of `least` or more, can lie apart."""
+    share = min(0.5, least / len(vectors))
+    return float(np.sqrt(vectors.var(axis=0).sum() / (share * (1.0 - share))))
+
+
 def _bisect(
-    vectors: Array, rows: Integers, labels: Integers, settings: AuditSettings, depth: int = 0
+    vectors: Array,
+    rows: Integers,
+    labels: Integers,
+    settings: AuditSettings,
+    *,
+    separation: float,
+    depth: int = 0,
 ) -> None:
     """Split `rows` while both opinions agree; writes new labels in place."""
-    least = _least(settings, len(labels))
+    least = smallest(settings, len(labels))
     if depth == MAXIMUM_DEPTH or len(rows) < 2 * least:
         return
     part = vectors[rows]
-    share = least / len(rows)
-    reach = np.sqrt(part.var(axis=0).sum() / (share * (1.0 - share)))
-    if reach < settings.minimum_separation_m:  # no split of this spread can be that far apart
+    if reach(part, least) < separation:  # no split of this spread can be that far apart
         return
     sides = next(
         (
             split
             for split in _principal_splits(part, least, settings.minimum_gain)
-            if _separation(part, split) >= settings.minimum_separation_m
-            and _confirmed(part, split, least)
+            if _separation(part, split) >= separation and _confirmed(part, split, least)
         ),
         None,
     )
@@ -163,10 +185,12 @@ def _bisect(
     for side in range(1, int(sides.max()) + 1):
         labels[rows[sides == side]] = labels.max() + 1
     for side in range(int(sides.max()) + 1):
-        _bisect(vectors, rows[sides == side], labels, settings, depth + 1)
+        _bisect(
+            vectors, rows[sides == side], labels, settings, separation=separation, depth=depth + 1
+        )
 
 
-def _least(settings: AuditSettings, members: int) -> int:
+def smallest(settings: AuditSettings, members: int) -> int:
     """Smallest size of a mode among `members` chunks."""
     return max(settings.minimum_mode_size, int(np.ceil(settings.minimum_mode_share * members)))
 

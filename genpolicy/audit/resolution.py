@@ -18,6 +18,8 @@ def resolved_by_observation(
     settings: AuditSettings,
     situation: Neighbourhood,
     clustering: Clustering,
+    *,
+    speed: bool = False,
 ) -> bool:
     """Whether one observed component, or the place, already tells the clusters apart.
 
@@ -25,7 +27,10 @@ def resolved_by_observation(
     It must order them (nearly) perfectly and differ by at least its own scale. The place (up to
     three components) is also looked at along Fisher's line from one cluster to the other, which
     need not lie along an axis; more components would always have such a line among so few members.
+    With `speed`, a history of observations also shows how fast the position moves.
     """
+    if speed and _told_by_speed(data, settings, situation, clustering):
+        return True
     place = _place(data)
     for values, inside in _observed(data, settings, situation, clustering):
         if len(place):
@@ -37,6 +42,21 @@ def resolved_by_observation(
         if any(_auc(values[:, j], inside) >= settings.resolved_auc for j in far):
             return True
     return False
+
+
+def _told_by_speed(
+    data: AuditInput, settings: AuditSettings, situation: Neighbourhood, clustering: Clustering
+) -> bool:
+    """Whether the speed over the observed history orders the clusters (nearly) perfectly."""
+    if settings.observation_horizon < 2 or data.position.shape[1] == 0:
+        return False
+    rows = situation.members
+    before = np.maximum(rows - settings.observation_horizon + 1, data.first_row[rows])
+    speeds = np.linalg.norm(data.position[rows] - data.position[before], axis=1)[:, None]
+    return any(
+        _auc(speeds[:, 0], clustering.labels == mode) >= settings.resolved_auc
+        for mode in range(clustering.count)
+    )
 
 
 def _place(data: AuditInput) -> Integers:
