@@ -56,7 +56,8 @@ def write_situations(folder, rows):
         {
             "split": "test", "phase": "approach", "episode_uuid": uuid, "index": index,
             "two_mode": True, "persistent": True, "mean_path": straight.ravel().tolist(),
-            "mode_paths": [left.ravel().tolist(), right.ravel().tolist()], **changes,
+            "mode_paths": [left.ravel().tolist(), right.ravel().tolist()],
+            "component": "position", **changes,
         }
         for uuid, index, changes in rows
     ]  # fmt: skip

@@ -16,21 +16,21 @@ from typing import Literal
 import numpy as np
 
 from genpolicy.audit.data import Array, AuditInput, Integers, chunk_rows, relative_paths
-from genpolicy.audit.modes import ROUTE_CHUNKS, SMOOTHING_SHARE, features, progress
+from genpolicy.audit.modes import ROUTE_CHUNKS, SMOOTHING_SHARE, distances, features, progress
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.contract.rotation import rotation_from_6d
 
 POSITION, ROTATION, GRIPPER, OTHER, TIMING = "position", "rotation", "gripper", "other", "timing"
 NAMES = (POSITION, ROTATION, GRIPPER, OTHER, TIMING)
-State = Literal["varies", "hardly_varies", "absent", "unreadable"]
+State = Literal["varies", "hardly_varies", "in_position", "absent", "unreadable"]
 # Scales that two modes lie apart at least: as the routes' 3 cm are three times their 1 cm.
 APART = 3.0
-# Of the whole stroke, for a whole chunk: a gripper that closes some two steps of 16 later.
-STROKE_SHARE = 0.1
+# Of the whole stroke, on average over a chunk: a gripper that closes a quarter of it later.
+STROKE_SHARE = 0.2
 # A stroke below this many deviations of white noise is no stroke.
 STROKE_NOISE = 8.0
 # Situations whose scatter gives the scale.
-MEASURED = 400
+MEASURED = 150
 # Difference of third order and its noise gain, as for the progress along a path.
 THIRD, THIRD_POWER = 3, 20.0
 
@@ -41,8 +41,9 @@ class Component:
 
     Attributes:
         name: One of `NAMES`.
-        state: `varies`; `hardly_varies`: no situation spreads far enough for two modes; `absent`:
-            the action has no such numbers; `unreadable`: it has, but they could not be read, so
+        state: `varies`; `hardly_varies`: no situation spreads far enough for two modes;
+            `in_position`: what is compared as position holds it; `absent`: the action has no such
+            numbers; `unreadable`: it has, but they could not be read, so
             nothing is known of their modes.
         unit: Unit of the lengths below; empty for that of the position.
         separation: Modes nearer than this (RMS over a chunk) are one.
@@ -83,7 +84,7 @@ def components_of(
         _stroke(data, GRIPPER, data.action_gripper),
         _stroke(data, OTHER, _leftover(data)),
         # Compared position by position, the routes hold their timing.
-        Component(TIMING, "varies" if settings.representation == "path" else "absent", "", floor),
+        Component(TIMING, "varies" if settings.representation == "path" else "in_position", "", floor),
     )
     return tuple(
         _scaled(data, settings, item, situations) if item.state == "varies" else item
@@ -203,7 +204,6 @@ def _scaled(
 
 def _nearest(part: Array) -> float:
     """Median distance of a chunk to its nearest other one."""
-    squares = np.sum(part * part, axis=1)
-    gaps = squares[:, None] + squares[None] - 2.0 * (part @ part.T)
+    gaps = distances(part)
     np.fill_diagonal(gaps, np.inf)
-    return float(np.sqrt(max(float(np.median(gaps.min(axis=1))), 0.0)))
+    return float(np.median(gaps.min(axis=1)))

@@ -43,6 +43,7 @@ NEIGHBOURHOODS = pa.schema(
         ("two_mode", FLAG), ("separation_m", REAL), ("mean_admissible", FLAG),
         ("mean_reason", TEXT), ("modes_admissible", WHOLE), ("mean_path", pa.list_(REAL)),
         ("mode_paths", pa.list_(pa.list_(REAL))), ("persistent", FLAG),
+        ("component", TEXT),
     ]
 )  # fmt: skip
 COMPONENTS = pa.schema(
@@ -235,6 +236,7 @@ def _situation(data: AuditInput, item: Situation) -> dict[str, Any]:
         "mean_path": item.chunks.mean[:, position].ravel().tolist(),
         "mode_paths": [mode[:, position].ravel().tolist() for mode in item.chunks.modes],
         "persistent": persistent(item.identity),
+        "component": item.component,
     }
 
 

@@ -38,7 +38,7 @@ class ComponentModes:
 
     Attributes:
         component: Name.
-        state: `varies`, `hardly_varies`, `absent` or `unreadable`, as of the component.
+        state: As of the component; modes were looked for only where it `varies`.
         unit: Unit of the lengths.
         separation: Modes nearer than this are one.
         scale: Usual distance of a chunk to its nearest other one; NaN if unknown.

@@ -97,14 +97,26 @@ def cluster(vectors: Array, settings: AuditSettings, separation: float) -> Clust
     Returns:
         The modes; a single one unless both opinions agree on more.
     """
-    n = len(vectors)
-    labels = np.zeros(n, dtype=np.int64)
-    _bisect(vectors, np.arange(n), labels, settings, separation=separation)
+    labels = np.zeros(len(vectors), dtype=np.int64)
+    _bisect(vectors, np.arange(len(vectors)), labels, settings, separation=separation)
+    gaps = distances(vectors)
+    if not labels.any():
+        return Clustering(labels, 0.0, (int(np.argmin(gaps.sum(axis=1))),))
     labels = by_size(labels)
-    count = int(labels.max()) + 1
-    gaps = np.linalg.norm(vectors[:, None] - vectors[None], axis=2)
-    medoids = tuple(_medoid(gaps, np.flatnonzero(labels == mode)) for mode in range(count))
+    medoids = tuple(
+        _medoid(gaps, np.flatnonzero(labels == mode)) for mode in range(int(labels.max()) + 1)
+    )
     return Clustering(labels=labels, separation=_separation(vectors, labels), medoids=medoids)
+
+
+def distances(vectors: Array) -> Array:
+    """Euclidean distances of all pairs. Shape (n, n)."""
+    centred = vectors - vectors.mean(axis=0)
+    products = centred @ centred.T
+    squares = np.diagonal(products)
+    gaps = np.sqrt(np.maximum(squares[:, None] + squares[None] - 2.0 * products, 0.0))
+    np.fill_diagonal(gaps, 0.0)
+    return np.asarray(gaps, dtype=np.float64)
 
 
 def split_gain(values: Array, least: int, groups: int = 2) -> tuple[float, Integers]:
@@ -232,11 +244,14 @@ def _by_arc_length(paths: Array, steps: int) -> Array:
     """Paths resampled at equal arc lengths up to one that most of them reach within `steps`.
 
     Whoever still rests when the chunk begins goes the same way a little later: what follows the
-    chunk counts until the common length is reached, so that to wait is no route of its own.
+    chunk counts until the common length is reached, so that to wait is no route of its own. The
+    length begins where the path does, at the origin, not at the first command: what lies between
+    them is lag times speed, and a faster one would seem to go another way.
     """
     n = len(paths)
+    paths = np.concatenate([np.zeros_like(paths[:, :1]), paths], axis=1)
     along = progress(paths, max(1, steps // SMOOTHING_SHARE))
-    lengths = along[:, steps - 1]
+    lengths = along[:, steps]
     common = max(float(np.quantile(lengths, 0.25)), 0.5 * float(np.median(lengths)))
     at = np.broadcast_to(np.linspace(0.0, common, steps), (n, steps))
     left = np.sum(along[:, None, 1:-1] <= at[:, :, None], axis=2)

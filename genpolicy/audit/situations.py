@@ -104,7 +104,7 @@ def claimed(
     for number, (phase, item, split) in enumerate(found):
         analysed.setdefault(phase, []).append(item)
         if split.count > 1 and not resolved_by_observation(
-            data, settings, item, split, speed=component != POSITION
+            data, settings, item, split, route=component == POSITION
         ):
             numbers.setdefault(phase, []).append(number)
     return {

@@ -272,6 +272,17 @@ def _bow(episode: int, index: int) -> float:
     return 0.13 * (1 if episode % 2 == 0 else -1) * (1 - ((index - 4) / 4) ** 2)
 
 
+def _component(name: str) -> dict[str, object]:
+    """Modes of the position; nothing beside it."""
+    followed = name == "position"
+    return {
+        "component": name, "state": "varies", "unit": "m", "separation": 0.03, "scale": 0.01,
+        "spread": 0.01, "situations": 90, "clusters": 50 * followed, "two_mode": 50 * followed,
+        "two_mode_episodes": 30 * followed, "incoherent": 0, "persistent": 50 * followed,
+        "followed": followed,
+    }  # fmt: skip
+
+
 def _audit(root: Path) -> None:
     photo = root / "artifacts/audit/scene.png"
     photo.parent.mkdir(parents=True, exist_ok=True)
@@ -301,6 +312,7 @@ def _audit(root: Path) -> None:
         [{"epoch": e, "episodes": 20, "residual_m": 0.001} for e in ("e1", "e2")],
     )
     table(root, "audit/neighbourhoods.parquet", [_situation(i) for i in range(60)])
+    table(root, "audit/components.parquet", [_component(name) for name in COMPONENTS])
     table(
         root,
         "audit/modes.parquet",

@@ -66,6 +66,9 @@ def read_situations(
 ) -> list[ModeSituation]:
     """Persistent situations with several modes from the audit's `neighbourhoods.parquet`.
 
+    Samples are held against routes, so only modes of the position count: where they differ in the
+    tool or in time alone, the paths of the modes are one and the same.
+
     Args:
         folder: The audit's folder.
         width: Components of a position.
@@ -87,7 +90,10 @@ def read_situations(
             ),
         )
         for row in rows
-        if row["two_mode"] and row["persistent"] and row["split"] in splits
+        if row["two_mode"]
+        and row["persistent"]
+        and row["split"] in splits
+        and row["component"] == POSITION
     ]
 
 

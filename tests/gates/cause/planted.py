@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from gates.cause import Cause, CauseLimits, default_limits, name_cause
-from gates.cause.numbers import Counts, Finding, Kept, Labels, Mode, Numbers, Stratum
+from gates.cause.numbers import Component, Counts, Finding, Kept, Labels, Mode, Numbers, Stratum
 from genpolicy.audit.settings import AuditSettings
 
 LIMITS = default_limits()
@@ -32,6 +32,13 @@ VALID = Numbers(
     counts=Counts(200, 180, 50, 120, 45, 50, 0, 0, 110, 0.1, 0.01),
     kept=Kept(0.95, 0.6, 118), strata=(STRATUM,),
     modes=(Mode("m0", 40, 40, 0.91, 50, 50), Mode("m1", 40, 39, 0.87, 48, 50)),
+    components=(
+        Component("position", "varies", "m", 0.03, 0.02, 180, 120, 45, True),
+        Component("rotation", "varies", "rad", 0.15, 0.01, 180, 0, 0, False),
+        Component("gripper", "hardly_varies", "strokes", 0.2, 0.0, 180, 0, 0, False),
+        Component("other", "absent", "strokes", 0.2, None, 0, 0, 0, False),
+        Component("timing", "varies", "m", 0.03, 0.01, 180, 0, 0, False),
+    ),
 )  # fmt: skip
 
 
