@@ -3,7 +3,7 @@
 from pydantic import Field
 
 from genpolicy.contract.settings import Settings
-from genpolicy.evidence.reproducibility.latency import DeclaredSettings
+from genpolicy.evidence.stress.latency import DeclaredTerm
 
 
 class LatencySection(Settings):
@@ -12,11 +12,16 @@ class LatencySection(Settings):
     Attributes:
         warm: Warm invocations per run.
         cold: Cold invocations per run.
-        declared: Bounds of the terms that this machine cannot measure.
+        declared: Least and most of each term that this machine cannot measure, s.
         declared_draws: Values drawn from each of them for the report.
     """
 
     warm: int = Field(ge=20)
     cold: int = Field(ge=2)
-    declared: dict[str, DeclaredSettings]
+    declared: dict[str, tuple[float, float]]
     declared_draws: int = Field(ge=20)
+
+    @property
+    def declared_terms(self) -> dict[str, DeclaredTerm]:
+        """Bounds of the terms that this machine cannot measure."""
+        return {name: DeclaredTerm(*bounds) for name, bounds in self.declared.items()}

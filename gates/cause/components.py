@@ -1,7 +1,8 @@
 """In which components of the action modes were looked for, so that no verdict claims more."""
 
 from gates.cause.answers import Answer, Layer
-from gates.cause.numbers import Component, Numbers
+from gates.cause.numbers import Numbers
+from genpolicy.audit.rows import ComponentModes
 
 NOT_LOOKED_AT = {
     "hardly_varies": "hardly varies",
@@ -59,7 +60,7 @@ def others(numbers: Numbers, red: Layer) -> str:
     )
 
 
-def _answer(item: Component) -> Answer:
+def _answer(item: ComponentModes) -> Answer:
     looked = item.state == "varies"
     if looked:
         note = f"from {item.separation:.3g} {item.unit} apart on"

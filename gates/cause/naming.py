@@ -11,7 +11,8 @@ from gates.cause.answers import NEXT, Answer, Cause, CauseName, Diagnosis, Layer
 from gates.cause.components import components, looked_in, others, unreadable
 from gates.cause.hidden import hidden
 from gates.cause.limits import CauseLimits
-from gates.cause.numbers import Mode, Numbers, folder_numbers
+from gates.cause.numbers import Numbers, folder_numbers
+from genpolicy.audit.rows import ModeOutcome
 from genpolicy.errors import ConfigError
 
 IN_METRES = ("calibration_residual_m", "noise_spread_m")
@@ -260,7 +261,7 @@ def _validity(numbers: Numbers, limits: CauseLimits) -> Named:
     answers = [
         Answer("modes", Layer.VALIDITY, "modes followed over situations", len(modes), 2.0, ">=")
     ]
-    valid: list[Mode] = []
+    valid: list[ModeOutcome] = []
     for mode in modes:
         success, feasible = _success(mode, limits), _feasible(mode, limits)
         answers.append(success)
@@ -284,7 +285,7 @@ def _validity(numbers: Numbers, limits: CauseLimits) -> Named:
     return answers, Diagnosis(CauseName.UNIMODAL, weak, "one_valid_mode", text)
 
 
-def _success(mode: Mode, limits: CauseLimits) -> Answer:
+def _success(mode: ModeOutcome, limits: CauseLimits) -> Answer:
     known = mode.episodes > 0
     return Answer(
         "mode_success_lower", Layer.VALIDITY, f"success of {mode.mode}, lower bound",
@@ -293,7 +294,7 @@ def _success(mode: Mode, limits: CauseLimits) -> Answer:
     )  # fmt: skip
 
 
-def _feasible(mode: Mode, limits: CauseLimits) -> Answer | None:
+def _feasible(mode: ModeOutcome, limits: CauseLimits) -> Answer | None:
     if mode.checked == 0:
         return None
     return Answer(

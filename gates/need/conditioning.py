@@ -7,6 +7,7 @@ from gates.criterion import Measured, criterion
 from gates.evidence import Evidence, number, numbers
 from gates.need.cause import found_cause
 from gates.need.settings import AUDIT, VALID_CAUSE, NeedSettings
+from genpolicy.audit.rows import Stratum
 
 
 @criterion(
@@ -16,8 +17,7 @@ from gates.need.settings import AUDIT, VALID_CAUSE, NeedSettings
 )
 def strata_effect(evidence: Evidence, settings: NeedSettings) -> Measured:
     """Largest effect among strata that are significant after correction; 0 if none is."""
-    columns = ("variable", "phase", "p_adjusted", "effect", "effect_lower", "effect_upper")
-    frame = evidence.frame(f"{AUDIT}/strata.parquet", *columns)
+    frame = evidence.rows(f"{AUDIT}/strata.parquet", Stratum)
     effects = np.abs(numbers(frame, "effect"))
     significant = numbers(frame, "p_adjusted") <= settings.strata_level
     if not significant.any():

@@ -17,10 +17,11 @@ import numpy as np
 
 from genpolicy.audit.data import Array, AuditInput, Integers, chunk_rows, relative_paths
 from genpolicy.audit.modes import ROUTE_CHUNKS, SMOOTHING_SHARE, distances, features, progress
+from genpolicy.audit.rows import POSITION
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.contract.rotation import rotation_from_6d
 
-POSITION, ROTATION, GRIPPER, OTHER, TIMING = "position", "rotation", "gripper", "other", "timing"
+ROTATION, GRIPPER, OTHER, TIMING = "rotation", "gripper", "other", "timing"
 NAMES = (POSITION, ROTATION, GRIPPER, OTHER, TIMING)
 State = Literal["varies", "hardly_varies", "in_position", "absent", "unreadable"]
 # Scales that two modes lie apart at least: as the routes' 3 cm are three times their 1 cm.
@@ -84,7 +85,9 @@ def components_of(
         _stroke(data, GRIPPER, data.action_gripper),
         _stroke(data, OTHER, _leftover(data)),
         # Compared position by position, the routes hold their timing.
-        Component(TIMING, "varies" if settings.representation == "path" else "in_position", "", floor),
+        Component(
+            TIMING, "varies" if settings.representation == "path" else "in_position", "", floor
+        ),
     )
     return tuple(
         _scaled(data, settings, item, situations) if item.state == "varies" else item

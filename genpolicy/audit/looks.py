@@ -7,10 +7,11 @@ component with most situations of several modes. The others are counted and name
 
 from dataclasses import dataclass, replace
 
-from genpolicy.audit.components import NAMES, POSITION, Component, components_of, vectors
+from genpolicy.audit.components import NAMES, Component, components_of, vectors
 from genpolicy.audit.data import AuditInput
 from genpolicy.audit.modes import cluster, reach, smallest
 from genpolicy.audit.persistence import persistent
+from genpolicy.audit.rows import POSITION, ComponentModes
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.audit.situations import Found, Situation, claimed, coherent, episodes_of, examine
 
@@ -30,41 +31,6 @@ class Look:
     found: list[Found]
     claims: dict[int, Situation]
     kept: frozenset[int]
-
-
-@dataclass(frozen=True)
-class ComponentModes:
-    """One component in numbers.
-
-    Attributes:
-        component: Name.
-        state: As of the component; modes were looked for only where it `varies`.
-        unit: Unit of the lengths.
-        separation: Modes nearer than this are one.
-        scale: Usual distance of a chunk to its nearest other one; NaN if unknown.
-        spread: Median RMS spread inside situations; NaN if unknown.
-        situations: Situations whose clusters were looked for.
-        clusters: Situations with several clusters.
-        two_mode: Situations with several modes under one observation, in phases that keep them.
-        two_mode_episodes: Held-out episodes with at least one of them.
-        incoherent: Situations with clusters in phases that do not keep them.
-        persistent: Situations with several modes, each of which persists.
-        followed: Whether the rest of the audit is about the modes of this component.
-    """
-
-    component: str
-    state: str
-    unit: str
-    separation: float
-    scale: float
-    spread: float
-    situations: int
-    clusters: int
-    two_mode: int
-    two_mode_episodes: int
-    incoherent: int
-    persistent: int
-    followed: bool
 
 
 def look_everywhere(

@@ -7,10 +7,9 @@ import numpy as np
 from genpolicy.audit.components import Component
 from genpolicy.audit.counts import Counts, count
 from genpolicy.audit.data import AuditInput, Integers, canonical
-from genpolicy.audit.labels import ModeOutcome, Replay, Replayed, mode_outcomes, replay_sample
+from genpolicy.audit.labels import Replay, Replayed, mode_outcomes, replay_sample
 from genpolicy.audit.linking import link
 from genpolicy.audit.looks import (
-    ComponentModes,
     Look,
     claimed_episodes,
     component_modes,
@@ -21,8 +20,9 @@ from genpolicy.audit.mean_versus_modes import Admissible, compare
 from genpolicy.audit.neighbourhoods import Support
 from genpolicy.audit.persistence import Persistence, summarise
 from genpolicy.audit.progress import Progress, silent
-from genpolicy.audit.recovery import RecoveryOutcome, recovery_outcomes
-from genpolicy.audit.resamples import Measures, Resample, resamples
+from genpolicy.audit.recovery import recovery_outcomes
+from genpolicy.audit.resamples import Measures, resamples
+from genpolicy.audit.rows import ComponentModes, ModeOutcome, RecoveryOutcome, Resample, Stratum
 from genpolicy.audit.semantics import Semantics, measure, realigned
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.audit.situations import (
@@ -34,7 +34,7 @@ from genpolicy.audit.situations import (
     find_situations,
     primary_phase,
 )
-from genpolicy.audit.strata import Stratum, examine_strata
+from genpolicy.audit.strata import examine_strata
 
 
 @dataclass(frozen=True)

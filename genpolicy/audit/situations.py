@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from genpolicy.audit.components import POSITION, TIMING, Component, series
+from genpolicy.audit.components import TIMING, Component, series
 from genpolicy.audit.data import Array, AuditInput, relative_paths
 from genpolicy.audit.mean_versus_modes import Admissible, MeanVersusModes, compare
 from genpolicy.audit.modes import ROUTE_CHUNKS, Clustering, cluster_chunks
@@ -19,6 +19,7 @@ from genpolicy.audit.persistence import (
 )
 from genpolicy.audit.progress import Progress, silent
 from genpolicy.audit.resolution import resolved_by_observation
+from genpolicy.audit.rows import POSITION
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.seeds import stream
 

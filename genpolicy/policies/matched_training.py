@@ -45,9 +45,9 @@ class PolicySettings(Settings):
         fixtures: Observations whose samples must be reproduced after reload.
     """
 
-    network: NetworkConfig
-    head: HeadConfig
-    training: TrainingConfig
+    network: NetworkConfig = NetworkConfig()
+    head: HeadConfig = HeadConfig()
+    training: TrainingConfig = TrainingConfig()
     seeds: list[int] = Field(min_length=1)
     fixtures: int = Field(ge=1)
 

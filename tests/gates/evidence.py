@@ -16,8 +16,38 @@ from gates.cause import default_limits
 from gates.cause.limits import OWN
 from gates.feasibility import LAYERS
 from gates.reproducibility import MEASURED_HERE, TERMS
-from genpolicy.audit.evidence import FINDINGS
+from genpolicy.audit.rows import (
+    Alignment,
+    Calibration,
+    Clock,
+    ComponentModes,
+    ExampleChunk,
+    Finding,
+    ModeOutcome,
+    RecoveryOutcome,
+    ReplayRow,
+    Resample,
+    SituationRow,
+    Stratum,
+)
+from genpolicy.data.rows import EpisodeRow, FrameRow
+from genpolicy.evidence.rows.need import (
+    EffectRow,
+    FactorErrorRow,
+    FactorModeRow,
+    ModeRow,
+    OfflineRow,
+)
+from genpolicy.evidence.rows.reproducibility import CoverageRow, LatencyRow, NfeRow, SampleRow
+from genpolicy.evidence.rows.shadow import CandidateRow, ShadowCountRow, ShadowStubRow
+from genpolicy.evidence.rows.stress import (
+    ConservationRow,
+    RolloutRow,
+    StressCountRow,
+    StressStubRow,
+)
 from genpolicy.integrity.documents import canonical_json
+from genpolicy.integrity.rows import write_rows
 from genpolicy.integrity.tables import read_table, write_table
 
 BASELINES = ("bc", "chunked_bc", "act")
@@ -203,8 +233,8 @@ def limited(gate: str) -> set[str]:
     return {name for entries in PARAMS[gate]["limits"].values() for name in entries}
 
 
-def table(root: Path, path: str, rows: list[dict[str, Any]]) -> None:
-    write_table(root / "artifacts" / path, pa.Table.from_pylist(rows))
+def table(root: Path, path: str, row: type, rows: list[dict[str, Any]]) -> None:
+    write_rows(root / "artifacts" / path, row, [row(**values) for values in rows])
 
 
 def document(root: Path, path: str, value: Any) -> None:
@@ -251,8 +281,16 @@ def _dataset(root: Path) -> None:
     table(
         root,
         "ingest/frames.parquet",
+        FrameRow,
         [
-            {"episode_uuid": f"e{e}", "index": i, "action": [0.38 + 0.03 * i, _bow(e, i), 0.15] * 3}
+            {
+                "episode_uuid": f"e{e}",
+                "index": i,
+                "event_time_s": 0.1 * i,
+                "observation": [0.0],
+                "action": [0.38 + 0.03 * i, _bow(e, i), 0.15] * 3,
+                "phase": "approach",
+            }
             for e in range(4)
             for i in rows
         ],
@@ -260,8 +298,27 @@ def _dataset(root: Path) -> None:
     table(
         root,
         "ingest/episodes.parquet",
+        EpisodeRow,
         [
-            {"episode_uuid": f"e{e}", "outcome": "failure" if e == 3 else "success"}
+            {
+                "episode_uuid": f"e{e}",
+                "split": "train",
+                "task": "t",
+                "object": "o",
+                "operator": "p",
+                "calibration_epoch": "c0",
+                "outcome": "failure" if e == 3 else "success",
+                "is_recovery": False,
+                "is_intervention": None,
+                "source_file": f"{e}.mcap",
+                "source_sha256": "",
+                "content_sha256": "",
+                "rows": 9,
+                "lead_rows": 0,
+                "recorded_at_s": float(e),
+                "lead_action": [],
+                "scene_start": "",
+            }
             for e in range(4)
         ],
     )
@@ -290,6 +347,7 @@ def _audit(root: Path) -> None:
     table(
         root,
         "audit/clocks.parquet",
+        Clock,
         [
             {
                 "stream": stream,
@@ -309,13 +367,16 @@ def _audit(root: Path) -> None:
     table(
         root,
         "audit/calibration.parquet",
+        Calibration,
         [{"epoch": e, "episodes": 20, "residual_m": 0.001} for e in ("e1", "e2")],
     )
-    table(root, "audit/neighbourhoods.parquet", [_situation(i) for i in range(60)])
-    table(root, "audit/components.parquet", [_component(name) for name in COMPONENTS])
+    table(root, "audit/neighbourhoods.parquet", SituationRow, [_situation(i) for i in range(60)])
+    names = ("position", "rotation", "gripper", "timing")
+    table(root, "audit/components.parquet", ComponentModes, [_component(name) for name in names])
     table(
         root,
         "audit/modes.parquet",
+        ModeOutcome,
         [
             {
                 "mode": mode,
@@ -333,6 +394,7 @@ def _audit(root: Path) -> None:
     table(
         root,
         "audit/strata.parquet",
+        Stratum,
         [
             {
                 "variable": variable,
@@ -353,6 +415,7 @@ def _audit(root: Path) -> None:
     table(
         root,
         "audit/replay.parquet",
+        ReplayRow,
         [
             {
                 "episode_uuid": f"e{i}",
@@ -363,23 +426,25 @@ def _audit(root: Path) -> None:
             for i in range(40)
         ],
     )
-    table(root, "audit/examples.parquet", [_example(i) for i in range(12)])
+    table(root, "audit/examples.parquet", ExampleChunk, [_example(i) for i in range(12)])
     table(
         root,
         "audit/alignment.parquet",
+        Alignment,
         [
             {
                 "episode_uuid": f"e{i}",
                 "epoch": "c0",
                 "order": float(i),
+                "lag_steps": 2.0,
                 "offset_before_s": 0.01 * (i % 2),
                 "offset_after_s": 0.0,
             }
             for i in range(10)
         ],
     )
-    write_table(root / "artifacts/audit/findings.parquet", FINDINGS.empty_table())
-    table(root, "audit/resamples.parquet", [_draw() for _ in range(4)])
+    table(root, "audit/findings.parquet", Finding, [])
+    table(root, "audit/resamples.parquet", Resample, [_draw() for _ in range(4)])
     document(
         root,
         "audit/persistence.json",
@@ -388,6 +453,7 @@ def _audit(root: Path) -> None:
     table(
         root,
         "audit/recovery.parquet",
+        RecoveryOutcome,
         [
             {"split": "recovery", "mode": "left", "episodes": 40, "successes": 38},
             {"split": "recovery", "mode": "right", "episodes": 40, "successes": 8},
@@ -451,8 +517,10 @@ def _example(i: int) -> dict[str, Any]:
     return {
         "example": 0,
         "phase": "approach",
+        "two_mode": True,
         "query_uuid": "e1",
         "query_index": 4,
+        "episode_uuid": f"e{i}",
         "is_query": i == 0,
         "distance": 0.1 * i,
         "cluster": i % 2,
@@ -482,6 +550,7 @@ def _situation(i: int) -> dict[str, Any]:
         "mean_path": mean,
         "mode_paths": [left, right],
         "persistent": True,
+        "component": "position",
     }
 
 
@@ -504,6 +573,18 @@ def _modes(methods: tuple[str, ...], covered: int) -> list[dict[str, Any]]:
         for method in methods
         for i in range(30)
     ]
+
+
+def _offline(method: str) -> dict[str, Any]:
+    return {
+        "method": method,
+        "seed": 0,
+        "split": "test",
+        "phase": "approach",
+        "windows": 9,
+        "masked_mae": 0.02,
+        "position_rmse_m": 0.01,
+    }
 
 
 def _matched(methods: tuple[str, ...]) -> dict[str, Any]:
@@ -532,9 +613,9 @@ def _checkpoints(root: Path, stage: str, methods: tuple[str, ...]) -> None:
 def _baselines(root: Path) -> None:
     fixed = [{**row, "admissible": 0} for row in _modes(BASELINES, 1)]
     drawn = [{**row, "convention": "derivative_free"} for row in _modes((DRAWN,), 2)]
-    table(root, "measure_baselines/modes.parquet", fixed + drawn)
+    table(root, "measure_baselines/modes.parquet", ModeRow, fixed + drawn)
     document(root, "train_baselines/matched.json", _matched((*BASELINES, DRAWN)))
-    table(root, "measure_baselines/offline.parquet", [{"method": "bc", "seed": 0}])
+    table(root, "measure_baselines/offline.parquet", OfflineRow, [_offline("bc")])
     latent = {
         "method": "act", "convention": "z_prior", "seed": 0, "situations": 30, "spread_m": 0.03,
         "condition_share": 0.4, "distance_correlation": 0.6, "exceeding": 0, "permutations": 999,
@@ -566,8 +647,8 @@ def _factors(root: Path) -> None:
             }
             for i in range(30)
         ]  # fmt: skip
-    table(root, "measure_factors/modes.parquet", modes)
-    table(root, "measure_factors/errors.parquet", errors)
+    table(root, "measure_factors/modes.parquet", FactorModeRow, modes)
+    table(root, "measure_factors/errors.parquet", FactorErrorRow, errors)
     effects = [
         {
             "variant": name, "factor": factor, "convention": convention, "measure": measure,
@@ -577,7 +658,7 @@ def _factors(root: Path) -> None:
         for place, (name, (factor, convention, _, _)) in enumerate(VARIANTS.items())
         for measure in ("chunk_error", "mode_coverage", "valid_share")
     ]  # fmt: skip
-    table(root, "measure_factors/effects.parquet", effects)
+    table(root, "measure_factors/effects.parquet", EffectRow, effects)
     variants = {
         name: {
             "factor": factor,
@@ -598,9 +679,9 @@ def _factors(root: Path) -> None:
 
 
 def _generators(root: Path) -> None:
-    table(root, "reload/modes.parquet", _modes(CANDIDATES, 2))
+    table(root, "reload/modes.parquet", ModeRow, _modes(CANDIDATES, 2))
     document(root, "train_generators/matched.json", _matched(CANDIDATES))
-    table(root, "reload/offline.parquet", [{"method": "flow", "seed": 0}])
+    table(root, "reload/offline.parquet", OfflineRow, [_offline("flow")])
     _checkpoints(root, "train_generators", CANDIDATES)
 
 
@@ -609,6 +690,7 @@ def _reload(root: Path) -> None:
     table(
         root,
         "reload/samples.parquet",
+        SampleRow,
         [
             {
                 "method": m,
@@ -625,11 +707,13 @@ def _reload(root: Path) -> None:
     table(
         root,
         "reload/nfe.parquet",
+        NfeRow,
         [{"method": m, "seed": 0, "recorded": 8, "counted": 8} for m in CANDIDATES],
     )
     table(
         root,
         "reload/coverage.parquet",
+        CoverageRow,
         [
             {
                 "method": m,
@@ -670,6 +754,7 @@ def _latency(root: Path) -> None:
     table(
         root,
         "latency/latency.parquet",
+        LatencyRow,
         [
             {
                 "method": m,
@@ -719,6 +804,7 @@ def _shadow(root: Path) -> None:
     table(
         root,
         "shadow/candidates.parquet",
+        CandidateRow,
         [
             _candidate(m, fixture, o, c)
             for m in CANDIDATES
@@ -730,6 +816,7 @@ def _shadow(root: Path) -> None:
     table(
         root,
         "shadow/stub.parquet",
+        ShadowStubRow,
         [
             {"method": m, "fixture": f, "delivered": 9, "arrivals": 200, "stale": 0, "invalid": 0}
             for m in CANDIDATES
@@ -739,6 +826,7 @@ def _shadow(root: Path) -> None:
     table(
         root,
         "shadow/counts.parquet",
+        ShadowCountRow,
         [
             {
                 "method": m,
@@ -806,16 +894,18 @@ def _stress(root: Path) -> None:
                         "mode": "left",
                     }
                 )
-    table(root, "stress/rollouts.parquet", rows)
+    table(root, "stress/rollouts.parquet", RolloutRow, rows)
     cells = [(m, c) for m in methods for c in CONDITIONS]
     table(
         root,
         "stress/counts.parquet",
+        StressCountRow,
         [{"method": m, "perturbation": c, "reason": "expired", "count": 10} for m, c in cells],
     )
     table(
         root,
         "stress/conservation.parquet",
+        ConservationRow,
         [
             {
                 "method": m,
@@ -831,6 +921,7 @@ def _stress(root: Path) -> None:
     table(
         root,
         "stress/stub.parquet",
+        StressStubRow,
         [
             {"method": m, "perturbation": c, "arrivals": 500, "stale": 0, "invalid": 0}
             for m, c in cells

@@ -6,10 +6,12 @@ from pathlib import Path
 import pytest
 from ladder_workspace import edit_params, hashes, repro, run_stage, set_limit
 
+from genpolicy.policies.settings import HeadConfig
+
 
 def test_more_sampler_steps_than_training_levels_is_a_bad_setting(copy: Path) -> None:
     def too_many(params: dict) -> None:
-        levels = params["policy"]["head"]["diffusion_levels"]
+        levels = HeadConfig().diffusion_levels
         params["train_generators"]["samplers"]["diffusion"]["steps"] = levels + 1
 
     edit_params(copy, too_many)

@@ -12,7 +12,6 @@ from genpolicy.candidates.judged import JudgedPolicy
 from genpolicy.contract.chunk import Proposal
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.contract.latency import DECLARED_TERMS, MEASURED_TERMS, OWNERS, Term
-from genpolicy.contract.settings import Settings
 from genpolicy.data.dataset import load_dataset
 from genpolicy.errors import ContractError
 from genpolicy.evidence.admission_context import context_at_rest, make_checker, recorded_proposal
@@ -28,13 +27,6 @@ Array = NDArray[np.float64]
 
 RUNS = (1, 2)
 OBSERVATIONS = 32
-
-
-class DeclaredSettings(Settings):
-    """Bounds of a term that this machine cannot measure, s."""
-
-    minimum_s: float
-    maximum_s: float
 
 
 @dataclass(frozen=True)
@@ -79,7 +71,7 @@ def measured_rows(plan: LatencyPlan, policies: Sequence[JudgedPolicy]) -> list[L
 
 def declared_rows(
     names: Sequence[str],
-    declared: Mapping[str, DeclaredSettings],
+    declared: Mapping[str, DeclaredTerm],
     *,
     draws: int,
     generator: np.random.Generator,
@@ -156,14 +148,13 @@ def measure_terms(plan: LatencyPlan, judged: JudgedPolicy) -> list[Measurement]:
 
 
 def latency_models(
-    table: pd.DataFrame, declared: Mapping[str, DeclaredSettings]
+    table: pd.DataFrame, declared: Mapping[str, DeclaredTerm]
 ) -> dict[str, LatencyModel]:
     """The virtual clock's model of each method, from `latency.parquet`.
 
     Raises:
         ContractError: A method lacks a measured term.
     """
-    bounds = {name: DeclaredTerm(item.minimum_s, item.maximum_s) for name, item in declared.items()}
     models = {}
     measured = table[table["source"] == "measured"]
     for method, rows in measured.groupby("method", sort=True):
@@ -182,5 +173,5 @@ def latency_models(
             )
         first = float(cold.groupby(["run", "repeat"])["seconds"].sum().max())
         typical = float(warm.groupby(["run", "repeat"])["seconds"].sum().median())
-        models[str(method)] = LatencyModel(bounds, terms, max(0.0, first - typical))
+        models[str(method)] = LatencyModel(declared, terms, max(0.0, first - typical))
     return models

@@ -6,6 +6,7 @@ start, invocation and term, and not by the method: where a term is the same for 
 so is the draw, and where it is not, both get the same quantile of their own distribution.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -13,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.contract.latency import DECLARED_TERMS, MEASURED_TERMS
-from genpolicy.errors import ContractError
+from genpolicy.errors import ConfigError, ContractError
 from genpolicy.seeds import stream
 
 Array = NDArray[np.float64]
@@ -26,10 +27,22 @@ class DeclaredTerm:
     Attributes:
         minimum_s: Smallest duration, s.
         maximum_s: Largest duration, s.
+
+    Raises:
+        ConfigError: Bounds that are no times, or the wrong way round.
     """
 
     minimum_s: float
     maximum_s: float
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.minimum_s <= self.maximum_s < math.inf:
+            raise ConfigError(
+                where="params.yaml: latency.declared",
+                found=f"[{self.minimum_s}, {self.maximum_s}]",
+                expected="least and most of a duration, s: 0 <= least <= most, finite",
+                action="Correct the bounds; an unknown term is not zero.",
+            )
 
 
 @dataclass(frozen=True)

@@ -5,15 +5,12 @@ import pandas as pd
 import pytest
 
 from genpolicy.contract.latency import DECLARED_TERMS, MEASURED_TERMS, OWNERS
-from genpolicy.errors import ContractError
-from genpolicy.evidence.reproducibility.latency import (
-    DeclaredSettings,
-    declared_rows,
-    latency_models,
-)
+from genpolicy.errors import ConfigError, ContractError
+from genpolicy.evidence.reproducibility.latency import declared_rows, latency_models
+from genpolicy.evidence.stress.latency import DeclaredTerm
 from genpolicy.seeds import stream
 
-DECLARED = {name: DeclaredSettings(minimum_s=0.001, maximum_s=0.002) for name in DECLARED_TERMS}
+DECLARED = {name: DeclaredTerm(0.001, 0.002) for name in DECLARED_TERMS}
 
 
 def table(methods=("a", "b"), *, warm=20, cold=2):
@@ -92,3 +89,9 @@ def test_a_term_without_bounds_or_bounds_of_no_term_are_refused():
     for declared in (short, more):
         with pytest.raises(ContractError, match=r"latency\.declared is bounds of"):
             declared_rows(["a"], declared, draws=1, generator=stream(1, "declared"))
+
+
+@pytest.mark.parametrize("bounds", [(-0.001, 0.1), (0.2, 0.1), (0.0, np.nan), (0.0, np.inf)])
+def test_bounds_that_are_no_times_are_refused(bounds):
+    with pytest.raises(ConfigError, match=r"latency\.declared"):
+        DeclaredTerm(*bounds)

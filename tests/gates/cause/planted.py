@@ -3,7 +3,8 @@
 from dataclasses import replace
 
 from gates.cause import Cause, CauseLimits, default_limits, name_cause
-from gates.cause.numbers import Component, Counts, Finding, Kept, Labels, Mode, Numbers, Stratum
+from gates.cause.numbers import Counts, Kept, Labels, Numbers
+from genpolicy.audit.rows import ComponentModes, Finding, ModeOutcome, Stratum
 from genpolicy.audit.settings import AuditSettings
 
 LIMITS = default_limits()
@@ -20,7 +21,14 @@ def limit(**changes: float) -> CauseLimits:
     return CauseLimits(found)
 
 
-STRATUM = Stratum("operator", "approach", 0.9, 0.05, 0.0, 100, True, False, "")
+STRATUM = Stratum("operator", "approach", 0.9, 0.9, 0.05, 0.0, 0.1, 100, True, False, "")
+
+
+def component(name: str, **changes) -> ComponentModes:
+    plain = ComponentModes(
+        name, "varies", "m", 0.03, 0.01, 0.01, 180, 0, 0, 0, 0, 0, followed=False
+    )
+    return replace(plain, **changes)
 
 
 HIDDEN = replace(STRATUM, p_adjusted=0.001, effect=0.8, effect_lower=0.6)
@@ -31,18 +39,21 @@ VALID = Numbers(
     labels=Labels(60, 0, 0.06),
     counts=Counts(200, 180, 50, 120, 45, 50, 0, 0, 110, 0.1, 0.01),
     kept=Kept(0.95, 0.6, 118), strata=(STRATUM,),
-    modes=(Mode("m0", 40, 40, 0.91, 50, 50), Mode("m1", 40, 39, 0.87, 48, 50)),
+    modes=(
+        ModeOutcome("m0", "approach", 40, 40, 0.91, 1.0, 50, 50),
+        ModeOutcome("m1", "approach", 40, 39, 0.87, 1.0, 48, 50),
+    ),
     components=(
-        Component("position", "varies", "m", 0.03, 0.02, 180, 120, 45, True),
-        Component("rotation", "varies", "rad", 0.15, 0.01, 180, 0, 0, False),
-        Component("gripper", "hardly_varies", "strokes", 0.2, 0.0, 180, 0, 0, False),
-        Component("other", "absent", "strokes", 0.2, None, 0, 0, 0, False),
-        Component("timing", "varies", "m", 0.03, 0.01, 180, 0, 0, False),
+        component("position", clusters=120, two_mode=120, two_mode_episodes=45, followed=True),
+        component("rotation", unit="rad", separation=0.15),
+        component("gripper", state="hardly_varies", unit="strokes", separation=0.2),
+        component("other", state="absent", unit="strokes", separation=0.2, situations=0),
+        component("timing"),
     ),
 )  # fmt: skip
 
 
-OFFSET = Finding("clock", "robot", "epoch e1", "clock_residual_s", 0.05, "s", "Correct it.")
+OFFSET = Finding("clock", "robot", "epoch e1", "clock_residual_s", 0.05, 0.01, "s", "Correct it.")
 
 
 def counts(**changes) -> Numbers:
