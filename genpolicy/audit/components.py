@@ -79,15 +79,14 @@ def components_of(
         situations: Rows of the members of each situation.
     """
     floor = settings.minimum_separation_m
+    # Compared position by position, the routes hold their timing.
+    timing: State = "varies" if settings.representation == "path" else "in_position"
     found = (
         Component(POSITION, "varies", "", floor),
         _rotation(data, settings),
         _stroke(data, GRIPPER, data.action_gripper),
         _stroke(data, OTHER, _leftover(data)),
-        # Compared position by position, the routes hold their timing.
-        Component(
-            TIMING, "varies" if settings.representation == "path" else "in_position", "", floor
-        ),
+        Component(TIMING, timing, "", floor),
     )
     return tuple(
         _scaled(data, settings, item, situations) if item.state == "varies" else item
