@@ -94,6 +94,12 @@ def components_of(
     )
 
 
+def stricter(settings: AuditSettings) -> AuditSettings:
+    """The same for components beside the route: as likely to see modes by chance as one alone."""
+    gain = settings.minimum_gain + 2.0 * float(np.log(len(NAMES)))
+    return settings.model_copy(update={"minimum_gain": gain})
+
+
 def vectors(
     data: AuditInput, settings: AuditSettings, component: Component, rows: Integers
 ) -> Array:

@@ -7,7 +7,7 @@ component with most situations of several modes. The others are counted and name
 
 from dataclasses import dataclass, replace
 
-from genpolicy.audit.components import NAMES, Component, components_of, vectors
+from genpolicy.audit.components import NAMES, Component, components_of, stricter, vectors
 from genpolicy.audit.data import AuditInput
 from genpolicy.audit.modes import cluster, reach, smallest
 from genpolicy.audit.persistence import persistent
@@ -130,6 +130,7 @@ def _clustered(
     data: AuditInput, settings: AuditSettings, component: Component, found: list[Found]
 ) -> tuple[list[Found], bool]:
     """The same situations with the clusters of another component, and whether any spreads far."""
+    settings = stricter(settings)
     result: list[Found] = []
     far = False
     for phase, item, _ in found:
