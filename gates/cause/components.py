@@ -2,22 +2,14 @@
 
 from gates.cause.answers import Answer, Layer
 from gates.cause.numbers import Numbers
-from genpolicy.audit.rows import ComponentModes
+from genpolicy.audit.component_rows import NOT_LOOKED_AT, OTHER, ComponentModes
 
-NOT_LOOKED_AT = {
-    "hardly_varies": "hardly varies",
-    "absent": "the action has none",
-    "unreadable": "could not be read",
-    "in_position": "is part of the position, compared at equal times",
-}
-# What is left over beside the named components: that nothing is, is not worth a word.
-REST = "other"
 # The causes of these layers speak of modes, or of their absence.
 SPEAK_OF_MODES = (Layer.STRUCTURE, Layer.HIDDEN, Layer.VALIDITY, Layer.NONE)
 
 
 def components(numbers: Numbers) -> list[Answer]:
-    """One answer for each component; the limit is held against the one that was followed."""
+    """One answer for each component, without a limit: the one followed is judged beside them."""
     return [_answer(item) for item in numbers.components]
 
 
@@ -42,7 +34,7 @@ def looked_in(numbers: Numbers) -> str:
     rest += [
         f"the action has no {item.component}"
         for item in numbers.components
-        if item.state == "absent" and item.component != REST
+        if item.state == "absent" and item.component != OTHER
     ]
     words = " and ".join(filter(None, [", ".join(seen[:-1]), *seen[-1:]])) or "no component"
     return f"{words} ({'; '.join(rest)})" if rest else words

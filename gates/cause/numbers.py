@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
 
-from genpolicy.audit.rows import ComponentModes, Finding, ModeOutcome, Resample, Stratum
+from genpolicy.audit.component_rows import ComponentModes
+from genpolicy.audit.rows import Finding, ModeOutcome, Resample, Stratum
 from genpolicy.errors import BadInputError
 from genpolicy.integrity.documents import read_json
 from genpolicy.integrity.rows import Row, read_rows

@@ -15,13 +15,13 @@ from typing import Literal
 
 import numpy as np
 
+from genpolicy.audit.component_rows import OTHER, POSITION
 from genpolicy.audit.data import Array, AuditInput, Integers, chunk_rows, relative_paths
 from genpolicy.audit.modes import ROUTE_CHUNKS, SMOOTHING_SHARE, distances, features, progress
-from genpolicy.audit.rows import POSITION
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.contract.rotation import rotation_from_6d
 
-ROTATION, GRIPPER, OTHER, TIMING = "rotation", "gripper", "other", "timing"
+ROTATION, GRIPPER, TIMING = "rotation", "gripper", "timing"
 NAMES = (POSITION, ROTATION, GRIPPER, OTHER, TIMING)
 State = Literal["varies", "hardly_varies", "in_position", "absent", "unreadable"]
 # Scales that two modes lie apart at least: as the routes' 3 cm are three times their 1 cm.

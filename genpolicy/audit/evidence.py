@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from genpolicy.audit.component_rows import ComponentModes
 from genpolicy.audit.data import AuditInput, Integers
 from genpolicy.audit.examples import (
     alignment,
@@ -17,7 +18,7 @@ from genpolicy.audit.examples import (
 )
 from genpolicy.audit.labels import disagreement
 from genpolicy.audit.persistence import persistent
-from genpolicy.audit.rows import TABLES, ComponentModes, ReplayRow, SituationRow
+from genpolicy.audit.rows import TABLES, ReplayRow, SituationRow
 from genpolicy.audit.run import AuditResult
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.audit.situations import Situation

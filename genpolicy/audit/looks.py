@@ -7,11 +7,11 @@ component with most situations of several modes. The others are counted and name
 
 from dataclasses import dataclass, replace
 
+from genpolicy.audit.component_rows import POSITION, ComponentModes
 from genpolicy.audit.components import NAMES, Component, components_of, stricter, vectors
 from genpolicy.audit.data import AuditInput
 from genpolicy.audit.modes import cluster, reach, smallest
 from genpolicy.audit.persistence import persistent
-from genpolicy.audit.rows import POSITION, ComponentModes
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.audit.situations import Found, Situation, claimed, coherent, episodes_of, examine
 

@@ -1,14 +1,13 @@
 """Rows of the audit's tables, one frozen dataclass a table.
 
 Field order is column order, as in `genpolicy.evidence.rows`. The audit measures these rows, gates
-and pages read them, so a column is spelled here and nowhere else; this file imports nothing. Most
-are what the audit itself computes with. None is "not measured", never zero.
+and pages read them, so a column is spelled here and nowhere else; this file imports rows only.
+Most are what the audit itself computes with. None is "not measured", never zero.
 """
 
 from dataclasses import dataclass
 
-POSITION = "position"
-"""Component of the action whose modes are routes."""
+from genpolicy.audit.component_rows import ComponentModes
 
 
 @dataclass(frozen=True)
@@ -122,41 +121,6 @@ class SituationRow:
     mode_paths: tuple[tuple[float, ...], ...]
     persistent: bool
     component: str
-
-
-@dataclass(frozen=True)
-class ComponentModes:
-    """`components.parquet`: modes in one component of the action.
-
-    Attributes:
-        component: One of `genpolicy.audit.components.NAMES`.
-        state: Its state there; modes were looked for only where it `varies`.
-        unit: Unit of the lengths; `strokes` are shares of what a column does in all.
-        separation: Modes nearer than this (RMS over a chunk) are one.
-        scale: Usual distance of a chunk to its nearest other one.
-        spread: Median RMS spread inside situations.
-        situations: Situations whose clusters were looked for.
-        clusters: Of them with several clusters.
-        two_mode: Situations with several modes under one observation, in phases that keep them.
-        two_mode_episodes: Held-out episodes with at least one of them.
-        incoherent: Situations with clusters in phases that do not keep them.
-        persistent: Situations with several modes, each of which persists.
-        followed: Whether the rest of the audit is about the modes of this component.
-    """
-
-    component: str
-    state: str
-    unit: str
-    separation: float
-    scale: float | None
-    spread: float | None
-    situations: int
-    clusters: int
-    two_mode: int
-    two_mode_episodes: int
-    incoherent: int
-    persistent: int
-    followed: bool
 
 
 @dataclass(frozen=True)

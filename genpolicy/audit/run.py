@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from genpolicy.audit.component_rows import ComponentModes
 from genpolicy.audit.components import Component
 from genpolicy.audit.counts import Counts, count
 from genpolicy.audit.data import AuditInput, Integers, canonical
@@ -22,7 +23,7 @@ from genpolicy.audit.persistence import Persistence, summarise
 from genpolicy.audit.progress import Progress, silent
 from genpolicy.audit.recovery import recovery_outcomes
 from genpolicy.audit.resamples import Measures, resamples
-from genpolicy.audit.rows import ComponentModes, ModeOutcome, RecoveryOutcome, Resample, Stratum
+from genpolicy.audit.rows import ModeOutcome, RecoveryOutcome, Resample, Stratum
 from genpolicy.audit.semantics import Semantics, measure, realigned
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.audit.situations import (

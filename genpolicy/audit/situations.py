@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from genpolicy.audit.component_rows import POSITION
 from genpolicy.audit.components import TIMING, Component, series
 from genpolicy.audit.data import Array, AuditInput, relative_paths
 from genpolicy.audit.mean_versus_modes import Admissible, MeanVersusModes, compare
@@ -19,7 +20,6 @@ from genpolicy.audit.persistence import (
 )
 from genpolicy.audit.progress import Progress, silent
 from genpolicy.audit.resolution import resolved_by_observation
-from genpolicy.audit.rows import POSITION
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.seeds import stream
 

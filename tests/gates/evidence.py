@@ -16,11 +16,11 @@ from gates.cause import default_limits
 from gates.cause.limits import OWN
 from gates.feasibility import LAYERS
 from gates.reproducibility import MEASURED_HERE, TERMS
+from genpolicy.audit.component_rows import ComponentModes
 from genpolicy.audit.rows import (
     Alignment,
     Calibration,
     Clock,
-    ComponentModes,
     ExampleChunk,
     Finding,
     ModeOutcome,

@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from genpolicy.audit.rows import POSITION, SituationRow
+from genpolicy.audit.component_rows import POSITION
+from genpolicy.audit.rows import SituationRow
 from genpolicy.errors import ContractError
 from genpolicy.integrity.rows import read_rows
 

@@ -4,7 +4,8 @@ from dataclasses import replace
 
 from gates.cause import Cause, CauseLimits, default_limits, name_cause
 from gates.cause.numbers import Counts, Kept, Labels, Numbers
-from genpolicy.audit.rows import ComponentModes, Finding, ModeOutcome, Stratum
+from genpolicy.audit.component_rows import ComponentModes
+from genpolicy.audit.rows import Finding, ModeOutcome, Stratum
 from genpolicy.audit.settings import AuditSettings
 
 LIMITS = default_limits()
