@@ -126,7 +126,7 @@ def audit(
     measured = Measures(
         replayed, persistence, strata, tuple(mode for mode in modes if mode.phase == primary)
     )
-    before = counts.two_mode_episodes
+    before, component = counts.two_mode_episodes, followed.component
     return AuditResult(
         data=data,
         semantics=semantics,
@@ -137,22 +137,29 @@ def audit(
         links=links,
         strata=strata,
         replayed=replayed,
-        recovery=recovery_outcomes(
-            data,
-            settings,
-            several.get(primary, []),
-            links.get(primary),
-            component=followed.component,
-        ),
+        recovery=_recovery(data, settings, several, links, component),
         counts=counts,
         modes_after_realignment=_after_realignment(
-            data, settings, semantics, before, followed.component, root_seed=root_seed
+            data, settings, semantics, before, component, root_seed=root_seed
         ),
-        modes_other_phases=_other_phases(data, settings, followed.component, root_seed),
-        component=followed.component,
-        components=component_modes(data, looks, followed.component.name),
+        modes_other_phases=_other_phases(data, settings, component, root_seed),
+        component=component,
+        components=component_modes(data, looks, component.name),
         resamples=resamples(data, settings, measured, claims, root_seed=root_seed),
     )
+
+
+def _recovery(
+    data: AuditInput,
+    settings: AuditSettings,
+    several: Several,
+    links: dict[str, Integers],
+    component: Component,
+) -> tuple[RecoveryOutcome, ...]:
+    """The disturbed episodes in the phase with most situations of several modes."""
+    phase = primary_phase(several)
+    items, linked = several.get(phase, []), links.get(phase)
+    return recovery_outcomes(data, settings, items, linked, component=component)
 
 
 def _examined(

@@ -14,7 +14,8 @@ from genpolicy.evidence.need.method_modes import one_per_episode, read_situation
 from genpolicy.integrity.tables import read_table
 
 FILES = {
-    "clocks.parquet", "calibration.parquet", "neighbourhoods.parquet", "modes.parquet",
+    "clocks.parquet", "calibration.parquet", "components.parquet", "neighbourhoods.parquet",
+    "modes.parquet",
     "strata.parquet", "replay.parquet", "recovery.parquet", "persistence.json", "summary.json",
     "settings.json", "findings.parquet", "resamples.parquet", "examples.parquet",
     "alignment.parquet", "support.parquet",
