@@ -12,6 +12,7 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
+from gates.claim import CHECKPOINT_ONLY
 from gates.report import Gate, GateReport, Point, StrictModel, parse_section
 from gates.settings import GateSettings
 from genpolicy.errors import RefusedError
@@ -34,10 +35,13 @@ FIXED = (
     "rollback",
 )
 ABORT_FROM = {
-    "action_age_s": "action_age_p95_s",
+    "latency_s": "latency_p95_s",
     "deadline_miss_share": "deadline_miss_upper",
+    "hold_share": "hold_share_upper",
+    "rejection_share": "rejection_share_upper",
     "fallback_share": "fallback_share_upper",
     "intervention_share": "intervention_upper",
+    "reset_share": "reset_upper",
 }
 
 
@@ -127,6 +131,7 @@ def draft_card(
     candidate = promoted(reports["D"])
     limits = {c.id: c.threshold for c in reports["D"].criteria if c.threshold is not None}
     caveats = [caveat for gate in sorted(reports) for caveat in reports[gate].caveats]
+    caveats.insert(0, CHECKPOINT_ONLY)
     baselines = reports["D"].settings.get("baselines", ())
     return TrialCard(
         schema_version=CARD_SCHEMA_VERSION,

@@ -7,10 +7,10 @@ import numpy as np
 
 from genpolicy.audit.components import vectors
 from genpolicy.audit.data import Array, AuditInput, Integers, origin, relative_paths
-from genpolicy.audit.rows import Alignment, ExampleChunk, SupportPoint
 from genpolicy.audit.run import AuditResult
 from genpolicy.audit.semantics import episode_lags, realigned
 from genpolicy.audit.settings import AuditSettings
+from genpolicy.audit.shown_rows import Alignment, ExampleChunk, SupportPoint
 from genpolicy.audit.situations import Situation
 
 EXAMPLES = 3

@@ -21,7 +21,7 @@ from genpolicy.audit.mean_versus_modes import Admissible, compare
 from genpolicy.audit.neighbourhoods import Support
 from genpolicy.audit.persistence import Persistence, summarise
 from genpolicy.audit.progress import Progress, silent
-from genpolicy.audit.recovery import recovery_outcomes
+from genpolicy.audit.recovery import demonstrated, recovery_outcomes
 from genpolicy.audit.resamples import Measures, resamples
 from genpolicy.audit.rows import ModeOutcome, RecoveryOutcome, Resample, Stratum
 from genpolicy.audit.semantics import Semantics, measure, realigned
@@ -53,6 +53,8 @@ class AuditResult:
         strata: Tests of recorded variables.
         replayed: Labels against replay.
         recovery: The disturbed episodes.
+        demonstrated: The mode that each episode followed in the primary phase, -1 for none.
+            Shape (E,).
         counts: Numbers for the summary.
         modes_after_realignment: Held-out episodes with two modes on realigned data.
         modes_other_phases: The same with the phase looked at the other way: across phases if the
@@ -72,6 +74,7 @@ class AuditResult:
     strata: tuple[Stratum, ...]
     replayed: tuple[Replayed, ...]
     recovery: tuple[RecoveryOutcome, ...]
+    demonstrated: Integers
     counts: Counts
     modes_after_realignment: int
     modes_other_phases: int | None
@@ -123,10 +126,11 @@ def audit(
     counts = count(data, situations, support, incoherent)
     primary = primary_phase(several)
     persistence = summarise([item.identity for item in situations if item.two_mode])
-    measured = Measures(
-        replayed, persistence, strata, tuple(mode for mode in modes if mode.phase == primary)
-    )
+    items, linked = several.get(primary, []), links.get(primary)
+    chosen = tuple(mode for mode in modes if mode.phase == primary)
+    measured = Measures(replayed, persistence, strata, chosen)
     before, component = counts.two_mode_episodes, followed.component
+    after = _after_realignment(data, settings, semantics, before, component, root_seed=root_seed)
     return AuditResult(
         data=data,
         semantics=semantics,
@@ -137,29 +141,15 @@ def audit(
         links=links,
         strata=strata,
         replayed=replayed,
-        recovery=_recovery(data, settings, several, links, component),
+        recovery=recovery_outcomes(data, settings, items, linked, component=component),
+        demonstrated=demonstrated(data, settings, items, linked, component=component),
         counts=counts,
-        modes_after_realignment=_after_realignment(
-            data, settings, semantics, before, component, root_seed=root_seed
-        ),
+        modes_after_realignment=after,
         modes_other_phases=_other_phases(data, settings, component, root_seed),
         component=component,
         components=component_modes(data, looks, component.name),
         resamples=resamples(data, settings, measured, claims, root_seed=root_seed),
     )
-
-
-def _recovery(
-    data: AuditInput,
-    settings: AuditSettings,
-    several: Several,
-    links: dict[str, Integers],
-    component: Component,
-) -> tuple[RecoveryOutcome, ...]:
-    """The disturbed episodes in the phase with most situations of several modes."""
-    phase = primary_phase(several)
-    items, linked = several.get(phase, []), links.get(phase)
-    return recovery_outcomes(data, settings, items, linked, component=component)
 
 
 def _examined(

@@ -28,7 +28,7 @@ from genpolicy.integrity.hashing import sha256_bytes_of
 
 Array = NDArray[np.float64]
 
-JOURNAL_VERSION = 2
+JOURNAL_VERSION = 3
 MAXIMUM_UNCOMPRESSED_BYTES = 8 << 30
 MAXIMUM_RECORD_BYTES = 64 << 20
 
@@ -44,7 +44,7 @@ EVENT_FIELDS: dict[str, tuple[str, ...]] = {
     "enqueue": ("arrival", "chunk_id", "source", "method", "condition_ns", "start_ns", "period_ns",
                 "valid_until_ns", "phase", "calibration_epoch", "checkpoint", "sampler",
                 "session_epoch", "predecessor", "rows", "actions", "actions_sha256",
-                "checked_rows", "layers"),
+                "checked_rows", "layers", "motion"),
     "discard": ("arrival", "chunk_id", "at", "reason", "ended", "rows"),
     "finish": ("arrival", "chunk_id", "ended", "rows"),
     "accept": ("arrival", "chunk_id", "row", "sequence", "age_ns", "action"),
@@ -56,6 +56,8 @@ EVENT_FIELDS: dict[str, tuple[str, ...]] = {
     "invalidate": ("reason", "before_ns"),
     "mode": ("old", "new"),
     "reset": ("session_epoch",),
+    "force": ("force_n",),
+    "outcome": ("outcome", "mode"),
     "end": ("chunks", "actions", "events"),
 }  # fmt: skip
 """Payload of each kind of event; `session`, `n` and `t` (ns) are in every message."""
