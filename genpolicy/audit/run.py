@@ -115,7 +115,7 @@ def audit(
     semantics = measure(data, settings)
     found, support = find_situations(data, settings, root_seed, progress=progress)
     looks = look_everywhere(data, settings, found, root_seed)
-    followed = foremost(looks)
+    followed, component = foremost(looks), foremost(looks).component
     claims = _examined(data, settings, followed, admissible=admissible, progress=progress)
     situations, incoherent = coherent(settings, claims)
     several = by_phase(situations)
@@ -126,11 +126,9 @@ def audit(
     counts = count(data, situations, support, incoherent)
     primary = primary_phase(several)
     persistence = summarise([item.identity for item in situations if item.two_mode])
-    items, linked = several.get(primary, []), links.get(primary)
-    chosen = tuple(mode for mode in modes if mode.phase == primary)
-    measured = Measures(replayed, persistence, strata, chosen)
-    before, component = counts.two_mode_episodes, followed.component
-    after = _after_realignment(data, settings, semantics, before, component, root_seed=root_seed)
+    main = several.get(primary, []), links.get(primary)
+    measured = Measures(replayed, persistence, strata, _of_phase(modes, primary))
+    after = _after_realignment(data, settings, semantics, counts, component, root_seed=root_seed)
     return AuditResult(
         data=data,
         semantics=semantics,
@@ -141,8 +139,8 @@ def audit(
         links=links,
         strata=strata,
         replayed=replayed,
-        recovery=recovery_outcomes(data, settings, items, linked, component=component),
-        demonstrated=demonstrated(data, settings, items, linked, component=component),
+        recovery=recovery_outcomes(data, settings, *main, component=component),
+        demonstrated=demonstrated(data, settings, *main, component=component),
         counts=counts,
         modes_after_realignment=after,
         modes_other_phases=_other_phases(data, settings, component, root_seed),
@@ -150,6 +148,10 @@ def audit(
         components=component_modes(data, looks, component.name),
         resamples=resamples(data, settings, measured, claims, root_seed=root_seed),
     )
+
+
+def _of_phase(modes: tuple[ModeOutcome, ...], phase: str) -> tuple[ModeOutcome, ...]:
+    return tuple(mode for mode in modes if mode.phase == phase)
 
 
 def _examined(
@@ -179,7 +181,7 @@ def _after_realignment(
     data: AuditInput,
     settings: AuditSettings,
     semantics: Semantics,
-    before: int,
+    counts: Counts,
     component: Component,
     *,
     root_seed: int,
@@ -187,7 +189,7 @@ def _after_realignment(
     """Held-out episodes with several modes once every epoch is shifted by its measured offset."""
     shifted, moved = realigned(data, semantics)
     if not moved:
-        return before
+        return counts.two_mode_episodes
     found, _ = find_situations(shifted, settings, root_seed)
     return claimed_episodes(shifted, settings, component, found)
 

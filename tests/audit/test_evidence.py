@@ -60,7 +60,7 @@ def test_tables_have_the_columns_that_the_gate_reads(evidence):
     assert table.column_names == [
         "split", "phase", "episode_uuid", "index", "neighbours", "clusters", "cluster_sizes",
         "two_mode", "separation_m", "mean_admissible", "mean_reason", "median_admissible",
-        "modes_admissible", "mean_path", "mode_paths", "persistent",
+        "modes_admissible", "mean_path", "mode_paths", "persistent", "component",
     ]  # fmt: skip
     rows = table.to_pylist()
     assert all(sum(row["cluster_sizes"]) == row["neighbours"] + 1 for row in rows)
