@@ -15,7 +15,7 @@ import yaml
 from gates import pipeline
 from gates.cause import default_limits
 from gates.cause.limits import OWN
-from gates.feasibility import LAYERS
+from gates.feasibility.settings import LAYERS
 from gates.reproducibility.timing import MEASURED_HERE, TERMS
 from genpolicy.audit.component_rows import ComponentModes
 from genpolicy.audit.rows import (
