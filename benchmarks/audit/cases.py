@@ -95,6 +95,11 @@ MODES = (
         lambda seed, s, task: Plan(seed, shares=HALF, width=s),
         (VALID,), (UNIMODAL, SUPPORT, NOISE),
     ),
+    Cause(
+        "2 valid modes, correlated strata", "valid_modes", "share that goes together", (0.5, 0.9),
+        0.5, "operator, object and epoch go together, and none of them decides",
+        lambda seed, s, task: Plan(seed, shares=HALF, correlation=s), (VALID,),
+    ),
 )  # fmt: skip
 
 HIDDEN = (
@@ -105,6 +110,15 @@ HIDDEN = (
     _decided("side in turns", "alternation", (ORDER,)),
     _decided("early lamp", "lamp_early", (hidden("unrecorded"),)),
     _decided("early path", "path_early", (hidden("unrecorded"), hidden("start_position"))),
+    _decided("habit", "habit", (ORDER,)),
+    _decided("drift over the session", "drift", (ORDER, *EPOCH)),
+    Cause(
+        "hidden operator, correlated", "hidden_state", "share of episodes that obey",
+        (0.3, 0.6, 0.8, 0.9, 1.0), 0.8, "as for the operator; what goes with it may be named",
+        lambda seed, s, task: Plan(
+            seed, shares=HALF, decided_by="operator", fidelity=s, correlation=0.7
+        ), (hidden("operator"), hidden("object"), *EPOCH), (VALID,),
+    ),
     Cause(
         "hidden phase", "hidden_state", "rest in both phases, s", (0.1, 0.4, 0.8, 1.6), 0.8,
         "8 observations and more without a motion that tells the phases apart",

@@ -81,6 +81,18 @@ class Stratum:
 
 
 @dataclass(frozen=True)
+class Told:
+    """Share of wrong guesses at the mode that a variable takes away on held-out episodes."""
+
+    variable: str
+    phase: str
+    told: float
+    told_lower: float
+    told_upper: float
+    n: int
+
+
+@dataclass(frozen=True)
 class Mode:
     """Success and feasibility of one mode of the phase with most situations."""
 
@@ -105,6 +117,7 @@ class Numbers:
         counts: Support and modes.
         kept: Identity over time.
         strata: Tests of variables.
+        told: What variables, order and past tell of the modes.
         modes: Modes of the phase with most situations.
     """
 
@@ -116,6 +129,7 @@ class Numbers:
     counts: Counts
     kept: Kept
     strata: tuple[Stratum, ...]
+    told: tuple[Told, ...]
     modes: tuple[Mode, ...]
 
 
@@ -146,6 +160,7 @@ def read_numbers(
             counts=_of(Counts, summary["counts"]),
             kept=_of(Kept, kept),
             strata=tuple(_of(Stratum, row) for row in rows("strata.parquet")),
+            told=tuple(_of(Told, row) for row in rows("predictions.parquet")),
             modes=tuple(
                 _of(Mode, row)
                 for row in rows("modes.parquet")
@@ -193,11 +208,22 @@ def _draws(measured: Numbers, rows: Rows) -> Iterator[Numbers]:
                 replace(stratum, p_adjusted=p, effect=effect, effect_lower=lower)
                 for stratum, (p, effect, lower) in zip(measured.strata, tests, strict=True)
             ),
+            told=tuple(
+                _moved(told, value) for told, value in zip(measured.told, row["told"], strict=True)
+            ),
             modes=tuple(
                 replace(mode, success_lower=lower, admissible=admissible)
                 for mode, (lower, admissible) in zip(measured.modes, outcomes, strict=True)
             ),
         )
+
+
+def _moved(row: Told, told: float) -> Told:
+    """The same row with another number, and the interval about it."""
+    away = told - row.told
+    return replace(
+        row, told=told, told_lower=row.told_lower + away, told_upper=row.told_upper + away
+    )
 
 
 def _of(kind: Any, row: Mapping[str, Any]) -> Any:

@@ -58,6 +58,12 @@ STRATA = pa.schema(
         ("recorded", FLAG), ("observed", FLAG), ("detail", TEXT),
     ]
 )  # fmt: skip
+PREDICTIONS = pa.schema(
+    [
+        ("variable", TEXT), ("phase", TEXT), ("told", REAL), ("told_lower", REAL),
+        ("told_upper", REAL), ("right", REAL), ("chance", REAL), ("n", WHOLE), ("detail", TEXT),
+    ]
+)  # fmt: skip
 REPLAY = pa.schema([("episode_uuid", TEXT), ("label", TEXT), ("replayed", TEXT), ("mode", TEXT)])
 RECOVERY = pa.schema([("split", TEXT), ("mode", TEXT), ("episodes", WHOLE), ("successes", WHOLE)])
 
@@ -80,8 +86,8 @@ RESAMPLES = pa.schema(
         ("two_mode_episodes", WHOLE), ("incoherent", WHOLE), ("persistent", WHOLE),
         ("kept", REAL), ("kept_null_q95", REAL), ("kept_n", WHOLE),
         ("p_adjusted", pa.list_(REAL)), ("effect", pa.list_(REAL)),
-        ("effect_lower", pa.list_(REAL)), ("success_lower", pa.list_(REAL)),
-        ("admissible", pa.list_(WHOLE)),
+        ("effect_lower", pa.list_(REAL)), ("told", pa.list_(REAL)),
+        ("success_lower", pa.list_(REAL)), ("admissible", pa.list_(WHOLE)),
     ]
 )  # fmt: skip
 ALIGNMENT = pa.schema(
@@ -124,6 +130,7 @@ def write_evidence(
         ),
         "modes": _table(result.modes, MODES),
         "strata": _table(result.strata, STRATA),
+        "predictions": _table(result.told, PREDICTIONS),
         "replay": pa.Table.from_pylist(_replays(result), REPLAY),
         "recovery": _table(result.recovery, RECOVERY),
         "findings": _table(result.semantics.findings, FINDINGS),

@@ -11,6 +11,7 @@ from genpolicy.audit.linking import link
 from genpolicy.audit.mean_versus_modes import Admissible
 from genpolicy.audit.neighbourhoods import Support
 from genpolicy.audit.persistence import Persistence, summarise
+from genpolicy.audit.predictability import Prediction, predictions
 from genpolicy.audit.progress import Progress, silent
 from genpolicy.audit.recovery import RecoveryOutcome, recovery_outcomes
 from genpolicy.audit.resamples import Measures, Resample, resamples
@@ -44,6 +45,7 @@ class AuditResult:
         modes: Outcome of each mode of each phase.
         links: Mode of each episode, -1 for none, per phase. Shape (E,).
         strata: Tests of recorded variables.
+        told: What variables, order and past tell of the modes of held-out episodes.
         replayed: Labels against replay.
         recovery: The disturbed episodes.
         counts: Numbers for the summary.
@@ -61,6 +63,7 @@ class AuditResult:
     modes: tuple[ModeOutcome, ...]
     links: dict[str, Integers]
     strata: tuple[Stratum, ...]
+    told: tuple[Prediction, ...]
     replayed: tuple[Replayed, ...]
     recovery: tuple[RecoveryOutcome, ...]
     counts: Counts
@@ -109,12 +112,12 @@ def audit(
     links = _links(data, settings, several)
     modes = _modes(data, situations, links, replayed)
     strata = examine_strata(data, settings, several, links, root_seed=root_seed)
+    told = predictions(data, settings, several, links, root_seed=root_seed)
     counts = count(data, situations, support, incoherent)
     primary = primary_phase(several)
     persistence = summarise([item.identity for item in situations if item.two_mode])
-    measured = Measures(
-        replayed, persistence, strata, tuple(mode for mode in modes if mode.phase == primary)
-    )
+    of_primary = tuple(mode for mode in modes if mode.phase == primary)
+    measured = Measures(replayed, persistence, strata, told, of_primary)
     before = counts.two_mode_episodes
     return AuditResult(
         data=data,
@@ -125,6 +128,7 @@ def audit(
         modes=modes,
         links=links,
         strata=strata,
+        told=told,
         replayed=replayed,
         recovery=recovery_outcomes(data, settings, several.get(primary, []), links.get(primary)),
         counts=counts,

@@ -91,6 +91,7 @@ PARAMS: dict[str, Any] = {
             mean_defeated_share=(0.5, "model"),
             recovery_benefit=(0.1, "model"),
             strata_effect=(0.3, "perception"),
+            told_share=(0.4, "perception"),
             cause_accepted=(1, "model"),
             baselines_matched=(0, "model"),
             baseline_mode_coverage=(0.6, "model"),
@@ -338,6 +339,7 @@ def _audit(root: Path) -> None:
             for variable in ("operator", "object", "epoch")
         ],
     )
+    table(root, "audit/predictions.parquet", [_told(name) for name in ("operator", "object")])
     table(
         root,
         "audit/replay.parquet",
@@ -415,6 +417,20 @@ def _audit(root: Path) -> None:
     )
 
 
+def _told(variable: str) -> dict[str, Any]:
+    return {
+        "variable": variable,
+        "phase": "approach",
+        "told": 0.05,
+        "told_lower": -0.08,
+        "told_upper": 0.18,
+        "right": 0.53,
+        "chance": 0.5,
+        "n": 150,
+        "detail": "",
+    }
+
+
 def _draw() -> dict[str, Any]:
     return {
         "disagreements": 0,
@@ -429,6 +445,7 @@ def _draw() -> dict[str, Any]:
         "p_adjusted": [0.9] * 3,
         "effect": [0.05] * 3,
         "effect_lower": [0.0] * 3,
+        "told": [0.05] * 2,
         "success_lower": [0.8] * 2,
         "admissible": [49] * 2,
     }

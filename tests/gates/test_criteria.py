@@ -98,6 +98,10 @@ WORSE = {
             AUDIT + "strata.parquet",
             lambda s: lambda f: cells("effect", s)(cells("p_adjusted", 0.001)(f)),
         ),
+        "told_share": _table(
+            AUDIT + "predictions.parquet",
+            lambda s: lambda f: f.assign(told_lower=0.9 * s - 0.1, told_upper=0.9 * s + 0.1),
+        ),
         "cause_accepted": _document(
             AUDIT + "summary.json", lambda s: _set("label_disagreement_upper", 0.06 + s)
         ),
@@ -279,6 +283,7 @@ TABLES = {
         "audit/neighbourhoods",
         "audit/modes",
         "audit/strata",
+        "audit/predictions",
         "audit/replay",
         "audit/calibration",
         "measure_baselines/modes",
@@ -349,6 +354,7 @@ def test_empty_table_is_inconclusive_never_pass(gate, path, ladder):
     [
         ("A", "audit/clocks", "offset_after_s"),
         ("A", "audit/strata", "p_adjusted"),
+        ("A", "audit/predictions", "told_upper"),
         ("B", "reload/samples", "max_abs_difference"),
         ("B", "reload/coverage", "modes_covered_share"),
         ("C", "shadow/candidates", "position_change_m"),

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from gates.cause import Cause, CauseLimits, default_limits, name_cause
-from gates.cause.numbers import Counts, Finding, Kept, Labels, Mode, Numbers, Stratum
+from gates.cause.numbers import Counts, Finding, Kept, Labels, Mode, Numbers, Stratum, Told
 from genpolicy.audit.settings import AuditSettings
 
 LIMITS = default_limits()
@@ -26,11 +26,14 @@ STRATUM = Stratum("operator", "approach", 0.9, 0.05, 0.0, 100, True, False, "")
 HIDDEN = replace(STRATUM, p_adjusted=0.001, effect=0.8, effect_lower=0.6)
 
 
+TOLD = Told("operator", "approach", 0.05, -0.1, 0.2, 120)
+
+
 VALID = Numbers(
     findings=(), floors=AuditSettings().floors, metre=1.0, unit="m",
     labels=Labels(60, 0, 0.06),
     counts=Counts(200, 180, 50, 120, 45, 50, 0, 0, 110, 0.1, 0.01),
-    kept=Kept(0.95, 0.6, 118), strata=(STRATUM,),
+    kept=Kept(0.95, 0.6, 118), strata=(STRATUM,), told=(TOLD,),
     modes=(Mode("m0", 40, 40, 0.91, 50, 50), Mode("m1", 40, 39, 0.87, 48, 50)),
 )  # fmt: skip
 
