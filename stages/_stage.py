@@ -35,7 +35,10 @@ STAGES = (
     "measure_factors", "gate_a", "train_generators", "reload", "latency", "gate_b", "shadow",
     "gate_c", "stress", "gate_d", "card", "gate_e",
 )  # fmt: skip
-SHARED = ("seed", "confidence", "task", "horizons", "compute", "policy", "feasibility", "execution")
+SHARED = (
+    "seed", "confidence", "task", "source", "horizons", "compute", "policy", "feasibility",
+    "execution",
+)  # fmt: skip
 
 
 class TaskSection(Settings):

@@ -7,11 +7,13 @@ from genpolicy.evidence.need.pictures import scene_png
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import output_folder, write_bytes
 from genpolicy.tasks.api import load_task
+from stages._contracts import require_one_contract
 from stages._stage import ARTIFACTS, Params, main
 
 
 def work(params: Params) -> None:
     """Audit the dataset and write the evidence."""
+    require_one_contract()
     task = load_task(params.task.name)
     settings = with_channels(params.section("audit", AuditSettings), task)
     feasibility = params.section("feasibility", FeasibilitySettings)

@@ -15,6 +15,7 @@ from genpolicy.integrity.atomic import output_folder
 from genpolicy.integrity.rows import write_rows
 from genpolicy.policies.matched_training import PolicySettings
 from genpolicy.seeds import stream
+from stages._contracts import require_one_contract
 from stages._latency import LatencySection
 from stages._stage import ARTIFACTS, Params, main
 from stages._training import MethodsSection
@@ -23,6 +24,7 @@ from stages._training import MethodsSection
 def work(params: Params) -> None:
     """Measure every method twice, each time in a fresh process."""
     admit("latency", Path.cwd())
+    require_one_contract("train_baselines", "train_generators")
     section = params.section("latency", LatencySection)
     policies = compared(
         ARTIFACTS,

@@ -5,6 +5,7 @@ from genpolicy.evidence.need.baselines import BaselinePlan, write_baselines
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import output_folder
 from genpolicy.policies.matched_training import PolicySettings
+from stages._contracts import require_one_contract
 from stages._measuring import MeasureBaselinesSection
 from stages._stage import ARTIFACTS, Params, main
 from stages._training import MethodsSection
@@ -12,6 +13,7 @@ from stages._training import MethodsSection
 
 def work(params: Params) -> None:
     """Measure errors, modes and the latent of every baseline."""
+    require_one_contract("train_baselines")
     section = params.section("measure_baselines", MeasureBaselinesSection)
     names = params.section("train_baselines", MethodsSection).samplers
     plan = BaselinePlan(

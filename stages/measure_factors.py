@@ -8,6 +8,7 @@ from genpolicy.evidence.need.factors import FactorPlan, write_factors
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import output_folder
 from genpolicy.policies.matched_training import PolicySettings
+from stages._contracts import require_one_contract
 from stages._measuring import MeasureBaselinesSection
 from stages._stage import ARTIFACTS, Params, main
 from stages._training import FactorsSection, MethodsSection
@@ -27,6 +28,7 @@ class MeasureFactorsSection(Settings):
 
 def work(params: Params) -> None:
     """Measure every variant."""
+    require_one_contract("train_factors")
     section = params.section("measure_factors", MeasureFactorsSection)
     variants = params.section("train_factors", FactorsSection).variants
     plan = FactorPlan(

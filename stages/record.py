@@ -7,6 +7,7 @@ from genpolicy.integrity.atomic import output_folder, write_bytes
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_tree
 from genpolicy.tasks.demonstrations import record_session
+from stages._source import INDEX_FILE, SourceSection
 from stages._stage import ARTIFACTS, Params, main
 
 
@@ -23,22 +24,24 @@ class RecordSection(Settings):
 
 
 def work(params: Params) -> None:
-    """Record the session and its index."""
+    """Record the session and its index; nothing where the recordings are one's own."""
     section = params.section("record", RecordSection)
+    embedded = params.section("source", SourceSection).kind == "embedded"
     with output_folder(ARTIFACTS / "record") as folder:
         episodes = folder / "episodes"
         episodes.mkdir()
-        record_session(
-            params.task.name,
-            root_seed=params.seed,
-            episodes=section.episodes,
-            shares=section.shares,
-            folder=episodes,
-            workers=params.compute.workers,
-            scheduler=params.compute.scheduler,
-        )
+        if embedded:
+            record_session(
+                params.task.name,
+                root_seed=params.seed,
+                episodes=section.episodes,
+                shares=section.shares,
+                folder=episodes,
+                workers=params.compute.workers,
+                scheduler=params.compute.scheduler,
+            )
         index = {"task": params.task.name, "files": sha256_tree(episodes)}
-        write_bytes(folder / "index.json", canonical_json(index))
+        write_bytes(folder / INDEX_FILE, canonical_json(index))
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ from genpolicy.evidence.reproducibility.reload import ReloadPlan, write_reload
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import output_folder
 from genpolicy.policies.matched_training import PolicySettings
+from stages._contracts import require_one_contract
 from stages._stage import ARTIFACTS, Params, main
 from stages._training import MethodsSection
 
@@ -30,6 +31,7 @@ class ReloadSection(Settings):
 def work(params: Params) -> None:
     """Admit through gate A, then reload, compare, sweep."""
     admit("reload", Path.cwd())
+    require_one_contract("train_generators")
     section = params.section("reload", ReloadSection)
     names = params.section("train_generators", MethodsSection).samplers
     seeds = params.section("policy", PolicySettings).seeds

@@ -22,6 +22,7 @@ from genpolicy.integrity.atomic import output_folder
 from genpolicy.policies.matched_training import PolicySettings
 from genpolicy.seeds import stream
 from genpolicy.tasks.api import load_task
+from stages._contracts import require_one_contract
 from stages._stage import ARTIFACTS, Params, main
 
 
@@ -44,6 +45,7 @@ class ShadowSection(Settings):
 def work(params: Params) -> None:
     """Admit through gate B, then sample, check, corrupt and execute against the stub."""
     admitted = admit("shadow", Path.cwd()).candidates
+    require_one_contract("train_generators")
     section = params.section("shadow", ShadowSection)
     feasibility = params.section("feasibility", FeasibilitySettings)
     seed = params.section("policy", PolicySettings).seeds[0]

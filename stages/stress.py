@@ -16,6 +16,7 @@ from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.tables import read_table
 from genpolicy.policies.matched_training import PolicySettings
 from genpolicy.tasks.api import load_task
+from stages._contracts import require_one_contract
 from stages._latency import LatencySection
 from stages._stage import ARTIFACTS, Params, main
 from stages._training import MethodsSection
@@ -24,6 +25,7 @@ from stages._training import MethodsSection
 def work(params: Params) -> None:
     """Admit through gate C, then run every method under every perturbation."""
     admitted = admit("stress", Path.cwd()).candidates
+    require_one_contract("train_baselines", "train_generators", dataset=False)
     section = params.section("stress", StressSettings)
     timing = params.section("latency", LatencySection)
     table = read_table(ARTIFACTS / "latency" / "latency.parquet").to_pandas()

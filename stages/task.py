@@ -1,19 +1,24 @@
-"""Stage `task`: the identity of the task that everything else is measured on.
+"""Stage `task`: the identity of the task, and of the recordings that are brought to it.
 
-It runs every time (`always_changed`): a task may be installed outside the tree, where nothing
-else sees an edit. What it writes changes only when the task does.
+It runs every time (`always_changed`): a task may be installed and recordings may lie outside the
+tree, where nothing else sees an edit. What it writes changes only when they do. Coming first, it
+also stops the ladder before a stage would replace files that somebody else put in its folder.
 """
 
 from genpolicy.integrity.atomic import output_folder, write_bytes
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.tasks.identity import IDENTITY_FILE, task_identity
+from stages._source import SOURCE_FILE, SourceSection, refuse_foreign_files, source_document
 from stages._stage import ARTIFACTS, Params, main
 
 
 def work(params: Params) -> None:
-    """Write the identity."""
+    """Write both identities."""
+    refuse_foreign_files()
+    source = source_document(params.section("source", SourceSection))
     with output_folder(ARTIFACTS / "task") as folder:
         write_bytes(folder / IDENTITY_FILE, canonical_json(task_identity(params.task.name)))
+        write_bytes(folder / SOURCE_FILE, canonical_json(source))
 
 
 if __name__ == "__main__":

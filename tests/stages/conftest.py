@@ -83,3 +83,21 @@ def gate_evidence() -> ModuleType:
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
+
+
+EPISODES = 14
+
+
+@pytest.fixture(scope="session")
+def recorded(
+    tmp_path_factory: pytest.TempPathFactory, process: Callable[..., tuple[int, str]]
+) -> Path:
+    """A workspace with recordings of the scripted operators, by the stages themselves."""
+    folder = tmp_path_factory.mktemp("recorded")
+    params = yaml.safe_load((ROOT / "params.yaml").read_text())
+    params["record"].update(episodes=EPISODES, shares={"nominal": 1.0})
+    (folder / "params.yaml").write_text(yaml.safe_dump(params))
+    for stage in ("task", "record"):
+        code, said = process(stage, folder)
+        assert code == 0, said
+    return folder
