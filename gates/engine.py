@@ -155,7 +155,7 @@ def judge(
         upstream=upstream_hashes(evidence.root, spec.gate),
         settings=settings.model_dump(mode="json"),
         environment=environment(),
-        caveats=(*spec.caveats, *_waivers(limits), *caveats),
+        caveats=(*spec.caveats, *_waivers(limits), *settings.caveats, *caveats),
         diagnosis=f"{_diagnosis(spec, judged)} {note}".strip(),
         decision=decision.text,
         promoted=decision.promoted,

@@ -64,6 +64,7 @@ PREDICTIONS = pa.schema(
         ("told_upper", REAL), ("right", REAL), ("chance", REAL), ("n", WHOLE), ("detail", TEXT),
     ]
 )  # fmt: skip
+ASKED = pa.schema([("check", TEXT), ("asked", FLAG), ("reason", TEXT)])
 REPLAY = pa.schema([("episode_uuid", TEXT), ("label", TEXT), ("replayed", TEXT), ("mode", TEXT)])
 RECOVERY = pa.schema([("split", TEXT), ("mode", TEXT), ("episodes", WHOLE), ("successes", WHOLE)])
 
@@ -131,6 +132,7 @@ def write_evidence(
         "modes": _table(result.modes, MODES),
         "strata": _table(result.strata, STRATA),
         "predictions": _table(result.told, PREDICTIONS),
+        "asked": _table(result.asked, ASKED),
         "replay": pa.Table.from_pylist(_replays(result), REPLAY),
         "recovery": _table(result.recovery, RECOVERY),
         "findings": _table(result.semantics.findings, FINDINGS),

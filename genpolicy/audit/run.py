@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from genpolicy.audit.asked import Asked, questions
 from genpolicy.audit.counts import Counts, count
 from genpolicy.audit.data import AuditInput, Integers, canonical
 from genpolicy.audit.labels import ModeOutcome, Replay, Replayed, mode_outcomes, replay_sample
@@ -48,6 +49,7 @@ class AuditResult:
         told: What variables, order and past tell of the modes of held-out episodes.
         replayed: Labels against replay.
         recovery: The disturbed episodes.
+        asked: Which questions could be asked of the data.
         counts: Numbers for the summary.
         modes_after_realignment: Held-out episodes with two modes on realigned data.
         modes_other_phases: The same with the phase looked at the other way: across phases if the
@@ -66,6 +68,7 @@ class AuditResult:
     told: tuple[Prediction, ...]
     replayed: tuple[Replayed, ...]
     recovery: tuple[RecoveryOutcome, ...]
+    asked: tuple[Asked, ...]
     counts: Counts
     modes_after_realignment: int
     modes_other_phases: int | None
@@ -129,6 +132,15 @@ def audit(
         links=links,
         strata=strata,
         told=told,
+        asked=questions(
+            data,
+            settings,
+            semantics,
+            told,
+            sorted(several),
+            replays=len(replayed),
+            checked=admissible is not None,
+        ),
         replayed=replayed,
         recovery=recovery_outcomes(data, settings, several.get(primary, []), links.get(primary)),
         counts=counts,

@@ -52,7 +52,12 @@ def test_it_says_what_it_rests_on(valid):
     report = audit(bare, SETTINGS.model_copy(update=NAMES))
     text = " ".join(report.rests_on)
     assert report.rests_on[0] == "tcp: unit m was guessed."
-    for what in ("operator: not recorded", "outcome: not recorded", "feasibility: not checked"):
+    for what in (
+        "operator (not recorded",
+        "outcome: not recorded",
+        "feasibility (neither",
+        "labels (no episode",
+    ):
         assert what in text
     cause = named(report.result, report.settings)
     assert (cause.name, cause.variable) == ("insufficient_support", "outcome")

@@ -79,6 +79,7 @@ PARAMS: dict[str, Any] = {
         "chunked_baseline": "chunked_bc",
         "limits": by_owner(
             refused_recordings_accounted=(0, "perception"),
+            unasked_checks=(0, "perception"),
             clock_residual_s=(0.01, "perception"),
             lag_spread_steps=(1, "controller"),
             calibration_residual_m=(0.005, "perception"),
@@ -339,6 +340,9 @@ def _audit(root: Path) -> None:
             for variable in ("operator", "object", "epoch")
         ],
     )
+    names = ("labels", "constant_lag", "operator")
+    asked = [{"check": name, "asked": True, "reason": ""} for name in names]
+    table(root, "audit/asked.parquet", asked)
     table(root, "audit/predictions.parquet", [_told(name) for name in ("operator", "object")])
     table(
         root,

@@ -98,6 +98,10 @@ WORSE = {
             AUDIT + "strata.parquet",
             lambda s: lambda f: cells("effect", s)(cells("p_adjusted", 0.001)(f)),
         ),
+        "unasked_checks": _table(
+            AUDIT + "asked.parquet",
+            lambda s: cells("asked", False, share=s),
+        ),
         "told_share": _table(
             AUDIT + "predictions.parquet",
             lambda s: lambda f: f.assign(told_lower=0.9 * s - 0.1, told_upper=0.9 * s + 0.1),
@@ -284,6 +288,7 @@ TABLES = {
         "audit/modes",
         "audit/strata",
         "audit/predictions",
+        "audit/asked",
         "audit/replay",
         "audit/calibration",
         "measure_baselines/modes",
