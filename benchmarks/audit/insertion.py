@@ -136,7 +136,7 @@ def demonstrate(plan: Plan, roster: Roster, number: int, cell: Cell) -> Truth:
     lanes = LANES.get(max(2, len(plan.shares)), MORE_LANES)
     side, wide = lanes[mode]
     style = STYLES[str(roster.operator[number])]
-    via = style.via_m * wide * plan.width + plan.route_spread_m * rng.normal()
+    via = style.via_m * wide * plan.width + plan.spread(rng)
     style = replace(style, via_m=via, speed_m_s=style.speed_m_s * rng.uniform(0.92, 1.08))
     kind = "wander" if roster.recovery[number] else "nominal"
     kind = "missed" if roster.failure[number] else kind

@@ -25,6 +25,8 @@ DECIDERS = (
 # Episodes that are not as they should be in every data set: disturbed ones and honest failures.
 RECOVERY_SHARE = 0.08
 FAILURE_SHARE = 0.03
+# No route lies further out than so many times its spread.
+STRAY = 6.0
 
 
 @dataclass(frozen=True)
@@ -67,7 +69,10 @@ class Plan:
             first phase and another in the second; 0: it does not go to the station.
         phase_observed: Whether a policy would see the phase.
         failing: Share of the last mode's episodes that fail.
+        tails: Degrees of freedom of Student's t for the width of the routes, of the same scale; 0
+            is the normal distribution.
         wrong_labels: Share of labels that are wrong.
+        wrong_mode_only: Wrong labels are those of the last mode only.
         episodes: Number of episodes; None draws 100 to 200.
         recoveries: How many of them, the last ones, are disturbed beside those by chance.
         exact: Nothing but what is planted, for tests that need exact numbers. The plant follows one
@@ -91,7 +96,9 @@ class Plan:
     station_dwell_s: float = 0.0
     phase_observed: bool = True
     failing: float = 0.0
+    tails: float = 0.0
     wrong_labels: float = 0.0
+    wrong_mode_only: bool = False
     episodes: int | None = None
     recoveries: int = 0
     exact: bool = False
@@ -100,6 +107,12 @@ class Plan:
     def __post_init__(self) -> None:
         if self.decided_by not in DECIDERS or abs(sum(self.shares) - 1.0) > 1e-9:
             raise ValueError(f"{self.decided_by} decides, shares {self.shares}")
+
+    def spread(self, rng: np.random.Generator) -> float:
+        """Deviation of one route's width from its operator's, m."""
+        drawn = rng.standard_t(self.tails) if self.tails else rng.normal()
+        # A stray goes round, never through: a way that far out is not gone.
+        return self.route_spread_m * float(np.clip(drawn, -STRAY, STRAY))
 
     @property
     def by_chance(self) -> float:

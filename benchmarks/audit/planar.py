@@ -56,7 +56,7 @@ def demonstrate(plan: Plan, roster: Roster, number: int, cell: Cell) -> Truth:
     goal[1] += CONTEXT_M * (roster.context[number] - 0.5 * (plan.contexts - 1))
     operator = str(roster.operator[number])
     speed = SPEED_M_S[operator] * rng.uniform(0.9, 1.1)
-    width = HALF_WIDTH_M * plan.width * WIDTH[operator] + plan.route_spread_m * rng.normal()
+    width = HALF_WIDTH_M * plan.width * WIDTH[operator] + plan.spread(rng)
     lane = LANES[mode] * width
     pieces, lamp = [], []
     if plan.decided_by == "path_early":  # comes from the side that it intends, through one gate
