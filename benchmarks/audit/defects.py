@@ -5,8 +5,8 @@ Kinds and the meaning of their size: `robot_clock`, `camera_clock` (offset, s), 
 episode, s, growing from the first), `camera_shift`, `tool_shift` (m), `position_unit`,
 `scene_unit`, `action_unit` (factor), `turn` (rad, observed position about the vertical), `mirror`,
 `swap` (size unused), `drop` (share of rows that are missing), `freeze` (the observed position
-stands still for a third of the episode while its stamps go on; size unused), `repeat` (share of episodes
-that are stored twice), `glue` (share of episodes that hold the next one as well).
+stands still for a third of the episode while its stamps go on; size unused), `repeat` (share of
+episodes that are stored twice), `glue` (share of episodes that hold the next one as well).
 """
 
 import numpy as np

@@ -14,7 +14,7 @@ from scipy import stats
 from genpolicy.audit.choices import Choices, choices
 from genpolicy.audit.data import Array, AuditInput, Integers, recorded
 from genpolicy.audit.guesses import Guess, by_all, by_best_column, by_nearest, by_value, right
-from genpolicy.audit.history import past_features, shortest_gap
+from genpolicy.audit.history import past_features, present_features, shortest_gap
 from genpolicy.audit.modes import Clustering
 from genpolicy.audit.neighbourhoods import Neighbourhood
 from genpolicy.audit.resolution import observed_gap
@@ -36,6 +36,8 @@ Items = list[tuple[Neighbourhood, Clustering]]
 Seeds = tuple[str, int]
 NEXT_TO = 4  # episodes recorded next to one another that speak for each other
 HABIT_LENGTH = 2
+# Of what the present tells, no more than this is taken for granted: something must be left to tell.
+MOST_SEEN = 0.9
 # Clusters that differ this much in what is observed have begun to move apart, in scales.
 STILL_TOGETHER = 0.5
 
@@ -47,7 +49,8 @@ class Prediction:
     Attributes:
         variable: Name of the variable.
         phase: Task phase.
-        told: Share of wrong guesses that it takes away on held-out episodes; below 0: misleads.
+        told: Share of wrong guesses that it takes away on held-out episodes; of the past, of those
+            that the present leaves.
         told_lower: Lower end of the interval.
         told_upper: Upper end of the interval.
         right: Share of right guesses, each episode weighted by how rare its mode is where it was.
@@ -198,13 +201,10 @@ def _past(
         )
         for values in (past, present)
     ]  # fmt: skip
-    told, seen = rows[0], max(0.0, rows[1].told)
-    return replace(
-        told,
-        told=told.told - seen,
-        told_lower=told.told_lower - seen,
-        told_upper=told.told_upper - seen,
-    )
+    told, seen = rows[0], min(rows[1].told, MOST_SEEN)
+    ends = (told.told, told.told_lower, told.told_upper)
+    middle, lower, upper = ((end - seen) / (1.0 - seen) for end in ends)
+    return replace(told, told=middle, told_lower=lower, told_upper=upper)
 
 
 def _seen(
@@ -217,7 +217,8 @@ def _seen(
     gaps = np.array([observed_gap(data, settings, *item) for item in items])
     first = np.unique(data.first_row)[:1]
     past = np.full((len(chosen.episode), past_features(data, settings, first)[0].shape[1]), np.nan)
-    present = np.full((len(chosen.episode), data.observation.shape[1]), np.nan)
+    now = present_features(data, settings, first)
+    present = np.full((len(chosen.episode), now.shape[1]), np.nan)
     place = {int(episode): number for number, episode in enumerate(chosen.episode)}
     for number in np.argsort(np.round(gaps, 6), kind="stable"):
         if not STILL_TOGETHER - gaps[int(number)] > 0:
@@ -228,7 +229,7 @@ def _seen(
         new = ~np.isfinite(present[at, 0]) if len(at) else np.zeros(0, dtype=bool)
         if not new.any():
             continue
-        seen = data.observation[members]
+        seen = present_features(data, settings, members)
         present[at[new]] = (seen - np.median(seen, axis=0))[new]
         old = members - data.first_row[members] >= shortest_gap(settings)
         if np.any(old & new):
@@ -238,13 +239,16 @@ def _seen(
 
 
 def _row(variable: str, phase: str, chosen: Choices, hits: Array) -> Prediction:
-    """Share of right guesses with an interval for weighted shares. Source: Korn, Graubard 1998."""
+    """Share of right guesses with an interval for weighted shares. Source: Korn, Graubard 1998.
+
+    Whoever is misled by a variable would not use it: no share is less than that of a guess.
+    """
     weight, chance = chosen.weight, chosen.chance
     n = len(weight)
     if n < LEAST_EPISODES:
         low = -chance / max(1.0 - chance, 1e-12)
         return Prediction(variable, phase, 0.0, low, 1.0, chance, chance, n, "too few episodes")
-    share = float(weight @ hits / weight.sum())
+    share = max(float(weight @ hits / weight.sum()), chance)
     effective = float(weight.sum() ** 2 / np.sum(weight**2))
     k, tail = share * effective, (1.0 - CONFIDENCE) / 2.0
     low = float(stats.beta.ppf(tail, k, effective - k + 1.0)) if k > 0.0 else 0.0
