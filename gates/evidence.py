@@ -5,7 +5,7 @@ becomes the `materials` of its report, and what one criterion read becomes its `
 """
 
 import contextlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,13 @@ from numpy.typing import NDArray
 
 from genpolicy.integrity.documents import parse_json
 from genpolicy.integrity.hashing import sha256_bytes_of, sha256_file
-from genpolicy.integrity.rows import check_columns, columns_of
+from genpolicy.integrity.rows import (
+    Row,
+    check_columns,
+    missing_columns,
+    rows_of_table,
+    unknown_columns,
+)
 from genpolicy.integrity.tables import table_of
 
 Array = NDArray[np.float64]
@@ -33,7 +39,7 @@ class Evidence:
         self.root = root
         self._materials: dict[str, str] = {}
         self._tables: dict[str, pa.Table] = {}
-        self._frames: dict[str, pd.DataFrame] = {}
+        self._frames: dict[tuple[str, bool], pd.DataFrame] = {}
         self._documents: dict[str, Any] = {}
         self._touched: dict[str, None] = {}
 
@@ -53,25 +59,28 @@ class Evidence:
             paths += self._touched
             self._touched = {**before, **self._touched}
 
-    def rows(self, path: str, row: type) -> pd.DataFrame:
-        """Rows of a table of the class `row`, at least one; columns that hold lists are left out.
+    def rows(self, path: str, row: type, *, lists: bool = False) -> pd.DataFrame:
+        """Rows of a table of the class `row`, at least one.
 
         The frame is kept and given again: do not write into it.
+
+        Args:
+            path: The table.
+            row: Its class.
+            lists: Whether columns that hold lists come too; they take long.
 
         Raises:
             MissingEvidenceError: No such file or row, or a column of `row` is missing.
             IntegrityError: A column that `row` does not know: other code wrote it. Or the file
                 is not a whole table.
         """
-        table = self._table(path)
-        wanted = columns_of(row)
-        if set(table.column_names) - set(wanted):
-            check_columns(row, table.column_names, where=path)
-        self._require(table, path, wanted)
-        if path not in self._frames:
-            plain = [field.name for field in table.schema if not pa.types.is_list(field.type)]
-            self._frames[path] = table.select(plain).to_pandas()
-        return self._frames[path]
+        table = self._known(path, row)
+        if table.num_rows == 0:
+            raise MissingEvidenceError(f"{path} has no rows")
+        if (path, lists) not in self._frames:
+            names = [f.name for f in table.schema if lists or not pa.types.is_nested(f.type)]
+            self._frames[path, lists] = table.select(names).to_pandas()
+        return self._frames[path, lists]
 
     def of(self, path: str, row: type, method: str) -> pd.DataFrame:
         """Rows of one method; as `rows`.
@@ -86,34 +95,24 @@ class Evidence:
             raise MissingEvidenceError(f"{path} has no rows of {method}")
         return found
 
-    def frame(self, path: str, *columns: str) -> pd.DataFrame:
-        """Some columns of a table, at least one row.
+    def records(self, path: str, row: type[Row]) -> list[Row]:
+        """All rows of a table of the class `row`, possibly none, as that class.
 
         Raises:
-            MissingEvidenceError: No such file, column or row.
-            IntegrityError: The file is not a whole table.
+            MissingEvidenceError: No such file, or a column of `row` is missing.
+            IntegrityError: An unknown column, or no whole table.
         """
-        table = self._table(path)
-        self._require(table, path, columns)
-        frame: pd.DataFrame = table.select(list(columns)).to_pandas()
-        return frame
+        return rows_of_table(self._known(path, row), row, where=path)
 
-    @staticmethod
-    def _require(table: pa.Table, path: str, columns: Sequence[str]) -> None:
-        absent = [name for name in columns if name not in table.column_names]
+    def _known(self, path: str, row: type) -> pa.Table:
+        """The table with the columns of its class: an unknown one refuses, by name."""
+        table = self._table(path)
+        if unknown_columns(row, table.column_names):
+            check_columns(row, table.column_names, where=path)
+        absent = missing_columns(row, table.column_names)
         if absent:
             raise MissingEvidenceError(f"{path} has no column {', '.join(absent)}")
-        if table.num_rows == 0:
-            raise MissingEvidenceError(f"{path} has no rows")
-
-    def records(self, path: str) -> list[dict[str, Any]]:
-        """All rows of a table, possibly none, as they stand.
-
-        Raises:
-            MissingEvidenceError: No such file.
-            IntegrityError: The file is not a whole table.
-        """
-        return list(self._table(path).to_pylist())
+        return table
 
     def document(self, path: str) -> dict[str, Any]:
         """A JSON document whose top is an object.

@@ -5,6 +5,7 @@ from pathlib import Path
 from gates.proof import admit
 from genpolicy.candidates.judged import compared
 from genpolicy.evidence.reproducibility.latency import latency_models
+from genpolicy.evidence.rows.reproducibility import LatencyRow
 from genpolicy.evidence.shadow.session import Cell
 from genpolicy.evidence.stress.matched import Comparison, matched_starts
 from genpolicy.evidence.stress.settings import StressSettings
@@ -13,7 +14,7 @@ from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import output_folder, write_bytes
 from genpolicy.integrity.documents import canonical_json
-from genpolicy.integrity.tables import read_table
+from genpolicy.integrity.rows import read_columns
 from genpolicy.policies.matched_training import PolicySettings
 from genpolicy.tasks.api import load_task
 from stages._contracts import require_one_contract
@@ -28,7 +29,7 @@ def work(params: Params) -> None:
     require_one_contract("train_baselines", "train_generators", dataset=False)
     section = params.section("stress", StressSettings)
     timing = params.section("latency", LatencySection)
-    table = read_table(ARTIFACTS / "latency" / "latency.parquet").to_pandas()
+    table = read_columns(ARTIFACTS / "latency" / "latency.parquet", LatencyRow).to_pandas()
     task = load_task(params.task.name)
     starts = matched_starts(task, root_seed=params.seed, count=section.starts)
     comparison = Comparison(

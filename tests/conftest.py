@@ -2,13 +2,14 @@
 
 import shutil
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
-import pyarrow as pa
 import pytest
 
+from genpolicy.audit.rows import SituationRow
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.data.contract import TCP_ACTION, IngestContract, plausible_ranges
 from genpolicy.data.dataset import load_dataset
@@ -17,7 +18,7 @@ from genpolicy.evidence.admission_context import make_checker
 from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.documents import read_yaml
-from genpolicy.integrity.tables import write_table
+from genpolicy.integrity.rows import write_rows
 from genpolicy.policies.matched_training import PolicySettings, TrainingPlan, train_methods
 from genpolicy.policies.policy import load_policy
 from genpolicy.policies.settings import HeadConfig, NetworkConfig, SamplerConfig, TrainingConfig
@@ -52,15 +53,17 @@ def write_situations(folder, rows):
     folder.mkdir(exist_ok=True)
     straight = np.zeros((16, 3))
     left, right = straight + np.array(SIDE_M), straight - np.array(SIDE_M)
+    plain = SituationRow(
+        split="test", phase="approach", episode_uuid="", index=0, neighbours=12, clusters=2,
+        cluster_sizes=(7, 6), two_mode=True, separation_m=0.2, mean_admissible=False,
+        mean_reason="collision", modes_admissible=2, mean_path=tuple(straight.ravel()),
+        mode_paths=(tuple(left.ravel()), tuple(right.ravel())), persistent=True,
+    )  # fmt: skip
     table = [
-        {
-            "split": "test", "phase": "approach", "episode_uuid": uuid, "index": index,
-            "two_mode": True, "persistent": True, "mean_path": straight.ravel().tolist(),
-            "mode_paths": [left.ravel().tolist(), right.ravel().tolist()], **changes,
-        }
+        replace(plain, **{"episode_uuid": uuid, "index": index, **changes})
         for uuid, index, changes in rows
-    ]  # fmt: skip
-    write_table(folder / "neighbourhoods.parquet", pa.Table.from_pylist(table))
+    ]
+    write_rows(folder / "neighbourhoods.parquet", SituationRow, table)
     return folder
 
 

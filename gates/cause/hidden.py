@@ -2,8 +2,9 @@
 
 from gates.cause.answers import Answer, CauseName, Diagnosis, Layer, Named
 from gates.cause.limits import CauseLimits
-from gates.cause.numbers import Numbers, Stratum
+from gates.cause.numbers import Numbers
 from gates.cause.told import teller, told
+from genpolicy.audit.rows import Stratum
 
 DATA_VARIABLES = ("calibration_epoch",)
 HISTORY, SEQUENCE = "history", "recording_sequence"

@@ -10,7 +10,8 @@ from pathlib import Path
 from gates.cause.answers import NEXT, Answer, Cause, CauseName, Diagnosis, Layer, Named
 from gates.cause.hidden import hidden
 from gates.cause.limits import CauseLimits
-from gates.cause.numbers import Counts, Mode, Numbers, folder_numbers
+from gates.cause.numbers import Counts, Numbers, folder_numbers
+from genpolicy.audit.rows import ModeOutcome
 from genpolicy.errors import ConfigError
 
 IN_METRES = ("calibration_residual_m", "noise_spread_m")
@@ -249,7 +250,7 @@ def _validity(numbers: Numbers, limits: CauseLimits) -> Named:
     answers = [
         Answer("modes", Layer.VALIDITY, "modes followed over situations", len(modes), 2.0, ">=")
     ]
-    valid: list[Mode] = []
+    valid: list[ModeOutcome] = []
     for mode in modes:
         success, feasible = _success(mode, limits), _feasible(mode, limits)
         answers.append(success)
@@ -273,7 +274,7 @@ def _validity(numbers: Numbers, limits: CauseLimits) -> Named:
     return answers, Diagnosis(CauseName.UNIMODAL, weak, "one_valid_mode", text)
 
 
-def _success(mode: Mode, limits: CauseLimits) -> Answer:
+def _success(mode: ModeOutcome, limits: CauseLimits) -> Answer:
     known = mode.episodes > 0
     return Answer(
         "mode_success_lower", Layer.VALIDITY, f"success of {mode.mode}, lower bound",
@@ -282,7 +283,7 @@ def _success(mode: Mode, limits: CauseLimits) -> Answer:
     )  # fmt: skip
 
 
-def _feasible(mode: Mode, limits: CauseLimits) -> Answer | None:
+def _feasible(mode: ModeOutcome, limits: CauseLimits) -> Answer | None:
     if mode.checked == 0:
         return None
     return Answer(

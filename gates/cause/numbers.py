@@ -1,28 +1,21 @@
 """The audit's numbers, read from its evidence: only what a cause is named from."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
+from genpolicy.audit.rows import Finding, ModeOutcome, Prediction, Resample, Stratum
 from genpolicy.errors import BadInputError
 from genpolicy.integrity.documents import read_json
-from genpolicy.integrity.tables import read_table
-
-Rows = list[dict[str, Any]]
+from genpolicy.integrity.rows import Row, read_rows
 
 
-@dataclass(frozen=True)
-class Finding:
-    """A deviation of the data that stands out of the noise; `question` names its limit."""
+class Rows(Protocol):
+    """A table of the evidence by file name, as rows of its class."""
 
-    kind: str
-    variable: str
-    where: str
-    question: str
-    measured: float
-    unit: str
-    action: str
+    def __call__(self, name: str, row: type[Row], /) -> list[Row]:
+        """The rows, possibly none."""
 
 
 @dataclass(frozen=True)
@@ -66,45 +59,6 @@ class Kept:
 
 
 @dataclass(frozen=True)
-class Stratum:
-    """One variable in one phase; None where it was not tested."""
-
-    variable: str
-    phase: str
-    p_adjusted: float | None
-    effect: float | None
-    effect_lower: float | None
-    n: int
-    recorded: bool
-    observed: bool
-    detail: str
-
-
-@dataclass(frozen=True)
-class Told:
-    """Share of wrong guesses at the mode that a variable takes away on held-out episodes."""
-
-    variable: str
-    phase: str
-    told: float
-    told_lower: float
-    told_upper: float
-    n: int
-
-
-@dataclass(frozen=True)
-class Mode:
-    """Success and feasibility of one mode of the phase with most situations."""
-
-    mode: str
-    episodes: int
-    successes: int
-    success_lower: float
-    admissible: int
-    checked: int
-
-
-@dataclass(frozen=True)
 class Numbers:
     """All that a cause is named from.
 
@@ -129,18 +83,18 @@ class Numbers:
     counts: Counts
     kept: Kept
     strata: tuple[Stratum, ...]
-    told: tuple[Told, ...]
-    modes: tuple[Mode, ...]
+    told: tuple[Prediction, ...]
+    modes: tuple[ModeOutcome, ...]
 
 
 def read_numbers(
-    document: Callable[[str], Mapping[str, Any]], rows: Callable[[str], Rows]
+    document: Callable[[str], Mapping[str, Any]], rows: Rows
 ) -> tuple[Numbers, tuple[Numbers, ...]]:
     """The numbers of an audit, and those of its resamples.
 
     Args:
         document: A JSON document of the evidence by name.
-        rows: A table of the evidence by name, as rows.
+        rows: A table of the evidence by name and class of its rows.
 
     Raises:
         BadInputError: A document or table lacks something.
@@ -148,7 +102,7 @@ def read_numbers(
     summary, kept = document("summary.json"), document("persistence.json")
     try:
         numbers = Numbers(
-            findings=tuple(_of(Finding, row) for row in rows("findings.parquet")),
+            findings=tuple(rows("findings.parquet", Finding)),
             floors={str(key): float(value) for key, value in summary["floors"].items()},
             metre=float(summary["metre"]),
             unit=str(summary["position_unit"]),
@@ -159,15 +113,15 @@ def read_numbers(
             ),
             counts=_of(Counts, summary["counts"]),
             kept=_of(Kept, kept),
-            strata=tuple(_of(Stratum, row) for row in rows("strata.parquet")),
-            told=tuple(_of(Told, row) for row in rows("predictions.parquet")),
+            strata=tuple(rows("strata.parquet", Stratum)),
+            told=tuple(rows("predictions.parquet", Prediction)),
             modes=tuple(
-                _of(Mode, row)
-                for row in rows("modes.parquet")
-                if row["phase"] == summary["primary_phase"]
+                row
+                for row in rows("modes.parquet", ModeOutcome)
+                if row.phase == summary["primary_phase"]
             ),
         )
-        return numbers, tuple(_draws(numbers, rows("resamples.parquet")))
+        return numbers, tuple(_draws(numbers, rows("resamples.parquet", Resample)))
     except (KeyError, TypeError, ValueError) as error:
         raise BadInputError(
             where="the audit's evidence",
@@ -185,31 +139,36 @@ def folder_numbers(folder: Path) -> tuple[Numbers, tuple[Numbers, ...]]:
     """
     return read_numbers(
         lambda name: read_json(folder / name),
-        lambda name: read_table(folder / name).to_pylist(),
+        lambda name, row: read_rows(folder / name, row),
     )
 
 
-def _draws(measured: Numbers, rows: Rows) -> Iterator[Numbers]:
+def _draws(measured: Numbers, rows: Iterable[Resample]) -> Iterator[Numbers]:
     """What was measured, with the numbers of each resample in their places."""
     for row in rows:
-        tests = zip(row["p_adjusted"], row["effect"], row["effect_lower"], strict=True)
-        outcomes = zip(row["success_lower"], row["admissible"], strict=True)
-        counted = ("two_mode", "two_mode_episodes", "incoherent", "persistent")
+        tests = zip(row.p_adjusted, row.effect, row.effect_lower, strict=True)
+        outcomes = zip(row.success_lower, row.admissible, strict=True)
         yield replace(
             measured,
             labels=replace(
                 measured.labels,
-                disagreements=row["disagreements"],
-                upper=row["disagreement_upper"],
+                disagreements=row.disagreements,
+                upper=row.disagreement_upper,
             ),
-            counts=replace(measured.counts, **{name: row[name] for name in counted}),
-            kept=Kept(row["kept"], row["kept_null_q95"], row["kept_n"]),
+            counts=replace(
+                measured.counts,
+                two_mode=row.two_mode,
+                two_mode_episodes=row.two_mode_episodes,
+                incoherent=row.incoherent,
+                persistent=row.persistent,
+            ),
+            kept=Kept(row.kept, row.kept_null_q95, row.kept_n),
             strata=tuple(
                 replace(stratum, p_adjusted=p, effect=effect, effect_lower=lower)
                 for stratum, (p, effect, lower) in zip(measured.strata, tests, strict=True)
             ),
             told=tuple(
-                _moved(told, value) for told, value in zip(measured.told, row["told"], strict=True)
+                _moved(told, value) for told, value in zip(measured.told, row.told, strict=True)
             ),
             modes=tuple(
                 replace(mode, success_lower=lower, admissible=admissible)
@@ -218,7 +177,7 @@ def _draws(measured: Numbers, rows: Rows) -> Iterator[Numbers]:
         )
 
 
-def _moved(row: Told, told: float) -> Told:
+def _moved(row: Prediction, told: float) -> Prediction:
     """The same row with another number, and the interval about it."""
     away = told - row.told
     return replace(

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from gates.cause.answers import Answer, CauseName, Diagnosis, Layer
 from gates.cause.limits import CauseLimits
-from gates.cause.numbers import Told
+from genpolicy.audit.rows import Prediction
 
 QUESTION = "told_share"
 PREDICTED, UNDECIDED = "prediction", "undecided"
@@ -23,14 +23,14 @@ EVERYTHING = 2
 SHOWN = 8
 
 
-def surely(row: Told, limit: float) -> bool | None:
+def surely(row: Prediction, limit: float) -> bool | None:
     """Whether a variable tells more than the limit; None where its interval lies astride."""
     if row.told_lower > limit:
         return True
     return False if limit - row.told_upper >= 0 else None
 
 
-def told(rows: Sequence[Told], limits: CauseLimits) -> list[Answer]:
+def told(rows: Sequence[Prediction], limits: CauseLimits) -> list[Answer]:
     """What tells most, each by the end of its interval that decides."""
     limit = limits[QUESTION]
     ranked = sorted(rows, key=lambda row: (-_judged(row, limit), row.variable))
@@ -46,7 +46,7 @@ def told(rows: Sequence[Told], limits: CauseLimits) -> list[Answer]:
     ]  # fmt: skip
 
 
-def teller(rows: Sequence[Told], limits: CauseLimits) -> Diagnosis | None:
+def teller(rows: Sequence[Prediction], limits: CauseLimits) -> Diagnosis | None:
     """The variable that surely tells too much, else the one of which that is not decided."""
     limit = limits[QUESTION]
     beyond = [row for row in rows if surely(row, limit)]
@@ -56,20 +56,20 @@ def teller(rows: Sequence[Told], limits: CauseLimits) -> Diagnosis | None:
     return _undecided(max(open_, key=lambda row: row.told_upper), limit) if open_ else None
 
 
-def _judged(row: Told, limit: float) -> float:
+def _judged(row: Prediction, limit: float) -> float:
     return row.told_lower if surely(row, limit) else row.told_upper
 
 
-def _end(row: Told, limit: float) -> str:
+def _end(row: Prediction, limit: float) -> str:
     return {True: "judged by the lower end", False: "judged by the upper end", None: "undecided"}[
         surely(row, limit)
     ]
 
 
-def _foremost(rows: Sequence[Told], nearly: float) -> Told:
+def _foremost(rows: Sequence[Prediction], nearly: float) -> Prediction:
     best = max(row.told for row in rows)
 
-    def rank(row: Told) -> tuple[int, float, str]:
+    def rank(row: Prediction) -> tuple[int, float, str]:
         known = row.variable in CONCRETE
         place = CONCRETE.index(row.variable) if known else len(CONCRETE) - EVERYTHING
         return place, -row.told, row.variable
@@ -77,7 +77,7 @@ def _foremost(rows: Sequence[Told], nearly: float) -> Told:
     return min((row for row in rows if row.told >= best - nearly), key=rank)
 
 
-def _hidden(row: Told) -> Diagnosis:
+def _hidden(row: Prediction) -> Diagnosis:
     text = (
         f"{row.variable.replace('_', ' ')} tells the mode of held-out episodes in {row.phase}: it "
         f"takes away {row.told:.0%} of the wrong guesses (at least {row.told_lower:.0%}). Observe "
@@ -87,7 +87,7 @@ def _hidden(row: Told) -> Diagnosis:
     return Diagnosis(name, row.variable, PREDICTED, text)
 
 
-def _undecided(row: Told, limit: float) -> Diagnosis:
+def _undecided(row: Prediction, limit: float) -> Diagnosis:
     text = (
         f"{row.variable.replace('_', ' ')} may tell the mode in {row.phase}: it takes away between "
         f"{row.told_lower:.0%} and {row.told_upper:.0%} of the wrong guesses, and {limit:.0%} is "

@@ -27,7 +27,7 @@ def found_cause(evidence: Evidence, settings: NeedSettings) -> Cause:
     try:
         numbers, draws = read_numbers(
             lambda name: evidence.document(f"{AUDIT}/{name}"),
-            lambda name: evidence.records(f"{AUDIT}/{name}"),
+            lambda name, row: evidence.records(f"{AUDIT}/{name}", row),
         )
     except BadInputError as error:
         raise MissingEvidenceError(str(error)) from error

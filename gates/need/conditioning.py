@@ -10,6 +10,7 @@ from gates.criterion import Measured, criterion
 from gates.evidence import Evidence, number, numbers
 from gates.need.cause import found_cause
 from gates.need.settings import AUDIT, VALID_CAUSE, NeedSettings
+from genpolicy.audit.rows import Prediction, Stratum
 
 
 @criterion(
@@ -19,8 +20,7 @@ from gates.need.settings import AUDIT, VALID_CAUSE, NeedSettings
 )
 def strata_effect(evidence: Evidence, settings: NeedSettings) -> Measured:
     """Largest effect among strata that are significant after correction; 0 if none is."""
-    columns = ("variable", "phase", "p_adjusted", "effect", "effect_lower", "effect_upper")
-    frame = evidence.frame(f"{AUDIT}/strata.parquet", *columns)
+    frame = evidence.rows(f"{AUDIT}/strata.parquet", Stratum)
     effects = np.abs(numbers(frame, "effect"))
     significant = numbers(frame, "p_adjusted") <= settings.strata_level
     if not significant.any():
@@ -44,8 +44,7 @@ def told_share(evidence: Evidence, settings: NeedSettings) -> Measured:
     Judged by the end of the interval that speaks against the limit: the upper one below it, the
     lower one above it. Where an interval lies astride, nothing can be said.
     """
-    columns = ("variable", "phase", "told", "told_lower", "told_upper", "n")
-    frame = evidence.frame(f"{AUDIT}/predictions.parquet", *columns)
+    frame = evidence.rows(f"{AUDIT}/predictions.parquet", Prediction)
     limit = settings.limits.of.get("told_share")
     least = math.inf if limit is None or limit.limit is None else limit.limit
     lower, upper = numbers(frame, "told_lower"), numbers(frame, "told_upper")

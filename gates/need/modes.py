@@ -7,12 +7,12 @@ from gates.bounds import counted_interval, share_interval
 from gates.criterion import Measured, criterion
 from gates.evidence import Evidence, MissingEvidenceError, flags, number, numbers
 from gates.need.settings import AUDIT, VALID_CAUSE, NeedSettings
+from genpolicy.audit.rows import ModeOutcome, RecoveryOutcome, SituationRow
 from genpolicy.statistics.intervals import clopper_pearson
 
 
-def _held_out(evidence: Evidence, settings: NeedSettings, *columns: str) -> pd.DataFrame:
-    path = f"{AUDIT}/neighbourhoods.parquet"
-    frame = evidence.frame(path, "split", "episode_uuid", "two_mode", *columns)
+def _held_out(evidence: Evidence, settings: NeedSettings) -> pd.DataFrame:
+    frame = evidence.rows(f"{AUDIT}/neighbourhoods.parquet", SituationRow)
     return frame[frame["split"].isin(settings.held_out_splits)]
 
 
@@ -35,7 +35,7 @@ def held_out_situations(evidence: Evidence, settings: NeedSettings) -> Measured:
 )
 def multimodal_situations(evidence: Evidence, settings: NeedSettings) -> Measured:
     """Held-out situations with two clusters that persist."""
-    rows = _held_out(evidence, settings, "persistent")
+    rows = _held_out(evidence, settings)
     kept = rows[flags(rows, "two_mode") & flags(rows, "persistent")]
     text = f"from {kept['episode_uuid'].nunique()} episodes; two clusters that persist"
     return Measured(float(len(kept)), caveat=text)
@@ -63,8 +63,7 @@ def persistence_margin(evidence: Evidence, settings: NeedSettings) -> Measured:
 )
 def mode_success_lower(evidence: Evidence, settings: NeedSettings) -> Measured:
     """Lowest exact lower bound of success over the modes."""
-    columns = ("mode", "episodes", "successes")
-    frame = evidence.frame(f"{AUDIT}/modes.parquet", *columns)
+    frame = evidence.rows(f"{AUDIT}/modes.parquet", ModeOutcome)
     bounds = [
         (counted_interval(hits, trials, confidence=settings.confidence), str(mode))
         for mode, trials, hits in zip(
@@ -87,8 +86,7 @@ def mode_success_lower(evidence: Evidence, settings: NeedSettings) -> Measured:
 )
 def mode_feasible_share(evidence: Evidence, settings: NeedSettings) -> Measured:
     """Lowest share of admissible modal chunks over the modes."""
-    columns = ("mode", "admissible", "checked")
-    frame = evidence.frame(f"{AUDIT}/modes.parquet", *columns)
+    frame = evidence.rows(f"{AUDIT}/modes.parquet", ModeOutcome)
     checked = numbers(frame, "checked")
     if not np.all(checked > 0):
         raise MissingEvidenceError("a mode has no checked chunk")
@@ -106,7 +104,7 @@ def mode_feasible_share(evidence: Evidence, settings: NeedSettings) -> Measured:
 )
 def mean_defeated_share(evidence: Evidence, settings: NeedSettings) -> Measured:
     """Lower bound of the share of two-mode situations in which only the mean is rejected."""
-    rows = _held_out(evidence, settings, "clusters", "mean_admissible", "modes_admissible")
+    rows = _held_out(evidence, settings)
     rows = rows[flags(rows, "two_mode")]
     if len(rows) == 0:
         return Measured(0.0, caveat="no held-out situation has two modes")
@@ -135,8 +133,7 @@ def mean_defeated_share(evidence: Evidence, settings: NeedSettings) -> Measured:
 )
 def recovery_benefit(evidence: Evidence, settings: NeedSettings) -> Measured:
     """Lower bound of recovery by the best mode minus recovery by the worst other one."""
-    columns = ("split", "mode", "episodes", "successes")
-    frame = evidence.frame(f"{AUDIT}/recovery.parquet", *columns)
+    frame = evidence.rows(f"{AUDIT}/recovery.parquet", RecoveryOutcome)
     frame = frame.assign(episodes=numbers(frame, "episodes"), successes=numbers(frame, "successes"))
     by_mode = frame.groupby("mode")[["episodes", "successes"]].sum()
     bounds = {

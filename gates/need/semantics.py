@@ -6,6 +6,7 @@ from gates.bounds import counted_interval
 from gates.criterion import Measured, criterion
 from gates.evidence import Evidence, MissingEvidenceError, count, number, numbers
 from gates.need.settings import AUDIT, NeedSettings
+from genpolicy.audit.rows import Asked, Calibration, Clock, ReplayRow
 from genpolicy.errors import ConfigError
 
 REFUSALS = "artifacts/ingest/refusals.json"
@@ -34,7 +35,7 @@ def refused_recordings_accounted(evidence: Evidence, settings: NeedSettings) -> 
 )
 def unasked_checks(evidence: Evidence, settings: NeedSettings) -> Measured:
     """Questions that could not be asked and that nobody waived; with any, nothing can be said."""
-    frame = evidence.frame(f"{AUDIT}/asked.parquet", "check", "asked", "reason")
+    frame = evidence.rows(f"{AUDIT}/asked.parquet", Asked)
     answered = {check for checks in settings.waived_checks.values() for check in checks}
     for check in sorted(answered - set(frame["check"])):
         raise ConfigError(
@@ -60,7 +61,7 @@ def unasked_checks(evidence: Evidence, settings: NeedSettings) -> Measured:
 )
 def clock_residual_s(evidence: Evidence, settings: NeedSettings) -> Measured:
     """Largest clock offset left after realignment over streams and epochs, s."""
-    frame = evidence.frame(f"{AUDIT}/clocks.parquet", "stream", "epoch", "offset_after_s")
+    frame = evidence.rows(f"{AUDIT}/clocks.parquet", Clock)
     return Measured(float(np.abs(numbers(frame, "offset_after_s")).max()))
 
 
@@ -71,7 +72,7 @@ def clock_residual_s(evidence: Evidence, settings: NeedSettings) -> Measured:
 )
 def lag_spread_steps(evidence: Evidence, settings: NeedSettings) -> Measured:
     """Largest spread over epochs of the lag of one stream, action steps."""
-    frame = evidence.frame(f"{AUDIT}/clocks.parquet", "stream", "epoch", "lag_steps")
+    frame = evidence.rows(f"{AUDIT}/clocks.parquet", Clock)
     lags = frame.assign(lag_steps=numbers(frame, "lag_steps")).groupby("stream")["lag_steps"]
     return Measured(float((lags.max() - lags.min()).max()), caveat="largest over streams")
 
@@ -83,7 +84,7 @@ def lag_spread_steps(evidence: Evidence, settings: NeedSettings) -> Measured:
 )
 def calibration_residual_m(evidence: Evidence, settings: NeedSettings) -> Measured:
     """Largest calibration residual over epochs, m."""
-    frame = evidence.frame(f"{AUDIT}/calibration.parquet", "epoch", "residual_m")
+    frame = evidence.rows(f"{AUDIT}/calibration.parquet", Calibration)
     return Measured(float(np.abs(numbers(frame, "residual_m")).max()), caveat="largest over epochs")
 
 
@@ -94,7 +95,7 @@ def calibration_residual_m(evidence: Evidence, settings: NeedSettings) -> Measur
 )
 def label_disagreement(evidence: Evidence, settings: NeedSettings) -> Measured:
     """Upper exact bound of the share of labels that replay contradicts."""
-    frame = evidence.frame(f"{AUDIT}/replay.parquet", "episode_uuid", "label", "replayed")
+    frame = evidence.rows(f"{AUDIT}/replay.parquet", ReplayRow)
     wrong = int((frame["label"] != frame["replayed"]).sum())
     interval = counted_interval(wrong, len(frame), confidence=settings.confidence)
     text = f"{wrong} of {len(frame)} replayed episodes disagree; judged by the upper bound"

@@ -8,6 +8,7 @@ from gates.evidence import Evidence, MissingEvidenceError, numbers
 from gates.need.settings import MEASURED_FACTORS
 from gates.pages.figures import Plot
 from gates.report import GateReport
+from genpolicy.evidence.rows.need import EffectRow
 from genpolicy.pages.figures.drawing import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, new_figure
 
 EFFECTS = f"{MEASURED_FACTORS}/effects.parquet"
@@ -26,8 +27,7 @@ PANELS = (
 
 
 def _factors(evidence: Evidence, report: GateReport) -> Figure:
-    columns = ("variant", "factor", "convention", "measure", "value", "effect", "lower", "upper")
-    frame = evidence.frame(EFFECTS, *columns)
+    frame = evidence.rows(EFFECTS, EffectRow)
     places = {factor: place for place, factor in enumerate(COLOURS)}
     frame = frame.assign(place=frame["factor"].map(places).fillna(len(places)))
     frame = frame.sort_values("place", kind="stable")

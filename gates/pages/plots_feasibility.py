@@ -12,11 +12,12 @@ from gates.feasibility import CANDIDATES, HELD_OUT, LAYERS, admissible
 from gates.pages.figures import Plot, colours, dashes, in_order
 from gates.pages.limits import draw_limit
 from gates.report import GateReport
+from genpolicy.evidence.rows.shadow import CandidateRow
 from genpolicy.pages.figures.drawing import GREY, HATCHES, new_figure
 
 
 def _waterfall(evidence: Evidence, report: GateReport) -> Figure:
-    frame = evidence.frame(CANDIDATES, "method", "fixture", *LAYERS)
+    frame = evidence.rows(CANDIDATES, CandidateRow)
     methods = in_order(frame["method"])
     colour = colours(methods)
     figure, pair = new_figure(height=3.0, columns=2)
@@ -56,7 +57,7 @@ def _waterfall(evidence: Evidence, report: GateReport) -> Figure:
 
 
 def _admitted(evidence: Evidence, column: str) -> pd.DataFrame:
-    frame = evidence.frame(CANDIDATES, "method", "mode", "fixture", column, *LAYERS)
+    frame = evidence.rows(CANDIDATES, CandidateRow)
     frame = frame[(frame["fixture"] == HELD_OUT).to_numpy()]
     frame = frame[admissible(frame) == 1.0].dropna(subset=[column])
     if len(frame) == 0:

@@ -12,6 +12,15 @@ from gates.pages.figures import Photo, Plot, in_order
 from gates.pages.limits import draw_limit, limit_of
 from gates.pages.plots_scene import SUMMARY, obstacles
 from gates.report import GateReport
+from genpolicy.audit.rows import (
+    Alignment,
+    ExampleChunk,
+    ModeOutcome,
+    ReplayRow,
+    SituationRow,
+    Stratum,
+)
+from genpolicy.evidence.rows.need import ModeRow
 from genpolicy.pages.figures import captions, checks, situations
 from genpolicy.pages.figures.drawing import BLUE, new_figure
 from genpolicy.statistics.intervals import clopper_pearson
@@ -32,17 +41,12 @@ def _plane(evidence: Evidence) -> dict[str, Any]:
 
 
 def _clusters(evidence: Evidence, report: GateReport) -> Figure:
-    columns = (
-        "example", "phase", "query_uuid", "query_index", "is_query", "distance", "cluster",
-        "coordinate", "path",
-    )  # fmt: skip
-    return situations.clusters(evidence.frame(EXAMPLES, *columns), **_plane(evidence))
+    frame = evidence.rows(EXAMPLES, ExampleChunk, lists=True)
+    return situations.clusters(frame, **_plane(evidence))
 
 
 def _overlay(evidence: Evidence, report: GateReport) -> Figure:
-    path = f"{AUDIT}/neighbourhoods.parquet"
-    columns = ("split", "two_mode", "mean_admissible", "mean_reason", "mean_path", "mode_paths")
-    frame = evidence.frame(path, *columns)
+    frame = evidence.rows(f"{AUDIT}/neighbourhoods.parquet", SituationRow, lists=True)
     held_out = frame["split"].isin(report.settings.get("held_out_splits", []))
     return situations.mean_versus_modes(
         frame[held_out & flags(frame, "two_mode")], **_plane(evidence)
@@ -51,9 +55,7 @@ def _overlay(evidence: Evidence, report: GateReport) -> Figure:
 
 def _realignment(evidence: Evidence, report: GateReport) -> Figure:
     summary = evidence.document(SUMMARY)
-    frame = evidence.frame(
-        ALIGNMENT, "episode_uuid", "epoch", "order", "offset_before_s", "offset_after_s"
-    )
+    frame = evidence.rows(ALIGNMENT, Alignment)
     limit_s = limit_of(report, "clock_residual_s")
     if limit_s is None:
         raise MissingEvidenceError("the report has no limit of the clock")
@@ -66,20 +68,19 @@ def _realignment(evidence: Evidence, report: GateReport) -> Figure:
 
 
 def _labels(evidence: Evidence, report: GateReport) -> Figure:
-    return checks.label_agreement(evidence.frame(REPLAY, "label", "replayed", "mode"))
+    return checks.label_agreement(evidence.rows(REPLAY, ReplayRow))
 
 
 def _strata(evidence: Evidence, report: GateReport) -> Figure:
-    columns = ("variable", "phase", "p_adjusted", "effect", "effect_lower", "effect_upper", "n")
     return checks.strata_bars(
-        evidence.frame(f"{AUDIT}/strata.parquet", *columns),
+        evidence.rows(f"{AUDIT}/strata.parquet", Stratum),
         level=float(report.settings.get("strata_level", 0.05)),
         limit=limit_of(report, "strata_effect"),
     )
 
 
 def _mode_success(evidence: Evidence, report: GateReport) -> Figure:
-    frame = evidence.frame(f"{AUDIT}/modes.parquet", "mode", "phase", "episodes", "successes")
+    frame = evidence.rows(f"{AUDIT}/modes.parquet", ModeOutcome)
     level = float(report.settings.get("confidence", 0.95))
     trials, hits = numbers(frame, "episodes"), numbers(frame, "successes")
     ends = np.array(
@@ -93,8 +94,7 @@ def _mode_success(evidence: Evidence, report: GateReport) -> Figure:
 
 
 def _baselines(evidence: Evidence, report: GateReport) -> Figure:
-    columns = ("method", "convention", "modes_present", "modes_covered")
-    frame = evidence.frame(f"{MEASURED}/modes.parquet", *columns)
+    frame = evidence.rows(f"{MEASURED}/modes.parquet", ModeRow)
     frame = frame[numbers(frame, "modes_present") >= 2]
     share = numbers(frame, "modes_covered") / numbers(frame, "modes_present")
     means = (

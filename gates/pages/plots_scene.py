@@ -13,6 +13,7 @@ from gates.evidence import Array, Evidence, MissingEvidenceError
 from gates.need.settings import AUDIT
 from gates.pages.figures import Photo, Plot
 from gates.report import GateReport
+from genpolicy.data.rows import EpisodeRow, FrameRow
 from genpolicy.pages.figures.drawing import BLUE, GREY, ORANGE, RED, new_figure
 from genpolicy.pages.figures.situations import STONE, draw_obstacles
 
@@ -68,8 +69,8 @@ def paths(evidence: Evidence) -> list[Path]:
     Raises:
         MissingEvidenceError: No such table or column, or an action without a position.
     """
-    frames = evidence.frame(FRAMES, "episode_uuid", "index", "action")
-    episodes = evidence.frame(EPISODES, "episode_uuid", "outcome")
+    frames = evidence.rows(FRAMES, FrameRow, lists=True)
+    episodes = evidence.rows(EPISODES, EpisodeRow)
     frames = frames.sort_values(["episode_uuid", "index"], kind="stable")
     positions = np.array(frames["action"].tolist(), dtype=np.float64)[:, :3]
     if positions.shape[1] != 3 or not np.all(np.isfinite(positions)):

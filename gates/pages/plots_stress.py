@@ -8,6 +8,7 @@ from gates.pages.figures import Plot, colours, dashes, in_order
 from gates.pages.limits import draw_limit
 from gates.report import GateReport
 from gates.stress.rollouts import ROLLOUTS
+from genpolicy.evidence.rows.stress import RolloutRow
 from genpolicy.pages.figures.drawing import (
     BLUE,
     GREEN,
@@ -35,7 +36,7 @@ OUTCOMES = {
 
 
 def _success(evidence: Evidence, report: GateReport) -> Figure:
-    frame = evidence.frame(ROLLOUTS, "method", "perturbation", "success")
+    frame = evidence.rows(ROLLOUTS, RolloutRow)
     methods, conditions = in_order(frame["method"]), sorted(set(frame["perturbation"]))
     conditions.sort(key=lambda name: name != "nominal")
     colour = colours(methods)
@@ -66,7 +67,7 @@ def _success(evidence: Evidence, report: GateReport) -> Figure:
 
 
 def _age(evidence: Evidence, report: GateReport) -> Figure:
-    frame = evidence.frame(ROLLOUTS, "method", "action_age_p95_s", "action_ticks")
+    frame = evidence.rows(ROLLOUTS, RolloutRow)
     frame = frame[numbers(frame, "action_ticks") > 0]
     if len(frame) == 0:
         raise MissingEvidenceError("no rollout executed an action")
@@ -87,7 +88,7 @@ def _age(evidence: Evidence, report: GateReport) -> Figure:
 
 
 def _outcomes(evidence: Evidence, report: GateReport) -> Figure:
-    frame = evidence.frame(ROLLOUTS, "method", "outcome")
+    frame = evidence.rows(ROLLOUTS, RolloutRow)
     methods = in_order(frame["method"])
     seen = set(frame["outcome"])
     names = [*(name for name in OUTCOMES if name in seen), *sorted(seen - set(OUTCOMES))]
@@ -118,7 +119,7 @@ def _outcomes(evidence: Evidence, report: GateReport) -> Figure:
 
 
 def _force(evidence: Evidence, report: GateReport) -> Figure:
-    frame = evidence.frame(ROLLOUTS, "method", "force_peak_n")
+    frame = evidence.rows(ROLLOUTS, RolloutRow)
     methods = in_order(frame["method"])
     colour = colours(methods)
     figure, (axes,) = new_figure(height=1.0 + 0.32 * len(methods))

@@ -8,13 +8,14 @@ from gates.pages.figures import Plot, colours, dashes, in_order
 from gates.pages.limits import draw_limit
 from gates.report import GateReport
 from gates.reproducibility import LATENCY, RELOAD, TERMS
+from genpolicy.evidence.rows.reproducibility import CoverageRow, LatencyRow
 from genpolicy.pages.figures.drawing import GREY, new_figure, plain_ticks
 
 MILLI = 1e3
 
 
 def _latency(evidence: Evidence, report: GateReport) -> Figure:
-    frame = evidence.frame(LATENCY, "method", "component", "temperature", "seconds", "source")
+    frame = evidence.rows(LATENCY, LatencyRow)
     warm = frame[frame["temperature"] == "warm"]
     if len(warm) == 0:
         raise MissingEvidenceError("no warm measurement")
@@ -49,8 +50,7 @@ def _latency(evidence: Evidence, report: GateReport) -> Figure:
 
 
 def _coverage(evidence: Evidence, report: GateReport) -> Figure:
-    columns = ("method", "nfe", "modes_covered_share", "spread_m")
-    frame = evidence.frame(f"{RELOAD}/coverage.parquet", *columns)
+    frame = evidence.rows(f"{RELOAD}/coverage.parquet", CoverageRow)
     figure, (left, right) = new_figure(columns=2)
     colour = colours(list(frame["method"]))
     dash = dashes(frame["method"])
@@ -75,7 +75,7 @@ def _coverage(evidence: Evidence, report: GateReport) -> Figure:
 
 
 def _cold(evidence: Evidence, report: GateReport) -> Figure:
-    frame = evidence.frame(LATENCY, "method", "component", "run", "temperature", "seconds")
+    frame = evidence.rows(LATENCY, LatencyRow)
     part = frame[frame["component"] == "sample"]
     methods = in_order(part["method"])
     colour = colours(methods)

@@ -5,29 +5,14 @@ a word on it: what is not asked is for a person to ask otherwise, or to waive wi
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from genpolicy.audit.data import AuditInput, recorded
-from genpolicy.audit.predictability import EPISODE_VARIABLES, HISTORY, Prediction
+from genpolicy.audit.predictability import EPISODE_VARIABLES, HISTORY
+from genpolicy.audit.rows import Asked, Prediction
 from genpolicy.audit.semantics import Semantics
 from genpolicy.audit.settings import AuditSettings
-
-
-@dataclass(frozen=True)
-class Asked:
-    """One question, and whether it could be asked.
-
-    Attributes:
-        check: Name of the question, `name` or `name.of what`.
-        asked: Whether it could be asked.
-        reason: Why not; empty where it was.
-    """
-
-    check: str
-    asked: bool
-    reason: str
 
 
 def questions(

@@ -1,12 +1,11 @@
 """The audit's evidence as files: the tables that the gate reads, and nothing that decides."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 
 from genpolicy.audit.data import AuditInput, Integers
 from genpolicy.audit.examples import (
@@ -18,91 +17,13 @@ from genpolicy.audit.examples import (
 )
 from genpolicy.audit.labels import disagreement
 from genpolicy.audit.persistence import persistent
+from genpolicy.audit.rows import TABLES, ReplayRow, SituationRow
 from genpolicy.audit.run import AuditResult
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.audit.situations import Situation
 from genpolicy.integrity.atomic import write_bytes
 from genpolicy.integrity.documents import canonical_json
-from genpolicy.integrity.tables import write_table
-
-TEXT, WHOLE, REAL, FLAG = pa.string(), pa.int64(), pa.float64(), pa.bool_()
-
-CLOCKS = pa.schema(
-    [
-        ("stream", TEXT), ("epoch", TEXT), ("episodes", WHOLE), ("offset_before_s", REAL),
-        ("offset_after_s", REAL), ("lag_steps", REAL), ("receive_delay_p50_s", REAL),
-        ("receive_delay_p95_s", REAL), ("jitter_p95_s", REAL),
-    ]
-)  # fmt: skip
-CALIBRATION = pa.schema([("epoch", TEXT), ("episodes", WHOLE), ("residual_m", REAL)])
-NEIGHBOURHOODS = pa.schema(
-    [
-        ("split", TEXT), ("phase", TEXT), ("episode_uuid", TEXT), ("index", WHOLE),
-        ("neighbours", WHOLE), ("clusters", WHOLE), ("cluster_sizes", pa.list_(WHOLE)),
-        ("two_mode", FLAG), ("separation_m", REAL), ("mean_admissible", FLAG),
-        ("mean_reason", TEXT), ("modes_admissible", WHOLE), ("mean_path", pa.list_(REAL)),
-        ("mode_paths", pa.list_(pa.list_(REAL))), ("persistent", FLAG),
-    ]
-)  # fmt: skip
-MODES = pa.schema(
-    [
-        ("mode", TEXT), ("phase", TEXT), ("episodes", WHOLE), ("successes", WHOLE),
-        ("success_lower", REAL), ("success_upper", REAL), ("admissible", WHOLE),
-        ("checked", WHOLE),
-    ]
-)  # fmt: skip
-STRATA = pa.schema(
-    [
-        ("variable", TEXT), ("phase", TEXT), ("p_value", REAL), ("p_adjusted", REAL),
-        ("effect", REAL), ("effect_lower", REAL), ("effect_upper", REAL), ("n", WHOLE),
-        ("recorded", FLAG), ("observed", FLAG), ("detail", TEXT),
-    ]
-)  # fmt: skip
-PREDICTIONS = pa.schema(
-    [
-        ("variable", TEXT), ("phase", TEXT), ("told", REAL), ("told_lower", REAL),
-        ("told_upper", REAL), ("right", REAL), ("chance", REAL), ("n", WHOLE), ("detail", TEXT),
-    ]
-)  # fmt: skip
-ASKED = pa.schema([("check", TEXT), ("asked", FLAG), ("reason", TEXT)])
-REPLAY = pa.schema([("episode_uuid", TEXT), ("label", TEXT), ("replayed", TEXT), ("mode", TEXT)])
-RECOVERY = pa.schema([("split", TEXT), ("mode", TEXT), ("episodes", WHOLE), ("successes", WHOLE)])
-
-FINDINGS = pa.schema(
-    [
-        ("kind", TEXT), ("variable", TEXT), ("where", TEXT), ("question", TEXT),
-        ("measured", REAL), ("floor", REAL), ("unit", TEXT), ("action", TEXT),
-    ]
-)  # fmt: skip
-EXAMPLES = pa.schema(
-    [
-        ("example", WHOLE), ("phase", TEXT), ("two_mode", FLAG), ("query_uuid", TEXT),
-        ("query_index", WHOLE), ("episode_uuid", TEXT), ("is_query", FLAG), ("distance", REAL),
-        ("cluster", WHOLE), ("coordinate", REAL), ("path", pa.list_(REAL)),
-    ]
-)  # fmt: skip
-RESAMPLES = pa.schema(
-    [
-        ("disagreements", WHOLE), ("disagreement_upper", REAL), ("two_mode", WHOLE),
-        ("two_mode_episodes", WHOLE), ("incoherent", WHOLE), ("persistent", WHOLE),
-        ("kept", REAL), ("kept_null_q95", REAL), ("kept_n", WHOLE),
-        ("p_adjusted", pa.list_(REAL)), ("effect", pa.list_(REAL)),
-        ("effect_lower", pa.list_(REAL)), ("told", pa.list_(REAL)),
-        ("success_lower", pa.list_(REAL)), ("admissible", pa.list_(WHOLE)),
-    ]
-)  # fmt: skip
-ALIGNMENT = pa.schema(
-    [
-        ("episode_uuid", TEXT), ("epoch", TEXT), ("order", REAL), ("lag_steps", REAL),
-        ("offset_before_s", REAL), ("offset_after_s", REAL),
-    ]
-)  # fmt: skip
-SUPPORT = pa.schema(
-    [
-        ("phase", TEXT), ("episode_uuid", TEXT), ("index", WHOLE), ("analysed", FLAG),
-        ("two_mode", FLAG), ("position", pa.list_(REAL)),
-    ]
-)  # fmt: skip
+from genpolicy.integrity.rows import write_rows
 
 
 def write_evidence(
@@ -123,26 +44,24 @@ def write_evidence(
     Raises:
         BadInputError: The place cannot be written.
     """
-    tables = {
-        "clocks": _table(result.semantics.clocks, CLOCKS),
-        "calibration": _table(result.semantics.calibrations, CALIBRATION),
-        "neighbourhoods": pa.Table.from_pylist(
-            [_situation(result.data, item) for item in result.situations], NEIGHBOURHOODS
-        ),
-        "modes": _table(result.modes, MODES),
-        "strata": _table(result.strata, STRATA),
-        "predictions": _table(result.told, PREDICTIONS),
-        "asked": _table(result.asked, ASKED),
-        "replay": pa.Table.from_pylist(_replays(result), REPLAY),
-        "recovery": _table(result.recovery, RECOVERY),
-        "findings": _table(result.semantics.findings, FINDINGS),
-        "resamples": _table(result.resamples, RESAMPLES),
-        "examples": _table(example_chunks(result, settings), EXAMPLES),
-        "alignment": _table(alignment(result, settings), ALIGNMENT),
-        "support": _table(support_points(result), SUPPORT),
+    rows: dict[str, Sequence[Any]] = {
+        "alignment": alignment(result, settings),
+        "asked": result.asked,
+        "calibration": result.semantics.calibrations,
+        "clocks": result.semantics.clocks,
+        "examples": example_chunks(result, settings),
+        "findings": result.semantics.findings,
+        "modes": result.modes,
+        "neighbourhoods": [_situation(result.data, item) for item in result.situations],
+        "predictions": result.told,
+        "recovery": result.recovery,
+        "replay": _replays(result),
+        "resamples": result.resamples,
+        "strata": result.strata,
+        "support": support_points(result),
     }
-    for name, table in tables.items():
-        write_table(folder / f"{name}.parquet", table)
+    for name, row in TABLES.items():
+        write_rows(folder / f"{name}.parquet", row, [_known(item) for item in rows[name]])
     write_bytes(folder / "persistence.json", canonical_json(asdict(result.persistence)))
     write_bytes(folder / "settings.json", canonical_json(settings.model_dump(mode="json")))
     write_bytes(
@@ -208,35 +127,40 @@ def _defeated(item: Situation) -> bool:
     return not item.chunks.mean_admissible and all(item.chunks.mode_admissible)
 
 
-def _situation(data: AuditInput, item: Situation) -> dict[str, Any]:
+def _situation(data: AuditInput, item: Situation) -> SituationRow:
     query = item.neighbourhood.query
     episode = int(data.episode[query])
     position = data.action_position
-    return {
-        "split": str(data.episodes.split[episode]),
-        "phase": item.phase,
-        "episode_uuid": str(data.episodes.uuid[episode]),
-        "index": int(data.index[query]),
-        "neighbours": len(item.neighbourhood.rows),
-        "clusters": item.clustering.count,
-        "cluster_sizes": list(item.clustering.sizes),
-        "two_mode": item.two_mode,
-        "separation_m": item.clustering.separation,
-        "mean_admissible": item.chunks.mean_admissible,
-        "mean_reason": item.chunks.mean_reason,
-        "modes_admissible": sum(item.chunks.mode_admissible),
-        "mean_path": item.chunks.mean[:, position].ravel().tolist(),
-        "mode_paths": [mode[:, position].ravel().tolist() for mode in item.chunks.modes],
-        "persistent": persistent(item.identity),
-    }
+    return SituationRow(
+        split=str(data.episodes.split[episode]),
+        phase=item.phase,
+        episode_uuid=str(data.episodes.uuid[episode]),
+        index=int(data.index[query]),
+        neighbours=len(item.neighbourhood.rows),
+        clusters=item.clustering.count,
+        cluster_sizes=item.clustering.sizes,
+        two_mode=item.two_mode,
+        separation_m=item.clustering.separation,
+        mean_admissible=item.chunks.mean_admissible,
+        mean_reason=item.chunks.mean_reason,
+        modes_admissible=sum(item.chunks.mode_admissible),
+        mean_path=tuple(item.chunks.mean[:, position].ravel().tolist()),
+        mode_paths=tuple(tuple(mode[:, position].ravel().tolist()) for mode in item.chunks.modes),
+        persistent=persistent(item.identity),
+    )
 
 
-def _replays(result: AuditResult) -> list[dict[str, Any]]:
+def _replays(result: AuditResult) -> list[ReplayRow]:
     """Replayed episodes with the mode that each followed, in the phase with most situations."""
     linked = result.links.get(result.primary_phase)
     places = {str(uuid): place for place, uuid in enumerate(result.data.episodes.uuid)}
     return [
-        asdict(item) | {"mode": _mode(linked, places[item.episode_uuid])}
+        ReplayRow(
+            episode_uuid=item.episode_uuid,
+            label=item.label,
+            replayed=item.replayed,
+            mode=_mode(linked, places[item.episode_uuid]),
+        )
         for item in result.replayed
     ]
 
@@ -245,17 +169,9 @@ def _mode(linked: Integers | None, episode: int) -> str | None:
     return None if linked is None or linked[episode] < 0 else f"m{linked[episode]}"
 
 
-def _table(rows: Sequence[Any], schema: pa.Schema) -> pa.Table:
-    """Rows of dataclasses in the columns of `schema`; fields that it lacks are left out."""
-    return pa.Table.from_pylist(
-        [
-            {name: _plain(value) for name, value in asdict(row).items() if name in schema.names}
-            for row in rows
-        ],
-        schema,
-    )
-
-
-def _plain(value: Any) -> Any:
-    """NaN is written as missing: unknown is never a number."""
-    return None if isinstance(value, float) and np.isnan(value) else value
+def _known(row: Any) -> Any:
+    """The row with NaN as missing: unknown is never a number."""
+    unknown = [
+        name for name, value in vars(row).items() if isinstance(value, float) and np.isnan(value)
+    ]
+    return replace(row, **dict.fromkeys(unknown)) if unknown else row

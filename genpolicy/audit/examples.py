@@ -3,12 +3,11 @@
 These tables decide nothing. They hold what the figures of the audit's page and of gate A show.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from genpolicy.audit.data import Array, AuditInput, Integers, origin, relative_paths
 from genpolicy.audit.modes import features
+from genpolicy.audit.rows import Alignment, ExampleChunk, SupportPoint
 from genpolicy.audit.run import AuditResult
 from genpolicy.audit.semantics import episode_lags, realigned
 from genpolicy.audit.settings import AuditSettings
@@ -16,71 +15,6 @@ from genpolicy.audit.situations import Situation
 
 EXAMPLES = 3
 UNITS = {"m": "m", "px": "px", "rad": "rad", "deg": "deg", "n": "N"}
-
-
-@dataclass(frozen=True)
-class ExampleChunk:
-    """One demonstration's chunk in one example situation.
-
-    Attributes:
-        example: Number of the situation.
-        phase: Task phase.
-        two_mode: Whether the situation counts as one with several modes.
-        query_uuid: Held-out episode that asked.
-        query_index: Its row.
-        episode_uuid: Episode of this chunk.
-        is_query: Whether it is the one that asked.
-        distance: How far its observation lies from the query's, in scales.
-        cluster: Mode, 0 the largest.
-        coordinate: Where the chunk lies along the direction in which the chunks differ most
-            between clusters, RMS distance in the unit of the position.
-        path: Commanded positions, moved to the query's place. K times P numbers.
-    """
-
-    example: int
-    phase: str
-    two_mode: bool
-    query_uuid: str
-    query_index: int
-    episode_uuid: str
-    is_query: bool
-    distance: float
-    cluster: int
-    coordinate: float
-    path: list[float]
-
-
-@dataclass(frozen=True)
-class Alignment:
-    """Clock of one episode against the others; NaN where it cannot be measured.
-
-    Attributes:
-        episode_uuid: The episode.
-        epoch: Calibration epoch.
-        order: Rank of the recording; by identifier where no order was recorded.
-        lag_steps: Action-to-state lag.
-        offset_before_s: Its deviation from the median lag.
-        offset_after_s: The same on realigned data.
-    """
-
-    episode_uuid: str
-    epoch: str
-    order: float
-    lag_steps: float
-    offset_before_s: float
-    offset_after_s: float
-
-
-@dataclass(frozen=True)
-class SupportPoint:
-    """One query: where it was made, and whether the training episodes reach there."""
-
-    phase: str
-    episode_uuid: str
-    index: int
-    analysed: bool
-    two_mode: bool
-    position: list[float]
 
 
 def example_chunks(result: AuditResult, settings: AuditSettings) -> list[ExampleChunk]:
@@ -131,7 +65,7 @@ def support_points(result: AuditResult) -> list[SupportPoint]:
             index=int(data.index[row]),
             analysed=points[phase, row][0],
             two_mode=points[phase, row][1],
-            position=place.tolist(),
+            position=tuple(place.tolist()),
         )
         for (phase, row), place in zip(keys, places, strict=True)
     ]
@@ -204,7 +138,7 @@ def _chunks(
             distance=float(distance[place]),
             cluster=int(item.clustering.labels[place]),
             coordinate=float(coordinate[place]),
-            path=placed[place].ravel().tolist(),
+            path=tuple(placed[place].ravel().tolist()),
         )
         for place, row in enumerate(members)
     ]

@@ -7,6 +7,7 @@ import numpy as np
 
 from genpolicy.audit.data import AuditInput, Integers
 from genpolicy.audit.progress import Progress, silent
+from genpolicy.audit.rows import ModeOutcome
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.seeds import stream
 from genpolicy.statistics.intervals import clopper_pearson
@@ -22,31 +23,6 @@ class Replayed:
     episode_uuid: str
     label: str
     replayed: str
-
-
-@dataclass(frozen=True)
-class ModeOutcome:
-    """Success and feasibility of one mode of one phase.
-
-    Attributes:
-        mode: Name.
-        phase: Task phase.
-        episodes: Episodes of the mode, recoveries left out.
-        successes: Of them successful; by replay where replayed, else by label.
-        success_lower: Lower end of the exact interval.
-        success_upper: Upper end of the exact interval.
-        admissible: Modal chunks that passed the feasibility check.
-        checked: Modal chunks checked.
-    """
-
-    mode: str
-    phase: str
-    episodes: int
-    successes: int
-    success_lower: float
-    success_upper: float
-    admissible: int
-    checked: int
 
 
 def replay_sample(

@@ -6,7 +6,7 @@ episodes that were left out when it was learned, as the share of wrong guesses t
 0 is a guess, 1 is certainty. Of two even modes, 0.4 is 7 right of 10.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy import stats
@@ -18,6 +18,7 @@ from genpolicy.audit.history import past_features, present_features, shortest_ga
 from genpolicy.audit.modes import Clustering
 from genpolicy.audit.neighbourhoods import Neighbourhood
 from genpolicy.audit.resolution import observed_gap
+from genpolicy.audit.rows import Prediction
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.audit.situations import Several
 from genpolicy.seeds import stream
@@ -40,34 +41,6 @@ HABIT_LENGTH = 2
 MOST_SEEN = 0.9
 # Clusters that differ this much in what is observed have begun to move apart, in scales.
 STILL_TOGETHER = 0.5
-
-
-@dataclass(frozen=True)
-class Prediction:
-    """What one variable tells of the modes of one phase.
-
-    Attributes:
-        variable: Name of the variable.
-        phase: Task phase.
-        told: Share of wrong guesses that it takes away on held-out episodes; of the past, of those
-            that the present leaves.
-        told_lower: Lower end of the interval.
-        told_upper: Upper end of the interval.
-        right: Share of right guesses, each episode weighted by how rare its mode is where it was.
-        chance: The same of guesses without knowledge.
-        n: Episodes that had a choice and the variable.
-        detail: What of it, in words; empty where the name says all.
-    """
-
-    variable: str
-    phase: str
-    told: float
-    told_lower: float
-    told_upper: float
-    right: float
-    chance: float
-    n: int
-    detail: str = ""
 
 
 def predictions(

@@ -1,7 +1,5 @@
 """The disturbed episodes on their own: which mode did each follow, and did it succeed?"""
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -9,19 +7,10 @@ from genpolicy.audit.data import AuditInput, Integers, observation_history, rela
 from genpolicy.audit.labels import SUCCESS
 from genpolicy.audit.modes import Clustering, features
 from genpolicy.audit.neighbourhoods import Neighbourhood
+from genpolicy.audit.rows import RecoveryOutcome
 from genpolicy.audit.settings import AuditSettings
 
 UNASSIGNED = "unassigned"
-
-
-@dataclass(frozen=True)
-class RecoveryOutcome:
-    """Disturbed episodes of one split that followed one mode."""
-
-    split: str
-    mode: str
-    episodes: int
-    successes: int
 
 
 def assign(

@@ -11,12 +11,11 @@ import numpy as np
 from scipy.stats import norm
 
 from genpolicy.audit.data import Array, AuditInput, Integers
-from genpolicy.audit.labels import ModeOutcome, Replayed, disagreement
+from genpolicy.audit.labels import Replayed, disagreement
 from genpolicy.audit.persistence import NULL_QUANTILE, Persistence, persistent
-from genpolicy.audit.predictability import Prediction
+from genpolicy.audit.rows import ModeOutcome, Prediction, Resample, Stratum
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.audit.situations import Claim, Situation, claims_of, coherent_phases
-from genpolicy.audit.strata import Stratum
 from genpolicy.seeds import stream
 from genpolicy.statistics.intervals import clopper_pearson
 
@@ -40,45 +39,6 @@ class Measures:
     strata: tuple[Stratum, ...]
     told: tuple[Prediction, ...]
     modes: tuple[ModeOutcome, ...]
-
-
-@dataclass(frozen=True)
-class Resample:
-    """The numbers of one draw.
-
-    Attributes:
-        disagreements: Labels that a replay contradicts.
-        disagreement_upper: Exact upper bound of their share.
-        two_mode: Situations with several modes.
-        two_mode_episodes: Held-out episodes with at least one of them.
-        incoherent: Situations with clusters that do not persist.
-        persistent: Situations with several modes that persist.
-        kept: Share of episodes that keep their mode.
-        kept_null_q95: What chance reaches in 95 of 100.
-        kept_n: Situations in which it could be measured.
-        p_adjusted: One for each stratum; None where it was not tested.
-        effect: The same.
-        effect_lower: The same.
-        told: One for each prediction.
-        success_lower: One for each mode of the phase with most situations.
-        admissible: The same.
-    """
-
-    disagreements: int
-    disagreement_upper: float
-    two_mode: int
-    two_mode_episodes: int
-    incoherent: int
-    persistent: int
-    kept: float
-    kept_null_q95: float
-    kept_n: int
-    p_adjusted: tuple[float | None, ...]
-    effect: tuple[float | None, ...]
-    effect_lower: tuple[float | None, ...]
-    told: tuple[float, ...]
-    success_lower: tuple[float, ...]
-    admissible: tuple[int, ...]
 
 
 @dataclass(frozen=True)

@@ -4,18 +4,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from genpolicy.audit.asked import Asked, questions
+from genpolicy.audit.asked import questions
 from genpolicy.audit.counts import Counts, count
 from genpolicy.audit.data import AuditInput, Integers, canonical
-from genpolicy.audit.labels import ModeOutcome, Replay, Replayed, mode_outcomes, replay_sample
+from genpolicy.audit.labels import Replay, Replayed, mode_outcomes, replay_sample
 from genpolicy.audit.linking import link
 from genpolicy.audit.mean_versus_modes import Admissible
 from genpolicy.audit.neighbourhoods import Support
 from genpolicy.audit.persistence import Persistence, summarise
-from genpolicy.audit.predictability import Prediction, predictions
+from genpolicy.audit.predictability import predictions
 from genpolicy.audit.progress import Progress, silent
-from genpolicy.audit.recovery import RecoveryOutcome, recovery_outcomes
-from genpolicy.audit.resamples import Measures, Resample, resamples
+from genpolicy.audit.recovery import recovery_outcomes
+from genpolicy.audit.resamples import Measures, resamples
+from genpolicy.audit.rows import Asked, ModeOutcome, Prediction, RecoveryOutcome, Resample, Stratum
 from genpolicy.audit.semantics import Semantics, measure, realigned
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.audit.situations import (
@@ -30,7 +31,7 @@ from genpolicy.audit.situations import (
     find_situations,
     primary_phase,
 )
-from genpolicy.audit.strata import Stratum, examine_strata
+from genpolicy.audit.strata import examine_strata
 
 
 @dataclass(frozen=True)

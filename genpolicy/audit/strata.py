@@ -5,7 +5,7 @@ situations conditions on the observation. Situations share training episodes; fo
 set of situations without a common episode is drawn, so that every episode counts once.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from genpolicy.audit.history import history_test
 from genpolicy.audit.modes import Clustering
 from genpolicy.audit.neighbourhoods import Neighbourhood
 from genpolicy.audit.resolution import observed_gap
+from genpolicy.audit.rows import Stratum
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.seeds import stream
 from genpolicy.statistics.conditional import conditional_test
@@ -31,37 +32,6 @@ SEQUENCE_PLACES = (-4, -2, 2, 4)
 # A cluster that has begun to move apart by half a scale is no longer a matter of the past.
 STILL_TOGETHER = 0.5
 Drawn = tuple[Integers, Integers, Integers]
-
-
-@dataclass(frozen=True)
-class Stratum:
-    """One variable in one phase; the test's numbers are None where it was not run.
-
-    Attributes:
-        variable: Name of the variable; `channel.component` for an observed one.
-        phase: Task phase.
-        p_value: Permutation p-value.
-        p_adjusted: After Holm over all variables and phases.
-        effect: Share of the modes' entropy inside situations that it explains.
-        effect_lower: Lower end of the interval.
-        effect_upper: Upper end of the interval.
-        n: Episodes that could tell.
-        recorded: False where the variable was not recorded at all: it stays unknown.
-        observed: Whether a policy sees it.
-        detail: What of it, in words; empty where the name says all.
-    """
-
-    variable: str
-    phase: str
-    p_value: float | None
-    p_adjusted: float | None
-    effect: float | None
-    effect_lower: float | None
-    effect_upper: float | None
-    n: int
-    recorded: bool
-    observed: bool
-    detail: str = ""
 
 
 def examine_strata(

@@ -14,11 +14,13 @@ from genpolicy.contract.normalisation import Normalisation, statistics_of
 from genpolicy.contract.observation import ObservationContract
 from genpolicy.data.contract import ActionContract, SplitRule
 from genpolicy.data.resample import Rows
+from genpolicy.data.rows import EpisodeRow, FrameRow
 from genpolicy.data.split import SPLITS, assign_splits, rule_as_json, split_hash
 from genpolicy.errors import ContractError
 from genpolicy.integrity.atomic import output_folder, write_bytes
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_bytes, sha256_file
+from genpolicy.integrity.rows import check_columns, table_of_rows
 from genpolicy.integrity.tables import write_table
 
 SCHEMA_VERSION = 1
@@ -170,30 +172,34 @@ def frames_table(episodes: Sequence[AcceptedEpisode], description: Description) 
         np.concatenate([e.rows.action for e in episodes]), description.action.dim
     )
     columns["phase"] = pa.array(np.concatenate([e.rows.phase for e in episodes]))
+    check_columns(FrameRow, columns, where=FRAMES_FILE)
     return pa.table(columns)
 
 
 def episodes_table(episodes: Sequence[AcceptedEpisode], splits: Sequence[str]) -> pa.Table:
     """One row per episode, in the order of the frames."""
-    columns: dict[str, Any] = {
-        "episode_uuid": [e.episode_uuid for e in episodes],
-        "split": list(splits),
-    }
-    columns |= {name: [e.strata[name] for e in episodes] for name in STRATA}
-    columns |= {name: pa.array([e.flags[name] for e in episodes], pa.bool_()) for name in FLAGS}
-    columns |= {
-        "source_file": [e.source_file for e in episodes],
-        "source_sha256": [e.source_sha256 for e in episodes],
-        "content_sha256": [e.content_sha256 for e in episodes],
-        "rows": pa.array([len(e.rows.tick_ns) for e in episodes], pa.int64()),
-        "lead_rows": pa.array([len(e.rows.lead_action) for e in episodes], pa.int64()),
-        "recorded_at_s": pa.array([e.recorded_at_ns / NS_PER_S for e in episodes], pa.float64()),
-        "lead_action": pa.array(
-            [e.rows.lead_action.tolist() for e in episodes], pa.list_(pa.list_(pa.float64()))
-        ),
-        "scene_start": [e.scene_start for e in episodes],
-    }
-    return pa.table(columns)
+    rows = [
+        EpisodeRow(
+            episode_uuid=e.episode_uuid,
+            split=split,
+            **_recorded(e),
+            source_file=e.source_file,
+            source_sha256=e.source_sha256,
+            content_sha256=e.content_sha256,
+            rows=len(e.rows.tick_ns),
+            lead_rows=len(e.rows.lead_action),
+            recorded_at_s=e.recorded_at_ns / NS_PER_S,
+            lead_action=tuple(tuple(action) for action in e.rows.lead_action.tolist()),
+            scene_start=e.scene_start,
+        )
+        for e, split in zip(episodes, splits, strict=True)
+    ]
+    return table_of_rows(EpisodeRow, rows)
+
+
+def _recorded(episode: AcceptedEpisode) -> dict[str, Any]:
+    """What the recording says of its episode, by column."""
+    return {**episode.strata, **episode.flags}
 
 
 def seal(manifest: dict[str, Any]) -> bytes:

@@ -71,9 +71,39 @@ def read_rows(path: Path, row: type[Row]) -> list[Row]:
         IntegrityError: Unknown or missing columns.
         BadInputError: Missing, truncated or changed.
     """
+    return rows_of_table(read_table(path), row, where=str(path))
+
+
+def read_columns(path: Path, row: type) -> pa.Table:
+    """The table of a file that `write_rows` wrote, for who computes by columns; as `read_rows`."""
     table = read_table(path)
     check_columns(row, table.column_names, where=str(path))
+    return table
+
+
+def rows_of_table(table: pa.Table, row: type[Row], *, where: str) -> list[Row]:
+    """The rows of a table as their class, lists as tuples.
+
+    Raises:
+        IntegrityError: Unknown or missing columns.
+    """
+    check_columns(row, table.column_names, where=where)
     return [row(**_frozen(values)) for values in table.to_pylist()]
+
+
+def unknown_columns(row: type, names: Iterable[str]) -> list[str]:
+    """Columns of a table that its row class does not know.
+
+    A class variable `FAMILIES` names beginnings of columns of which a table may have any number.
+    """
+    wanted, families = columns_of(row), tuple(getattr(row, "FAMILIES", ()))
+    return [name for name in names if name not in wanted and not name.startswith(families)]
+
+
+def missing_columns(row: type, names: Iterable[str]) -> list[str]:
+    """Columns of the row class that a table lacks."""
+    have = set(names)
+    return [name for name in columns_of(row) if name not in have]
 
 
 def check_columns(row: type, names: Iterable[str], *, where: str) -> None:
@@ -87,9 +117,8 @@ def check_columns(row: type, names: Iterable[str], *, where: str) -> None:
     Raises:
         IntegrityError: Unknown or missing columns.
     """
-    have, wanted = list(names), columns_of(row)
-    unknown = [name for name in have if name not in wanted]
-    missing = [name for name in wanted if name not in have]
+    have = list(names)
+    unknown, missing = unknown_columns(row, have), missing_columns(row, have)
     if unknown or missing:
         found = [
             f"{kind} column{'s' if len(some) > 1 else ''} {', '.join(some)}"

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from planar import SETTINGS
 
-from genpolicy.audit.labels import ModeOutcome, Replayed
+from genpolicy.audit.labels import Replayed
 from genpolicy.audit.modes import Clustering
 from genpolicy.audit.neighbourhoods import Neighbourhood
 from genpolicy.audit.persistence import Persistence
 from genpolicy.audit.resamples import Measures, resamples
+from genpolicy.audit.rows import ModeOutcome, Stratum
 from genpolicy.audit.situations import Situation
-from genpolicy.audit.strata import Stratum
 from genpolicy.statistics.intervals import clopper_pearson
 
 NULL = np.linspace(0.0, 0.5, 99)

@@ -16,8 +16,39 @@ from gates.cause import default_limits
 from gates.cause.limits import OWN
 from gates.feasibility import LAYERS
 from gates.reproducibility import MEASURED_HERE, TERMS
-from genpolicy.audit.evidence import FINDINGS
+from genpolicy.audit.rows import (
+    Alignment,
+    Asked,
+    Calibration,
+    Clock,
+    ExampleChunk,
+    Finding,
+    ModeOutcome,
+    Prediction,
+    RecoveryOutcome,
+    ReplayRow,
+    Resample,
+    SituationRow,
+    Stratum,
+)
+from genpolicy.data.rows import EpisodeRow, FrameRow
+from genpolicy.evidence.rows.need import (
+    EffectRow,
+    FactorErrorRow,
+    FactorModeRow,
+    ModeRow,
+    OfflineRow,
+)
+from genpolicy.evidence.rows.reproducibility import CoverageRow, LatencyRow, NfeRow, SampleRow
+from genpolicy.evidence.rows.shadow import CandidateRow, ShadowCountRow, ShadowStubRow
+from genpolicy.evidence.rows.stress import (
+    ConservationRow,
+    RolloutRow,
+    StressCountRow,
+    StressStubRow,
+)
 from genpolicy.integrity.documents import canonical_json
+from genpolicy.integrity.rows import write_rows
 from genpolicy.integrity.tables import read_table, write_table
 
 BASELINES = ("bc", "chunked_bc", "act")
@@ -205,8 +236,8 @@ def limited(gate: str) -> set[str]:
     return {name for entries in PARAMS[gate]["limits"].values() for name in entries}
 
 
-def table(root: Path, path: str, rows: list[dict[str, Any]]) -> None:
-    write_table(root / "artifacts" / path, pa.Table.from_pylist(rows))
+def table(root: Path, path: str, row: type, rows: list[dict[str, Any]]) -> None:
+    write_rows(root / "artifacts" / path, row, [row(**values) for values in rows])
 
 
 def document(root: Path, path: str, value: Any) -> None:
@@ -253,8 +284,16 @@ def _dataset(root: Path) -> None:
     table(
         root,
         "ingest/frames.parquet",
+        FrameRow,
         [
-            {"episode_uuid": f"e{e}", "index": i, "action": [0.38 + 0.03 * i, _bow(e, i), 0.15] * 3}
+            {
+                "episode_uuid": f"e{e}",
+                "index": i,
+                "event_time_s": 0.1 * i,
+                "observation": [0.0],
+                "action": [0.38 + 0.03 * i, _bow(e, i), 0.15] * 3,
+                "phase": "approach",
+            }
             for e in range(4)
             for i in rows
         ],
@@ -262,8 +301,27 @@ def _dataset(root: Path) -> None:
     table(
         root,
         "ingest/episodes.parquet",
+        EpisodeRow,
         [
-            {"episode_uuid": f"e{e}", "outcome": "failure" if e == 3 else "success"}
+            {
+                "episode_uuid": f"e{e}",
+                "split": "train",
+                "task": "t",
+                "object": "o",
+                "operator": "p",
+                "calibration_epoch": "c0",
+                "outcome": "failure" if e == 3 else "success",
+                "is_recovery": False,
+                "is_intervention": None,
+                "source_file": f"{e}.mcap",
+                "source_sha256": "",
+                "content_sha256": "",
+                "rows": 9,
+                "lead_rows": 0,
+                "recorded_at_s": float(e),
+                "lead_action": [],
+                "scene_start": "",
+            }
             for e in range(4)
         ],
     )
@@ -281,6 +339,7 @@ def _audit(root: Path) -> None:
     table(
         root,
         "audit/clocks.parquet",
+        Clock,
         [
             {
                 "stream": stream,
@@ -300,12 +359,14 @@ def _audit(root: Path) -> None:
     table(
         root,
         "audit/calibration.parquet",
+        Calibration,
         [{"epoch": e, "episodes": 20, "residual_m": 0.001} for e in ("e1", "e2")],
     )
-    table(root, "audit/neighbourhoods.parquet", [_situation(i) for i in range(60)])
+    table(root, "audit/neighbourhoods.parquet", SituationRow, [_situation(i) for i in range(60)])
     table(
         root,
         "audit/modes.parquet",
+        ModeOutcome,
         [
             {
                 "mode": mode,
@@ -323,6 +384,7 @@ def _audit(root: Path) -> None:
     table(
         root,
         "audit/strata.parquet",
+        Stratum,
         [
             {
                 "variable": variable,
@@ -342,11 +404,13 @@ def _audit(root: Path) -> None:
     )
     names = ("labels", "constant_lag", "operator")
     asked = [{"check": name, "asked": True, "reason": ""} for name in names]
-    table(root, "audit/asked.parquet", asked)
-    table(root, "audit/predictions.parquet", [_told(name) for name in ("operator", "object")])
+    table(root, "audit/asked.parquet", Asked, asked)
+    told = [_told(name) for name in ("operator", "object")]
+    table(root, "audit/predictions.parquet", Prediction, told)
     table(
         root,
         "audit/replay.parquet",
+        ReplayRow,
         [
             {
                 "episode_uuid": f"e{i}",
@@ -357,23 +421,25 @@ def _audit(root: Path) -> None:
             for i in range(40)
         ],
     )
-    table(root, "audit/examples.parquet", [_example(i) for i in range(12)])
+    table(root, "audit/examples.parquet", ExampleChunk, [_example(i) for i in range(12)])
     table(
         root,
         "audit/alignment.parquet",
+        Alignment,
         [
             {
                 "episode_uuid": f"e{i}",
                 "epoch": "c0",
                 "order": float(i),
+                "lag_steps": 2.0,
                 "offset_before_s": 0.01 * (i % 2),
                 "offset_after_s": 0.0,
             }
             for i in range(10)
         ],
     )
-    write_table(root / "artifacts/audit/findings.parquet", FINDINGS.empty_table())
-    table(root, "audit/resamples.parquet", [_draw() for _ in range(4)])
+    table(root, "audit/findings.parquet", Finding, [])
+    table(root, "audit/resamples.parquet", Resample, [_draw() for _ in range(4)])
     document(
         root,
         "audit/persistence.json",
@@ -382,6 +448,7 @@ def _audit(root: Path) -> None:
     table(
         root,
         "audit/recovery.parquet",
+        RecoveryOutcome,
         [
             {"split": "recovery", "mode": "left", "episodes": 40, "successes": 38},
             {"split": "recovery", "mode": "right", "episodes": 40, "successes": 8},
@@ -460,8 +527,10 @@ def _example(i: int) -> dict[str, Any]:
     return {
         "example": 0,
         "phase": "approach",
+        "two_mode": True,
         "query_uuid": "e1",
         "query_index": 4,
+        "episode_uuid": f"e{i}",
         "is_query": i == 0,
         "distance": 0.1 * i,
         "cluster": i % 2,
@@ -515,6 +584,18 @@ def _modes(methods: tuple[str, ...], covered: int) -> list[dict[str, Any]]:
     ]
 
 
+def _offline(method: str) -> dict[str, Any]:
+    return {
+        "method": method,
+        "seed": 0,
+        "split": "test",
+        "phase": "approach",
+        "windows": 9,
+        "masked_mae": 0.02,
+        "position_rmse_m": 0.01,
+    }
+
+
 def _matched(methods: tuple[str, ...]) -> dict[str, Any]:
     return {
         "methods": {
@@ -541,9 +622,9 @@ def _checkpoints(root: Path, stage: str, methods: tuple[str, ...]) -> None:
 def _baselines(root: Path) -> None:
     fixed = [{**row, "admissible": 0} for row in _modes(BASELINES, 1)]
     drawn = [{**row, "convention": "derivative_free"} for row in _modes((DRAWN,), 2)]
-    table(root, "measure_baselines/modes.parquet", fixed + drawn)
+    table(root, "measure_baselines/modes.parquet", ModeRow, fixed + drawn)
     document(root, "train_baselines/matched.json", _matched((*BASELINES, DRAWN)))
-    table(root, "measure_baselines/offline.parquet", [{"method": "bc", "seed": 0}])
+    table(root, "measure_baselines/offline.parquet", OfflineRow, [_offline("bc")])
     latent = {
         "method": "act", "convention": "z_prior", "seed": 0, "situations": 30, "spread_m": 0.03,
         "condition_share": 0.4, "distance_correlation": 0.6, "exceeding": 0, "permutations": 999,
@@ -575,8 +656,8 @@ def _factors(root: Path) -> None:
             }
             for i in range(30)
         ]  # fmt: skip
-    table(root, "measure_factors/modes.parquet", modes)
-    table(root, "measure_factors/errors.parquet", errors)
+    table(root, "measure_factors/modes.parquet", FactorModeRow, modes)
+    table(root, "measure_factors/errors.parquet", FactorErrorRow, errors)
     effects = [
         {
             "variant": name, "factor": factor, "convention": convention, "measure": measure,
@@ -586,7 +667,7 @@ def _factors(root: Path) -> None:
         for place, (name, (factor, convention, _, _)) in enumerate(VARIANTS.items())
         for measure in ("chunk_error", "mode_coverage", "valid_share")
     ]  # fmt: skip
-    table(root, "measure_factors/effects.parquet", effects)
+    table(root, "measure_factors/effects.parquet", EffectRow, effects)
     variants = {
         name: {
             "factor": factor,
@@ -607,9 +688,9 @@ def _factors(root: Path) -> None:
 
 
 def _generators(root: Path) -> None:
-    table(root, "reload/modes.parquet", _modes(CANDIDATES, 2))
+    table(root, "reload/modes.parquet", ModeRow, _modes(CANDIDATES, 2))
     document(root, "train_generators/matched.json", _matched(CANDIDATES))
-    table(root, "reload/offline.parquet", [{"method": "flow", "seed": 0}])
+    table(root, "reload/offline.parquet", OfflineRow, [_offline("flow")])
     _checkpoints(root, "train_generators", CANDIDATES)
 
 
@@ -618,6 +699,7 @@ def _reload(root: Path) -> None:
     table(
         root,
         "reload/samples.parquet",
+        SampleRow,
         [
             {
                 "method": m,
@@ -634,11 +716,13 @@ def _reload(root: Path) -> None:
     table(
         root,
         "reload/nfe.parquet",
+        NfeRow,
         [{"method": m, "seed": 0, "recorded": 8, "counted": 8} for m in CANDIDATES],
     )
     table(
         root,
         "reload/coverage.parquet",
+        CoverageRow,
         [
             {
                 "method": m,
@@ -679,6 +763,7 @@ def _latency(root: Path) -> None:
     table(
         root,
         "latency/latency.parquet",
+        LatencyRow,
         [
             {
                 "method": m,
@@ -728,6 +813,7 @@ def _shadow(root: Path) -> None:
     table(
         root,
         "shadow/candidates.parquet",
+        CandidateRow,
         [
             _candidate(m, fixture, o, c)
             for m in CANDIDATES
@@ -739,6 +825,7 @@ def _shadow(root: Path) -> None:
     table(
         root,
         "shadow/stub.parquet",
+        ShadowStubRow,
         [
             {"method": m, "fixture": f, "delivered": 9, "arrivals": 200, "stale": 0, "invalid": 0}
             for m in CANDIDATES
@@ -748,6 +835,7 @@ def _shadow(root: Path) -> None:
     table(
         root,
         "shadow/counts.parquet",
+        ShadowCountRow,
         [
             {
                 "method": m,
@@ -815,16 +903,18 @@ def _stress(root: Path) -> None:
                         "mode": "left",
                     }
                 )
-    table(root, "stress/rollouts.parquet", rows)
+    table(root, "stress/rollouts.parquet", RolloutRow, rows)
     cells = [(m, c) for m in methods for c in CONDITIONS]
     table(
         root,
         "stress/counts.parquet",
+        StressCountRow,
         [{"method": m, "perturbation": c, "reason": "expired", "count": 10} for m, c in cells],
     )
     table(
         root,
         "stress/conservation.parquet",
+        ConservationRow,
         [
             {
                 "method": m,
@@ -840,6 +930,7 @@ def _stress(root: Path) -> None:
     table(
         root,
         "stress/stub.parquet",
+        StressStubRow,
         [
             {"method": m, "perturbation": c, "arrivals": 500, "stale": 0, "invalid": 0}
             for m, c in cells

@@ -4,9 +4,12 @@ import evidence
 import pytest
 
 from gates.evidence import Evidence, MissingEvidenceError
+from genpolicy.audit.rows import TABLES, ModeOutcome, SituationRow
+from genpolicy.data.rows import FrameRow
 from genpolicy.errors import IntegrityError
 from genpolicy.evidence.rows.reproducibility import NfeRow
 from genpolicy.evidence.rows.shadow import CandidateRow
+from genpolicy.integrity.rows import columns_of
 
 NFE = "artifacts/reload/nfe.parquet"
 
@@ -47,3 +50,37 @@ def test_what_is_bound_is_material_and_not_read(repo):
         assert found.bind("artifacts/reload/*.parquet")
         assert found.digest("artifacts/none") == ""
     assert touched == ["artifacts/none"] and NFE in found.materials
+
+
+def test_lists_come_where_they_are_asked_for(repo):
+    found = Evidence(repo)
+    path = "artifacts/audit/neighbourhoods.parquet"
+    assert "mode_paths" not in found.rows(path, SituationRow).columns
+    assert len(found.rows(path, SituationRow, lists=True)["mode_paths"][0]) == 2
+
+
+def test_records_are_rows_of_their_class_and_may_be_none(repo):
+    found = Evidence(repo)
+    first = found.records("artifacts/audit/modes.parquet", ModeOutcome)[0]
+    assert isinstance(first, ModeOutcome) and first.mode == "left"
+    assert found.records("artifacts/audit/findings.parquet", TABLES["findings"]) == []
+
+
+@pytest.mark.parametrize("name", sorted(set(TABLES) - {"findings", "support"}))
+def test_a_misspelt_column_of_an_audit_table_refuses_by_both_names(repo, name):
+    column = columns_of(TABLES[name])[0]
+    evidence.edit_table(repo, f"audit/{name}.parquet", lambda f: f.rename(columns={column: "odd"}))
+    for read in (Evidence(repo).rows, Evidence(repo).records):
+        with pytest.raises(
+            IntegrityError, match=rf"{name}.*unknown column odd.*missing .*{column}"
+        ):
+            read(f"artifacts/audit/{name}.parquet", TABLES[name])
+
+
+def test_columns_of_a_stream_are_known_by_their_beginning(repo):
+    frames = "ingest/frames.parquet"
+    evidence.edit_table(repo, frames, lambda f: f.assign(**{"event_time_s.robot": 0.0}))
+    assert len(Evidence(repo).rows(f"artifacts/{frames}", FrameRow))
+    evidence.edit_table(repo, frames, lambda f: f.assign(**{"even_time_s.robot": 0.0}))
+    with pytest.raises(IntegrityError, match=r"unknown column even_time_s\.robot"):
+        Evidence(repo).rows(f"artifacts/{frames}", FrameRow)

@@ -3,8 +3,8 @@
 from genpolicy.audit.semantics.clocks import episode_lags
 from genpolicy.audit.semantics.measure import measure
 from genpolicy.audit.semantics.realign import realigned
-from genpolicy.audit.semantics.report import Calibration, Clock, Finding, Semantics
+from genpolicy.audit.semantics.report import Semantics
 
 __all__ = [
-    "Calibration", "Clock", "Finding", "Semantics", "episode_lags", "measure", "realigned",
+    "Semantics", "episode_lags", "measure", "realigned",
 ]  # fmt: skip

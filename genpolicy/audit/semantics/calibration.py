@@ -7,8 +7,8 @@ stands beside its command where both rest.
 import numpy as np
 
 from genpolicy.audit.data import Array, AuditInput, Integers, Text
+from genpolicy.audit.rows import Calibration, Finding
 from genpolicy.audit.semantics.motion import Motion
-from genpolicy.audit.semantics.report import Calibration, Finding
 from genpolicy.audit.semantics.robust import densest_half, episode_deviation, episode_medians
 from genpolicy.audit.settings import AuditSettings
 
@@ -34,7 +34,7 @@ def calibrations(data: AuditInput, settings: AuditSettings) -> tuple[Calibration
         Calibration(
             epoch=str(name),
             episodes=int(np.count_nonzero(epochs == name)),
-            residual_m=_epoch_residual(str(name), medians),
+            residual_m=_epoch_residual(str(name), medians) if str(name) in medians else None,
         )
         for name in names
     )
@@ -50,7 +50,7 @@ def release_findings(
     spread = _scatter(residual, epochs)
     findings = []
     for row in found:
-        if not np.isfinite(row.residual_m):
+        if row.residual_m is None or not np.isfinite(row.residual_m):
             continue
         error = 1.2533 * spread * np.sqrt(2.0 / max(row.episodes, 1))
         limit = max(settings.calibration_floor_m, settings.significance * float(error))
@@ -179,9 +179,7 @@ def _rest_offsets(motion: Motion) -> Array:
 
 
 def _epoch_residual(name: str, medians: dict[str, Array]) -> float:
-    """Distance to the median epoch; with two epochs to the other one; NaN without a release."""
-    if name not in medians:
-        return float("nan")
+    """Distance to the median epoch; with two epochs to the other one."""
     others = [value for key, value in medians.items() if key != name]
     if not others:
         return 0.0

@@ -8,10 +8,11 @@ held against all episodes, an episode against its epoch.
 import numpy as np
 
 from genpolicy.audit.data import Array, AuditInput, Flags, Integers, Text
+from genpolicy.audit.rows import Clock, Finding
 from genpolicy.audit.semantics.lags import Lags
 from genpolicy.audit.semantics.lags import episode_lags as piecewise_lags
 from genpolicy.audit.semantics.motion import Motion, make_motion
-from genpolicy.audit.semantics.report import Clock, Finding, listed
+from genpolicy.audit.semantics.report import listed
 from genpolicy.audit.semantics.robust import (
     episode_medians,
     group_medians,

@@ -3,8 +3,9 @@
 import numpy as np
 
 from genpolicy.audit.data import Array, AuditInput, Flags
+from genpolicy.audit.rows import Finding
 from genpolicy.audit.semantics.motion import Motion
-from genpolicy.audit.semantics.report import Finding, listed
+from genpolicy.audit.semantics.report import listed
 from genpolicy.audit.semantics.robust import episode_deviation, episode_sums, some
 from genpolicy.audit.settings import AuditSettings
 

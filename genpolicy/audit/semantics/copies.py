@@ -12,8 +12,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from genpolicy.audit.data import Array, AuditInput, Flags, Integers, Text
+from genpolicy.audit.rows import Finding
 from genpolicy.audit.semantics.motion import Motion
-from genpolicy.audit.semantics.report import Finding, listed
+from genpolicy.audit.semantics.report import listed
 from genpolicy.audit.semantics.robust import episode_centred, episode_sums, some
 from genpolicy.audit.settings import AuditSettings
 

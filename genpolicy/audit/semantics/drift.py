@@ -7,10 +7,10 @@ over the recordings the lags are cut in two at the place that separates them bes
 import numpy as np
 
 from genpolicy.audit.data import Array, AuditInput, Integers
+from genpolicy.audit.rows import Finding
 from genpolicy.audit.semantics.clocks import EPOCH_SPREADS, LEAST_EPISODES
 from genpolicy.audit.semantics.lags import segment_lags
 from genpolicy.audit.semantics.motion import Motion
-from genpolicy.audit.semantics.report import Finding
 from genpolicy.audit.semantics.robust import (
     densest_half,
     episode_sums,

@@ -11,8 +11,9 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from genpolicy.audit.data import Array, AuditInput, Flags, Integers
+from genpolicy.audit.rows import Finding
 from genpolicy.audit.semantics.motion import Motion
-from genpolicy.audit.semantics.report import Finding, listed
+from genpolicy.audit.semantics.report import listed
 from genpolicy.audit.semantics.robust import densest_half, episode_sums, some
 from genpolicy.audit.settings import AuditSettings
 

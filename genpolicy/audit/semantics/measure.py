@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from genpolicy.audit.data import Array, AuditInput, Integers
+from genpolicy.audit.rows import Clock, Finding
 from genpolicy.audit.semantics import calibration, continuity, copies
 from genpolicy.audit.semantics.clocks import (
     EPISODE_DELAYS,
@@ -29,7 +30,7 @@ from genpolicy.audit.semantics.drift import (
 )
 from genpolicy.audit.semantics.frames import frame_findings
 from genpolicy.audit.semantics.motion import Motion, make_motion
-from genpolicy.audit.semantics.report import Clock, Finding, Semantics, in_order
+from genpolicy.audit.semantics.report import Semantics, in_order
 from genpolicy.audit.semantics.robust import episode_medians
 from genpolicy.audit.semantics.streams import stream_lags
 from genpolicy.audit.semantics.units import component_findings, gain_findings, magnitude_findings

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from genpolicy.audit.data import Integers, Text
+from genpolicy.audit.rows import Calibration, Clock, Finding
 
 # In the order of diagnosis. Units and frames are measured
 # whatever the lag is, but a lag is not worth much in a turned frame: so they stand before clocks.
@@ -12,69 +13,6 @@ KINDS = (
     "unit", "swapped_columns", "frame", "clock", "rate", "jitter", "gaps", "clock_drift", "glued",
     "duplicate", "stub", "calibration",
 )  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Clock:
-    """One stream in one calibration epoch; unknown numbers are None.
-
-    Attributes:
-        stream: Name of the stream.
-        epoch: Calibration epoch.
-        episodes: Episodes measured.
-        offset_before_s: Deviation from the declared alignment.
-        offset_after_s: What is left after realignment, measured on the other half of the episodes.
-        lag_steps: Action-to-state lag for the stream of the position; for the others the median
-            receive delay, in action steps.
-        receive_delay_p50_s: Median receive delay.
-        receive_delay_p95_s: 95 % quantile of the receive delay.
-        jitter_p95_s: 95 % quantile of the deviation from the period (position) or from the median
-            delay (others).
-    """
-
-    stream: str
-    epoch: str
-    episodes: int
-    offset_before_s: float | None
-    offset_after_s: float | None
-    lag_steps: float | None
-    receive_delay_p50_s: float | None
-    receive_delay_p95_s: float | None
-    jitter_p95_s: float | None
-
-
-@dataclass(frozen=True)
-class Calibration:
-    """Residual of one epoch: how far its releases lie from those of the others, m."""
-
-    epoch: str
-    episodes: int
-    residual_m: float
-
-
-@dataclass(frozen=True)
-class Finding:
-    """One deviation that stands out of the noise; whether it is a fault, a limit says elsewhere.
-
-    Attributes:
-        kind: One of `KINDS`.
-        variable: What it is a fault of: a stream, an epoch or a component.
-        where: Which episodes, epochs or rows.
-        question: Which limit it is to be held against.
-        measured: The number.
-        floor: From where on it is reported: what noise explains, or the floor of the settings.
-        unit: Unit of both.
-        action: What to do about it, a sentence.
-    """
-
-    kind: str
-    variable: str
-    where: str
-    question: str
-    measured: float
-    floor: float
-    unit: str
-    action: str
 
 
 @dataclass(frozen=True)

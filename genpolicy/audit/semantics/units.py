@@ -7,8 +7,9 @@ that no arm produces is a unit; so is an epoch that answers by another factor th
 import numpy as np
 
 from genpolicy.audit.data import Array, AuditInput, Flags
+from genpolicy.audit.rows import Finding
 from genpolicy.audit.semantics.motion import Motion
-from genpolicy.audit.semantics.report import Finding, listed
+from genpolicy.audit.semantics.report import listed
 from genpolicy.audit.semantics.robust import (
     densest_half,
     episode_deviation,

@@ -12,8 +12,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from genpolicy.audit.rows import SituationRow
 from genpolicy.errors import ContractError
-from genpolicy.integrity.tables import read_table
+from genpolicy.integrity.rows import read_rows
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -73,21 +74,22 @@ def read_situations(
 
     Raises:
         BadInputError: The table is missing or changed.
+        IntegrityError: Unknown or missing columns.
     """
-    rows = read_table(folder / "neighbourhoods.parquet").to_pylist()
+    rows = read_rows(folder / "neighbourhoods.parquet", SituationRow)
     return [
         ModeSituation(
-            split=row["split"],
-            phase=row["phase"],
-            episode_uuid=row["episode_uuid"],
-            index=row["index"],
-            mean_path=np.asarray(row["mean_path"], dtype=np.float64).reshape(-1, width),
+            split=row.split,
+            phase=row.phase,
+            episode_uuid=row.episode_uuid,
+            index=row.index,
+            mean_path=np.asarray(row.mean_path, dtype=np.float64).reshape(-1, width),
             mode_paths=np.stack(
-                [np.asarray(p, dtype=np.float64).reshape(-1, width) for p in row["mode_paths"]]
+                [np.asarray(p, dtype=np.float64).reshape(-1, width) for p in row.mode_paths]
             ),
         )
         for row in rows
-        if row["two_mode"] and row["persistent"] and row["split"] in splits
+        if row.two_mode and row.persistent and row.split in splits
     ]
 
 

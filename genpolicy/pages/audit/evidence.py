@@ -7,14 +7,10 @@ from typing import Any
 
 import pandas as pd
 
+from genpolicy.audit.rows import TABLES
 from genpolicy.integrity.documents import read_json
 from genpolicy.integrity.hashing import sha256_file
-from genpolicy.integrity.tables import read_table
-
-TABLES = (
-    "alignment", "calibration", "clocks", "examples", "findings", "modes", "neighbourhoods",
-    "recovery", "replay", "strata", "support",
-)  # fmt: skip
+from genpolicy.integrity.rows import read_columns
 
 
 @dataclass(frozen=True)
@@ -50,8 +46,12 @@ def read_evidence(folder: Path) -> AuditEvidence:
 
     Raises:
         BadInputError: A file is missing or damaged.
+        IntegrityError: A table with unknown or missing columns.
     """
-    tables = {name: read_table(folder / f"{name}.parquet").to_pandas() for name in TABLES}
+    tables = {
+        name: read_columns(folder / f"{name}.parquet", row).to_pandas()
+        for name, row in TABLES.items()
+    }
     documents = {
         name: read_json(folder / f"{name}.json") for name in ("summary", "settings", "persistence")
     }

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from genpolicy.audit.semantics.report import KINDS, Finding, in_order, listed
+from genpolicy.audit.rows import Finding
+from genpolicy.audit.semantics.report import KINDS, in_order, listed
 
 
 def finding(kind, variable="arm"):

@@ -3,7 +3,8 @@
 from dataclasses import replace
 
 from gates.cause import Cause, CauseLimits, default_limits, name_cause
-from gates.cause.numbers import Counts, Finding, Kept, Labels, Mode, Numbers, Stratum, Told
+from gates.cause.numbers import Counts, Kept, Labels, Numbers
+from genpolicy.audit.rows import Finding, ModeOutcome, Prediction, Stratum
 from genpolicy.audit.settings import AuditSettings
 
 LIMITS = default_limits()
@@ -20,13 +21,13 @@ def limit(**changes: float) -> CauseLimits:
     return CauseLimits(found)
 
 
-STRATUM = Stratum("operator", "approach", 0.9, 0.05, 0.0, 100, True, False, "")
+STRATUM = Stratum("operator", "approach", 0.9, 0.9, 0.05, 0.0, 0.1, 100, True, False, "")
 
 
 HIDDEN = replace(STRATUM, p_adjusted=0.001, effect=0.8, effect_lower=0.6)
 
 
-TOLD = Told("operator", "approach", 0.05, -0.1, 0.2, 120)
+TOLD = Prediction("operator", "approach", 0.05, -0.1, 0.2, 0.52, 0.5, 120)
 
 
 VALID = Numbers(
@@ -34,11 +35,14 @@ VALID = Numbers(
     labels=Labels(60, 0, 0.06),
     counts=Counts(200, 180, 50, 120, 45, 50, 0, 0, 110, 0.1, 0.01),
     kept=Kept(0.95, 0.6, 118), strata=(STRATUM,), told=(TOLD,),
-    modes=(Mode("m0", 40, 40, 0.91, 50, 50), Mode("m1", 40, 39, 0.87, 48, 50)),
+    modes=(
+        ModeOutcome("m0", "approach", 40, 40, 0.91, 1.0, 50, 50),
+        ModeOutcome("m1", "approach", 40, 39, 0.87, 1.0, 48, 50),
+    ),
 )  # fmt: skip
 
 
-OFFSET = Finding("clock", "robot", "epoch e1", "clock_residual_s", 0.05, "s", "Correct it.")
+OFFSET = Finding("clock", "robot", "epoch e1", "clock_residual_s", 0.05, 0.01, "s", "Correct it.")
 
 
 def counts(**changes) -> Numbers:

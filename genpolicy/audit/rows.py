@@ -1,0 +1,383 @@
+"""Rows of the audit's tables, one frozen dataclass a table.
+
+Field order is column order, as in `genpolicy.evidence.rows`. The audit measures these rows, gates
+and pages read them, so a column is spelled here and nowhere else; this file imports nothing. Most
+are what the audit itself computes with. None is "not measured", never zero.
+"""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Clock:
+    """`clocks.parquet`: one stream in one calibration epoch.
+
+    Attributes:
+        stream: Name of the stream.
+        epoch: Calibration epoch.
+        episodes: Episodes measured.
+        offset_before_s: Deviation from the declared alignment.
+        offset_after_s: What is left after realignment, measured on the other half of the episodes.
+        lag_steps: Action-to-state lag for the stream of the position; for the others the median
+            receive delay, in action steps.
+        receive_delay_p50_s: Median receive delay.
+        receive_delay_p95_s: 95 % quantile of the receive delay.
+        jitter_p95_s: 95 % quantile of the deviation from the period (position) or from the median
+            delay (others).
+    """
+
+    stream: str
+    epoch: str
+    episodes: int
+    offset_before_s: float | None
+    offset_after_s: float | None
+    lag_steps: float | None
+    receive_delay_p50_s: float | None
+    receive_delay_p95_s: float | None
+    jitter_p95_s: float | None
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """`calibration.parquet`: one calibration epoch.
+
+    Attributes:
+        epoch: The epoch.
+        episodes: Its episodes with a release.
+        residual_m: How far its releases lie from those of the others; None without a release.
+    """
+
+    epoch: str
+    episodes: int
+    residual_m: float | None
+
+
+@dataclass(frozen=True)
+class Finding:
+    """`findings.parquet`: one deviation that stands out of the noise.
+
+    Whether it is a fault, a limit says elsewhere.
+
+    Attributes:
+        kind: One of `genpolicy.audit.semantics.report.KINDS`.
+        variable: What it is a fault of: a stream, an epoch or a component.
+        where: Which episodes, epochs or rows.
+        question: Which limit it is to be held against.
+        measured: The number.
+        floor: From where on it is reported: what noise explains, or the floor of the settings.
+        unit: Unit of both.
+        action: What to do about it, a sentence.
+    """
+
+    kind: str
+    variable: str
+    where: str
+    question: str
+    measured: float
+    floor: float
+    unit: str
+    action: str
+
+
+@dataclass(frozen=True)
+class SituationRow:
+    """`neighbourhoods.parquet`: one analysed situation.
+
+    Attributes:
+        split: Split of the episode that asks.
+        phase: Task phase.
+        episode_uuid: The episode.
+        index: Its row.
+        neighbours: Training episodes that stood in nearly the same place.
+        clusters: Clusters of their chunks and the query's own.
+        cluster_sizes: Chunks in each.
+        two_mode: Whether the clusters count as modes.
+        separation_m: Smallest RMS distance of two clusters, unit of the position.
+        mean_admissible: Whether the mean chunk passes the feasibility check.
+        mean_reason: Why not.
+        modes_admissible: Modal chunks that pass it.
+        mean_path: Positions of the mean chunk. K times P numbers.
+        mode_paths: Positions of each modal chunk.
+        persistent: Whether the clusters keep their episodes a chunk later.
+    """
+
+    split: str
+    phase: str
+    episode_uuid: str
+    index: int
+    neighbours: int
+    clusters: int
+    cluster_sizes: tuple[int, ...]
+    two_mode: bool
+    separation_m: float
+    mean_admissible: bool | None
+    mean_reason: str
+    modes_admissible: int
+    mean_path: tuple[float, ...]
+    mode_paths: tuple[tuple[float, ...], ...]
+    persistent: bool
+
+
+@dataclass(frozen=True)
+class ModeOutcome:
+    """`modes.parquet`: success and feasibility of one mode of one phase.
+
+    Attributes:
+        mode: Name.
+        phase: Task phase.
+        episodes: Episodes of the mode, recoveries left out.
+        successes: Of them successful; by replay where replayed, else by label.
+        success_lower: Lower end of the exact interval.
+        success_upper: Upper end of the exact interval.
+        admissible: Modal chunks that passed the feasibility check.
+        checked: Modal chunks checked.
+    """
+
+    mode: str
+    phase: str
+    episodes: int
+    successes: int
+    success_lower: float
+    success_upper: float
+    admissible: int
+    checked: int
+
+
+@dataclass(frozen=True)
+class Stratum:
+    """`strata.parquet`: one variable in one phase; None where the test was not run.
+
+    Attributes:
+        variable: Name of the variable; `channel.component` for an observed one.
+        phase: Task phase.
+        p_value: Permutation p-value.
+        p_adjusted: After Holm over all variables and phases.
+        effect: Share of the modes' entropy inside situations that it explains.
+        effect_lower: Lower end of the interval.
+        effect_upper: Upper end of the interval.
+        n: Episodes that could tell.
+        recorded: False where the variable was not recorded at all: it stays unknown.
+        observed: Whether a policy sees it.
+        detail: What of it, in words; empty where the name says all.
+    """
+
+    variable: str
+    phase: str
+    p_value: float | None
+    p_adjusted: float | None
+    effect: float | None
+    effect_lower: float | None
+    effect_upper: float | None
+    n: int
+    recorded: bool
+    observed: bool
+    detail: str = ""
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """`predictions.parquet`: what one variable tells of the modes of one phase.
+
+    Attributes:
+        variable: Name of the variable.
+        phase: Task phase.
+        told: Share of wrong guesses that it takes away on held-out episodes; of the past, of those
+            that the present leaves.
+        told_lower: Lower end of the interval.
+        told_upper: Upper end of the interval.
+        right: Share of right guesses, each episode weighted by how rare its mode is where it was.
+        chance: The same of guesses without knowledge.
+        n: Episodes that had a choice and the variable.
+        detail: What of it, in words; empty where the name says all.
+    """
+
+    variable: str
+    phase: str
+    told: float
+    told_lower: float
+    told_upper: float
+    right: float
+    chance: float
+    n: int
+    detail: str = ""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """`asked.parquet`: one question, and whether it could be asked.
+
+    Attributes:
+        check: Name of the question, `name` or `name.of what`.
+        asked: Whether it could be asked.
+        reason: Why not; empty where it was.
+    """
+
+    check: str
+    asked: bool
+    reason: str
+
+
+@dataclass(frozen=True)
+class ReplayRow:
+    """`replay.parquet`: one replayed episode.
+
+    Attributes:
+        episode_uuid: The episode.
+        label: Its recorded outcome.
+        replayed: What the replay did.
+        mode: Mode that it followed in the phase with most situations; None for none.
+    """
+
+    episode_uuid: str
+    label: str
+    replayed: str
+    mode: str | None
+
+
+@dataclass(frozen=True)
+class RecoveryOutcome:
+    """`recovery.parquet`: disturbed episodes of one split that followed one mode.
+
+    Attributes:
+        split: The split.
+        mode: The mode; `unassigned` for episodes near no situation.
+        episodes: Disturbed episodes.
+        successes: Of them successful.
+    """
+
+    split: str
+    mode: str
+    episodes: int
+    successes: int
+
+
+@dataclass(frozen=True)
+class Resample:
+    """`resamples.parquet`: the numbers of one draw.
+
+    Attributes:
+        disagreements: Labels that a replay contradicts.
+        disagreement_upper: Exact upper bound of their share.
+        two_mode: Situations with several modes.
+        two_mode_episodes: Held-out episodes with at least one of them.
+        incoherent: Situations with clusters that do not persist.
+        persistent: Situations with several modes that persist.
+        kept: Share of episodes that keep their mode.
+        kept_null_q95: What chance reaches in 95 of 100.
+        kept_n: Situations in which it could be measured.
+        p_adjusted: One for each row of `strata.parquet`; None where it was not tested.
+        effect: The same.
+        effect_lower: The same.
+        told: One for each row of `predictions.parquet`.
+        success_lower: One for each mode of the phase with most situations.
+        admissible: The same.
+    """
+
+    disagreements: int
+    disagreement_upper: float
+    two_mode: int
+    two_mode_episodes: int
+    incoherent: int
+    persistent: int
+    kept: float
+    kept_null_q95: float
+    kept_n: int
+    p_adjusted: tuple[float | None, ...]
+    effect: tuple[float | None, ...]
+    effect_lower: tuple[float | None, ...]
+    told: tuple[float, ...]
+    success_lower: tuple[float, ...]
+    admissible: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class ExampleChunk:
+    """`examples.parquet`: one demonstration's chunk in one example situation.
+
+    Attributes:
+        example: Number of the situation.
+        phase: Task phase.
+        two_mode: Whether the situation counts as one with several modes.
+        query_uuid: Held-out episode that asked.
+        query_index: Its row.
+        episode_uuid: Episode of this chunk.
+        is_query: Whether it is the one that asked.
+        distance: How far its observation lies from the query's, in scales.
+        cluster: Mode, 0 the largest.
+        coordinate: Where the chunk lies along the direction in which the chunks differ most
+            between clusters, RMS distance in the unit of the position.
+        path: Commanded positions, moved to the query's place. K times P numbers.
+    """
+
+    example: int
+    phase: str
+    two_mode: bool
+    query_uuid: str
+    query_index: int
+    episode_uuid: str
+    is_query: bool
+    distance: float
+    cluster: int
+    coordinate: float
+    path: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Alignment:
+    """`alignment.parquet`: clock of one episode against the others.
+
+    Attributes:
+        episode_uuid: The episode.
+        epoch: Calibration epoch.
+        order: Rank of the recording; by identifier where no order was recorded.
+        lag_steps: Action-to-state lag; None where it cannot be measured, as for what follows.
+        offset_before_s: Its deviation from the median lag.
+        offset_after_s: The same on realigned data.
+    """
+
+    episode_uuid: str
+    epoch: str
+    order: float
+    lag_steps: float | None
+    offset_before_s: float | None
+    offset_after_s: float | None
+
+
+@dataclass(frozen=True)
+class SupportPoint:
+    """`support.parquet`: one query, and whether the training episodes reach there.
+
+    Attributes:
+        phase: Task phase.
+        episode_uuid: Held-out episode that asks.
+        index: Its row.
+        analysed: Whether enough training episodes came near.
+        two_mode: Whether several modes were found.
+        position: Observed position. P numbers.
+    """
+
+    phase: str
+    episode_uuid: str
+    index: int
+    analysed: bool
+    two_mode: bool
+    position: tuple[float, ...]
+
+
+TABLES: dict[str, type] = {
+    "alignment": Alignment,
+    "asked": Asked,
+    "calibration": Calibration,
+    "clocks": Clock,
+    "examples": ExampleChunk,
+    "findings": Finding,
+    "modes": ModeOutcome,
+    "neighbourhoods": SituationRow,
+    "predictions": Prediction,
+    "recovery": RecoveryOutcome,
+    "replay": ReplayRow,
+    "resamples": Resample,
+    "strata": Stratum,
+    "support": SupportPoint,
+}
+"""Row of each table, by name without the suffix."""
