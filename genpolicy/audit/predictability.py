@@ -12,7 +12,7 @@ import numpy as np
 from scipy import stats
 
 from genpolicy.audit.choices import Choices, choices
-from genpolicy.audit.data import Array, AuditInput, Integers, recorded
+from genpolicy.audit.data import Array, AuditInput, Integers, Text, recorded
 from genpolicy.audit.guesses import Guess, by_all, by_best_column, by_nearest, by_value, right
 from genpolicy.audit.history import past_features, present_features, shortest_gap
 from genpolicy.audit.modes import Clustering
@@ -230,9 +230,9 @@ def _row(variable: str, phase: str, chosen: Choices, hits: Array) -> Prediction:
     return Prediction(variable, phase, told, lower, upper, share, chance, n)
 
 
-def _numbered(values) -> Integers:
+def _numbered(values: Integers | Text) -> Integers:
     return np.asarray(np.unique(values, return_inverse=True)[1].reshape(-1), dtype=np.int64)
 
 
 def _one_hot(values: Integers) -> Array:
-    return (values[:, None] == np.unique(values)[None]).astype(np.float64)
+    return np.asarray(values[:, None] == np.unique(values)[None], dtype=np.float64)
