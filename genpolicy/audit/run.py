@@ -14,7 +14,7 @@ from genpolicy.audit.neighbourhoods import Support
 from genpolicy.audit.persistence import Persistence, summarise
 from genpolicy.audit.predictability import predictions
 from genpolicy.audit.progress import Progress, silent
-from genpolicy.audit.recovery import recovery_outcomes
+from genpolicy.audit.recovery import demonstrated, recovery_outcomes
 from genpolicy.audit.resamples import Measures, resamples
 from genpolicy.audit.rows import Asked, ModeOutcome, Prediction, RecoveryOutcome, Resample, Stratum
 from genpolicy.audit.semantics import Semantics, measure, realigned
@@ -50,6 +50,8 @@ class AuditResult:
         told: What variables, order and past tell of the modes of held-out episodes.
         replayed: Labels against replay.
         recovery: The disturbed episodes.
+        demonstrated: The mode that each episode followed in the primary phase, -1 for none.
+            Shape (E,).
         asked: Which questions could be asked of the data.
         counts: Numbers for the summary.
         modes_after_realignment: Held-out episodes with two modes on realigned data.
@@ -69,6 +71,7 @@ class AuditResult:
     told: tuple[Prediction, ...]
     replayed: tuple[Replayed, ...]
     recovery: tuple[RecoveryOutcome, ...]
+    demonstrated: Integers
     asked: tuple[Asked, ...]
     counts: Counts
     modes_after_realignment: int
@@ -144,6 +147,7 @@ def audit(
         ),
         replayed=replayed,
         recovery=recovery_outcomes(data, settings, several.get(primary, []), links.get(primary)),
+        demonstrated=demonstrated(data, settings, several.get(primary, []), links.get(primary)),
         counts=counts,
         modes_after_realignment=_after_realignment(data, settings, semantics, before, root_seed),
         modes_other_phases=_other_phases(data, settings, root_seed),

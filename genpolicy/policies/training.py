@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from genpolicy.contract.horizons import HorizonConfig
-from genpolicy.errors import NonFiniteError
+from genpolicy.errors import IntegrityError, NonFiniteError
 from genpolicy.integrity.atomic import output_folder, write_bytes
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_bytes
@@ -27,6 +27,7 @@ from genpolicy.policies.checkpoint import (
     CheckpointConfig,
     NormalisationRecord,
     Provenance,
+    load_checkpoint,
     save_checkpoint,
     serialise_weights,
 )
@@ -63,6 +64,7 @@ class TrainingRequest:
         sampler: Sampler that the checkpoint will name as its own.
         provenance: Dataset and contracts.
         seed: Root seed of this training.
+        phase_columns: Numbers of an observation that name the phase.
     """
 
     method: str
@@ -74,6 +76,7 @@ class TrainingRequest:
     sampler: SamplerConfig
     provenance: Provenance
     seed: int
+    phase_columns: tuple[int, ...] = ()
 
 
 def train(
@@ -83,6 +86,7 @@ def train(
     windows: Windows,
     validation: Windows | None = None,
     device: str = "cpu",
+    weights_of: Path | None = None,
 ) -> str:
     """Train one method and write its checkpoint folder, whole or not at all.
 
@@ -92,12 +96,14 @@ def train(
         windows: Training split.
         validation: Validation split, for the record only; it stops and selects nothing.
         device: `cpu` or a CUDA device.
+        weights_of: Checkpoint whose weights are taken over in place of an optimisation.
 
     Returns:
         SHA-256 of the checkpoint.
 
     Raises:
         ConfigError: Unknown method, or a sampler that does not fit it.
+        IntegrityError: The checkpoint to take over is damaged, or was trained differently.
         ContractError: Windows that do not fit the horizons or the normalisation.
         NonFiniteError: The loss became NaN or infinite.
     """
@@ -112,21 +118,27 @@ def train(
         network, objective = _build(method, _dimensions(horizons, request), request, device)
         objective.prepare(network, data)
         averaged = copy.deepcopy(network)
-        records = list(
-            _optimise(
-                network,
-                averaged,
-                objective,
-                data=data,
-                held_out=held_out,
-                request=request,
-                device=device,
+        if weights_of is not None:
+            records = [take_over(averaged, weights_of, request)]
+        else:
+            records = list(
+                _optimise(
+                    network,
+                    averaged,
+                    objective,
+                    data=data,
+                    held_out=held_out,
+                    request=request,
+                    device=device,
+                )
             )
-        )
+        objective.finish(averaged, data)
     weights = serialise_weights(averaged, method=request.method)
     config = _checkpoint_config(request, averaged, objective, weights=weights)
     summary = {
-        "stopping_rule": "fixed number of steps",
+        "stopping_rule": f"weights of {weights_of.parent.name}"
+        if weights_of is not None
+        else "fixed number of steps",
         "steps": request.training.steps,
         "evaluated_weights": "exponential moving average",
         "windows": len(windows.observations),
@@ -135,6 +147,28 @@ def train(
         "regime": regime(device),
     }
     return _write(folder, weights=weights, config=config, records=records, summary=summary)
+
+
+def take_over(
+    network: PolicyNetwork, folder: Path, request: TrainingRequest
+) -> dict[str, float | int | None]:
+    """Put the weights of a trained checkpoint into a network; returns its last record.
+
+    Raises:
+        IntegrityError: The checkpoint is damaged, or was trained with other settings.
+    """
+    checkpoint = load_checkpoint(folder)
+    config = checkpoint.config
+    asked = (request.network, request.training, request.provenance, request.seed)
+    if (config.network, config.training, config.provenance, config.training_seed) != asked:
+        raise IntegrityError(
+            where=str(folder),
+            found="a checkpoint that was trained with other settings",
+            expected="network, training, data and seed of the method that takes over its weights",
+            action="Train both in one run (`dvc repro train_baselines`).",
+        )
+    network.load_state_dict({**network.state_dict(), **checkpoint.network.state_dict()})
+    return {"step": config.training.steps, "training_loss": None, "validation_loss": None}
 
 
 def learning_rate(step: int, config: TrainingConfig) -> float:
@@ -186,6 +220,7 @@ def _dimensions(horizons: HorizonConfig, request: TrainingRequest) -> Dimensions
         observation_dim=request.normalisation.observation.dim,
         prediction_horizon=horizons.prediction_horizon,
         action_dim=request.normalisation.action.dim,
+        phase_columns=request.phase_columns,
     )
 
 

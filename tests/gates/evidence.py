@@ -12,6 +12,7 @@ import pandas as pd
 import pyarrow as pa
 import yaml
 
+from gates import pipeline
 from gates.cause import default_limits
 from gates.cause.limits import OWN
 from gates.feasibility import LAYERS
@@ -43,6 +44,7 @@ from genpolicy.evidence.rows.reproducibility import CoverageRow, LatencyRow, Nfe
 from genpolicy.evidence.rows.shadow import CandidateRow, ShadowCountRow, ShadowStubRow
 from genpolicy.evidence.rows.stress import (
     ConservationRow,
+    InvocationRow,
     RolloutRow,
     StressCountRow,
     StressStubRow,
@@ -51,11 +53,15 @@ from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.rows import write_rows
 from genpolicy.integrity.tables import read_table, write_table
 
+CODE = "genpolicy/robot/impedance.py"
+"""A file of code in the repository of the tests."""
 BASELINES = ("bc", "chunked_bc", "act")
+REMEDIES = {"chunked_l1": "direct", "one_mode_bc": "direct", "bc_noise": "offset"}
 DRAWN = "ibc"
 CANDIDATES = ("diffusion", "flow")
-CONDITIONS = ("nominal", "camera_delay", "compute_contention")
-STARTS = 40
+CONDITIONS = ("nominal", "camera_delay", "recovery_drill")
+STARTS = 80
+INVOCATIONS = 20
 PNG = base64.b64decode(
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAAAAAA6fptVAAAACklEQVR4nGNgAAAAAgABSK+kcQAAAABJRU5ErkJggg=="
 )
@@ -90,9 +96,11 @@ def _cause() -> dict[str, Any]:
 
 
 PARAMS: dict[str, Any] = {
+    "seed": 1,
     "confidence": 0.95,
+    "horizons": {"execution_horizon": 8, "action_period_s": 0.05},
     "task": {"name": "tabletop_insertion"},
-    "train_baselines": {"samplers": {name: {} for name in (*BASELINES, DRAWN)}},
+    "train_baselines": {"samplers": {name: {} for name in (*BASELINES, *REMEDIES, DRAWN)}},
     "measure_baselines": {"latent": {"method": "act"}},
     "train_generators": {"samplers": {name: {} for name in CANDIDATES}},
     "stress": {
@@ -101,11 +109,13 @@ PARAMS: dict[str, Any] = {
         "perturbations": {name: {} for name in CONDITIONS},
         "margin": 0.1,
         "alpha": 0.1,
+        "samples": 4,
+        "planned_effect": [0.5, 0.95],
     },
     "gate_a": {
         "cause": _cause(),
         "held_out_splits": ["validation", "test"],
-        "deployed_conventions": ["direct", "z_zero"],
+        "deployed_conventions": ["direct", "z_zero", "offset"],
         "generative_baselines": [DRAWN],
         "chunked_baseline": "chunked_bc",
         "limits": by_owner(
@@ -121,7 +131,9 @@ PARAMS: dict[str, Any] = {
             mode_success_lower=(0.6, "model"),
             mode_feasible_share=(0.9, "controller"),
             mean_defeated_share=(0.5, "model"),
-            recovery_benefit=(0.1, "model"),
+            median_valid_share=(0.5, "model"),
+            remedy_valid_share=(0.5, "model"),
+            data_defects=(0, "perception"),
             strata_effect=(0.3, "perception"),
             told_share=(0.4, "perception"),
             cause_accepted=(1, "model"),
@@ -169,13 +181,16 @@ PARAMS: dict[str, Any] = {
         ),
     },
     "gate_d": {
-        "minimum_power": 0.8,
         "limits": by_owner(
             unmatched_starts=(0, "model"),
-            verdict_reachable=(1, "model"),
+            verdict_reachable=(0.8, "model"),
             nominal_success_lower=(0.7, "model"),
             deadline_miss_upper=(0.1, "controller"),
-            action_age_p95_s=(0.5, "perception"),
+            latency_p95_s=("derived", "controller"),
+            hold_share_upper=(0.25, "controller"),
+            rejection_share_upper=(0.2, "model"),
+            reset_upper=(0.1, "safety"),
+            recovery_success_lower=(0.5, "safety"),
             fallback_share_upper=(0.15, "safety"),
             intervention_upper=(0.1, "safety"),
             stub_violations=(0, "safety"),
@@ -218,6 +233,7 @@ def write_params(root: Path, change: Callable[[dict[str, Any]], Any] | None = No
     if change:
         change(params)
     (root / "params.yaml").write_text(yaml.safe_dump(params, sort_keys=False))
+    record(root)
 
 
 def set_limit(gate: str, name: str, limit: Any) -> Callable[[dict[str, Any]], None]:
@@ -251,6 +267,7 @@ def edit_table(root: Path, path: str, change: Any) -> None:
     file = root / "artifacts" / path
     frame = change(read_table(file).to_pandas())
     write_table(file, pa.Table.from_pandas(pd.DataFrame(frame), preserve_index=False))
+    record(root)
 
 
 def edit_document(root: Path, path: str, change: Any) -> None:
@@ -258,6 +275,14 @@ def edit_document(root: Path, path: str, change: Any) -> None:
     file = root / "artifacts" / path
     value = json.loads(file.read_bytes())
     document(root, path, change(value) or value)
+    record(root)
+
+
+def replace(root: Path, path: str, data: bytes | None) -> None:
+    """Other bytes in place of a file, as if its stage had written them; None removes it."""
+    file = root / "artifacts" / path
+    file.write_bytes(data) if data is not None else file.unlink()
+    record(root)
 
 
 def build(root: Path) -> None:
@@ -273,6 +298,33 @@ def build(root: Path) -> None:
     _latency(root)
     _shadow(root)
     _stress(root)
+    (root / CODE).parent.mkdir(parents=True)
+    (root / CODE).write_text("STIFFNESS = 1\n")
+    (root / "dvc.yaml").write_text(yaml.safe_dump({"stages": {}}))
+    record(root)
+
+
+def record(root: Path) -> None:
+    """Pipeline and lock as if every evidence stage had just written what lies here."""
+    if not (root / "dvc.yaml").is_file():
+        return
+    disk = pipeline._Disk(root, {})
+    params = yaml.safe_load((root / "params.yaml").read_text()) or {}
+    stages, runs = {}, {}
+    for gate, names in pipeline.RUNGS.items():
+        for name in names:
+            outs = [out for out in (f"artifacts/{name}",) if (root / out).is_dir()]
+            keys = [name] if isinstance(params, dict) and name in params else []
+            stages[name] = {"cmd": name, "deps": [CODE], "params": keys, "outs": outs}
+            runs[name] = {
+                "cmd": name,
+                "deps": [{"path": CODE, "md5": disk.md5(CODE)}],
+                "params": {"params.yaml": {key: params[key] for key in keys}},
+                "outs": [{"path": out, "md5": disk.md5(out)} for out in outs],
+            }
+        stages[f"gate_{gate.lower()}"] = {"cmd": "gate", "deps": [CODE], "outs": []}
+    (root / "dvc.yaml").write_text(json.dumps({"stages": stages}))
+    (root / "dvc.lock").write_text(json.dumps({"schema": "2.0", "stages": runs}))
 
 
 def _dataset(root: Path) -> None:
@@ -556,6 +608,7 @@ def _situation(i: int) -> dict[str, Any]:
         "separation_m": 0.2,
         "mean_admissible": False,
         "mean_reason": "collision",
+        "median_admissible": False,
         "modes_admissible": 2,
         "mean_path": mean,
         "mode_paths": [left, right],
@@ -576,6 +629,8 @@ def _modes(methods: tuple[str, ...], covered: int) -> list[dict[str, Any]]:
             "modes_covered": covered,
             "between_modes": 0,
             "admissible": 16,
+            "valid": 16 if covered else 0,
+            "modes_valid": covered,
             "nfe": 1,
             "spread_m": 0.0,
         }
@@ -620,17 +675,22 @@ def _checkpoints(root: Path, stage: str, methods: tuple[str, ...]) -> None:
 
 
 def _baselines(root: Path) -> None:
-    fixed = [{**row, "admissible": 0} for row in _modes(BASELINES, 1)]
+    refused = {"admissible": 0, "valid": 0, "modes_valid": 0}
+    fixed = [{**row, **refused} for row in _modes(BASELINES, 1)]
+    fixed += [
+        {**row, **refused, "convention": REMEDIES[row["method"]]}
+        for row in _modes(tuple(REMEDIES), 1)
+    ]
     drawn = [{**row, "convention": "derivative_free"} for row in _modes((DRAWN,), 2)]
     table(root, "measure_baselines/modes.parquet", ModeRow, fixed + drawn)
-    document(root, "train_baselines/matched.json", _matched((*BASELINES, DRAWN)))
+    document(root, "train_baselines/matched.json", _matched((*BASELINES, *REMEDIES, DRAWN)))
     table(root, "measure_baselines/offline.parquet", OfflineRow, [_offline("bc")])
     latent = {
         "method": "act", "convention": "z_prior", "seed": 0, "situations": 30, "spread_m": 0.03,
         "condition_share": 0.4, "distance_correlation": 0.6, "exceeding": 0, "permutations": 999,
     }  # fmt: skip
     document(root, "measure_baselines/latent.json", [latent])
-    _checkpoints(root, "train_baselines", (*BASELINES, DRAWN))
+    _checkpoints(root, "train_baselines", (*BASELINES, *REMEDIES, DRAWN))
 
 
 VARIANTS = {
@@ -647,7 +707,8 @@ def _factors(root: Path) -> None:
     for place, (name, (factor, convention, _, _)) in enumerate(VARIANTS.items()):
         named = {"variant": name, "factor": factor, "convention": convention}
         covered = 2 if factor == "head" else 1
-        modes += [{**row, **named, "admissible": 0} for row in _modes((name,), covered)]
+        refused = {"admissible": 0, "valid": 0, "modes_valid": 0}
+        modes += [{**row, **named, **refused} for row in _modes((name,), covered)]
         errors += [
             {
                 **named, "seed": 0, "split": "test", "episode_uuid": f"e{i}", "windows": 9,
@@ -827,7 +888,7 @@ def _shadow(root: Path) -> None:
         "shadow/stub.parquet",
         ShadowStubRow,
         [
-            {"method": m, "fixture": f, "delivered": 9, "arrivals": 200, "stale": 0, "invalid": 0}
+            {"method": m, "fixture": f, "delivered": 400, "arrivals": 900, "stale": 0, "invalid": 0}
             for m in CANDIDATES
             for f in FIXTURES
         ],
@@ -866,6 +927,11 @@ def _succeeds(method: str, start: int) -> bool:
     return not (method == "flow" and start == 7)
 
 
+def _answer_s(method: str, lot: int) -> float:
+    """Between 0.05 and 0.06 s; of diffusion, 0.02 s more."""
+    return 0.05 + 0.0001 * (lot % 100) + (0.02 if method == "diffusion" else 0.0)
+
+
 def _stress(root: Path) -> None:
     methods = (*BASELINES, *CANDIDATES)
     rows = []
@@ -887,13 +953,13 @@ def _stress(root: Path) -> None:
                         "action_ticks": 150,
                         "hold_ticks": 8,
                         "fallback_ticks": 2,
-                        "invocations": 20,
+                        "invocations": INVOCATIONS,
                         "deadline_misses": 0,
                         "discards": 1,
                         "rejections": 1,
                         "rejected_by": "",
-                        "recovery_attempted": False,
-                        "recovered": False,
+                        "recovery_attempted": condition == "recovery_drill",
+                        "recovered": success and condition == "recovery_drill",
                         "interventions": 0,
                         "action_age_p50_s": 0.1,
                         "action_age_p95_s": 0.2 + 0.001 * start,
@@ -904,6 +970,25 @@ def _stress(root: Path) -> None:
                     }
                 )
     table(root, "stress/rollouts.parquet", RolloutRow, rows)
+    table(
+        root,
+        "stress/invocations.parquet",
+        InvocationRow,
+        [
+            {
+                "method": method,
+                "seed": 0,
+                "perturbation": condition,
+                "start": start,
+                "invocation": number,
+                "latency_s": 0.9 if number == 0 else _answer_s(method, start + 7 * number),
+            }
+            for method in methods
+            for condition in CONDITIONS
+            for start in range(STARTS)
+            for number in range(INVOCATIONS)
+        ],
+    )
     cells = [(m, c) for m in methods for c in CONDITIONS]
     table(
         root,

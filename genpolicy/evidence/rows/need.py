@@ -41,6 +41,8 @@ class ModeRow:
         modes_covered: Modes that at least one sample reaches.
         between_modes: Samples in the middle between two modes.
         admissible: Samples of which the whole chunk passes the six layers.
+        valid: Those of them that reach a mode.
+        modes_valid: Modes that at least one of those reaches.
         nfe: Network evaluations of one invocation, counted.
         spread_m: Mean standard deviation of the positions over samples, m.
     """
@@ -55,6 +57,8 @@ class ModeRow:
     modes_covered: int
     between_modes: int
     admissible: int
+    valid: int
+    modes_valid: int
     nfe: int
     spread_m: float
 
@@ -108,6 +112,8 @@ class FactorModeRow:
     modes_covered: int
     between_modes: int
     admissible: int
+    valid: int
+    modes_valid: int
     nfe: int
     spread_m: float
 

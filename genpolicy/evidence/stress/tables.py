@@ -10,9 +10,11 @@ import numpy as np
 
 from genpolicy.candidates.judged import JudgedPolicy
 from genpolicy.compute import map_shards
+from genpolicy.errors import ConfigError
 from genpolicy.evidence.rows.stress import (
     AgeRow,
     ConservationRow,
+    InvocationRow,
     RolloutRow,
     StressCountRow,
     StressStubRow,
@@ -29,9 +31,8 @@ from genpolicy.seeds import stream
 from genpolicy.statistics.eprocess import power_table
 
 AGE_LEVELS = (0.0, 0.05, 0.25, 0.5, 0.75, 0.9, 0.95, 0.99, 1.0)
-POWER_SCENARIOS = ((0.5, 0.5), (0.9, 0.9), (0.5, 0.8), (0.3, 0.9), (0.1, 0.9))
 POWER_CORRELATION = 0.3
-POWER_TRIALS = 2000
+POWER_TRIALS = 4000
 
 
 def write_stress(folder: Path, shards: Sequence[Shard], *, workers: int, scheduler: str) -> None:
@@ -48,6 +49,8 @@ def write_stress(folder: Path, shards: Sequence[Shard], *, workers: int, schedul
     pairs = list(zip(shards, results, strict=True))
     rollouts = [row for _, result in pairs for row in result.rollouts]
     write_rows(folder / "rollouts.parquet", RolloutRow, rollouts)
+    invocations = [row for _, result in pairs for row in result.invocations]
+    write_rows(folder / "invocations.parquet", InvocationRow, invocations)
     counts: list[StressCountRow] = []
     balances: list[ConservationRow] = []
     for shard, result in pairs:
@@ -92,7 +95,18 @@ def plan_shards(
         perturbations: What is injected, by name.
         latency: Latency of each method.
         journals: Folder of the journals.
+
+    Raises:
+        ConfigError: A method whose latency was not measured.
     """
+    untimed = sorted({policy.name for policy in judged} - set(latency))
+    if untimed:
+        raise ConfigError(
+            where="params.yaml: stress.baselines, train_generators.samplers",
+            found=f"with {', '.join(untimed)}, whose latency was not measured",
+            expected=f"methods out of {', '.join(sorted(latency))}",
+            action="Correct the names, or run `dvc repro latency`.",
+        )
     return [
         Shard(
             comparison=comparison,
@@ -116,7 +130,7 @@ def power_document(settings: StressSettings, *, candidates: int, root_seed: int)
     """
     alpha = settings.alpha_of_each(candidates)
     rows = power_table(
-        POWER_SCENARIOS,
+        power_worlds(settings),
         margin=settings.margin,
         alpha=alpha,
         pairs=settings.starts,
@@ -130,6 +144,17 @@ def power_document(settings: StressSettings, *, candidates: int, root_seed: int)
         "pairs": settings.starts,
         "rows": [{key: _finite(value) for key, value in asdict(row).items()} for row in rows],
     }
+
+
+def power_worlds(settings: StressSettings) -> list[tuple[float, float]]:
+    """Worlds of the power table, baseline and candidate: no gain, just the margin, and more.
+
+    A start is one draw, as if all its conditions ended alike: the world with most noise.
+    """
+    baseline, margin = settings.planned_effect[0], settings.margin
+    lowest = min(max(baseline, -margin), 1.0 - margin)  # so that both are shares
+    worlds = [(baseline, baseline), (0.9, 0.9), (lowest, lowest + margin), settings.planned_effect]
+    return list(dict.fromkeys([*worlds, (0.3, 0.9), (0.1, 0.9)]))
 
 
 def _key(shard: Shard) -> dict[str, str]:

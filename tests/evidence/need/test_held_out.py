@@ -6,7 +6,7 @@ import pytest
 from genpolicy.errors import ContractError
 from genpolicy.evidence.need.held_out import (
     admissible,
-    admissible_count,
+    admissible_chunks,
     held_out_situations,
     modes_of_policy,
 )
@@ -76,6 +76,7 @@ def test_rows_count_modes_and_samples(data, kit, tmp_path, policy, task, checker
         assert row.samples == 4 and row.nfe == 2 and row.modes_present == 2
         assert 0 <= row.modes_covered <= 2
         assert 0 <= row.between_modes + row.admissible <= 8
+        assert 0 <= row.modes_valid <= row.valid <= row.admissible
         assert row.spread_m > 0
 
 
@@ -97,6 +98,6 @@ def test_a_demonstrated_chunk_is_admissible_and_its_damage_is_named(data, kit, t
     far = np.array(actions)
     far[:, 0] += 0.5
     chunks = np.stack([actions, broken, far])
-    assert admissible_count(task, checker, chunks, observation, **keywords) == 1
+    assert admissible_chunks(task, checker, chunks, observation, **keywords).sum() == 1
     verdict, reason = admissible(task, checker, broken, observation, **keywords)
     assert not verdict and reason == "representation: finite"
