@@ -2,8 +2,9 @@
 
 import numpy as np
 import pandas as pd
+from pydantic import Field
 
-from gates.bounds import counted_interval, share_interval, upper_quantile
+from gates.bounds import counted_interval, share_interval, upper_quantile, widest_gap
 from gates.criterion import Measured, criteria_of, criterion
 from gates.engine import GateSpec
 from gates.evidence import Array, Evidence, MissingEvidenceError, count, flags, number, numbers
@@ -14,6 +15,8 @@ SHADOW = "artifacts/shadow"
 CANDIDATES = f"{SHADOW}/candidates.parquet"
 LAYERS = ("representation", "kinematic", "geometric", "dynamic", "contact", "fresh")
 HELD_OUT = "held_out"
+TWO_MODES = "two_modes"
+INTACT = (HELD_OUT, TWO_MODES)
 
 
 class FeasibilitySettings(CandidateSettings):
@@ -21,13 +24,16 @@ class FeasibilitySettings(CandidateSettings):
 
     Attributes:
         required_fixtures: Corrupted fixtures that must have been tried.
-        required_checks: Checks, or layers of checks, each of which must have been left out once.
+        required_checks: Checks, `layer.check`, each of which must have been left out once.
         unassigned_modes: Labels of candidates that belong to no mode.
+        mode_observations: Independent observations of every mode without which the modes are not
+            compared.
     """
 
     required_fixtures: tuple[str, ...]
     required_checks: tuple[str, ...]
     unassigned_modes: tuple[str, ...]
+    mode_observations: int = Field(ge=2)
 
 
 def _rows(evidence: Evidence, candidate: str) -> pd.DataFrame:
@@ -59,18 +65,33 @@ def admissible(rows: pd.DataFrame) -> Array:
 def mode_admissible_gap(
     evidence: Evidence, settings: FeasibilitySettings, candidate: str
 ) -> Measured:
-    """Largest difference between modes in the share that is admissible."""
-    rows = _held_out(evidence, candidate)
-    rows = rows.assign(admissible=admissible(rows), mode=rows["mode"].fillna("").astype(str))
+    """Upper bound of the largest difference between modes in the share that is admissible."""
+    rows = _rows(evidence, candidate)
+    rows = rows[rows["fixture"] == TWO_MODES]
+    if len(rows) == 0:
+        raise MissingEvidenceError("no situation with several modes was sampled")
+    rows = rows.assign(
+        admissible=admissible(rows),
+        mode=rows["mode"].fillna("").astype(str),
+        episode=rows["situation"].astype(str).str.rpartition(":")[0],
+    )
     rows = rows[~rows["mode"].isin(settings.unassigned_modes)]
-    sampled = rows.groupby("observation")["mode"].transform("nunique")
-    rows = rows[sampled >= 2]
-    shares = rows.groupby("mode")["admissible"].mean()
-    if len(shares) < 2:
+    rows = rows[rows.groupby("observation")["mode"].transform("nunique") >= 2]
+    by_mode = {str(mode): part for mode, part in rows.groupby("mode")}
+    seen = {mode: part["episode"].nunique() for mode, part in by_mode.items()}
+    if len(seen) < 2:
         raise MissingEvidenceError("no observation was answered in two modes")
-    text = ", ".join(f"{mode} {float(share):.4g}" for mode, share in shares.items())
-    text += f" over {rows['observation'].nunique()} observations answered in several modes"
-    return Measured(float(shares.max() - shares.min()), caveat=text)
+    if min(seen.values()) < settings.mode_observations:
+        rare = ", ".join(f"{mode} {count}" for mode, count in seen.items())
+        raise MissingEvidenceError(
+            f"observations answered in several modes: {rare}; "
+            f"at least {settings.mode_observations} of each are needed"
+        )
+    shares = {m: (p["admissible"].to_numpy(), p["episode"].tolist()) for m, p in by_mode.items()}
+    interval, more, less = widest_gap(shares, confidence=settings.confidence)
+    text = ", ".join(f"{m} {p['admissible'].mean():.4g} of {seen[m]}" for m, p in by_mode.items())
+    text += f" episodes answered in several modes; upper bound of {more} minus {less}"
+    return Measured(interval[1], interval, text)
 
 
 @criterion(
@@ -152,7 +173,7 @@ def corrupted_refused_share(
 ) -> Measured:
     """Share of corrupted candidates that are refused with a reason."""
     rows = _rows(evidence, candidate)
-    rows = rows[rows["fixture"] != HELD_OUT]
+    rows = rows[~rows["fixture"].isin(INTACT)]
     absent = sorted(set(settings.required_fixtures) - set(rows["fixture"]))
     if absent:
         raise MissingEvidenceError(f"corrupted fixtures not tried: {', '.join(absent)}")
@@ -283,16 +304,20 @@ def checker_violations(evidence: Evidence, settings: FeasibilitySettings) -> Mea
 
 
 def checked_violations(evidence: Evidence, path: str) -> Measured:
-    """Violations that the independent checker found; none counts only if it checked something.
+    """Violations that the independent checker found; none counts only if it proved every action.
 
     Raises:
-        MissingEvidenceError: It checked nothing.
+        MissingEvidenceError: It checked nothing, or did not prove the motion of what it checked.
     """
     document = evidence.document(path)
     checked = number(document, "checked_actions")
+    proved = number(document, "reproved_actions")
     if checked <= 0:
         raise MissingEvidenceError("the checker saw no action")
-    return Measured(count(document, "violations"), caveat=f"{checked:g} actions re-proved")
+    if not proved >= checked:
+        raise MissingEvidenceError(f"the motion of {proved:g} of {checked:g} actions was proved")
+    text = f"{checked:g} actions proved again, their motion by other geometry"
+    return Measured(count(document, "violations"), caveat=text)
 
 
 @criterion(
@@ -302,17 +327,22 @@ def checked_violations(evidence: Evidence, path: str) -> Measured:
     always=True,
 )
 def mutants_undetected(evidence: Evidence, settings: FeasibilitySettings) -> Measured:
-    """Checks whose absence the independent checker did not notice, or that were not tried."""
+    """Checks whose absence was not noticed, or that were not tried."""
     entries = evidence.listing(f"{SHADOW}/mutants.json")
-    silent, covered = [], set()
+    found, excused = dict[str, bool](), dict[str, str]()
     for entry in entries:
         if not isinstance(entry, dict) or not isinstance(entry.get("detected"), bool):
             raise MissingEvidenceError("mutants.json has an entry without check or detected")
-        covered |= {str(entry.get("check")), str(entry.get("layer"))}
-        if not entry["detected"]:
-            silent.append(str(entry.get("check")))
-    silent += [f"{name} (not tried)" for name in settings.required_checks if name not in covered]
-    text = f"not detected: {', '.join(silent)}" if silent else f"all {len(entries)} detected"
+        name = f"{entry.get('layer')}.{entry.get('check')}"
+        found[name] = found.get(name, True) and entry["detected"]
+        if entry.get("not_applicable") and not entry["detected"] and not entry.get("tried"):
+            excused[name] = str(entry["not_applicable"])
+    silent = [name for name, detected in found.items() if not detected and name not in excused]
+    silent += [f"{name} (not tried)" for name in settings.required_checks if name not in found]
+    text = f"not detected: {', '.join(silent)}" if silent else f"all {len(found)} detected"
+    if excused:
+        listed = ", ".join(f"{name} ({reason})" for name, reason in excused.items())
+        text += f"; of them not asked of this task: {listed}"
     return Measured(float(len(silent)), caveat=text)
 
 

@@ -12,6 +12,7 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
+from gates.claim import CHECKPOINT_ONLY
 from gates.report import Gate, GateReport, Point, StrictModel, parse_section
 from gates.settings import GateSettings
 from genpolicy.errors import RefusedError
@@ -130,6 +131,7 @@ def draft_card(
     candidate = promoted(reports["D"])
     limits = {c.id: c.threshold for c in reports["D"].criteria if c.threshold is not None}
     caveats = [caveat for gate in sorted(reports) for caveat in reports[gate].caveats]
+    caveats.insert(0, CHECKPOINT_ONLY)
     baselines = reports["D"].settings.get("baselines", ())
     return TrialCard(
         schema_version=CARD_SCHEMA_VERSION,

@@ -270,11 +270,13 @@ def training_windows(
         observation_horizon=horizons.observation_horizon,
         prediction_horizon=horizons.prediction_horizon,
     )
-    if episodes is None:
-        return Windows(cut.observations, cut.actions, cut.is_pad)
-    uuids = data.episodes["episode_uuid"].to_numpy()
-    own = np.isin(uuids[cut.episode], np.asarray(episodes, dtype=uuids.dtype))
-    return Windows(cut.observations[own], cut.actions[own], cut.is_pad[own])
+    uuids = data.episodes["episode_uuid"].to_numpy(dtype=str)
+    own = np.ones(len(cut.episode), dtype=bool)
+    if episodes is not None:
+        own = np.isin(uuids[cut.episode], np.asarray(episodes, dtype=uuids.dtype))
+    return Windows(
+        cut.observations[own], cut.actions[own], cut.is_pad[own], uuids[cut.episode[own]]
+    )
 
 
 def matched_configuration(folders: Mapping[str, Path], *, reference: str) -> dict[str, Any]:

@@ -22,6 +22,8 @@ from genpolicy.errors import IntegrityError, NonFiniteError
 from genpolicy.integrity.atomic import output_folder, write_bytes
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_bytes
+from genpolicy.integrity.rows import rows_of_table, write_rows
+from genpolicy.integrity.tables import read_table
 from genpolicy.policies.checkpoint import (
     FORMAT_VERSION,
     CheckpointConfig,
@@ -42,10 +44,11 @@ from genpolicy.policies.networks import (
 from genpolicy.policies.normalisation import Normalisation
 from genpolicy.policies.objectives import Batch, Objective
 from genpolicy.policies.settings import HeadConfig, NetworkConfig, SamplerConfig, TrainingConfig
+from genpolicy.policies.validation import Validation, moments
+from genpolicy.policies.validation_row import VALIDATION_FILE, ValidationRow
 from genpolicy.policies.windows import Windows, as_batch
 from genpolicy.seeds import integer_seed, stream
 
-VALIDATION_WINDOWS = 1024
 TRAINING_FILE = "training.json"
 METRICS_FILE = "metrics.jsonl"
 
@@ -91,7 +94,8 @@ def train(
     """Train one method and write its checkpoint folder, whole or not at all.
 
     Args:
-        folder: Folder to write: weights, config, `training.json`, `metrics.jsonl`.
+        folder: Folder to write: weights, config, `training.json`, `metrics.jsonl`, and
+            `validation.parquet` where the validation windows name their episodes.
         request: What decides the result.
         windows: Training split.
         validation: Validation split, for the record only; it stops and selects nothing.
@@ -112,9 +116,7 @@ def train(
     horizons = method.horizons(request.horizons)
     with deterministic(device):
         data = _batch_of(windows, horizons, request, device)
-        held_out = (
-            _batch_of(validation, horizons, request, device) if validation is not None else None
-        )
+        followed = _follow(validation, horizons, request, device) if validation else None
         network, objective = _build(method, _dimensions(horizons, request), request, device)
         objective.prepare(network, data)
         averaged = copy.deepcopy(network)
@@ -127,7 +129,7 @@ def train(
                     averaged,
                     objective,
                     data=data,
-                    held_out=held_out,
+                    followed=followed,
                     request=request,
                     device=device,
                 )
@@ -146,7 +148,11 @@ def train(
         "final": records[-1],
         "regime": regime(device),
     }
-    return _write(folder, weights=weights, config=config, records=records, summary=summary)
+    rows = followed.rows if followed else []
+    if weights_of is not None and followed:  # the weights' own training is what converged or not
+        path = weights_of / VALIDATION_FILE
+        rows = rows_of_table(read_table(path), ValidationRow, where=str(path))
+    return _write(folder, rows, weights=weights, config=config, records=records, summary=summary)
 
 
 def take_over(
@@ -186,13 +192,14 @@ def averaging_decay(step: int, config: TrainingConfig) -> float:
 
 def _write(
     folder: Path,
+    measured: list[ValidationRow],
     *,
     weights: bytes,
     config: CheckpointConfig,
     records: list[dict[str, float | int | None]],
     summary: dict[str, object],
 ) -> str:
-    """Write all four files, whole or not at all; returns the checkpoint's SHA-256."""
+    """Write all files, whole or not at all; returns the checkpoint's SHA-256."""
     lines = "".join(json.dumps(record, sort_keys=True) + "\n" for record in records)
     with output_folder(folder) as temporary:
         identity = save_checkpoint(temporary, weights=weights, config=config)
@@ -200,6 +207,8 @@ def _write(
         write_bytes(
             temporary / TRAINING_FILE, canonical_json({**summary, "checkpoint_sha256": identity})
         )
+        if measured:
+            write_rows(temporary / VALIDATION_FILE, ValidationRow, measured)
     return identity
 
 
@@ -212,6 +221,13 @@ def _batch_of(
         mask_padding=request.training.mask_padding,
         device=device,
     )
+
+
+def _follow(
+    windows: Windows, horizons: HorizonConfig, request: TrainingRequest, device: str
+) -> Validation:
+    held_out = _batch_of(windows, horizons, request, device)
+    return Validation(held_out, windows.episodes, seed=request.seed, device=device)
 
 
 def _dimensions(horizons: HorizonConfig, request: TrainingRequest) -> Dimensions:
@@ -263,14 +279,14 @@ def _optimise(
     objective: Objective,
     *,
     data: Batch,
-    held_out: Batch | None,
+    followed: Validation | None,
     request: TrainingRequest,
     device: str,
 ) -> Iterator[dict[str, float | int | None]]:
     """Run all updates; yields one record per measurement."""
     config = request.training
     trained = [*network.parameters(), *objective.parameters()]
-    followed: list[Tensor] = list(network.parameters())
+    current: list[Tensor] = list(network.parameters())
     average: list[Tensor] = list(averaged.parameters())
     optimiser = torch.optim.AdamW(
         trained,
@@ -282,6 +298,7 @@ def _optimise(
     generator.manual_seed(integer_seed(request.seed, "training_noise"))
     order = _batch_order(len(data.actions), config.batch_size, request.seed)
     total, counted = torch.zeros((), device=device), 0
+    measured_after = moments(config)
     for step in range(config.steps):
         rows = torch.as_tensor(next(order)).to(device)
         batch = Batch(data.observations[rows], data.actions[rows], data.weight[rows])
@@ -293,8 +310,10 @@ def _optimise(
         torch.nn.utils.clip_grad_norm_(trained, config.gradient_clip)
         optimiser.step()
         with torch.no_grad():
-            torch._foreach_lerp_(average, followed, 1.0 - averaging_decay(step, config))
+            torch._foreach_lerp_(average, current, 1.0 - averaging_decay(step, config))
         total, counted = total + loss.detach(), counted + 1
+        if followed and step + 1 in measured_after:
+            followed.follow(step + 1, averaged, objective)
         if (step + 1) % config.validation_every == 0 or step + 1 == config.steps:
             mean_loss = float(total) / counted
             if not math.isfinite(mean_loss):
@@ -307,7 +326,7 @@ def _optimise(
             yield {
                 "step": step + 1,
                 "training_loss": mean_loss,
-                "validation_loss": _validate(averaged, objective, held_out, request, device),
+                "validation_loss": followed.loss(averaged, objective) if followed else None,
                 "learning_rate": learning_rate(step, config),
             }
             total, counted = torch.zeros((), device=device), 0
@@ -322,25 +341,3 @@ def _batch_order(windows: int, batch_size: int, seed: int) -> Iterator[NDArray[n
             pool = np.concatenate([pool, generator.permutation(windows)])
         yield pool[:batch_size]
         pool = pool[batch_size:]
-
-
-def _validate(
-    averaged: PolicyNetwork,
-    objective: Objective,
-    held_out: Batch | None,
-    request: TrainingRequest,
-    device: str,
-) -> float | None:
-    """Loss of the averaged weights on fixed held-out windows with fixed noise."""
-    if held_out is None:
-        return None
-    stride = max(1, len(held_out.actions) // VALIDATION_WINDOWS)
-    some = Batch(
-        held_out.observations[::stride][:VALIDATION_WINDOWS],
-        held_out.actions[::stride][:VALIDATION_WINDOWS],
-        held_out.weight[::stride][:VALIDATION_WINDOWS],
-    )
-    generator = torch.Generator(device=device)
-    generator.manual_seed(integer_seed(request.seed, "validation_noise"))
-    with torch.no_grad():
-        return float(objective.loss(averaged, some, generator))

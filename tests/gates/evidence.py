@@ -16,7 +16,7 @@ from gates import pipeline
 from gates.cause import default_limits
 from gates.cause.limits import OWN
 from gates.feasibility import LAYERS
-from gates.reproducibility import MEASURED_HERE, TERMS
+from gates.reproducibility.timing import MEASURED_HERE, TERMS
 from genpolicy.audit.rows import (
     Alignment,
     Asked,
@@ -52,9 +52,12 @@ from genpolicy.evidence.rows.stress import (
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.rows import write_rows
 from genpolicy.integrity.tables import read_table, write_table
+from genpolicy.policies.validation_row import ValidationRow
 
 CODE = "genpolicy/robot/impedance.py"
 """A file of code in the repository of the tests."""
+CHECKS = (*((layer, "first") for layer in LAYERS), ("fresh", "expired"), ("execution", "expired"))
+
 BASELINES = ("bc", "chunked_bc", "act")
 REMEDIES = {"chunked_l1": "direct", "one_mode_bc": "direct", "bc_noise": "offset"}
 DRAWN = "ibc"
@@ -62,6 +65,7 @@ CANDIDATES = ("diffusion", "flow")
 CONDITIONS = ("nominal", "camera_delay", "recovery_drill")
 STARTS = 80
 INVOCATIONS = 20
+UPDATES = 4000
 PNG = base64.b64decode(
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAAAAAA6fptVAAAACklEQVR4nGNgAAAAAgABSK+kcQAAAABJRU5ErkJggg=="
 )
@@ -71,12 +75,16 @@ SPEED = {"diffusion": 0.02, "flow": 0.01}
 
 FIXTURES = (
     "held_out",
+    "two_modes",
     "stale_observation",
     "infeasible_rotation",
     "collision",
     "phase_change",
     "reordered_chunk",
 )
+
+
+PLAYED = tuple(name for name in FIXTURES if name != "two_modes")
 
 
 def by_owner(**limits: tuple[Any, str]) -> dict[str, dict[str, list[Any]]]:
@@ -149,6 +157,7 @@ PARAMS: dict[str, Any] = {
     "gate_b": {
         "budget_reference": "chunked_bc",
         "budget_parts": ["total"],
+        "mode_minimum_share": 0.125,
         "limits": by_owner(
             unmatched_keys=(0, "model"),
             parameter_budget_deviation=(0.05, "model"),
@@ -158,14 +167,18 @@ PARAMS: dict[str, Any] = {
             samples_difference=(0, "model"),
             nfe_mismatch=(0, "model"),
             mode_coverage_lower=(0.6, "model"),
+            outside_modes_upper=(0.25, "model"),
+            validation_fall_upper=(0.1, "model"),
+            baseline_fall_upper=(0.1, "model"),
             latency_terms_missing=(0, "perception"),
             latency_median_ratio=(1.5, "controller"),
         ),
     },
     "gate_c": {
-        "required_fixtures": list(FIXTURES[1:]),
-        "required_checks": list(LAYERS),
+        "required_fixtures": list(FIXTURES[2:]),
+        "required_checks": [f"{layer}.{name}" for layer, name in CHECKS],
         "unassigned_modes": ["", "none"],
+        "mode_observations": 30,
         "limits": by_owner(
             mode_admissible_gap=(0.3, "controller"),
             admissible_share=(0.6, "model"),
@@ -616,7 +629,7 @@ def _situation(i: int) -> dict[str, Any]:
     }
 
 
-def _modes(methods: tuple[str, ...], covered: int) -> list[dict[str, Any]]:
+def _modes(methods: tuple[str, ...], covered: int, *, nfe: int = 1) -> list[dict[str, Any]]:
     return [
         {
             "method": method,
@@ -628,10 +641,12 @@ def _modes(methods: tuple[str, ...], covered: int) -> list[dict[str, Any]]:
             "modes_present": 2,
             "modes_covered": covered,
             "between_modes": 0,
+            "far_from_modes": 0,
             "admissible": 16,
             "valid": 16 if covered else 0,
             "modes_valid": covered,
-            "nfe": 1,
+            "fewest_admissible": 7 if covered > 1 else 0,
+            "nfe": nfe,
             "spread_m": 0.0,
         }
         for method in methods
@@ -657,7 +672,7 @@ def _matched(methods: tuple[str, ...]) -> dict[str, Any]:
             m: {
                 "parameters": {"encoder": 10, "trunk": 80, "head": 10, "total": 100},
                 "flops": 1,
-                "config": {},
+                "config": {"training": {"steps": UPDATES}},
             }
             for m in methods
         },
@@ -672,6 +687,22 @@ def _checkpoints(root: Path, stage: str, methods: tuple[str, ...]) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         (folder / "model.safetensors").write_bytes(method.encode())
         (folder / "config.json").write_bytes(b"{}\n")
+        table(root, f"{stage}/{method}/seed_0/validation.parquet", ValidationRow, validation())
+
+
+def validation(fall: float = 0.04) -> list[dict[str, Any]]:
+    """Validation loss of 20 episodes, falling by `fall` over the last quarter."""
+    uneven = {step: 0.002 * (step == UPDATES) for step in (2000, 3000, UPDATES)}
+    return [
+        {
+            "step": step,
+            "episode_uuid": f"e{e}",
+            "windows": 32,
+            "loss": loss * (1 + 0.1 * (e % 3)) * (1 + uneven[step] * (-1) ** e),
+        }
+        for e in range(20)
+        for step, loss in ((2000, 1.5), (3000, 1.0), (UPDATES, 1.0 - fall))
+    ]
 
 
 def _baselines(root: Path) -> None:
@@ -749,7 +780,7 @@ def _factors(root: Path) -> None:
 
 
 def _generators(root: Path) -> None:
-    table(root, "reload/modes.parquet", ModeRow, _modes(CANDIDATES, 2))
+    table(root, "reload/modes.parquet", ModeRow, _modes(CANDIDATES, 2, nfe=8))
     document(root, "train_generators/matched.json", _matched(CANDIDATES))
     table(root, "reload/offline.parquet", OfflineRow, [_offline("flow")])
     _checkpoints(root, "train_generators", CANDIDATES)
@@ -778,7 +809,7 @@ def _reload(root: Path) -> None:
         root,
         "reload/nfe.parquet",
         NfeRow,
-        [{"method": m, "seed": 0, "recorded": 8, "counted": 8} for m in CANDIDATES],
+        [{"method": m, "seed": 0, "recorded": 8, "counted": 8, "expected": 8} for m in CANDIDATES],
     )
     table(
         root,
@@ -846,7 +877,7 @@ def _latency(root: Path) -> None:
 
 
 def _candidate(method: str, fixture: str, observation: int, candidate: int) -> dict[str, Any]:
-    held = fixture == "held_out"
+    held = fixture in ("held_out", "two_modes")
     layers: dict[str, Any] = dict.fromkeys(LAYERS, True)
     if not held:
         layers.update(dynamic=False, contact=None, fresh=None)
@@ -854,7 +885,7 @@ def _candidate(method: str, fixture: str, observation: int, candidate: int) -> d
         "method": method,
         "seed": 0,
         "fixture": fixture,
-        "situation": "e0:0",
+        "situation": f"e{observation}:0",
         "phase": "approach",
         "observation": observation,
         "candidate": candidate,
@@ -879,7 +910,7 @@ def _shadow(root: Path) -> None:
             _candidate(m, fixture, o, c)
             for m in CANDIDATES
             for fixture in FIXTURES
-            for o in range(20 if fixture == "held_out" else 4)
+            for o in range({"held_out": 20, "two_modes": 60}.get(fixture, 4))
             for c in range(4)
         ],
     )
@@ -890,7 +921,7 @@ def _shadow(root: Path) -> None:
         [
             {"method": m, "fixture": f, "delivered": 400, "arrivals": 900, "stale": 0, "invalid": 0}
             for m in CANDIDATES
-            for f in FIXTURES
+            for f in PLAYED
         ],
     )
     table(
@@ -908,15 +939,19 @@ def _shadow(root: Path) -> None:
                 "count": n,
             }
             for m in CANDIDATES
-            for f in FIXTURES
+            for f in PLAYED
             for reason, n in (("expired", 10), ("phase", 5))
         ],
     )
-    document(root, "shadow/checker.json", {"violations": [], "checked_actions": 1000})
+    proved = {"violations": [], "checked_actions": 1000, "reproved_actions": 1000}
+    document(root, "shadow/checker.json", proved)
     document(
         root,
         "shadow/mutants.json",
-        [{"check": name, "detected": True, "violations": 3} for name in LAYERS],
+        [
+            {"check": name, "layer": layer, "detected": True, "tried": 3, "violations": 3}
+            for layer, name in CHECKS
+        ],
     )
     (root / "artifacts/shadow/journal.mcap").write_bytes(b"journal")
 
@@ -1024,7 +1059,12 @@ def _stress(root: Path) -> None:
     document(
         root,
         "stress/checker.json",
-        {"violations": [], "checked_actions": 5000, "journals": ["a.mcap"]},
+        {
+            "violations": [],
+            "checked_actions": 5000,
+            "reproved_actions": 5000,
+            "journals": ["a.mcap"],
+        },
     )
     power = {"margin": 0.1, "alpha": 0.05, "pairs": STARTS}
     row = {"baseline_success": 0.5, "correlation": 0.6, "margin": 0.1, "pairs": STARTS}

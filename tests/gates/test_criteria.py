@@ -45,10 +45,21 @@ def _identity(key):
     return lambda s: lambda d: [e.__setitem__(key, int(3 * s) + 1) for e in d.values()] and None
 
 
+def _each_training(stage, methods):
+    """A validation loss that falls by another tenth and more in the last quarter."""
+
+    def worse(root, s):
+        for method in methods:
+            path = f"{stage}{method}/seed_0/validation.parquet"
+            evidence.table(root, path, evidence.ValidationRow, evidence.validation(0.1 + 0.5 * s))
+
+    return worse
+
+
 def _collapse(frame, share):
-    """Reject the right-hand mode in `share` of the held-out observations."""
-    bad = (frame["fixture"] == "held_out") & (frame["mode"] == "right")
-    bad &= frame["observation"] < np.ceil(20 * share)
+    """Reject the right-hand mode in `share` of the situations with two modes."""
+    bad = (frame["fixture"] == "two_modes") & (frame["mode"] == "right")
+    bad &= frame["observation"] < np.ceil(60 * share)
     frame.loc[bad, "geometric"] = False
     return frame
 
@@ -193,8 +204,13 @@ WORSE = {
         "nfe_mismatch": _table(
             "reload/nfe.parquet", lambda s: cells("counted", 8 + int(8 * s) + 1)
         ),
+        "validation_fall_upper": _each_training(GEN, evidence.CANDIDATES),
+        "baseline_fall_upper": _each_training(TRAINED, ("act",)),
         "mode_coverage_lower": _table(
-            "reload/coverage.parquet", lambda s: cells("modes_covered_share", 1 - s)
+            "reload/modes.parquet", lambda s: cells("fewest_admissible", 1, share=s)
+        ),
+        "outside_modes_upper": _table(
+            "reload/modes.parquet", lambda s: cells("between_modes", 4 + int(12 * s))
         ),
         "latency_terms_missing": _table(
             "latency/latency.parquet",
@@ -320,7 +336,7 @@ TABLES = {
         "measure_baselines/modes",
         "measure_factors/modes",
     ],
-    "B": ["reload/samples", "reload/nfe", "reload/coverage", "latency/latency"],
+    "B": ["reload/samples", "reload/nfe", "reload/modes", "latency/latency"],
     "C": ["shadow/candidates", "shadow/stub", "shadow/counts"],
     "D": [
         "stress/rollouts",
@@ -390,7 +406,8 @@ def test_empty_table_is_inconclusive_never_pass(gate, path, ladder):
         ("A", "audit/strata", "p_adjusted"),
         ("A", "audit/predictions", "told_upper"),
         ("B", "reload/samples", "max_abs_difference"),
-        ("B", "reload/coverage", "modes_covered_share"),
+        ("B", "reload/modes", "fewest_admissible"),
+        ("B", "train_baselines/chunked_bc/seed_0/validation", "loss"),
         ("C", "shadow/candidates", "position_change_m"),
         ("D", "stress/invocations", "latency_s"),
         ("D", "stress/rollouts", "force_peak_n"),

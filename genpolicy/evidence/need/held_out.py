@@ -88,9 +88,11 @@ def modes_of_policy(
                 modes_present=reached.modes_present,
                 modes_covered=reached.modes_covered,
                 between_modes=int(reached.between.sum()),
+                far_from_modes=int((reached.far & ~reached.between).sum()),
                 admissible=int(passed.sum()),
                 valid=int(valid.sum()),
                 modes_valid=int((valid > 0).sum()),
+                fewest_admissible=int(valid.min()),
                 nfe=drawn.nfe,
                 spread_m=float(chunks[:, :, POSITION].std(axis=0).mean()),
             )

@@ -5,6 +5,7 @@ clock of its observation, and the journal of that is what the independent checke
 """
 
 from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -15,7 +16,8 @@ from genpolicy.contract.action import POSITION
 from genpolicy.contract.chunk import ChunkMetadata, Proposal
 from genpolicy.evidence.admission_context import Moment, Session, context_of
 from genpolicy.evidence.rows.shadow import CandidateRow
-from genpolicy.evidence.shadow.corruption import CORRUPTIONS, Case
+from genpolicy.evidence.shadow.case import Case, decide
+from genpolicy.evidence.shadow.corruption import CORRUPTIONS
 from genpolicy.evidence.shadow.observations import Observation
 from genpolicy.evidence.shadow.session import IN_FLIGHT_PHASE_CHANGE, Cell, Judged, play
 from genpolicy.execution.journal import Journal
@@ -29,8 +31,10 @@ from genpolicy.tasks.api import Task
 Array = NDArray[np.float64]
 
 HELD_OUT = "held_out"
+TWO_MODES = "two_modes"
 SELECTOR = "first_admissible"
 DEMONSTRATION = "demonstration"
+BUILT_EVERY = 6  # observations of a phase; fixtures without anything of the candidate's chunk
 
 
 class Identity(Protocol):
@@ -94,30 +98,61 @@ class Shadow:
 
 
 def shadow_policy(
-    shadow: Shadow, policy: Policy, observations: list[Observation], *, seed: int
+    shadow: Shadow,
+    policy: Policy,
+    observations: list[Observation],
+    *,
+    seed: int,
+    two_mode: Sequence[Observation] = (),
 ) -> ShadowEvidence:
-    """Every candidate of a policy on every observation, intact and corrupted."""
+    """Every candidate of a policy on every observation, intact and corrupted.
+
+    Args:
+        shadow: What every shadow test shares.
+        policy: The policy.
+        observations: Held-out moments.
+        seed: Number of its training seed.
+        two_mode: Moments at which modes were found: judged, neither corrupted nor executed.
+    """
     evidence = ShadowEvidence()
+    of_phase: Counter[str] = Counter()
+    for number, (item, cases) in enumerate(_answers(shadow, policy, [*observations, *two_mode])):
+        seen = _Seen(shadow, evidence, item, number, seed)
+        if number >= len(observations):
+            seen.judge(cases, fixture=TWO_MODES)
+            continue
+        judged = seen.judge(cases, fixture=HELD_OUT)
+        seen.play(judged, fixture=HELD_OUT)
+        if any(isinstance(result, Admitted) for _, result in judged):
+            seen.play(judged, fixture=IN_FLIGHT_PHASE_CHANGE)
+        skip_built = of_phase[item.phase] % BUILT_EVERY > 0
+        of_phase[item.phase] += 1
+        for corruption in CORRUPTIONS:
+            if corruption.built and skip_built:
+                continue
+            broken = corruption.apply(cases[0], shadow.checker)
+            if broken is not None:
+                seen.play(seen.judge([broken], fixture=corruption.name), fixture=corruption.name)
+    return evidence
+
+
+def _answers(
+    shadow: Shadow, policy: Policy, observations: Sequence[Observation]
+) -> Iterator[tuple[Observation, list[Case]]]:
+    """The candidates of a policy at each observation."""
     drawn = policy.sample(
         np.stack([item.history for item in observations]),
         noise_names=[("shadow", item.episode_uuid, item.index) for item in observations],
         candidates=shadow.samples,
     )
     for number, (item, chunks) in enumerate(zip(observations, drawn.actions, strict=True)):
-        cases = [
-            case_of(shadow, item, chunk, number=number, candidate=k, of=policy)
-            for k, chunk in enumerate(chunks)
-        ]
-        seen = _Seen(shadow, evidence, item, number, seed)
-        judged = seen.judge(cases, fixture=HELD_OUT)
-        seen.play(judged, fixture=HELD_OUT)
-        if any(isinstance(result, Admitted) for _, result in judged):
-            seen.play(judged, fixture=IN_FLIGHT_PHASE_CHANGE)
-        for corruption in CORRUPTIONS:
-            broken = corruption.apply(cases[0], shadow.checker)
-            if broken is not None:
-                seen.play(seen.judge([broken], fixture=corruption.name), fixture=corruption.name)
-    return evidence
+        yield (
+            item,
+            [
+                case_of(shadow, item, chunk, number=number, candidate=k, of=policy)
+                for k, chunk in enumerate(chunks)
+            ],
+        )
 
 
 @dataclass(frozen=True)
@@ -233,7 +268,7 @@ def case_of(
 
 def admit(shadow: Shadow, case: Case) -> Admitted | Rejected:
     """The verdict of the six layers."""
-    return shadow.checker.admit(case.proposal, context=case.context)
+    return decide(shadow.checker, case)
 
 
 def _smallest(verdict: Verdict) -> float | None:

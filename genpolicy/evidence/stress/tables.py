@@ -24,11 +24,13 @@ from genpolicy.evidence.stress.latency import LatencyModel
 from genpolicy.evidence.stress.matched import Comparison, Shard, ShardResult, run_shard
 from genpolicy.evidence.stress.perturbations import Perturbation
 from genpolicy.evidence.stress.settings import StressSettings
+from genpolicy.feasibility.cell import cell_of
 from genpolicy.integrity.atomic import write_bytes
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.rows import write_rows
 from genpolicy.seeds import stream
 from genpolicy.statistics.eprocess import power_table
+from genpolicy.tasks.api import load_task
 
 AGE_LEVELS = (0.0, 0.05, 0.25, 0.5, 0.75, 0.9, 0.95, 0.99, 1.0)
 POWER_CORRELATION = 0.3
@@ -75,7 +77,13 @@ def write_stress(folder: Path, shards: Sequence[Shard], *, workers: int, schedul
     ages = [row for shard, result in pairs for row in _age_rows(shard, result)]
     write_rows(folder / "ages.parquet", AgeRow, ages)
     journals = [shard.journal for shard in shards]
-    checked = checker_document(journals, cell=shards[0].comparison.cell)
+    comparison = shards[0].comparison
+    robot = cell_of(
+        load_task(comparison.task),
+        comparison.feasibility,
+        action_period_s=comparison.cell.horizons.action_period_s,
+    )
+    checked = checker_document(journals, cell=comparison.cell, robot=robot)
     write_bytes(folder / "checker.json", canonical_json(checked))
 
 
