@@ -1,9 +1,8 @@
 """Rows of the audit's tables, one frozen dataclass a table.
 
 Field order is column order, as in `genpolicy.evidence.rows`. The audit measures these rows, gates
-and pages read them, so a column is spelled here and nowhere else; this file imports
-rows only. Most
-are what the audit itself computes with. None is "not measured", never zero.
+and pages read them, so a column is spelled here and nowhere else; this file imports rows
+only. Most are what the audit itself computes with. None is "not measured", never zero.
 """
 
 from dataclasses import dataclass
