@@ -7,6 +7,7 @@ against, no more. Below, a data set is still run, and what was said of it is sho
 from collections.abc import Callable
 from dataclasses import replace
 
+from benchmarks.audit.actions import ACTIONS
 from benchmarks.audit.catalogue import (
     CALIBRATION,
     CLOCK,
@@ -282,4 +283,4 @@ STRUCTURE = (
     ),
 )  # fmt: skip
 
-CAUSES = MODES + HIDDEN + CLOCKS + DATA + LOST + LABELLED + STRUCTURE + PAIRS
+CAUSES = MODES + HIDDEN + CLOCKS + DATA + LOST + LABELLED + STRUCTURE + PAIRS + ACTIONS

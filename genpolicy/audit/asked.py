@@ -4,7 +4,7 @@ A question that could not be asked looks like one that was answered well. So eac
 a word on it: what is not asked is for a person to ask otherwise, or to waive with their name.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -20,7 +20,7 @@ def questions(
     settings: AuditSettings,
     semantics: Semantics,
     told: Sequence[Prediction],
-    phases: Sequence[str],
+    phases: Iterable[str],
     *,
     replays: int,
     checked: bool,
@@ -61,7 +61,7 @@ def questions(
     ordered = bool(np.all(np.isfinite(data.episodes.order)))
     found["order"] = "" if ordered else "not recorded: habits and drifts cannot be seen"
     past = {row.phase for row in told if row.variable == HISTORY}
-    for phase in phases:
+    for phase in sorted(phases):
         apart = "where modes are, the observation differs: what came before was not held to them"
         found[f"past.{phase}"] = "" if phase in past else apart
     return tuple(Asked(name, not reason, reason) for name, reason in found.items())
