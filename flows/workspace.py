@@ -26,6 +26,8 @@ PIPELINE = "dvc.yaml"
 LOCK = "dvc.lock"
 DVC_CONFIG = ".dvc/config"
 COPIED = ".workspace.json"
+LIMITS, WAIVED = "limits", "not_applicable"
+"""Keys of a gate's section."""
 
 
 def make_workspace(source: Path, target: Path, overrides: Mapping[str, Any] | Path) -> Path:
@@ -69,12 +71,17 @@ def merged(
 ) -> dict[str, Any]:
     """`base` with the leaves of `overrides` in place of its own; every key must exist in `base`.
 
+    Only what a gate declares not applicable may be added, and takes the limits of the same names
+    away: a limit and a waiver of one criterion exclude each other.
+
     Raises:
         ConfigError: An unknown key, or a section replaced by a value or the other way round.
     """
     result = dict(base)
     for key, value in overrides.items():
         place = f"{at}.{key}" if at else str(key)
+        if key == WAIVED and isinstance(base.get(LIMITS), Mapping):
+            continue
         if key not in base:
             raise ConfigError(
                 where=f"override {place}",
@@ -90,6 +97,13 @@ def merged(
                 action="Override the values inside a section, not the section.",
             )
         result[key] = merged(base[key], value, at=place) if isinstance(value, Mapping) else value
+    if WAIVED in overrides and LIMITS in base:
+        result[WAIVED] = overrides[WAIVED]
+        waived = {name for names in overrides[WAIVED].values() for name in names}
+        result[LIMITS] = {
+            owner: {name: limit for name, limit in limits.items() if name not in waived}
+            for owner, limits in result[LIMITS].items()
+        }
     return result
 
 

@@ -1,8 +1,12 @@
-"""Bounds of shares whose rows are not all independent.
+"""Bounds by which criteria are judged, where rows are not all independent.
 
-Rows that share an episode, an observation or a start are one draw, not many. The exact bound is
-therefore taken over the clusters: the share is that of the rows, the number of trials that of
+Rows that share an episode, an observation or a start are one draw, not many. An exact bound of a
+share is taken over the clusters: the share is that of the rows, the number of trials that of
 the clusters, and the count is rounded to the unfavourable side.
+
+One rule for every quantile (`upper_quantile`): it is judged at the worse end of its interval. What
+the sample is too small to bound is not measured, so the criterion is INCONCLUSIVE; the point, which
+may lie below the limit by luck, is never judged.
 """
 
 import math
@@ -11,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gates.evidence import Array, MissingEvidenceError
-from genpolicy.statistics.intervals import clopper_pearson, order_statistic_interval
+from genpolicy.statistics.clustered import quantile_interval
+from genpolicy.statistics.intervals import clopper_pearson
 
 
 def share_interval(
@@ -57,18 +62,44 @@ def counted_interval(hits: float, trials: float, *, confidence: float) -> tuple[
 
 
 def upper_quantile(
-    values: Array, quantile: float, *, confidence: float
-) -> tuple[float, tuple[float, float] | None]:
-    """Order statistic at or above a quantile, with its distribution-free interval.
+    values: Array,
+    clusters: NDArray[np.generic] | list[str],
+    quantile: float,
+    *,
+    confidence: float,
+    rng: np.random.Generator,
+) -> tuple[float, tuple[float, float]]:
+    """Order statistic at or above a quantile, and the interval whose upper end is judged.
 
-    Returns:
-        The order statistic, and the interval where the sample is large enough for both ends.
+    Args:
+        values: One per row. Shape (n,).
+        clusters: Cluster of each row. Shape (n,).
+        quantile: Which quantile, between 0 and 1.
+        confidence: Coverage of the interval.
+        rng: Draws clusters, where one holds several rows.
 
     Raises:
-        MissingEvidenceError: No values.
+        MissingEvidenceError: No values, or too few to bound the quantile from both sides.
     """
     if len(values) == 0:
         raise MissingEvidenceError("no values to take a quantile of")
     point = float(np.quantile(values, quantile, method="higher"))
-    lower, upper = order_statistic_interval(values, quantile, confidence)
-    return point, (lower, upper) if math.isfinite(lower) and math.isfinite(upper) else None
+    lower, upper = quantile_interval(
+        values, np.asarray(clusters), quantile, confidence=confidence, rng=rng
+    )
+    if not (math.isfinite(lower) and math.isfinite(upper)):
+        trials = len(set(np.asarray(clusters).tolist()))
+        raise MissingEvidenceError(
+            f"{len(values)} values of {trials} independent draws bound no {quantile:.0%} quantile "
+            f"at confidence {confidence:g}; {draws_for_quantile(quantile, confidence)} draws of "
+            "one value each do"
+        )
+    return point, (lower, upper)
+
+
+def draws_for_quantile(quantile: float, confidence: float) -> int:
+    """Fewest independent values of which the largest bounds a quantile, 0.5 or above, from above.
+
+    The largest of n lies below the quantile with probability quantile ** n.
+    """
+    return math.ceil(math.log((1.0 - confidence) / 2.0) / math.log(quantile))

@@ -102,7 +102,7 @@ def admissible_share(evidence: Evidence, settings: FeasibilitySettings, candidat
     per_candidate=True,
 )
 def projection_p95_m(evidence: Evidence, settings: FeasibilitySettings, candidate: str) -> Measured:
-    """Largest move by projection that 95 % of the admissible candidates keep, m."""
+    """Upper bound of the move by projection that 95 % of the admissible candidates keep, m."""
     return _of_admissible(evidence, settings, candidate, "position_change_m")
 
 
@@ -115,7 +115,7 @@ def projection_p95_m(evidence: Evidence, settings: FeasibilitySettings, candidat
 def boundary_jerk_p95_m_s3(
     evidence: Evidence, settings: FeasibilitySettings, candidate: str
 ) -> Measured:
-    """Jerk at the boundary that 95 % of the admissible candidates keep, m/s^3."""
+    """Upper bound of the jerk at the boundary that 95 % of the admissible keep, m/s^3."""
     return _of_admissible(evidence, settings, candidate, "boundary_jerk_m_s3")
 
 
@@ -127,9 +127,18 @@ def _of_admissible(
     if len(rows) == 0:
         raise MissingEvidenceError("no candidate is admissible")
     values = np.abs(numbers(rows, column))
-    point, interval = upper_quantile(values, 0.95, confidence=settings.confidence)
-    text = f"{len(rows)} admissible held-out candidates, largest {values.max():.4g}"
-    return Measured(point, interval, text)
+    point, interval = upper_quantile(
+        values,
+        rows["observation"].to_numpy(),
+        0.95,
+        confidence=settings.confidence,
+        rng=settings.draws("C", column, candidate),
+    )
+    text = (
+        f"p95 {point:.4g}, largest {values.max():.4g}; {len(rows)} admissible candidates of "
+        f"{rows['observation'].nunique()} held-out observations"
+    )
+    return Measured(interval[1], interval, text)
 
 
 @criterion(
@@ -195,19 +204,35 @@ def stub_invalid(evidence: Evidence, settings: FeasibilitySettings, candidate: s
 
 @criterion(
     "<=",
-    question="How high can the true rate of bad arrivals still be?",
-    look_at="Evaluator: too few arrivals for this bound; run more shadow invocations.",
+    question="How often can something bad still arrive?",
+    look_at="Evaluator: too few observations for this bound; run more shadow invocations.",
     per_candidate=True,
     always=True,
 )
 def stub_violation_upper(
     evidence: Evidence, settings: FeasibilitySettings, candidate: str
 ) -> Measured:
-    """Exact upper bound of the rate of bad arrivals."""
-    stale, arrivals = _stub(evidence, candidate, "stale")
-    bad = min(stale + _stub(evidence, candidate, "invalid")[0], arrivals)
-    interval = counted_interval(bad, arrivals, confidence=settings.confidence)
-    return Measured(interval[1], interval, f"{bad:g} of {arrivals:g} arrivals; exact upper bound")
+    """Exact upper bound of the share of observations after which something bad arrives.
+
+    Actions of one observation arrive or fail together, so the observations are the trials.
+    """
+    stale, _ = _stub(evidence, candidate, "stale")
+    bad = stale + _stub(evidence, candidate, "invalid")[0]
+    rows = evidence.of(f"{SHADOW}/stub.parquet", ShadowStubRow, candidate)
+    # The same observations are played in every fixture, and deliver at most one chunk in each.
+    observations = float(numbers(rows, "delivered").max())
+    if observations <= 0:
+        raise MissingEvidenceError("no observation delivered a chunk")
+    bad = min(bad, observations)
+    interval = counted_interval(bad, observations, confidence=settings.confidence)
+    limit = settings.limits.of.get("stub_violation_upper")
+    if bad == 0 and limit and limit.limit is not None and not interval[1] <= limit.limit:
+        raise MissingEvidenceError(
+            f"none bad of {observations:g} observations that delivered bounds it by "
+            f"{interval[1]:.4g} only"
+        )
+    text = f"{bad:g} of {observations:g} observations that delivered; exact upper bound"
+    return Measured(interval[1], interval, text)
 
 
 @criterion(

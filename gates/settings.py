@@ -19,6 +19,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar, NoReturn, Self, TypeVar
 
+import numpy as np
 from pydantic import Field, PrivateAttr
 
 from gates.criterion import Criterion
@@ -26,6 +27,7 @@ from gates.report import OWNERS, Gate, Owner, StrictModel, parse_section, stage_
 from genpolicy.errors import ConfigError, IntegrityError
 from genpolicy.integrity.documents import parse_yaml
 from genpolicy.integrity.hashing import sha256_bytes_of
+from genpolicy.seeds import stream
 
 PARAMS_FILE = "params.yaml"
 DERIVED = "derived"
@@ -87,15 +89,22 @@ class CandidateSettings(GateSettings):
     Attributes:
         confidence: Coverage of every interval.
         candidates: Methods that stand for promotion.
+        root_seed: Root of the named streams that intervals over clusters are drawn from.
     """
 
     homes: ClassVar[Mapping[str, str]] = {
+        "root_seed": "seed",
         "confidence": "confidence",
         "candidates": "train_generators.samplers",
     }
 
     confidence: float = Field(gt=0.5, lt=1.0)
     candidates: tuple[str, ...]
+    root_seed: int
+
+    def draws(self, *names: str) -> np.random.Generator:
+        """Generator of an interval, the same whenever and wherever the gate is judged."""
+        return stream(self.root_seed, "gate", *names)
 
 
 Settings = TypeVar("Settings", bound=StrictModel)

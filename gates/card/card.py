@@ -34,10 +34,13 @@ FIXED = (
     "rollback",
 )
 ABORT_FROM = {
-    "action_age_s": "action_age_p95_s",
+    "latency_s": "latency_p95_s",
     "deadline_miss_share": "deadline_miss_upper",
+    "hold_share": "hold_share_upper",
+    "rejection_share": "rejection_share_upper",
     "fallback_share": "fallback_share_upper",
     "intervention_share": "intervention_upper",
+    "reset_share": "reset_upper",
 }
 
 

@@ -80,7 +80,6 @@ def _age(evidence: Evidence, report: GateReport) -> Figure:
         share = np.linspace(1 / len(kept), 1, len(kept))
         axes.step(kept, share, where="post", color=colour[method], ls=dash[method], label=method)
     axes.set_ylim(0, 1.12)
-    draw_limit(axes, report, "action_age_p95_s")
     axes.set_xlabel("p95 of the action age in a rollout, s")
     axes.set_ylabel("share of rollouts")
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
@@ -151,7 +150,8 @@ PLOTS = (
     Plot(
         "Action age",
         "How old the observation behind an action is when the controller accepts it: share of "
-        "rollouts whose 95th percentile is at most this. Dotted: the limit.",
+        "rollouts whose 95th percentile is at most this. The executor refuses older actions than its "
+        "maximum age, so there is no limit to judge.",
         ROLLOUTS,
         _age,
     ),

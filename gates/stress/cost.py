@@ -1,15 +1,30 @@
-"""The cost: deadlines, ages, fallback, people, force, and what reaches the controller."""
+"""The cost: deadlines, latency, holds, rejections, fallback, people, stops, and force.
 
-import math
+Each must be within its limit in every planned condition. Where one rollout holds many trials
+(ticks, invocations), the starts are drawn again, whole; where it holds one, the bound is exact.
+"""
 
 import numpy as np
+import pandas as pd
 
-from gates.bounds import counted_interval, share_interval, upper_quantile
+from gates.bounds import draws_for_quantile, share_interval, upper_quantile
 from gates.criterion import Measured, criterion
 from gates.evidence import Evidence, MissingEvidenceError, numbers
-from gates.feasibility import checked_violations
-from gates.stress.rollouts import NOMINAL, STRESS, StressSettings, rollouts, success_lower
-from genpolicy.evidence.rows.stress import ConservationRow, StressCountRow, StressStubRow
+from gates.stress.rollouts import (
+    DRILL,
+    INVOCATIONS,
+    NOMINAL,
+    Interval,
+    StressSettings,
+    in_every_condition,
+    rollouts,
+    success_lower,
+)
+from genpolicy.evidence.rows.stress import InvocationRow
+from genpolicy.statistics.clustered import ratio_interval
+
+STOPS = ("collision", "force_stop")
+"""Outcomes (`genpolicy.evidence.stress.state`) that stay until a person resets the cell."""
 
 
 @criterion(
@@ -25,22 +40,66 @@ def deadline_miss_upper(evidence: Evidence, settings: StressSettings, candidate:
 
 @criterion(
     "<=",
-    question="How old are the observations behind the actions?",
-    look_at="Timing: look at queue, replacement and camera delay.",
+    question="How long until an answer arrives?",
+    look_at="Timing: answers come when their chunk is over; read latency by term in gate B.",
+    per_candidate=True,
+    derived=lambda settings: settings.usable_s,
+)
+def latency_p95_s(evidence: Evidence, settings: StressSettings, candidate: str) -> Measured:
+    """Upper bound of the end-to-end latency that 95 % of the warm invocations keep, s.
+
+    The first invocation of a session is cold and before any motion; it is said apart.
+    """
+    rows = evidence.of(INVOCATIONS, InvocationRow, candidate)
+    latency = numbers(rows, "latency_s")
+    if not np.all(latency >= 0):
+        raise MissingEvidenceError("a latency is negative: the clocks are wrong")
+    recorded = _invocations_by_rollout(rows, ["seed", "perturbation", "start"])
+    stated = rollouts(evidence, settings, candidate)
+    stated = stated.set_index(["seed", "perturbation", "start"])["invocations"]
+    if not recorded.reindex(stated.index, fill_value=0).equals(stated.astype(recorded.dtype)):
+        raise MissingEvidenceError("rollouts state other numbers of invocations than are recorded")
+    cold = numbers(rows, "invocation") == 0
+
+    def measure(part: pd.DataFrame, condition: str) -> Interval:
+        point, ends = upper_quantile(
+            numbers(part, "latency_s"),
+            part["start"].to_numpy(),
+            0.95,
+            confidence=settings.confidence,
+            rng=settings.draws("D", "latency", candidate, condition),
+        )
+        return point, *ends
+
+    found = in_every_condition(rows[~cold], settings.perturbations, measure)
+    text = f"{found.caveat}; cold at most {latency[cold].max(initial=0.0):.4g} s"
+    return Measured(found.value, found.interval, text)
+
+
+def _invocations_by_rollout(rows: pd.DataFrame, keys: list[str]) -> "pd.Series[int]":
+    return rows.groupby(keys)["invocation"].nunique()
+
+
+@criterion(
+    "<=",
+    question="What share of time does it stand and wait?",
+    look_at="Timing: the queue runs dry; look at misses, rejections and discards by reason.",
     per_candidate=True,
 )
-def action_age_p95_s(evidence: Evidence, settings: StressSettings, candidate: str) -> Measured:
-    """Age that 95 % of the rollouts keep with their own 95 % quantile, s."""
-    rows = rollouts(evidence, settings, candidate)
-    acted = rows[numbers(rows, "action_ticks") > 0]
-    ages = numbers(acted, "action_age_p95_s")
-    if np.any(ages < 0):
-        raise MissingEvidenceError("an action age is negative: the clocks are wrong")
-    point, interval = upper_quantile(ages, 0.95, confidence=settings.confidence)
-    text = f"95 % of {len(acted)} rollouts keep their own p95 below this"
-    if len(acted) < len(rows):
-        text += f"; {len(rows) - len(acted)} rollouts executed no action of the policy"
-    return Measured(point, interval, text)
+def hold_share_upper(evidence: Evidence, settings: StressSettings, candidate: str) -> Measured:
+    """Upper bound of the share of ticks without any action."""
+    return _share_of(evidence, settings, candidate, "hold_ticks", "ticks")
+
+
+@criterion(
+    "<=",
+    question="How often is all of an answer rejected?",
+    look_at="Feasibility: read the reasons; the generator leaves the feasible set in closed loop.",
+    per_candidate=True,
+)
+def rejection_share_upper(evidence: Evidence, settings: StressSettings, candidate: str) -> Measured:
+    """Upper bound of the share of invocations of which no candidate passes."""
+    return _share_of(evidence, settings, candidate, "rejections", "invocations")
 
 
 @criterion(
@@ -50,28 +109,36 @@ def action_age_p95_s(evidence: Evidence, settings: StressSettings, candidate: st
     per_candidate=True,
 )
 def fallback_share_upper(evidence: Evidence, settings: StressSettings, candidate: str) -> Measured:
-    """Upper bound of the share of ticks driven by the fallback."""
-    return _share_of(evidence, settings, candidate, "fallback_ticks", "ticks")
+    """Upper bound of the share of ticks driven by the fallback; not where it is drilled."""
+    conditions = [name for name in settings.perturbations if name != DRILL]
+    return _share_of(evidence, settings, candidate, "fallback_ticks", "ticks", conditions)
 
 
-def _share_of(
-    evidence: Evidence, settings: StressSettings, candidate: str, part: str, whole: str
+def _share_of(  # noqa: PLR0917
+    evidence: Evidence,
+    settings: StressSettings,
+    candidate: str,
+    part: str,
+    whole: str,
+    conditions: list[str] | None = None,
 ) -> Measured:
-    """Upper bound of a share of ticks; the unit of independence is the rollout."""
+    """Upper bound of a share of ticks or invocations; the starts are the draws."""
+
+    def measure(rows: pd.DataFrame, condition: str) -> Interval:
+        hits, all_of = numbers(rows, part), numbers(rows, whole)
+        if np.any(all_of <= 0) or np.any(hits > all_of) or np.any(hits < 0):
+            raise MissingEvidenceError(f"{part} is no part of {whole}")
+        sums = rows.assign(hits=hits, all_of=all_of).groupby("start")[["hits", "all_of"]].sum()
+        ends = ratio_interval(
+            sums["hits"].to_numpy(),
+            sums["all_of"].to_numpy(),
+            confidence=settings.confidence,
+            rng=settings.draws("D", part, candidate, condition),
+        )
+        return float(hits.sum() / all_of.sum()), *ends
+
     rows = rollouts(evidence, settings, candidate)
-    hits, all_of = numbers(rows, part), numbers(rows, whole)
-    if all_of.sum() <= 0 or np.any(hits > all_of) or np.any(hits < 0):
-        raise MissingEvidenceError(f"{part} is no part of {whole}")
-    share, trials = float(hits.sum() / all_of.sum()), len(rows)
-    bad = math.ceil(round(share * trials, 9))
-    interval = counted_interval(bad, trials, confidence=settings.confidence)
-    ratios = rows.assign(hits=hits, whole=all_of).groupby("perturbation")[["hits", "whole"]].sum()
-    worst = ratios["hits"] / ratios["whole"]
-    text = (
-        f"share {share:.4g}, worst in {worst.idxmax()} at {float(worst.max()):.4g}; "
-        f"upper bound over {trials} rollouts"
-    )
-    return Measured(interval[1], interval, text)
+    return in_every_condition(rows, conditions or settings.perturbations, measure)
 
 
 @criterion(
@@ -83,30 +150,35 @@ def _share_of(
 def intervention_upper(evidence: Evidence, settings: StressSettings, candidate: str) -> Measured:
     """Upper bound of the share of rollouts in which a person had to step in."""
     rows = rollouts(evidence, settings, candidate)
-    share, lower, upper = share_interval(
-        numbers(rows, "interventions") > 0,
-        [f"{c}/{s}" for c, s in zip(rows["perturbation"], rows["start"], strict=True)],
-        confidence=settings.confidence,
-        favourable=False,
-    )
-    return Measured(upper, (lower, upper), f"share {share:.4g} of {len(rows)} rollouts")
+    return _rollouts_with(rows.assign(hit=numbers(rows, "interventions") > 0), settings)
 
 
 @criterion(
     "<=",
-    question="How many stale or invalid actions reached the stub?",
-    look_at="Feasibility: a stale or rejected action reached the controller; stop here.",
+    question="How often does it stop so that a person must reset the cell?",
+    look_at="Contact controller: see which stop, collision or force, and in which phase.",
     per_candidate=True,
-    always=True,
 )
-def stub_violations(evidence: Evidence, settings: StressSettings, candidate: str) -> Measured:
-    """Stale or invalid actions that arrived at the controller stub."""
-    rows = evidence.of(f"{STRESS}/stub.parquet", StressStubRow, candidate)
-    arrivals = float(numbers(rows, "arrivals").sum())
-    if arrivals <= 0:
-        raise MissingEvidenceError("nothing arrived at the stub")
-    bad = float(numbers(rows, "stale").sum() + numbers(rows, "invalid").sum())
-    return Measured(bad, caveat=f"stale or invalid, of {arrivals:g} arrivals")
+def reset_upper(evidence: Evidence, settings: StressSettings, candidate: str) -> Measured:
+    """Upper bound of the share of rollouts that end in a protective stop."""
+    rows = rollouts(evidence, settings, candidate)
+    if rows["outcome"].fillna("").eq("").any():
+        raise MissingEvidenceError("a rollout has no outcome")
+    return _rollouts_with(rows.assign(hit=rows["outcome"].isin(STOPS)), settings)
+
+
+def _rollouts_with(rows: pd.DataFrame, settings: StressSettings) -> Measured:
+    """Exact upper bound of the share of rollouts that were hit, in every condition."""
+    return in_every_condition(
+        rows,
+        settings.perturbations,
+        lambda part, _: share_interval(
+            part["hit"].to_numpy(),
+            part["start"].to_numpy(),
+            confidence=settings.confidence,
+            favourable=False,
+        ),
+    )
 
 
 @criterion(
@@ -116,11 +188,36 @@ def stub_violations(evidence: Evidence, settings: StressSettings, candidate: str
     per_candidate=True,
 )
 def force_peak_p95_n(evidence: Evidence, settings: StressSettings, candidate: str) -> Measured:
-    """Peak contact force that 95 % of the rollouts keep, N."""
+    """Upper bound of the peak contact force that 95 % of the rollouts keep, N.
+
+    A policy that never touches shows nothing about force: as many starts must see contact, in any
+    condition, as bound a p95.
+    """
     rows = rollouts(evidence, settings, candidate)
-    values = numbers(rows, "force_peak_n")
-    point, interval = upper_quantile(values, 0.95, confidence=settings.confidence)
-    return Measured(point, interval, f"{len(rows)} rollouts, largest {values.max():.4g} N")
+    forces = numbers(rows, "force_peak_n")
+    if not np.all(forces >= 0):
+        raise MissingEvidenceError("a force is negative")
+    touched = rows[forces > 0]["start"].nunique()
+    fewest = draws_for_quantile(0.95, settings.confidence)
+    if touched < fewest:
+        raise MissingEvidenceError(
+            f"hardly exercised: contact on {touched} of {rows['start'].nunique()} starts, in any "
+            f"condition; {fewest} are needed to bound a 95% quantile"
+        )
+
+    def measure(part: pd.DataFrame, condition: str) -> Interval:
+        point, ends = upper_quantile(
+            numbers(part, "force_peak_n"),
+            part["start"].to_numpy(),
+            0.95,
+            confidence=settings.confidence,
+            rng=settings.draws("D", "force", candidate, condition),
+        )
+        return point, *ends
+
+    found = in_every_condition(rows, settings.perturbations, measure)
+    text = f"{found.caveat}; contact on {touched} starts, largest {forces.max():.4g} N"
+    return Measured(found.value, found.interval, text)
 
 
 @criterion(
@@ -133,39 +230,3 @@ def stress_success_lower(evidence: Evidence, settings: StressSettings, candidate
     """Lowest lower bound of success over the perturbations."""
     conditions = [name for name in settings.perturbations if name != NOMINAL]
     return success_lower(evidence, settings, candidate, conditions)
-
-
-@criterion(
-    "<=",
-    question="Is every generated action executed, discarded by reason, or queued?",
-    look_at="Evaluator: actions vanish or appear; read the counts per perturbation.",
-    per_candidate=True,
-    always=True,
-)
-def conservation_error(evidence: Evidence, settings: StressSettings, candidate: str) -> Measured:
-    """Actions unaccounted for: generated - executed - discarded - queued, and by reason."""
-    names = ("generated", "executed", "discarded", "queued")
-    path = f"{STRESS}/conservation.parquet"
-    rows = evidence.of(path, ConservationRow, candidate)
-    generated, executed, discarded, queued = (numbers(rows, name) for name in names)
-    if generated.sum() <= 0:
-        raise MissingEvidenceError("nothing was generated")
-    error = float(np.abs(generated - executed - discarded - queued).sum())
-    reasons = evidence.of(f"{STRESS}/counts.parquet", StressCountRow, candidate)
-    by_reason = (
-        reasons.assign(count=numbers(reasons, "count")).groupby("perturbation")["count"].sum()
-    )
-    stated = rows.assign(discarded=discarded).groupby("perturbation")["discarded"].sum()
-    error += float(stated.sub(by_reason, fill_value=0.0).abs().sum())
-    return Measured(error, caveat="generated = executed + discarded by reason + still queued")
-
-
-@criterion(
-    "<=",
-    question="What does the independent checker find in the journals?",
-    look_at="Evaluator: executor and independent checker disagree; read the violations.",
-    always=True,
-)
-def checker_violations(evidence: Evidence, settings: StressSettings) -> Measured:
-    """Violations that the independent checker found in the journals."""
-    return checked_violations(evidence, f"{STRESS}/checker.json")

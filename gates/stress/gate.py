@@ -2,19 +2,18 @@
 
 Each candidate meets every simple baseline on identical starts. The paired test and its margin
 are fixed before the run; the cost criteria must hold together with it. All conditions and
-training seeds of one start are averaged: the start is the unit of independence.
+training seeds of one start are averaged for the gain: the start is the unit of independence.
 """
 
-import math
-
 import numpy as np
-import pandas as pd
 
 from gates.criterion import Measured, criteria_of, criterion
 from gates.engine import Decision, GateSpec, Judged
-from gates.evidence import Array, Evidence, MissingEvidenceError, flags
-from gates.stress import cost, trial
-from gates.stress.rollouts import ROLLOUTS, STRESS, StressSettings, rollouts
+from gates.evidence import Evidence, MissingEvidenceError, flags
+from gates.stress import cost, safety, trial
+from gates.stress.choice import choose
+from gates.stress.pairs import paired_differences
+from gates.stress.rollouts import ROLLOUTS, STRESS, StressSettings
 from genpolicy.evidence.rows.stress import RolloutRow
 from genpolicy.statistics.eprocess import paired_e_value
 
@@ -42,35 +41,6 @@ def promotion_e_value(evidence: Evidence, settings: StressSettings, candidate: s
     return Measured(value, caveat=text)
 
 
-def paired_differences(
-    evidence: Evidence, settings: StressSettings, method: str, baseline: str
-) -> Array:
-    """Success of `method` minus that of `baseline`, per start. Shape (planned_starts,).
-
-    All conditions and seeds of a start are one draw, so that the pairs are independent.
-    """
-    own, other = (
-        success_by_start(evidence, settings, method),
-        success_by_start(evidence, settings, baseline),
-    )
-    common = own.index.intersection(other.index)[: settings.planned_starts]
-    if len(common) < settings.planned_starts:
-        raise MissingEvidenceError(f"only {len(common)} starts are shared with {baseline}")
-    return np.asarray(own[common].to_numpy() - other[common].to_numpy(), dtype=np.float64)
-
-
-def success_by_start(
-    evidence: Evidence, settings: StressSettings, method: str
-) -> "pd.Series[float]":
-    """Mean success of a method per start, over conditions and training seeds, in start order."""
-    rows = rollouts(evidence, settings, method)
-    if rows["success"].isna().any():
-        raise MissingEvidenceError(f"{method} has a rollout without outcome")
-    rows = rows.assign(success=flags(rows, "success").astype(np.float64))
-    means = rows.groupby(["start", "perturbation"])["success"].mean()
-    return means.groupby("start").mean().sort_index()
-
-
 def best_baseline(evidence: Evidence, settings: StressSettings) -> str:
     """The simple method with the highest success over all planned conditions.
 
@@ -87,20 +57,11 @@ def best_baseline(evidence: Evidence, settings: StressSettings) -> str:
 
 
 def _decide(judged: Judged) -> Decision:
-    """Promote the passing candidate with the most evidence, or return to the best baseline."""
+    """Promote a passing candidate, or either of several, or return to the best baseline."""
     if judged.verdict == "INCONCLUSIVE":
         return Decision("No decision: complete the evidence, then judge again.")
     if judged.verdict == "PASS":
-        values = {
-            answer.candidate: answer.measured if answer.measured is not None else -math.inf
-            for answer in judged.answers
-            if answer.id == promotion_e_value.id and answer.candidate
-        }
-        passed = sorted(
-            (name for name, one in judged.candidates.items() if one == "PASS"),
-            key=lambda name: (-values.get(name, -math.inf), name),
-        )
-        return Decision(f"promote {passed[0]}", promoted=passed[0])
+        return choose(judged)
     try:
         return Decision(f"return to {best_baseline(judged.evidence, judged.settings)}")
     except MissingEvidenceError as error:
@@ -110,13 +71,14 @@ def _decide(judged: Judged) -> Decision:
 GATE = GateSpec(
     gate="D",
     settings=StressSettings,
-    criteria=criteria_of(vars(trial), vars(cost), globals()),
+    criteria=criteria_of(vars(trial), vars(cost), vars(safety), globals()),
     bind=(f"{STRESS}/journals/*.mcap",),
     back_to="the simpler policy",
     go_on="Draft the trial card.",
     caveats=(
         "Simulation: contact, sensing and delays are models; nothing here was seen on hardware.",
         "Starts are the unit of independence; conditions and seeds of one start are averaged.",
+        "Every cost and every bound of success holds in each planned condition, not on average.",
         "Only methods matched in data, encoder, horizons, resets and deadlines are compared.",
     ),
     below="C",

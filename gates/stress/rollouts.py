@@ -1,6 +1,6 @@
 """Rollouts of the matched comparison, and the settings of Gate D that say which must be there."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import ClassVar
 
 import pandas as pd
@@ -14,7 +14,13 @@ from genpolicy.evidence.rows.stress import RolloutRow
 
 STRESS = "artifacts/stress"
 ROLLOUTS = f"{STRESS}/rollouts.parquet"
+INVOCATIONS = f"{STRESS}/invocations.parquet"
 NOMINAL = "nominal"
+DRILL = "recovery_drill"
+"""Condition in which recovery is called for on every start, so that it is exercised."""
+
+Interval = tuple[float, float, float]
+"""Share or quantile, lower and upper end."""
 
 
 class StressSettings(CandidateSettings):
@@ -26,7 +32,9 @@ class StressSettings(CandidateSettings):
         margin: Gain in success share to be shown.
         family_alpha: Probability of any wrong promotion.
         planned_starts: Starts planned; fewer recorded ones leave the gate without a verdict.
-        minimum_power: Share of simulated trials in which each verdict must be reached.
+        planned_effect: Success of baseline and candidate that the test must be able to tell apart.
+        execution_horizon: Actions of a chunk that may be executed.
+        action_period_s: Period of the actions, s.
     """
 
     homes: ClassVar[Mapping[str, str]] = {
@@ -36,6 +44,9 @@ class StressSettings(CandidateSettings):
         "margin": "stress.margin",
         "family_alpha": "stress.alpha",
         "planned_starts": "stress.starts",
+        "planned_effect": "stress.planned_effect",
+        "execution_horizon": "horizons.execution_horizon",
+        "action_period_s": "horizons.action_period_s",
     }
 
     candidates: tuple[str, ...] = Field(min_length=1)
@@ -44,7 +55,14 @@ class StressSettings(CandidateSettings):
     margin: float = Field(gt=-1.0, lt=1.0)
     family_alpha: float = Field(gt=0.0, lt=1.0)
     planned_starts: int = Field(gt=0)
-    minimum_power: float = Field(gt=0.0, le=1.0)
+    planned_effect: tuple[float, float]
+    execution_horizon: int = Field(gt=0)
+    action_period_s: float = Field(gt=0.0)
+
+    @property
+    def usable_s(self) -> float:
+        """How long after its observation a chunk still has an action to execute, s."""
+        return self.execution_horizon * self.action_period_s
 
     @property
     def alpha(self) -> float:
@@ -77,6 +95,29 @@ def rollouts(evidence: Evidence, settings: StressSettings, method: str) -> pd.Da
             f"planned {settings.planned_starts}"
         )
     return rows
+
+
+def in_every_condition(
+    rows: pd.DataFrame, conditions: Sequence[str], measure: Callable[[pd.DataFrame, str], Interval]
+) -> Measured:
+    """An upper bound that must hold in each of some conditions: that of the worst one.
+
+    A policy that breaks the limit in some condition passes that condition with at most the error
+    of one bound, so the bounds need no correction for their number (intersection-union).
+
+    Args:
+        rows: Rollouts, or invocations, of one method.
+        conditions: Where it must hold.
+        measure: Point and ends of the interval in one condition, from its rows and its name.
+    """
+    found = []
+    for condition in conditions:
+        point, lower, upper = measure(rows[rows["perturbation"] == condition], condition)
+        found.append((upper, lower, point, condition))
+    upper, lower, point, condition = max(found)
+    others = ", ".join(f"{name} {end:.4g}" for end, _, _, name in found if name != condition)
+    text = f"worst in {condition}: {point:.4g}, bounded by {upper:.4g}"
+    return Measured(upper, (lower, upper), text + (f"; {others}" if others else ""))
 
 
 def success_lower(

@@ -35,11 +35,15 @@ def _starts(evidence: Evidence, settings: StressSettings, method: str) -> set[tu
 
 @criterion(
     ">=",
-    question="Could the test have come out either way at this size?",
+    question="Would a gain worth having be found, and none where there is none, at this size?",
     look_at="Evaluator: too few starts for this margin; plan more before looking at results.",
 )
 def verdict_reachable(evidence: Evidence, settings: StressSettings) -> Measured:
-    """1 if the pre-registered test reaches both verdicts often enough, else 0."""
+    """Share of simulated trials that end right: where the planned effect holds, and the margin.
+
+    The lower of two: promotion in the world of the planned effect, and return in the worlds in
+    which the gain is at most the margin.
+    """
     document = evidence.document(f"{STRESS}/power.json")
     stated = {"margin": settings.margin, "alpha": settings.alpha, "pairs": settings.planned_starts}
     for key, value in stated.items():
@@ -48,11 +52,20 @@ def verdict_reachable(evidence: Evidence, settings: StressSettings) -> Measured:
     rows: Any = document.get("rows")
     if not isinstance(rows, list) or not rows:
         raise MissingEvidenceError("the power table has no rows")
-    promote = max(number(row, "promote_share") for row in rows)
-    back = max(number(row, "return_share") for row in rows)
-    reachable = min(promote, back) >= settings.minimum_power
-    text = f"promote reached in {promote:.3g} of simulated trials, return in {back:.3g}"
-    return Measured(float(reachable), caveat=text)
+    worlds = {
+        (number(row, "baseline_success"), number(row, "candidate_success")): row for row in rows
+    }
+    without = {w: row for w, row in worlds.items() if not w[1] - w[0] > settings.margin + 1e-9}
+    if settings.planned_effect not in worlds or not without:
+        raise MissingEvidenceError("the power table lacks the planned effect or a world without")
+    promote = number(worlds[settings.planned_effect], "promote_share")
+    back = min(number(row, "return_share") for row in without.values())
+    baseline, candidate = settings.planned_effect
+    text = (
+        f"success {baseline:g} against {candidate:g} is promoted in {promote:.3g} of simulated "
+        f"trials; a gain of at most the margin is returned in {back:.3g}"
+    )
+    return Measured(min(promote, back), caveat=text)
 
 
 @criterion(

@@ -28,7 +28,8 @@ class ExecutionSettings(Settings):
         deadline_s: An invocation that takes longer has missed its deadline and is given up.
         watchdog_s: Silence after which the stub holds.
         queue_capacity: Chunks kept.
-        maximum_age_s: Largest action age by phase; one number for all.
+        maximum_age_s: Largest action age by phase, less than a chunk's validity (execution
+            horizon times period), or it would refuse nothing; one number for all.
         maximum_divergence_m: Measured against commanded TCP, beyond which chunks are void.
         force_limit_n: Contact force by phase at which the simulated supervisor stops. A fixture
             of the simulation, not a value for any robot.
@@ -84,7 +85,12 @@ class ExecutionSettings(Settings):
             )
 
     def executor(self, horizons: HorizonConfig) -> ExecutorSettings:
-        """Settings of the executor and its stub."""
+        """Settings of the executor and its stub.
+
+        Raises:
+            ConfigError: An age limit that no chunk can reach: it is void before.
+        """
+        self._require_ages_that_bind(horizons)
         return ExecutorSettings(
             execution_horizon=horizons.execution_horizon,
             action_period_s=horizons.action_period_s,
@@ -94,6 +100,17 @@ class ExecutionSettings(Settings):
             replan_lead_steps=self.replan_lead_steps,
             maximum_divergence_m=self.maximum_divergence_m,
         )
+
+    def _require_ages_that_bind(self, horizons: HorizonConfig) -> None:
+        valid_s = horizons.execution_horizon * horizons.action_period_s
+        for phase, age_s in self.maximum_age_s.items():
+            if not age_s < valid_s - 1e-9:
+                raise ConfigError(
+                    where=f"execution.maximum_age_s of phase {phase}",
+                    found=f"{age_s} s",
+                    expected=f"less than {valid_s:g} s, after which a chunk is no longer valid",
+                    action="Lower it: a limit that nothing can reach refuses nothing.",
+                )
 
     def supervisor(self, horizons: HorizonConfig) -> SupervisorSettings:
         """Settings of the simulated supervisor."""

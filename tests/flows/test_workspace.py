@@ -76,3 +76,13 @@ def test_a_folder_with_other_things_is_left_alone(checkout: Path, tmp_path: Path
 def test_outputs_of_every_kind_are_found() -> None:
     stage = {"outs": ["a", {"b": {"cache": False}}], "metrics": [{"m.json": {}}], "plots": ["p"]}
     assert declared_outputs({"stages": {"s": stage}}) == ("a", "b", "m.json", "p")
+
+
+def test_an_override_may_declare_a_criterion_not_applicable_in_place_of_its_limit() -> None:
+    base = {"gate_d": {"limits": {"safety": {"force": [80, "why"], "stub": [0, "why"]}}}}
+    waived = {"not_applicable": {"safety": {"force": "twelve starts"}}}
+    assert merged(base, {"gate_d": waived}) == {
+        "gate_d": {"limits": {"safety": {"stub": [0, "why"]}}, **waived}
+    }
+    with pytest.raises(ConfigError, match="not_applicable is not a key"):
+        merged({"record": {"episodes": 3}}, {"record": waived})

@@ -41,6 +41,7 @@ from genpolicy.evidence.rows.reproducibility import CoverageRow, LatencyRow, Nfe
 from genpolicy.evidence.rows.shadow import CandidateRow, ShadowCountRow, ShadowStubRow
 from genpolicy.evidence.rows.stress import (
     ConservationRow,
+    InvocationRow,
     RolloutRow,
     StressCountRow,
     StressStubRow,
@@ -52,8 +53,9 @@ from genpolicy.integrity.tables import read_table, write_table
 BASELINES = ("bc", "chunked_bc", "act")
 DRAWN = "ibc"
 CANDIDATES = ("diffusion", "flow")
-CONDITIONS = ("nominal", "camera_delay", "compute_contention")
-STARTS = 40
+CONDITIONS = ("nominal", "camera_delay", "recovery_drill")
+STARTS = 80
+INVOCATIONS = 20
 PNG = base64.b64decode(
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAAAAAA6fptVAAAACklEQVR4nGNgAAAAAgABSK+kcQAAAABJRU5ErkJggg=="
 )
@@ -88,7 +90,9 @@ def _cause() -> dict[str, Any]:
 
 
 PARAMS: dict[str, Any] = {
+    "seed": 1,
     "confidence": 0.95,
+    "horizons": {"execution_horizon": 8, "action_period_s": 0.05},
     "task": {"name": "tabletop_insertion"},
     "train_baselines": {"samplers": {name: {} for name in (*BASELINES, DRAWN)}},
     "measure_baselines": {"latent": {"method": "act"}},
@@ -99,6 +103,7 @@ PARAMS: dict[str, Any] = {
         "perturbations": {name: {} for name in CONDITIONS},
         "margin": 0.1,
         "alpha": 0.1,
+        "planned_effect": [0.5, 0.95],
     },
     "gate_a": {
         "cause": _cause(),
@@ -165,13 +170,16 @@ PARAMS: dict[str, Any] = {
         ),
     },
     "gate_d": {
-        "minimum_power": 0.8,
         "limits": by_owner(
             unmatched_starts=(0, "model"),
-            verdict_reachable=(1, "model"),
+            verdict_reachable=(0.8, "model"),
             nominal_success_lower=(0.7, "model"),
             deadline_miss_upper=(0.1, "controller"),
-            action_age_p95_s=(0.5, "perception"),
+            latency_p95_s=("derived", "controller"),
+            hold_share_upper=(0.25, "controller"),
+            rejection_share_upper=(0.2, "model"),
+            reset_upper=(0.1, "safety"),
+            recovery_success_lower=(0.5, "safety"),
             fallback_share_upper=(0.15, "safety"),
             intervention_upper=(0.1, "safety"),
             stub_violations=(0, "safety"),
@@ -803,7 +811,7 @@ def _shadow(root: Path) -> None:
         "shadow/stub.parquet",
         ShadowStubRow,
         [
-            {"method": m, "fixture": f, "delivered": 9, "arrivals": 200, "stale": 0, "invalid": 0}
+            {"method": m, "fixture": f, "delivered": 400, "arrivals": 900, "stale": 0, "invalid": 0}
             for m in CANDIDATES
             for f in FIXTURES
         ],
@@ -842,6 +850,11 @@ def _succeeds(method: str, start: int) -> bool:
     return not (method == "flow" and start == 7)
 
 
+def _answer_s(method: str, lot: int) -> float:
+    """Between 0.05 and 0.06 s; of diffusion, 0.02 s more."""
+    return 0.05 + 0.0001 * (lot % 100) + (0.02 if method == "diffusion" else 0.0)
+
+
 def _stress(root: Path) -> None:
     methods = (*BASELINES, *CANDIDATES)
     rows = []
@@ -863,13 +876,13 @@ def _stress(root: Path) -> None:
                         "action_ticks": 150,
                         "hold_ticks": 8,
                         "fallback_ticks": 2,
-                        "invocations": 20,
+                        "invocations": INVOCATIONS,
                         "deadline_misses": 0,
                         "discards": 1,
                         "rejections": 1,
                         "rejected_by": "",
-                        "recovery_attempted": False,
-                        "recovered": False,
+                        "recovery_attempted": condition == "recovery_drill",
+                        "recovered": success and condition == "recovery_drill",
                         "interventions": 0,
                         "action_age_p50_s": 0.1,
                         "action_age_p95_s": 0.2 + 0.001 * start,
@@ -880,6 +893,25 @@ def _stress(root: Path) -> None:
                     }
                 )
     table(root, "stress/rollouts.parquet", RolloutRow, rows)
+    table(
+        root,
+        "stress/invocations.parquet",
+        InvocationRow,
+        [
+            {
+                "method": method,
+                "seed": 0,
+                "perturbation": condition,
+                "start": start,
+                "invocation": number,
+                "latency_s": 0.9 if number == 0 else _answer_s(method, start + 7 * number),
+            }
+            for method in methods
+            for condition in CONDITIONS
+            for start in range(STARTS)
+            for number in range(INVOCATIONS)
+        ],
+    )
     cells = [(m, c) for m in methods for c in CONDITIONS]
     table(
         root,

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from gates.bounds import counted_interval, share_interval, upper_quantile
+from gates.bounds import counted_interval, draws_for_quantile, share_interval, upper_quantile
 from gates.evidence import MissingEvidenceError
-from genpolicy.statistics.intervals import clopper_pearson
+from genpolicy.seeds import stream
+from genpolicy.statistics.intervals import clopper_pearson, order_statistic_interval
 
 
 def share(hits, clusters, favourable):
@@ -44,11 +45,28 @@ def test_no_rows_are_missing_evidence():
     with pytest.raises(MissingEvidenceError):
         share([], [], favourable=True)
     with pytest.raises(MissingEvidenceError):
-        upper_quantile(np.zeros(0), 0.95, confidence=0.95)
+        p95(np.zeros(0), [])
 
 
-def test_a_quantile_is_a_value_that_occurred_and_few_values_have_no_interval():
-    values = np.arange(1.0, 11.0)
-    assert upper_quantile(values, 0.95, confidence=0.95) == (10.0, None)
-    point, interval = upper_quantile(np.arange(1000.0), 0.95, confidence=0.95)
-    assert point in np.arange(1000.0) and interval[0] < point < interval[1]
+def p95(values, clusters):
+    return upper_quantile(values, clusters, 0.95, confidence=0.95, rng=stream(1, "bounds"))
+
+
+def test_a_quantile_is_a_value_that_occurred_inside_its_interval():
+    values = np.arange(1000.0)
+    point, interval = p95(values, np.arange(1000))
+    assert point in values and interval[0] < point < interval[1]
+    assert interval == order_statistic_interval(values, 0.95, 0.95)
+
+
+def test_a_quantile_that_the_sample_cannot_bound_is_missing_evidence_and_never_the_point():
+    fewest = draws_for_quantile(0.95, 0.95)
+    assert fewest == 72 and 0.95**72 <= 0.025 < 0.95**71
+    assert p95(np.arange(float(fewest)), np.arange(fewest))[1][1] == fewest - 1
+    with pytest.raises(MissingEvidenceError, match=r"bound no 95% quantile .* 72 draws"):
+        p95(np.arange(fewest - 1.0), np.arange(fewest - 1))
+
+
+def test_copies_of_a_few_draws_bound_no_quantile():
+    with pytest.raises(MissingEvidenceError, match="of 10 independent draws"):
+        p95(np.arange(1000.0), np.repeat(np.arange(10), 100))

@@ -241,7 +241,18 @@ WORSE = {
             ),
         ),
         "deadline_miss_upper": _table(ROLL, lambda s: cells("deadline_misses", int(20 * s))),
-        "action_age_p95_s": _table(ROLL, lambda s: cells("action_age_p95_s", 0.3 + s)),
+        "latency_p95_s": _table(
+            STRESS + "invocations.parquet", lambda s: cells("latency_s", 0.4 + 9 * s, share=0.1 + s)
+        ),
+        "hold_share_upper": _table(ROLL, lambda s: cells("hold_ticks", int(160 * s))),
+        "rejection_share_upper": _table(ROLL, lambda s: cells("rejections", int(20 * s))),
+        "reset_upper": _table(ROLL, lambda s: cells("outcome", "force_stop", share=s)),
+        "recovery_success_lower": _table(
+            ROLL,
+            lambda s: cells(
+                "recovered", False, where=lambda f: f["recovery_attempted"], share=0.5 + s / 2
+            ),
+        ),
         "fallback_share_upper": _table(ROLL, lambda s: cells("fallback_ticks", int(160 * s))),
         "intervention_upper": _table(ROLL, lambda s: cells("interventions", 1, share=s)),
         "stub_violations": _table(
@@ -286,7 +297,13 @@ TABLES = {
     ],
     "B": ["reload/samples", "reload/nfe", "reload/coverage", "latency/latency"],
     "C": ["shadow/candidates", "shadow/stub", "shadow/counts"],
-    "D": ["stress/rollouts", "stress/stub", "stress/conservation", "stress/counts"],
+    "D": [
+        "stress/rollouts",
+        "stress/invocations",
+        "stress/stub",
+        "stress/conservation",
+        "stress/counts",
+    ],
 }
 
 
@@ -352,7 +369,7 @@ def test_empty_table_is_inconclusive_never_pass(gate, path, ladder):
         ("B", "reload/samples", "max_abs_difference"),
         ("B", "reload/coverage", "modes_covered_share"),
         ("C", "shadow/candidates", "position_change_m"),
-        ("D", "stress/rollouts", "action_age_p95_s"),
+        ("D", "stress/invocations", "latency_s"),
         ("D", "stress/rollouts", "force_peak_n"),
     ],
 )

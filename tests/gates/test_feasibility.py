@@ -1,8 +1,15 @@
 """Gate C in particular: checks that were never left out are undetected."""
 
 import evidence
+import numpy as np
+import pytest
+from asked import asked
+from editing import cells
 
+from gates.evidence import MissingEvidenceError
+from gates.feasibility import boundary_jerk_p95_m_s3, projection_p95_m, stub_violation_upper
 from gates.proof import judge
+from genpolicy.statistics.intervals import clopper_pearson
 
 
 def _found(report, name):
@@ -14,3 +21,63 @@ def test_a_check_that_was_never_disabled_is_undetected(ladder):
     report = judge(ladder, "C")
     assert report.verdict == "FAIL"
     assert "representation (not tried)" in _found(report, "mutants_undetected")[0].caveat
+
+
+STUB, SAMPLED = "shadow/stub.parquet", "shadow/candidates.parquet"
+
+
+def of(frame):
+    return frame["method"] == "flow"
+
+
+def bound(root):
+    return asked(root, stub_violation_upper, "flow", gate="C")
+
+
+def test_a_bad_arrival_is_one_of_the_observations_and_not_of_the_rows(ladder):
+    """Eight actions of one chunk arrive together: 400 observations are 400 trials, not 5400."""
+    assert bound(ladder).value == clopper_pearson(0, 400, 0.95)[1]
+    evidence.edit_table(ladder, STUB, cells("stale", 1, where=of, share=0.01))
+    assert bound(ladder).value == clopper_pearson(1, 400, 0.95)[1]
+    assert "1 of 400 observations" in bound(ladder).caveat
+
+
+def test_too_few_observations_are_no_proof_of_a_small_share_and_no_failure(ladder):
+    evidence.edit_table(ladder, STUB, cells("delivered", 120, where=of))
+    report = judge(ladder, "C")
+    found = next(c for c in _found(report, "stub_violation_upper") if c.candidate == "flow")
+    assert (found.verdict, found.measured) == ("INCONCLUSIVE", None)
+    assert "none bad of 120 observations" in found.caveat and "0.03027" in found.caveat
+    evidence.edit_table(ladder, STUB, cells("delivered", 0, where=of))
+    assert judge(ladder, "C").candidates["flow"] == "INCONCLUSIVE"
+    # One that is bad among 120 is no want of evidence.
+    evidence.edit_table(ladder, STUB, cells("delivered", 120, where=of))
+    evidence.edit_table(ladder, STUB, cells("invalid", 1, where=of, share=0.01))
+    assert judge(ladder, "C").candidates["flow"] == "FAIL"
+
+
+@pytest.mark.parametrize(
+    ("criterion", "column"),
+    [(projection_p95_m, "position_change_m"), (boundary_jerk_p95_m_s3, "boundary_jerk_m_s3")],
+)
+def test_a_p95_is_judged_at_the_upper_end_over_observations(ladder, criterion, column):
+    """One observation of twenty is far off in all its candidates: p95 may lie there by luck."""
+
+    def change(frame):
+        far = of(frame) & (frame["fixture"] == "held_out") & (frame["observation"] == 3)
+        near = of(frame) & (frame["fixture"] == "held_out") & ~far
+        values = np.where(far, 900.0, np.where(near, 0.001, frame[column].astype(float)))
+        return frame.assign(**{column: values})
+
+    evidence.edit_table(ladder, SAMPLED, change)
+    found = asked(ladder, criterion, "flow", gate="C")
+    assert found.interval == (0.001, 900.0) and found.value == 900.0
+    assert "p95 0.001, largest 900" in found.caveat or "p95 900" in found.caveat
+    assert judge(ladder, "C").candidates["flow"] == "FAIL"
+
+
+def test_a_p95_of_a_few_observations_is_not_measured(ladder):
+    few = lambda f: f[~(of(f) & (f["fixture"] == "held_out") & (f["observation"] > 9))]  # noqa: E731
+    evidence.edit_table(ladder, SAMPLED, few)
+    with pytest.raises(MissingEvidenceError, match="10 independent draws"):
+        asked(ladder, projection_p95_m, "flow", gate="C")

@@ -32,6 +32,11 @@ DROPPED = {
 }  # fmt: skip
 
 ALWAYS_RUN = "task"
+UNFORMED = {
+    "gate_c": {"controller": ("projection_p95_m", "boundary_jerk_p95_m_s3")},
+    "gate_d": {"controller": ("latency_p95_s",), "safety": ("force_peak_p95_n", "recovery_success_lower")},
+}
+"""Criteria that a handful of starts leaves without a verdict, whatever the limit."""
 LEFT_ALONE = {
     "energy_head": {"name": "derivative_free", "steps": 16, "population": 64},
     "single_action": {"name": "direct"},
@@ -53,6 +58,10 @@ def make_small_ladder(target: Path) -> Path:
         overrides.setdefault(name, {})["limits"] = {
             owner: {key: widest[key] for key in entries if key in widest}
             for owner, entries in params[name]["limits"].items()
+        }
+    for gate, owners in UNFORMED.items():
+        overrides[gate]["not_applicable"] = {
+            owner: dict.fromkeys(names, REASON) for owner, names in owners.items()
         }
     make_workspace(ROOT, target, overrides)
 

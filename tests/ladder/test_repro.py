@@ -48,7 +48,7 @@ def test_a_second_repro_does_nothing(copy: Path) -> None:
 def test_judging_one_gate_again_changes_its_report_only(copy: Path) -> None:
     """A moved threshold, `dvc repro -s gate_c`: seconds, and nothing but that gate's report."""
     before = hashes(copy, "artifacts", "reports")
-    set_limit(copy, "gate_c", "projection_p95_m", 1e8)
+    set_limit(copy, "gate_c", "mode_admissible_gap", 1e8)
     outcome, ran = repro(copy, "gate_c", single_item=True)
     assert (outcome.code, ran) == (0, ["gate_c"])
     after = hashes(copy, "artifacts", "reports")

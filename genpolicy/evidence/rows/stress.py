@@ -65,6 +65,27 @@ class RolloutRow:
 
 
 @dataclass(frozen=True)
+class InvocationRow:
+    """`invocations.parquet` of stress: one invocation of the policy.
+
+    Attributes:
+        method: The method.
+        seed: Number of its training seed.
+        perturbation: What was injected.
+        start: Number of the initial state.
+        invocation: Count in this rollout; 0 is cold.
+        latency_s: From sensor event to delivery, the sum of all terms, s.
+    """
+
+    method: str
+    seed: int
+    perturbation: str
+    start: int
+    invocation: int
+    latency_s: float
+
+
+@dataclass(frozen=True)
 class StressCountRow:
     """`counts.parquet` of stress: actions discarded, by reason.
 

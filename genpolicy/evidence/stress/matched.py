@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from genpolicy.candidates.judged import JudgedPolicy
 from genpolicy.evidence.admission_context import make_checker
-from genpolicy.evidence.rows.stress import RolloutRow, StressStubRow
+from genpolicy.evidence.rows.stress import InvocationRow, RolloutRow, StressStubRow
 from genpolicy.evidence.shadow.session import Cell
 from genpolicy.evidence.stress.latency import LatencyModel
 from genpolicy.evidence.stress.perturbations import Perturbation
@@ -81,12 +81,14 @@ class ShardResult:
 
     Attributes:
         rollouts: One row per start.
+        invocations: One row per invocation.
         accounts: Balance of chunks, per rollout.
         ages_s: Every action age, s.
         stub: Arrivals, stale and invalid offers.
     """
 
     rollouts: list[RolloutRow]
+    invocations: list[InvocationRow]
     accounts: list[Account]
     ages_s: Array
     stub: StressStubRow
@@ -134,6 +136,7 @@ def run_shard(shard: Shard) -> ShardResult:
     parts = [rollout_row(shard, rollout) for rollout in rollouts]
     return ShardResult(
         rollouts=[row for row, _ in parts],
+        invocations=[row for rollout in rollouts for row in invocation_rows(shard, rollout)],
         accounts=[rollout.executor.conservation().chunks for rollout in rollouts],
         ages_s=np.concatenate([ages for _, ages in parts]),
         stub=StressStubRow(
@@ -231,6 +234,21 @@ def rollout_row(shard: Shard, rollout: Rollout) -> tuple[RolloutRow, Array]:
         mode=rollout.fixture.task.mode_of(path, rollout.history[-1]),
     )
     return row, ages
+
+
+def invocation_rows(shard: Shard, rollout: Rollout) -> list[InvocationRow]:
+    """Rows of `invocations.parquet`, in the order in which they began."""
+    return [
+        InvocationRow(
+            method=shard.judged.name,
+            seed=shard.judged.seed,
+            perturbation=shard.perturbation,
+            start=rollout.start_index,
+            invocation=number,
+            latency_s=latency_s,
+        )
+        for number, latency_s in enumerate(rollout.tally.latencies_s)
+    ]
 
 
 def _quantile(values: Array, level: float) -> float | None:

@@ -14,6 +14,14 @@ from pydantic import Field
 from genpolicy.contract.settings import Settings
 from genpolicy.seeds import stream
 
+OPEN_PUSH_S = (0.3, 1.5)
+"""Window of a push in the open, s after the start."""
+CONTACT_PUSH_S = (0.8, 1.8)
+"""Window of a push in contact, s after the first tick in a phase of contact: first it lowers."""
+PUSH_DURATION_S = 0.2
+DRILL_S = (0.5, 3.0)
+"""Window of a drill, s after the start: from the open into contact."""
+
 
 @dataclass(frozen=True)
 class Injection:
@@ -109,10 +117,25 @@ class Nominal(Settings):
 
 
 class SidewaysPush(Settings):
-    """The hand is pushed sideways once per rollout, with `force_n`, N."""
+    """The hand is pushed sideways: once in the open, once more where contact begins.
+
+    Without the second push a policy that inserts cleanly never touches anything, and nobody knows
+    how hard it would. In contact the push must move the hand through the play, so it is harder.
+
+    Attributes:
+        force_n: Push in the open, N.
+        contact_force_n: Push in contact, N; 0 for none.
+    """
 
     kind: Literal["push"] = "push"
     force_n: float = Field(gt=0.0)
+    contact_force_n: float = Field(default=0.0, ge=0.0)
+
+
+class RecoveryDrill(Settings):
+    """Recovery is called for once per rollout, whatever the policy does, at a drawn time."""
+
+    kind: Literal["recovery_drill"] = "recovery_drill"
 
 
 Perturbation = Annotated[
@@ -122,7 +145,8 @@ Perturbation = Annotated[
     | NetworkJitter
     | QueueReorder
     | ChunkDrop
-    | SidewaysPush,
+    | SidewaysPush
+    | RecoveryDrill,
     Field(discriminator="kind"),
 ]
 
@@ -144,24 +168,39 @@ class Push:
     """One sideways push on the hand.
 
     Attributes:
-        time_s: When it begins, s after the start.
+        time_s: When it begins, s after the start, or after contact begins.
         force_n: Sideways force, N, signed.
         duration_s: How long, s.
+        in_contact: Whether it waits for a phase of contact.
     """
 
     time_s: float
     force_n: float
     duration_s: float
+    in_contact: bool = False
 
 
-def push(perturbation: Perturbation, *, root_seed: int, name: str, start: int) -> Push | None:
-    """The push of this start, or none where the perturbation pushes nobody."""
+def pushes(
+    perturbation: Perturbation, *, root_seed: int, name: str, start: int
+) -> tuple[Push, ...]:
+    """The pushes of this start; none where the perturbation pushes nobody."""
     if not isinstance(perturbation, SidewaysPush):
-        return None
+        return ()
     generator = stream(root_seed, "push", name, start)
-    sign = 1.0 if generator.random() < 0.5 else -1.0
-    return Push(
-        time_s=float(generator.uniform(0.3, 1.5)),
-        force_n=sign * perturbation.force_n,
-        duration_s=0.2,
-    )
+    found = []
+    for force_n, window_s in (
+        (perturbation.force_n, OPEN_PUSH_S),
+        (perturbation.contact_force_n, CONTACT_PUSH_S),
+    ):
+        sign = 1.0 if generator.random() < 0.5 else -1.0
+        time_s = float(generator.uniform(*window_s))
+        in_contact = window_s is CONTACT_PUSH_S
+        found.append(Push(time_s, sign * force_n, PUSH_DURATION_S, in_contact))
+    return tuple(push for push in found if push.force_n != 0.0)
+
+
+def drill_s(perturbation: Perturbation, *, root_seed: int, name: str, start: int) -> float | None:
+    """When recovery is called for in this start, s after it; None where there is no drill."""
+    if not isinstance(perturbation, RecoveryDrill):
+        return None
+    return float(stream(root_seed, "drill", name, start).uniform(*DRILL_S))

@@ -19,8 +19,8 @@ from genpolicy.evidence.admission_context import (
     Session,
     context_of,
 )
+from genpolicy.evidence.stress.disturbance import Disturbance
 from genpolicy.evidence.stress.fallback import Fallback
-from genpolicy.evidence.stress.perturbations import Push, push
 from genpolicy.evidence.stress.state import Fixture, InFlight, Outcome, Tally, in_flight
 from genpolicy.execution.command import Command
 from genpolicy.execution.executor import Executor
@@ -81,8 +81,7 @@ class Rollout:
         before = [self.world.last_action] * COMMANDS_AT_THE_BOUNDARY
         self._commanded: deque[Array] = deque(before, maxlen=COMMANDS_AT_THE_BOUNDARY)
         self.history: deque[Array] = deque(maxlen=fixture.horizons.observation_horizon)
-        schedule, seed, name = fixture.schedule, fixture.root_seed, fixture.perturbation
-        self._push: Push | None = push(schedule, root_seed=seed, name=name, start=start_index)
+        self._disturbance = Disturbance(fixture, self.world, start=start_index)
         self.executor.set_active(0.0, fixture.checkpoint, fixture.sampler)
 
     @property
@@ -176,9 +175,7 @@ class Rollout:
             self.wanted = None
         command = self.executor.tick(now_s)
         self._apply(command, now_s)
-        if self._push is not None and now_s >= self._push.time_s:
-            self.world.apply_force(np.array([0.0, self._push.force_n, 0.0]), self._push.duration_s)
-            self._push = None
+        self._disturbance.push(now_s)
         self.world.advance()
         self.tick += 1
         self.tally.force_peak_n = max(self.tally.force_peak_n, self.world.contact_force_n)
@@ -286,8 +283,8 @@ class Rollout:
     def _recover(self, now_s: float) -> None:
         last_s = self._last_command_s if self._last_command_s is not None else 0.0
         silent = now_s - last_s >= self.fixture.execution.hold_before_recovery_s - 1e-9
-        if not self.recovery.active and silent:
-            self.recovery.trigger(now_s, self.world.phase, "silence")
+        if not self.recovery.active and (silent or self._disturbance.drill(now_s)):
+            self.recovery.trigger(now_s, self.world.phase, "silence" if silent else "drill")
         if not self.recovery.active:
             return
         state = step(

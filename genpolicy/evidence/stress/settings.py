@@ -1,9 +1,13 @@
 """Section `stress`: the matched comparison, registered before it runs."""
 
-from pydantic import Field
+from typing import Annotated
+
+from pydantic import Field, field_validator, model_validator
 
 from genpolicy.contract.settings import Settings
 from genpolicy.evidence.stress.perturbations import Perturbation
+
+Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
 class StressSettings(Settings):
@@ -17,6 +21,8 @@ class StressSettings(Settings):
         perturbations: What is injected, by name; `nominal` is one of them.
         margin: Pre-registered gain in success.
         alpha: Pre-registered family-wise error; each candidate gets its equal share.
+        planned_effect: Success of a baseline and of a candidate that is worth promoting; a gain
+            of this size must be found.
     """
 
     starts: int = Field(ge=1)
@@ -26,6 +32,19 @@ class StressSettings(Settings):
     perturbations: dict[str, Perturbation]
     margin: float
     alpha: float = Field(gt=0.0, lt=1.0)
+    planned_effect: tuple[Share, Share]
+
+    @field_validator("planned_effect", mode="before")
+    @classmethod
+    def _pair(cls, value: object) -> object:
+        return tuple(value) if isinstance(value, list) else value
+
+    @model_validator(mode="after")
+    def _effect_beyond_margin(self) -> "StressSettings":
+        baseline, candidate = self.planned_effect
+        if not candidate - baseline > self.margin:
+            raise ValueError("the planned effect must be larger than the margin")
+        return self
 
     def alpha_of_each(self, candidates: int) -> float:
         """Error that one of so many pre-registered candidates may spend (Bonferroni)."""

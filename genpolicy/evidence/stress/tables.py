@@ -13,6 +13,7 @@ from genpolicy.compute import map_shards
 from genpolicy.evidence.rows.stress import (
     AgeRow,
     ConservationRow,
+    InvocationRow,
     RolloutRow,
     StressCountRow,
     StressStubRow,
@@ -29,9 +30,8 @@ from genpolicy.seeds import stream
 from genpolicy.statistics.eprocess import power_table
 
 AGE_LEVELS = (0.0, 0.05, 0.25, 0.5, 0.75, 0.9, 0.95, 0.99, 1.0)
-POWER_SCENARIOS = ((0.5, 0.5), (0.9, 0.9), (0.5, 0.8), (0.3, 0.9), (0.1, 0.9))
 POWER_CORRELATION = 0.3
-POWER_TRIALS = 2000
+POWER_TRIALS = 4000
 
 
 def write_stress(folder: Path, shards: Sequence[Shard], *, workers: int, scheduler: str) -> None:
@@ -48,6 +48,8 @@ def write_stress(folder: Path, shards: Sequence[Shard], *, workers: int, schedul
     pairs = list(zip(shards, results, strict=True))
     rollouts = [row for _, result in pairs for row in result.rollouts]
     write_rows(folder / "rollouts.parquet", RolloutRow, rollouts)
+    invocations = [row for _, result in pairs for row in result.invocations]
+    write_rows(folder / "invocations.parquet", InvocationRow, invocations)
     counts: list[StressCountRow] = []
     balances: list[ConservationRow] = []
     for shard, result in pairs:
@@ -116,7 +118,7 @@ def power_document(settings: StressSettings, *, candidates: int, root_seed: int)
     """
     alpha = settings.alpha_of_each(candidates)
     rows = power_table(
-        POWER_SCENARIOS,
+        power_worlds(settings),
         margin=settings.margin,
         alpha=alpha,
         pairs=settings.starts,
@@ -130,6 +132,17 @@ def power_document(settings: StressSettings, *, candidates: int, root_seed: int)
         "pairs": settings.starts,
         "rows": [{key: _finite(value) for key, value in asdict(row).items()} for row in rows],
     }
+
+
+def power_worlds(settings: StressSettings) -> list[tuple[float, float]]:
+    """Worlds of the power table, baseline and candidate: no gain, just the margin, and more.
+
+    A start is one draw, as if all its conditions ended alike: the world with most noise.
+    """
+    baseline, margin = settings.planned_effect[0], settings.margin
+    lowest = min(max(baseline, -margin), 1.0 - margin)  # so that both are shares
+    worlds = [(baseline, baseline), (0.9, 0.9), (lowest, lowest + margin), settings.planned_effect]
+    return list(dict.fromkeys([*worlds, (0.3, 0.9), (0.1, 0.9)]))
 
 
 def _key(shard: Shard) -> dict[str, str]:

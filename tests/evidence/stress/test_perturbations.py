@@ -9,9 +9,11 @@ from genpolicy.evidence.stress.perturbations import (
     Injection,
     Nominal,
     Perturbation,
+    RecoveryDrill,
     SidewaysPush,
+    drill_s,
     injection,
-    push,
+    pushes,
 )
 
 KINDS = {
@@ -67,22 +69,44 @@ def test_each_kind_touches_what_it_names():
     assert at(settings("chunk_drop")) == Injection(dropped=True)
     sizes = [at(settings("network_jitter"), invocation=n).extra_s["network"] for n in range(200)]
     assert 0 <= min(sizes) < 0.01 and 0.11 < max(sizes) <= 0.12
-    for other in (Nominal(), SidewaysPush(force_n=15.0)):
+    for other in (Nominal(), SidewaysPush(force_n=15.0), RecoveryDrill()):
         assert at(other) == Injection()
+
+
+def pushed(item, start):
+    return pushes(item, root_seed=1, name="push", start=start)
 
 
 def test_a_push_is_drawn_once_per_start():
     item = SidewaysPush(force_n=15.0)
-    drawn = [push(item, root_seed=1, name="push", start=n) for n in range(100)]
-    assert drawn == [push(item, root_seed=1, name="push", start=n) for n in range(100)]
-    assert {p.force_n for p in drawn} == {-15.0, 15.0}
-    assert all(0.3 <= p.time_s <= 1.5 and p.duration_s == 0.2 for p in drawn)
-    assert len({p.time_s for p in drawn}) == 100
+    drawn = [pushed(item, n) for n in range(100)]
+    assert drawn == [pushed(item, n) for n in range(100)]
+    assert all(len(found) == 1 and not found[0].in_contact for found in drawn)
+    assert {p.force_n for (p,) in drawn} == {-15.0, 15.0}
+    assert all(0.3 <= p.time_s <= 1.5 and p.duration_s == 0.2 for (p,) in drawn)
+    assert len({p.time_s for (p,) in drawn}) == 100
+
+
+def test_a_push_in_contact_is_a_second_one_and_leaves_the_first_as_it_was():
+    both, open_only = SidewaysPush(force_n=15.0, contact_force_n=30.0), SidewaysPush(force_n=15.0)
+    drawn = [pushed(both, n) for n in range(100)]
+    assert [found[:1] for found in drawn] == [pushed(open_only, n) for n in range(100)]
+    assert all(found[1].in_contact and abs(found[1].force_n) == 30.0 for found in drawn)
+
+
+def test_a_drill_is_drawn_once_per_start_and_nobody_else_drills():
+    drawn = [drill_s(RecoveryDrill(), root_seed=1, name="drill", start=n) for n in range(100)]
+    assert drawn == [
+        drill_s(RecoveryDrill(), root_seed=1, name="drill", start=n) for n in range(100)
+    ]
+    assert all(0.5 <= time_s <= 3.0 for time_s in drawn) and len(set(drawn)) == 100
+    for item in (Nominal(), SidewaysPush(force_n=15.0)):
+        assert drill_s(item, root_seed=1, name="drill", start=0) is None
 
 
 def test_nobody_else_pushes():
-    for item in (Nominal(), ChunkDrop()):
-        assert push(item, root_seed=1, name="push", start=0) is None
+    for item in (Nominal(), ChunkDrop(), RecoveryDrill()):
+        assert pushed(item, 0) == ()
 
 
 @pytest.mark.parametrize(
@@ -92,6 +116,7 @@ def test_nobody_else_pushes():
         {"kind": "chunk_drop", "probability": float("nan")},
         {"kind": "camera_delay", "magnitude_s": -0.1}, {"kind": "camera_delay"},
         {"kind": "compute_contention", "factor": 0.5}, {"kind": "push", "force_n": 0.0},
+        {"kind": "push", "force_n": 1.0, "contact_force_n": -1.0},
         {"kind": "push", "force_n": 1.0, "probability": 0.5}, {"kind": "nominal", "factor": 2.0},
     ],
 )  # fmt: skip

@@ -8,6 +8,7 @@ from genpolicy.evidence.stress.settings import StressSettings
 PLAIN = {
     "starts": 10, "episode_limit_s": 20.0, "samples": 2, "baselines": ["bc"],
     "perturbations": {"nominal": {"kind": "nominal"}}, "margin": 0.1, "alpha": 0.05,
+    "planned_effect": [0.5, 0.8],
 }  # fmt: skip
 
 
@@ -20,6 +21,7 @@ def test_candidates_share_alpha_in_equal_parts():
 @pytest.mark.parametrize(
     "change",
     [{"starts": 0}, {"episode_limit_s": 0.0}, {"samples": 0}, {"alpha": 0.0}, {"alpha": 1.0},
+     {"planned_effect": [0.5, 0.6]}, {"planned_effect": [0.5, 1.1]}, {"planned_effect": [0.5]},
      {"perturbations": {"nominal": {"kind": "earthquake"}}}, {"retries": 3}],
 )  # fmt: skip
 def test_what_is_out_of_range_or_unknown_is_refused(change):

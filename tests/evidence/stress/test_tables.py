@@ -32,7 +32,7 @@ PERTURBATIONS = {
 def settings(*, starts=2, margin=0.05, alpha=0.05):
     return StressSettings(
         starts=starts, episode_limit_s=1.5, samples=2, baselines=["chunked_bc"],
-        perturbations=PERTURBATIONS, margin=margin, alpha=alpha,
+        perturbations=PERTURBATIONS, margin=margin, alpha=alpha, planned_effect=(0.5, 0.8),
     )  # fmt: skip
 
 
@@ -95,6 +95,16 @@ def test_tables_agree_with_each_other(written):
     assert stub.set_index(key)["arrivals"].to_dict() == moved.to_dict()
 
 
+def test_every_invocation_of_a_rollout_is_a_row_and_the_first_is_cold(written):
+    keys = ["method", "perturbation", "start"]
+    rows = read_table(written / "rollouts.parquet").to_pandas().set_index(keys)
+    invocations = read_table(written / "invocations.parquet").to_pandas()
+    groups = invocations.groupby(keys)["invocation"]
+    assert groups.size().to_dict() == rows["invocations"].to_dict()
+    assert (groups.min() == 0).all() and (groups.max() + 1 == groups.size()).all()
+    assert (invocations["latency_s"] > 0).all()
+
+
 def test_the_checker_has_read_every_journal(written):
     checked = read_json(written / "checker.json")
     rows = read_table(written / "rollouts.parquet").to_pandas()
@@ -133,16 +143,32 @@ def test_power_is_reproducible_and_grows_with_the_starts():
 
     assert promoted(many)[0.3, 0.9] > 0.95
     assert promoted(many)[0.3, 0.9] >= promoted(few)[0.3, 0.9]
-    # No gain: a wrong promotion is no more probable than alpha (plus simulation error).
-    assert max(promoted(many)[0.5, 0.5], promoted(many)[0.9, 0.9]) <= 0.05 + 0.015
+    # No gain, or just the margin: a wrong promotion is no more probable than alpha (plus
+    # simulation error).
+    for world in ((0.5, 0.5), (0.9, 0.9), (0.5, 0.55)):
+        assert promoted(many)[world] <= 0.05 + 0.015
+    assert promoted(many)[0.5, 0.8] > promoted(few)[0.5, 0.8]
+
+
+def test_the_ladder_s_own_plan_finds_its_planned_effect(kit):
+    plan = StressSettings(**kit.PARAMS["stress"])
+    candidates = len(kit.PARAMS["train_generators"]["samplers"])
+    document = power_document(plan, candidates=candidates, root_seed=kit.PARAMS["seed"])
+    found = {
+        (row["baseline_success"], row["candidate_success"]): row["promote_share"]
+        for row in document["rows"]
+    }
+    assert found[plan.planned_effect] >= 0.8
+    at_margin = plan.planned_effect[0] + plan.margin
+    assert found[plan.planned_effect[0], at_margin] <= plan.alpha_of_each(candidates) + 0.006
 
 
 def test_too_few_starts_can_never_promote():
     # An e-value can at most grow by a factor of (1 + wager * (1 - margin)) < 2 per pair:
     # two pairs give less than 4, and alpha = 0.05 asks for 20.
     document = power_document(settings(starts=2), candidates=1, root_seed=1)
-    assert [row["promote_share"] for row in document["rows"]] == [0.0] * 5
-    assert [row["median_pairs"] for row in document["rows"]] == [None] * 5
+    assert [row["promote_share"] for row in document["rows"]] == [0.0] * 6
+    assert [row["median_pairs"] for row in document["rows"]] == [None] * 6
 
 
 def test_alpha_is_shared_between_the_registered_candidates():

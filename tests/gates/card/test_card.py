@@ -27,6 +27,6 @@ def test_limits_are_checked_on_every_side(team):
         {"speed_limit_m_s": None},
         {"speed_limit_m_s": 0.0},
         {"abort_thresholds": {}},
-        {"abort_thresholds": {**draft.abort_thresholds, "action_age_s": -1.0}},
+        {"abort_thresholds": {**draft.abort_thresholds, "latency_s": -1.0}},
     ):
         assert envelope_violations(good.model_copy(update=change), draft, envelope), change

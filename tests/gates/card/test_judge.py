@@ -130,7 +130,7 @@ FORGERIES = {
         "envelope_within_limits",
     ),
     "abort threshold raised": (
-        lambda t: t.forge(_edit(abort_thresholds={"action_age_s": 9.0})),
+        lambda t: t.forge(_edit(abort_thresholds={"latency_s": 9.0})),
         "envelope_within_limits",
     ),
     "valid for years": (lambda t: t.forge(_edit(expires="2036-01-01")), "not_expired"),

@@ -7,7 +7,7 @@ from asked import settings_of
 from editing import cells
 
 from gates.evidence import Evidence, MissingEvidenceError
-from gates.stress.rollouts import rollouts, success_lower
+from gates.stress.rollouts import in_every_condition, rollouts, success_lower
 from genpolicy.statistics.intervals import clopper_pearson
 
 TABLE = "stress/rollouts.parquet"
@@ -38,7 +38,7 @@ def test_one_start_less_in_one_condition_is_named(ladder):
         return frame[~gone]
 
     evidence.edit_table(ladder, TABLE, less)
-    with pytest.raises(MissingEvidenceError, match="39 starts in camera_delay, planned 40"):
+    with pytest.raises(MissingEvidenceError, match="79 starts in camera_delay, planned 80"):
         of(ladder)
 
 
@@ -47,12 +47,12 @@ def test_the_lowest_bound_over_the_conditions_decides_and_the_starts_are_the_tri
 
     def spoil(frame):
         hit = (frame["perturbation"] == "camera_delay") & (frame["method"] == "flow")
-        ten = hit & (frame["start"] < 30)
+        ten = hit & (frame["start"] < 60)
         return frame.assign(success=(frame["success"] | hit) & ~ten)
 
     evidence.edit_table(ladder, TABLE, spoil)
     found = success_lower(Evidence(ladder), settings, "flow", evidence.CONDITIONS)
-    assert (found.value, found.interval[1]) == clopper_pearson(10, 40, settings.confidence)
+    assert (found.value, found.interval[1]) == clopper_pearson(20, 80, settings.confidence)
     assert found.caveat.startswith("camera_delay: share 0.25")
     undisturbed = success_lower(Evidence(ladder), settings, "flow", ("nominal",))
     assert undisturbed.value > found.value
@@ -63,3 +63,12 @@ def test_a_rollout_without_outcome_is_missing_evidence(ladder):
     evidence.edit_table(ladder, TABLE, cells("success", None, where=first))
     with pytest.raises(MissingEvidenceError, match="no outcome"):
         success_lower(Evidence(ladder), settings_of(ladder, "D"), "flow", ("nominal",))
+
+
+def test_the_highest_bound_of_all_conditions_is_judged_and_the_others_are_said():
+    rows = pd.DataFrame({"perturbation": ["calm", "storm", "storm"], "value": [1.0, 2.0, 3.0]})
+    found = in_every_condition(
+        rows, ("calm", "storm"), lambda part, _: (part["value"].mean(), 0.0, part["value"].max())
+    )
+    assert (found.value, found.interval) == (3.0, (0.0, 3.0))
+    assert found.caveat == "worst in storm: 2.5, bounded by 3; calm 1"

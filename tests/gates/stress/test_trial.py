@@ -1,9 +1,13 @@
 """The trial: fewer starts than planned give no verdict, no gain returns to the baseline."""
 
 import evidence
+import pytest
+from asked import asked, settings_of
 from editing import cells
 
+from gates.evidence import MissingEvidenceError
 from gates.proof import judge
+from gates.stress.trial import verdict_reachable
 
 
 def _of(method):
@@ -21,7 +25,43 @@ def test_no_gain_returns_to_the_best_baseline(ladder):
 
 
 def test_fewer_starts_than_planned_gives_no_verdict(ladder):
-    evidence.edit_table(ladder, "stress/rollouts.parquet", lambda f: f[f["start"] < 30])
+    evidence.edit_table(ladder, "stress/rollouts.parquet", lambda f: f[f["start"] < 60])
     report = judge(ladder, "D")
     assert report.verdict == "INCONCLUSIVE"
     assert report.decision.startswith("No decision")
+
+
+POWER = "stress/power.json"
+
+
+def test_only_the_planned_effect_counts_as_found(ladder):
+    """A huge gain that would surely be found says nothing of the gain that is planned."""
+
+    def change(document):
+        planned, none = document["rows"]
+        huge = {**planned, "baseline_success": 0.1, "candidate_success": 0.9, "promote_share": 1.0}
+        document["rows"] = [huge, {**planned, "promote_share": 0.47, "return_share": 0.53}, none]
+
+    evidence.edit_document(ladder, POWER, change)
+    found = asked(ladder, verdict_reachable, gate="D")
+    assert found.value == 0.47 and "0.5 against 0.95 is promoted in 0.47" in found.caveat
+    assert judge(ladder, "D").verdict == "FAIL"
+
+
+def test_a_test_that_promotes_at_the_margin_is_no_test(ladder):
+    evidence.edit_document(ladder, POWER, lambda d: d["rows"][1].update(return_share=0.6))
+    assert asked(ladder, verdict_reachable, gate="D").value == 0.6
+
+
+@pytest.mark.parametrize("row", [0, 1])
+def test_a_power_table_without_its_worlds_is_missing_evidence(ladder, row):
+    evidence.edit_document(ladder, POWER, lambda d: d["rows"].pop(row) and None)
+    with pytest.raises(MissingEvidenceError, match="lacks the planned effect or a world without"):
+        asked(ladder, verdict_reachable, gate="D")
+
+
+def test_the_power_is_that_of_this_plan(ladder):
+    assert settings_of(ladder, "D").planned_effect == (0.5, 0.95)
+    evidence.edit_document(ladder, POWER, lambda d: d.update(pairs=evidence.STARTS + 1))
+    with pytest.raises(MissingEvidenceError, match="for another pairs"):
+        asked(ladder, verdict_reachable, gate="D")

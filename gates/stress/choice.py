@@ -1,0 +1,102 @@
+"""Between candidates that pass: is one shown to be better, or is it either of them?
+
+Passing says that a candidate beats the simple policies; it does not order the candidates. The
+order is a question of its own, with a paired test of its own. Where no test tells them apart the
+decision says so, and which of them goes on the card follows from a rule fixed before the run: the
+one whose answers come sooner, then the one registered first.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import permutations
+
+from gates.engine import Decision, Judged
+from gates.evidence import Evidence
+from gates.stress.cost import latency_p95_s
+from gates.stress.pairs import paired_differences
+from gates.stress.rollouts import StressSettings
+from genpolicy.statistics.eprocess import paired_e_value
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Evidence that one passing candidate is better than another.
+
+    Attributes:
+        better: The one.
+        other: The other.
+        e_value: Evidence that the mean success of `better` is the higher one.
+        gain: Mean difference over the starts.
+    """
+
+    better: str
+    other: str
+    e_value: float
+    gain: float
+
+
+def choose(judged: Judged) -> Decision:
+    """Whom to promote of those that passed, and whether it is one or either.
+
+    Raises:
+        MissingEvidenceError: Two that passed do not share their starts.
+    """
+    settings: StressSettings = judged.settings
+    passed = [name for name in settings.candidates if judged.candidates.get(name) == "PASS"]
+    if len(passed) == 1:
+        return Decision(f"promote {passed[0]}", promoted=passed[0])
+    needed = 1.0 / pair_alpha(settings)
+    found = comparisons(judged.evidence, settings, passed)
+    shown = [one for one in found if one.e_value >= needed]
+    left = [name for name in passed if all(one.other != name for one in shown)] or passed
+    for_the_card = sooner(left, _latency(judged))
+    others = [name for name in passed if name not in left]
+    better = f"; shown to be worse: {', '.join(others)}" if others else ""
+    if len(left) == 1:
+        return Decision(f"promote {for_the_card}{better}", promoted=for_the_card)
+    most = max(
+        (one for one in found if one.better in left and one.other in left),
+        key=lambda one: one.e_value,
+    )
+    text = (
+        f"promote either of {', '.join(left)}{better}: no paired test tells them apart (at most "
+        f"{most.e_value:.3g} that {most.better} is better than {most.other} by {most.gain:.3g}; "
+        f"{needed:.3g} needed). The card is drafted for {for_the_card}, whose answers come sooner."
+    )
+    return Decision(text, promoted=for_the_card)
+
+
+def pair_alpha(settings: StressSettings) -> float:
+    """Error of one ordered pair; all pairs of those registered share that of the family."""
+    registered = len(settings.candidates)
+    return settings.family_alpha / max(1, registered * (registered - 1))
+
+
+def comparisons(
+    evidence: Evidence, settings: StressSettings, names: Sequence[str]
+) -> list[Comparison]:
+    """Every ordered pair of candidates, tested for any gain at all.
+
+    Raises:
+        MissingEvidenceError: Two do not share their starts.
+    """
+    found = []
+    for better, other in permutations(names, 2):
+        differences = paired_differences(evidence, settings, better, other)
+        test = paired_e_value(differences, margin=0.0, alpha=pair_alpha(settings))
+        found.append(Comparison(better, other, test.e_value, float(differences.mean())))
+    return found
+
+
+def sooner(names: Sequence[str], latency_s: Mapping[str, float]) -> str:
+    """The first of those whose answers come soonest; an unknown latency comes last."""
+    return min(names, key=lambda name: latency_s.get(name, math.inf))
+
+
+def _latency(judged: Judged) -> dict[str, float]:
+    return {
+        answer.candidate: answer.measured
+        for answer in judged.answers
+        if answer.id == latency_p95_s.id and answer.candidate and answer.measured is not None
+    }

@@ -1,0 +1,109 @@
+"""What must hold whatever is gained: recovery, the stub, the balance, the independent checker."""
+
+import numpy as np
+
+from gates.bounds import counted_interval, share_interval
+from gates.criterion import Measured, criterion
+from gates.evidence import Evidence, MissingEvidenceError, flags, numbers
+from gates.feasibility import checked_violations
+from gates.stress.rollouts import STRESS, StressSettings, rollouts
+from genpolicy.evidence.rows.stress import ConservationRow, StressCountRow, StressStubRow
+
+
+@criterion(
+    ">=",
+    question="When recovery begins, does it end in success?",
+    look_at="Recovery: read by condition and phase whether the policy goes on after a retreat.",
+    per_candidate=True,
+)
+def recovery_success_lower(
+    evidence: Evidence, settings: StressSettings, candidate: str
+) -> Measured:
+    """Lower bound of success after a recovery began, over all conditions.
+
+    Few recoveries of a condition cannot show that it is good there, but enough failures can show
+    that it is bad: where the upper bound of a condition is lower, it is what is measured.
+    """
+    rows = rollouts(evidence, settings, candidate)
+    begun = rows[flags(rows, "recovery_attempted")]
+    if np.any(flags(begun, "recovered") & ~flags(begun, "success")):
+        raise MissingEvidenceError("a rollout recovered and did not succeed")
+    starts = begun["start"].nunique()
+    limit = settings.limits.of.get("recovery_success_lower")
+    least = limit.limit if limit and limit.limit is not None else 0.0
+    reach = counted_interval(starts, starts, confidence=settings.confidence)[0] if starts else 0.0
+    if starts == 0 or not reach >= least:
+        raise MissingEvidenceError(
+            f"hardly exercised: recovery began on {starts} starts, in any condition; had each "
+            f"succeeded, {reach:.4g} were shown"
+        )
+    share, lower, upper = share_interval(
+        flags(begun, "recovered"),
+        begun["start"].to_numpy(),
+        confidence=settings.confidence,
+        favourable=True,
+    )
+    found = (lower, (lower, upper), f"{share:.4g} of {len(begun)} recoveries on {starts} starts")
+    for condition, part in begun.groupby("perturbation", sort=True):
+        own, low, high = share_interval(
+            flags(part, "recovered"),
+            part["start"].to_numpy(),
+            confidence=settings.confidence,
+            favourable=False,
+        )
+        text = f"worst in {condition}: {own:.4g} of {len(part)} recoveries, at best {high:.4g}"
+        found = min(found, (high, (low, high), text))
+    return Measured(*found)
+
+
+@criterion(
+    "<=",
+    question="How many stale or invalid actions reached the stub?",
+    look_at="Feasibility: a stale or rejected action reached the controller; stop here.",
+    per_candidate=True,
+    always=True,
+)
+def stub_violations(evidence: Evidence, settings: StressSettings, candidate: str) -> Measured:
+    """Stale or invalid actions that arrived at the controller stub."""
+    rows = evidence.of(f"{STRESS}/stub.parquet", StressStubRow, candidate)
+    arrivals = float(numbers(rows, "arrivals").sum())
+    if arrivals <= 0:
+        raise MissingEvidenceError("nothing arrived at the stub")
+    bad = float(numbers(rows, "stale").sum() + numbers(rows, "invalid").sum())
+    return Measured(bad, caveat=f"stale or invalid, of {arrivals:g} arrivals")
+
+
+@criterion(
+    "<=",
+    question="Is every generated action executed, discarded by reason, or queued?",
+    look_at="Evaluator: actions vanish or appear; read the counts per perturbation.",
+    per_candidate=True,
+    always=True,
+)
+def conservation_error(evidence: Evidence, settings: StressSettings, candidate: str) -> Measured:
+    """Actions unaccounted for: generated - executed - discarded - queued, and by reason."""
+    names = ("generated", "executed", "discarded", "queued")
+    path = f"{STRESS}/conservation.parquet"
+    rows = evidence.of(path, ConservationRow, candidate)
+    generated, executed, discarded, queued = (numbers(rows, name) for name in names)
+    if generated.sum() <= 0:
+        raise MissingEvidenceError("nothing was generated")
+    error = float(np.abs(generated - executed - discarded - queued).sum())
+    reasons = evidence.of(f"{STRESS}/counts.parquet", StressCountRow, candidate)
+    by_reason = (
+        reasons.assign(count=numbers(reasons, "count")).groupby("perturbation")["count"].sum()
+    )
+    stated = rows.assign(discarded=discarded).groupby("perturbation")["discarded"].sum()
+    error += float(stated.sub(by_reason, fill_value=0.0).abs().sum())
+    return Measured(error, caveat="generated = executed + discarded by reason + still queued")
+
+
+@criterion(
+    "<=",
+    question="What does the independent checker find in the journals?",
+    look_at="Evaluator: executor and independent checker disagree; read the violations.",
+    always=True,
+)
+def checker_violations(evidence: Evidence, settings: StressSettings) -> Measured:
+    """Violations that the independent checker found in the journals."""
+    return checked_violations(evidence, f"{STRESS}/checker.json")

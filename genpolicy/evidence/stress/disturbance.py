@@ -1,0 +1,43 @@
+"""What a perturbation does to the cell itself, once per rollout: pushes, and a recovery drill."""
+
+import numpy as np
+
+from genpolicy.evidence.stress.perturbations import drill_s, pushes
+from genpolicy.evidence.stress.state import Fixture
+from genpolicy.tasks.api import World
+
+
+class Disturbance:
+    """Pushes and drill of one rollout, each of which happens once.
+
+    Args:
+        fixture: What all rollouts share.
+        world: What is pushed.
+        start: Index of the initial state; key of the draws.
+    """
+
+    def __init__(self, fixture: Fixture, world: World, *, start: int) -> None:
+        schedule, seed, name = fixture.schedule, fixture.root_seed, fixture.perturbation
+        self._world = world
+        self._contact_phases = fixture.task.contact_phases
+        self._contact_since_s: float | None = None
+        self._pushes = list(pushes(schedule, root_seed=seed, name=name, start=start))
+        self._drill_s = drill_s(schedule, root_seed=seed, name=name, start=start)
+
+    def push(self, now_s: float) -> None:
+        """Apply the pushes that are due; one in contact counts from where contact began."""
+        if self._contact_since_s is None and self._world.phase in self._contact_phases:
+            self._contact_since_s = now_s
+        for push in list(self._pushes):
+            since_s = self._contact_since_s if push.in_contact else 0.0
+            if since_s is not None and now_s >= since_s + push.time_s:
+                force_n = np.array([0.0, push.force_n, 0.0])
+                self._world.apply_force(force_n, push.duration_s)
+                self._pushes.remove(push)
+
+    def drill(self, now_s: float) -> bool:
+        """Whether recovery is called for now; true once."""
+        due = self._drill_s is not None and now_s >= self._drill_s
+        if due:
+            self._drill_s = None
+        return due

@@ -1,0 +1,84 @@
+"""Of several that pass: one if a paired test tells them apart, else either, by a fixed rule."""
+
+import evidence
+import pytest
+from asked import settings_of
+from editing import cells
+
+from gates.evidence import Evidence
+from gates.proof import judge
+from gates.stress.choice import comparisons, pair_alpha, sooner
+from gates.stress.pairs import paired_differences
+from genpolicy.statistics.eprocess import paired_e_value
+
+ROLLOUTS, INVOCATIONS = "stress/rollouts.parquet", "stress/invocations.parquet"
+
+
+def worse(root, method, starts):
+    """The method fails on some more starts, in every condition."""
+    hit = lambda f: (f["method"] == method) & (f["start"] % 16 == 8) & (f["start"] < starts)  # noqa: E731
+    evidence.edit_table(root, ROLLOUTS, cells("success", False, where=hit))
+    evidence.edit_table(root, ROLLOUTS, cells("recovered", False, where=hit))
+
+
+def test_two_that_cannot_be_told_apart_are_either_and_the_sooner_goes_on_the_card(ladder):
+    report = judge(ladder, "D")
+    assert report.candidates == {"diffusion": "PASS", "flow": "PASS"}
+    assert report.decision.startswith("promote either of diffusion, flow: no paired test")
+    assert "The card is drafted for flow, whose answers come sooner" in report.decision
+    assert report.promoted == "flow"
+
+
+def test_the_rule_is_the_latency_and_not_the_point_of_success(ladder):
+    slow = lambda f: (f["method"] == "flow") & (f["invocation"] > 0)  # noqa: E731
+    evidence.edit_table(ladder, INVOCATIONS, cells("latency_s", 0.2, where=slow))
+    worse(ladder, "diffusion", 16)
+    report = judge(ladder, "D")
+    assert report.promoted == "diffusion" and "either of diffusion, flow" in report.decision
+
+
+def test_one_that_is_shown_to_be_better_is_promoted_alone(ladder):
+    params = lambda p: [  # noqa: E731
+        entries[name].__setitem__(0, limit)
+        for entries in p["gate_d"]["limits"].values()
+        for name, limit in (("nominal_success_lower", 0.1), ("stress_success_lower", 0.1),
+                            ("recovery_success_lower", 0.1), ("reset_upper", 1.0))
+        if name in entries
+    ]  # fmt: skip
+    bad = lambda f: (f["method"] == "flow") & (f["start"] % 3 == 0)  # noqa: E731
+    base = lambda f: f["method"].isin(evidence.BASELINES) & (f["start"] % 5 != 0)  # noqa: E731
+    for who in (bad, base):
+        for column in ("success", "recovered"):
+            evidence.edit_table(ladder, ROLLOUTS, cells(column, False, where=who))
+    evidence.write_params(ladder, params)
+    report = judge(ladder, "D")
+    assert report.candidates == {"diffusion": "PASS", "flow": "PASS"}
+    assert (report.decision, report.promoted) == (
+        "promote diffusion; shown to be worse: flow", "diffusion"
+    )  # fmt: skip
+
+
+def test_one_that_passes_alone_is_compared_with_nobody(ladder):
+    bad = lambda f: f["method"] == "flow"  # noqa: E731
+    evidence.edit_table(ladder, ROLLOUTS, cells("interventions", 1, where=bad))
+    report = judge(ladder, "D")
+    assert (report.decision, report.promoted) == ("promote diffusion", "diffusion")
+
+
+def test_every_ordered_pair_is_tested_at_its_share_of_the_family(ladder):
+    worse(ladder, "flow", 80)
+    reader, settings = Evidence(ladder), settings_of(ladder, "D")
+    found = {(c.better, c.other): c for c in comparisons(reader, settings, settings.candidates)}
+    assert set(found) == {("diffusion", "flow"), ("flow", "diffusion")}
+    for (better, other), one in found.items():
+        d = paired_differences(reader, settings, better, other)
+        assert one.e_value == paired_e_value(d, margin=0.0, alpha=0.05).e_value
+        assert one.gain == pytest.approx(d.mean())
+    assert pair_alpha(settings) == settings.family_alpha / 2
+    three = settings.model_copy(update={"candidates": ("a", "b", "c")})
+    assert pair_alpha(three) == settings.family_alpha / 6
+
+
+def test_equal_latency_is_decided_by_the_order_of_registration():
+    assert sooner(["b", "a"], {"a": 0.1, "b": 0.1}) == "b"
+    assert sooner(["b", "a"], {"a": 0.1}) == "a"

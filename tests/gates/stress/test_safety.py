@@ -1,0 +1,108 @@
+"""Recovery that is exercised and helps; a stub and a balance that are counted, not averaged."""
+
+import evidence
+import pytest
+from asked import asked
+from editing import cells
+
+from gates.evidence import MissingEvidenceError
+from gates.proof import judge
+from gates.stress import safety
+from genpolicy.statistics.intervals import clopper_pearson
+
+ROLLOUTS, N = "stress/rollouts.parquet", evidence.STARTS
+
+
+def of(frame):
+    return frame["method"] == "flow"
+
+
+def recovery(root):
+    return asked(root, safety.recovery_success_lower, "flow", gate="D")
+
+
+def begun(root, condition, starts, successes):
+    """Recovery begins on some starts of one condition, and on nothing else of flow there."""
+
+    def change(frame):
+        rows = of(frame) & (frame["perturbation"] == condition)
+        frame = frame.assign(
+            recovery_attempted=frame["recovery_attempted"] & ~rows
+            | rows & (frame["start"] < starts),
+        )
+        recovered = rows & (frame["start"] < successes)
+        return frame.assign(
+            recovered=frame["recovered"] & ~rows | recovered,
+            success=frame["success"] & ~(rows & (frame["start"] < starts)) | recovered,
+        )
+
+    evidence.edit_table(root, ROLLOUTS, change)
+
+
+def test_recoveries_that_all_failed_stop_the_gate(ladder):
+    begun(ladder, "recovery_drill", N, 0)
+    assert recovery(ladder).value == 0.0
+    report = judge(ladder, "D")
+    assert report.candidates["flow"] == "FAIL"
+    assert "recovery_success_lower" in {c.id for c in report.criteria if c.verdict == "FAIL"}
+
+
+def test_the_lower_bound_over_the_starts_is_judged(ladder):
+    begun(ladder, "recovery_drill", N, 60)
+    found = recovery(ladder)
+    assert (found.value, found.interval) == (
+        clopper_pearson(60, N, 0.95)[0], clopper_pearson(60, N, 0.95)
+    )  # fmt: skip
+
+
+def test_a_recovery_that_hardly_ever_began_is_no_evidence(ladder):
+    begun(ladder, "recovery_drill", 0, 0)
+    with pytest.raises(MissingEvidenceError, match="hardly exercised: recovery began on 0 starts"):
+        recovery(ladder)
+    assert judge(ladder, "D").candidates["flow"] == "INCONCLUSIVE"
+    # Five of five could all be luck: even then no more than 0.478 is shown, and 0.5 is asked.
+    begun(ladder, "recovery_drill", 5, 5)
+    assert judge(ladder, "D").candidates["flow"] == "INCONCLUSIVE"
+    begun(ladder, "recovery_drill", 6, 6)
+    assert judge(ladder, "D").candidates["flow"] == "PASS"
+
+
+def test_drills_that_succeed_do_not_hide_a_condition_that_is_shown_to_fail(ladder):
+    begun(ladder, "camera_delay", 16, 1)
+    found = recovery(ladder)
+    assert found.value == clopper_pearson(1, 16, 0.95)[1] < 0.5
+    assert "worst in camera_delay" in found.caveat
+
+
+def test_one_failure_of_three_in_a_condition_shows_nothing_about_it(ladder):
+    before = recovery(ladder)
+    begun(ladder, "camera_delay", 3, 2)
+    found = recovery(ladder)
+    assert found.value >= 0.5 and "camera_delay" not in found.caveat
+    assert found.value <= before.value + 0.02
+
+
+def test_what_recovered_also_succeeded(ladder):
+    drill = lambda f: of(f) & f["recovered"]  # noqa: E731
+    evidence.edit_table(ladder, ROLLOUTS, cells("success", False, where=drill, share=0.01))
+    with pytest.raises(MissingEvidenceError, match="recovered and did not succeed"):
+        recovery(ladder)
+
+
+def test_every_stale_or_invalid_action_counts_and_silence_proves_nothing(ladder):
+    evidence.edit_table(ladder, "stress/stub.parquet", cells("stale", 2, where=of, share=0.01))
+    evidence.edit_table(ladder, "stress/stub.parquet", cells("invalid", 1, where=of, share=0.01))
+    assert asked(ladder, safety.stub_violations, "flow", gate="D").value == 3.0
+    assert asked(ladder, safety.stub_violations, "diffusion", gate="D").value == 0.0
+    evidence.edit_table(ladder, "stress/stub.parquet", cells("arrivals", 0, where=of))
+    with pytest.raises(MissingEvidenceError, match="nothing arrived"):
+        asked(ladder, safety.stub_violations, "flow", gate="D")
+
+
+def test_an_action_lost_and_a_reason_too_many_do_not_cancel(ladder):
+    assert asked(ladder, safety.conservation_error, "flow", gate="D").value == 0.0
+    table = "stress/conservation.parquet"
+    evidence.edit_table(ladder, table, cells("executed", 87, where=of, share=0.01))
+    assert asked(ladder, safety.conservation_error, "flow", gate="D").value == 1.0
+    evidence.edit_table(ladder, "stress/counts.parquet", cells("count", 11, where=of, share=0.01))
+    assert asked(ladder, safety.conservation_error, "flow", gate="D").value == 2.0
