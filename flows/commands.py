@@ -38,7 +38,7 @@ def ladder(workspace: Workspace = Path()) -> int:
     """Run the ladder as Prefect flows.
 
     Without PREFECT_API_URL a temporary server is started. Exit codes: 0 done,
-    1 a fault, 2 bad input, 3 refused by a gate.
+    1 a fault, 2 bad input, 3 refused by a gate that does not pass.
     """
     from flows.ladder import run_ladder
 

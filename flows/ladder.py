@@ -1,8 +1,9 @@
 """The ladder as Prefect flows: one flow per gate, its stages as tasks, all of it through DVC.
 
 Prefect decides when to go on, shows and schedules it; DVC knows what is up to date; the gates
-judge. So no verdict depends on a server, and `dvc repro` alone ends at the same place. Retries
-are for faults of the machine only: a refusal or a bad input does not become better by itself.
+judge. So no verdict depends on a server, and `dvc repro` alone ends at the same place. A gate that
+does not pass is a failed task and a failed flow, named by its verdict. Retries are for faults of
+the machine only: a refusal or a bad input does not become better by itself.
 """
 
 import os
@@ -39,8 +40,8 @@ from flows.reproduce import (  # noqa: E402
     stop_all,
 )
 from genpolicy.cli.shell import run_program  # noqa: E402
-from genpolicy.errors import ConfigError  # noqa: E402
-from genpolicy.integrity.documents import read_yaml  # noqa: E402
+from genpolicy.errors import BadInputError, ConfigError  # noqa: E402
+from genpolicy.integrity.documents import read_json, read_yaml  # noqa: E402
 
 GATES = ("a", "b", "c", "d", "e")
 RETRIES = 2
@@ -50,6 +51,8 @@ FIRST_ANSWER_S = 10.0
 SILENCE_S = 30.0
 PROBE_PERIOD_S = 3.0
 
+PENDING = "PENDING_REVIEW"
+RED = ("FAIL", "INCONCLUSIVE")
 STATE_NAMES = {EXIT_FAULT: "Fault", EXIT_BAD_INPUT: "Bad input", EXIT_REFUSED: "Refused"}
 
 
@@ -60,10 +63,12 @@ class StageStoppedError(Exception):
         code: Exit code of the ladder: 1 fault, 2 bad input, 3 refused by a gate.
         sentence: What the stage said.
         infrastructure: Whether a retry could help.
+        verdict: Verdict of the gate that has judged and does not pass; empty before a judgement.
     """
 
-    def __init__(self, code: int, sentence: str, infrastructure: bool) -> None:
-        super().__init__(code, sentence, infrastructure)
+    def __init__(self, code: int, sentence: str, infrastructure: bool, verdict: str = "") -> None:
+        super().__init__(code, sentence, infrastructure, verdict)
+        self.verdict = verdict
         self.code = code
         self.sentence = sentence
         self.infrastructure = infrastructure
@@ -91,14 +96,39 @@ def reproduce_stage(workspace: str, stage: str) -> float:
         Wall time, s.
 
     Raises:
-        StageStoppedError: The stage was refused, had bad input or failed.
+        StageStoppedError: The stage was refused, had bad input or failed, or it is a gate that
+            has judged and does not pass.
     """
     outcome = reproduce(
         Path(workspace), stages=(stage,), single_item=True, echo=get_run_logger().info
     )
     if outcome.code != EXIT_DONE:
         raise StageStoppedError(outcome.code, outcome.sentence, outcome.infrastructure)
+    if stage.startswith("gate_"):
+        verdict, sentence = judged(Path(workspace), stage)
+        if verdict not in ("PASS", PENDING):
+            raise StageStoppedError(EXIT_REFUSED, sentence, False, verdict)
     return outcome.duration_s
+
+
+def judged(workspace: Path, stage: str) -> tuple[str, str]:
+    """Verdict of a gate stage that has just run, and one sentence about it.
+
+    Raises:
+        BadInputError: It left no report, or one without verdict.
+    """
+    path = workspace / "reports" / f"{stage}.json"
+    document = read_json(path)
+    verdict = document.get("verdict") if isinstance(document, dict) else None
+    if not isinstance(verdict, str):
+        raise BadInputError(
+            where=str(path),
+            found="without a verdict",
+            expected="the report of a gate",
+            action=f"Run `dvc repro -f {stage}`.",
+        )
+    words = (f"{stage}: {verdict}.", document.get("decision"), document.get("diagnosis"))
+    return verdict, " ".join(str(word) for word in words if word)
 
 
 def stages_by_gate(pipeline: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
@@ -141,9 +171,11 @@ def _gate_flow(letter: str) -> Flow[..., State[Any]]:
                 )
                 break
         _publish(Path(workspace), letter, stopped)
-        if stopped is None:
-            return Completed(message=f"Gate {letter.upper()} has judged; see its report.")
-        return Failed(name=STATE_NAMES[stopped.code], message=stopped.sentence)
+        if stopped is not None:
+            name = stopped.verdict or STATE_NAMES[stopped.code]
+            return Failed(name=name, message=stopped.sentence)
+        verdict, sentence = judged(Path(workspace), f"gate_{letter}")
+        return Completed(name=verdict if verdict == PENDING else None, message=sentence)
 
     gate.__doc__ = f"The evidence stages of gate {letter.upper()}, then its judgement."
     return flow(name=f"gate-{letter}", retries=0)(gate)
@@ -168,12 +200,13 @@ def ladder(workspace: str = ".") -> State[Any]:
         workspace: Folder with `dvc.yaml`, as the process that runs the flow sees it.
     """
     plan = stages_by_gate(read_yaml(Path(workspace) / "dvc.yaml"))
+    state: State[Any] = Completed()
     with watch_server(_api_url()):
         for letter, stages in plan.items():
             state = GATE_FLOWS[letter](workspace, list(stages), return_state=True)
             if not state.is_completed():
                 return Failed(name=state.name, message=state.message)
-    return Completed(message="Every gate has judged. Gate E waits for the people who sign.")
+    return Completed(name=state.name, message=state.message)
 
 
 class watch_server:  # noqa: N801  (used like a function, as a context)
@@ -261,14 +294,14 @@ def run_ladder(workspace: Path) -> int:
     if state.is_completed():
         return EXIT_DONE
     print(f"\nThe ladder stopped: {state.message}", file=sys.stderr)
-    codes = {name: code for code, name in STATE_NAMES.items()}
+    codes = {name: code for code, name in STATE_NAMES.items()} | dict.fromkeys(RED, EXIT_REFUSED)
     return codes.get(state.name or "", EXIT_FAULT)
 
 
 def _publish(workspace: Path, letter: str, stopped: StageStoppedError | None) -> None:
     """Show the gate's report, or why there is none, in Prefect's own interface."""
     title = f"Gate {letter.upper()}"
-    if stopped is not None:  # a report that lies there is of an earlier run
+    if stopped is not None and not stopped.verdict:  # a report that lies there is of an earlier run
         create_markdown_artifact(
             f"**{title} was not reached.** {stopped.sentence}",
             key=f"gate-{letter}",

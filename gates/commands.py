@@ -1,7 +1,7 @@
 """Commands of the gates: judge evidence, prove reports, sign and verify trial cards.
 
-Registered in `genpolicy.commands`. Exit codes: 0 done, 1 not every gate passes (`check`) or a
-fault of ours, 2 bad usage or input, 3 refused.
+Registered in `genpolicy.commands`. Exit codes: 0 done, 1 a fault of ours, 2 bad usage or input,
+3 refused: a gate that does not pass, or a report that is not what the files say.
 """
 
 import dataclasses
@@ -68,28 +68,40 @@ def check(
     root: Root = Path(),
     as_json: AsJson = False,
 ) -> int:
-    """Prove the chain. Exit 0 if every gate up to `--through` passes, else 1."""
+    """Prove the chain.
+
+    Exit 0 if every gate up to `--through` passes, 3 if one does not or its
+    report is untrue, 2 if a report or a setting cannot be read.
+    """
     from gates.proof import prove_all
     from gates.report import GATES
 
     last = _gate(through)
     rungs = prove_all(root)[: GATES.index(last) + 1]
     _print_rungs(rungs, as_json)
-    return int(any(rung.verdict != "PASS" for rung in rungs))
+    codes = {rung.exit_code for rung in rungs if rung.verdict != "PASS"}
+    return 2 if 2 in codes else max(codes, default=0)
 
 
 @gates.command("verify", epilog=examples("genpolicy gates verify --json"))
 @verify.command("report", epilog=examples("genpolicy verify report --json"))
 def verify_reports(root: Root = Path(), as_json: AsJson = False) -> int:
-    """Hash all evidence, derive all verdicts again. Exit 2 or 3 if a report is untrue."""
+    """Hash all evidence, derive all verdicts again.
+
+    The independent checker reads every journal again, and each rollout must be
+    what its journal says. Exit 3 if a report is untrue, 2 if one cannot be read.
+    """
     from gates.proof import prove_all
+    from gates.rederive import rederived
 
     rungs = [rung for rung in prove_all(root) if rung.verdict != "NOT JUDGED"]
     if not rungs:
         print("No report lies here. Run `dvc repro gate_a`.", file=sys.stderr)
         return 3
+    rungs = rederived(root, rungs)
     _print_rungs(rungs, as_json)
-    return max((rung.exit_code for rung in rungs if rung.verdict == "REFUSED"), default=0)
+    codes = {rung.exit_code for rung in rungs if rung.verdict == "REFUSED"}
+    return 2 if 2 in codes else max(codes, default=0)
 
 
 @gates.command(epilog=examples("genpolicy gates show C"))

@@ -5,7 +5,6 @@ Pure: the report is a function of the evidence, the limits and the settings.
 
 import importlib.metadata
 import math
-import os
 import platform
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ from typing import Any
 
 from gates.criterion import Criterion, Measured
 from gates.evidence import Evidence, MissingEvidenceError
+from gates.pipeline import TASK_IDENTITY, basis_of, check_record, outputs_of
 from gates.report import (
     GATES,
     SCHEMA_VERSION,
@@ -30,8 +30,7 @@ from gates.verdicts import combine, first_unmet, judge_criterion, rounded
 from genpolicy.errors import IntegrityError
 from genpolicy.integrity.hashing import sha256_bytes_of
 
-TASK_IDENTITY = "artifacts/task/identity.json"
-"""What the task is, by hash: material of every gate."""
+UNRECORDED = "Judged outside the pipeline: dvc.lock holds no run of"
 LIBRARIES = ("numpy", "pandas", "pyarrow", "pydantic", "scipy")
 REGIME = (
     "bit-equal for the same wheels, CPU capability, one thread and one batch shape; "
@@ -101,7 +100,22 @@ def judge_gate(spec: GateSpec, root: Path) -> GateReport:
     caveats: Sequence[str] = ()
     if spec.below is not None:
         names, caveats = promoted_below(root, spec.below, getattr(settings, "candidates", ()))
-    return judge(spec, Evidence(root), limits, settings, candidates=names, caveats=caveats)
+    evidence = recorded_evidence(root, spec.gate)
+    report = judge(spec, evidence, limits, settings, candidates=names, caveats=caveats)
+    check_record(root, spec.gate, report.materials)
+    return report
+
+
+def recorded_evidence(root: Path, gate: Gate) -> Evidence:
+    """Evidence below `root` with all files of the gate's evidence stages bound, read or not.
+
+    Raises:
+        ConfigError: `dvc.yaml`, `dvc.lock` or `params.yaml` is malformed.
+        IntegrityError: A file of code or evidence is a link or not readable.
+    """
+    evidence = Evidence(root, basis_of(root, gate))
+    evidence.bind_files(outputs_of(root, gate))
+    return evidence
 
 
 def judge(
@@ -142,6 +156,10 @@ def judge(
     if not evidence.bind(TASK_IDENTITY) and verdict == "PASS":
         verdict = "INCONCLUSIVE"
         caveats = (*caveats, f"{TASK_IDENTITY} is missing: nobody wrote which task this is about.")
+    basis = evidence.basis
+    if basis.unrecorded:
+        verdict = "INCONCLUSIVE" if verdict == "PASS" else verdict
+        caveats = (*caveats, f"{UNRECORDED} {', '.join(basis.unrecorded)}.")
     judged = Judged(evidence, inputs, tuple(answers), verdict, verdicts)
     decision = (spec.decide or _decision(spec))(judged)
     note = spec.note(judged) if spec.note else ""
@@ -153,6 +171,9 @@ def judge(
         criteria=judged.answers,
         materials=evidence.materials,
         upstream=upstream_hashes(evidence.root, spec.gate),
+        code=dict(basis.code),
+        parameters=dict(basis.parameters),
+        pipeline=dict(basis.pipeline),
         settings=settings.model_dump(mode="json"),
         environment=environment(),
         caveats=(*spec.caveats, *_waivers(limits), *caveats),
@@ -170,6 +191,8 @@ def _answer(
             measured = item.measure(evidence, inputs, *([] if candidate is None else [candidate]))
         except MissingEvidenceError as error:
             measured = Measured(None, caveat=f"not measured: {error}")
+        except KeyError as error:  # a document of another form; never a traceback, never a pass
+            measured = Measured(None, caveat=f"not measured: the evidence has no {error}")
     value, interval = measured.value, measured.interval
     if value is not None:
         value = rounded(value) if math.isfinite(value) else None
@@ -210,7 +233,7 @@ def _diagnosis(spec: GateSpec, judged: Judged) -> str:
     """The first unmet criterion in order of diagnosis, and where to look."""
     decided = first_unmet(judged.answers, judged.verdict)
     if decided is None:
-        lacking = "No criterion decided: criteria, limits or the task's identity lack."
+        lacking = "No criterion decided: criteria, limits, the task's identity or a record lack."
         return "" if judged.verdict == "PASS" else lacking
     of = f" of {decided.candidate}" if decided.candidate else ""
     why = f" ({decided.caveat})" if decided.measured is None and decided.caveat else ""
@@ -261,9 +284,8 @@ def promoted_below(root: Path, below: Gate, wanted: Sequence[str]) -> tuple[list
 
 
 def environment() -> dict[str, str]:
-    """Library versions, threads and the regime in which the numbers repeat."""
+    """Library versions and the regime in which the numbers repeat: part of what is derived."""
     found = {name: importlib.metadata.version(name) for name in LIBRARIES}
-    found["python"] = platform.python_version()
-    found["threads"] = os.environ.get("OMP_NUM_THREADS", "not set")
+    found["python"] = ".".join(platform.python_version_tuple()[:2])
     found["regime"] = REGIME
     return found

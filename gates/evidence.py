@@ -5,7 +5,7 @@ becomes the `materials` of its report, and what one criterion read becomes its `
 """
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ import pandas as pd
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from gates.pipeline import Basis
 from genpolicy.integrity.documents import parse_json
 from genpolicy.integrity.hashing import sha256_bytes_of, sha256_file
 from genpolicy.integrity.rows import (
@@ -33,10 +34,16 @@ class MissingEvidenceError(Exception):
 
 
 class Evidence:
-    """The evidence below one repository root, with the hash of everything touched."""
+    """The evidence below one repository root, with the hash of everything touched.
 
-    def __init__(self, root: Path) -> None:
+    Args:
+        root: Repository root.
+        basis: Code, parameters and recorded runs that it stands on; none where nobody asks.
+    """
+
+    def __init__(self, root: Path, basis: Basis | None = None) -> None:
         self.root = root
+        self.basis = basis or Basis()
         self._materials: dict[str, str] = {}
         self._tables: dict[str, pa.Table] = {}
         self._frames: dict[tuple[str, bool], pd.DataFrame] = {}
@@ -142,6 +149,11 @@ class Evidence:
                 self._materials.setdefault(name, sha256_file(file))
                 bound.append(name)
         return bound
+
+    def bind_files(self, names: Iterable[str]) -> None:
+        """Hash files by name without reading them."""
+        for name in names:
+            self._materials.setdefault(name, sha256_file(self.root / name))
 
     def digest(self, path: str) -> str:
         """SHA-256 of one file, without reading it further; empty where it is missing."""

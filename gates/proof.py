@@ -1,21 +1,21 @@
 """Proof of reports, and admission: what a stage calls before its first line of work.
 
 A `verdict` field is never believed: every material is hashed, the judge runs again over the
-evidence, and the whole report must come out the same, apart from the environment it was judged
-in. Stages, command line, Gate E and bundles all prove by this one implementation.
+evidence, and the whole report must come out the same: from the same code, parameters, recorded
+runs and library versions. Stages, command line and Gate E all prove by this one implementation.
 """
 
 import datetime
-import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from gates import feasibility, reproducibility
 from gates.card import judge as card
+from gates.differences import first_difference
 from gates.engine import GateSpec, judge_gate
 from gates.need import gate as need
+from gates.pipeline import basis_of, changed_pages, changed_task, outputs_of
 from gates.report import (
     GATES,
     NAMES,
@@ -60,7 +60,6 @@ STAGE_REQUIRES: dict[str, Gate | None] = {
     "card": "D",
     "gate_e": None,
 }
-NOT_COMPARED = {"environment"}
 
 
 @dataclass(frozen=True)
@@ -195,7 +194,7 @@ def prove_all(root: Path) -> list[Rung]:
         try:
             report, digest = verify_report(root, gate, upstream=hashes, judging=again)
         except GenpolicyError as error:
-            code = error.exit_code if isinstance(error, RefusedError | IntegrityError) else 2
+            code = error.exit_code
             rungs.append(Rung(gate, NAMES[gate], "REFUSED", "", str(error), path, code))
             continue
         reports[gate], hashes[gate] = report, digest
@@ -239,7 +238,12 @@ def verify_report(
     report, digest = read_report(root, gate)
     _check_materials(root, gate, report)
     _check_upstream(gate, report, upstream)
+    _check_basis(root, gate, report)
     _check_same(gate, report, judging(root, gate))
+    page = changed_pages(root, gate)
+    if page:
+        action = f"Run `dvc repro {stage_of(gate)}`; never edit a page."
+        raise _refused(gate, page, "another page", "the page printed when the gate ran", action)
     return report, digest
 
 
@@ -276,6 +280,11 @@ def _check_materials(root: Path, gate: Gate, report: GateReport) -> None:
                 f"{expected[:16]}…",
                 f"Run `dvc repro {stage}` and judge again, or restore the original bytes.",
             )
+    for name in outputs_of(root, gate):
+        if name not in report.materials:
+            stage = Path(name).parts[1]
+            action = f"Run `dvc repro {stage}` and judge again, or remove it."
+            raise _refused(gate, name, "a file that nobody judged", "in the report", action)
 
 
 def _check_upstream(gate: Gate, report: GateReport, upstream: Mapping[Gate, str]) -> None:
@@ -291,42 +300,39 @@ def _check_upstream(gate: Gate, report: GateReport, upstream: Mapping[Gate, str]
             )
 
 
+def _check_basis(root: Path, gate: Gate, report: GateReport) -> None:
+    changed = changed_task(root) if gate == "A" else ""
+    if changed:
+        raise _refused(gate, changed, "another file", "the one measured on", "Run `dvc repro`.")
+    now = basis_of(root, gate)
+    for kind, stated, found in (
+        ("code", report.code, now.code),
+        ("parameters", report.parameters, now.parameters),
+        ("the recorded run", report.pipeline, now.pipeline),
+    ):
+        for name in sorted({*stated, *found}):
+            if stated.get(name) != found.get(name):
+                raise _refused(
+                    gate,
+                    f"{kind} of {name}",
+                    f"{found.get(name, 'none')[:16]}…",
+                    f"{stated.get(name, 'none')[:16]}… as judged",
+                    "Run `dvc repro`, or restore what was judged.",
+                )
+
+
 def _check_same(gate: Gate, report: GateReport, again: GateReport) -> None:
-    old, new = _comparable(report), _comparable(again)
-    if old == new:
+    difference = first_difference(report, again)
+    if difference is None:
         return
-    place, stated, derived = _first_difference(old, new, "")
+    place, stated, derived = difference
     raise _refused(
         gate,
         f"{report_path(gate)}{place}",
-        _short(stated),
-        f"{_short(derived)} as derived again from evidence and params.yaml",
+        stated,
+        f"{derived} as derived again from evidence and params.yaml",
         f"Run `dvc repro -f {stage_of(gate)}`; never edit a report.",
     )
-
-
-def _comparable(report: GateReport) -> Any:
-    return json.loads(report.model_dump_json(exclude=NOT_COMPARED))
-
-
-def _first_difference(old: Any, new: Any, place: str) -> tuple[str, Any, Any]:
-    if isinstance(old, dict) and isinstance(new, dict):
-        order = sorted(set(old) | set(new), key=lambda key: (key == "verdict", key))
-        for key in order:
-            if old.get(key) != new.get(key) or (key in old) != (key in new):
-                return _first_difference(old.get(key), new.get(key), f"{place}.{key}")
-    if isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
-        for index, (one, other) in enumerate(zip(old, new, strict=True)):
-            if one != other:
-                return _first_difference(one, other, f"{place}[{index}]")
-    return place, old, new
-
-
-def _short(value: Any) -> str:
-    if isinstance(value, list):
-        return f"a list of {len(value)}"
-    text = json.dumps(value, ensure_ascii=False)
-    return text if len(text) <= 60 else f"{text[:59]}…"
 
 
 def _refused(gate: Gate, criterion: str, measured: str, limit: str, action: str) -> RefusedError:

@@ -12,7 +12,7 @@ from genpolicy.errors import BadInputError, ConfigError, IntegrityError
 from genpolicy.integrity.documents import canonical_json, parse_json
 from genpolicy.integrity.hashing import sha256_bytes_of
 
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
 
 Gate = Literal["A", "B", "C", "D", "E"]
 Owner = Literal["model", "perception", "controller", "safety"]
@@ -87,8 +87,11 @@ class GateReport(StrictModel):
         criteria: In the order in which a failure is diagnosed.
         materials: SHA-256 of every file read or bound, by path relative to the repository.
         upstream: SHA-256 of the reports below this one, by gate.
+        code: SHA-256 of the code that the gate and its evidence stages depend on, by package.
+        parameters: SHA-256 of what they read of `params.yaml`, by key.
+        pipeline: SHA-256 of the recorded run (`dvc.lock`) of each evidence stage.
         settings: The gate's parameters other than limits (levels, margins, candidates).
-        environment: Library versions, threads and regime; not part of what is re-derived.
+        environment: Library versions and regime.
         caveats: What this gate does not show.
         diagnosis: Where to look first; empty after PASS.
         decision: What to do next.
@@ -102,6 +105,9 @@ class GateReport(StrictModel):
     criteria: tuple[Answer, ...]
     materials: dict[str, str]
     upstream: dict[str, str]
+    code: dict[str, str]
+    parameters: dict[str, str]
+    pipeline: dict[str, str]
     settings: dict[str, Any]
     environment: dict[str, str]
     caveats: tuple[str, ...]

@@ -3,11 +3,13 @@
 `artifacts/gate_x/verdict.json` changes only when the verdict or the evidence changes. The next
 stage depends on it and not on the report, so that a limit moved within the same verdict
 re-judges and re-trains nothing; admission still re-derives the verdict from the report.
+`reports/gate_x.metrics.json` is versioned beside the report, so that `dvc metrics diff` needs no
+cache to say which verdict turned.
 """
 
 from pathlib import Path
 
-from gates.report import Answer, Gate
+from gates.report import Answer, Gate, GateReport
 from gates.writing import write_gate
 from genpolicy.integrity.atomic import output_folder, write_bytes
 from genpolicy.integrity.documents import canonical_json
@@ -27,8 +29,7 @@ def judge(letter: Gate, params: Params) -> None:
             "materials": dict(report.materials),
         }
         write_bytes(folder / "verdict.json", canonical_json(token))
-        measured = {_name(item): item.measured for item in report.criteria}
-        write_bytes(folder / "metrics.json", canonical_json(measured))
+        write_bytes(Path("reports") / f"{name}.metrics.json", canonical_json(_metrics(report)))
         lines = ["criterion,measured,threshold,verdict"]
         lines += [
             f"{_name(item)},{_plain(item.measured)},{_plain(item.threshold)},{item.verdict}"
@@ -36,6 +37,23 @@ def judge(letter: Gate, params: Params) -> None:
         ]
         write_bytes(folder / "criteria.csv", "\n".join([*lines, ""]).encode())
     print(f"gate {letter}: {report.verdict}; see reports/{name}.html")
+
+
+def _metrics(report: GateReport) -> dict[str, object]:
+    """What `dvc metrics diff` compares: a verdict that turns shows, also where no number moved."""
+    return {
+        "verdict": str(report.verdict),
+        "passes": int(report.verdict == "PASS"),
+        "candidates": {method: str(verdict) for method, verdict in report.candidates.items()},
+        "criteria": {
+            _name(item): {
+                "measured": item.measured,
+                "threshold": item.threshold,
+                "verdict": str(item.verdict),
+            }
+            for item in report.criteria
+        },
+    }
 
 
 def _name(criterion: Answer) -> str:

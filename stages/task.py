@@ -2,11 +2,15 @@
 
 It runs every time (`always_changed`): a task may be installed and recordings may lie outside the
 tree, where nothing else sees an edit. What it writes changes only when they do. Coming first, it
-also stops the ladder before a stage would replace files that somebody else put in its folder.
+also stops the ladder before a stage would replace files that somebody else put in its folder, and
+where a fixture (controller, limits, supervisor, scene) is not the one that is pinned.
 """
+
+from pathlib import Path
 
 from genpolicy.integrity.atomic import output_folder, write_bytes
 from genpolicy.integrity.documents import canonical_json
+from genpolicy.tasks.fixtures import fixture_hashes, require_pinned
 from genpolicy.tasks.identity import IDENTITY_FILE, task_identity
 from stages._source import SOURCE_FILE, SourceSection, refuse_foreign_files, source_document
 from stages._stage import ARTIFACTS, Params, main
@@ -15,9 +19,11 @@ from stages._stage import ARTIFACTS, Params, main
 def work(params: Params) -> None:
     """Write both identities."""
     refuse_foreign_files()
+    identity = task_identity(params.task.name)
+    require_pinned(Path.cwd(), params.task.name, fixture_hashes(identity))
     source = source_document(params.section("source", SourceSection))
     with output_folder(ARTIFACTS / "task") as folder:
-        write_bytes(folder / IDENTITY_FILE, canonical_json(task_identity(params.task.name)))
+        write_bytes(folder / IDENTITY_FILE, canonical_json(identity))
         write_bytes(folder / SOURCE_FILE, canonical_json(source))
 
 

@@ -34,8 +34,9 @@ from gates.card.signing import (
     utc_today,
 )
 from gates.criterion import Measured, criteria_of, criterion
-from gates.engine import GateSpec, judge
+from gates.engine import GateSpec, judge, recorded_evidence
 from gates.evidence import Evidence, MissingEvidenceError
+from gates.pipeline import check_record
 from gates.report import OWNERS, Gate, GateReport, Point, stage_of
 from gates.settings import GateSettings, read_limits, read_params, read_settings
 from genpolicy.errors import BadInputError, GenpolicyError
@@ -133,7 +134,9 @@ def judge_card(root: Path, chain: Chain, *, today: datetime.date | None = None) 
     error = chain.error or _chain_error(root, chain, papers.draft)
     dossier = Dossier(settings, papers, error, today or utc_today())
     limits = read_limits(params, "E", GATE.criteria)
-    return judge(GATE, Evidence(root), limits, settings, given=dossier)
+    report = judge(GATE, recorded_evidence(root, "E"), limits, settings, given=dossier)
+    check_record(root, "E", report.materials)
+    return report
 
 
 def examine(root: Path, name: str) -> Papers:

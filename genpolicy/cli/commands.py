@@ -14,7 +14,7 @@ Import recordings, audit them, run the ladder of five gates, prove its reports,
 sign and verify trial cards.
 
 Exit codes: 0 done, 1 a fault of ours, 2 bad usage, configuration or input,
-3 refused by a gate.
+3 refused by a gate (it does not pass, or its report is untrue), 130 interrupted.
 """
 
 # Named here once more, because their home loads every table library; a test holds both together.
@@ -41,6 +41,7 @@ def program(arguments: Sequence[str]) -> int:
     app = new_app(DESCRIPTION, cls=Registered)
     app.command("propose", epilog=IMPORT_EXAMPLES)(propose)
     app.command("ingest", epilog=IMPORT_EXAMPLES)(ingest)
+    app.command("fixtures", epilog=examples("genpolicy fixtures --pin"))(fixtures)
     app.command("doctor", epilog=examples("genpolicy doctor --json"))(doctor)
     return run_program(app, "genpolicy", arguments)
 
@@ -74,6 +75,20 @@ def ingest(
 
     source = Recordings(path, format=layout, contract=contract, task=task)
     return run_ingest(source, out=out, as_json=as_json)
+
+
+def fixtures(
+    pin: Annotated[bool, typer.Option("--pin", help="Pin them as they are now.")] = False,
+    task: TaskName = None,
+    root: Annotated[Path, typer.Option(help="The workspace.")] = Path(),
+) -> int:
+    """Hold controller, limits, supervisor and scene against fixtures.yaml.
+
+    Exit 2 if one is not as pinned. The ladder stops for the same reason.
+    """
+    from genpolicy.cli.fixtures import run_fixtures
+
+    return run_fixtures(root, task=task, write=pin)
 
 
 def doctor(

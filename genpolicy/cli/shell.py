@@ -1,6 +1,7 @@
 """The shell of every command: one help, one line per error, one meaning per exit code.
 
-0 done, 1 a fault of ours, 2 bad configuration, bad input or bad usage, 3 refused by a gate.
+0 done, 1 a fault of ours, 2 bad configuration, bad input or bad usage, 3 refused by a gate,
+130 interrupted.
 
 Commands of the packages above this one are found by the entry-point group `genpolicy.commands`
 (name = "package.module:object", a function or a `typer.Typer`), so that imports run one way.

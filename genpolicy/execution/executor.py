@@ -215,11 +215,11 @@ class Executor:
         now_ns = self._journal.clock(now_s)
         return self._queue.remaining(now_ns) <= self.settings.replan_lead_steps
 
-    def begin_invocation(self, now_s: float, invocation_id: str) -> None:
-        """An invocation is in flight until `end_invocation` or a reset."""
+    def begin_invocation(self, now_s: float, invocation_id: str, detail: str = "") -> None:
+        """An invocation is in flight until `end_invocation` or a reset; `detail` goes on record."""
         self._begin(now_s)
         self._in_flight.add(invocation_id)
-        self._journal.invocation(now_s, invocation_id=invocation_id, stage="begin")
+        self._journal.invocation(now_s, invocation_id=invocation_id, stage="begin", detail=detail)
 
     def end_invocation(self, now_s: float, invocation_id: str, detail: str = "") -> None:
         """The invocation answered, failed or was given up; `detail` says which."""

@@ -28,7 +28,7 @@ from genpolicy.integrity.hashing import sha256_bytes_of
 
 Array = NDArray[np.float64]
 
-JOURNAL_VERSION = 2
+JOURNAL_VERSION = 3
 MAXIMUM_UNCOMPRESSED_BYTES = 8 << 30
 MAXIMUM_RECORD_BYTES = 64 << 20
 
@@ -56,6 +56,8 @@ EVENT_FIELDS: dict[str, tuple[str, ...]] = {
     "invalidate": ("reason", "before_ns"),
     "mode": ("old", "new"),
     "reset": ("session_epoch",),
+    "force": ("force_n",),
+    "outcome": ("outcome", "mode"),
     "end": ("chunks", "actions", "events"),
 }  # fmt: skip
 """Payload of each kind of event; `session`, `n` and `t` (ns) are in every message."""

@@ -6,6 +6,30 @@ from collections.abc import Iterator
 
 import torch
 
+from genpolicy.errors import ConfigError
+
+
+def require_device(device: str) -> None:
+    """Refuse a device that this machine does not have.
+
+    Raises:
+        ConfigError: No such device, or none of this kind.
+    """
+    if device == "cpu":
+        return
+    try:
+        wanted = torch.device(device)
+        count = {"cpu": 1, "cuda": torch.cuda.device_count()}.get(wanted.type, 0)
+    except RuntimeError:
+        count, wanted = 0, torch.device("cpu")
+    if not (wanted.index or 0) < count:
+        raise ConfigError(
+            where="params.yaml: compute.device",
+            found=f"{device!r}, which this machine does not have",
+            expected=f"cpu, or one of {torch.cuda.device_count()} CUDA devices",
+            action="Set `compute.device: cpu`, or run where the device is.",
+        )
+
 
 @contextlib.contextmanager
 def deterministic(device: str) -> Iterator[None]:
@@ -13,7 +37,11 @@ def deterministic(device: str) -> Iterator[None]:
 
     Args:
         device: `cpu`, or a CUDA device, whose matrix products then use a fixed workspace.
+
+    Raises:
+        ConfigError: This machine has no such device.
     """
+    require_device(device)
     threads = torch.get_num_threads()
     strict = torch.are_deterministic_algorithms_enabled()
     if device != "cpu":

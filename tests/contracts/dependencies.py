@@ -120,7 +120,37 @@ def counts(path: Path) -> bool:
     return path.is_file() and "__pycache__" not in path.parts and ".tmp." not in path.name
 
 
+def rung(stage: str) -> list[str]:
+    """Stages between a gate and the one below it, as `dvc.yaml` lists them; none of another stage.
+
+    A report names the code and parameters of the evidence that it judges, so the gate judges again
+    when these change.
+    """
+    names = list(pipeline())
+    if not stage.startswith("gate_") or stage not in names:
+        return []
+    before = names[: names.index(stage)]
+    gates = [index for index, name in enumerate(before) if name.startswith("gate_")]
+    return before[gates[-1] + 1 if gates else 0 :]
+
+
 def reached_files(stage: str) -> set[str]:
+    if below := rung(stage):
+        return _reached(stage).union(*map(_reached, below))
+    return _reached(stage)
+
+
+def bound_outputs(stage: str) -> list[str]:
+    """What the evidence stages below a gate write: it binds all of it."""
+    return [out for name in rung(stage) for out in pipeline()[name]["outs"]]
+
+
+def bound_parameters(stage: str) -> list[str]:
+    """What the evidence stages below a gate read of `params.yaml`."""
+    return sorted({key for name in rung(stage) for key in pipeline()[name]["params"]})
+
+
+def _reached(stage: str) -> set[str]:
     modules = reached_modules(f"stages.{stage}")
     return {module_file(module) for module in modules} | data_files(modules)
 
@@ -262,20 +292,27 @@ def table() -> str:
 def rewritten(text: str) -> str:
     """`dvc.yaml` with the code dependencies of every stage put right, comments kept."""
     lines, result = text.split("\n"), []
-    stage, at_deps = "", False
+    stage, at_deps, at_params, listed = "", False, False, set[str]()
     for line in lines:
         named = re.fullmatch(r"  (\w+):", line)
         if named:
             stage = named[1]
         if at_deps and not line.startswith("      - "):
             at_deps = False
+            result += [f"      - {out}" for out in bound_outputs(stage) if out not in listed]
             result += [f"      - {dep}" for dep in code_deps(stage)]
+        if at_params and not line.startswith("      - "):
+            at_params = False
+            result += [f"      - {key}" for key in bound_parameters(stage) if key not in listed]
         dep = line.removeprefix("      - ").strip()
         if at_deps and (is_code(dep) or dep == IDENTITY):
             continue
         result.append(line)
+        listed.add(dep)
+        if line == "    params:":
+            at_params, listed = True, set()
         if line == "    deps:":
-            at_deps = True
+            at_deps, listed = True, set()
             if stage != TASK_STAGE and loads_a_task(stage):
                 result.append(f"      - {IDENTITY}")
     return "\n".join(result)

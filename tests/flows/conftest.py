@@ -13,7 +13,7 @@ import pytest
 SIOCGIFFLAGS, SIOCSIFFLAGS, IFF_UP = 0x8913, 0x8914, 0x1
 
 STAGE = """
-import pathlib, sys, yaml
+import json, pathlib, sys, yaml
 name = sys.argv[1]
 params = yaml.safe_load(pathlib.Path("params.yaml").read_text())
 code = params[name]["code"]
@@ -32,6 +32,8 @@ if name.startswith("gate_"):
     report = pathlib.Path("reports") / f"{name}.md"
     report.parent.mkdir(exist_ok=True)
     report.write_text(f"# {name}\\n\\nPASS\\n")
+    said = {"verdict": params[name].get("verdict", "PASS"), "decision": "Return to the dataset."}
+    report.with_suffix(".json").write_text(json.dumps(said))
 """
 
 NAMES = ("record", "gate_a", "generators", "gate_b")
@@ -46,7 +48,7 @@ def checkout(tmp_path: Path) -> Path:
     (folder / ".gitignore").write_text("/artifacts/\n/build/\n")
     (folder / "stage.py").write_text(textwrap.dedent(STAGE))
     (folder / "params.yaml").write_text(
-        "".join(f"{name}:\n  value: 1\n  code: 0\n" for name in NAMES)
+        "".join(f"{name}:\n  value: 1\n  code: 0\n  verdict: PASS\n" for name in NAMES)
     )
     lines = ["stages:"]
     for place, name in enumerate(NAMES):

@@ -9,7 +9,7 @@ import pytest
 
 from flows import ladder
 from flows.workspace import make_workspace
-from genpolicy.errors import ConfigError
+from genpolicy.errors import BadInputError, ConfigError
 
 
 def test_stages_are_cut_behind_every_gate() -> None:
@@ -96,6 +96,37 @@ def test_a_refusal_travels_through_prefect_as_code_and_sentence(
     assert (target / "build" / "runs.txt").read_text().split() == ["record", "gate_a"]
     assert "Refused(" in done.stdout + done.stderr
     assert "Retry" not in done.stdout + done.stderr
+
+
+@pytest.mark.parametrize("verdict", ["FAIL", "INCONCLUSIVE"])
+def test_a_gate_that_does_not_pass_is_a_failed_task_and_flow(
+    checkout: Path, tmp_path: Path, verdict: str
+) -> None:
+    target = make_workspace(checkout, tmp_path / "run", {"gate_a": {"verdict": verdict}})
+    done = _run(target, tmp_path)
+    said = done.stdout + done.stderr
+    assert done.returncode == 3, done.stderr
+    assert f"The ladder stopped: gate_a: {verdict}. Return to the dataset." in done.stderr
+    assert (target / "build" / "runs.txt").read_text().split() == ["record", "gate_a"]
+    assert f"Finished in state {verdict}(" in said or f"{verdict}('gate_a" in said, said
+    assert "Finished in state Failed(" in said, "the task of the gate is red too"
+
+
+def test_a_gate_that_waits_for_people_is_complete_under_that_name(
+    checkout: Path, tmp_path: Path
+) -> None:
+    target = make_workspace(checkout, tmp_path / "run", {"gate_b": {"verdict": "PENDING_REVIEW"}})
+    done = _run(target, tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "PENDING_REVIEW(" in done.stdout + done.stderr
+
+
+@pytest.mark.parametrize("text", ["{}", "[]", '{"verdict": 1}'])
+def test_a_gate_without_a_verdict_is_bad_input(tmp_path: Path, text: str) -> None:
+    (tmp_path / "reports").mkdir()
+    (tmp_path / "reports" / "gate_a.json").write_text(text)
+    with pytest.raises(BadInputError, match="without a verdict"):
+        ladder.judged(tmp_path, "gate_a")
 
 
 def _run(workspace: Path, home: Path, **variables: str) -> "subprocess.CompletedProcess[str]":

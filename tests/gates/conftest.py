@@ -29,6 +29,7 @@ def write_draft(root: Path) -> None:
     admission = admit("card", root)
     card = draft(root, admission.reports, admission.hashes)
     write_bytes(root / "artifacts/card/card.json", card_bytes(card))
+    evidence.record(root)
 
 
 @pytest.fixture(scope="session")

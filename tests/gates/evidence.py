@@ -12,6 +12,7 @@ import pandas as pd
 import pyarrow as pa
 import yaml
 
+from gates import pipeline
 from gates.cause import default_limits
 from gates.cause.limits import OWN
 from gates.feasibility import LAYERS
@@ -50,6 +51,8 @@ from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.rows import write_rows
 from genpolicy.integrity.tables import read_table, write_table
 
+CODE = "genpolicy/robot/impedance.py"
+"""A file of code in the repository of the tests."""
 BASELINES = ("bc", "chunked_bc", "act")
 DRAWN = "ibc"
 CANDIDATES = ("diffusion", "flow")
@@ -222,6 +225,7 @@ def write_params(root: Path, change: Callable[[dict[str, Any]], Any] | None = No
     if change:
         change(params)
     (root / "params.yaml").write_text(yaml.safe_dump(params, sort_keys=False))
+    record(root)
 
 
 def set_limit(gate: str, name: str, limit: Any) -> Callable[[dict[str, Any]], None]:
@@ -255,6 +259,7 @@ def edit_table(root: Path, path: str, change: Any) -> None:
     file = root / "artifacts" / path
     frame = change(read_table(file).to_pandas())
     write_table(file, pa.Table.from_pandas(pd.DataFrame(frame), preserve_index=False))
+    record(root)
 
 
 def edit_document(root: Path, path: str, change: Any) -> None:
@@ -262,6 +267,14 @@ def edit_document(root: Path, path: str, change: Any) -> None:
     file = root / "artifacts" / path
     value = json.loads(file.read_bytes())
     document(root, path, change(value) or value)
+    record(root)
+
+
+def replace(root: Path, path: str, data: bytes | None) -> None:
+    """Other bytes in place of a file, as if its stage had written them; None removes it."""
+    file = root / "artifacts" / path
+    file.write_bytes(data) if data is not None else file.unlink()
+    record(root)
 
 
 def build(root: Path) -> None:
@@ -277,6 +290,33 @@ def build(root: Path) -> None:
     _latency(root)
     _shadow(root)
     _stress(root)
+    (root / CODE).parent.mkdir(parents=True)
+    (root / CODE).write_text("STIFFNESS = 1\n")
+    (root / "dvc.yaml").write_text(yaml.safe_dump({"stages": {}}))
+    record(root)
+
+
+def record(root: Path) -> None:
+    """Pipeline and lock as if every evidence stage had just written what lies here."""
+    if not (root / "dvc.yaml").is_file():
+        return
+    disk = pipeline._Disk(root, {})
+    params = yaml.safe_load((root / "params.yaml").read_text()) or {}
+    stages, runs = {}, {}
+    for gate, names in pipeline.RUNGS.items():
+        for name in names:
+            outs = [out for out in (f"artifacts/{name}",) if (root / out).is_dir()]
+            keys = [name] if isinstance(params, dict) and name in params else []
+            stages[name] = {"cmd": name, "deps": [CODE], "params": keys, "outs": outs}
+            runs[name] = {
+                "cmd": name,
+                "deps": [{"path": CODE, "md5": disk.md5(CODE)}],
+                "params": {"params.yaml": {key: params[key] for key in keys}},
+                "outs": [{"path": out, "md5": disk.md5(out)} for out in outs],
+            }
+        stages[f"gate_{gate.lower()}"] = {"cmd": "gate", "deps": [CODE], "outs": []}
+    (root / "dvc.yaml").write_text(json.dumps({"stages": stages}))
+    (root / "dvc.lock").write_text(json.dumps({"schema": "2.0", "stages": runs}))
 
 
 def _dataset(root: Path) -> None:

@@ -9,6 +9,7 @@ import pytest
 from gates.commands import gates
 from gates.proof import STAGE_REQUIRES
 from genpolicy.cli.shell import run_program
+from genpolicy.errors import RefusedError
 
 
 @dataclass(frozen=True)
@@ -34,8 +35,17 @@ def _clean(result):
 def test_check_passes_through_d_and_not_through_e(ladder, _run):
     assert _run(ladder, "check").exit_code == 0
     result = _run(ladder, "check", "--through", "E")
-    assert result.exit_code == 1
+    assert result.exit_code == 3
     assert "NOT JUDGED" in result.output
+
+
+def test_check_says_3_for_a_verdict_2_for_what_cannot_be_read_and_never_1(ladder, _run):
+    evidence.edit_table(ladder, "audit/clocks.parquet", lambda f: f.assign(offset_after_s=0.5))
+    assert _run(ladder, "judge", "A").exit_code == 0
+    assert _run(ladder, "check", "--through", "A").exit_code == 3
+    (ladder / "reports" / "gate_a.json").write_text("{")
+    assert _run(ladder, "check", "--through", "A").exit_code == 2
+    assert _run(ladder, "verify").exit_code == 2
 
 
 def test_summary_prints_one_line_per_stage_and_exits_0(ladder, _run):
@@ -49,6 +59,25 @@ def test_summary_prints_one_line_per_stage_and_exits_0(ladder, _run):
     rows = json.loads(_run(ladder, "summary", "--json").output)
     verdicts = {row["stage"]: row["verdict"] for row in rows}
     assert [verdicts[f"gate_{letter}"] for letter in "abcd"] == ["PASS"] * 4
+
+
+@pytest.fixture(autouse=True)
+def _no_journals(monkeypatch):
+    """The journals of this evidence are no journals; tests/gates/test_rederive.py has some."""
+    monkeypatch.setattr("gates.rederive.rederive", lambda root, gate: None)
+
+
+def test_verify_asks_the_journals_too(ladder, _run, monkeypatch):
+    def differs(root, gate):
+        if gate == "D":
+            raise RefusedError(
+                gate="D", criterion="rollout", measured="1", limit="0", report="r", action="Stop."
+            )
+
+    monkeypatch.setattr("gates.rederive.rederive", differs)
+    result = _run(ladder, "verify")
+    assert result.exit_code == 3
+    assert "Gate D refuses: rollout is 1" in result.output
 
 
 def test_verify_finds_a_changed_byte(ladder, _run):

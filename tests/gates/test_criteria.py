@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 from editing import cells
 
-from gates.engine import TASK_IDENTITY, promoted_below
 from gates.engine import judge as judge_spec
+from gates.engine import promoted_below
 from gates.evidence import Evidence
+from gates.pipeline import TASK_IDENTITY
 from gates.proof import SPECS, judge
 from gates.report import report_bytes, report_path
 from gates.settings import Limits, read_limits, read_params, read_settings
@@ -349,7 +350,7 @@ def test_worse_evidence_is_red_and_measured_moves_one_way(gate, name, _ladder, t
 
 @pytest.mark.parametrize(("gate", "path"), [(g, p) for g, paths in TABLES.items() for p in paths])
 def test_missing_table_is_inconclusive_never_pass(gate, path, ladder):
-    (ladder / "artifacts" / f"{path}.parquet").unlink()
+    evidence.replace(ladder, f"{path}.parquet", None)
     report = judge(ladder, gate)
     assert report.verdict == "INCONCLUSIVE"
     assert any("missing" in c.caveat for c in report.criteria)
@@ -381,7 +382,7 @@ def test_nan_is_inconclusive_never_pass(gate, path, column, ladder):
 @pytest.mark.parametrize("gate", "ABCD")
 def test_the_task_is_material_and_without_its_identity_nothing_passes(gate, ladder):
     assert TASK_IDENTITY in judge(ladder, gate).materials
-    (ladder / TASK_IDENTITY).unlink()
+    evidence.replace(ladder, "task/identity.json", None)
     report = judge(ladder, gate)
     assert (report.verdict, report.promoted) == ("INCONCLUSIVE", None)
     assert any(TASK_IDENTITY in caveat for caveat in report.caveats)

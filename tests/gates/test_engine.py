@@ -1,12 +1,14 @@
 """The engine: what is missing is named, and without a limit nothing passes."""
 
 import json
+from dataclasses import replace
 
 import pytest
 from asking import SPEC
 
-from gates.engine import TASK_IDENTITY, judge
+from gates.engine import judge
 from gates.evidence import Evidence
+from gates.pipeline import TASK_IDENTITY, Basis
 from gates.settings import GateSettings, Limit, Limits, Waiver
 
 
@@ -60,3 +62,25 @@ def test_what_does_not_apply_is_a_caveat_and_decides_nothing(tmp_path):
         tmp_path, 1, 1, waived={item.id: Waiver("r", "model") for item in SPEC.criteria}
     )
     assert nothing.verdict == "INCONCLUSIVE"
+
+
+def test_a_document_of_another_form_is_not_measured_and_no_fault(tmp_path, monkeypatch):
+    def measure(evidence, settings):
+        return evidence.document("a.json")["no such key"]
+
+    first, *others = SPEC.criteria
+    spec = replace(SPEC, criteria=(replace(first, measure=measure), *others))
+    (tmp_path / "a.json").write_text("{}")
+    report = judge(spec, Evidence(tmp_path), Limits(), GateSettings())
+    assert "not measured: the evidence has no 'no such key'" in report.criteria[0].caveat
+    assert report.verdict == "INCONCLUSIVE"
+
+
+def test_what_no_run_stands_for_does_not_pass(tmp_path):
+    of = {"second_in_the_alphabet": Limit(1.0, "r", "model")}
+    waived = {"first_in_the_alphabet": Waiver("no such thing here", "controller")}
+    assert _judge(tmp_path, 1, 99, of=of, waived=waived).verdict == "PASS"
+    evidence = Evidence(tmp_path, Basis(unrecorded=("stress",)))
+    report = judge(SPEC, evidence, Limits(of=of, waived=waived), GateSettings())
+    assert (report.verdict, report.promoted) == ("INCONCLUSIVE", None)
+    assert report.caveats[-1].endswith("dvc.lock holds no run of stress.")

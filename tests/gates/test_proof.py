@@ -151,9 +151,10 @@ def test_a_promotion_written_by_hand_refuses(ladder):
         admit("card", ladder)
 
 
-def test_the_environment_is_recorded_but_not_compared(ladder):
-    _edit_report(ladder, "A", lambda r: r["environment"].update(threads="64"))
-    admit("train_generators", ladder)
+def test_another_environment_refuses(ladder):
+    _edit_report(ladder, "A", lambda r: r["environment"].update(numpy="0.1"))
+    with pytest.raises(RefusedError, match=r"environment\.numpy is .0\.1"):
+        admit("train_generators", ladder)
 
 
 def test_a_report_of_another_gate_or_another_run_refuses(ladder, repo):

@@ -78,7 +78,7 @@ def _waive(owner, name, reason="no such thing in this cell", gate="gate_a"):
 
 def test_a_criterion_that_does_not_apply_is_said_and_not_asked(ladder):
     evidence.write_params(ladder, _waive("perception", "calibration_residual_m"))
-    (ladder / "artifacts/audit/calibration.parquet").unlink()
+    evidence.replace(ladder, "audit/calibration.parquet", None)
     report = judge(ladder, "A")
     assert report.verdict == "PASS"
     assert "calibration_residual_m" not in {c.id for c in report.criteria}

@@ -124,7 +124,7 @@ CASES: dict[str, tuple[Tamper, str, int, str]] = {
     ),
     "older schema version": (
         edit_report("gate_a", lambda d: d.update(schema_version=0)), "train_generators", 2,
-        r"reports/gate_a\.json: schema_version is 0, expected 2\. Run `dvc repro -f gate_a`",
+        r"reports/gate_a\.json: schema_version is 0, expected 3\. Run `dvc repro -f gate_a`",
     ),
     "report of another gate": (
         lambda w: shutil.copy(w / "reports" / "gate_a.json", w / "reports" / "gate_b.json"),

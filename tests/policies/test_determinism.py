@@ -3,6 +3,8 @@
 import pytest
 import torch
 
+from genpolicy.errors import ConfigError
+from genpolicy.policies import determinism
 from genpolicy.policies.determinism import deterministic
 from genpolicy.policies.methods import METHODS
 from genpolicy.policies.networks import (
@@ -40,3 +42,24 @@ def test_a_row_keeps_its_bits_at_every_place_of_a_batch(method, rows):
     with deterministic("cpu"), torch.inference_mode():
         out = network.evaluate(network.encode(observations), values, time)
     assert all(torch.equal(out[0], row) for row in out)
+
+
+@pytest.mark.parametrize("device", ["cuda:99", "mps", "gpu", ""])
+def test_a_device_that_is_not_there_is_a_bad_setting(device: str) -> None:
+    with (
+        pytest.raises(ConfigError, match=r"compute\.device is .*expected cpu") as caught,
+        determinism.deterministic(device),
+    ):
+        pass
+    assert caught.value.exit_code == 2
+
+
+def test_without_a_gpu_cuda_is_a_bad_setting(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(torch.cuda, "device_count", lambda: 0)
+    with pytest.raises(ConfigError, match="'cuda', which this machine does not have"):
+        determinism.require_device("cuda")
+    monkeypatch.setattr(torch.cuda, "device_count", lambda: 1)
+    determinism.require_device("cuda")
+    determinism.require_device("cuda:0")
+    with pytest.raises(ConfigError):
+        determinism.require_device("cuda:1")

@@ -3,6 +3,7 @@
 import importlib
 import importlib.util
 import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -13,6 +14,7 @@ from typing import Any
 import pytest
 import yaml
 
+from genpolicy.tasks.fixtures import PINS
 from stages._stage import main
 
 ROOT = Path(__file__).parents[2]
@@ -21,7 +23,8 @@ Edit = Callable[[dict[str, Any]], Any]
 
 @pytest.fixture
 def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The current folder, with the parameters of the checkout."""
+    """The current folder, with the parameters and the pinned fixtures of the checkout."""
+    shutil.copy(ROOT / PINS, tmp_path)
     (tmp_path / "params.yaml").write_bytes((ROOT / "params.yaml").read_bytes())
     monkeypatch.chdir(tmp_path)
     return tmp_path
@@ -95,6 +98,7 @@ def recorded(
     """A workspace with recordings of the scripted operators, by the stages themselves."""
     folder = tmp_path_factory.mktemp("recorded")
     params = yaml.safe_load((ROOT / "params.yaml").read_text())
+    shutil.copy(ROOT / PINS, folder)
     params["record"].update(episodes=EPISODES, shares={"nominal": 1.0})
     (folder / "params.yaml").write_text(yaml.safe_dump(params))
     for stage in ("task", "record"):

@@ -40,12 +40,17 @@ def test_each_gate_writes_its_verdict_numbers_and_table(evidence, stage) -> None
         names = [
             f"{c['candidate']}.{c['id']}" if c["candidate"] else c["id"] for c in report["criteria"]
         ]
-        metrics = json.loads(read(evidence, gate, "metrics.json"))
+        written = json.loads((evidence / "reports" / f"{gate}.metrics.json").read_text())
+        assert (written["verdict"], written["passes"]) == ("PASS", 1)
+        assert written["candidates"] == report["candidates"]
+        metrics = written["criteria"]
         assert sorted(metrics) == sorted(names)
         rows = list(csv.DictReader(read(evidence, gate, "criteria.csv").decode().splitlines()))
         assert [row["criterion"] for row in rows] == names
         for row, criterion in zip(rows, report["criteria"], strict=True):
-            assert metrics[row["criterion"]] == criterion["measured"]
+            assert metrics[row["criterion"]] == {
+                key: criterion[key] for key in ("measured", "threshold", "verdict")
+            }
             assert float(row["measured"]) == pytest.approx(criterion["measured"], rel=1e-9)
             assert float(row["threshold"]) == criterion["threshold"]
             assert row["verdict"] == criterion["verdict"]
@@ -100,6 +105,9 @@ def test_a_failed_gate_ends_with_0_and_its_report_says_fail(evidence, stage, edi
     judge(stage, "gate_a")
     report = json.loads((evidence / "reports" / "gate_a.json").read_text())
     assert report["verdict"] == "FAIL"
+    metrics = json.loads((evidence / "reports" / "gate_a.metrics.json").read_text())
+    assert (metrics["verdict"], metrics["passes"]) == ("FAIL", 0)
+    assert metrics["criteria"]["held_out_situations"]["verdict"] == "FAIL"
     code, said = stage("train_generators")
     assert code == 3
     assert "Gate A refuses: held_out_situations is" in said

@@ -5,6 +5,7 @@ import re
 from pathlib import Path
 
 import pytest
+import yaml
 
 from genpolicy.errors import ContractError, RefusedError
 from stages._stage import SHARED, STAGES, load_params, main
@@ -198,3 +199,15 @@ def test_times_that_cannot_be_written_fail_no_stage(workspace, capsys) -> None:
         main("record", lambda _: None)
     assert end.value.code == 0
     assert "time not recorded" in capsys.readouterr().err
+
+
+def test_a_fixture_that_is_not_the_pinned_one_stops_the_ladder_at_its_first_stage(
+    workspace, stage
+) -> None:
+    pins = yaml.safe_load((workspace / "fixtures.yaml").read_text())
+    pins["tabletop_insertion"]["supervisor"] = "0" * 64
+    (workspace / "fixtures.yaml").write_text(yaml.safe_dump(pins))
+    code, said = stage("task")
+    assert (code, said.count("\n")) == (2, 1)
+    assert "fixtures.yaml: tabletop_insertion.supervisor" in said
+    assert not (workspace / "artifacts" / "task").exists()

@@ -203,7 +203,7 @@ def rollout_row(shard: Shard, rollout: Rollout) -> tuple[RolloutRow, Array]:
         [event.payload["age_ns"] / NS_PER_S for event in events if event.kind == "accept"]
     )
     balance = rollout.executor.conservation().chunks
-    tally, path = rollout.tally, np.stack(rollout.tally.path_m)
+    tally = rollout.tally
     assert rollout.outcome is not None
     row = RolloutRow(
         method=shard.judged.name,
@@ -231,7 +231,7 @@ def rollout_row(shard: Shard, rollout: Rollout) -> tuple[RolloutRow, Array]:
         action_age_max_s=_quantile(ages, 1.0),
         latency_p95_s=_quantile(np.array(tally.latencies_s), 0.95),
         force_peak_n=tally.force_peak_n,
-        mode=rollout.fixture.task.mode_of(path, rollout.history[-1]),
+        mode=tally.mode,
     )
     return row, ages
 

@@ -178,7 +178,7 @@ class Rollout:
         self._disturbance.push(now_s)
         self.world.advance()
         self.tick += 1
-        self.tally.force_peak_n = max(self.tally.force_peak_n, self.world.contact_force_n)
+        self.tally.feel(self.journal, self.now_s, self.world.contact_force_n)
         if self.world.success:
             self._end(Outcome.SUCCESS)
 
@@ -193,6 +193,7 @@ class Rollout:
             self._write_off(flying, DiscardReason.END_OF_EPISODE)
         self._flying.clear()
         self._arrived.clear()
+        self.tally.conclude(self.journal, self.fixture.task, outcome, self.history[-1])
         self.executor.end_episode(self.now_s)
 
     def _supervise(self, now_s: float) -> None:
@@ -227,7 +228,7 @@ class Rollout:
         flying = in_flight(
             self.fixture, metadata, self.history[-1], start=self.start_index, number=number
         )
-        self.executor.begin_invocation(now_s, metadata.chunk_id)
+        self.executor.begin_invocation(now_s, metadata.chunk_id, repr(flying.total_s))
         self.tally.latencies_s.append(flying.total_s)
         return flying
 

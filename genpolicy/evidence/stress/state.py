@@ -98,6 +98,7 @@ class InFlight:
 class Tally:
     """What a rollout counts while it runs."""
 
+    mode: str = ""
     action_ticks: int = 0
     hold_ticks: int = 0
     fallback_ticks: int = 0
@@ -108,6 +109,18 @@ class Tally:
     rejected_by: dict[str, int] = field(default_factory=dict)
     latencies_s: list[float] = field(default_factory=list)
     path_m: list[Array] = field(default_factory=list)
+
+    def feel(self, journal: Journal, now_s: float, force_n: float) -> None:
+        """Note a contact force; a new peak goes on record."""
+        if force_n > self.force_peak_n:
+            self.force_peak_n = float(force_n)
+            journal.add("force", journal.clock(now_s), {"force_n": self.force_peak_n})
+
+    def conclude(self, journal: Journal, task: Task, outcome: Outcome, observation: Array) -> None:
+        """Put the outcome on record, before the session ends. Observation: the last, (D_o,)."""
+        self.mode = task.mode_of(np.stack(self.path_m), observation)
+        payload = {"outcome": str(outcome), "mode": self.mode}
+        journal.add("outcome", journal.latest_ns, payload)
 
 
 def in_flight(

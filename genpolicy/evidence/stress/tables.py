@@ -10,6 +10,7 @@ import numpy as np
 
 from genpolicy.candidates.judged import JudgedPolicy
 from genpolicy.compute import map_shards
+from genpolicy.errors import ConfigError
 from genpolicy.evidence.rows.stress import (
     AgeRow,
     ConservationRow,
@@ -94,7 +95,18 @@ def plan_shards(
         perturbations: What is injected, by name.
         latency: Latency of each method.
         journals: Folder of the journals.
+
+    Raises:
+        ConfigError: A method whose latency was not measured.
     """
+    untimed = sorted({policy.name for policy in judged} - set(latency))
+    if untimed:
+        raise ConfigError(
+            where="params.yaml: stress.baselines, train_generators.samplers",
+            found=f"with {', '.join(untimed)}, whose latency was not measured",
+            expected=f"methods out of {', '.join(sorted(latency))}",
+            action="Correct the names, or run `dvc repro latency`.",
+        )
     return [
         Shard(
             comparison=comparison,

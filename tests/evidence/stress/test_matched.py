@@ -1,6 +1,6 @@
 """Shards of the matched comparison: rows, journals, batches that change nothing."""
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -19,6 +19,7 @@ from genpolicy.policies.windows import Windows
 from genpolicy.seeds import stream
 from genpolicy.tasks.api import WorldSettings
 from genpolicy.verification.checker import check_journal
+from genpolicy.verification.rollouts import derived_rollouts, differences
 
 METHODS = {"chunked_bc": SamplerConfig(name="direct"), "flow": SamplerConfig(name="euler", steps=2)}
 
@@ -130,6 +131,28 @@ def test_a_row_says_what_its_journal_says(shard):
         assert row.outcome == "timeout" and row.success is False
         moved = row.action_ticks + row.hold_ticks + row.fallback_ticks
         assert moved == row.ticks
+
+
+@pytest.mark.parametrize("seconds", [0.03, 0.25, 0.6])
+def test_every_row_follows_from_its_journal(shard, kit, seconds):
+    """Answered in time, answered late and rejected, never answered: recoveries among them."""
+    plan = shard(latency=kit.latency(seconds))
+    result = run_shard(plan)
+    derived = derived_rollouts(plan.journal)
+    assert len(derived) == len(result.rollouts)
+    for row in result.rollouts:
+        columns = derived[f"flow/nominal/{row.start}"]
+        assert differences(asdict(row), columns) == [], (row, columns)
+        assert set(asdict(row)) - set(columns) == {"seed", "duration_s"}
+
+
+@pytest.mark.parametrize("column", ["success", "force_peak_n", "outcome", "hold_ticks", "mode"])
+def test_a_row_that_was_changed_is_told_from_its_journal(shard, column):
+    plan = shard()
+    row = asdict(run_shard(plan).rollouts[0])
+    columns = derived_rollouts(plan.journal)["flow/nominal/0"]
+    row[column] = {"success": True, "outcome": "success", "mode": "other"}.get(column, 123)
+    assert differences(row, columns) == [column]
 
 
 def test_company_changes_no_rollout(shard, plans):

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from genpolicy.candidates.judged import JudgedPolicy
+from genpolicy.errors import ConfigError
 from genpolicy.evidence.shadow.session import Cell
 from genpolicy.evidence.stress.latency import (
     DECLARED_TERMS,
@@ -71,6 +72,13 @@ def test_every_method_meets_every_perturbation(tmp_path):
     ]
     assert all(shard.schedule is PERTURBATIONS[shard.perturbation] for shard in plan)
     assert len({shard.journal for shard in plan}) == len(plan)
+
+
+def test_a_method_whose_latency_was_not_measured_is_a_bad_setting(tmp_path):
+    judged = [JudgedPolicy(name, 0, tmp_path, "") for name in "abc"]
+    models = dict.fromkeys("ac")
+    with pytest.raises(ConfigError, match="with b, whose latency was not measured"):
+        plan_shards(None, judged, PERTURBATIONS, latency=models, journals=tmp_path)
 
 
 def test_starts_are_matched_by_hash(written):

@@ -4,6 +4,7 @@ import base64
 import datetime
 import json
 
+import evidence
 import pytest
 from team import PEOPLE
 
@@ -91,6 +92,11 @@ def _self_review(team):
     team.forge(_edit(reviewer="Ada Author"), names)
 
 
+def _other_draft(root):
+    _byte(root, "artifacts/card/card.json")
+    evidence.record(root)
+
+
 FORGERIES = {
     "payload tampered": (_document(_tamper), "signature_valid"),
     "another payload type": (_other_type, "signature_valid"),
@@ -143,7 +149,7 @@ FORGERIES = {
         lambda t: _byte(t.root, "artifacts/audit/summary.json"),
         "upstream_passed",
     ),
-    "the draft changed": (lambda t: _byte(t.root, "artifacts/card/card.json"), "signature_valid"),
+    "the draft changed": (lambda t: _other_draft(t.root), "signature_valid"),
 }
 
 

@@ -32,7 +32,7 @@ def test_the_scene_is_shown_byte_for_byte_and_bound(ladder):
     ],
 )
 def test_what_is_no_small_png_is_not_shown(ladder, data, why):
-    (ladder / SCENE).write_bytes(data)
+    evidence.replace(ladder, "audit/scene.png", data)
     write_gate(ladder, "A")
     page = (ladder / "reports/gate_a.html").read_text()
     assert not SHOWN.search(page) and "onload" not in page
@@ -47,7 +47,7 @@ def test_a_scene_that_changed_after_judging_is_not_shown(ladder):
 
 
 def test_without_a_scene_the_gate_is_judged_all_the_same(ladder):
-    (ladder / SCENE).unlink()
+    evidence.replace(ladder, "audit/scene.png", None)
     assert write_gate(ladder, "A").verdict == "PASS"
     page = (ladder / "reports/gate_a.html").read_text()
     assert f"Not drawn: {SCENE} is missing." in page and not SHOWN.search(page)

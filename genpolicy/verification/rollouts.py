@@ -1,0 +1,133 @@
+"""What a journal says of each rollout: the rows of the comparison, derived again from raw events.
+
+Shares no code with the rollout that wrote them, so that a row and its journal are two witnesses.
+"""
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from genpolicy.verification.journal_source import Message, read_messages
+
+CALLS_A_PERSON = ("ask_human", "abort")
+SUCCESS = "success"
+
+
+def derived_rollouts(path: Path) -> dict[str, dict[str, Any]]:
+    """Columns of each rollout of a journal file, by session.
+
+    Returns:
+        By session: the columns of `RolloutRow` that follow from events. Times in s, force in N.
+
+    Raises:
+        IntegrityError: No regular file.
+        BadInputError: Not a whole journal, or an event that cannot be read.
+    """
+    sessions: dict[str, _Session] = {}
+    for kind, message in read_messages(path):
+        sessions.setdefault(str(message.get("session")), _Session()).read(kind, message)
+    return {name: session.columns() for name, session in sessions.items()}
+
+
+def differences(row: dict[str, Any], derived: dict[str, Any]) -> list[str]:
+    """Columns of a row that are not what the journal says."""
+    return sorted(name for name, value in derived.items() if row.get(name) != value)
+
+
+@dataclass
+class _Session:
+    """Counts of one rollout while its events go by."""
+
+    labels: dict[str, str] = field(default_factory=dict)
+    period_ns: int = 0
+    end_ns: int = 0
+    outcome: str = ""
+    mode: str = ""
+    peak_n: float = 0.0
+    counts: Counter[str] = field(default_factory=Counter)
+    rejected_by: Counter[str] = field(default_factory=Counter)
+    open_rejections: set[str] = field(default_factory=set)
+    ages_ns: list[int] = field(default_factory=list)
+    latencies_s: list[float] = field(default_factory=list)
+
+    def read(self, kind: str, m: Message) -> None:
+        """Take an event in."""
+        if kind == "session":
+            self.labels, self.period_ns = m["labels"], m["period_ns"]
+        elif kind == "invocation":
+            self._invocation(m)
+        elif kind == "candidate":
+            self._candidate(m)
+        elif kind in ("accept", "fallback"):
+            self.counts[kind] += 1
+            if kind == "accept":
+                self.ages_ns.append(m["age_ns"])
+        elif kind in ("discard", "finish"):
+            self.counts["discards"] += m["ended"] == "discarded"
+        elif kind == "recovery":
+            self.counts["recoveries"] += m["old"] == "idle"
+            self.counts["calls"] += m["new"] in CALLS_A_PERSON
+        elif kind == "force":
+            self.peak_n = max(self.peak_n, m["force_n"])
+        elif kind == "outcome":
+            self.outcome, self.mode = m["outcome"], m["mode"]
+        elif kind == "end":
+            self.end_ns = m["t"]
+
+    def _invocation(self, m: Message) -> None:
+        if m["stage"] == "begin":
+            self.counts["invocations"] += 1
+            self.latencies_s.append(float(m["detail"]))
+        self.counts["misses"] += m["stage"] == "end" and m["detail"] == "deadline"
+
+    def _candidate(self, m: Message) -> None:
+        """An invocation counts as rejected until one of its candidates passes every layer."""
+        if all(passed is True for passed in m["layers"].values()):
+            self.open_rejections.discard(m["chunk_id"])
+        else:
+            self.open_rejections.add(m["chunk_id"])
+            self.rejected_by[str(m["first_reason"])] += 1
+
+    def columns(self) -> dict[str, Any]:
+        """The columns at the end."""
+        ages = [age / 1e9 for age in self.ages_ns]
+        recovered = self.counts["recoveries"] > 0
+        ticks = round(self.end_ns / self.period_ns) if self.period_ns else 0
+        return {
+            "method": self.labels.get("method"),
+            "perturbation": self.labels.get("perturbation"),
+            "start": int(self.labels.get("start", -1)),
+            "start_sha256": self.labels.get("start_sha256"),
+            "outcome": self.outcome,
+            "success": self.outcome == SUCCESS,
+            "ticks": ticks,
+            "action_ticks": self.counts["accept"],
+            "fallback_ticks": self.counts["fallback"],
+            "hold_ticks": ticks - self.counts["accept"] - self.counts["fallback"],
+            "invocations": self.counts["invocations"],
+            "deadline_misses": self.counts["misses"],
+            "discards": self.counts["discards"],
+            "rejections": len(self.open_rejections),
+            "rejected_by": max(
+                sorted(self.rejected_by), key=lambda name: self.rejected_by[name], default=""
+            ),
+            "recovery_attempted": recovered,
+            "recovered": recovered and self.outcome == SUCCESS,
+            "interventions": self.counts["calls"],
+            "action_age_p50_s": _order_statistic(ages, 0.5),
+            "action_age_p95_s": _order_statistic(ages, 0.95),
+            "action_age_max_s": _order_statistic(ages, 1.0),
+            "latency_p95_s": _order_statistic(self.latencies_s, 0.95),
+            "force_peak_n": self.peak_n,
+            "mode": self.mode,
+        }
+
+
+def _order_statistic(values: Sequence[float], level: float) -> float | None:
+    """The smallest value that at least this share does not exceed; None without any."""
+    if not values:
+        return None
+    return sorted(values)[math.ceil((len(values) - 1) * level)]

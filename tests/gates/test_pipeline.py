@@ -1,0 +1,239 @@
+"""The record of the pipeline: nothing is judged or proved that its stage did not write."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import evidence
+import pytest
+import yaml
+
+from gates import pipeline
+from gates.proof import admit, judge, prove_all
+from gates.report import report_bytes, report_path
+from genpolicy.errors import ConfigError, IntegrityError, RefusedError
+from genpolicy.integrity.atomic import write_bytes
+from genpolicy.integrity.hashing import sha256_file
+from genpolicy.integrity.tables import read_table, write_table
+
+ROLLOUTS = "artifacts/stress/rollouts.parquet"
+
+
+def _judge_again(root, gates):
+    for gate in gates:
+        write_bytes(root / report_path(gate), report_bytes(judge(root, gate)))
+
+
+def _forge(root):
+    """A table in which every candidate succeeds, put in the place of the measured one."""
+    table = read_table(root / ROLLOUTS)
+    place = table.schema.get_field_index("success")
+    write_table(
+        root / ROLLOUTS,
+        table.set_column(place, table.schema.field(place), [[True] * table.num_rows]),
+    )
+
+
+def test_every_file_of_every_evidence_stage_is_bound(ladder):
+    bound = set()
+    for gate in "ABCDE":
+        bound |= set(judge(ladder, gate).materials)
+    folders = [f"artifacts/{stage}" for stages in pipeline.RUNGS.values() for stage in stages]
+    lying = {
+        path.relative_to(ladder).as_posix()
+        for folder in folders
+        for path in (ladder / folder).rglob("*")
+        if path.is_file()
+    }
+    assert lying and lying <= bound
+
+
+def test_forged_evidence_is_refused_when_it_is_judged(ladder):
+    _forge(ladder)
+    with pytest.raises(IntegrityError, match=r"artifacts/stress is other than recorded"):
+        judge(ladder, "D")
+
+
+def test_a_file_added_to_the_evidence_is_refused_by_its_name(ladder):
+    (ladder / "artifacts/shadow/notes.txt").write_text("all fine")
+    with pytest.raises(RefusedError, match=r"shadow/notes\.txt is a file that nobody judged"):
+        admit("stress", ladder)
+    with pytest.raises(IntegrityError, match="artifacts/shadow"):
+        judge(ladder, "C")
+
+
+def test_other_code_refuses_below_and_above(ladder):
+    """The stiffness of the controller, changed after everything passed."""
+    (ladder / evidence.CODE).write_text("STIFFNESS = 2\n")
+    with pytest.raises(RefusedError, match="Gate A refuses: code of genpolicy/robot is"):
+        admit("card", ladder)
+    with pytest.raises(IntegrityError, match=r"impedance\.py is other than recorded"):
+        judge(ladder, "D")
+    assert [rung.verdict for rung in prove_all(ladder)][:4] == ["REFUSED"] * 4
+
+
+def test_other_parameters_of_the_evidence_refuse(ladder):
+    params = yaml.safe_load((ladder / "params.yaml").read_text())
+    params["stress"]["margin"] = 0.001
+    (ladder / "params.yaml").write_text(yaml.safe_dump(params, sort_keys=False))
+    with pytest.raises(RefusedError, match="Gate D refuses: parameters of stress is"):
+        admit("card", ladder)
+    with pytest.raises(IntegrityError, match=r"params\.yaml: stress is other than recorded"):
+        judge(ladder, "D")
+
+
+def test_evidence_measured_again_needs_a_judgement(ladder):
+    _forge(ladder)
+    evidence.record(ladder)
+    with pytest.raises(RefusedError, match="Gate D refuses"):
+        admit("card", ladder)
+    lock = yaml.safe_load((ladder / "dvc.lock").read_text())
+    lock["stages"]["audit"]["cmd"] = "python -m other"
+    (ladder / "dvc.lock").write_text(json.dumps(lock))
+    with pytest.raises(RefusedError, match="Gate A refuses: the recorded run of audit"):
+        admit("card", ladder)
+
+
+@pytest.mark.parametrize("name", ["dvc.lock", "dvc.yaml"])
+def test_nothing_passes_outside_a_recorded_pipeline(ladder, name):
+    (ladder / name).unlink()
+    for gate in "ABCD":
+        report = judge(ladder, gate)
+        assert report.verdict == "INCONCLUSIVE"
+        assert any("dvc.lock holds no run of" in caveat for caveat in report.caveats)
+        assert all(answer.verdict == "PASS" for answer in report.criteria)
+
+
+def test_one_stage_without_a_record_is_enough(ladder):
+    lock = yaml.safe_load((ladder / "dvc.lock").read_text())
+    del lock["stages"]["latency"]
+    (ladder / "dvc.lock").write_text(json.dumps(lock))
+    report = judge(ladder, "B")
+    assert report.verdict == "INCONCLUSIVE"
+    assert report.caveats[-1].endswith("no run of latency.")
+    assert judge(ladder, "A").verdict == "PASS"
+
+
+def test_a_task_whose_package_has_changed_refuses(ladder):
+    package = ladder / "some_task"
+    package.mkdir()
+    (package / "task.py").write_text("TASK = 1\n")
+    (package / "scene.xml").write_text("<mujoco/>")
+    files = {name: sha256_file(package / name) for name in ("scene.xml", "task.py")}
+    identity = {"name": "t", "entry_point": "some_task.task:TASK", "package": files}
+    evidence.edit_document(ladder, "task/identity.json", lambda _: identity)
+    assert judge(ladder, "A").verdict == "PASS"
+    (package / "scene.xml").write_text("<mujoco></mujoco>")
+    with pytest.raises(IntegrityError, match=r"the task t: scene\.xml is other than"):
+        judge(ladder, "A")
+    (package / "scene.xml").unlink()
+    with pytest.raises(IntegrityError, match=r"the task t: scene\.xml is other than"):
+        judge(ladder, "A")
+
+
+def test_a_report_about_another_task_refuses(ladder):
+    identity = {"name": "t", "entry_point": "no_task:TASK", "package": {"task.py": "0" * 64}}
+    _judge_again(ladder, "A")
+    evidence.edit_document(ladder, "task/identity.json", lambda _: identity)
+    with pytest.raises(RefusedError):
+        admit("train_generators", ladder)
+
+
+def test_a_printed_page_that_was_changed_refuses(ladder):
+    page = ladder / "reports/gate_a.html"
+    page.write_text("<p>FAIL</p>")
+    lock = yaml.safe_load((ladder / "dvc.lock").read_text())
+    md5 = pipeline._Disk(ladder, {}).md5("reports/gate_a.html")
+    lock["stages"]["gate_a"] = {"outs": [{"path": "reports/gate_a.html", "md5": md5}]}
+    (ladder / "dvc.lock").write_text(json.dumps(lock))
+    admit("train_generators", ladder)
+    page.write_text("<p>PASS</p>")
+    with pytest.raises(RefusedError, match=r"reports/gate_a\.html is another page"):
+        admit("train_generators", ladder)
+    page.unlink()
+    with pytest.raises(RefusedError, match=r"reports/gate_a\.html is another page"):
+        admit("train_generators", ladder)
+
+
+@pytest.mark.parametrize("text", ["stages: [1]", "stages: {", "a: 1\na: 2"])
+def test_a_malformed_record_is_a_bad_setting(ladder, text):
+    (ladder / "dvc.lock").write_text(text)
+    with pytest.raises(ConfigError, match=r"dvc\.lock"):
+        judge(ladder, "D")
+
+
+@pytest.fixture(scope="module")
+def _real(tmp_path_factory) -> Path:
+    """A pipeline of one stage, run by DVC itself."""
+    root = tmp_path_factory.mktemp("real")
+    subprocess.run([sys.executable, "-m", "dvc", "init", "--no-scm", "-q"], cwd=root, check=True)
+    (root / ".dvcignore").write_text("__pycache__\n*.pyc\n")
+    for name in ("genpolicy/deep/b.py", "genpolicy/a.py", "genpolicy/__pycache__/a.pyc"):
+        (root / name).parent.mkdir(parents=True, exist_ok=True)
+        (root / name).write_text(name)
+    (root / "params.yaml").write_text(
+        "shadow:\n  small: 0.00001\n  list: [1, 2.5, true, null]\n  text: '1e-05'\nother: {x: 1}\n"
+    )
+    command = "mkdir -p artifacts/shadow/a && echo 1 > artifacts/shadow/a/x && "
+    command += "echo 2 > artifacts/shadow/a.txt"
+    stage = {
+        "cmd": command,
+        "deps": ["genpolicy"],
+        "params": ["shadow", "other.x"],
+        "outs": ["artifacts/shadow"],
+    }
+    (root / "dvc.yaml").write_text(yaml.safe_dump({"stages": {"shadow": stage}}))
+    subprocess.run([sys.executable, "-m", "dvc", "repro", "-q"], cwd=root, check=True)
+    return root
+
+
+WRONG = {
+    "code": ("genpolicy/deep/b.py", "other", r"genpolicy is other than recorded"),
+    "new code": ("genpolicy/c.py", "new", r"genpolicy is other than recorded"),
+    "evidence": ("artifacts/shadow/a/x", "3\n", r"artifacts/shadow is other than recorded"),
+    "small number": (
+        "params.yaml",
+        "shadow:\n  small: 0.00002\n  list: [1, 2.5, true, null]\n  text: '1e-05'\nother: {x: 1}",
+        r"params\.yaml: shadow is other",
+    ),
+    "nested number": (
+        "params.yaml",
+        "shadow:\n  small: 0.00001\n  list: [1, 2.5, true, null]\n  text: '1e-05'\nother: {x: 2}",
+        r"params\.yaml: other\.x is other",
+    ),
+}
+
+
+def test_the_record_is_read_as_dvc_writes_it(_real):
+    """Folders, nested folders, ignored files, nested parameters and small numbers."""
+    pipeline.check_record(_real, "C", {})
+    assert pipeline.basis_of(_real, "C").unrecorded == ()
+    assert pipeline.outputs_of(_real, "C") == ("artifacts/shadow/a.txt", "artifacts/shadow/a/x")
+    (_real / "genpolicy/__pycache__/b.pyc").write_text("compiled again")
+    pipeline.check_record(_real, "C", {})
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_what_is_not_as_dvc_recorded_it_is_refused(_real, name):
+    file, text, sentence = WRONG[name]
+    path = _real / file
+    before = path.read_text() if path.exists() else None
+    path.write_text(text)
+    try:
+        with pytest.raises(IntegrityError, match=sentence):
+            pipeline.check_record(_real, "C", {})
+    finally:
+        path.unlink() if before is None else path.write_text(before)
+
+
+def test_bytes_that_change_while_they_are_judged_are_refused(_real):
+    with pytest.raises(IntegrityError, match="changed while it was judged"):
+        pipeline.check_record(_real, "C", {"artifacts/shadow/a.txt": "0" * 64})
+
+
+def test_an_output_that_is_missing_is_no_output_as_recorded(ladder):
+    (ladder / "artifacts/latency/latency.parquet").unlink()
+    (ladder / "artifacts/latency").rmdir()
+    with pytest.raises(IntegrityError, match="artifacts/latency is missing"):
+        pipeline.check_record(ladder, "B", {})

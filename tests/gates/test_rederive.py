@@ -1,0 +1,165 @@
+"""Journals are a second witness: what they do not say is refused, whoever recorded it."""
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+
+import pytest
+import yaml
+
+from gates import rederive as module
+from gates.proof import Rung
+from gates.rederive import STRESS, rederive, rederived
+from genpolicy.contract.horizons import HorizonConfig
+from genpolicy.errors import BadInputError, RefusedError
+from genpolicy.evidence.rows.stress import RolloutRow
+from genpolicy.execution.cell import ExecutionSettings
+from genpolicy.execution.executor import Executor
+from genpolicy.execution.journal import Journal, write_journal
+from genpolicy.execution.stub import ControllerStub
+from genpolicy.execution.supervisor import Supervisor
+from genpolicy.integrity.rows import write_rows
+from genpolicy.integrity.tables import read_table, write_table
+from genpolicy.verification.checker import check_journal
+from genpolicy.verification.rollouts import derived_rollouts
+
+PARAMS = yaml.safe_load((Path(__file__).parents[2] / "params.yaml").read_text())
+NAMES = ("flow__nominal", "bc__nominal")
+
+
+def _session(method: str, start: int) -> Journal:
+    """A rollout in which nothing is delivered: it holds, touches something and ends."""
+    labels = {
+        "method": method, "perturbation": "nominal", "start": str(start), "start_sha256": "ab",
+    }  # fmt: skip
+    journal = Journal(f"{method}/nominal/{start}", labels)
+    horizons = HorizonConfig(**PARAMS["horizons"])
+    execution = ExecutionSettings(**PARAMS["execution"])
+    supervisor = Supervisor(execution.supervisor(horizons), journal)
+    settings = execution.executor(horizons)
+    executor = Executor(settings, journal, ControllerStub(settings, journal, supervisor))
+    executor.set_active(0.0, "weights", "sampler")
+    for tick in range(4):
+        now_s = tick * horizons.action_period_s
+        executor.observe(now_s, now_s, "approach", "epoch_1", 0.0)
+        executor.tick(now_s)
+    executor.begin_invocation(0.2, "one", repr(0.031))
+    executor.end_invocation(0.2, "one", "deadline")
+    for force_n in (3.0, 7.5, 2.0):
+        journal.add("force", journal.clock(0.2), {"force_n": force_n})
+    outcome = "collision" if start == 0 else "timeout"
+    journal.add("outcome", journal.clock(0.2), {"outcome": outcome, "mode": "left"})
+    executor.end_episode(0.2)
+    return journal
+
+
+@pytest.fixture
+def root(tmp_path):
+    """Stress evidence of two methods on two starts, as its journals tell it."""
+    (tmp_path / "params.yaml").write_text(yaml.safe_dump(PARAMS))
+    folder = tmp_path / STRESS
+    (folder / "journals").mkdir(parents=True)
+    expected = module._expected(tmp_path)
+    rows, documents = [], {}
+    for name in NAMES:
+        path = folder / "journals" / f"{name}.mcap"
+        write_journal(path, [_session(name.split("__")[0], start) for start in (0, 1)])
+        documents[path.name] = check_journal(path, expected).as_document()
+        for columns in derived_rollouts(path).values():
+            rows.append(RolloutRow(**columns, seed=0, duration_s=0.2))
+    write_rows(folder / "rollouts.parquet", RolloutRow, rows)
+    _write_checker(folder, documents)
+    return tmp_path
+
+
+def _write_checker(folder, documents):
+    violations = [v for document in documents.values() for v in document["violations"]]
+    document = {"violations": violations, "checked_actions": 0, "journals": documents}
+    (folder / "checker.json").write_text(json.dumps(document))
+
+
+def test_true_evidence_stands(root):
+    rederive(root, "D")
+    for gate in "ABE":
+        rederive(root, gate)
+    (row, *_) = read_table(root / STRESS / "rollouts.parquet").to_pylist()
+    assert (row["force_peak_n"], row["outcome"], row["ticks"]) == (7.5, "collision", 4)
+    assert (row["invocations"], row["deadline_misses"]) == (1, 1)
+    assert row["latency_p95_s"] == 0.031
+
+
+FORGED = {
+    "success": True, "outcome": "success", "force_peak_n": 1.0, "deadline_misses": 0,
+    "interventions": 5, "latency_p95_s": 0.001, "start_sha256": "cd", "mode": "right",
+    "recovered": True, "rejections": 9, "hold_ticks": 1, "action_age_p95_s": 0.1,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("column", FORGED)
+def test_a_forged_cell_is_refused_by_name(root, column):
+    path = root / STRESS / "rollouts.parquet"
+    table = read_table(path)
+    place = table.schema.get_field_index(column)
+    values = [FORGED[column], *table[column].to_pylist()[1:]]
+    write_table(path, table.set_column(place, table.schema.field(place), [values]))
+    with pytest.raises(RefusedError, match=rf"rollout flow/nominal/0: {column} is") as caught:
+        rederive(root, "D")
+    assert "as its journal says" in str(caught.value)
+
+
+def test_a_row_without_a_journal_and_a_journal_without_a_row(root):
+    path = root / STRESS / "rollouts.parquet"
+    table = read_table(path)
+    write_table(path, table.slice(1))
+    with pytest.raises(RefusedError, match=r"rollout flow/nominal/0 is only in a journal"):
+        rederive(root, "D")
+    rows = table.to_pylist()
+    extra = RolloutRow(**{**rows[0], "start": 7})
+    write_rows(path, RolloutRow, [*(RolloutRow(**row) for row in rows), extra])
+    with pytest.raises(RefusedError, match=r"rollout flow/nominal/7 is without a journal"):
+        rederive(root, "D")
+    assert asdict(extra)["start"] == 7
+
+
+def test_a_finding_of_the_checker_that_was_removed_is_found_again(root):
+    """A session that declares other limits than `params.yaml` is a violation."""
+    params = yaml.safe_load((root / "params.yaml").read_text())
+    params["execution"]["queue_capacity"] += 1
+    (root / "params.yaml").write_text(yaml.safe_dump(params))
+    with pytest.raises(RefusedError, match=r"0 violations in 0 actions.*required 2 violations"):
+        rederive(root, "D")
+
+
+def test_a_violation_left_out_of_the_list_is_found(root):
+    path = root / STRESS / "checker.json"
+    document = json.loads(path.read_text())
+    document["violations"] = [{"rule": "P1"}]
+    path.write_text(json.dumps(document))
+    with pytest.raises(RefusedError, match=r"checker\.json: violations"):
+        rederive(root, "D")
+
+
+def test_a_journal_that_nobody_checked_is_found(root):
+    path = root / STRESS / "checker.json"
+    document = json.loads(path.read_text())
+    del document["journals"]["flow__nominal.mcap"]
+    path.write_text(json.dumps(document))
+    with pytest.raises(RefusedError, match=r"flow__nominal\.mcap is nothing"):
+        rederive(root, "D")
+
+
+def test_a_damaged_journal_is_bad_input(root):
+    (root / STRESS / "journals" / "flow__nominal.mcap").write_bytes(b"journal")
+    with pytest.raises(BadInputError, match="no journal"):
+        rederive(root, "D")
+
+
+def test_a_refused_rung_says_why_and_the_others_stand(root):
+    (root / STRESS / "journals" / "bc__nominal.mcap").unlink()
+    rungs = [Rung(gate, "n", "PASS", "", "", "r", 0) for gate in "AD"]
+    first, second = rederived(root, rungs)
+    assert first == rungs[0]
+    assert (second.verdict, second.exit_code) == ("REFUSED", 3)
+    assert "bc__nominal.mcap" in second.note
+    judged = Rung("D", "n", "REFUSED", "", "before", "r", 2)
+    assert rederived(root, [judged]) == [judged]
