@@ -134,7 +134,7 @@ def judge(letter: Letter, root: Root = Path()) -> int:
     return 0
 
 
-SIGN_EXAMPLE = "sign --card card.json --key my_key.pem --reviewer 'My Name'"
+SIGN_EXAMPLE = "sign --card card.json --key my_key.pem --reviewer my-id"
 
 
 @gates.command(epilog=examples(f"genpolicy gates {SIGN_EXAMPLE}"))
@@ -142,7 +142,7 @@ SIGN_EXAMPLE = "sign --card card.json --key my_key.pem --reviewer 'My Name'"
 def sign(
     card: Annotated[Path, typer.Option(help="Completed card, or an envelope to sign as well.")],
     key: Annotated[Path, typer.Option(help="Your private key, PEM, Ed25519.")],
-    reviewer: Annotated[str, typer.Option(help="Your name as on reviewers.yaml.")],
+    reviewer: Annotated[str, typer.Option(help="Your id on reviewers.yaml.")],
     root: Root = Path(),
 ) -> int:
     """Add your signature to a trial card. Gates A to D are proved again before."""

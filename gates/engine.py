@@ -14,6 +14,7 @@ from typing import Any
 from gates.criterion import Criterion, Measured
 from gates.evidence import Evidence, MissingEvidenceError
 from gates.pipeline import TASK_IDENTITY, basis_of, check_record, outputs_of
+from gates.protection import require_protection
 from gates.report import (
     GATES,
     SCHEMA_VERSION,
@@ -90,17 +91,19 @@ def judge_gate(spec: GateSpec, root: Path) -> GateReport:
     """Report of a gate from the evidence and `params.yaml` below `root`; writes nothing.
 
     Raises:
-        ConfigError: The section is missing or wrong.
+        ConfigError: The section is missing or wrong, or looser than the code allows.
         IntegrityError: Evidence that is not what it claims to be.
     """
     params = read_params(root)
     settings = read_settings(params, stage_of(spec.gate), spec.settings)
+    rehearsed = require_protection(params, spec.gate)
     limits = read_limits(params, spec.gate, spec.criteria)
     names: Sequence[str] = ()
     caveats: Sequence[str] = ()
     if spec.below is not None:
         names, caveats = promoted_below(root, spec.below, getattr(settings, "candidates", ()))
     evidence = recorded_evidence(root, spec.gate)
+    caveats = (*caveats, *rehearsed)
     report = judge(spec, evidence, limits, settings, candidates=names, caveats=caveats)
     check_record(root, spec.gate, report.materials)
     return report

@@ -5,7 +5,7 @@ becomes the `materials` of its report, and what one criterion read becomes its `
 """
 
 import contextlib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
