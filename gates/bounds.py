@@ -9,7 +9,9 @@ the sample is too small to bound is not measured, so the criterion is INCONCLUSI
 may lie below the limit by luck, is never judged.
 """
 
+import itertools
 import math
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,6 +61,39 @@ def counted_interval(hits: float, trials: float, *, confidence: float) -> tuple[
     if trials <= 0 or not 0 <= hits <= trials:
         raise MissingEvidenceError(f"{hits:g} of {trials:g} is no share")
     return clopper_pearson(int(hits), int(trials), confidence)
+
+
+def widest_gap(
+    shares: Mapping[str, tuple[Array | NDArray[np.bool_], list[str]]], *, confidence: float
+) -> tuple[tuple[float, float], str, str]:
+    """Largest upper bound of a difference between the shares of two groups.
+
+    Each share has its exact interval over clusters, rounded to both unfavourable sides; the ends
+    of a difference lie as far out as the two ends, squared and added (Newcombe 1998, method 10).
+
+    Args:
+        shares: Hits and clusters of each group, at least two.
+        confidence: Coverage of an interval.
+
+    Returns:
+        Interval of the widest difference, not below 0, and the groups with more and with less.
+
+    Raises:
+        MissingEvidenceError: A group without rows.
+    """
+    bounds: dict[str, tuple[float, float, float]] = {}
+    for name, (hits, clusters) in shares.items():
+        share, lower, _ = share_interval(hits, clusters, confidence=confidence, favourable=True)
+        upper = share_interval(hits, clusters, confidence=confidence, favourable=False)[2]
+        bounds[name] = (share, lower, upper)
+    found = []
+    for more, less in itertools.permutations(bounds, 2):
+        (p, p_lower, p_upper), (q, q_lower, q_upper) = bounds[more], bounds[less]
+        upper = p - q + math.hypot(p_upper - p, q - q_lower)
+        lower = p - q - math.hypot(p - p_lower, q_upper - q)
+        found.append((upper, max(lower, 0.0), more, less))
+    upper, lower, more, less = max(found)
+    return (lower, upper), more, less
 
 
 def upper_quantile(

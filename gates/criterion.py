@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from gates.report import REQUIRED, Comparison
+from gates.report import Comparison
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,6 @@ class Criterion:
         question: What is asked, as a reader would ask it.
         look_at: Where to look first if it is not met.
         comparison: How the number must stand to its limit.
-        route: `required`, or the name of the alternative it belongs to.
         per_candidate: Whether each method that stands for promotion is asked.
         always: Whether it may never be declared not applicable: it guards people or the proof.
         derived: Limit that follows from the gate's settings, where `params.yaml` says `derived`.
@@ -49,7 +48,6 @@ class Criterion:
     question: str
     look_at: str
     comparison: Comparison
-    route: str = REQUIRED
     per_candidate: bool = False
     always: bool = False
     derived: Callable[[Any], float] | None = None
@@ -65,7 +63,6 @@ def criterion(
     *,
     question: str,
     look_at: str,
-    route: str = REQUIRED,
     per_candidate: bool = False,
     always: bool = False,
     derived: Callable[[Any], float] | None = None,
@@ -73,9 +70,7 @@ def criterion(
     """Make a criterion of the function that measures it; arguments as in `Criterion`."""
 
     def of(measure: Callable[..., Measured]) -> Criterion:
-        return Criterion(
-            measure, question, look_at, comparison, route, per_candidate, always, derived
-        )
+        return Criterion(measure, question, look_at, comparison, per_candidate, always, derived)
 
     return of
 

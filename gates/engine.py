@@ -156,13 +156,9 @@ def judge(
             answers.append(_answer(item, evidence, inputs, limit, name))
     verdict, verdicts = combine(answers, expects_candidates=spec.below is not None)
     evidence.bind(*spec.bind)
-    if not evidence.bind(TASK_IDENTITY) and verdict == "PASS":
-        verdict = "INCONCLUSIVE"
-        caveats = (*caveats, f"{TASK_IDENTITY} is missing: nobody wrote which task this is about.")
+    lacking = _lacking(evidence)
+    verdict = "INCONCLUSIVE" if lacking and verdict == "PASS" else verdict
     basis = evidence.basis
-    if basis.unrecorded:
-        verdict = "INCONCLUSIVE" if verdict == "PASS" else verdict
-        caveats = (*caveats, f"{UNRECORDED} {', '.join(basis.unrecorded)}.")
     judged = Judged(evidence, inputs, tuple(answers), verdict, verdicts)
     decision = (spec.decide or _decision(spec))(judged)
     note = spec.note(judged) if spec.note else ""
@@ -179,7 +175,7 @@ def judge(
         pipeline=dict(basis.pipeline),
         settings=settings.model_dump(mode="json"),
         environment=environment(),
-        caveats=(*spec.caveats, *_waivers(limits), *caveats),
+        caveats=(*spec.caveats, *_waivers(limits), *caveats, *lacking),
         diagnosis=f"{_diagnosis(spec, judged)} {note}".strip(),
         decision=decision.text,
         promoted=decision.promoted,
@@ -212,7 +208,6 @@ def _answer(
         question=item.question,
         owner=limit.owner if limit else None,
         candidate=candidate,
-        route=item.route,
         measured=value,
         interval=interval,
         threshold=threshold,
@@ -222,6 +217,16 @@ def _answer(
         evidence=tuple(touched),
         caveat=measured.caveat,
     )
+
+
+def _lacking(evidence: Evidence) -> list[str]:
+    """What no gate passes without, beside its criteria, and is not there."""
+    lacking = []
+    if not evidence.bind(TASK_IDENTITY):
+        lacking.append(f"{TASK_IDENTITY} is missing: nobody wrote which task this is about.")
+    if evidence.basis.unrecorded:
+        lacking.append(f"{UNRECORDED} {', '.join(evidence.basis.unrecorded)}.")
+    return lacking
 
 
 def _waivers(limits: Limits) -> list[str]:

@@ -2,8 +2,9 @@
 
 import numpy as np
 import pandas as pd
+from pydantic import Field
 
-from gates.bounds import counted_interval, share_interval, upper_quantile
+from gates.bounds import counted_interval, share_interval, upper_quantile, widest_gap
 from gates.criterion import Measured, criteria_of, criterion
 from gates.engine import GateSpec
 from gates.evidence import Array, Evidence, MissingEvidenceError, count, flags, number, numbers
@@ -14,6 +15,8 @@ SHADOW = "artifacts/shadow"
 CANDIDATES = f"{SHADOW}/candidates.parquet"
 LAYERS = ("representation", "kinematic", "geometric", "dynamic", "contact", "fresh")
 HELD_OUT = "held_out"
+TWO_MODES = "two_modes"
+INTACT = (HELD_OUT, TWO_MODES)
 
 
 class FeasibilitySettings(CandidateSettings):
@@ -23,11 +26,14 @@ class FeasibilitySettings(CandidateSettings):
         required_fixtures: Corrupted fixtures that must have been tried.
         required_checks: Checks, or layers of checks, each of which must have been left out once.
         unassigned_modes: Labels of candidates that belong to no mode.
+        mode_observations: Independent observations of every mode without which the modes are not
+            compared.
     """
 
     required_fixtures: tuple[str, ...]
     required_checks: tuple[str, ...]
     unassigned_modes: tuple[str, ...]
+    mode_observations: int = Field(ge=2)
 
 
 def _rows(evidence: Evidence, candidate: str) -> pd.DataFrame:
@@ -59,18 +65,33 @@ def admissible(rows: pd.DataFrame) -> Array:
 def mode_admissible_gap(
     evidence: Evidence, settings: FeasibilitySettings, candidate: str
 ) -> Measured:
-    """Largest difference between modes in the share that is admissible."""
-    rows = _held_out(evidence, candidate)
-    rows = rows.assign(admissible=admissible(rows), mode=rows["mode"].fillna("").astype(str))
+    """Upper bound of the largest difference between modes in the share that is admissible."""
+    rows = _rows(evidence, candidate)
+    rows = rows[rows["fixture"] == TWO_MODES]
+    if len(rows) == 0:
+        raise MissingEvidenceError("no situation with several modes was sampled")
+    rows = rows.assign(
+        admissible=admissible(rows),
+        mode=rows["mode"].fillna("").astype(str),
+        episode=rows["situation"].astype(str).str.rpartition(":")[0],
+    )
     rows = rows[~rows["mode"].isin(settings.unassigned_modes)]
-    sampled = rows.groupby("observation")["mode"].transform("nunique")
-    rows = rows[sampled >= 2]
-    shares = rows.groupby("mode")["admissible"].mean()
-    if len(shares) < 2:
+    rows = rows[rows.groupby("observation")["mode"].transform("nunique") >= 2]
+    by_mode = {str(mode): part for mode, part in rows.groupby("mode")}
+    seen = {mode: part["episode"].nunique() for mode, part in by_mode.items()}
+    if len(seen) < 2:
         raise MissingEvidenceError("no observation was answered in two modes")
-    text = ", ".join(f"{mode} {float(share):.4g}" for mode, share in shares.items())
-    text += f" over {rows['observation'].nunique()} observations answered in several modes"
-    return Measured(float(shares.max() - shares.min()), caveat=text)
+    if min(seen.values()) < settings.mode_observations:
+        rare = ", ".join(f"{mode} {count}" for mode, count in seen.items())
+        raise MissingEvidenceError(
+            f"observations answered in several modes: {rare}; "
+            f"at least {settings.mode_observations} of each are needed"
+        )
+    shares = {m: (p["admissible"].to_numpy(), p["episode"].tolist()) for m, p in by_mode.items()}
+    interval, more, less = widest_gap(shares, confidence=settings.confidence)
+    text = ", ".join(f"{m} {p['admissible'].mean():.4g} of {seen[m]}" for m, p in by_mode.items())
+    text += f" episodes answered in several modes; upper bound of {more} minus {less}"
+    return Measured(interval[1], interval, text)
 
 
 @criterion(
@@ -152,7 +173,7 @@ def corrupted_refused_share(
 ) -> Measured:
     """Share of corrupted candidates that are refused with a reason."""
     rows = _rows(evidence, candidate)
-    rows = rows[rows["fixture"] != HELD_OUT]
+    rows = rows[~rows["fixture"].isin(INTACT)]
     absent = sorted(set(settings.required_fixtures) - set(rows["fixture"]))
     if absent:
         raise MissingEvidenceError(f"corrupted fixtures not tried: {', '.join(absent)}")

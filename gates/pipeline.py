@@ -45,7 +45,7 @@ class Basis:
 
     Attributes:
         code: SHA-256 per package, over the files that the gate and its evidence stages depend on.
-        parameters: SHA-256 of each entry of `params.yaml` that they read.
+        parameters: SHA-256 of each entry of `params.yaml` that its evidence stages read.
         pipeline: SHA-256 of the recorded run of each evidence stage.
         unrecorded: Evidence stages that no recorded run stands for.
     """
@@ -69,7 +69,8 @@ def basis_of(root: Path, gate: Gate) -> Basis:
     keys: set[str] = set()
     for name in names:
         stage = stages.get(name) or {}
-        keys |= set(_texts(stage.get("params")))
+        if name in RUNGS[gate]:  # the gate's own are re-derived, with a better sentence
+            keys |= set(_texts(stage.get("params")))
         for dep in _texts(stage.get("deps")):
             if PurePosixPath(dep).parts[0] not in CODE:
                 continue

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from gates import feasibility, reproducibility
+from gates import feasibility
 from gates.card import judge as card
 from gates.differences import first_difference
 from gates.engine import GateSpec, judge_gate
@@ -27,6 +27,7 @@ from gates.report import (
     report_path,
     stage_of,
 )
+from gates.reproducibility import gate as reproducibility
 from gates.stress import gate as stress
 from gates.verdicts import first_unmet
 from genpolicy.errors import ConfigError, GenpolicyError, IntegrityError, RefusedError

@@ -28,7 +28,6 @@ NAMES: dict[Gate, str] = {
     "D": "matched simulation and stress",
     "E": "trial card",
 }
-REQUIRED = "required"
 
 Point = tuple[float, float, float]
 
@@ -51,8 +50,6 @@ class Answer(StrictModel):
         id: Name of the criterion; the key of its limit in `params.yaml`.
         owner: Who answers for the limit; None where `params.yaml` has none.
         candidate: Method it speaks of; None for the whole gate.
-        route: `required`, or the name of the alternative it belongs to: of several routes, one
-            that passes whole is enough.
         measured: Number held against the limit; None where evidence is missing.
         interval: Interval of what was measured, where it has one.
         threshold: The limit; None where `params.yaml` has none.
@@ -66,7 +63,6 @@ class Answer(StrictModel):
     question: str
     owner: Owner | None
     candidate: str | None
-    route: str
     measured: float | None
     interval: tuple[float, float] | None
     threshold: float | None
@@ -88,7 +84,7 @@ class GateReport(StrictModel):
         materials: SHA-256 of every file read or bound, by path relative to the repository.
         upstream: SHA-256 of the reports below this one, by gate.
         code: SHA-256 of the code that the gate and its evidence stages depend on, by package.
-        parameters: SHA-256 of what they read of `params.yaml`, by key.
+        parameters: SHA-256 of what the evidence stages read of `params.yaml`, by key.
         pipeline: SHA-256 of the recorded run (`dvc.lock`) of each evidence stage.
         settings: The gate's parameters other than limits (levels, margins, candidates).
         environment: Library versions and regime.

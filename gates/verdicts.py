@@ -7,7 +7,7 @@ level and no correction is needed. Nothing that is missing can pass.
 import math
 from collections.abc import Iterable, Sequence
 
-from gates.report import REQUIRED, Answer, Comparison, Verdict
+from gates.report import Answer, Comparison, Verdict
 
 SEVERITY: dict[Verdict, int] = {"FAIL": 3, "INCONCLUSIVE": 2, "PENDING_REVIEW": 1, "PASS": 0}
 SIGNIFICANT_DIGITS = 12
@@ -47,21 +47,15 @@ def combine(
 ) -> tuple[Verdict, dict[str, Verdict]]:
     """Verdict of a gate and of each candidate.
 
-    A gate passes if and only if every required gate-wide criterion passes, one of the
-    alternative routes (where there are any) passes whole, and, where candidates are expected,
-    at least one candidate passes all of its criteria. A route waives what failed in another one,
-    never what was not measured.
+    A gate passes if and only if every gate-wide criterion passes and, where candidates are
+    expected, at least one candidate passes all of its criteria.
 
     Args:
         criteria: Judged criteria.
         expects_candidates: Whether the gate is about candidates.
     """
     common = [c for c in criteria if c.candidate is None]
-    parts: list[Verdict] = [c.verdict for c in common if c.route == REQUIRED]
-    routes = sorted({c.route for c in common} - {REQUIRED})
-    if routes:
-        parts.append(best(worst(c.verdict for c in common if c.route == r) for r in routes))
-        parts += [c.verdict for c in common if c.verdict == "INCONCLUSIVE"]
+    parts: list[Verdict] = [c.verdict for c in common]
     names = sorted({c.candidate for c in criteria if c.candidate is not None})
     candidates = {name: worst(c.verdict for c in criteria if c.candidate == name) for name in names}
     if expects_candidates:
@@ -77,6 +71,5 @@ def first_unmet(criteria: Sequence[Answer], verdict: Verdict) -> Answer | None:
     if verdict == "PASS":
         return None
     unmet = [c for c in criteria if c.verdict == verdict]
-    required = [c for c in unmet if c.candidate is None and c.route == REQUIRED]
     common = [c for c in unmet if c.candidate is None]
-    return next(iter(required or common or unmet), None)
+    return next(iter(common or unmet), None)

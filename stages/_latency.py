@@ -1,5 +1,7 @@
 """Section `latency`, read by the stage that measures and by the one that draws from it."""
 
+from typing import Annotated
+
 from pydantic import Field
 
 from genpolicy.contract.settings import Settings
@@ -18,10 +20,10 @@ class LatencySection(Settings):
 
     warm: int = Field(ge=20)
     cold: int = Field(ge=2)
-    declared: dict[str, tuple[float, float]]
+    declared: dict[str, Annotated[list[float], Field(min_length=2, max_length=2)]]
     declared_draws: int = Field(ge=20)
 
     @property
     def declared_terms(self) -> dict[str, DeclaredTerm]:
         """Bounds of the terms that this machine cannot measure."""
-        return {name: DeclaredTerm(*bounds) for name, bounds in self.declared.items()}
+        return {name: DeclaredTerm(bounds[0], bounds[1]) for name, bounds in self.declared.items()}

@@ -1,5 +1,7 @@
 """Sections that say what is trained, read by the stages that train and by those that measure."""
 
+from collections.abc import Mapping
+
 from pydantic import Field
 
 from genpolicy.contract.settings import Settings
@@ -31,8 +33,10 @@ class FactorsSection(Settings):
     variants: dict[str, Variant]
 
 
-def training_plan(params: Params, *, steps: int | None = None) -> TrainingPlan:
-    """What all trainings share; `steps` shortens them."""
+def training_plan(
+    params: Params, *, steps: int | None = None, followed: Mapping[str, str] | None = None
+) -> TrainingPlan:
+    """What all trainings share; `steps` shortens them, `followed` is the mode of each episode."""
     settings = params.section("policy", PolicySettings)
     if steps is not None:
         training = settings.training.model_copy(update={"steps": steps, "validation_every": steps})
@@ -45,4 +49,5 @@ def training_plan(params: Params, *, steps: int | None = None) -> TrainingPlan:
         device=params.compute.device,
         workers=params.compute.workers,
         scheduler=params.compute.scheduler,
+        followed=followed,
     )

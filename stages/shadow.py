@@ -11,7 +11,11 @@ from genpolicy.data.dataset import load_dataset
 from genpolicy.evidence.admission_context import make_checker
 from genpolicy.evidence.shadow.corruption import CORRUPTIONS
 from genpolicy.evidence.shadow.layer_mutants import missing_checks_evidence
-from genpolicy.evidence.shadow.observations import held_out_observations, spread
+from genpolicy.evidence.shadow.observations import (
+    held_out_observations,
+    spread,
+    two_mode_observations,
+)
 from genpolicy.evidence.shadow.session import Cell
 from genpolicy.evidence.shadow.shadow import Shadow, shadow_policy
 from genpolicy.evidence.shadow.tables import write_shadow
@@ -58,15 +62,17 @@ def work(params: Params) -> None:
         late_steps=section.late_steps,
         samples=section.samples,
     )
+    data = load_dataset(ARTIFACTS / "ingest")
+    two_mode = two_mode_observations(data, ARTIFACTS / "audit", horizons=params.horizons)
     observations = held_out_observations(
-        load_dataset(ARTIFACTS / "ingest"),
+        data,
         horizons=params.horizons,
         count=section.observations,
         generator=stream(params.seed, "shadow", "observations"),
     )
     with output_folder(ARTIFACTS / "shadow") as folder:
         found = [
-            shadow_policy(shadow, candidate.load(), observations, seed=seed)
+            shadow_policy(shadow, candidate.load(), observations, seed=seed, two_mode=two_mode)
             for candidate in trained(ARTIFACTS / GENERATORS, admitted, seeds=[seed])
         ]
         mutants = missing_checks_evidence(

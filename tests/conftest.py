@@ -56,7 +56,8 @@ def write_situations(folder, rows):
     plain = SituationRow(
         split="test", phase="approach", episode_uuid="", index=0, neighbours=12, clusters=2,
         cluster_sizes=(7, 6), two_mode=True, separation_m=0.2, mean_admissible=False,
-        mean_reason="collision", modes_admissible=2, mean_path=tuple(straight.ravel()),
+        mean_reason="collision", median_admissible=False, modes_admissible=2,
+        mean_path=tuple(straight.ravel()),
         mode_paths=(tuple(left.ravel()), tuple(right.ravel())), persistent=True,
     )  # fmt: skip
     table = [

@@ -14,6 +14,7 @@ from pydantic import Field
 
 from gates.card.envelope import Simulated, beyond_simulation
 from gates.card.people import PersonId
+from gates.claim import CHECKPOINT_ONLY
 from gates.report import Gate, GateReport, Point, StrictModel, parse_section
 from gates.settings import GateSettings
 from genpolicy.errors import RefusedError
@@ -134,6 +135,7 @@ def draft_card(
     candidate = promoted(reports["D"])
     limits = {c.id: c.threshold for c in reports["D"].criteria if c.threshold is not None}
     caveats = [caveat for gate in sorted(reports) for caveat in reports[gate].caveats]
+    caveats.insert(0, CHECKPOINT_ONLY)
     baselines = reports["D"].settings.get("baselines", ())
     return TrialCard(
         schema_version=CARD_SCHEMA_VERSION,

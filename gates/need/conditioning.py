@@ -34,7 +34,7 @@ def strata_effect(evidence: Evidence, settings: NeedSettings) -> Measured:
     ">=",
     question="Does the audit attribute the modes to the task itself?",
     look_at="Conditioning: the audit found another cause than valid modes; remove it first.",
-    route=VALID_CAUSE,
+    always=True,
 )
 def cause_accepted(evidence: Evidence, settings: NeedSettings) -> Measured:
     """1 if the audit attributes the modes to the task itself, else 0."""

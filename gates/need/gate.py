@@ -1,8 +1,4 @@
-"""Gate A as a whole: its questions in the order in which a failure is diagnosed.
-
-Either the modes are valid (route `valid_modes`) or a mode is shown to matter for recovery
-(route `recovery`); data semantics, strata and matched baselines must hold in both cases.
-"""
+"""Gate A as a whole: its questions in the order in which a failure is diagnosed; all must hold."""
 
 from pathlib import Path
 

@@ -6,9 +6,8 @@ import pandas as pd
 from gates.bounds import counted_interval, share_interval
 from gates.criterion import Measured, criterion
 from gates.evidence import Evidence, MissingEvidenceError, flags, number, numbers
-from gates.need.settings import AUDIT, VALID_CAUSE, NeedSettings
+from gates.need.settings import AUDIT, NeedSettings
 from genpolicy.audit.rows import ModeOutcome, RecoveryOutcome, SituationRow
-from genpolicy.statistics.intervals import clopper_pearson
 
 
 def _held_out(evidence: Evidence, settings: NeedSettings) -> pd.DataFrame:
@@ -31,7 +30,6 @@ def held_out_situations(evidence: Evidence, settings: NeedSettings) -> Measured:
     ">=",
     question="In how many do two persistent modes exist?",
     look_at="Multimodality: the actions are unimodal here; keep the simpler policy.",
-    route=VALID_CAUSE,
 )
 def multimodal_situations(evidence: Evidence, settings: NeedSettings) -> Measured:
     """Held-out situations with two clusters that persist."""
@@ -45,7 +43,6 @@ def multimodal_situations(evidence: Evidence, settings: NeedSettings) -> Measure
     ">=",
     question="Does mode identity persist over steps, beyond a shuffled-time null?",
     look_at="Multimodality: this is pointwise noise (tremor, quantisation), not a mode.",
-    route=VALID_CAUSE,
 )
 def persistence_margin(evidence: Evidence, settings: NeedSettings) -> Measured:
     """Persistence of mode identity above the 95 % quantile of the shuffled-time null."""
@@ -59,7 +56,6 @@ def persistence_margin(evidence: Evidence, settings: NeedSettings) -> Measured:
     ">=",
     question="Does each mode succeed?",
     look_at="Multimodality: a mode fails; separate failed and intervention targets.",
-    route=VALID_CAUSE,
 )
 def mode_success_lower(evidence: Evidence, settings: NeedSettings) -> Measured:
     """Lowest exact lower bound of success over the modes."""
@@ -74,15 +70,28 @@ def mode_success_lower(evidence: Evidence, settings: NeedSettings) -> Measured:
         )
     ]
     interval, mode = min(bounds)
-    text = f"lowest over {len(bounds)} modes, at {mode}; exact lower bound"
+    text = f"lowest over {len(bounds)} modes, at {mode}; exact lower bound; {_recovered(evidence)}"
     return Measured(interval[0], interval, text)
+
+
+def _recovered(evidence: Evidence) -> str:
+    """What the disturbed demonstrations did, by mode: shown, never judged."""
+    try:
+        frame = evidence.rows(f"{AUDIT}/recovery.parquet", RecoveryOutcome)
+    except MissingEvidenceError:
+        return "no disturbed demonstration is known"
+    counts = frame.groupby("mode")[["successes", "episodes"]].sum()
+    by_mode = ", ".join(
+        f"{mode} {int(good)} of {int(episodes)}"
+        for mode, (good, episodes) in zip(counts.index, counts.to_numpy(), strict=True)
+    )
+    return f"disturbed demonstrations that recovered (shown, not judged): {by_mode}"
 
 
 @criterion(
     ">=",
     question="Is each mode feasible in all layers?",
     look_at="Multimodality: a mode breaks limits or collides; it is no valid target.",
-    route=VALID_CAUSE,
 )
 def mode_feasible_share(evidence: Evidence, settings: NeedSettings) -> Measured:
     """Lowest share of admissible modal chunks over the modes."""
@@ -100,16 +109,12 @@ def mode_feasible_share(evidence: Evidence, settings: NeedSettings) -> Measured:
     ">=",
     question="Is the mean rejected where every mode passes?",
     look_at="Multimodality: the mean action is admissible, so a point policy loses nothing.",
-    route=VALID_CAUSE,
 )
 def mean_defeated_share(evidence: Evidence, settings: NeedSettings) -> Measured:
     """Lower bound of the share of two-mode situations in which only the mean is rejected."""
-    rows = _held_out(evidence, settings)
-    rows = rows[flags(rows, "two_mode")]
+    rows = _compared(evidence, settings, "mean")
     if len(rows) == 0:
         return Measured(0.0, caveat="no held-out situation has two modes")
-    if rows["mean_admissible"].isna().any():
-        raise MissingEvidenceError("the mean was not checked in every two-mode situation")
     valid = numbers(rows, "modes_admissible") >= numbers(rows, "clusters")
     defeated = valid & ~flags(rows, "mean_admissible")
     share, lower, upper = share_interval(
@@ -126,25 +131,41 @@ def mean_defeated_share(evidence: Evidence, settings: NeedSettings) -> Measured:
 
 
 @criterion(
-    ">=",
-    question="Does a mode matter for recovery?",
-    look_at="Multimodality: no mode is better at recovering.",
-    route="recovery",
+    "<=",
+    question="Is the point-wise median a plan of its own?",
+    look_at="Multimodality: the median of the demonstrations is admissible; regress on it.",
 )
-def recovery_benefit(evidence: Evidence, settings: NeedSettings) -> Measured:
-    """Lower bound of recovery by the best mode minus recovery by the worst other one."""
-    frame = evidence.rows(f"{AUDIT}/recovery.parquet", RecoveryOutcome)
-    frame = frame.assign(episodes=numbers(frame, "episodes"), successes=numbers(frame, "successes"))
-    by_mode = frame.groupby("mode")[["episodes", "successes"]].sum()
-    bounds = {
-        str(mode): clopper_pearson(int(row["successes"]), int(row["episodes"]), settings.confidence)
-        for mode, row in by_mode.iterrows()
-    }
-    best = max(bounds, key=lambda mode: bounds[mode])
-    others = {mode: ends for mode, ends in bounds.items() if mode != best}
-    if not others:
-        return Measured(0.0, caveat=f"only {best} was seen to recover, so there is no comparison")
-    other = min(others, key=lambda mode: others[mode][1])
-    interval = (bounds[best][0] - others[other][1], bounds[best][1] - others[other][0])
-    text = f"recovery by {best} against recovery by {other}; lower bound"
-    return Measured(interval[0], interval, text)
+def median_valid_share(evidence: Evidence, settings: NeedSettings) -> Measured:
+    """Upper bound of the share of two-mode situations in which the median passes all layers.
+
+    Of an odd number of plans on two sides, or of unequal sides, the median lies on one of them.
+    """
+    rows = _compared(evidence, settings, "median")
+    if len(rows) == 0:
+        raise MissingEvidenceError("no held-out situation has two modes")
+    share, lower, upper = share_interval(
+        flags(rows, "median_admissible"),
+        list(rows["episode_uuid"]),
+        confidence=settings.confidence,
+        favourable=False,
+    )
+    text = (
+        f"share {share:.4g} of {len(rows)} situations; upper bound over "
+        f"{rows['episode_uuid'].nunique()} episodes. The median of recorded neighbours: what a "
+        "regression of absolute error tends to, not what one has learned"
+    )
+    return Measured(upper, (lower, upper), text)
+
+
+def _compared(evidence: Evidence, settings: NeedSettings, which: str) -> pd.DataFrame:
+    """Held-out two-mode situations in which the mean or the median was checked.
+
+    Raises:
+        MissingEvidenceError: It was not, in one of them.
+    """
+    column = f"{which}_admissible"
+    rows = _held_out(evidence, settings)
+    rows = rows[flags(rows, "two_mode")]
+    if rows[column].isna().any():
+        raise MissingEvidenceError(f"the {which} was not checked in every two-mode situation")
+    return rows

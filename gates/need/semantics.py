@@ -3,8 +3,10 @@
 import numpy as np
 
 from gates.bounds import counted_interval
+from gates.cause import Layer
 from gates.criterion import Measured, criterion
 from gates.evidence import Evidence, MissingEvidenceError, count, number, numbers
+from gates.need.cause import found_cause
 from gates.need.settings import AUDIT, NeedSettings
 from genpolicy.audit.rows import Calibration, Clock, ReplayRow
 
@@ -73,3 +75,27 @@ def label_disagreement(evidence: Evidence, settings: NeedSettings) -> Measured:
     interval = counted_interval(wrong, len(frame), confidence=settings.confidence)
     text = f"{wrong} of {len(frame)} replayed episodes disagree; judged by the upper bound"
     return Measured(interval[1], interval, text)
+
+
+@criterion(
+    "<=",
+    question="Do units, frames, columns, copies, boundaries and labels mean what they say?",
+    look_at="Data semantics: the recordings are not what they claim; repair them, count again.",
+    always=True,
+)
+def data_defects(evidence: Evidence, settings: NeedSettings) -> Measured:
+    """Questions to the data whose number is beyond its limit, those of the cause.
+
+    Units, frames, swapped columns, copied and glued recordings, clocks and labels are asked once,
+    by the cause; its limits hold here as well, whatever the modes look like.
+    """
+    cause = found_cause(evidence, settings)
+    asked = [answer for answer in cause.answers if answer.layer in (Layer.DATA, Layer.LABELS)]
+    red = [
+        f"{answer.what} {answer.measured:.4g}{f' {answer.unit}' if answer.unit else ''}"
+        f"{f' ({answer.note})' if answer.note else ''}, limit {answer.limit:.4g}"
+        for answer in asked
+        if answer.red
+    ]
+    text = "; ".join(red) or f"none of {len(asked)} numbers that stand out is beyond its limit"
+    return Measured(float(len(red)), caveat=text)

@@ -23,11 +23,13 @@ class NeedSettings(GateSettings):
         confidence: Coverage of every interval.
         held_out_splits: Splits whose situations are judged.
         baselines: Simpler policies that must be there, frozen and matched.
-        deployed_conventions: Sampling conventions under which a baseline is deployed; drawing
-            from a latent is a generator's way and is reported beside them.
+        deployed_conventions: Sampling conventions under which a baseline is deployed, an unlearned
+            offset among them; drawing from a latent is a generator's way, reported beside them.
         generative_baselines: Baselines that are drawn at random under every convention (an
             energy's candidates are), so that they are reported beside the deployed ones.
         chunked_baseline: Baseline that shows what chunking alone does.
+        remedies: Baselines that do without a density where one plan, or any of them, is enough.
+        redraws: Candidates that a policy may draw until one is admissible, as in the comparison.
         latent_baseline: Baseline whose latent must answer the observation.
         factors: Factors of which each must have been changed alone.
         conditioning_factors: Factors that could make a density unnecessary; a head is what the
@@ -40,6 +42,7 @@ class NeedSettings(GateSettings):
         "confidence": "confidence",
         "baselines": "train_baselines.samplers",
         "latent_baseline": "measure_baselines.latent.method",
+        "redraws": "stress.samples",
     }
 
     confidence: float = Field(gt=0.5, lt=1.0)
@@ -48,6 +51,8 @@ class NeedSettings(GateSettings):
     deployed_conventions: tuple[str, ...]
     generative_baselines: tuple[str, ...]
     chunked_baseline: str
+    remedies: tuple[str, ...] = ("chunked_l1", "one_mode_bc", "bc_noise")
+    redraws: int = Field(ge=1)
     latent_baseline: str
     factors: tuple[str, ...] = ("reference", "representation", "trunk", "head", "temporal")
     conditioning_factors: tuple[str, ...] = ("representation", "trunk")

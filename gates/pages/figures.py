@@ -12,14 +12,17 @@ from gates.report import GateReport
 from genpolicy.integrity.hashing import sha256_bytes_of
 from genpolicy.pages.figures.drawing import (
     BLUE,
+    BROWN,
     DASHES,
     GREEN,
     GREY,
     INK,
+    OLIVE,
     ORANGE,
     PALETTE,
     PURPLE,
     SKY,
+    TEAL,
     Picture,
     drawn,
 )
@@ -27,6 +30,9 @@ from genpolicy.pages.figures.drawing import (
 METHODS = {
     "bc": INK,
     "chunked_bc": GREY,
+    "chunked_l1": BROWN,
+    "one_mode_bc": OLIVE,
+    "bc_noise": TEAL,
     "act": GREEN,
     "cvae": PURPLE,
     "ibc": SKY,

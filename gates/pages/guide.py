@@ -39,7 +39,7 @@ READING: dict[Gate, tuple[str, ...]] = {
     "D": (
         "The decision above: promoting a method and returning to a simpler one are both results.",
         "Success by condition: is the gain where it matters, and which condition is missing?",
-        "Action age and outcomes: what does the gain cost? Far from the limit, or just inside?",
+        "Costs in the worst condition, and outcomes: far from the limit, or just inside?",
         "The promotion margin and the limits: would they matter in your cell? Then the caveats.",
     ),
     "E": (
@@ -63,8 +63,8 @@ WORDS: dict[str, str] = {
     "fallback": "the classical motion that drives while no admissible action is there",
     "e-value": "evidence that the gain exceeds the margin; above 1/alpha it is promoted",
     "p95": "the value that 95 of 100 do not exceed",
-    "interval": "exact interval at the confidence under Settings; limits are held against its "
-    "worse end",
+    "interval": "interval at the confidence under Settings, exact or over whole starts drawn "
+    "again; limits are held against its worse end",
 }
 USED: dict[Gate, tuple[str, ...]] = {
     "A": ("situation", "chunk", "mode", "held-out", "admissible", "interval"),

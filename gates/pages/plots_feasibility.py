@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from gates.evidence import Evidence, MissingEvidenceError, flags
-from gates.feasibility import CANDIDATES, HELD_OUT, LAYERS, admissible
+from gates.feasibility import CANDIDATES, HELD_OUT, INTACT, LAYERS, admissible
 from gates.pages.figures import Plot, colours, dashes, in_order
 from gates.pages.limits import draw_limit
 from gates.report import GateReport
@@ -22,9 +22,10 @@ def _waterfall(evidence: Evidence, report: GateReport) -> Figure:
     colour = colours(methods)
     figure, pair = new_figure(height=3.0, columns=2)
     held = (frame["fixture"] == HELD_OUT).to_numpy()
+    corrupted = ~frame["fixture"].isin(INTACT).to_numpy()
     for axes, rows, title in zip(
         pair,
-        (frame[held], frame[~held]),
+        (frame[held], frame[corrupted]),
         ("held-out observations", "corrupted observations"),
         strict=True,
     ):

@@ -96,7 +96,7 @@ def _mode_success(evidence: Evidence, report: GateReport) -> Figure:
 def _baselines(evidence: Evidence, report: GateReport) -> Figure:
     frame = evidence.rows(f"{MEASURED}/modes.parquet", ModeRow)
     frame = frame[numbers(frame, "modes_present") >= 2]
-    share = numbers(frame, "modes_covered") / numbers(frame, "modes_present")
+    share = numbers(frame, "modes_valid") / numbers(frame, "modes_present")
     means = (
         frame.assign(share=share).groupby(["method", "convention"])["share"].agg(["mean", "size"])
     )
@@ -166,10 +166,10 @@ PLOTS: tuple[Plot | Photo, ...] = (
     ),
     Plot(
         "Modes that the simple policies keep",
-        "Share of the modes of a held-out situation that a policy's samples reach. A deterministic "
-        "policy reaches one of two at most, which is 0.5; less means that it lands between them. "
-        "Judged is the best baseline as it is deployed (solid bars); hatched bars draw at random, "
-        "as a generator does.",
+        "Share of the modes of a held-out situation that a policy's admissible samples reach. A "
+        "deterministic policy reaches one of two at most, which is 0.5; less means that it lands "
+        "between them or is refused. Judged is the best baseline as it is deployed (solid bars); "
+        "hatched bars draw at random, as a generator does.",
         f"{MEASURED}/modes.parquet",
         _baselines,
     ),

@@ -150,8 +150,8 @@ PLOTS = (
     Plot(
         "Action age",
         "How old the observation behind an action is when the controller accepts it: share of "
-        "rollouts whose 95th percentile is at most this. The executor refuses older actions than its "
-        "maximum age, so there is no limit to judge.",
+        "rollouts whose 95th percentile is at most this. No limit: the executor refuses actions "
+        "older than its maximum age.",
         ROLLOUTS,
         _age,
     ),

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from itertools import groupby
 
 from gates.pages.guide import unit
-from gates.report import REQUIRED, Answer, GateReport, limit_text, measured_text
+from gates.report import Answer, GateReport, limit_text, measured_text
 from gates.verdicts import first_unmet
 
 
@@ -28,7 +28,6 @@ class Group:
 
     question: str
     id: str
-    route: str
     reason: str
     owner: str
     unit: str
@@ -42,12 +41,10 @@ def groups(report: GateReport) -> list[Group]:
         same = list(members)
         first = same[0]
         lines = tuple(Line(c, waived(c, report)) for c in same)
-        route = "" if first.route == REQUIRED else first.route
         found.append(
             Group(
                 first.question,
                 name,
-                route,
                 first.reason,
                 first.owner or "nobody",
                 unit(name),
@@ -61,10 +58,6 @@ def waived(criterion: Answer, report: GateReport) -> str:
     """Why an unmet criterion does not stand in the way; empty if it does."""
     if criterion.verdict != "FAIL":
         return ""
-    if criterion.route != REQUIRED and criterion.candidate is None:
-        for route in sorted({c.route for c in report.criteria} - {REQUIRED, criterion.route}):
-            if all(c.verdict == "PASS" for c in report.criteria if c.route == route):
-                return f"not needed: route {route.replace('_', ' ')} holds"
     if criterion.candidate is not None and report.verdict == "PASS":
         return f"stops {criterion.candidate} only"
     return ""
@@ -123,14 +116,6 @@ def passed_by(report: GateReport) -> str:
     if report.verdict != "PASS":
         return ""
     text = "every required criterion holds"
-    routes = sorted({c.route for c in report.criteria} - {REQUIRED})
-    whole = [
-        route.replace("_", " ")
-        for route in routes
-        if all(c.verdict == "PASS" for c in report.criteria if c.route == route)
-    ]
-    if whole:
-        text += f", by route {' and '.join(whole)}"
     names = sorted(name for name, verdict in report.candidates.items() if verdict == "PASS")
     if names:
         text += f"; {', '.join(names)} {'pass' if len(names) > 1 else 'passes'} whole"

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import permutations
 
+from gates.claim import IN_SHORT
 from gates.engine import Decision, Judged
 from gates.evidence import Evidence
 from gates.stress.cost import latency_p95_s
@@ -45,7 +46,7 @@ def choose(judged: Judged) -> Decision:
     settings: StressSettings = judged.settings
     passed = [name for name in settings.candidates if judged.candidates.get(name) == "PASS"]
     if len(passed) == 1:
-        return Decision(f"promote {passed[0]}", promoted=passed[0])
+        return Decision(f"promote {passed[0]}, {IN_SHORT}", promoted=passed[0])
     needed = 1.0 / pair_alpha(settings)
     found = comparisons(judged.evidence, settings, passed)
     shown = [one for one in found if one.e_value >= needed]
@@ -54,13 +55,14 @@ def choose(judged: Judged) -> Decision:
     others = [name for name in passed if name not in left]
     better = f"; shown to be worse: {', '.join(others)}" if others else ""
     if len(left) == 1:
-        return Decision(f"promote {for_the_card}{better}", promoted=for_the_card)
+        return Decision(f"promote {for_the_card}, {IN_SHORT}{better}", promoted=for_the_card)
     most = max(
         (one for one in found if one.better in left and one.other in left),
         key=lambda one: one.e_value,
     )
     text = (
-        f"promote either of {', '.join(left)}{better}: no paired test tells them apart (at most "
+        f"promote either of {', '.join(left)}, {IN_SHORT}{better}: no paired test "
+        f"tells them apart (at most "
         f"{most.e_value:.3g} that {most.better} is better than {most.other} by {most.gain:.3g}; "
         f"{needed:.3g} needed). The card is drafted for {for_the_card}, whose answers come sooner."
     )

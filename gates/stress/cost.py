@@ -54,10 +54,15 @@ def latency_p95_s(evidence: Evidence, settings: StressSettings, candidate: str) 
     latency = numbers(rows, "latency_s")
     if not np.all(latency >= 0):
         raise MissingEvidenceError("a latency is negative: the clocks are wrong")
-    recorded = _invocations_by_rollout(rows, ["seed", "perturbation", "start"])
-    stated = rollouts(evidence, settings, candidate)
-    stated = stated.set_index(["seed", "perturbation", "start"])["invocations"]
-    if not recorded.reindex(stated.index, fill_value=0).equals(stated.astype(recorded.dtype)):
+    keys = ["seed", "perturbation", "start"]
+    recorded = rows.groupby(keys)["invocation"].nunique().to_dict()
+    rolled = rollouts(evidence, settings, candidate)
+    stated = zip(
+        zip(*(rolled[name] for name in keys), strict=True),
+        numbers(rolled, "invocations"),
+        strict=True,
+    )
+    if any(recorded.get(key, 0) != count for key, count in stated):
         raise MissingEvidenceError("rollouts state other numbers of invocations than are recorded")
     cold = numbers(rows, "invocation") == 0
 
@@ -74,10 +79,6 @@ def latency_p95_s(evidence: Evidence, settings: StressSettings, candidate: str) 
     found = in_every_condition(rows[~cold], settings.perturbations, measure)
     text = f"{found.caveat}; cold at most {latency[cold].max(initial=0.0):.4g} s"
     return Measured(found.value, found.interval, text)
-
-
-def _invocations_by_rollout(rows: pd.DataFrame, keys: list[str]) -> "pd.Series[int]":
-    return rows.groupby(keys)["invocation"].nunique()
 
 
 @criterion(

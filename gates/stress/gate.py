@@ -7,6 +7,7 @@ training seeds of one start are averaged for the gain: the start is the unit of 
 
 import numpy as np
 
+from gates.claim import CHECKPOINT_ONLY
 from gates.criterion import Measured, criteria_of, criterion
 from gates.engine import Decision, GateSpec, Judged
 from gates.evidence import Evidence, MissingEvidenceError, flags
@@ -76,6 +77,7 @@ GATE = GateSpec(
     back_to="the simpler policy",
     go_on="Draft the trial card.",
     caveats=(
+        CHECKPOINT_ONLY,
         "Simulation: contact, sensing and delays are models; nothing here was seen on hardware.",
         "Starts are the unit of independence; conditions and seeds of one start are averaged.",
         "Every cost and every bound of success holds in each planned condition, not on average.",

@@ -17,7 +17,7 @@ from genpolicy.audit.examples import (
 )
 from genpolicy.audit.labels import disagreement
 from genpolicy.audit.persistence import persistent
-from genpolicy.audit.rows import TABLES, ReplayRow, SituationRow
+from genpolicy.audit.rows import TABLES, Demonstration, ReplayRow, SituationRow
 from genpolicy.audit.run import AuditResult
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.audit.situations import Situation
@@ -48,6 +48,7 @@ def write_evidence(
         "alignment": alignment(result, settings),
         "calibration": result.semantics.calibrations,
         "clocks": result.semantics.clocks,
+        "demonstrated": _demonstrated(result),
         "examples": example_chunks(result, settings),
         "findings": result.semantics.findings,
         "modes": result.modes,
@@ -141,6 +142,7 @@ def _situation(data: AuditInput, item: Situation) -> SituationRow:
         separation_m=item.clustering.separation,
         mean_admissible=item.chunks.mean_admissible,
         mean_reason=item.chunks.mean_reason,
+        median_admissible=item.chunks.median_admissible,
         modes_admissible=sum(item.chunks.mode_admissible),
         mean_path=tuple(item.chunks.mean[:, position].ravel().tolist()),
         mode_paths=tuple(tuple(mode[:, position].ravel().tolist()) for mode in item.chunks.modes),
@@ -160,6 +162,16 @@ def _replays(result: AuditResult) -> list[ReplayRow]:
             mode=_mode(linked, places[item.episode_uuid]),
         )
         for item in result.replayed
+    ]
+
+
+def _demonstrated(result: AuditResult) -> list[Demonstration]:
+    """The mode that each episode followed, in the phase with most situations; unknown left out."""
+    uuids = result.data.episodes.uuid
+    return [
+        Demonstration(str(uuids[place]), result.primary_phase, f"m{mode}")
+        for place, mode in enumerate(result.demonstrated)
+        if mode >= 0
     ]
 
 

@@ -1,4 +1,4 @@
-"""The disturbed episodes on their own: which mode did each follow, and did it succeed?"""
+"""Which mode did each episode follow, and did the disturbed ones succeed?"""
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -52,6 +52,31 @@ def assign(
             votes[episode_modes[data.episode[situation.members[nearest]]]] += 1
         if votes[:-1].any():
             result[number] = int(np.argmax(votes[:-1]))
+    return result
+
+
+def demonstrated(
+    data: AuditInput,
+    settings: AuditSettings,
+    situations: list[tuple[Neighbourhood, Clustering]],
+    episode_modes: Integers | None,
+) -> Integers:
+    """The mode that every episode followed, as it was clustered, else by its nearest chunks.
+
+    Args:
+        data: Canonical audit input.
+        settings: Radius, representation.
+        situations: Situations with several modes, of one phase.
+        episode_modes: Mode of each episode in that phase, -1 for none. Shape (E,).
+
+    Returns:
+        -1 where no situation is near. Shape (E,).
+    """
+    if episode_modes is None:
+        return np.full(len(data.episodes), -1, dtype=np.int64)
+    result = episode_modes.copy()
+    open_ones = np.flatnonzero(result < 0)
+    result[open_ones] = assign(data, settings, situations, episode_modes, open_ones)
     return result
 
 

@@ -95,6 +95,7 @@ class SituationRow:
         separation_m: Smallest RMS distance of two clusters, unit of the position.
         mean_admissible: Whether the mean chunk passes the feasibility check.
         mean_reason: Why not.
+        median_admissible: Whether the point-wise median of the chunks passes it.
         modes_admissible: Modal chunks that pass it.
         mean_path: Positions of the mean chunk. K times P numbers.
         mode_paths: Positions of each modal chunk.
@@ -112,6 +113,7 @@ class SituationRow:
     separation_m: float
     mean_admissible: bool | None
     mean_reason: str
+    median_admissible: bool | None
     modes_admissible: int
     mean_path: tuple[float, ...]
     mode_paths: tuple[tuple[float, ...], ...]
@@ -189,6 +191,21 @@ class ReplayRow:
     label: str
     replayed: str
     mode: str | None
+
+
+@dataclass(frozen=True)
+class Demonstration:
+    """`demonstrated.parquet`: the mode that one episode followed; unknown ones are left out.
+
+    Attributes:
+        episode_uuid: The episode.
+        phase: The phase with most situations.
+        mode: The mode that it followed there, as clustered or by its nearest chunks.
+    """
+
+    episode_uuid: str
+    phase: str
+    mode: str
 
 
 @dataclass(frozen=True)
@@ -323,6 +340,7 @@ TABLES: dict[str, type] = {
     "alignment": Alignment,
     "calibration": Calibration,
     "clocks": Clock,
+    "demonstrated": Demonstration,
     "examples": ExampleChunk,
     "findings": Finding,
     "modes": ModeOutcome,

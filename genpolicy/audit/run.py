@@ -12,7 +12,7 @@ from genpolicy.audit.mean_versus_modes import Admissible
 from genpolicy.audit.neighbourhoods import Support
 from genpolicy.audit.persistence import Persistence, summarise
 from genpolicy.audit.progress import Progress, silent
-from genpolicy.audit.recovery import recovery_outcomes
+from genpolicy.audit.recovery import demonstrated, recovery_outcomes
 from genpolicy.audit.resamples import Measures, resamples
 from genpolicy.audit.rows import ModeOutcome, RecoveryOutcome, Resample, Stratum
 from genpolicy.audit.semantics import Semantics, measure, realigned
@@ -47,6 +47,8 @@ class AuditResult:
         strata: Tests of recorded variables.
         replayed: Labels against replay.
         recovery: The disturbed episodes.
+        demonstrated: The mode that each episode followed in the primary phase, -1 for none.
+            Shape (E,).
         counts: Numbers for the summary.
         modes_after_realignment: Held-out episodes with two modes on realigned data.
         modes_other_phases: The same with the phase looked at the other way: across phases if the
@@ -64,6 +66,7 @@ class AuditResult:
     strata: tuple[Stratum, ...]
     replayed: tuple[Replayed, ...]
     recovery: tuple[RecoveryOutcome, ...]
+    demonstrated: Integers
     counts: Counts
     modes_after_realignment: int
     modes_other_phases: int | None
@@ -128,6 +131,7 @@ def audit(
         strata=strata,
         replayed=replayed,
         recovery=recovery_outcomes(data, settings, several.get(primary, []), links.get(primary)),
+        demonstrated=demonstrated(data, settings, several.get(primary, []), links.get(primary)),
         counts=counts,
         modes_after_realignment=_after_realignment(data, settings, semantics, before, root_seed),
         modes_other_phases=_other_phases(data, settings, root_seed),

@@ -82,9 +82,10 @@ def fixtures(
     task: TaskName = None,
     root: Annotated[Path, typer.Option(help="The workspace.")] = Path(),
 ) -> int:
-    """Hold controller, limits, supervisor and scene against fixtures.yaml.
+    """Compare the fixtures with their pins, or pin them.
 
-    Exit 2 if one is not as pinned. The ladder stops for the same reason.
+    Fixtures are controller, limits, supervisor, robot and scene; the pins stand
+    in fixtures.yaml. Exit 2 if one is not as pinned. The ladder stops for the same reason.
     """
     from genpolicy.cli.fixtures import run_fixtures
 

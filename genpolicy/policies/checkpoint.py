@@ -58,11 +58,14 @@ class Provenance(Settings):
         dataset_manifest_sha256: Manifest of the dataset that it was trained on.
         action_contract_sha256: Definition of the action.
         observation_contract_sha256: Definition of the observation.
+        episodes_sha256: Identifiers of the episodes, where it was not trained on all of the
+            training split; None where it was.
     """
 
     dataset_manifest_sha256: str = Field(pattern=DIGEST)
     action_contract_sha256: str = Field(pattern=DIGEST)
     observation_contract_sha256: str = Field(pattern=DIGEST)
+    episodes_sha256: str | None = Field(default=None, pattern=DIGEST)
 
 
 class CheckpointConfig(Settings):
@@ -215,6 +218,7 @@ def _build(config: CheckpointConfig, *, where: Path) -> PolicyNetwork:
         and sizes.prediction_horizon == horizons.prediction_horizon
         and len(config.normalisation.observation.minimum) == sizes.observation_dim
         and len(config.normalisation.action.minimum) == sizes.action_dim
+        and all(column < sizes.observation_dim for column in sizes.phase_columns)
     )
     if not consistent:
         _refuse(where, "a config whose dimensions contradict each other", "one set of dimensions")

@@ -1,26 +1,32 @@
 """Training of several methods and seeds on one dataset, and how they differ.
 
 All methods get the same windows, the same encoder and trunk, the same optimisation. What may
-differ is named (`ALLOWED_DIFFERENCES`); every other difference is listed for the gate. Each
-checkpoint leaves fixtures: samples that it must give again after reload.
+differ is named (`ALLOWED_DIFFERENCES`); every other difference is listed for the gate. A method
+that is defined by its demonstrations (those of one mode) gets fewer windows and as many updates.
+Each checkpoint leaves fixtures: samples that it must give again after reload.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from pydantic import Field
 
 from genpolicy.compute import map_shards
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.contract.settings import Settings
 from genpolicy.data.dataset import Dataset, load_dataset
+from genpolicy.errors import ConfigError
 from genpolicy.integrity.atomic import write_bytes
 from genpolicy.integrity.documents import canonical_json, read_json
+from genpolicy.integrity.hashing import sha256_bytes
 from genpolicy.integrity.rows import write_rows
 from genpolicy.policies.checkpoint import CONFIG_FILE, Provenance
+from genpolicy.policies.demonstrations import episodes_of_one_mode, phase_columns
 from genpolicy.policies.fixtures import FixtureRow, fixture_observations, fixture_rows
+from genpolicy.policies.methods import method_named
 from genpolicy.policies.policy import load_policy
 from genpolicy.policies.settings import HeadConfig, NetworkConfig, SamplerConfig, TrainingConfig
 from genpolicy.policies.training import TrainingRequest, train
@@ -64,6 +70,7 @@ class TrainingPlan:
         device: Torch device.
         workers: Local processes.
         scheduler: `local` or the address of a Dask scheduler.
+        followed: Mode that each episode followed, as the audit saw it; None where no method asks.
     """
 
     dataset: Path
@@ -73,6 +80,7 @@ class TrainingPlan:
     device: str
     workers: int
     scheduler: str
+    followed: Mapping[str, str] | None = None
 
     def request(
         self,
@@ -85,6 +93,7 @@ class TrainingPlan:
         observation_horizon: int | None = None,
     ) -> TrainingRequest:
         """One training; network and observation horizon are the common ones where None."""
+        chosen = self.episodes(data, method)
         seen = observation_horizon or self.horizons.observation_horizon
         return TrainingRequest(
             method=method,
@@ -98,9 +107,28 @@ class TrainingPlan:
                 dataset_manifest_sha256=data.manifest_sha256,
                 action_contract_sha256=data.manifest["action_contract"]["sha256"],
                 observation_contract_sha256=data.manifest["observation_contract"]["sha256"],
+                episodes_sha256=None if chosen is None else sha256_bytes(canonical_json(chosen)),
             ),
             seed=integer_seed(self.root_seed, "training", seed),
+            phase_columns=phase_columns(data),
         )
+
+    def episodes(self, data: Dataset, method: str) -> list[str] | None:
+        """Episodes that a method is trained on; None: all of the training split.
+
+        Raises:
+            ConfigError: It asks for those of one mode, and no audit says which.
+        """
+        if not method_named(method).one_mode:
+            return None
+        if self.followed is None:
+            raise ConfigError(
+                where=f"training of {method}",
+                found="no word of the modes that the demonstrations followed",
+                expected="the audit's `demonstrated.parquet`",
+                action="Train it in the stage `train_baselines`, behind the audit.",
+            )
+        return episodes_of_one_mode(self.followed, data)
 
 
 @dataclass(frozen=True)
@@ -114,6 +142,8 @@ class TrainingJob:
         device: Torch device.
         seed: Number of the training seed.
         fixtures: Observations to draw fixtures at; 0 draws none.
+        episodes: Episodes to train on; None: all of the training split.
+        weights_of: Checkpoint whose weights are taken over; None trains.
     """
 
     dataset: Path
@@ -122,6 +152,8 @@ class TrainingJob:
     device: str
     seed: int
     fixtures: int
+    episodes: tuple[str, ...] | None = None
+    weights_of: Path | None = None
 
 
 def train_matched(
@@ -161,22 +193,48 @@ def train_methods(
     """
     data = load_dataset(plan.dataset)
     keys = [(method, seed) for method in samplers for seed in plan.settings.seeds]
-    jobs = [
-        TrainingJob(
+    jobs = {
+        (method, seed): TrainingJob(
             dataset=plan.dataset,
             folder=folder / method / f"seed_{seed}",
             request=plan.request(data, method=method, sampler=samplers[method], seed=seed),
             device=plan.device,
             seed=seed,
             fixtures=plan.settings.fixtures,
+            episodes=_tuple(plan.episodes(data, method)),
+            weights_of=_source(folder, method, samplers, seed),
         )
         for method, seed in keys
-    ]
-    trained = map_shards(train_job, jobs, workers=plan.workers, scheduler=plan.scheduler)
+    }
+    trained: dict[tuple[str, int], tuple[str, list[FixtureRow]]] = {}
+    # What takes over weights comes behind what trains them.
+    for own in (True, False):
+        due = [key for key in keys if (jobs[key].weights_of is None) == own]
+        done = map_shards(
+            train_job, [jobs[key] for key in due], workers=plan.workers, scheduler=plan.scheduler
+        )
+        trained |= dict(zip(due, done, strict=True))
     hashes: dict[str, dict[int, str]] = {}
-    for (method, seed), (digest, _) in zip(keys, trained, strict=True):
-        hashes.setdefault(method, {})[seed] = digest
-    return hashes, [row for _, rows in trained for row in rows]
+    for method, seed in keys:
+        hashes.setdefault(method, {})[seed] = trained[method, seed][0]
+    return hashes, [row for key in keys for row in trained[key][1]]
+
+
+def _tuple(names: list[str] | None) -> tuple[str, ...] | None:
+    return None if names is None else tuple(names)
+
+
+def _source(folder: Path, method: str, samplers: Iterable[str], seed: int) -> Path | None:
+    """Checkpoint folder whose weights a method takes over; None where it trains its own."""
+    source = method_named(method).weights_of
+    if source is not None and source not in samplers:
+        raise ConfigError(
+            where=f"samplers of the stage that trains {method}",
+            found=f"without {source}",
+            expected=f"{source}, whose weights {method} takes over",
+            action=f"Train {source} in the same stage, or leave {method} out.",
+        )
+    return None if source is None else folder / source / f"seed_{seed}"
 
 
 def train_job(job: TrainingJob) -> tuple[str, list[FixtureRow]]:
@@ -187,9 +245,10 @@ def train_job(job: TrainingJob) -> tuple[str, list[FixtureRow]]:
     digest = train(
         job.folder,
         job.request,
-        windows=training_windows(data, "train", horizons),
+        windows=training_windows(data, "train", horizons, episodes=job.episodes),
         validation=training_windows(data, "validation", horizons),
         device=job.device,
+        weights_of=job.weights_of,
     )
     if job.fixtures == 0:
         return digest, []
@@ -198,14 +257,26 @@ def train_job(job: TrainingJob) -> tuple[str, list[FixtureRow]]:
     return digest, fixture_rows(policy, seen, method=job.request.method, seed=job.seed)
 
 
-def training_windows(data: Dataset, split: str, horizons: HorizonConfig) -> Windows:
-    """Windows of the successful episodes of a split."""
+def training_windows(
+    data: Dataset, split: str, horizons: HorizonConfig, *, episodes: Sequence[str] | None = None
+) -> Windows:
+    """Windows of the successful episodes of a split, or of some of them.
+
+    Raises:
+        ContractError: None of `episodes` is a successful one of the split.
+    """
     cut = data.windows(
         split,
         observation_horizon=horizons.observation_horizon,
         prediction_horizon=horizons.prediction_horizon,
     )
-    return Windows(cut.observations, cut.actions, cut.is_pad)
+    uuids = data.episodes["episode_uuid"].to_numpy(dtype=str)
+    own = np.ones(len(cut.episode), dtype=bool)
+    if episodes is not None:
+        own = np.isin(uuids[cut.episode], np.asarray(episodes, dtype=uuids.dtype))
+    return Windows(
+        cut.observations[own], cut.actions[own], cut.is_pad[own], uuids[cut.episode[own]]
+    )
 
 
 def matched_configuration(folders: Mapping[str, Path], *, reference: str) -> dict[str, Any]:
@@ -228,7 +299,12 @@ def matched_configuration(folders: Mapping[str, Path], *, reference: str) -> dic
             "config": config,
         }
         # A method that predicts one action differs in its horizon by definition (chapter 1.2).
-        skip = SINGLE_ACTION_KEYS if config["horizons"]["prediction_horizon"] == 1 else ()
+        skip: tuple[str, ...] = ()
+        if config["horizons"]["prediction_horizon"] == 1:
+            skip = SINGLE_ACTION_KEYS
+        # And one that is trained on the demonstrations of one mode, in these.
+        if method_named(config["method"]).one_mode:
+            skip = ONE_MODE_KEYS
         changed = differing_keys(configs[reference], config)
         differing[method] = [key for key in changed if key not in skip]
     return {
@@ -237,12 +313,14 @@ def matched_configuration(folders: Mapping[str, Path], *, reference: str) -> dic
         "differing_keys": differing,
         "whitelist": list(ALLOWED_DIFFERENCES),
         "single_action_keys": list(SINGLE_ACTION_KEYS),
+        "one_mode_keys": list(ONE_MODE_KEYS),
     }
 
 
 SINGLE_ACTION_KEYS = (
     "horizons.prediction_horizon", "horizons.execution_horizon", "dimensions.prediction_horizon",
 )  # fmt: skip
+ONE_MODE_KEYS = ("provenance.episodes_sha256",)
 
 
 def differing_keys(one: Mapping[str, Any], other: Mapping[str, Any]) -> list[str]:

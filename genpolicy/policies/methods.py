@@ -21,6 +21,7 @@ from genpolicy.policies.objectives import (
     flow_matching,
     squared_error,
 )
+from genpolicy.policies.offset import OffsetError, OffsetNetwork
 from genpolicy.policies.samplers import (
     DIFFUSION_SAMPLERS,
     ODE_SAMPLERS,
@@ -38,9 +39,9 @@ from genpolicy.policies.schedules import (
 )
 from genpolicy.policies.settings import HeadConfig, NetworkConfig, SamplerConfig
 
-SINGLE_EVALUATION = ("direct", "z_zero", "z_prior")
+SINGLE_EVALUATION = ("direct", "z_zero", "z_prior", "offset")
 ENERGY_SAMPLER = "derivative_free"
-STOCHASTIC_SAMPLERS = ("z_prior", ENERGY_SAMPLER, *DIFFUSION_SAMPLERS, *ODE_SAMPLERS)
+STOCHASTIC_SAMPLERS = ("z_prior", "offset", ENERGY_SAMPLER, *DIFFUSION_SAMPLERS, *ODE_SAMPLERS)
 
 
 @dataclass(frozen=True)
@@ -50,19 +51,23 @@ class Method:
     Attributes:
         name: Its name everywhere.
         chunked: Whether it predicts K actions; False means K = H_e = 1.
-        reads: Input of the head: nothing, a latent, a noisy chunk with a time, or candidate codes
-            to score.
+        reads: Input of the head: nothing, a latent, a noisy chunk with a time, candidate codes
+            to score, or a draw that moves the predicted chunk.
         objective: Makes its training objective.
         samplers: Samplers that fit; the first is the default.
         gains: Fixed gains around the network at a sampler time, for methods that read a chunk.
+        weights_of: Method whose trained weights it takes over; None trains its own.
+        one_mode: Whether it is trained on the demonstrations of one mode only.
     """
 
     name: str
     chunked: bool
-    reads: Literal["nothing", "latent", "chunk", "codes"]
+    reads: Literal["nothing", "latent", "chunk", "codes", "offset"]
     objective: ObjectiveFactory
     samplers: tuple[str, ...]
     gains: Callable[[HeadConfig, Tensor], Gains] | None = None
+    weights_of: str | None = None
+    one_mode: bool = False
 
     def horizons(self, horizons: HorizonConfig) -> HorizonConfig:
         """The horizons of this method: those given, or K = H_e = 1."""
@@ -78,6 +83,8 @@ class Method:
         """
         if self.reads == "codes":
             return EnergyNetwork(dimensions, network, head)
+        if self.reads == "offset":
+            return OffsetNetwork(dimensions, network)
         numbers = {
             "nothing": 0,
             "latent": head.latent_dim,
@@ -101,8 +108,11 @@ METHODS = {
     for method in (
         Method("bc", False, "nothing", squared_error, ("direct",)),
         Method("chunked_bc", True, "nothing", squared_error, ("direct",)),
-        # As `chunked_bc` with the other usual error, for the separation of factors.
+        # As `chunked_bc` with the other usual error: the median in place of the mean.
         Method("chunked_l1", True, "nothing", absolute_error, ("direct",)),
+        # The same weights, moved by a draw of the size of their training residuals.
+        Method("bc_noise", True, "offset", OffsetError, ("offset",), weights_of="chunked_bc"),
+        Method("one_mode_bc", True, "nothing", squared_error, ("direct",), one_mode=True),
         Method("act", True, "latent", ConditionalVae, ("z_zero", "z_prior")),
         # The same network and objective as `act`; drawn from its prior it is a generator and
         # stands for promotion like the others.
@@ -213,7 +223,7 @@ def generate(
         chunks = sample_ode(counted, noise, name=sampler.name, steps=sampler.steps)
     else:
         latent = torch.zeros(len(condition), head.latent_dim, device=condition.device)
-        if sampler.name == "z_prior":
+        if sampler.name in ("z_prior", "offset"):
             latent = noise(0)
         chunks = counted(latent, latent.new_zeros(len(latent)))
     return chunks, counted.nfe
@@ -222,10 +232,12 @@ def generate(
 def noise_shape(
     dimensions: Dimensions, sampler: SamplerConfig, head: HeadConfig
 ) -> tuple[int, ...]:
-    """Shape of one row's noise per sampler step: a latent, a chunk, or a population of codes."""
+    """Shape of one row's noise per sampler step: a latent, an offset, a chunk, or codes."""
     if sampler.name == ENERGY_SAMPLER:
         length = min(head.code_dim, dimensions.chunk_numbers)
         return (sampler.population, noise_length(length))
+    if sampler.name == "offset":
+        return (dimensions.action_dim,)
     if sampler.name in SINGLE_EVALUATION:
         return (head.latent_dim,)
     return (dimensions.prediction_horizon, dimensions.action_dim)

@@ -9,6 +9,7 @@ import functools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Annotated
 
 import torch
 from pydantic import Field
@@ -32,12 +33,15 @@ class Dimensions(Settings):
         observation_dim: D_o.
         prediction_horizon: K.
         action_dim: D_a.
+        phase_columns: Numbers of an observation that name the phase, one-hot; none where the
+            observation does not name it.
     """
 
     observation_horizon: int = Field(ge=1, le=64)
     observation_dim: int = Field(ge=1, le=4096)
     prediction_horizon: int = Field(ge=1, le=512)
     action_dim: int = Field(ge=1, le=512)
+    phase_columns: tuple[Annotated[int, Field(ge=0, lt=4096)], ...] = ()
 
     @property
     def chunk_numbers(self) -> int:

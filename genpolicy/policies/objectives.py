@@ -35,6 +35,9 @@ class Objective(nn.Module):
     def prepare(self, network: PolicyNetwork, data: Batch) -> None:
         """Fix what the network takes from the training split; by default nothing."""
 
+    def finish(self, network: PolicyNetwork, data: Batch) -> None:
+        """Fix what the averaged network takes from it after the last update; likewise."""
+
     def loss(self, network: PolicyNetwork, batch: Batch, generator: torch.Generator) -> Tensor:
         """Scalar loss of a batch; `generator` is the only source of randomness."""
         raise NotImplementedError

@@ -113,7 +113,7 @@ class SamplerConfig(Settings):
 
     name: Literal[
         "direct", "z_zero", "z_prior", "ddpm", "ddim", "dpm_2m", "euler", "heun", "rk4",
-        "derivative_free",
+        "derivative_free", "offset",
     ]  # fmt: skip
     steps: int = Field(default=1, le=10_000)
     clip: float | None = Field(default=1.0, gt=0.0)

@@ -18,15 +18,18 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from genpolicy.contract.horizons import HorizonConfig
-from genpolicy.errors import NonFiniteError
+from genpolicy.errors import IntegrityError, NonFiniteError
 from genpolicy.integrity.atomic import output_folder, write_bytes
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_bytes
+from genpolicy.integrity.rows import rows_of_table, write_rows
+from genpolicy.integrity.tables import read_table
 from genpolicy.policies.checkpoint import (
     FORMAT_VERSION,
     CheckpointConfig,
     NormalisationRecord,
     Provenance,
+    load_checkpoint,
     save_checkpoint,
     serialise_weights,
 )
@@ -41,10 +44,11 @@ from genpolicy.policies.networks import (
 from genpolicy.policies.normalisation import Normalisation
 from genpolicy.policies.objectives import Batch, Objective
 from genpolicy.policies.settings import HeadConfig, NetworkConfig, SamplerConfig, TrainingConfig
+from genpolicy.policies.validation import Validation, moments
+from genpolicy.policies.validation_row import VALIDATION_FILE, ValidationRow
 from genpolicy.policies.windows import Windows, as_batch
 from genpolicy.seeds import integer_seed, stream
 
-VALIDATION_WINDOWS = 1024
 TRAINING_FILE = "training.json"
 METRICS_FILE = "metrics.jsonl"
 
@@ -63,6 +67,7 @@ class TrainingRequest:
         sampler: Sampler that the checkpoint will name as its own.
         provenance: Dataset and contracts.
         seed: Root seed of this training.
+        phase_columns: Numbers of an observation that name the phase.
     """
 
     method: str
@@ -74,6 +79,7 @@ class TrainingRequest:
     sampler: SamplerConfig
     provenance: Provenance
     seed: int
+    phase_columns: tuple[int, ...] = ()
 
 
 def train(
@@ -83,21 +89,25 @@ def train(
     windows: Windows,
     validation: Windows | None = None,
     device: str = "cpu",
+    weights_of: Path | None = None,
 ) -> str:
     """Train one method and write its checkpoint folder, whole or not at all.
 
     Args:
-        folder: Folder to write: weights, config, `training.json`, `metrics.jsonl`.
+        folder: Folder to write: weights, config, `training.json`, `metrics.jsonl`, and
+            `validation.parquet` where the validation windows name their episodes.
         request: What decides the result.
         windows: Training split.
         validation: Validation split, for the record only; it stops and selects nothing.
         device: `cpu` or a CUDA device.
+        weights_of: Checkpoint whose weights are taken over in place of an optimisation.
 
     Returns:
         SHA-256 of the checkpoint.
 
     Raises:
         ConfigError: Unknown method, or a sampler that does not fit it.
+        IntegrityError: The checkpoint to take over is damaged, or was trained differently.
         ContractError: Windows that do not fit the horizons or the normalisation.
         NonFiniteError: The loss became NaN or infinite.
     """
@@ -106,27 +116,31 @@ def train(
     horizons = method.horizons(request.horizons)
     with deterministic(device):
         data = _batch_of(windows, horizons, request, device)
-        held_out = (
-            _batch_of(validation, horizons, request, device) if validation is not None else None
-        )
+        followed = _follow(validation, horizons, request, device) if validation else None
         network, objective = _build(method, _dimensions(horizons, request), request, device)
         objective.prepare(network, data)
         averaged = copy.deepcopy(network)
-        records = list(
-            _optimise(
-                network,
-                averaged,
-                objective,
-                data=data,
-                held_out=held_out,
-                request=request,
-                device=device,
+        if weights_of is not None:
+            records = [take_over(averaged, weights_of, request)]
+        else:
+            records = list(
+                _optimise(
+                    network,
+                    averaged,
+                    objective,
+                    data=data,
+                    followed=followed,
+                    request=request,
+                    device=device,
+                )
             )
-        )
+        objective.finish(averaged, data)
     weights = serialise_weights(averaged, method=request.method)
     config = _checkpoint_config(request, averaged, objective, weights=weights)
     summary = {
-        "stopping_rule": "fixed number of steps",
+        "stopping_rule": f"weights of {weights_of.parent.name}"
+        if weights_of is not None
+        else "fixed number of steps",
         "steps": request.training.steps,
         "evaluated_weights": "exponential moving average",
         "windows": len(windows.observations),
@@ -134,7 +148,33 @@ def train(
         "final": records[-1],
         "regime": regime(device),
     }
-    return _write(folder, weights=weights, config=config, records=records, summary=summary)
+    rows = followed.rows if followed else []
+    if weights_of is not None and followed:  # the weights' own training is what converged or not
+        path = weights_of / VALIDATION_FILE
+        rows = rows_of_table(read_table(path), ValidationRow, where=str(path))
+    return _write(folder, rows, weights=weights, config=config, records=records, summary=summary)
+
+
+def take_over(
+    network: PolicyNetwork, folder: Path, request: TrainingRequest
+) -> dict[str, float | int | None]:
+    """Put the weights of a trained checkpoint into a network; returns its last record.
+
+    Raises:
+        IntegrityError: The checkpoint is damaged, or was trained with other settings.
+    """
+    checkpoint = load_checkpoint(folder)
+    config = checkpoint.config
+    asked = (request.network, request.training, request.provenance, request.seed)
+    if (config.network, config.training, config.provenance, config.training_seed) != asked:
+        raise IntegrityError(
+            where=str(folder),
+            found="a checkpoint that was trained with other settings",
+            expected="network, training, data and seed of the method that takes over its weights",
+            action="Train both in one run (`dvc repro train_baselines`).",
+        )
+    network.load_state_dict({**network.state_dict(), **checkpoint.network.state_dict()})
+    return {"step": config.training.steps, "training_loss": None, "validation_loss": None}
 
 
 def learning_rate(step: int, config: TrainingConfig) -> float:
@@ -152,13 +192,14 @@ def averaging_decay(step: int, config: TrainingConfig) -> float:
 
 def _write(
     folder: Path,
+    measured: list[ValidationRow],
     *,
     weights: bytes,
     config: CheckpointConfig,
     records: list[dict[str, float | int | None]],
     summary: dict[str, object],
 ) -> str:
-    """Write all four files, whole or not at all; returns the checkpoint's SHA-256."""
+    """Write all files, whole or not at all; returns the checkpoint's SHA-256."""
     lines = "".join(json.dumps(record, sort_keys=True) + "\n" for record in records)
     with output_folder(folder) as temporary:
         identity = save_checkpoint(temporary, weights=weights, config=config)
@@ -166,6 +207,8 @@ def _write(
         write_bytes(
             temporary / TRAINING_FILE, canonical_json({**summary, "checkpoint_sha256": identity})
         )
+        if measured:
+            write_rows(temporary / VALIDATION_FILE, ValidationRow, measured)
     return identity
 
 
@@ -180,12 +223,20 @@ def _batch_of(
     )
 
 
+def _follow(
+    windows: Windows, horizons: HorizonConfig, request: TrainingRequest, device: str
+) -> Validation:
+    held_out = _batch_of(windows, horizons, request, device)
+    return Validation(held_out, windows.episodes, seed=request.seed, device=device)
+
+
 def _dimensions(horizons: HorizonConfig, request: TrainingRequest) -> Dimensions:
     return Dimensions(
         observation_horizon=horizons.observation_horizon,
         observation_dim=request.normalisation.observation.dim,
         prediction_horizon=horizons.prediction_horizon,
         action_dim=request.normalisation.action.dim,
+        phase_columns=request.phase_columns,
     )
 
 
@@ -228,14 +279,14 @@ def _optimise(
     objective: Objective,
     *,
     data: Batch,
-    held_out: Batch | None,
+    followed: Validation | None,
     request: TrainingRequest,
     device: str,
 ) -> Iterator[dict[str, float | int | None]]:
     """Run all updates; yields one record per measurement."""
     config = request.training
     trained = [*network.parameters(), *objective.parameters()]
-    followed: list[Tensor] = list(network.parameters())
+    current: list[Tensor] = list(network.parameters())
     average: list[Tensor] = list(averaged.parameters())
     optimiser = torch.optim.AdamW(
         trained,
@@ -247,6 +298,7 @@ def _optimise(
     generator.manual_seed(integer_seed(request.seed, "training_noise"))
     order = _batch_order(len(data.actions), config.batch_size, request.seed)
     total, counted = torch.zeros((), device=device), 0
+    measured_after = moments(config)
     for step in range(config.steps):
         rows = torch.as_tensor(next(order)).to(device)
         batch = Batch(data.observations[rows], data.actions[rows], data.weight[rows])
@@ -258,8 +310,10 @@ def _optimise(
         torch.nn.utils.clip_grad_norm_(trained, config.gradient_clip)
         optimiser.step()
         with torch.no_grad():
-            torch._foreach_lerp_(average, followed, 1.0 - averaging_decay(step, config))
+            torch._foreach_lerp_(average, current, 1.0 - averaging_decay(step, config))
         total, counted = total + loss.detach(), counted + 1
+        if followed and step + 1 in measured_after:
+            followed.follow(step + 1, averaged, objective)
         if (step + 1) % config.validation_every == 0 or step + 1 == config.steps:
             mean_loss = float(total) / counted
             if not math.isfinite(mean_loss):
@@ -272,7 +326,7 @@ def _optimise(
             yield {
                 "step": step + 1,
                 "training_loss": mean_loss,
-                "validation_loss": _validate(averaged, objective, held_out, request, device),
+                "validation_loss": followed.loss(averaged, objective) if followed else None,
                 "learning_rate": learning_rate(step, config),
             }
             total, counted = torch.zeros((), device=device), 0
@@ -287,25 +341,3 @@ def _batch_order(windows: int, batch_size: int, seed: int) -> Iterator[NDArray[n
             pool = np.concatenate([pool, generator.permutation(windows)])
         yield pool[:batch_size]
         pool = pool[batch_size:]
-
-
-def _validate(
-    averaged: PolicyNetwork,
-    objective: Objective,
-    held_out: Batch | None,
-    request: TrainingRequest,
-    device: str,
-) -> float | None:
-    """Loss of the averaged weights on fixed held-out windows with fixed noise."""
-    if held_out is None:
-        return None
-    stride = max(1, len(held_out.actions) // VALIDATION_WINDOWS)
-    some = Batch(
-        held_out.observations[::stride][:VALIDATION_WINDOWS],
-        held_out.actions[::stride][:VALIDATION_WINDOWS],
-        held_out.weight[::stride][:VALIDATION_WINDOWS],
-    )
-    generator = torch.Generator(device=device)
-    generator.manual_seed(integer_seed(request.seed, "validation_noise"))
-    with torch.no_grad():
-        return float(objective.loss(averaged, some, generator))

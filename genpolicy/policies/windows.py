@@ -23,11 +23,13 @@ class Windows:
         observations: Shape (M, H_o, D_o).
         actions: Row 0 is the action commanded at the newest observation. Shape (M, K, D_a).
         is_pad: True where an action repeats the last one of its episode. Shape (M, K).
+        episodes: Episode of each window; None where nobody asks. Shape (M,).
     """
 
     observations: Array
     actions: Array
     is_pad: NDArray[np.bool_]
+    episodes: NDArray[np.str_] | None = None
 
     def __post_init__(self) -> None:
         fits = (
@@ -35,13 +37,14 @@ class Windows:
             and self.actions.ndim == 3
             and len(self.observations) == len(self.actions) > 0
             and self.is_pad.shape == self.actions.shape[:2]
+            and (self.episodes is None or self.episodes.shape == self.actions.shape[:1])
         )
         if not fits:
             raise ContractError(
                 where="training windows",
                 found=f"of shapes {self.observations.shape}, {self.actions.shape} "
                 f"and {self.is_pad.shape}",
-                expected="(M, H_o, D_o), (M, K, D_a) and (M, K) with M > 0",
+                expected="(M, H_o, D_o), (M, K, D_a) and (M, K) with M > 0, an episode for each",
                 action="Build the windows again from the dataset.",
             )
         for name in ("observations", "actions"):
@@ -69,7 +72,10 @@ class Windows:
                 action="Cut the windows with the horizons of params.yaml.",
             )
         return Windows(
-            self.observations[:, -oldest:], self.actions[:, :last], self.is_pad[:, :last]
+            self.observations[:, -oldest:],
+            self.actions[:, :last],
+            self.is_pad[:, :last],
+            self.episodes,
         )
 
 

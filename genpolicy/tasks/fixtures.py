@@ -6,7 +6,7 @@ in a file under version control, per task, and the ladder stops where they diffe
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import yaml
 
@@ -62,7 +62,7 @@ def require_pinned(root: Path, task: str, found: Mapping[str, str]) -> None:
     Raises:
         ConfigError: No pins, none of this task, or a fixture that differs, is new or is gone.
     """
-    pinned = _pins(root).get(task)
+    pinned: Any = _pins(root).get(task)
     if not isinstance(pinned, dict):
         _refuse(task, "not pinned", "the hashes of its fixtures")
     for name in sorted({*found, *pinned}):
@@ -88,7 +88,7 @@ def _pins(root: Path) -> dict[str, Any]:
     return pins if isinstance(pins, dict) else {}
 
 
-def _refuse(where: str, found: str, expected: str) -> None:
+def _refuse(where: str, found: str, expected: str) -> NoReturn:
     raise ConfigError(
         where=f"{PINS}: {where}",
         found=found,

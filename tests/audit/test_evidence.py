@@ -17,7 +17,7 @@ FILES = {
     "clocks.parquet", "calibration.parquet", "neighbourhoods.parquet", "modes.parquet",
     "strata.parquet", "replay.parquet", "recovery.parquet", "persistence.json", "summary.json",
     "settings.json", "findings.parquet", "resamples.parquet", "examples.parquet",
-    "alignment.parquet", "support.parquet",
+    "alignment.parquet", "support.parquet", "demonstrated.parquet",
 }  # fmt: skip
 
 
@@ -58,13 +58,17 @@ def test_tables_have_the_columns_that_the_gate_reads(evidence):
     table = read_table(folder / "neighbourhoods.parquet")
     assert table.column_names == [
         "split", "phase", "episode_uuid", "index", "neighbours", "clusters", "cluster_sizes",
-        "two_mode", "separation_m", "mean_admissible", "mean_reason", "modes_admissible",
-        "mean_path", "mode_paths", "persistent",
+        "two_mode", "separation_m", "mean_admissible", "mean_reason", "median_admissible",
+        "modes_admissible", "mean_path", "mode_paths", "persistent",
     ]  # fmt: skip
     rows = table.to_pylist()
     assert all(sum(row["cluster_sizes"]) == row["neighbours"] + 1 for row in rows)
     assert all(len(row["mode_paths"]) == row["clusters"] for row in rows)
-    assert all((row["mean_admissible"] is None) == (not row["two_mode"]) for row in rows)
+    for name in ("mean_admissible", "median_admissible"):
+        assert all((row[name] is None) == (not row["two_mode"]) for row in rows)
+    followed = read_table(folder / "demonstrated.parquet").to_pylist()
+    assert {row["mode"] for row in followed} == {"m0", "m1"}
+    assert len({row["episode_uuid"] for row in followed}) == len(followed) > 60
     strata = read_table(folder / "strata.parquet").to_pylist()
     assert {"operator", "object", "calibration_epoch", "episode_order", "time_in_episode"} <= {
         row["variable"] for row in strata

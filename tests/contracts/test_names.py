@@ -44,7 +44,7 @@ def test_a_stage_its_file_its_section_and_its_folder_have_one_name(stage: str) -
     for name in outputs:
         parts = PurePosixPath(name).parts
         own_folder = parts[:2] == ("artifacts", stage)
-        own_report = parts[0] == "reports" and PurePosixPath(name).stem == stage
+        own_report = parts[0] == "reports" and parts[-1].split(".")[0] == stage
         assert own_folder or own_report, f"stage {stage} writes {name}"
 
 

@@ -58,3 +58,12 @@ def test_an_unknown_primitive_is_refused(kit):
     section = ExecutionSettings(**(kit.PARAMS["execution"] | {"recovery_plans": plans}))
     with pytest.raises(ValueError, match="levitate"):
         section.recovery()
+
+
+@pytest.mark.parametrize("age_s", [0.4, 0.45, {"default": 0.35, "insert": 0.4}])
+def test_an_age_limit_that_a_chunk_never_reaches_is_refused(kit, age_s):
+    """Eight actions of 0.05 s: a chunk is void after 0.4 s, and 0.45 s would refuse nothing."""
+    section = ExecutionSettings(**(kit.PARAMS["execution"] | {"maximum_age_s": age_s}))
+    with pytest.raises(ConfigError, match=r"maximum_age_s of phase .* less than 0\.4 s"):
+        section.executor(kit.HORIZONS)
+    assert kit.EXECUTION.executor(kit.HORIZONS).maximum_age_s["insert"] < 0.4

@@ -16,7 +16,7 @@ from gates import pipeline
 from gates.cause import default_limits
 from gates.cause.limits import OWN
 from gates.feasibility import LAYERS
-from gates.reproducibility import MEASURED_HERE, TERMS
+from gates.reproducibility.timing import MEASURED_HERE, TERMS
 from genpolicy.audit.rows import (
     Alignment,
     Calibration,
@@ -50,15 +50,18 @@ from genpolicy.evidence.rows.stress import (
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.rows import write_rows
 from genpolicy.integrity.tables import read_table, write_table
+from genpolicy.policies.validation_row import ValidationRow
 
 CODE = "genpolicy/robot/impedance.py"
 """A file of code in the repository of the tests."""
 BASELINES = ("bc", "chunked_bc", "act")
+REMEDIES = {"chunked_l1": "direct", "one_mode_bc": "direct", "bc_noise": "offset"}
 DRAWN = "ibc"
 CANDIDATES = ("diffusion", "flow")
 CONDITIONS = ("nominal", "camera_delay", "recovery_drill", "envelope")
 STARTS = 80
 INVOCATIONS = 20
+UPDATES = 4000
 PNG = base64.b64decode(
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAAAAAA6fptVAAAACklEQVR4nGNgAAAAAgABSK+kcQAAAABJRU5ErkJggg=="
 )
@@ -83,12 +86,16 @@ SPEED = {"diffusion": 0.02, "flow": 0.01}
 
 FIXTURES = (
     "held_out",
+    "two_modes",
     "stale_observation",
     "infeasible_rotation",
     "collision",
     "phase_change",
     "reordered_chunk",
 )
+
+
+PLAYED = tuple(name for name in FIXTURES if name != "two_modes")
 
 
 def by_owner(**limits: tuple[Any, str]) -> dict[str, dict[str, list[Any]]]:
@@ -112,7 +119,7 @@ PARAMS: dict[str, Any] = {
     "confidence": 0.95,
     "horizons": {"execution_horizon": 8, "action_period_s": 0.05},
     "task": {"name": "tabletop_insertion"},
-    "train_baselines": {"samplers": {name: {} for name in (*BASELINES, DRAWN)}},
+    "train_baselines": {"samplers": {name: {} for name in (*BASELINES, *REMEDIES, DRAWN)}},
     "measure_baselines": {"latent": {"method": "act"}},
     "train_generators": {"samplers": {name: {} for name in CANDIDATES}},
     "stress": {
@@ -121,12 +128,13 @@ PARAMS: dict[str, Any] = {
         "perturbations": {name: {} for name in CONDITIONS},
         "margin": 0.1,
         "alpha": 0.1,
+        "samples": 4,
         "planned_effect": [0.5, 0.95],
     },
     "gate_a": {
         "cause": _cause(),
         "held_out_splits": ["validation", "test"],
-        "deployed_conventions": ["direct", "z_zero"],
+        "deployed_conventions": ["direct", "z_zero", "offset"],
         "generative_baselines": [DRAWN],
         "chunked_baseline": "chunked_bc",
         "limits": by_owner(
@@ -141,7 +149,9 @@ PARAMS: dict[str, Any] = {
             mode_success_lower=(0.6, "model"),
             mode_feasible_share=(0.9, "controller"),
             mean_defeated_share=(0.5, "model"),
-            recovery_benefit=(0.1, "model"),
+            median_valid_share=(0.5, "model"),
+            remedy_valid_share=(0.5, "model"),
+            data_defects=(0, "perception"),
             strata_effect=(0.3, "perception"),
             cause_accepted=(1, "model"),
             baselines_matched=(0, "model"),
@@ -156,6 +166,7 @@ PARAMS: dict[str, Any] = {
     "gate_b": {
         "budget_reference": "chunked_bc",
         "budget_parts": ["total"],
+        "mode_minimum_share": 0.125,
         "limits": by_owner(
             unmatched_keys=(0, "model"),
             parameter_budget_deviation=(0.05, "model"),
@@ -165,14 +176,18 @@ PARAMS: dict[str, Any] = {
             samples_difference=(0, "model"),
             nfe_mismatch=(0, "model"),
             mode_coverage_lower=(0.6, "model"),
+            outside_modes_upper=(0.25, "model"),
+            validation_fall_upper=(0.1, "model"),
+            baseline_fall_upper=(0.1, "model"),
             latency_terms_missing=(0, "perception"),
             latency_median_ratio=(1.5, "controller"),
         ),
     },
     "gate_c": {
-        "required_fixtures": list(FIXTURES[1:]),
+        "required_fixtures": list(FIXTURES[2:]),
         "required_checks": list(LAYERS),
         "unassigned_modes": ["", "none"],
+        "mode_observations": 30,
         "limits": by_owner(
             mode_admissible_gap=(0.3, "controller"),
             admissible_share=(0.6, "model"),
@@ -596,6 +611,7 @@ def _situation(i: int) -> dict[str, Any]:
         "separation_m": 0.2,
         "mean_admissible": False,
         "mean_reason": "collision",
+        "median_admissible": False,
         "modes_admissible": 2,
         "mean_path": mean,
         "mode_paths": [left, right],
@@ -603,7 +619,7 @@ def _situation(i: int) -> dict[str, Any]:
     }
 
 
-def _modes(methods: tuple[str, ...], covered: int) -> list[dict[str, Any]]:
+def _modes(methods: tuple[str, ...], covered: int, *, nfe: int = 1) -> list[dict[str, Any]]:
     return [
         {
             "method": method,
@@ -615,8 +631,12 @@ def _modes(methods: tuple[str, ...], covered: int) -> list[dict[str, Any]]:
             "modes_present": 2,
             "modes_covered": covered,
             "between_modes": 0,
+            "far_from_modes": 0,
             "admissible": 16,
-            "nfe": 1,
+            "valid": 16 if covered else 0,
+            "modes_valid": covered,
+            "fewest_admissible": 7 if covered > 1 else 0,
+            "nfe": nfe,
             "spread_m": 0.0,
         }
         for method in methods
@@ -642,7 +662,7 @@ def _matched(methods: tuple[str, ...]) -> dict[str, Any]:
             m: {
                 "parameters": {"encoder": 10, "trunk": 80, "head": 10, "total": 100},
                 "flops": 1,
-                "config": {},
+                "config": {"training": {"steps": UPDATES}},
             }
             for m in methods
         },
@@ -657,20 +677,41 @@ def _checkpoints(root: Path, stage: str, methods: tuple[str, ...]) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         (folder / "model.safetensors").write_bytes(method.encode())
         (folder / "config.json").write_bytes(b"{}\n")
+        table(root, f"{stage}/{method}/seed_0/validation.parquet", ValidationRow, validation())
+
+
+def validation(fall: float = 0.04) -> list[dict[str, Any]]:
+    """Validation loss of 20 episodes, falling by `fall` over the last quarter."""
+    uneven = {step: 0.002 * (step == UPDATES) for step in (2000, 3000, UPDATES)}
+    return [
+        {
+            "step": step,
+            "episode_uuid": f"e{e}",
+            "windows": 32,
+            "loss": loss * (1 + 0.1 * (e % 3)) * (1 + uneven[step] * (-1) ** e),
+        }
+        for e in range(20)
+        for step, loss in ((2000, 1.5), (3000, 1.0), (UPDATES, 1.0 - fall))
+    ]
 
 
 def _baselines(root: Path) -> None:
-    fixed = [{**row, "admissible": 0} for row in _modes(BASELINES, 1)]
+    refused = {"admissible": 0, "valid": 0, "modes_valid": 0}
+    fixed = [{**row, **refused} for row in _modes(BASELINES, 1)]
+    fixed += [
+        {**row, **refused, "convention": REMEDIES[row["method"]]}
+        for row in _modes(tuple(REMEDIES), 1)
+    ]
     drawn = [{**row, "convention": "derivative_free"} for row in _modes((DRAWN,), 2)]
     table(root, "measure_baselines/modes.parquet", ModeRow, fixed + drawn)
-    document(root, "train_baselines/matched.json", _matched((*BASELINES, DRAWN)))
+    document(root, "train_baselines/matched.json", _matched((*BASELINES, *REMEDIES, DRAWN)))
     table(root, "measure_baselines/offline.parquet", OfflineRow, [_offline("bc")])
     latent = {
         "method": "act", "convention": "z_prior", "seed": 0, "situations": 30, "spread_m": 0.03,
         "condition_share": 0.4, "distance_correlation": 0.6, "exceeding": 0, "permutations": 999,
     }  # fmt: skip
     document(root, "measure_baselines/latent.json", [latent])
-    _checkpoints(root, "train_baselines", (*BASELINES, DRAWN))
+    _checkpoints(root, "train_baselines", (*BASELINES, *REMEDIES, DRAWN))
 
 
 VARIANTS = {
@@ -687,7 +728,8 @@ def _factors(root: Path) -> None:
     for place, (name, (factor, convention, _, _)) in enumerate(VARIANTS.items()):
         named = {"variant": name, "factor": factor, "convention": convention}
         covered = 2 if factor == "head" else 1
-        modes += [{**row, **named, "admissible": 0} for row in _modes((name,), covered)]
+        refused = {"admissible": 0, "valid": 0, "modes_valid": 0}
+        modes += [{**row, **named, **refused} for row in _modes((name,), covered)]
         errors += [
             {
                 **named, "seed": 0, "split": "test", "episode_uuid": f"e{i}", "windows": 9,
@@ -728,7 +770,7 @@ def _factors(root: Path) -> None:
 
 
 def _generators(root: Path) -> None:
-    table(root, "reload/modes.parquet", ModeRow, _modes(CANDIDATES, 2))
+    table(root, "reload/modes.parquet", ModeRow, _modes(CANDIDATES, 2, nfe=8))
     document(root, "train_generators/matched.json", _matched(CANDIDATES))
     table(root, "reload/offline.parquet", OfflineRow, [_offline("flow")])
     _checkpoints(root, "train_generators", CANDIDATES)
@@ -757,7 +799,7 @@ def _reload(root: Path) -> None:
         root,
         "reload/nfe.parquet",
         NfeRow,
-        [{"method": m, "seed": 0, "recorded": 8, "counted": 8} for m in CANDIDATES],
+        [{"method": m, "seed": 0, "recorded": 8, "counted": 8, "expected": 8} for m in CANDIDATES],
     )
     table(
         root,
@@ -825,7 +867,7 @@ def _latency(root: Path) -> None:
 
 
 def _candidate(method: str, fixture: str, observation: int, candidate: int) -> dict[str, Any]:
-    held = fixture == "held_out"
+    held = fixture in ("held_out", "two_modes")
     layers: dict[str, Any] = dict.fromkeys(LAYERS, True)
     if not held:
         layers.update(dynamic=False, contact=None, fresh=None)
@@ -833,7 +875,7 @@ def _candidate(method: str, fixture: str, observation: int, candidate: int) -> d
         "method": method,
         "seed": 0,
         "fixture": fixture,
-        "situation": "e0:0",
+        "situation": f"e{observation}:0",
         "phase": "approach",
         "observation": observation,
         "candidate": candidate,
@@ -858,7 +900,7 @@ def _shadow(root: Path) -> None:
             _candidate(m, fixture, o, c)
             for m in CANDIDATES
             for fixture in FIXTURES
-            for o in range(20 if fixture == "held_out" else 4)
+            for o in range({"held_out": 20, "two_modes": 60}.get(fixture, 4))
             for c in range(4)
         ],
     )
@@ -869,7 +911,7 @@ def _shadow(root: Path) -> None:
         [
             {"method": m, "fixture": f, "delivered": 400, "arrivals": 900, "stale": 0, "invalid": 0}
             for m in CANDIDATES
-            for f in FIXTURES
+            for f in PLAYED
         ],
     )
     table(
@@ -887,7 +929,7 @@ def _shadow(root: Path) -> None:
                 "count": n,
             }
             for m in CANDIDATES
-            for f in FIXTURES
+            for f in PLAYED
             for reason, n in (("expired", 10), ("phase", 5))
         ],
     )

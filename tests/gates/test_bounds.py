@@ -3,7 +3,13 @@
 import numpy as np
 import pytest
 
-from gates.bounds import counted_interval, draws_for_quantile, share_interval, upper_quantile
+from gates.bounds import (
+    counted_interval,
+    draws_for_quantile,
+    share_interval,
+    upper_quantile,
+    widest_gap,
+)
 from gates.evidence import MissingEvidenceError
 from genpolicy.seeds import stream
 from genpolicy.statistics.intervals import clopper_pearson, order_statistic_interval
@@ -70,3 +76,38 @@ def test_a_quantile_that_the_sample_cannot_bound_is_missing_evidence_and_never_t
 def test_copies_of_a_few_draws_bound_no_quantile():
     with pytest.raises(MissingEvidenceError, match="of 10 independent draws"):
         p95(np.arange(1000.0), np.repeat(np.arange(10), 100))
+
+
+def test_the_widest_gap_by_hand():
+    """Shares 1 of 30 and .5 of 30: ends from Clopper and Pearson, squared and added."""
+    clusters = [str(i) for i in range(30)]
+    shares = {"a": (np.ones(30), clusters), "b": (np.repeat([1.0, 0.0], 15), clusters)}
+    (lower, upper), more, less = widest_gap(shares, confidence=0.95)
+    a, b = clopper_pearson(30, 30), clopper_pearson(15, 30)
+    assert (more, less) == ("a", "b")
+    assert upper == pytest.approx(0.5 + (0.5 - b[0]))
+    assert lower == pytest.approx(0.5 - np.hypot(1 - a[0], b[1] - 0.5))
+
+
+def test_equal_shares_may_still_differ_and_the_widest_of_three_is_told():
+    clusters = [str(i) for i in range(40)]
+    same = {name: (np.ones(40), clusters) for name in "ab"}
+    (lower, upper), _, _ = widest_gap(same, confidence=0.95)
+    assert lower == 0.0 and 0.05 < upper < 0.15
+    third = {**same, "c": (np.repeat([1.0, 0.0], [10, 30]), clusters)}
+    assert widest_gap(third, confidence=0.95)[2] == "c"
+
+
+def test_the_gap_covers_the_true_difference():
+    """Four samples each of 60 observations, alike in an observation: .8 against .65."""
+    generator = np.random.default_rng(1)
+    clusters = [str(i) for i in range(60) for _ in range(4)]
+    covered = 0
+    for _ in range(400):
+        shares = {}
+        for name, mean in (("a", 0.8), ("b", 0.65)):
+            own = generator.beta(4 * mean, 4 * (1 - mean), 60)
+            shares[name] = (generator.random((60, 4)) < own[:, None]).ravel(), clusters
+        (lower, upper), _, _ = widest_gap(shares, confidence=0.95)
+        covered += lower <= 0.15 <= upper
+    assert covered / 400 >= 0.95

@@ -183,7 +183,14 @@ def _real(tmp_path_factory) -> Path:
         "params": ["shadow", "other.x"],
         "outs": ["artifacts/shadow"],
     }
-    (root / "dvc.yaml").write_text(yaml.safe_dump({"stages": {"shadow": stage}}))
+    # What a gate sees of the lock while it judges, in the same `dvc repro` as its evidence.
+    gate = {
+        "cmd": "cp dvc.lock seen.lock",
+        "deps": ["artifacts/shadow"],
+        "outs": [{"seen.lock": {"cache": False}}],
+    }
+    pipeline_of = {"stages": {"shadow": stage, "gate_c": gate}}
+    (root / "dvc.yaml").write_text(yaml.safe_dump(pipeline_of))
     subprocess.run([sys.executable, "-m", "dvc", "repro", "-q"], cwd=root, check=True)
     return root
 
@@ -203,6 +210,12 @@ WRONG = {
         r"params\.yaml: other\.x is other",
     ),
 }
+
+
+def test_a_gate_finds_the_run_of_its_evidence_and_not_its_own(_real):
+    seen = yaml.safe_load((_real / "seen.lock").read_text())["stages"]
+    assert set(seen) == {"shadow"}
+    assert seen["shadow"] == yaml.safe_load((_real / "dvc.lock").read_text())["stages"]["shadow"]
 
 
 def test_the_record_is_read_as_dvc_writes_it(_real):

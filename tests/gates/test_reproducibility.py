@@ -1,12 +1,20 @@
-"""Gate B in particular: what pins a candidate."""
+"""Gate B in particular: what pins a candidate, what covers a mode, what a training still gains."""
 
 import evidence
+import pytest
+from editing import cells
 
 from gates.proof import judge
+
+MODES = "reload/modes.parquet"
 
 
 def _found(report, name):
     return [c for c in report.criteria if c.id == name]
+
+
+def _red(report):
+    return {c.id for c in report.criteria if c.verdict == "FAIL"}
 
 
 def test_a_candidate_of_another_dataset_is_not_pinned(ladder):
@@ -14,3 +22,143 @@ def test_a_candidate_of_another_dataset_is_not_pinned(ladder):
     report = judge(ladder, "B")
     assert report.verdict == "FAIL"
     assert "another one than the audited" in _found(report, "unpinned_items")[0].caveat
+
+
+def test_a_solver_that_agrees_with_itself_but_not_with_its_definition_is_red(ladder):
+    """One evaluation too often, at training and after reload: recorded and counted agree."""
+    evidence.edit_table(
+        ladder, "reload/nfe.parquet", lambda f: f.assign(recorded=9, counted=9, expected=8)
+    )
+    evidence.edit_table(ladder, MODES, cells("nfe", 9))
+    report = judge(ladder, "B")
+    assert _red(report) == {"nfe_mismatch"}
+    found = _found(report, "nfe_mismatch")[0]
+    assert found.measured == 1 and "8 by the definition" in found.caveat
+
+
+def test_a_noisy_point_policy_that_samples_between_the_modes_is_red(ladder):
+    """Every mode is reached, with admissible samples enough, and 45 % lie between."""
+    evidence.edit_table(
+        ladder, MODES,
+        lambda f: f.assign(
+            samples=20, modes_covered=2, between_modes=9, admissible=8, fewest_admissible=4
+        ),
+    )  # fmt: skip
+    report = judge(ladder, "B")
+    assert _red(report) == {"outside_modes_upper"}
+    assert "share 0.45" in _found(report, "outside_modes_upper")[0].caveat
+
+
+def test_samples_far_from_every_mode_lie_outside_as_well(ladder):
+    evidence.edit_table(ladder, MODES, cells("far_from_modes", 6))
+    assert _red(judge(ladder, "B")) == {"outside_modes_upper"}
+
+
+@pytest.mark.parametrize(("fewest", "passes"), [(0, False), (1, False), (2, True)])
+def test_a_mode_counts_from_its_share_of_admissible_samples_on(ladder, fewest, passes):
+    """Reached by half of the samples, a mode whose samples may not be executed is lost: 2 of 16."""
+    evidence.edit_table(ladder, MODES, cells("fewest_admissible", fewest))
+    report = judge(ladder, "B")
+    assert (report.verdict == "PASS") is passes
+    assert _red(report) == (set() if passes else {"mode_coverage_lower"})
+    caveat = _found(report, "mode_coverage_lower")[0].caveat
+    assert f"in {30 if passes else 0} of 30 two-mode situations" in caveat
+
+
+def test_the_worst_training_seed_decides(ladder):
+    def second_seed(frame):
+        other = frame.assign(seed=1, fewest_admissible=0, between_modes=12)
+        return evidence.pd.concat([frame, other], ignore_index=True)
+
+    evidence.edit_table(ladder, MODES, second_seed)
+    assert _red(judge(ladder, "B")) == {"mode_coverage_lower", "outside_modes_upper"}
+
+
+def test_modes_counted_at_another_nfe_say_nothing(ladder):
+    evidence.edit_table(ladder, MODES, cells("nfe", 4))
+    report = judge(ladder, "B")
+    assert report.verdict == "INCONCLUSIVE"
+    assert "chosen NFE" in _found(report, "mode_coverage_lower")[0].caveat
+
+
+def _train(root, stage, method, fall):
+    path = f"{stage}/{method}/seed_0/validation.parquet"
+    evidence.table(root, path, evidence.ValidationRow, evidence.validation(fall))
+
+
+def test_a_candidate_whose_loss_still_falls_is_red(ladder):
+    for method in evidence.CANDIDATES:
+        _train(ladder, "train_generators", method, 0.15)
+    report = judge(ladder, "B")
+    assert _red(report) == {"validation_fall_upper"}
+    found = _found(report, "validation_fall_upper")[0]
+    assert found.interval[0] < 0.15 < found.interval[1] == found.measured
+    assert "last quarter of 4000 updates, 20 held-out episodes" in found.caveat
+
+
+def test_a_gain_over_a_baseline_that_still_learns_is_none(ladder):
+    _train(ladder, "train_baselines", "act", 0.2)
+    report = judge(ladder, "B")
+    assert _red(report) == {"baseline_fall_upper"}
+    caveat = _found(report, "baseline_fall_upper")[0].caveat
+    assert all(name in caveat for name in ("chunked_bc 0.04", "; bc 0.04", "; act 0.2"))
+
+
+def test_the_worse_end_over_episodes_decides(ladder):
+    """Half of the episodes gain nothing and half much: .08 on average is not below .1."""
+    for method in evidence.CANDIDATES:
+        rows = evidence.validation(0.0)
+        for row in rows:
+            if row["step"] == evidence.UPDATES and int(row["episode_uuid"][1:]) % 2:
+                row["loss"] *= 0.84
+        evidence.table(
+            ladder,
+            f"train_generators/{method}/seed_0/validation.parquet",
+            evidence.ValidationRow,
+            rows,
+        )
+    report = judge(ladder, "B")
+    assert _red(report) == {"validation_fall_upper"}
+    assert all(c.interval[0] < 0.08 for c in _found(report, "validation_fall_upper"))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda rows: [row for row in rows if row["step"] != 3000],
+        lambda rows: [row for row in rows if row["step"] != 4000],
+        lambda rows: [row for row in rows if (row["step"], row["episode_uuid"]) != (3000, "e3")],
+        lambda rows: [{**row, "windows": 32 + (row["step"] == 4000)} for row in rows],
+        lambda rows: [row for row in rows if row["episode_uuid"] == "e3"],
+        lambda rows: [{**row, "loss": 0.0} for row in rows],
+        lambda rows: [*rows, rows[-1]],
+    ],
+    ids=[
+        "no middle",
+        "no end",
+        "an episode less",
+        "other windows",
+        "one episode",
+        "no loss",
+        "twice",
+    ],
+)
+def test_a_training_that_was_not_followed_is_inconclusive(ladder, change):
+    for method in evidence.CANDIDATES:
+        path = f"train_generators/{method}/seed_0/validation.parquet"
+        evidence.table(ladder, path, evidence.ValidationRow, change(evidence.validation()))
+    report = judge(ladder, "B")
+    assert report.verdict == "INCONCLUSIVE"
+    assert {c.verdict for c in _found(report, "validation_fall_upper")} == {"INCONCLUSIVE"}
+
+
+def test_a_trained_baseline_without_its_loss_is_inconclusive_one_without_training_is_named(ladder):
+    folder = ladder / "artifacts/train_baselines/act/seed_0"
+    (folder / "validation.parquet").unlink()
+    report = judge(ladder, "B")
+    assert report.verdict == "INCONCLUSIVE"
+    assert "while act was trained" in _found(report, "baseline_fall_upper")[0].caveat
+    (folder / "model.safetensors").unlink()
+    report = judge(ladder, "B")
+    assert report.verdict == "PASS"
+    assert "no training of its own: act" in _found(report, "baseline_fall_upper")[0].caveat

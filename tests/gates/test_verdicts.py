@@ -13,13 +13,12 @@ NUMBERS = st.floats(allow_nan=False, allow_infinity=False, width=64)
 VERDICTS = st.sampled_from(sorted(SEVERITY))
 
 
-def criterion(verdict: str, candidate: str | None = None, route: str = "required", name: str = "x"):
+def criterion(verdict: str, candidate: str | None = None, name: str = "x"):
     return Answer(
         id=name,
         question="?",
         owner="model",
         candidate=candidate,
-        route=route,
         measured=1.0,
         interval=None,
         threshold=1.0,
@@ -80,14 +79,6 @@ def test_candidates_are_a_union_of_intersections(cases):
     assert {n for n, v in candidates.items() if v == "PASS"} == {
         n for n, found in cases.items() if all(v == "PASS" for v in found)
     }
-
-
-def test_one_whole_route_is_enough_but_required_ones_stay():
-    bad, good = criterion("FAIL", route="one"), criterion("PASS", route="two")
-    assert combine([criterion("PASS"), bad, good], expects_candidates=False)[0] == "PASS"
-    assert combine([criterion("FAIL"), bad, good], expects_candidates=False)[0] == "FAIL"
-    half = [criterion("PASS", route="one"), bad, criterion("FAIL", route="two")]
-    assert combine(half, expects_candidates=False)[0] == "FAIL"
 
 
 def test_the_first_unmet_criterion_is_named_required_before_candidates():

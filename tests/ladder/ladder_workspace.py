@@ -34,7 +34,10 @@ DROPPED = {
 ALWAYS_RUN = "task"
 UNFORMED = {
     "gate_c": {"controller": ("projection_p95_m", "boundary_jerk_p95_m_s3")},
-    "gate_d": {"controller": ("latency_p95_s",), "safety": ("force_peak_p95_n", "recovery_success_lower")},
+    "gate_d": {
+        "controller": ("latency_p95_s",),
+        "safety": ("force_peak_p95_n", "recovery_success_lower"),
+    },
 }
 """Criteria that a handful of starts leaves without a verdict, whatever the limit."""
 LEFT_ALONE = {

@@ -55,7 +55,7 @@ def test_judging_one_gate_again_changes_its_report_only(copy: Path) -> None:
     changed = {name for name in before | after if before.get(name) != after.get(name)}
     assert changed <= {
         "reports/gate_c.json", "reports/gate_c.md", "reports/gate_c.html", "reports/index.html",
-        "artifacts/gate_c/criteria.csv",
+        "reports/gate_c.metrics.json", "artifacts/gate_c/criteria.csv",
     }  # fmt: skip
     assert "reports/gate_c.json" in changed
     print(f"re-judging one gate: {outcome.duration_s:.2f} s")

@@ -1,6 +1,5 @@
 """Settings that only make sense together, found by the stage or by the gate that needs both."""
 
-import json
 from pathlib import Path
 
 import pytest
@@ -33,13 +32,12 @@ def test_a_sampler_of_another_method_is_a_bad_setting(copy: Path) -> None:
 
 
 @pytest.mark.parametrize(("key", "value"), [("starts", 4), ("margin", -0.8)])
-def test_a_plan_other_than_the_run_leaves_gate_d_without_a_verdict(
-    copy: Path, key: str, value: float
-) -> None:
+def test_a_plan_other_than_the_run_is_not_judged(copy: Path, key: str, value: float) -> None:
     edit_params(copy, lambda params: params["stress"].update({key: value}))
-    assert run_stage(copy, "gate_d")[0] == 0
-    report = json.loads((copy / "reports" / "gate_d.json").read_text())
-    assert report["verdict"] == "INCONCLUSIVE"
+    code, said = run_stage(copy, "gate_d")
+    assert code == 2, said
+    assert "params.yaml: stress is other than recorded" in said
+    assert not (copy / "reports" / "gate_d.json").exists()
 
 
 def test_a_promotion_limit_of_ones_own_is_a_bad_setting(copy: Path) -> None:

@@ -16,6 +16,8 @@ SAMPLERS = {
     "bc": ("direct", 1),
     "chunked_bc": ("direct", 1),
     "chunked_l1": ("direct", 1),
+    "bc_noise": ("offset", 1),
+    "one_mode_bc": ("direct", 1),
     "act": ("z_zero", 1),
     "cvae": ("z_prior", 1),
     "ibc": ("derivative_free", 8),

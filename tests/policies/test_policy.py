@@ -11,12 +11,12 @@ from genpolicy.policies.settings import SamplerConfig
 from genpolicy.policies.training import train
 
 STEPS = {
-    "bc": 1, "chunked_bc": 1, "chunked_l1": 1, "act": 1, "cvae": 1, "ibc": 8, "diffusion": 10,
-    "flow": 8,
+    "bc": 1, "chunked_bc": 1, "chunked_l1": 1, "bc_noise": 1, "one_mode_bc": 1, "act": 1,
+    "cvae": 1, "ibc": 8, "diffusion": 10, "flow": 8,
 }  # fmt: skip
 STOCHASTIC = {
-    "act": ("z_prior", 1), "ibc": ("derivative_free", 8), "diffusion": ("ddim", 10),
-    "flow": ("euler", 8),
+    "act": ("z_prior", 1), "bc_noise": ("offset", 1), "ibc": ("derivative_free", 8),
+    "diffusion": ("ddim", 10), "flow": ("euler", 8),
 }  # fmt: skip
 POPULATION = {"derivative_free": 32}
 
@@ -80,6 +80,7 @@ def test_two_loads_give_equal_bytes(folders, method, two_mode_windows):
         ("act", "z_prior", 1, 1), ("diffusion", "ddim", 7, 7), ("diffusion", "ddpm", 100, 100),
         ("diffusion", "dpm_2m", 6, 6), ("flow", "euler", 5, 5), ("flow", "heun", 5, 10),
         ("flow", "rk4", 3, 12), ("chunked_l1", "direct", 1, 1), ("ibc", "derivative_free", 6, 7),
+        ("bc_noise", "offset", 1, 1),
     ],
 )  # fmt: skip
 def test_nfe_and_shape(folders, method, name, steps, nfe, two_mode_windows):
@@ -105,6 +106,7 @@ def test_deterministic_conventions_give_equal_candidates(folders, two_mode_windo
     ("method", "name", "steps"),
     [("diffusion", "ddim", 101), ("diffusion", "ddim", 0), ("diffusion", "euler", 4),
      ("flow", "euler", 0), ("flow", "ddim", 4), ("bc", "direct", 2), ("ibc", "euler", 4),
+     ("bc_noise", "offset", 2), ("bc_noise", "direct", 1), ("chunked_bc", "offset", 1),
      ("flow", "derivative_free", 4), ("ibc", "derivative_free", 0)],
 )  # fmt: skip
 def test_samplers_that_do_not_fit_are_refused(folders, method, name, steps):

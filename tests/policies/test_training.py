@@ -8,10 +8,12 @@ import pytest
 import torch
 
 from genpolicy.errors import ConfigError, ContractError, NonFiniteError
+from genpolicy.integrity.rows import read_rows
 from genpolicy.policies.methods import METHODS
 from genpolicy.policies.objectives import Batch
 from genpolicy.policies.settings import TrainingConfig
 from genpolicy.policies.training import averaging_decay, learning_rate, train
+from genpolicy.policies.validation_row import VALIDATION_FILE, ValidationRow
 from genpolicy.policies.windows import Windows
 
 
@@ -69,6 +71,27 @@ def test_schedules():
     assert averaging_decay(0, config) == 0.0
     assert averaging_decay(15, config) == pytest.approx(1 - 16**-0.75)
     assert averaging_decay(10**9, config) == config.ema_cap
+
+
+def test_following_the_validation_changes_no_weight_and_is_paired(
+    tmp_path, request_for, two_mode_windows
+):
+    """The same windows and noise at three quarters and at the end; without it, the same bytes."""
+    windows, request = two_mode_windows(), request_for("flow", steps=30)
+    names = np.array([f"e{row % 3}" for row in range(len(windows.actions))])
+    named = dataclasses.replace(windows, episodes=names)
+    train(tmp_path / "followed", request, windows=windows, validation=named)
+    train(tmp_path / "alone", request, windows=windows)
+    weights = [(tmp_path / n / "model.safetensors").read_bytes() for n in ("followed", "alone")]
+    assert weights[0] == weights[1]
+    assert not (tmp_path / "alone" / VALIDATION_FILE).exists()
+    rows = read_rows(tmp_path / "followed" / VALIDATION_FILE, ValidationRow)
+    assert [(row.step, row.episode_uuid) for row in rows] == [
+        (step, f"e{e}") for step in (10, 20, 23, 30) for e in range(3)
+    ]
+    assert {row.windows for row in rows} == {32}
+    lines = (tmp_path / "followed" / "metrics.jsonl").read_text().splitlines()
+    assert [json.loads(line)["step"] for line in lines] == [10, 20, 30]
 
 
 def test_an_unknown_method_and_wrong_windows_are_refused(tmp_path, request_for, two_mode_windows):

@@ -8,6 +8,7 @@ import pytest
 import yaml
 
 from genpolicy.errors import ContractError, RefusedError
+from stages._latency import LatencySection
 from stages._stage import SHARED, STAGES, load_params, main
 
 BAD_SETTINGS = {
@@ -199,6 +200,11 @@ def test_times_that_cannot_be_written_fail_no_stage(workspace, capsys) -> None:
         main("record", lambda _: None)
     assert end.value.code == 0
     assert "time not recorded" in capsys.readouterr().err
+
+
+def test_the_declared_bounds_of_the_ladder_are_read(workspace):
+    section = load_params().section("latency", LatencySection)
+    assert section.declared_terms["queue"].minimum_s == 0.0
 
 
 def test_a_fixture_that_is_not_the_pinned_one_stops_the_ladder_at_its_first_stage(

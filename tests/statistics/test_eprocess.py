@@ -68,7 +68,7 @@ def test_a_gain_of_three_tenths_is_found_on_ninety_starts():
 
 
 def test_averages_over_conditions_keep_the_error_at_the_margin():
-    """Pairs of a real trial are means over conditions, not coins; skewed so that few starts gain."""
+    """Pairs of a real trial are means over conditions, not coins; few starts gain."""
     rng, wrong = np.random.default_rng(9), 0
     for _ in range(1500):
         d = np.where(rng.random(90) < 0.1, 0.8, rng.choice([-0.2, 0.0, 0.1], size=90))

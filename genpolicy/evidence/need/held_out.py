@@ -73,6 +73,10 @@ def modes_of_policy(
         held_out.situations, held_out.observations[:, -1], drawn.actions, strict=True
     ):
         reached = sample_modes(chunks, situation.mode_paths, position=POSITION)
+        passed = admissible_chunks(
+            task, checker, chunks, observation, action_period_s=policy.horizons.action_period_s
+        )
+        valid = reached.counts(passed)
         rows.append(
             ModeRow(
                 method=policy.method,
@@ -84,13 +88,11 @@ def modes_of_policy(
                 modes_present=reached.modes_present,
                 modes_covered=reached.modes_covered,
                 between_modes=int(reached.between.sum()),
-                admissible=admissible_count(
-                    task,
-                    checker,
-                    chunks,
-                    observation,
-                    action_period_s=policy.horizons.action_period_s,
-                ),
+                far_from_modes=int((reached.far & ~reached.between).sum()),
+                admissible=int(passed.sum()),
+                valid=int(valid.sum()),
+                modes_valid=int((valid > 0).sum()),
+                fewest_admissible=int(valid.min()),
                 nfe=drawn.nfe,
                 spread_m=float(chunks[:, :, POSITION].std(axis=0).mean()),
             )
@@ -98,25 +100,20 @@ def modes_of_policy(
     return rows
 
 
-def admissible_count(
+def admissible_chunks(
     task: Task,
     checker: FeasibilityChecker,
     chunks: Array,
     observation: Array,
     *,
     action_period_s: float,
-) -> int:
-    """How many chunks (S, K, D_a) pass all six layers at a recorded observation (D_o,)."""
-    return sum(
-        admissible(
-            task,
-            checker,
-            chunk,
-            observation,
-            action_period_s=action_period_s,
-        )[0]
+) -> NDArray[np.bool_]:
+    """Which chunks (S, K, D_a) pass all six layers at a recorded observation (D_o,). Shape (S,)."""
+    verdicts = [
+        admissible(task, checker, chunk, observation, action_period_s=action_period_s)[0]
         for chunk in chunks
-    )
+    ]
+    return np.array(verdicts, dtype=np.bool_)
 
 
 def admissible(

@@ -61,6 +61,11 @@ class SampleModes:
     modes_present: int
     modes_covered: int
 
+    def counts(self, among: NDArray[np.bool_]) -> Integers:
+        """Samples that reach each mode, of those in `among` (S,). Shape (modes_present,)."""
+        reaching = self.nearest[among & ~self.between & ~self.far]
+        return np.bincount(reaching, minlength=self.modes_present).astype(np.int64)
+
 
 def read_situations(
     folder: Path, *, width: int = 3, splits: Sequence[str] = ("validation", "test")

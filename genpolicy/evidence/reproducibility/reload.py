@@ -24,6 +24,7 @@ from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_bytes, sha256_file
 from genpolicy.integrity.rows import read_rows, write_rows
 from genpolicy.policies.checkpoint import CONFIG_FILE
+from genpolicy.policies.evaluations import expected_evaluations
 from genpolicy.policies.fixtures import FixtureRow, compare_fixtures, reload_fixture
 from genpolicy.policies.policy import NetworkPolicy
 from genpolicy.statistics.intervals import clopper_pearson
@@ -135,7 +136,9 @@ def _reloaded(
     rows.samples += [
         SampleRow(candidate.name, candidate.seed, **asdict(fixture)) for fixture in compared
     ]
-    rows.nfe.append(NfeRow(candidate.name, candidate.seed, before[0].nfe, after[0].nfe))
+    expected = expected_evaluations(candidate.load().sampler)
+    nfe = (before[0].nfe, after[0].nfe, expected)
+    rows.nfe.append(NfeRow(candidate.name, candidate.seed, *nfe))
     return differing
 
 

@@ -40,7 +40,11 @@ class ModeRow:
         modes_present: Modes of the situation.
         modes_covered: Modes that at least one sample reaches.
         between_modes: Samples in the middle between two modes.
+        far_from_modes: Samples further from every mode than the modes are apart, and not between.
         admissible: Samples of which the whole chunk passes the six layers.
+        valid: Those of them that reach a mode.
+        modes_valid: Modes that at least one of those reaches.
+        fewest_admissible: Admissible samples that reach the mode reached by the fewest of them.
         nfe: Network evaluations of one invocation, counted.
         spread_m: Mean standard deviation of the positions over samples, m.
     """
@@ -54,7 +58,11 @@ class ModeRow:
     modes_present: int
     modes_covered: int
     between_modes: int
+    far_from_modes: int
     admissible: int
+    valid: int
+    modes_valid: int
+    fewest_admissible: int
     nfe: int
     spread_m: float
 
@@ -107,7 +115,11 @@ class FactorModeRow:
     modes_present: int
     modes_covered: int
     between_modes: int
+    far_from_modes: int
     admissible: int
+    valid: int
+    modes_valid: int
+    fewest_admissible: int
     nfe: int
     spread_m: float
 

@@ -33,12 +33,14 @@ class NfeRow:
         seed: Number of its training seed.
         recorded: As written at training.
         counted: As counted at the network after reload.
+        expected: By the definition of its sampler, for its steps.
     """
 
     method: str
     seed: int
     recorded: int
     counted: int
+    expected: int
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ class CandidateRow:
     Attributes:
         method: The method.
         seed: Number of its training seed.
-        fixture: `held_out`, or the corruption.
+        fixture: `held_out`, `two_modes` (held-out too, where modes were found), or the corruption.
         situation: Episode and row.
         phase: Task phase.
         observation: Number of the observation.

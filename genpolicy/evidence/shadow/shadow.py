@@ -5,6 +5,7 @@ clock of its observation, and the journal of that is what the independent checke
 """
 
 from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -29,6 +30,7 @@ from genpolicy.tasks.api import Task
 Array = NDArray[np.float64]
 
 HELD_OUT = "held_out"
+TWO_MODES = "two_modes"
 SELECTOR = "first_admissible"
 DEMONSTRATION = "demonstration"
 
@@ -94,21 +96,28 @@ class Shadow:
 
 
 def shadow_policy(
-    shadow: Shadow, policy: Policy, observations: list[Observation], *, seed: int
+    shadow: Shadow,
+    policy: Policy,
+    observations: list[Observation],
+    *,
+    seed: int,
+    two_mode: Sequence[Observation] = (),
 ) -> ShadowEvidence:
-    """Every candidate of a policy on every observation, intact and corrupted."""
+    """Every candidate of a policy on every observation, intact and corrupted.
+
+    Args:
+        shadow: What every shadow test shares.
+        policy: The policy.
+        observations: Held-out moments.
+        seed: Number of its training seed.
+        two_mode: Moments at which modes were found: judged, neither corrupted nor executed.
+    """
     evidence = ShadowEvidence()
-    drawn = policy.sample(
-        np.stack([item.history for item in observations]),
-        noise_names=[("shadow", item.episode_uuid, item.index) for item in observations],
-        candidates=shadow.samples,
-    )
-    for number, (item, chunks) in enumerate(zip(observations, drawn.actions, strict=True)):
-        cases = [
-            case_of(shadow, item, chunk, number=number, candidate=k, of=policy)
-            for k, chunk in enumerate(chunks)
-        ]
+    for number, (item, cases) in enumerate(_answers(shadow, policy, [*observations, *two_mode])):
         seen = _Seen(shadow, evidence, item, number, seed)
+        if number >= len(observations):
+            seen.judge(cases, fixture=TWO_MODES)
+            continue
         judged = seen.judge(cases, fixture=HELD_OUT)
         seen.play(judged, fixture=HELD_OUT)
         if any(isinstance(result, Admitted) for _, result in judged):
@@ -118,6 +127,25 @@ def shadow_policy(
             if broken is not None:
                 seen.play(seen.judge([broken], fixture=corruption.name), fixture=corruption.name)
     return evidence
+
+
+def _answers(
+    shadow: Shadow, policy: Policy, observations: Sequence[Observation]
+) -> Iterator[tuple[Observation, list[Case]]]:
+    """The candidates of a policy at each observation."""
+    drawn = policy.sample(
+        np.stack([item.history for item in observations]),
+        noise_names=[("shadow", item.episode_uuid, item.index) for item in observations],
+        candidates=shadow.samples,
+    )
+    for number, (item, chunks) in enumerate(zip(observations, drawn.actions, strict=True)):
+        yield (
+            item,
+            [
+                case_of(shadow, item, chunk, number=number, candidate=k, of=policy)
+                for k, chunk in enumerate(chunks)
+            ],
+        )
 
 
 @dataclass(frozen=True)

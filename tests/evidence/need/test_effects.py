@@ -18,7 +18,8 @@ def situation(variant, episode, covered, admissible, present=2):
     return FactorModeRow(
         variant=variant, factor="trunk", method="chunked_bc", seed=0, convention="direct",
         episode_uuid=episode, index=0, samples=4, modes_present=present, modes_covered=covered,
-        between_modes=0, admissible=admissible, nfe=1, spread_m=0.0,
+        between_modes=0, far_from_modes=0, admissible=admissible, valid=0, modes_valid=0,
+        fewest_admissible=0, nfe=1, spread_m=0.0,
     )  # fmt: skip
 
 

@@ -1,12 +1,15 @@
 """Held-out situations: the right rows, and errors for rows that are not there."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from genpolicy.errors import ContractError
+from genpolicy.evidence.need import held_out
 from genpolicy.evidence.need.held_out import (
     admissible,
-    admissible_count,
+    admissible_chunks,
     held_out_situations,
     modes_of_policy,
 )
@@ -76,7 +79,34 @@ def test_rows_count_modes_and_samples(data, kit, tmp_path, policy, task, checker
         assert row.samples == 4 and row.nfe == 2 and row.modes_present == 2
         assert 0 <= row.modes_covered <= 2
         assert 0 <= row.between_modes + row.admissible <= 8
+        assert 0 <= row.modes_valid <= row.valid <= row.admissible
         assert row.spread_m > 0
+
+
+def test_a_mode_counts_the_samples_that_reach_it_and_may_be_executed(
+    data, kit, tmp_path, policy, task, checker, monkeypatch
+):
+    """Left three times, once inadmissible; right twice; between, far away: the fewest is two."""
+    name = kit.uuids(data)[9]
+    audit = kit.write_situations(tmp_path / "audit", [(name, 0, {})])
+    found = held_out_situations(audit, data, horizons=kit.HORIZONS)
+    side = [1.0, 1.0, 1.0, -1.0, -1.0, 0.0, 5.0]
+    chunks = np.zeros((7, 16, 10))
+    chunks[:, :, 1] = 0.1 * np.array(side)[:, None]
+    verdicts = [True, True, False, True, True, True, True]
+
+    def drawn(observations, *, noise_names, candidates):
+        return SimpleNamespace(actions=chunks[None], nfe=2)
+
+    monkeypatch.setattr(policy, "sample", drawn)
+    monkeypatch.setattr(held_out, "admissible_chunks", lambda *_, **__: np.array(verdicts))
+    asked = {"seed": 0, "convention": "euler", "samples": 7, "task": task, "checker": checker}
+    (row,) = modes_of_policy(policy, found, **asked)
+    assert (row.between_modes, row.far_from_modes, row.admissible) == (1, 1, 6)
+    assert (row.modes_covered, row.fewest_admissible) == (2, 2)
+    verdicts[3] = verdicts[4] = False
+    (row,) = modes_of_policy(policy, found, **asked)
+    assert (row.modes_covered, row.fewest_admissible) == (2, 0)
 
 
 def demonstrated(data, number, index, steps=16):
@@ -97,6 +127,7 @@ def test_a_demonstrated_chunk_is_admissible_and_its_damage_is_named(data, kit, t
     far = np.array(actions)
     far[:, 0] += 0.5
     chunks = np.stack([actions, broken, far])
-    assert admissible_count(task, checker, chunks, observation, **keywords) == 1
+    passed = admissible_chunks(task, checker, chunks, observation, **keywords)
+    assert passed.tolist() == [True, False, False]
     verdict, reason = admissible(task, checker, broken, observation, **keywords)
     assert not verdict and reason == "representation: finite"

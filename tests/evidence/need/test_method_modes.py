@@ -42,6 +42,12 @@ def test_between_begins_a_quarter_of_the_way_from_mode_to_mode(share, between):
     assert found(on_the_way).between.tolist() == [between]
 
 
+def test_samples_are_counted_by_the_mode_that_they_reach():
+    reached = found(MODES[0], MODES[0], MODES[1], STRAIGHT)
+    assert reached.counts(np.ones(4, dtype=bool)).tolist() == [2, 1]
+    assert reached.counts(np.array([True, False, False, True])).tolist() == [1, 0]
+
+
 def test_a_shorter_sample_is_held_against_the_beginning_of_the_modes():
     assert found(*MODES, steps=4).modes_covered == 2
 

@@ -8,7 +8,7 @@ import pytest
 
 from genpolicy.evidence.shadow.corruption import CORRUPTIONS
 from genpolicy.evidence.shadow.session import IN_FLIGHT_PHASE_CHANGE
-from genpolicy.evidence.shadow.shadow import HELD_OUT, case_of, shadow_policy
+from genpolicy.evidence.shadow.shadow import HELD_OUT, TWO_MODES, case_of, shadow_policy
 from genpolicy.execution.journal import write_journal
 from genpolicy.feasibility.settings import LAYERS
 from genpolicy.verification.checker import check_journal
@@ -93,6 +93,18 @@ def test_nothing_is_lost_and_the_reason_is_its_own(evidence, tmp_path):
     for fixture, reason in expected.items():
         assert reasons[fixture, reason] > 0, fixture
     assert reasons[HELD_OUT, "superseded"] > 0
+
+
+def test_situations_with_modes_are_judged_neither_corrupted_nor_executed(shadow, observations):
+    few, more = observations[:1], observations[1:4]
+    found = shadow_policy(shadow, Demonstrator(observations), few, seed=0, two_mode=more)
+    rows = [row for row in found.candidates if row.fixture == TWO_MODES]
+    assert len(rows) == 3 * len(more) and {row.observation for row in rows} == {1, 2, 3}
+    assert [row.situation for row in rows[::3]] == [f"{o.episode_uuid}:{o.index}" for o in more]
+    alone = shadow_policy(shadow, Demonstrator(observations), few, seed=0)
+    rest = [row for row in found.candidates if row.fixture != TWO_MODES]
+    assert repr(rest) == repr(alone.candidates)
+    assert found.stub == alone.stub and len(found.sessions) == len(alone.sessions)
 
 
 def test_a_policy_that_answers_not_a_number_leaves_evidence(shadow, observations):

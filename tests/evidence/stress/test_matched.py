@@ -13,6 +13,7 @@ from genpolicy.evidence.stress.matched import Comparison, Shard, matched_starts,
 from genpolicy.evidence.stress.perturbations import NetworkJitter, Nominal, ReducedEnvelope
 from genpolicy.execution.journal import read_journal
 from genpolicy.policies.checkpoint import Provenance
+from genpolicy.policies.policy import NetworkPolicy
 from genpolicy.policies.settings import HeadConfig, NetworkConfig, SamplerConfig, TrainingConfig
 from genpolicy.policies.training import TrainingRequest, train
 from genpolicy.policies.windows import Windows
@@ -22,7 +23,11 @@ from genpolicy.verification.checker import check_journal
 from genpolicy.verification.commands import reach_of
 from genpolicy.verification.rollouts import derived_rollouts, differences
 
-METHODS = {"chunked_bc": SamplerConfig(name="direct"), "flow": SamplerConfig(name="euler", steps=2)}
+METHODS = {
+    "chunked_bc": SamplerConfig(name="direct"),
+    "bc_noise": SamplerConfig(name="offset"),
+    "flow": SamplerConfig(name="euler", steps=2),
+}
 
 
 @pytest.fixture(scope="module")
@@ -100,6 +105,22 @@ def test_starts_do_not_depend_on_how_many_there_are(task):
     assert matched_starts(task, root_seed=10, count=1)[0].to_json() != few[0].to_json()
 
 
+def test_noise_is_redrawn_as_often_as_every_other_method_that_draws(shard, monkeypatch):
+    asked = {}
+    drawn = NetworkPolicy.sample
+
+    def sample(policy, observations, *, noise_names, candidates):
+        asked.setdefault(policy.method, set()).add(candidates)
+        return drawn(policy, observations, noise_names=noise_names, candidates=candidates)
+
+    monkeypatch.setattr(NetworkPolicy, "sample", sample)
+    for method in METHODS:
+        made = shard(method)
+        run_shard(made)
+        assert check_journal(made.journal).violations == []
+    assert asked == {"chunked_bc": {1}, "bc_noise": {2}, "flow": {2}}
+
+
 def test_a_shard_is_deterministic_and_proved(shard):
     first, second = shard(), shard()
     one, two = run_shard(first), run_shard(second)
@@ -169,9 +190,9 @@ def test_methods_meet_the_same_starts(shard):
         method: run_shard(shard(method, perturbation="jitter", schedule=jitter)).rollouts
         for method in METHODS
     }
-    for one, two in zip(*rows.values(), strict=True):
-        assert one.start_sha256 == two.start_sha256
-        assert one.method != two.method
+    for matched in zip(*rows.values(), strict=True):
+        assert len({row.start_sha256 for row in matched}) == 1
+        assert len({row.method for row in matched}) == len(METHODS)
 
 
 def test_a_method_that_never_delivers_has_unknown_ages_not_zero(shard, kit):

@@ -1,19 +1,94 @@
-"""Gate A as a whole: its two routes."""
+"""Gate A as a whole: nothing waives the cause, and every red number of the data stops it."""
 
 import evidence
-from editing import cells
+import pytest
 
 from gates.proof import judge
+from genpolicy.audit.rows import Finding
+from genpolicy.integrity.rows import write_rows
+
+DEFECTS = {
+    "units": ("unit", "hole_pose", "magnitude_factor", 1000.0),
+    "units by gain": ("unit", "action", "gain_factor", 1000.0),
+    "frames": ("frame", "epoch_2", "frame_angle_rad", 0.5),
+    "swapped columns": ("swapped_columns", "action", "swapped_columns", 2.0),
+    "copies": ("duplicate", "", "faulty_episodes_share", 0.1),
+    "boundaries": ("glued", "", "faulty_episodes_share", 0.1),
+}
 
 
 def _set(key, value):
     return lambda document: document.__setitem__(key, value)
 
 
-def test_recovery_benefit_is_a_second_route_but_waives_no_data_check(repo):
-    evidence.edit_document(repo, "audit/persistence.json", _set("observed", 0.55))
-    assert judge(repo, "A").verdict == "PASS"
-    evidence.edit_table(repo, "audit/clocks.parquet", cells("offset_after_s", 0.5))
-    report = judge(repo, "A")
+def find(root, kind, variable, question, measured):
+    """A finding of the audit, as it writes one."""
+    row = Finding(
+        kind=kind, variable=variable, where="somewhere", question=question, measured=measured,
+        floor=0.0, unit="", action="Repair it.",
+    )  # fmt: skip
+    write_rows(root / "artifacts/audit/findings.parquet", Finding, [row])
+
+
+def contaminated(root):
+    """More labels disagree with the replay than the limit allows; the replay table says nothing."""
+    evidence.edit_document(
+        root,
+        "audit/summary.json",
+        lambda d: {**d, "label_disagreements": 30, "label_disagreement_upper": 0.6},
+    )
+
+
+def verdicts(report):
+    return {answer.id: answer.verdict for answer in report.criteria}
+
+
+@pytest.mark.parametrize("name", list(DEFECTS))
+def test_each_kind_of_defect_fails_the_gate(ladder, name):
+    kind, variable, question, measured = DEFECTS[name]
+    assert judge(ladder, "A").verdict == "PASS"
+    find(ladder, kind, variable, question, measured)
+    report = judge(ladder, "A")
     assert report.verdict == "FAIL"
-    assert "clock_residual_s" in report.diagnosis
+    assert verdicts(report)["data_defects"] == verdicts(report)["cause_accepted"] == "FAIL"
+    (answer,) = [c for c in report.criteria if c.id == "data_defects"]
+    assert answer.measured == 1.0 and kind.replace("_", " ") in answer.caveat
+    assert "data_defects" in report.diagnosis
+
+
+def test_labels_that_disagree_with_the_replay_are_a_defect(ladder):
+    contaminated(ladder)
+    report = judge(ladder, "A")
+    assert report.verdict == "FAIL" and verdicts(report)["data_defects"] == "FAIL"
+
+
+def test_a_defect_is_red_also_where_no_mode_persists_and_recovery_differs(ladder):
+    """What passed before: cause data_defect(unit), no persistent mode, a mode that recovers."""
+    evidence.edit_document(ladder, "audit/persistence.json", _set("observed", 0.55))
+    evidence.edit_table(
+        ladder, "audit/recovery.parquet",
+        lambda f: f.assign(episodes=400, successes=f["mode"].map({"left": 400, "right": 0})),
+    )  # fmt: skip
+    report = judge(ladder, "A")
+    assert report.verdict == "FAIL" and verdicts(report)["persistence_margin"] == "FAIL"
+    assert verdicts(report)["data_defects"] == "PASS"
+    find(ladder, *DEFECTS["units"])
+    assert verdicts(judge(ladder, "A"))["data_defects"] == "FAIL"
+
+
+def test_a_number_that_keeps_its_limit_is_no_defect(ladder):
+    find(ladder, "frame", "epoch_2", "frame_angle_rad", 0.14)
+    report = judge(ladder, "A")
+    assert report.verdict == "PASS" and verdicts(report)["data_defects"] == "PASS"
+
+
+@pytest.mark.parametrize("name", ["data_defects", "cause_accepted"])
+def test_the_cause_cannot_be_declared_not_applicable(ladder, name):
+    def waive(params):
+        for entries in params["gate_a"]["limits"].values():
+            entries.pop(name, None)
+        params["gate_a"]["not_applicable"] = {"model": {name: "we know our data"}}
+
+    evidence.write_params(ladder, waive)
+    with pytest.raises(Exception, match=name):
+        judge(ladder, "A")

@@ -7,6 +7,7 @@ from editing import cells
 
 from gates.evidence import MissingEvidenceError
 from gates.need import modes
+from gates.proof import judge
 from genpolicy.statistics.intervals import clopper_pearson
 
 SITUATIONS = "audit/neighbourhoods.parquet"
@@ -67,7 +68,22 @@ def test_the_mean_is_defeated_only_where_every_mode_passes(ladder):
         value(ladder, modes.mean_defeated_share)
 
 
-def test_one_mode_alone_shows_no_benefit_for_recovery(ladder):
-    evidence.edit_table(ladder, "audit/recovery.parquet", lambda f: f.assign(mode="m0"))
-    found = asked(ladder, modes.recovery_benefit, gate="A")
-    assert found.value == 0.0 and "no comparison" in found.caveat
+def test_what_disturbed_demonstrations_did_is_shown_and_never_judged(ladder):
+    before = asked(ladder, modes.mode_success_lower, gate="A")
+    assert "(shown, not judged): left 38 of 40, right 8 of 40" in before.caveat
+    evidence.edit_table(ladder, "audit/recovery.parquet", lambda f: f.assign(successes=0))
+    assert asked(ladder, modes.mode_success_lower, gate="A").value == before.value
+    (ladder / "artifacts/audit/recovery.parquet").unlink()
+    found = asked(ladder, modes.mode_success_lower, gate="A")
+    assert found.value == before.value and "no disturbed demonstration" in found.caveat
+
+
+def test_a_median_that_passes_where_the_mean_fails_is_a_simpler_policy(ladder):
+    assert value(ladder, modes.median_valid_share) < 0.5
+    evidence.edit_table(ladder, SITUATIONS, cells("median_admissible", True, share=1.0))
+    assert value(ladder, modes.median_valid_share) == 1.0
+    assert value(ladder, modes.mean_defeated_share) > 0.5
+    assert judge(ladder, "A").verdict == "FAIL"
+    evidence.edit_table(ladder, SITUATIONS, cells("median_admissible", None, share=1.0))
+    with pytest.raises(MissingEvidenceError, match="the median was not checked"):
+        value(ladder, modes.median_valid_share)

@@ -1,9 +1,13 @@
 """Settings of Gate A: the level of the strata is that of the cause, numbers have one home."""
 
+from pathlib import Path
+
 import evidence
 import pytest
+import yaml
 from asked import settings_of
 
+from gates.need.settings import NeedSettings
 from genpolicy.errors import ConfigError
 
 
@@ -23,7 +27,16 @@ def test_without_a_level_nothing_is_judged_rather_than_every_stratum_let_through
         _ = settings.strata_level
 
 
+def test_every_remedy_of_gate_a_is_a_baseline_that_gate_d_runs():
+    params = yaml.safe_load((Path(__file__).parents[3] / "params.yaml").read_text())
+    remedies = set(NeedSettings.model_fields["remedies"].default)
+    assert remedies == {"chunked_l1", "one_mode_bc", "bc_noise"}
+    assert remedies <= set(params["stress"]["baselines"])
+    assert remedies <= set(params["train_baselines"]["samplers"])
+
+
 def test_the_ladder_s_baselines_and_latent_are_read_from_their_homes(ladder):
     settings = settings_of(ladder, "A")
-    assert set(settings.baselines) == {*evidence.BASELINES, evidence.DRAWN}
+    assert set(settings.baselines) == {*evidence.BASELINES, *evidence.REMEDIES, evidence.DRAWN}
+    assert settings.redraws == evidence.PARAMS["stress"]["samples"]
     assert settings.latent_baseline == "act" and settings.confidence == 0.95

@@ -6,7 +6,7 @@ import pandas as pd
 import pytest
 
 from gates.evidence import MissingEvidenceError
-from gates.need.simpler import valid_share
+from gates.need.simpler import redrawn_validity, valid_share
 from gates.proof import judge
 from gates.writing import write_gate
 from genpolicy.statistics.intervals import clopper_pearson
@@ -115,13 +115,13 @@ def test_only_conditioning_factors_can_remove_the_mean(ladder):
 
 def test_ibc_is_reported_beside_the_deployed_baselines_and_not_judged(ladder):
     criterion = found(ladder, "baseline_mode_coverage")
-    assert criterion.measured == 0.5 and criterion.verdict == "PASS"
+    assert criterion.measured == 0.0 and criterion.verdict == "PASS"
     assert "ibc, derivative_free 1 (100% of samples admissible)" in criterion.caveat
     # A convention under which others are deployed does not make an energy deterministic.
     evidence.edit_table(
         ladder, "measure_baselines/modes.parquet", lambda f: f.assign(convention="direct")
     )
-    assert found(ladder, "baseline_mode_coverage").measured == 0.5
+    assert found(ladder, "baseline_mode_coverage").measured == 0.0
     evidence.write_params(ladder, lambda p: p["gate_a"].update(generative_baselines=[]))
     assert found(ladder, "baseline_mode_coverage").measured == 1.0
 
@@ -137,3 +137,76 @@ def test_the_page_draws_the_factors_and_says_what_ibc_is(ladder):
         "Not drawn: artifacts/measure_factors/effects.parquet is missing"
         in (ladder / "reports/gate_a.html").read_text()
     )
+
+
+SAMPLED = {"samples": 16, "admissible": 4, "valid": 2}
+
+
+@pytest.mark.parametrize(
+    ("changes", "chance"),
+    [
+        ({"admissible": 16, "valid": 16}, 1.0), ({"admissible": 0, "valid": 0}, 0.0),
+        # 1 - C(12, 4) / C(16, 4) = 1 - 495 / 1820, and half of what passes is in a mode.
+        ({}, 0.5 * (1 - 495 / 1820)), ({"valid": 4}, 1 - 495 / 1820),
+        ({"samples": 2, "admissible": 1, "valid": 1}, 1.0),
+    ],
+)  # fmt: skip
+def test_golden_chance_that_a_redrawn_sample_is_valid(changes, chance):
+    frame = pd.DataFrame([{**SAMPLED, **changes}])
+    assert redrawn_validity(frame, redraws=4)[0] == pytest.approx(chance)
+
+
+def test_the_chance_is_that_of_drawing_without_replacement():
+    """By simulation: four of sixteen samples in random order, the first admissible one counts."""
+    rng = np.random.default_rng(0)
+    passed, valid = np.arange(16) < 4, np.arange(16) < 2
+    hits = 0
+    for _ in range(20_000):
+        drawn = rng.permutation(16)[:4]
+        first = next((k for k in drawn if passed[k]), None)
+        hits += first is not None and bool(valid[first])
+    expected = redrawn_validity(pd.DataFrame([SAMPLED]), redraws=4)[0]
+    assert hits / 20_000 == pytest.approx(expected, abs=0.01)
+
+
+def test_more_valid_than_admissible_samples_are_no_evidence():
+    for wrong in ({"valid": 5}, {"admissible": 17}, {"valid": -1}):
+        with pytest.raises(MissingEvidenceError, match="no part"):
+            redrawn_validity(pd.DataFrame([{**SAMPLED, **wrong}]), redraws=4)
+
+
+@pytest.mark.parametrize("name", list(evidence.REMEDIES))
+def test_each_remedy_that_acts_validly_fails_the_gate(ladder, name):
+    assert found(ladder, "remedy_valid_share").verdict == "PASS"
+    evidence.edit_table(
+        ladder, "measure_baselines/modes.parquet",
+        lambda f: f.assign(**{
+            key: np.where(f["method"] == name, 16, f[key]) for key in ("admissible", "valid")
+        }),
+    )  # fmt: skip
+    report = judge(ladder, "A")
+    criterion = found(ladder, "remedy_valid_share")
+    assert report.verdict == "FAIL" and criterion.verdict == "FAIL"
+    assert criterion.measured == 1.0 and criterion.caveat.startswith(f"{name} with 1 of 30")
+
+
+@pytest.mark.parametrize("name", list(evidence.REMEDIES))
+def test_a_remedy_that_was_not_tried_leaves_no_verdict(ladder, name):
+    evidence.edit_table(ladder, "measure_baselines/modes.parquet", lambda f: f[f["method"] != name])
+    assert found(ladder, "remedy_valid_share").verdict == "INCONCLUSIVE"
+    evidence.write_params(ladder, lambda p: p["train_baselines"]["samplers"].pop(name))
+    criterion = found(ladder, "remedy_valid_share")
+    assert criterion.verdict == "INCONCLUSIVE" and f"not trained: {name}" in criterion.caveat
+
+
+def test_noise_counts_as_a_simple_policy_and_only_by_what_may_be_executed(ladder):
+    def scatter(frame, **changes):
+        rows = frame["method"] == "bc_noise"
+        return frame.assign(**{k: np.where(rows, v, frame[k]) for k, v in changes.items()})
+
+    path = "measure_baselines/modes.parquet"
+    evidence.edit_table(ladder, path, lambda f: scatter(f, modes_covered=2))
+    assert found(ladder, "baseline_mode_coverage").measured == 0.0
+    evidence.edit_table(ladder, path, lambda f: scatter(f, modes_valid=2))
+    criterion = found(ladder, "baseline_mode_coverage")
+    assert criterion.verdict == "FAIL" and "by bc_noise, offset" in criterion.caveat

@@ -1,0 +1,74 @@
+"""Modes at the chosen NFE: does every one get samples that may be executed, what lies outside?"""
+
+import numpy as np
+import pandas as pd
+
+from gates.bounds import counted_interval, share_interval
+from gates.criterion import Measured, criterion
+from gates.evidence import Evidence, MissingEvidenceError, numbers
+from gates.reproducibility.settings import MODES, ReproducibilitySettings, chosen_nfe
+from genpolicy.evidence.rows.need import ModeRow
+
+
+@criterion(
+    ">=",
+    question="Does every mode get its share of admissible samples?",
+    look_at="Sampler: modes are lost at this NFE; look at the coverage curve and at training.",
+    per_candidate=True,
+)
+def mode_coverage_lower(
+    evidence: Evidence, settings: ReproducibilitySettings, candidate: str
+) -> Measured:
+    """Lower bound of the share of situations of which every mode gets admissible samples enough."""
+    found = []
+    for _, rows in _situations(evidence, candidate).groupby("seed"):
+        drawn, fewest = numbers(rows, "samples"), numbers(rows, "fewest_admissible")
+        covered = float((fewest >= settings.mode_minimum_share * drawn).sum())
+        interval = counted_interval(covered, float(len(rows)), confidence=settings.confidence)
+        reached = float((numbers(rows, "modes_covered") >= numbers(rows, "modes_present")).mean())
+        found.append((interval, covered, len(rows), reached))
+    interval, covered, situations, reached = min(found)
+    text = (
+        f"in {covered:g} of {situations} two-mode situations every mode gets at least "
+        f"{settings.mode_minimum_share:g} of the samples, admissible; "
+        f"one sample, whether or not it may be executed, reaches every mode in {reached:.4g}"
+    )
+    return Measured(interval[0], interval, text)
+
+
+@criterion(
+    "<=",
+    question="What share of the samples lies in no mode?",
+    look_at="Sampler: samples between the modes are where nobody went; look at training and NFE.",
+    per_candidate=True,
+)
+def outside_modes_upper(
+    evidence: Evidence, settings: ReproducibilitySettings, candidate: str
+) -> Measured:
+    """Upper bound of the share of samples between two modes, or far from all of them."""
+    found = []
+    for _, rows in _situations(evidence, candidate).groupby("seed"):
+        between, far = numbers(rows, "between_modes"), numbers(rows, "far_from_modes")
+        share, lower, upper = share_interval(
+            (between + far) / numbers(rows, "samples"),
+            list(rows["episode_uuid"]),
+            confidence=settings.confidence,
+            favourable=False,
+        )
+        found.append((upper, lower, share, float(far.sum()), len(rows)))
+    upper, lower, share, far_away, situations = max(found)
+    text = (
+        f"share {share:.4g} over {situations} two-mode situations, {far_away:g} samples far from "
+        "every mode; upper bound over episodes"
+    )
+    return Measured(upper, (lower, upper), text)
+
+
+def _situations(evidence: Evidence, candidate: str) -> pd.DataFrame:
+    """Two-mode situations as the candidate answered them at the NFE that it records."""
+    rows = evidence.of(MODES, ModeRow, candidate)
+    if not np.all(numbers(rows, "samples") > 0):
+        raise MissingEvidenceError("a situation without samples")
+    if not np.all(numbers(rows, "nfe") == chosen_nfe(evidence, candidate)):
+        raise MissingEvidenceError("modes were not counted at the chosen NFE")
+    return rows

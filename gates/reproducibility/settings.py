@@ -1,0 +1,50 @@
+"""Settings of Gate B, and where its evidence lies."""
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+from pydantic import Field
+
+from gates.evidence import Evidence, MissingEvidenceError, numbers
+from gates.settings import CandidateSettings
+from genpolicy.evidence.rows.reproducibility import NfeRow
+
+RELOAD = "artifacts/reload"
+COVERAGE = f"{RELOAD}/coverage.parquet"
+MODES = f"{RELOAD}/modes.parquet"
+GENERATORS = "artifacts/train_generators"
+
+
+class ReproducibilitySettings(CandidateSettings):
+    """Settings of Gate B other than limits.
+
+    Attributes:
+        baselines: Simpler methods that candidates will be compared with.
+        budget_reference: Method whose parameter count is the budget.
+        budget_parts: Parts of the model whose parameters are compared, summed.
+        mode_minimum_share: Share of the samples of a situation that must be admissible and reach
+            a mode, for that mode to be covered.
+    """
+
+    homes: ClassVar[Mapping[str, str]] = {
+        **CandidateSettings.homes,
+        "baselines": "stress.baselines",
+    }
+
+    baselines: tuple[str, ...] = Field(min_length=1)
+    budget_reference: str
+    budget_parts: tuple[str, ...]
+    mode_minimum_share: float = Field(gt=0.0, le=0.5)
+
+
+def chosen_nfe(evidence: Evidence, candidate: str) -> float:
+    """Network evaluations that the candidate records.
+
+    Raises:
+        MissingEvidenceError: None, or several.
+    """
+    rows = evidence.of(f"{RELOAD}/nfe.parquet", NfeRow, candidate)
+    found = sorted(set(numbers(rows, "recorded").tolist()))
+    if len(found) != 1:
+        raise MissingEvidenceError(f"{candidate} records several NFE: {found}")
+    return float(found[0])

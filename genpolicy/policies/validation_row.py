@@ -1,0 +1,27 @@
+"""The table that a training leaves of its validation loss, apart from what a training imports."""
+
+from dataclasses import dataclass
+
+VALIDATION_FILE = "validation.parquet"
+
+
+@dataclass(frozen=True)
+class ValidationRow:
+    """`validation.parquet` of a checkpoint: loss of the averaged weights on a held-out episode.
+
+    Attributes:
+        step: Updates so far.
+        episode_uuid: The episode.
+        windows: Windows of it, at equal distances.
+        loss: Mean loss over them; each method has its own loss.
+    """
+
+    step: int
+    episode_uuid: str
+    windows: int
+    loss: float
+
+
+def three_quarters(steps: int) -> int:
+    """The update with which the last quarter of a training begins."""
+    return steps - steps // 4
