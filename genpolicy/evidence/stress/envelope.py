@@ -74,7 +74,9 @@ def require_tighter(envelope: ReducedEnvelope, task: Task, settings: Feasibility
         ("workspace_lower_m", envelope.workspace_lower_m, lower),
         ("workspace_upper_m", envelope.workspace_upper_m, upper),
     ):
-        if not all(low <= value <= high for low, value, high in zip(lower, found, upper, strict=True)):
+        if not all(
+            low <= value <= high for low, value, high in zip(lower, found, upper, strict=True)
+        ):
             _refuse(name, found, f"inside the task's workspace, at the most {list(inside)}")
     if not envelope.speed_limit_m_s <= settings.tcp_speed_limit_m_s:
         text = f"at most the cell's {settings.tcp_speed_limit_m_s} (tcp_speed_limit_m_s)"
