@@ -24,7 +24,7 @@ class FeasibilitySettings(CandidateSettings):
 
     Attributes:
         required_fixtures: Corrupted fixtures that must have been tried.
-        required_checks: Checks, or layers of checks, each of which must have been left out once.
+        required_checks: Checks, `layer.check`, each of which must have been left out once.
         unassigned_modes: Labels of candidates that belong to no mode.
         mode_observations: Independent observations of every mode without which the modes are not
             compared.
@@ -304,16 +304,20 @@ def checker_violations(evidence: Evidence, settings: FeasibilitySettings) -> Mea
 
 
 def checked_violations(evidence: Evidence, path: str) -> Measured:
-    """Violations that the independent checker found; none counts only if it checked something.
+    """Violations that the independent checker found; none counts only if it proved every action.
 
     Raises:
-        MissingEvidenceError: It checked nothing.
+        MissingEvidenceError: It checked nothing, or did not prove the motion of what it checked.
     """
     document = evidence.document(path)
     checked = number(document, "checked_actions")
+    proved = number(document, "reproved_actions")
     if checked <= 0:
         raise MissingEvidenceError("the checker saw no action")
-    return Measured(count(document, "violations"), caveat=f"{checked:g} actions re-proved")
+    if not proved >= checked:
+        raise MissingEvidenceError(f"the motion of {proved:g} of {checked:g} actions was proved")
+    text = f"{checked:g} actions proved again, their motion by other geometry"
+    return Measured(count(document, "violations"), caveat=text)
 
 
 @criterion(
@@ -323,17 +327,22 @@ def checked_violations(evidence: Evidence, path: str) -> Measured:
     always=True,
 )
 def mutants_undetected(evidence: Evidence, settings: FeasibilitySettings) -> Measured:
-    """Checks whose absence the independent checker did not notice, or that were not tried."""
+    """Checks whose absence was not noticed, or that were not tried."""
     entries = evidence.listing(f"{SHADOW}/mutants.json")
-    silent, covered = [], set()
+    found, excused = dict[str, bool](), dict[str, str]()
     for entry in entries:
         if not isinstance(entry, dict) or not isinstance(entry.get("detected"), bool):
             raise MissingEvidenceError("mutants.json has an entry without check or detected")
-        covered |= {str(entry.get("check")), str(entry.get("layer"))}
-        if not entry["detected"]:
-            silent.append(str(entry.get("check")))
-    silent += [f"{name} (not tried)" for name in settings.required_checks if name not in covered]
-    text = f"not detected: {', '.join(silent)}" if silent else f"all {len(entries)} detected"
+        name = f"{entry.get('layer')}.{entry.get('check')}"
+        found[name] = found.get(name, True) and entry["detected"]
+        if entry.get("not_applicable") and not entry["detected"] and not entry.get("tried"):
+            excused[name] = str(entry["not_applicable"])
+    silent = [name for name, detected in found.items() if not detected and name not in excused]
+    silent += [f"{name} (not tried)" for name in settings.required_checks if name not in found]
+    text = f"not detected: {', '.join(silent)}" if silent else f"all {len(found)} detected"
+    if excused:
+        listed = ", ".join(f"{name} ({reason})" for name, reason in excused.items())
+        text += f"; of them not asked of this task: {listed}"
     return Measured(float(len(silent)), caveat=text)
 
 

@@ -9,7 +9,6 @@ from genpolicy.candidates.judged import GENERATORS, trained
 from genpolicy.contract.settings import Settings
 from genpolicy.data.dataset import load_dataset
 from genpolicy.evidence.admission_context import make_checker
-from genpolicy.evidence.shadow.corruption import CORRUPTIONS
 from genpolicy.evidence.shadow.layer_mutants import missing_checks_evidence
 from genpolicy.evidence.shadow.observations import (
     held_out_observations,
@@ -20,7 +19,6 @@ from genpolicy.evidence.shadow.session import Cell
 from genpolicy.evidence.shadow.shadow import Shadow, shadow_policy
 from genpolicy.evidence.shadow.tables import write_shadow
 from genpolicy.execution.cell import ExecutionSettings
-from genpolicy.feasibility.checks import without
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import output_folder
 from genpolicy.policies.matched_training import PolicySettings
@@ -75,18 +73,8 @@ def work(params: Params) -> None:
             shadow_policy(shadow, candidate.load(), observations, seed=seed, two_mode=two_mode)
             for candidate in trained(ARTIFACTS / GENERATORS, admitted, seeds=[seed])
         ]
-        mutants = missing_checks_evidence(
-            shadow,
-            spread(observations, section.mutant_observations),
-            without={
-                item.checks: make_checker(
-                    task, feasibility, action_period_s=period_s, checks=without(*item.checks)
-                )
-                for item in CORRUPTIONS
-                if item.checks
-            },
-        )
-        write_shadow(folder, found, mutants, cell=shadow.cell)
+        mutants = missing_checks_evidence(shadow, spread(observations, section.mutant_observations))
+        write_shadow(folder, found, mutants, cell=shadow.cell, robot=shadow.checker.cell)
 
 
 if __name__ == "__main__":

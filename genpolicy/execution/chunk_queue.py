@@ -2,6 +2,8 @@
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from genpolicy.contract.chunk import DiscardReason
 from genpolicy.execution.checks import Checks, Place, refusal
 from genpolicy.execution.journal import Journal, encode_actions
@@ -214,4 +216,23 @@ def _enqueue_payload(chunk: QueuedChunk) -> Payload:
         "actions_sha256": admitted.actions_sha256,
         "checked_rows": list(admitted.verdict.rows),
         "layers": {layer.name: bool(layer.passed) for layer in admitted.verdict.layers},
+        "motion": _motion(admitted),
     }  # fmt: skip
+
+
+def _motion(admitted: "Admitted") -> Payload | None:
+    """What the chunk was checked against, so that it can be proved again; None if imitated."""
+    context = getattr(admitted, "context", None)
+    q_rad = getattr(admitted.verdict, "q_rad", None)
+    if context is None or q_rad is None:
+        return None
+    return {
+        "joints": q_rad.shape[1],
+        "q_rad": encode_actions(q_rad),
+        "q_cmd_rad": encode_actions(context.q_cmd),
+        "last_action": encode_actions(context.last_action),
+        "scene": {
+            name: encode_actions(np.concatenate([np.ravel(part) for part in pose]))
+            for name, pose in sorted(context.scene.bodies.items())
+        },
+    }

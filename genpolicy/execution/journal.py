@@ -44,7 +44,7 @@ EVENT_FIELDS: dict[str, tuple[str, ...]] = {
     "enqueue": ("arrival", "chunk_id", "source", "method", "condition_ns", "start_ns", "period_ns",
                 "valid_until_ns", "phase", "calibration_epoch", "checkpoint", "sampler",
                 "session_epoch", "predecessor", "rows", "actions", "actions_sha256",
-                "checked_rows", "layers"),
+                "checked_rows", "layers", "motion"),
     "discard": ("arrival", "chunk_id", "at", "reason", "ended", "rows"),
     "finish": ("arrival", "chunk_id", "ended", "rows"),
     "accept": ("arrival", "chunk_id", "row", "sequence", "age_ns", "action"),

@@ -56,18 +56,18 @@ class Admitted:
         projected: Raw and projected actions.
         actions_sha256: Hash of the projected actions when they passed.
         verdict: The six layers.
-        admitted_at_s: When.
+        context: What it was checked against.
     """
 
-    __slots__ = ("__weakref__", "actions_sha256", "admitted_at_s", "projected", "verdict")
+    __slots__ = ("__weakref__", "actions_sha256", "context", "projected", "verdict")
 
     projected: Projected
     actions_sha256: str
     verdict: Verdict
-    admitted_at_s: float
+    context: Context
 
     def __init__(
-        self, *, projected: Projected, verdict: Verdict, admitted_at_s: float, seal: object = None
+        self, *, projected: Projected, verdict: Verdict, context: Context, seal: object = None
     ) -> None:
         if seal is not _SEAL:
             raise TypeError("Admitted is made by genpolicy.feasibility.admission only.")
@@ -77,7 +77,7 @@ class Admitted:
         put(self, "projected", projected)
         put(self, "actions_sha256", actions_sha256(projected.actions))
         put(self, "verdict", verdict)
-        put(self, "admitted_at_s", admitted_at_s)
+        put(self, "context", context)
         _ISSUED.add(self)
 
     def __init_subclass__(cls, **kwargs: Any) -> NoReturn:
@@ -141,12 +141,17 @@ class FeasibilityChecker(LayerChecker):
         projected = self.project_many(proposals, contexts)
         verdicts = self.check_many(projected, contexts)
         return [
-            _decide(chunk, verdict, context.now_s)
+            _decide(chunk, verdict, context)
             for chunk, verdict, context in zip(projected, verdicts, contexts, strict=True)
         ]
 
+    def admit_as_it_is(self, proposal: Proposal, *, context: Context) -> Admitted | Rejected:
+        """Check and decide on a proposal without repairing anything in it."""
+        projected = Projected(proposal, proposal.actions, 0.0, 0.0)
+        return _decide(projected, self.check(projected, context=context), context)
 
-def _decide(projected: Projected, verdict: Verdict, now_s: float) -> Admitted | Rejected:
+
+def _decide(projected: Projected, verdict: Verdict, context: Context) -> Admitted | Rejected:
     if verdict.passed:
-        return Admitted(projected=projected, verdict=verdict, admitted_at_s=now_s, seal=_SEAL)
-    return Rejected(projected, verdict, now_s)
+        return Admitted(projected=projected, verdict=verdict, context=context, seal=_SEAL)
+    return Rejected(projected, verdict, context.now_s)

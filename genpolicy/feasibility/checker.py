@@ -37,6 +37,7 @@ class _State:
     margins: dict[str, float] = field(default_factory=dict)
     detail: str = ""
     alive: bool = True
+    q_rad: Array | None = None
 
     @property
     def row_count(self) -> int:
@@ -45,8 +46,11 @@ class _State:
 
     @property
     def computable(self) -> bool:
-        """The projected rows are numbers that kinematics and collision may be asked about."""
-        return self.shaped and bool(np.all(np.isfinite(self.projected.actions)))
+        """The executable rows are numbers that kinematics and collision may be asked about."""
+        if not self.shaped:
+            return False
+        actions = self.projected.actions
+        return bool(np.all(np.isfinite(actions[self.context.rows(len(actions))])))
 
 
 class LayerChecker:
@@ -135,10 +139,7 @@ class LayerChecker:
         """
         for context in contexts:
             self.cell.require_known(context)
-        states = [
-            _State(p, c, is_shaped(p, c, self.settings))
-            for p, c in zip(projected, contexts, strict=True)
-        ]
+        states = [_State(p, c, is_shaped(p, c)) for p, c in zip(projected, contexts, strict=True)]
         self._measure(FIRST, states, _batch(states))
         groups: dict[int, list[_State]] = defaultdict(list)
         for state in states:
@@ -189,6 +190,8 @@ class LayerChecker:
         """Kinematic, geometric, dynamic and contact layer of chunks with equally many rows."""
         batch = solved(_batch(states), self.cell)
         usable = np.all(np.isfinite(batch.solved.q_rad), axis=(1, 2))
+        for state, q_rad in zip(states, batch.solved.q_rad, strict=True):
+            state.q_rad = q_rad
         for layer in MOTION:
             self._measure(layer, states, batch)
             left = [i for i, s in enumerate(states) if usable[i] and (s.alive or evaluate_all)]
@@ -227,7 +230,8 @@ class LayerChecker:
             rejected = rejected or verdict.passed is not True
             found.append(verdict)
         rows = state.context.rows(len(state.projected.actions)) if state.shaped else slice(0, 0)
-        return Verdict(tuple(found), dict(state.margins), (rows.start, rows.stop), state.detail)
+        place = (rows.start, rows.stop)
+        return Verdict(tuple(found), dict(state.margins), place, state.detail, state.q_rad)
 
 
 def _batch(states: Sequence[_State]) -> Batch:

@@ -1,7 +1,7 @@
 """The verdict on one chunk: six layers in order, the first reason, a margin each."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,12 +40,15 @@ class Verdict:
         margins: Limit minus value of every check that was evaluated.
         rows: First row that was checked, and the row behind the last one.
         detail: What touched what, for a collision; empty otherwise.
+        q_rad: Joint positions of the checked rows, for whoever proves them again; None where
+            they were never computed. Shape (n, J).
     """
 
     layers: tuple[LayerVerdict, ...]
     margins: Mapping[str, float]
     rows: tuple[int, int]
     detail: str = ""
+    q_rad: Array | None = field(default=None, compare=False, repr=False)
 
     @property
     def passed(self) -> bool:

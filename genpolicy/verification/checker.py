@@ -3,8 +3,9 @@
 It shares no code with the executor, the stub or feasibility, and believes nothing that they say
 about freshness: phase, calibration, newest observation, voiding events and stops are followed
 again from the raw events, and every accepted action is compared bit for bit with the chunk that
-was admitted. Rules: P1 gate to stub, P2 watchdog, P3 monotone, P4 chain, P5 newest first, P7 stop
-is sticky, `conservation`, `journal` (form), `settings` (declared limits).
+was admitted. Where the caller says what the robot is, executed rows are proved feasible again, by
+MuJoCo (`motion`). Rules: P1 gate to stub, P2 watchdog, P3 monotone, P4 chain, P5 newest first,
+P6 feasible, P7 stop is sticky, `conservation`, `journal` (form), `settings` (declared limits).
 """
 
 import hashlib
@@ -16,6 +17,7 @@ from typing import Any
 from genpolicy.contract.action import ACTION_DIM
 from genpolicy.verification.balance import Balance
 from genpolicy.verification.journal_source import Message, read_messages
+from genpolicy.verification.motion import ExpectedMotion, MotionProof
 from genpolicy.verification.report import CheckReport, Violation
 from genpolicy.verification.world_view import WorldView
 
@@ -45,30 +47,36 @@ class ExpectedSettings:
         }
 
 
-def check_journal(path: Path, expected: ExpectedSettings | None = None) -> CheckReport:
+def check_journal(
+    path: Path, expected: ExpectedSettings | None = None, motion: ExpectedMotion | None = None
+) -> CheckReport:
     """Check a journal file.
 
     Args:
         path: MCAP journal of one or more sessions.
         expected: Settings that every session must declare; None trusts the declaration.
+        motion: What every executed row must keep to; None proves no row feasible.
 
     Raises:
         IntegrityError: No regular file.
         BadInputError: Not a whole journal.
     """
-    return check_messages(read_messages(path), expected)
+    return check_messages(read_messages(path), expected, motion)
 
 
 def check_messages(
-    messages: Iterable[tuple[str, Message]], expected: ExpectedSettings | None = None
+    messages: Iterable[tuple[str, Message]],
+    expected: ExpectedSettings | None = None,
+    motion: ExpectedMotion | None = None,
 ) -> CheckReport:
     """Check events, each `(kind, {"session", "n", "t", ...payload})`, in the order written."""
     report = CheckReport()
+    proof = None if motion is None else MotionProof(motion)
     sessions: dict[str, _Session] = {}
     for kind, message in messages:
         name = str(message.get("session"))
         if name not in sessions:
-            sessions[name] = _Session(name, report, expected)
+            sessions[name] = _Session(name, report, expected, proof)
         sessions[name].read(kind, message)
     for session in sessions.values():
         session.finish()
@@ -79,8 +87,14 @@ def check_messages(
 class _Session:
     """Follows one session."""
 
-    def __init__(self, name: str, report: CheckReport, expected: ExpectedSettings | None) -> None:
-        self.name, self.report, self.expected = name, report, expected
+    def __init__(
+        self,
+        name: str,
+        report: CheckReport,
+        expected: ExpectedSettings | None,
+        proof: MotionProof | None,
+    ) -> None:
+        self.name, self.report, self.expected, self.proof = name, report, expected, proof
         self.settings: Message = {}
         self.world = WorldView()
         self.balance = Balance()
@@ -150,6 +164,8 @@ class _Session:
             if kind == "supervisor" and self.world.stopped:
                 self._answered(self.t)
                 self.unanswered_ns = None
+            if kind in ("reset", "mode") and self.proof is not None:
+                self.proof.forget(self.name)
             if kind == "reset":
                 self.head = self.last_due_ns = self.last_start_ns = None
 
@@ -189,6 +205,17 @@ class _Session:
         if m["age_ns"] != age_ns:
             self.flag("P1.age", f"The age is noted as {m['age_ns']} ns and is {age_ns} ns.")
         self._check_order(chunk, row, m)
+        self._check_motion(chunk, row)
+
+    def _check_motion(self, chunk: Message, row: int) -> None:
+        if self.proof is None:
+            return
+        self.report.reproved_actions += 1
+        period_s = self.settings["period_ns"] / 1e9
+        for rule, sentence in self.proof.objections(
+            self.name, chunk, row, phase=self.world.phase, period_s=period_s
+        ):
+            self.flag(rule, f"Row {row} of {chunk['chunk_id']!r}: {sentence}")
 
     def _check_bits(self, chunk: Message, row: int, m: Message) -> None:
         admitted = chunk["actions"][row * ROW_HEX_DIGITS : (row + 1) * ROW_HEX_DIGITS]

@@ -32,6 +32,7 @@ class CheckReport:
         events: Events read.
         checked_actions: Actions of policies that the stub accepted, each proved.
         checked_fallback_actions: The same for the fallback.
+        reproved_actions: Of both, those whose motion was proved feasible again.
         chunks: Chunks that arrived.
         discarded: Chunks discarded by reason.
         oldest_action_ns: Largest action age found.
@@ -44,6 +45,7 @@ class CheckReport:
     events: int = 0
     checked_actions: int = 0
     checked_fallback_actions: int = 0
+    reproved_actions: int = 0
     chunks: int = 0
     discarded: Counter[str] = field(default_factory=Counter)
     oldest_action_ns: int = 0
@@ -61,6 +63,7 @@ class CheckReport:
             "events": self.events,
             "checked_actions": self.checked_actions,
             "checked_fallback_actions": self.checked_fallback_actions,
+            "reproved_actions": self.reproved_actions,
             "chunks": self.chunks,
             "discarded": dict(sorted(self.discarded.items())),
             "oldest_action_s": self.oldest_action_ns / 1e9,

@@ -169,12 +169,12 @@ def test_a_chunk_that_feasibility_issued_is_taken_and_a_tampered_one_is_not():
         layers = tuple(LayerVerdict(name, True, "", 1.0, "any") for name in LAYERS)
         projected = Projected(Proposal(made.metadata, made.actions, "first"), made.actions, 0, 0)
         return admission.Admitted(
-            projected=projected, verdict=Verdict(layers, {}, (0, 16)), admitted_at_s=0.0,
+            projected=projected, verdict=Verdict(layers, {}, (0, 16)), context=None,
             seal=admission._SEAL,
         )  # fmt: skip
 
     forged = object.__new__(admission.Admitted)  # behind the seal's back, all else in order
-    for name in ("projected", "actions_sha256", "verdict", "admitted_at_s"):
+    for name in ("projected", "actions_sha256", "verdict", "context"):
         object.__setattr__(forged, name, getattr(issued(), name))
     assert strict.deliver(forged, 0.0) is R.INFEASIBLE
     good, bad = issued(), issued()

@@ -26,7 +26,7 @@ def test_it_carries_what_passed(admitted):
     assert [layer.name for layer in admitted.verdict.layers] == list(LAYERS)
     assert all(layer.passed is True for layer in admitted.verdict.layers)
     assert admitted.metadata.chunk_id == "c0"
-    assert admitted.admitted_at_s == 10.0
+    assert admitted.context.now_s == 10.0
     admitted.verify()
 
 
@@ -34,8 +34,9 @@ def test_it_cannot_be_constructed(admitted):
     for seal in (None, object(), "seal"):
         with pytest.raises(TypeError, match="admission only"):
             Admitted(
-                projected=admitted.projected, verdict=admitted.verdict, admitted_at_s=0.0, seal=seal
-            )
+                projected=admitted.projected, verdict=admitted.verdict, context=admitted.context,
+                seal=seal,
+            )  # fmt: skip
 
 
 def test_it_cannot_be_copied_replaced_pickled_or_subclassed(admitted):
@@ -54,7 +55,7 @@ def test_it_cannot_be_copied_replaced_pickled_or_subclassed(admitted):
 
 def test_a_forgery_behind_the_seal_is_recognised(admitted):
     forged = object.__new__(Admitted)
-    for name in ("projected", "actions_sha256", "verdict", "admitted_at_s"):
+    for name in ("projected", "actions_sha256", "verdict", "context"):
         object.__setattr__(forged, name, getattr(admitted, name))
     with pytest.raises(IntegrityError, match="not issued by the feasibility module"):
         forged.verify()

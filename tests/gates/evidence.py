@@ -54,6 +54,8 @@ from genpolicy.policies.validation_row import ValidationRow
 
 CODE = "genpolicy/robot/impedance.py"
 """A file of code in the repository of the tests."""
+CHECKS = (*((layer, "first") for layer in LAYERS), ("fresh", "expired"), ("execution", "expired"))
+
 BASELINES = ("bc", "chunked_bc", "act")
 REMEDIES = {"chunked_l1": "direct", "one_mode_bc": "direct", "bc_noise": "offset"}
 DRAWN = "ibc"
@@ -185,7 +187,7 @@ PARAMS: dict[str, Any] = {
     },
     "gate_c": {
         "required_fixtures": list(FIXTURES[2:]),
-        "required_checks": list(LAYERS),
+        "required_checks": [f"{layer}.{name}" for layer, name in CHECKS],
         "unassigned_modes": ["", "none"],
         "mode_observations": 30,
         "limits": by_owner(
@@ -933,11 +935,15 @@ def _shadow(root: Path) -> None:
             for reason, n in (("expired", 10), ("phase", 5))
         ],
     )
-    document(root, "shadow/checker.json", {"violations": [], "checked_actions": 1000})
+    proved = {"violations": [], "checked_actions": 1000, "reproved_actions": 1000}
+    document(root, "shadow/checker.json", proved)
     document(
         root,
         "shadow/mutants.json",
-        [{"check": name, "detected": True, "violations": 3} for name in LAYERS],
+        [
+            {"check": name, "layer": layer, "detected": True, "tried": 3, "violations": 3}
+            for layer, name in CHECKS
+        ],
     )
     (root / "artifacts/shadow/journal.mcap").write_bytes(b"journal")
 
@@ -1045,7 +1051,12 @@ def _stress(root: Path) -> None:
     document(
         root,
         "stress/checker.json",
-        {"violations": [], "checked_actions": 5000, "journals": ["a.mcap"]},
+        {
+            "violations": [],
+            "checked_actions": 5000,
+            "reproved_actions": 5000,
+            "journals": ["a.mcap"],
+        },
     )
     document(root, "stress/envelope.json", ENVELOPE)
     power = {"margin": 0.1, "alpha": 0.05, "pairs": STARTS}

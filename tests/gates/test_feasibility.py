@@ -1,13 +1,23 @@
 """Gate C in particular: checks that were never left out are undetected."""
 
+import json
+
 import evidence
 import numpy as np
 import pytest
 from asked import asked
 from editing import cells
 
-from gates.evidence import MissingEvidenceError
-from gates.feasibility import boundary_jerk_p95_m_s3, projection_p95_m, stub_violation_upper
+from gates.evidence import Evidence, MissingEvidenceError
+from gates.feasibility import (
+    SHADOW,
+    FeasibilitySettings,
+    boundary_jerk_p95_m_s3,
+    checked_violations,
+    mutants_undetected,
+    projection_p95_m,
+    stub_violation_upper,
+)
 from gates.proof import judge
 from genpolicy.statistics.intervals import clopper_pearson
 
@@ -16,11 +26,63 @@ def _found(report, name):
     return [c for c in report.criteria if c.id == name]
 
 
+ROWS = [
+    {"check": name, "layer": layer, "detected": True, "tried": 3, "violations": 3}
+    for layer, name in evidence.CHECKS
+]
+
+
+def _undetected(root, rows):
+    """What the criterion says of these rows of `mutants.json`."""
+    (root / SHADOW).mkdir(parents=True)
+    (root / SHADOW / "mutants.json").write_text(json.dumps(rows))
+    settings = FeasibilitySettings.model_construct(
+        required_checks=tuple(f"{layer}.{name}" for layer, name in evidence.CHECKS)
+    )
+    return mutants_undetected.measure(Evidence(root), settings)
+
+
 def test_a_check_that_was_never_disabled_is_undetected(ladder):
-    evidence.edit_document(ladder, "shadow/mutants.json", lambda d: d[1:])
+    evidence.edit_document(ladder, "shadow/mutants.json", lambda rows: rows[1:])
     report = judge(ladder, "C")
     assert report.verdict == "FAIL"
-    assert "representation (not tried)" in _found(report, "mutants_undetected")[0].caveat
+    assert "representation.first (not tried)" in _found(report, "mutants_undetected")[0].caveat
+
+
+@pytest.mark.parametrize("row", range(len(ROWS)))
+def test_every_row_counts_under_its_own_layer(row, tmp_path):
+    """`expired` of the layers does not stand for `expired` of the executor."""
+    found = _undetected(tmp_path, ROWS[:row] + ROWS[row + 1 :])
+    assert found.value == 1 and ".".join(evidence.CHECKS[row]) in found.caveat
+
+
+def test_all_of_them_are_enough(tmp_path):
+    assert _undetected(tmp_path, ROWS).value == 0
+
+
+EXCUSED = {**ROWS[0], "detected": False, "tried": 0, "not_applicable": "no gripper"}
+
+
+def test_a_check_that_a_task_has_no_chunk_for_is_named_with_its_reason(tmp_path):
+    found = _undetected(tmp_path, [EXCUSED, *ROWS[1:]])
+    assert found.value == 0 and "representation.first (no gripper)" in found.caveat
+
+
+@pytest.mark.parametrize("changes", [{"not_applicable": ""}, {"tried": 3}])
+def test_no_reason_or_a_tried_fixture_excuses_nothing(changes, tmp_path):
+    assert _undetected(tmp_path, [EXCUSED | changes, *ROWS[1:]]).value == 1
+
+
+@pytest.mark.parametrize("path", ["shadow/checker.json", "stress/checker.json"])
+@pytest.mark.parametrize(("proved", "counts"), [(7, True), (6, False), (0, False), (None, False)])
+def test_an_action_whose_motion_was_not_proved_is_not_proved(path, proved, counts, tmp_path):
+    document = {"violations": [], "checked_actions": 7, "reproved_actions": proved}
+    evidence.document(tmp_path, path, document)
+    if counts:
+        assert checked_violations(Evidence(tmp_path), f"artifacts/{path}").value == 0
+    else:
+        with pytest.raises(MissingEvidenceError):
+            checked_violations(Evidence(tmp_path), f"artifacts/{path}")
 
 
 STUB, SAMPLED = "shadow/stub.parquet", "shadow/candidates.parquet"

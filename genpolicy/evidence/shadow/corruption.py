@@ -1,59 +1,46 @@
 """Corrupted fixtures: a good chunk with one thing wrong, and the check that must notice it.
 
-Each takes a good case (chunk, context) and returns it broken in one way. Where a fixture names a
-check, that check alone stands between it and admission: a checker made without it admits the
-fixture, which is the evidence that the check is needed.
+Each takes a good case (chunk, context) and returns it broken in one way. Every check has a fixture
+that it alone refuses: a checker made without it admits the fixture, which is the evidence that the
+check is needed. Where other checks must refuse the same thing, because a way is in collision when
+its end is, they are named as standing behind it, and are left out on both sides.
 
 What a task calls its phases and bodies stands in the case.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.contract.action import GRIPPER, POSITION, ROTATION
-from genpolicy.contract.chunk import Proposal
+from genpolicy.evidence.shadow import at_the_margin as margin
+from genpolicy.evidence.shadow.case import Case
 from genpolicy.feasibility.admission import FeasibilityChecker
-from genpolicy.feasibility.context import Context
+from genpolicy.feasibility.cell import Cell
 from genpolicy.robot.scene_state import SceneState
 
 Array = NDArray[np.float64]
 
 OVERLAP_M = 0.02  # an obstacle in the way reaches at least this far above the tip of the tool
 
+Applicable = Callable[[Cell, tuple[str, ...]], str]
 
-@dataclass(frozen=True)
-class Case:
-    """A chunk and what it is checked against.
 
-    Attributes:
-        proposal: The chunk.
-        context: State at the check.
-        poses: Scene bodies by name, as observed.
-        obstacles: Those of them that are only in the way.
-        free_phases: The task's phases of motion in the open.
-    """
+def always(cell: Cell, obstacles: tuple[str, ...]) -> str:
+    """The check is asked of every task."""
+    return ""
 
-    proposal: Proposal
-    context: Context
-    poses: dict[str, tuple[Array, Array]]
-    obstacles: tuple[str, ...] = ()
-    free_phases: frozenset[str] = frozenset()
 
-    def with_actions(self, actions: Array) -> "Case":
-        """The case with other actions."""
-        return replace(self, proposal=replace(self.proposal, actions=actions))
+def in_contact(cell: Cell, obstacles: tuple[str, ...]) -> str:
+    """Why the check is asked of no chunk of a task without contact phases; else empty."""
+    return "" if cell.contact_phases else "the task has no contact phase"
 
-    def with_metadata(self, **changes: object) -> "Case":
-        """The case with other chunk metadata."""
-        metadata = replace(self.proposal.metadata, **changes)  # type: ignore[arg-type]
-        return replace(self, proposal=replace(self.proposal, metadata=metadata))
 
-    def with_context(self, **changes: object) -> "Case":
-        """The case in another context."""
-        return replace(self, context=replace(self.context, **changes))  # type: ignore[arg-type]
+def with_obstacle(cell: Cell, obstacles: tuple[str, ...]) -> str:
+    """Why nothing can be put in the way of a task without obstacles; else empty."""
+    return "" if obstacles else "nothing in the task's scene can be put in the way"
 
 
 @dataclass(frozen=True)
@@ -64,13 +51,25 @@ class Corruption:
         name: Name of the fixture.
         apply: Breaks a case; None where it cannot be broken in this way.
         layer: Layer that must refuse it.
-        checks: Checks that, left out together, let it through; empty where others cover it too.
+        check: Check that must refuse it; empty where it is only one of several.
+        behind: Checks that cannot but refuse it too.
+        applicable: From the cell and the task's obstacles, why a task has no such fixture.
+
+    A fixture whose chunk is built anew keeps nothing of the candidate's actions (`built`), so a
+    few observations say of it what all of them would.
     """
 
     name: str
     apply: Callable[[Case, FeasibilityChecker], Case | None]
     layer: str
-    checks: tuple[str, ...] = ()
+    check: str = ""
+    behind: tuple[str, ...] = ()
+    applicable: Applicable = always
+
+    @property
+    def built(self) -> bool:
+        """Nothing of the candidate's actions is left in it."""
+        return self.apply.__module__ == margin.__name__ or self.apply is leap
 
 
 def stale_observation(case: Case, _: FeasibilityChecker) -> Case:
@@ -152,12 +151,31 @@ def not_a_number(case: Case, _: FeasibilityChecker) -> Case:
 
 def collision(case: Case, checker: FeasibilityChecker) -> Case | None:
     """The obstacle stands where the projected chunk goes, lifted if too low; None without one."""
-    actions, rows = case.proposal.actions, case.context.rows(len(case.proposal.actions))
-    name = next((body for body in case.obstacles if body in case.poses), None)
-    if name is None or not np.all(np.isfinite(actions)):
+    actions = case.proposal.actions
+    if not np.all(np.isfinite(actions)):
         return None
     actions = checker.project(case.proposal, context=case.context).actions
-    middle = actions[(rows.start + min(rows.stop, len(actions)) - 1) // 2, POSITION]
+    rows = case.context.rows(len(actions))
+    return _obstructed(
+        case, checker, actions[(rows.start + min(rows.stop, len(actions)) - 1) // 2, POSITION]
+    )
+
+
+def leap(case: Case, checker: FeasibilityChecker) -> Case | None:
+    """The obstacle stands between where the arm is and the next row, and both are free."""
+
+    def place(leaping: Case) -> Case | None:
+        way = np.stack([leaping.context.last_action, leaping.proposal.actions[-1]])
+        return _obstructed(leaping, checker, way[:, POSITION].mean(axis=0))
+
+    return margin.leapt_obstacle(case, checker, place)
+
+
+def _obstructed(case: Case, checker: FeasibilityChecker, middle: Array) -> Case | None:
+    """The case with the obstacle at a place (3,) of the TCP; None without one."""
+    name = next((body for body in case.obstacles if body in case.poses), None)
+    if name is None:
+        return None
     position, quaternion = case.poses[name]
     tip_m = middle[2] - checker.collision.shapes.held_reach_m
     lift_m = max(0.0, tip_m + OVERLAP_M - _top_m(name, position, checker))
@@ -172,18 +190,6 @@ def _top_m(body: str, position: Array, checker: FeasibilityChecker) -> float:
     return float(max(tops, default=np.inf))
 
 
-def broken_boundary(case: Case, _: FeasibilityChecker) -> Case:
-    """The commands before came in so fast that nothing can go on from them without a jolt.
-
-    A chunk that is merely rough is no such case: projection smooths it.
-    """
-    q_cmd = case.context.q_cmd
-    step_rad = np.zeros_like(q_cmd)
-    step_rad[0] = 3.0 * case.proposal.metadata.action_period_s
-    history = np.stack([q_cmd - 2 * step_rad, q_cmd - step_rad])
-    return case.with_context(q_cmd_history=history)
-
-
 def early_release(case: Case, checker: FeasibilityChecker) -> Case | None:
     """The gripper opens while the object is carried; None where nothing is."""
     settings = checker.settings
@@ -195,47 +201,55 @@ def early_release(case: Case, checker: FeasibilityChecker) -> Case | None:
     return case.with_actions(actions)
 
 
-def awkward_posture(case: Case, checker: FeasibilityChecker) -> Case | None:
-    """The same hand pose, but with a joint at its limit; None where the arm has no such way."""
-    if case.context.phase not in case.free_phases:
-        return None
-    kinematics = checker.kinematics
-    position, rotation = kinematics.forward(case.context.q_cmd[None])
-    seeds = np.tile(case.context.q_cmd, (64, 1))
-    sweep = np.linspace(-2.8, 2.8, num=64)
-    seeds[:, 0] += sweep
-    seeds[:, 2] -= 1.5 * sweep
-    found = kinematics.solve(
-        np.repeat(position, 64, axis=0),
-        np.repeat(rotation, 64, axis=0),
-        q_seed_rad=np.clip(seeds, kinematics.lower_rad, kinematics.upper_rad),
-    )
-    margin = np.minimum(found.q_rad - kinematics.lower_rad, kinematics.upper_rad - found.q_rad)
-    tight = margin.min(axis=1)
-    usable = found.converged & (tight > 0.0) & (tight < checker.settings.joint_margin_rad / 2)
-    if not usable.any():
-        return None
-    q = found.q_rad[int(np.flatnonzero(usable)[0])]
-    return case.with_context(q_cmd=q, q_meas=q, q_cmd_history=np.zeros((0, len(q))))
-
-
 CORRUPTIONS = (
-    Corruption("stale_observation", stale_observation, "fresh", ("stale_observation",)),
-    Corruption("future_observation", future_observation, "fresh", ("future_observation",)),
-    Corruption("expired", expired, "fresh", ("expired",)),
-    Corruption("reordered_chunk", reordered_chunk, "fresh", ("out_of_order",)),
-    Corruption("phase_change", phase_change, "fresh", ("phase_transition",)),
-    Corruption("calibration_change", calibration_change, "fresh", ("calibration_mismatch",)),
-    Corruption("checkpoint_swap", checkpoint_swap, "fresh", ("checkpoint_mismatch",)),
-    Corruption("sampler_swap", sampler_swap, "fresh", ("sampler_mismatch",)),
-    Corruption("earlier_session", earlier_session, "fresh", ("reset",)),
-    Corruption("other_period", other_period, "dynamic", ("action_period",)),
-    Corruption("infeasible_rotation", infeasible_rotation, "representation"),
-    Corruption("scaled_rotation", scaled_rotation, "representation", ("rotation_not_orthonormal",)),
+    Corruption("too_long", margin.too_long, "representation", "shape"),
     Corruption("not_a_number", not_a_number, "representation"),
-    Corruption("collision", collision, "geometric", ("scene_collision", "swept_collision")),
-    Corruption("broken_seam", broken_boundary, "dynamic", ("joint_acceleration", "joint_jerk")),
-    Corruption("early_release", early_release, "contact", ("gripper_opening",)),
-    Corruption("awkward_posture", awkward_posture, "kinematic", ("joint_position",)),
-)
-"""Every corrupted fixture, with the layer that owns it."""
+    Corruption("late_row_not_a_number", margin.late_row_not_a_number, "representation", "finite"),
+    Corruption("infeasible_rotation", infeasible_rotation, "representation"),
+    Corruption(
+        "late_row_without_rotation", margin.late_row_without_rotation, "representation",
+        "rotation_degenerate", ("rotation_not_orthonormal",),
+    ),
+    Corruption("scaled_rotation", scaled_rotation, "representation", "rotation_not_orthonormal"),
+    Corruption(
+        "gripper_out_of_range", margin.gripper_out_of_range, "representation", "gripper_range"
+    ),
+    Corruption("far_ahead", margin.far_ahead, "representation", "projection_too_large"),
+    Corruption("outside_workspace", margin.outside_workspace, "kinematic", "workspace"),
+    Corruption(
+        "out_of_reach", margin.out_of_reach, "kinematic", "unreachable", ("workspace", "singular")
+    ),
+    Corruption("awkward_posture", margin.awkward_posture, "kinematic", "joint_position"),
+    Corruption("singular_posture", margin.singular_posture, "kinematic", "singular"),
+    Corruption(
+        "collision", collision, "geometric", "scene_collision", ("swept_collision",), with_obstacle
+    ),
+    Corruption(
+        "folded_posture", margin.folded_posture, "geometric", "self_collision",
+        ("workspace", "swept_collision"),
+    ),
+    Corruption("leap", leap, "geometric", "swept_collision", margin.RATES, with_obstacle),
+    Corruption("other_period", other_period, "dynamic", "action_period"),
+    Corruption("fast_joint", margin.fast_joint, "dynamic", "joint_velocity"),
+    Corruption("broken_boundary", margin.broken_boundary, "dynamic", "joint_acceleration"),
+    Corruption("jolt_before", margin.jolt_before, "dynamic", "joint_jerk"),
+    Corruption("fast_tcp", margin.fast_tcp, "dynamic", "tcp_speed"),
+    Corruption("fast_turn", margin.fast_turn, "dynamic", "tcp_turn"),
+    Corruption(
+        "aside_in_contact", margin.aside_in_contact, "contact", "approach_direction", (), in_contact
+    ),
+    Corruption(
+        "fast_in_contact", margin.fast_in_contact, "contact", "contact_speed", (), in_contact
+    ),
+    Corruption("early_release", early_release, "contact", "gripper_opening"),
+    Corruption("earlier_session", earlier_session, "fresh", "reset"),
+    Corruption("calibration_change", calibration_change, "fresh", "calibration_mismatch"),
+    Corruption("phase_change", phase_change, "fresh", "phase_transition"),
+    Corruption("checkpoint_swap", checkpoint_swap, "fresh", "checkpoint_mismatch"),
+    Corruption("sampler_swap", sampler_swap, "fresh", "sampler_mismatch"),
+    Corruption("future_observation", future_observation, "fresh", "future_observation"),
+    Corruption("reordered_chunk", reordered_chunk, "fresh", "out_of_order"),
+    Corruption("stale_observation", stale_observation, "fresh", "stale_observation"),
+    Corruption("expired", expired, "fresh", "expired"),
+)  # fmt: skip
+"""Every corrupted fixture, in the order of the checks; each check has exactly one of its own."""

@@ -1,53 +1,76 @@
 """Checks of the six layers, each left out once: does its corruption show that?"""
 
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Sequence
 from typing import Any
 
-from genpolicy.evidence.shadow.corruption import CORRUPTIONS
+from genpolicy.evidence.shadow.case import Case, decide
+from genpolicy.evidence.shadow.corruption import CORRUPTIONS, Corruption
 from genpolicy.evidence.shadow.observations import Observation
 from genpolicy.evidence.shadow.shadow import Shadow, admit, case_of
 from genpolicy.feasibility.admission import Admitted, FeasibilityChecker, Rejected
+from genpolicy.feasibility.checks import CHECKS, Check
 
 
 def missing_checks_evidence(
-    shadow: Shadow,
-    observations: list[Observation],
-    *,
-    without: Mapping[tuple[str, ...], FeasibilityChecker],
+    shadow: Shadow, observations: Sequence[Observation], *, checks: tuple[Check, ...] = CHECKS
 ) -> list[dict[str, Any]]:
-    """For each check: is a corrupted demonstration refused with it, and admitted without it?
+    """For each check: is its fixture refused with it, for its reason, and admitted without it?
 
     Args:
         shadow: The shadow test, with all checks.
         observations: Held-out moments; what the operator did is the good chunk.
-        without: A checker for each group of checks, made without them.
+        checks: The table that a mutant is made of; another one is for the tests.
 
     Returns:
-        Rows of `mutants.json`: check, layer, detected, and how many cases showed it.
+        Rows of `mutants.json`, one per fixture of a check: `check`, `layer`, `fixture`, `behind`
+        (checks that are left out on both sides), `detected`, `tried` and `violations` (how many
+        cases were broken, and how many showed it), and `not_applicable`, which says why a task
+        has no such fixture and is empty otherwise.
     """
-    rows = []
-    for corruption in CORRUPTIONS:
-        if not corruption.checks:
-            continue
-        mutant = replace(shadow, checker=without[corruption.checks])
-        tried = noticed = 0
-        for number, item in enumerate(observations):
-            good = case_of(shadow, item, item.demonstrated, number=number)
-            bad = corruption.apply(good, shadow.checker)
-            if bad is None or not isinstance(admit(shadow, good), Admitted):
-                continue
-            tried += 1
-            refused = isinstance(admit(shadow, bad), Rejected)
-            noticed += refused and isinstance(admit(mutant, bad), Admitted)
-        rows.append(
-            {
-                "check": "+".join(corruption.checks),
-                "fixture": corruption.name,
-                "layer": corruption.layer,
-                "detected": noticed > 0,
-                "violations": noticed,
-                "tried": tried,
-            }
-        )
-    return rows
+    good = [
+        case
+        for number, item in enumerate(observations)
+        for case in [case_of(shadow, item, item.demonstrated, number=number)]
+        if isinstance(admit(shadow, case), Admitted)
+    ]
+    return [
+        _row(shadow, corruption, good, checks) for corruption in CORRUPTIONS if corruption.check
+    ]
+
+
+def _row(
+    shadow: Shadow, corruption: Corruption, good: Sequence[Case], checks: tuple[Check, ...]
+) -> dict[str, Any]:
+    reason = corruption.applicable(shadow.checker.cell, shadow.task.obstacles)
+    tried = noticed = 0
+    if not reason:
+        broken = [corruption.apply(case, shadow.checker) for case in good]
+        cases = [case for case in broken if case is not None]
+        tried = len(cases)
+        noticed = _noticed(shadow, corruption, cases, checks)
+    return {
+        "check": corruption.check,
+        "layer": corruption.layer,
+        "fixture": corruption.name,
+        "behind": list(corruption.behind),
+        "detected": noticed > 0,
+        "tried": tried,
+        "violations": noticed,
+        "not_applicable": reason,
+    }
+
+
+def _noticed(
+    shadow: Shadow, corruption: Corruption, cases: Sequence[Case], checks: tuple[Check, ...]
+) -> int:
+    """How many cases the check refuses by its name and a checker without it admits."""
+    cell = shadow.checker.cell
+    whole = tuple(check for check in checks if check.name not in corruption.behind)
+    rest = tuple(check for check in whole if check.name != corruption.check)
+    seeing, blind = (FeasibilityChecker(cell, checks=table) for table in (whole, rest))
+    found = 0
+    for case in cases:
+        refused = decide(seeing, case)
+        named = isinstance(refused, Rejected) and refused.reason == corruption.check
+        found += named and isinstance(decide(blind, case), Admitted)
+    return found

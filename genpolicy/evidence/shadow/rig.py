@@ -64,7 +64,6 @@ class StandIn:
     actions: Array = field(repr=False)
     actions_sha256: str
     verdict: StandInVerdict
-    admitted_at_s: float = 0.0
 
 
 def passing_verdict(

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from genpolicy.contract.chunk import DiscardReason
 from genpolicy.contract.horizons import HorizonConfig
-from genpolicy.evidence.shadow.corruption import Case
+from genpolicy.evidence.shadow.case import Case
 from genpolicy.evidence.shadow.observations import Observation
 from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.execution.executor import Executor

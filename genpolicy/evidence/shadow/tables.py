@@ -4,16 +4,20 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from genpolicy.evidence.rows.shadow import CandidateRow, ShadowCountRow, ShadowStubRow
 from genpolicy.evidence.shadow.mutants import run_mutants
 from genpolicy.evidence.shadow.session import Cell
 from genpolicy.evidence.shadow.shadow import ShadowEvidence
 from genpolicy.execution.journal import write_journal
 from genpolicy.execution.ledger import Account
+from genpolicy.feasibility.cell import Cell as FeasibilityCell
 from genpolicy.integrity.atomic import write_bytes
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.rows import write_rows
 from genpolicy.verification.checker import ExpectedSettings, check_journal
+from genpolicy.verification.motion import ExpectedMotion
 
 
 def write_shadow(
@@ -22,6 +26,7 @@ def write_shadow(
     mutants: list[dict[str, Any]],
     *,
     cell: Cell,
+    robot: FeasibilityCell,
 ) -> None:
     """Write everything; the checker reads the journal back from the file.
 
@@ -30,6 +35,7 @@ def write_shadow(
         found: Evidence of each method.
         mutants: Disabled checks of the six layers.
         cell: What every session must have run under.
+        robot: What every executed row must keep to.
     """
     candidates = [row for item in found for row in item.candidates]
     write_rows(folder / "candidates.parquet", CandidateRow, candidates)
@@ -44,7 +50,7 @@ def write_shadow(
     write_rows(folder / "counts.parquet", ShadowCountRow, counts)
     journal = folder / "journal.mcap"
     write_journal(journal, [session for item in found for session in item.sessions])
-    checked = checker_document([journal], cell=cell)
+    checked = checker_document([journal], cell=cell, robot=robot)
     write_bytes(folder / "checker.json", canonical_json(checked))
     # The executor's checks are owned by freshness and hand-over, layer six and beyond.
     executor = [{**row, "layer": "execution"} for row in run_mutants()]
@@ -66,7 +72,23 @@ def account_rows(accounts: Sequence[Account]) -> list[dict[str, Any]]:
     return [{**totals, "reason": reason, "count": count} for reason, count in reasons]
 
 
-def checker_document(journals: Sequence[Path], *, cell: Cell) -> dict[str, Any]:
+def expected_motion(robot: FeasibilityCell) -> ExpectedMotion:
+    """What the independent checker holds executed rows against: figures, none of the layers."""
+    limits, settings = robot.usable_limits, robot.settings
+    return ExpectedMotion(
+        scene_path=robot.kinematics.scene_path,
+        workspace_m=np.array([robot.workspace.lower_m, robot.workspace.upper_m]),
+        velocity_rad_s=limits.velocity_rad_s,
+        tcp_speed_m_s=settings.tcp_speed_limit_m_s,
+        tcp_turn_rad_s=settings.tcp_turn_limit_rad_s,
+        held_opening_m=settings.held_opening_m,
+        contact_phases=robot.contact_phases,
+    )
+
+
+def checker_document(
+    journals: Sequence[Path], *, cell: Cell, robot: FeasibilityCell
+) -> dict[str, Any]:
     """What the independent checker says of journal files; content of `checker.json`.
 
     The settings that every session must have run under come from `params.yaml`, not from the
@@ -80,7 +102,10 @@ def checker_document(journals: Sequence[Path], *, cell: Cell) -> dict[str, Any]:
         watchdog_s=execution.watchdog_s,
         queue_capacity=execution.queue_capacity,
     )
-    documents = {path.name: check_journal(path, expected).as_document() for path in journals}
+    motion = expected_motion(robot)
+    documents = {
+        path.name: check_journal(path, expected, motion).as_document() for path in journals
+    }
     return {
         "violations": [
             {"journal": name, **violation}
@@ -88,6 +113,7 @@ def checker_document(journals: Sequence[Path], *, cell: Cell) -> dict[str, Any]:
             for violation in document["violations"]
         ],
         "checked_actions": sum(item["checked_actions"] for item in documents.values()),
+        "reproved_actions": sum(item["reproved_actions"] for item in documents.values()),
         "journals": documents,
     }
 

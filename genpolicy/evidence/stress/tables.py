@@ -25,6 +25,7 @@ from genpolicy.evidence.stress.latency import LatencyModel
 from genpolicy.evidence.stress.matched import Comparison, Shard, ShardResult, run_shard
 from genpolicy.evidence.stress.perturbations import Perturbation, ReducedEnvelope
 from genpolicy.evidence.stress.settings import StressSettings
+from genpolicy.feasibility.cell import cell_of
 from genpolicy.integrity.atomic import write_bytes
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.rows import write_rows
@@ -78,7 +79,13 @@ def write_stress(folder: Path, shards: Sequence[Shard], *, workers: int, schedul
     ages = [row for shard, result in pairs for row in _age_rows(shard, result)]
     write_rows(folder / "ages.parquet", AgeRow, ages)
     journals = [shard.journal for shard in shards]
-    checked = checker_document(journals, cell=shards[0].comparison.cell)
+    comparison = shards[0].comparison
+    robot = cell_of(
+        load_task(comparison.task),
+        comparison.feasibility,
+        action_period_s=comparison.cell.horizons.action_period_s,
+    )
+    checked = checker_document(journals, cell=comparison.cell, robot=robot)
     write_bytes(folder / "checker.json", canonical_json(checked))
     _write_envelope(folder, shards)
 

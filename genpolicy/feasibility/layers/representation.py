@@ -33,7 +33,7 @@ def margins(batch: Batch, cell: Cell) -> Margins:
                                   used up more of its limit
     ============================  =============================================================
 
-    A check behind one that failed may be NaN: it cannot be asked of what is no chunk.
+    Each is asked by itself; NaN where a number that it needs is none.
     """
     found = [
         _margins_of(projected, context, cell.settings)
@@ -42,16 +42,21 @@ def margins(batch: Batch, cell: Cell) -> Margins:
     return Margins({name: np.array([m.get(name, np.nan) for m in found]) for name in CHECKED})
 
 
-def is_shaped(projected: Projected, context: Context, settings: FeasibilitySettings) -> bool:
-    """The raw chunk has the right shape and at least one executable row."""
-    return _shape_margin(projected.proposal.actions, context, settings) >= 0
+def is_shaped(projected: Projected, context: Context) -> bool:
+    """The raw chunk is rows of actions, of which at least one is executable."""
+    return _executable(projected.proposal.actions, context) > 0
+
+
+def _executable(raw: Array, context: Context) -> int:
+    """Number of rows that can be executed; 0 where the array is no chunk."""
+    if raw.ndim != 2 or raw.shape[1:] != (ACTION_DIM,):
+        return 0
+    return len(range(raw.shape[0])[context.rows(raw.shape[0])])
 
 
 def _shape_margin(raw: Array, context: Context, settings: FeasibilitySettings) -> float:
-    if raw.ndim != 2 or raw.shape[1:] != (ACTION_DIM,):
-        return -1.0
-    rows = range(raw.shape[0])[context.rows(raw.shape[0])]
-    return float(min(settings.maximum_actions - raw.shape[0], len(rows) - 1))
+    rows = _executable(raw, context)
+    return float(min(settings.maximum_actions - len(raw), rows - 1)) if rows else -1.0
 
 
 def _margins_of(
@@ -59,17 +64,15 @@ def _margins_of(
 ) -> dict[str, float]:
     raw = projected.proposal.actions
     result = {"shape": _shape_margin(raw, context, settings)}
-    if not result["shape"] >= 0:
+    if not is_shaped(projected, context):
         return result
     result["finite"] = 0.0 if np.all(np.isfinite(raw)) else float("nan")
-    if not result["finite"] >= 0:
-        return result
     columns = raw[:, ROTATION]
-    degenerate = not np.all(np.isfinite(rotation_from_6d(columns)))
+    with np.errstate(invalid="ignore", over="ignore"):
+        degenerate = not np.all(np.isfinite(rotation_from_6d(columns)))
+        error = float(np.max(orthonormality_error(columns)))
     result["rotation_degenerate"] = float("nan") if degenerate else 0.0
-    result["rotation_not_orthonormal"] = settings.orthonormality_tolerance - float(
-        np.max(orthonormality_error(columns))
-    )
+    result["rotation_not_orthonormal"] = settings.orthonormality_tolerance - error
     opening, slack = raw[:, GRIPPER], settings.gripper_tolerance_m
     result["gripper_range"] = float(
         min(

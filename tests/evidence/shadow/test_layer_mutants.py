@@ -1,36 +1,70 @@
-"""A check left out is noticed by exactly its corruption."""
+"""Every row of the table of checks, taken away or made blind, is noticed by its fixture."""
 
 from dataclasses import replace
 
-from genpolicy.evidence.admission_context import make_checker
+import numpy as np
+import pytest
+
+from genpolicy.evidence.shadow import layer_mutants
 from genpolicy.evidence.shadow.corruption import CORRUPTIONS
 from genpolicy.evidence.shadow.layer_mutants import missing_checks_evidence
-from genpolicy.feasibility.checks import without
+from genpolicy.evidence.shadow.observations import spread
+from genpolicy.execution.checks import CHECKS as EXECUTION_CHECKS
+from genpolicy.feasibility.batch import Margins
+from genpolicy.feasibility.checks import CHECKS, without
 
 
-def test_a_missing_check_is_noticed_by_exactly_its_fixture(shadow, observations, task, kit):
-    blind = {
-        item.checks: make_checker(
-            task,
-            kit.FEASIBILITY,
-            action_period_s=kit.HORIZONS.action_period_s,
-            checks=without(*item.checks),
-        )
-        for item in CORRUPTIONS
-        if item.checks
-    }
-    rows = missing_checks_evidence(shadow, observations, without=blind)
-    assert {row["check"] for row in rows} == {"+".join(checks) for checks in blind}
-    assert all(row["detected"] and 0 < row["violations"] <= row["tried"] for row in rows)
-    # Where the check is not really off, the table must not claim that its absence shows.
-    seeing = dict.fromkeys(blind, shadow.checker)
-    rows = missing_checks_evidence(shadow, observations[:5], without=seeing)
-    assert not any(row["detected"] for row in rows)
-    # And where everything is admitted anyway, nothing was refused that could be noticed.
-    late = replace(shadow, checker=blind["expired",])
-    (row,) = (
-        row
-        for row in missing_checks_evidence(late, observations[:5], without=blind)
-        if row["fixture"] == "expired"
-    )
-    assert row["tried"] > 0 and not row["detected"]
+@pytest.fixture(scope="module")
+def few(observations):
+    return spread(observations, 6)
+
+
+@pytest.fixture(scope="module")
+def rows(shadow, few):
+    return missing_checks_evidence(shadow, few)
+
+
+def blinded(name):
+    """The table with one row that finds nothing wrong with anything."""
+
+    def nothing(batch, cell):
+        return Margins({name: np.full(len(batch), np.inf)})
+
+    return tuple(replace(c, measure=nothing) if c.name == name else c for c in CHECKS)
+
+
+def test_every_row_of_the_table_has_a_row_and_is_noticed(rows):
+    assert [(row["layer"], row["check"]) for row in rows] == [(c.layer, c.name) for c in CHECKS]
+    assert [row["check"] for row in rows if not row["detected"]] == []
+    assert all(0 < row["violations"] == row["tried"] for row in rows)
+    assert not any(row["not_applicable"] for row in rows)
+
+
+def test_the_gate_asks_for_every_row_of_both_tables(kit):
+    expected = [f"{check.layer}.{check.name}" for check in CHECKS]
+    expected += [f"execution.{check.name}" for check in EXECUTION_CHECKS]
+    assert kit.PARAMS["gate_c"]["required_checks"] == expected
+
+
+@pytest.mark.parametrize("name", [check.name for check in CHECKS])
+def test_a_row_that_is_gone_or_blind_is_not_claimed_to_be_noticed(name, shadow, few, monkeypatch):
+    own = tuple(item for item in CORRUPTIONS if item.check == name)
+    monkeypatch.setattr(layer_mutants, "CORRUPTIONS", own)
+    for table in (without(name), blinded(name)):
+        (row,) = missing_checks_evidence(shadow, few[-2:], checks=table)
+        assert row["check"] == name and not row["detected"]
+
+
+def test_what_is_not_asked_of_a_task_is_declared_and_not_tried(shadow, few, monkeypatch):
+    class Bare:
+        obstacles = ()
+
+        def __getattr__(self, name):
+            return getattr(shadow.task, name)
+
+    own = tuple(item for item in CORRUPTIONS if item.layer == "geometric")
+    monkeypatch.setattr(layer_mutants, "CORRUPTIONS", own)
+    rows = missing_checks_evidence(replace(shadow, task=Bare()), few[:1])
+    excused = {row["check"]: row for row in rows if row["not_applicable"]}
+    assert set(excused) == {"scene_collision", "swept_collision"}
+    assert not any(row["detected"] or row["tried"] for row in excused.values())

@@ -39,7 +39,7 @@ def written(task, checker, data, policy, kit, tmp_path_factory):
     )
     found = [shadow_policy(shadow, item, seen, seed=0) for item in (operator, policy)]
     mutants = [{"check": "expired", "layer": "fresh", "detected": True, "violations": 1}]
-    write_shadow(folder, found, mutants, cell=shadow.cell)
+    write_shadow(folder, found, mutants, cell=shadow.cell, robot=shadow.checker.cell)
     return folder
 
 
@@ -66,19 +66,23 @@ def test_all_files_are_there_and_agree(written):
 @pytest.mark.parametrize(
     ("name", "value"), [("watchdog_s", 0.2), ("queue_capacity", 9), ("maximum_age_s", None)]
 )
-def test_sessions_under_other_settings_are_flagged(written, kit, name, value):
+def test_sessions_under_other_settings_are_flagged(written, kit, checker, name, value):
     if value is None:
         value = {phase: age + 1.0 for phase, age in kit.EXECUTION.maximum_age_s.items()}
     execution = kit.EXECUTION.model_copy(update={name: value})
-    found = checker_document([written / "journal.mcap"], cell=Cell(kit.HORIZONS, execution))
+    found = checker_document(
+        [written / "journal.mcap"], cell=Cell(kit.HORIZONS, execution), robot=checker.cell
+    )
     rules = {violation["rule"] for violation in found["violations"]}
     assert rules == {"settings.limits"}
     assert all(violation["journal"] == "journal.mcap" for violation in found["violations"])
 
 
-def test_another_execution_horizon_is_flagged(written, kit):
+def test_another_execution_horizon_is_flagged(written, kit, checker):
     horizons = kit.HORIZONS.model_copy(update={"execution_horizon": 4})
-    found = checker_document([written / "journal.mcap"], cell=Cell(horizons, kit.EXECUTION))
+    found = checker_document(
+        [written / "journal.mcap"], cell=Cell(horizons, kit.EXECUTION), robot=checker.cell
+    )
     assert found["violations"]
 
 

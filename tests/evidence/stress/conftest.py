@@ -9,6 +9,7 @@ import pytest
 
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.evidence.admission_context import make_checker
+from genpolicy.evidence.shadow.tables import expected_motion
 from genpolicy.evidence.stress.latency import (
     DECLARED_TERMS,
     MEASURED_TERMS,
@@ -120,7 +121,8 @@ def check(rollouts, folder, *, execution=EXECUTION):
         watchdog_s=execution.watchdog_s,
         queue_capacity=execution.queue_capacity,
     )
-    return check_journal(path, expected)
+    robot = rollouts[0].fixture.checker.cell if rollouts else None
+    return check_journal(path, expected, robot and expected_motion(robot))
 
 
 @pytest.fixture(scope="session")

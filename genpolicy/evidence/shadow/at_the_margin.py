@@ -1,0 +1,218 @@
+"""Corruptions at the margin of one check of posture, motion or contact.
+
+Each says where the arm could stand or go so that its check alone refuses the chunk, and takes the
+first such place of which that is true; None where there is none.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from genpolicy.contract.action import GRIPPER, POSITION, ROTATION, join_action
+from genpolicy.evidence.shadow.case import Case, alone, moving, still
+from genpolicy.evidence.shadow.postures import directions, joint_steps, postures_of, step_of
+from genpolicy.feasibility.admission import FeasibilityChecker
+
+Array = NDArray[np.float64]
+Place = Callable[[Case], Case | None]
+
+RATES = ("joint_velocity", "joint_acceleration", "joint_jerk", "tcp_speed", "tcp_turn")
+
+BEYOND = 1.02  # of a limit
+WITHIN = 0.98
+UNSTOPPABLE = 4.0  # times the robot's acceleration: no projection can go on from it
+LEAPS = (4, 6, 8, 10)  # times the fastest step
+
+
+def too_long(case: Case, checker: FeasibilityChecker) -> Case | None:
+    """The arm is told to stay where it is, by one row more than a chunk may have."""
+    rows = checker.settings.maximum_actions + 1 - case.context.first_index
+    return still(case, checker, case.context.q_cmd, rows=rows)
+
+
+def late_row_not_a_number(case: Case, checker: FeasibilityChecker) -> Case | None:
+    """A number is NaN in a row that is late already, so that nothing else would ever read it."""
+    return _late_row(case, checker, slice(0, 1), np.nan)
+
+
+def late_row_without_rotation(case: Case, checker: FeasibilityChecker) -> Case | None:
+    """A row that is late already has six zeros for a rotation."""
+    return _late_row(case, checker, ROTATION, 0.0)
+
+
+def _late_row(case: Case, checker: FeasibilityChecker, columns: slice, value: float) -> Case:
+    late = case.with_context(first_index=max(1, case.context.first_index))
+    here = still(late, checker, late.context.q_cmd)
+    actions = np.array(here.proposal.actions)
+    actions[0, columns] = value
+    return here.with_actions(actions).as_it_is()
+
+
+def gripper_out_of_range(case: Case, checker: FeasibilityChecker) -> Case | None:
+    """The gripper is told to close or open by more than its range and the tolerance."""
+    settings, here = checker.settings, still(case, checker, case.context.q_cmd)
+    cases = []
+    for opening_m in (
+        settings.gripper_lower_m - BEYOND * settings.gripper_tolerance_m,
+        settings.gripper_upper_m + BEYOND * settings.gripper_tolerance_m,
+    ):
+        actions = np.array(here.proposal.actions)
+        actions[:, GRIPPER] = opening_m
+        cases.append(here.with_actions(actions))
+    return alone(checker, cases, "gripper_range")
+
+
+def far_ahead(case: Case, checker: FeasibilityChecker) -> Case | None:
+    """The next row is so far ahead that projection must bring it back by more than it may."""
+    settings, cell = checker.settings, checker.cell
+    step_m = settings.tcp_speed_limit_m_s * cell.action_period_s
+    cases = []
+    for way in directions():
+        ahead = _going(case, checker, linear_m=WITHIN * step_m * way)
+        actions = np.array(ahead.proposal.actions)
+        excess_m = BEYOND * settings.position_change_limit_m + (1 - WITHIN) * step_m
+        actions[-1, POSITION] += excess_m * way
+        cases.append(ahead.with_actions(actions))
+    return alone(checker, cases, "projection_too_large")
+
+
+def outside_workspace(case: Case, checker: FeasibilityChecker) -> Case | None:
+    """The arm stands still just outside the workspace, and projection leaves it there."""
+    cases = [still(case, checker, q).as_it_is() for q in postures_of(checker.cell).outside]
+    return alone(checker, cases, "workspace")
+
+
+def out_of_reach(case: Case, checker: FeasibilityChecker) -> Case | None:
+    """The arm is stretched out towards a place that it cannot reach, and told to go on there.
+
+    It is badly conditioned there, and outside the workspace.
+    """
+    cases = []
+    for q_rad, place in postures_of(checker.cell).stretched:
+        action = join_action(*place, case.context.last_action[GRIPPER])
+        there = still(case, checker, q_rad)
+        actions = np.tile(action, (len(there.proposal.actions), 1))
+        cases.append(there.with_context(last_action=action).with_actions(actions).as_it_is())
+    return alone(checker, cases, "unreachable", ("workspace", "singular"))
+
+
+def awkward_posture(case: Case, checker: FeasibilityChecker) -> Case | None:
+    """The arm stands still with a joint at its limit."""
+    cases = [still(case, checker, q) for q in postures_of(checker.cell).tight]
+    return alone(checker, cases, "joint_position")
+
+
+def singular_posture(case: Case, checker: FeasibilityChecker) -> Case | None:
+    """The arm stands still where it cannot move in every direction."""
+    cases = [still(case, checker, q) for q in postures_of(checker.cell).singular]
+    return alone(checker, cases, "singular")
+
+
+def folded_posture(case: Case, checker: FeasibilityChecker) -> Case | None:
+    """The arm stands still, folded into itself; also its way there is in collision."""
+    cases = [still(case, checker, q).as_it_is() for q in postures_of(checker.cell).folded]
+    return alone(checker, cases, "self_collision", ("workspace", "swept_collision"))
+
+
+def leapt_obstacle(case: Case, checker: FeasibilityChecker, place: Place) -> Case | None:
+    """One row leads from one side of the obstacle to the other, too fast for any joint.
+
+    Args:
+        case: The case.
+        checker: The six layers.
+        place: Puts the obstacle half-way between where a case is and where it goes; None
+            without one.
+    """
+    step_m = checker.settings.tcp_speed_limit_m_s * checker.cell.action_period_s
+    level = [way for way in directions() if way[2] == 0.0]
+    for times in LEAPS:
+        leaps = [_going(case, checker, linear_m=times * step_m * way) for way in level]
+        placed = [place(leap.as_it_is()) for leap in leaps]
+        cases = [leap for leap in placed if leap is not None]
+        found = alone(checker, cases, "swept_collision", RATES)
+        if found is not None:
+            return found
+    return None
+
+
+def fast_joint(case: Case, checker: FeasibilityChecker) -> Case | None:
+    """A joint goes on faster than it may, as it did before; the TCP does not."""
+    cell, limits = checker.cell, checker.cell.usable_limits
+    cases = []
+    for way in joint_steps(cell, case.context.q_cmd):
+        used = np.max(np.abs(way) / (limits.velocity_rad_s * cell.action_period_s))
+        cases.append(moving(case, checker, BEYOND * way / used).as_it_is())
+    return alone(checker, cases, "joint_velocity")
+
+
+def broken_boundary(case: Case, checker: FeasibilityChecker) -> Case | None:
+    """The commands before came in so fast that nothing can go on from them without a jolt.
+
+    A chunk that is merely rough is no such case: projection smooths it.
+    """
+    cases = [
+        _after(case, checker, joint, (-2 * step, -step))
+        for joint, step in enumerate(UNSTOPPABLE * checker.cell.limits.acceleration_rad_s2)
+    ]
+    return alone(checker, cases, "joint_acceleration")
+
+
+def jolt_before(case: Case, checker: FeasibilityChecker) -> Case | None:
+    """The arm stands still after a jump of its commands: too much jerk, no acceleration."""
+    limit = checker.cell.usable_limits.jerk_rad_s3 * checker.cell.action_period_s
+    cases = [_after(case, checker, joint, (-2 * step, 0.0)) for joint, step in enumerate(limit)]
+    return alone(checker, cases, "joint_jerk")
+
+
+def _after(
+    case: Case, checker: FeasibilityChecker, joint: int, offsets: tuple[float, float]
+) -> Case:
+    """The arm is told to stay; its commands before were off by so much / T^2 in one joint."""
+    history = np.tile(case.context.q_cmd, (2, 1))
+    history[:, joint] += np.array(offsets) * checker.cell.action_period_s**2
+    here = still(case, checker, case.context.q_cmd)
+    return here.with_context(q_cmd_history=history)
+
+
+def fast_tcp(case: Case, checker: FeasibilityChecker) -> Case | None:
+    """The TCP goes on faster than it may, as it did before; no joint does."""
+    step_m = BEYOND * checker.settings.tcp_speed_limit_m_s * checker.cell.action_period_s
+    cases = [_going(case, checker, linear_m=step_m * way).as_it_is() for way in directions()]
+    return alone(checker, cases, "tcp_speed")
+
+
+def fast_turn(case: Case, checker: FeasibilityChecker) -> Case | None:
+    """The TCP turns on faster than it may, as it did before; no joint does."""
+    step_rad = BEYOND * checker.settings.tcp_turn_limit_rad_s * checker.cell.action_period_s
+    cases = [_going(case, checker, turn_rad=step_rad * way).as_it_is() for way in directions()]
+    return alone(checker, cases, "tcp_turn")
+
+
+def aside_in_contact(case: Case, checker: FeasibilityChecker) -> Case | None:
+    """What is held goes up or aside while it is in the target."""
+    step_m = 1.1 * checker.settings.step_tolerance_m
+    cases = [_going(case, checker, linear_m=step_m * way) for way in directions()]
+    return alone(checker, cases, "approach_direction")
+
+
+def fast_in_contact(case: Case, checker: FeasibilityChecker) -> Case | None:
+    """What is held goes straight down faster than it may in contact."""
+    step_m = BEYOND * checker.settings.contact_speed_limit_m_s * checker.cell.action_period_s
+    down = np.array([0.0, 0.0, -step_m])
+    return alone(checker, [_going(case, checker, linear_m=down)], "contact_speed")
+
+
+def _going(
+    case: Case,
+    checker: FeasibilityChecker,
+    *,
+    linear_m: Array | None = None,
+    turn_rad: Array | None = None,
+) -> Case:
+    """The TCP goes on by this step as it came."""
+    twist = np.concatenate([
+        np.zeros(3) if linear_m is None else linear_m,
+        np.zeros(3) if turn_rad is None else turn_rad,
+    ])  # fmt: skip
+    return moving(case, checker, step_of(checker.cell, case.context.q_cmd, twist))

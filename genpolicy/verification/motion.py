@@ -1,0 +1,199 @@
+"""Feasibility of executed rows, proved again with MuJoCo's kinematics and contacts.
+
+It believes no layer. The journal says from which commands a chunk went on, where the scene stood
+and which joint positions its rows have; that these joint positions are the poses that were
+executed is checked first, and then they are held against the robot's limits and the scene.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from genpolicy.contract.action import GRIPPER, POSITION, ROTATION
+from genpolicy.contract.rotation import angle_between, rotation_from_6d
+from genpolicy.verification.journal_source import Message
+
+Array = NDArray[np.float64]
+Finding = tuple[str, str]
+
+HELD, SCENE = 2, 3  # geom groups of a scene file; 1 is the robot's
+POSE_TOLERANCE_M = POSE_TOLERANCE_RAD = 1e-5  # ten times what feasibility lets a pose be missed by
+CONTACT_TOLERANCE_M = 1e-4  # less than this deep, two libraries may disagree whether shapes touch
+ROUNDING = 1e-6  # relative: a step that was limited to its limit is within it
+
+
+@dataclass(frozen=True)
+class ExpectedMotion:
+    """What every executed row must keep to, as the caller knows it.
+
+    Attributes:
+        scene_path: MJCF of robot and scene: the arm's joints first, a site `tcp` behind them.
+        workspace_m: Lower and upper corner of the box of the TCP, m. Shape (2, 3).
+        velocity_rad_s: What each joint of the arm may do. Shape (J,).
+        tcp_speed_m_s: What the TCP may do.
+        tcp_turn_rad_s: Likewise.
+        held_opening_m: Above this opening nothing is held.
+        contact_phases: Phases in which the held object may touch the target.
+    """
+
+    scene_path: Path
+    workspace_m: Array
+    velocity_rad_s: Array
+    tcp_speed_m_s: float
+    tcp_turn_rad_s: float
+    held_opening_m: float
+    contact_phases: frozenset[str]
+
+
+class MotionProof:
+    """Proves rows; holds one MuJoCo model, and of each session the action accepted last.
+
+    Args:
+        expected: What every row must keep to.
+    """
+
+    def __init__(self, expected: ExpectedMotion) -> None:
+        self.expected = expected
+        self._model: Any = mujoco.MjModel.from_xml_path(str(expected.scene_path))
+        self._data: Any = mujoco.MjData(self._model)
+        self._joints = len(expected.velocity_rad_s)
+        model = self._model
+        self._tcp = int(model.site("tcp").id)
+        sites = {model.site(i).name: int(model.site_bodyid[i]) for i in range(model.nsite)}
+        self._target = sites.get("target", -1)
+        slides = model.jnt_type == mujoco.mjtJoint.mjJNT_SLIDE
+        self._slides = model.jnt_qposadr[slides].tolist()
+        self._weld = next(
+            (i for i in range(model.neq) if model.eq_type[i] == mujoco.mjtEq.mjEQ_WELD), None
+        )
+        held = model.geom_group == HELD
+        self._held_width_m = float(model.geom_size[held].min()) if held.any() else 0.0
+        self._last: dict[str, Array] = {}
+
+    def forget(self, session: str) -> None:
+        """Somebody else moved the arm: the next row has no executed row before it."""
+        self._last.pop(session, None)
+
+    def objections(
+        self, session: str, chunk: Message, row: int, *, phase: str, period_s: float
+    ) -> Iterator[Finding]:
+        """What is wrong with an executed row of a chunk; nothing if it is feasible.
+
+        Args:
+            session: Name of the session.
+            chunk: Its `enqueue` event.
+            row: Which row was accepted.
+            phase: Task phase at the time.
+            period_s: The controller's period, s.
+        """
+        motion = chunk["motion"]
+        if motion is None:
+            yield "P6.ground", f"{chunk['chunk_id']!r} does not say what it was checked against."
+            return
+        joints = self._joints
+        first, last = chunk["checked_rows"]
+        path = _floats(motion["q_rad"])
+        q_cmd, told = _floats(motion["q_cmd_rad"]), _floats(motion["last_action"])
+        if motion["joints"] != joints or path.size != (last - first) * joints:
+            yield "P6.ground", f"{chunk['chunk_id']!r} has not {last - first} x {joints} joints."
+            return
+        if not first <= row < last:
+            return  # a violation of its own (P1.checked_rows)
+        path = np.concatenate([q_cmd[None], path.reshape(-1, joints)])
+        actions = _floats(chunk["actions"]).reshape(chunk["rows"], -1)
+        action = actions[row]
+        before = self._last.get(session, actions[row - 1] if row > first else told)
+        self._last[session] = action
+        place = row - first + 1
+        openings = np.concatenate([told[GRIPPER][None], actions[first : row + 1, GRIPPER]])
+        held = bool(np.all(openings <= self.expected.held_opening_m))
+        self._pose(path[place], float(action[GRIPPER]), held, motion["scene"])
+        yield from self._reached(action)
+        yield from self._within(path[place], path[place - 1], action, before, period_s)
+        yield from self._touching(held, phase in self.expected.contact_phases)
+
+    def _pose(self, q_rad: Array, opening_m: float, held: bool, scene: dict[str, str]) -> None:
+        model, data = self._model, self._data
+        mujoco.mj_resetData(model, data)
+        data.qpos[: self._joints] = q_rad
+        data.qpos[self._slides] = max(opening_m, self._held_width_m if held else 0.0)
+        for name, text in scene.items():
+            body, pose = int(model.body(name).id), _floats(text)
+            mocap = int(model.body_mocapid[body])
+            positions, turns, index = (
+                (data.mocap_pos, data.mocap_quat, mocap)
+                if mocap >= 0
+                else (model.body_pos, model.body_quat, body)
+            )
+            positions[index], turns[index] = pose[:3], pose[3:]
+        mujoco.mj_kinematics(model, data)
+        if held and self._weld is not None:
+            self._grasp()
+        mujoco.mj_collision(model, data)
+
+    def _grasp(self) -> None:
+        """Put the held object where the weld has it in the hand."""
+        model, data = self._model, self._data
+        hand, body = int(model.eq_obj1id[self._weld]), int(model.eq_obj2id[self._weld])
+        values = model.eq_data[self._weld]  # anchor on the object, position and turn in the hand
+        turn, position, anchor = np.zeros(4), np.zeros(3), np.zeros(3)
+        mujoco.mju_mulQuat(turn, data.xquat[hand], values[6:10])
+        mujoco.mju_rotVecQuat(position, values[3:6], data.xquat[hand])
+        mujoco.mju_rotVecQuat(anchor, values[:3], turn)
+        address = int(model.jnt_qposadr[model.body_jntadr[body]])
+        data.qpos[address : address + 3] = data.xpos[hand] + position - anchor
+        data.qpos[address + 3 : address + 7] = turn
+        mujoco.mj_kinematics(model, data)
+
+    def _reached(self, action: Array) -> Iterator[Finding]:
+        away_m = float(np.linalg.norm(self._data.site_xpos[self._tcp] - action[POSITION]))
+        rotation = self._data.site_xmat[self._tcp].reshape(3, 3)
+        turned = float(angle_between(rotation, rotation_from_6d(action[ROTATION])))
+        if not (away_m <= POSE_TOLERANCE_M and turned <= POSE_TOLERANCE_RAD):
+            yield "P6.pose", f"Its joints are {away_m:.3g} m and {turned:.3g} rad off its pose."
+
+    def _within(
+        self, q_rad: Array, q_before: Array, action: Array, before: Array, period_s: float
+    ) -> Iterator[Finding]:
+        expected, limits = self.expected, self._model.jnt_range[: self._joints].T
+        lower, upper = expected.workspace_m
+        if not np.all((action[POSITION] >= lower - 1e-9) & (action[POSITION] <= upper + 1e-9)):
+            yield "P6.workspace", f"The TCP goes to {action[POSITION].tolist()} m."
+        if not np.all((q_rad >= limits[0]) & (q_rad <= limits[1])):
+            yield "P6.joint_limit", f"The joints go to {q_rad.tolist()} rad."
+        rate = np.abs(q_rad - q_before) / period_s
+        if not np.all(rate <= expected.velocity_rad_s * (1 + ROUNDING)):
+            yield "P6.joint_speed", f"The joints move at {rate.tolist()} rad/s."
+        speed = float(np.linalg.norm(action[POSITION] - before[POSITION])) / period_s
+        if not speed <= expected.tcp_speed_m_s * (1 + ROUNDING):
+            yield "P6.tcp_speed", f"The TCP moves at {speed:.4g} m/s."
+        rotations = rotation_from_6d(np.stack([before[ROTATION], action[ROTATION]]))
+        turn = float(angle_between(*rotations)) / period_s
+        if not turn <= expected.tcp_turn_rad_s * (1 + ROUNDING):
+            yield "P6.tcp_turn", f"The TCP turns at {turn:.4g} rad/s."
+
+    def _touching(self, held: bool, in_contact: bool) -> Iterator[Finding]:
+        model, contact = self._model, self._data.contact
+        for index in range(self._data.ncon):
+            if not contact.dist[index] < -CONTACT_TOLERANCE_M:
+                continue
+            pair = sorted(contact.geom[index].tolist(), key=lambda geom: model.geom_group[geom])
+            groups = [int(model.geom_group[geom]) for geom in pair]
+            if HELD in groups and not held:
+                continue
+            allowed = in_contact and groups == [HELD, SCENE]
+            if allowed and int(model.geom_bodyid[pair[1]]) == self._target:
+                continue
+            first, second = (model.geom(geom).name for geom in pair)
+            depth_m = -float(contact.dist[index])
+            yield "P6.collision", f"{first} is {depth_m:.3g} m deep in {second}."
+
+
+def _floats(text: str) -> Array:
+    """Little-endian float64 numbers of their hex."""
+    return np.frombuffer(bytes.fromhex(text), dtype="<f8")

@@ -1,0 +1,131 @@
+"""What layers let through is found again in the journal, by MuJoCo, whatever the layers claim."""
+
+from copy import deepcopy
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from genpolicy.evidence.shadow.corruption import CORRUPTIONS
+from genpolicy.evidence.shadow.observations import spread
+from genpolicy.evidence.shadow.session import play
+from genpolicy.evidence.shadow.shadow import admit, case_of
+from genpolicy.evidence.shadow.tables import expected_motion
+from genpolicy.execution.journal import encode_actions
+from genpolicy.feasibility.admission import Admitted, FeasibilityChecker
+from genpolicy.feasibility.checks import without
+from genpolicy.verification.checker import check_messages
+
+BY_CHECK = {item.check: item for item in CORRUPTIONS if item.check}
+RULES = {
+    "workspace": "P6.workspace",
+    "unreachable": "P6.pose",
+    "scene_collision": "P6.collision",
+    "joint_velocity": "P6.joint_speed",
+    "tcp_speed": "P6.tcp_speed",
+    "tcp_turn": "P6.tcp_turn",
+}
+
+
+def journal(shadow, item, case, name):
+    result = admit(shadow, case)
+    assert isinstance(result, Admitted), result.reason
+    played = play(shadow.cell, item, [(case, result)], fixture=name, number=0)
+    return [
+        (e.kind, deepcopy({"session": e.session, "n": e.n, "t": e.t, **e.payload}))
+        for e in played.journal.events()
+    ]
+
+
+def rules(messages, shadow, **changes):
+    motion = replace(expected_motion(shadow.checker.cell), **changes)
+    report = check_messages(messages, None, motion)
+    assert report.reproved_actions > 0
+    return {violation.rule for violation in report.violations}
+
+
+@pytest.fixture(scope="module")
+def items(observations):
+    return spread(observations, 6)
+
+
+@pytest.fixture
+def clean(shadow, items):
+    item = next(item for item in items if item.phase == "approach")
+    return journal(shadow, item, case_of(shadow, item, item.demonstrated, number=0), "held_out")
+
+
+def enqueued(messages):
+    return next(message for kind, message in messages if kind == "enqueue")
+
+
+def test_what_the_operator_did_is_proved_in_every_phase(shadow, items):
+    phases = set()
+    for item in items:
+        case = case_of(shadow, item, item.demonstrated, number=0)
+        if isinstance(admit(shadow, case), Admitted):
+            phases.add(item.phase)
+            assert not rules(journal(shadow, item, case, "held_out"), shadow)
+    assert {"approach", "insert", "retreat"} <= phases
+
+
+@pytest.mark.parametrize("check", RULES)
+def test_an_executed_row_that_a_missing_check_let_through_is_found(check, shadow, items):
+    corruption = BY_CHECK[check]
+    table = without(check, *corruption.behind)
+    blind = replace(shadow, checker=FeasibilityChecker(shadow.checker.cell, checks=table))
+    found = []
+    for item in items:
+        bad = corruption.apply(case_of(shadow, item, item.demonstrated, number=0), shadow.checker)
+        if bad is not None:
+            messages = journal(blind, item, bad, corruption.name)
+            assert all(enqueued(messages)["layers"].values())
+            found.append(rules(messages, shadow))
+    assert found and all(RULES[check] in names for names in found)
+
+
+def test_joints_that_are_not_the_executed_pose_are_found(clean, shadow):
+    assert not rules(clean, shadow)
+    motion = enqueued(clean)["motion"]
+    q_rad = np.frombuffer(bytes.fromhex(motion["q_rad"])).copy()
+    q_rad[0] += 1e-4
+    motion["q_rad"] = encode_actions(q_rad)
+    assert "P6.pose" in rules(clean, shadow)
+
+
+def test_joints_beyond_their_limits_are_found(clean, shadow):
+    motion = enqueued(clean)["motion"]
+    q_rad = np.frombuffer(bytes.fromhex(motion["q_rad"])).reshape(-1, motion["joints"]).copy()
+    q_rad[:, -1] += 2 * np.pi  # the same poses
+    motion["q_rad"] = encode_actions(q_rad)
+    motion["q_cmd_rad"] = encode_actions(q_rad[0])
+    found = rules(clean, shadow)
+    assert "P6.joint_limit" in found and "P6.pose" not in found
+
+
+def test_a_chunk_that_does_not_say_what_it_was_checked_against_is_found(clean, shadow):
+    enqueued(clean)["motion"] = None
+    assert rules(clean, shadow) == {"P6.ground"}
+
+
+@pytest.mark.parametrize("change", [{"joints": 6}, {"q_rad": ""}])
+def test_a_ground_of_another_size_is_found(change, clean, shadow):
+    enqueued(clean)["motion"].update(change)
+    assert rules(clean, shadow) == {"P6.ground"}
+
+
+def test_without_figures_of_the_robot_nothing_is_claimed_to_be_proved(clean):
+    assert check_messages(clean).reproved_actions == 0
+
+
+def test_what_is_held_may_touch_the_target_in_contact_phases_only(shadow, items):
+    item = next(item for item in items if item.phase == "insert")
+    case = case_of(shadow, item, item.demonstrated, number=0)
+    messages = journal(shadow, item, case, "held_out")
+    scene = enqueued(messages)["motion"]["scene"]
+    target = shadow.checker.collision.shapes.target_body
+    pose = np.frombuffer(bytes.fromhex(scene[target])).copy()
+    pose[0] += 0.012  # a wall of the target stands in what is held
+    scene[target] = encode_actions(pose)
+    assert not rules(messages, shadow)
+    assert "P6.collision" in rules(messages, shadow, contact_phases=frozenset())
