@@ -36,6 +36,7 @@ from gates.criterion import Measured, criteria_of, criterion
 from gates.engine import GateSpec, judge, recorded_evidence
 from gates.evidence import Evidence, MissingEvidenceError
 from gates.pipeline import check_record
+from gates.preregistration import NONE, PREREGISTRATION, moved_caveats, read_plan
 from gates.protection import REHEARSED, is_rehearsal, require_protection
 from gates.report import OWNERS, Gate, GateReport, stage_of
 from gates.settings import GateSettings, read_limits, read_params, read_settings
@@ -114,7 +115,7 @@ def judge_card(root: Path, chain: Chain, *, today: datetime.date | None = None) 
     """
     params = read_params(root)
     settings = read_settings(params, stage_of("E"), CardGateSettings)
-    caveats = require_protection(params, "E")
+    caveats = (*require_protection(params, "E"), *moved_caveats(root, params))
     papers = examine(root, settings.card)
     error = chain.error or _chain_error(root, chain, papers.draft)
     dossier = Dossier(settings, papers, error, today or utc_today())
@@ -146,6 +147,8 @@ def examine(root: Path, name: str) -> Papers:
             signed = open_envelope(root, data, where=path.name, allowed=allowed)
             if signed.card.name != name:
                 signed, refusal = None, "the card has another name than its file"
+            if read_plan(root) is None:
+                signed, refusal = None, NONE
             if is_rehearsal(read_params(root)):
                 signed, refusal = None, REHEARSED
         except GenpolicyError as error:
@@ -318,7 +321,14 @@ GATE = GateSpec(
     gate="E",
     settings=CardGateSettings,
     criteria=criteria_of(globals()),
-    bind=(DRAFT_PATH, ENVELOPE, f"{CARDS}/*.dsse.json", ALLOW_LIST, "reports/gate_[a-d].json"),
+    bind=(
+        DRAFT_PATH,
+        ENVELOPE,
+        PREREGISTRATION,
+        f"{CARDS}/*.dsse.json",
+        ALLOW_LIST,
+        "reports/gate_[a-d].json",
+    ),
     back_to="the reviewer",
     go_on="The card is valid. What happens on hardware is outside this project.",
     caveats=(

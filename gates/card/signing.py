@@ -21,6 +21,7 @@ from securesystemslib.signer import CryptoSigner, SSlibKey  # type: ignore[attr-
 
 from gates.card.card import FIXED, TrialCard, draft_path, missing_fields, read_card
 from gates.card.people import ALLOW_LIST, REVIEWER, AllowList, Person, dependence, load_allow_list
+from gates.preregistration import PREREGISTRATION, read_plan
 from gates.protection import is_rehearsal
 from gates.report import parse_section
 from gates.settings import PARAMS_FILE, read_params
@@ -129,6 +130,8 @@ def sign_card(root: Path, *, card_file: Path, key_file: Path, reviewer: str) -> 
     """
     if is_rehearsal(read_params(root)):
         raise _bad(PARAMS_FILE, "a rehearsal", "a ladder whose limits protect people")
+    if read_plan(root) is None:
+        raise _bad(PREREGISTRATION, "missing or malformed", "a plan committed before the evidence")
     allowed = load_allow_list(root)
     person = allowed.find(reviewer)
     if person is None:

@@ -16,6 +16,7 @@ from gates import pipeline
 from gates.cause import default_limits
 from gates.cause.limits import OWN
 from gates.feasibility import LAYERS
+from gates.preregistration import PREREGISTRATION, plan_bytes
 from gates.reproducibility.timing import MEASURED_HERE, TERMS
 from genpolicy.audit.rows import (
     Alignment,
@@ -305,6 +306,7 @@ def replace(root: Path, path: str, data: bytes | None) -> None:
 def build(root: Path) -> None:
     """All evidence and settings, without any report."""
     write_params(root)
+    (root / PREREGISTRATION).write_bytes(plan_bytes(PARAMS, {}))
     document(
         root,
         "task/identity.json",
