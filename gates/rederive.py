@@ -16,9 +16,14 @@ from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.contract.settings import parse_settings
 from genpolicy.errors import GenpolicyError, RefusedError
 from genpolicy.execution.cell import ExecutionSettings
+from genpolicy.feasibility.cell import cell_of
+from genpolicy.feasibility.figures import expected_motion
+from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.documents import read_json
 from genpolicy.integrity.tables import read_table
+from genpolicy.tasks.api import load_task
 from genpolicy.verification.checker import ExpectedSettings, check_journal
+from genpolicy.verification.motion import ExpectedMotion
 from genpolicy.verification.rollouts import derived_rollouts, differences
 
 SHADOW, STRESS = "artifacts/shadow", "artifacts/stress"
@@ -58,8 +63,8 @@ def rederive(root: Path, gate: Gate) -> None:
 
 def _check(root: Path, gate: Gate, folder: str, journals: list[Path]) -> None:
     """The checker's document, made again under the settings of `params.yaml`."""
-    expected = _expected(root)
-    found = {path.name: check_journal(path, expected).as_document() for path in journals}
+    expected, motion = _expected(root), _motion(root)
+    found = {path.name: check_journal(path, expected, motion).as_document() for path in journals}
     stated = read_json(root / folder / "checker.json")
     claimed = stated.get("journals") if isinstance(stated, dict) else None
     for name in sorted({*found, *(claimed if isinstance(claimed, dict) else ())}):
@@ -90,6 +95,17 @@ def _expected(root: Path) -> ExpectedSettings:
         watchdog_s=execution.watchdog_s,
         queue_capacity=execution.queue_capacity,
     )
+
+
+def _motion(root: Path) -> ExpectedMotion:
+    """What every executed row must have kept to, by `params.yaml` and the task."""
+    params = read_params(root)
+    settings = parse_settings(
+        FeasibilitySettings, section_of(params, "feasibility"), where=f"{PARAMS_FILE}: feasibility"
+    )
+    task = load_task(str(section_of(params, "task")["name"]))
+    period_s = _expected(root).action_period_s
+    return expected_motion(cell_of(task, settings, action_period_s=period_s))
 
 
 def _totals(document: Any) -> str:

@@ -59,6 +59,7 @@ def write_situations(folder, rows):
         mean_reason="collision", median_admissible=False, modes_admissible=2,
         mean_path=tuple(straight.ravel()),
         mode_paths=(tuple(left.ravel()), tuple(right.ravel())), persistent=True,
+        component="position",
     )  # fmt: skip
     table = [
         replace(plain, **{"episode_uuid": uuid, "index": index, **changes})

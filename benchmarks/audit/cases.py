@@ -8,6 +8,7 @@ either the planted cause or the answer without it counts as right.
 from collections.abc import Callable
 from dataclasses import replace
 
+from benchmarks.audit.actions import ACTIONS
 from benchmarks.audit.catalogue import (
     CALIBRATION,
     CLOCK,
@@ -239,4 +240,4 @@ STRUCTURE = (
     ),
 )  # fmt: skip
 
-CAUSES = MODES + HIDDEN + CLOCKS + DATA + LABELLED + STRUCTURE + PAIRS
+CAUSES = MODES + HIDDEN + CLOCKS + DATA + LABELLED + STRUCTURE + PAIRS + ACTIONS

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from benchmarks.audit.plan import OPERATORS, Array, Plan, Roster
+from benchmarks.audit.tool import intent, profiles, turned
 from benchmarks.audit.truth import INSTANT_S, SUB_STEPS, Truth
 from genpolicy.seeds import stream
 from genpolicy.tasks.tabletop_insertion import scene
@@ -134,10 +135,12 @@ def demonstrate(plan: Plan, roster: Roster, number: int, cell: Cell) -> Truth:
     mode, cue = int(roster.mode[number]), int(roster.cue[number])
     start = _start(plan, roster, number, rng)
     lanes = LANES.get(max(2, len(plan.shares)), MORE_LANES)
-    side, wide = lanes[mode]
+    side, wide = lanes[mode if plan.differ == "position" else 0]
+    way = intent(plan, mode, stream(plan.seed, "intent", number))
     style = STYLES[str(roster.operator[number])]
     via = style.via_m * wide * plan.width + plan.route_spread_m * rng.normal()
     style = replace(style, via_m=via, speed_m_s=style.speed_m_s * rng.uniform(0.92, 1.08))
+    style = replace(style, speed_m_s=style.speed_m_s * way.pace)
     kind = "wander" if roster.recovery[number] else "nominal"
     kind = "missed" if roster.failure[number] else kind
     world = Kinematic(_moved(plan, start, cue), cell)
@@ -150,7 +153,18 @@ def demonstrate(plan: Plan, roster: Roster, number: int, cell: Cell) -> Truth:
         phases.append("fetch" if plan.station_dwell_s and not operator.begun else world.phase)
         actions.append(action)
         world.advance(action)
-    return _truth(plan, start, np.array(actions), phases, world, lit, cue, rng, kind != "missed")
+    commands = np.array(actions)
+    if plan.tool:
+        _use_tool(commands, phases, way)
+    return _truth(plan, start, commands, phases, world, lit, cue, rng, kind != "missed")
+
+
+def _use_tool(actions: Array, phases: list[str], way) -> None:
+    """Turn and grip on the approach, in place; what was planned after it is kept."""
+    last = max((k for k, phase in enumerate(phases) if phase == "approach"), default=0)
+    angle, opening = profiles(way, actions[:, :3], 0, last)
+    actions[:, 3:9] = turned(actions[:, 3:9], angle)
+    actions[: last + 1, 9] = opening[: last + 1]
 
 
 def _start(plan: Plan, roster: Roster, number: int, rng: np.random.Generator) -> InsertionStart:
@@ -253,6 +267,7 @@ def layout(columns: dict[str, Array]) -> dict[str, object]:
         "observation_position": slice(0, 3),
         "action_position": slice(0, 3),
         "action_rotation": slice(3, 9),
+        "action_gripper": slice(9, 10),
         "reference": hole,
         "context": {"hole_pose": hole, "lamp": slice(24, 25)},
     }

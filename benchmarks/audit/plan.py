@@ -22,6 +22,8 @@ DECIDERS = (
     "chance", "operator", "object", "calibration_epoch", "session", "alternation",
     "lamp_early", "path_early", "lamp", "goal",
 )  # fmt: skip
+# What modes may differ in.
+DIFFER = ("position", "rotation", "gripper", "timing")
 # Episodes that are not as they should be in every data set: disturbed ones and honest failures.
 RECOVERY_SHARE = 0.08
 FAILURE_SHARE = 0.03
@@ -57,6 +59,10 @@ class Plan:
         contexts: Clusters of goals, each with all the modes.
         goal_half_width_m: Half width of the goal's lateral position; None takes the task's.
         start_wide: Half width of the start position, relative to the task's.
+        differ: What the modes differ in, one of `DIFFER`; beside the position there is one route.
+        apart: How far, by component: angle of the tool (rad), share of the path at which the
+            gripper closes, or factor of the speeds.
+        free: Instead of two modes, every episode draws the same evenly between the two.
         route_spread_m: Standard deviation of the width of the routes of one mode.
         tremor_m: Standard deviation of white noise on every command.
         station_dwell_s: How long the arm rests, twice, at one place, before it goes one way in the
@@ -81,6 +87,9 @@ class Plan:
     contexts: int = 1
     goal_half_width_m: float | None = None
     start_wide: float = 1.0
+    differ: str = "position"
+    apart: float = 0.0
+    free: bool = False
     route_spread_m: float = 0.008
     tremor_m: float = 0.0005
     station_dwell_s: float = 0.0
@@ -95,6 +104,13 @@ class Plan:
     def __post_init__(self) -> None:
         if self.decided_by not in DECIDERS or abs(sum(self.shares) - 1.0) > 1e-9:
             raise ValueError(f"{self.decided_by} decides, shares {self.shares}")
+        if self.differ not in DIFFER:
+            raise ValueError(f"modes differ in {self.differ}")
+
+    @property
+    def tool(self) -> bool:
+        """Whether the tool turns and grips on the way."""
+        return self.differ in ("rotation", "gripper")
 
     @property
     def by_chance(self) -> float:

@@ -1,7 +1,8 @@
 """The planar task: past a post to a goal, at 10 Hz, in milliseconds.
 
 Observed: x, y; goal x, y; a lamp. Commanded: x, y. The arm rests, passes the post on one side
-(near or wide), and rests at the goal. An operator has an own speed and width.
+(near or wide), and rests at the goal. An operator has an own speed and width. Where modes are
+planted in the tool, it also turns and grips, and both are observed a tick later.
 """
 
 from dataclasses import dataclass
@@ -9,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.audit.plan import OPERATORS, Array, Plan, Roster
+from benchmarks.audit.tool import intent, profiles, turned
 from benchmarks.audit.truth import INSTANT_S, SUB_STEPS, Truth, follow
 from genpolicy.seeds import stream
 from genpolicy.tasks.tabletop_insertion.plans import travel
@@ -29,6 +31,9 @@ SETTLE_TICKS = 3
 SPEED_M_S = dict(zip(OPERATORS, (0.095, 0.110, 0.125), strict=True))
 WIDTH = dict(zip(OPERATORS, (0.96, 1.0, 1.05), strict=True))
 ACCELERATION_M_S2 = 0.5
+MEASURED_TOOL_NOISE = 0.001
+TOOL = (*(f"tool.rotation_{number}" for number in range(6)), "tool.opening_m")
+TOOL_SCALE = (*(0.1,) * 6, 0.01)
 
 
 @dataclass(frozen=True)
@@ -57,7 +62,9 @@ def demonstrate(plan: Plan, roster: Roster, number: int, cell: Cell) -> Truth:
     operator = str(roster.operator[number])
     speed = SPEED_M_S[operator] * rng.uniform(0.9, 1.1)
     width = HALF_WIDTH_M * plan.width * WIDTH[operator] + plan.route_spread_m * rng.normal()
-    lane = LANES[mode] * width
+    way = intent(plan, mode, stream(plan.seed, "intent", number))
+    speed *= way.pace
+    lane = LANES[mode if plan.differ == "position" else 0] * width
     pieces, lamp = [], []
     if plan.decided_by == "path_early":  # comes from the side that it intends, through one gate
         start[1] += 0.045 * (1.0 if cue == 0 else -1.0)
@@ -99,8 +106,21 @@ def demonstrate(plan: Plan, roster: Roster, number: int, cell: Cell) -> Truth:
         fine=follow(
             command, period_s=PERIOD_S, delay_s=cell.delay_s, constant_s=cell.constant_s
         ),
-        scene=goal, lamp=light, phase=phase, success=not roster.failure[number], other={},
+        scene=goal, lamp=light, phase=phase, success=not roster.failure[number],
+        other=_tool(command, way, begin, begin + len(path), rng) if plan.tool else {},
     )  # fmt: skip
+
+
+def _tool(command: Array, way, first: int, last: int, rng: np.random.Generator):
+    """Rotation and opening of each tick, commanded, and observed one tick later."""
+    angle, opening = profiles(way, command, first, last)
+    straight = np.tile([1.0, 0.0, 0.0, 0.0, 1.0, 0.0], (len(command), 1))
+    tool = np.hstack([turned(straight, angle), opening[:, None]])
+    before = np.vstack([tool[:1], tool[:-1]])
+    return {
+        "tool": before + MEASURED_TOOL_NOISE * rng.normal(size=before.shape),
+        "tool_command": tool,
+    }
 
 
 def admissible(plan: Plan):
@@ -138,8 +158,9 @@ def bump(path: Array, rng: np.random.Generator) -> Array:
 
 def layout(columns: dict[str, Array]) -> dict[str, object]:
     """Observation and action of the rows, and where what lies in them."""
-    return {
-        "observation": np.hstack([columns["position"], columns["scene"], columns["lamp"]]),
+    parts = [columns["position"], columns["scene"], columns["lamp"]]
+    result = {
+        "observation": np.hstack(parts),
         "action": columns["command"],
         "observation_scale": np.array([0.01, 0.01, 0.01, 0.01, 0.1]),
         "observation_names": ("x", "y", "goal.x_m", "goal.y_m", "lamp"),
@@ -147,4 +168,14 @@ def layout(columns: dict[str, Array]) -> dict[str, object]:
         "action_position": slice(0, 2),
         "reference": slice(2, 4),
         "context": {"goal": slice(2, 4), "lamp": slice(4, 5)},
+    }
+    if "tool" not in columns:
+        return result
+    return result | {
+        "observation": np.hstack([*parts, columns["tool"]]),
+        "action": np.hstack([columns["command"], columns["tool_command"]]),
+        "observation_scale": np.append(result["observation_scale"], TOOL_SCALE),
+        "observation_names": (*result["observation_names"], *TOOL),
+        "action_rotation": slice(2, 8),
+        "action_gripper": slice(8, 9),
     }

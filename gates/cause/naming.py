@@ -8,9 +8,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from gates.cause.answers import NEXT, Answer, Cause, CauseName, Diagnosis, Layer, Named
+from gates.cause.components import components, looked_in, others, unreadable
 from gates.cause.hidden import hidden
 from gates.cause.limits import CauseLimits
-from gates.cause.numbers import Counts, Numbers, folder_numbers
+from gates.cause.numbers import Numbers, folder_numbers
 from genpolicy.audit.rows import ModeOutcome
 from genpolicy.errors import ConfigError
 
@@ -58,7 +59,7 @@ def name_cause(numbers: Numbers, draws: Sequence[Numbers], limits: CauseLimits) 
         variable=verdict.variable,
         kind=verdict.kind,
         layer=red,
-        next_action=verdict.next_action,
+        next_action=f"{verdict.next_action}{others(numbers, red)}",
         answers=tuple(answers),
         confidence=sum(same) / len(same) if same else None,
     )
@@ -198,13 +199,13 @@ def _structure(numbers: Numbers, limits: CauseLimits) -> Named:
         "multimodal_situations", Layer.STRUCTURE, "situations whose modes persist",
         counts.persistent, limits["multimodal_situations"], ">=",
     )  # fmt: skip
-    answers = [modes, long_enough, margin, persistent]
+    answers = [modes, *components(numbers), long_enough, margin, persistent]
     white = (
         counts.noise_ratio - limits["noise_ratio"] >= 0
         and counts.noise_spread - limits["noise_spread_m"] * numbers.metre >= 0
     )
     if modes.red or (white and long_enough.red):
-        absent, verdict = _absent(counts, limits, white=white)
+        absent, verdict = _absent(numbers, limits, white=white)
         return [*answers, absent], verdict
     if long_enough.red or persistent.red:
         number = kept.n if long_enough.red else counts.persistent
@@ -221,8 +222,9 @@ def _structure(numbers: Numbers, limits: CauseLimits) -> Named:
     return answers, _noise("Clusters do not persist over a chunk") if margin.red else None
 
 
-def _absent(counts: Counts, limits: CauseLimits, *, white: bool) -> tuple[Answer, Diagnosis]:
+def _absent(numbers: Numbers, limits: CauseLimits, *, white: bool) -> tuple[Answer, Diagnosis]:
     """No modes were found; is that enough to say that there are none?"""
+    counts, unread = numbers.counts, unreadable(numbers)
     answer = Answer(
         "denial_share", Layer.STRUCTURE,
         "share of situations with enough demonstrations to deny modes", counts.share,
@@ -239,8 +241,17 @@ def _absent(counts: Counts, limits: CauseLimits, *, white: bool) -> tuple[Answer
         return answer, _noise("The spread is noise from action to action")
     if counts.incoherent - limits["incoherent_situations"] >= 0:
         return answer, _noise("Clusters do not persist over a chunk")
+    if unread:
+        text = (
+            f"No modes were found, but those of {', '.join(unread)} could not be looked for: "
+            "record the commands so that they can be read, and repeat the audit."
+        )
+        return answer, Diagnosis(CauseName.INSUFFICIENT_SUPPORT, unread[0], "component", text)
     decided = counts.resolved > counts.two_mode
-    text = "Use the simple baselines: one observation has one action here."
+    text = (
+        "Use the simple baselines: no two separate actions were found under one observation, in "
+        f"{looked_in(numbers)}."
+    )
     kind = "observation_decides" if decided else ""
     return answer, Diagnosis(CauseName.UNIMODAL, "", kind, text)
 

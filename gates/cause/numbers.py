@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
 
+from genpolicy.audit.component_rows import ComponentModes
 from genpolicy.audit.rows import Finding, ModeOutcome, Resample, Stratum
 from genpolicy.errors import BadInputError
 from genpolicy.integrity.documents import read_json
@@ -72,6 +73,8 @@ class Numbers:
         kept: Identity over time.
         strata: Tests of variables.
         modes: Modes of the phase with most situations.
+        components: Where in the action modes were looked for; counts, strata and modes are about
+            the one followed.
     """
 
     findings: tuple[Finding, ...]
@@ -83,6 +86,7 @@ class Numbers:
     kept: Kept
     strata: tuple[Stratum, ...]
     modes: tuple[ModeOutcome, ...]
+    components: tuple[ComponentModes, ...]
 
 
 def read_numbers(
@@ -117,6 +121,7 @@ def read_numbers(
                 for row in rows("modes.parquet", ModeOutcome)
                 if row.phase == summary["primary_phase"]
             ),
+            components=tuple(rows("components.parquet", ComponentModes)),
         )
         return numbers, tuple(_draws(numbers, rows("resamples.parquet", Resample)))
     except (KeyError, TypeError, ValueError) as error:

@@ -12,14 +12,8 @@ from gates.pages.figures import Photo, Plot, in_order
 from gates.pages.limits import draw_limit, limit_of
 from gates.pages.plots_scene import SUMMARY, obstacles
 from gates.report import GateReport
-from genpolicy.audit.rows import (
-    Alignment,
-    ExampleChunk,
-    ModeOutcome,
-    ReplayRow,
-    SituationRow,
-    Stratum,
-)
+from genpolicy.audit.rows import ModeOutcome, ReplayRow, SituationRow, Stratum
+from genpolicy.audit.shown_rows import Alignment, ExampleChunk
 from genpolicy.evidence.rows.need import ModeRow
 from genpolicy.pages.figures import captions, checks, situations
 from genpolicy.pages.figures.drawing import BLUE, new_figure

@@ -67,6 +67,7 @@ class AuditInput:
         observation_position: Where the TCP position (or the joint angles) lies in the observation.
         action_position: Where what is commanded of it lies in the action, component by component.
         action_rotation: Where the six-number rotation lies in the action, if there is one.
+        action_gripper: Where the opening of the gripper lies in the action, if there is one.
         period_s: Action period.
         delay_s: Receive time minus event time of the sample used, per stream. Shape (N,).
         position_stream: Stream that delivers the observed position.
@@ -91,6 +92,7 @@ class AuditInput:
     action_position: Index
     period_s: float
     action_rotation: slice | None = None
+    action_gripper: Index | None = None
     delay_s: dict[str, Array] = field(default_factory=dict)
     position_stream: str = "robot"
     reference: slice | None = None

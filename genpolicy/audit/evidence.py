@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from genpolicy.audit.component_rows import ComponentModes
 from genpolicy.audit.data import AuditInput, Integers
 from genpolicy.audit.examples import (
     alignment,
@@ -48,6 +49,7 @@ def write_evidence(
         "alignment": alignment(result, settings),
         "calibration": result.semantics.calibrations,
         "clocks": result.semantics.clocks,
+        "components": _components(result),
         "demonstrated": _demonstrated(result),
         "examples": example_chunks(result, settings),
         "findings": result.semantics.findings,
@@ -107,6 +109,12 @@ def summary(result: AuditResult, settings: AuditSettings) -> dict[str, Any]:
     }
 
 
+def _components(result: AuditResult) -> list[ComponentModes]:
+    """Modes in every component; lengths along the path are in the unit of the position."""
+    unit = position_unit(result.data)
+    return [replace(item, unit=item.unit or unit) for item in result.components]
+
+
 def _by_phase(result: AuditResult) -> dict[str, int | None]:
     """Held-out episodes with several modes, with the phase looked at and without.
 
@@ -147,6 +155,7 @@ def _situation(data: AuditInput, item: Situation) -> SituationRow:
         mean_path=tuple(item.chunks.mean[:, position].ravel().tolist()),
         mode_paths=tuple(tuple(mode[:, position].ravel().tolist()) for mode in item.chunks.modes),
         persistent=persistent(item.identity),
+        component=item.component,
     )
 
 

@@ -5,12 +5,12 @@ These tables decide nothing. They hold what the figures of the audit's page and 
 
 import numpy as np
 
+from genpolicy.audit.components import vectors
 from genpolicy.audit.data import Array, AuditInput, Integers, origin, relative_paths
-from genpolicy.audit.modes import features
-from genpolicy.audit.rows import Alignment, ExampleChunk, SupportPoint
 from genpolicy.audit.run import AuditResult
 from genpolicy.audit.semantics import episode_lags, realigned
 from genpolicy.audit.settings import AuditSettings
+from genpolicy.audit.shown_rows import Alignment, ExampleChunk, SupportPoint
 from genpolicy.audit.situations import Situation
 
 EXAMPLES = 3
@@ -21,7 +21,7 @@ def example_chunks(result: AuditResult, settings: AuditSettings) -> list[Example
     """Chunks of a few situations, chosen evenly over how far apart their chunks lie."""
     rows: list[ExampleChunk] = []
     for number, item in enumerate(_chosen(result, settings)):
-        rows += _chunks(result.data, settings, number, item)
+        rows += _chunks(result, settings, number, item)
     return rows
 
 
@@ -105,25 +105,26 @@ def _chosen(result: AuditResult, settings: AuditSettings) -> list[Situation]:
     primary = max(sorted(set(phases)), key=phases.count)
     pool = [item for item in pool if item.phase == primary]
     spread = [
-        item.clustering.separation if several else _spread(result.data, settings, item)
-        for item in pool
+        item.clustering.separation if several else _spread(result, settings, item) for item in pool
     ]
     order = np.argsort(spread, kind="stable")
     places = (np.arange(EXAMPLES) + 0.5) / EXAMPLES * len(pool)
     return [pool[int(order[place])] for place in np.unique(places.astype(int))]
 
 
-def _spread(data: AuditInput, settings: AuditSettings, item: Situation) -> float:
-    paths = relative_paths(data, item.neighbourhood.members, settings.chunk_steps)
-    return float(features(paths, settings).var(axis=0).sum())
+def _spread(result: AuditResult, settings: AuditSettings, item: Situation) -> float:
+    members = item.neighbourhood.members
+    return float(vectors(result.data, settings, result.component, members).var(axis=0).sum())
 
 
 def _chunks(
-    data: AuditInput, settings: AuditSettings, number: int, item: Situation
+    result: AuditResult, settings: AuditSettings, number: int, item: Situation
 ) -> list[ExampleChunk]:
+    data = result.data
     members, query = item.neighbourhood.members, item.neighbourhood.query
     paths = relative_paths(data, members, settings.chunk_steps)
-    coordinate = _coordinate(features(paths, settings), item.clustering.labels)
+    parts = vectors(data, settings, result.component, members)
+    coordinate = _coordinate(parts, item.clustering.labels)
     placed = paths + origin(data, np.array([query], dtype=np.int64))[:, None, :]
     distance = np.append(item.neighbourhood.distance, 0.0)
     return [

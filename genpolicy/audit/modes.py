@@ -83,15 +83,40 @@ def cluster_chunks(paths: Array, settings: AuditSettings) -> Clustering:
     Returns:
         The modes; a single one unless both opinions agree on more.
     """
-    vectors = features(paths, settings)
-    n = len(vectors)
-    labels = np.zeros(n, dtype=np.int64)
-    _bisect(vectors, np.arange(n), labels, settings)
+    return cluster(features(paths, settings), settings, settings.minimum_separation_m)
+
+
+def cluster(vectors: Array, settings: AuditSettings, separation: float) -> Clustering:
+    """Modes of chunks given as vectors.
+
+    Args:
+        vectors: Euclidean distances between them are RMS distances of chunks. Shape (n, d).
+        settings: Sizes and gain.
+        separation: Modes nearer than this are one, unit of the vectors.
+
+    Returns:
+        The modes; a single one unless both opinions agree on more.
+    """
+    labels = np.zeros(len(vectors), dtype=np.int64)
+    _bisect(vectors, np.arange(len(vectors)), labels, settings, separation=separation)
+    gaps = distances(vectors)
+    if not labels.any():
+        return Clustering(labels, 0.0, (int(np.argmin(gaps.sum(axis=1))),))
     labels = by_size(labels)
-    count = int(labels.max()) + 1
-    gaps = np.linalg.norm(vectors[:, None] - vectors[None], axis=2)
-    medoids = tuple(_medoid(gaps, np.flatnonzero(labels == mode)) for mode in range(count))
+    medoids = tuple(
+        _medoid(gaps, np.flatnonzero(labels == mode)) for mode in range(int(labels.max()) + 1)
+    )
     return Clustering(labels=labels, separation=_separation(vectors, labels), medoids=medoids)
+
+
+def distances(vectors: Array) -> Array:
+    """Euclidean distances of all pairs. Shape (n, n)."""
+    centred = vectors - vectors.mean(axis=0)
+    products = centred @ centred.T
+    squares = np.diagonal(products)
+    gaps = np.sqrt(np.maximum(squares[:, None] + squares[None] - 2.0 * products, 0.0))
+    np.fill_diagonal(gaps, 0.0)
+    return np.asarray(gaps, dtype=np.float64)
 
 
 def split_gain(values: Array, least: int, groups: int = 2) -> tuple[float, Integers]:
@@ -137,24 +162,33 @@ def _cuts(n: int, least: int, groups: int) -> Integers:
     return np.stack([a[keep], b[keep]], axis=1)
 
 
+def reach(vectors: Array, least: int) -> float:
+    """Furthest that the centres of two groups, each of `least` or more, can lie apart."""
+    share = min(0.5, least / len(vectors))
+    return float(np.sqrt(vectors.var(axis=0).sum() / (share * (1.0 - share))))
+
+
 def _bisect(
-    vectors: Array, rows: Integers, labels: Integers, settings: AuditSettings, depth: int = 0
+    vectors: Array,
+    rows: Integers,
+    labels: Integers,
+    settings: AuditSettings,
+    *,
+    separation: float,
+    depth: int = 0,
 ) -> None:
     """Split `rows` while both opinions agree; writes new labels in place."""
-    least = _least(settings, len(labels))
+    least = smallest(settings, len(labels))
     if depth == MAXIMUM_DEPTH or len(rows) < 2 * least:
         return
     part = vectors[rows]
-    share = least / len(rows)
-    reach = np.sqrt(part.var(axis=0).sum() / (share * (1.0 - share)))
-    if reach < settings.minimum_separation_m:  # no split of this spread can be that far apart
+    if reach(part, least) < separation:  # no split of this spread can be that far apart
         return
     sides = next(
         (
             split
             for split in _principal_splits(part, least, settings.minimum_gain)
-            if _separation(part, split) >= settings.minimum_separation_m
-            and _confirmed(part, split, least)
+            if _separation(part, split) >= separation and _confirmed(part, split, least)
         ),
         None,
     )
@@ -163,10 +197,12 @@ def _bisect(
     for side in range(1, int(sides.max()) + 1):
         labels[rows[sides == side]] = labels.max() + 1
     for side in range(int(sides.max()) + 1):
-        _bisect(vectors, rows[sides == side], labels, settings, depth + 1)
+        _bisect(
+            vectors, rows[sides == side], labels, settings, separation=separation, depth=depth + 1
+        )
 
 
-def _least(settings: AuditSettings, members: int) -> int:
+def smallest(settings: AuditSettings, members: int) -> int:
     """Smallest size of a mode among `members` chunks."""
     return max(settings.minimum_mode_size, int(np.ceil(settings.minimum_mode_share * members)))
 
@@ -208,11 +244,14 @@ def _by_arc_length(paths: Array, steps: int) -> Array:
     """Paths resampled at equal arc lengths up to one that most of them reach within `steps`.
 
     Whoever still rests when the chunk begins goes the same way a little later: what follows the
-    chunk counts until the common length is reached, so that to wait is no route of its own.
+    chunk counts until the common length is reached, so that to wait is no route of its own. The
+    length begins where the path does, at the origin, not at the first command: what lies between
+    them is lag times speed, and a faster one would seem to go another way.
     """
     n = len(paths)
+    paths = np.concatenate([np.zeros_like(paths[:, :1]), paths], axis=1)
     along = progress(paths, max(1, steps // SMOOTHING_SHARE))
-    lengths = along[:, steps - 1]
+    lengths = along[:, steps]
     common = max(float(np.quantile(lengths, 0.25)), 0.5 * float(np.median(lengths)))
     at = np.broadcast_to(np.linspace(0.0, common, steps), (n, steps))
     left = np.sum(along[:, None, 1:-1] <= at[:, :, None], axis=2)

@@ -3,14 +3,18 @@
 The clusters of a situation are looked up again a chunk later, when not one action is shared:
 each episode should then lie nearer to the others of its own cluster than to the other cluster.
 The null deals the later chunks at random among the episodes (the link over time is shuffled).
+
+A grip or a start is one event, gone a chunk later. So clusters of other components than the route
+are made of every other action, and looked up in those between, none of which they have seen.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
+from genpolicy.audit.components import Component, joined, series
 from genpolicy.audit.data import Array, AuditInput, Integers, relative_paths
-from genpolicy.audit.modes import ROUTE_CHUNKS, Clustering, features
+from genpolicy.audit.modes import ROUTE_CHUNKS, Clustering, cluster, features
 from genpolicy.audit.neighbourhoods import Neighbourhood
 from genpolicy.audit.settings import AuditSettings
 
@@ -57,7 +61,32 @@ def kept_identity(
     if np.count_nonzero(counts >= MINIMUM_PER_MODE) < 2:
         return None
     paths = relative_paths(data, later[alive], ROUTE_CHUNKS * settings.chunk_steps)
-    vectors = features(paths, settings)
+    return _against_null(features(paths, settings), labels, rng)
+
+
+def kept_between(
+    data: AuditInput,
+    settings: AuditSettings,
+    component: Component,
+    situation: Neighbourhood,
+    *,
+    rng: np.random.Generator,
+) -> tuple[float, Array]:
+    """Share of episodes that clusters of every other action find again in those between.
+
+    Returns:
+        Share and null draws, shape (99,); zeros where every other action has no clusters.
+    """
+    values = series(data, settings, component, situation.members)
+    labels = cluster(joined(component, values[:, ::2]), settings, component.separation).labels
+    if labels.max() == 0:
+        return 0.0, np.zeros(99)
+    return _against_null(joined(component, values[:, 1::2]), labels, rng)
+
+
+def _against_null(
+    vectors: Array, labels: Integers, rng: np.random.Generator
+) -> tuple[float, Array]:
     gaps = np.linalg.norm(vectors[:, None] - vectors[None], axis=2)
     observed = _share(gaps, labels)
     null = np.array([_share(gaps, rng.permutation(labels)) for _ in range(99)])
@@ -91,6 +120,17 @@ def _share(gaps: Array, labels: Integers) -> float:
     means = (gaps @ own) / np.maximum(counts, 1)
     means[np.broadcast_to(counts == 0, means.shape)] = np.inf
     return float(np.mean(kinds[np.argmin(means, axis=1)] == labels))
+
+
+def roughness(values: Array) -> float:
+    """Von Neumann ratio of the spread, constant differences counted as smooth: 1 is white noise.
+
+    Args:
+        values: Shape (n, S, d).
+    """
+    residual = values - values.mean(axis=0)
+    power = float(np.mean(residual**2))
+    return float(np.mean(np.diff(residual, axis=1) ** 2)) / (2.0 * power) if power > 0.0 else 0.0
 
 
 def von_neumann(paths: Array) -> tuple[float, float]:

@@ -3,9 +3,10 @@
 import numpy as np
 from scipy.spatial import cKDTree
 
-from genpolicy.audit.data import AuditInput, Integers, observation_history, relative_paths
+from genpolicy.audit.components import Component, vectors
+from genpolicy.audit.data import AuditInput, Integers, observation_history
 from genpolicy.audit.labels import SUCCESS
-from genpolicy.audit.modes import Clustering, features
+from genpolicy.audit.modes import Clustering
 from genpolicy.audit.neighbourhoods import Neighbourhood
 from genpolicy.audit.rows import RecoveryOutcome
 from genpolicy.audit.settings import AuditSettings
@@ -19,6 +20,8 @@ def assign(
     situations: list[tuple[Neighbourhood, Clustering]],
     episode_modes: Integers,
     episodes: Integers,
+    *,
+    component: Component,
 ) -> Integers:
     """Mode of episodes that were in no situation, by their nearest chunks.
 
@@ -28,6 +31,7 @@ def assign(
         situations: Situations with several modes.
         episode_modes: Mode of each episode, -1 for none. Shape (E,).
         episodes: Which episodes to assign. Shape (n,).
+        component: Component of the action whose modes they are.
 
     Returns:
         Mode of each, by majority over its situations; -1 where none is near. Shape (n,).
@@ -47,8 +51,8 @@ def assign(
         for place in np.flatnonzero(np.isfinite(gaps)):
             situation, _ = situations[int(place)]
             chunks = np.append(situation.members, rows[near[place]])
-            vectors = features(relative_paths(data, chunks, settings.chunk_steps), settings)
-            nearest = int(np.argmin(np.linalg.norm(vectors[:-1] - vectors[-1], axis=1)))
+            near_by = vectors(data, settings, component, chunks)
+            nearest = int(np.argmin(np.linalg.norm(near_by[:-1] - near_by[-1], axis=1)))
             votes[episode_modes[data.episode[situation.members[nearest]]]] += 1
         if votes[:-1].any():
             result[number] = int(np.argmax(votes[:-1]))
@@ -60,6 +64,8 @@ def demonstrated(
     settings: AuditSettings,
     situations: list[tuple[Neighbourhood, Clustering]],
     episode_modes: Integers | None,
+    *,
+    component: Component,
 ) -> Integers:
     """The mode that every episode followed, as it was clustered, else by its nearest chunks.
 
@@ -68,6 +74,7 @@ def demonstrated(
         settings: Radius, representation.
         situations: Situations with several modes, of one phase.
         episode_modes: Mode of each episode in that phase, -1 for none. Shape (E,).
+        component: Component of the action whose modes they are.
 
     Returns:
         -1 where no situation is near. Shape (E,).
@@ -76,7 +83,9 @@ def demonstrated(
         return np.full(len(data.episodes), -1, dtype=np.int64)
     result = episode_modes.copy()
     open_ones = np.flatnonzero(result < 0)
-    result[open_ones] = assign(data, settings, situations, episode_modes, open_ones)
+    result[open_ones] = assign(
+        data, settings, situations, episode_modes, open_ones, component=component
+    )
     return result
 
 
@@ -85,12 +94,14 @@ def recovery_outcomes(
     settings: AuditSettings,
     situations: list[tuple[Neighbourhood, Clustering]],
     episode_modes: Integers | None,
+    *,
+    component: Component,
 ) -> tuple[RecoveryOutcome, ...]:
     """Disturbed episodes per split and mode; episodes near no situation are `unassigned`."""
     disturbed = np.flatnonzero(data.episodes.is_recovery)
     if episode_modes is None:
         episode_modes = np.full(len(data.episodes), -1, dtype=np.int64)
-    modes = assign(data, settings, situations, episode_modes, disturbed)
+    modes = assign(data, settings, situations, episode_modes, disturbed, component=component)
     rows = []
     for split in np.unique(data.episodes.split[disturbed]):
         for mode in np.unique(modes):

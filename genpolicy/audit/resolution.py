@@ -10,6 +10,9 @@ from genpolicy.audit.neighbourhoods import Neighbourhood
 from genpolicy.audit.settings import AuditSettings
 
 AXES = (2, 3)
+# Share of a scale by which what is no route must differ to be seen: a declared scale is several
+# times the noise of its sensor.
+ONSET = 0.25
 JITTER = 0.01  # a tenth of a scale, squared: flat clouds stay solvable
 
 
@@ -18,6 +21,8 @@ def resolved_by_observation(
     settings: AuditSettings,
     situation: Neighbourhood,
     clustering: Clustering,
+    *,
+    route: bool = True,
 ) -> bool:
     """Whether one observed component, or the place, already tells the clusters apart.
 
@@ -25,18 +30,39 @@ def resolved_by_observation(
     It must order them (nearly) perfectly and differ by at least its own scale. The place (up to
     three components) is also looked at along Fisher's line from one cluster to the other, which
     need not lie along an axis; more components would always have such a line among so few members.
+    Routes part little by little, so less than a scale is no sign of them. Where something else
+    than the route differs, a hand that has begun to close or turn shows it at once, and a history
+    shows how fast the arm goes: there a fraction of a scale is enough.
     """
+    least = 1.0 if route else ONSET
+    if not route and _told_by_speed(data, settings, situation, clustering):
+        return True
     place = _place(data)
     for values, inside in _observed(data, settings, situation, clustering):
         if len(place):
             line = _along(values[:, place], inside)
-            if _apart(line, inside) >= 1.0 and _auc(line, inside) >= settings.resolved_auc:
+            if _apart(line, inside) >= least and _auc(line, inside) >= settings.resolved_auc:
                 return True
         gap = np.abs(np.median(values[inside], axis=0) - np.median(values[~inside], axis=0))
-        far = np.flatnonzero(gap >= 1.0)
+        far = np.flatnonzero(gap >= least)
         if any(_auc(values[:, j], inside) >= settings.resolved_auc for j in far):
             return True
     return False
+
+
+def _told_by_speed(
+    data: AuditInput, settings: AuditSettings, situation: Neighbourhood, clustering: Clustering
+) -> bool:
+    """Whether the speed over the observed history orders the clusters (nearly) perfectly."""
+    if settings.observation_horizon < 2 or data.position.shape[1] == 0:
+        return False
+    rows = situation.members
+    before = np.maximum(rows - settings.observation_horizon + 1, data.first_row[rows])
+    speeds = np.linalg.norm(data.position[rows] - data.position[before], axis=1)[:, None]
+    return any(
+        _auc(speeds[:, 0], clustering.labels == mode) >= settings.resolved_auc
+        for mode in range(clustering.count)
+    )
 
 
 def _place(data: AuditInput) -> Integers:

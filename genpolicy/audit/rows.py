@@ -1,11 +1,14 @@
 """Rows of the audit's tables, one frozen dataclass a table.
 
 Field order is column order, as in `genpolicy.evidence.rows`. The audit measures these rows, gates
-and pages read them, so a column is spelled here and nowhere else; this file imports nothing. Most
-are what the audit itself computes with. None is "not measured", never zero.
+and pages read them, so a column is spelled here and nowhere else; this file imports rows only.
+Most are what the audit itself computes with. None is "not measured", never zero.
 """
 
 from dataclasses import dataclass
+
+from genpolicy.audit.component_rows import ComponentModes
+from genpolicy.audit.shown_rows import Alignment, ExampleChunk, SupportPoint
 
 
 @dataclass(frozen=True)
@@ -92,14 +95,16 @@ class SituationRow:
         clusters: Clusters of their chunks and the query's own.
         cluster_sizes: Chunks in each.
         two_mode: Whether the clusters count as modes.
-        separation_m: Smallest RMS distance of two clusters, unit of the position.
+        separation_m: Smallest RMS distance of two clusters, unit of the component.
         mean_admissible: Whether the mean chunk passes the feasibility check.
         mean_reason: Why not.
         median_admissible: Whether the point-wise median of the chunks passes it.
         modes_admissible: Modal chunks that pass it.
         mean_path: Positions of the mean chunk. K times P numbers.
         mode_paths: Positions of each modal chunk.
-        persistent: Whether the clusters keep their episodes a chunk later.
+        persistent: Whether the clusters keep their episodes: of the position a chunk later, of
+            another component in the actions between those that were clustered.
+        component: Component of the action that was clustered.
     """
 
     split: str
@@ -118,6 +123,7 @@ class SituationRow:
     mean_path: tuple[float, ...]
     mode_paths: tuple[tuple[float, ...], ...]
     persistent: bool
+    component: str
 
 
 @dataclass(frozen=True)
@@ -262,84 +268,11 @@ class Resample:
     admissible: tuple[int, ...]
 
 
-@dataclass(frozen=True)
-class ExampleChunk:
-    """`examples.parquet`: one demonstration's chunk in one example situation.
-
-    Attributes:
-        example: Number of the situation.
-        phase: Task phase.
-        two_mode: Whether the situation counts as one with several modes.
-        query_uuid: Held-out episode that asked.
-        query_index: Its row.
-        episode_uuid: Episode of this chunk.
-        is_query: Whether it is the one that asked.
-        distance: How far its observation lies from the query's, in scales.
-        cluster: Mode, 0 the largest.
-        coordinate: Where the chunk lies along the direction in which the chunks differ most
-            between clusters, RMS distance in the unit of the position.
-        path: Commanded positions, moved to the query's place. K times P numbers.
-    """
-
-    example: int
-    phase: str
-    two_mode: bool
-    query_uuid: str
-    query_index: int
-    episode_uuid: str
-    is_query: bool
-    distance: float
-    cluster: int
-    coordinate: float
-    path: tuple[float, ...]
-
-
-@dataclass(frozen=True)
-class Alignment:
-    """`alignment.parquet`: clock of one episode against the others.
-
-    Attributes:
-        episode_uuid: The episode.
-        epoch: Calibration epoch.
-        order: Rank of the recording; by identifier where no order was recorded.
-        lag_steps: Action-to-state lag; None where it cannot be measured, as for what follows.
-        offset_before_s: Its deviation from the median lag.
-        offset_after_s: The same on realigned data.
-    """
-
-    episode_uuid: str
-    epoch: str
-    order: float
-    lag_steps: float | None
-    offset_before_s: float | None
-    offset_after_s: float | None
-
-
-@dataclass(frozen=True)
-class SupportPoint:
-    """`support.parquet`: one query, and whether the training episodes reach there.
-
-    Attributes:
-        phase: Task phase.
-        episode_uuid: Held-out episode that asks.
-        index: Its row.
-        analysed: Whether enough training episodes came near.
-        two_mode: Whether several modes were found.
-        position: Observed position. P numbers.
-    """
-
-    phase: str
-    episode_uuid: str
-    index: int
-    analysed: bool
-    two_mode: bool
-    position: tuple[float, ...]
-
-
 TABLES: dict[str, type] = {
     "alignment": Alignment,
     "calibration": Calibration,
     "clocks": Clock,
+    "components": ComponentModes,
     "demonstrated": Demonstration,
     "examples": ExampleChunk,
     "findings": Finding,

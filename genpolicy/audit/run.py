@@ -4,11 +4,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from genpolicy.audit.component_rows import ComponentModes
+from genpolicy.audit.components import Component
 from genpolicy.audit.counts import Counts, count
 from genpolicy.audit.data import AuditInput, Integers, canonical
 from genpolicy.audit.labels import Replay, Replayed, mode_outcomes, replay_sample
 from genpolicy.audit.linking import link
-from genpolicy.audit.mean_versus_modes import Admissible
+from genpolicy.audit.looks import (
+    Look,
+    claimed_episodes,
+    component_modes,
+    foremost,
+    look_everywhere,
+)
+from genpolicy.audit.mean_versus_modes import Admissible, compare
 from genpolicy.audit.neighbourhoods import Support
 from genpolicy.audit.persistence import Persistence, summarise
 from genpolicy.audit.progress import Progress, silent
@@ -18,13 +27,10 @@ from genpolicy.audit.rows import ModeOutcome, RecoveryOutcome, Resample, Stratum
 from genpolicy.audit.semantics import Semantics, measure, realigned
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.audit.situations import (
-    Found,
     Several,
     Situation,
     by_phase,
-    claimed,
     coherent,
-    episodes_of,
     examine,
     find_situations,
     primary_phase,
@@ -54,6 +60,8 @@ class AuditResult:
         modes_other_phases: The same with the phase looked at the other way: across phases if the
             policy sees the phase, inside each if not; None with one phase only.
         resamples: The measures on resampled data.
+        component: Component of the action whose modes all else is about.
+        components: Modes in every component.
     """
 
     data: AuditInput
@@ -71,6 +79,8 @@ class AuditResult:
     modes_after_realignment: int
     modes_other_phases: int | None
     resamples: tuple[Resample, ...]
+    component: Component
+    components: tuple[ComponentModes, ...]
 
     @property
     def primary_phase(self) -> str:
@@ -104,9 +114,9 @@ def audit(
     data = canonical(data)
     semantics = measure(data, settings)
     found, support = find_situations(data, settings, root_seed, progress=progress)
-    claims = _examined(
-        data, settings, found, admissible=admissible, root_seed=root_seed, progress=progress
-    )
+    looks = look_everywhere(data, settings, found, root_seed)
+    followed, component = foremost(looks), foremost(looks).component
+    claims = _examined(data, settings, followed, admissible=admissible, progress=progress)
     situations, incoherent = coherent(settings, claims)
     several = by_phase(situations)
     replayed = replay_sample(data, settings, replay=replay, root_seed=root_seed, progress=progress)
@@ -116,10 +126,9 @@ def audit(
     counts = count(data, situations, support, incoherent)
     primary = primary_phase(several)
     persistence = summarise([item.identity for item in situations if item.two_mode])
-    measured = Measures(
-        replayed, persistence, strata, tuple(mode for mode in modes if mode.phase == primary)
-    )
-    before = counts.two_mode_episodes
+    main = several.get(primary, []), links.get(primary)
+    measured = Measures(replayed, persistence, strata, _of_phase(modes, primary))
+    after = _after_realignment(data, settings, semantics, counts, component, root_seed=root_seed)
     return AuditResult(
         data=data,
         semantics=semantics,
@@ -130,47 +139,64 @@ def audit(
         links=links,
         strata=strata,
         replayed=replayed,
-        recovery=recovery_outcomes(data, settings, several.get(primary, []), links.get(primary)),
-        demonstrated=demonstrated(data, settings, several.get(primary, []), links.get(primary)),
+        recovery=recovery_outcomes(data, settings, *main, component=component),
+        demonstrated=demonstrated(data, settings, *main, component=component),
         counts=counts,
-        modes_after_realignment=_after_realignment(data, settings, semantics, before, root_seed),
-        modes_other_phases=_other_phases(data, settings, root_seed),
+        modes_after_realignment=after,
+        modes_other_phases=_other_phases(data, settings, component, root_seed),
+        component=component,
+        components=component_modes(data, looks, component.name),
         resamples=resamples(data, settings, measured, claims, root_seed=root_seed),
     )
+
+
+def _of_phase(modes: tuple[ModeOutcome, ...], phase: str) -> tuple[ModeOutcome, ...]:
+    return tuple(mode for mode in modes if mode.phase == phase)
 
 
 def _examined(
     data: AuditInput,
     settings: AuditSettings,
-    found: list[Found],
+    look: Look,
     *,
     admissible: Admissible | None,
-    root_seed: int,
     progress: Progress,
 ) -> tuple[Situation, ...]:
     """Every situation, looked at in turn; those of a claim are split into modes."""
-    chosen = claimed(data, settings, found)
     examined: list[Situation] = []
-    for number, entry in enumerate(found):
-        split = number in chosen
-        item = examine(data, settings, entry, split, admissible=admissible, seed=root_seed)
+    for number, entry in enumerate(look.found):
+        item = look.claims.get(number)
+        if item is None:
+            item = examine(data, settings, entry, look.component, admissible=None, seed=None)
+        else:
+            _, situation, split = entry
+            chunks = compare(data, settings, situation, split, admissible=admissible)
+            item = replace(item, chunks=chunks)
         examined.append(item)
-        progress("situations examined", number + 1, len(found))
+        progress("situations examined", number + 1, len(look.found))
     return tuple(examined)
 
 
 def _after_realignment(
-    data: AuditInput, settings: AuditSettings, semantics: Semantics, before: int, root_seed: int
+    data: AuditInput,
+    settings: AuditSettings,
+    semantics: Semantics,
+    counts: Counts,
+    component: Component,
+    *,
+    root_seed: int,
 ) -> int:
     """Held-out episodes with several modes once every epoch is shifted by its measured offset."""
     shifted, moved = realigned(data, semantics)
     if not moved:
-        return before
+        return counts.two_mode_episodes
     found, _ = find_situations(shifted, settings, root_seed)
-    return _claimed_episodes(shifted, settings, found)
+    return claimed_episodes(shifted, settings, component, found)
 
 
-def _other_phases(data: AuditInput, settings: AuditSettings, root_seed: int) -> int | None:
+def _other_phases(
+    data: AuditInput, settings: AuditSettings, component: Component, root_seed: int
+) -> int | None:
     """The same count with the phase looked at the other way; None where there is only one phase.
 
     Across phases if the policy sees the phase, inside each phase if it does not: modes that are
@@ -180,11 +206,7 @@ def _other_phases(data: AuditInput, settings: AuditSettings, root_seed: int) -> 
         return None
     other = replace(data, phase_observed=not data.phase_observed)
     found, _ = find_situations(other, settings, root_seed)
-    return _claimed_episodes(other, settings, found)
-
-
-def _claimed_episodes(data: AuditInput, settings: AuditSettings, found: list[Found]) -> int:
-    return episodes_of(data, [found[number][1] for number in claimed(data, settings, found)])
+    return claimed_episodes(other, settings, component, found)
 
 
 def _links(data: AuditInput, settings: AuditSettings, several: Several) -> dict[str, Integers]:

@@ -4,11 +4,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from genpolicy.audit.component_rows import POSITION
+from genpolicy.audit.components import TIMING, Component, series
 from genpolicy.audit.data import Array, AuditInput, relative_paths
 from genpolicy.audit.mean_versus_modes import Admissible, MeanVersusModes, compare
 from genpolicy.audit.modes import ROUTE_CHUNKS, Clustering, cluster_chunks
 from genpolicy.audit.neighbourhoods import Neighbourhood, Support, find
-from genpolicy.audit.persistence import POINTWISE_RATIO, kept_identity, persistent, von_neumann
+from genpolicy.audit.persistence import (
+    POINTWISE_RATIO,
+    kept_between,
+    kept_identity,
+    persistent,
+    roughness,
+    von_neumann,
+)
 from genpolicy.audit.progress import Progress, silent
 from genpolicy.audit.resolution import resolved_by_observation
 from genpolicy.audit.settings import AuditSettings
@@ -31,6 +40,8 @@ class Situation:
         chunks: Mean, median and modal chunks with their verdicts.
         noise_ratio: Von Neumann ratio of the spread along the chunk: 1 white, 0 smooth.
         noise_spread: RMS of that spread, unit of the position.
+        component: Component of the action whose clusters these are.
+        roughness: The same ratio of that component; None where it is that of the position.
     """
 
     phase: str
@@ -41,6 +52,8 @@ class Situation:
     chunks: MeanVersusModes
     noise_ratio: float
     noise_spread: float
+    component: str = POSITION
+    roughness: float | None = None
 
 
 @dataclass(frozen=True)
@@ -52,7 +65,7 @@ class Claim:
         phase: Task phase.
         measured: Whether it goes on long enough to see whether the modes persist.
         persists: Whether they do, beyond their null.
-        noise_ratio: As of the situation.
+        noise_ratio: As of the situation, in the component of its clusters.
     """
 
     situation: int
@@ -79,7 +92,9 @@ def find_situations(
     return found, tuple(support)
 
 
-def claimed(data: AuditInput, settings: AuditSettings, found: list[Found]) -> set[int]:
+def claimed(
+    data: AuditInput, settings: AuditSettings, found: list[Found], *, component: str = POSITION
+) -> set[int]:
     """Which entries of `found` have several modes under one observation.
 
     A phase in which too few held-out episodes show them is said to have one mode: a handful
@@ -89,7 +104,9 @@ def claimed(data: AuditInput, settings: AuditSettings, found: list[Found]) -> se
     analysed: dict[str, list[Neighbourhood]] = {}
     for number, (phase, item, split) in enumerate(found):
         analysed.setdefault(phase, []).append(item)
-        if split.count > 1 and not resolved_by_observation(data, settings, item, split):
+        if split.count > 1 and not resolved_by_observation(
+            data, settings, item, split, route=component == POSITION
+        ):
             numbers.setdefault(phase, []).append(number)
     return {
         number
@@ -104,22 +121,39 @@ def examine(
     data: AuditInput,
     settings: AuditSettings,
     entry: Found,
-    two_mode: bool,
+    component: Component,
     *,
     admissible: Admissible | None,
-    seed: int,
+    seed: int | None,
 ) -> Situation:
-    """Persistence, and mean against modes, of one situation; both only where it has modes."""
+    """Persistence, and mean against modes, of one situation; both only where it has modes.
+
+    Args:
+        data: Canonical audit input.
+        settings: Lags and chunk length.
+        entry: The situation with its clusters.
+        component: What was clustered.
+        admissible: Feasibility of a chunk, asked where there are modes.
+        seed: Seed of the null of persistence; None where the clusters are not claimed as modes.
+    """
     phase, item, clustering = entry
-    identity = None
-    if two_mode:
+    identity, rough = None, None
+    if seed is not None:
         name = str(data.episodes.uuid[data.episode[item.query]])
         rng = stream(seed, "audit", "persistence", phase, name, int(data.index[item.query]))
-        identity = kept_identity(data, settings, item, clustering, rng=rng)
-    check = admissible if two_mode else None
+        if component.name == POSITION:
+            identity = kept_identity(data, settings, item, clustering, rng=rng)
+        else:
+            identity = kept_between(data, settings, component, item, rng=rng)
+            if component.name != TIMING:
+                rough = roughness(series(data, settings, component, item.members))
+    check = None if seed is None else admissible
     chunks = compare(data, settings, item, clustering, admissible=check)
     ratio, spread = von_neumann(relative_paths(data, item.members, settings.chunk_steps))
-    return Situation(phase, item, clustering, two_mode, identity, chunks, ratio, spread)
+    return Situation(
+        phase, item, clustering, seed is not None, identity, chunks, ratio, spread,
+        component.name, rough,
+    )  # fmt: skip
 
 
 def coherent(
@@ -153,7 +187,7 @@ def claims_of(situations: tuple[Situation, ...]) -> list[Claim]:
             item.phase,
             item.identity is not None,
             persistent(item.identity),
-            item.noise_ratio,
+            item.noise_ratio if item.roughness is None else item.roughness,
         )
         for number, item in enumerate(situations)
         if item.two_mode

@@ -3,6 +3,7 @@
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from genpolicy.audit.component_rows import NOT_LOOKED_AT, OTHER
 from genpolicy.audit.labels import Replay, disagreement
 from genpolicy.audit.mean_versus_modes import Admissible
 from genpolicy.audit.progress import Progress, silent
@@ -138,7 +139,8 @@ def _evidence(result: AuditResult, settings: AuditSettings) -> list[str]:
         f"{settings.minimum_neighbours} or more comparable training episodes, from "
         f"{counts.analysed_episodes} held-out episodes",
         f"structure: {counts.two_mode} situations from {counts.two_mode_episodes} held-out "
-        f"episodes have several modes; after realignment {result.modes_after_realignment}",
+        f"episodes have several modes of {result.component.name}; after realignment "
+        f"{result.modes_after_realignment}",
     ]
     if persistence.n:
         lines.append(
@@ -188,6 +190,11 @@ def _rests_on(
             "history: the modes part before there is a past to look at, so whether something "
             "earlier decided them was not tested."
         )
+    lines += [
+        f"{item.component}: {NOT_LOOKED_AT[item.state]}, so nothing is said of its modes."
+        for item in result.components
+        if item.state in NOT_LOOKED_AT and item.component != OTHER
+    ]
     if not result.data.paired:
         lines.append("pairing: no action commands an observed number, so no lag was measured.")
     return lines

@@ -58,6 +58,7 @@ def from_dataset(
             observation_position=observed,
             action_position=commanded,
             action_rotation=_rotation(dataset, commanded),
+            action_gripper=_gripper(dataset, commanded),
             period_s=period_s,
             delay_s={
                 name: received - frames.stream_event_time_s[name]
@@ -133,6 +134,14 @@ def _rotation(dataset: Dataset, commanded: Index) -> slice | None:
     names = list(dataset.manifest["action_contract"]["components"])
     whole = set(range(POSITION.start, POSITION.stop)) <= set(np.arange(len(names))[commanded])
     return ROTATION if whole and names[ROTATION] == list(ACTION_COMPONENTS[ROTATION]) else None
+
+
+def _gripper(dataset: Dataset, commanded: Index) -> Index | None:
+    """Columns that name a gripper and are no part of the position; None where there is none."""
+    names = list(dataset.manifest["action_contract"]["components"])
+    taken = set(np.arange(len(names))[commanded].tolist())
+    found = [k for k, name in enumerate(names) if "gripper" in name.lower() and k not in taken]
+    return _columns(found) if found else None
 
 
 def _scale(channel: Channel, component: str, settings: AuditSettings) -> float:

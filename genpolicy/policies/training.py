@@ -94,8 +94,7 @@ def train(
     """Train one method and write its checkpoint folder, whole or not at all.
 
     Args:
-        folder: Folder to write: weights, config, `training.json`, `metrics.jsonl`, and
-            `validation.parquet` where the validation windows name their episodes.
+        folder: Folder to write: weights, config, records; of named episodes `validation.parquet`.
         request: What decides the result.
         windows: Training split.
         validation: Validation split, for the record only; it stops and selects nothing.
@@ -125,22 +124,15 @@ def train(
         else:
             records = list(
                 _optimise(
-                    network,
-                    averaged,
-                    objective,
-                    data=data,
-                    followed=followed,
-                    request=request,
-                    device=device,
+                    network, averaged, objective,
+                    data=data, followed=followed, request=request, device=device,
                 )
-            )
+            )  # fmt: skip
         objective.finish(averaged, data)
     weights = serialise_weights(averaged, method=request.method)
     config = _checkpoint_config(request, averaged, objective, weights=weights)
     summary = {
-        "stopping_rule": f"weights of {weights_of.parent.name}"
-        if weights_of is not None
-        else "fixed number of steps",
+        "stopping_rule": _stopping_rule(weights_of),
         "steps": request.training.steps,
         "evaluated_weights": "exponential moving average",
         "windows": len(windows.observations),
@@ -148,11 +140,24 @@ def train(
         "final": records[-1],
         "regime": regime(device),
     }
-    rows = followed.rows if followed else []
-    if weights_of is not None and followed:  # the weights' own training is what converged or not
-        path = weights_of / VALIDATION_FILE
-        rows = rows_of_table(read_table(path), ValidationRow, where=str(path))
+    rows = _validation_rows(followed, weights_of)
     return _write(folder, rows, weights=weights, config=config, records=records, summary=summary)
+
+
+def _validation_rows(followed: Validation | None, weights_of: Path | None) -> list[ValidationRow]:
+    """Rows of `validation.parquet`; of taken over weights those of their own training."""
+    if followed is None:
+        return []
+    if weights_of is None:
+        return followed.rows
+    path = weights_of / VALIDATION_FILE
+    if not path.is_file():
+        return []
+    return rows_of_table(read_table(path), ValidationRow, where=str(path))
+
+
+def _stopping_rule(weights_of: Path | None) -> str:
+    return f"weights of {weights_of.parent.name}" if weights_of else "fixed number of steps"
 
 
 def take_over(

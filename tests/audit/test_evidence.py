@@ -14,7 +14,8 @@ from genpolicy.evidence.need.method_modes import one_per_episode, read_situation
 from genpolicy.integrity.tables import read_table
 
 FILES = {
-    "clocks.parquet", "calibration.parquet", "neighbourhoods.parquet", "modes.parquet",
+    "clocks.parquet", "calibration.parquet", "components.parquet", "neighbourhoods.parquet",
+    "modes.parquet",
     "strata.parquet", "replay.parquet", "recovery.parquet", "persistence.json", "summary.json",
     "settings.json", "findings.parquet", "resamples.parquet", "examples.parquet",
     "alignment.parquet", "support.parquet", "demonstrated.parquet",
@@ -59,7 +60,7 @@ def test_tables_have_the_columns_that_the_gate_reads(evidence):
     assert table.column_names == [
         "split", "phase", "episode_uuid", "index", "neighbours", "clusters", "cluster_sizes",
         "two_mode", "separation_m", "mean_admissible", "mean_reason", "median_admissible",
-        "modes_admissible", "mean_path", "mode_paths", "persistent",
+        "modes_admissible", "mean_path", "mode_paths", "persistent", "component",
     ]  # fmt: skip
     rows = table.to_pylist()
     assert all(sum(row["cluster_sizes"]) == row["neighbours"] + 1 for row in rows)

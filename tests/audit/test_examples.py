@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from planar import SETTINGS, planar
 
+from genpolicy.audit.components import Component
 from genpolicy.audit.data import canonical
 from genpolicy.audit.examples import (
     EXAMPLES,
@@ -73,7 +74,10 @@ def test_every_query_is_a_point_analysed_or_not(late):
 
 def test_examples_are_spread_over_the_separations_and_hold_every_member(late):
     items = tuple(situation(late, 2, separation=0.01 * k) for k in range(9))
-    rows = example_chunks(SimpleNamespace(data=late, situations=items), SETTINGS)
+    found = SimpleNamespace(
+        data=late, situations=items, component=Component("position", "varies", "", 0.03)
+    )
+    rows = example_chunks(found, SETTINGS)
     assert {row.example for row in rows} == set(range(EXAMPLES))
     first = [row for row in rows if row.example == 0]
     assert len(first) == 12 and sum(row.is_query for row in first) == 1

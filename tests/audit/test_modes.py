@@ -86,10 +86,11 @@ def test_resampling_by_arc_length_agrees_with_interpolation():
     rng = stream(25, "arc")
     paths = np.cumsum(rng.normal(size=(7, 16, 3)), axis=1)
     paths[2] = paths[2, 0]  # one that stands still
-    along = progress(paths, 4)
+    whole = np.concatenate([np.zeros((7, 1, 3)), paths], axis=1)  # from the origin on
+    along = progress(whole, 4)
     common = max(np.quantile(along[:, -1], 0.25), 0.5 * np.median(along[:, -1]))
     at = np.linspace(0, common, 16)
-    expected = [[np.interp(at, along[i], paths[i, :, j]) for j in range(3)] for i in range(7)]
+    expected = [[np.interp(at, along[i], whole[i, :, j]) for j in range(3)] for i in range(7)]
     got = features(paths, SETTINGS).reshape(7, 16, 3) * 4.0
     assert got == pytest.approx(np.swapaxes(np.array(expected), 1, 2), abs=1e-12)
 

@@ -18,11 +18,10 @@ from gates.cause.limits import OWN
 from gates.feasibility import LAYERS
 from gates.preregistration import PREREGISTRATION, plan_bytes
 from gates.reproducibility.timing import MEASURED_HERE, TERMS
+from genpolicy.audit.component_rows import ComponentModes
 from genpolicy.audit.rows import (
-    Alignment,
     Calibration,
     Clock,
-    ExampleChunk,
     Finding,
     ModeOutcome,
     RecoveryOutcome,
@@ -31,6 +30,7 @@ from genpolicy.audit.rows import (
     SituationRow,
     Stratum,
 )
+from genpolicy.audit.shown_rows import Alignment, ExampleChunk
 from genpolicy.data.rows import EpisodeRow, FrameRow
 from genpolicy.evidence.rows.need import (
     EffectRow,
@@ -411,6 +411,17 @@ def _bow(episode: int, index: int) -> float:
     return 0.13 * (1 if episode % 2 == 0 else -1) * (1 - ((index - 4) / 4) ** 2)
 
 
+def _component(name: str) -> dict[str, object]:
+    """Modes of the position; nothing beside it."""
+    followed = name == "position"
+    return {
+        "component": name, "state": "varies", "unit": "m", "separation": 0.03, "scale": 0.01,
+        "spread": 0.01, "situations": 90, "clusters": 50 * followed, "two_mode": 50 * followed,
+        "two_mode_episodes": 30 * followed, "incoherent": 0, "persistent": 50 * followed,
+        "followed": followed,
+    }  # fmt: skip
+
+
 def _audit(root: Path) -> None:
     photo = root / "artifacts/audit/scene.png"
     photo.parent.mkdir(parents=True, exist_ok=True)
@@ -442,6 +453,8 @@ def _audit(root: Path) -> None:
         [{"epoch": e, "episodes": 20, "residual_m": 0.001} for e in ("e1", "e2")],
     )
     table(root, "audit/neighbourhoods.parquet", SituationRow, [_situation(i) for i in range(60)])
+    names = ("position", "rotation", "gripper", "timing")
+    table(root, "audit/components.parquet", ComponentModes, [_component(name) for name in names])
     table(
         root,
         "audit/modes.parquet",
@@ -620,6 +633,7 @@ def _situation(i: int) -> dict[str, Any]:
         "mean_path": mean,
         "mode_paths": [left, right],
         "persistent": True,
+        "component": "position",
     }
 
 

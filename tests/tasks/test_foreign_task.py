@@ -19,7 +19,6 @@ from genpolicy.evidence.shadow.mutants import run_mutants
 from genpolicy.evidence.shadow.observations import held_out_observations
 from genpolicy.evidence.shadow.session import Cell
 from genpolicy.evidence.shadow.shadow import Shadow, admit, case_of
-from genpolicy.evidence.shadow.tables import expected_motion
 from genpolicy.evidence.stress.latency import (
     DECLARED_TERMS,
     MEASURED_TERMS,
@@ -33,6 +32,7 @@ from genpolicy.evidence.stress.state import Fixture, Outcome
 from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.execution.journal import write_journal
 from genpolicy.feasibility.admission import Admitted, Rejected
+from genpolicy.feasibility.figures import expected_motion
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.seeds import stream
 from genpolicy.tasks.api import load_task

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from genpolicy.audit.component_rows import POSITION
 from genpolicy.audit.rows import SituationRow
 from genpolicy.errors import ContractError
 from genpolicy.integrity.rows import read_rows
@@ -72,6 +73,9 @@ def read_situations(
 ) -> list[ModeSituation]:
     """Persistent situations with several modes from the audit's `neighbourhoods.parquet`.
 
+    Samples are held against routes, so only modes of the position count: where they differ in the
+    tool or in time alone, the paths of the modes are one and the same.
+
     Args:
         folder: The audit's folder.
         width: Components of a position.
@@ -94,7 +98,7 @@ def read_situations(
             ),
         )
         for row in rows
-        if row.two_mode and row.persistent and row.split in splits
+        if row.two_mode and row.persistent and row.split in splits and row.component == POSITION
     ]
 
 

@@ -4,8 +4,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from genpolicy.evidence.rows.shadow import CandidateRow, ShadowCountRow, ShadowStubRow
 from genpolicy.evidence.shadow.mutants import run_mutants
 from genpolicy.evidence.shadow.session import Cell
@@ -13,11 +11,11 @@ from genpolicy.evidence.shadow.shadow import ShadowEvidence
 from genpolicy.execution.journal import write_journal
 from genpolicy.execution.ledger import Account
 from genpolicy.feasibility.cell import Cell as FeasibilityCell
+from genpolicy.feasibility.figures import expected_motion
 from genpolicy.integrity.atomic import write_bytes
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.rows import write_rows
 from genpolicy.verification.checker import ExpectedSettings, check_journal
-from genpolicy.verification.motion import ExpectedMotion
 
 
 def write_shadow(
@@ -70,20 +68,6 @@ def account_rows(accounts: Sequence[Account]) -> list[dict[str, Any]]:
     }
     reasons = sorted(discarded.items()) or [("", 0)]
     return [{**totals, "reason": reason, "count": count} for reason, count in reasons]
-
-
-def expected_motion(robot: FeasibilityCell) -> ExpectedMotion:
-    """What the independent checker holds executed rows against: figures, none of the layers."""
-    limits, settings = robot.usable_limits, robot.settings
-    return ExpectedMotion(
-        scene_path=robot.kinematics.scene_path,
-        workspace_m=np.array([robot.workspace.lower_m, robot.workspace.upper_m]),
-        velocity_rad_s=limits.velocity_rad_s,
-        tcp_speed_m_s=settings.tcp_speed_limit_m_s,
-        tcp_turn_rad_s=settings.tcp_turn_limit_rad_s,
-        held_opening_m=settings.held_opening_m,
-        contact_phases=robot.contact_phases,
-    )
 
 
 def checker_document(

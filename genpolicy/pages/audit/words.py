@@ -20,7 +20,8 @@ MEANINGS = {
     "called valid by its label.",
     "pointwise_noise": "Actions differ from step to step without any strategy that lasts. "
     "Averaging over a chunk removes it.",
-    "unimodal": "One observation has one action here: the simple policies are enough.",
+    "unimodal": "No two separate actions were found under one observation, in what was "
+    "looked at: the simple policies are enough.",
     "insufficient_support": "The data cannot answer. That is not the same as one action: what "
     "is missing is said below.",
 }

@@ -10,10 +10,10 @@ from genpolicy.evidence.shadow.corruption import CORRUPTIONS
 from genpolicy.evidence.shadow.observations import spread
 from genpolicy.evidence.shadow.session import play
 from genpolicy.evidence.shadow.shadow import admit, case_of
-from genpolicy.evidence.shadow.tables import expected_motion
 from genpolicy.execution.journal import encode_actions
 from genpolicy.feasibility.admission import Admitted, FeasibilityChecker
 from genpolicy.feasibility.checks import without
+from genpolicy.feasibility.figures import expected_motion
 from genpolicy.verification.checker import check_messages
 
 BY_CHECK = {item.check: item for item in CORRUPTIONS if item.check}

@@ -9,7 +9,6 @@ import pytest
 
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.evidence.admission_context import make_checker
-from genpolicy.evidence.shadow.tables import expected_motion
 from genpolicy.evidence.stress.latency import (
     DECLARED_TERMS,
     MEASURED_TERMS,
@@ -22,6 +21,7 @@ from genpolicy.evidence.stress.rollout import Rollout
 from genpolicy.evidence.stress.state import Fixture, Outcome
 from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.execution.journal import write_journal
+from genpolicy.feasibility.figures import expected_motion
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.documents import read_yaml
 from genpolicy.tasks.api import load_task

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 from gates.cause import Cause, CauseLimits, default_limits, name_cause
 from gates.cause.numbers import Counts, Kept, Labels, Numbers
+from genpolicy.audit.component_rows import ComponentModes
 from genpolicy.audit.rows import Finding, ModeOutcome, Stratum
 from genpolicy.audit.settings import AuditSettings
 
@@ -24,6 +25,13 @@ def limit(**changes: float) -> CauseLimits:
 STRATUM = Stratum("operator", "approach", 0.9, 0.9, 0.05, 0.0, 0.1, 100, True, False, "")
 
 
+def component(name: str, **changes) -> ComponentModes:
+    plain = ComponentModes(
+        name, "varies", "m", 0.03, 0.01, 0.01, 180, 0, 0, 0, 0, 0, followed=False
+    )
+    return replace(plain, **changes)
+
+
 HIDDEN = replace(STRATUM, p_adjusted=0.001, effect=0.8, effect_lower=0.6)
 
 
@@ -35,6 +43,13 @@ VALID = Numbers(
     modes=(
         ModeOutcome("m0", "approach", 40, 40, 0.91, 1.0, 50, 50),
         ModeOutcome("m1", "approach", 40, 39, 0.87, 1.0, 48, 50),
+    ),
+    components=(
+        component("position", clusters=120, two_mode=120, two_mode_episodes=45, followed=True),
+        component("rotation", unit="rad", separation=0.15),
+        component("gripper", state="hardly_varies", unit="strokes", separation=0.2),
+        component("other", state="absent", unit="strokes", separation=0.2, situations=0),
+        component("timing"),
     ),
 )  # fmt: skip
 

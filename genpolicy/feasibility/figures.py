@@ -1,0 +1,20 @@
+"""The figures of a cell that the independent checker holds executed rows against."""
+
+import numpy as np
+
+from genpolicy.feasibility.cell import Cell
+from genpolicy.verification.motion import ExpectedMotion
+
+
+def expected_motion(robot: Cell) -> ExpectedMotion:
+    """What the independent checker holds executed rows against: figures, none of the layers."""
+    limits, settings = robot.usable_limits, robot.settings
+    return ExpectedMotion(
+        scene_path=robot.kinematics.scene_path,
+        workspace_m=np.array([robot.workspace.lower_m, robot.workspace.upper_m]),
+        velocity_rad_s=limits.velocity_rad_s,
+        tcp_speed_m_s=settings.tcp_speed_limit_m_s,
+        tcp_turn_rad_s=settings.tcp_turn_limit_rad_s,
+        held_opening_m=settings.held_opening_m,
+        contact_phases=robot.contact_phases,
+    )
