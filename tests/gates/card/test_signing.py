@@ -85,5 +85,18 @@ def test_a_rehearsal_is_never_signed_and_never_valid(team):
         team.sign(team.complete(), ["rita"])
 
 
+def test_without_a_plan_nothing_is_signed_and_nothing_is_valid(team):
+    path = team.sign(team.complete(), PEOPLE)
+    assert team.judge().verdict == "PASS"
+    (team.root / "preregistration.yaml").unlink()
+    report = team.judge()
+    assert report.verdict == "FAIL"
+    red = {c.id: c.caveat for c in report.criteria if c.verdict != "PASS"}
+    assert "planned in writing" in red["signature_valid"]
+    path.unlink()
+    with pytest.raises(BadInputError, match="preregistration"):
+        team.sign(team.complete(), ["rita"])
+
+
 def test_the_shipped_allow_list_names_nobody(request):
     assert load_allow_list(request.config.rootpath).people == ()
