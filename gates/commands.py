@@ -134,7 +134,25 @@ def judge(letter: Letter, root: Root = Path()) -> int:
     return 0
 
 
-SIGN_EXAMPLE = "sign --card card.json --key my_key.pem --reviewer 'My Name'"
+@gates.command(epilog=examples("genpolicy gates preregister"))
+def preregister(root: Root = Path()) -> int:
+    """Write preregistration.yaml from params.yaml. Commit it, then run the ladder."""
+    from gates.preregistration import PREREGISTRATION, plan_bytes
+    from gates.proof import SPECS
+    from gates.report import stage_of
+    from gates.settings import read_params
+    from genpolicy.integrity.atomic import write_bytes
+
+    comparisons = {
+        stage_of(gate): {item.id: item.comparison for item in spec.criteria}
+        for gate, spec in SPECS.items()
+    }
+    write_bytes(root / PREREGISTRATION, plan_bytes(read_params(root), comparisons))
+    print(f"Wrote {PREREGISTRATION}. Commit it before the evidence exists.")
+    return 0
+
+
+SIGN_EXAMPLE = "sign --card card.json --key my_key.pem --reviewer my-id"
 
 
 @gates.command(epilog=examples(f"genpolicy gates {SIGN_EXAMPLE}"))
@@ -142,14 +160,24 @@ SIGN_EXAMPLE = "sign --card card.json --key my_key.pem --reviewer 'My Name'"
 def sign(
     card: Annotated[Path, typer.Option(help="Completed card, or an envelope to sign as well.")],
     key: Annotated[Path, typer.Option(help="Your private key, PEM, Ed25519.")],
-    reviewer: Annotated[str, typer.Option(help="Your name as on reviewers.yaml.")],
+    reviewer: Annotated[str, typer.Option(help="Your id on reviewers.yaml.")],
     root: Root = Path(),
 ) -> int:
-    """Add your signature to a trial card. Gates A to D are proved again before."""
+    """Add your signature to a trial card.
+
+    Before, gates A to D are proved again, the plan must have been committed
+    before the evidence, and a reviewer must not have committed to the candidate.
+    """
+    from gates.card.history import require_no_commit_of, require_registered_first
+    from gates.card.people import load_allow_list
     from gates.card.signing import sign_card
     from gates.proof import prove_chain
 
     prove_chain(root, "D")
+    require_registered_first(root)
+    person = load_allow_list(root).find(reviewer)
+    if person is not None:
+        require_no_commit_of(root, person)
     path = sign_card(root, card_file=card, key_file=key, reviewer=reviewer)
     print(f"Signed {path.name} as {reviewer}. Judge gate E again to see what is missing.")
     return 0
@@ -163,9 +191,12 @@ def verify_card(
     as_json: AsJson = False,
 ) -> int:
     """Judge gate E without writing. Exit 0 only for a valid, complete, signed card."""
+    from gates.card.history import require_registered_first
     from gates.proof import judge
 
     report = judge(root, "E", today=_day(today) if today else None)
+    if report.verdict == "PASS":
+        require_registered_first(root)
     if as_json:
         print(report.model_dump_json(indent=2))
     else:

@@ -14,6 +14,8 @@ from typing import Any
 from gates.criterion import Criterion, Measured
 from gates.evidence import Evidence, MissingEvidenceError
 from gates.pipeline import TASK_IDENTITY, basis_of, check_record, outputs_of
+from gates.preregistration import moved_caveats
+from gates.protection import require_protection
 from gates.report import (
     GATES,
     SCHEMA_VERSION,
@@ -90,17 +92,21 @@ def judge_gate(spec: GateSpec, root: Path) -> GateReport:
     """Report of a gate from the evidence and `params.yaml` below `root`; writes nothing.
 
     Raises:
-        ConfigError: The section is missing or wrong.
+        ConfigError: The section is missing or wrong, or looser than the code allows.
         IntegrityError: Evidence that is not what it claims to be.
     """
     params = read_params(root)
     settings = read_settings(params, stage_of(spec.gate), spec.settings)
+    said = require_protection(params, spec.gate)
+    if spec.gate == "D":
+        said = (*said, *moved_caveats(root, params))
     limits = read_limits(params, spec.gate, spec.criteria)
     names: Sequence[str] = ()
     caveats: Sequence[str] = ()
     if spec.below is not None:
         names, caveats = promoted_below(root, spec.below, getattr(settings, "candidates", ()))
     evidence = recorded_evidence(root, spec.gate)
+    caveats = (*caveats, *said)
     report = judge(spec, evidence, limits, settings, candidates=names, caveats=caveats)
     check_record(root, spec.gate, report.materials)
     return report

@@ -37,7 +37,7 @@ STAGES = (
 )  # fmt: skip
 SHARED = (
     "seed", "confidence", "task", "source", "horizons", "compute", "policy", "feasibility",
-    "execution",
+    "execution", "rehearsal",
 )  # fmt: skip
 
 

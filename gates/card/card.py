@@ -12,13 +12,15 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
+from gates.card.envelope import Simulated, beyond_simulation
+from gates.card.people import PersonId
 from gates.claim import CHECKPOINT_ONLY
 from gates.report import Gate, GateReport, Point, StrictModel, parse_section
 from gates.settings import GateSettings
 from genpolicy.errors import RefusedError
 from genpolicy.integrity.documents import canonical_json, parse_json
 
-CARD_SCHEMA_VERSION = 1
+CARD_SCHEMA_VERSION = 2
 DRAFT_PATH = "artifacts/card/card.json"
 CardName = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]{0,63}$")]
 
@@ -30,8 +32,11 @@ FIXED = (
     "candidate",
     "candidate_checkpoint_sha256",
     "robot_model",
-    "author",
+    "authors",
     "reports",
+    "workspace_lower_m",
+    "workspace_upper_m",
+    "speed_limit_m_s",
     "rollback",
 )
 ABORT_FROM = {
@@ -50,23 +55,15 @@ class CardSettings(GateSettings):
 
     Attributes:
         name: File name of the signed card: `cards/<name>.dsse.json`.
-        author: Who made the candidate; may not review it.
-        robot_model: The one robot model that the card is for.
+        authors: Who made the candidate, by identifier on the allow-list; they sign nothing.
         task: Name of the task.
-        workspace_lower_m: Lower corner of the reduced workspace, base frame. Shape (3,).
-        workspace_upper_m: Upper corner. Shape (3,).
-        speed_limit_m_s: Reduced speed of the tool.
     """
 
     homes: ClassVar[Mapping[str, str]] = {"task": "task.name"}
 
     name: CardName
-    author: str = Field(min_length=1)
-    robot_model: str = Field(min_length=1)
+    authors: tuple[PersonId, ...]
     task: str = Field(min_length=1)
-    workspace_lower_m: Point
-    workspace_upper_m: Point
-    speed_limit_m_s: float = Field(gt=0.0)
 
 
 class TrialCard(StrictModel):
@@ -75,7 +72,12 @@ class TrialCard(StrictModel):
     Empty text and None mean: a person has still to fill this in.
 
     Attributes:
+        robot_model: The one robot model that the card is for.
+        authors: Who made the candidate, by identifier on the allow-list.
         reports: SHA-256 of the reports of gates A to D.
+        workspace_lower_m: Lower corner of the workspace that was simulated, base frame. (3,).
+        workspace_upper_m: Upper corner. (3,).
+        speed_limit_m_s: Most for the speed of the tool, as simulated.
         force_limit_n: Contact force at which the trial stops, N; measured for this cell.
         force_limit_reason: Where the force limit comes from.
         spotter: Who stands at the stop.
@@ -93,11 +95,11 @@ class TrialCard(StrictModel):
     candidate: str
     candidate_checkpoint_sha256: str
     robot_model: str
-    author: str
+    authors: tuple[str, ...]
     reports: dict[str, str]
-    workspace_lower_m: Point | None
-    workspace_upper_m: Point | None
-    speed_limit_m_s: float | None
+    workspace_lower_m: Point
+    workspace_upper_m: Point
+    speed_limit_m_s: float
     force_limit_n: float | None
     force_limit_reason: str
     spotter: str
@@ -116,6 +118,7 @@ def draft_card(
     reports: Mapping[Gate, GateReport],
     hashes: Mapping[Gate, str],
     checkpoint: str,
+    simulated: Simulated,
 ) -> TrialCard:
     """Draft from the passed reports, with the fields of the reviewer left empty.
 
@@ -124,6 +127,7 @@ def draft_card(
         reports: Passed reports of gates A to D, as `gates.proof.admit` gives them.
         hashes: Their SHA-256.
         checkpoint: Hash of the promoted candidate's checkpoint, as Gate B pinned it.
+        simulated: Robot, workspace and speed that its rollouts were held to.
 
     Raises:
         RefusedError: Gate D promotes no one.
@@ -139,12 +143,12 @@ def draft_card(
         task=settings.task,
         candidate=candidate,
         candidate_checkpoint_sha256=checkpoint,
-        robot_model=settings.robot_model,
-        author=settings.author,
+        robot_model=simulated.robot,
+        authors=settings.authors,
         reports={str(gate): digest for gate, digest in sorted(hashes.items())},
-        workspace_lower_m=settings.workspace_lower_m,
-        workspace_upper_m=settings.workspace_upper_m,
-        speed_limit_m_s=settings.speed_limit_m_s,
+        workspace_lower_m=simulated.workspace_lower_m,
+        workspace_upper_m=simulated.workspace_upper_m,
+        speed_limit_m_s=simulated.speed_limit_m_s,
         force_limit_n=None,
         force_limit_reason="",
         spotter="",
@@ -195,55 +199,33 @@ def missing_fields(card: TrialCard) -> list[str]:
     return sorted({*empty, *blank, *short, *reports} - {"caveats"})
 
 
-def envelope_violations(card: TrialCard, draft: TrialCard, envelope: "Envelope") -> list[str]:
-    """Limits of the card that are looser than the simulated envelope, or impossible.
+def envelope_violations(card: TrialCard, draft: TrialCard, simulated: Simulated) -> list[str]:
+    """Limits of the card that are not those of the simulated envelope, or impossible.
 
-    Every comparison accepts with `margin >= 0`, so that NaN does not pass.
+    Workspace and speed are exactly those that the candidate's rollouts were held to: of another
+    box or speed, tighter ones too, nobody knows whether the policy works there. Every comparison
+    accepts with `<=`, so that NaN does not pass.
     """
-    bad = []
-    lower, upper = card.workspace_lower_m, card.workspace_upper_m
-    if lower is None or upper is None:
-        bad.append("workspace")
-    else:
-        for axis, low, high, floor, ceiling in zip(
-            "xyz",
-            lower,
-            upper,
-            envelope.workspace_lower_m,
-            envelope.workspace_upper_m,
-            strict=True,
-        ):
-            if not (low >= floor and high <= ceiling and high > low):
-                bad.append(f"workspace {axis}")
-    if card.speed_limit_m_s is None or not 0 < card.speed_limit_m_s <= envelope.speed_limit_m_s:
-        bad.append("speed_limit_m_s")
+    bad = beyond_simulation(simulated, card.candidate)
+    for name in ("workspace_lower_m", "workspace_upper_m", "speed_limit_m_s"):
+        if getattr(card, name) != getattr(simulated, name):
+            bad.append(f"{name} other than simulated")
+    if card.robot_model != simulated.robot:
+        bad.append("robot_model other than simulated")
     if card.force_limit_n is None or not card.force_limit_n > 0:
         bad.append("force_limit_n")
-    for name, limit in draft.abort_thresholds.items():
-        value = card.abort_thresholds.get(name)
-        if value is None or not 0 <= value <= limit:
+    for name in sorted({*ABORT_FROM, *draft.abort_thresholds}):
+        value, limit = card.abort_thresholds.get(name), draft.abort_thresholds.get(name)
+        if value is None or limit is None or not 0 <= value <= limit:
             bad.append(f"abort_thresholds.{name}")
     return bad
 
 
-class Envelope(StrictModel):
-    """What was simulated; the card must stay inside.
-
-    Attributes:
-        workspace_lower_m: Lower corner, base frame. Shape (3,).
-        workspace_upper_m: Upper corner. Shape (3,).
-        speed_limit_m_s: Speed of the tool.
-        maximum_days: Longest validity of a card.
-    """
-
-    workspace_lower_m: Point
-    workspace_upper_m: Point
-    speed_limit_m_s: float = Field(gt=0.0)
-    maximum_days: int = Field(gt=0)
-
-
 def validity(card: TrialCard, *, today: datetime.date, maximum_days: int) -> tuple[bool, str]:
-    """Whether the card is valid on a day, and the sentence that says why not."""
+    """Whether the card is valid on a day, and the sentence that says why not.
+
+    The first and the last day count: a card of one day begins and expires on it.
+    """
     if not all(re.fullmatch(r"\d{4}-\d{2}-\d{2}", t) for t in (card.not_before, card.expires)):
         return False, "not_before and expires must be days, YYYY-MM-DD"
     try:
@@ -253,7 +235,7 @@ def validity(card: TrialCard, *, today: datetime.date, maximum_days: int) -> tup
         return False, "not_before or expires is no day of the calendar"
     for wrong, text in (
         (last < first, "the card expires before it begins"),
-        ((last - first).days > maximum_days, f"valid for more than {maximum_days} days"),
+        ((last - first).days + 1 > maximum_days, f"valid for more than {maximum_days} days"),
         (today < first, f"valid only from {card.not_before}"),
         (today > last, f"expired on {card.expires}"),
     ):

@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from gates.card.card import CardSettings, TrialCard, draft_card, promoted
+from gates.card.envelope import simulated_envelope, was_judged
+from gates.evidence import Evidence
 from gates.report import Gate, GateReport
 from gates.settings import read_params, read_settings
 from genpolicy.errors import IntegrityError
@@ -22,11 +24,20 @@ def draft(root: Path, reports: Mapping[Gate, GateReport], hashes: Mapping[Gate, 
 
     Raises:
         ConfigError: Section `card` is missing or wrong.
-        IntegrityError: Gate B pinned no checkpoint of the promoted candidate.
+        IntegrityError: Gate B pinned no checkpoint of the promoted candidate, or no rollouts ran
+            inside an envelope.
         RefusedError: Gate D promotes no one.
     """
     settings = read_settings(read_params(root), "card", CardSettings)
     candidate = promoted(reports["D"])
+    simulated = simulated_envelope(Evidence(root))
+    if not was_judged(reports["D"], simulated.condition):
+        raise IntegrityError(
+            where="reports/gate_d.json: settings.perturbations",
+            found=f"without {simulated.condition!r}",
+            expected="the condition that ran inside the card's envelope",
+            action="Judge gate D again: `dvc repro gate_d`.",
+        )
     identity = read_json(root / IDENTITY)
     entry = identity.get(candidate) if isinstance(identity, dict) else None
     checkpoint = entry.get("checkpoint") if isinstance(entry, dict) else None
@@ -37,4 +48,4 @@ def draft(root: Path, reports: Mapping[Gate, GateReport], hashes: Mapping[Gate, 
             expected="the hash of the promoted checkpoint",
             action="Run `dvc repro reload`.",
         )
-    return draft_card(settings, reports, hashes, checkpoint)
+    return draft_card(settings, reports, hashes, checkpoint, simulated)

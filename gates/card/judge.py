@@ -14,7 +14,6 @@ from pydantic import Field
 from gates.card.card import (
     DRAFT_PATH,
     CardName,
-    Envelope,
     TrialCard,
     envelope_violations,
     missing_fields,
@@ -23,13 +22,13 @@ from gates.card.card import (
     validity,
 )
 from gates.card.drafting import IDENTITY
+from gates.card.envelope import ENVELOPE, simulated_envelope, was_judged
+from gates.card.people import ALLOW_LIST, load_allow_list
 from gates.card.signing import (
-    ALLOW_LIST,
     CARDS,
     SignedCard,
     conflicting_cards,
     independence,
-    load_allow_list,
     open_envelope,
     utc_today,
 )
@@ -37,9 +36,11 @@ from gates.criterion import Measured, criteria_of, criterion
 from gates.engine import GateSpec, judge, recorded_evidence
 from gates.evidence import Evidence, MissingEvidenceError
 from gates.pipeline import check_record
-from gates.report import OWNERS, Gate, GateReport, Point, stage_of
+from gates.preregistration import NONE, PREREGISTRATION, moved_caveats, read_plan
+from gates.protection import REHEARSED, is_rehearsal, require_protection
+from gates.report import OWNERS, Gate, GateReport, stage_of
 from gates.settings import GateSettings, read_limits, read_params, read_settings
-from genpolicy.errors import BadInputError, GenpolicyError
+from genpolicy.errors import BadInputError, GenpolicyError, IntegrityError
 from genpolicy.integrity.hashing import sha256_bytes_of
 
 
@@ -48,29 +49,13 @@ class CardGateSettings(GateSettings):
 
     Attributes:
         card: Name of the signed card: `cards/<card>.dsse.json`.
-        workspace_lower_m: Lower corner of the simulated workspace, base frame. Shape (3,).
-        workspace_upper_m: Upper corner. Shape (3,).
-        speed_limit_m_s: Simulated speed limit of the tool.
         maximum_days: Longest validity of a card.
     """
 
     homes: ClassVar[Mapping[str, str]] = {"card": "card.name"}
 
     card: CardName
-    workspace_lower_m: Point
-    workspace_upper_m: Point
-    speed_limit_m_s: float = Field(gt=0.0)
     maximum_days: int = Field(gt=0)
-
-    @property
-    def envelope(self) -> Envelope:
-        """What was simulated."""
-        return Envelope(
-            workspace_lower_m=self.workspace_lower_m,
-            workspace_upper_m=self.workspace_upper_m,
-            speed_limit_m_s=self.speed_limit_m_s,
-            maximum_days=self.maximum_days,
-        )
 
 
 @dataclass(frozen=True)
@@ -130,11 +115,13 @@ def judge_card(root: Path, chain: Chain, *, today: datetime.date | None = None) 
     """
     params = read_params(root)
     settings = read_settings(params, stage_of("E"), CardGateSettings)
+    caveats = (*require_protection(params, "E"), *moved_caveats(root, params))
     papers = examine(root, settings.card)
     error = chain.error or _chain_error(root, chain, papers.draft)
     dossier = Dossier(settings, papers, error, today or utc_today())
     limits = read_limits(params, "E", GATE.criteria)
-    report = judge(GATE, recorded_evidence(root, "E"), limits, settings, given=dossier)
+    evidence = recorded_evidence(root, "E")
+    report = judge(GATE, evidence, limits, settings, given=dossier, caveats=caveats)
     check_record(root, "E", report.materials)
     return report
 
@@ -160,6 +147,10 @@ def examine(root: Path, name: str) -> Papers:
             signed = open_envelope(root, data, where=path.name, allowed=allowed)
             if signed.card.name != name:
                 signed, refusal = None, "the card has another name than its file"
+            if read_plan(root) is None:
+                signed, refusal = None, NONE
+            if is_rehearsal(read_params(root)):
+                signed, refusal = None, REHEARSED
         except GenpolicyError as error:
             signed, refusal = None, str(error)
     return Papers(draft, present, signed, refusal)
@@ -178,6 +169,9 @@ def _chain_error(root: Path, chain: Chain, draft: TrialCard | None) -> str:
         candidate = promoted(chain.reports["D"])
         if draft is None:
             return f"{DRAFT_PATH} is missing or malformed"
+        simulated = simulated_envelope(Evidence(root))
+        if not was_judged(chain.reports["D"], simulated.condition):
+            return f"gate D did not judge the condition {simulated.condition!r} of the card"
         entry = Evidence(root).document(IDENTITY).get(candidate)
     except (MissingEvidenceError, GenpolicyError) as error:
         return str(error)
@@ -252,22 +246,22 @@ def signature_valid(evidence: Evidence, dossier: Dossier) -> Measured:
     found = _signed(dossier.papers, "sign the card")
     if isinstance(found, Measured):
         return found
-    names = ", ".join(f"{p.name} ({p.role})" for p in found.signers)
+    names = ", ".join(f"{p.id} ({p.role})" for p in found.signers)
     return Measured(1.0, caveat=f"signed by {names}, over this chain")
 
 
 @criterion(
     ">=",
-    question="Is the reviewer someone other than the author?",
+    question="Is the reviewer none of the authors, and does no author sign?",
     look_at="Find a reviewer who did not make the candidate.",
     always=True,
 )
 def reviewer_independent(evidence: Evidence, dossier: Dossier) -> Measured:
-    """1 if the named reviewer signed and is not the author, else 0."""
-    found = _signed(dossier.papers, "review by someone who is not the author")
+    """1 if the named reviewer signed and no signer is an author, else 0."""
+    found = _signed(dossier.papers, "review by someone who is no author")
     if isinstance(found, Measured):
         return found
-    independent, text = independence(found)
+    independent, text = independence(found, load_allow_list(evidence.root))
     return Measured(float(independent), caveat=text)
 
 
@@ -289,18 +283,22 @@ def owners_signed(evidence: Evidence, dossier: Dossier) -> Measured:
 
 @criterion(
     "<=",
-    question="How many limits are looser than what was simulated?",
-    look_at="Tighten the card; what was not simulated is not allowed.",
+    question="How many limits are not those that the rollouts were held to?",
+    look_at="Plan the card's envelope and run again; what was not simulated is not allowed.",
     always=True,
 )
 def envelope_within_limits(evidence: Evidence, dossier: Dossier) -> Measured:
-    """Limits of the card beyond the simulated envelope or the draft."""
+    """Limits of the card other than simulated or looser than the draft; commands beyond them."""
     found = _signed(dossier.papers, "complete the envelope")
     if isinstance(found, Measured):
         return found if found.pending else Measured(None, caveat=found.caveat)
     draft = _draft_of(dossier.papers)
-    bad = envelope_violations(found.card, draft, dossier.settings.envelope)
-    return Measured(float(len(bad)), caveat=", ".join(bad) or "inside what was simulated")
+    try:
+        simulated = simulated_envelope(evidence)
+    except IntegrityError as error:
+        raise MissingEvidenceError(str(error)) from error
+    bad = envelope_violations(found.card, draft, simulated)
+    return Measured(float(len(bad)), caveat=", ".join(bad) or "as simulated, and no command beyond")
 
 
 @criterion(
@@ -323,12 +321,19 @@ GATE = GateSpec(
     gate="E",
     settings=CardGateSettings,
     criteria=criteria_of(globals()),
-    bind=(DRAFT_PATH, f"{CARDS}/*.dsse.json", ALLOW_LIST, "reports/gate_[a-d].json"),
+    bind=(
+        DRAFT_PATH,
+        ENVELOPE,
+        PREREGISTRATION,
+        f"{CARDS}/*.dsse.json",
+        ALLOW_LIST,
+        "reports/gate_[a-d].json",
+    ),
     back_to="the reviewer",
     go_on="The card is valid. What happens on hardware is outside this project.",
     caveats=(
         "A signature says who answers for the card; it does not make the trial safe.",
-        "One person under two names on the allow-list is not detected; review that file.",
+        "One person under two keys on the allow-list is not detected; review that file.",
         "Revocation is by removing a key from the allow-list and judging again.",
     ),
 )

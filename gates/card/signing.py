@@ -13,54 +13,27 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey, Ed25519PublicKey
+from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 from cryptography.hazmat.primitives.serialization import load_pem_private_key
-from pydantic import Field
 from securesystemslib.dsse import Envelope as DsseEnvelope
 from securesystemslib.exceptions import VerificationError
 from securesystemslib.signer import CryptoSigner, SSlibKey  # type: ignore[attr-defined]
 
 from gates.card.card import FIXED, TrialCard, draft_path, missing_fields, read_card
-from gates.report import OWNERS, StrictModel, parse_section
-from genpolicy.errors import BadInputError, ConfigError, IntegrityError
+from gates.card.people import ALLOW_LIST, REVIEWER, AllowList, Person, dependence, load_allow_list
+from gates.preregistration import PREREGISTRATION, read_plan
+from gates.protection import is_rehearsal
+from gates.report import parse_section
+from gates.settings import PARAMS_FILE, read_params
+from genpolicy.errors import BadInputError, IntegrityError
 from genpolicy.integrity.atomic import write_bytes
-from genpolicy.integrity.documents import canonical_json, parse_json, read_yaml
+from genpolicy.integrity.documents import canonical_json, parse_json
 from genpolicy.integrity.hashing import sha256_bytes_of, sha256_file
 
 PAYLOAD_TYPE = "application/vnd.genpolicy.trial-card+json"
 STATEMENT_TYPE = "urn:genpolicy:statement:1"
 PREDICATE_TYPE = "urn:genpolicy:trial-card:1"
-ALLOW_LIST = "reviewers.yaml"
 CARDS = "cards"
-REVIEWER = "reviewer"
-ROLES = (REVIEWER, *OWNERS)
-
-
-class Person(StrictModel):
-    """Someone who may sign: one person, one role, one key.
-
-    Attributes:
-        name: Unique.
-        role: `reviewer` or one of the four owners.
-        public_key: Ed25519 public key, 64 hex digits.
-    """
-
-    name: str = Field(min_length=1)
-    role: str = Field(pattern=f"^({'|'.join(ROLES)})$")
-    public_key: str = Field(pattern=r"^[0-9a-f]{64}$")
-
-    @property
-    def key(self) -> SSlibKey:
-        """The public key, with the identifier that its bytes give it."""
-        return SSlibKey.from_crypto(
-            Ed25519PublicKey.from_public_bytes(bytes.fromhex(self.public_key))
-        )
-
-
-class AllowList(StrictModel):
-    """The committed file `reviewers.yaml`."""
-
-    people: tuple[Person, ...]
 
 
 @dataclass(frozen=True)
@@ -74,27 +47,6 @@ class SignedCard:
 
     card: TrialCard
     signers: tuple[Person, ...]
-
-
-def load_allow_list(root: Path) -> AllowList:
-    """People who may sign.
-
-    Raises:
-        ConfigError: Missing, malformed, or a name or key that appears twice.
-    """
-    found = parse_section(AllowList, read_yaml(root / ALLOW_LIST), where=ALLOW_LIST)
-    for what, values in (
-        ("name", [_plain(person.name) for person in found.people]),
-        ("public_key", [person.public_key for person in found.people]),
-    ):
-        if len(set(values)) != len(values):
-            raise ConfigError(
-                where=f"{ALLOW_LIST}: {what}",
-                found="the same value twice",
-                expected="one entry per person and key",
-                action="One person holds one role here; remove the double entry.",
-            )
-    return found
 
 
 def statement(root: Path, card: TrialCard) -> bytes:
@@ -166,19 +118,24 @@ def sign_card(root: Path, *, card_file: Path, key_file: Path, reviewer: str) -> 
         root: Repository root.
         card_file: A completed card (JSON), or an envelope that others have signed.
         key_file: The person's private key, PEM, Ed25519.
-        reviewer: The person's name as on the allow-list.
+        reviewer: The person's identifier on the allow-list.
 
     Returns:
         Path of the envelope, `cards/<name>.dsse.json`.
 
     Raises:
-        BadInputError: The person is not listed, the key is not theirs, the card is incomplete,
-            changed, self-reviewed, or stands against another card of the same name.
+        BadInputError: This is a rehearsal, the person is not listed or signed already, the key is
+            not theirs, the card is incomplete, changed, reviewed or owned by an author, or stands
+            against another card of the same name.
     """
+    if is_rehearsal(read_params(root)):
+        raise _bad(PARAMS_FILE, "a rehearsal", "a ladder whose limits protect people")
+    if read_plan(root) is None:
+        raise _bad(PREREGISTRATION, "missing or malformed", "a plan committed before the evidence")
     allowed = load_allow_list(root)
-    person = next((p for p in allowed.people if p.name == reviewer), None)
+    person = allowed.find(reviewer)
     if person is None:
-        raise _bad(ALLOW_LIST, f"without {reviewer!r}", "the name of a listed person")
+        raise _bad(ALLOW_LIST, f"without {reviewer!r}", "the id of a listed person")
     key = _private_key(key_file)
     if SSlibKey.from_crypto(key.public_key()).keyid != person.key.keyid:
         raise _bad("the private key", "another key", f"the key that {ALLOW_LIST} lists for them")
@@ -188,11 +145,13 @@ def sign_card(root: Path, *, card_file: Path, key_file: Path, reviewer: str) -> 
     if card_file.name.endswith(".dsse.json"):
         card = open_envelope(root, data, where=where, allowed=allowed).card
         payload, signatures = _parse_envelope(data, where)
+        if person.key.keyid in {entry["keyid"] for entry in signatures}:
+            raise _bad(where, f"signed by {person.id} already", "one signature of each person")
     else:
         card = read_card(data, where=where)
         _check_fixed(root, card, where)
         payload = statement(root, card)
-    _check_signable(card, person, where)
+    _check_signable(card, person, allowed, where)
     envelope = _dsse(payload, signatures, where)
     envelope.sign(CryptoSigner(key))
     target = root / CARDS / f"{card.name}.dsse.json"
@@ -202,17 +161,18 @@ def sign_card(root: Path, *, card_file: Path, key_file: Path, reviewer: str) -> 
     return target
 
 
-def independence(signed: SignedCard) -> tuple[bool, str]:
-    """Whether the named reviewer signed and is not the author."""
-    names = [person.name for person in signed.signers if person.role == REVIEWER]
+def independence(signed: SignedCard, allowed: AllowList) -> tuple[bool, str]:
+    """Whether the named reviewer signed and neither reviewer nor owners are authors."""
+    card = signed.card
+    names = [person.id for person in signed.signers if person.role == REVIEWER]
     if not names:
         return False, "no reviewer signed"
-    if signed.card.reviewer not in names:
+    if card.reviewer not in names:
         return False, "the reviewer named on the card did not sign"
-    author = _plain(signed.card.author)
-    if any(_plain(name) == author for name in names):
-        return False, "the author reviewed their own candidate"
-    return True, f"reviewed by {signed.card.reviewer}, candidate by {signed.card.author}"
+    why = dependence(card.reviewer, card.authors, signed.signers, allowed)
+    if why:
+        return False, why
+    return True, f"reviewed by {card.reviewer}, candidate by {', '.join(card.authors)}"
 
 
 def conflicting_cards(root: Path, name: str) -> list[str]:
@@ -226,14 +186,15 @@ def utc_today() -> datetime.date:
     return datetime.datetime.now(datetime.UTC).date()
 
 
-def _check_signable(card: TrialCard, person: Person, where: str) -> None:
+def _check_signable(card: TrialCard, person: Person, allowed: AllowList, where: str) -> None:
     missing = missing_fields(card)
     if missing:
         raise _bad(where, f"incomplete ({', '.join(missing)})", "every field filled by a person")
-    if person.role == REVIEWER and _plain(person.name) == _plain(card.author):
-        raise _bad(where, f"by {card.author}", "a reviewer who is not the author")
-    if person.role == REVIEWER and person.name != card.reviewer:
-        raise _bad(where, f"naming the reviewer {card.reviewer!r}", f"{person.name!r}")
+    if person.role == REVIEWER and person.id != card.reviewer:
+        raise _bad(where, f"naming the reviewer {card.reviewer!r}", f"{person.id!r}")
+    why = dependence(card.reviewer, card.authors, [person], allowed)
+    if why:
+        raise _bad(where, why, "people who did not make the candidate")
 
 
 def _check_fixed(root: Path, card: TrialCard, where: str) -> None:
@@ -295,10 +256,6 @@ def _private_key(path: Path) -> Ed25519PrivateKey:
     if not isinstance(key, Ed25519PrivateKey):
         raise _bad("the private key", type(key).__name__, "an Ed25519 key")
     return key
-
-
-def _plain(name: str) -> str:
-    return " ".join(name.split()).casefold()
 
 
 def _bad(where: str, found: str, expected: str) -> BadInputError:

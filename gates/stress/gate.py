@@ -11,6 +11,7 @@ from gates.claim import CHECKPOINT_ONLY
 from gates.criterion import Measured, criteria_of, criterion
 from gates.engine import Decision, GateSpec, Judged
 from gates.evidence import Evidence, MissingEvidenceError, flags
+from gates.preregistration import PREREGISTRATION
 from gates.stress import cost, safety, trial
 from gates.stress.choice import choose
 from gates.stress.pairs import paired_differences
@@ -73,7 +74,7 @@ GATE = GateSpec(
     gate="D",
     settings=StressSettings,
     criteria=criteria_of(vars(trial), vars(cost), vars(safety), globals()),
-    bind=(f"{STRESS}/journals/*.mcap",),
+    bind=(f"{STRESS}/journals/*.mcap", PREREGISTRATION),
     back_to="the simpler policy",
     go_on="Draft the trial card.",
     caveats=(

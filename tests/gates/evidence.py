@@ -16,6 +16,7 @@ from gates import pipeline
 from gates.cause import default_limits
 from gates.cause.limits import OWN
 from gates.feasibility.settings import LAYERS
+from gates.preregistration import PREREGISTRATION, plan_bytes
 from gates.reproducibility.timing import MEASURED_HERE, TERMS
 from genpolicy.audit.component_rows import ComponentModes
 from genpolicy.audit.rows import (
@@ -62,7 +63,7 @@ BASELINES = ("bc", "chunked_bc", "act")
 REMEDIES = {"chunked_l1": "direct", "one_mode_bc": "direct", "bc_noise": "offset"}
 DRAWN = "ibc"
 CANDIDATES = ("diffusion", "flow")
-CONDITIONS = ("nominal", "camera_delay", "recovery_drill")
+CONDITIONS = ("nominal", "camera_delay", "recovery_drill", "envelope")
 STARTS = 80
 INVOCATIONS = 20
 UPDATES = 4000
@@ -70,6 +71,21 @@ PNG = base64.b64decode(
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAAAAAA6fptVAAAACklEQVR4nGNgAAAAAgABSK+kcQAAAABJRU5ErkJggg=="
 )
 """The smallest grey picture: one pixel."""
+ENVELOPE = {
+    "condition": "envelope",
+    "workspace_lower_m": [0.35, -0.2, 0.03],
+    "workspace_upper_m": [0.7, 0.2, 0.25],
+    "speed_limit_m_s": 0.25,
+    "reached": {
+        method: {
+            "commands": 400,
+            "fastest_m_s": 0.25,
+            "lowest_m": [0.36, -0.18, 0.03],
+            "highest_m": [0.69, 0.2, 0.25],
+        }
+        for method in CANDIDATES
+    },
+}
 SPEED = {"diffusion": 0.02, "flow": 0.01}
 
 
@@ -215,9 +231,6 @@ PARAMS: dict[str, Any] = {
         ),
     },
     "gate_e": {
-        "workspace_lower_m": [0.3, -0.22, 0.02],
-        "workspace_upper_m": [0.72, 0.22, 0.28],
-        "speed_limit_m_s": 0.4,
         "maximum_days": 30,
         "limits": by_owner(
             upstream_passed=(1, "safety"),
@@ -231,11 +244,7 @@ PARAMS: dict[str, Any] = {
     },
     "card": {
         "name": "trial",
-        "author": "Ada Author",
-        "robot_model": "panda",
-        "workspace_lower_m": [0.35, -0.2, 0.03],
-        "workspace_upper_m": [0.7, 0.2, 0.25],
-        "speed_limit_m_s": 0.25,
+        "authors": ["ada"],
     },
 }
 
@@ -301,7 +310,16 @@ def replace(root: Path, path: str, data: bytes | None) -> None:
 def build(root: Path) -> None:
     """All evidence and settings, without any report."""
     write_params(root)
-    document(root, "task/identity.json", {"name": "tabletop_insertion"})
+    (root / PREREGISTRATION).write_bytes(plan_bytes(PARAMS, {}))
+    document(
+        root,
+        "task/identity.json",
+        {
+            "name": "tabletop_insertion",
+            "robot": "panda",
+            "workspace_m": [[0.3, -0.22, 0.02], [0.72, 0.22, 0.28]],
+        },
+    )
     _dataset(root)
     _audit(root)
     _baselines(root)
@@ -1080,6 +1098,7 @@ def _stress(root: Path) -> None:
             "journals": ["a.mcap"],
         },
     )
+    document(root, "stress/envelope.json", ENVELOPE)
     power = {"margin": 0.1, "alpha": 0.05, "pairs": STARTS}
     row = {"baseline_success": 0.5, "correlation": 0.6, "margin": 0.1, "pairs": STARTS}
     document(

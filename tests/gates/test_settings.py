@@ -115,7 +115,7 @@ def test_a_number_has_one_home():
     with pytest.raises(ConfigError, match=r"stress\.margin is missing"):
         read_settings(_params(lambda p: p["stress"].pop("margin")), "gate_d", SPECS["D"].settings)
     card = read_settings(_params(), "card", CardSettings)
-    assert (card.task, card.robot_model) == ("tabletop_insertion", "panda")
+    assert (card.task, card.authors) == ("tabletop_insertion", ("ada",))
 
 
 def test_conditions_are_the_undisturbed_one_and_more():

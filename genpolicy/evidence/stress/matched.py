@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.candidates.judged import JudgedPolicy
-from genpolicy.evidence.admission_context import make_checker
 from genpolicy.evidence.rows.stress import InvocationRow, RolloutRow, StressStubRow
 from genpolicy.evidence.shadow.session import Cell
+from genpolicy.evidence.stress.envelope import checker_under
 from genpolicy.evidence.stress.latency import LatencyModel
 from genpolicy.evidence.stress.perturbations import Perturbation
 from genpolicy.evidence.stress.rollout import Rollout
@@ -106,8 +106,11 @@ def run_shard(shard: Shard) -> ShardResult:
     task, policy = load_task(comparison.task), shard.judged.load()
     fixture = Fixture(
         task=task,
-        checker=make_checker(
-            task, comparison.feasibility, action_period_s=horizons.action_period_s
+        checker=checker_under(
+            shard.schedule,
+            task,
+            comparison.feasibility,
+            action_period_s=horizons.action_period_s,
         ),
         horizons=horizons,
         execution=comparison.cell.execution,

@@ -9,7 +9,7 @@ from abc import abstractmethod
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from genpolicy.contract.settings import Settings
 from genpolicy.seeds import stream
@@ -138,6 +138,26 @@ class RecoveryDrill(Settings):
     kind: Literal["recovery_drill"] = "recovery_drill"
 
 
+class ReducedEnvelope(Settings):
+    """Nothing is injected; all methods are held to the workspace and speed of the trial card.
+
+    Attributes:
+        workspace_lower_m: Lower corner of the reduced workspace, base frame. Shape (3,).
+        workspace_upper_m: Upper corner. Shape (3,).
+        speed_limit_m_s: Most for the TCP's speed.
+    """
+
+    kind: Literal["envelope"] = "envelope"
+    workspace_lower_m: tuple[float, float, float]
+    workspace_upper_m: tuple[float, float, float]
+    speed_limit_m_s: float = Field(gt=0.0)
+
+    @field_validator("workspace_lower_m", "workspace_upper_m", mode="before")
+    @classmethod
+    def _corner(cls, value: object) -> object:
+        return tuple(value) if isinstance(value, list) else value
+
+
 Perturbation = Annotated[
     Nominal
     | CameraDelay
@@ -146,7 +166,8 @@ Perturbation = Annotated[
     | QueueReorder
     | ChunkDrop
     | SidewaysPush
-    | RecoveryDrill,
+    | RecoveryDrill
+    | ReducedEnvelope,
     Field(discriminator="kind"),
 ]
 

@@ -5,8 +5,10 @@ from typing import Annotated
 from pydantic import Field, field_validator, model_validator
 
 from genpolicy.contract.settings import Settings
-from genpolicy.evidence.stress.perturbations import Perturbation
+from genpolicy.evidence.stress.perturbations import Perturbation, ReducedEnvelope
 
+ENVELOPE = "envelope"
+"""Name of the condition that runs inside the trial card's envelope, and its kind."""
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
@@ -38,6 +40,13 @@ class StressSettings(Settings):
     @classmethod
     def _pair(cls, value: object) -> object:
         return tuple(value) if isinstance(value, list) else value
+
+    @model_validator(mode="after")
+    def _one_envelope(self) -> "StressSettings":
+        for name, condition in self.perturbations.items():
+            if isinstance(condition, ReducedEnvelope) != (name == ENVELOPE):
+                raise ValueError(f"`{ENVELOPE}` is the name of the one condition of that kind")
+        return self
 
     @model_validator(mode="after")
     def _effect_beyond_margin(self) -> "StressSettings":

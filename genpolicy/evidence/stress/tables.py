@@ -20,9 +20,10 @@ from genpolicy.evidence.rows.stress import (
     StressStubRow,
 )
 from genpolicy.evidence.shadow.tables import account_rows, checker_document
+from genpolicy.evidence.stress.envelope import ENVELOPE_FILE, envelope_document, require_tighter
 from genpolicy.evidence.stress.latency import LatencyModel
 from genpolicy.evidence.stress.matched import Comparison, Shard, ShardResult, run_shard
-from genpolicy.evidence.stress.perturbations import Perturbation
+from genpolicy.evidence.stress.perturbations import Perturbation, ReducedEnvelope
 from genpolicy.evidence.stress.settings import StressSettings
 from genpolicy.feasibility.cell import cell_of
 from genpolicy.integrity.atomic import write_bytes
@@ -31,6 +32,7 @@ from genpolicy.integrity.rows import write_rows
 from genpolicy.seeds import stream
 from genpolicy.statistics.eprocess import power_table
 from genpolicy.tasks.api import load_task
+from genpolicy.verification.commands import reach_of
 
 AGE_LEVELS = (0.0, 0.05, 0.25, 0.5, 0.75, 0.9, 0.95, 0.99, 1.0)
 POWER_CORRELATION = 0.3
@@ -85,6 +87,19 @@ def write_stress(folder: Path, shards: Sequence[Shard], *, workers: int, schedul
     )
     checked = checker_document(journals, cell=comparison.cell, robot=robot)
     write_bytes(folder / "checker.json", canonical_json(checked))
+    _write_envelope(folder, shards)
+
+
+def _write_envelope(folder: Path, shards: Sequence[Shard]) -> None:
+    """`envelope.json`, where a condition ran inside the card's envelope."""
+    inside = [shard for shard in shards if isinstance(shard.schedule, ReducedEnvelope)]
+    if not inside:
+        return
+    reached = {shard.judged.name: reach_of(shard.journal) for shard in inside}
+    first = inside[0]
+    assert isinstance(first.schedule, ReducedEnvelope)
+    document = envelope_document(first.perturbation, first.schedule, reached)
+    write_bytes(folder / ENVELOPE_FILE, canonical_json(document))
 
 
 def plan_shards(
@@ -105,8 +120,12 @@ def plan_shards(
         journals: Folder of the journals.
 
     Raises:
-        ConfigError: A method whose latency was not measured.
+        ConfigError: A method whose latency was not measured, or an envelope that is looser
+            than the cell.
     """
+    for schedule in perturbations.values():
+        if isinstance(schedule, ReducedEnvelope):
+            require_tighter(schedule, load_task(comparison.task), comparison.feasibility)
     untimed = sorted({policy.name for policy in judged} - set(latency))
     if untimed:
         raise ConfigError(

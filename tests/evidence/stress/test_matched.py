@@ -10,7 +10,7 @@ from genpolicy.contract.normalisation import MinMax, Normalisation
 from genpolicy.errors import IntegrityError
 from genpolicy.evidence.shadow.session import Cell
 from genpolicy.evidence.stress.matched import Comparison, Shard, matched_starts, run_shard
-from genpolicy.evidence.stress.perturbations import NetworkJitter, Nominal
+from genpolicy.evidence.stress.perturbations import NetworkJitter, Nominal, ReducedEnvelope
 from genpolicy.execution.journal import read_journal
 from genpolicy.policies.checkpoint import Provenance
 from genpolicy.policies.policy import NetworkPolicy
@@ -20,6 +20,7 @@ from genpolicy.policies.windows import Windows
 from genpolicy.seeds import stream
 from genpolicy.tasks.api import WorldSettings
 from genpolicy.verification.checker import check_journal
+from genpolicy.verification.commands import reach_of
 from genpolicy.verification.rollouts import derived_rollouts, differences
 
 METHODS = {
@@ -208,3 +209,25 @@ def test_another_checkpoint_is_refused(shard):
     with pytest.raises(IntegrityError):
         run_shard(replace(plan, judged=replace(plan.judged, sha256="0" * 64)))
     assert not plan.journal.exists()
+
+
+def test_rollouts_inside_the_card_s_envelope_are_held_to_it(shard):
+    """A speed that binds: free rollouts exceed it, those of the condition do not."""
+    free = shard()
+    run_shard(free)
+    loose = reach_of(free.journal)
+    low, high = np.array(loose.lowest_m), np.array(loose.highest_m)
+    middle = 0.5 * (low[1] + high[1])
+    tight = ReducedEnvelope(
+        workspace_lower_m=(0.3, -0.22, 0.02),
+        workspace_upper_m=(0.72, float(middle), 0.24),
+        speed_limit_m_s=0.5 * loose.fastest_m_s,
+    )
+    inside = shard(perturbation="envelope", schedule=tight)
+    result = run_shard(inside)
+    reached = reach_of(inside.journal)
+    assert loose.commands > 0 and reached.commands > 0
+    assert loose.fastest_m_s > tight.speed_limit_m_s and high[1] > middle
+    assert reached.fastest_m_s <= tight.speed_limit_m_s * (1 + 1e-9)
+    assert reached.highest_m[1] <= middle + 1e-9
+    assert result.stub.invalid == 0 and check_journal(inside.journal).violations == []

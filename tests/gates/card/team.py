@@ -17,20 +17,21 @@ TODAY = datetime.date(2026, 11, 21)
 
 
 PEOPLE = {
-    "Rita Reviewer": "reviewer",
-    "Mo Model": "model",
-    "Pia Perception": "perception",
-    "Col Controller": "controller",
-    "Sam Safety": "safety",
+    "rita": "reviewer",
+    "mo": "model",
+    "pia": "perception",
+    "col": "controller",
+    "sam": "safety",
 }
+AUTHORS = {"ada": "author"}
 
 
 FILLED = {
     "force_limit_n": 30.0,
     "force_limit_reason": "measured at this cell",
-    "spotter": "Sam Safety",
+    "spotter": "sam",
     "stop_path": "hand button to drive enable",
-    "reviewer": "Rita Reviewer",
+    "reviewer": "rita",
     "not_before": "2026-11-20",
     "expires": "2026-11-30",
     "nonce": "0123456789abcdef0",
@@ -42,7 +43,7 @@ class Team:
 
     def __init__(self, root):
         self.root = root
-        self.keys = {name: Ed25519PrivateKey.generate() for name in [*PEOPLE, "Ada Author", "Eve"]}
+        self.keys = {name: Ed25519PrivateKey.generate() for name in [*PEOPLE, "ada", "eve"]}
         self.folder = root.parent / "keys"
         self.folder.mkdir(exist_ok=True)
         for name, key in self.keys.items():
@@ -52,11 +53,17 @@ class Team:
                 serialization.NoEncryption(),
             )
             (self.folder / name).write_bytes(pem)
-        self.allow(PEOPLE)
+        self.allow({**PEOPLE, **AUTHORS})
 
     def allow(self, people):
         entries = [
-            {"name": n, "role": r, "public_key": self.keys[n].public_key().public_bytes_raw().hex()}
+            {
+                "id": n,
+                "name": n.title(),
+                "role": r,
+                "public_key": self.keys[n].public_key().public_bytes_raw().hex(),
+                "emails": [f"{n}@example.org"],
+            }
             for n, r in people.items()
         ]
         (self.root / "reviewers.yaml").write_text(yaml.safe_dump({"people": entries}))

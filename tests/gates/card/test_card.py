@@ -1,32 +1,126 @@
-"""The card: limits checked on every side."""
+"""The card: limits checked on every side, and days at their borders."""
 
-import evidence
+import datetime
+
+import pytest
+from evidence import edit_document
 from team import FILLED
 
-from gates.card.card import Envelope, TrialCard, envelope_violations
+from gates.card.card import TrialCard, envelope_violations, missing_fields, validity
+from gates.card.envelope import beyond_simulation, simulated_envelope
 from gates.card.signing import read_draft
+from gates.evidence import Evidence
+from genpolicy.errors import IntegrityError
 
 
-def test_limits_are_checked_on_every_side(team):
-    draft = read_draft(team.root)
-    section = evidence.PARAMS["gate_e"]
-    envelope = Envelope(
-        workspace_lower_m=tuple(section["workspace_lower_m"]),
-        workspace_upper_m=tuple(section["workspace_upper_m"]),
-        speed_limit_m_s=section["speed_limit_m_s"],
-        maximum_days=30,
-    )
-    good = TrialCard.model_validate(
-        {**draft.model_dump(), **{k: v for k, v in FILLED.items() if k != "reviewer"}}
-    )
-    assert envelope_violations(good, draft, envelope) == []
+@pytest.fixture
+def draft(team):
+    return read_draft(team.root)
+
+
+@pytest.fixture
+def simulated(team):
+    return simulated_envelope(Evidence(team.root))
+
+
+@pytest.fixture
+def card(draft):
+    return TrialCard.model_validate({**draft.model_dump(), **FILLED})
+
+
+def test_a_card_allows_exactly_what_was_simulated(draft, simulated, card):
+    assert envelope_violations(card, draft, simulated) == []
     for change in (
         {"workspace_lower_m": (0.2, -0.2, 0.03)},
-        {"workspace_lower_m": (0.71, -0.2, 0.03)},
-        {"workspace_lower_m": None},
-        {"speed_limit_m_s": None},
-        {"speed_limit_m_s": 0.0},
+        {"workspace_lower_m": (0.36, -0.2, 0.03)},
+        {"workspace_upper_m": (0.7, 0.2, float("nan"))},
+        {"speed_limit_m_s": 0.24},
+        {"speed_limit_m_s": float("nan")},
+        {"robot_model": "fr3"},
+        {"force_limit_n": None},
+        {"force_limit_n": float("nan")},
+        {"candidate": "another"},
         {"abort_thresholds": {}},
         {"abort_thresholds": {**draft.abort_thresholds, "latency_s": -1.0}},
     ):
-        assert envelope_violations(good.model_copy(update=change), draft, envelope), change
+        assert envelope_violations(card.model_copy(update=change), draft, simulated), change
+
+
+def test_a_threshold_that_the_draft_lacks_is_missing_on_the_card(draft, simulated, card):
+    for name in draft.abort_thresholds:
+        less = {key: value for key, value in draft.abort_thresholds.items() if key != name}
+        changed = draft.model_copy(update={"abort_thresholds": less})
+        bad = envelope_violations(card, changed, simulated)
+        assert bad == [f"abort_thresholds.{name}"]
+    empty = {"abort_thresholds": {}}
+    bad = envelope_violations(
+        card.model_copy(update=empty), draft.model_copy(update=empty), simulated
+    )
+    assert len(bad) == len(draft.abort_thresholds) > 0
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "text"),
+    [
+        ("commands", 0, "was not run"),
+        ("fastest_m_s", 0.251, "0.251 m/s"),
+        ("fastest_m_s", None, "nan m/s"),
+        ("lowest_m", [0.34, -0.18, 0.03], "in x"),
+        ("highest_m", [0.69, 0.201, 0.25], "in y"),
+    ],
+)
+def test_commands_beyond_the_envelope_void_it(team, key, value, text):
+    def change(document):
+        document["reached"]["flow"][key] = value
+
+    edit_document(team.root, "stress/envelope.json", change)
+    simulated = simulated_envelope(Evidence(team.root))
+    assert any(text in found for found in beyond_simulation(simulated, "flow"))
+    assert beyond_simulation(simulated, "diffusion") == []
+    assert "was not run" in beyond_simulation(simulated, "another")[0]
+
+
+def test_an_envelope_looser_than_the_task_is_none(team):
+    def change(identity):
+        identity["workspace_m"][1][2] = 0.24
+
+    edit_document(team.root, "task/identity.json", change)
+    found = beyond_simulation(simulated_envelope(Evidence(team.root)), "flow")
+    assert found == ["workspace z not inside the task's"]
+
+
+@pytest.mark.parametrize("missing", ["stress/envelope.json", "task/identity.json"])
+def test_without_rollouts_inside_an_envelope_there_is_no_card(team, missing):
+    (team.root / "artifacts" / missing).unlink()
+    with pytest.raises(IntegrityError, match="no envelope"):
+        simulated_envelope(Evidence(team.root))
+    report = team.judge()
+    assert report.verdict in ("FAIL", "INCONCLUSIVE")
+    assert {c.id for c in report.criteria if c.verdict == "FAIL"} >= {"upstream_passed"}
+
+
+SAID = [name for name in TrialCard.model_fields if name not in ("caveats", "schema_version")]
+
+
+@pytest.mark.parametrize("name", SAID)
+def test_every_field_but_the_caveats_is_required(card, name):
+    assert missing_fields(card) == []
+    value = getattr(card, name)
+    if not isinstance(value, float) and not name.startswith("workspace"):
+        for empty in {str: ["", "  "], dict: [{}], tuple: [()]}[type(value)]:
+            assert missing_fields(card.model_copy(update={name: empty})) == [name]
+    if name == "force_limit_n":
+        assert missing_fields(card.model_copy(update={name: None})) == [name]
+
+
+def test_both_days_count(card):
+    def on(day, first="2026-11-01", last="2026-11-30", days=30):
+        dated = card.model_copy(update={"not_before": first, "expires": last})
+        return validity(dated, today=datetime.date.fromisoformat(day), maximum_days=days)[0]
+
+    assert on("2026-11-01") and on("2026-11-30")
+    assert not on("2026-10-31") and not on("2026-12-01")
+    assert on("2026-11-05", days=30) and not on("2026-11-05", days=29)
+    assert not on("2026-11-05", last="2026-12-01")
+    assert on("2026-11-05", "2026-11-05", "2026-11-05", 1)
+    assert not on("2026-11-05", "2026-11-06", "2026-11-05")

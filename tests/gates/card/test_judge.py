@@ -6,7 +6,10 @@ import json
 
 import evidence
 import pytest
-from team import PEOPLE
+from team import AUTHORS, PEOPLE
+
+from genpolicy.integrity.documents import canonical_json
+from genpolicy.integrity.hashing import sha256_file
 
 
 @pytest.fixture
@@ -82,14 +85,55 @@ def _second_card(team):
 
 def _impostor(team):
     data = base64.b64decode(json.loads(team.envelope.read_bytes())["payload"])
-    names = ["Eve", *list(PEOPLE)[1:]]
-    team.write(data, names, keyid_of={"Eve": "Rita Reviewer"})
+    names = ["eve", *list(PEOPLE)[1:]]
+    team.write(data, names, keyid_of={"eve": "rita"})
 
 
-def _self_review(team):
-    team.allow({**{n: r for n, r in PEOPLE.items() if r != "reviewer"}, "Ada Author": "reviewer"})
-    names = [*list(PEOPLE)[1:], "Ada Author"]
-    team.forge(_edit(reviewer="Ada Author"), names)
+def _allowing(**roles):
+    """The team's list with other roles, or without people (None)."""
+    people = {**PEOPLE, **AUTHORS, **roles}
+    return {name: role for name, role in people.items() if role}
+
+
+def _author_reviews(team):
+    team.allow(_allowing(ada="reviewer", rita=None))
+    team.forge(_edit(reviewer="ada"), ["ada", *list(PEOPLE)[1:]])
+
+
+def _author_owns(team):
+    """The model owner is named as an author in the settings, the draft and the card."""
+    _authors(team, ["ada", "mo"])
+
+
+def _authors(team, names):
+    """As if the settings, the draft and the card all named these authors."""
+    _redraft(team, authors=names)
+
+
+def _resubject(team, **changes):
+    """A payload that signs the draft as it lies there now."""
+
+    def change(statement):
+        statement["predicate"].update(changes)
+        for subject in statement["subject"]:
+            if subject["name"].endswith("card.json"):
+                subject["digest"]["sha256"] = sha256_file(team.root / subject["name"])
+        return statement
+
+    return change
+
+
+def _redraft(team, **changes):
+    """Another draft, and a card that was signed over it."""
+    path = team.root / "artifacts/card/card.json"
+    path.write_bytes(canonical_json({**json.loads(path.read_bytes()), **changes}))
+    evidence.record(team.root)
+    team.forge(_resubject(team, **changes))
+
+
+def _looser(**changes):
+    """A card and its draft that allow more than was simulated."""
+    return lambda team: _redraft(team, **changes)
 
 
 def _other_draft(root):
@@ -105,36 +149,66 @@ FORGERIES = {
     "signatures removed": (_document(lambda d: d.update(signatures=[])), "signature_valid"),
     "duplicate JSON key": (_duplicate_key, "signature_valid"),
     "empty file": (lambda t: t.envelope.write_bytes(b""), "signature_valid"),
-    "key not on the list": (
-        lambda t: t.allow({n: r for n, r in PEOPLE.items() if n != "Rita Reviewer"}),
-        "signature_valid",
-    ),
+    "key not on the list": (lambda t: t.allow(_allowing(rita=None)), "signature_valid"),
     "another key under a listed name": (_impostor, "signature_valid"),
-    "author reviews": (_self_review, "reviewer_independent"),
+    "author reviews": (_author_reviews, "reviewer_independent"),
+    "an author is an owner": (_author_owns, "reviewer_independent"),
+    "an author whom nobody knows": (lambda t: _authors(t, ["nobody"]), "reviewer_independent"),
+    "no author": (lambda t: _authors(t, []), "reviewer_independent"),
+    "an author signs as well": (
+        lambda t: t.forge(lambda s: s, [*PEOPLE, "ada"]),
+        "reviewer_independent",
+    ),
+    "reviewer named who has another role": (
+        lambda t: t.forge(_edit(reviewer="sam")),
+        "reviewer_independent",
+    ),
     "named reviewer did not sign": (
         lambda t: t.forge(lambda s: s, list(PEOPLE)[1:]),
         "reviewer_independent",
     ),
     "an owner is missing": (lambda t: t.forge(lambda s: s, list(PEOPLE)[:-1]), "owners_signed"),
-    "card of another candidate": (lambda t: t.forge(_edit(candidate="flow")), "signature_valid"),
+    "card of another candidate": (lambda t: t.forge(_edit(candidate="another")), "signature_valid"),
     "card of another checkpoint": (
         lambda t: t.forge(_edit(candidate_checkpoint_sha256="0" * 64)),
         "signature_valid",
     ),
     "card of another robot": (lambda t: t.forge(_edit(robot_model="fr3")), "signature_valid"),
-    "another author on the card": (lambda t: t.forge(_edit(author="Someone")), "signature_valid"),
+    "other authors on the card": (lambda t: t.forge(_edit(authors=["mo"])), "signature_valid"),
     "subject of another chain": (lambda t: t.forge(_subject), "signature_valid"),
     "force limit empty": (lambda t: t.forge(_edit(force_limit_n=None)), "draft_complete"),
     "force limit zero": (lambda t: t.forge(_edit(force_limit_n=0.0)), "envelope_within_limits"),
     "spotter blank": (lambda t: t.forge(_edit(spotter="  ")), "draft_complete"),
-    "faster than simulated": (
-        lambda t: t.forge(_edit(speed_limit_m_s=0.5)),
-        "envelope_within_limits",
-    ),
+    "faster than the draft": (lambda t: t.forge(_edit(speed_limit_m_s=0.2501)), "signature_valid"),
+    "slower than simulated": (_looser(speed_limit_m_s=0.2), "envelope_within_limits"),
+    "faster than simulated": (_looser(speed_limit_m_s=0.2501), "envelope_within_limits"),
     "workspace beyond the simulated one": (
-        lambda t: t.forge(_edit(workspace_upper_m=[0.9, 0.2, 0.25])),
+        _looser(workspace_upper_m=[0.71, 0.2, 0.25]),
         "envelope_within_limits",
     ),
+    "workspace smaller than simulated": (
+        _looser(workspace_lower_m=[0.4, -0.2, 0.03]),
+        "envelope_within_limits",
+    ),
+    "robot that was not simulated": (_looser(robot_model="fr3"), "envelope_within_limits"),
+    "no abort thresholds at all": (_looser(abort_thresholds={}), "envelope_within_limits"),
+    "no abort thresholds, incomplete": (
+        lambda t: t.forge(_edit(abort_thresholds={})),
+        "draft_complete",
+    ),
+    "rollback empty": (_looser(rollback=""), "draft_complete"),
+    "task empty": (_looser(task=" "), "draft_complete"),
+    "another rollback": (lambda t: t.forge(_edit(rollback="go on")), "signature_valid"),
+    "another task": (lambda t: t.forge(_edit(task="other")), "signature_valid"),
+    "a draft of other reports": (
+        _looser(reports=dict.fromkeys("ABCD", "0" * 64)),
+        "upstream_passed",
+    ),
+    "a draft of another checkpoint": (
+        _looser(candidate_checkpoint_sha256="0" * 64),
+        "upstream_passed",
+    ),
+    "a draft of another candidate": (_looser(candidate="another"), "upstream_passed"),
     "abort threshold raised": (
         lambda t: t.forge(_edit(abort_thresholds={"latency_s": 9.0})),
         "envelope_within_limits",

@@ -1,11 +1,13 @@
 """Trial card and Gate E: pending until people sign; forged cards are refused (P21)."""
 
+import json
+
 import pytest
-import yaml
 from team import PEOPLE
 
 from gates.card.signing import load_allow_list, sign_card
-from genpolicy.errors import BadInputError, ConfigError
+from genpolicy.errors import BadInputError
+from genpolicy.integrity.documents import canonical_json
 
 
 def test_signing_in_turns_waits_for_the_last_owner(team):
@@ -19,10 +21,10 @@ def test_signing_in_turns_waits_for_the_last_owner(team):
 @pytest.mark.parametrize(
     ("changes", "name", "text"),
     [
-        ({"force_limit_n": None}, "Rita Reviewer", "incomplete"),
-        ({"candidate": "flow"}, "Rita Reviewer", "candidate"),
-        ({"reviewer": "Someone Else"}, "Rita Reviewer", "Someone Else"),
-        ({}, "Eve", "listed person"),
+        ({"force_limit_n": None}, "rita", "incomplete"),
+        ({"candidate": "another"}, "rita", "candidate"),
+        ({"reviewer": "Someone Else"}, "rita", "Someone Else"),
+        ({}, "eve", "listed person"),
     ],
 )
 def test_signing_refuses_what_cannot_pass(team, changes, name, text):
@@ -36,17 +38,64 @@ def test_signing_with_another_persons_key_is_refused(team):
         sign_card(
             team.root,
             card_file=team.complete(),
-            key_file=team.folder / "Eve",
-            reviewer="Rita Reviewer",
+            key_file=team.folder / "eve",
+            reviewer="rita",
         )
 
 
-def test_one_person_cannot_hold_two_roles(team):
-    entry = yaml.safe_load((team.root / "reviewers.yaml").read_text())["people"]
-    for twin in ({**entry[0], "name": "Other"}, {**entry[0], "public_key": "ab" * 32}):
-        (team.root / "reviewers.yaml").write_text(yaml.safe_dump({"people": [*entry, twin]}))
-        with pytest.raises(ConfigError, match="twice"):
-            load_allow_list(team.root)
+def test_nobody_signs_twice(team):
+    path = team.sign(team.complete(), ["rita"])
+    with pytest.raises(BadInputError, match="signed by rita already"):
+        team.sign(path, ["rita"])
+
+
+@pytest.mark.parametrize("authors", [["ada", "rita"], ["rita"], [], ["nobody"]])
+def test_a_reviewer_who_made_the_candidate_cannot_sign(team, authors):
+    _redraft(team, authors)
+    with pytest.raises(BadInputError, match="author"):
+        team.sign(team.complete(authors=authors), ["rita"])
+
+
+def test_neither_an_owner_who_made_the_candidate_nor_an_author_can_sign(team):
+    with pytest.raises(BadInputError, match="ada is an author and signs"):
+        team.sign(team.complete(), ["ada"])
+    _redraft(team, ["mo"])
+    with pytest.raises(BadInputError, match="mo is an author and signs"):
+        team.sign(team.complete(authors=["mo"]), ["rita", "mo"])
+
+
+def _redraft(team, authors):
+    path = team.root / "artifacts/card/card.json"
+    path.write_bytes(canonical_json({**json.loads(path.read_bytes()), "authors": authors}))
+
+
+def test_a_rehearsal_is_never_signed_and_never_valid(team):
+    path = team.sign(team.complete(), PEOPLE)
+    assert team.judge().verdict == "PASS"
+    params = team.root / "params.yaml"
+    params.write_text("rehearsal: true\n" + params.read_text())
+    report = team.judge()
+    assert report.verdict == "FAIL"
+    red = {c.id: c.caveat for c in report.criteria if c.verdict != "PASS"}
+    assert "rehearsal" in red["signature_valid"]
+    assert any("rehearsal" in caveat for caveat in report.caveats)
+    path.unlink()
+    assert team.judge().verdict == "PENDING_REVIEW"
+    with pytest.raises(BadInputError, match="rehearsal"):
+        team.sign(team.complete(), ["rita"])
+
+
+def test_without_a_plan_nothing_is_signed_and_nothing_is_valid(team):
+    path = team.sign(team.complete(), PEOPLE)
+    assert team.judge().verdict == "PASS"
+    (team.root / "preregistration.yaml").unlink()
+    report = team.judge()
+    assert report.verdict == "FAIL"
+    red = {c.id: c.caveat for c in report.criteria if c.verdict != "PASS"}
+    assert "planned in writing" in red["signature_valid"]
+    path.unlink()
+    with pytest.raises(BadInputError, match="preregistration"):
+        team.sign(team.complete(), ["rita"])
 
 
 def test_the_shipped_allow_list_names_nobody(request):

@@ -1,0 +1,96 @@
+"""The envelope that a card may allow: the one that the comparison ran inside, and nothing else."""
+
+import math
+
+from gates.evidence import Evidence, MissingEvidenceError
+from gates.pipeline import TASK_IDENTITY
+from gates.report import GateReport, Point, StrictModel, parse_section
+from genpolicy.errors import IntegrityError
+
+ENVELOPE = "artifacts/stress/envelope.json"
+"""Written by the comparison: the limits of the condition, and how far its commands went."""
+ROUNDING = 1e-6
+"""Of a position in m, and of a speed as a share: what rounding of commands may add."""
+
+
+class Reached(StrictModel):
+    """How far the commands of one method went, read from its journal; None without commands."""
+
+    commands: int
+    fastest_m_s: float | None
+    lowest_m: Point | None
+    highest_m: Point | None
+
+
+class _Condition(StrictModel):
+    condition: str
+    workspace_lower_m: Point
+    workspace_upper_m: Point
+    speed_limit_m_s: float
+    reached: dict[str, Reached]
+
+
+class Simulated(_Condition):
+    """What the rollouts were held to.
+
+    Attributes:
+        condition: Name of the planned condition.
+        workspace_lower_m: Lower corner, base frame. Shape (3,).
+        workspace_upper_m: Upper corner. Shape (3,).
+        speed_limit_m_s: Most for the speed of the TCP.
+        reached: By method.
+        robot: Name of the robot in the scene.
+        task_lower_m: Lower corner of the task's own workspace. Shape (3,).
+        task_upper_m: Upper corner. Shape (3,).
+    """
+
+    robot: str
+    task_lower_m: Point
+    task_upper_m: Point
+
+
+def simulated_envelope(evidence: Evidence) -> Simulated:
+    """The envelope of the comparison, with robot and workspace of the task's identity.
+
+    Raises:
+        IntegrityError: No condition ran inside an envelope, or a document of another form.
+    """
+    try:
+        document, identity = evidence.document(ENVELOPE), evidence.document(TASK_IDENTITY)
+        lower, upper = identity["workspace_m"]
+        task = {"robot": identity["robot"], "task_lower_m": lower, "task_upper_m": upper}
+        return parse_section(Simulated, {**document, **task}, where=ENVELOPE)
+    except (MissingEvidenceError, KeyError, TypeError, ValueError) as error:
+        raise IntegrityError(
+            where=ENVELOPE,
+            found=f"no envelope ({error})",
+            expected="rollouts inside the card's envelope, and the task's identity",
+            action="Plan the condition `envelope` in `stress.perturbations`; run `dvc repro`.",
+        ) from error
+
+
+def was_judged(report: GateReport, condition: str) -> bool:
+    """Whether Gate D held its criteria against the condition."""
+    return condition in report.settings.get("perturbations", ())
+
+
+def beyond_simulation(simulated: Simulated, candidate: str) -> list[str]:
+    """Where the envelope is looser than the task, or the candidate's commands left it."""
+    bad = []
+    lower, upper = simulated.workspace_lower_m, simulated.workspace_upper_m
+    limits = zip("xyz", simulated.task_lower_m, lower, upper, simulated.task_upper_m, strict=True)
+    for axis, floor, low, high, ceiling in limits:
+        if not floor <= low < high <= ceiling:
+            bad.append(f"workspace {axis} not inside the task's")
+    reached = simulated.reached.get(candidate)
+    if reached is None or not reached.commands > 0:
+        return [*bad, f"{candidate} was not run inside the envelope"]
+    fastest = math.nan if reached.fastest_m_s is None else reached.fastest_m_s
+    if not 0 <= fastest <= simulated.speed_limit_m_s * (1 + ROUNDING):
+        bad.append(f"commands at {fastest:.4g} m/s inside the envelope")
+    for axis, low, high, least, most in zip(
+        "xyz", lower, upper, reached.lowest_m or (), reached.highest_m or (), strict=True
+    ):
+        if not low - ROUNDING <= least <= most <= high + ROUNDING:
+            bad.append(f"commands outside the workspace in {axis}")
+    return bad

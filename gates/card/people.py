@@ -1,0 +1,116 @@
+"""Who may sign: the allow-list `reviewers.yaml`, and who is independent of whom.
+
+A person is an identifier and a key of that list. Names are for reading: two names that look alike,
+or one name spelt in two ways, decide nothing.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
+from pydantic import Field
+from securesystemslib.signer import SSlibKey  # type: ignore[attr-defined]
+
+from gates.card.keys import key_weakness
+from gates.report import OWNERS, StrictModel, parse_section
+from genpolicy.errors import ConfigError
+from genpolicy.integrity.documents import read_yaml
+
+ALLOW_LIST = "reviewers.yaml"
+REVIEWER, AUTHOR = "reviewer", "author"
+ROLES = (REVIEWER, *OWNERS, AUTHOR)
+PersonId = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9._-]{0,63}$")]
+"""ASCII, so that no two of them look alike by accident of spelling."""
+Email = Annotated[str, Field(pattern=r"^[!-?A-~]+@[a-z0-9.-]+$")]
+
+
+class Person(StrictModel):
+    """One person, one role, one key.
+
+    Attributes:
+        id: Identifies the person, here and on the card.
+        name: For reading.
+        role: `reviewer`, one of the four owners, or `author` (made the candidate; signs nothing).
+        public_key: Ed25519 public key, 64 hex digits.
+        emails: Addresses under which the person commits.
+    """
+
+    id: PersonId
+    name: str = Field(min_length=1)
+    role: str = Field(pattern=f"^({'|'.join(ROLES)})$")
+    public_key: str = Field(pattern=r"^[0-9a-f]{64}$")
+    emails: tuple[Email, ...] = ()
+
+    @property
+    def key(self) -> SSlibKey:
+        """The public key, with the identifier that its bytes give it."""
+        return SSlibKey.from_crypto(
+            Ed25519PublicKey.from_public_bytes(bytes.fromhex(self.public_key))
+        )
+
+
+class AllowList(StrictModel):
+    """The committed file `reviewers.yaml`."""
+
+    people: tuple[Person, ...]
+
+    def find(self, identifier: str) -> Person | None:
+        """The person of that identifier."""
+        return next((person for person in self.people if person.id == identifier), None)
+
+
+def load_allow_list(root: Path) -> AllowList:
+    """People who may sign.
+
+    Raises:
+        ConfigError: Missing, malformed, a weak key, or an identifier, key or address that appears
+            twice.
+    """
+    found = parse_section(AllowList, read_yaml(root / ALLOW_LIST), where=ALLOW_LIST)
+    for what, values in (
+        ("id", [person.id for person in found.people]),
+        ("public_key", [person.public_key for person in found.people]),
+        ("emails", [mail.casefold() for person in found.people for mail in person.emails]),
+    ):
+        if len(set(values)) != len(values):
+            raise ConfigError(
+                where=f"{ALLOW_LIST}: {what}",
+                found="the same value twice",
+                expected="one entry per person, key and address",
+                action="One person holds one role here; remove the double entry.",
+            )
+    for person in found.people:
+        weakness = key_weakness(bytes.fromhex(person.public_key))
+        if weakness:
+            raise ConfigError(
+                where=f"{ALLOW_LIST}: public_key of {person.id}",
+                found=weakness,
+                expected="a key that the person generated",
+                action="Ask the person for the key; do not copy one from elsewhere.",
+            )
+    return found
+
+
+def dependence(
+    reviewer: str, authors: Sequence[str], signers: Sequence[Person], allowed: AllowList
+) -> str:
+    """Why a review is not independent of the authors; empty if it is.
+
+    Args:
+        reviewer: Identifier that the card names.
+        authors: Identifiers that the card names.
+        signers: People whose signatures verified, or who is about to sign.
+        allowed: The allow-list.
+    """
+    if not authors:
+        return "the card names no author, so nobody is shown to be independent of them"
+    unknown = [author for author in authors if allowed.find(author) is None]
+    if unknown:
+        return f"the author {unknown[0]!r} is not on {ALLOW_LIST}"
+    if reviewer in authors:
+        return f"{reviewer} is author and reviewer"
+    both = [person.id for person in signers if person.id in authors or person.role == AUTHOR]
+    if both:
+        return f"{both[0]} is an author and signs; authors sign nothing"
+    return ""

@@ -1,0 +1,152 @@
+"""Floors and ceilings of limits that protect people: fixed here, not in `params.yaml`.
+
+`params.yaml` may be tighter. Looser is bad configuration, unless the ladder declares itself a
+rehearsal (`rehearsal: true`): a test of the machinery, of which no card can ever be signed.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from gates.report import Gate, stage_of
+from genpolicy.errors import ConfigError
+
+REHEARSAL = "rehearsal"
+REHEARSED = "A rehearsal: limits that protect people may be looser here, and no card can be signed."
+
+
+@dataclass(frozen=True)
+class Bound:
+    """How loose a setting may be at most.
+
+    Attributes:
+        gate: Who judges by it.
+        place: Criterion of that gate, or dotted path in `params.yaml`.
+        comparison: The setting must be `<=` or `>=` the bound.
+        bound: The loosest value.
+        reason: Why no team may go beyond it.
+    """
+
+    gate: Gate
+    place: str
+    comparison: Literal["<=", ">="]
+    bound: float
+    reason: str
+
+
+def _counts(gate: Gate, reason: str, *criteria: str) -> list[Bound]:
+    return [Bound(gate, name, "<=", 0.0, reason) for name in criteria]
+
+
+BOUNDS: tuple[Bound, ...] = (
+    *_counts("C", "one bad action is enough to hurt somebody", "stub_stale", "stub_invalid"),
+    *_counts("C", "the independent proof agrees or there is none", "checker_violations"),
+    *_counts("C", "a check whose absence goes unseen protects nobody", "mutants_undetected"),
+    *_counts("C", "an action that vanished may still be executed", "conservation_error"),
+    Bound("C", "corrupted_refused_share", ">=", 1.0, "corrupted input is never executed"),
+    Bound("C", "stub_violation_upper", "<=", 0.01, "more says nothing although none was seen"),
+    *_counts("D", "one bad action is enough to hurt somebody", "stub_violations"),
+    *_counts("D", "the independent proof agrees or there is none", "checker_violations"),
+    *_counts("D", "an action that vanished may still be executed", "conservation_error"),
+    *_counts("D", "methods on other starts are not compared", "unmatched_starts"),
+    Bound("D", "confidence", ">=", 0.9, "what is wrong more often than once in ten is no bound"),
+    Bound("D", "stress.alpha", "<=", 0.1, "a wrong promotion once in ten trials at the most"),
+    Bound("D", "stress.margin", ">=", 0.0, "a candidate that is worse is not promoted"),
+    Bound(
+        "D",
+        "stress.perturbations.envelope.speed_limit_m_s",
+        "<=",
+        0.25,
+        "reduced speed with a person near the arm, ISO 10218-1",
+    ),
+    Bound("E", "gate_e.maximum_days", "<=", 30.0, "cell, people and policy change; review again"),
+    Bound("E", "upstream_passed", ">=", 1.0, "a card stands on gates A to D"),
+    Bound("E", "draft_complete", "<=", 0.0, "an empty field is an unanswered question"),
+    Bound("E", "signature_valid", ">=", 1.0, "an unsigned card allows nothing"),
+    Bound("E", "reviewer_independent", ">=", 1.0, "nobody reviews their own candidate"),
+    Bound("E", "owners_signed", ">=", 4.0, "each of the four answers for a part"),
+    Bound("E", "envelope_within_limits", "<=", 0.0, "what was not simulated is not allowed"),
+    Bound("E", "not_expired", ">=", 1.0, "a review ages"),
+)
+
+
+def is_rehearsal(params: Mapping[str, Any]) -> bool:
+    """Whether this ladder only tests the machinery.
+
+    Raises:
+        ConfigError: Neither true nor false.
+    """
+    value = params.get(REHEARSAL, False)
+    if not isinstance(value, bool):
+        raise ConfigError(
+            where=f"params.yaml: {REHEARSAL}",
+            found=repr(value)[:60],
+            expected="true or false",
+            action="Say which; only a ladder that is no rehearsal leads to a card.",
+        )
+    return value
+
+
+def loosened(params: Mapping[str, Any], gate: Gate) -> list[tuple[Bound, object]]:
+    """Bounds that the settings of a gate go beyond, with what stands there instead.
+
+    A criterion that is declared not applicable goes beyond its bound like any looser value. A
+    setting that is missing does not: without a limit no gate passes, and models ask for the rest.
+    """
+    found: list[tuple[Bound, object]] = []
+    for bound in BOUNDS:
+        if bound.gate != gate:
+            continue
+        for value in _values(params, bound):
+            number = isinstance(value, int | float) and not isinstance(value, bool)
+            if number and bound.comparison == "<=" and value <= bound.bound:
+                continue
+            if number and bound.comparison == ">=" and value >= bound.bound:
+                continue
+            found.append((bound, value))
+    return found
+
+
+def require_protection(params: Mapping[str, Any], gate: Gate) -> tuple[str, ...]:
+    """Refuse settings that go beyond a bound.
+
+    Returns:
+        Caveats for the report; empty unless this is a rehearsal.
+
+    Raises:
+        ConfigError: A looser setting, in a ladder that is no rehearsal.
+    """
+    beyond = loosened(params, gate)
+    if is_rehearsal(params):
+        names = ", ".join(bound.place for bound, _ in beyond)
+        return (f"{REHEARSED} Looser: {names or 'none of this gate'}.",)
+    for bound, value in beyond:
+        place = bound.place if "." in bound.place else f"{stage_of(gate)}: {bound.place}"
+        raise ConfigError(
+            where=f"params.yaml: {place}",
+            found=repr(value)[:60],
+            expected=f"{bound.comparison} {bound.bound:g}, because {bound.reason}",
+            action="Tighten it. This bound stands in the code; a rehearsal may go beyond it.",
+        )
+    return ()
+
+
+def _values(params: Mapping[str, Any], bound: Bound) -> list[object]:
+    """What `params.yaml` says at a place: nothing, one value, or those of several owners."""
+    if "." in bound.place or bound.place in params:
+        value: Any = params
+        for part in bound.place.split("."):
+            if not isinstance(value, Mapping) or part not in value:
+                return []
+            value = value[part]
+        return [value]
+    section = params.get(stage_of(bound.gate))
+    if not isinstance(section, Mapping):
+        return []
+    found: list[object] = []
+    for owners in (section.get("limits"), section.get("not_applicable")):
+        for entries in owners.values() if isinstance(owners, Mapping) else ():
+            if isinstance(entries, Mapping) and bound.place in entries:
+                entry = entries[bound.place]
+                found.append(entry[0] if isinstance(entry, list) and entry else entry)
+    return found

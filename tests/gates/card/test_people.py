@@ -1,0 +1,86 @@
+"""Who is independent of whom: identifiers and keys decide, spelling does not."""
+
+import pytest
+import yaml
+from team import AUTHORS, PEOPLE
+
+from gates.card.people import Person, dependence, load_allow_list
+from genpolicy.errors import ConfigError
+
+
+def _people(root):
+    return yaml.safe_load((root / "reviewers.yaml").read_text())["people"]
+
+
+def _write(root, people):
+    (root / "reviewers.yaml").write_text(yaml.safe_dump({"people": people}, allow_unicode=True))
+
+
+@pytest.mark.parametrize(
+    "spelling",
+    [
+        "ri\u200bta",  # zero width space
+        "ri\u00adta",  # soft hyphen
+        "rit\u0430",  # Cyrillic
+        "\uff52\uff49\uff54\uff41",  # full width
+        "ri\u0301ta",  # decomposed
+        "Rita",
+        "rita ",
+        "",
+    ],
+)
+def test_an_identifier_has_one_spelling(team, spelling):
+    people = _people(team.root)
+    people[-1]["id"] = spelling
+    _write(team.root, people)
+    with pytest.raises(ConfigError, match=r"reviewers\.yaml"):
+        load_allow_list(team.root)
+
+
+@pytest.mark.parametrize("name", ["Rita", "Ri\u200bta", "Rit\u0430"])
+def test_a_name_that_looks_like_another_decides_nothing(team, name):
+    """The author under the reviewer's name is still the author, whatever the name looks like."""
+    people = _people(team.root)
+    people[-1]["name"] = name
+    _write(team.root, people)
+    allowed = load_allow_list(team.root)
+    assert dependence("rita", ["ada"], [allowed.find("rita")], allowed) == ""
+    assert "author and reviewer" in dependence("ada", ["ada"], [], allowed)
+
+
+@pytest.mark.parametrize("field", ["id", "public_key", "emails"])
+def test_one_person_has_one_entry(team, field):
+    people = _people(team.root)
+    people[1][field] = people[0][field]
+    _write(team.root, people)
+    with pytest.raises(ConfigError, match=f"{field}.*twice"):
+        load_allow_list(team.root)
+
+
+def test_an_address_in_other_letters_is_the_same_address(team):
+    people = _people(team.root)
+    people[1]["emails"] = ["RITA@example.org"]
+    _write(team.root, people)
+    with pytest.raises(ConfigError, match=r"emails.*twice"):
+        load_allow_list(team.root)
+
+
+def test_a_key_of_small_order_is_refused(team):
+    people = _people(team.root)
+    people[0]["public_key"] = "01" + "00" * 31
+    _write(team.root, people)
+    with pytest.raises(ConfigError, match="small order"):
+        load_allow_list(team.root)
+
+
+def test_authors_are_listed_people_who_sign_nothing(team):
+    allowed = load_allow_list(team.root)
+    signers = [allowed.find(name) for name in PEOPLE]
+    assert isinstance(signers[0], Person)
+    assert dependence("rita", ["ada"], signers, allowed) == ""
+    assert "no author" in dependence("rita", [], signers, allowed)
+    assert "'nobody' is not on" in dependence("rita", ["ada", "nobody"], signers, allowed)
+    assert "author and reviewer" in dependence("rita", ["ada", "rita"], [], allowed)
+    assert "mo is an author" in dependence("rita", ["ada", "mo"], signers, allowed)
+    by_role = [*signers, *(allowed.find(name) for name in AUTHORS)]
+    assert "ada is an author" in dependence("rita", ["mo"], [by_role[0], by_role[-1]], allowed)

@@ -1,0 +1,110 @@
+"""The plan: what moved since shows, loosened apart from tightened."""
+
+import copy
+
+import evidence
+import pytest
+import yaml
+
+from gates.preregistration import (
+    NONE,
+    PREREGISTRATION,
+    moved_caveats,
+    moves,
+    plan_bytes,
+    plan_of,
+    read_plan,
+)
+from gates.proof import SPECS, judge
+from gates.report import stage_of
+
+COMPARISONS = {
+    stage_of(gate): {item.id: item.comparison for item in spec.criteria}
+    for gate, spec in SPECS.items()
+}
+
+
+def _moved(change):
+    params = copy.deepcopy(evidence.PARAMS)
+    change(params)
+    return [(m.place, m.kind) for m in moves(plan_of(evidence.PARAMS, COMPARISONS), params)]
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "kind"),
+    [
+        (("stress", "margin"), 0.05, "loosened"),
+        (("stress", "margin"), 0.2, "tightened"),
+        (("stress", "alpha"), 0.2, "loosened"),
+        (("stress", "alpha"), 0.01, "tightened"),
+        (("stress", "starts"), 10, "loosened"),
+        (("stress", "starts"), 1000, "tightened"),
+        (("stress", "baselines"), ["bc"], "changed"),
+        (("stress", "perturbations"), {"nominal": {}}, "changed"),
+        (("seed",), 2, "changed"),
+        (("confidence",), 0.9, "loosened"),
+    ],
+)
+def test_what_moved_is_told_from_what_was_planned(path, value, kind):
+    def change(params):
+        for part in path[:-1]:
+            params = params[part]
+        params[path[-1]] = value
+
+    assert _moved(change) == [(".".join(path), kind)]
+
+
+@pytest.mark.parametrize(
+    ("name", "limit", "kind"),
+    [
+        ("fallback_share_upper", 0.5, "loosened"),
+        ("fallback_share_upper", 0.1, "tightened"),
+        ("nominal_success_lower", 0.1, "loosened"),
+        ("nominal_success_lower", 0.9, "tightened"),
+    ],
+)
+def test_a_limit_moves_to_its_own_side(name, limit, kind):
+    found = _moved(evidence.set_limit("gate_d", name, limit))
+    assert found == [(f"gate_d.{name}", kind)]
+
+
+def test_a_limit_that_was_dropped_is_loosened_and_a_reason_or_owner_is_free():
+    def drop(params):
+        del params["gate_d"]["limits"]["safety"]["intervention_upper"]
+        params["gate_d"]["limits"]["safety"]["fallback_share_upper"][1] = "other words"
+
+    assert _moved(drop) == [("gate_d.intervention_upper", "loosened")]
+    assert _moved(lambda params: None) == []
+
+
+def test_the_report_binds_the_plan_and_says_what_moved(ladder):
+    (ladder / PREREGISTRATION).write_bytes(plan_bytes(evidence.PARAMS, COMPARISONS))
+    report = judge(ladder, "D")
+    assert PREREGISTRATION in report.materials
+    assert not any(PREREGISTRATION in caveat for caveat in report.caveats)
+
+    def change(params):
+        evidence.set_limit("gate_d", "fallback_share_upper", 0.5)(params)
+        evidence.set_limit("gate_c", "admissible_share", 0.7)(params)
+        params["seed"] = 5
+
+    evidence.write_params(ladder, change)
+    said = [caveat for caveat in judge(ladder, "D").caveats if PREREGISTRATION in caveat]
+    assert [caveat.split()[0] for caveat in said] == ["Loosened", "Tightened", "Changed"]
+    assert "fallback_share_upper (0.15 -> 0.5)" in said[0]
+    assert "gate_c.admissible_share" in said[1] and "seed (1 -> 5)" in said[2]
+
+
+@pytest.mark.parametrize("text", [None, "", "[1]", "seed: 1", "{seed: ['', 1]}", "a: ["])
+def test_without_a_plan_the_report_says_so(ladder, text):
+    path = ladder / PREREGISTRATION
+    path.unlink() if text is None else path.write_text(text)
+    assert read_plan(ladder) is None
+    assert moved_caveats(ladder, evidence.PARAMS) == (NONE,)
+
+
+def test_the_shipped_plan_can_be_read(request):
+    plan = read_plan(request.config.rootpath)
+    assert plan is not None
+    text = plan_bytes(yaml.safe_load((request.config.rootpath / "params.yaml").read_text()), {})
+    assert set(yaml.safe_load(text)) >= {"stress.margin", "gate_d.stub_violations"}
