@@ -5,6 +5,7 @@ a word on it: what is not asked is for a person to ask otherwise, or to waive wi
 """
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,15 +16,21 @@ from genpolicy.audit.semantics import Semantics
 from genpolicy.audit.settings import AuditSettings
 
 
+@dataclass(frozen=True)
+class Given:
+    """Episodes that were replayed, and whether chunks were held against limits."""
+
+    replays: int
+    feasibility: bool
+
+
 def questions(
     data: AuditInput,
     settings: AuditSettings,
     semantics: Semantics,
     told: Sequence[Prediction],
     phases: Iterable[str],
-    *,
-    replays: int,
-    checked: bool,
+    given: Given,
 ) -> tuple[Asked, ...]:
     """Every question that depends on what was recorded or given, asked or not.
 
@@ -33,8 +40,7 @@ def questions(
         semantics: What the layer of data semantics measured.
         told: What variables tell of the modes.
         phases: Phases with several modes.
-        replays: Episodes that were replayed.
-        checked: Whether chunks were held against limits.
+        given: What the audit was given beside the data.
     """
     epochs = len(np.unique(data.episodes.calibration_epoch))
     alone = "" if epochs > 1 else "there is one calibration epoch: nothing to hold it against"
@@ -48,8 +54,10 @@ def questions(
         "constant_lag": pairs or ("" if clock else late),
         "calibration_at_release": _releases(data, settings, semantics) or alone,
         "calibration_at_rest": pairs or alone,
-        "labels": "" if replays else "no episode was replayed",
-        "feasibility": "" if checked else "neither the mean nor a mode was held against limits",
+        "labels": "" if given.replays else "no episode was replayed",
+        "feasibility": ""
+        if given.feasibility
+        else "neither the mean nor a mode was held against limits",
     }
     found |= {
         f"clock.{name}": "neither receive times nor motion that the arm's explains"

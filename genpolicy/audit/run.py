@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from genpolicy.audit.asked import questions
+from genpolicy.audit.asked import Given, questions
 from genpolicy.audit.component_rows import ComponentModes
 from genpolicy.audit.components import Component
 from genpolicy.audit.counts import Counts, count
@@ -103,19 +103,15 @@ def audit(
     root_seed: int,
     progress: Progress = silent,
 ) -> AuditResult:
-    """Audit a dataset.
+    """Audit a dataset: the evidence, the same for every order of episodes.
 
     Args:
         data: Rows and episodes, in any order.
         settings: What counts as near, as two modes, and from where on deviations are reported.
-        admissible: Feasibility of a chunk, `(actions (K, D_a), observation (D_o,)) -> (bool,
-            reason)`; None leaves the columns empty.
+        admissible: Feasibility of a chunk, as in `Admissible`; None leaves the columns empty.
         replay: Outcome of a replayed episode, by identifier; None leaves labels unproven.
         root_seed: Seed of all draws.
         progress: Called as `progress(what, done, total)` after every situation and replay.
-
-    Returns:
-        The evidence; the same for every order of episodes.
     """
     data = canonical(data)
     semantics = measure(data, settings)
@@ -128,16 +124,14 @@ def audit(
     replayed = replay_sample(data, settings, replay=replay, root_seed=root_seed, progress=progress)
     links = _links(data, settings, several)
     modes = _modes(data, situations, links, replayed)
-    strata = examine_strata(data, settings, several, links, root_seed=root_seed)
     told = predictions(data, settings, several, links, root_seed=root_seed)
+    given = Given(replays=len(replayed), feasibility=admissible is not None)
+    strata = examine_strata(data, settings, several, links, root_seed=root_seed)
     counts = count(data, situations, support, incoherent)
     primary = primary_phase(several)
     persistence = summarise([item.identity for item in situations if item.two_mode])
     main = several.get(primary, []), links.get(primary)
     measured = Measures(replayed, persistence, strata, told, _of_phase(modes, primary))
-    asked = questions(
-        data, settings, semantics, told, several, replays=len(replayed), checked=bool(admissible)
-    )
     after = _after_realignment(data, settings, semantics, counts, component, root_seed=root_seed)
     return AuditResult(
         data=data,
@@ -149,7 +143,7 @@ def audit(
         links=links,
         strata=strata,
         told=told,
-        asked=asked,
+        asked=questions(data, settings, semantics, told, several, given),
         replayed=replayed,
         recovery=recovery_outcomes(data, settings, *main, component=component),
         demonstrated=demonstrated(data, settings, *main, component=component),

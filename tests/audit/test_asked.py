@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from planar import SETTINGS, planar
 
-from genpolicy.audit.asked import questions
+from genpolicy.audit.asked import Given, questions
 from genpolicy.audit.data import canonical
 from genpolicy.audit.predictability import HISTORY, Prediction
 from genpolicy.audit.semantics import measure
@@ -22,7 +22,7 @@ def data():
 
 def silent(data, settings=WHOLE, *, told=(PAST,), phases=("approach",), replays=60, checked=True):
     found = measure(data, settings)
-    rows = questions(data, settings, found, told, phases, replays=replays, checked=checked)
+    rows = questions(data, settings, found, told, phases, Given(replays, checked))
     assert all(row.asked == (row.reason == "") for row in rows)
     return {row.check for row in rows if not row.asked}
 
