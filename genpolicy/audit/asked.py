@@ -30,6 +30,7 @@ def questions(
     semantics: Semantics,
     told: Sequence[Prediction],
     phases: Iterable[str],
+    *,
     given: Given,
 ) -> tuple[Asked, ...]:
     """Every question that depends on what was recorded or given, asked or not.

@@ -143,7 +143,7 @@ def audit(
         links=links,
         strata=strata,
         told=told,
-        asked=questions(data, settings, semantics, told, several, given),
+        asked=questions(data, settings, semantics, told, several, given=given),
         replayed=replayed,
         recovery=recovery_outcomes(data, settings, *main, component=component),
         demonstrated=demonstrated(data, settings, *main, component=component),

@@ -22,7 +22,7 @@ def data():
 
 def silent(data, settings=WHOLE, *, told=(PAST,), phases=("approach",), replays=60, checked=True):
     found = measure(data, settings)
-    rows = questions(data, settings, found, told, phases, Given(replays, checked))
+    rows = questions(data, settings, found, told, phases, given=Given(replays, checked))
     assert all(row.asked == (row.reason == "") for row in rows)
     return {row.check for row in rows if not row.asked}
 
