@@ -178,7 +178,7 @@ def judge(
         pipeline=dict(basis.pipeline),
         settings=settings.model_dump(mode="json"),
         environment=environment(),
-        caveats=(*spec.caveats, *_waivers(limits), *caveats, *lacking),
+        caveats=(*spec.caveats, *_waivers(limits), *settings.caveats, *caveats, *lacking),
         diagnosis=f"{_diagnosis(spec, judged)} {note}".strip(),
         decision=decision.text,
         promoted=decision.promoted,

@@ -10,10 +10,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from gates import feasibility
 from gates.card import judge as card
 from gates.differences import first_difference
 from gates.engine import GateSpec, judge_gate
+from gates.feasibility import gate as feasibility
 from gates.need import gate as need
 from gates.pipeline import basis_of, changed_pages, changed_task, outputs_of
 from gates.report import (

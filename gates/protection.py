@@ -98,13 +98,16 @@ def loosened(params: Mapping[str, Any], gate: Gate) -> list[tuple[Bound, Any]]:
         if bound.gate != gate:
             continue
         for value in _values(params, bound):
-            number = isinstance(value, int | float) and not isinstance(value, bool)
-            if number and bound.comparison == "<=" and value <= bound.bound:
-                continue
-            if number and bound.comparison == ">=" and value >= bound.bound:
-                continue
-            found.append((bound, value))
+            if not _keeps(value, bound):
+                found.append((bound, value))
     return found
+
+
+def _keeps(value: object, bound: Bound) -> bool:
+    """Whether a setting stays on its side of a bound; what is no number, or NaN, does not."""
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        return False
+    return value <= bound.bound if bound.comparison == "<=" else value >= bound.bound
 
 
 def require_protection(params: Mapping[str, Any], gate: Gate) -> tuple[str, ...]:

@@ -76,6 +76,11 @@ class GateSettings(StrictModel):
         """Limits that the gate judges by, for a measure that must know those of other questions."""
         return self._held_to
 
+    @property
+    def caveats(self) -> tuple[str, ...]:
+        """What the reader must know because of these settings."""
+        return ()
+
     def under(self, limits: Limits) -> Self:
         """The same settings, with the limits that the gate judges by."""
         settings = self.model_copy()

@@ -13,15 +13,17 @@ import time
 from pathlib import Path
 
 from benchmarks.audit.cases import CAUSES
+from benchmarks.audit.frozen import frozen_commit, report_seed
 from benchmarks.audit.runner import Job, Result, run
 from benchmarks.audit.tables import into_page, markdown
 from genpolicy.compute import LOCAL, map_shards
 
-# Development seeds were looked at while the audit was written; report seeds were not.
-FIRST_SEED = {"development": 1_000, "report": 90_000_000}
+# Development seeds were looked at while the audit was written. Report seeds follow from the commit.
+DEVELOPMENT, REPORT = "development", "report"
+FIRST_DEVELOPMENT_SEED = 1_000
 
 
-def jobs(seeds: str, *, repeats: int, tasks: list[str], only: str) -> list[Job]:
+def jobs(first_seed: int, *, repeats: int, tasks: list[str], only: str) -> list[Job]:
     """Every cause at every strength.
 
     From the minimum strength on in every task, twice, and three times where nothing is wrong with
@@ -37,7 +39,7 @@ def jobs(seeds: str, *, repeats: int, tasks: list[str], only: str) -> list[Job]:
                 if strong or turn == (number + place) % len(tasks):
                     # Each data set has its own seed, whatever else is run.
                     offset = 20_000 * number + 10_000 * (task == "insertion") + 100 * place
-                    seed = FIRST_SEED[seeds] + offset
+                    seed = first_seed + offset
                     found += [Job(number, strength, task, seed + k) for k in range(times)]
     return [job for job in found if only in CAUSES[job.cause].name]
 
@@ -45,7 +47,7 @@ def jobs(seeds: str, *, repeats: int, tasks: list[str], only: str) -> list[Job]:
 def main() -> None:
     """Run the benchmark and write its tables."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.audit", description=__doc__)
-    parser.add_argument("--seeds", choices=sorted(FIRST_SEED), default="development")
+    parser.add_argument("--seeds", choices=(DEVELOPMENT, REPORT), default=DEVELOPMENT)
     parser.add_argument("--repeats", type=int, default=1)
     parser.add_argument("--tasks", nargs="+", default=["planar", "insertion"])
     parser.add_argument("--only", default="", help="causes whose name holds this text")
@@ -54,15 +56,19 @@ def main() -> None:
     parser.add_argument("--docs", type=Path, help="page between whose marks the tables go")
     parser.add_argument("--out", type=Path, required=True)
     options = parser.parse_args()
+    seeds, first = options.seeds, FIRST_DEVELOPMENT_SEED
+    if seeds == REPORT:
+        commit = frozen_commit()
+        seeds, first = f"report seeds of commit {commit}", report_seed(commit)
     tasks = ["planar"] if options.quick else options.tasks
-    todo = jobs(options.seeds, repeats=options.repeats, tasks=tasks, only=options.only)
+    todo = jobs(first, repeats=options.repeats, tasks=tasks, only=options.only)
     begin = time.perf_counter()
     results: list[Result] = map_shards(run, todo, workers=options.workers, scheduler=LOCAL)
     wall_s = time.perf_counter() - begin
     options.out.mkdir(parents=True, exist_ok=True)
     rows = [result.as_row() for result in results]
     (options.out / "results.json").write_text(json.dumps(rows, indent=1) + "\n")
-    text = markdown(results, seeds=options.seeds)
+    text = markdown(results, seeds=seeds)
     (options.out / "table.md").write_text(text)
     if options.docs:
         into_page(options.docs, text)

@@ -45,6 +45,8 @@ CALIBRATION = Answer("data_defect", ("calibration",))
 UNIT = Answer("data_defect", ("unit",))
 FRAME = Answer("data_defect", ("frame", "rotat", "mirror", "swap"))
 REPEATED = Answer("data_defect", ("duplicate",))
+GAPS = Answer("data_defect", ("gap", "rate", "jitter"))
+FROZEN = Answer("data_defect", ("frozen", "clock", "stub"))
 GLUED = Answer("data_defect", ("glue", "duplicate"))
 EPOCH = (Answer("data_defect", ("epoch",)), Answer("hidden_state", ("epoch",)))
 ORDER = Answer("hidden_state", ("order", "session", "previous", "unrecorded"))
@@ -64,8 +66,9 @@ class Cause:
         group: Name of its row in the confusion matrix.
         unit: What the strength is measured in.
         strengths: From invisible to obvious.
-        minimum: Strength from which it is to be named; above it if `falling`.
-        reason: Why there, in physical terms.
+        minimum: Strength from which it is to be named; up to it if `falling`. It is the detector's
+            own limit: there and just above it errors are to be expected, and they are counted.
+        reason: Which limit that is.
         plan: Plan of one data set from its seed, strength and task.
         answers: Right answers from the minimum on.
         weaker: Further right answers below the minimum.

@@ -4,8 +4,9 @@ Kinds and the meaning of their size: `robot_clock`, `camera_clock` (offset, s), 
 (offset at the end of the episode, s, from 0 at its begin), `clock_session` (offset of the last
 episode, s, growing from the first), `camera_shift`, `tool_shift` (m), `position_unit`,
 `scene_unit`, `action_unit` (factor), `turn` (rad, observed position about the vertical), `mirror`,
-`swap` (size unused), `repeat` (share of episodes that are stored twice), `glue` (share of episodes
-that hold the next one as well).
+`swap` (size unused), `drop` (share of rows that are missing), `freeze` (the observed position
+stands still for a third of the episode while its stamps go on; size unused), `repeat` (share of
+episodes that are stored twice), `glue` (share of episodes that hold the next one as well).
 """
 
 import numpy as np
@@ -80,6 +81,14 @@ def spoil_rows(
         elif defect.kind == "scene_unit":
             result["scene"] = result["scene"].copy()
             result["scene"][:, :2] *= defect.size
+        elif defect.kind == "drop":
+            keep = stream(plan.seed, "drop", episode).random(len(position)) >= defect.size
+            result = {name: values[keep] for name, values in result.items()}
+        elif defect.kind == "freeze":
+            n = len(position)
+            begin = int(stream(plan.seed, "freeze", episode).integers(n // 4, n // 2))
+            result["position"] = position.copy()
+            result["position"][begin : begin + n // 3] = position[begin]
         elif defect.kind in ("turn", "mirror", "swap"):
             result["position"] = position.copy()
             result["position"][:, :2] = position[:, :2] @ _matrix(defect, sign).T

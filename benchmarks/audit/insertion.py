@@ -138,7 +138,7 @@ def demonstrate(plan: Plan, roster: Roster, number: int, cell: Cell) -> Truth:
     side, wide = lanes[mode if plan.differ == "position" else 0]
     way = intent(plan, mode, stream(plan.seed, "intent", number))
     style = STYLES[str(roster.operator[number])]
-    via = style.via_m * wide * plan.width + plan.route_spread_m * rng.normal()
+    via = style.via_m * wide * plan.width + plan.spread(rng)
     style = replace(style, via_m=via, speed_m_s=style.speed_m_s * rng.uniform(0.92, 1.08))
     style = replace(style, speed_m_s=style.speed_m_s * way.pace)
     kind = "wander" if roster.recovery[number] else "nominal"

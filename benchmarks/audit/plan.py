@@ -20,13 +20,15 @@ OBJECTS = ("peg_a", "peg_b")
 # What decides the mode of an episode; `chance` is a free choice of the operator.
 DECIDERS = (
     "chance", "operator", "object", "calibration_epoch", "session", "alternation",
-    "lamp_early", "path_early", "lamp", "goal",
+    "lamp_early", "path_early", "lamp", "goal", "habit", "drift",
 )  # fmt: skip
 # What modes may differ in.
 DIFFER = ("position", "rotation", "gripper", "timing")
 # Episodes that are not as they should be in every data set: disturbed ones and honest failures.
 RECOVERY_SHARE = 0.08
 FAILURE_SHARE = 0.03
+# No route lies further out than so many times its spread.
+STRAY = 6.0
 
 
 @dataclass(frozen=True)
@@ -55,7 +57,11 @@ class Plan:
         shares: Share of each mode, the first the largest; one mode for (1.0,).
         width: Distance of the first two modes' routes, relative to the task's usual one.
         decided_by: One of `DECIDERS`.
-        fidelity: How often the decider decides; otherwise chance does.
+        fidelity: How often the decider decides; otherwise chance does. Of `habit`, how often the
+            episode before is repeated without a choice; of `drift`, how far the share of the second
+            mode moves over the session, evenly and about one half.
+        correlation: Share of episodes in which object and operator go together, and operators come
+            by epochs.
         contexts: Clusters of goals, each with all the modes.
         goal_half_width_m: Half width of the goal's lateral position; None takes the task's.
         start_wide: Half width of the start position, relative to the task's.
@@ -69,7 +75,10 @@ class Plan:
             first phase and another in the second; 0: it does not go to the station.
         phase_observed: Whether a policy would see the phase.
         failing: Share of the last mode's episodes that fail.
+        tails: Degrees of freedom of Student's t for the width of the routes, of the same scale; 0
+            is the normal distribution.
         wrong_labels: Share of labels that are wrong.
+        wrong_mode_only: Wrong labels are those of the last mode only.
         episodes: Number of episodes; None draws 100 to 200.
         recoveries: How many of them, the last ones, are disturbed beside those by chance.
         exact: Nothing but what is planted, for tests that need exact numbers. The plant follows one
@@ -84,6 +93,7 @@ class Plan:
     width: float = 1.0
     decided_by: str = "chance"
     fidelity: float = 1.0
+    correlation: float = 0.0
     contexts: int = 1
     goal_half_width_m: float | None = None
     start_wide: float = 1.0
@@ -95,7 +105,9 @@ class Plan:
     station_dwell_s: float = 0.0
     phase_observed: bool = True
     failing: float = 0.0
+    tails: float = 0.0
     wrong_labels: float = 0.0
+    wrong_mode_only: bool = False
     episodes: int | None = None
     recoveries: int = 0
     exact: bool = False
@@ -111,6 +123,12 @@ class Plan:
     def tool(self) -> bool:
         """Whether the tool turns and grips on the way."""
         return self.differ in ("rotation", "gripper")
+
+    def spread(self, rng: np.random.Generator) -> float:
+        """Deviation of one route's width from its operator's, m."""
+        drawn = rng.standard_t(self.tails) if self.tails else rng.normal()
+        # A stray goes round, never through: a way that far out is not gone.
+        return self.route_spread_m * float(np.clip(drawn, -STRAY, STRAY))
 
     @property
     def by_chance(self) -> float:
@@ -157,6 +175,8 @@ def draw_roster(plan: Plan, goal_half_width_m: float) -> Roster:
     objects = np.array(OBJECTS)[rng.integers(0, 2, n)]
     epochs = 2 if plan.exact else int(rng.integers(2, 4))
     epoch = np.arange(n) * epochs // n
+    if plan.correlation:
+        operator, objects = _together(plan, operator, objects, epoch)
     context = rng.integers(0, plan.contexts, n)
     wide = goal_half_width_m if plan.goal_half_width_m is None else plan.goal_half_width_m
     goal = wide * rng.uniform(-1.0, 1.0, n)
@@ -171,6 +191,15 @@ def draw_roster(plan: Plan, goal_half_width_m: float) -> Roster:
         goal_lateral_m=goal, recovery=recovery, failure=failure,
         split=_splits(n, rng),
     )  # fmt: skip
+
+
+def _together(plan, operator, objects, epoch):
+    """Operators that come by epochs, each with an object of their own, in a share of episodes."""
+    rng = stream(plan.seed, "correlation")
+    by_epoch = rng.random(len(epoch)) < plan.correlation
+    operator = np.where(by_epoch, np.array(OPERATORS)[epoch % len(OPERATORS)], operator)
+    own = np.array(OBJECTS)[np.isin(operator, OPERATORS[1:2]).astype(int)]
+    return operator, np.where(rng.random(len(epoch)) < plan.correlation, own, objects)
 
 
 def _modes(plan, operator, objects, epoch, goal, rng):
@@ -191,11 +220,22 @@ def _modes(plan, operator, objects, epoch, goal, rng):
         "lamp_early": free,
         "path_early": free,
         "lamp": free,
+        "habit": free,
+        "drift": free,
         "goal": (goal > 0).astype(int),
     }[plan.decided_by]
     obeys = rng.random(n) < plan.fidelity
     cue = np.asarray(decided, dtype=np.int64)
     other = rng.choice(count, size=n, p=np.array(plan.shares))
+    if plan.decided_by == "drift":
+        share = 0.5 + plan.fidelity * (number / max(n - 1, 1) - 0.5)
+        drawn = (rng.random(n) < share).astype(np.int64)
+        return drawn, drawn
+    if plan.decided_by == "habit":
+        for at in range(1, n):
+            cue[at] = other[at - 1]
+            other[at] = cue[at] if obeys[at] else other[at]
+        return other, cue
     return np.where(obeys, cue, other), cue
 
 

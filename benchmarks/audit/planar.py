@@ -61,7 +61,7 @@ def demonstrate(plan: Plan, roster: Roster, number: int, cell: Cell) -> Truth:
     goal[1] += CONTEXT_M * (roster.context[number] - 0.5 * (plan.contexts - 1))
     operator = str(roster.operator[number])
     speed = SPEED_M_S[operator] * rng.uniform(0.9, 1.1)
-    width = HALF_WIDTH_M * plan.width * WIDTH[operator] + plan.route_spread_m * rng.normal()
+    width = HALF_WIDTH_M * plan.width * WIDTH[operator] + plan.spread(rng)
     way = intent(plan, mode, stream(plan.seed, "intent", number))
     speed *= way.pace
     lane = LANES[mode if plan.differ == "position" else 0] * width

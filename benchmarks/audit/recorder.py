@@ -53,6 +53,8 @@ def record(task: str, plan: Plan) -> Labelled:
     rng = stream(plan.seed, "labels")
     truth = np.array(["success" if item.success else "failure" for item in truths])
     wrong = rng.random(n) < plan.wrong_labels
+    if plan.wrong_mode_only:
+        wrong &= roster.mode == len(plan.shares) - 1
     label = np.where(wrong, np.where(truth == "success", "failure", "success"), truth)
     table = _table(plan, roster, label)
     episodes, table, truth = repeat(plan, episodes, table, truth)

@@ -8,7 +8,7 @@ from benchmarks.audit.cases import CAUSES
 from benchmarks.audit.runner import Result
 from genpolicy.statistics.intervals import clopper_pearson
 
-VALID = "valid_modes"
+VALID, OPEN = "valid_modes", "insufficient_support"
 BEGIN, END = "<!-- tables of the benchmark -->", "<!-- end of the tables -->"
 
 
@@ -16,7 +16,7 @@ def markdown(results: Sequence[Result], *, seeds: str) -> str:
     """All tables as Markdown."""
     strong = [result for result in results if result.strong]
     parts = [
-        f"{len(results)} data sets ({seeds} seeds), {len(strong)} of them at or above the stated "
+        f"{len(results)} data sets ({seeds}), {len(strong)} of them at or above the stated "
         "minimum strength.",
         "",
         *_headline(strong, results),
@@ -27,8 +27,10 @@ def markdown(results: Sequence[Result], *, seeds: str) -> str:
         "",
         "### Right answers by cause and strength",
         "",
-        "Named: the planted cause was said. Below the minimum the answer without it also counts as "
-        "right, and the audit must not be relied on to name it.",
+        "Named: the planted cause was said. Open: too little to decide was said, which stops a "
+        "ladder and is no answer. Need: valid modes were said. From the minimum on only the "
+        "planted cause is right. Below it nothing is right or wrong: what was said stands here, "
+        "and the audit must not be relied on to name the cause.",
         "",
         *_strengths(results),
         "",
@@ -63,15 +65,21 @@ def _headline(strong: Sequence[Result], results: Sequence[Result]) -> list[str]:
     valid = [r for r in strong if r.group == VALID]
     lines = [
         ("right, from the minimum strength on", sum(r.right for r in strong), len(strong)),
+        ("left open, from the minimum strength on", sum(_open(r) for r in strong), len(strong)),
         (
             "false need: valid_modes said of anything else",
             sum(r.verdict == VALID for r in others), len(others),
         ),
         (
-            "false need below the minimum, where even two modes were not planted",
-            sum(r.verdict == VALID and not r.right for r in weak), len(weak),
+            "below the minimum: valid_modes said although a cause was planted",
+            sum(r.verdict == VALID for r in weak), len(weak),
         ),
-        ("true modes denied", sum(r.verdict != VALID for r in valid), len(valid)),
+        ("below the minimum: planted cause not said", sum(not r.named for r in weak), len(weak)),
+        (
+            "true modes denied: another cause said",
+            sum(r.verdict != VALID and not _open(r) for r in valid), len(valid),
+        ),
+        ("true modes left open", sum(_open(r) for r in valid), len(valid)),
     ]  # fmt: skip
     for task in ("planar", "insertion"):
         part = [r for r in strong if r.job.task == task]
@@ -82,6 +90,11 @@ def _headline(strong: Sequence[Result], results: Sequence[Result]) -> list[str]:
             low, high = clopper_pearson(k, n)
             rows.append(f"| {name} | {k} | {n} | {k / n:.3f} | {low:.4f} to {high:.4f} |")
     return rows
+
+
+def _open(result: Result) -> bool:
+    """Whether too little to decide was said, where something could have been decided."""
+    return result.verdict == OPEN and result.group != OPEN
 
 
 def _said(result: Result) -> str:
@@ -103,32 +116,33 @@ def _confusion(results: Sequence[Result]) -> list[str]:
 
 
 def _strengths(results: Sequence[Result]) -> list[str]:
-    rows = ["| cause | strength | minimum | named | right | of |", "|---|---|---|---|---|---|"]
+    rows = [
+        "| cause | strength | minimum | named | open | need | of |",
+        "|---|---|---|---|---|---|---|",
+    ]  # fmt: skip
     for cause in CAUSES:
         for strength in cause.strengths:
             part = [r for r in results if r.name == cause.name and r.job.strength == strength]
             if part:
                 mark = "yes" if cause.strong(strength) else "below"
-                named, right = sum(r.named for r in part), sum(r.right for r in part)
+                named, left = sum(r.named for r in part), sum(_open(r) for r in part)
+                need = sum(r.verdict == VALID for r in part)
                 rows.append(
-                    f"| {cause.name} | {strength:g} {cause.unit} | {mark} | {named} | {right} "
-                    f"| {len(part)} |"
+                    f"| {cause.name} | {strength:g} {cause.unit} | {mark} | {named} | {left} "
+                    f"| {need} | {len(part)} |"
                 )
     return rows
 
 
 def _wrong(results: Sequence[Result]) -> list[str]:
-    wrong = [r for r in results if not r.right]
+    wrong = [r for r in results if r.strong and not r.right]
     if not wrong:
         return []
     rows = [
-        "### Wrong answers", "",
+        "### Wrong and open answers, from the minimum strength on", "",
         "| cause | strength | task | seed | said |", "|---|---|---|---|---|",
     ]  # fmt: skip
     for r in wrong:
         said = f"{r.verdict}({', '.join(x for x in (r.variable, r.kind) if x)})"
-        mark = "" if r.strong else " (below)"
-        rows.append(
-            f"| {r.name} | {r.job.strength:g}{mark} | {r.job.task} | {r.job.seed} | {said} |"
-        )
+        rows.append(f"| {r.name} | {r.job.strength:g} | {r.job.task} | {r.job.seed} | {said} |")
     return rows

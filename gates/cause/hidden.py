@@ -3,6 +3,7 @@
 from gates.cause.answers import Answer, CauseName, Diagnosis, Layer, Named
 from gates.cause.limits import CauseLimits
 from gates.cause.numbers import Numbers
+from gates.cause.told import teller, told
 from genpolicy.audit.rows import Stratum
 
 DATA_VARIABLES = ("calibration_epoch",)
@@ -20,7 +21,7 @@ SHOWN = 8
 
 
 def hidden(numbers: Numbers, limits: CauseLimits) -> Named:
-    """Every variable that is significant after correction, and what the foremost one says."""
+    """Variables that explain the modes significantly or tell them, and what the foremost says."""
     clear = [row for row in numbers.strata if _clear(row, limits)]
     clear.sort(key=lambda row: (-(row.effect or 0.0), row.variable))
     answers = [_answer(row, limits) for row in clear[:SHOWN]]
@@ -36,7 +37,10 @@ def hidden(numbers: Numbers, limits: CauseLimits) -> Named:
             )
         ]  # fmt: skip
     found = [row for row in clear if _wide_of(row, limits)]
-    return answers, _said(_foremost(found, limits)) if found else None
+    answers += told(numbers.told, limits)
+    if found:
+        return answers, _said(_foremost(found, limits))
+    return answers, teller(numbers.told, limits)
 
 
 def _clear(row: Stratum, limits: CauseLimits) -> bool:

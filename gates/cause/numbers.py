@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from genpolicy.audit.component_rows import ComponentModes
-from genpolicy.audit.rows import Finding, ModeOutcome, Resample, Stratum
+from genpolicy.audit.rows import Finding, ModeOutcome, Prediction, Resample, Stratum
 from genpolicy.errors import BadInputError
 from genpolicy.integrity.documents import read_json
 from genpolicy.integrity.rows import Row, read_rows
@@ -72,6 +72,7 @@ class Numbers:
         counts: Support and modes.
         kept: Identity over time.
         strata: Tests of variables.
+        told: What variables, order and past tell of the modes.
         modes: Modes of the phase with most situations.
         components: Where in the action modes were looked for; counts, strata and modes are about
             the one followed.
@@ -85,6 +86,7 @@ class Numbers:
     counts: Counts
     kept: Kept
     strata: tuple[Stratum, ...]
+    told: tuple[Prediction, ...]
     modes: tuple[ModeOutcome, ...]
     components: tuple[ComponentModes, ...]
 
@@ -116,6 +118,7 @@ def read_numbers(
             counts=_of(Counts, summary["counts"]),
             kept=_of(Kept, kept),
             strata=tuple(rows("strata.parquet", Stratum)),
+            told=tuple(rows("predictions.parquet", Prediction)),
             modes=tuple(
                 row
                 for row in rows("modes.parquet", ModeOutcome)
@@ -169,11 +172,22 @@ def _draws(measured: Numbers, rows: Iterable[Resample]) -> Iterator[Numbers]:
                 replace(stratum, p_adjusted=p, effect=effect, effect_lower=lower)
                 for stratum, (p, effect, lower) in zip(measured.strata, tests, strict=True)
             ),
+            told=tuple(
+                _moved(told, value) for told, value in zip(measured.told, row.told, strict=True)
+            ),
             modes=tuple(
                 replace(mode, success_lower=lower, admissible=admissible)
                 for mode, (lower, admissible) in zip(measured.modes, outcomes, strict=True)
             ),
         )
+
+
+def _moved(row: Prediction, told: float) -> Prediction:
+    """The same row with another number, and the interval about it."""
+    away = told - row.told
+    return replace(
+        row, told=told, told_lower=row.told_lower + away, told_upper=row.told_upper + away
+    )
 
 
 def _of(kind: Any, row: Mapping[str, Any]) -> Any:

@@ -1,13 +1,16 @@
 """Conditioning: does something that was, or could have been, recorded explain the modes?"""
 
+import math
+
 import numpy as np
 
 from gates.bounds import counted_interval
+from gates.cause.told import UNDECIDED
 from gates.criterion import Measured, criterion
 from gates.evidence import Evidence, number, numbers
 from gates.need.cause import found_cause
 from gates.need.settings import AUDIT, VALID_CAUSE, NeedSettings
-from genpolicy.audit.rows import Stratum
+from genpolicy.audit.rows import Prediction, Stratum
 
 
 @criterion(
@@ -31,6 +34,33 @@ def strata_effect(evidence: Evidence, settings: NeedSettings) -> Measured:
 
 
 @criterion(
+    "<=",
+    question="Can the mode be told from what the policy does not see?",
+    look_at="Conditioning: a variable, the order or the past tells the mode; observe it.",
+)
+def told_share(evidence: Evidence, settings: NeedSettings) -> Measured:
+    """Wrong guesses at the mode of held-out episodes that the best teller takes away, as a share.
+
+    Judged by the end of the interval that speaks against the limit: the upper one below it, the
+    lower one above it. Where an interval lies astride, nothing can be said.
+    """
+    frame = evidence.rows(f"{AUDIT}/predictions.parquet", Prediction)
+    limit = settings.limits.of.get("told_share")
+    least = math.inf if limit is None or limit.limit is None else limit.limit
+    lower, upper = numbers(frame, "told_lower"), numbers(frame, "told_upper")
+    beyond = bool(np.any(lower > least))
+    row = int(np.argmax(lower if beyond else upper))
+    interval = (float(lower[row]), float(upper[row]))
+    chosen = frame.iloc[row]
+    text = f"{chosen['variable']} in {chosen['phase']}, {chosen['n']} episodes that had a choice"
+    if beyond:
+        return Measured(interval[0], interval, f"{text}; lower end")
+    if least - interval[1] >= 0:
+        return Measured(interval[1], interval, f"{text}; upper end")
+    return Measured(None, interval, f"not decided: the limit lies inside the interval of {text}")
+
+
+@criterion(
     ">=",
     question="Does the audit attribute the modes to the task itself?",
     look_at="Conditioning: the audit found another cause than valid modes; remove it first.",
@@ -39,6 +69,8 @@ def strata_effect(evidence: Evidence, settings: NeedSettings) -> Measured:
 def cause_accepted(evidence: Evidence, settings: NeedSettings) -> Measured:
     """1 if the audit attributes the modes to the task itself, else 0."""
     cause = found_cause(evidence, settings)
+    if cause.kind == UNDECIDED:
+        return Measured(None, caveat=f"not decided: {cause.next_action}")
     return Measured(float(cause.name == VALID_CAUSE), caveat=f"cause: {cause.text}")
 
 

@@ -8,7 +8,8 @@ from gates.criterion import Measured, criterion
 from gates.evidence import Evidence, MissingEvidenceError, count, number, numbers
 from gates.need.cause import found_cause
 from gates.need.settings import AUDIT, NeedSettings
-from genpolicy.audit.rows import Calibration, Clock, ReplayRow
+from genpolicy.audit.rows import Asked, Calibration, Clock, ReplayRow
+from genpolicy.errors import ConfigError
 
 REFUSALS = "artifacts/ingest/refusals.json"
 
@@ -27,6 +28,33 @@ def refused_recordings_accounted(evidence: Evidence, settings: NeedSettings) -> 
         raise MissingEvidenceError("no recordings were found")
     text = f"{found:g} found, {accepted:g} accepted, {refused:g} refused"
     return Measured(abs(accepted + refused - found), caveat=text)
+
+
+@criterion(
+    "<=",
+    question="Was every question asked of the data, or waived by name?",
+    look_at="Data semantics: record or declare what is missing, or let its owner waive it by name.",
+    always=True,
+)
+def unasked_checks(evidence: Evidence, settings: NeedSettings) -> Measured:
+    """Questions that could not be asked and that nobody waived; with any, nothing can be said."""
+    frame = evidence.rows(f"{AUDIT}/asked.parquet", Asked)
+    answered = {check for checks in settings.waived_checks.values() for check in checks}
+    for check in sorted(answered - set(frame["check"])):
+        raise ConfigError(
+            where=f"params.yaml: gate_a.waived_checks: {check}",
+            found="a waiver of no question",
+            expected=f"one of {', '.join(sorted(frame['check']))}",
+            action="Correct the name; a misspelt waiver would waive nothing.",
+        )
+    silent = frame[~frame["asked"].astype(bool)]
+    left = silent[~silent["check"].isin(answered)]
+    if len(left) == 0:
+        waived = f", {len(silent)} of them waived" if len(silent) else ""
+        return Measured(0.0, caveat=f"{len(frame)} questions{waived}")
+    rows = zip(left["check"], left["reason"], strict=True)
+    text = "; ".join(f"{check} ({reason})" for check, reason in rows)
+    return Measured(None, caveat=f"not asked: {text}")
 
 
 @criterion(

@@ -1,10 +1,11 @@
 """Settings of Gate A other than limits, and where its evidence lies."""
 
 from collections.abc import Mapping
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 from pydantic import Field
 
+from gates.report import Owner
 from gates.settings import GateSettings
 from genpolicy.errors import ConfigError
 
@@ -34,6 +35,8 @@ class NeedSettings(GateSettings):
         factors: Factors of which each must have been changed alone.
         conditioning_factors: Factors that could make a density unnecessary; a head is what the
             gate is about, and a single action commits to no mode.
+        waived_checks: Questions of the audit that could not be asked, by the owner who answers for
+            leaving them unasked: question and reason. They stand as caveats in report and card.
         cause: Limits of the questions that only the cause asks, by owner: limit and reason; those
             that a criterion asks as well stand among the limits.
     """
@@ -56,7 +59,19 @@ class NeedSettings(GateSettings):
     latent_baseline: str
     factors: tuple[str, ...] = ("reference", "representation", "trunk", "head", "temporal")
     conditioning_factors: tuple[str, ...] = ("representation", "trunk")
+    waived_checks: dict[Owner, dict[str, Annotated[str, Field(pattern=r"\S")]]] = Field(
+        default_factory=dict
+    )
     cause: dict[str, dict[str, tuple[float, str]]]
+
+    @property
+    def caveats(self) -> tuple[str, ...]:
+        """Who answers for which question that was not asked, and why."""
+        return tuple(
+            f"{check} need not be asked of the data: the {owner} owner answers for it ({reason})."
+            for owner, checks in self.waived_checks.items()
+            for check, reason in checks.items()
+        )
 
     @property
     def strata_level(self) -> float:

@@ -8,7 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from gates.evidence import Evidence, MissingEvidenceError, flags
-from gates.feasibility import CANDIDATES, HELD_OUT, INTACT, LAYERS, admissible
+from gates.feasibility.candidates import admissible
+from gates.feasibility.settings import CANDIDATES, HELD_OUT, INTACT, LAYERS
 from gates.pages.figures import Plot, colours, dashes, in_order
 from gates.pages.limits import draw_limit
 from gates.report import GateReport

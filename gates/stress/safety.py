@@ -5,7 +5,7 @@ import numpy as np
 from gates.bounds import counted_interval, share_interval
 from gates.criterion import Measured, criterion
 from gates.evidence import Evidence, MissingEvidenceError, flags, numbers
-from gates.feasibility import checked_violations
+from gates.feasibility.proof import checked_violations
 from gates.stress.rollouts import STRESS, StressSettings, rollouts
 from genpolicy.evidence.rows.stress import ConservationRow, StressCountRow, StressStubRow
 

@@ -47,6 +47,7 @@ def write_evidence(
     """
     rows: dict[str, Sequence[Any]] = {
         "alignment": alignment(result, settings),
+        "asked": result.asked,
         "calibration": result.semantics.calibrations,
         "clocks": result.semantics.clocks,
         "components": _components(result),
@@ -55,6 +56,7 @@ def write_evidence(
         "findings": result.semantics.findings,
         "modes": result.modes,
         "neighbourhoods": [_situation(result.data, item) for item in result.situations],
+        "predictions": result.told,
         "recovery": result.recovery,
         "replay": _replays(result),
         "resamples": result.resamples,

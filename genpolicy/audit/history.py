@@ -77,7 +77,7 @@ def history_test(
     cell = np.unique(blocks, return_inverse=True)[1].reshape(-1)
     features, names = past_features(data, settings, rows)
     past_values = _standardised(features, cell)
-    now_values = _standardised(_present(data, settings, rows), cell)
+    now_values = _standardised(present_features(data, settings, rows), cell)
     draws = np.stack([_dealt(labels, cell, rng) for _ in range(settings.permutations)])
     null = np.array([_ratio(past_values, draw, cell).max(initial=0.0) for draw in draws])
     null_now = np.array([_ratio(now_values, draw, cell).max(initial=0.0) for draw in draws[:99]])
@@ -145,7 +145,7 @@ def _summary(values: Array) -> tuple[Array, Array, Array]:
     return values.min(axis=0), values.max(axis=0), values.mean(axis=0)
 
 
-def _present(data: AuditInput, settings: AuditSettings, rows: Integers) -> Array:
+def present_features(data: AuditInput, settings: AuditSettings, rows: Integers) -> Array:
     """The observations that the policy sees, and their changes. Shape (n, F)."""
     first = data.first_row[rows]
     seen = [

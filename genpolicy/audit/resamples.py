@@ -13,13 +13,13 @@ from scipy.stats import norm
 from genpolicy.audit.data import Array, AuditInput, Integers
 from genpolicy.audit.labels import Replayed, disagreement
 from genpolicy.audit.persistence import NULL_QUANTILE, Persistence, persistent
-from genpolicy.audit.rows import ModeOutcome, Resample, Stratum
+from genpolicy.audit.rows import ModeOutcome, Prediction, Resample, Stratum
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.audit.situations import Claim, Situation, claims_of, coherent_phases
 from genpolicy.seeds import stream
 from genpolicy.statistics.intervals import clopper_pearson
 
-TWO_SIDED_95 = 1.96
+TWO_SIDED_95, TWO_SIDED_90 = 1.96, 1.645
 
 
 @dataclass(frozen=True)
@@ -30,12 +30,14 @@ class Measures:
         replayed: Labels and replays.
         persistence: Identity over time.
         strata: Tests of variables, in the order of `strata.parquet`.
+        told: What variables tell of the modes, in the order of `predictions.parquet`.
         modes: Modes of the phase with most situations, in the order of `modes.parquet`.
     """
 
     replayed: tuple[Replayed, ...]
     persistence: Persistence
     strata: tuple[Stratum, ...]
+    told: tuple[Prediction, ...]
     modes: tuple[ModeOutcome, ...]
 
 
@@ -116,6 +118,7 @@ def _draw(
     identity = _persistence(measured.persistence, table, weights * kept)
     strata = [_stratum(row, rng) for row in measured.strata]
     modes = [_mode(mode, rng) for mode in measured.modes]
+    told = [_told(row, rng) for row in measured.told]
     return Resample(
         disagreements=wrong,
         disagreement_upper=upper,
@@ -129,6 +132,7 @@ def _draw(
         p_adjusted=tuple(row[0] for row in strata),
         effect=tuple(row[1] for row in strata),
         effect_lower=tuple(row[2] for row in strata),
+        told=tuple(told),
         success_lower=tuple(mode[0] for mode in modes),
         admissible=tuple(mode[1] for mode in modes),
     )
@@ -165,6 +169,12 @@ def _stratum(
     effect = min(1.0, max(0.0, row.effect + shock * wide / (2 * TWO_SIDED_95)))
     p_value = float(norm.sf(norm.isf(min(max(row.p_adjusted, 1e-12), 1.0 - 1e-12)) + shock))
     return p_value, effect, max(0.0, effect - (row.effect - (row.effect_lower or 0.0)))
+
+
+def _told(row: Prediction, rng: np.random.Generator) -> float:
+    """What a variable tells, drawn from the normal distribution of its interval."""
+    wide = (row.told_upper - row.told_lower) / (2 * TWO_SIDED_90)
+    return row.told + wide * float(rng.normal())
 
 
 def _mode(mode: ModeOutcome, rng: np.random.Generator) -> tuple[float, int]:

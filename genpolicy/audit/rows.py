@@ -8,7 +8,10 @@ Most are what the audit itself computes with. None is "not measured", never zero
 from dataclasses import dataclass
 
 from genpolicy.audit.component_rows import ComponentModes
+from genpolicy.audit.hidden_rows import Asked, Prediction, Stratum
 from genpolicy.audit.shown_rows import Alignment, ExampleChunk, SupportPoint
+
+__all__ = ["Asked", "Prediction", "Stratum"]  # and what is defined here
 
 
 @dataclass(frozen=True)
@@ -152,37 +155,6 @@ class ModeOutcome:
 
 
 @dataclass(frozen=True)
-class Stratum:
-    """`strata.parquet`: one variable in one phase; None where the test was not run.
-
-    Attributes:
-        variable: Name of the variable; `channel.component` for an observed one.
-        phase: Task phase.
-        p_value: Permutation p-value.
-        p_adjusted: After Holm over all variables and phases.
-        effect: Share of the modes' entropy inside situations that it explains.
-        effect_lower: Lower end of the interval.
-        effect_upper: Upper end of the interval.
-        n: Episodes that could tell.
-        recorded: False where the variable was not recorded at all: it stays unknown.
-        observed: Whether a policy sees it.
-        detail: What of it, in words; empty where the name says all.
-    """
-
-    variable: str
-    phase: str
-    p_value: float | None
-    p_adjusted: float | None
-    effect: float | None
-    effect_lower: float | None
-    effect_upper: float | None
-    n: int
-    recorded: bool
-    observed: bool
-    detail: str = ""
-
-
-@dataclass(frozen=True)
 class ReplayRow:
     """`replay.parquet`: one replayed episode.
 
@@ -248,6 +220,7 @@ class Resample:
         p_adjusted: One for each row of `strata.parquet`; None where it was not tested.
         effect: The same.
         effect_lower: The same.
+        told: One for each row of `predictions.parquet`.
         success_lower: One for each mode of the phase with most situations.
         admissible: The same.
     """
@@ -264,12 +237,14 @@ class Resample:
     p_adjusted: tuple[float | None, ...]
     effect: tuple[float | None, ...]
     effect_lower: tuple[float | None, ...]
+    told: tuple[float, ...]
     success_lower: tuple[float, ...]
     admissible: tuple[int, ...]
 
 
 TABLES: dict[str, type] = {
     "alignment": Alignment,
+    "asked": Asked,
     "calibration": Calibration,
     "clocks": Clock,
     "components": ComponentModes,
@@ -278,6 +253,7 @@ TABLES: dict[str, type] = {
     "findings": Finding,
     "modes": ModeOutcome,
     "neighbourhoods": SituationRow,
+    "predictions": Prediction,
     "recovery": RecoveryOutcome,
     "replay": ReplayRow,
     "resamples": Resample,

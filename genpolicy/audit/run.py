@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from genpolicy.audit.asked import questions
 from genpolicy.audit.component_rows import ComponentModes
 from genpolicy.audit.components import Component
 from genpolicy.audit.counts import Counts, count
@@ -20,10 +21,11 @@ from genpolicy.audit.looks import (
 from genpolicy.audit.mean_versus_modes import Admissible, compare
 from genpolicy.audit.neighbourhoods import Support
 from genpolicy.audit.persistence import Persistence, summarise
+from genpolicy.audit.predictability import predictions
 from genpolicy.audit.progress import Progress, silent
 from genpolicy.audit.recovery import demonstrated, recovery_outcomes
 from genpolicy.audit.resamples import Measures, resamples
-from genpolicy.audit.rows import ModeOutcome, RecoveryOutcome, Resample, Stratum
+from genpolicy.audit.rows import Asked, ModeOutcome, Prediction, RecoveryOutcome, Resample, Stratum
 from genpolicy.audit.semantics import Semantics, measure, realigned
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.audit.situations import (
@@ -51,10 +53,12 @@ class AuditResult:
         modes: Outcome of each mode of each phase.
         links: Mode of each episode, -1 for none, per phase. Shape (E,).
         strata: Tests of recorded variables.
+        told: What variables, order and past tell of the modes of held-out episodes.
         replayed: Labels against replay.
         recovery: The disturbed episodes.
         demonstrated: The mode that each episode followed in the primary phase, -1 for none.
             Shape (E,).
+        asked: Which questions could be asked of the data.
         counts: Numbers for the summary.
         modes_after_realignment: Held-out episodes with two modes on realigned data.
         modes_other_phases: The same with the phase looked at the other way: across phases if the
@@ -72,9 +76,11 @@ class AuditResult:
     modes: tuple[ModeOutcome, ...]
     links: dict[str, Integers]
     strata: tuple[Stratum, ...]
+    told: tuple[Prediction, ...]
     replayed: tuple[Replayed, ...]
     recovery: tuple[RecoveryOutcome, ...]
     demonstrated: Integers
+    asked: tuple[Asked, ...]
     counts: Counts
     modes_after_realignment: int
     modes_other_phases: int | None
@@ -123,11 +129,15 @@ def audit(
     links = _links(data, settings, several)
     modes = _modes(data, situations, links, replayed)
     strata = examine_strata(data, settings, several, links, root_seed=root_seed)
+    told = predictions(data, settings, several, links, root_seed=root_seed)
     counts = count(data, situations, support, incoherent)
     primary = primary_phase(several)
     persistence = summarise([item.identity for item in situations if item.two_mode])
     main = several.get(primary, []), links.get(primary)
-    measured = Measures(replayed, persistence, strata, _of_phase(modes, primary))
+    measured = Measures(replayed, persistence, strata, told, _of_phase(modes, primary))
+    asked = questions(
+        data, settings, semantics, told, several, replays=len(replayed), checked=bool(admissible)
+    )
     after = _after_realignment(data, settings, semantics, counts, component, root_seed=root_seed)
     return AuditResult(
         data=data,
@@ -138,6 +148,8 @@ def audit(
         modes=modes,
         links=links,
         strata=strata,
+        told=told,
+        asked=asked,
         replayed=replayed,
         recovery=recovery_outcomes(data, settings, *main, component=component),
         demonstrated=demonstrated(data, settings, *main, component=component),

@@ -11,7 +11,6 @@ from genpolicy.audit.propose import observation_contract, propose_settings
 from genpolicy.audit.run import AuditResult
 from genpolicy.audit.run import audit as audit_rows
 from genpolicy.audit.settings import AuditSettings
-from genpolicy.audit.strata import EPISODE_VARIABLES, HISTORY
 from genpolicy.audit.view import from_dataset
 from genpolicy.data.dataset import Dataset
 
@@ -99,7 +98,7 @@ def audit(
         modes=tuple(asdict(mode) for mode in result.modes),
         support=_support(result),
         evidence=tuple(_evidence(result, settings)),
-        rests_on=tuple(_rests_on(dataset, result, admissible, replay)),
+        rests_on=tuple(_rests_on(dataset, result)),
         settings=settings,
         dataset=dataset.manifest_sha256,
         result=result,
@@ -164,37 +163,20 @@ def _evidence(result: AuditResult, settings: AuditSettings) -> list[str]:
     return lines
 
 
-def _rests_on(
-    dataset: Dataset,
-    result: AuditResult,
-    admissible: Admissible | None,
-    replay: Replay | None,
-) -> list[str]:
-    """Everything that was guessed, not recorded or not checked."""
-    episodes = result.data.episodes
+def _rests_on(dataset: Dataset, result: AuditResult) -> list[str]:
+    """Everything that was guessed, not recorded or not asked."""
     lines = [str(note) for note in dataset.manifest.get("notes", ())]
     lines += result.semantics.notes
-    for name in EPISODE_VARIABLES:
-        if not any(getattr(episodes, name)):
-            lines.append(f"{name}: not recorded, so it may explain the modes unseen.")
-    if not any(episodes.outcome):
+    lines += [
+        f"Not asked: {row.check.replace('_', ' ')} ({row.reason})."
+        for row in result.asked
+        if not row.asked
+    ]
+    if not any(result.data.episodes.outcome):
         lines.append("outcome: not recorded, so no mode can be called valid.")
-    elif replay is None:
-        lines.append("outcome: taken as labelled; no episode was replayed.")
-    if admissible is None:
-        lines.append(
-            "feasibility: not checked; neither the mean nor a mode was held against limits."
-        )
-    if any(row.variable == HISTORY and row.n == 0 for row in result.strata):
-        lines.append(
-            "history: the modes part before there is a past to look at, so whether something "
-            "earlier decided them was not tested."
-        )
     lines += [
         f"{item.component}: {NOT_LOOKED_AT[item.state]}, so nothing is said of its modes."
         for item in result.components
         if item.state in NOT_LOOKED_AT and item.component != OTHER
     ]
-    if not result.data.paired:
-        lines.append("pairing: no action commands an observed number, so no lag was measured.")
     return lines

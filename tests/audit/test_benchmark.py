@@ -1,16 +1,20 @@
 """The benchmark's generator plants what it says, and nothing else."""
 
+import subprocess
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from benchmarks.audit.__main__ import FIRST_SEED, jobs
+from benchmarks.audit.__main__ import FIRST_DEVELOPMENT_SEED, jobs
 from benchmarks.audit.cases import CAUSES
+from benchmarks.audit.frozen import frozen_commit, report_seed
 from benchmarks.audit.plan import Defect, Plan, draw_roster
 from benchmarks.audit.recorder import TASKS, record
-from benchmarks.audit.tables import BEGIN, END, into_page
+from benchmarks.audit.runner import Job, Result
+from benchmarks.audit.tables import BEGIN, END, into_page, markdown
 from genpolicy.audit.data import relative_paths
+from genpolicy.errors import BadInputError
 
 SMALL = 24
 
@@ -121,9 +125,10 @@ def test_the_catalogue_is_complete_and_seeds_are_apart():
         for task in TASKS:
             plan = cause.plan(1, cause.strengths[-1], task)
             assert isinstance(plan, Plan)
+    firsts = {"development": FIRST_DEVELOPMENT_SEED, "report": report_seed("0" * 40)}
     both = {
-        seeds: [job.seed for job in jobs(seeds, repeats=1, tasks=list(TASKS), only="")]
-        for seeds in FIRST_SEED
+        seeds: [job.seed for job in jobs(first, repeats=1, tasks=list(TASKS), only="")]
+        for seeds, first in firsts.items()
     }
     assert len(both["report"]) >= 400
     assert all(len(set(seeds)) == len(seeds) for seeds in both.values())
@@ -137,3 +142,100 @@ def test_tables_go_between_the_marks_of_the_page(tmp_path):
     text = page.read_text()
     assert "old" not in text and "new" in text
     assert text.startswith("before\n") and text.endswith("\nafter\n")
+
+
+def test_a_habit_repeats_and_a_drift_moves_as_far_as_said():
+    plan = Plan(7, shares=(0.5, 0.5), decided_by="habit", fidelity=0.7, episodes=4000)
+    mode = draw_roster(plan, 0.01).mode
+    assert np.mean(mode[1:] == mode[:-1]) == pytest.approx(0.85, abs=0.02)
+    drift = draw_roster(replace(plan, decided_by="drift", fidelity=0.8), 0.01).mode
+    assert np.mean(drift[:400]) == pytest.approx(0.14, abs=0.05)
+    assert np.mean(drift[-400:]) == pytest.approx(0.86, abs=0.05)
+
+
+def test_what_goes_together_goes_together_and_decides_nothing():
+    roster = draw_roster(Plan(7, shares=(0.5, 0.5), correlation=0.9, episodes=4000), 0.01)
+    birch = roster.operator == "birch"
+    assert np.mean((roster.object == "peg_b") == birch) > 0.9
+    assert np.mean(roster.mode[birch]) == pytest.approx(0.5, abs=0.06)
+
+
+def test_dropped_rows_frozen_positions_and_labels_of_one_mode():
+    whole = record("planar", Plan(9, episodes=SMALL)).data
+    fewer = record("planar", Plan(9, episodes=SMALL, defects=(Defect("drop", 0.2, "all"),))).data
+    assert len(fewer.observation) / len(whole.observation) == pytest.approx(0.8, abs=0.05)
+    assert np.isin(fewer.event_time_s, whole.event_time_s).all()
+    frozen = record("planar", Plan(9, episodes=SMALL, defects=(Defect("freeze", 1.0, "all"),))).data
+    same = frozen.episode[1:] == frozen.episode[:-1]
+    still = np.mean((np.diff(frozen.position, axis=0) == 0).all(axis=1)[same])
+    assert still == pytest.approx(1 / 3, abs=0.05) and np.array_equal(frozen.action, whole.action)
+    plan = Plan(8, shares=(0.5, 0.5), wrong_labels=0.5, wrong_mode_only=True, episodes=200)
+    wrong = record("planar", plan)
+    truth = np.array([wrong.outcomes[uuid] for uuid in wrong.data.episodes.uuid])
+    mode = draw_roster(plan, 0.01).mode
+    assert not np.any((truth != wrong.data.episodes.outcome) & (mode == 0))
+    assert np.mean((truth != wrong.data.episodes.outcome)[mode == 1]) == pytest.approx(0.5, abs=0.1)
+
+
+def test_tails_are_heavy_and_end():
+    rng = np.random.default_rng(0)
+    normal, heavy = (
+        np.abs([Plan(0, tails=tails).spread(rng) for _ in range(4000)]) / 0.008
+        for tails in (0.0, 2.0)
+    )
+    assert np.mean(normal > 4) < 0.001 < 0.02 < np.mean(heavy > 4)
+    assert heavy.max() <= 6.0 + 1e-9
+
+
+def _git(root, *command):
+    subprocess.run(
+        ["git", "-C", str(root), "-c", "user.name=a", "-c", "user.email=a@b.c", *command],
+        check=True, capture_output=True,
+    )  # fmt: skip
+
+
+def test_a_report_is_drawn_from_the_commit_and_refused_where_the_detector_is_not_committed(
+    tmp_path,
+):
+    _git(tmp_path, "init", "-q")
+    detector = tmp_path / "genpolicy/audit/modes.py"
+    detector.parent.mkdir(parents=True)
+    detector.write_text("A = 1\n")
+    (tmp_path / "notes.md").write_text("x\n")
+    _git(tmp_path, "add", "-A")
+    _git(tmp_path, "commit", "-q", "-m", "x")
+    first = frozen_commit(tmp_path)
+    (tmp_path / "notes.md").write_text("y\n")
+    assert frozen_commit(tmp_path) == first and len(first) == 40
+    detector.write_text("A = 2\n")
+    with pytest.raises(BadInputError, match="modes"):
+        frozen_commit(tmp_path)
+    _git(tmp_path, "commit", "-q", "-am", "y")
+    second = frozen_commit(tmp_path)
+    assert report_seed(first) != report_seed(second)
+    (tmp_path / "gates").mkdir()
+    (tmp_path / "gates/new.py").write_text("")
+    with pytest.raises(BadInputError, match="new"):
+        frozen_commit(tmp_path)
+
+
+def _result(cause, strength, verdict, *, named):
+    number = next(k for k, item in enumerate(CAUSES) if item.name == cause)
+    entry = CAUSES[number]
+    return Result(
+        Job(number, strength, "planar", 1), entry.name, entry.group, entry.strong(strength),
+        verdict, "", "", named, named, {}, 1.0,
+    )  # fmt: skip
+
+
+def test_errors_below_the_minimum_and_open_answers_are_counted():
+    weak = [_result("hidden operator", 0.2, "valid_modes", named=False)] * 3
+    weak += [_result("hidden operator", 0.2, "hidden_state", named=True)]
+    strong = [_result("hidden operator", 0.8, "insufficient_support", named=False)]
+    strong += [_result("2 valid modes", 0.5, "insufficient_support", named=False)]
+    text = markdown([*weak, *strong], seeds="a test")
+    assert "| below the minimum: valid_modes said although a cause was planted | 3 | 4 |" in text
+    assert "| below the minimum: planted cause not said | 3 | 4 |" in text
+    assert "| left open, from the minimum strength on | 2 | 2 |" in text
+    assert "| true modes denied: another cause said | 0 | 1 |" in text
+    assert "| true modes left open | 1 | 1 |" in text

@@ -19,6 +19,7 @@ FILES = {
     "strata.parquet", "replay.parquet", "recovery.parquet", "persistence.json", "summary.json",
     "settings.json", "findings.parquet", "resamples.parquet", "examples.parquet",
     "alignment.parquet", "support.parquet", "demonstrated.parquet",
+    "predictions.parquet", "asked.parquet",
 }  # fmt: skip
 
 

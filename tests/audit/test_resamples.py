@@ -11,7 +11,7 @@ from genpolicy.audit.modes import Clustering
 from genpolicy.audit.neighbourhoods import Neighbourhood
 from genpolicy.audit.persistence import Persistence
 from genpolicy.audit.resamples import Measures, resamples
-from genpolicy.audit.rows import ModeOutcome, Stratum
+from genpolicy.audit.rows import ModeOutcome, Prediction, Stratum
 from genpolicy.audit.situations import Situation
 from genpolicy.statistics.intervals import clopper_pearson
 
@@ -29,11 +29,11 @@ def situations(kept=0.9, two_mode=True):
     )  # fmt: skip
 
 
-def drawn(items=None, *, wrong=0, strata=(), modes=(), seed=1, count=60):
+def drawn(items=None, *, wrong=0, strata=(), told=(), modes=(), seed=1, count=60):
     replayed = tuple(
         Replayed(str(n), "success", "failure" if n < wrong else "success") for n in range(40)
     )
-    measured = Measures(replayed, Persistence(0.9, 0.4, 0.2, 12), strata, modes)
+    measured = Measures(replayed, Persistence(0.9, 0.4, 0.2, 12), strata, told, modes)
     settings = SETTINGS.model_copy(update={"resamples": count})
     found = situations() if items is None else items
     return resamples(DATA, settings, measured, found, root_seed=seed)
@@ -86,6 +86,15 @@ def test_what_was_not_tested_stays_unknown_and_effects_stay_in_their_range():
     assert np.median([row.p_adjusted[0] for row in rows]) == pytest.approx(0.2, abs=0.07)
 
 
+def test_what_is_told_is_drawn_from_its_interval():
+    row = Prediction("operator", "approach", 0.3, 0.1355, 0.4645, 0.65, 0.5, 100)
+    found = np.array([draw.told for draw in drawn(told=(row, row), count=400)])
+    assert found.shape == (400, 2)
+    assert np.mean(found) == pytest.approx(0.3, abs=0.02)
+    # Each end is a bound of 95 %: 0.1645 is 1.645 standard deviations.
+    assert np.std(found) == pytest.approx(0.1, rel=0.15)
+
+
 def test_a_mode_that_always_succeeds_does_so_in_every_draw():
     modes = (ModeOutcome("m0", "approach", 30, 30, 0.88, 1.0, 5, 5),
              ModeOutcome("m1", "approach", 30, 15, 0.3, 0.7, 0, 0))  # fmt: skip
@@ -96,6 +105,6 @@ def test_a_mode_that_always_succeeds_does_so_in_every_draw():
 
 
 def test_no_situation_and_no_replay_are_drawn_as_nothing():
-    empty = Measures((), Persistence(0.0, 1.0, 1.0, 0), (), ())
+    empty = Measures((), Persistence(0.0, 1.0, 1.0, 0), (), (), ())
     (row,) = resamples(DATA, SETTINGS.model_copy(update={"resamples": 1}), empty, (), root_seed=1)
     assert (row.two_mode, row.kept_n, row.disagreement_upper) == (0, 0, 1.0)

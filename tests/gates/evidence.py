@@ -15,15 +15,17 @@ import yaml
 from gates import pipeline
 from gates.cause import default_limits
 from gates.cause.limits import OWN
-from gates.feasibility import LAYERS
+from gates.feasibility.settings import LAYERS
 from gates.preregistration import PREREGISTRATION, plan_bytes
 from gates.reproducibility.timing import MEASURED_HERE, TERMS
 from genpolicy.audit.component_rows import ComponentModes
 from genpolicy.audit.rows import (
+    Asked,
     Calibration,
     Clock,
     Finding,
     ModeOutcome,
+    Prediction,
     RecoveryOutcome,
     ReplayRow,
     Resample,
@@ -142,6 +144,7 @@ PARAMS: dict[str, Any] = {
         "chunked_baseline": "chunked_bc",
         "limits": by_owner(
             refused_recordings_accounted=(0, "perception"),
+            unasked_checks=(0, "perception"),
             clock_residual_s=(0.01, "perception"),
             lag_spread_steps=(1, "controller"),
             calibration_residual_m=(0.005, "perception"),
@@ -156,6 +159,7 @@ PARAMS: dict[str, Any] = {
             remedy_valid_share=(0.5, "model"),
             data_defects=(0, "perception"),
             strata_effect=(0.3, "perception"),
+            told_share=(0.4, "perception"),
             cause_accepted=(1, "model"),
             baselines_matched=(0, "model"),
             baseline_mode_coverage=(0.6, "model"),
@@ -494,6 +498,11 @@ def _audit(root: Path) -> None:
             for variable in ("operator", "object", "epoch")
         ],
     )
+    names = ("labels", "constant_lag", "operator")
+    asked = [{"check": name, "asked": True, "reason": ""} for name in names]
+    table(root, "audit/asked.parquet", Asked, asked)
+    told = [_told(name) for name in ("operator", "object")]
+    table(root, "audit/predictions.parquet", Prediction, told)
     table(
         root,
         "audit/replay.parquet",
@@ -575,6 +584,20 @@ def _audit(root: Path) -> None:
     )
 
 
+def _told(variable: str) -> dict[str, Any]:
+    return {
+        "variable": variable,
+        "phase": "approach",
+        "told": 0.05,
+        "told_lower": -0.08,
+        "told_upper": 0.18,
+        "right": 0.53,
+        "chance": 0.5,
+        "n": 150,
+        "detail": "",
+    }
+
+
 def _draw() -> dict[str, Any]:
     return {
         "disagreements": 0,
@@ -589,6 +612,7 @@ def _draw() -> dict[str, Any]:
         "p_adjusted": [0.9] * 3,
         "effect": [0.05] * 3,
         "effect_lower": [0.0] * 3,
+        "told": [0.05] * 2,
         "success_lower": [0.8] * 2,
         "admissible": [49] * 2,
     }

@@ -113,6 +113,14 @@ WORSE = {
             AUDIT + "strata.parquet",
             lambda s: lambda f: cells("effect", s)(cells("p_adjusted", 0.001)(f)),
         ),
+        "unasked_checks": _table(
+            AUDIT + "asked.parquet",
+            lambda s: cells("asked", False, share=s),
+        ),
+        "told_share": _table(
+            AUDIT + "predictions.parquet",
+            lambda s: lambda f: f.assign(told_lower=0.9 * s - 0.1, told_upper=0.9 * s + 0.1),
+        ),
         "cause_accepted": _document(
             AUDIT + "summary.json", lambda s: _set("label_disagreement_upper", 0.06 + s)
         ),
@@ -321,6 +329,8 @@ TABLES = {
         "audit/neighbourhoods",
         "audit/modes",
         "audit/strata",
+        "audit/predictions",
+        "audit/asked",
         "audit/replay",
         "audit/calibration",
         "measure_baselines/modes",
@@ -394,6 +404,7 @@ def test_empty_table_is_inconclusive_never_pass(gate, path, ladder):
     [
         ("A", "audit/clocks", "offset_after_s"),
         ("A", "audit/strata", "p_adjusted"),
+        ("A", "audit/predictions", "told_upper"),
         ("B", "reload/samples", "max_abs_difference"),
         ("B", "reload/modes", "fewest_admissible"),
         ("B", "train_baselines/chunked_bc/seed_0/validation", "loss"),

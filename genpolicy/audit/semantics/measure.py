@@ -56,7 +56,7 @@ def measure(data: AuditInput, settings: AuditSettings) -> Semantics:
         findings += component_findings(data, motion, settings)
     clocks, shift, found = _position(data, motion, settings)
     findings += found
-    others, stream_shift, found = _others(data, motion, shift, settings)
+    others, stream_shift, found, unclocked = _others(data, motion, shift, settings)
     findings += found
     stubs, remarks = continuity.stub_findings(data, motion, settings)
     releases = calibration.calibrations(data, settings)
@@ -82,6 +82,7 @@ def measure(data: AuditInput, settings: AuditSettings) -> Semantics:
         notes=(*notes, *remarks, *([wander] if wander else [])),
         shift_steps=shift,
         stream_shift_steps=stream_shift,
+        unclocked=unclocked,
     )
 
 
@@ -118,11 +119,15 @@ def _position(
 
 def _others(
     data: AuditInput, motion: Motion, shift: Integers, settings: AuditSettings
-) -> tuple[list[Clock], dict[str, Integers], list[Finding]]:
-    """Clocks, shifts and findings of all other streams: by delay, and by motion where they move."""
+) -> tuple[list[Clock], dict[str, Integers], list[Finding], tuple[str, ...]]:
+    """Clocks, shifts and findings of all other streams: by delay, and by motion where they move.
+
+    Last, the streams that could be looked at in neither way.
+    """
     clocks: list[Clock] = []
     findings: list[Finding] = []
     shifts: dict[str, Integers] = {}
+    unclocked: list[str] = []
     names = sorted({*data.delay_s, *data.streams} - {data.position_stream})
     for stream in names:
         taken = np.zeros(len(data.episodes))
@@ -131,13 +136,16 @@ def _others(
             found, taken = _by_delay(data, stream, motion, settings)
             findings += found
         if stream in data.streams:
-            found, moved = _by_motion(data, stream, motion, shift, settings)
+            seen = _by_motion(data, stream, motion, shift, settings)
+            if seen is None and stream not in data.delay_s:
+                unclocked.append(stream)
+            found, moved = seen or ([], taken)
             # One fault shows in both: it is said once.
             if found and not any(item.variable == stream for item in findings):
                 findings += found
                 taken = moved
         shifts[stream] = shift_steps(taken, data.period_s)
-    return clocks, shifts, findings
+    return clocks, shifts, findings, tuple(unclocked)
 
 
 def _by_delay(
@@ -161,11 +169,11 @@ def _by_delay(
 
 def _by_motion(
     data: AuditInput, stream: str, motion: Motion, shift: Integers, settings: AuditSettings
-) -> tuple[list[Finding], Array]:
+) -> tuple[list[Finding], Array] | None:
     columns = np.arange(data.observation.shape[1])[data.streams[stream]]
     lags = stream_lags(data, motion, columns, settings)
     if lags is None:
-        return [], np.zeros(len(data.episodes))
+        return None
     # What is late against a late position is late by both.
     offsets = (lags.steps + shift) * data.period_s
     findings, taken = offset_findings(

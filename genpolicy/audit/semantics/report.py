@@ -31,6 +31,7 @@ class Semantics:
         shift_steps: By how many rows the commands of each episode are to be moved so that all
             episodes are aligned. Shape (E,).
         stream_shift_steps: The same for the columns of each other stream that was measured.
+        unclocked: Streams whose clock could not be looked at, neither by delay nor by motion.
     """
 
     clocks: tuple[Clock, ...]
@@ -42,6 +43,7 @@ class Semantics:
     notes: tuple[str, ...] = ()
     shift_steps: Integers = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     stream_shift_steps: dict[str, Integers] = field(default_factory=dict)
+    unclocked: tuple[str, ...] = ()
 
 
 def in_order(findings: list[Finding]) -> tuple[Finding, ...]:

@@ -5,7 +5,7 @@ from dataclasses import replace
 from gates.cause import Cause, CauseLimits, default_limits, name_cause
 from gates.cause.numbers import Counts, Kept, Labels, Numbers
 from genpolicy.audit.component_rows import ComponentModes
-from genpolicy.audit.rows import Finding, ModeOutcome, Stratum
+from genpolicy.audit.rows import Finding, ModeOutcome, Prediction, Stratum
 from genpolicy.audit.settings import AuditSettings
 
 LIMITS = default_limits()
@@ -35,11 +35,14 @@ def component(name: str, **changes) -> ComponentModes:
 HIDDEN = replace(STRATUM, p_adjusted=0.001, effect=0.8, effect_lower=0.6)
 
 
+TOLD = Prediction("operator", "approach", 0.05, -0.1, 0.2, 0.52, 0.5, 120)
+
+
 VALID = Numbers(
     findings=(), floors=AuditSettings().floors, metre=1.0, unit="m",
     labels=Labels(60, 0, 0.06),
     counts=Counts(200, 180, 50, 120, 45, 50, 0, 0, 110, 0.1, 0.01),
-    kept=Kept(0.95, 0.6, 118), strata=(STRATUM,),
+    kept=Kept(0.95, 0.6, 118), strata=(STRATUM,), told=(TOLD,),
     modes=(
         ModeOutcome("m0", "approach", 40, 40, 0.91, 1.0, 50, 50),
         ModeOutcome("m1", "approach", 40, 39, 0.87, 1.0, 48, 50),

@@ -7,6 +7,7 @@ from editing import cells
 
 from gates.evidence import MissingEvidenceError
 from gates.need import conditioning
+from gates.proof import judge
 from genpolicy.statistics.intervals import clopper_pearson
 
 
@@ -36,3 +37,38 @@ def test_without_modes_nothing_collapses_and_without_the_number_nothing_is_known
     evidence.edit_document(ladder, "audit/summary.json", lambda d: {**d, "modes_with_phase": None})
     with pytest.raises(MissingEvidenceError):
         asked(ladder, conditioning.phase_collapse_share, gate="A")
+
+
+@pytest.mark.parametrize(
+    ("lower", "upper", "found", "verdict"),
+    [(-0.1, 0.2, 0.2, "PASS"), (0.3, 0.5, None, "INCONCLUSIVE"), (0.5, 0.8, 0.5, "FAIL")],
+)
+def test_what_tells_the_mode_is_judged_by_the_end_that_speaks_against(
+    ladder, lower, upper, found, verdict
+):
+    worse = {"told": (lower + upper) / 2, "told_lower": lower, "told_upper": upper}
+    evidence.edit_table(ladder, "audit/predictions.parquet", lambda f: f.assign(**worse))
+    report = judge(ladder, "A")
+    answers = {answer.id: answer for answer in report.criteria}
+    told = answers["told_share"]
+    assert (told.measured, told.verdict, told.interval) == (found, verdict, (lower, upper))
+    assert answers["cause_accepted"].verdict == report.verdict == verdict
+    assert verdict == "PASS" or "told_share" in report.diagnosis
+
+
+def test_one_variable_beyond_the_limit_is_red_whatever_the_others_say(ladder):
+    def change(frame):
+        frame.loc[0, ["told_lower", "told_upper"]] = [0.6, 0.8]
+        frame.loc[1, ["told_lower", "told_upper"]] = [0.2, 0.9]
+        return frame
+
+    evidence.edit_table(ladder, "audit/predictions.parquet", change)
+    report = judge(ladder, "A")
+    told = next(answer for answer in report.criteria if answer.id == "told_share")
+    assert (told.measured, told.verdict) == (0.6, "FAIL") and "operator" in told.caveat
+
+
+def test_without_a_choice_nothing_is_known_of_it(ladder):
+    evidence.edit_table(ladder, "audit/predictions.parquet", lambda frame: frame.head(0))
+    with pytest.raises(MissingEvidenceError, match="no rows"):
+        asked(ladder, conditioning.told_share, gate="A")

@@ -28,6 +28,7 @@ def find(root, kind, variable, question, measured):
         floor=0.0, unit="", action="Repair it.",
     )  # fmt: skip
     write_rows(root / "artifacts/audit/findings.parquet", Finding, [row])
+    evidence.record(root)
 
 
 def contaminated(root):

@@ -5,7 +5,7 @@ from planar import LIMITS
 from gates.cause import cause_of
 
 CASES = {
-    "valid": {"episodes": 100, "recoveries": 6},
+    "valid": {"episodes": 160, "recoveries": 20},
     "clock": {"episodes": 100, "clock_steps": 3},
     "labels": {"episodes": 100, "wrong_labels": 0.3},
     "operator": {"episodes": 100, "modes": "operator"},

@@ -9,15 +9,10 @@ from asked import asked
 from editing import cells
 
 from gates.evidence import Evidence, MissingEvidenceError
-from gates.feasibility import (
-    SHADOW,
-    FeasibilitySettings,
-    boundary_jerk_p95_m_s3,
-    checked_violations,
-    mutants_undetected,
-    projection_p95_m,
-    stub_violation_upper,
-)
+from gates.feasibility.arrivals import stub_violation_upper
+from gates.feasibility.candidates import boundary_jerk_p95_m_s3, projection_p95_m
+from gates.feasibility.proof import checked_violations, mutants_undetected
+from gates.feasibility.settings import SHADOW, FeasibilitySettings
 from gates.proof import judge
 from genpolicy.statistics.intervals import clopper_pearson
 

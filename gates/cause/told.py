@@ -1,0 +1,96 @@
+"""How much of the mode can be told from what the policy does not see, and is that too much?
+
+The end of the interval that speaks against the limit is held to it: what is told for sure beyond
+the limit is a hidden state, what is surely below is none, and what lies astride is not decided.
+"""
+
+from collections.abc import Sequence
+
+from gates.cause.answers import Answer, CauseName, Diagnosis, Layer
+from gates.cause.limits import CauseLimits
+from genpolicy.audit.rows import Prediction
+
+QUESTION = "told_share"
+PREDICTED, UNDECIDED = "prediction", "undecided"
+EPOCH = "calibration_epoch"
+# Which to name of several that tell nearly as much, most concrete first; others come before the
+# last two, which anything else shines through.
+CONCRETE = (
+    "object", "operator", EPOCH, "previous_episodes", "previous_episodes_of_operator",
+    "every_other_episode", "episode_order", "recording_sequence", "everything_together", "history",
+)  # fmt: skip
+EVERYTHING = 2
+SHOWN = 8
+
+
+def surely(row: Prediction, limit: float) -> bool | None:
+    """Whether a variable tells more than the limit; None where its interval lies astride."""
+    if row.told_lower > limit:
+        return True
+    return False if limit - row.told_upper >= 0 else None
+
+
+def told(rows: Sequence[Prediction], limits: CauseLimits) -> list[Answer]:
+    """What tells most, each by the end of its interval that decides."""
+    limit = limits[QUESTION]
+    ranked = sorted(rows, key=lambda row: (-_judged(row, limit), row.variable))
+    return [
+        Answer(
+            QUESTION, Layer.HIDDEN,
+            f"what {row.variable.replace('_', ' ')} tells of the mode, beyond a guess",
+            _judged(row, limit), limit,
+            note=f"{row.told:.2f} ({row.told_lower:.2f} to {row.told_upper:.2f}) in {row.phase}, "
+            f"{row.n} held-out episodes; {_end(row, limit)}",
+        )
+        for row in ranked[:SHOWN]
+    ]  # fmt: skip
+
+
+def teller(rows: Sequence[Prediction], limits: CauseLimits) -> Diagnosis | None:
+    """The variable that surely tells too much, else the one of which that is not decided."""
+    limit = limits[QUESTION]
+    beyond = [row for row in rows if surely(row, limit)]
+    if beyond:
+        return _hidden(_foremost(beyond, limits["nearly_equal_effect"]))
+    open_ = [row for row in rows if surely(row, limit) is None]
+    return _undecided(max(open_, key=lambda row: row.told_upper), limit) if open_ else None
+
+
+def _judged(row: Prediction, limit: float) -> float:
+    return row.told_lower if surely(row, limit) else row.told_upper
+
+
+def _end(row: Prediction, limit: float) -> str:
+    return {True: "judged by the lower end", False: "judged by the upper end", None: "undecided"}[
+        surely(row, limit)
+    ]
+
+
+def _foremost(rows: Sequence[Prediction], nearly: float) -> Prediction:
+    best = max(row.told for row in rows)
+
+    def rank(row: Prediction) -> tuple[int, float, str]:
+        known = row.variable in CONCRETE
+        place = CONCRETE.index(row.variable) if known else len(CONCRETE) - EVERYTHING
+        return place, -row.told, row.variable
+
+    return min((row for row in rows if row.told >= best - nearly), key=rank)
+
+
+def _hidden(row: Prediction) -> Diagnosis:
+    text = (
+        f"{row.variable.replace('_', ' ')} tells the mode of held-out episodes in {row.phase}: it "
+        f"takes away {row.told:.0%} of the wrong guesses (at least {row.told_lower:.0%}). Observe "
+        "it, standardise it, or draw it anew for every episode; then repeat the audit."
+    )
+    name = CauseName.DATA_DEFECT if row.variable == EPOCH else CauseName.HIDDEN_STATE
+    return Diagnosis(name, row.variable, PREDICTED, text)
+
+
+def _undecided(row: Prediction, limit: float) -> Diagnosis:
+    text = (
+        f"{row.variable.replace('_', ' ')} may tell the mode in {row.phase}: it takes away between "
+        f"{row.told_lower:.0%} and {row.told_upper:.0%} of the wrong guesses, and {limit:.0%} is "
+        f"too much; {row.n} episodes do not decide it: record more."
+    )
+    return Diagnosis(CauseName.INSUFFICIENT_SUPPORT, row.variable, UNDECIDED, text)

@@ -1,0 +1,112 @@
+"""What reaches the controller stub, and whether every generated action is accounted for."""
+
+import pandas as pd
+
+from gates.bounds import counted_interval
+from gates.criterion import Measured, criterion
+from gates.evidence import Evidence, MissingEvidenceError, numbers
+from gates.feasibility.settings import SHADOW, FeasibilitySettings
+from genpolicy.evidence.rows.shadow import ShadowCountRow, ShadowStubRow
+
+
+@criterion(
+    "<=",
+    question="How many stale actions arrived at the stub?",
+    look_at="Timing: freshness is not enforced before the controller.",
+    per_candidate=True,
+    always=True,
+)
+def stub_stale(evidence: Evidence, settings: FeasibilitySettings, candidate: str) -> Measured:
+    """Stale actions that arrived at the stub."""
+    bad, arrivals = _stub(evidence, candidate, "stale")
+    return Measured(bad, caveat=f"of {arrivals:g} arrivals")
+
+
+def _stub(evidence: Evidence, candidate: str, column: str) -> tuple[float, float]:
+    rows = evidence.of(f"{SHADOW}/stub.parquet", ShadowStubRow, candidate)
+    arrivals = float(numbers(rows, "arrivals").sum())
+    if arrivals <= 0:
+        raise MissingEvidenceError("nothing arrived at the stub")
+    return float(numbers(rows, column).sum()), arrivals
+
+
+@criterion(
+    "<=",
+    question="How many invalid actions arrived at the stub?",
+    look_at="Feasibility: something bypasses admission.",
+    per_candidate=True,
+    always=True,
+)
+def stub_invalid(evidence: Evidence, settings: FeasibilitySettings, candidate: str) -> Measured:
+    """Actions of no admitted chunk that arrived at the stub."""
+    bad, arrivals = _stub(evidence, candidate, "invalid")
+    return Measured(bad, caveat=f"of {arrivals:g} arrivals")
+
+
+@criterion(
+    "<=",
+    question="How often can something bad still arrive?",
+    look_at="Evaluator: too few observations for this bound; run more shadow invocations.",
+    per_candidate=True,
+    always=True,
+)
+def stub_violation_upper(
+    evidence: Evidence, settings: FeasibilitySettings, candidate: str
+) -> Measured:
+    """Exact upper bound of the share of observations after which something bad arrives.
+
+    Actions of one observation arrive or fail together, so the observations are the trials.
+    """
+    stale, _ = _stub(evidence, candidate, "stale")
+    bad = stale + _stub(evidence, candidate, "invalid")[0]
+    rows = evidence.of(f"{SHADOW}/stub.parquet", ShadowStubRow, candidate)
+    # The same observations are played in every fixture, and deliver at most one chunk in each.
+    observations = float(numbers(rows, "delivered").max())
+    if observations <= 0:
+        raise MissingEvidenceError("no observation delivered a chunk")
+    bad = min(bad, observations)
+    interval = counted_interval(bad, observations, confidence=settings.confidence)
+    limit = settings.limits.of.get("stub_violation_upper")
+    if bad == 0 and limit and limit.limit is not None and not interval[1] <= limit.limit:
+        raise MissingEvidenceError(
+            f"none bad of {observations:g} observations that delivered bounds it by "
+            f"{interval[1]:.4g} only"
+        )
+    text = f"{bad:g} of {observations:g} observations that delivered; exact upper bound"
+    return Measured(interval[1], interval, text)
+
+
+@criterion(
+    "<=",
+    question="Is every generated action executed, discarded by reason, or queued?",
+    look_at="Evaluator: actions vanish or appear; read the counts per fixture.",
+    per_candidate=True,
+    always=True,
+)
+def conservation_error(
+    evidence: Evidence, settings: FeasibilitySettings, candidate: str
+) -> Measured:
+    """Actions unaccounted for, over all fixtures."""
+    rows = evidence.of(f"{SHADOW}/counts.parquet", ShadowCountRow, candidate)
+    error = unaccounted(rows, ["fixture"])
+    if float(rows["generated"].sum()) <= 0:
+        raise MissingEvidenceError("nothing was generated")
+    return Measured(error, caveat="generated = executed + discarded by reason + still queued")
+
+
+def unaccounted(frame: pd.DataFrame, keys: list[str]) -> float:
+    """Sum over runs of |generated - executed - queued - discarded|.
+
+    Raises:
+        MissingEvidenceError: A run states its totals differently in different rows.
+    """
+    error = 0.0
+    for name in ("generated", "executed", "queued", "count"):
+        frame = frame.assign(**{name: numbers(frame, name)})
+    for run, rows in frame.groupby(keys):
+        totals = rows[["generated", "executed", "queued"]].drop_duplicates()
+        if len(totals) != 1:
+            raise MissingEvidenceError(f"{run} states several totals")
+        generated, executed, queued = (float(value) for value in totals.iloc[0])
+        error += abs(generated - executed - queued - float(rows["count"].sum()))
+    return error

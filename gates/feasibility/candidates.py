@@ -1,0 +1,170 @@
+"""The sampled chunks: how many the six layers admit, by mode, and what projection did to them."""
+
+import numpy as np
+import pandas as pd
+
+from gates.bounds import counted_interval, share_interval, upper_quantile, widest_gap
+from gates.criterion import Measured, criterion
+from gates.evidence import Array, Evidence, MissingEvidenceError, flags, numbers
+from gates.feasibility.settings import (
+    CANDIDATES,
+    HELD_OUT,
+    INTACT,
+    LAYERS,
+    TWO_MODES,
+    FeasibilitySettings,
+)
+from genpolicy.evidence.rows.shadow import CandidateRow
+
+
+def _rows(evidence: Evidence, candidate: str) -> pd.DataFrame:
+    return evidence.of(CANDIDATES, CandidateRow, candidate)
+
+
+def _held_out(evidence: Evidence, candidate: str) -> pd.DataFrame:
+    rows = _rows(evidence, candidate)
+    rows = rows[rows["fixture"] == HELD_OUT]
+    if len(rows) == 0:
+        raise MissingEvidenceError("no held-out observation was sampled")
+    return rows
+
+
+def admissible(rows: pd.DataFrame) -> Array:
+    """1.0 where a candidate passed all six layers; a layer not reached is not passed."""
+    passed = np.ones(len(rows), dtype=np.bool_)
+    for layer in LAYERS:
+        passed &= flags(rows, layer)
+    return passed.astype(np.float64)
+
+
+@criterion(
+    "<=",
+    question="Do the checks treat the modes alike, or remove one?",
+    look_at="Conditioning: one mode is outside the feasible set; look at raw samples by mode.",
+    per_candidate=True,
+)
+def mode_admissible_gap(
+    evidence: Evidence, settings: FeasibilitySettings, candidate: str
+) -> Measured:
+    """Upper bound of the largest difference between modes in the share that is admissible."""
+    rows = _rows(evidence, candidate)
+    rows = rows[rows["fixture"] == TWO_MODES]
+    if len(rows) == 0:
+        raise MissingEvidenceError("no situation with several modes was sampled")
+    rows = rows.assign(
+        admissible=admissible(rows),
+        mode=rows["mode"].fillna("").astype(str),
+        episode=rows["situation"].astype(str).str.rpartition(":")[0],
+    )
+    rows = rows[~rows["mode"].isin(settings.unassigned_modes)]
+    rows = rows[rows.groupby("observation")["mode"].transform("nunique") >= 2]
+    by_mode = {str(mode): part for mode, part in rows.groupby("mode")}
+    seen = {mode: part["episode"].nunique() for mode, part in by_mode.items()}
+    if len(seen) < 2:
+        raise MissingEvidenceError("no observation was answered in two modes")
+    if min(seen.values()) < settings.mode_observations:
+        rare = ", ".join(f"{mode} {count}" for mode, count in seen.items())
+        raise MissingEvidenceError(
+            f"observations answered in several modes: {rare}; "
+            f"at least {settings.mode_observations} of each are needed"
+        )
+    shares = {m: (p["admissible"].to_numpy(), p["episode"].tolist()) for m, p in by_mode.items()}
+    interval, more, less = widest_gap(shares, confidence=settings.confidence)
+    text = ", ".join(f"{m} {p['admissible'].mean():.4g} of {seen[m]}" for m, p in by_mode.items())
+    text += f" episodes answered in several modes; upper bound of {more} minus {less}"
+    return Measured(interval[1], interval, text)
+
+
+@criterion(
+    ">=",
+    question="What share of held-out candidates passes all six layers?",
+    look_at="Feasibility: read the rejection waterfall from the first layer down.",
+    per_candidate=True,
+)
+def admissible_share(evidence: Evidence, settings: FeasibilitySettings, candidate: str) -> Measured:
+    """Lower bound of the share of held-out candidates that pass all six layers."""
+    rows = _held_out(evidence, candidate)
+    share, lower, upper = share_interval(
+        admissible(rows),
+        rows["observation"].to_numpy(),
+        confidence=settings.confidence,
+        favourable=True,
+    )
+    text = (
+        f"share {share:.4g} of {len(rows)} candidates; lower bound over "
+        f"{rows['observation'].nunique()} observations"
+    )
+    return Measured(lower, (lower, upper), text)
+
+
+@criterion(
+    "<=",
+    question="How far does projection move an admitted chunk?",
+    look_at="Feasibility: projection repairs too much; compare raw samples with the limits.",
+    per_candidate=True,
+)
+def projection_p95_m(evidence: Evidence, settings: FeasibilitySettings, candidate: str) -> Measured:
+    """Upper bound of the move by projection that 95 % of the admissible candidates keep, m."""
+    return _of_admissible(evidence, settings, candidate, "position_change_m")
+
+
+@criterion(
+    "<=",
+    question="How hard is the boundary between two chunks?",
+    look_at="Timing: look at H_e, re-planning, blending and normalisation.",
+    per_candidate=True,
+)
+def boundary_jerk_p95_m_s3(
+    evidence: Evidence, settings: FeasibilitySettings, candidate: str
+) -> Measured:
+    """Upper bound of the jerk at the boundary that 95 % of the admissible keep, m/s^3."""
+    return _of_admissible(evidence, settings, candidate, "boundary_jerk_m_s3")
+
+
+def _of_admissible(
+    evidence: Evidence, settings: FeasibilitySettings, candidate: str, column: str
+) -> Measured:
+    rows = _held_out(evidence, candidate)
+    rows = rows[admissible(rows) == 1.0]
+    if len(rows) == 0:
+        raise MissingEvidenceError("no candidate is admissible")
+    values = np.abs(numbers(rows, column))
+    point, interval = upper_quantile(
+        values,
+        rows["observation"].to_numpy(),
+        0.95,
+        confidence=settings.confidence,
+        rng=settings.draws("C", column, candidate),
+    )
+    text = (
+        f"p95 {point:.4g}, largest {values.max():.4g}; {len(rows)} admissible candidates of "
+        f"{rows['observation'].nunique()} held-out observations"
+    )
+    return Measured(interval[1], interval, text)
+
+
+@criterion(
+    ">=",
+    question="Is every corrupted fixture refused, with a reason?",
+    look_at="Feasibility: a layer lets a corrupted input through; see which fixture.",
+    per_candidate=True,
+)
+def corrupted_refused_share(
+    evidence: Evidence, settings: FeasibilitySettings, candidate: str
+) -> Measured:
+    """Share of corrupted candidates that are refused with a reason."""
+    rows = _rows(evidence, candidate)
+    rows = rows[~rows["fixture"].isin(INTACT)]
+    absent = sorted(set(settings.required_fixtures) - set(rows["fixture"]))
+    if absent:
+        raise MissingEvidenceError(f"corrupted fixtures not tried: {', '.join(absent)}")
+    named = rows["first_reason"].fillna("").astype(str).str.len().to_numpy() > 0
+    refused = (admissible(rows) == 0.0) & named
+    interval = counted_interval(
+        float(refused.sum()), float(len(rows)), confidence=settings.confidence
+    )
+    through = sorted(set(rows.loc[~refused, "fixture"]))
+    text = f"{len(rows)} candidates of {rows['fixture'].nunique()} corrupted fixtures" + (
+        f"; let through or refused without reason: {', '.join(through)}" if through else ""
+    )
+    return Measured(float(refused.mean()), interval, text)

@@ -1,0 +1,59 @@
+"""Who watches the watchers: the independent checker, and the mutants that it must find."""
+
+from gates.criterion import Measured, criterion
+from gates.evidence import Evidence, MissingEvidenceError, count, number
+from gates.feasibility.settings import SHADOW, FeasibilitySettings
+
+
+@criterion(
+    "<=",
+    question="What does the independent checker find in the journal?",
+    look_at="Evaluator: executor and independent checker disagree; read the violations.",
+    always=True,
+)
+def checker_violations(evidence: Evidence, settings: FeasibilitySettings) -> Measured:
+    """Violations that the independent checker found in the journal."""
+    return checked_violations(evidence, f"{SHADOW}/checker.json")
+
+
+def checked_violations(evidence: Evidence, path: str) -> Measured:
+    """Violations that the independent checker found; none counts only if it proved every action.
+
+    Raises:
+        MissingEvidenceError: It checked nothing, or did not prove the motion of what it checked.
+    """
+    document = evidence.document(path)
+    checked = number(document, "checked_actions")
+    proved = number(document, "reproved_actions")
+    if checked <= 0:
+        raise MissingEvidenceError("the checker saw no action")
+    if not proved >= checked:
+        raise MissingEvidenceError(f"the motion of {proved:g} of {checked:g} actions was proved")
+    text = f"{checked:g} actions proved again, their motion by other geometry"
+    return Measured(count(document, "violations"), caveat=text)
+
+
+@criterion(
+    "<=",
+    question="Does disabling any one check turn the checker red?",
+    look_at="Evaluator: a check left out goes unnoticed, so its green means nothing.",
+    always=True,
+)
+def mutants_undetected(evidence: Evidence, settings: FeasibilitySettings) -> Measured:
+    """Checks whose absence was not noticed, or that were not tried."""
+    entries = evidence.listing(f"{SHADOW}/mutants.json")
+    found, excused = dict[str, bool](), dict[str, str]()
+    for entry in entries:
+        if not isinstance(entry, dict) or not isinstance(entry.get("detected"), bool):
+            raise MissingEvidenceError("mutants.json has an entry without check or detected")
+        name = f"{entry.get('layer')}.{entry.get('check')}"
+        found[name] = found.get(name, True) and entry["detected"]
+        if entry.get("not_applicable") and not entry["detected"] and not entry.get("tried"):
+            excused[name] = str(entry["not_applicable"])
+    silent = [name for name, detected in found.items() if not detected and name not in excused]
+    silent += [f"{name} (not tried)" for name in settings.required_checks if name not in found]
+    text = f"not detected: {', '.join(silent)}" if silent else f"all {len(found)} detected"
+    if excused:
+        listed = ", ".join(f"{name} ({reason})" for name, reason in excused.items())
+        text += f"; of them not asked of this task: {listed}"
+    return Measured(float(len(silent)), caveat=text)

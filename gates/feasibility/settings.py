@@ -1,0 +1,29 @@
+"""What Gate C is set by other than limits, and where its evidence lies."""
+
+from pydantic import Field
+
+from gates.settings import CandidateSettings
+
+SHADOW = "artifacts/shadow"
+CANDIDATES = f"{SHADOW}/candidates.parquet"
+LAYERS = ("representation", "kinematic", "geometric", "dynamic", "contact", "fresh")
+HELD_OUT = "held_out"
+TWO_MODES = "two_modes"
+INTACT = (HELD_OUT, TWO_MODES)
+
+
+class FeasibilitySettings(CandidateSettings):
+    """Settings of Gate C other than limits.
+
+    Attributes:
+        required_fixtures: Corrupted fixtures that must have been tried.
+        required_checks: Checks, `layer.check`, each of which must have been left out once.
+        unassigned_modes: Labels of candidates that belong to no mode.
+        mode_observations: Independent observations of every mode without which the modes are not
+            compared.
+    """
+
+    required_fixtures: tuple[str, ...]
+    required_checks: tuple[str, ...]
+    unassigned_modes: tuple[str, ...]
+    mode_observations: int = Field(ge=2)

@@ -1,0 +1,119 @@
+"""What tells the modes of held-out episodes: planted tellers are found, free choices are not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from planar import LIMITS, SETTINGS, named
+
+from benchmarks.audit.plan import Plan
+from benchmarks.audit.planar import admissible
+from benchmarks.audit.recorder import record
+from gates.cause import CauseName
+from genpolicy.audit.data import canonical
+from genpolicy.audit.linking import link
+from genpolicy.audit.predictability import HISTORY, LEAST_EPISODES, predictions
+from genpolicy.audit.run import audit
+from genpolicy.audit.situations import find_situations
+from genpolicy.seeds import stream
+
+EVEN = (0.5, 0.5)
+N = 160
+
+
+def told(plan, seed=0, stride=20):
+    """What everything tells of the modes of a plan, by variable."""
+    data = canonical(record("planar", plan).data)
+    settings = SETTINGS.model_copy(update={"query_stride": stride})
+    several = [(i, c) for _, i, c in find_situations(data, settings, seed)[0] if c.count > 1]
+    members = [(data.episode[item.members], split.labels) for item, split in several]
+    links = {"approach": link(members, len(data.episodes), 6)}
+    rows = predictions(data, settings, {"approach": several}, links, root_seed=seed)
+    return {row.variable: row for row in rows}
+
+
+def planned(**changes):
+    return Plan(3, shares=EVEN, episodes=N, exact=True, start_wide=0.5, **changes)
+
+
+@pytest.mark.parametrize(
+    ("decided_by", "fidelity", "variable", "ideal"),
+    [("operator", 0.6, "operator", 0.6), ("object", 0.6, "object", 0.6),
+     ("calibration_epoch", 0.6, "calibration_epoch", 0.6), ("habit", 0.7, "previous_episodes", 0.7),
+     ("drift", 0.8, "episode_order", 0.4), ("session", 0.9, "recording_sequence", 0.7),
+     ("alternation", 0.6, "every_other_episode", 0.6)],
+)  # fmt: skip
+def test_a_planted_teller_tells_as_much_as_it_was_made_to(decided_by, fidelity, variable, ideal):
+    found = told(planned(decided_by=decided_by, fidelity=fidelity))
+    row = found[variable]
+    assert row.told_lower - 0.1 <= ideal <= row.told_upper + 0.1
+    assert row.told_lower > 0.1
+    assert row.told >= max(r.told for r in found.values()) - 0.15
+
+
+def test_where_an_episode_came_from_tells_where_it_goes():
+    found = told(planned(decided_by="path_early"), stride=6)[HISTORY]
+    assert found.told_lower > 0.4
+
+
+@pytest.mark.parametrize(
+    "plan",
+    [planned(), planned(correlation=0.9), replace(planned(), shares=(0.75, 0.25)),
+     planned(goal_half_width_m=0.01)],
+    ids=["free", "strata that go together", "uneven", "goals apart"],
+)  # fmt: skip
+def test_a_free_choice_is_told_by_nothing(plan):
+    for row in told(plan).values():
+        assert row.told_lower <= 0.0 + 1e-9 or row.told < 0.2, row
+        assert row.told_upper <= 0.4, row
+
+
+def test_what_only_a_combination_tells_is_told_by_everything_together():
+    # Whoever takes this object and that one goes left: neither of the two tells it alone.
+    data = canonical(record("planar", planned()).data)
+    rng = stream(8, "pair")
+    settings = SETTINGS.model_copy(update={"query_stride": 20})
+    several = [(i, c) for _, i, c in find_situations(data, settings, 0)[0] if c.count > 1]
+    links = link([(data.episode[i.members], c.labels) for i, c in several], N, 6)
+    first = rng.integers(0, 2, N)
+    table = replace(
+        data.episodes,
+        operator=np.where(first, "amber", "birch"),
+        object=np.where(first ^ (links == 1), "peg_a", "peg_b"),
+    )
+    rows = predictions(
+        replace(data, episodes=table), settings, {"approach": several}, {"approach": links},
+        root_seed=0,
+    )  # fmt: skip
+    found = {row.variable: row for row in rows}
+    assert found["everything_together"].told_lower > 0.7
+    assert max(found["operator"].told, found["object"].told) < 0.4
+
+
+def test_too_few_episodes_decide_nothing():
+    plan = replace(planned(decided_by="object"), episodes=LEAST_EPISODES + 4)
+    data = canonical(record("planar", plan).data)
+    settings = SETTINGS.model_copy(update={"query_stride": 12})
+    several = [(i, c) for _, i, c in find_situations(data, settings, 0)[0] if c.count > 1]
+    few = np.where(np.arange(len(data.episodes)) < 12, np.arange(len(data.episodes)) % 2, -1)
+    rows = predictions(data, settings, {"approach": several}, {"approach": few}, root_seed=0)
+    for row in rows:
+        assert row.told_upper == 1.0 and row.told_lower < 0.0
+
+
+# What the audit said of these before what is told was judged: valid modes, each time.
+@pytest.mark.parametrize(
+    ("decided_by", "fidelity", "names"),
+    [("object", 0.6, {"object"}), ("habit", 0.7, {"previous_episodes", "unrecorded"}),
+     ("drift", 0.8, {"episode_order", "calibration_epoch", "everything_together"})],
+)  # fmt: skip
+def test_four_right_of_five_are_no_valid_modes(decided_by, fidelity, names):
+    plan = planned(decided_by=decided_by, fidelity=fidelity, goal_half_width_m=0.004)
+    labelled = record("planar", plan)
+    result = audit(
+        labelled.data, SETTINGS, admissible=admissible(plan),
+        replay=labelled.outcomes.__getitem__, root_seed=3,
+    )  # fmt: skip
+    cause = named(result, limits=LIMITS)
+    assert cause.name is not CauseName.VALID_MODES
+    assert cause.variable in names

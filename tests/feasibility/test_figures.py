@@ -1,0 +1,28 @@
+"""The checker is given the cell's own figures: each one changed in the cell changes there."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from genpolicy.feasibility.figures import expected_motion
+
+
+def test_every_figure_is_that_of_the_cell(cell):
+    found, limits = expected_motion(cell), cell.usable_limits
+    assert found.scene_path == cell.kinematics.scene_path
+    assert found.workspace_m.tolist() == [
+        list(cell.workspace.lower_m),
+        list(cell.workspace.upper_m),
+    ]
+    assert np.array_equal(found.velocity_rad_s, limits.velocity_rad_s)
+    assert found.tcp_speed_m_s == cell.settings.tcp_speed_limit_m_s
+    assert found.tcp_turn_rad_s == cell.settings.tcp_turn_limit_rad_s
+    assert found.held_opening_m == cell.settings.held_opening_m
+    assert found.contact_phases == cell.contact_phases
+
+
+def test_a_stricter_cell_gives_stricter_figures(cell):
+    settings = cell.settings.model_copy(update={"velocity_factor": 0.5, "tcp_speed_limit_m_s": 0.1})
+    found = expected_motion(replace(cell, settings=settings))
+    assert np.allclose(found.velocity_rad_s, 0.5 * cell.limits.velocity_rad_s)
+    assert found.tcp_speed_m_s == 0.1
