@@ -87,13 +87,13 @@ def is_rehearsal(params: Mapping[str, Any]) -> bool:
     return value
 
 
-def loosened(params: Mapping[str, Any], gate: Gate) -> list[tuple[Bound, object]]:
+def loosened(params: Mapping[str, Any], gate: Gate) -> list[tuple[Bound, Any]]:
     """Bounds that the settings of a gate go beyond, with what stands there instead.
 
     A criterion that is declared not applicable goes beyond its bound like any looser value. A
     setting that is missing does not: without a limit no gate passes, and models ask for the rest.
     """
-    found: list[tuple[Bound, object]] = []
+    found: list[tuple[Bound, Any]] = []
     for bound in BOUNDS:
         if bound.gate != gate:
             continue
@@ -134,7 +134,7 @@ def require_protection(params: Mapping[str, Any], gate: Gate) -> tuple[str, ...]
     return ()
 
 
-def _values(params: Mapping[str, Any], bound: Bound) -> list[object]:
+def _values(params: Mapping[str, Any], bound: Bound) -> list[Any]:
     """What `params.yaml` says at a place: nothing, one value, or those of several owners."""
     if "." in bound.place or bound.place in params:
         value: Any = params
@@ -146,7 +146,7 @@ def _values(params: Mapping[str, Any], bound: Bound) -> list[object]:
     section = params.get(stage_of(bound.gate))
     if not isinstance(section, Mapping):
         return []
-    found: list[object] = []
+    found: list[Any] = []
     for owners in (section.get("limits"), section.get("not_applicable")):
         for entries in owners.values() if isinstance(owners, Mapping) else ():
             if isinstance(entries, Mapping) and bound.place in entries:
