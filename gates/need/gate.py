@@ -52,6 +52,8 @@ GATE = GateSpec(
     back_to="the dataset, the observation, or the simpler policy",
     go_on="A generator is a candidate: train diffusion and flow under the matched configuration.",
     caveats=(
+        "One mode alone, or the median, stays valid wherever each mode is: whether that is enough "
+        "is asked in motion, where Gate D compares every candidate with `one_mode_bc`.",
         "Modes are clusters of recorded chunks; a mode that no demonstrator used is not seen.",
         "Conditional tests see measured variables only; an unrecorded one can still explain modes.",
         "An energy policy (IBC) draws its candidates at random: a generator, reported beside the "

@@ -29,7 +29,9 @@ class NeedSettings(GateSettings):
         generative_baselines: Baselines that are drawn at random under every convention (an
             energy's candidates are), so that they are reported beside the deployed ones.
         chunked_baseline: Baseline that shows what chunking alone does.
-        remedies: Baselines that do without a density where one plan, or any of them, is enough.
+        remedies: Baselines that learn all demonstrations and still may do without a density.
+        one_mode: Baseline that knows the demonstrations of one mode only: shown, and judged by what
+            it loses in Gate D.
         redraws: Candidates that a policy may draw until one is admissible, as in the comparison.
         latent_baseline: Baseline whose latent must answer the observation.
         factors: Factors of which each must have been changed alone.
@@ -54,7 +56,8 @@ class NeedSettings(GateSettings):
     deployed_conventions: tuple[str, ...]
     generative_baselines: tuple[str, ...]
     chunked_baseline: str
-    remedies: tuple[str, ...] = ("chunked_l1", "one_mode_bc", "bc_noise")
+    remedies: tuple[str, ...] = ("chunked_l1", "bc_noise")
+    one_mode: str = "one_mode_bc"
     redraws: int = Field(ge=1)
     latent_baseline: str
     factors: tuple[str, ...] = ("reference", "representation", "trunk", "head", "temporal")

@@ -155,7 +155,6 @@ PARAMS: dict[str, Any] = {
             mode_success_lower=(0.6, "model"),
             mode_feasible_share=(0.9, "controller"),
             mean_defeated_share=(0.5, "model"),
-            median_valid_share=(0.5, "model"),
             remedy_valid_share=(0.5, "model"),
             data_defects=(0, "perception"),
             strata_effect=(0.3, "perception"),

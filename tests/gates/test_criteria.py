@@ -140,14 +140,11 @@ WORSE = {
             BASE + "modes.parquet",
             lambda s: cells("admissible", 16, where=_of("chunked_bc"), share=s),
         ),
-        "median_valid_share": _table(
-            AUDIT + "neighbourhoods.parquet", lambda s: cells("median_admissible", True, share=s)
-        ),
         "remedy_valid_share": _table(
             BASE + "modes.parquet",
             lambda s: (
-                lambda f: cells("valid", 16, where=_of("one_mode_bc"), share=s)(
-                    cells("admissible", 16, where=_of("one_mode_bc"), share=s)(f)
+                lambda f: cells("valid", 16, where=_of("bc_noise"), share=s)(
+                    cells("admissible", 16, where=_of("bc_noise"), share=s)(f)
                 )
             ),
         ),

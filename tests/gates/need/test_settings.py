@@ -29,7 +29,8 @@ def test_without_a_level_nothing_is_judged_rather_than_every_stratum_let_through
 
 def test_every_remedy_of_gate_a_is_a_baseline_that_gate_d_runs():
     params = yaml.safe_load((Path(__file__).parents[3] / "params.yaml").read_text())
-    remedies = set(NeedSettings.model_fields["remedies"].default)
+    fields = NeedSettings.model_fields
+    remedies = {*fields["remedies"].default, fields["one_mode"].default}
     assert remedies == {"chunked_l1", "one_mode_bc", "bc_noise"}
     assert remedies <= set(params["stress"]["baselines"])
     assert remedies <= set(params["train_baselines"]["samplers"])

@@ -175,7 +175,20 @@ def test_more_valid_than_admissible_samples_are_no_evidence():
             redrawn_validity(pd.DataFrame([{**SAMPLED, **wrong}]), redraws=4)
 
 
-@pytest.mark.parametrize("name", list(evidence.REMEDIES))
+def test_one_mode_is_shown_and_left_to_motion(ladder):
+    """Each mode is valid, so one of them is: a limit here is one that no task with modes meets."""
+    evidence.edit_table(
+        ladder, "measure_baselines/modes.parquet",
+        lambda f: f.assign(**{
+            key: np.where(f["method"] == "one_mode_bc", 16, f[key])
+            for key in ("admissible", "valid")
+        }),
+    )  # fmt: skip
+    criterion = found(ladder, "remedy_valid_share")
+    assert criterion.verdict == "PASS" and "one_mode_bc 1 (shown, not judged" in criterion.caveat
+
+
+@pytest.mark.parametrize("name", ["chunked_l1", "bc_noise"])
 def test_each_remedy_that_acts_validly_fails_the_gate(ladder, name):
     assert found(ladder, "remedy_valid_share").verdict == "PASS"
     evidence.edit_table(
