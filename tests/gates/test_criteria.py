@@ -52,6 +52,7 @@ def _each_training(stage, methods):
         for method in methods:
             path = f"{stage}{method}/seed_0/validation.parquet"
             evidence.table(root, path, evidence.ValidationRow, evidence.validation(0.1 + 0.5 * s))
+        evidence.record(root)
 
     return worse
 

@@ -84,6 +84,7 @@ def test_modes_counted_at_another_nfe_say_nothing(ladder):
 def _train(root, stage, method, fall):
     path = f"{stage}/{method}/seed_0/validation.parquet"
     evidence.table(root, path, evidence.ValidationRow, evidence.validation(fall))
+    evidence.record(root)
 
 
 def test_a_candidate_whose_loss_still_falls_is_red(ladder):
@@ -117,6 +118,7 @@ def test_the_worse_end_over_episodes_decides(ladder):
             evidence.ValidationRow,
             rows,
         )
+    evidence.record(ladder)
     report = judge(ladder, "B")
     assert _red(report) == {"validation_fall_upper"}
     assert all(c.interval[0] < 0.08 for c in _found(report, "validation_fall_upper"))
@@ -147,6 +149,7 @@ def test_a_training_that_was_not_followed_is_inconclusive(ladder, change):
     for method in evidence.CANDIDATES:
         path = f"train_generators/{method}/seed_0/validation.parquet"
         evidence.table(ladder, path, evidence.ValidationRow, change(evidence.validation()))
+    evidence.record(ladder)
     report = judge(ladder, "B")
     assert report.verdict == "INCONCLUSIVE"
     assert {c.verdict for c in _found(report, "validation_fall_upper")} == {"INCONCLUSIVE"}

@@ -5,6 +5,7 @@ import pytest
 from asked import settings_of
 from editing import cells
 
+from gates.claim import IN_SHORT
 from gates.evidence import Evidence
 from gates.proof import judge
 from gates.stress.choice import comparisons, pair_alpha, sooner
@@ -24,7 +25,9 @@ def worse(root, method, starts):
 def test_two_that_cannot_be_told_apart_are_either_and_the_sooner_goes_on_the_card(ladder):
     report = judge(ladder, "D")
     assert report.candidates == {"diffusion": "PASS", "flow": "PASS"}
-    assert report.decision.startswith("promote either of diffusion, flow: no paired test")
+    assert report.decision.startswith(
+        f"promote either of diffusion, flow, {IN_SHORT}: no paired test"
+    )
     assert "The card is drafted for flow, whose answers come sooner" in report.decision
     assert report.promoted == "flow"
 
@@ -54,7 +57,7 @@ def test_one_that_is_shown_to_be_better_is_promoted_alone(ladder):
     report = judge(ladder, "D")
     assert report.candidates == {"diffusion": "PASS", "flow": "PASS"}
     assert (report.decision, report.promoted) == (
-        "promote diffusion; shown to be worse: flow", "diffusion"
+        f"promote diffusion, {IN_SHORT}; shown to be worse: flow", "diffusion"
     )  # fmt: skip
 
 
@@ -62,7 +65,7 @@ def test_one_that_passes_alone_is_compared_with_nobody(ladder):
     bad = lambda f: f["method"] == "flow"  # noqa: E731
     evidence.edit_table(ladder, ROLLOUTS, cells("interventions", 1, where=bad))
     report = judge(ladder, "D")
-    assert (report.decision, report.promoted) == ("promote diffusion", "diffusion")
+    assert (report.decision, report.promoted) == (f"promote diffusion, {IN_SHORT}", "diffusion")
 
 
 def test_every_ordered_pair_is_tested_at_its_share_of_the_family(ladder):
