@@ -30,6 +30,7 @@ EVALUATIONS = {
     "direct": Evaluations(1),
     "z_zero": Evaluations(1),
     "z_prior": Evaluations(1),
+    "offset": Evaluations(1),
     # One noise estimate a level. DPM-Solver++(2M) takes the earlier one of its two from the step
     # before, and its last step is of first order.
     "ddpm": Evaluations(1),

@@ -24,12 +24,14 @@ def sampler_of(name, steps):
 def counted(folder, sampler):
     checkpoint = load_checkpoint(folder)
     network, head = checkpoint.network, checkpoint.config.head
-    shape = noise_shape(network.dimensions, sampler, head)
+    sizes = network.dimensions
+    seen = torch.zeros(2, sizes.observation_horizon, sizes.observation_dim)
+    shape = noise_shape(sizes, sampler, head)
     generator = torch.Generator().manual_seed(1)
     with torch.no_grad():
         _, nfe = generate(
             network,
-            torch.zeros(2, checkpoint.config.network.condition_dim),
+            network.encode(seen),
             lambda _: torch.randn(2, *shape, generator=generator),
             sampler=sampler,
             head=head,
@@ -47,9 +49,9 @@ def test_every_sampler_evaluates_as_often_as_its_definition_says(method, name, s
 @pytest.mark.parametrize(
     ("name", "steps", "expected"),
     [
-        ("direct", 1, 1), ("z_zero", 1, 1), ("z_prior", 1, 1), ("ddpm", 10, 10), ("ddim", 16, 16),
-        ("dpm_2m", 8, 8), ("euler", 4, 4), ("heun", 4, 8), ("rk4", 4, 16),
-        ("derivative_free", 16, 17),
+        ("direct", 1, 1), ("z_zero", 1, 1), ("z_prior", 1, 1), ("offset", 1, 1),
+        ("ddpm", 10, 10), ("ddim", 16, 16), ("dpm_2m", 8, 8), ("euler", 4, 4),
+        ("heun", 4, 8), ("rk4", 4, 16), ("derivative_free", 16, 17),
     ],
 )  # fmt: skip
 def test_the_counts_by_hand(name, steps, expected):

@@ -15,7 +15,9 @@ def evidence(workspace, gate_evidence):
     shared = yaml.safe_load((workspace / "params.yaml").read_text())
     gate_evidence.build(workspace)
     own = yaml.safe_load((workspace / "params.yaml").read_text())
-    (workspace / "params.yaml").write_text(yaml.safe_dump({**shared, **own}, sort_keys=False))
+    horizons = {**shared["horizons"], **own["horizons"]}
+    params = {**shared, **own, "horizons": horizons}
+    (workspace / "params.yaml").write_text(yaml.safe_dump(params, sort_keys=False))
     return workspace
 
 

@@ -10,6 +10,9 @@ from pathlib import Path
 import pytest
 import yaml
 
+from genpolicy.tasks.fixtures import PINS
+
+ROOT = Path(__file__).parents[2]
 PR_CAPBSET_DROP, CAP_DAC_OVERRIDE = 24, 1
 FULL_BYTES = 48 * 1024
 
@@ -35,13 +38,15 @@ def without_override():
 
 @pytest.fixture(scope="session")
 def recorded(tmp_path_factory, process):
-    """A workspace with six recordings."""
+    """A workspace with the task's identity and six recordings."""
     folder = tmp_path_factory.mktemp("recorded")
-    params = yaml.safe_load((Path(__file__).parents[2] / "params.yaml").read_text())
+    params = yaml.safe_load((ROOT / "params.yaml").read_text())
     few()(params)
     (folder / "params.yaml").write_text(yaml.safe_dump(params))
-    code, said = process("record", folder)
-    assert code == 0, said
+    shutil.copy(ROOT / PINS, folder)
+    for stage in ("task", "record"):
+        code, said = process(stage, folder)
+        assert code == 0, said
     return folder
 
 
