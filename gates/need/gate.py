@@ -19,6 +19,8 @@ from gates.need.settings import (
 from gates.report import stage_of
 from gates.settings import read_limits, read_params, read_settings
 
+ONE_MODE = "Gate D asks that in motion, against `one_mode_bc`."
+
 
 def _cause(judged: Judged) -> str:
     """The cause that the audit found, and after a verdict other than PASS what it asks for."""
@@ -27,7 +29,9 @@ def _cause(judged: Judged) -> str:
     except MissingEvidenceError as error:
         return f"Cause unknown: {error}."
     text = f"Cause found by the audit: {cause.text}."
-    return text if judged.verdict == "PASS" else f"{text} Next: {cause.next_action}"
+    if judged.verdict != "PASS":
+        return f"{text} Next: {cause.next_action}"
+    return f"{text} One mode alone may still be enough: {ONE_MODE}"
 
 
 GATE = GateSpec(
@@ -52,8 +56,7 @@ GATE = GateSpec(
     back_to="the dataset, the observation, or the simpler policy",
     go_on="A generator is a candidate: train diffusion and flow under the matched configuration.",
     caveats=(
-        "One mode alone, or the median, stays valid wherever each mode is: whether that is enough "
-        "is asked in motion, where Gate D compares every candidate with `one_mode_bc`.",
+        f"One mode alone, or the median, stays valid wherever each mode is: {ONE_MODE}",
         "Modes are clusters of recorded chunks; a mode that no demonstrator used is not seen.",
         "Conditional tests see measured variables only; an unrecorded one can still explain modes.",
         "An energy policy (IBC) draws its candidates at random: a generator, reported beside the "

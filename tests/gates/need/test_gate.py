@@ -93,3 +93,9 @@ def test_the_cause_cannot_be_declared_not_applicable(ladder, name):
     evidence.write_params(ladder, waive)
     with pytest.raises(Exception, match=name):
         judge(ladder, "A")
+
+
+def test_a_pass_says_first_that_one_mode_may_be_enough(ladder):
+    report = judge(ladder, "A")
+    assert report.verdict == "PASS" and "one_mode_bc" in report.diagnosis
+    assert "one_mode_bc" in report.caveats[0]
