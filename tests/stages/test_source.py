@@ -7,9 +7,11 @@ from pathlib import Path
 
 import pytest
 
+from genpolicy.data.assemble import MANIFEST_FILE
+from genpolicy.data.dataset import DATA_FILES
 from genpolicy.errors import ConfigError
 from genpolicy.integrity.hashing import sha256_tree
-from stages._source import SourceSection
+from stages._source import KEPT_BY_INGEST, SourceSection, source_files
 
 Stage = Callable[[str], tuple[int, str]]
 
@@ -146,8 +148,6 @@ def test_a_folder_without_recordings_is_refused(tmp_path, kind, make):
     if make:
         folder.mkdir()
     with pytest.raises(ConfigError, match=r"source\.path"):
-        from stages._source import source_files
-
         source_files(SourceSection(kind=kind, path=str(folder)))
 
 
@@ -155,3 +155,7 @@ def test_a_folder_where_the_stages_write_is_refused(run):
     section = SourceSection(kind="recordings", path="artifacts/record/episodes")
     with pytest.raises(ConfigError, match="where the stages write"):
         _ = section.folder
+
+
+def test_the_first_stage_knows_every_file_of_a_dataset_without_loading_what_writes_it():
+    assert set(KEPT_BY_INGEST) == {*DATA_FILES, MANIFEST_FILE}
