@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.audit.__main__ import FIRST_DEVELOPMENT_SEED, jobs
+import benchmarks.audit.__main__ as command
+from benchmarks.audit.__main__ import FIRST_DEVELOPMENT_SEED, jobs, measured, sampled
 from benchmarks.audit.cases import CAUSES
 from benchmarks.audit.frozen import frozen_commit, report_seed
 from benchmarks.audit.plan import Defect, Plan, draw_roster
@@ -301,3 +302,30 @@ def test_errors_below_the_minimum_and_open_answers_are_counted():
     assert "| left open, from the minimum strength on | 2 | 2 |" in text
     assert "| true modes denied: another cause said | 0 | 1 |" in text
     assert "| true modes left open | 1 | 1 |" in text
+
+
+def test_a_sample_holds_every_cause_and_a_larger_one_holds_the_smaller():
+    every = jobs(1_000, repeats=1, tasks=list(TASKS), only="")
+    one, two = sampled(every, 5, 1), sampled(every, 5, 2)
+    assert {job.cause for job in one} == set(range(len(CAUSES)))
+    strong = [(job.cause, job.task) for job in one if CAUSES[job.cause].strong(job.strength)]
+    assert len(strong) == len(set(strong)) == len(TASKS) * len(CAUSES)
+    assert two[: len(one)] == one and set(sampled(every, 5, None)) == set(every)
+    assert [job.strength for job in sampled(every, 6, 1)] != [job.strength for job in one]
+
+
+def test_a_run_that_was_stopped_goes_on_where_it_stopped(tmp_path, monkeypatch):
+    """What the file holds is taken as it is; nothing is measured twice."""
+    ran = []
+
+    def fake(run, block, **_):
+        ran.extend(block)
+        return [replace(_result("unimodal", 8, "unimodal", named=True), job=j) for j in block]
+
+    monkeypatch.setattr(command, "map_shards", fake)
+    number = next(k for k, item in enumerate(CAUSES) if item.name == "unimodal")
+    todo = [Job(number, 8.0, "planar", seed) for seed in range(20)]
+    first = measured(todo[:18], tmp_path / "results.json", workers=1)
+    assert ran == todo[:18]
+    again = measured(todo, tmp_path / "results.json", workers=1)
+    assert ran == todo and again[:18] == first and [r.job for r in again] == todo
