@@ -102,7 +102,7 @@ def longest_holds(values: Array, moving: Flags, starts: Integers) -> Integers:
     same[starts[:-1][starts[:-1] < len(same)]] = False
     # Rows that move, counted since the last row that brought something new.
     count = np.cumsum(same & moving)
-    since = count - np.maximum.accumulate(np.where(same, 0, count))
+    since: Integers = count - np.maximum.accumulate(np.where(same, 0, count))
     result = np.zeros(len(starts) - 1, dtype=np.int64)
     filled = starts[1:] > starts[:-1]
     if filled.any():
