@@ -5,7 +5,7 @@ import pytest
 
 from genpolicy.contract.chunk import DiscardReason
 from genpolicy.evidence.shadow.mutants import SCENARIOS, without
-from genpolicy.evidence.shadow.rig import CHECKPOINT, SAMPLER, SETTINGS, Rig, looks_admitted
+from genpolicy.evidence.shadow.rig import CHECKPOINT, SAMPLER, Rig, looks_admitted
 from genpolicy.execution.checks import CHECKS, Place
 from genpolicy.execution.executor import Executor
 from genpolicy.verification.checker import check_messages
@@ -21,7 +21,7 @@ def half_asleep(check):
     """A rig whose executor lacks one check, while its stub has them all."""
     rig = Rig()
     rig.executor = Executor(
-        SETTINGS, rig.journal, rig.stub,
+        rig.cell, rig.journal, rig.stub,
         checks=without(check), genuine=looks_admitted,
     )  # fmt: skip
     rig.executor.set_active(0.0, CHECKPOINT, SAMPLER)

@@ -4,15 +4,15 @@ import copy
 
 import pytest
 
-from genpolicy.evidence.shadow.rig import SETTINGS, Rig
+from genpolicy.evidence.shadow.rig import EXECUTION, HORIZONS, Rig
 from genpolicy.verification.checker import ExpectedSettings, check_messages
 
 EXPECTED = ExpectedSettings(
-    execution_horizon=SETTINGS.execution_horizon,
-    action_period_s=SETTINGS.action_period_s,
-    maximum_age_s=dict(SETTINGS.maximum_age_s),
-    watchdog_s=SETTINGS.watchdog_s,
-    queue_capacity=SETTINGS.queue_capacity,
+    execution_horizon=HORIZONS.execution_horizon,
+    action_period_s=HORIZONS.action_period_s,
+    maximum_age_s=dict(EXECUTION.maximum_age_s),
+    watchdog_s=EXECUTION.watchdog_s,
+    queue_capacity=EXECUTION.queue_capacity,
 )
 
 

@@ -12,31 +12,38 @@ from numpy.typing import NDArray
 
 from genpolicy.contract.action import ACTION_DIM
 from genpolicy.contract.chunk import ChunkMetadata, DiscardReason, actions_sha256, frozen_array
+from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.execution.arrival import LAYER_COUNT
+from genpolicy.execution.cell import PRIMITIVES, Cell, ExecutionSettings
 from genpolicy.execution.checks import CHECKS, Checks
 from genpolicy.execution.command import Command
 from genpolicy.execution.executor import Executor
 from genpolicy.execution.journal import Event, Journal
-from genpolicy.execution.settings import ExecutorSettings
 from genpolicy.execution.stub import ControllerStub
-from genpolicy.execution.supervisor import Supervisor, SupervisorSettings
+from genpolicy.execution.supervisor import Supervisor
 
 Array = NDArray[np.float64]
 
 PERIOD_S = 0.05
 ROWS = 16
 CHECKPOINT, SAMPLER = "c" * 64, "5" * 64
-SETTINGS = ExecutorSettings(
-    execution_horizon=8,
-    action_period_s=PERIOD_S,
-    maximum_age_s={"approach": 0.6, "insert": 0.5},
+HORIZONS = HorizonConfig(
+    observation_horizon=1, prediction_horizon=ROWS, execution_horizon=8, action_period_s=PERIOD_S
+)
+EXECUTION = ExecutionSettings(
+    replan_lead_steps=3,
+    deadline_s=0.15,
     watchdog_s=0.1,
     queue_capacity=2,
-    replan_lead_steps=3,
+    maximum_age_s={"approach": 0.6, "insert": 0.5},
     maximum_divergence_m=0.05,
-)
-SUPERVISION = SupervisorSettings(
-    force_limit_n={"approach": 20.0, "insert": 40.0}, watchdog_s=0.1, action_period_s=PERIOD_S
+    force_limit_n={"approach": 20.0, "insert": 40.0},
+    hold_before_recovery_s=0.6,
+    recovery_hold_s=0.2,
+    primitive_timeout_s=5.0,
+    human_timeout_s=10.0,
+    maximum_failures=3,
+    recovery_plans={"approach": PRIMITIVES[1:], "insert": PRIMITIVES},
 )
 
 
@@ -79,27 +86,36 @@ def looks_admitted(chunk: object) -> bool:
     return type(chunk) is StandIn
 
 
+def rig_cell(*, execution_horizon: int = HORIZONS.execution_horizon, **changes: Any) -> Cell:
+    """The cell of a rig, with changes to the settings of execution; its chunks live long."""
+    horizons = HorizonConfig(**{**HORIZONS.model_dump(), "execution_horizon": execution_horizon})
+    return Cell(horizons, ExecutionSettings(**{**EXECUTION.model_dump(), **changes}))
+
+
 class Rig:
     """One session: clock, supervisor, stub and executor.
 
     Args:
         checks: The table of executor, stub and supervisor.
-        settings: Replaces the standard settings.
+        execution_horizon: Actions of a chunk that may be executed.
         session: Name of the session.
+        changes: Of the settings of execution.
     """
 
     def __init__(
         self,
         *,
         checks: Checks = CHECKS,
-        settings: ExecutorSettings = SETTINGS,
         session: str = "rig",
+        execution_horizon: int = HORIZONS.execution_horizon,
+        **changes: Any,
     ) -> None:
         self.journal = Journal(session)
-        self.supervisor = Supervisor(SUPERVISION, self.journal, checks=checks)
-        self.stub = ControllerStub(settings, self.journal, self.supervisor, checks=checks)
+        self.cell = rig_cell(execution_horizon=execution_horizon, **changes)
+        self.supervisor = Supervisor(self.cell.execution, self.journal, checks=checks)
+        self.stub = ControllerStub(self.cell, self.journal, self.supervisor, checks=checks)
         self.executor = Executor(
-            settings, self.journal, self.stub, checks=checks, genuine=looks_admitted
+            self.cell, self.journal, self.stub, checks=checks, genuine=looks_admitted
         )
         self.now_ns = 0
         self.phase, self.epoch = "approach", "epoch-1"
@@ -177,7 +193,7 @@ class Rig:
         """Observe, deliver a (changed) chunk, tick it through."""
         self.observe()
         self.deliver(self.chunk(**changes))
-        return self.tick(self.executor.settings.execution_horizon)
+        return self.tick(self.cell.horizons.execution_horizon)
 
     def end(self) -> list[Event]:
         """End the episode and return the journal's events."""
