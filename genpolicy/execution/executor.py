@@ -6,11 +6,10 @@ ones from its start on. Whatever is doubtful is discarded with one reason, and t
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 
 from genpolicy.contract.chunk import ChunkMetadata, DiscardReason
-from genpolicy.execution.arrival import Arrivals, issued_by_feasibility
+from genpolicy.execution.arrival import Arrivals
 from genpolicy.execution.cell import Cell
 from genpolicy.execution.checks import CHECKS, Checks, missing
 from genpolicy.execution.chunk_queue import ChunkQueue
@@ -31,8 +30,6 @@ class Executor:
         journal: Where every event goes; one journal, one session.
         stub: The controller stub with its supervisor.
         checks: The table; a row that is missing is declared in the journal.
-        genuine: Tells a chunk that feasibility issued from an imitation. Another rule than the
-            default is for tests only and is declared in the journal.
 
     Attributes:
         observations_ignored: Observations dropped as older than one already used, or from the
@@ -49,7 +46,6 @@ class Executor:
         stub: ControllerStub,
         *,
         checks: Checks = CHECKS,
-        genuine: Callable[[object], bool] = issued_by_feasibility,
     ) -> None:
         self.cell = cell
         self.stub = stub
@@ -59,7 +55,7 @@ class Executor:
         self._checks = checks
         self._view = cell.first_view()
         self._queue = ChunkQueue(cell.execution.queue_capacity, journal, checks)
-        self._arrivals = Arrivals(self._queue, checks, genuine)
+        self._arrivals = Arrivals(self._queue, checks)
         self._in_flight: set[str] = set()
         self._sequence = 0
         self._stops_seen = 0
@@ -292,7 +288,6 @@ class Executor:
                 self.cell,
                 labels=self._journal.labels,
                 checks_missing=missing(self._checks, self.stub.checks, self.stub.supervisor.checks),
-                genuine=self._arrivals.genuine is issued_by_feasibility,
             )
             self._journal.add("session", now_ns, payload)
         return now_ns

@@ -28,13 +28,13 @@ from genpolicy.integrity.hashing import sha256_bytes_of
 
 Array = NDArray[np.float64]
 
-JOURNAL_VERSION = 3
+JOURNAL_VERSION = 4
 MAXIMUM_UNCOMPRESSED_BYTES = 8 << 30
 MAXIMUM_RECORD_BYTES = 64 << 20
 
 EVENT_FIELDS: dict[str, tuple[str, ...]] = {
     "session": ("version", "labels", "execution_horizon", "period_ns", "maximum_age_ns",
-                "watchdog_ns", "queue_capacity", "fallback_hash", "checks_missing", "admission"),
+                "watchdog_ns", "queue_capacity", "fallback_hash", "checks_missing"),
     "observation": ("event_time_ns", "phase", "calibration_epoch", "used", "ignored_because"),
     "phase": ("event_time_ns", "old", "new"),
     "epoch": ("event_time_ns", "old", "new"),
@@ -136,7 +136,6 @@ def session_payload(
     *,
     labels: Mapping[str, str],
     checks_missing: Sequence[str],
-    genuine: bool,
 ) -> dict[str, Any]:
     """Payload of the first event: what the session is held to."""
     return {
@@ -149,7 +148,6 @@ def session_payload(
         "queue_capacity": cell.execution.queue_capacity,
         "fallback_hash": FALLBACK_HASH,
         "checks_missing": list(checks_missing),
-        "admission": "feasibility" if genuine else "imitation",
     }
 
 

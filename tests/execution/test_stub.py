@@ -5,7 +5,7 @@ import pytest
 
 from genpolicy.contract.chunk import DiscardReason
 from genpolicy.evidence.shadow.mutants import SCENARIOS, without
-from genpolicy.evidence.shadow.rig import CHECKPOINT, SAMPLER, Rig, looks_admitted
+from genpolicy.evidence.shadow.rig import CHECKPOINT, IMITATED, SAMPLER, Rig
 from genpolicy.execution.checks import CHECKS, Place
 from genpolicy.execution.executor import Executor
 from genpolicy.verification.checker import check_messages
@@ -22,7 +22,7 @@ def half_asleep(check):
     rig = Rig()
     rig.executor = Executor(
         rig.cell, rig.journal, rig.stub,
-        checks=without(check), genuine=looks_admitted,
+        checks=without(check, IMITATED),
     )  # fmt: skip
     rig.executor.set_active(0.0, CHECKPOINT, SAMPLER)
     return rig

@@ -1,7 +1,8 @@
 """A test rig: one session on a simulated clock, and chunks that no feasibility module made.
 
 What is built here has the form of an admitted chunk and none of its authority. It exists so that
-the executor, the stub and the checker can be tried with chunks of which something is wrong.
+the executor, the stub and the checker can be tried with chunks of which something is wrong. The
+whole table refuses all of them, so a rig has the table minus `issued`, and its journal says so.
 """
 
 from dataclasses import dataclass, field, replace
@@ -47,6 +48,10 @@ EXECUTION = ExecutionSettings(
 )
 
 
+IMITATED: Checks = tuple(check for check in CHECKS if check.name != "issued")
+"""The table minus the one row that no imitation passes."""
+
+
 @dataclass(frozen=True)
 class StandInLayer:
     """Verdict of one layer, as claimed."""
@@ -61,6 +66,23 @@ class StandInVerdict:
 
     layers: tuple[StandInLayer, ...]
     rows: tuple[int, int]
+    q_rad: Array = field(default_factory=lambda: np.zeros((ROWS, 1)), repr=False)
+
+
+@dataclass(frozen=True)
+class StandInScene:
+    """A scene without a body, as claimed."""
+
+    bodies: dict[str, tuple[Array, Array]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class StandInContext:
+    """What the chunk was checked against, as claimed."""
+
+    q_cmd: Array = field(default_factory=lambda: np.zeros(1))
+    last_action: Array = field(default_factory=lambda: np.zeros(ACTION_DIM))
+    scene: StandInScene = field(default_factory=StandInScene)
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +93,7 @@ class StandIn:
     actions: Array = field(repr=False)
     actions_sha256: str
     verdict: StandInVerdict
+    context: StandInContext | None = field(default_factory=StandInContext, repr=False)
 
 
 def passing_verdict(
@@ -79,11 +102,6 @@ def passing_verdict(
     """Six layers, of which at most one fails; `rows` are those that were checked."""
     layers = (StandInLayer(f"layer_{n}", n != failed) for n in range(LAYER_COUNT))
     return StandInVerdict(tuple(layers), rows)
-
-
-def looks_admitted(chunk: object) -> bool:
-    """The rig takes imitations; whatever is no imitation is refused."""
-    return type(chunk) is StandIn
 
 
 def rig_cell(*, execution_horizon: int = HORIZONS.execution_horizon, **changes: Any) -> Cell:
@@ -96,7 +114,7 @@ class Rig:
     """One session: clock, supervisor, stub and executor.
 
     Args:
-        checks: The table of executor, stub and supervisor.
+        checks: The table of executor, stub and supervisor; the whole one takes no imitation.
         execution_horizon: Actions of a chunk that may be executed.
         session: Name of the session.
         changes: Of the settings of execution.
@@ -105,7 +123,7 @@ class Rig:
     def __init__(
         self,
         *,
-        checks: Checks = CHECKS,
+        checks: Checks = IMITATED,
         session: str = "rig",
         execution_horizon: int = HORIZONS.execution_horizon,
         **changes: Any,
@@ -114,9 +132,7 @@ class Rig:
         self.cell = rig_cell(execution_horizon=execution_horizon, **changes)
         self.supervisor = Supervisor(self.cell.execution, self.journal, checks=checks)
         self.stub = ControllerStub(self.cell, self.journal, self.supervisor, checks=checks)
-        self.executor = Executor(
-            self.cell, self.journal, self.stub, checks=checks, genuine=looks_admitted
-        )
+        self.executor = Executor(self.cell, self.journal, self.stub, checks=checks)
         self.now_ns = 0
         self.phase, self.epoch = "approach", "epoch-1"
         self.made = 0
@@ -133,15 +149,16 @@ class Rig:
         return self.executor.observe(self.now_s, event_time_s, self.phase, self.epoch, divergence_m)
 
     def chunk(self, **changes: Any) -> StandIn:
-        """A valid chunk from an observation made now, with changes to metadata, actions, verdict.
+        """A valid chunk from an observation made now, with changes to what it carries.
 
         Args:
-            changes: Fields of the metadata, or `actions`, `actions_sha256`, `verdict`.
+            changes: Fields of the metadata, or `actions`, `actions_sha256`, `verdict`, `context`.
         """
         self.made += 1
         actions = changes.pop("actions", self.actions(self.made))
         sha256 = changes.pop("actions_sha256", None)
         verdict = changes.pop("verdict", passing_verdict())
+        context = changes.pop("context", StandInContext())
         metadata = ChunkMetadata(
             chunk_id=f"chunk-{self.made}",
             condition_observation_event_time_s=self.now_s,
@@ -159,7 +176,7 @@ class Rig:
         )
         values = frozen_array(actions)
         return StandIn(
-            replace(metadata, **changes), values, sha256 or actions_sha256(values), verdict
+            replace(metadata, **changes), values, sha256 or actions_sha256(values), verdict, context
         )
 
     @staticmethod
