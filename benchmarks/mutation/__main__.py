@@ -3,8 +3,8 @@
 The mutants are those of Cosmic Ray (`pip install -e '.[mutation]'`). They are run here and not by
 its own command, because half of the time of a mutant would go into imports: libraries are imported
 once, and each mutant is a forked process in which one module of `gates` is compiled from changed
-text. No file on disk is changed, so a run that is cut leaves nothing behind. `plan.KINDS` says which
-operators are kept; `|` is not, since it stands in annotations mostly. See docs/mutation.md.
+text. No file on disk is changed, so a run that is cut leaves nothing behind. `plan.KINDS` says
+which operators are kept; `|` is not, since it stands in annotations mostly. See docs/mutation.md.
 
     python -m benchmarks.mutation run gates/card --sample 60 --near --out build/mutation.jsonl
     python -m benchmarks.mutation again --out build/mutation.jsonl     # its survivors, once more
