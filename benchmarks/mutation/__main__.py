@@ -16,6 +16,7 @@ import json
 import os
 import sys
 import time
+from dataclasses import asdict
 from pathlib import Path
 
 from benchmarks.mutation.plan import ROOT, Mutant, drawn, inside, modules, mutants_of
@@ -23,12 +24,14 @@ from benchmarks.mutation.runner import run
 
 
 def rows_of(out: Path) -> list[dict]:
-    """Last row of each mutant in a file of results."""
-    found = {}
-    for line in out.read_text().splitlines():
-        row = json.loads(line)
-        found[row["path"], row["kind"], row["occurrence"]] = row
-    return list(found.values())
+    """Last row of each mutant in a file of results; none where there is no file yet."""
+    lines = out.read_text().splitlines() if out.is_file() else []
+    return list({key(row): row for row in map(json.loads, lines)}.values())
+
+
+def key(row: dict) -> tuple[str, str, int]:
+    """What a mutant is known by, as long as its module stays as it is."""
+    return row["path"], row["kind"], row["occurrence"]
 
 
 def show(out: Path) -> None:
@@ -73,7 +76,9 @@ def main() -> None:
         for path in modules(places):
             print(len(mutants_of(path)), path)
     elif asked.what == "run":
-        run(drawn(places, asked.sample, asked.seed), asked.out, asked.jobs, near=asked.near)
+        done = {key(row) for row in rows_of(asked.out)}
+        chosen = [m for m in drawn(places, asked.sample, asked.seed) if key(asdict(m)) not in done]
+        run(chosen, asked.out, asked.jobs, near=asked.near)
         print(f"{time.monotonic() - started:.0f} s")
     elif asked.what == "again":
         left = [row for row in rows_of(asked.out) if row["outcome"] == "survived"]

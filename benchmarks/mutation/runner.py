@@ -17,6 +17,7 @@ from pathlib import Path
 
 from benchmarks.mutation.plan import ROOT, Mutant, change_of, tests_of, text_of
 
+OURS = ("gates", "tests", "benchmarks")
 CPU_S = 150
 """A mutant that needs more processor time than this hangs: killed. The slowest tests need 60."""
 
@@ -43,19 +44,16 @@ class _Finder(importlib.abc.MetaPathFinder):
         return importlib.util.spec_from_file_location(fullname, self.path, loader=loader)
 
 
-def warm_up() -> None:
-    """Import what every mutant needs and none changes: libraries and `genpolicy`."""
+def warm_up(tests: Sequence[str]) -> None:
+    """Import what every mutant needs and none changes: all that tests load but `gates` itself."""
     read, write = os.pipe()
     if os.fork() == 0:
         try:
-            import gates.audit.command
-            import gates.commands
-            import gates.overview
-            import gates.proof
-            import gates.rederive  # noqa: F401
+            _silence(os.devnull)
+            import pytest
 
-            own = ("gates", "tests", "benchmarks")
-            names = [name for name in sys.modules if name.partition(".")[0] not in own]
+            pytest.main(["--collect-only", "-q", "-p", "no:cacheprovider", *tests])
+            names = [name for name in sys.modules if name.partition(".")[0] not in OURS]
             os.write(write, "\n".join(names).encode())
         finally:
             os._exit(0)
@@ -63,10 +61,16 @@ def warm_up() -> None:
     with os.fdopen(read, "rb") as pipe:
         names = pipe.read().decode().split()
     os.wait()
-    for name in (*names, "pytest", "pytest_timeout", "hypothesis"):
+    for name in (*names, "pytest"):
         with contextlib.suppress(Exception):
             importlib.import_module(name)
     assert not [name for name in sys.modules if name.partition(".")[0] == "gates"]
+
+
+def _silence(file: str | Path) -> None:
+    out = os.open(file, os.O_WRONLY | os.O_CREAT)
+    os.dup2(out, 1)
+    os.dup2(out, 2)
 
 
 def outcome(path: str, text: str | None, tests: Sequence[str]) -> tuple[str, float, str]:
@@ -90,9 +94,7 @@ def _run(path: str, text: str | None, tests: Sequence[str], log: Path, scratch: 
         os.setsid()
         resource.setrlimit(resource.RLIMIT_CPU, (CPU_S, CPU_S + 5))
         signal.signal(signal.SIGXCPU, signal.SIG_DFL)
-        out = os.open(log, os.O_WRONLY | os.O_CREAT)
-        os.dup2(out, 1)
-        os.dup2(out, 2)
+        _silence(log)
         sys.dont_write_bytecode = True
         if text is not None:
             sys.meta_path.insert(0, _Finder(path, text))
@@ -117,11 +119,11 @@ def run(mutants: Sequence[Mutant], out: Path, jobs: int, *, near: bool) -> None:
         jobs: How many at a time.
         near: Only the tests nearest to the module, as a first look: they take a second or two.
     """
-    warm_up()
 
     def tests(path: str) -> list[str]:
         return tests_of(path)[:1] if near else tests_of(path)
 
+    warm_up(sorted({name for mutant in mutants for name in tests(mutant.path)}))
     clean: dict[str, float] = {}
     for path in sorted({mutant.path for mutant in mutants}):
         for name in set(tests(path)) - set(clean):
