@@ -8,7 +8,7 @@ import pytest
 from flows.workspace import merged
 from gates.card.card import CardSettings
 from gates.proof import SPECS, judge
-from gates.settings import read_limits, read_settings
+from gates.settings import read_limits, read_params, read_settings, section_of
 from genpolicy.errors import ConfigError
 from genpolicy.integrity.documents import read_yaml
 
@@ -174,3 +174,17 @@ def test_the_same_clusters_are_drawn_whenever_a_gate_is_judged():
     settings = read_settings(_params(), "gate_d", SPECS["D"].settings)
     one, again = (settings.draws("D", "force").integers(0, 1000, 5).tolist() for _ in range(2))
     assert one == again != settings.draws("D", "latency").integers(0, 1000, 5).tolist()
+
+
+def test_a_settings_file_that_is_not_there_or_says_nothing_is_a_bad_setting(tmp_path):
+    with pytest.raises(ConfigError, match=r"params\.yaml"):
+        read_params(tmp_path)
+    (tmp_path / "moved.yaml").write_text("seed: 1")
+    (tmp_path / "params.yaml").symlink_to("moved.yaml")
+    with pytest.raises(ConfigError, match=r"params\.yaml"):
+        read_params(tmp_path)
+    (tmp_path / "params.yaml").unlink()
+    for text in ("", "[1]", "seed: 1", "gate_a: [1]"):
+        (tmp_path / "params.yaml").write_text(text)
+        with pytest.raises(ConfigError, match="gate_a is missing"):
+            section_of(read_params(tmp_path), "gate_a")
