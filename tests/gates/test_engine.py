@@ -8,9 +8,10 @@ import pytest
 from asking import SPEC
 
 from gates.criterion import Measured
-from gates.engine import environment, judge
+from gates.engine import environment, judge, promoted_below, upstream_hashes
 from gates.evidence import Evidence
 from gates.pipeline import TASK_IDENTITY, Basis
+from gates.report import report_bytes, report_path
 from gates.settings import GateSettings, Limit, Limits, Waiver
 
 
@@ -119,3 +120,43 @@ def test_number_and_interval_are_rounded_before_they_are_judged(tmp_path):
 def test_the_environment_names_python_by_its_minor_version():
     """A patch release of Python changes no number; a report is not void for it."""
     assert environment()["python"] == f"{sys.version_info[0]}.{sys.version_info[1]}"
+
+
+def _below(tmp_path, gate, **candidates):
+    """A report of a gate that gives these verdicts."""
+    report = _judge(tmp_path, 1, 1).model_copy(update={"gate": gate, "candidates": candidates})
+    path = tmp_path / report_path(gate)
+    path.parent.mkdir(exist_ok=True)
+    path.write_bytes(report_bytes(report))
+    return path
+
+
+def test_who_passed_below_stands_and_why_the_others_do_not(tmp_path):
+    _below(tmp_path, "B", flow="PASS", act="FAIL", new="INCONCLUSIVE")
+    stands, why = promoted_below(tmp_path, "B", ["act", "flow", "other"])
+    assert stands == ["flow"]
+    assert [text.split()[0] for text in why] == ["act", "other"]
+    assert "gate B says FAIL" in why[0] and "gate B says nothing" in why[1]
+
+
+def test_gate_a_judges_no_method_and_lets_all_stand(tmp_path):
+    _below(tmp_path, "A")
+    assert promoted_below(tmp_path, "A", ["act", "flow"]) == (["act", "flow"], [])
+
+
+@pytest.mark.parametrize("data", [None, b"", b"{}", b"no report"])
+def test_on_a_report_that_cannot_be_read_no_method_stands(tmp_path, data):
+    path = _below(tmp_path, "B", flow="PASS")
+    path.unlink() if data is None else path.write_bytes(data)
+    stands, (why,) = promoted_below(tmp_path, "B", ["flow"])
+    assert stands == [] and "Gate B has no readable report" in why
+    # Gate A judges no method: they stand, and it is said that nothing is under them.
+    stands, (why,) = promoted_below(tmp_path, "A", ["flow"])
+    assert stands == ["flow"] and "Gate A has no readable report" in why
+
+
+def test_the_reports_below_are_bound_and_no_others(tmp_path):
+    for gate in "ABD":
+        _below(tmp_path, gate)
+    assert set(upstream_hashes(tmp_path, "D")) == {"A", "B"}
+    assert upstream_hashes(tmp_path, "A") == {}
