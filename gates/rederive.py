@@ -117,7 +117,7 @@ def _check(root: Path, gate: Gate, params: Mapping[str, Any], journals: list[Pat
         if own != found.get(name):
             again = f"{_totals(found.get(name))}, as checked again"
             _refuse(gate, f"{path}: {name}", _totals(own), again)
-    again = {
+    derived = {
         "violations": [
             {"journal": name, **violation}
             for name, document in found.items()
@@ -126,7 +126,7 @@ def _check(root: Path, gate: Gate, params: Mapping[str, Any], journals: list[Pat
         **{key: sum(d[key] for d in found.values()) for key in ("checked_actions",
                                                                 "reproved_actions")},
     }  # fmt: skip
-    for key, value in again.items():
+    for key, value in derived.items():
         if stated.get(key) != value:
             _refuse(gate, f"{path}: {key}", _short(stated.get(key)), f"{_short(value)}, as "
                     "checked again")  # fmt: skip

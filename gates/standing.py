@@ -40,7 +40,9 @@ def standing(root: Path) -> frozenset[str] | None:
             return False
         if path != found:
             return bool(disk.md5(path) == read)
-        wrote = (out.get("md5") for out in _entries(runs[writers[found]]) if out["path"] == path)
+        wrote = (
+            out.get("md5") for out in _entries(runs[writers[found]]) if out.get("path") == path
+        )
         return read in wrote
 
     return frozenset(name for name in runs if stands(name))
