@@ -8,9 +8,9 @@ below it, or of one that failed after all of them.
 from dataclasses import dataclass
 from pathlib import Path
 
+from gates.present import present_runs
 from gates.proof import STAGE_REQUIRES, Rung
 from gates.report import stage_of
-from gates.standing import standing
 from genpolicy.errors import GenpolicyError
 from genpolicy.integrity.documents import read_json
 
@@ -42,7 +42,7 @@ class Line:
 def overview(root: Path, rungs: list[Rung]) -> list[Line]:
     """One line per stage, in the order of the ladder."""
     by_stage = {stage_of(rung.gate): rung for rung in rungs}
-    recorded = standing(root)
+    recorded = present_runs(root)
     lines = []
     newest_ns = 0
     for stage in STAGE_REQUIRES:

@@ -19,11 +19,11 @@ from gates.engine import judge_gate
 from gates.evidence import Evidence
 from gates.pipeline import TASK_IDENTITY, basis_of, changed_pages, changed_task, check_record
 from gates.preregistration import moved_caveats
+from gates.present import present_runs
 from gates.proof import SPECS, admit
 from gates.protection import require_protection
 from gates.report import GATES, read_report, report_path, stage_of
 from gates.settings import read_limits, read_settings
-from gates.standing import standing
 from genpolicy.integrity.documents import canonical_json
 
 ROOT = Path(__file__).parents[2]
@@ -94,7 +94,7 @@ def test_lock_and_pipeline(fallen_over, edited, whole):
             basis_of(whole, "C")
             check_record(whole, "C", {})
             changed_pages(whole, "C")
-            standing(whole)
+            present_runs(whole)
             _evidence_digest(whole)
 
         reader = edited(name, read)

@@ -9,8 +9,8 @@ import pytest
 import yaml
 
 from gates.overview import as_text, overview
+from gates.present import present_runs
 from gates.proof import STAGE_REQUIRES, prove_all
-from gates.standing import standing
 
 
 def _record(root: Path, stage: str, **values: object) -> None:
@@ -103,6 +103,6 @@ def test_a_file_of_a_folder_that_another_stage_wrote_is_compared_by_its_bytes(
                              "md5": hashlib.md5(b"{}").hexdigest()}]},
     }  # fmt: skip
     (tmp_path / "dvc.lock").write_text(yaml.safe_dump({"stages": runs}))
-    assert standing(tmp_path) == {"task", "record"}
+    assert present_runs(tmp_path) == {"task", "record"}
     identity.write_text("[]")
-    assert standing(tmp_path) == {"task"}
+    assert present_runs(tmp_path) == {"task"}

@@ -11,7 +11,7 @@ from typing import Any
 from gates.pipeline import LOCK, Disk, stages_of
 
 
-def standing(root: Path) -> frozenset[str] | None:
+def present_runs(root: Path) -> frozenset[str] | None:
     """Stages whose recorded run read what the runs below it wrote; None without a lock file.
 
     Raises:
