@@ -94,13 +94,3 @@ def test_an_override_may_name_who_answers_for_a_question_that_was_not_asked() ->
     assert merged(base, {"gate_a": waived}) == {"gate_a": {**base["gate_a"], **waived}}
     with pytest.raises(ConfigError, match="waived_checks is not a key"):
         merged({"record": {"episodes": 3}}, {"record": waived})
-
-
-def test_the_smoke_ladder_waives_only_by_name_and_says_why() -> None:
-    root = Path(__file__).parents[2]
-    base, smoke = (
-        yaml.safe_load((root / name).read_text()) for name in ("params.yaml", "params.smoke.yaml")
-    )
-    gate = merged(base, smoke)["gate_a"]
-    assert "waived_checks" not in base["gate_a"]
-    assert all(text.startswith("smoke: ") for text in gate["waived_checks"]["model"].values())
