@@ -144,7 +144,7 @@ def test_a_printed_page_that_was_changed_refuses(ladder):
     page = ladder / "reports/gate_a.html"
     page.write_text("<p>FAIL</p>")
     lock = yaml.safe_load((ladder / "dvc.lock").read_text())
-    md5 = pipeline._Disk(ladder, {}).md5("reports/gate_a.html")
+    md5 = pipeline.Disk(ladder, {}).md5("reports/gate_a.html")
     lock["stages"]["gate_a"] = {"outs": [{"path": "reports/gate_a.html", "md5": md5}]}
     (ladder / "dvc.lock").write_text(json.dumps(lock))
     admit("train_generators", ladder)
