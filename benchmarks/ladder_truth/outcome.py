@@ -138,7 +138,7 @@ def run(workspace: Path, base: str) -> Seen:
         raise RuntimeError(f"the machine failed, not the ladder: {end.sentence}")
     stops: list[Stop] = []
     if end.code != 0:
-        refused = _refusal(end.stage, end.sentence)
+        refused = _refusal(end.stage, _said(end.sentence, runs.lines))
         stops = [refused] if refused else []
     seen = look(workspace, base)
     found = {(s.gate, s.reason, s.candidate): s for s in (*stops, *seen.stops)}
@@ -210,6 +210,14 @@ def count(expected: Expected, seen: Seen) -> Count:
     right = [stop for stop in seen.stops if stop.gate == expected.gate and expected.names(stop)]
     lowest = min(stop.gate for stop in seen.stops)
     return "right" if right and lowest == expected.gate else "elsewhere"
+
+
+def _said(sentence: str, lines: list[str]) -> str:
+    """The sentence of a stage; of a command of the product that is no stage, its last lines."""
+    if not re.search(r"ended with code \d+$", sentence):
+        return sentence
+    before = [line for line in lines if line.strip() and not line.startswith("ERROR: ")]
+    return " ".join(before[-2:]) or sentence
 
 
 def _refusal(stage: str, sentence: str) -> Stop | None:

@@ -38,6 +38,7 @@ NOT_ASKED = {
 }
 """What tests/ladder declares not applicable: a handful of starts forms no verdict."""
 BROUGHT = "recordings"
+VARIANTS = ("reference", "linear_encoder")
 UNTRACKED = shutil.ignore_patterns("__pycache__")
 
 
@@ -97,6 +98,8 @@ def brought(target: Path, small_ladder: Path) -> Path:
         params["policy"]["training"] |= {"steps": 60, "warmup_steps": 5, "validation_every": 60}
         params["policy"]["fixtures"] = 4
         params["train_factors"]["steps"] = 5
+        variants = params["train_factors"]["variants"]
+        params["train_factors"]["variants"] = {name: variants[name] for name in VARIANTS}
         params["measure_baselines"]["samples"] = 2
         params["measure_factors"] |= {"samples": 2, "stride": 32}
         limits = {k: v for owner in params["gate_a"]["limits"].values() for k, v in owner.items()}
