@@ -16,7 +16,7 @@ from typing import Any
 
 import yaml
 
-from benchmarks.ladder_truth.outcome import look, settled
+from benchmarks.ladder_truth.outcome import look, settled, verified
 from benchmarks.ladder_truth.sealing import KEYS, SIGNERS
 from gates.card.card import card_bytes
 from gates.card.drafting import draft
@@ -100,6 +100,8 @@ def brought(target: Path, small_ladder: Path) -> Path:
         params["train_factors"]["steps"] = 5
         variants = params["train_factors"]["variants"]
         params["train_factors"]["variants"] = {name: variants[name] for name in VARIANTS}
+        asked = {"factors": ["reference", "representation"]}
+        params["gate_a"] |= {**asked, "conditioning_factors": ["representation"]}
         params["measure_baselines"]["samples"] = 2
         params["measure_factors"] |= {"samples": 2, "stride": 32}
         limits = {k: v for owner in params["gate_a"]["limits"].values() for k, v in owner.items()}
@@ -158,4 +160,4 @@ BASES: dict[str, str] = {
 
 def honest(workspace: Path, base: str) -> bool:
     """Whether a base is as it has to be: nothing of it is stopped."""
-    return not look(workspace, base).stops
+    return not look(workspace, base).stops and not verified(workspace, base)
