@@ -1,5 +1,6 @@
 """Stage `train_generators`: the candidates, on the network and budget of the baselines."""
 
+from dataclasses import replace
 from pathlib import Path
 
 from gates.proof import admit
@@ -13,7 +14,7 @@ def work(params: Params) -> None:
     """Admit through gate A, then train every candidate."""
     admit("train_generators", Path.cwd())
     section = params.section("train_generators", MethodsSection)
-    plan = training_plan(params)
+    plan = replace(training_plan(params), keep_earlier=True)
     reference = ARTIFACTS / "train_baselines" / "chunked_bc" / f"seed_{plan.settings.seeds[0]}"
     with output_folder(ARTIFACTS / "train_generators") as folder:
         train_matched(plan, section.samplers, folder=folder, reference=reference)

@@ -131,7 +131,7 @@ def fleet(dataset, tmp_path_factory):
     root = tmp_path_factory.mktemp("fleet")
     plan = TrainingPlan(
         dataset=dataset, settings=POLICY, horizons=HORIZONS, root_seed=1, device="cpu", workers=1,
-        scheduler="local",
+        scheduler="local", keep_earlier=True,
     )  # fmt: skip
     trained, _ = train_methods(plan, SAMPLERS, folder=root)
     return root, trained

@@ -4,12 +4,16 @@ r"""How often is the audit right? Data sets with planted causes, and what it say
     python -m benchmarks.audit --seeds report --out build/audit-benchmark \
         --docs docs/audit-accuracy.md
 
-Writes `results.json` (every data set) and `table.md` (what docs/audit-accuracy.md shows).
+Writes `results.json` (every data set) and `table.md` (what docs/audit-accuracy.md shows). With
+`--sample n` at most n data sets of each cause in each task from its minimum on, and n below. A run
+that was stopped goes on where it stopped, and so does a larger sample.
 """
 
 import argparse
 import json
 import time
+from collections import defaultdict
+from collections.abc import Sequence
 from pathlib import Path
 
 from benchmarks.audit.cases import CAUSES
@@ -17,10 +21,13 @@ from benchmarks.audit.frozen import frozen_commit, report_seed
 from benchmarks.audit.runner import Job, Result, run
 from benchmarks.audit.tables import into_page, markdown
 from genpolicy.compute import LOCAL, map_shards
+from genpolicy.seeds import stream
 
 # Development seeds were looked at while the audit was written. Report seeds follow from the commit.
 DEVELOPMENT, REPORT = "development", "report"
 FIRST_DEVELOPMENT_SEED = 1_000
+# Results are written after so many data sets.
+BLOCK = 16
 
 
 def jobs(first_seed: int, *, repeats: int, tasks: list[str], only: str) -> list[Job]:
@@ -44,12 +51,50 @@ def jobs(first_seed: int, *, repeats: int, tasks: list[str], only: str) -> list[
     return [job for job in found if only in CAUSES[job.cause].name]
 
 
+def sampled(found: Sequence[Job], root_seed: int, largest: int | None) -> list[Job]:
+    """Jobs in random order, of which each part is a fair sample; at most so many of each kind.
+
+    Kinds are a cause in one task from its minimum on, and a cause below it.
+
+    Args:
+        found: All jobs.
+        root_seed: Seed of the order.
+        largest: None takes all of them.
+    """
+    order = stream(root_seed, "sample").permutation(len(found)).tolist()
+    kinds: dict[tuple[int, str], int] = defaultdict(int)
+    ranked = []
+    for job in (found[place] for place in order):
+        strong = CAUSES[job.cause].strong(job.strength)
+        kind = (job.cause, job.task if strong else "below")
+        ranked.append((kinds[kind], job))
+        kinds[kind] += 1
+    ranked.sort(key=lambda item: item[0])
+    return [job for rank, job in ranked if largest is None or rank < largest]
+
+
+def measured(todo: Sequence[Job], file: Path, *, workers: int) -> list[Result]:
+    """Results of all jobs; those that the file holds already are not measured again."""
+    rows = json.loads(file.read_text()) if file.exists() else []
+    known = {result.job: result for result in map(Result.from_row, rows)}
+    missing = [job for job in todo if job not in known]
+    for first in range(0, len(missing), BLOCK):
+        block = missing[first : first + BLOCK]
+        for result in map_shards(run, block, workers=workers, scheduler=LOCAL):
+            known[result.job] = result
+        done = [known[job].as_row() for job in todo if job in known]
+        file.write_text(json.dumps(done, indent=1) + "\n")
+        print(f"{len(done)} of {len(todo)} data sets", flush=True)
+    return [known[job] for job in todo]
+
+
 def main() -> None:
     """Run the benchmark and write its tables."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.audit", description=__doc__)
     parser.add_argument("--seeds", choices=(DEVELOPMENT, REPORT), default=DEVELOPMENT)
     parser.add_argument("--repeats", type=int, default=1)
     parser.add_argument("--tasks", nargs="+", default=["planar", "insertion"])
+    parser.add_argument("--sample", type=int, help="data sets of each kind, at most")
     parser.add_argument("--only", default="", help="causes whose name holds this text")
     parser.add_argument("--quick", action="store_true", help="the planar task only")
     parser.add_argument("--workers", type=int, default=2)
@@ -62,12 +107,11 @@ def main() -> None:
         seeds, first = f"report seeds of commit {commit}", report_seed(commit)
     tasks = ["planar"] if options.quick else options.tasks
     todo = jobs(first, repeats=options.repeats, tasks=tasks, only=options.only)
+    todo = sampled(todo, first, options.sample)
     begin = time.perf_counter()
-    results: list[Result] = map_shards(run, todo, workers=options.workers, scheduler=LOCAL)
-    wall_s = time.perf_counter() - begin
     options.out.mkdir(parents=True, exist_ok=True)
-    rows = [result.as_row() for result in results]
-    (options.out / "results.json").write_text(json.dumps(rows, indent=1) + "\n")
+    results = measured(todo, options.out / "results.json", workers=options.workers)
+    wall_s = time.perf_counter() - begin
     text = markdown(results, seeds=seeds)
     (options.out / "table.md").write_text(text)
     if options.docs:

@@ -4,7 +4,6 @@ Each has a smallest strength from which the audit is expected to name it: the li
 against, no more. Below, a data set is still run, and what was said of it is shown.
 """
 
-from collections.abc import Callable
 from dataclasses import replace
 
 from benchmarks.audit.actions import ACTIONS
@@ -13,8 +12,6 @@ from benchmarks.audit.catalogue import (
     CLOCK,
     EPOCH,
     FRAME,
-    FROZEN,
-    GAPS,
     GLUED,
     HALF,
     LABELS,
@@ -30,8 +27,10 @@ from benchmarks.audit.catalogue import (
     Answer,
     Cause,
     base,
+    fault,
     hidden,
 )
+from benchmarks.audit.lost import FEW, LOST, MOVING
 from benchmarks.audit.pairs import PAIRS
 from benchmarks.audit.plan import Defect, Plan
 
@@ -53,7 +52,6 @@ def _modes(count: int, contexts: int) -> Cause:
     )  # fmt: skip
 
 
-FEW = "the limit of faulty episodes, two at least"
 TOLD = "7 of 10 modes are told, the limit of what may be"
 
 
@@ -74,17 +72,6 @@ def _clock(name: str, kind: str, scope: str, share: float = 1.0, minimum: float 
             base(seed), defects=(Defect(kind, s * PERIOD_S[task], scope, share),)
         ),
         (CLOCK,), (VALID, UNIMODAL),
-    )  # fmt: skip
-
-
-def _fault(
-    name: str, group: str, unit: str, strengths, minimum: float, reason: str,
-    defect: Callable[[float], Defect], answer: Answer,
-) -> Cause:  # fmt: skip
-    return Cause(
-        name, group, unit, strengths, minimum, reason,
-        lambda seed, s, task: replace(base(seed), defects=(defect(s),)),
-        (answer,), (VALID, UNIMODAL, SUPPORT),
     )  # fmt: skip
 
 
@@ -142,81 +129,69 @@ CLOCKS = (
 )
 
 DATA = (
-    _fault(
+    fault(
         "camera shift", "data_defect: calibration", "mm", (1, 3, 5, 10, 20), 3,
         "the limit of a calibration's residual",
         lambda s: Defect("camera_shift", s * 1e-3), CALIBRATION,
     ),
-    _fault(
+    fault(
         "tool shift", "data_defect: calibration", "mm", (1, 3, 5, 10, 20), 3,
         "the limit of a calibration's residual",
         lambda s: Defect("tool_shift", s * 1e-3), CALIBRATION,
     ),
-    _fault(
+    fault(
         "position unit, epoch", "data_defect: unit", "factor",
         (1.02, 1.15, 1.3, 10, 39.37, 1000), 1.15,
         "the limit between an epoch's answer and that of all",
         lambda s: Defect("position_unit", s), UNIT,
     ),
-    _fault(
+    fault(
         "action unit, all", "data_defect: unit", "factor", (1.02, 3, 10, 1000), 3,
         "the limit between commanded and observed motion",
         lambda s: Defect("action_unit", s, "all"), UNIT,
     ),
-    _fault(
+    fault(
         "position unit, share of episodes", "data_defect: unit", "share of episodes in mm",
         (0.01, 0.02, 0.1, 0.3), 0.02, FEW,
         lambda s: Defect("position_unit", 1000.0, "some", s), UNIT,
     ),
-    _fault(
+    fault(
         "scene unit, epoch", "data_defect: unit", "factor", (1.002, 1.01, 10, 1000), 1.01,
         "3 mm at the reach of the tasks, the limit of a calibration's residual",
         lambda s: Defect("scene_unit", s), Answer("data_defect", ("unit", "calibration")),
     ),
-    _fault(
+    fault(
         "frame turned, epoch", "data_defect: frame", "degrees", (1, 5, 8.1, 15, 90), 8.1,
         "the limit between commanded and observed motion",
         lambda s: Defect("turn", s * 0.017453292519943295), FRAME,
     ),
-    _fault(
+    fault(
         "frame turned, all", "data_defect: frame", "degrees", (1, 5, 8.1, 15, 90), 8.1,
         "the limit between commanded and observed motion",
         lambda s: Defect("turn", s * 0.017453292519943295, "all"), FRAME,
     ),
-    _fault(
+    fault(
         "mirrored, share of episodes", "data_defect: frame", "share of episodes",
         (0.01, 0.02, 0.2, 1.0), 0.02, FEW,
         lambda s: Defect("mirror", 1.0, "some", s), FRAME,
     ),
-    _fault(
+    fault(
         "columns swapped, share of episodes", "data_defect: frame", "share of episodes",
         (0.01, 0.02, 0.2, 1.0), 0.02, FEW,
         lambda s: Defect("swap", 1.0, "some", s), FRAME,
     ),
-    _fault(
+    fault(
         "stored twice", "data_defect: duplicate", "share of episodes",
         (0.01, 0.02, 0.05, 0.3), 0.02, FEW,
         lambda s: Defect("repeat", s), REPEATED,
     ),
-    _fault(
+    fault(
         "glued to the next", "data_defect: glued", "share of episodes",
         (0.01, 0.02, 0.1, 0.5), 0.02, FEW, lambda s: Defect("glue", s, "some"), GLUED,
     ),
-    _fault(
+    fault(
         "glued to itself", "data_defect: glued", "share of episodes",
         (0.01, 0.02, 0.1, 1.0), 0.02, FEW, lambda s: Defect("glue", s, "all"), GLUED,
-    ),
-)  # fmt: skip
-
-LOST = (
-    _fault(
-        "dropped rows", "data_defect: gaps", "share of rows", (0.002, 0.01, 0.05, 0.2), 0.01,
-        "the limit of rows that follow a gap",
-        lambda s: Defect("drop", s, "all"), GAPS,
-    ),
-    _fault(
-        "frozen position", "data_defect: frozen", "share of episodes", (0.01, 0.02, 0.1, 0.5), 0.02,
-        FEW, lambda s: Defect("freeze", 1.0, "some", s), FROZEN,
     ),
 )  # fmt: skip
 
@@ -283,4 +258,4 @@ STRUCTURE = (
     ),
 )  # fmt: skip
 
-CAUSES = MODES + HIDDEN + CLOCKS + DATA + LOST + LABELLED + STRUCTURE + PAIRS + ACTIONS
+CAUSES = MODES + HIDDEN + CLOCKS + DATA + LOST + LABELLED + STRUCTURE + PAIRS + ACTIONS + MOVING

@@ -5,9 +5,9 @@ causes, the first red layer is the answer.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from benchmarks.audit.plan import Plan
+from benchmarks.audit.plan import Defect, Plan
 
 PERIOD_S = {"planar": 0.1, "insertion": 0.05}
 HALF = (0.5, 0.5)
@@ -46,7 +46,7 @@ UNIT = Answer("data_defect", ("unit",))
 FRAME = Answer("data_defect", ("frame", "rotat", "mirror", "swap"))
 REPEATED = Answer("data_defect", ("duplicate",))
 GAPS = Answer("data_defect", ("gap", "rate", "jitter"))
-FROZEN = Answer("data_defect", ("frozen", "clock", "stub"))
+FROZEN = Answer("data_defect", ("frozen",))
 GLUED = Answer("data_defect", ("glue", "duplicate"))
 EPOCH = (Answer("data_defect", ("epoch",)), Answer("hidden_state", ("epoch",)))
 ORDER = Answer("hidden_state", ("order", "session", "previous", "unrecorded"))
@@ -94,3 +94,15 @@ class Cause:
 def base(seed: int) -> Plan:
     """Data sets in which a fault of data or labels is planted: with one mode, or with two."""
     return Plan(seed, shares=HALF if seed % 2 else (1.0,))
+
+
+def fault(
+    name: str, group: str, unit: str, strengths, minimum: float, reason: str,
+    defect: Callable[[float], Defect], answer: Answer,
+) -> Cause:  # fmt: skip
+    """A fault of the recording in a data set with one mode or with two."""
+    return Cause(
+        name, group, unit, strengths, minimum, reason,
+        lambda seed, s, task: replace(base(seed), defects=(defect(s),)),
+        (answer,), (VALID, UNIMODAL, SUPPORT),
+    )  # fmt: skip

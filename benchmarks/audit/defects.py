@@ -4,9 +4,11 @@ Kinds and the meaning of their size: `robot_clock`, `camera_clock` (offset, s), 
 (offset at the end of the episode, s, from 0 at its begin), `clock_session` (offset of the last
 episode, s, growing from the first), `camera_shift`, `tool_shift` (m), `position_unit`,
 `scene_unit`, `action_unit` (factor), `turn` (rad, observed position about the vertical), `mirror`,
-`swap` (size unused), `drop` (share of rows that are missing), `freeze` (the observed position
-stands still for a third of the episode while its stamps go on; size unused), `repeat` (share of
-episodes that are stored twice), `glue` (share of episodes that hold the next one as well).
+`swap` (size unused), `drop` (share of rows that are missing), `freeze` and `freeze_camera` (the
+stream of the robot or of the camera repeats itself so many seconds while the arm moves and its
+stamps go on), `drop_camera` (share of frames that are lost; rows hold the last one, with its
+stamps), `latch` (the camera looks once, at the begin of the episode; size unused), `repeat` (share
+of episodes that are stored twice), `glue` (share of episodes that hold the next one as well).
 """
 
 import numpy as np
@@ -21,6 +23,11 @@ CLOCKS = {
 # A second copy is rarely the same bytes: another export rounds, or begins a few rows later.
 COPY_NOISE_M = 2e-5
 COPY_LATE_ROWS = 3
+# Columns that a stream delivers.
+FROZEN = {"freeze": ("position", "tool"), "freeze_camera": ("scene", "lamp")}
+CAMERA = ("scene", "lamp", "stamp_camera", "delay_camera")
+# The arm moves in a row whose command is this share of its usual step away from the one before.
+MOVING_STEP = 0.2
 
 
 class Faults:
@@ -39,6 +46,7 @@ class Faults:
             hit = {
                 "epoch": roster.epoch == roster.epoch.max(),
                 "some": rng.random(n) < defect.share,
+                "mode": (roster.mode == roster.mode.max()) & (rng.random(n) < defect.share),
                 "all": np.ones(n, dtype=bool),
             }[defect.scope]
             self.hit.append((number, defect, hit))
@@ -84,15 +92,36 @@ def spoil_rows(
         elif defect.kind == "drop":
             keep = stream(plan.seed, "drop", episode).random(len(position)) >= defect.size
             result = {name: values[keep] for name, values in result.items()}
-        elif defect.kind == "freeze":
-            n = len(position)
-            begin = int(stream(plan.seed, "freeze", episode).integers(n // 4, n // 2))
-            result["position"] = position.copy()
-            result["position"][begin : begin + n // 3] = position[begin]
+        elif defect.kind in FROZEN:
+            rows = round(defect.size / faults.period_s)
+            held = _stretch(columns["command"], rows, stream(plan.seed, "freeze", episode))
+            result |= _held(result, FROZEN[defect.kind], held)
+        elif defect.kind == "drop_camera":
+            lost = stream(plan.seed, "drop", episode).random(len(position)) < defect.size
+            result |= _held(result, CAMERA, lost)
+        elif defect.kind == "latch":
+            result |= _held(result, FROZEN["freeze_camera"], np.ones(len(position), dtype=bool))
         elif defect.kind in ("turn", "mirror", "swap"):
             result["position"] = position.copy()
             result["position"][:, :2] = position[:, :2] @ _matrix(defect, sign).T
     return result
+
+
+def _stretch(command: Array, rows: int, rng: np.random.Generator) -> np.ndarray:
+    """So many rows in which the arm moves, one after the other. Shape (T,)."""
+    steps = np.linalg.norm(np.diff(command, axis=0, prepend=command[:1]), axis=1)
+    moving = np.flatnonzero(steps > MOVING_STEP * np.median(steps[steps > 0]))
+    first = int(rng.integers(max(1, len(moving) - rows)))
+    chosen = np.zeros(len(command), dtype=bool)
+    chosen[moving[first] : moving[min(first + rows, len(moving)) - 1] + 1] = True
+    return chosen
+
+
+def _held(columns: dict[str, Array], names: tuple[str, ...], held: np.ndarray) -> dict[str, Array]:
+    """The columns with what was read before the held rows; the first row is always read."""
+    fresh = np.where(held, 0, np.arange(len(held)))
+    newest = np.maximum.accumulate(fresh)
+    return {name: columns[name][newest] for name in names if name in columns}
 
 
 def repeat(plan: Plan, episodes, table, truth):

@@ -35,6 +35,8 @@ FORCE_NOISE_N = 0.15
 INSERTION_FORCE_N = 2.0
 # An operator judges where the arm is on average over this time, not where its tremor takes it.
 GLANCE_S = 0.3
+# About as long as an approach takes.
+APPROACH_TICKS = 50
 MEASURED_ROTATION_NOISE = 0.001
 SCENE_LENGTHS = [0, 1, 4]
 SLICES = OBSERVATION.slices
@@ -58,18 +60,33 @@ def make_cell(plan: Plan) -> Cell:
     return Cell(int(rng.integers(1, 6)), rng.uniform(0.02, 0.05))
 
 
+class Plant:
+    """A point that follows its target with a dead time and to the first order."""
+
+    def __init__(self, at: Array, cell: Cell) -> None:
+        self.at = self._from = at
+        self.fine: list[Array] = []
+        self._share = 1.0 - np.exp(-PERIOD_S / SUB_STEPS / cell.constant_s)
+        self._queue = [at] * cell.dead_steps
+
+    def follow(self, target: Array) -> None:
+        """One action period, towards the target at an even pace."""
+        for step in range(1, SUB_STEPS + 1):
+            self.fine.append(self.at)
+            self._queue.append(self._from + step / SUB_STEPS * (target - self._from))
+            self.at = self.at + self._share * (self._queue.pop(0) - self.at)
+        self._from = target
+
+
 class Kinematic:
-    """What an operator sees of its cell; the arm follows like a first-order plant."""
+    """What an operator sees of its cell."""
 
     def __init__(self, start: InsertionStart, cell: Cell) -> None:
         self.start = start
-        self.tcp = np.array([start.tcp_x_m, start.tcp_y_m, start.tcp_z_m])
-        self._seen: list[Array] = [self.tcp]
-        self.fine: list[Array] = []
+        self._plant = Plant(np.array([start.tcp_x_m, start.tcp_y_m, start.tcp_z_m]), cell)
+        self.fine = self._plant.fine
+        self._seen: list[Array] = [self._plant.at]
         self.contact_force_n = 0.0
-        self._share = 1.0 - np.exp(-PERIOD_S / SUB_STEPS / cell.constant_s)
-        self._queue = [self.tcp] * cell.dead_steps
-        self._from = self.tcp
         self._phases = PhaseLogic()
         self._holding = True
         self._recover = False
@@ -91,17 +108,13 @@ class Kinematic:
 
     def advance(self, action: Array) -> None:
         """One action period."""
-        for step in range(1, SUB_STEPS + 1):
-            self.fine.append(self.tcp)
-            self._queue.append(self._from + step / SUB_STEPS * (action[:3] - self._from))
-            self.tcp = self.tcp + self._share * (self._queue.pop(0) - self.tcp)
-        self._from = action[:3]
-        self._seen.append(self.tcp)
+        self._plant.follow(action[:3])
+        self._seen.append(self._plant.at)
         opening = float(action[9])
         self._holding = self._holding and opening < scene.RELEASE_OPENING_M
         self._phases.update(
             Measured(
-                tcp_m=self.tcp,
+                tcp_m=self._plant.at,
                 hole_xy_m=np.array([self.start.hole_x_m, self.start.hole_y_m]),
                 gripper_opening_m=opening,
                 holding=self._holding,
@@ -156,7 +169,19 @@ def demonstrate(plan: Plan, roster: Roster, number: int, cell: Cell) -> Truth:
     commands = np.array(actions)
     if plan.tool:
         _use_tool(commands, phases, way)
-    return _truth(plan, start, commands, phases, world, lit, cue, rng, kind != "missed")
+    truth = _truth(plan, start, commands, phases, world, lit, cue, rng, kind != "missed")
+    moved = plan.moved(len(commands), (0, APPROACH_TICKS), number)
+    return truth if moved is None else _with_moved_goal(truth, moved, cell)
+
+
+def _with_moved_goal(truth: Truth, moved: Array, cell: Cell) -> Truth:
+    """The operator stays where it is to the goal; the plant answers linearly."""
+    shift = np.pad(moved, ((0, 0), (0, 1)))
+    plant = Plant(np.zeros(3), cell)
+    for target in shift:
+        plant.follow(target)
+    fine = truth.fine + np.array(plant.fine)
+    return replace(truth, command=truth.command + shift, fine=fine, moved=moved)
 
 
 def _use_tool(actions: Array, phases: list[str], way) -> None:
@@ -270,6 +295,11 @@ def layout(columns: dict[str, Array]) -> dict[str, object]:
         "action_gripper": slice(9, 10),
         "reference": hole,
         "context": {"hole_pose": hole, "lamp": slice(24, 25)},
+        "streams": {
+            "robot": slice(0, hole.start - 3),
+            "force": slice(hole.start - 3, hole.start),
+            "camera": np.array([*range(hole.start, hole.start + 5), 24]),
+        },
     }
 
 

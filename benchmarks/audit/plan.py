@@ -80,6 +80,9 @@ class Plan:
         wrong_labels: Share of labels that are wrong.
         wrong_mode_only: Wrong labels are those of the last mode only.
         episodes: Number of episodes; None draws 100 to 200.
+        object_move_m: How far the goal moves to one side or the other in the course of the motion,
+            the operator with it; evenly up to that far, or, with `object_jumps`, always so far.
+        object_jumps: See there.
         recoveries: How many of them, the last ones, are disturbed beside those by chance.
         exact: Nothing but what is planted, for tests that need exact numbers. The plant follows one
             action period later and goes at once; sensors and clocks have no error, and a clock
@@ -109,6 +112,8 @@ class Plan:
     wrong_labels: float = 0.0
     wrong_mode_only: bool = False
     episodes: int | None = None
+    object_move_m: float = 0.0
+    object_jumps: bool = False
     recoveries: int = 0
     exact: bool = False
     defects: tuple[Defect, ...] = field(default=())
@@ -129,6 +134,22 @@ class Plan:
         drawn = rng.standard_t(self.tails) if self.tails else rng.normal()
         # A stray goes round, never through: a way that far out is not gone.
         return self.route_spread_m * float(np.clip(drawn, -STRAY, STRAY))
+
+    def moved(self, ticks: int, motion: tuple[int, int], number: int) -> Array | None:
+        """How far an episode's goal has moved to the side at each tick. Shape (T, 2).
+
+        The arm sets out at the first tick of `motion` and takes as many as the second. The goal
+        sets out up to a third of them later, and takes a quarter.
+        """
+        if not self.object_move_m:
+            return None
+        rng = stream(self.seed, "object", number)
+        far = rng.choice([-1.0, 1.0]) * (1.0 if self.object_jumps else rng.uniform(0.0, 1.0))
+        first, long = motion
+        begin = first + long * rng.uniform(0.05, 0.3)
+        share = np.clip((np.arange(ticks) - begin) / (0.25 * long), 0.0, 1.0)
+        lateral = self.object_move_m * far * share * share * (3.0 - 2.0 * share)
+        return np.column_stack([np.zeros(ticks), lateral])
 
     @property
     def by_chance(self) -> float:

@@ -91,6 +91,9 @@ def demonstrate(plan: Plan, roster: Roster, number: int, cell: Cell) -> Truth:
     begin = sum(len(piece) for piece in pieces)
     command = np.vstack([*pieces, path, rest(end, rng.integers(7, 12))])
     command = command + plan.tremor_m * rng.normal(size=command.shape)
+    moved = plan.moved(len(command), (begin, len(path)), number)
+    if moved is not None:
+        command = command + moved
     first = begin + len(path) + SETTLE_TICKS  # at rest at the goal, it lets go
     phase = ["approach"] * first + ["release"] * (len(command) - first)
     if plan.station_dwell_s:
@@ -107,6 +110,7 @@ def demonstrate(plan: Plan, roster: Roster, number: int, cell: Cell) -> Truth:
             command, period_s=PERIOD_S, delay_s=cell.delay_s, constant_s=cell.constant_s
         ),
         scene=goal, lamp=light, phase=phase, success=not roster.failure[number],
+        moved=moved,
         other=_tool(command, way, begin, begin + len(path), rng) if plan.tool else {},
     )  # fmt: skip
 
@@ -168,6 +172,7 @@ def layout(columns: dict[str, Array]) -> dict[str, object]:
         "action_position": slice(0, 2),
         "reference": slice(2, 4),
         "context": {"goal": slice(2, 4), "lamp": slice(4, 5)},
+        "streams": {"robot": slice(0, 2), "camera": slice(2, 5)},
     }
     if "tool" not in columns:
         return result
@@ -178,4 +183,5 @@ def layout(columns: dict[str, Array]) -> dict[str, object]:
         "observation_names": (*result["observation_names"], *TOOL),
         "action_rotation": slice(2, 8),
         "action_gripper": slice(8, 9),
+        "streams": {"robot": np.array([0, 1, *range(5, 12)]), "camera": slice(2, 5)},
     }

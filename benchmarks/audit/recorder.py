@@ -79,6 +79,8 @@ def _observe(
     position = truth.position(sampled - ahead["robot"])
     position = position + share * POSITION_NOISE_M * rng.normal(size=position.shape)
     scene = np.tile(truth.scene, (len(ticks), 1))
+    if truth.moved is not None:
+        scene[:, :2] += truth.moved
     scene[:, :2] += shift
     scene[:, world.SCENE_LENGTHS] += (
         share * CAMERA_NOISE_M * rng.normal(size=(len(ticks), len(world.SCENE_LENGTHS)))
@@ -94,6 +96,7 @@ def _observe(
     }
     for name, (low, high) in DELAY_S.items():
         columns[f"delay_{name}"] = rng.uniform(low, high, len(ticks)) - ahead[name]
+        columns[f"stamp_{name}"] = columns["time"] + ahead[name]
     return spoil_rows(plan, columns, faults, number)
 
 
@@ -117,11 +120,13 @@ def _assemble(world, plan, episodes, table, task) -> AuditInput:
         known = rng.random() < RECORDED_SHARE or plan.exact
         if not known and plan.decided_by != name:
             table[name] = np.full(len(table["uuid"]), "")
-    needs_delay = any(d.kind == "camera_clock" for d in plan.defects)
+    needs_delay = any(d.kind in ("camera_clock", "drop_camera") for d in plan.defects)
     delays = (bool(rng.random() < RECORDED_SHARE) and not plan.exact) or needs_delay
     joined = {name: np.concatenate([item[name] for item in episodes]) for name in episodes[0]}
     lengths = [len(item["time"]) for item in episodes]
     layout = world.layout(joined)
+    if plan.exact:
+        layout.pop("streams")  # a scene without noise stands still
     assert set(np.unique(table["object"])) <= {"", *OBJECTS}
     assert set(np.unique(table["operator"])) <= {"", *OPERATORS}
     return AuditInput(
@@ -133,6 +138,7 @@ def _assemble(world, plan, episodes, table, task) -> AuditInput:
         episodes=Episodes(**table),
         period_s=world.PERIOD_S,
         delay_s={name: joined[f"delay_{name}"] for name in DELAY_S} if delays else {},
+        stream_time_s={name: joined[f"stamp_{name}"] for name in DELAY_S} if delays else {},
         position_stream="robot",
         phase_observed=plan.phase_observed,
     )

@@ -3,8 +3,10 @@
 import sys
 import tempfile
 import time
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 from threadpoolctl import threadpool_limits
 
@@ -70,6 +72,13 @@ class Result:
         row.update(row.pop("job"))
         row["cause"] = self.name
         return row
+
+    @classmethod
+    def from_row(cls, row: Mapping[str, Any]) -> "Result":
+        """A result from its flat row."""
+        number = next(k for k, item in enumerate(CAUSES) if item.name == row["cause"])
+        job = Job(number, row["strength"], row["task"], row["seed"])
+        return cls(job=job, **{name: row[name] for name in cls.__annotations__ if name != "job"})
 
 
 def judged(result: AuditResult, settings: AuditSettings, *, keep: Path | None = None) -> Cause:

@@ -21,10 +21,11 @@ class Truth:
         command: Commanded position at each tick. Shape (T, P).
         fine_s: Fine times since the first tick, also before and after it. Shape (F,).
         fine: True position at the fine times. Shape (F, P).
-        scene: What the camera sees, constant in an episode: the goal first. Shape (S,).
+        scene: What the camera sees at the begin of the episode: the goal first. Shape (S,).
         lamp: A light that stands for the intended mode: -1, 0 (off) or 1. Shape (T,).
         phase: Task phase at each tick. Length T.
         success: Whether the task was done.
+        moved: How far the goal has moved since, at each tick; None: it stands. Shape (T, 2).
         other: Further components at each tick, `observed` and `commanded`. Shapes (T, .).
     """
 
@@ -36,6 +37,7 @@ class Truth:
     phase: list[str]
     success: bool
     other: dict[str, Array]
+    moved: Array | None = None
 
     def position(self, time_s: Array) -> Array:
         """True position at the given times. Shape (n, P)."""

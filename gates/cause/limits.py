@@ -28,7 +28,7 @@ AT_MOST = (
 )  # fmt: skip
 """Those of them whose number must not exceed the limit; the others must reach it."""
 OWN = (
-    "clock_disorder", "rate_deviation", "gap_share", "jitter_share", "lag_drift_steps",
+    "clock_disorder", "rate_deviation", "gap_share", "frozen_s", "jitter_share", "lag_drift_steps",
     "gain_factor", "gain_epoch_factor", "magnitude_factor", "frame_angle_rad", "swapped_columns",
     "faulty_episodes_share", "supported_episodes", "supported_share", "denial_share",
     "two_mode_episodes", "two_mode_share", "incoherent_situations", "noise_ratio",

@@ -21,7 +21,7 @@ def mode_coverage_lower(
 ) -> Measured:
     """Lower bound of the share of situations of which every mode gets admissible samples enough."""
     found = []
-    for _, rows in _situations(evidence, candidate).groupby("seed"):
+    for _, rows in situations_of(evidence, candidate).groupby("seed"):
         drawn, fewest = numbers(rows, "samples"), numbers(rows, "fewest_admissible")
         covered = float((fewest >= settings.mode_minimum_share * drawn).sum())
         interval = counted_interval(covered, float(len(rows)), confidence=settings.confidence)
@@ -47,7 +47,7 @@ def outside_modes_upper(
 ) -> Measured:
     """Upper bound of the share of samples between two modes, or far from all of them."""
     found = []
-    for _, rows in _situations(evidence, candidate).groupby("seed"):
+    for _, rows in situations_of(evidence, candidate).groupby("seed"):
         between, far = numbers(rows, "between_modes"), numbers(rows, "far_from_modes")
         share, lower, upper = share_interval(
             (between + far) / numbers(rows, "samples"),
@@ -64,9 +64,13 @@ def outside_modes_upper(
     return Measured(upper, (lower, upper), text)
 
 
-def _situations(evidence: Evidence, candidate: str) -> pd.DataFrame:
-    """Two-mode situations as the candidate answered them at the NFE that it records."""
-    rows = evidence.of(MODES, ModeRow, candidate)
+def situations_of(evidence: Evidence, candidate: str, *, table: str = MODES) -> pd.DataFrame:
+    """Two-mode situations as the candidate answered them at the NFE that it records.
+
+    Raises:
+        MissingEvidenceError: Without samples, or at another NFE.
+    """
+    rows = evidence.of(table, ModeRow, candidate)
     if not np.all(numbers(rows, "samples") > 0):
         raise MissingEvidenceError("a situation without samples")
     if not np.all(numbers(rows, "nfe") == chosen_nfe(evidence, candidate)):

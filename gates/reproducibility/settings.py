@@ -12,6 +12,7 @@ from genpolicy.evidence.rows.reproducibility import NfeRow
 RELOAD = "artifacts/reload"
 COVERAGE = f"{RELOAD}/coverage.parquet"
 MODES = f"{RELOAD}/modes.parquet"
+MODES_EARLIER = f"{RELOAD}/modes_earlier.parquet"
 GENERATORS = "artifacts/train_generators"
 
 

@@ -64,6 +64,10 @@ def questions(
         f"clock.{name}": "neither receive times nor motion that the arm's explains"
         for name in semantics.unclocked
     }
+    found |= {
+        f"frozen.{name}": "stands still for long in most episodes: a freeze would look the same"
+        for name in semantics.untold_freezes
+    }
     for name in EPISODE_VARIABLES:
         values = getattr(data.episodes, name)
         found[name] = "" if recorded(values) else "not recorded, so it may decide modes unseen"

@@ -70,6 +70,7 @@ class AuditInput:
         action_gripper: Where the opening of the gripper lies in the action, if there is one.
         period_s: Action period.
         delay_s: Receive time minus event time of the sample used, per stream. Shape (N,).
+        stream_time_s: Event time of the sample used, per stream, on any clock. Shape (N,).
         position_stream: Stream that delivers the observed position.
         reference: Where the pose of reference begins with its position, if there is one.
         context: Observed channels that are held against the modes.
@@ -94,6 +95,7 @@ class AuditInput:
     action_rotation: slice | None = None
     action_gripper: Index | None = None
     delay_s: dict[str, Array] = field(default_factory=dict)
+    stream_time_s: dict[str, Array] = field(default_factory=dict)
     position_stream: str = "robot"
     reference: slice | None = None
     context: dict[str, slice] = field(default_factory=dict)
@@ -171,6 +173,7 @@ def canonical(data: AuditInput) -> AuditInput:
         index=np.asarray(data.index[rows], dtype=np.int64),
         event_time_s=data.event_time_s[rows],
         delay_s={name: values[rows] for name, values in sorted(data.delay_s.items())},
+        stream_time_s={name: item[rows] for name, item in sorted(data.stream_time_s.items())},
         episodes=Episodes(
             **{name: getattr(table, name)[order] for name in Episodes.__dataclass_fields__}
         ),

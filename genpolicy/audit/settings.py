@@ -68,6 +68,8 @@ class AuditSettings(BaseModel):
             unit. No object stands five times further away.
         rate_floor: Reported from: deviation of the period of the rows from the declared one, as its
             share.
+        frozen_floor_s: Reported from: how long a stream shows the same while the arm moves. No
+            older observation is acted upon.
         gap_share_floor: Reported from: share of rows that follow a gap. At 1 % every sixth chunk
             of 16 holds one.
         jitter_floor_share: Reported from: deviation of every tenth row from the period, as its
@@ -133,6 +135,7 @@ class AuditSettings(BaseModel):
     frame_floor_rad: float = Field(default=0.14, gt=0)
     magnitude_floor: float = Field(default=5.0, gt=1)
     rate_floor: float = Field(default=0.1, gt=0, lt=1)
+    frozen_floor_s: float = Field(default=0.35, gt=0)
     gap_share_floor: float = Field(default=0.01, gt=0, lt=1)
     jitter_floor_share: float = Field(default=0.5, gt=0)
     negative_delay_tolerance_s: float = Field(default=0.001, ge=0)
@@ -157,6 +160,7 @@ class AuditSettings(BaseModel):
             "frame_angle_rad": self.frame_floor_rad,
             "magnitude_factor": self.magnitude_floor,
             "rate_deviation": self.rate_floor,
+            "frozen_s": self.frozen_floor_s,
             "gap_share": self.gap_share_floor,
             "jitter_share": self.jitter_floor_share,
             "calibration_residual_m": self.calibration_floor_m / self.metre,

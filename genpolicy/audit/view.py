@@ -65,6 +65,11 @@ def from_dataset(
                 for name, received in frames.stream_receive_time_s.items()
                 if name in contract.streams
             },
+            stream_time_s={
+                name: stamps
+                for name, stamps in frames.stream_event_time_s.items()
+                if name in contract.streams
+            },
             position_stream=stream,
             reference=slices.get(settings.reference_channel or ""),
             context={name: slices[name] for name in settings.context_channels},

@@ -16,26 +16,27 @@ from typing import Any
 import numpy as np
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from genpolicy.contract.action import ACTION_DIM
 from genpolicy.errors import BadInputError, ContractError
+from genpolicy.execution.cell import FALLBACK_HASH, Cell
 from genpolicy.execution.nanoseconds import to_ns
-from genpolicy.execution.settings import ExecutorSettings
 from genpolicy.integrity.atomic import write_bytes
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_bytes_of
 
 Array = NDArray[np.float64]
 
-JOURNAL_VERSION = 3
+JOURNAL_VERSION = 4
 MAXIMUM_UNCOMPRESSED_BYTES = 8 << 30
 MAXIMUM_RECORD_BYTES = 64 << 20
 
 EVENT_FIELDS: dict[str, tuple[str, ...]] = {
     "session": ("version", "labels", "execution_horizon", "period_ns", "maximum_age_ns",
-                "watchdog_ns", "queue_capacity", "fallback_hash", "checks_missing", "admission"),
+                "watchdog_ns", "queue_capacity", "fallback_hash", "checks_missing"),
     "observation": ("event_time_ns", "phase", "calibration_epoch", "used", "ignored_because"),
+    "scene": ("bodies",),
     "phase": ("event_time_ns", "old", "new"),
     "epoch": ("event_time_ns", "old", "new"),
     "active": ("checkpoint", "sampler"),
@@ -118,6 +119,10 @@ class Journal:
         }  # fmt: skip
         self.add("candidate", self.clock(now_s), payload)
 
+    def scene(self, now_s: float, poses: Mapping[str, tuple[ArrayLike, ArrayLike]]) -> None:
+        """Record where bodies of the scene were seen: positions, m, and quaternions, by name."""
+        self.add("scene", self.clock(now_s), {"bodies": encode_poses(poses)})
+
     def invocation(self, now_s: float, *, invocation_id: str, stage: str, detail: str = "") -> None:
         """Record the begin or the end of an invocation."""
         payload = {"id": invocation_id, "stage": stage, "detail": detail}
@@ -132,30 +137,36 @@ class Journal:
 
 
 def session_payload(
-    settings: ExecutorSettings,
+    cell: Cell,
     *,
     labels: Mapping[str, str],
     checks_missing: Sequence[str],
-    genuine: bool,
 ) -> dict[str, Any]:
     """Payload of the first event: what the session is held to."""
     return {
         "version": JOURNAL_VERSION,
         "labels": dict(labels),
-        "execution_horizon": settings.execution_horizon,
-        "period_ns": settings.period_ns,
-        "maximum_age_ns": settings.maximum_age_ns,
-        "watchdog_ns": settings.watchdog_ns,
-        "queue_capacity": settings.queue_capacity,
-        "fallback_hash": settings.fallback_hash,
+        "execution_horizon": cell.horizons.execution_horizon,
+        "period_ns": cell.period_ns,
+        "maximum_age_ns": cell.maximum_age_ns,
+        "watchdog_ns": cell.watchdog_ns,
+        "queue_capacity": cell.execution.queue_capacity,
+        "fallback_hash": FALLBACK_HASH,
         "checks_missing": list(checks_missing),
-        "admission": "feasibility" if genuine else "imitation",
     }
 
 
 def encode_actions(actions: Array) -> str:
     """Hex of the little-endian float64 bytes, row after row."""
     return np.ascontiguousarray(actions, dtype="<f8").tobytes().hex()
+
+
+def encode_poses(poses: Mapping[str, tuple[ArrayLike, ArrayLike]]) -> dict[str, str]:
+    """Hex of x, y, z, m, and w, x, y, z of each body, by name, in the order of names."""
+    return {
+        name: encode_actions(np.concatenate([np.ravel(part) for part in poses[name]]))
+        for name in sorted(poses)
+    }
 
 
 def decode_actions(text: str) -> Array:

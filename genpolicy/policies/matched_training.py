@@ -71,6 +71,7 @@ class TrainingPlan:
         workers: Local processes.
         scheduler: `local` or the address of a Dask scheduler.
         followed: Mode that each episode followed, as the audit saw it; None where no method asks.
+        keep_earlier: Whether the weights at three quarters of each training are kept too.
     """
 
     dataset: Path
@@ -81,6 +82,7 @@ class TrainingPlan:
     workers: int
     scheduler: str
     followed: Mapping[str, str] | None = None
+    keep_earlier: bool = False
 
     def request(
         self,
@@ -111,6 +113,7 @@ class TrainingPlan:
             ),
             seed=integer_seed(self.root_seed, "training", seed),
             phase_columns=phase_columns(data),
+            keep_earlier=self.keep_earlier,
         )
 
     def episodes(self, data: Dataset, method: str) -> list[str] | None:

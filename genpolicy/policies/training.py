@@ -19,10 +19,8 @@ from torch import Tensor
 
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.errors import IntegrityError, NonFiniteError
-from genpolicy.integrity.atomic import output_folder, write_bytes
-from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_bytes
-from genpolicy.integrity.rows import rows_of_table, write_rows
+from genpolicy.integrity.rows import rows_of_table
 from genpolicy.integrity.tables import read_table
 from genpolicy.policies.checkpoint import (
     FORMAT_VERSION,
@@ -30,7 +28,6 @@ from genpolicy.policies.checkpoint import (
     NormalisationRecord,
     Provenance,
     load_checkpoint,
-    save_checkpoint,
     serialise_weights,
 )
 from genpolicy.policies.determinism import deterministic, initial_weights, regime
@@ -44,13 +41,16 @@ from genpolicy.policies.networks import (
 from genpolicy.policies.normalisation import Normalisation
 from genpolicy.policies.objectives import Batch, Objective
 from genpolicy.policies.settings import HeadConfig, NetworkConfig, SamplerConfig, TrainingConfig
+from genpolicy.policies.training_files import TrainingFiles
 from genpolicy.policies.validation import Validation, moments
-from genpolicy.policies.validation_row import VALIDATION_FILE, ValidationRow
+from genpolicy.policies.validation_row import (
+    EARLIER_FOLDER,
+    VALIDATION_FILE,
+    ValidationRow,
+    three_quarters,
+)
 from genpolicy.policies.windows import Windows, as_batch
 from genpolicy.seeds import integer_seed, stream
-
-TRAINING_FILE = "training.json"
-METRICS_FILE = "metrics.jsonl"
 
 
 @dataclass(frozen=True)
@@ -68,6 +68,7 @@ class TrainingRequest:
         provenance: Dataset and contracts.
         seed: Root seed of this training.
         phase_columns: Numbers of an observation that name the phase.
+        keep_earlier: Whether the averaged weights at three quarters of the training are kept.
     """
 
     method: str
@@ -80,6 +81,7 @@ class TrainingRequest:
     provenance: Provenance
     seed: int
     phase_columns: tuple[int, ...] = ()
+    keep_earlier: bool = False
 
 
 def train(
@@ -128,9 +130,10 @@ def train(
                     data=data, followed=followed, request=request, device=device,
                 )
             )  # fmt: skip
-        objective.finish(averaged, data)
-    weights = serialise_weights(averaged, method=request.method)
-    config = _checkpoint_config(request, averaged, objective, weights=weights)
+        earlier = followed.earlier if followed else None
+        trained = {".": averaged} | ({EARLIER_FOLDER: earlier} if earlier else {})
+        for found in trained.values():
+            objective.finish(found, data)
     summary = {
         "stopping_rule": _stopping_rule(weights_of),
         "steps": request.training.steps,
@@ -140,8 +143,11 @@ def train(
         "final": records[-1],
         "regime": regime(device),
     }
-    rows = _validation_rows(followed, weights_of)
-    return _write(folder, rows, weights=weights, config=config, records=records, summary=summary)
+    files = TrainingFiles(records, summary, _validation_rows(followed, weights_of))
+    for part, found in trained.items():
+        weights = serialise_weights(found, method=request.method)
+        files.add(part, weights, _checkpoint_config(request, found, objective, weights=weights))
+    return files.write(folder)
 
 
 def _validation_rows(followed: Validation | None, weights_of: Path | None) -> list[ValidationRow]:
@@ -195,28 +201,6 @@ def averaging_decay(step: int, config: TrainingConfig) -> float:
     return float(min(config.ema_cap, 1.0 - (1.0 + step) ** -config.ema_power))
 
 
-def _write(
-    folder: Path,
-    measured: list[ValidationRow],
-    *,
-    weights: bytes,
-    config: CheckpointConfig,
-    records: list[dict[str, float | int | None]],
-    summary: dict[str, object],
-) -> str:
-    """Write all files, whole or not at all; returns the checkpoint's SHA-256."""
-    lines = "".join(json.dumps(record, sort_keys=True) + "\n" for record in records)
-    with output_folder(folder) as temporary:
-        identity = save_checkpoint(temporary, weights=weights, config=config)
-        write_bytes(temporary / METRICS_FILE, lines.encode())
-        write_bytes(
-            temporary / TRAINING_FILE, canonical_json({**summary, "checkpoint_sha256": identity})
-        )
-        if measured:
-            write_rows(temporary / VALIDATION_FILE, ValidationRow, measured)
-    return identity
-
-
 def _batch_of(
     windows: Windows, horizons: HorizonConfig, request: TrainingRequest, device: str
 ) -> Batch:
@@ -232,7 +216,8 @@ def _follow(
     windows: Windows, horizons: HorizonConfig, request: TrainingRequest, device: str
 ) -> Validation:
     held_out = _batch_of(windows, horizons, request, device)
-    return Validation(held_out, windows.episodes, seed=request.seed, device=device)
+    keep = three_quarters(request.training.steps) if request.keep_earlier else None
+    return Validation(held_out, windows.episodes, seed=request.seed, device=device, keep_after=keep)
 
 
 def _dimensions(horizons: HorizonConfig, request: TrainingRequest) -> Dimensions:

@@ -5,6 +5,8 @@ so are the noise, the noise levels and the flow times drawn for them. Nothing is
 stopped by it.
 """
 
+import copy
+
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -30,10 +32,17 @@ class Validation:
 
     Attributes:
         rows: What was measured by episode so far.
+        earlier: The averaged network as it was after `keep_after` updates; None before.
     """
 
     def __init__(
-        self, windows: Batch, episodes: NDArray[np.str_] | None, *, seed: int, device: str
+        self,
+        windows: Batch,
+        episodes: NDArray[np.str_] | None,
+        *,
+        seed: int,
+        device: str,
+        keep_after: int | None = None,
     ) -> None:
         """Choose the windows.
 
@@ -42,9 +51,11 @@ class Validation:
             episodes: Episode of each; None follows no episode. Shape (M,).
             seed: Root seed of the training.
             device: Torch device.
+            keep_after: Updates after which the network is kept; None keeps none.
         """
         self.rows: list[ValidationRow] = []
-        self._seed, self._device = seed, device
+        self.earlier: PolicyNetwork | None = None
+        self._seed, self._device, self._keep_after = seed, device, keep_after
         stride = max(1, len(windows.actions) // VALIDATION_WINDOWS)
         self._all = _rows(windows, np.arange(0, len(windows.actions), stride)[:VALIDATION_WINDOWS])
         self._by_episode: dict[str, Batch] = {}
@@ -59,7 +70,9 @@ class Validation:
         return self._loss(network, objective, self._all, "validation_noise")
 
     def follow(self, step: int, network: PolicyNetwork, objective: Objective) -> None:
-        """Measure every episode after so many updates."""
+        """Measure every episode after so many updates; keep the network where it is asked for."""
+        if step == self._keep_after:
+            self.earlier = copy.deepcopy(network)
         for name, windows in self._by_episode.items():
             loss = self._loss(network, objective, windows, f"validation_noise/{name}")
             self.rows.append(ValidationRow(step, name, len(windows.actions), loss))

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 
 VALIDATION_FILE = "validation.parquet"
+EARLIER_FOLDER = "three_quarters"
+"""Folder in a checkpoint's with the averaged weights as they were at three quarters."""
 
 
 @dataclass(frozen=True)

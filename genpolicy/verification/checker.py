@@ -208,8 +208,13 @@ class _Session:
         self._check_motion(chunk, row)
 
     def _check_motion(self, chunk: Message, row: int) -> None:
-        if self.proof is None:
-            return
+        if chunk["motion"] is None:
+            self.flag("P6.ground", f"{chunk['chunk_id']!r} does not say what it was held against.")
+        elif self.proof is not None:
+            self._reprove(chunk, row)
+
+    def _reprove(self, chunk: Message, row: int) -> None:
+        assert self.proof is not None
         self.report.reproved_actions += 1
         period_s = self.settings["period_ns"] / 1e9
         for rule, sentence in self.proof.objections(
@@ -278,7 +283,20 @@ class _Session:
             self.flag("P4.chain", f"{chunk_id!r} continues {m['predecessor']!r}, not {head!r}.")
         if len(self.open) > self.settings["queue_capacity"]:
             self.flag("settings.capacity", f"{len(self.open)} chunks are queued.")
+        self._check_ground(m)
         self.head = (m["arrival"], chunk_id)
+
+    def _check_ground(self, chunk: Message) -> None:
+        """What a chunk was checked against: the scene that was seen, and a state that is young."""
+        motion = chunk["motion"]
+        if self.proof is None or motion is None:
+            return  # a row of it that is executed is a violation of its own (P6.ground)
+        if motion["scene"] != self.world.scene:
+            self.flag("P6.scene", f"{chunk['chunk_id']!r} was checked in another scene than seen.")
+        age_ns = self.t - motion["measured_ns"]
+        limit_ns = self.settings["maximum_age_ns"].get(chunk["phase"])
+        if limit_ns is None or not 0 <= age_ns <= limit_ns:
+            self.flag("P6.state_age", f"{chunk['chunk_id']!r} rests on joints {age_ns} ns old.")
 
     def _check_close(self, kind: str, m: Message) -> None:
         arrival, reason = m["arrival"], m.get("reason")
@@ -302,8 +320,6 @@ class _Session:
     def _check_settings(self, m: Message) -> None:
         self.settings = m
         self.world.fallback_hash = m["fallback_hash"]
-        if self.expected is not None and m["admission"] != "feasibility":
-            self.flag("settings.admission", "Chunks were accepted that feasibility did not issue.")
         if m["checks_missing"]:
             self.report.checks_missing.update(m["checks_missing"])
             self.flag("settings.checks", f"Checks are missing: {m['checks_missing']}.")

@@ -47,7 +47,8 @@ def text(data, value):
       {"calibration_at_release", "calibration_at_rest"}),
      (lambda d: episodes(d, order=np.full(len(d.episodes), np.nan)), {"order"}),
      (lambda d: replace(d, reference=None), {"calibration_at_release"}),
-     (lambda d: replace(d, streams={**d.streams, "scale": slice(4, 5)}), {"clock.scale"})],
+     (lambda d: replace(d, streams={**d.streams, "scale": slice(4, 5)}),
+      {"clock.scale", "frozen.scale"})],
 )  # fmt: skip
 def test_what_was_not_recorded_is_not_asked(data, change, expected):
     assert silent(change(data)) == expected
@@ -61,6 +62,11 @@ def test_what_was_not_recorded_is_not_asked(data, change, expected):
 )  # fmt: skip
 def test_what_the_settings_do_not_name_is_not_asked(data, changes, expected):
     assert silent(data, WHOLE.model_copy(update=changes)) == expected
+
+
+def test_a_scene_that_stands_still_is_not_asked_whether_it_froze(data):
+    seen = replace(data, streams={"robot": slice(0, 2), "camera": slice(2, 4)})
+    assert silent(seen) == {"clock.camera", "frozen.camera"}
 
 
 def test_what_the_audit_was_not_given_is_not_asked(data):

@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.audit.__main__ import FIRST_DEVELOPMENT_SEED, jobs
+import benchmarks.audit.__main__ as command
+from benchmarks.audit.__main__ import FIRST_DEVELOPMENT_SEED, jobs, measured, sampled
 from benchmarks.audit.cases import CAUSES
 from benchmarks.audit.frozen import frozen_commit, report_seed
 from benchmarks.audit.plan import Defect, Plan, draw_roster
@@ -160,21 +161,83 @@ def test_what_goes_together_goes_together_and_decides_nothing():
     assert np.mean(roster.mode[birch]) == pytest.approx(0.5, abs=0.06)
 
 
-def test_dropped_rows_frozen_positions_and_labels_of_one_mode():
+def test_dropped_rows_and_labels_of_one_mode():
     whole = record("planar", Plan(9, episodes=SMALL)).data
     fewer = record("planar", Plan(9, episodes=SMALL, defects=(Defect("drop", 0.2, "all"),))).data
     assert len(fewer.observation) / len(whole.observation) == pytest.approx(0.8, abs=0.05)
     assert np.isin(fewer.event_time_s, whole.event_time_s).all()
-    frozen = record("planar", Plan(9, episodes=SMALL, defects=(Defect("freeze", 1.0, "all"),))).data
-    same = frozen.episode[1:] == frozen.episode[:-1]
-    still = np.mean((np.diff(frozen.position, axis=0) == 0).all(axis=1)[same])
-    assert still == pytest.approx(1 / 3, abs=0.05) and np.array_equal(frozen.action, whole.action)
     plan = Plan(8, shares=(0.5, 0.5), wrong_labels=0.5, wrong_mode_only=True, episodes=200)
     wrong = record("planar", plan)
     truth = np.array([wrong.outcomes[uuid] for uuid in wrong.data.episodes.uuid])
     mode = draw_roster(plan, 0.01).mode
     assert not np.any((truth != wrong.data.episodes.outcome) & (mode == 0))
     assert np.mean((truth != wrong.data.episodes.outcome)[mode == 1]) == pytest.approx(0.5, abs=0.1)
+
+
+@pytest.mark.parametrize("task", list(TASKS))
+@pytest.mark.parametrize(("kind", "stream"), [("freeze", "robot"), ("freeze_camera", "camera")])
+def test_a_frozen_stream_stands_as_long_as_said_while_the_arm_moves(task, kind, stream):
+    whole = record(task, Plan(9, episodes=SMALL)).data
+    fault = Defect(kind, 1.0, "some", 0.5)
+    frozen = record(task, Plan(9, episodes=SMALL, defects=(fault,))).data
+    columns = np.arange(whole.observation.shape[1])[whole.streams[stream]]
+    others = np.setdiff1d(np.arange(whole.observation.shape[1]), columns)
+    assert np.array_equal(frozen.action, whole.action)
+    assert np.array_equal(frozen.observation[:, others], whole.observation[:, others])
+    still = np.append(False, np.all(np.diff(frozen.observation[:, columns], axis=0) == 0, axis=1))
+    rows = np.bincount(frozen.episode[still], minlength=SMALL)
+    hit = rows > 0
+    assert 0.2 < np.mean(hit) < 0.8
+    # A stretch in which the arm slows down in between is longer.
+    assert np.quantile(rows[hit], 0.25) == pytest.approx(1.0 / whole.period_s, abs=1)
+    steps = np.linalg.norm(np.diff(frozen.commanded, axis=0, prepend=0.0), axis=1)
+    assert np.median(steps[still]) > 0.2 * np.median(steps)
+
+
+@pytest.mark.parametrize("task", list(TASKS))
+def test_a_lost_frame_is_held_with_its_stamp(task):
+    fault = Defect("drop_camera", 0.3, "all")
+    data = record(task, Plan(9, episodes=SMALL, defects=(fault,))).data
+    same = data.episode[1:] == data.episode[:-1]
+    held = np.diff(data.stream_time_s["camera"])[same] == 0
+    still = np.all(np.diff(data.observation[:, data.streams["camera"]], axis=0) == 0, axis=1)[same]
+    assert np.mean(held) == pytest.approx(0.3, abs=0.03) and np.array_equal(held, still)
+    assert np.all(np.diff(data.stream_time_s["robot"])[same] > 0)
+
+
+def test_a_freeze_of_one_mode_spares_the_other():
+    plan = Plan(9, shares=(0.5, 0.5), episodes=SMALL)
+    fault = Defect("freeze_camera", 1.0, "mode", 1.0)
+    whole, frozen = (
+        record("planar", item).data for item in (plan, replace(plan, defects=(fault,)))
+    )
+    changed = np.unique(frozen.episode[np.any(frozen.observation != whole.observation, axis=1)])
+    assert changed.tolist() == np.flatnonzero(draw_roster(plan, 0.01).mode == 1).tolist()
+
+
+@pytest.mark.parametrize("task", list(TASKS))
+def test_the_operator_goes_with_an_object_that_moves(task):
+    still, moving = (
+        record(task, Plan(9, episodes=SMALL, object_move_m=far, object_jumps=True)).data
+        for far in (0.0, 0.02)
+    )
+    goal = still.reference.start + 1
+    ends = np.searchsorted(still.episode, np.arange(SMALL), side="right") - 1
+    moved = moving.observation[:, goal] - still.observation[:, goal]
+    assert np.abs(moved[ends]) == pytest.approx(0.02, abs=1e-9)
+    assert 0.2 < np.mean(moved[ends] > 0) < 0.8
+    commanded = moving.commanded[:, 1] - still.commanded[:, 1]
+    assert commanded == pytest.approx(moved, abs=1e-9)
+    seen = moving.position[:, 1] - still.position[:, 1]
+    assert seen[ends] == pytest.approx(moved[ends], abs=1e-3)
+    latched = record(
+        task,
+        Plan(9, episodes=SMALL, object_move_m=0.02, object_jumps=True,
+             defects=(Defect("latch", 1.0, "all"),)),
+    ).data  # fmt: skip
+    assert np.array_equal(latched.action, moving.action)
+    spread = [np.ptp(latched.observation[latched.episode == k, goal]) for k in range(SMALL)]
+    assert max(spread) == 0.0
 
 
 def test_tails_are_heavy_and_end():
@@ -239,3 +302,30 @@ def test_errors_below_the_minimum_and_open_answers_are_counted():
     assert "| left open, from the minimum strength on | 2 | 2 |" in text
     assert "| true modes denied: another cause said | 0 | 1 |" in text
     assert "| true modes left open | 1 | 1 |" in text
+
+
+def test_a_sample_holds_every_cause_and_a_larger_one_holds_the_smaller():
+    every = jobs(1_000, repeats=1, tasks=list(TASKS), only="")
+    one, two = sampled(every, 5, 1), sampled(every, 5, 2)
+    assert {job.cause for job in one} == set(range(len(CAUSES)))
+    strong = [(job.cause, job.task) for job in one if CAUSES[job.cause].strong(job.strength)]
+    assert len(strong) == len(set(strong)) == len(TASKS) * len(CAUSES)
+    assert two[: len(one)] == one and set(sampled(every, 5, None)) == set(every)
+    assert [job.strength for job in sampled(every, 6, 1)] != [job.strength for job in one]
+
+
+def test_a_run_that_was_stopped_goes_on_where_it_stopped(tmp_path, monkeypatch):
+    """What the file holds is taken as it is; nothing is measured twice."""
+    ran = []
+
+    def fake(run, block, **_):
+        ran.extend(block)
+        return [replace(_result("unimodal", 8, "unimodal", named=True), job=j) for j in block]
+
+    monkeypatch.setattr(command, "map_shards", fake)
+    number = next(k for k, item in enumerate(CAUSES) if item.name == "unimodal")
+    todo = [Job(number, 8.0, "planar", seed) for seed in range(20)]
+    first = measured(todo[:18], tmp_path / "results.json", workers=1)
+    assert ran == todo[:18]
+    again = measured(todo, tmp_path / "results.json", workers=1)
+    assert ran == todo and again[:18] == first and [r.job for r in again] == todo

@@ -52,6 +52,9 @@ def test_a_dataset_becomes_audit_input():
     assert data.episodes.is_recovery.tolist() == [True, False]
     assert data.episodes.order.tolist() == [1.0, 0.0]
     assert list(data.delay_s) == ["robot"] and data.delay_s["robot"] == pytest.approx(0.01)
+    stamps = small_dataset().frames.stream_event_time_s["robot"]
+    assert list(data.stream_time_s) == ["robot"]
+    assert sorted(data.stream_time_s["robot"]) == sorted(stamps)
     with pytest.raises(ContractError, match="naming the channel force"):
         from_dataset(
             small_dataset(), contract=contract(), period_s=0.05,

@@ -202,7 +202,9 @@ WORSE = {
         "nfe_mismatch": _table(
             "reload/nfe.parquet", lambda s: cells("counted", 8 + int(8 * s) + 1)
         ),
-        "validation_fall_upper": _each_training(GEN, evidence.CANDIDATES),
+        "late_change_upper": _table(
+            "reload/modes_earlier.parquet", lambda s: cells("valid", 12 - int(10 * s))
+        ),
         "baseline_fall_upper": _each_training(TRAINED, ("act",)),
         "mode_coverage_lower": _table(
             "reload/modes.parquet", lambda s: cells("fewest_admissible", 1, share=s)
@@ -405,6 +407,7 @@ def test_empty_table_is_inconclusive_never_pass(gate, path, ladder):
         ("A", "audit/predictions", "told_upper"),
         ("B", "reload/samples", "max_abs_difference"),
         ("B", "reload/modes", "fewest_admissible"),
+        ("B", "reload/modes_earlier", "valid"),
         ("B", "train_baselines/chunked_bc/seed_0/validation", "loss"),
         ("C", "shadow/candidates", "position_change_m"),
         ("D", "stress/invocations", "latency_s"),

@@ -7,6 +7,7 @@ from editing import cells
 from gates.proof import judge
 
 MODES = "reload/modes.parquet"
+EARLIER = "reload/modes_earlier.parquet"
 
 
 def _found(report, name):
@@ -38,12 +39,13 @@ def test_a_solver_that_agrees_with_itself_but_not_with_its_definition_is_red(lad
 
 def test_a_noisy_point_policy_that_samples_between_the_modes_is_red(ladder):
     """Every mode is reached, with admissible samples enough, and 45 % lie between."""
-    evidence.edit_table(
-        ladder, MODES,
-        lambda f: f.assign(
-            samples=20, modes_covered=2, between_modes=9, admissible=8, fewest_admissible=4
-        ),
-    )  # fmt: skip
+    for table in (MODES, EARLIER):
+        evidence.edit_table(
+            ladder, table,
+            lambda f: f.assign(
+                samples=20, modes_covered=2, between_modes=9, admissible=8, fewest_admissible=4
+            ),
+        )  # fmt: skip
     report = judge(ladder, "B")
     assert _red(report) == {"outside_modes_upper"}
     assert "share 0.45" in _found(report, "outside_modes_upper")[0].caveat
@@ -87,14 +89,66 @@ def _train(root, stage, method, fall):
     evidence.record(root)
 
 
-def test_a_candidate_whose_loss_still_falls_is_red(ladder):
-    for method in evidence.CANDIDATES:
-        _train(ladder, "train_generators", method, 0.15)
+@pytest.mark.parametrize("better", [EARLIER, MODES], ids=["lost", "gained"])
+def test_a_candidate_whose_samples_still_change_is_red(ladder, better):
+    other = MODES if better == EARLIER else EARLIER
+    evidence.edit_table(ladder, other, cells("valid", 12))
     report = judge(ladder, "B")
-    assert _red(report) == {"validation_fall_upper"}
-    found = _found(report, "validation_fall_upper")[0]
-    assert found.interval[0] < 0.15 < found.interval[1] == found.measured
+    assert _red(report) == {"late_change_upper"}
+    found = _found(report, "late_change_upper")[0]
+    assert found.measured == pytest.approx(0.25) and found.interval == (0.25, 0.25)
+    assert f"valid samples {-0.25 if better == EARLIER else 0.25:+.4g}" in found.caveat
     assert "last quarter of 4000 updates, 20 held-out episodes" in found.caveat
+
+
+def test_the_worse_end_of_the_change_decides(ladder):
+    """Half of the situations gain a quarter and half nothing: .125 on average is not below .15."""
+    evidence.edit_table(ladder, EARLIER, lambda f: f.assign(valid=16 - 4 * (f["index"] % 2)))
+    report = judge(ladder, "B")
+    assert _red(report) == {"late_change_upper"}
+    found = _found(report, "late_change_upper")[0]
+    assert found.interval[0] < 0.125 < 0.15 < found.interval[1] == found.measured
+
+
+def test_few_situations_cannot_show_that_nothing_changes(ladder):
+    found = _found(judge(ladder, "B"), "late_change_upper")[0]
+    assert found.verdict == "PASS" and found.interval[0] == 0.0
+    assert found.measured == pytest.approx(1 - 0.025 ** (1 / 30))
+
+    def ten(frame):
+        return frame[frame["index"] < 10]
+
+    for table in (MODES, EARLIER):
+        evidence.edit_table(ladder, table, ten)
+    assert "late_change_upper" in _red(judge(ladder, "B"))
+
+
+def test_the_training_seed_that_changes_most_decides(ladder):
+    def second_seed(valid):
+        return lambda f: evidence.pd.concat([f, f.assign(seed=1, valid=valid)], ignore_index=True)
+
+    evidence.edit_table(ladder, MODES, second_seed(16))
+    evidence.edit_table(ladder, EARLIER, second_seed(8))
+    found = _found(judge(ladder, "B"), "late_change_upper")[0]
+    assert found.verdict == "FAIL" and found.measured == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda f: f[f["index"] > 0],
+        lambda f: f.assign(episode_uuid="other"),
+        lambda f: f.assign(nfe=4),
+        lambda f: f.assign(samples=0),
+        lambda f: evidence.pd.concat([f, f], ignore_index=True),
+    ],
+    ids=["fewer", "other episodes", "other NFE", "no samples", "twice"],
+)
+def test_samples_that_were_not_drawn_alike_before_say_nothing(ladder, change):
+    evidence.edit_table(ladder, EARLIER, change)
+    report = judge(ladder, "B")
+    assert report.verdict == "INCONCLUSIVE"
+    assert {c.verdict for c in _found(report, "late_change_upper")} == {"INCONCLUSIVE"}
 
 
 def test_a_gain_over_a_baseline_that_still_learns_is_none(ladder):
@@ -107,21 +161,16 @@ def test_a_gain_over_a_baseline_that_still_learns_is_none(ladder):
 
 def test_the_worse_end_over_episodes_decides(ladder):
     """Half of the episodes gain nothing and half much: .08 on average is not below .1."""
-    for method in evidence.CANDIDATES:
-        rows = evidence.validation(0.0)
-        for row in rows:
-            if row["step"] == evidence.UPDATES and int(row["episode_uuid"][1:]) % 2:
-                row["loss"] *= 0.84
-        evidence.table(
-            ladder,
-            f"train_generators/{method}/seed_0/validation.parquet",
-            evidence.ValidationRow,
-            rows,
-        )
+    rows = evidence.validation(0.0)
+    for row in rows:
+        if row["step"] == evidence.UPDATES and int(row["episode_uuid"][1:]) % 2:
+            row["loss"] *= 0.84
+    path = "train_baselines/act/seed_0/validation.parquet"
+    evidence.table(ladder, path, evidence.ValidationRow, rows)
     evidence.record(ladder)
     report = judge(ladder, "B")
-    assert _red(report) == {"validation_fall_upper"}
-    assert all(c.interval[0] < 0.08 for c in _found(report, "validation_fall_upper"))
+    assert _red(report) == {"baseline_fall_upper"}
+    assert all(c.interval[0] < 0.08 for c in _found(report, "baseline_fall_upper"))
 
 
 @pytest.mark.parametrize(
@@ -152,7 +201,7 @@ def test_a_training_that_was_not_followed_is_inconclusive(ladder, change):
     evidence.record(ladder)
     report = judge(ladder, "B")
     assert report.verdict == "INCONCLUSIVE"
-    assert {c.verdict for c in _found(report, "validation_fall_upper")} == {"INCONCLUSIVE"}
+    assert {c.verdict for c in _found(report, "late_change_upper")} == {"INCONCLUSIVE"}
 
 
 def test_a_trained_baseline_without_its_loss_is_inconclusive_one_without_training_is_named(ladder):

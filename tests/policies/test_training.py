@@ -9,11 +9,12 @@ import torch
 
 from genpolicy.errors import ConfigError, ContractError, NonFiniteError
 from genpolicy.integrity.rows import read_rows
+from genpolicy.policies.checkpoint import load_checkpoint
 from genpolicy.policies.methods import METHODS
 from genpolicy.policies.objectives import Batch
 from genpolicy.policies.settings import TrainingConfig
 from genpolicy.policies.training import averaging_decay, learning_rate, train
-from genpolicy.policies.validation_row import VALIDATION_FILE, ValidationRow
+from genpolicy.policies.validation_row import EARLIER_FOLDER, VALIDATION_FILE, ValidationRow
 from genpolicy.policies.windows import Windows
 
 
@@ -90,8 +91,27 @@ def test_following_the_validation_changes_no_weight_and_is_paired(
         (step, f"e{e}") for step in (10, 20, 23, 30) for e in range(3)
     ]
     assert {row.windows for row in rows} == {32}
+    assert not (tmp_path / "followed" / EARLIER_FOLDER).exists()
     lines = (tmp_path / "followed" / "metrics.jsonl").read_text().splitlines()
     assert [json.loads(line)["step"] for line in lines] == [10, 20, 30]
+
+
+def test_the_earlier_weights_are_those_of_three_quarters_and_change_nothing(
+    tmp_path, request_for, two_mode_windows
+):
+    """A checkpoint of its own below the result, whose bytes are the same without it."""
+    windows, request = two_mode_windows(), request_for("flow", steps=30)
+    train(tmp_path / "plain", request, windows=windows, validation=windows)
+    kept = dataclasses.replace(request, keep_earlier=True)
+    train(tmp_path / "kept", kept, windows=windows, validation=windows)
+    files = {"model.safetensors", "config.json", "training.json", "metrics.jsonl"}
+    for name in files:
+        assert (tmp_path / "kept" / name).read_bytes() == (tmp_path / "plain" / name).read_bytes()
+    result, earlier = (load_checkpoint(tmp_path / "kept" / part) for part in (".", EARLIER_FOLDER))
+    assert result.sha256 != earlier.sha256
+    assert {p.name for p in (tmp_path / "kept" / EARLIER_FOLDER).iterdir()} == {
+        "model.safetensors", "config.json",
+    }  # fmt: skip
 
 
 def test_an_unknown_method_and_wrong_windows_are_refused(tmp_path, request_for, two_mode_windows):

@@ -45,6 +45,23 @@ def test_windows_and_noise_are_fixed_and_the_random_state_is_not_touched(
     assert not Validation(windows, None, seed=5, device="cpu").rows
 
 
+def test_the_network_is_kept_as_it_was_where_it_is_asked_for(folders, two_mode_windows):
+    checkpoint = load_checkpoint(folders["flow"])
+    config, network = checkpoint.config, checkpoint.network
+    objective = method_named("flow").objective(config.dimensions, config.network, config.head)
+    windows = as_batch(
+        two_mode_windows(), checkpoint.normalisation, mask_padding=True, device="cpu"
+    )
+    followed = Validation(windows, None, seed=5, device="cpu", keep_after=2)
+    weight = next(network.parameters())
+    for step in (1, 2, 3):
+        with torch.no_grad():
+            weight.fill_(float(step))
+        followed.follow(step, network, objective)
+        assert (followed.earlier is None) == (step < 2)
+    assert bool((next(followed.earlier.parameters()) == 2.0).all())
+
+
 @pytest.mark.parametrize(
     ("steps", "every", "expected"),
     [

@@ -29,6 +29,7 @@ from genpolicy.audit.semantics.drift import (
     order_findings,
 )
 from genpolicy.audit.semantics.frames import frame_findings
+from genpolicy.audit.semantics.frozen import frozen_findings, stream_gap_findings
 from genpolicy.audit.semantics.motion import Motion, make_motion
 from genpolicy.audit.semantics.report import Semantics, in_order
 from genpolicy.audit.semantics.robust import episode_medians
@@ -46,6 +47,7 @@ def measure(data: AuditInput, settings: AuditSettings) -> Semantics:
     notes: list[str] = []
     if motion.wraps:
         notes.append(f"{motion.wraps} jumps by a whole turn were taken out of angles.")
+    frozen, untold = frozen_findings(data, motion, settings)
     findings, factors = gain_findings(data, motion, settings)
     findings += magnitude_findings(data, motion, settings)
     turned, answered = frame_findings(data, motion, settings)
@@ -62,6 +64,8 @@ def measure(data: AuditInput, settings: AuditSettings) -> Semantics:
     releases = calibration.calibrations(data, settings)
     negative = continuity.negative_delays(data, settings)
     findings += [
+        *frozen,
+        *stream_gap_findings(data, motion, settings),
         *continuity.negative_findings(negative),
         *continuity.time_findings(data, settings),
         *stubs,
@@ -83,6 +87,7 @@ def measure(data: AuditInput, settings: AuditSettings) -> Semantics:
         shift_steps=shift,
         stream_shift_steps=stream_shift,
         unclocked=unclocked,
+        untold_freezes=untold,
     )
 
 

@@ -7,11 +7,12 @@ import numpy as np
 from genpolicy.audit.data import Integers, Text
 from genpolicy.audit.rows import Calibration, Clock, Finding
 
-# In the order of diagnosis. Units and frames are measured
-# whatever the lag is, but a lag is not worth much in a turned frame: so they stand before clocks.
+# In the order of diagnosis. A stream that stands still makes all that is measured of its motion
+# wrong, and is seen whatever its unit. Units and frames are measured whatever the lag is, but a lag
+# is not worth much in a turned frame: so they stand before clocks.
 KINDS = (
-    "unit", "swapped_columns", "frame", "clock", "rate", "jitter", "gaps", "clock_drift", "glued",
-    "duplicate", "stub", "calibration",
+    "frozen", "unit", "swapped_columns", "frame", "clock", "rate", "jitter", "gaps", "clock_drift",
+    "glued", "duplicate", "stub", "calibration",
 )  # fmt: skip
 
 
@@ -31,6 +32,7 @@ class Semantics:
         shift_steps: By how many rows the commands of each episode are to be moved so that all
             episodes are aligned. Shape (E,).
         stream_shift_steps: The same for the columns of each other stream that was measured.
+        untold_freezes: Streams that stand still for long in most episodes.
         unclocked: Streams whose clock could not be looked at, neither by delay nor by motion.
     """
 
@@ -44,6 +46,7 @@ class Semantics:
     shift_steps: Integers = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     stream_shift_steps: dict[str, Integers] = field(default_factory=dict)
     unclocked: tuple[str, ...] = ()
+    untold_freezes: tuple[str, ...] = ()
 
 
 def in_order(findings: list[Finding]) -> tuple[Finding, ...]:

@@ -26,7 +26,8 @@ from genpolicy.integrity.rows import read_rows, write_rows
 from genpolicy.policies.checkpoint import CONFIG_FILE
 from genpolicy.policies.evaluations import expected_evaluations
 from genpolicy.policies.fixtures import FixtureRow, compare_fixtures, reload_fixture
-from genpolicy.policies.policy import NetworkPolicy
+from genpolicy.policies.policy import NetworkPolicy, load_policy
+from genpolicy.policies.validation_row import EARLIER_FOLDER
 from genpolicy.statistics.intervals import clopper_pearson
 from genpolicy.tasks.api import Task, load_task
 
@@ -63,6 +64,7 @@ class ReloadRows:
     coverage: list[CoverageRow] = field(default_factory=list)
     offline: list[OfflineRow] = field(default_factory=list)
     modes: list[ModeRow] = field(default_factory=list)
+    earlier: list[ModeRow] = field(default_factory=list)
 
     def write(self, folder: Path) -> None:
         """Write every table."""
@@ -71,12 +73,16 @@ class ReloadRows:
         write_rows(folder / "coverage.parquet", CoverageRow, self.coverage)
         write_rows(folder / "offline.parquet", OfflineRow, self.offline)
         write_rows(folder / "modes.parquet", ModeRow, self.modes)
+        write_rows(folder / "modes_earlier.parquet", ModeRow, self.earlier)
 
 
 def write_reload(
     plan: ReloadPlan, candidates: Sequence[JudgedPolicy], fixtures: Path, folder: Path
 ) -> None:
     """Reload every candidate in a fresh process, compare, sweep the NFE, write the evidence.
+
+    Modes are counted a second time with the weights of three quarters of the training: what the
+    last quarter still changes, a longer training might go on changing.
 
     Args:
         plan: What is reloaded and swept.
@@ -101,6 +107,15 @@ def write_reload(
         rows.offline += offline_rows(policy, data, seed=candidate.seed, horizons=plan.horizons)
         own, swept = _sweep(plan, policy, held_out, candidate.seed, task=task, checker=checker)
         rows.modes += own
+        rows.earlier += modes_of_policy(
+            load_policy(candidate.folder / EARLIER_FOLDER),
+            held_out,
+            seed=candidate.seed,
+            convention=policy.sampler.name,
+            samples=plan.samples,
+            task=task,
+            checker=checker,
+        )
         rows.coverage += swept
     rows.write(folder)
     write_bytes(folder / "identity.json", canonical_json(identity))

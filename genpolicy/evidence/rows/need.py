@@ -30,6 +30,8 @@ class OfflineRow:
 class ModeRow:
     """`modes.parquet` of measure_baselines and reload: modes reached at one held-out situation.
 
+    Also `modes_earlier.parquet` of reload: by the weights at three quarters of the training.
+
     Attributes:
         method: The method.
         seed: Number of its training seed.

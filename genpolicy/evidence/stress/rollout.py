@@ -22,6 +22,7 @@ from genpolicy.evidence.admission_context import (
 from genpolicy.evidence.stress.disturbance import Disturbance
 from genpolicy.evidence.stress.fallback import Fallback
 from genpolicy.evidence.stress.state import Fixture, InFlight, Outcome, Tally, in_flight
+from genpolicy.execution.cell import FALLBACK_HASH, Cell
 from genpolicy.execution.command import Command
 from genpolicy.execution.executor import Executor
 from genpolicy.execution.recovery import Recovery, RecoveryState, step
@@ -60,16 +61,15 @@ class Rollout:
         self.world: World = fixture.task.make_world(start, settings=epoch)
         self.start_sha256 = self.world.state_sha256()
         self.journal = fixture.journal(start_index, self.start_sha256)
-        self.supervisor = Supervisor(fixture.execution.supervisor(fixture.horizons), self.journal)
-        fixture.execution.require_phases(fixture.task.phases)
-        settings = fixture.execution.executor(fixture.horizons)
-        self.stub = ControllerStub(settings, self.journal, self.supervisor)
-        self.executor = Executor(settings, self.journal, self.stub)
-        self.recovery = Recovery(fixture.execution.recovery(), self.journal)
+        cell = Cell(fixture.horizons, fixture.execution)
+        cell.require_task(fixture.task.phases)
+        self.supervisor = Supervisor(cell.execution, self.journal)
+        self.stub = ControllerStub(cell, self.journal, self.supervisor)
+        self.executor = Executor(cell, self.journal, self.stub)
+        self.recovery = Recovery(cell.execution, self.journal)
         self.outcome: Outcome | None = None
         self.tally = Tally()
-        self.tick = 0
-        self.invocations = 0
+        self.tick = self.invocations = 0
         self.wanted: InFlight | None = None
         self._flying: list[InFlight] = []
         self._arrived: deque[tuple[InFlight, int]] = deque()
@@ -81,6 +81,7 @@ class Rollout:
         before = [self.world.last_action] * COMMANDS_AT_THE_BOUNDARY
         self._commanded: deque[Array] = deque(before, maxlen=COMMANDS_AT_THE_BOUNDARY)
         self.history: deque[Array] = deque(maxlen=fixture.horizons.observation_horizon)
+        self._measured: deque[Array] = deque(maxlen=2)
         self._disturbance = Disturbance(fixture, self.world, start=start_index)
         self.executor.set_active(0.0, fixture.checkpoint, fixture.sampler)
 
@@ -104,6 +105,8 @@ class Rollout:
         now_s, world = self.now_s, self.world
         observation = world.observe()
         self.history.append(observation)
+        self._measured.append(world.q_meas)
+        self.journal.scene(now_s, self.fixture.task.scene_poses(observation))
         position, _ = world.tcp_pose
         self.tally.path_m.append(np.array(position))
         divergence_m = float(np.linalg.norm(position - world.last_action[:3]))
@@ -304,12 +307,11 @@ class Rollout:
             self._last_command_s = now_s  # the silence is over; the policy gets its time
 
     def _admit_fallback(self, proposal: Proposal) -> Admitted | None:
-        identity = self.executor.settings.fallback_hash
         context = context_of(
             self.fixture.task,
             self.fixture.checker,
             self._moment(),
-            session=self._session(identity, identity),
+            session=self._session(FALLBACK_HASH, FALLBACK_HASH),
         )
         result = self.fixture.checker.admit(proposal, context=context)
         return result if isinstance(result, Admitted) else None
@@ -317,10 +319,11 @@ class Rollout:
     def _moment(self) -> Moment:
         return Moment(
             observation=self.history[-1],
-            q_meas=self.world.q_meas,
+            q_meas=self._measured[-1],
             commanded=list(self._commanded),
             now_s=self.now_s,
             phase=self.world.phase,
+            q_before=self._measured[0] if len(self._measured) > 1 else None,
         )
 
     def _session(self, checkpoint: str, sampler: str) -> Session:

@@ -49,6 +49,11 @@ def test_modes_of_the_chosen_steps_are_those_of_the_sweep(reloaded):
     assert [row.steps for row in coverage] == [1, 2]
     assert {row.convention for row in modes} == {"euler"} and len(modes) == 2
     assert coverage_row(modes, steps=2) == coverage[1]
+    earlier = read_rows(folder / "modes_earlier.parquet", ModeRow)
+    drawn = [
+        [(r.episode_uuid, r.index, r.samples, r.nfe) for r in rows] for rows in (modes, earlier)
+    ]
+    assert drawn[0] == drawn[1] and modes != earlier
     assert {row.split for row in read_rows(folder / "offline.parquet", OfflineRow)} == {
         "validation", "test",
     }  # fmt: skip

@@ -11,6 +11,8 @@ from gates.cause import (
     Layer,
 )
 from gates.cause.numbers import Kept, Labels
+from genpolicy.audit.rows import Finding
+from genpolicy.errors import ConfigError
 
 
 def test_all_green_is_valid_modes():
@@ -26,6 +28,15 @@ def test_an_earlier_red_layer_is_believed_before_a_later_one():
     assert named(both).name is CauseName.DATA_DEFECT
     # Below its limit the offset is no fault, and the next red layer decides.
     assert named(both, limit(clock_residual_s=0.05)).name is CauseName.HIDDEN_STATE
+
+
+def test_a_frozen_stream_is_a_defect_beyond_its_own_limit_and_no_other():
+    stuck = Finding("frozen", "camera", "ep1", "frozen_s", 0.5, 0.35, "s", "Leave it out.")
+    cause = named(replace(VALID, findings=(stuck,)))
+    assert (cause.name, cause.variable, cause.kind) == (CauseName.DATA_DEFECT, "camera", "frozen")
+    assert named(replace(VALID, findings=(stuck,)), limit(frozen_s=0.5)).layer is Layer.NONE
+    with pytest.raises(ConfigError, match="frozen_s"):
+        named(VALID, limit(frozen_s=0.3))  # below what the audit looks for
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,8 @@ DEFECTS = {
     "frames": ("frame", "epoch_2", "frame_angle_rad", 0.5),
     "swapped columns": ("swapped_columns", "action", "swapped_columns", 2.0),
     "copies": ("duplicate", "", "faulty_episodes_share", 0.1),
+    "freezes": ("frozen", "camera", "frozen_s", 1.0),
+    "lost frames": ("gaps", "camera", "gap_share", 0.05),
     "boundaries": ("glued", "", "faulty_episodes_share", 0.1),
 }
 
