@@ -32,7 +32,7 @@ def _plan(change: str) -> Plant:
     return patched(
         STAGE,
         ("from pathlib import Path", "import dataclasses\nfrom pathlib import Path"),
-        ("    plan = training_plan(params)\n", f"    plan = training_plan(params)\n    {change}\n"),
+        ("    reference = ARTIFACTS", f"    {change}\n    reference = ARTIFACTS"),
     )
 
 
@@ -83,7 +83,8 @@ WRONGS = (
           "small",
           _settings('{"training": plan.settings.training.model_copy('
                     'update={"steps": 40, "warmup_steps": 5, "validation_every": 10})}'),
-          Expected(B, ("unmatched_keys", "validation_fall_upper"))),
+          Expected(B, ("unmatched_keys", "validation_fall_upper", "late_change_upper")),
+          note="`late_change_upper` took the place of `validation_fall_upper` since."),
     Wrong("candidates_with_a_larger_head", "training",
           "Candidates have twice the parameters in the head.",
           "small",
