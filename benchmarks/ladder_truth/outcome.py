@@ -27,6 +27,9 @@ GATE_OF_STAGE = {
 LAST = {"small": "E", "brought": "A", "signed": "E"}
 """The last gate of each base; what stands above it is not looked at."""
 TARGETS = {"small": (), "brought": ("gate_a",), "signed": ("gate_e",)}
+PROOF = ("verify", "report")
+_PROOF = {"signed": ("gates", "check", "--through", "E")}
+"""Synthetic evidence has no journals from which it could be derived again."""
 REFUSES = re.compile(r"Gate (?P<gate>[A-E]) refuses: (?P<what>.*)")
 REFUSED_CRITERION = re.compile(r"^[a-z_0-9]+(\([a-z_0-9]+\))? is ")
 WAITING = "PENDING_REVIEW"
@@ -177,7 +180,7 @@ def look(workspace: Path, base: str) -> Seen:
 def verified(workspace: Path, base: str) -> list[Stop]:
     """What `genpolicy verify report` refuses; what a reviewer or CI would run."""
     done = subprocess.run(
-        [sys.executable, "-m", "genpolicy", "verify", "report", "--json"],
+        [sys.executable, "-m", "genpolicy", *_PROOF.get(base, PROOF), "--json"],
         cwd=workspace,
         env=stage_environment(workspace),
         capture_output=True,
@@ -185,7 +188,7 @@ def verified(workspace: Path, base: str) -> list[Stop]:
         check=False,
     )
     if done.returncode not in (0, 2, 3):
-        raise RuntimeError(f"verify report broke: {done.stderr[-400:]}")
+        raise RuntimeError(f"the proof broke: {done.stderr[-400:]}")
     try:
         rungs = json.loads(done.stdout)
     except ValueError:
@@ -193,7 +196,7 @@ def verified(workspace: Path, base: str) -> list[Stop]:
     rungs = rungs if isinstance(rungs, list) else rungs["gates"]
     kept = GATES[: GATES.index(LAST[base]) + 1]
     return [
-        Stop(rung["gate"], "refusal", f"verify report: {rung['note']}")
+        Stop(rung["gate"], "refusal", f"proof: {rung['note']}")
         for rung in rungs
         if rung["verdict"] == "REFUSED" and rung["gate"] in kept
     ]

@@ -105,9 +105,13 @@ def table(file: str, change: Callable[[pd.DataFrame], pd.DataFrame]) -> Plant:
 
 
 def silently(pattern: str) -> Plant:
-    """Flip one bit of the first file that matches; size and times stay, so DVC does not look."""
+    """Flip one bit of the first file that matches; size and times stay, so DVC does not look.
+
+    DVC is shown the copy before: files that are new to it are hashed, and put right.
+    """
 
     def plant(workspace: Path) -> None:
+        _dvc(workspace, "status", "--quiet")
         path = sorted(workspace.glob(pattern))[0]
         times = path.stat()
         data = bytearray(path.read_bytes())
@@ -123,11 +127,19 @@ def committed(*stages: str) -> Plant:
     """Make DVC take what lies in a stage's folder for what the stage wrote."""
 
     def plant(workspace: Path) -> None:
-        command = [sys.executable, "-m", "dvc", "commit", "--force", *stages]
-        environment = stage_environment(workspace)
-        subprocess.run(command, cwd=workspace, env=environment, check=True, capture_output=True)
+        _dvc(workspace, "commit", "--force", *stages)
 
     return plant
+
+
+def _dvc(workspace: Path, *words: str) -> None:
+    """A command of DVC; `status` leaves with 1 where something is to be done."""
+    command = [sys.executable, "-m", "dvc", *words]
+    done = subprocess.run(
+        command, cwd=workspace, env=stage_environment(workspace), check=False, capture_output=True
+    )
+    if done.returncode and words[0] != "status":
+        raise RuntimeError(f"dvc {words[0]}: {done.stderr.decode()[-400:]}")
 
 
 def recordings(change: Change, *, only: Callable[[int], bool] = lambda number: True) -> Plant:

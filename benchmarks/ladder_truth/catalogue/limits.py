@@ -56,7 +56,8 @@ WRONGS = (
           "Situations of the training split count as held out.",
           "small",
           _params(lambda p: p["gate_a"].update(held_out_splits=["train", "validation", "test"])),
-          Expected("A", ("held_out_situations",), refusal=r"held_out_splits|train")),
+          Expected("A", ("held_out_situations",), refusal=r"held_out_splits|train"),
+          note="Not stopped at first; refused since, see `held_out_splits`."),
     Wrong("a_misspelt_setting", "limits", "A setting is misspelt, so its default would stand.",
           "small",
           _params(lambda p: p["gate_c"].update(mode_observation=p["gate_c"].pop(
