@@ -31,6 +31,7 @@ def arguments(argv: Sequence[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--area", action="append", default=[], help="area, or `honest`")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--list", action="store_true", help="print the catalogue and stop")
+    parser.add_argument("--docs", type=Path, help="page to print the table into")
     parser.add_argument("--table", action="store_true", help="print what was counted and stop")
     return parser.parse_args(argv)
 
@@ -145,6 +146,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     text = tables.markdown(items, results)
     (args.out / "table.md").write_text(text)
     print(text)
+    if args.docs:
+        args.docs.write_text(tables.into_page(args.docs.read_text(), text))
     good = all(result["count"] in ("right", "let through") for result in results)
     return 0 if good and len(results) == len(items) else 1
 

@@ -10,6 +10,20 @@ from benchmarks.ladder_truth.planting import Wrong
 COUNTS = ("right", "elsewhere", "not at all", "broken")
 Result = Mapping[str, Any]
 WIDTH = 130
+BEGIN, END = "<!-- begin of table -->", "<!-- end of table -->"
+
+
+def into_page(page: str, table: str) -> str:
+    """The page with this table between its marks.
+
+    Raises:
+        ValueError: The marks are not there once, in this order.
+    """
+    before, begin, rest = page.partition(BEGIN)
+    _, end, after = rest.partition(END)
+    if not (begin and end):
+        raise ValueError(f"the page has no {BEGIN} ... {END}")
+    return f"{before}{BEGIN}\n\n{table}\n{END}{after}"
 
 
 def catalogue(items: Sequence[Wrong | Variant]) -> str:
