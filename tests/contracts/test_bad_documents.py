@@ -7,6 +7,7 @@ reader may do without a key; it may not fall over it.
 import copy
 import importlib
 import json
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -141,9 +142,7 @@ def test_manifest_of_a_dataset(dataset, tmp_path):
 def test_configuration_of_a_checkpoint_and_its_sampler(fleet, tmp_path):
     root, _ = fleet
     folder = tmp_path / "flow"
-    folder.mkdir()
-    for path in (root / "flow" / "seed_0").iterdir():
-        (folder / path.name).write_bytes(path.read_bytes())
+    shutil.copytree(root / "flow" / "seed_0", folder)
     whole = json.loads((folder / "config.json").read_text())
     assert "sampler" in whole
 
