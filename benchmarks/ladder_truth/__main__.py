@@ -7,6 +7,7 @@ built once below `--work` (some minutes), the copies are removed after each run.
 import argparse
 import dataclasses
 import json
+import os
 import shutil
 import sys
 import time
@@ -114,7 +115,7 @@ def try_one(item: Wrong | Variant, base: Path, copy: Path) -> dict[str, object]:
 
 
 def _one(item: Wrong | Variant, work: Path, out: Path) -> dict[str, object]:
-    result = try_one(item, work / item.base, work / "copies" / item.name)
+    result = try_one(item, work / item.base, work / "copies" / f"{item.name}-{os.getpid()}")
     path = out / f"{item.name}.json"
     path.with_suffix(".tmp").write_text(json.dumps(result, indent=1, sort_keys=True) + "\n")
     path.with_suffix(".tmp").rename(path)

@@ -137,7 +137,7 @@ def run(workspace: Path, base: str) -> Seen:
     """
     runs = Runs()
     end = reproduce(workspace, stages=TARGETS[base], single_item=_single(workspace), echo=runs.echo)
-    if end.infrastructure:
+    if end.infrastructure or (end.code == 1 and not end.stage):
         raise RuntimeError(f"the machine failed, not the ladder: {end.sentence}")
     stops: list[Stop] = []
     if end.code != 0:
