@@ -2,16 +2,10 @@
 
 import pytest
 
+from genpolicy.evidence.shadow.rig import EXECUTION
 from genpolicy.execution.journal import Journal, write_journal
-from genpolicy.execution.recovery import Recovery, RecoverySettings, RecoveryState
+from genpolicy.execution.recovery import Recovery
 from genpolicy.verification.rollouts import derived_rollouts
-
-SETTINGS = RecoverySettings(
-    plans={"default": (RecoveryState.RETREAT,)},
-    hold_s=0.2,
-    primitive_timeout_s=6.0,
-    human_timeout_s=0.0,
-)
 
 
 @pytest.mark.parametrize("stopped", [False, True])
@@ -20,7 +14,7 @@ def test_a_recovery_was_attempted_where_one_began_and_not_where_it_only_stopped(
     tmp_path, begun, stopped
 ):
     journal = Journal("rollout")
-    recovery = Recovery(SETTINGS, journal)
+    recovery = Recovery(EXECUTION, journal)
     journal.add("force", 1, {"force_n": 1.0})
     if begun:
         recovery.trigger(1.0, "approach", "rejected")
