@@ -97,5 +97,6 @@ WRONGS = (
     Wrong("a_file_that_nobody_judged", "evidence",
           "A journal lies beside those that were judged.",
           "small", _unjudged,
-          Expected("D", refusal=r"extra\.mcap")),
+          Expected("D", refusal=r"extra\.mcap"),
+          note="`dvc repro` checks the folder out anew and removes it: nothing is left to stop."),
 )  # fmt: skip
