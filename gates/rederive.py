@@ -72,6 +72,12 @@ def _check(root: Path, gate: Gate, folder: str, journals: list[Path]) -> None:
         if own != found.get(name):
             where = f"{folder}/checker.json: {name}"
             _refuse(gate, where, _totals(own), f"{_totals(found.get(name))}, as checked again")
+    for total in ("checked_actions", "reproved_actions"):  # the gates judge by the totals
+        summed = sum(document[total] for document in found.values())
+        told = stated.get(total) if isinstance(stated, dict) else None
+        if told != summed:
+            where = f"{folder}/checker.json: {total}"
+            _refuse(gate, where, repr(told)[:60], f"{summed}, as checked again")
     violations = sum(len(document["violations"]) for document in found.values())
     listed = stated.get("violations") if isinstance(stated, dict) else None
     if not isinstance(listed, list) or len(listed) != violations:
