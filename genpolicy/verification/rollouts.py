@@ -68,7 +68,8 @@ class _Session:
         elif kind in ("discard", "finish"):
             self.counts["discards"] += m["ended"] == "discarded"
         elif kind == "recovery":
-            self.counts["recoveries"] += m["old"] == "idle"
+            # A stop also leaves `idle`, and nothing is tried after it.
+            self.counts["recoveries"] += m["old"] == "idle" and m["new"] == "hold"
             self.counts["calls"] += m["new"] in CALLS_A_PERSON
         elif kind == "force":
             self.peak_n = max(self.peak_n, m["force_n"])

@@ -99,9 +99,16 @@ def _envelope(folder):
 
 
 def _write_checker(folder, documents):
-    document = {
-        "violations": [], "checked_actions": 0, "reproved_actions": 0, "journals": documents,
-    }  # fmt: skip
+    violations = [
+        {"journal": name, **violation}
+        for name, document in documents.items()
+        for violation in document["violations"]
+    ]
+    totals = {
+        name: sum(item[name] for item in documents.values())
+        for name in ("checked_actions", "reproved_actions")
+    }
+    document = {"violations": violations, **totals, "journals": documents}
     (folder / "checker.json").write_text(json.dumps(document))
 
 
@@ -246,3 +253,13 @@ def test_a_refused_rung_says_why_and_the_others_stand(root):
     assert "bc__nominal.mcap" in second.note
     judged = Rung("D", "n", "REFUSED", "", "before", "r", 2)
     assert rederived(root, [judged]) == [judged]
+
+
+@pytest.mark.parametrize("total", ["checked_actions", "reproved_actions"])
+def test_a_total_that_the_gates_judge_by_is_derived_again(root, total):
+    path = root / STRESS / "checker.json"
+    document = json.loads(path.read_text())
+    document[total] += 1000
+    path.write_text(json.dumps(document))
+    with pytest.raises(RefusedError, match=rf"checker\.json: {total} is 1\d\d\d, required \d+"):
+        rederive(root, "D")
