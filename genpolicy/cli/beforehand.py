@@ -160,9 +160,7 @@ def check_writable(path: Path, out: Path, layout: str) -> None:
     try:
         place = next(p for p in out.resolve().parents if p.is_dir())
         if not os.access(place, os.W_OK | os.X_OK):
-            _refuse(
-                f"{out}, where you may not write", "a writable place", "Name another place."
-            )
+            _refuse(f"{out}, where you may not write", "a writable place", "Name another place.")
         needed = 0 if layout == DATASET else _size(path, MOST_ROOM_BYTES)
         free = shutil.disk_usage(place).free
     except OSError as error:

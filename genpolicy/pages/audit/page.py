@@ -139,7 +139,8 @@ def _labels(mode: str, part: pd.DataFrame) -> dict[str, Any]:
 def _wrong(frame: pd.DataFrame, origins: Mapping[str, str]) -> tuple[list[str], int]:
     """The first episodes whose label disagrees, and how many more there are."""
     found = frame.loc[frame["label"] != frame["replayed"], "episode_uuid"].tolist()
-    return [origins.get(uuid, uuid) for uuid in found[:SHOWN_EPISODES]], max(0, len(found) - SHOWN_EPISODES)
+    shown = [origins.get(uuid, uuid) for uuid in found[:SHOWN_EPISODES]]
+    return shown, len(found) - len(shown)
 
 
 def _named(document: Mapping[str, Any]) -> str:
