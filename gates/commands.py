@@ -56,6 +56,11 @@ def audit(
     correct it and give it back), evidence/ and dataset/. The exit code is 0
     whatever the verdict: it was measured.
     """
+    from genpolicy.cli.beforehand import check_folder, check_given, check_import
+
+    check_given(limits, "--limits")
+    check_import(path, out, format=layout, contract=contract)
+    check_folder(out, "audit.json", "audit")
     from gates.audit.command import AuditOptions, run_audit
 
     options = AuditOptions(path, layout, contract, task, out=out, limits=limits, seed=seed)

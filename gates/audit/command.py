@@ -8,6 +8,7 @@ import os
 import shutil
 import sys
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -19,6 +20,7 @@ from genpolicy.audit.evidence import write_evidence
 from genpolicy.audit.propose import propose_settings
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.audit.standalone import AuditReport, audit
+from genpolicy.cli.beforehand import check_apart, check_folder
 from genpolicy.cli.ingest import Recordings, given_contract
 from genpolicy.cli.progress import ProgressLine
 from genpolicy.cli.remember import Answers, remembered_admissible, remembered_replay
@@ -27,11 +29,11 @@ from genpolicy.cli.task_checks import TaskChecks, task_checks
 from genpolicy.data.dataset import Dataset, load_dataset
 from genpolicy.data.formats import Opened, open_dataset
 from genpolicy.data.formats.contract import write_contract
-from genpolicy.errors import BadInputError
 from genpolicy.integrity.atomic import output_folder, write_bytes
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_bytes
 from genpolicy.pages.audit.evidence import read_evidence
+from genpolicy.pages.audit.origins import named, origins_of, origins_shown
 from genpolicy.pages.audit.page import audit_page
 from genpolicy.pages.audit.words import TITLES
 
@@ -52,12 +54,14 @@ def run_audit(options: AuditOptions) -> int:
     """Import, audit, write everything or nothing, and print the verdict."""
     began_s = time.monotonic()
     out = options.out
-    check_output(options.path, out)
+    check_apart(options.path, out)
+    check_folder(out, DOCUMENT, "audit")
     limits = given_limits(options.limits)
     work = work_folder(out)
     opened = _opened(options, work)
     _say(f"{opened.accepted} episodes accepted, {len(opened.refused)} refused; auditing")
     dataset = load_dataset(opened.folder)
+    origins = origins_of(dataset)
     settings = propose_settings(dataset, source=opened.contract.model_dump(mode="json"))
     checks = task_checks(dataset, task=options.task, chunk_steps=settings.chunk_steps)
     report = _audited(options, dataset, settings, checks, work)
@@ -65,11 +69,18 @@ def run_audit(options: AuditOptions) -> int:
     with output_folder(out) as folder:
         write_contract(folder / CONTRACT, opened.contract)
         name = name_of(dataset, options.path)
-        cause = write_report(report, folder, limits=limits, name=name, obstacles=checks.obstacles)
+        cause = write_report(
+            report,
+            folder,
+            limits=limits,
+            name=name,
+            obstacles=checks.obstacles,
+            origins=origins,
+        )
         if opened.folder == work / DATASET:
             os.replace(opened.folder, folder / DATASET)
     shutil.rmtree(work, ignore_errors=True)
-    print(as_text(report, cause, opened, out))
+    print(named(as_text(report, cause, opened, out), origins))
     print(limits_text(limits, options.limits))
     _say(f"{time.monotonic() - began_s:.1f} s")
     return 0
@@ -91,6 +102,7 @@ def write_report(
     limits: CauseLimits,
     name: str,
     obstacles: list[dict[str, float]],
+    origins: Mapping[str, str] | None = None,
 ) -> Cause:
     """Write audit.json, audit.html and the evidence into an existing folder.
 
@@ -100,6 +112,7 @@ def write_report(
         limits: Limits of the cause.
         name: What the dataset is called on the page.
         obstacles: Round obstacles of the scene plane, for figures.
+        origins: What the user calls an episode, by identifier.
 
     Returns:
         The cause, named from what was written.
@@ -108,9 +121,10 @@ def write_report(
     evidence.mkdir()
     write_evidence(report.result, evidence, settings=report.settings, obstacles=obstacles)
     cause = cause_of(evidence, limits)
-    document = judged(report, cause, limits)
+    document, written = judged(report, cause, limits), read_evidence(evidence)
+    document["episodes"] = origins_shown(document, written, origins or {})
     write_bytes(folder / DOCUMENT, canonical_json(document))
-    page = audit_page(document, read_evidence(evidence), name=name)
+    page = audit_page(document, written, name=name)
     write_bytes(folder / PAGE, page.encode())
     return cause
 
@@ -129,36 +143,6 @@ def judged(report: AuditReport, cause: Cause, limits: CauseLimits) -> dict[str, 
     }
 
 
-def check_output(path: Path, out: Path) -> None:
-    """Refuse an output that would overwrite the recordings or something that is no audit.
-
-    Raises:
-        BadInputError: It would.
-    """
-    source, target = path.resolve(), out.resolve()
-    if source.is_relative_to(target) or target.is_relative_to(source):
-        raise BadInputError(
-            where="--out",
-            found=f"{out}, in or around the recordings {path}",
-            expected="a place apart from them",
-            action="Name another folder; recordings are never written to.",
-        )
-    if out.is_symlink() or (out.exists() and not out.is_dir()):
-        raise BadInputError(
-            where="--out",
-            found=f"{out}, not a folder",
-            expected="a new folder, or that of an earlier audit",
-            action="Name another folder.",
-        )
-    if out.is_dir() and any(out.iterdir()) and not (out / DOCUMENT).is_file():
-        raise BadInputError(
-            where="--out",
-            found=f"{out}, which holds something else than an audit",
-            expected="a new folder, or that of an earlier audit, which is replaced",
-            action="Name another folder; nothing was removed.",
-        )
-
-
 def name_of(dataset: Dataset, path: Path) -> str:
     """The task's name where the data state one, else that of the file or folder."""
     tasks = [str(task) for task in dataset.manifest["tasks"]]
@@ -167,8 +151,8 @@ def name_of(dataset: Dataset, path: Path) -> str:
 
 def as_text(report: AuditReport, cause: Cause, opened: Opened, out: Path) -> str:
     """The verdict for a person at a terminal."""
-    named = [part.replace("_", " ") for part in (cause.variable, cause.kind) if part]
-    said = f"{cause.name} ({', '.join(dict.fromkeys(named))})" if named else cause.name.value
+    parts = [part.replace("_", " ") for part in (cause.variable, cause.kind) if part]
+    said = f"{cause.name} ({', '.join(dict.fromkeys(parts))})" if parts else cause.name.value
     red = "no layer is red" if cause.layer is Layer.NONE else f"first red layer: {cause.layer}"
     beyond = tuple(_beyond(answer) for answer in cause.answers if answer.layer is cause.layer)
     sure = "unknown" if cause.confidence is None else f"{cause.confidence:.2f}"

@@ -54,9 +54,13 @@ def propose(
     force: Annotated[bool, typer.Option("--force", help="Replace an old contract.yaml.")] = False,
 ) -> int:
     """Propose the contract of an import, for a person to correct."""
+    from genpolicy.cli.beforehand import check_file, check_import
+
+    check_import(path, out, format=layout, contract=None)
+    check_file(out, force=force)
     from genpolicy.cli.ingest import run_propose
 
-    return run_propose(path, out=out, format=layout, task=task, force=force)
+    return run_propose(path, out=out, format=layout, task=task)
 
 
 def ingest(
@@ -71,6 +75,11 @@ def ingest(
 
     Every episode is accepted, or refused by name with row and reason.
     """
+    from genpolicy.cli.beforehand import check_folder, check_import, refuse_dataset
+
+    if check_import(path, out, format=layout, contract=contract) == "dataset":
+        refuse_dataset(path)
+    check_folder(out, "manifest.json", "dataset")
     from genpolicy.cli.ingest import Recordings, run_ingest
 
     source = Recordings(path, format=layout, contract=contract, task=task)

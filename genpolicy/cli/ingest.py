@@ -9,7 +9,6 @@ from genpolicy.cli.progress import ProgressLine
 from genpolicy.data.formats import Opened, open_dataset, propose
 from genpolicy.data.formats.contract import ImportContract, load_contract, write_contract
 from genpolicy.data.formats.open_questions import open_questions
-from genpolicy.errors import ConfigError
 
 SHOWN_REFUSALS = 20
 
@@ -54,26 +53,12 @@ def run_ingest(recordings: Recordings, *, out: Path, as_json: bool) -> int:
         )
     finally:
         progress.close()
-    if opened.folder != out:
-        raise ConfigError(
-            where=str(recordings.path),
-            found="a dataset already",
-            expected="recordings",
-            action="Use it as it is, for instance with `genpolicy audit`.",
-        )
     print(json.dumps(document_of(opened), indent=2) if as_json else as_text(opened))
     return 0
 
 
-def run_propose(path: Path, *, out: Path, format: str, task: str | None, force: bool) -> int:
+def run_propose(path: Path, *, out: Path, format: str, task: str | None) -> int:
     """Write the proposal, and print what it leaves open."""
-    if out.exists() and not force:
-        raise ConfigError(
-            where=str(out),
-            found="there already",
-            expected="a new file: somebody may have corrected the old one",
-            action="Name another file, or give --force.",
-        )
     contract = propose(path, format=format, task=task)
     write_contract(out, contract)
     print(f"contract  {out}")

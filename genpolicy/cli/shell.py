@@ -128,6 +128,12 @@ def run_program(
         code = int(command.main(args=words, prog_name=program, standalone_mode=False) or 0)
     except GenpolicyError as error:
         return _failed(place, str(error), error.exit_code)
+    except PermissionError as error:  # the machine's answer about a place that the user named
+        said = (
+            f"{error.filename or 'a file'} is not accessible ({error.strerror or error}), expected "
+            "a place that you may read and write. Check its permissions."
+        )
+        return _failed(place, said, BAD_USAGE)
     except typer.TyperException as error:
         return _bad_usage(place, error)
     except typer.Abort:

@@ -92,12 +92,13 @@ def test_a_dataset_is_not_ingested_again(layouts, tmp_path, capsys):
     assert "a dataset already" in capsys.readouterr().err
 
 
-def test_a_fault_of_ours_is_code_one(tmp_path, capsys, monkeypatch):
+def test_a_fault_of_ours_is_code_one(layouts, tmp_path, capsys, monkeypatch):
     def fail(*_, **__):
         raise RuntimeError("unforeseen")
 
     monkeypatch.setattr("genpolicy.cli.ingest.open_dataset", fail)
-    assert main(["ingest", str(tmp_path), "--out", str(tmp_path / "out")]) == 1
+    root = layouts.v2(tmp_path / "recordings")
+    assert main(["ingest", str(root), "--out", str(tmp_path / "out")]) == 1
     assert "fault of genpolicy" in capsys.readouterr().err
 
 

@@ -54,7 +54,8 @@ class LeRobotDataset:
         self._listed, notes = read_episodes(path, self._info)
         if not self._files:
             refuse(str(path), "without a data file", "files named by its template")
-        with open_table(self._files[0][1], label=self._label(self._files[0][1])) as table:
+        first = self._files[0][1]
+        with open_table(first, label=self._label(first), hashed=False) as table:
             stored = dict(table.columns)
         self.columns = self._columns(stored, notes)
         self.labels = labels_of(

@@ -11,7 +11,7 @@ from genpolicy.data.formats.contract import Format, ImportContract
 from genpolicy.data.formats.detect import DATASET, detect
 from genpolicy.data.formats.ingested import open_ingested
 from genpolicy.data.formats.mcap import import_recordings, propose_recordings
-from genpolicy.data.formats.propose import propose_contract
+from genpolicy.data.formats.proposal import propose_contract
 from genpolicy.data.formats.result import Opened
 from genpolicy.data.formats.source import Progress, Source
 from genpolicy.errors import ConfigError

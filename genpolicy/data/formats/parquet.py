@@ -62,7 +62,8 @@ class ParquetFiles:
         first: BadInputError | None = None
         for path in self._files:
             try:
-                with open_table(path, label=path.relative_to(self._root).as_posix()) as table:
+                label = path.relative_to(self._root).as_posix()
+                with open_table(path, label=label, hashed=False) as table:
                     return table
             except BadInputError as error:
                 first = first or error

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import h5py
 import numpy as np
@@ -57,7 +57,8 @@ class RobomimicFile:
         self.name = path.name
         self._path = path
         notes: list[str] = []
-        with _open(path) as (file, self._digest):
+        self._state = _state(path)
+        with _open(path, hashed=False) as (file, _):
             data = _group(file, DATA, self.name)
             self._demos = sorted((name for name in data if name != MASK), key=_natural)
             if not self._demos:
@@ -86,13 +87,13 @@ class RobomimicFile:
         names = list(dict.fromkeys([*(n for n in wanted if n not in per_episode), ACTIONS]))
         done = 0
         with _open(self._path) as (file, digest):
-            if digest != self._digest:
+            if _state(self._path) != self._state:
                 refuse(self.name, "changed while it was read", "the bytes of before")
             data = _group(file, DATA, self.name)
             for demo in self._demos:
                 label = f"{self.name}#{demo}"
                 try:
-                    raw = self._read(data, demo, names, label, done)
+                    raw = self._read(data, demo, names, label, (digest, done))
                     done += len(raw.columns[ACTIONS])
                     yield raw
                 except BadInputError as error:
@@ -101,15 +102,16 @@ class RobomimicFile:
                     yield refusal_of(label, _unreadable(label, error))
 
     def _read(
-        self, data: Any, demo: str, names: Sequence[str], label: str, done: int
+        self, data: Any, demo: str, names: Sequence[str], label: str, origin: tuple[str, int]
     ) -> RawEpisode:
+        digest, done = origin
         group = _group(data, demo, label)
         columns = {name: _values(group, name, label) for name in names}
         check_columns(columns, label=label, known={c.name: c for c in self.columns})
         attributes = _attributes(group)
         if demo in self._operators:
             attributes["operator"] = self._operators[demo]
-        return RawEpisode(label, self._digest, columns, attributes, first_row=done)
+        return RawEpisode(label, digest, columns, attributes, first_row=done)
 
     def _describe(self, data: Any) -> tuple[list[Column], set[str], list[str]]:
         """Columns of the first demonstration that can be described."""
@@ -128,8 +130,11 @@ def open_source(path: Path) -> RobomimicFile:
 
 
 @contextmanager
-def _open(path: Path) -> Iterator[tuple[Any, str]]:
-    """The file and the SHA-256 of the very bytes that are read; opened without following a link."""
+def _open(path: Path, *, hashed: bool = True) -> Iterator[tuple[Any, str]]:
+    """The file and the SHA-256 of the very bytes that are read; opened without following a link.
+
+    It must open as HDF5 before it is hashed: that costs nothing, and a hash of 300 GB minutes.
+    """
     try:
         descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
     except OSError as error:
@@ -137,19 +142,36 @@ def _open(path: Path) -> Iterator[tuple[Any, str]]:
     with os.fdopen(descriptor, "rb") as stream:
         if not stat.S_ISREG(os.fstat(descriptor).st_mode):
             refuse(path.name, "a folder or a device", "a regular file", REWRITE)
-        digest = sha256()
-        while block := stream.read(HASH_BYTES):
-            digest.update(block)
-        stream.seek(0)
-        try:
-            file = h5py.File(stream, "r")
-        except READ_ERRORS as error:
-            raise _unreadable(path.name, error) from error
-        with file:
+        if hashed:
+            _file(stream, path.name).close()
+        digest = _digest(stream) if hashed else ""
+        with _file(stream, path.name) as file:
             try:
-                yield file, digest.hexdigest()
+                yield file, digest
             except READ_ERRORS as error:  # what a damaged file makes the library raise
                 raise _unreadable(path.name, error) from error
+
+
+def _file(stream: BinaryIO, name: str) -> Any:
+    try:
+        return h5py.File(stream, "r")
+    except READ_ERRORS as error:
+        raise _unreadable(name, error) from error
+
+
+def _digest(stream: BinaryIO) -> str:
+    stream.seek(0)
+    digest = sha256()
+    while block := stream.read(HASH_BYTES):
+        digest.update(block)
+    stream.seek(0)
+    return digest.hexdigest()
+
+
+def _state(path: Path) -> tuple[int, int, int]:
+    """What changes with the file: number, size and time of change."""
+    status = path.lstat()
+    return status.st_ino, status.st_size, status.st_mtime_ns
 
 
 def _member(group: Any, name: str, where: str) -> Any:

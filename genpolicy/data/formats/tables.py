@@ -55,17 +55,21 @@ class Table:
 
 
 @contextmanager
-def open_table(path: Path, *, label: str) -> Iterator[Table]:
+def open_table(path: Path, *, label: str, hashed: bool = True) -> Iterator[Table]:
     """A Parquet file, opened without following a link; bytes hashed are the bytes read.
+
+    Its footer is read once before: what claims too much, or is no table, is never hashed.
+
+    Args:
+        path: The file.
+        label: What texts call it.
+        hashed: Off only where it is described and not read; the digest is empty then.
 
     Raises:
         BadInputError: Missing, a link, not Parquet, or larger in memory than the caps.
     """
     with _open(path, label) as stream:
-        digest = sha256()
-        while block := stream.read(HASH_BYTES):
-            digest.update(block)
-        stream.seek(0)
+        digest = _digest(stream, label) if hashed else ""
         try:
             file = pq.ParquetFile(stream, page_checksum_verification=True)
             kinds = _kinds(file)
@@ -76,7 +80,7 @@ def open_table(path: Path, *, label: str) -> Iterator[Table]:
         except (pa.ArrowException, OSError, MemoryError, ValueError) as error:
             raise _unreadable(label, error) from error
         skipped = tuple(name for name, kind in kinds.items() if kind is None)
-        yield Table(label, digest.hexdigest(), file, columns, skipped)
+        yield Table(label, digest, file, columns, skipped)
 
 
 def batches(table: Table, wanted: Sequence[str]) -> Iterator[dict[str, NDArray[Any]]]:
@@ -115,6 +119,22 @@ def read_columns(table: Table, wanted: Sequence[str]) -> dict[str, NDArray[Any]]
         name: np.concatenate([part[name] for part in parts]) if parts else np.zeros(0)
         for name in wanted
     }
+
+
+def _digest(stream: io.BufferedReader, label: str) -> str:
+    """SHA-256 of the whole file, once its footer has been believed."""
+    try:
+        file = pq.ParquetFile(stream)
+        _kinds(file)
+        _check_size(file, label)
+    except (pa.ArrowException, OSError, MemoryError, ValueError) as error:
+        raise _unreadable(label, error) from error
+    stream.seek(0)
+    digest = sha256()
+    while block := stream.read(HASH_BYTES):
+        digest.update(block)
+    stream.seek(0)
+    return digest.hexdigest()
 
 
 @contextmanager

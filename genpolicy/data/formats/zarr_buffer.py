@@ -83,11 +83,8 @@ class ReplayBuffer:
         """
         self.path = path
         self.name = path.name
-        self.digest = sha256_bytes(canonical_json(sha256_tree(path)))
-        self._ends = _array(path / "meta" / "episode_ends")
-        steps = np.diff(self._ends, prepend=0)
-        if self._ends.ndim != 1 or not (steps > 0).all():
-            _refuse(f"{path}/meta/episode_ends", "not rising", "the last row of each episode")
+        ends = path / "meta" / "episode_ends"
+        _check_head(_head(ends), str(ends))
         columns: list[Column] = []
         skipped: list[str] = []
         for folder in sorted((path / "data").glob("*/.zarray")):
@@ -96,6 +93,12 @@ class ReplayBuffer:
                 skipped.append(folder.parent.name)
             else:
                 columns.append(column)
+        # Described before it is hashed, hashed before it is decoded.
+        self.digest = sha256_bytes(canonical_json(sha256_tree(path)))
+        self._ends = _array(ends)
+        steps = np.diff(self._ends, prepend=0)
+        if self._ends.ndim != 1 or not (steps > 0).all():
+            _refuse(f"{path}/meta/episode_ends", "not rising", "the last row of each episode")
         self.columns = tuple(columns)
         self.notes = (f"Not read: {', '.join(skipped)} (no plain columns).",) if skipped else ()
         self.count = len(self._ends)

@@ -1,7 +1,7 @@
 """The audit's evidence folder, read back: a page can show only what was written."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,7 @@ class AuditEvidence:
         settings: What the audit was made with, `settings.json`.
         persistence: Identity over time, `persistence.json`.
         digests: SHA-256 of every file, by name.
+        origins: What the user calls an episode, by identifier; none is in the folder itself.
     """
 
     tables: Mapping[str, pd.DataFrame]
@@ -30,6 +31,7 @@ class AuditEvidence:
     settings: Mapping[str, Any]
     persistence: Mapping[str, Any]
     digests: Mapping[str, str]
+    origins: Mapping[str, str] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> pd.DataFrame:
         return self.tables[name]

@@ -6,6 +6,7 @@ drawn here and the style sheet. Numbers stand as `<data value="...">` with the J
 
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import pandas as pd
@@ -16,6 +17,7 @@ from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_bytes
 from genpolicy.pages.audit.evidence import AuditEvidence
 from genpolicy.pages.audit.ladder import ladder
+from genpolicy.pages.audit.origins import named
 from genpolicy.pages.audit.pictures import draw_all
 from genpolicy.pages.audit.words import MARKS, MEANINGS, READING, TITLES, TONES, WORDS, short
 from genpolicy.pages.figures.checks import NO_MODE
@@ -29,7 +31,8 @@ def audit_page(document: Mapping[str, Any], evidence: AuditEvidence, *, name: st
     """HTML of one audit; the same inputs give the same bytes.
 
     Args:
-        document: `audit.json`, with the cause, its questions and its limits.
+        document: `audit.json`, with the cause, its questions and its limits; `episodes`, if it is
+            there, says what the user calls the episodes that are named.
         evidence: The evidence beside it.
         name: What the dataset is called.
     """
@@ -42,21 +45,23 @@ def audit_page(document: Mapping[str, Any], evidence: AuditEvidence, *, name: st
     )
     own, _, _ = PackageLoader("genpolicy.pages.audit").get_source(environment, "audit.css")
     cause, limits = str(document["verdict"]), _limits(document["limits"])
-    summary = evidence.summary
+    origins = document.get("episodes", {})
+    said, summary = named(document, origins), named(evidence.summary, origins)
+    evidence = replace(evidence, summary=summary, origins=origins)
     return environment.get_template("audit.html").render(
         style=page_style() + Markup(own),
         name=name,
-        report=document,
+        report=said,
         title=TITLES.get(cause, cause.replace("_", " ")),
         meaning=MEANINGS.get(cause, ""),
         tone=TONES.get(cause, "open"),
-        named=_named(document),
+        named=_named(said),
         marks=MARKS,
-        layers=ladder(document, evidence),
+        layers=ladder(said, evidence),
         pictures=draw_all(evidence, {row["question"]: row["limit"] for row in limits}),
         limits=limits,
         labels=label_table(evidence),
-        wrong=_wrong(evidence["replay"]),
+        wrong=_wrong(evidence["replay"], origins),
         recovery=recovery_table(evidence["recovery"]),
         phases=_phases(summary),
         summary=summary,
@@ -131,10 +136,11 @@ def _labels(mode: str, part: pd.DataFrame) -> dict[str, Any]:
     }
 
 
-def _wrong(frame: pd.DataFrame) -> tuple[list[str], int]:
+def _wrong(frame: pd.DataFrame, origins: Mapping[str, str]) -> tuple[list[str], int]:
     """The first episodes whose label disagrees, and how many more there are."""
     found = frame.loc[frame["label"] != frame["replayed"], "episode_uuid"].tolist()
-    return found[:SHOWN_EPISODES], max(0, len(found) - SHOWN_EPISODES)
+    shown = [origins.get(uuid, uuid) for uuid in found[:SHOWN_EPISODES]]
+    return shown, len(found) - len(shown)
 
 
 def _named(document: Mapping[str, Any]) -> str:

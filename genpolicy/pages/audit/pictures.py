@@ -7,6 +7,7 @@ from functools import partial
 from matplotlib.figure import Figure
 
 from genpolicy.pages.audit.evidence import AuditEvidence
+from genpolicy.pages.audit.origins import short_name
 from genpolicy.pages.figures import captions, checks, situations
 from genpolicy.pages.figures.drawing import Picture, drawn
 from genpolicy.pages.figures.situations import NothingToDrawError
@@ -45,13 +46,26 @@ def draw_all(evidence: AuditEvidence, limits: Limits) -> list[Picture]:
 
 
 def _clusters(evidence: AuditEvidence, limits: Limits) -> Figure:
-    summary = evidence.summary
-    return situations.clusters(
-        evidence["examples"],
+    summary, examples = evidence.summary, evidence["examples"]
+    figure = situations.clusters(
+        examples,
         names=summary["position_names"],
         unit=summary["position_unit"],
         obstacles=summary["obstacles"],
     )
+    for axes in figure.axes:
+        title = _in_users_words(axes.get_title(), evidence)
+        axes.set_title(title, fontsize=9, parse_math=False)
+    return figure
+
+
+def _in_users_words(title: str, evidence: AuditEvidence) -> str:
+    """A title that begins with the first digits of an identifier, with the episode's own name."""
+    for uuid in set(evidence["examples"]["query_uuid"]) & set(evidence.origins):
+        start = f"{uuid[:8]}, "
+        if title.startswith(start):
+            return f"{short_name(evidence.origins[uuid])}\n{title.removeprefix(start)}"
+    return title
 
 
 def _overlay(evidence: AuditEvidence, limits: Limits) -> Figure:

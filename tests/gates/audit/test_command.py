@@ -90,6 +90,12 @@ def test_everything_is_written_and_again_the_same(recordings, tmp_path, capsys):
     assert (document["verdict"], document["confidence"]) == (cause.name.value, cause.confidence)
     assert load_dataset(out / "dataset").manifest_sha256 == document["dataset_manifest_sha256"]
     assert not work_folder(out).exists()
+    page = (out / "audit.html").read_text()
+    for uuid in load_dataset(out / "dataset").episodes["episode_uuid"]:
+        assert uuid not in printed.out and uuid not in page and f"{uuid[:8]}, row" not in page
+    assert document["episodes"]  # of the situations that are drawn
+    for name in document["episodes"].values():
+        assert name.startswith("planar.parquet#episode_") and name.split("#")[1] in page
     first = files(out)
 
     contract = tmp_path / "contract.yaml"
