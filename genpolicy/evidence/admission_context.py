@@ -92,6 +92,9 @@ class Moment:
         commanded: Commanded actions, oldest first, at least one. Shape (10,) each.
         now_s: Now, s.
         phase: Active task phase.
+        q_before: Joint positions measured one period before `q_meas`, rad; None where the arm was
+            measured once. Shape (J,).
+        measured_at_s: When `q_meas` was measured, s; None: now.
     """
 
     observation: Array
@@ -99,6 +102,12 @@ class Moment:
     commanded: Sequence[Array]
     now_s: float
     phase: str
+    q_before: Array | None = None
+    measured_at_s: float | None = None
+
+    def velocity(self, period_s: float) -> Array | None:
+        """Measured joint velocities over the period before, rad/s; None if unknown. (J,)."""
+        return None if self.q_before is None else (self.q_meas - self.q_before) / period_s
 
 
 def context_of(
@@ -139,6 +148,8 @@ def context_of(
         q_cmd_history=history,
         newest_accepted_observation_s=newest_accepted_observation_s,
         first_index=late_rows,
+        dq_meas=moment.velocity(checker.cell.action_period_s),
+        state_time_s=moment.measured_at_s,
     )
 
 

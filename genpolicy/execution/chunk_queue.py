@@ -2,13 +2,12 @@
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from genpolicy.contract.chunk import DiscardReason
 from genpolicy.execution.checks import Checks, Place, refusal
-from genpolicy.execution.journal import Journal, encode_actions
+from genpolicy.execution.journal import Journal, encode_actions, encode_poses
 from genpolicy.execution.ledger import BEYOND_HORIZON, Conservation, Ledger, QueuedChunk
 from genpolicy.execution.moment import Chunk, Moment, View
+from genpolicy.execution.nanoseconds import to_ns
 from genpolicy.execution.settings import ExecutorSettings
 
 if TYPE_CHECKING:
@@ -230,9 +229,10 @@ def _motion(admitted: "Admitted") -> Payload | None:
         "joints": q_rad.shape[1],
         "q_rad": encode_actions(q_rad),
         "q_cmd_rad": encode_actions(context.q_cmd),
+        "q_before_rad": encode_actions(context.q_cmd_history),
+        "q_meas_rad": encode_actions(context.q_meas),
+        "dq_meas_rad_s": None if context.dq_meas is None else encode_actions(context.dq_meas),
+        "measured_ns": to_ns(context.measured_at_s),
         "last_action": encode_actions(context.last_action),
-        "scene": {
-            name: encode_actions(np.concatenate([np.ravel(part) for part in pose]))
-            for name, pose in sorted(context.scene.bodies.items())
-        },
+        "scene": encode_poses(context.scene.bodies),
     }

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from genpolicy.contract.action import ACTION_DIM
 from genpolicy.errors import BadInputError, ContractError
@@ -28,7 +28,7 @@ from genpolicy.integrity.hashing import sha256_bytes_of
 
 Array = NDArray[np.float64]
 
-JOURNAL_VERSION = 3
+JOURNAL_VERSION = 4
 MAXIMUM_UNCOMPRESSED_BYTES = 8 << 30
 MAXIMUM_RECORD_BYTES = 64 << 20
 
@@ -36,6 +36,7 @@ EVENT_FIELDS: dict[str, tuple[str, ...]] = {
     "session": ("version", "labels", "execution_horizon", "period_ns", "maximum_age_ns",
                 "watchdog_ns", "queue_capacity", "fallback_hash", "checks_missing", "admission"),
     "observation": ("event_time_ns", "phase", "calibration_epoch", "used", "ignored_because"),
+    "scene": ("bodies",),
     "phase": ("event_time_ns", "old", "new"),
     "epoch": ("event_time_ns", "old", "new"),
     "active": ("checkpoint", "sampler"),
@@ -118,6 +119,10 @@ class Journal:
         }  # fmt: skip
         self.add("candidate", self.clock(now_s), payload)
 
+    def scene(self, now_s: float, poses: Mapping[str, tuple[ArrayLike, ArrayLike]]) -> None:
+        """Record where bodies of the scene were seen: positions, m, and quaternions, by name."""
+        self.add("scene", self.clock(now_s), {"bodies": encode_poses(poses)})
+
     def invocation(self, now_s: float, *, invocation_id: str, stage: str, detail: str = "") -> None:
         """Record the begin or the end of an invocation."""
         payload = {"id": invocation_id, "stage": stage, "detail": detail}
@@ -156,6 +161,14 @@ def session_payload(
 def encode_actions(actions: Array) -> str:
     """Hex of the little-endian float64 bytes, row after row."""
     return np.ascontiguousarray(actions, dtype="<f8").tobytes().hex()
+
+
+def encode_poses(poses: Mapping[str, tuple[ArrayLike, ArrayLike]]) -> dict[str, str]:
+    """Hex of x, y, z, m, and w, x, y, z of each body, by name, in the order of names."""
+    return {
+        name: encode_actions(np.concatenate([np.ravel(part) for part in poses[name]]))
+        for name in sorted(poses)
+    }
 
 
 def decode_actions(text: str) -> Array:

@@ -13,6 +13,7 @@ from genpolicy.errors import ConfigError, ContractError
 from genpolicy.feasibility.context import Context
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.robot.collision import CollisionModel
+from genpolicy.robot.dynamics import ArmDynamics
 from genpolicy.robot.kinematics import ArmKinematics
 from genpolicy.robot.limits import RobotLimits
 
@@ -147,6 +148,11 @@ class Cell:
             acceleration_rad_s2=limits.acceleration_rad_s2 * settings.acceleration_factor,
             jerk_rad_s3=limits.jerk_rad_s3 * settings.jerk_factor,
         )
+
+    @cached_property
+    def dynamics(self) -> ArmDynamics:
+        """What torques a motion of the arm needs."""
+        return ArmDynamics(self.kinematics)
 
     @property
     def joint_count(self) -> int:

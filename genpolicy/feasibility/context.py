@@ -36,6 +36,9 @@ class Context:
         newest_accepted_observation_s: Observation under the newest chunk accepted so far; an
             older one behind it is out of order. None before the first.
         first_index: Rows before it are late and will never be executed; the boundary is there.
+        dq_meas: Measured joint velocities, rad/s, over the period before `q_meas`; None where only
+            one state was measured: then nothing is assumed of them. Shape (J,).
+        state_time_s: When `q_meas` was measured; None: now.
     """
 
     q_meas: Array
@@ -53,6 +56,8 @@ class Context:
     q_cmd_history: Array = field(default_factory=lambda: np.zeros((0, 0)))
     newest_accepted_observation_s: float | None = None
     first_index: int = 0
+    dq_meas: Array | None = None
+    state_time_s: float | None = None
 
     def __post_init__(self) -> None:
         joints = np.size(self.q_cmd)
@@ -60,10 +65,12 @@ class Context:
         if not history.size:
             history = np.zeros((0, joints))
             object.__setattr__(self, "q_cmd_history", history)
-        shapes = {
+        shapes: dict[str, tuple[int, ...]] = {
             "q_meas": (joints,), "q_cmd": (joints,), "last_action": (ACTION_DIM,),
             "q_cmd_history": (len(history), joints),
         }  # fmt: skip
+        if self.dq_meas is not None:
+            shapes["dq_meas"] = (joints,)
         for name, expected in shapes.items():
             value = frozen_array(getattr(self, name))
             object.__setattr__(self, name, value)
@@ -88,6 +95,11 @@ class Context:
                 expected="at least 0",
                 action="Count the late rows of the chunk from its first row.",
             )
+
+    @property
+    def measured_at_s(self) -> float:
+        """When the joints were measured, s."""
+        return self.now_s if self.state_time_s is None else self.state_time_s
 
     def rows(self, actions: int) -> slice:
         """Which rows of a chunk of that many actions are checked: all that are not late."""

@@ -12,7 +12,9 @@ def expected_motion(robot: Cell) -> ExpectedMotion:
     return ExpectedMotion(
         scene_path=robot.kinematics.scene_path,
         workspace_m=np.array([robot.workspace.lower_m, robot.workspace.upper_m]),
-        velocity_rad_s=limits.velocity_rad_s,
+        rates=np.stack([limits.velocity_rad_s, limits.acceleration_rad_s2, limits.jerk_rad_s3]),
+        arm_rates=np.stack([robot.limits.velocity_rad_s, robot.limits.acceleration_rad_s2]),
+        torque_nm=robot.limits.torque_nm,
         tcp_speed_m_s=settings.tcp_speed_limit_m_s,
         tcp_turn_rad_s=settings.tcp_turn_limit_rad_s,
         held_opening_m=settings.held_opening_m,

@@ -278,7 +278,20 @@ class _Session:
             self.flag("P4.chain", f"{chunk_id!r} continues {m['predecessor']!r}, not {head!r}.")
         if len(self.open) > self.settings["queue_capacity"]:
             self.flag("settings.capacity", f"{len(self.open)} chunks are queued.")
+        self._check_ground(m)
         self.head = (m["arrival"], chunk_id)
+
+    def _check_ground(self, chunk: Message) -> None:
+        """What a chunk was checked against: the scene that was seen, and a state that is young."""
+        motion = chunk["motion"]
+        if self.proof is None or motion is None:
+            return  # a row of it that is executed is a violation of its own (P6.ground)
+        if motion["scene"] != self.world.scene:
+            self.flag("P6.scene", f"{chunk['chunk_id']!r} was checked in another scene than seen.")
+        age_ns = self.t - motion["measured_ns"]
+        limit_ns = self.settings["maximum_age_ns"].get(chunk["phase"])
+        if limit_ns is None or not 0 <= age_ns <= limit_ns:
+            self.flag("P6.state_age", f"{chunk['chunk_id']!r} rests on joints {age_ns} ns old.")
 
     def _check_close(self, kind: str, m: Message) -> None:
         arrival, reason = m["arrival"], m.get("reason")

@@ -2,7 +2,8 @@
 
 It believes no layer. The journal says from which commands a chunk went on, where the scene stood
 and which joint positions its rows have; that these joint positions are the poses that were
-executed is checked first, and then they are held against the robot's limits and the scene.
+executed is checked first, and then they are held against the robot's limits, the scene and the
+robot's own body; the first step also against where the arm was measured.
 """
 
 from collections.abc import Iterator
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 
 from genpolicy.contract.action import GRIPPER, POSITION, ROTATION
 from genpolicy.contract.rotation import angle_between, rotation_from_6d
+from genpolicy.verification.body import Driven, OwnBody
 from genpolicy.verification.journal_source import Message
 
 Array = NDArray[np.float64]
@@ -23,6 +25,8 @@ Finding = tuple[str, str]
 
 HELD, SCENE = 2, 3  # geom groups of a scene file; 1 is the robot's
 POSE_TOLERANCE_M = POSE_TOLERANCE_RAD = 1e-5  # ten times what feasibility lets a pose be missed by
+RATES = ("speed", "acceleration", "jerk")
+TORQUE_TOLERANCE_NM = 1e-6
 CONTACT_TOLERANCE_M = 1e-4  # less than this deep, two libraries may disagree whether shapes touch
 ROUNDING = 1e-6  # relative: a step that was limited to its limit is within it
 
@@ -34,7 +38,10 @@ class ExpectedMotion:
     Attributes:
         scene_path: MJCF of robot and scene: the arm's joints first, a site `tcp` behind them.
         workspace_m: Lower and upper corner of the box of the TCP, m. Shape (2, 3).
-        velocity_rad_s: What each joint of the arm may do. Shape (J,).
+        rates: What commands of each joint may do: velocity, acceleration, jerk, rad and s.
+            Shape (3, J).
+        arm_rates: Velocity and acceleration that each joint has, rad and s. Shape (2, J).
+        torque_nm: What each joint can bear. Shape (J,).
         tcp_speed_m_s: What the TCP may do.
         tcp_turn_rad_s: Likewise.
         held_opening_m: Above this opening nothing is held.
@@ -43,7 +50,9 @@ class ExpectedMotion:
 
     scene_path: Path
     workspace_m: Array
-    velocity_rad_s: Array
+    rates: Array
+    arm_rates: Array
+    torque_nm: Array
     tcp_speed_m_s: float
     tcp_turn_rad_s: float
     held_opening_m: float
@@ -61,7 +70,7 @@ class MotionProof:
         self.expected = expected
         self._model: Any = mujoco.MjModel.from_xml_path(str(expected.scene_path))
         self._data: Any = mujoco.MjData(self._model)
-        self._joints = len(expected.velocity_rad_s)
+        self._joints = len(expected.torque_nm)
         model = self._model
         self._tcp = int(model.site("tcp").id)
         sites = {model.site(i).name: int(model.site_bodyid[i]) for i in range(model.nsite)}
@@ -71,6 +80,8 @@ class MotionProof:
         self._weld = next(
             (i for i in range(model.neq) if model.eq_type[i] == mujoco.mjtEq.mjEQ_WELD), None
         )
+        self._own = OwnBody(model, self._joints, self._weld)
+        self._driven = Driven(expected.scene_path, self._joints)
         held = model.geom_group == HELD
         self._held_width_m = float(model.geom_size[held].min()) if held.any() else 0.0
         self._last: dict[str, Array] = {}
@@ -104,17 +115,21 @@ class MotionProof:
             return
         if not first <= row < last:
             return  # a violation of its own (P1.checked_rows)
-        path = np.concatenate([q_cmd[None], path.reshape(-1, joints)])
+        before_rad = _floats(motion["q_before_rad"]).reshape(-1, joints)
+        path = np.concatenate([before_rad, q_cmd[None], path.reshape(-1, joints)])
         actions = _floats(chunk["actions"]).reshape(chunk["rows"], -1)
         action = actions[row]
         before = self._last.get(session, actions[row - 1] if row > first else told)
         self._last[session] = action
-        place = row - first + 1
+        place = len(before_rad) + row - first + 1
         openings = np.concatenate([told[GRIPPER][None], actions[first : row + 1, GRIPPER]])
         held = bool(np.all(openings <= self.expected.held_opening_m))
         self._pose(path[place], float(action[GRIPPER]), held, motion["scene"])
         yield from self._reached(action)
-        yield from self._within(path[place], path[place - 1], action, before, period_s)
+        yield from self._within(path[place], action, before, period_s)
+        yield from self._rates(path[: place + 1], period_s)
+        if row == first:
+            yield from self._from_measured(chunk, path[place - 1 : place + 1], period_s)
         yield from self._touching(held, phase in self.expected.contact_phases)
 
     def _pose(self, q_rad: Array, opening_m: float, held: bool, scene: dict[str, str]) -> None:
@@ -158,7 +173,7 @@ class MotionProof:
             yield "P6.pose", f"Its joints are {away_m:.3g} m and {turned:.3g} rad off its pose."
 
     def _within(
-        self, q_rad: Array, q_before: Array, action: Array, before: Array, period_s: float
+        self, q_rad: Array, action: Array, before: Array, period_s: float
     ) -> Iterator[Finding]:
         expected, limits = self.expected, self._model.jnt_range[: self._joints].T
         lower, upper = expected.workspace_m
@@ -166,9 +181,6 @@ class MotionProof:
             yield "P6.workspace", f"The TCP goes to {action[POSITION].tolist()} m."
         if not np.all((q_rad >= limits[0]) & (q_rad <= limits[1])):
             yield "P6.joint_limit", f"The joints go to {q_rad.tolist()} rad."
-        rate = np.abs(q_rad - q_before) / period_s
-        if not np.all(rate <= expected.velocity_rad_s * (1 + ROUNDING)):
-            yield "P6.joint_speed", f"The joints move at {rate.tolist()} rad/s."
         speed = float(np.linalg.norm(action[POSITION] - before[POSITION])) / period_s
         if not speed <= expected.tcp_speed_m_s * (1 + ROUNDING):
             yield "P6.tcp_speed", f"The TCP moves at {speed:.4g} m/s."
@@ -176,6 +188,37 @@ class MotionProof:
         turn = float(angle_between(*rotations)) / period_s
         if not turn <= expected.tcp_turn_rad_s * (1 + ROUNDING):
             yield "P6.tcp_turn", f"The TCP turns at {turn:.4g} rad/s."
+
+    def _rates(self, path: Array, period_s: float) -> Iterator[Finding]:
+        """Rates and torques of the path (n, J) that ends at the row, as far as it is known."""
+        expected = self.expected
+        for order, (name, limit) in enumerate(zip(RATES, expected.rates, strict=True), start=1):
+            if len(path) > order:
+                rate = np.abs(np.diff(path[-order - 1 :], n=order, axis=0)[0]) / period_s**order
+                if not np.all(rate <= limit * (1 + ROUNDING)):
+                    yield f"P6.joint_{name}", f"The joints do {rate.tolist()} rad/s^{order}."
+        if len(path) > 2:
+            speed = (path[-1] - path[-3]) / (2 * period_s)
+            acceleration = np.diff(path[-3:], n=2, axis=0)[0] / period_s**2
+            torque = np.abs(self._driven.torque_nm(path[-2], speed, acceleration))
+            if not np.all(torque <= expected.torque_nm + TORQUE_TOLERANCE_NM):
+                yield "P6.torque", f"The joints bear {torque.tolist()} N m."
+
+    def _from_measured(self, chunk: Message, ends: Array, period_s: float) -> Iterator[Finding]:
+        """What the arm needs from where it was measured; `ends` are last command and row (2, J)."""
+        motion, (speed_limit, acceleration_limit) = chunk["motion"], self.expected.arm_rates
+        ends_ns = chunk["start_ns"] + (chunk["checked_rows"][0] + 1) * chunk["period_ns"]
+        time_s = (ends_ns - motion["measured_ns"]) / 1e9
+        if not time_s > 0:
+            yield "P6.measured_speed", "The arm was measured after the first row had ended."
+            return
+        speed = np.abs(ends[1] - _floats(motion["q_meas_rad"])) / time_s
+        if not np.all(speed <= speed_limit * (1 + ROUNDING)):
+            yield "P6.measured_speed", f"The arm must come at {speed.tolist()} rad/s."
+        if motion["dq_meas_rad_s"] is not None:
+            step = (ends[1] - ends[0]) / period_s - _floats(motion["dq_meas_rad_s"])
+            if not np.all(np.abs(step) / time_s <= acceleration_limit * (1 + ROUNDING)):
+                yield "P6.measured_acceleration", f"The arm must change by {step.tolist()} rad/s."
 
     def _touching(self, held: bool, in_contact: bool) -> Iterator[Finding]:
         model, contact = self._model, self._data.contact
@@ -185,6 +228,8 @@ class MotionProof:
             pair = sorted(contact.geom[index].tolist(), key=lambda geom: model.geom_group[geom])
             groups = [int(model.geom_group[geom]) for geom in pair]
             if HELD in groups and not held:
+                continue
+            if SCENE not in groups and self._own.may_meet(*pair):
                 continue
             allowed = in_contact and groups == [HELD, SCENE]
             if allowed and int(model.geom_bodyid[pair[1]]) == self._target:

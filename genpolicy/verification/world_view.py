@@ -8,7 +8,7 @@ Finding = tuple[str, str]
 STOP_STATES = ("protective_stop", "emergency_stop")
 KINDS = frozenset({
     "observation", "phase", "epoch", "active", "invocation", "candidate", "refuse", "supervisor",
-    "recovery", "invalidate", "mode", "reset", "force", "outcome",
+    "recovery", "invalidate", "mode", "reset", "force", "outcome", "scene",
 })  # fmt: skip
 
 
@@ -27,6 +27,7 @@ class WorldView:
         self.session_epoch = 0
         self.mode = "run"
         self.stopped = False
+        self.scene: dict[str, str] = {}
         self.void_before: dict[str, int] = {}
 
     def follow(self, kind: str, m: Message) -> Iterator[Finding]:
@@ -35,6 +36,8 @@ class WorldView:
             yield "journal.kind", f"There is no event of kind {kind!r}."
         elif kind == "observation":
             yield from self._observe(m)
+        elif kind == "scene":
+            self.scene = m["bodies"]
         elif kind == "active":
             self.active = (m["checkpoint"], m["sampler"])
         elif kind == "mode":

@@ -14,7 +14,12 @@ def test_every_figure_is_that_of_the_cell(cell):
         list(cell.workspace.lower_m),
         list(cell.workspace.upper_m),
     ]
-    assert np.array_equal(found.velocity_rad_s, limits.velocity_rad_s)
+    own = cell.limits
+    assert np.array_equal(
+        found.rates, [limits.velocity_rad_s, limits.acceleration_rad_s2, limits.jerk_rad_s3]
+    )
+    assert np.array_equal(found.arm_rates, [own.velocity_rad_s, own.acceleration_rad_s2])
+    assert np.array_equal(found.torque_nm, own.torque_nm)
     assert found.tcp_speed_m_s == cell.settings.tcp_speed_limit_m_s
     assert found.tcp_turn_rad_s == cell.settings.tcp_turn_limit_rad_s
     assert found.held_opening_m == cell.settings.held_opening_m
@@ -24,5 +29,5 @@ def test_every_figure_is_that_of_the_cell(cell):
 def test_a_stricter_cell_gives_stricter_figures(cell):
     settings = cell.settings.model_copy(update={"velocity_factor": 0.5, "tcp_speed_limit_m_s": 0.1})
     found = expected_motion(replace(cell, settings=settings))
-    assert np.allclose(found.velocity_rad_s, 0.5 * cell.limits.velocity_rad_s)
+    assert np.allclose(found.rates[0], 0.5 * cell.limits.velocity_rad_s)
     assert found.tcp_speed_m_s == 0.1

@@ -39,12 +39,13 @@ def test_a_solver_that_agrees_with_itself_but_not_with_its_definition_is_red(lad
 
 def test_a_noisy_point_policy_that_samples_between_the_modes_is_red(ladder):
     """Every mode is reached, with admissible samples enough, and 45 % lie between."""
-    evidence.edit_table(
-        ladder, MODES,
-        lambda f: f.assign(
-            samples=20, modes_covered=2, between_modes=9, admissible=8, fewest_admissible=4
-        ),
-    )  # fmt: skip
+    for table in (MODES, EARLIER):
+        evidence.edit_table(
+            ladder, table,
+            lambda f: f.assign(
+                samples=20, modes_covered=2, between_modes=9, admissible=8, fewest_admissible=4
+            ),
+        )  # fmt: skip
     report = judge(ladder, "B")
     assert _red(report) == {"outside_modes_upper"}
     assert "share 0.45" in _found(report, "outside_modes_upper")[0].caveat
@@ -102,7 +103,7 @@ def test_a_candidate_whose_samples_still_change_is_red(ladder, better):
 
 def test_the_worse_end_of_the_change_decides(ladder):
     """Half of the situations gain a quarter and half nothing: .125 on average is not below .15."""
-    evidence.edit_table(ladder, EARLIER, cells("valid", 12, share=0.5))
+    evidence.edit_table(ladder, EARLIER, lambda f: f.assign(valid=16 - 4 * (f["index"] % 2)))
     report = judge(ladder, "B")
     assert _red(report) == {"late_change_upper"}
     found = _found(report, "late_change_upper")[0]

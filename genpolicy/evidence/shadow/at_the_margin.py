@@ -1,4 +1,4 @@
-"""Corruptions at the margin of one check of posture, motion or contact.
+"""Corruptions at the margin of one check of posture, of motion in progress or of contact.
 
 Each says where the arm could stand or go so that its check alone refuses the chunk, and takes the
 first such place of which that is true; None where there is none.
@@ -18,10 +18,10 @@ Array = NDArray[np.float64]
 Place = Callable[[Case], Case | None]
 
 RATES = ("joint_velocity", "joint_acceleration", "joint_jerk", "tcp_speed", "tcp_turn")
+LEAPING = (*RATES, "measured_velocity")  # a leap is too fast, and so is the way to it
 
 BEYOND = 1.02  # of a limit
 WITHIN = 0.98
-UNSTOPPABLE = 4.0  # times the robot's acceleration: no projection can go on from it
 LEAPS = (4, 6, 8, 10)  # times the fastest step
 
 
@@ -130,7 +130,7 @@ def leapt_obstacle(case: Case, checker: FeasibilityChecker, place: Place) -> Cas
         leaps = [_going(case, checker, linear_m=times * step_m * way) for way in level]
         placed = [place(leap.as_it_is()) for leap in leaps]
         cases = [leap for leap in placed if leap is not None]
-        found = alone(checker, cases, "swept_collision", RATES)
+        found = alone(checker, cases, "swept_collision", LEAPING)
         if found is not None:
             return found
     return None
@@ -144,35 +144,6 @@ def fast_joint(case: Case, checker: FeasibilityChecker) -> Case | None:
         used = np.max(np.abs(way) / (limits.velocity_rad_s * cell.action_period_s))
         cases.append(moving(case, checker, BEYOND * way / used).as_it_is())
     return alone(checker, cases, "joint_velocity")
-
-
-def broken_boundary(case: Case, checker: FeasibilityChecker) -> Case | None:
-    """The commands before came in so fast that nothing can go on from them without a jolt.
-
-    A chunk that is merely rough is no such case: projection smooths it.
-    """
-    cases = [
-        _after(case, checker, joint, (-2 * step, -step))
-        for joint, step in enumerate(UNSTOPPABLE * checker.cell.limits.acceleration_rad_s2)
-    ]
-    return alone(checker, cases, "joint_acceleration")
-
-
-def jolt_before(case: Case, checker: FeasibilityChecker) -> Case | None:
-    """The arm stands still after a jump of its commands: too much jerk, no acceleration."""
-    limit = checker.cell.usable_limits.jerk_rad_s3 * checker.cell.action_period_s
-    cases = [_after(case, checker, joint, (-2 * step, 0.0)) for joint, step in enumerate(limit)]
-    return alone(checker, cases, "joint_jerk")
-
-
-def _after(
-    case: Case, checker: FeasibilityChecker, joint: int, offsets: tuple[float, float]
-) -> Case:
-    """The arm is told to stay; its commands before were off by so much / T^2 in one joint."""
-    history = np.tile(case.context.q_cmd, (2, 1))
-    history[:, joint] += np.array(offsets) * checker.cell.action_period_s**2
-    here = still(case, checker, case.context.q_cmd)
-    return here.with_context(q_cmd_history=history)
 
 
 def fast_tcp(case: Case, checker: FeasibilityChecker) -> Case | None:

@@ -102,7 +102,12 @@ def still(case: Case, checker: FeasibilityChecker, q_rad: Array, *, rows: int = 
     target = _action(checker, q_rad, context.last_action[GRIPPER])
     actions = np.tile(target, (context.first_index + rows, 1))
     return case.with_context(
-        q_cmd=q_rad, q_meas=q_rad, last_action=target, q_cmd_history=np.tile(q_rad, (2, 1))
+        q_cmd=q_rad,
+        q_meas=q_rad,
+        last_action=target,
+        q_cmd_history=np.tile(q_rad, (2, 1)),
+        dq_meas=np.zeros(len(q_rad)),
+        state_time_s=None,
     ).with_actions(actions)
 
 
@@ -114,7 +119,10 @@ def moving(case: Case, checker: FeasibilityChecker, step_rad: Array) -> Case:
     there = _action(checker, q_rad + step_rad, opening)
     actions = np.concatenate([np.tile(here, (context.first_index, 1)), there[None]])
     history = np.stack([q_rad - 2 * step_rad, q_rad - step_rad])
-    moved = case.with_context(q_meas=q_rad, last_action=here, q_cmd_history=history)
+    moved = case.with_context(
+        q_meas=q_rad, last_action=here, q_cmd_history=history, state_time_s=None,
+        dq_meas=step_rad / checker.cell.action_period_s,
+    )  # fmt: skip
     return moved.with_actions(actions)
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.contract.action import GRIPPER, POSITION, ROTATION
+from genpolicy.evidence.shadow import at_the_boundary as boundary
 from genpolicy.evidence.shadow import at_the_margin as margin
 from genpolicy.evidence.shadow.case import Case
 from genpolicy.feasibility.admission import FeasibilityChecker
@@ -69,7 +70,8 @@ class Corruption:
     @property
     def built(self) -> bool:
         """Nothing of the candidate's actions is left in it."""
-        return self.apply.__module__ == margin.__name__ or self.apply is leap
+        modules = (margin.__name__, boundary.__name__)
+        return self.apply.__module__ in modules or self.apply is leap
 
 
 def stale_observation(case: Case, _: FeasibilityChecker) -> Case:
@@ -77,7 +79,9 @@ def stale_observation(case: Case, _: FeasibilityChecker) -> Case:
     late_s = case.context.maximum_age_s + 0.05
     now_s = case.proposal.metadata.condition_observation_event_time_s + late_s
     moved = case.with_metadata(action_start_time_s=now_s, valid_until_s=now_s + 10.0)
-    return moved.with_context(now_s=now_s, latest_observation_event_time_s=now_s, first_index=0)
+    return moved.with_context(
+        now_s=now_s, latest_observation_event_time_s=now_s, state_time_s=now_s, first_index=0
+    )
 
 
 def future_observation(case: Case, _: FeasibilityChecker) -> Case:
@@ -228,13 +232,20 @@ CORRUPTIONS = (
         "folded_posture", margin.folded_posture, "geometric", "self_collision",
         ("workspace", "swept_collision"),
     ),
-    Corruption("leap", leap, "geometric", "swept_collision", margin.RATES, with_obstacle),
+    Corruption("leap", leap, "geometric", "swept_collision", margin.LEAPING, with_obstacle),
     Corruption("other_period", other_period, "dynamic", "action_period"),
     Corruption("fast_joint", margin.fast_joint, "dynamic", "joint_velocity"),
-    Corruption("broken_boundary", margin.broken_boundary, "dynamic", "joint_acceleration"),
-    Corruption("jolt_before", margin.jolt_before, "dynamic", "joint_jerk"),
+    Corruption("broken_boundary", boundary.broken_boundary, "dynamic", "joint_acceleration"),
+    Corruption("jolt_before", boundary.jolt_before, "dynamic", "joint_jerk"),
     Corruption("fast_tcp", margin.fast_tcp, "dynamic", "tcp_speed"),
     Corruption("fast_turn", margin.fast_turn, "dynamic", "tcp_turn"),
+    Corruption(
+        "heavy_jolt", boundary.heavy_jolt, "dynamic", "joint_torque",
+        ("joint_acceleration", "joint_jerk"),
+    ),
+    Corruption("left_behind", boundary.left_behind, "dynamic", "measured_velocity"),
+    Corruption("pushed_aside", boundary.pushed_aside, "dynamic", "measured_acceleration"),
+    Corruption("old_state", boundary.old_state, "dynamic", "state_age"),
     Corruption(
         "aside_in_contact", margin.aside_in_contact, "contact", "approach_direction", (), in_contact
     ),

@@ -80,6 +80,7 @@ def play(
     active = judged[0][0].context
     executor.set_active(0.0, active.active_checkpoint_hash, active.active_sampler_hash)
     executor.observe(0.0, 0.0, item.phase, item.calibration_epoch)
+    journal.scene(0.0, judged[0][0].poses)
     executor.begin_invocation(0.0, metadata.chunk_id)
     period_s, now_s = horizons.action_period_s, active.now_s
     executor.observe(now_s, now_s, item.phase, item.calibration_epoch)

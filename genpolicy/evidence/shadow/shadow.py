@@ -260,10 +260,21 @@ def case_of(
         maximum_age_s=shadow.cell.execution.maximum_age_s,
     )
     now_s = shadow.late_steps * period_s
-    moment = Moment(observation, q[0], list(item.commanded), now_s=now_s, phase=item.phase)
+    moment = Moment(
+        observation, q[0], list(item.commanded), now_s=now_s, phase=item.phase,
+        q_before=_joints_before(shadow, item, q[0]), measured_at_s=0.0,
+    )  # fmt: skip
     context = context_of(task, shadow.checker, moment, session=session, late_rows=shadow.late_steps)
     proposal = Proposal(metadata, actions, selected_by=SELECTOR)
     return Case(proposal, context, task.scene_poses(observation), task.obstacles, task.free_phases)
+
+
+def _joints_before(shadow: Shadow, item: Observation, q_rad: Array) -> Array | None:
+    """Joint positions (J,), rad, one observation before; None where there is none."""
+    if len(item.history) < 2:
+        return None
+    before, reached = shadow.checker.ik_chunk(shadow.task.action_at(item.history[-2])[None], q_rad)
+    return before[0] if reached[0] else None
 
 
 def admit(shadow: Shadow, case: Case) -> Admitted | Rejected:

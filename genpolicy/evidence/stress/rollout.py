@@ -68,8 +68,7 @@ class Rollout:
         self.recovery = Recovery(fixture.execution.recovery(), self.journal)
         self.outcome: Outcome | None = None
         self.tally = Tally()
-        self.tick = 0
-        self.invocations = 0
+        self.tick = self.invocations = 0
         self.wanted: InFlight | None = None
         self._flying: list[InFlight] = []
         self._arrived: deque[tuple[InFlight, int]] = deque()
@@ -81,6 +80,7 @@ class Rollout:
         before = [self.world.last_action] * COMMANDS_AT_THE_BOUNDARY
         self._commanded: deque[Array] = deque(before, maxlen=COMMANDS_AT_THE_BOUNDARY)
         self.history: deque[Array] = deque(maxlen=fixture.horizons.observation_horizon)
+        self._measured: deque[Array] = deque(maxlen=2)
         self._disturbance = Disturbance(fixture, self.world, start=start_index)
         self.executor.set_active(0.0, fixture.checkpoint, fixture.sampler)
 
@@ -104,6 +104,8 @@ class Rollout:
         now_s, world = self.now_s, self.world
         observation = world.observe()
         self.history.append(observation)
+        self._measured.append(world.q_meas)
+        self.journal.scene(now_s, self.fixture.task.scene_poses(observation))
         position, _ = world.tcp_pose
         self.tally.path_m.append(np.array(position))
         divergence_m = float(np.linalg.norm(position - world.last_action[:3]))
@@ -317,10 +319,11 @@ class Rollout:
     def _moment(self) -> Moment:
         return Moment(
             observation=self.history[-1],
-            q_meas=self.world.q_meas,
+            q_meas=self._measured[-1],
             commanded=list(self._commanded),
             now_s=self.now_s,
             phase=self.world.phase,
+            q_before=self._measured[0] if len(self._measured) > 1 else None,
         )
 
     def _session(self, checkpoint: str, sampler: str) -> Session:

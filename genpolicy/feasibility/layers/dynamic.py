@@ -1,4 +1,10 @@
-"""The dynamic layer: period, joint velocity, acceleration and jerk, speed and turn of the TCP."""
+"""The dynamic layer: period, rates of joints and TCP, torques, and the step from where the arm is.
+
+Rates of commands are held against the part of the robot's limits that commands may use. The arm is
+never quite where its last command is: it lags, it was pushed, it was held. What it needs to follow
+from there is held against the robot's limits as its maker gives them; the part that commands leave
+free is what there is to catch up with.
+"""
 
 from collections.abc import Sequence
 
@@ -14,6 +20,7 @@ Array = NDArray[np.float64]
 
 PERIOD_TOLERANCE_S = 1e-9
 ROUNDING = 1e-6  # relative; a step that was limited to its limit must not fail by rounding
+AGE_ROUNDING_S = 1e-9
 JERK_HISTORY = 2  # commands before the last one that jerk rests on
 
 
@@ -27,11 +34,18 @@ def margins(batch: Batch, cell: Cell) -> Margins:
     joint_jerk            min over joints of limit - |D^3 q| / T^3, rad/s^3
     tcp_speed             limit - |D p| / T, m/s
     tcp_turn              limit - angle of a step / T, rad/s
+    joint_torque          min over joints of limit - |torque of the commanded motion|, N m
+    measured_velocity     min over joints of limit - |q_1 - q_meas| / t, rad/s
+    measured_acceleration min over joints of limit - |(q_1 - q_cmd) / T - dq_meas| / t, rad/s^2
+    state_age             min of (allowed age - age of the measured state, that age), s
     ====================  =====================================================================
 
     Source:
         Backward differences D. They rest on given commands only: what is not known before the
-        boundary is not assumed, and the margin is inf where there are too few points.
+        boundary is not assumed, and the margin is inf where there are too few points. q_1 is the
+        first executable row, t the time from the measurement to the end of that row's period: in
+        t the arm must have come from where it was to q_1, and from its velocity to that of the
+        first step, whose mean lies as far before its end as dq_meas's before the measurement.
     """
     settings, period_s = cell.settings, cell.action_period_s
     off = np.array([abs(p.metadata.action_period_s - period_s) for p in batch.projected])
@@ -44,7 +58,51 @@ def margins(batch: Batch, cell: Cell) -> Margins:
         **_joint_rates(batch, cell),
         "tcp_speed": settings.tcp_speed_limit_m_s * (1 + ROUNDING) - speed.max(axis=1),
         "tcp_turn": settings.tcp_turn_limit_rad_s * (1 + ROUNDING) - turn.max(axis=1),
+        "joint_torque": _torque(batch, cell),
+        **_from_measured(batch, cell),
     })  # fmt: skip
+
+
+def _torque(batch: Batch, cell: Cell) -> Array:
+    """Torques at every command with one known on either side; inf without any. Shape (B,)."""
+    q, period_s = batch.solved.q_rad, cell.action_period_s
+    histories = [c.q_cmd_history for c in batch.contexts]
+    before = _history(histories, q.shape[-1])[:, -1:]
+    path = np.concatenate([before, batch.q_cmd_rad[:, None], q], axis=1)
+    speed = (path[:, 2:] - path[:, :-2]) / (2 * period_s)
+    acceleration = np.diff(path, n=2, axis=1) / period_s**2
+    flat = (value.reshape(-1, q.shape[-1]) for value in (path[:, 1:-1], speed, acceleration))
+    torque = cell.dynamics.torque(*flat).reshape(speed.shape)
+    left = np.min(cell.limits.torque_nm - np.abs(torque), axis=2)
+    unknown = np.array([not len(history) for history in histories])
+    left[unknown, 0] = np.inf
+    smallest: Array = left.min(axis=1)
+    return smallest
+
+
+def _from_measured(batch: Batch, cell: Cell) -> dict[str, Array]:
+    """Margins of the first step, from where the arm was measured. Shapes (B,)."""
+    limits, period_s = cell.limits, cell.action_period_s
+    first, contexts = batch.solved.q_rad[:, 0], batch.contexts
+    ends_s = [
+        chunk.metadata.action_start_time_s + (context.first_index + 1) * period_s
+        for chunk, context in zip(batch.projected, contexts, strict=True)
+    ]
+    time_s = np.array(ends_s) - [c.measured_at_s for c in contexts]
+    time_s = np.where(time_s > 0, time_s, np.nan)[:, None]  # no time to get there: refused
+    velocity = (first - np.stack([c.q_meas for c in contexts])) / time_s
+    step = (first - batch.q_cmd_rad) / period_s
+    known = np.array([c.dq_meas is not None for c in contexts])
+    came = [s if c.dq_meas is None else c.dq_meas for s, c in zip(step, contexts, strict=True)]
+    acceleration = (step - np.stack(came)) / time_s
+    ages_s = np.array([c.now_s - c.measured_at_s for c in contexts])
+    allowed_s = np.array([c.maximum_age_s for c in contexts])
+    left = np.min(limits.acceleration_rad_s2 - np.abs(acceleration), axis=1)
+    return {
+        "measured_velocity": np.min(limits.velocity_rad_s - np.abs(velocity), axis=1),
+        "measured_acceleration": np.where(known, left, np.inf),
+        "state_age": np.minimum(allowed_s - ages_s, ages_s) + AGE_ROUNDING_S,
+    }
 
 
 def _joint_rates(batch: Batch, cell: Cell) -> dict[str, Array]:

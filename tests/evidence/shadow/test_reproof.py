@@ -15,13 +15,21 @@ from genpolicy.feasibility.admission import Admitted, FeasibilityChecker
 from genpolicy.feasibility.checks import without
 from genpolicy.feasibility.figures import expected_motion
 from genpolicy.verification.checker import check_messages
+from genpolicy.verification.motion import MotionProof
 
 BY_CHECK = {item.check: item for item in CORRUPTIONS if item.check}
 RULES = {
     "workspace": "P6.workspace",
     "unreachable": "P6.pose",
     "scene_collision": "P6.collision",
+    "self_collision": "P6.collision",
     "joint_velocity": "P6.joint_speed",
+    "joint_acceleration": "P6.joint_acceleration",
+    "joint_jerk": "P6.joint_jerk",
+    "joint_torque": "P6.torque",
+    "measured_velocity": "P6.measured_speed",
+    "measured_acceleration": "P6.measured_acceleration",
+    "state_age": "P6.state_age",
     "tcp_speed": "P6.tcp_speed",
     "tcp_turn": "P6.tcp_turn",
 }
@@ -53,6 +61,20 @@ def items(observations):
 def clean(shadow, items):
     item = next(item for item in items if item.phase == "approach")
     return journal(shadow, item, case_of(shadow, item, item.demonstrated, number=0), "held_out")
+
+
+def of_kind(messages, kind):
+    return [message for found, message in messages if found == kind]
+
+
+def move(messages, body, x_m, *, seen=True):
+    """The body stood elsewhere when the chunk was checked, and was seen there (or not)."""
+    told = [enqueued(messages)["motion"]["scene"]]
+    told += [message["bodies"] for message in of_kind(messages, "scene") if seen]
+    for scene in told:
+        pose = np.frombuffer(bytes.fromhex(scene[body])).copy()
+        pose[0] += x_m
+        scene[body] = encode_actions(pose)
 
 
 def enqueued(messages):
@@ -122,10 +144,54 @@ def test_what_is_held_may_touch_the_target_in_contact_phases_only(shadow, items)
     item = next(item for item in items if item.phase == "insert")
     case = case_of(shadow, item, item.demonstrated, number=0)
     messages = journal(shadow, item, case, "held_out")
-    scene = enqueued(messages)["motion"]["scene"]
-    target = shadow.checker.collision.shapes.target_body
-    pose = np.frombuffer(bytes.fromhex(scene[target])).copy()
-    pose[0] += 0.012  # a wall of the target stands in what is held
-    scene[target] = encode_actions(pose)
+    move(messages, shadow.checker.collision.shapes.target_body, 0.012)  # a wall in what is held
     assert not rules(messages, shadow)
     assert "P6.collision" in rules(messages, shadow, contact_phases=frozenset())
+
+
+def test_a_scene_that_nobody_saw_is_found(clean, shadow):
+    assert of_kind(clean, "scene")
+    move(clean, shadow.checker.collision.shapes.target_body, 1e-6, seen=False)
+    assert rules(clean, shadow) == {"P6.scene"}
+
+
+def test_without_a_seen_scene_nothing_is_believed(clean, shadow):
+    for message in of_kind(clean, "scene"):
+        message["bodies"] = {}
+    assert rules(clean, shadow) == {"P6.scene"}
+
+
+def test_a_state_of_after_the_row_is_found(clean, shadow):
+    """Measured when the first row had ended: nothing is left of the time to get there."""
+    chunk = enqueued(clean)
+    first = chunk["checked_rows"][0] + 1
+    chunk["motion"]["measured_ns"] = chunk["start_ns"] + first * chunk["period_ns"]
+    assert rules(clean, shadow) == {"P6.measured_speed", "P6.state_age"}
+
+
+def test_commands_before_that_do_not_fit_are_found(clean, shadow):
+    """The journal says which commands the chunk went on from; a leap in them is a leap."""
+    motion = enqueued(clean)["motion"]
+    before = np.frombuffer(bytes.fromhex(motion["q_before_rad"])).copy()
+    before[-1] += 0.2
+    motion["q_before_rad"] = encode_actions(before)
+    assert "P6.joint_acceleration" in rules(clean, shadow)
+
+
+def test_a_robot_with_weaker_joints_is_not_proved(clean, shadow):
+    assert "P6.torque" in rules(clean, shadow, torque_nm=np.full(7, 1.0))
+
+
+def test_links_of_the_arm_may_not_meet_either(shadow):
+    """MuJoCo is asked about every pair with three joints between; the layers about the tool."""
+    arm = shadow.checker.kinematics
+    proof = MotionProof(expected_motion(shadow.checker.cell))
+    generator = np.random.default_rng(0)
+    found = set()
+    for q_rad in generator.uniform(arm.lower_rad, arm.upper_rad, (400, arm.joint_count)):
+        proof._pose(q_rad, 0.02, False, {})
+        found |= {text.split(" is ")[0] + "," + text.split(" in ")[1] for _, text in
+                  proof._touching(False, False)}  # fmt: skip
+    links = {pair for pair in found if pair.count("link") == 2}
+    assert links & {"link0,link5.", "link5,link0.", "link0,link6.", "link6,link0."}
+    assert not {pair for pair in found if {"link0", "link1"} == set(pair.rstrip(".").split(","))}

@@ -6,15 +6,25 @@ import numpy as np
 import pytest
 
 from genpolicy.contract.action import join_action
-from genpolicy.feasibility.batch import Solution
+from genpolicy.contract.chunk import Projected
+from genpolicy.feasibility.batch import Batch, Solution
 from genpolicy.feasibility.layers.dynamic import margins
+from genpolicy.robot.dynamics import ArmDynamics
 
 RATES = ("joint_velocity", "joint_acceleration", "joint_jerk", "tcp_speed")
+STATE = ("joint_torque", "measured_velocity", "measured_acceleration", "state_age")
 
 
 def yaw(angle):
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.0]])
+
+
+def jolted(ctx, acceleration, *, joint):
+    """The commands before came in at a speed that stopping takes this acceleration for."""
+    history = np.tile(ctx.q_cmd, (2, 1))
+    history[:, joint] += np.array([2.0, 1.0]) * acceleration * 0.05**2
+    return replace(ctx, q_cmd_history=history)
 
 
 @pytest.fixture(scope="module")
@@ -38,10 +48,17 @@ def cases(checker, kit):
             join_action(np.linspace(start, high, 5)[1:], flat[:4], 0.0), ctx, others=RATES
         ),
         "tcp_turn": kit.Outside(turned, ctx, others=("joint_acceleration", "joint_velocity")),
+        "joint_torque": kit.Outside(
+            np.tile(ctx.last_action, (kit.K, 1)), jolted(ctx, 300.0, joint=1),
+            others=("joint_acceleration", "joint_jerk"),
+        ),
+        "measured_velocity": kit.Outside(good, replace(ctx, q_meas=ctx.q_cmd - 0.12)),
+        "measured_acceleration": kit.Outside(good, replace(ctx, dq_meas=np.full(7, 0.5))),
+        "state_age": kit.Outside(good, replace(ctx, state_time_s=ctx.now_s - 0.31)),
     }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", ["action_period", *RATES, "tcp_turn"])
+@pytest.mark.parametrize("name", ["action_period", *RATES, "tcp_turn", *STATE])
 def test_outside_is_refused_by_exactly_this_check(name, cases, build, kit):
     assert list(cases) == kit.names_of("dynamic")
     kit.turns_red(build, name, cases[name])
@@ -88,3 +105,64 @@ def test_a_missing_history_is_not_invented(checker, kit):
     assert kit.judge(checker, good, replace(ctx, q_cmd_history=np.zeros((0, 7)))).passed
     rejected = kit.judge(checker, good, replace(ctx, q_cmd_history=moved))
     assert rejected.first_reason == "joint_acceleration"
+
+
+def of_one_row(kit, cell, ctx, **meta):
+    """Margins where the arm is told to stay where its last command is."""
+    chunk = Projected(kit.proposal(ctx.last_action[None], **meta), ctx.last_action[None], 0.0, 0.0)
+    return margins(kit.solved(Batch((chunk,), (ctx,)), cell), cell).values
+
+
+def test_the_step_from_the_measured_state_by_hand(checker, cell, kit):
+    """One joint is 0.05 rad behind: in one period 1 rad/s, in two half of it."""
+    ctx = kit.context(checker, kit.START)
+    q_meas = np.array(ctx.q_cmd)
+    q_meas[0] -= 0.05
+    behind = replace(ctx, q_meas=q_meas, dq_meas=np.array([-0.3, 0, 0, 0, 0, 0, 0]))
+    limits = cell.limits
+    for rows_away, time_s in ((0, 0.05), (1, 0.10)):
+        found = of_one_row(kit, cell, behind, action_start_time_s=10.0 + 0.05 * rows_away)
+        assert found["measured_velocity"][0] == pytest.approx(
+            limits.velocity_rad_s[0] - 0.05 / time_s, abs=1e-6
+        )
+        expected = min(limits.acceleration_rad_s2[0] - 0.3 / time_s, 7.5)
+        assert found["measured_acceleration"][0] == pytest.approx(expected, abs=1e-4)
+
+
+def test_an_arm_that_follows_at_the_speed_of_its_commands_need_not_catch_up(checker, cell, kit):
+    """However far behind, within its speed: its velocity is that of the next step already."""
+    ctx = kit.context(checker, kit.START)
+    far = replace(ctx, q_meas=ctx.q_cmd - 0.05, dq_meas=np.zeros(7))
+    found = of_one_row(kit, cell, far)
+    assert found["measured_acceleration"][0] == pytest.approx(7.5, abs=1e-4)
+
+
+def test_an_arm_measured_once_has_no_known_velocity(checker, cell, kit):
+    ctx = kit.context(checker, kit.START)
+    assert of_one_row(kit, cell, ctx)["measured_acceleration"][0] == np.inf
+
+
+@pytest.mark.parametrize("start_s", [9.95, 9.9])
+def test_a_row_that_ended_before_the_measurement_is_refused(start_s, checker, cell, kit):
+    """Nothing is left of the time to get there."""
+    ctx = kit.context(checker, kit.START)
+    found = of_one_row(kit, cell, ctx, action_start_time_s=start_s)
+    assert not found["measured_velocity"][0] >= 0
+
+
+@pytest.mark.parametrize(
+    ("age_s", "feasible"), [(0.0, True), (0.3, True), (0.31, False), (-0.01, False)]
+)
+def test_a_state_is_neither_old_nor_of_the_future(age_s, feasible, checker, cell, kit):
+    ctx = replace(kit.context(checker, kit.START), state_time_s=10.0 - age_s)
+    assert (of_one_row(kit, cell, ctx, action_start_time_s=10.2)["state_age"][0] >= 0) == feasible
+
+
+def test_torque_is_that_of_the_path_with_what_it_knows(checker, cell, kit):
+    """Standing still the arm bears its weight; without a command before, nothing is known."""
+    ctx = kit.context(checker, kit.START)
+    still = ArmDynamics(cell.kinematics).torque(ctx.q_cmd[None], np.zeros((1, 7)), np.zeros((1, 7)))
+    left = np.min(cell.limits.torque_nm - np.abs(still))
+    assert of_one_row(kit, cell, ctx)["joint_torque"][0] == pytest.approx(left, abs=1e-2)
+    alone = replace(ctx, q_cmd_history=np.zeros((0, 7)))
+    assert of_one_row(kit, cell, alone)["joint_torque"][0] == np.inf

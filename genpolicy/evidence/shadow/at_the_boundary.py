@@ -1,0 +1,91 @@
+"""Corruptions where commands, or the arm itself, came from: what a chunk at rest cannot go on from.
+
+The arm is told to stay where its last command is, so nothing in the chunk is wrong. Wrong is how
+its commands came there, where it was measured, how fast, or when.
+"""
+
+import numpy as np
+
+from genpolicy.evidence.shadow.at_the_margin import BEYOND
+from genpolicy.evidence.shadow.case import Case, alone, still
+from genpolicy.feasibility.admission import FeasibilityChecker
+
+UNSTOPPABLE = 4.0  # times the robot's acceleration: no projection can go on from it
+JOLTS = (4.0, 8.0, 16.0, -4.0, -8.0, -16.0)  # likewise; with gravity, and against it
+
+
+def broken_boundary(case: Case, checker: FeasibilityChecker) -> Case | None:
+    """The commands before came in so fast that nothing can go on from them without a jolt.
+
+    A chunk that is merely rough is no such case: projection smooths it.
+    """
+    cases = [
+        _after(case, checker, joint, (-2 * step, -step))
+        for joint, step in enumerate(UNSTOPPABLE * checker.cell.limits.acceleration_rad_s2)
+    ]
+    return alone(checker, cases, "joint_acceleration")
+
+
+def jolt_before(case: Case, checker: FeasibilityChecker) -> Case | None:
+    """The arm stands still after a jump of its commands: too much jerk, no acceleration."""
+    limit = checker.cell.usable_limits.jerk_rad_s3 * checker.cell.action_period_s
+    cases = [_after(case, checker, joint, (-2 * step, 0.0)) for joint, step in enumerate(limit)]
+    return alone(checker, cases, "joint_jerk")
+
+
+def heavy_jolt(case: Case, checker: FeasibilityChecker) -> Case | None:
+    """The commands before came in so fast that stopping them takes more torque than a joint has.
+
+    This arm is light: a torque beyond its limit needs an acceleration beyond it.
+    """
+    limit = checker.cell.limits.acceleration_rad_s2
+    cases = [
+        _after(case, checker, joint, (-2 * times * step, -times * step))
+        for times in JOLTS
+        for joint, step in enumerate(limit)
+    ]
+    return alone(checker, cases, "joint_torque", ("joint_acceleration", "joint_jerk"))
+
+
+def left_behind(case: Case, checker: FeasibilityChecker) -> Case | None:
+    """The arm did not follow its commands, and stands where it cannot catch up in time."""
+    here = still(case, checker, case.context.q_cmd)
+    away = BEYOND * checker.cell.limits.velocity_rad_s * _time_left_s(here, checker)
+    cases = []
+    for joint, way in enumerate(away):
+        q_rad = np.array(case.context.q_cmd)
+        q_rad[joint] -= way
+        cases.append(here.with_context(q_meas=q_rad))
+    return alone(checker, cases, "measured_velocity")
+
+
+def pushed_aside(case: Case, checker: FeasibilityChecker) -> Case | None:
+    """The arm is where it was told to be, but moves too fast to stop there in time."""
+    here = still(case, checker, case.context.q_cmd)
+    speeds = BEYOND * checker.cell.limits.acceleration_rad_s2 * _time_left_s(here, checker)
+    cases = [here.with_context(dq_meas=row) for row in np.diag(speeds)]
+    return alone(checker, cases, "measured_acceleration")
+
+
+def old_state(case: Case, checker: FeasibilityChecker) -> Case | None:
+    """The arm was measured longer ago than anything may be acted on; it stood still then."""
+    here = still(case, checker, case.context.q_cmd)
+    measured_s = here.context.now_s - here.context.maximum_age_s - checker.cell.action_period_s
+    return alone(checker, [here.with_context(state_time_s=measured_s)], "state_age")
+
+
+def _time_left_s(case: Case, checker: FeasibilityChecker) -> float:
+    """From the measurement to the end of the first row's period, s."""
+    row = case.context.first_index + 1
+    ends_s = case.proposal.metadata.action_start_time_s + row * checker.cell.action_period_s
+    return float(ends_s - case.context.measured_at_s)
+
+
+def _after(
+    case: Case, checker: FeasibilityChecker, joint: int, offsets: tuple[float, float]
+) -> Case:
+    """The arm is told to stay; its commands before were off by so much / T^2 in one joint."""
+    history = np.tile(case.context.q_cmd, (2, 1))
+    history[:, joint] += np.array(offsets) * checker.cell.action_period_s**2
+    here = still(case, checker, case.context.q_cmd)
+    return here.with_context(q_cmd_history=history)
