@@ -24,11 +24,19 @@ def require_contract_of_task(manifest: Mapping[str, Any], *, where: str) -> None
         ContractError: Other observations, other actions or other phases than the task has.
     """
     identity = read_json(IDENTITY)
-    stated = {name: (manifest[f"{name}_contract"]["sha256"], identity[f"{name}_sha256"])
-              for name in CONTRACTS}  # fmt: skip
-    stated["phase"] = (list(manifest["phases"]), identity["phases"]["all"])
+    of_task, task = str(IDENTITY), _at(identity, "name", where=str(IDENTITY))
+    stated = {
+        name: (
+            _at(manifest, f"{name}_contract", "sha256", where=where),
+            _at(identity, f"{name}_sha256", where=of_task),
+        )
+        for name in CONTRACTS
+    }
+    stated["phase"] = (
+        _at(manifest, "phases", where=where), _at(identity, "phases", "all", where=of_task)
+    )  # fmt: skip
     for name, (found, expected) in stated.items():
-        _require(f"{where}: {name}", found, expected, f"as {identity['name']} defines it")
+        _require(f"{where}: {name}", found, expected, f"as {task} defines it")
 
 
 def require_one_contract(*trained: str, dataset: bool = True) -> None:
@@ -46,13 +54,34 @@ def require_one_contract(*trained: str, dataset: bool = True) -> None:
         require_contract_of_task(read_json(MANIFEST), where=str(MANIFEST))
     for stage in trained:
         for path in sorted((ARTIFACTS / stage).glob("*/seed_*/config.json")):
-            provenance = read_json(path)["provenance"]
+            config = read_json(path)
+            task = _at(identity, "name", where=str(IDENTITY))
             for name in CONTRACTS:
-                found, expected = provenance[f"{name}_contract_sha256"], identity[f"{name}_sha256"]
-                _require(f"{path}: {name}", found, expected, f"as {identity['name']} defines it")
+                found = _at(config, "provenance", f"{name}_contract_sha256", where=str(path))
+                expected = _at(identity, f"{name}_sha256", where=str(IDENTITY))
+                _require(f"{path}: {name}", found, expected, f"as {task} defines it")
             if dataset:
-                found = provenance["dataset_manifest_sha256"]
+                found = _at(config, "provenance", "dataset_manifest_sha256", where=str(path))
                 _require(f"{path}: dataset", found, sha256_file(MANIFEST), str(MANIFEST))
+
+
+def _at(document: Any, *keys: str, where: str) -> Any:
+    """What stands at these keys of a document.
+
+    Raises:
+        ContractError: It stops before, or ends with nothing.
+    """
+    value = document
+    for key in keys:
+        value = value.get(key) if isinstance(value, Mapping) else None
+    if value is None:
+        raise ContractError(
+            where=f"{where}: {'.'.join(keys)}",
+            found="missing",
+            expected="what its stage wrote there",
+            action="Restore the file, or run the stage that writes it (`dvc repro`).",
+        )
+    return value
 
 
 def _require(where: str, found: object, expected: object, what: str) -> None:

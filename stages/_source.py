@@ -119,7 +119,9 @@ def refuse_foreign_files() -> None:
         BadInputError: A file in the folder of `record` or `ingest` that the stage did not write.
     """
     index = ARTIFACTS / "record" / INDEX_FILE
-    own: dict[str, Any] = read_json(index).get("files", {}) if index.is_file() else {}
+    listed = read_json(index) if index.is_file() else None
+    files = listed.get("files") if isinstance(listed, dict) else None
+    own: dict[str, Any] = files if isinstance(files, dict) else {}
     for path in _files(ARTIFACTS / "record"):
         name = path.relative_to(index.parent).as_posix().removeprefix("episodes/")
         if path != index and own.get(name) != sha256_file(path):

@@ -15,10 +15,9 @@ from genpolicy.evidence.shadow.observations import (
     spread,
     two_mode_observations,
 )
-from genpolicy.evidence.shadow.session import Cell
 from genpolicy.evidence.shadow.shadow import Shadow, shadow_policy
 from genpolicy.evidence.shadow.tables import write_shadow
-from genpolicy.execution.cell import ExecutionSettings
+from genpolicy.execution.cell import Cell, ExecutionSettings
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import output_folder
 from genpolicy.policies.matched_training import PolicySettings

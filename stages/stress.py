@@ -6,11 +6,10 @@ from gates.proof import admit
 from genpolicy.candidates.judged import compared
 from genpolicy.evidence.reproducibility.latency import latency_models
 from genpolicy.evidence.rows.reproducibility import LatencyRow
-from genpolicy.evidence.shadow.session import Cell
 from genpolicy.evidence.stress.matched import Comparison, matched_starts
 from genpolicy.evidence.stress.settings import StressSettings
 from genpolicy.evidence.stress.tables import plan_shards, power_document, write_stress
-from genpolicy.execution.cell import ExecutionSettings
+from genpolicy.execution.cell import Cell, ExecutionSettings
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import output_folder, write_bytes
 from genpolicy.integrity.documents import canonical_json

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from gates.cause import CauseLimits, limits_of
+from gates.cause import CauseLimits, CauseName, limits_of
 from gates.criterion import criteria_of
 from gates.engine import GateSpec, Judged
 from gates.evidence import MissingEvidenceError
@@ -20,6 +20,19 @@ from gates.report import stage_of
 from gates.settings import read_limits, read_params, read_settings
 
 ONE_MODE = "Gate D asks that in motion, against `one_mode_bc`."
+SIMPLER = (
+    "Next: run the simpler policy that is named above; nothing in the data has to be mended. Where "
+    "its interval holds the limit, it may do or may not: record more episodes to know."
+)
+SIMPLER_ASKED = frozenset(
+    item.id
+    for item in (
+        simpler.chunking_valid_share,
+        simpler.remedy_valid_share,
+        simpler.factor_valid_share,
+        simpler.baseline_mode_coverage,
+    )
+)
 
 
 def _cause(judged: Judged) -> str:
@@ -29,6 +42,9 @@ def _cause(judged: Judged) -> str:
     except MissingEvidenceError as error:
         return f"Cause unknown: {error}."
     text = f"Cause found by the audit: {cause.text}."
+    unmet = {answer.id for answer in judged.answers if answer.verdict != "PASS"}
+    if cause.name is CauseName.VALID_MODES and unmet and unmet <= SIMPLER_ASKED:
+        return f"{text} {SIMPLER}"
     if judged.verdict != "PASS":
         return f"{text} Next: {cause.next_action}"
     return f"{text} One mode alone may still be enough: {ONE_MODE}"

@@ -1,7 +1,5 @@
 """What claims to be an admitted chunk is read here; nothing is asked of what cannot be read."""
 
-from collections.abc import Callable
-
 import numpy as np
 
 from genpolicy.contract.action import ACTION_DIM
@@ -66,13 +64,9 @@ class Arrivals:
     Args:
         queue: Where it goes.
         checks: The table.
-        genuine: Tells a chunk that feasibility issued from an imitation.
     """
 
-    def __init__(
-        self, queue: ChunkQueue, checks: Checks, genuine: Callable[[object], bool]
-    ) -> None:
-        self.genuine = genuine
+    def __init__(self, queue: ChunkQueue, checks: Checks) -> None:
         self._queue = queue
         self._checks = checks
         self._names: set[str] = set()
@@ -83,12 +77,13 @@ class Arrivals:
         """Enqueue a chunk of this source, or discard it and say why."""
         rows, name = shape_of(admitted)
         arrival = self._queue.arrive(rows)
-        genuine = self.genuine(admitted)
-        known = genuine and name in self._names
-        if genuine:  # an imitation must not use up the name of a chunk to come
+        known, issued = name in self._names, issued_by_feasibility(admitted)
+        moment = Moment(now_ns=now_ns, view=view, known=known, issued=issued)
+        at_door = refusal(self._checks, Place.DOOR, moment)
+        about = None
+        if at_door is None:  # what is turned away must not use up the name of a chunk to come
             self._names.add(name)
-        about = read_chunk(admitted, arrival=arrival, source=source) if genuine else None
-        at_door = refusal(self._checks, Place.DOOR, Moment(now_ns=now_ns, view=view, known=known))
+            about = read_chunk(admitted, arrival=arrival, source=source)
         if at_door is not None:
             reason = at_door.reason
         elif about is None:

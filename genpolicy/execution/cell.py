@@ -1,23 +1,49 @@
-"""Section `execution`: how executor, supervisor and recovery of the simulated cell are set."""
+"""Section `execution`, and the cell that runs under it: one home of what holds in execution.
+
+Executor, controller stub, supervisor and recovery all read the section itself; nothing is copied
+out of it. Times are in s; whole ns, for those who compare, are derived here.
+"""
 
 from collections.abc import Iterable
-from typing import Any
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import cached_property
+from typing import Annotated, Any
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.contract.settings import Settings
 from genpolicy.errors import ConfigError
-from genpolicy.execution.recovery import RecoverySettings, RecoveryState
-from genpolicy.execution.settings import ExecutorSettings
-from genpolicy.execution.supervisor import SupervisorSettings
+from genpolicy.execution.moment import View
+from genpolicy.execution.nanoseconds import to_ns
 
 DEFAULT = "default"
 """Key of a table by phase whose value holds for every phase that the table does not name."""
 
+FALLBACK_HASH = "classical-fallback"
+"""Identity of the task's fallback planner, in place of a checkpoint and of a sampler."""
+
+NotNegative = Annotated[float, Field(ge=0)]
+
+
+class RecoveryState(StrEnum):
+    """Where recovery stands; IDLE while the policy commands."""
+
+    IDLE = "idle"
+    HOLD = "hold"
+    RETREAT = "retreat"
+    CLASSICAL_RETURN = "classical_return"
+    ASK_HUMAN = "ask_human"
+    ABORT = "abort"
+    STOPPED = "stopped"
+
+
+PRIMITIVES = (RecoveryState.RETREAT, RecoveryState.CLASSICAL_RETURN)
+
 
 class ExecutionSettings(Settings):
-    """Section `execution`: fixtures of the executor and the supervisor, equal for all methods.
+    """Section `execution`: fixtures of executor, supervisor and recovery, equal for all methods.
 
     The phases are those of `force_limit_n`, which has no default: each names its own limit.
     `maximum_age_s` and `recovery_plans` may name a `default` and the phases that differ from it,
@@ -26,34 +52,40 @@ class ExecutionSettings(Settings):
     Attributes:
         replan_lead_steps: Executable actions left at which the next invocation begins.
         deadline_s: An invocation that takes longer has missed its deadline and is given up.
-        watchdog_s: Silence after which the stub holds.
-        queue_capacity: Chunks kept.
+        watchdog_s: Silence after which the stub holds; at least one period. Polled every period,
+            the hold comes within `period + watchdog` (P2).
+        queue_capacity: Chunks kept; the oldest is dropped beyond it.
         maximum_age_s: Largest action age by phase, less than a chunk's validity (execution
-            horizon times period), or it would refuse nothing; one number for all.
+            horizon times period), or it would refuse nothing; one number for all. A phase without
+            one accepts nothing.
         maximum_divergence_m: Measured against commanded TCP, beyond which chunks are void.
-        force_limit_n: Contact force by phase at which the simulated supervisor stops. A fixture
-            of the simulation, not a value for any robot.
+        force_limit_n: Contact force by phase at which the simulated supervisor stops; a phase
+            without one has limit 0. A fixture of the simulation, not a value for any robot.
         hold_before_recovery_s: Silence after which recovery begins.
         recovery_hold_s: Hold at the start of a recovery.
-        primitive_timeout_s: Longest fallback primitive.
-        human_timeout_s: How long recovery waits for a person.
-        maximum_failures: Failed primitives before it aborts.
-        recovery_plans: Primitives by phase.
+        primitive_timeout_s: Longest fallback primitive; one that takes longer has failed.
+        human_timeout_s: How long recovery waits for a person before it aborts.
+        maximum_failures: Failed primitives before it aborts, and recoveries begun after which it
+            asks a person at once.
+        recovery_plans: Primitives by phase, in order, each at most once; a phase without any holds
+            and asks a person.
+        silence_stop_s: Silence after which the supervisor stops; None: it holds, however long.
     """
 
-    replan_lead_steps: int
-    deadline_s: float
-    watchdog_s: float
-    queue_capacity: int
-    maximum_age_s: dict[str, float]
-    maximum_divergence_m: float
-    force_limit_n: dict[str, float]
-    hold_before_recovery_s: float
-    recovery_hold_s: float
-    primitive_timeout_s: float
-    human_timeout_s: float
-    maximum_failures: int
-    recovery_plans: dict[str, list[str]]
+    replan_lead_steps: int = Field(ge=0)
+    deadline_s: float = Field(gt=0)
+    watchdog_s: float = Field(gt=0)
+    queue_capacity: int = Field(ge=1)
+    maximum_age_s: dict[str, NotNegative]
+    maximum_divergence_m: NotNegative
+    force_limit_n: dict[str, NotNegative]
+    hold_before_recovery_s: NotNegative
+    recovery_hold_s: NotNegative
+    primitive_timeout_s: NotNegative
+    human_timeout_s: NotNegative
+    maximum_failures: int = Field(ge=1)
+    recovery_plans: dict[str, tuple[RecoveryState, ...]]
+    silence_stop_s: float | None = Field(default=None, gt=0)
 
     @model_validator(mode="before")
     @classmethod
@@ -68,42 +100,68 @@ class ExecutionSettings(Settings):
                 table = {DEFAULT: table}
             if isinstance(table, dict):
                 complete[name] = _complete(name, table, phases)
+        plans = complete.get("recovery_plans")
+        if isinstance(plans, dict):
+            complete["recovery_plans"] = {phase: _plan(phase, plans[phase]) for phase in plans}
         return complete
 
-    def require_phases(self, phases: Iterable[str]) -> None:
-        """Refuse a section whose phases are not the task's.
+
+@dataclass(frozen=True)
+class Cell:
+    """What every session runs under.
+
+    Attributes:
+        horizons: H_o, K, H_e and the period.
+        execution: Settings of executor, stub, supervisor and recovery.
+
+    Raises:
+        ConfigError: A watchdog shorter than a period.
+    """
+
+    horizons: HorizonConfig
+    execution: ExecutionSettings
+
+    def __post_init__(self) -> None:
+        if not self.execution.watchdog_s >= self.horizons.action_period_s:
+            raise ConfigError(
+                where="execution.watchdog_s",
+                found=f"{self.execution.watchdog_s} s",
+                expected=f"at least one period, {self.horizons.action_period_s:g} s",
+                action="Raise it: the watchdog would hold between any two actions.",
+            )
+
+    @cached_property
+    def period_ns(self) -> int:
+        """Time between actions, ns."""
+        return to_ns(self.horizons.action_period_s)
+
+    @property
+    def watchdog_ns(self) -> int:
+        """Silence after which the stub holds, ns."""
+        return to_ns(self.execution.watchdog_s)
+
+    @cached_property
+    def maximum_age_ns(self) -> dict[str, int]:
+        """Largest action age per phase, ns."""
+        return {phase: to_ns(age) for phase, age in self.execution.maximum_age_s.items()}
+
+    def require_task(self, phases: Iterable[str]) -> None:
+        """Refuse a cell that is not for this task, or whose age limits refuse nothing.
 
         Raises:
-            ConfigError: A phase has no limits, or limits are for a phase that does not exist.
+            ConfigError: A phase has no limits, limits are for a phase that does not exist, or no
+                chunk can reach an age limit: it is void before.
         """
-        if set(phases) != set(self.force_limit_n):
+        limits_n = self.execution.force_limit_n
+        if set(phases) != set(limits_n):
             raise ConfigError(
                 where="execution.force_limit_n",
-                found=f"phases {sorted(self.force_limit_n)}",
+                found=f"phases {sorted(limits_n)}",
                 expected=f"the task's: {sorted(phases)}",
                 action="Name a force limit for each phase of the task and for no other.",
             )
-
-    def executor(self, horizons: HorizonConfig) -> ExecutorSettings:
-        """Settings of the executor and its stub.
-
-        Raises:
-            ConfigError: An age limit that no chunk can reach: it is void before.
-        """
-        self._require_ages_that_bind(horizons)
-        return ExecutorSettings(
-            execution_horizon=horizons.execution_horizon,
-            action_period_s=horizons.action_period_s,
-            maximum_age_s=self.maximum_age_s,
-            watchdog_s=self.watchdog_s,
-            queue_capacity=self.queue_capacity,
-            replan_lead_steps=self.replan_lead_steps,
-            maximum_divergence_m=self.maximum_divergence_m,
-        )
-
-    def _require_ages_that_bind(self, horizons: HorizonConfig) -> None:
-        valid_s = horizons.execution_horizon * horizons.action_period_s
-        for phase, age_s in self.maximum_age_s.items():
+        valid_s = self.horizons.execution_horizon * self.horizons.action_period_s
+        for phase, age_s in self.execution.maximum_age_s.items():
             if not age_s < valid_s - 1e-9:
                 raise ConfigError(
                     where=f"execution.maximum_age_s of phase {phase}",
@@ -112,27 +170,12 @@ class ExecutionSettings(Settings):
                     action="Lower it: a limit that nothing can reach refuses nothing.",
                 )
 
-    def supervisor(self, horizons: HorizonConfig) -> SupervisorSettings:
-        """Settings of the simulated supervisor."""
-        return SupervisorSettings(
-            force_limit_n=self.force_limit_n,
-            watchdog_s=self.watchdog_s,
-            action_period_s=horizons.action_period_s,
-        )
-
-    def recovery(self) -> RecoverySettings:
-        """Settings of the recovery state machine."""
-        plans = {
-            phase: tuple(RecoveryState(name) for name in names)
-            for phase, names in self.recovery_plans.items()
-        }
-        return RecoverySettings(
-            plans=plans,
-            hold_s=self.recovery_hold_s,
-            primitive_timeout_s=self.primitive_timeout_s,
-            human_timeout_s=self.human_timeout_s,
-            maximum_failures=self.maximum_failures,
-            maximum_attempts=self.maximum_failures,
+    def first_view(self) -> View:
+        """The view of whoever is held to this, before anything is observed."""
+        return View(
+            fallback=FALLBACK_HASH,
+            execution_horizon=self.horizons.execution_horizon,
+            period_ns=self.period_ns,
         )
 
 
@@ -151,3 +194,16 @@ def _complete(name: str, table: dict[str, Any], phases: list[str]) -> dict[str, 
         for phase in phases
         if phase in table or DEFAULT in table
     }
+
+
+def _plan(phase: str, names: Any) -> tuple[RecoveryState, ...]:
+    """The primitives of a phase."""
+    known = isinstance(names, list | tuple) and all(name in PRIMITIVES for name in names)
+    if not known or len(set(names)) != len(names):
+        raise ConfigError(
+            where=f"execution.recovery_plans of phase {phase}",
+            found=repr(names),
+            expected=f"a list of {' and '.join(PRIMITIVES)}, each at most once",
+            action="Correct it in params.yaml.",
+        )
+    return tuple(RecoveryState(name) for name in names)

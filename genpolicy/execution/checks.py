@@ -164,6 +164,7 @@ _LIVE = (Place.ARRIVAL, Place.QUEUE, Place.STUB)
 CHECKS: Checks = (
     _row("end_of_episode", lambda m: m.view.mode != ExecutorMode.ENDED,
          _R.END_OF_EPISODE, _P.DOOR, _P.QUEUE, _P.STUB),
+    _row("issued", lambda m: m.issued is True, _R.INFEASIBLE, _P.DOOR),
     _row("duplicate", lambda m: m.known is False, _R.DUPLICATE, _P.DOOR),
     _row("infeasible", lambda m: m.chunk.passed, _R.INFEASIBLE, _P.ARRIVAL),
     _row("period", lambda m: m.chunk.times.period_ns == m.view.period_ns,

@@ -8,7 +8,6 @@ from genpolicy.execution.journal import Journal, encode_actions, encode_poses
 from genpolicy.execution.ledger import BEYOND_HORIZON, Conservation, Ledger, QueuedChunk
 from genpolicy.execution.moment import Chunk, Moment, View
 from genpolicy.execution.nanoseconds import to_ns
-from genpolicy.execution.settings import ExecutorSettings
 
 if TYPE_CHECKING:
     from genpolicy.feasibility.admission import Admitted
@@ -22,17 +21,22 @@ LOST_AS = {"execution_horizon": BEYOND_HORIZON}
 class ChunkQueue:
     """Admitted chunks in the order of their arrival.
 
+    Args:
+        capacity: Chunks kept; the oldest is dropped beyond it.
+        journal: Where what enters and leaves goes.
+        checks: The table.
+
     Attributes:
         head: Chunk that the next one must name as predecessor; None after a break of the chain.
         last_accepted: Chunk of the last action that the controller accepted, in this session.
         last_due_ns: Begin of that action's window.
     """
 
-    def __init__(self, settings: ExecutorSettings, journal: Journal, checks: Checks) -> None:
+    def __init__(self, capacity: int, journal: Journal, checks: Checks) -> None:
         self.head: str | None = None
         self.last_accepted: QueuedChunk | None = None
         self.last_due_ns: int | None = None
-        self._settings = settings
+        self._capacity = capacity
         self._journal = journal
         self._checks = checks
         self._chunks: list[QueuedChunk] = []
@@ -84,7 +88,7 @@ class ChunkQueue:
             self._trim(now_ns, old, view, newer_start_ns=about.times.start_ns)
             if old.open_rows == 0:
                 self.close(now_ns, old, DiscardReason.SUPERSEDED)
-        while len(self._chunks) >= self._settings.queue_capacity:
+        while len(self._chunks) >= self._capacity:
             self.close(now_ns, self._chunks[0], DiscardReason.QUEUE_OVERFLOW)
         self._journal.add("enqueue", now_ns, _enqueue_payload(chunk))
         self._chunks.append(chunk)

@@ -6,11 +6,11 @@ ones from its start on. Whatever is doubtful is discarded with one reason, and t
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 
 from genpolicy.contract.chunk import ChunkMetadata, DiscardReason
-from genpolicy.execution.arrival import Arrivals, issued_by_feasibility
+from genpolicy.execution.arrival import Arrivals
+from genpolicy.execution.cell import Cell
 from genpolicy.execution.checks import CHECKS, Checks, missing
 from genpolicy.execution.chunk_queue import ChunkQueue
 from genpolicy.execution.command import Command
@@ -18,7 +18,6 @@ from genpolicy.execution.journal import Journal, session_payload
 from genpolicy.execution.ledger import Conservation
 from genpolicy.execution.moment import FALLBACK, POLICY, ExecutorMode, View
 from genpolicy.execution.nanoseconds import NEVER_NS, NS_PER_S, to_ns
-from genpolicy.execution.settings import ExecutorSettings
 from genpolicy.execution.stub import ControllerStub
 from genpolicy.feasibility.admission import Admitted
 
@@ -27,12 +26,10 @@ class Executor:
     """Queue, freshness and hand-over of admitted chunks; pure: every time is passed in.
 
     Args:
-        settings: Horizons, periods, ages.
+        cell: Horizons, periods, ages.
         journal: Where every event goes; one journal, one session.
         stub: The controller stub with its supervisor.
         checks: The table; a row that is missing is declared in the journal.
-        genuine: Tells a chunk that feasibility issued from an imitation. Another rule than the
-            default is for tests only and is declared in the journal.
 
     Attributes:
         observations_ignored: Observations dropped as older than one already used, or from the
@@ -44,22 +41,21 @@ class Executor:
 
     def __init__(
         self,
-        settings: ExecutorSettings,
+        cell: Cell,
         journal: Journal,
         stub: ControllerStub,
         *,
         checks: Checks = CHECKS,
-        genuine: Callable[[object], bool] = issued_by_feasibility,
     ) -> None:
-        self.settings = settings
+        self.cell = cell
         self.stub = stub
         self.observations_ignored = self.clock_faults = 0
         self.mode = ExecutorMode.RUN
         self._journal = journal
         self._checks = checks
-        self._view = settings.first_view()
-        self._queue = ChunkQueue(settings, journal, checks)
-        self._arrivals = Arrivals(self._queue, checks, genuine)
+        self._view = cell.first_view()
+        self._queue = ChunkQueue(cell.execution.queue_capacity, journal, checks)
+        self._arrivals = Arrivals(self._queue, checks)
         self._in_flight: set[str] = set()
         self._sequence = 0
         self._stops_seen = 0
@@ -103,7 +99,7 @@ class Executor:
         self._view = replace(
             before, newest_observation_ns=event_ns, phase=phase,
             calibration_epoch=calibration_epoch,
-            maximum_age_ns=self.settings.maximum_age_ns.get(phase),
+            maximum_age_ns=self.cell.maximum_age_ns.get(phase),
         )  # fmt: skip
         for kind, old, new, reason in (
             ("phase", before.phase, phase, DiscardReason.PHASE_TRANSITION),
@@ -114,7 +110,8 @@ class Executor:
                 self._journal.add(kind, now_ns, {"event_time_ns": event_ns, "old": old, "new": new})
                 if newest_ns is not None:
                     self._void(now_ns, reason, event_ns)
-        if divergence_m is not None and not self.settings.maximum_divergence_m - divergence_m >= 0:
+        limit_m = self.cell.execution.maximum_divergence_m
+        if divergence_m is not None and not limit_m - divergence_m >= 0:
             self._invalidate(now_ns, event_ns, DiscardReason.OBSERVATION_DIVERGENCE)
         return True
 
@@ -213,7 +210,7 @@ class Executor:
         if self.mode not in (ExecutorMode.RUN, ExecutorMode.FALLBACK):
             return False
         now_ns = self._journal.clock(now_s)
-        return self._queue.remaining(now_ns) <= self.settings.replan_lead_steps
+        return self._queue.remaining(now_ns) <= self.cell.execution.replan_lead_steps
 
     def begin_invocation(self, now_s: float, invocation_id: str, detail: str = "") -> None:
         """An invocation is in flight until `end_invocation` or a reset; `detail` goes on record."""
@@ -288,10 +285,9 @@ class Executor:
         if not self._begun:
             self._begun = True
             payload = session_payload(
-                self.settings,
+                self.cell,
                 labels=self._journal.labels,
                 checks_missing=missing(self._checks, self.stub.checks, self.stub.supervisor.checks),
-                genuine=self._arrivals.genuine is issued_by_feasibility,
             )
             self._journal.add("session", now_ns, payload)
         return now_ns

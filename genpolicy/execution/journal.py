@@ -20,8 +20,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from genpolicy.contract.action import ACTION_DIM
 from genpolicy.errors import BadInputError, ContractError
+from genpolicy.execution.cell import FALLBACK_HASH, Cell
 from genpolicy.execution.nanoseconds import to_ns
-from genpolicy.execution.settings import ExecutorSettings
 from genpolicy.integrity.atomic import write_bytes
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_bytes_of
@@ -34,7 +34,7 @@ MAXIMUM_RECORD_BYTES = 64 << 20
 
 EVENT_FIELDS: dict[str, tuple[str, ...]] = {
     "session": ("version", "labels", "execution_horizon", "period_ns", "maximum_age_ns",
-                "watchdog_ns", "queue_capacity", "fallback_hash", "checks_missing", "admission"),
+                "watchdog_ns", "queue_capacity", "fallback_hash", "checks_missing"),
     "observation": ("event_time_ns", "phase", "calibration_epoch", "used", "ignored_because"),
     "scene": ("bodies",),
     "phase": ("event_time_ns", "old", "new"),
@@ -137,24 +137,22 @@ class Journal:
 
 
 def session_payload(
-    settings: ExecutorSettings,
+    cell: Cell,
     *,
     labels: Mapping[str, str],
     checks_missing: Sequence[str],
-    genuine: bool,
 ) -> dict[str, Any]:
     """Payload of the first event: what the session is held to."""
     return {
         "version": JOURNAL_VERSION,
         "labels": dict(labels),
-        "execution_horizon": settings.execution_horizon,
-        "period_ns": settings.period_ns,
-        "maximum_age_ns": settings.maximum_age_ns,
-        "watchdog_ns": settings.watchdog_ns,
-        "queue_capacity": settings.queue_capacity,
-        "fallback_hash": settings.fallback_hash,
+        "execution_horizon": cell.horizons.execution_horizon,
+        "period_ns": cell.period_ns,
+        "maximum_age_ns": cell.maximum_age_ns,
+        "watchdog_ns": cell.watchdog_ns,
+        "queue_capacity": cell.execution.queue_capacity,
+        "fallback_hash": FALLBACK_HASH,
         "checks_missing": list(checks_missing),
-        "admission": "feasibility" if genuine else "imitation",
     }
 
 

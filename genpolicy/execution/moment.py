@@ -118,6 +118,7 @@ class Moment:
             a chunk that will be too old when it begins is too old now.
         row: The row in question.
         known: A chunk of this name was here before.
+        issued: Feasibility made this very object, and its actions are unchanged.
         same_action: The offered action is the admitted row, bit for bit.
         head: Chunk that the next one may name as predecessor.
         accepted_condition_ns: Observation under the action accepted last; None before the first.
@@ -138,6 +139,7 @@ class Moment:
     first_use_ns: int | None = None
     row: int | None = None
     known: bool | None = None
+    issued: bool | None = None
     same_action: bool | None = None
     head: str | None = None
     accepted_condition_ns: int | None = None

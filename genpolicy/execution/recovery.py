@@ -5,17 +5,21 @@ state; failures are bounded; every transition is journaled. The trajectory of a 
 from the task and goes through feasibility like any other proposal.
 """
 
-import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
-from enum import StrEnum
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.contract.chunk import ChunkMetadata, Proposal
-from genpolicy.errors import ConfigError, ContractError
+from genpolicy.errors import ContractError
+from genpolicy.execution.cell import (
+    FALLBACK_HASH,
+    PRIMITIVES,
+    ExecutionSettings,
+    RecoveryState,
+)
 from genpolicy.execution.executor import Executor
 from genpolicy.execution.journal import Journal
 from genpolicy.execution.nanoseconds import to_ns
@@ -24,63 +28,6 @@ if TYPE_CHECKING:
     from genpolicy.feasibility.admission import Admitted
 
 Array = NDArray[np.float64]
-
-
-class RecoveryState(StrEnum):
-    """Where recovery stands; IDLE while the policy commands."""
-
-    IDLE = "idle"
-    HOLD = "hold"
-    RETREAT = "retreat"
-    CLASSICAL_RETURN = "classical_return"
-    ASK_HUMAN = "ask_human"
-    ABORT = "abort"
-    STOPPED = "stopped"
-
-
-PRIMITIVES = (RecoveryState.RETREAT, RecoveryState.CLASSICAL_RETURN)
-
-
-@dataclass(frozen=True)
-class RecoverySettings:
-    """How recovery goes in each phase.
-
-    Attributes:
-        plans: Per phase the primitives after the hold, in order, of RETREAT and CLASSICAL_RETURN;
-            a phase without a plan holds and asks a human.
-        hold_s: How long it holds before the first primitive.
-        primitive_timeout_s: A primitive that takes longer has failed.
-        human_timeout_s: How long it waits for a person before it aborts.
-        maximum_failures: Failed primitives after which it aborts.
-        maximum_attempts: Recoveries begun after which it asks a human at once.
-    """
-
-    plans: Mapping[str, tuple[RecoveryState, ...]]
-    hold_s: float
-    primitive_timeout_s: float
-    human_timeout_s: float
-    maximum_failures: int = 3
-    maximum_attempts: int = 3
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "plans", dict(self.plans))
-        for phase, plan in self.plans.items():
-            if any(state not in PRIMITIVES for state in plan) or len(set(plan)) != len(plan):
-                raise ConfigError(
-                    where=f"recovery plan of phase {phase}",
-                    found=repr(plan),
-                    expected="retreat and classical_return, each at most once",
-                    action="Correct it in params.yaml.",
-                )
-        times = (self.hold_s, self.primitive_timeout_s, self.human_timeout_s)
-        counts = (self.maximum_failures, self.maximum_attempts)
-        if not (all(0 <= t < math.inf for t in times) and all(n >= 1 for n in counts)):
-            raise ConfigError(
-                where="recovery settings",
-                found=repr(self),
-                expected="finite times >= 0 s and counts >= 1",
-                action="Correct them in params.yaml.",
-            )
 
 
 class Recovery:
@@ -93,14 +40,14 @@ class Recovery:
         recovered: Recoveries that handed back to the policy without a person.
     """
 
-    def __init__(self, settings: RecoverySettings, journal: Journal) -> None:
+    def __init__(self, settings: ExecutionSettings, journal: Journal) -> None:
         self.settings = settings
         self.state = RecoveryState.IDLE
         self.failures = self.attempts = self.recovered = 0
         self._journal = journal
         self._phase = ""
         self._since_ns = 0
-        self._hold_ns = to_ns(settings.hold_s)
+        self._hold_ns = to_ns(settings.recovery_hold_s)
         self._primitive_ns = to_ns(settings.primitive_timeout_s)
         self._human_ns = to_ns(settings.human_timeout_s)
 
@@ -122,7 +69,7 @@ class Recovery:
         waited_ns = self._journal.clock(now_s) - self._since_ns
         if self.state is RecoveryState.HOLD and waited_ns >= self._hold_ns:
             plan = self._plan()
-            exhausted = self.attempts > self.settings.maximum_attempts
+            exhausted = self.attempts > self.settings.maximum_failures
             nowhere = exhausted or not plan
             following = RecoveryState.ASK_HUMAN if nowhere else plan[0]
             self._go(now_s, following, "attempts exhausted" if exhausted else "hold over")
@@ -178,7 +125,7 @@ class Recovery:
         self._go(now_s, RecoveryState.IDLE, f"reset by {person}")
 
     def _plan(self) -> tuple[RecoveryState, ...]:
-        return self.settings.plans.get(self._phase, ())
+        return self.settings.recovery_plans.get(self._phase, ())
 
     def _go(self, now_s: float, state: RecoveryState, cause: str) -> None:
         payload = {
@@ -220,15 +167,15 @@ def fallback_metadata(
     executor: Executor, *, now_s: float, chunk_id: str, event_time_s: float, phase: str, epoch: str
 ) -> ChunkMetadata:
     """Metadata of a chunk of the task's fallback, starting now, as an explicit re-plan."""
-    settings = executor.settings
+    horizons = executor.cell.horizons
     return ChunkMetadata(
         chunk_id=chunk_id,
         condition_observation_event_time_s=event_time_s,
-        policy_checkpoint_hash=settings.fallback_hash,
-        sampler_config_hash=settings.fallback_hash,
+        policy_checkpoint_hash=FALLBACK_HASH,
+        sampler_config_hash=FALLBACK_HASH,
         action_start_time_s=now_s,
-        action_period_s=settings.action_period_s,
-        valid_until_s=now_s + settings.execution_horizon * settings.action_period_s,
+        action_period_s=horizons.action_period_s,
+        valid_until_s=now_s + horizons.execution_horizon * horizons.action_period_s,
         task_phase=phase,
         calibration_epoch=epoch,
         predecessor_chunk_id="",

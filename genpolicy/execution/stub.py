@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.contract.chunk import DiscardReason
+from genpolicy.execution.cell import Cell
 from genpolicy.execution.checks import CHECKS, Checks, Place, refusal
 from genpolicy.execution.journal import Journal, encode_actions
 from genpolicy.execution.moment import Chunk, Moment, View
 from genpolicy.execution.nanoseconds import ChunkTimes
-from genpolicy.execution.settings import ExecutorSettings
 from genpolicy.execution.supervisor import Supervisor
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ class ControllerStub:
     """Accepts or refuses one action at a time.
 
     Args:
-        settings: The same limits that the executor is held to.
+        cell: The same limits that the executor is held to.
         journal: Where arrivals go.
         supervisor: The independent gate; while it stops, nothing is accepted.
         checks: The table; its rows of the place `STUB` are asked.
@@ -47,7 +47,7 @@ class ControllerStub:
 
     def __init__(
         self,
-        settings: ExecutorSettings,
+        cell: Cell,
         journal: Journal,
         supervisor: Supervisor,
         *,
@@ -57,8 +57,8 @@ class ControllerStub:
         self.arrivals = self.accepted = self.stale = self.invalid = 0
         self.checks = checks
         self._journal = journal
-        self._maximum_age_ns = settings.maximum_age_ns
-        self._view = settings.first_view()
+        self._maximum_age_ns = cell.maximum_age_ns
+        self._view = cell.first_view()
         self._last_due_ns: int | None = None
         self._last_sequence = -1
 

@@ -5,12 +5,10 @@ people. A stop is sticky: only a named person resets it (Simplex architecture, A
 monitor carries the assurance, the learned function does not).
 """
 
-import math
-from collections.abc import Mapping
-from dataclasses import dataclass
 from enum import StrEnum
 
-from genpolicy.errors import ConfigError, ContractError
+from genpolicy.errors import ContractError
+from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.execution.checks import CHECKS, Checks, Place, refusal
 from genpolicy.execution.journal import Journal
 from genpolicy.execution.moment import Moment
@@ -29,47 +27,17 @@ class SupervisorState(StrEnum):
 STOPPED = frozenset({SupervisorState.PROTECTIVE_STOP, SupervisorState.EMERGENCY_STOP})
 
 
-@dataclass(frozen=True)
-class SupervisorSettings:
-    """Limits of the supervisor; none has a default that could be taken for a safe value.
-
-    Attributes:
-        force_limit_n: Largest contact force per task phase, N; a phase without one has limit 0.
-        watchdog_s: Time since the last accepted command after which it holds. At least one period:
-            polled every period, the hold comes within `period + watchdog` (P2).
-        action_period_s: Time between actions, s.
-        silence_stop_s: Time since the last accepted command that ends in a protective stop.
-    """
-
-    force_limit_n: Mapping[str, float]
-    watchdog_s: float
-    action_period_s: float
-    silence_stop_s: float = math.inf
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "force_limit_n", dict(self.force_limit_n))
-        limits_hold = all(limit >= 0 for limit in self.force_limit_n.values())
-        times_hold = self.watchdog_s >= self.action_period_s > 0 and self.silence_stop_s > 0
-        if not (limits_hold and times_hold):
-            raise ConfigError(
-                where="supervisor settings",
-                found=repr(self),
-                expected="limits >= 0 N, watchdog >= period > 0 s, silence > 0 s",
-                action="Correct them in params.yaml.",
-            )
-
-
 class Supervisor:
     """Independent gate between whatever commands and the controller stub.
 
     Args:
-        settings: Its limits.
+        settings: Its limits; none has a default that could be taken for a safe value.
         journal: Where its events go.
         checks: The table; its rows of the place `SUPERVISOR` are asked.
     """
 
     def __init__(
-        self, settings: SupervisorSettings, journal: Journal, *, checks: Checks = CHECKS
+        self, settings: ExecutionSettings, journal: Journal, *, checks: Checks = CHECKS
     ) -> None:
         self.settings = settings
         self.state = SupervisorState.RUN
@@ -78,9 +46,8 @@ class Supervisor:
         self.checks = checks
         self._journal = journal
         self._watchdog_ns = to_ns(settings.watchdog_s)
-        self._silence_ns = (
-            to_ns(settings.silence_stop_s) if math.isfinite(settings.silence_stop_s) else None
-        )
+        silence_s = settings.silence_stop_s
+        self._silence_ns = None if silence_s is None else to_ns(silence_s)
         self._last_accept_ns: int | None = None
 
     @property

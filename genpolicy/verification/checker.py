@@ -208,8 +208,13 @@ class _Session:
         self._check_motion(chunk, row)
 
     def _check_motion(self, chunk: Message, row: int) -> None:
-        if self.proof is None:
-            return
+        if chunk["motion"] is None:
+            self.flag("P6.ground", f"{chunk['chunk_id']!r} does not say what it was held against.")
+        elif self.proof is not None:
+            self._reprove(chunk, row)
+
+    def _reprove(self, chunk: Message, row: int) -> None:
+        assert self.proof is not None
         self.report.reproved_actions += 1
         period_s = self.settings["period_ns"] / 1e9
         for rule, sentence in self.proof.objections(
@@ -315,8 +320,6 @@ class _Session:
     def _check_settings(self, m: Message) -> None:
         self.settings = m
         self.world.fallback_hash = m["fallback_hash"]
-        if self.expected is not None and m["admission"] != "feasibility":
-            self.flag("settings.admission", "Chunks were accepted that feasibility did not issue.")
         if m["checks_missing"]:
             self.report.checks_missing.update(m["checks_missing"])
             self.flag("settings.checks", f"Checks are missing: {m['checks_missing']}.")

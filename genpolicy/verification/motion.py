@@ -97,15 +97,12 @@ class MotionProof:
 
         Args:
             session: Name of the session.
-            chunk: Its `enqueue` event.
+            chunk: Its `enqueue` event; it says what the chunk was checked against.
             row: Which row was accepted.
             phase: Task phase at the time.
             period_s: The controller's period, s.
         """
         motion = chunk["motion"]
-        if motion is None:
-            yield "P6.ground", f"{chunk['chunk_id']!r} does not say what it was checked against."
-            return
         joints = self._joints
         first, last = chunk["checked_rows"]
         path = _floats(motion["q_rad"])

@@ -7,7 +7,7 @@ import pytest
 from playing import begin, judged
 
 from genpolicy.contract.chunk import DiscardReason
-from genpolicy.evidence.shadow.rig import CHECKPOINT, SAMPLER, SETTINGS, Rig
+from genpolicy.evidence.shadow.rig import CHECKPOINT, SAMPLER, Rig
 from genpolicy.execution.executor import Executor
 
 R = DiscardReason
@@ -115,7 +115,7 @@ def test_a_rejected_or_lost_chunk_is_written_off_once():
 
 def test_only_what_feasibility_issued_is_taken_by_default():
     rig = Rig()
-    strict = Executor(SETTINGS, rig.journal, rig.stub)
+    strict = Executor(rig.cell, rig.journal, rig.stub)
     strict.set_active(0.0, CHECKPOINT, SAMPLER)
     strict.observe(0.0, 0.0, "approach", "epoch-1")
     assert strict.deliver(rig.chunk(), 0.0) is R.INFEASIBLE
@@ -160,7 +160,7 @@ def test_a_chunk_that_feasibility_issued_is_taken_and_a_tampered_one_is_not():
     from genpolicy.feasibility.verdict import LayerVerdict, Verdict
 
     rig = Rig()
-    strict = Executor(SETTINGS, rig.journal, rig.stub)
+    strict = Executor(rig.cell, rig.journal, rig.stub)
     strict.set_active(0.0, CHECKPOINT, SAMPLER)
     strict.observe(0.0, 0.0, "approach", "epoch-1")
 

@@ -1,69 +1,104 @@
-"""Section `execution` as settings of executor, supervisor and recovery."""
+"""Section `execution`: one home of what executor, stub, supervisor and recovery are held to."""
+
+import math
 
 import pytest
 from pydantic import ValidationError
 
+from genpolicy.contract.settings import parse_settings
 from genpolicy.errors import ConfigError
-from genpolicy.execution.cell import ExecutionSettings
-from genpolicy.execution.recovery import RecoveryState
+from genpolicy.evidence.shadow.rig import EXECUTION, Rig, rig_cell
+from genpolicy.execution.cell import FALLBACK_HASH, Cell, ExecutionSettings, RecoveryState
+from genpolicy.execution.journal import Journal
+from genpolicy.execution.recovery import Recovery
 
 
-def test_the_parts_carry_the_section(kit):
-    section, horizons = kit.EXECUTION, kit.HORIZONS
-    executor = section.executor(horizons)
-    assert executor.execution_horizon == horizons.execution_horizon
-    assert executor.maximum_age_s == section.maximum_age_s
-    assert section.supervisor(horizons).watchdog_s == executor.watchdog_s == section.watchdog_s
-    plan = section.recovery().plans["approach"]
-    assert plan == tuple(RecoveryState(name) for name in section.recovery_plans["approach"])
+def section(kit, **changes):
+    return ExecutionSettings(**(kit.PARAMS["execution"] | changes))
+
+
+def test_everybody_reads_the_section_itself(kit):
+    rig = Rig()
+    recovery = Recovery(rig.cell.execution, Journal("r"))
+    for settings in (rig.executor.cell.execution, rig.supervisor.settings, recovery.settings):
+        assert settings is rig.cell.execution
+    cell = Cell(kit.HORIZONS, kit.EXECUTION)
+    assert cell.period_ns == round(kit.HORIZONS.action_period_s * 1e9)
+    assert cell.watchdog_ns == round(kit.EXECUTION.watchdog_s * 1e9)
+    assert cell.maximum_age_ns["insert"] == round(kit.EXECUTION.maximum_age_s["insert"] * 1e9)
+    view = cell.first_view()
+    assert (view.fallback, view.period_ns) == (FALLBACK_HASH, cell.period_ns)
+    assert view.execution_horizon == kit.HORIZONS.execution_horizon
 
 
 def test_every_phase_has_an_age_a_force_limit_and_a_plan(kit, task):
-    section = kit.EXECUTION
-    for table in (section.maximum_age_s, section.force_limit_n, section.recovery_plans):
+    settings = kit.EXECUTION
+    for table in (settings.maximum_age_s, settings.force_limit_n, settings.recovery_plans):
         assert set(table) == set(task.phases)
+    names = kit.PARAMS["execution"]["recovery_plans"]["approach"]
+    assert settings.recovery_plans["approach"] == tuple(RecoveryState(name) for name in names)
 
 
 def test_a_number_a_default_and_an_exception_are_read_as_one_entry_per_phase(kit):
-    raw = kit.PARAMS["execution"]
-    table = {"default": 0.4, "insert": 0.3}
-    section = ExecutionSettings(**(raw | {"maximum_age_s": table}))
-    assert section.maximum_age_s == dict.fromkeys(raw["force_limit_n"], 0.4) | {"insert": 0.3}
-    bare = ExecutionSettings(**(raw | {"maximum_age_s": {"insert": 0.3}, "recovery_plans": {}}))
+    phases = kit.PARAMS["execution"]["force_limit_n"]
+    settings = section(kit, maximum_age_s={"default": 0.4, "insert": 0.3})
+    assert settings.maximum_age_s == dict.fromkeys(phases, 0.4) | {"insert": 0.3}
+    bare = section(kit, maximum_age_s={"insert": 0.3}, recovery_plans={})
     assert bare.maximum_age_s == {"insert": 0.3} and bare.recovery_plans == {}
-    assert ExecutionSettings(**section.model_dump()) == section
+    assert ExecutionSettings(**settings.model_dump()) == settings
 
 
 @pytest.mark.parametrize("name", ["maximum_age_s", "recovery_plans"])
 def test_a_phase_that_nothing_else_knows_is_refused(kit, name):
     change = {name: {"levitate": 0.3 if name == "maximum_age_s" else ["retreat"]}}
     with pytest.raises(ConfigError, match="levitate"):
-        ExecutionSettings(**(kit.PARAMS["execution"] | change))
+        section(kit, **change)
 
 
 def test_the_phases_must_be_those_of_the_task(kit, task):
-    kit.EXECUTION.require_phases(task.phases)
+    cell = Cell(kit.HORIZONS, kit.EXECUTION)
+    cell.require_task(task.phases)
     with pytest.raises(ConfigError, match="expected the task"):
-        kit.EXECUTION.require_phases([*task.phases, "levitate"])
+        cell.require_task([*task.phases, "levitate"])
 
 
-@pytest.mark.parametrize("change", [{"unknown": 1}, {"watchdog_s": "0.1"}])
-def test_unknown_and_untyped_values_are_refused(kit, change):
+@pytest.mark.parametrize("change", [
+    {"unknown": 1}, {"watchdog_s": "0.1"}, {"watchdog_s": 0.0}, {"watchdog_s": math.inf},
+    {"queue_capacity": 0}, {"replan_lead_steps": -1}, {"maximum_age_s": {"approach": math.nan}},
+    {"maximum_age_s": {"approach": -0.1}}, {"maximum_divergence_m": math.nan},
+    {"force_limit_n": {"approach": -1.0}}, {"force_limit_n": {"approach": math.nan}},
+    {"recovery_hold_s": -1.0}, {"human_timeout_s": math.inf}, {"maximum_failures": 0},
+    {"silence_stop_s": 0.0}, {"deadline_s": 0.0},
+])  # fmt: skip
+def test_what_is_unknown_untyped_or_out_of_range_is_refused_by_name(change):
+    (name,) = change
+    values = {**EXECUTION.model_dump(), "recovery_plans": {}, **change}
+    if name == "force_limit_n":
+        values["maximum_age_s"] = 0.3
     with pytest.raises(ValidationError):
-        ExecutionSettings(**(kit.PARAMS["execution"] | change))
+        ExecutionSettings(**values)
+    with pytest.raises(ConfigError, match=rf"params\.yaml: execution\.{name}"):
+        parse_settings(ExecutionSettings, values, where="params.yaml: execution")
 
 
-def test_an_unknown_primitive_is_refused(kit):
-    plans = {"approach": ["levitate"]}
-    section = ExecutionSettings(**(kit.PARAMS["execution"] | {"recovery_plans": plans}))
-    with pytest.raises(ValueError, match="levitate"):
-        section.recovery()
+@pytest.mark.parametrize("names", [
+    ["levitate"], ["ask_human"], ["retreat", "retreat"], "retreat", None,
+])  # fmt: skip
+def test_a_plan_of_other_primitives_is_refused(kit, names):
+    with pytest.raises(ConfigError, match="recovery_plans of phase approach"):
+        section(kit, recovery_plans={"approach": names})
 
 
 @pytest.mark.parametrize("age_s", [0.4, 0.45, {"default": 0.35, "insert": 0.4}])
-def test_an_age_limit_that_a_chunk_never_reaches_is_refused(kit, age_s):
+def test_an_age_limit_that_a_chunk_never_reaches_is_refused(kit, task, age_s):
     """Eight actions of 0.05 s: a chunk is void after 0.4 s, and 0.45 s would refuse nothing."""
-    section = ExecutionSettings(**(kit.PARAMS["execution"] | {"maximum_age_s": age_s}))
+    cell = Cell(kit.HORIZONS, section(kit, maximum_age_s=age_s))
     with pytest.raises(ConfigError, match=r"maximum_age_s of phase .* less than 0\.4 s"):
-        section.executor(kit.HORIZONS)
-    assert kit.EXECUTION.executor(kit.HORIZONS).maximum_age_s["insert"] < 0.4
+        cell.require_task(task.phases)
+    Cell(kit.HORIZONS, kit.EXECUTION).require_task(task.phases)
+
+
+def test_a_watchdog_shorter_than_a_period_is_refused():
+    assert rig_cell(watchdog_s=0.05).watchdog_ns == 50_000_000
+    with pytest.raises(ConfigError, match=r"execution\.watchdog_s is 0\.049 s.* one period"):
+        rig_cell(watchdog_s=0.049)

@@ -26,8 +26,9 @@ VIEW = View(
     execution_horizon=8, period_ns=50 * MS,
 )  # fmt: skip
 GOOD = Moment(
-    now_ns=310 * MS, view=VIEW, about=CHUNK, row=2, known=False, same_action=True, sequence=5,
-    last_sequence=4, last_due_ns=250 * MS, watchdog_ns=100 * MS, last_accept_ns=260 * MS,
+    now_ns=310 * MS, view=VIEW, about=CHUNK, row=2, known=False, issued=True, same_action=True,
+    sequence=5, last_sequence=4, last_due_ns=250 * MS, watchdog_ns=100 * MS,
+    last_accept_ns=260 * MS,
     accepted_condition_ns=100 * MS, accepted_start_ns=200 * MS, queued_condition_ns=100 * MS,
     queued_start_ns=200 * MS, newer_start_ns=350 * MS,
 )  # fmt: skip
@@ -52,6 +53,7 @@ def voided(reason, arrivals=0):
 
 BAD = {
     "end_of_episode": view(mode=ExecutorMode.ENDED),
+    "issued": replace(GOOD, issued=False),
     "duplicate": replace(GOOD, known=True),
     "infeasible": chunk(passed=False),
     "period": view(period_ns=50 * MS + 1),
@@ -123,7 +125,7 @@ def test_at_the_limit_it_holds():
 def test_what_is_unknown_does_not_hold():
     unknown = Moment(now_ns=310 * MS, about=Chunk(METADATA, CHUNK.times), row=2)
     assert failing(unknown) >= {
-        "duplicate", "infeasible", "action_hash", "same_action", "execution_horizon",
+        "issued", "duplicate", "infeasible", "action_hash", "same_action", "execution_horizon",
         "checked_rows", "future_observation", "stale_observation", "sequence", "period",
     }  # fmt: skip
 

@@ -1,20 +1,18 @@
 """Which row of which queued chunk is due, and what leaves the queue."""
 
-from dataclasses import replace
-
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from playing import begin, judged
 
 from genpolicy.contract.chunk import DiscardReason
-from genpolicy.evidence.shadow.rig import SETTINGS, Rig, passing_verdict
+from genpolicy.evidence.shadow.rig import Rig, passing_verdict
 
 R = DiscardReason
 
 
 def test_a_full_queue_drops_its_oldest_chunk_and_does_not_block():
-    rig = Rig(settings=replace(SETTINGS, queue_capacity=1))
+    rig = Rig(queue_capacity=1)
     rig.observe()
     rig.deliver(rig.chunk(action_start_time_s=0.2))
     assert rig.deliver(rig.chunk(action_start_time_s=0.4)) is None

@@ -1,7 +1,6 @@
 """The executor in pairs: what is in order passes, what is not is discarded for its own reason."""
 
 import math
-from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
@@ -10,7 +9,8 @@ from playing import begin, judged
 
 from genpolicy.contract.chunk import DiscardReason
 from genpolicy.errors import NonFiniteError
-from genpolicy.evidence.shadow.rig import CHECKPOINT, SAMPLER, SETTINGS, Rig
+from genpolicy.evidence.shadow.rig import CHECKPOINT, SAMPLER, Rig
+from genpolicy.execution.cell import FALLBACK_HASH
 from genpolicy.execution.nanoseconds import to_ns
 
 R = DiscardReason
@@ -73,8 +73,7 @@ def test_an_older_observation_is_ignored_and_counted():
 
 
 def test_a_pause_of_300_ms_rejects_the_stale_rest_first():
-    settings_short = replace(SETTINGS, maximum_age_s={"approach": 0.25, "insert": 0.25})
-    rig = Rig(settings=settings_short)
+    rig = Rig(maximum_age_s={"approach": 0.25, "insert": 0.25})
     begin(rig, ticks=1)
     rig.advance(0.3)  # the executor sleeps; the controller's own clock goes on
     command = rig.tick()[0]
@@ -107,8 +106,8 @@ def test_intervention_until_handback_and_observations_after_it():
 def test_fallback_commands_only_in_its_mode_and_is_tagged():
     rig = Rig()
     rig.observe()
-    mark = {"policy_checkpoint_hash": SETTINGS.fallback_hash,
-            "sampler_config_hash": SETTINGS.fallback_hash}  # fmt: skip
+    mark = {"policy_checkpoint_hash": FALLBACK_HASH,
+            "sampler_config_hash": FALLBACK_HASH}  # fmt: skip
     assert rig.executor.deliver_fallback(rig.chunk(**mark), 0.0) is R.STOPPED
     assert rig.deliver(rig.chunk(**mark)) is R.CHECKPOINT_MISMATCH
     rig.executor.begin_fallback(0.0)
@@ -140,8 +139,8 @@ def test_needs_invocation_by_remaining_actions_and_flight():
 
 
 SHRINK = {
-    "maximum_age_s": lambda s, f: replace(s, maximum_age_s={"approach": 0.6 * f}),
-    "execution_horizon": lambda s, f: replace(s, execution_horizon=max(1, int(8 * f))),
+    "maximum_age_s": lambda f: {"maximum_age_s": {"approach": 0.6 * f}},
+    "execution_horizon": lambda f: {"execution_horizon": max(1, int(8 * f))},
 }
 
 
@@ -155,8 +154,8 @@ SHRINK = {
 @settings(max_examples=80, deadline=None, derandomize=True)
 def test_tighter_limits_never_accept_more(name, factor, age_s, validity_s, late_s):
     accepted = []
-    for limits in (SETTINGS, SHRINK[name](SETTINGS, factor)):
-        rig = Rig(settings=limits)
+    for limits in ({}, SHRINK[name](factor)):
+        rig = Rig(**limits)
         rig.advance(1.0)
         rig.observe()
         chunk = rig.chunk(

@@ -5,7 +5,7 @@ import pytest
 
 from genpolicy.contract.chunk import DiscardReason
 from genpolicy.evidence.shadow.mutants import SCENARIOS, without
-from genpolicy.evidence.shadow.rig import CHECKPOINT, SAMPLER, SETTINGS, Rig, looks_admitted
+from genpolicy.evidence.shadow.rig import CHECKPOINT, IMITATED, SAMPLER, Rig
 from genpolicy.execution.checks import CHECKS, Place
 from genpolicy.execution.executor import Executor
 from genpolicy.verification.checker import check_messages
@@ -21,8 +21,8 @@ def half_asleep(check):
     """A rig whose executor lacks one check, while its stub has them all."""
     rig = Rig()
     rig.executor = Executor(
-        SETTINGS, rig.journal, rig.stub,
-        checks=without(check), genuine=looks_admitted,
+        rig.cell, rig.journal, rig.stub,
+        checks=without(check, IMITATED),
     )  # fmt: skip
     rig.executor.set_active(0.0, CHECKPOINT, SAMPLER)
     return rig

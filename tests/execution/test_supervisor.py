@@ -8,17 +8,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from genpolicy.errors import ConfigError, ContractError
-from genpolicy.evidence.shadow.rig import SUPERVISION, Rig
+from genpolicy.errors import ContractError
+from genpolicy.evidence.shadow.rig import EXECUTION, Rig, rig_cell
 from genpolicy.execution import supervisor as module
 from genpolicy.execution.journal import Journal
 from genpolicy.execution.nanoseconds import to_ns
-from genpolicy.execution.supervisor import Supervisor, SupervisorSettings, SupervisorState
+from genpolicy.execution.supervisor import Supervisor, SupervisorState
 
 
 @pytest.fixture
 def supervisor():
-    return Supervisor(SUPERVISION, Journal("s"))
+    return Supervisor(EXECUTION, Journal("s"))
 
 
 @pytest.mark.parametrize("force_n, phase, trips", [
@@ -39,9 +39,9 @@ def test_collision_gate(supervisor):
 def test_any_cause_may_stop_it_and_a_limit_of_zero_is_a_limit(supervisor):
     supervisor.protective_stop(0.0, "light curtain")
     assert supervisor.state is SupervisorState.PROTECTIVE_STOP and supervisor.stops == 1
-    limits = {"approach": 0.0}
-    touchless = Supervisor(SupervisorSettings(limits, 0.05, 0.05), Journal("s"))
-    limits["approach"] = 99.0  # the supervisor keeps its own copy
+    limits = {"approach": 0.0, "insert": 40.0}
+    touchless = Supervisor(rig_cell(force_limit_n=limits).execution, Journal("s"))
+    limits["approach"] = 99.0  # the settings keep their own copy
     assert touchless.observe_force(0.0, 0.0, "approach") is False
     assert touchless.observe_force(0.0, 1e-9, "approach") is True
 
@@ -56,8 +56,8 @@ def test_watchdog_holds_within_period_plus_watchdog(supervisor):
 
 
 def test_long_silence_ends_in_a_protective_stop():
-    quiet = SupervisorSettings({}, 0.1, 0.05, silence_stop_s=1.0)
-    supervisor = Supervisor(quiet, Journal("s"))
+    quiet = rig_cell(silence_stop_s=1.0)
+    supervisor = Supervisor(quiet.execution, Journal("s"))
     supervisor.heard_accept(0)
     supervisor.poll(to_ns(0.2))
     supervisor.poll(to_ns(1.0))
@@ -133,14 +133,3 @@ def test_it_has_no_way_to_hear_a_score():
     assert not {name for name in names if "score" in name or "ood" in name or "clear" in name}
     words = {node.arg for node in ast.walk(tree) if isinstance(node, ast.arg)}
     assert not words & {"score", "confidence", "probability", "uncertainty"}
-
-
-@pytest.mark.parametrize("values", [
-    ({"approach": -1.0}, 0.1, 0.05), ({"approach": math.nan}, 0.1, 0.05), ({}, 0.01, 0.05),
-    ({}, 0.1, 0.0), ({}, math.nan, 0.05),
-])  # fmt: skip
-def test_settings_are_checked(values):
-    with pytest.raises(ConfigError, match="supervisor settings"):
-        SupervisorSettings(*values)
-    with pytest.raises(ConfigError, match="supervisor settings"):
-        SupervisorSettings({}, 0.1, 0.05, silence_stop_s=0.0)

@@ -13,7 +13,7 @@ from gates.rederive import STRESS, rederive, rederived
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.errors import BadInputError, RefusedError
 from genpolicy.evidence.rows.stress import RolloutRow
-from genpolicy.execution.cell import ExecutionSettings
+from genpolicy.execution.cell import Cell, ExecutionSettings
 from genpolicy.execution.executor import Executor
 from genpolicy.execution.journal import Journal, write_journal
 from genpolicy.execution.stub import ControllerStub
@@ -35,9 +35,9 @@ def _session(method: str, start: int) -> Journal:
     journal = Journal(f"{method}/nominal/{start}", labels)
     horizons = HorizonConfig(**PARAMS["horizons"])
     execution = ExecutionSettings(**PARAMS["execution"])
-    supervisor = Supervisor(execution.supervisor(horizons), journal)
-    settings = execution.executor(horizons)
-    executor = Executor(settings, journal, ControllerStub(settings, journal, supervisor))
+    cell = Cell(horizons, execution)
+    supervisor = Supervisor(execution, journal)
+    executor = Executor(cell, journal, ControllerStub(cell, journal, supervisor))
     executor.set_active(0.0, "weights", "sampler")
     for tick in range(4):
         now_s = tick * horizons.action_period_s

@@ -17,7 +17,6 @@ from genpolicy.evidence.shadow.corruption import CORRUPTIONS
 from genpolicy.evidence.shadow.layer_mutants import missing_checks_evidence
 from genpolicy.evidence.shadow.mutants import run_mutants
 from genpolicy.evidence.shadow.observations import held_out_observations
-from genpolicy.evidence.shadow.session import Cell
 from genpolicy.evidence.shadow.shadow import Shadow, admit, case_of
 from genpolicy.evidence.stress.latency import (
     DECLARED_TERMS,
@@ -29,7 +28,7 @@ from genpolicy.evidence.stress.matched import step
 from genpolicy.evidence.stress.perturbations import Nominal
 from genpolicy.evidence.stress.rollout import Rollout
 from genpolicy.evidence.stress.state import Fixture, Outcome
-from genpolicy.execution.cell import ExecutionSettings
+from genpolicy.execution.cell import Cell, ExecutionSettings
 from genpolicy.execution.journal import write_journal
 from genpolicy.feasibility.admission import Admitted, Rejected
 from genpolicy.feasibility.figures import expected_motion

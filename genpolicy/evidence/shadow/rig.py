@@ -1,7 +1,8 @@
 """A test rig: one session on a simulated clock, and chunks that no feasibility module made.
 
 What is built here has the form of an admitted chunk and none of its authority. It exists so that
-the executor, the stub and the checker can be tried with chunks of which something is wrong.
+the executor, the stub and the checker can be tried with chunks of which something is wrong. The
+whole table refuses all of them, so a rig has the table minus `issued`, and its journal says so.
 """
 
 from dataclasses import dataclass, field, replace
@@ -12,32 +13,43 @@ from numpy.typing import NDArray
 
 from genpolicy.contract.action import ACTION_DIM
 from genpolicy.contract.chunk import ChunkMetadata, DiscardReason, actions_sha256, frozen_array
+from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.execution.arrival import LAYER_COUNT
+from genpolicy.execution.cell import PRIMITIVES, Cell, ExecutionSettings
 from genpolicy.execution.checks import CHECKS, Checks
 from genpolicy.execution.command import Command
 from genpolicy.execution.executor import Executor
 from genpolicy.execution.journal import Event, Journal
-from genpolicy.execution.settings import ExecutorSettings
 from genpolicy.execution.stub import ControllerStub
-from genpolicy.execution.supervisor import Supervisor, SupervisorSettings
+from genpolicy.execution.supervisor import Supervisor
 
 Array = NDArray[np.float64]
 
 PERIOD_S = 0.05
 ROWS = 16
 CHECKPOINT, SAMPLER = "c" * 64, "5" * 64
-SETTINGS = ExecutorSettings(
-    execution_horizon=8,
-    action_period_s=PERIOD_S,
-    maximum_age_s={"approach": 0.6, "insert": 0.5},
+HORIZONS = HorizonConfig(
+    observation_horizon=1, prediction_horizon=ROWS, execution_horizon=8, action_period_s=PERIOD_S
+)
+EXECUTION = ExecutionSettings(
+    replan_lead_steps=3,
+    deadline_s=0.15,
     watchdog_s=0.1,
     queue_capacity=2,
-    replan_lead_steps=3,
+    maximum_age_s={"approach": 0.6, "insert": 0.5},
     maximum_divergence_m=0.05,
+    force_limit_n={"approach": 20.0, "insert": 40.0},
+    hold_before_recovery_s=0.6,
+    recovery_hold_s=0.2,
+    primitive_timeout_s=5.0,
+    human_timeout_s=10.0,
+    maximum_failures=3,
+    recovery_plans={"approach": PRIMITIVES[1:], "insert": PRIMITIVES},
 )
-SUPERVISION = SupervisorSettings(
-    force_limit_n={"approach": 20.0, "insert": 40.0}, watchdog_s=0.1, action_period_s=PERIOD_S
-)
+
+
+IMITATED: Checks = tuple(check for check in CHECKS if check.name != "issued")
+"""The table minus the one row that no imitation passes."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +66,23 @@ class StandInVerdict:
 
     layers: tuple[StandInLayer, ...]
     rows: tuple[int, int]
+    q_rad: Array = field(default_factory=lambda: np.zeros((ROWS, 1)), repr=False)
+
+
+@dataclass(frozen=True)
+class StandInScene:
+    """A scene without a body, as claimed."""
+
+    bodies: dict[str, tuple[Array, Array]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class StandInContext:
+    """What the chunk was checked against, as claimed."""
+
+    q_cmd: Array = field(default_factory=lambda: np.zeros(1))
+    last_action: Array = field(default_factory=lambda: np.zeros(ACTION_DIM))
+    scene: StandInScene = field(default_factory=StandInScene)
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +93,7 @@ class StandIn:
     actions: Array = field(repr=False)
     actions_sha256: str
     verdict: StandInVerdict
+    context: StandInContext | None = field(default_factory=StandInContext, repr=False)
 
 
 def passing_verdict(
@@ -74,33 +104,35 @@ def passing_verdict(
     return StandInVerdict(tuple(layers), rows)
 
 
-def looks_admitted(chunk: object) -> bool:
-    """The rig takes imitations; whatever is no imitation is refused."""
-    return type(chunk) is StandIn
+def rig_cell(*, execution_horizon: int = HORIZONS.execution_horizon, **changes: Any) -> Cell:
+    """The cell of a rig, with changes to the settings of execution; its chunks live long."""
+    horizons = HorizonConfig(**{**HORIZONS.model_dump(), "execution_horizon": execution_horizon})
+    return Cell(horizons, ExecutionSettings(**{**EXECUTION.model_dump(), **changes}))
 
 
 class Rig:
     """One session: clock, supervisor, stub and executor.
 
     Args:
-        checks: The table of executor, stub and supervisor.
-        settings: Replaces the standard settings.
+        checks: The table of executor, stub and supervisor; the whole one takes no imitation.
+        execution_horizon: Actions of a chunk that may be executed.
         session: Name of the session.
+        changes: Of the settings of execution.
     """
 
     def __init__(
         self,
         *,
-        checks: Checks = CHECKS,
-        settings: ExecutorSettings = SETTINGS,
+        checks: Checks = IMITATED,
         session: str = "rig",
+        execution_horizon: int = HORIZONS.execution_horizon,
+        **changes: Any,
     ) -> None:
         self.journal = Journal(session)
-        self.supervisor = Supervisor(SUPERVISION, self.journal, checks=checks)
-        self.stub = ControllerStub(settings, self.journal, self.supervisor, checks=checks)
-        self.executor = Executor(
-            settings, self.journal, self.stub, checks=checks, genuine=looks_admitted
-        )
+        self.cell = rig_cell(execution_horizon=execution_horizon, **changes)
+        self.supervisor = Supervisor(self.cell.execution, self.journal, checks=checks)
+        self.stub = ControllerStub(self.cell, self.journal, self.supervisor, checks=checks)
+        self.executor = Executor(self.cell, self.journal, self.stub, checks=checks)
         self.now_ns = 0
         self.phase, self.epoch = "approach", "epoch-1"
         self.made = 0
@@ -117,15 +149,16 @@ class Rig:
         return self.executor.observe(self.now_s, event_time_s, self.phase, self.epoch, divergence_m)
 
     def chunk(self, **changes: Any) -> StandIn:
-        """A valid chunk from an observation made now, with changes to metadata, actions, verdict.
+        """A valid chunk from an observation made now, with changes to what it carries.
 
         Args:
-            changes: Fields of the metadata, or `actions`, `actions_sha256`, `verdict`.
+            changes: Fields of the metadata, or `actions`, `actions_sha256`, `verdict`, `context`.
         """
         self.made += 1
         actions = changes.pop("actions", self.actions(self.made))
         sha256 = changes.pop("actions_sha256", None)
         verdict = changes.pop("verdict", passing_verdict())
+        context = changes.pop("context", StandInContext())
         metadata = ChunkMetadata(
             chunk_id=f"chunk-{self.made}",
             condition_observation_event_time_s=self.now_s,
@@ -143,7 +176,7 @@ class Rig:
         )
         values = frozen_array(actions)
         return StandIn(
-            replace(metadata, **changes), values, sha256 or actions_sha256(values), verdict
+            replace(metadata, **changes), values, sha256 or actions_sha256(values), verdict, context
         )
 
     @staticmethod
@@ -177,7 +210,7 @@ class Rig:
         """Observe, deliver a (changed) chunk, tick it through."""
         self.observe()
         self.deliver(self.chunk(**changes))
-        return self.tick(self.executor.settings.execution_horizon)
+        return self.tick(self.cell.horizons.execution_horizon)
 
     def end(self) -> list[Event]:
         """End the episode and return the journal's events."""

@@ -4,10 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from genpolicy.contract.chunk import DiscardReason
-from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.evidence.shadow.case import Case
 from genpolicy.evidence.shadow.observations import Observation
-from genpolicy.execution.cell import ExecutionSettings
+from genpolicy.execution.cell import Cell
 from genpolicy.execution.executor import Executor
 from genpolicy.execution.journal import Journal
 from genpolicy.execution.ledger import Account
@@ -19,19 +18,6 @@ from genpolicy.feasibility.settings import LAYERS
 IN_FLIGHT_PHASE_CHANGE = "phase_change_in_flight"
 
 Judged = tuple[Case, Admitted | Rejected]
-
-
-@dataclass(frozen=True)
-class Cell:
-    """What every session runs under.
-
-    Attributes:
-        horizons: H_o, K, H_e and the period.
-        execution: Settings of executor, supervisor and stub.
-    """
-
-    horizons: HorizonConfig
-    execution: ExecutionSettings
 
 
 @dataclass(frozen=True)
@@ -73,10 +59,9 @@ def play(
         f"{metadata.method}/{fixture}/{number}",
         {"method": metadata.method, "fixture": fixture, "situation": item.episode_uuid},
     )
-    settings = cell.execution.executor(horizons)
-    supervisor = Supervisor(cell.execution.supervisor(horizons), journal)
-    stub = ControllerStub(settings, journal, supervisor)
-    executor = Executor(settings, journal, stub)
+    supervisor = Supervisor(cell.execution, journal)
+    stub = ControllerStub(cell, journal, supervisor)
+    executor = Executor(cell, journal, stub)
     active = judged[0][0].context
     executor.set_active(0.0, active.active_checkpoint_hash, active.active_sampler_hash)
     executor.observe(0.0, 0.0, item.phase, item.calibration_epoch)

@@ -19,7 +19,8 @@ from genpolicy.evidence.rows.shadow import CandidateRow
 from genpolicy.evidence.shadow.case import Case, decide
 from genpolicy.evidence.shadow.corruption import CORRUPTIONS
 from genpolicy.evidence.shadow.observations import Observation
-from genpolicy.evidence.shadow.session import IN_FLIGHT_PHASE_CHANGE, Cell, Judged, play
+from genpolicy.evidence.shadow.session import IN_FLIGHT_PHASE_CHANGE, Judged, play
+from genpolicy.execution.cell import Cell
 from genpolicy.execution.journal import Journal
 from genpolicy.execution.ledger import Account
 from genpolicy.feasibility.admission import Admitted, FeasibilityChecker, Rejected
@@ -94,7 +95,7 @@ class Shadow:
     samples: int
 
     def __post_init__(self) -> None:
-        self.cell.execution.require_phases(self.task.phases)
+        self.cell.require_task(self.task.phases)
 
 
 def shadow_policy(

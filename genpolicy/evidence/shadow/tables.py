@@ -6,8 +6,8 @@ from typing import Any
 
 from genpolicy.evidence.rows.shadow import CandidateRow, ShadowCountRow, ShadowStubRow
 from genpolicy.evidence.shadow.mutants import run_mutants
-from genpolicy.evidence.shadow.session import Cell
 from genpolicy.evidence.shadow.shadow import ShadowEvidence
+from genpolicy.execution.cell import Cell
 from genpolicy.execution.journal import write_journal
 from genpolicy.execution.ledger import Account
 from genpolicy.feasibility.cell import Cell as FeasibilityCell

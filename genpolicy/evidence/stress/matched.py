@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from genpolicy.candidates.judged import JudgedPolicy
 from genpolicy.evidence.rows.stress import InvocationRow, RolloutRow, StressStubRow
-from genpolicy.evidence.shadow.session import Cell
 from genpolicy.evidence.stress.envelope import checker_under
 from genpolicy.evidence.stress.latency import LatencyModel
 from genpolicy.evidence.stress.perturbations import Perturbation
 from genpolicy.evidence.stress.rollout import Rollout
 from genpolicy.evidence.stress.state import Fixture, Outcome
+from genpolicy.execution.cell import Cell
 from genpolicy.execution.journal import write_journal
 from genpolicy.execution.ledger import Account
 from genpolicy.feasibility.settings import FeasibilitySettings

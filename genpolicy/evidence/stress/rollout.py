@@ -22,6 +22,7 @@ from genpolicy.evidence.admission_context import (
 from genpolicy.evidence.stress.disturbance import Disturbance
 from genpolicy.evidence.stress.fallback import Fallback
 from genpolicy.evidence.stress.state import Fixture, InFlight, Outcome, Tally, in_flight
+from genpolicy.execution.cell import FALLBACK_HASH, Cell
 from genpolicy.execution.command import Command
 from genpolicy.execution.executor import Executor
 from genpolicy.execution.recovery import Recovery, RecoveryState, step
@@ -60,12 +61,12 @@ class Rollout:
         self.world: World = fixture.task.make_world(start, settings=epoch)
         self.start_sha256 = self.world.state_sha256()
         self.journal = fixture.journal(start_index, self.start_sha256)
-        self.supervisor = Supervisor(fixture.execution.supervisor(fixture.horizons), self.journal)
-        fixture.execution.require_phases(fixture.task.phases)
-        settings = fixture.execution.executor(fixture.horizons)
-        self.stub = ControllerStub(settings, self.journal, self.supervisor)
-        self.executor = Executor(settings, self.journal, self.stub)
-        self.recovery = Recovery(fixture.execution.recovery(), self.journal)
+        cell = Cell(fixture.horizons, fixture.execution)
+        cell.require_task(fixture.task.phases)
+        self.supervisor = Supervisor(cell.execution, self.journal)
+        self.stub = ControllerStub(cell, self.journal, self.supervisor)
+        self.executor = Executor(cell, self.journal, self.stub)
+        self.recovery = Recovery(cell.execution, self.journal)
         self.outcome: Outcome | None = None
         self.tally = Tally()
         self.tick = self.invocations = 0
@@ -306,12 +307,11 @@ class Rollout:
             self._last_command_s = now_s  # the silence is over; the policy gets its time
 
     def _admit_fallback(self, proposal: Proposal) -> Admitted | None:
-        identity = self.executor.settings.fallback_hash
         context = context_of(
             self.fixture.task,
             self.fixture.checker,
             self._moment(),
-            session=self._session(identity, identity),
+            session=self._session(FALLBACK_HASH, FALLBACK_HASH),
         )
         result = self.fixture.checker.admit(proposal, context=context)
         return result if isinstance(result, Admitted) else None

@@ -3,8 +3,8 @@
 import pytest
 
 from genpolicy.evidence.shadow.observations import held_out_observations
-from genpolicy.evidence.shadow.session import Cell
 from genpolicy.evidence.shadow.shadow import Shadow
+from genpolicy.execution.cell import Cell
 from genpolicy.seeds import stream
 
 

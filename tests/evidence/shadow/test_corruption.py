@@ -9,8 +9,8 @@ from genpolicy.contract.action import GRIPPER
 from genpolicy.evidence.shadow.case import decide, refusals
 from genpolicy.evidence.shadow.corruption import CORRUPTIONS
 from genpolicy.evidence.shadow.observations import held_out_observations
-from genpolicy.evidence.shadow.session import Cell
 from genpolicy.evidence.shadow.shadow import Shadow, admit, case_of
+from genpolicy.execution.cell import Cell
 from genpolicy.feasibility.admission import Admitted, FeasibilityChecker, Rejected
 from genpolicy.feasibility.checks import CHECKS, without
 from genpolicy.seeds import stream

@@ -1,7 +1,7 @@
 """Each row of the table, taken away, must turn the independent checker red; else it is silent."""
 
 from genpolicy.evidence.shadow.mutants import SCENARIOS, play, run_mutants, without
-from genpolicy.evidence.shadow.rig import Rig
+from genpolicy.evidence.shadow.rig import IMITATED, Rig
 from genpolicy.execution.checks import CHECKS, missing
 from genpolicy.verification.checker import check_messages
 from genpolicy.verification.report import CheckReport
@@ -34,14 +34,16 @@ def test_the_rule_that_breaks_is_the_one_that_the_check_guards():
     assert "P1.state" in rules["commander"] & rules["intervention"]
     assert all("P1.void" in rules[name] for name in rules if name.startswith("after_"))
     assert "P7.stop" in rules["stopped"]
+    assert rules["issued"] == {"P6.ground"}
 
 
 def test_a_table_without_a_row_is_declared_and_a_table_with_another_row_too():
-    assert play("stale_observation", without("duplicate")) == []
+    assert play("stale_observation", without("duplicate", IMITATED)) == []
     assert missing(CHECKS, without("duplicate"), CHECKS) == ["duplicate"]
     blind = tuple(c._replace(holds=lambda m: True) if c.name == "expired" else c for c in CHECKS)
     assert missing(blind) == ["expired"]
-    for checks, names in ((CHECKS, []), (without("window"), ["window"])):
+    assert missing(IMITATED) == ["issued"]
+    for checks, names in ((CHECKS, []), (IMITATED, ["issued"]), (without("window"), ["window"])):
         rig = Rig(checks=checks)
         assert rig.journal.events()[0].payload["checks_missing"] == names
         report = check_messages(

@@ -8,10 +8,10 @@ from genpolicy.evidence.shadow.rig import (
     ROWS,
     Rig,
     StandIn,
-    looks_admitted,
     passing_verdict,
 )
 from genpolicy.execution.arrival import issued_by_feasibility
+from genpolicy.execution.checks import CHECKS
 
 
 def test_a_chunk_unchanged_is_executed_whole():
@@ -38,8 +38,10 @@ def test_actions_of_two_seeds_differ_in_every_row_and_are_finite():
 
 def test_an_imitation_is_never_what_feasibility_issued():
     chunk = Rig().chunk()
-    assert type(chunk) is StandIn and looks_admitted(chunk)
-    assert not issued_by_feasibility(chunk) and not looks_admitted(object())
+    assert type(chunk) is StandIn and not issued_by_feasibility(chunk)
+    whole = Rig(checks=CHECKS)
+    assert {command.kind for command in whole.run()} == {"hold"}
+    assert whole.executor.conservation().chunks.discarded == {"infeasible": 1}
 
 
 def test_time_passes_with_and_without_the_controller_s_own_clock():

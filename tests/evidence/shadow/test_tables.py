@@ -7,13 +7,13 @@ import pytest
 
 from genpolicy.contract.chunk import DiscardReason
 from genpolicy.evidence.shadow.observations import held_out_observations
-from genpolicy.evidence.shadow.session import Cell
 from genpolicy.evidence.shadow.shadow import HELD_OUT, Shadow, shadow_policy
 from genpolicy.evidence.shadow.tables import (
     account_rows,
     checker_document,
     write_shadow,
 )
+from genpolicy.execution.cell import Cell
 from genpolicy.execution.ledger import Account
 from genpolicy.integrity.documents import read_json
 from genpolicy.integrity.tables import read_table

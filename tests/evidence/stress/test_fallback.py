@@ -5,8 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from genpolicy.evidence.shadow.rig import SETTINGS, Rig
+from genpolicy.evidence.shadow.rig import Rig
 from genpolicy.evidence.stress.fallback import Fallback
+from genpolicy.execution.cell import FALLBACK_HASH
 
 PLAN = np.arange(20.0)[:, None] * np.ones((1, 10))
 
@@ -61,6 +62,6 @@ def test_its_chunks_are_counted_and_carry_the_identity_of_the_fallback(made):
     names = [made.fallback.metadata("s", now).chunk_id for now in (0.0, 0.05)]
     assert names == ["s/fallback/1", "s/fallback/2"]
     found = made.fallback.metadata("s", 0.1)
-    assert found.policy_checkpoint_hash == SETTINGS.fallback_hash
+    assert found.policy_checkpoint_hash == FALLBACK_HASH
     assert (found.task_phase, found.calibration_epoch) == ("approach", "epoch-1")
     assert found.condition_observation_event_time_s == 0.1

@@ -5,7 +5,6 @@ import pytest
 
 from genpolicy.candidates.judged import JudgedPolicy
 from genpolicy.errors import ConfigError
-from genpolicy.evidence.shadow.session import Cell
 from genpolicy.evidence.stress.latency import (
     DECLARED_TERMS,
     MEASURED_TERMS,
@@ -21,6 +20,7 @@ from genpolicy.evidence.stress.tables import (
     power_document,
     write_stress,
 )
+from genpolicy.execution.cell import Cell
 from genpolicy.integrity.documents import canonical_json, read_json
 from genpolicy.integrity.tables import read_table
 

@@ -97,6 +97,20 @@ def test_the_cause_cannot_be_declared_not_applicable(ladder, name):
         judge(ladder, "A")
 
 
+def test_where_a_simpler_policy_may_do_the_page_sends_nobody_to_the_data(ladder):
+    evidence.edit_table(
+        ladder,
+        "measure_baselines/modes.parquet",
+        lambda f: f.assign(valid=f["samples"], modes_valid=1, admissible=f["samples"]),
+    )
+    report = judge(ladder, "A")
+    assert report.verdict == "FAIL"
+    assert "run the simpler policy" in report.diagnosis
+    assert "Train the simple baselines" not in report.diagnosis
+    evidence.edit_table(ladder, "audit/clocks.parquet", lambda f: f.assign(offset_after_s=1.0))
+    assert "run the simpler policy" not in judge(ladder, "A").diagnosis
+
+
 def test_a_pass_says_first_that_one_mode_may_be_enough(ladder):
     report = judge(ladder, "A")
     assert report.verdict == "PASS" and "one_mode_bc" in report.diagnosis
