@@ -10,6 +10,8 @@ from typing import Any, Literal
 
 from gates.report import Gate, stage_of
 from genpolicy.errors import ConfigError
+from genpolicy.execution.checks import CHECKS as EXECUTION_CHECKS
+from genpolicy.feasibility.checks import CHECKS
 
 REHEARSAL = "rehearsal"
 REHEARSED = "A rehearsal: limits that protect people may be looser here, and no card can be signed."
@@ -70,6 +72,43 @@ BOUNDS: tuple[Bound, ...] = (
 )
 
 
+@dataclass(frozen=True)
+class Named:
+    """What a list of a gate must name at least.
+
+    Attributes:
+        gate: Who judges by it.
+        place: Setting in the gate's section.
+        names: The names.
+        reason: Why no team may leave one out.
+    """
+
+    gate: Gate
+    place: str
+    names: tuple[str, ...]
+    reason: str
+
+
+NAMED: tuple[Named, ...] = (
+    Named(
+        "C",
+        "required_checks",
+        (
+            *(f"{check.layer}.{check.name}" for check in CHECKS),
+            *(f"execution.{check.name}" for check in EXECUTION_CHECKS),
+        ),
+        "a check that nobody asks for may be gone; evidence says which do not apply to a task",
+    ),
+    Named(
+        "C",
+        "required_fixtures",
+        ("stale_observation", "infeasible_rotation", "phase_change", "reordered_chunk"),
+        "what is never tried is never refused",
+    ),
+)
+"""`collision` is not among them: a task may have nothing to collide with."""
+
+
 def is_rehearsal(params: Mapping[str, Any]) -> bool:
     """Whether this ladder only tests the machinery.
 
@@ -103,6 +142,24 @@ def loosened(params: Mapping[str, Any], gate: Gate) -> list[tuple[Bound, Any]]:
     return found
 
 
+def lacking(params: Mapping[str, Any], gate: Gate) -> list[tuple[Named, list[str]]]:
+    """Lists of a gate that leave out what they must name, with what is left out.
+
+    A list that is missing leaves out nothing: the gate's model asks for it.
+    """
+    found = []
+    for named in NAMED:
+        section = params.get(stage_of(gate)) if named.gate == gate else None
+        if not isinstance(section, Mapping) or named.place not in section:
+            continue
+        stated = section[named.place]
+        stated = stated if isinstance(stated, list) else []
+        absent = [name for name in named.names if name not in stated]
+        if absent:
+            found.append((named, absent))
+    return found
+
+
 def _keeps(value: object, bound: Bound) -> bool:
     """Whether a setting stays on its side of a bound; what is no number, or NaN, does not."""
     if not isinstance(value, int | float) or isinstance(value, bool):
@@ -119,9 +176,9 @@ def require_protection(params: Mapping[str, Any], gate: Gate) -> tuple[str, ...]
     Raises:
         ConfigError: A looser setting, in a ladder that is no rehearsal.
     """
-    beyond = loosened(params, gate)
+    beyond, absent = loosened(params, gate), lacking(params, gate)
     if is_rehearsal(params):
-        names = ", ".join(bound.place for bound, _ in beyond)
+        names = ", ".join([*(bound.place for bound, _ in beyond), *(n.place for n, _ in absent)])
         return (f"{REHEARSED} Looser: {names or 'none of this gate'}.",)
     for bound, value in beyond:
         place = bound.place if "." in bound.place else f"{stage_of(gate)}: {bound.place}"
@@ -130,6 +187,13 @@ def require_protection(params: Mapping[str, Any], gate: Gate) -> tuple[str, ...]
             found=repr(value)[:60],
             expected=f"{bound.comparison} {bound.bound:g}, because {bound.reason}",
             action="Tighten it. This bound stands in the code; a rehearsal may go beyond it.",
+        )
+    for named, left_out in absent:
+        raise ConfigError(
+            where=f"params.yaml: {stage_of(gate)}: {named.place}",
+            found=f"without {', '.join(left_out)}"[:200],
+            expected=f"all that the code names, because {named.reason}",
+            action="Name it. What it must name stands in the code; a rehearsal may leave it out.",
         )
     return ()
 

@@ -50,6 +50,8 @@ from genpolicy.evidence.rows.stress import (
     StressCountRow,
     StressStubRow,
 )
+from genpolicy.execution.checks import CHECKS as EXECUTION_CHECKS
+from genpolicy.feasibility.checks import CHECKS as FEASIBILITY_CHECKS
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.rows import write_rows
 from genpolicy.integrity.tables import read_table, write_table
@@ -57,7 +59,10 @@ from genpolicy.policies.validation_row import ValidationRow
 
 CODE = "genpolicy/robot/impedance.py"
 """A file of code in the repository of the tests."""
-CHECKS = (*((layer, "first") for layer in LAYERS), ("fresh", "expired"), ("execution", "expired"))
+CHECKS = (
+    *((check.layer, check.name) for check in FEASIBILITY_CHECKS),
+    *(("execution", check.name) for check in EXECUTION_CHECKS),
+)
 
 BASELINES = ("bc", "chunked_bc", "act")
 REMEDIES = {"chunked_l1": "direct", "one_mode_bc": "direct", "bc_noise": "offset"}

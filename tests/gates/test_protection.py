@@ -7,7 +7,15 @@ import yaml
 from flows.workspace import merged
 from gates.criterion import Criterion
 from gates.proof import SPECS, judge
-from gates.protection import BOUNDS, REHEARSED, is_rehearsal, loosened, require_protection
+from gates.protection import (
+    BOUNDS,
+    NAMED,
+    REHEARSED,
+    is_rehearsal,
+    lacking,
+    loosened,
+    require_protection,
+)
 from gates.report import GATES
 from genpolicy.errors import ConfigError
 from genpolicy.integrity.documents import read_yaml
@@ -60,6 +68,29 @@ def test_every_bound_is_of_a_criterion_or_a_setting(request):
             continue
         criterion = {item.id: item for item in SPECS[bound.gate].criteria}[bound.place]
         assert isinstance(criterion, Criterion) and criterion.comparison == bound.comparison
+
+
+@pytest.mark.parametrize("named", NAMED, ids=lambda named: named.place)
+@pytest.mark.parametrize("rehearsal", [False, True])
+def test_a_list_that_leaves_out_a_check_is_bad_configuration_but_in_a_rehearsal(named, rehearsal):
+    section = {named.place: [*named.names, "one_more"]}
+    params = {"gate_c": section, "rehearsal": rehearsal}
+    assert lacking(params, "C") == [] == lacking(params, "D")
+    assert bool(require_protection(params, "C")) == rehearsal
+    for broken in (list(named.names[1:]), [], "all", None):
+        params["gate_c"] = {named.place: broken}
+        if rehearsal:
+            assert named.place in require_protection(params, "C")[0]
+            continue
+        with pytest.raises(ConfigError, match=named.place) as refused:
+            require_protection(params, "C")
+        assert named.names[0] in str(refused.value) and named.reason in str(refused.value)
+
+
+def test_the_shipped_lists_name_what_they_must(request):
+    params = read_yaml(request.config.rootpath / "params.yaml")
+    assert {named.place for named in NAMED} <= set(params["gate_c"])
+    assert lacking(params, "C") == []
 
 
 def test_a_protective_criterion_cannot_be_waived():

@@ -41,7 +41,7 @@ def test_a_check_that_was_never_disabled_is_undetected(ladder):
     evidence.edit_document(ladder, "shadow/mutants.json", lambda rows: rows[1:])
     report = judge(ladder, "C")
     assert report.verdict == "FAIL"
-    assert "representation.first (not tried)" in _found(report, "mutants_undetected")[0].caveat
+    assert "representation.shape (not tried)" in _found(report, "mutants_undetected")[0].caveat
 
 
 @pytest.mark.parametrize("row", range(len(ROWS)))
@@ -60,7 +60,7 @@ EXCUSED = {**ROWS[0], "detected": False, "tried": 0, "not_applicable": "no gripp
 
 def test_a_check_that_a_task_has_no_chunk_for_is_named_with_its_reason(tmp_path):
     found = _undetected(tmp_path, [EXCUSED, *ROWS[1:]])
-    assert found.value == 0 and "representation.first (no gripper)" in found.caveat
+    assert found.value == 0 and "representation.shape (no gripper)" in found.caveat
 
 
 @pytest.mark.parametrize("changes", [{"not_applicable": ""}, {"tried": 3}])
@@ -73,7 +73,7 @@ def test_an_excuse_does_not_undo_a_failure_of_the_same_check(place, tmp_path):
     missed = {**ROWS[0], "detected": False}
     rows = [missed, EXCUSED] if place else [EXCUSED, missed]
     found = _undetected(tmp_path, [*rows, *ROWS[1:]])
-    assert found.value == 1 and "not detected: representation.first" in found.caveat
+    assert found.value == 1 and "not detected: representation.shape" in found.caveat
 
 
 def test_a_check_that_one_of_its_rows_missed_is_missed(tmp_path):
