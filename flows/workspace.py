@@ -26,8 +26,8 @@ PIPELINE = "dvc.yaml"
 LOCK = "dvc.lock"
 DVC_CONFIG = ".dvc/config"
 COPIED = ".workspace.json"
-LIMITS, WAIVED = "limits", "not_applicable"
-"""Keys of a gate's section."""
+LIMITS, WAIVED, ANSWERED = "limits", "not_applicable", "waived_checks"
+"""Keys of a gate's section: its limits; criteria, and questions of the audit, that owners waive."""
 
 
 def make_workspace(source: Path, target: Path, overrides: Mapping[str, Any] | Path) -> Path:
@@ -71,8 +71,8 @@ def merged(
 ) -> dict[str, Any]:
     """`base` with the leaves of `overrides` in place of its own; every key must exist in `base`.
 
-    Only what a gate declares not applicable may be added, and takes the limits of the same names
-    away: a limit and a waiver of one criterion exclude each other.
+    Only what owners of a gate waive by name may be added. A criterion that is declared not
+    applicable takes its limit away: a limit and a waiver of one criterion exclude each other.
 
     Raises:
         ConfigError: An unknown key, or a section replaced by a value or the other way round.
@@ -80,7 +80,8 @@ def merged(
     result = dict(base)
     for key, value in overrides.items():
         place = f"{at}.{key}" if at else str(key)
-        if key == WAIVED and isinstance(base.get(LIMITS), Mapping):
+        if key in (WAIVED, ANSWERED) and isinstance(base.get(LIMITS), Mapping):
+            result[key] = value
             continue
         if key not in base:
             raise ConfigError(
@@ -98,7 +99,6 @@ def merged(
             )
         result[key] = merged(base[key], value, at=place) if isinstance(value, Mapping) else value
     if WAIVED in overrides and LIMITS in base:
-        result[WAIVED] = overrides[WAIVED]
         waived = {name for names in overrides[WAIVED].values() for name in names}
         result[LIMITS] = {
             owner: {name: limit for name, limit in limits.items() if name not in waived}

@@ -27,6 +27,7 @@ from gates.report import (
     report_path,
     stage_of,
 )
+from gates.running import require_running_code
 from gates.settings import GateSettings, Limit, Limits, read_limits, read_params, read_settings
 from gates.verdicts import combine, first_unmet, judge_criterion, rounded
 from genpolicy.errors import IntegrityError
@@ -109,6 +110,7 @@ def judge_gate(spec: GateSpec, root: Path) -> GateReport:
     caveats = (*caveats, *said)
     report = judge(spec, evidence, limits, settings, candidates=names, caveats=caveats)
     check_record(root, spec.gate, report.materials)
+    require_running_code(root)
     return report
 
 

@@ -1,18 +1,22 @@
 """The table at the end of a run: every stage, its verdict, what decided, its time and memory.
 
-Times come from `build/times`, which the stages write outside of everything that is hashed; they
-are those of the last run of each stage in this workspace.
+Times come from `build/times`, which the stages write outside of everything that is hashed. Only
+those are shown that belong to the ladder as it is recorded now: of a run that stands on the runs
+below it, or of one that failed after all of them.
 """
 
 from dataclasses import dataclass
 from pathlib import Path
 
+from gates.present import present_runs
 from gates.proof import STAGE_REQUIRES, Rung
 from gates.report import stage_of
 from genpolicy.errors import GenpolicyError
 from genpolicy.integrity.documents import read_json
 
 TIMES = Path("build/times")
+ALWAYS = "task"
+"""The stage that every run begins with, also one that changes nothing."""
 ENDS = {0: "done", 1: "FAULT", 2: "BAD INPUT", 3: "REFUSED"}
 
 
@@ -38,9 +42,19 @@ class Line:
 def overview(root: Path, rungs: list[Rung]) -> list[Line]:
     """One line per stage, in the order of the ladder."""
     by_stage = {stage_of(rung.gate): rung for rung in rungs}
+    recorded = present_runs(root)
     lines = []
+    newest_ns = 0
     for stage in STAGE_REQUIRES:
-        ended, seconds, peak = _last_run(root / TIMES / f"{stage}.json")
+        record = root / TIMES / f"{stage}.json"
+        ended, seconds, peak = _last_run(record)
+        written_ns = record.stat().st_mtime_ns if record.is_file() else 0
+        current = recorded is None or (
+            stage in recorded if ended == ENDS[0] else written_ns >= newest_ns
+        )
+        newest_ns = max(newest_ns, written_ns if stage != ALWAYS else 0)
+        if not current:
+            ended, seconds, peak = "", None, None
         rung = by_stage.get(stage)
         if rung is None:
             lines.append(Line(stage, ended, "", seconds, peak))

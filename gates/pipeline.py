@@ -63,7 +63,7 @@ def basis_of(root: Path, gate: Gate) -> Basis:
         ConfigError: `dvc.yaml`, `dvc.lock` or `params.yaml` is malformed.
         IntegrityError: A file of the code is missing or a link.
     """
-    stages, recorded = _stages(root, PIPELINE), _stages(root, LOCK)
+    stages, recorded = stages_of(root, PIPELINE), stages_of(root, LOCK)
     names = (*RUNGS[gate], stage_of(gate))
     files: dict[str, dict[str, str]] = {}
     keys: set[str] = set()
@@ -103,9 +103,9 @@ def check_record(root: Path, gate: Gate, materials: Mapping[str, str]) -> None:
         IntegrityError: A file, a parameter, or what the stage reads is not as recorded.
         ConfigError: `dvc.yaml`, `dvc.lock` or `params.yaml` is malformed.
     """
-    stages, recorded = _stages(root, PIPELINE), _stages(root, LOCK)
+    stages, recorded = stages_of(root, PIPELINE), stages_of(root, LOCK)
     params = _document(root / PARAMS, PARAMS)
-    disk = _Disk(root, materials)
+    disk = Disk(root, materials)
     for name in RUNGS[gate]:
         if name not in recorded or name not in stages:
             continue
@@ -130,9 +130,9 @@ def changed_pages(root: Path, gate: Gate) -> str:
 
     A gate that was judged outside the pipeline has no record of its pages.
     """
-    run = _stages(root, LOCK).get(stage_of(gate)) or {}
+    run = stages_of(root, LOCK).get(stage_of(gate)) or {}
     json_report = report_path(gate)
-    disk = _Disk(root, {})
+    disk = Disk(root, {})
     for entry in run.get("outs") or ():
         path = str(entry.get("path"))
         if not path.startswith("reports/") or path == json_report:
@@ -151,7 +151,7 @@ def outputs_of(root: Path, gate: Gate) -> tuple[str, ...]:
     return tuple(sorted(names))
 
 
-class _Disk:
+class Disk:
     """Files as DVC sees them: MD5 of a file, or of the list of those of a folder."""
 
     def __init__(self, root: Path, materials: Mapping[str, str]) -> None:
@@ -316,7 +316,12 @@ def _texts(entries: Any) -> list[str]:
     ]
 
 
-def _stages(root: Path, name: str) -> dict[str, Any]:
+def stages_of(root: Path, name: str) -> dict[str, Any]:
+    """Entries of `dvc.yaml` or `dvc.lock` by stage; none where the file is missing.
+
+    Raises:
+        ConfigError: The file is malformed.
+    """
     document = _document(root / name, name)
     stages = document.get("stages") if isinstance(document, dict) else None
     if stages is not None and not isinstance(stages, dict):

@@ -5,6 +5,7 @@ before the evidence exists. Gates D and E bind it by hash and say what has moved
 apart from tightened, and apart from what is neither.
 """
 
+import functools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -86,7 +87,7 @@ def read_plan(root: Path) -> dict[str, list[Any]] | None:
     """The plan; None if there is none that can be read."""
     try:
         data = sha256_bytes_of(root / PREREGISTRATION, keep=True)[1]
-        plan = parse_yaml(data, where=PREREGISTRATION)
+        plan = _parsed(data)
     except GenpolicyError:
         return None
     good = isinstance(plan, dict) and all(
@@ -127,6 +128,11 @@ def moved_caveats(root: Path, params: Mapping[str, Any]) -> tuple[str, ...]:
         if of_kind:
             texts.append(f"{kind.capitalize()} since {PREREGISTRATION}: {', '.join(of_kind)}.")
     return tuple(texts)
+
+
+@functools.lru_cache(maxsize=4)
+def _parsed(data: bytes) -> Any:
+    return parse_yaml(data, where=PREREGISTRATION)
 
 
 def _kind(comparison: str, before: object, now: object) -> Kind:

@@ -61,6 +61,7 @@ def work(params: Params) -> None:
         recorded if source.kind == "embedded" else require_unchanged(source),
         contract=contract,
         out=ARTIFACTS / "ingest",
+        task=params.task.name,
         split=SplitRule(train=section.train, validation=section.validation),
     )
 

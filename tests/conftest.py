@@ -1,10 +1,13 @@
 """A small recorded dataset of the real task, and barely trained checkpoints on it."""
 
+import copy
 import shutil
 import sys
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +17,7 @@ from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.data.contract import TCP_ACTION, IngestContract, plausible_ranges
 from genpolicy.data.dataset import load_dataset
 from genpolicy.data.ingest import ingest_recordings
+from genpolicy.errors import BadInputError
 from genpolicy.evidence.admission_context import make_checker
 from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.feasibility.settings import FeasibilitySettings
@@ -159,3 +163,48 @@ def foreign_folder(tmp_path_factory):
 def foreign_task(foreign_folder):
     """Registered name of that task: another arm, phases and bodies, and no gripper."""
     return "ring_cell"
+
+
+def _places(document: Any, at: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+    """Every key of a document, by its path; of a list the first entry stands for all."""
+    entries = enumerate(document[:1]) if isinstance(document, list) else ()
+    if isinstance(document, dict):
+        entries = document.items()
+    for key, value in entries:
+        if isinstance(document, dict):
+            yield (*at, key)
+        yield from _places(value, (*at, key))
+
+
+def _damaged(document: Any) -> Iterator[tuple[str, Any]]:
+    """The document without each of its keys, and with each of them misspelt."""
+    for *path, key in _places(document):
+        for spelling in (None, f"{key}x"):
+            changed = copy.deepcopy(document)
+            inner = changed
+            for part in path:
+                inner = inner[part]
+            value = inner.pop(key)
+            if spelling is not None:
+                inner[spelling] = value
+            yield f"{'.'.join(map(str, (*path, key)))} -> {spelling}", changed
+
+
+def _fallen_over(document: Any, read: Any) -> tuple[int, dict[str, str]]:
+    """How many damaged documents were refused, and those that a reader fell over."""
+    refused, faults = 0, {}
+    for what, changed in _damaged(document):
+        try:
+            read(changed)
+        except BadInputError as error:
+            assert error.exit_code == 2 and error.where and error.action
+            refused += 1
+        except Exception as error:
+            faults[what] = repr(error)
+    return refused, faults
+
+
+@pytest.fixture(scope="session")
+def fallen_over():
+    """`(document, read)`: each key deleted, and misspelt; how often it refused, and the faults."""
+    return _fallen_over

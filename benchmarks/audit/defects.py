@@ -163,8 +163,9 @@ def glue(plan: Plan, episodes, table, truth):
             second = original[number if itself else (number + 1) % len(original)]
             joined = {name: np.concatenate([first[name], second[name]]) for name in first}
             step = first["time"][1] - first["time"][0]
-            joined["time"] = first["time"][0] + step * np.arange(len(joined["time"]))
-            glued[number] = joined
+            moved = first["time"][0] + step * np.arange(len(joined["time"])) - joined["time"]
+            stamps = ("time", *(name for name in joined if name.startswith("stamp_")))
+            glued[number] = joined | {name: joined[name] + moved for name in stamps}
         episodes = glued
     return episodes, table, truth
 

@@ -88,9 +88,9 @@ def beyond_simulation(simulated: Simulated, candidate: str) -> list[str]:
     fastest = math.nan if reached.fastest_m_s is None else reached.fastest_m_s
     if not 0 <= fastest <= simulated.speed_limit_m_s * (1 + ROUNDING):
         bad.append(f"commands at {fastest:.4g} m/s inside the envelope")
-    for axis, low, high, least, most in zip(
-        "xyz", lower, upper, reached.lowest_m or (), reached.highest_m or (), strict=True
-    ):
+    nowhere = (math.nan, math.nan, math.nan)
+    lowest, highest = reached.lowest_m or nowhere, reached.highest_m or nowhere
+    for axis, low, high, least, most in zip("xyz", lower, upper, lowest, highest, strict=True):
         if not low - ROUNDING <= least <= most <= high + ROUNDING:
             bad.append(f"commands outside the workspace in {axis}")
     return bad

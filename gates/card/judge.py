@@ -39,6 +39,7 @@ from gates.pipeline import check_record
 from gates.preregistration import NONE, PREREGISTRATION, moved_caveats, read_plan
 from gates.protection import REHEARSED, is_rehearsal, require_protection
 from gates.report import OWNERS, Gate, GateReport, stage_of
+from gates.running import require_running_code
 from gates.settings import GateSettings, read_limits, read_params, read_settings
 from genpolicy.errors import BadInputError, GenpolicyError, IntegrityError
 from genpolicy.integrity.hashing import sha256_bytes_of
@@ -123,6 +124,7 @@ def judge_card(root: Path, chain: Chain, *, today: datetime.date | None = None) 
     evidence = recorded_evidence(root, "E")
     report = judge(GATE, evidence, limits, settings, given=dossier, caveats=caveats)
     check_record(root, "E", report.materials)
+    require_running_code(root)
     return report
 
 

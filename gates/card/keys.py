@@ -4,6 +4,8 @@ A key of small order verifies signatures that nobody made; one with a part of sm
 under several encodings. No person's key is either, so both are refused.
 """
 
+import functools
+
 PRIME = 2**255 - 19
 ORDER = 2**252 + 27742317777372353535851937790883648493
 CURVE_D = -121665 * pow(121666, -1, PRIME) % PRIME
@@ -15,6 +17,7 @@ Point = tuple[int, int, int, int]
 NEUTRAL: Point = (0, 1, 1, 0)
 
 
+@functools.lru_cache(maxsize=256)
 def key_weakness(public_key: bytes) -> str:
     """Why 32 bytes are no key of a person; empty if they may be one."""
     point = _decoded(public_key)

@@ -22,12 +22,20 @@ def stub_stale(evidence: Evidence, settings: FeasibilitySettings, candidate: str
     return Measured(bad, caveat=f"of {arrivals:g} arrivals")
 
 
-def _stub(evidence: Evidence, candidate: str, column: str) -> tuple[float, float]:
-    rows = evidence.of(f"{SHADOW}/stub.parquet", ShadowStubRow, candidate)
+def at_the_stub(rows: pd.DataFrame, *columns: str) -> tuple[float, float]:
+    """Actions of these kinds that arrived at the controller stub, and all that arrived.
+
+    Raises:
+        MissingEvidenceError: Nothing arrived, or a count is no number.
+    """
     arrivals = float(numbers(rows, "arrivals").sum())
     if arrivals <= 0:
         raise MissingEvidenceError("nothing arrived at the stub")
-    return float(numbers(rows, column).sum()), arrivals
+    return sum(float(numbers(rows, column).sum()) for column in columns), arrivals
+
+
+def _stub(evidence: Evidence, candidate: str, *columns: str) -> tuple[float, float]:
+    return at_the_stub(evidence.of(f"{SHADOW}/stub.parquet", ShadowStubRow, candidate), *columns)
 
 
 @criterion(
@@ -57,8 +65,7 @@ def stub_violation_upper(
 
     Actions of one observation arrive or fail together, so the observations are the trials.
     """
-    stale, _ = _stub(evidence, candidate, "stale")
-    bad = stale + _stub(evidence, candidate, "invalid")[0]
+    bad, _ = _stub(evidence, candidate, "stale", "invalid")
     rows = evidence.of(f"{SHADOW}/stub.parquet", ShadowStubRow, candidate)
     # The same observations are played in every fixture, and deliver at most one chunk in each.
     observations = float(numbers(rows, "delivered").max())

@@ -42,15 +42,19 @@ def checked_violations(evidence: Evidence, path: str) -> Measured:
 def mutants_undetected(evidence: Evidence, settings: FeasibilitySettings) -> Measured:
     """Checks whose absence was not noticed, or that were not tried."""
     entries = evidence.listing(f"{SHADOW}/mutants.json")
-    found, excused = dict[str, bool](), dict[str, str]()
+    found, missed, excused = set[str](), dict[str, None](), dict[str, str]()
     for entry in entries:
         if not isinstance(entry, dict) or not isinstance(entry.get("detected"), bool):
             raise MissingEvidenceError("mutants.json has an entry without check or detected")
         name = f"{entry.get('layer')}.{entry.get('check')}"
-        found[name] = found.get(name, True) and entry["detected"]
-        if entry.get("not_applicable") and not entry["detected"] and not entry.get("tried"):
+        found.add(name)
+        if entry["detected"]:
+            continue
+        if entry.get("not_applicable") and not entry.get("tried"):
             excused[name] = str(entry["not_applicable"])
-    silent = [name for name, detected in found.items() if not detected and name not in excused]
+        else:  # an excuse in another row of the same check does not undo it
+            missed[name] = None
+    silent = [*missed]
     silent += [f"{name} (not tried)" for name in settings.required_checks if name not in found]
     text = f"not detected: {', '.join(silent)}" if silent else f"all {len(found)} detected"
     if excused:

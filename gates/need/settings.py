@@ -1,7 +1,7 @@
 """Settings of Gate A other than limits, and where its evidence lies."""
 
 from collections.abc import Mapping
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
@@ -22,7 +22,7 @@ class NeedSettings(GateSettings):
 
     Attributes:
         confidence: Coverage of every interval.
-        held_out_splits: Splits whose situations are judged.
+        held_out_splits: Splits whose situations are judged; never the one that trains.
         baselines: Simpler policies that must be there, frozen and matched.
         deployed_conventions: Sampling conventions under which a baseline is deployed, an unlearned
             offset among them; drawing from a latent is a generator's way, reported beside them.
@@ -51,7 +51,7 @@ class NeedSettings(GateSettings):
     }
 
     confidence: float = Field(gt=0.5, lt=1.0)
-    held_out_splits: tuple[str, ...]
+    held_out_splits: tuple[Literal["validation", "test"], ...] = Field(min_length=1)
     baselines: tuple[str, ...]
     deployed_conventions: tuple[str, ...]
     generative_baselines: tuple[str, ...]

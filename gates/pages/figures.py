@@ -44,12 +44,27 @@ PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
 LARGEST_PHOTO_BYTES = 400_000
 
 
+Table = tuple[tuple[str, ...], ...]
+
+
+@dataclass(frozen=True)
+class Shown(Picture):
+    """A figure of a gate's page.
+
+    Attributes:
+        table: The same in words: heads, then rows of cells; empty without.
+    """
+
+    table: Table = ()
+
+
 @dataclass(frozen=True)
 class Plot:
     """A figure that can be drawn: `draw(evidence, report)` fills a new figure.
 
     Attributes:
         also: Further files that it is drawn from.
+        read: The same in words, for readers who do not see it: heads, then rows of cells.
     """
 
     title: str
@@ -57,10 +72,12 @@ class Plot:
     source: str
     draw: Callable[[Evidence, GateReport], Figure]
     also: tuple[str, ...] = ()
+    read: Callable[[Evidence, GateReport], Table] | None = None
 
     def picture(self, evidence: Evidence, report: GateReport, salt: str) -> dict[str, Any]:
-        """What this adds to a `Picture`."""
-        return {"svg": drawn(lambda: self.draw(evidence, report), self.title, salt=salt)}
+        """What this adds to a `Shown`."""
+        svg = drawn(lambda: self.draw(evidence, report), self.title, salt=salt)
+        return {"svg": svg, "table": self.read(evidence, report) if self.read else ()}
 
 
 @dataclass(frozen=True)
@@ -73,7 +90,7 @@ class Photo:
     also: tuple[str, ...] = ()
 
     def picture(self, evidence: Evidence, report: GateReport, salt: str) -> dict[str, Any]:
-        """What this adds to a `Picture`; a photo has no inner names and needs no salt.
+        """What this adds to a `Shown`; a photo has no inner names and needs no salt.
 
         Raises:
             MissingEvidenceError: No such file, no PNG, too large, or other bytes than judged.
@@ -92,9 +109,7 @@ class Photo:
         return {"photo": f"data:image/png;base64,{base64.b64encode(data).decode()}"}
 
 
-def draw_all(
-    plots: Sequence[Plot | Photo], evidence: Evidence, report: GateReport
-) -> list[Picture]:
+def draw_all(plots: Sequence[Plot | Photo], evidence: Evidence, report: GateReport) -> list[Shown]:
     """Draw what the evidence allows; what is missing is said, never left out in silence."""
     pictures = []
     for index, plot in enumerate(plots):
@@ -103,7 +118,7 @@ def draw_all(
             found = plot.picture(evidence, report, f"{report.gate}{index}")
         except (MissingEvidenceError, KeyError, ValueError, TypeError, IndexError) as error:
             found = {"skipped": " ".join(str(error).split())[:200] or type(error).__name__}
-        pictures.append(Picture(plot.title, plot.caption, sources, **found))
+        pictures.append(Shown(plot.title, plot.caption, sources, **found))
     return pictures
 
 

@@ -14,7 +14,13 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from gates.card.card import DRAFT_PATH, TrialCard
 from gates.card.judge import examine
 from gates.evidence import Evidence
-from gates.pages import plots_feasibility, plots_need, plots_stress, plots_time
+from gates.pages import (
+    plots_convergence,
+    plots_feasibility,
+    plots_need,
+    plots_stress,
+    plots_time,
+)
 from gates.pages.figures import Photo, Plot, draw_all
 from gates.pages.guide import BACK_TO, QUESTIONS, READING, label, words
 from gates.pages.table import deciding, groups, passed_by, stops, tally
@@ -33,7 +39,7 @@ MARKS = {
 }
 PLOTS: dict[str, tuple[Plot | Photo, ...]] = {
     "A": plots_need.PLOTS,
-    "B": plots_time.PLOTS,
+    "B": (*plots_convergence.PLOTS, *plots_time.PLOTS),
     "C": plots_feasibility.PLOTS,
     "D": plots_stress.PLOTS,
     "E": (),

@@ -25,7 +25,7 @@ from gates.reproducibility.settings import (
     MODES_EARLIER,
     ReproducibilitySettings,
 )
-from genpolicy.policies.validation_row import ValidationRow, three_quarters
+from genpolicy.policies.validation_row import VALIDATION_FILE, ValidationRow, three_quarters
 from genpolicy.statistics.ratios import ratio_of_sums
 
 
@@ -115,18 +115,9 @@ def last_quarter(evidence: Evidence, root: str, method: str, *, confidence: floa
     Raises:
         MissingEvidenceError: It was not measured at both, on the same windows.
     """
-    updates = _updates(evidence, root, method)
-    tables = evidence.bind(f"{root}/{method}/seed_*/validation.parquet")
-    trained = evidence.bind(f"{root}/{method}/seed_*/model.safetensors")
-    if not tables or len(tables) != len(trained):
-        raise MissingEvidenceError(f"validation loss was not measured while {method} was trained")
+    updates = updates_of(evidence, root, method)
     falls = []
-    for table in tables:
-        rows = evidence.rows(table, ValidationRow)
-        rows = rows.assign(total=numbers(rows, "loss") * numbers(rows, "windows"))
-        if rows.duplicated(["episode_uuid", "step"]).any():
-            raise MissingEvidenceError(f"{table} states a loss twice")
-        by_step = rows.pivot(index="episode_uuid", columns="step", values=["total", "windows"])
+    for table, by_step in losses(evidence, root, method).items():
         moments = (three_quarters(updates), updates)
         if any(("total", moment) not in by_step.columns for moment in moments):
             raise MissingEvidenceError(f"{table} lacks the loss after {moments[0]} or {updates}")
@@ -141,7 +132,32 @@ def last_quarter(evidence: Evidence, root: str, method: str, *, confidence: floa
     return max(falls, key=lambda fall: fall.interval[1])
 
 
-def _updates(evidence: Evidence, root: str, method: str) -> int:
+def losses(evidence: Evidence, root: str, method: str) -> dict[str, pd.DataFrame]:
+    """By table of a training seed: total loss and windows of each held-out episode after each step.
+
+    Raises:
+        MissingEvidenceError: It was not measured in every training of the method, or stated twice.
+    """
+    tables = evidence.bind(f"{root}/{method}/seed_*/{VALIDATION_FILE}")
+    trained = evidence.bind(f"{root}/{method}/seed_*/model.safetensors")
+    if not tables or len(tables) != len(trained):
+        raise MissingEvidenceError(f"validation loss was not measured while {method} was trained")
+    found = {}
+    for table in tables:
+        rows = evidence.rows(table, ValidationRow)
+        rows = rows.assign(total=numbers(rows, "loss") * numbers(rows, "windows"))
+        if rows.duplicated(["episode_uuid", "step"]).any():
+            raise MissingEvidenceError(f"{table} states a loss twice")
+        found[table] = rows.pivot(index="episode_uuid", columns="step", values=["total", "windows"])
+    return found
+
+
+def updates_of(evidence: Evidence, root: str, method: str) -> int:
+    """How many updates a method was trained for.
+
+    Raises:
+        MissingEvidenceError: The evidence does not say.
+    """
     methods = evidence.document(f"{root}/matched.json").get("methods")
     entry = methods.get(method) if isinstance(methods, dict) else None
     config = entry.get("config") if isinstance(entry, dict) else None

@@ -5,6 +5,7 @@ import numpy as np
 from gates.bounds import counted_interval, share_interval
 from gates.criterion import Measured, criterion
 from gates.evidence import Evidence, MissingEvidenceError, flags, numbers
+from gates.feasibility.arrivals import at_the_stub
 from gates.feasibility.proof import checked_violations
 from gates.stress.rollouts import STRESS, StressSettings, rollouts
 from genpolicy.evidence.rows.stress import ConservationRow, StressCountRow, StressStubRow
@@ -66,10 +67,7 @@ def recovery_success_lower(
 def stub_violations(evidence: Evidence, settings: StressSettings, candidate: str) -> Measured:
     """Stale or invalid actions that arrived at the controller stub."""
     rows = evidence.of(f"{STRESS}/stub.parquet", StressStubRow, candidate)
-    arrivals = float(numbers(rows, "arrivals").sum())
-    if arrivals <= 0:
-        raise MissingEvidenceError("nothing arrived at the stub")
-    bad = float(numbers(rows, "stale").sum() + numbers(rows, "invalid").sum())
+    bad, arrivals = at_the_stub(rows, "stale", "invalid")
     return Measured(bad, caveat=f"stale or invalid, of {arrivals:g} arrivals")
 
 

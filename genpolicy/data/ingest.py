@@ -33,6 +33,7 @@ def ingest_recordings(
     *,
     contract: IngestContract,
     out: Path,
+    task: str | None = None,
     split: SplitRule | None = None,
     notes: tuple[str, ...] = (),
     import_contract: dict[str, Any] | None = None,
@@ -46,6 +47,7 @@ def ingest_recordings(
         files: MCAP recordings, one episode each.
         contract: What each must satisfy.
         out: The dataset folder; whole or not at all, an old one is replaced.
+        task: Task that each must name as its own; None takes recordings of any.
         split: Shares of the splits; 70 / 15 / 15 if absent.
         notes: What was guessed or not recorded, for the manifest.
         import_contract: The contract as a document, for the manifest.
@@ -60,6 +62,7 @@ def ingest_recordings(
     for name, path in sorted(zip(names, files, strict=True)):
         try:
             episode = accept_recording(path, contract=contract, label=name)
+            _refuse_other_task(episode, task)
             _refuse_duplicate(episode, accepted)
             accepted.append(episode)
         except BadInputError as error:
@@ -123,6 +126,18 @@ def _samples_hash(episode: RecordedEpisode) -> str:
         samples = episode.streams[name]
         arrays += [samples.values, samples.event_time_ns - samples.event_time_ns[0]]
     return content_hash(arrays)
+
+
+def _refuse_other_task(episode: AcceptedEpisode, task: str | None) -> None:
+    """Another task may have the same streams and units; what was done is not the same."""
+    recorded = episode.strata["task"]
+    if task is not None and recorded != task:
+        raise ContractError(
+            where=f"{episode.source_file}: metadata task",
+            found=repr(recorded[:60]),
+            expected=repr(task),
+            action="Judge it by the ladder of its own task (`params.yaml: task.name`).",
+        )
 
 
 def _refuse_duplicate(episode: AcceptedEpisode, accepted: Sequence[AcceptedEpisode]) -> None:

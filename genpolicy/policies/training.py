@@ -8,7 +8,7 @@ same seed sees the same batches in the same order. The stopping rule is a fixed 
 import copy
 import json
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -130,10 +130,7 @@ def train(
                     data=data, followed=followed, request=request, device=device,
                 )
             )  # fmt: skip
-        earlier = followed.earlier if followed else None
-        trained = {".": averaged} | ({EARLIER_FOLDER: earlier} if earlier else {})
-        for found in trained.values():
-            objective.finish(found, data)
+        trained = _finished(averaged, followed, objective, data)
     summary = {
         "stopping_rule": _stopping_rule(weights_of),
         "steps": request.training.steps,
@@ -144,10 +141,30 @@ def train(
         "regime": regime(device),
     }
     files = TrainingFiles(records, summary, _validation_rows(followed, weights_of))
-    for part, found in trained.items():
-        weights = serialise_weights(found, method=request.method)
-        files.add(part, weights, _checkpoint_config(request, found, objective, weights=weights))
+    _add_checkpoints(files, trained, request, objective)
     return files.write(folder)
+
+
+def _finished(
+    averaged: PolicyNetwork, followed: Validation | None, objective: Objective, data: Batch
+) -> dict[str, PolicyNetwork]:
+    """The result, and the earlier network where one was kept, by their folder."""
+    earlier = followed.earlier if followed else None
+    trained = {".": averaged} | ({EARLIER_FOLDER: earlier} if earlier else {})
+    for network in trained.values():
+        objective.finish(network, data)
+    return trained
+
+
+def _add_checkpoints(
+    files: TrainingFiles,
+    trained: Mapping[str, PolicyNetwork],
+    request: TrainingRequest,
+    objective: Objective,
+) -> None:
+    for part, network in trained.items():
+        weights = serialise_weights(network, method=request.method)
+        files.add(part, weights, _checkpoint_config(request, network, objective, weights=weights))
 
 
 def _validation_rows(followed: Validation | None, weights_of: Path | None) -> list[ValidationRow]:

@@ -68,7 +68,8 @@ class _Session:
         elif kind in ("discard", "finish"):
             self.counts["discards"] += m["ended"] == "discarded"
         elif kind == "recovery":
-            self.counts["recoveries"] += m["old"] == "idle"
+            # A stop also leaves `idle`, and nothing is tried after it.
+            self.counts["recoveries"] += m["old"] == "idle" and m["new"] == "hold"
             self.counts["calls"] += m["new"] in CALLS_A_PERSON
         elif kind == "force":
             self.peak_n = max(self.peak_n, m["force_n"])
@@ -103,6 +104,7 @@ class _Session:
             "start_sha256": self.labels.get("start_sha256"),
             "outcome": self.outcome,
             "success": self.outcome == SUCCESS,
+            "duration_s": ticks * (self.period_ns / 1e9),
             "ticks": ticks,
             "action_ticks": self.counts["accept"],
             "fallback_ticks": self.counts["fallback"],
@@ -117,16 +119,16 @@ class _Session:
             "recovery_attempted": recovered,
             "recovered": recovered and self.outcome == SUCCESS,
             "interventions": self.counts["calls"],
-            "action_age_p50_s": _order_statistic(ages, 0.5),
-            "action_age_p95_s": _order_statistic(ages, 0.95),
-            "action_age_max_s": _order_statistic(ages, 1.0),
-            "latency_p95_s": _order_statistic(self.latencies_s, 0.95),
+            "action_age_p50_s": order_statistic(ages, 0.5),
+            "action_age_p95_s": order_statistic(ages, 0.95),
+            "action_age_max_s": order_statistic(ages, 1.0),
+            "latency_p95_s": order_statistic(self.latencies_s, 0.95),
             "force_peak_n": self.peak_n,
             "mode": self.mode,
         }
 
 
-def _order_statistic(values: Sequence[float], level: float) -> float | None:
+def order_statistic(values: Sequence[float], level: float) -> float | None:
     """The smallest value that at least this share does not exceed; None without any."""
     if not values:
         return None

@@ -100,6 +100,12 @@ def test_wrong_labels_copies_and_glued_episodes_are_as_many_as_said():
     single = record("planar", Plan(8, episodes=50)).data
     glued = record("planar", Plan(8, defects=(Defect("glue", 1.0, "all"),), episodes=50)).data
     assert len(glued.observation) == 2 * len(single.observation)
+    ages = []
+    stamped = Defect("drop_camera", 0.0, "all")  # loses none, and has stamps
+    for faults in ((stamped,), (stamped, Defect("glue", 1.0, "all"))):
+        seen = record("planar", Plan(8, episodes=9, defects=faults)).data
+        ages.append(seen.event_time_s - seen.stream_time_s["camera"])
+    assert np.ptp(ages[1]) == pytest.approx(np.ptp(ages[0]), abs=1e-9)
 
 
 @pytest.mark.parametrize("kind", ["turn", "mirror", "swap", "position_unit", "tool_shift"])

@@ -20,7 +20,8 @@ NOT_IMPORTED = {
     "fastapi": "not ours: the bound keeps Prefect's server alive, see the comment there",
 }
 # Its wheel installs below a prefix of its own, where the metadata of modules do not look.
-INSTALLED_BY = {"pinocchio": {"pin"}}
+# That of `mutation` need not be installed.
+INSTALLED_BY = {"pinocchio": {"pin"}, "cosmic_ray": {"cosmic-ray"}}
 
 
 @cache
@@ -85,7 +86,7 @@ def test_every_imported_library_is_a_direct_dependency() -> None:
 
 
 def test_what_tests_and_benchmarks_import_is_declared_for_developers() -> None:
-    missing = by_chance(imported(*SUPPORT), declared(*EXTRAS, "dev"))
+    missing = by_chance(imported(*SUPPORT), declared(*EXTRAS, "dev", "mutation"))
     assert missing == {}, "declare it in pyproject.toml under dev"
 
 

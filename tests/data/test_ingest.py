@@ -29,6 +29,17 @@ def test_refusals_are_listed_and_nothing_is_dropped_silently(factory, tmp_path):
     assert all(item["where"].startswith(item["file"]) for item in listed["refused"])
 
 
+def test_what_names_another_task_is_refused_where_a_task_is_asked_for(factory, tmp_path):
+    mixed = [factory.episode(n, task="pour" if n == 3 else "reach") for n in range(5)]
+    paths = factory.write_all(tmp_path, mixed)
+    ingest_recordings(paths, contract=factory.contract(), out=tmp_path / "any")
+    assert json.loads((tmp_path / "any" / "refusals.json").read_text())["accepted"] == 5
+    ingest_recordings(paths, contract=factory.contract(), out=tmp_path / "one", task="reach")
+    (refused,) = json.loads((tmp_path / "one" / "refusals.json").read_text())["refused"]
+    assert refused["file"] == paths[3].name and "'pour'" in refused["reason"]
+    assert "expected 'reach'" in refused["reason"]
+
+
 def test_nothing_accepted_leaves_nothing_behind(factory, tmp_path):
     bad = tmp_path / "bad.mcap"
     bad.write_bytes(b"x")

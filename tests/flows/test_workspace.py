@@ -86,3 +86,11 @@ def test_an_override_may_declare_a_criterion_not_applicable_in_place_of_its_limi
     }
     with pytest.raises(ConfigError, match="not_applicable is not a key"):
         merged({"record": {"episodes": 3}}, {"record": waived})
+
+
+def test_an_override_may_name_who_answers_for_a_question_that_was_not_asked() -> None:
+    base = {"gate_a": {"limits": {"safety": {"force": [80, "why"]}}}}
+    waived = {"waived_checks": {"model": {"past.approach": "too few episodes"}}}
+    assert merged(base, {"gate_a": waived}) == {"gate_a": {**base["gate_a"], **waived}}
+    with pytest.raises(ConfigError, match="waived_checks is not a key"):
+        merged({"record": {"episodes": 3}}, {"record": waived})

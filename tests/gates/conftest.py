@@ -2,6 +2,7 @@
 
 import shutil
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,7 @@ from gates.card.drafting import draft
 from gates.proof import admit, judge
 from gates.report import GATES, report_bytes, report_path
 from genpolicy.integrity.atomic import write_bytes
+from genpolicy.statistics import clustered
 
 
 def judge_all(root: Path, gates: str = "ABCD") -> None:
@@ -30,6 +32,14 @@ def write_draft(root: Path) -> None:
     card = draft(root, admission.reports, admission.hashes)
     write_bytes(root / "artifacts/card/card.json", card_bytes(card))
     evidence.record(root)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _fewer_draws() -> Iterator[None]:
+    """A tenth of the draws of an interval; what it covers is tested where it is made."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(clustered, "DRAWS", 200)
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -338,7 +338,7 @@ def record(root: Path) -> None:
     """Pipeline and lock as if every evidence stage had just written what lies here."""
     if not (root / "dvc.yaml").is_file():
         return
-    disk = pipeline._Disk(root, {})
+    disk = pipeline.Disk(root, {})
     params = yaml.safe_load((root / "params.yaml").read_text()) or {}
     stages, runs = {}, {}
     for gate, names in pipeline.RUNGS.items():

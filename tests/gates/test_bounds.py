@@ -47,6 +47,11 @@ def test_counts_that_cannot_be_are_missing_evidence(hits, trials):
         counted_interval(hits, trials, confidence=0.95)
 
 
+@pytest.mark.parametrize(("hits", "trials"), [(0, 5), (5, 5), (1, 1), (0, 1)])
+def test_none_and_all_of_the_trials_are_shares(hits, trials):
+    assert counted_interval(hits, trials, confidence=0.9) == clopper_pearson(hits, trials, 0.9)
+
+
 def test_no_rows_are_missing_evidence():
     with pytest.raises(MissingEvidenceError):
         share([], [], favourable=True)

@@ -1,14 +1,17 @@
 """The engine: what is missing is named, and without a limit nothing passes."""
 
 import json
+import sys
 from dataclasses import replace
 
 import pytest
 from asking import SPEC
 
-from gates.engine import judge
+from gates.criterion import Measured
+from gates.engine import environment, judge, promoted_below, upstream_hashes
 from gates.evidence import Evidence
 from gates.pipeline import TASK_IDENTITY, Basis
+from gates.report import report_bytes, report_path
 from gates.settings import GateSettings, Limit, Limits, Waiver
 
 
@@ -84,3 +87,76 @@ def test_what_no_run_stands_for_does_not_pass(tmp_path):
     report = judge(SPEC, evidence, Limits(of=of, waived=waived), GateSettings())
     assert (report.verdict, report.promoted) == ("INCONCLUSIVE", None)
     assert report.caveats[-1].endswith("dvc.lock holds no run of stress.")
+
+
+def _asked(tmp_path, measured, **limits):
+    """The engine's answer to a criterion that measures just this."""
+    first = replace(SPEC.criteria[0], measure=lambda evidence, settings: measured)
+    (tmp_path / "a.json").write_text("{}")
+    spec = replace(SPEC, criteria=(first,))
+    of = {"<lambda>": Limit(1.0, "r", "model")} if not limits else limits["of"]
+    return judge(spec, Evidence(tmp_path), Limits(of=of), GateSettings()).criteria[0]
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), float("-inf")])
+def test_what_is_no_number_is_not_measured(tmp_path, value):
+    answer = _asked(tmp_path, Measured(value, (0.0, 1.0)))
+    assert (answer.measured, answer.verdict) == (None, "INCONCLUSIVE")
+
+
+def test_a_person_is_waited_for_only_where_they_can_still_decide(tmp_path):
+    assert _asked(tmp_path, Measured(None, pending=True)).verdict == "PENDING_REVIEW"
+    assert _asked(tmp_path, Measured(0.0, pending=True)).verdict == "PENDING_REVIEW"
+    assert _asked(tmp_path, Measured(1.0, pending=True)).verdict == "PASS"
+    assert _asked(tmp_path, Measured(0.0)).verdict == "FAIL"
+    assert _asked(tmp_path, Measured(1.0, pending=True), of={}).verdict == "INCONCLUSIVE"
+
+
+def test_number_and_interval_are_rounded_before_they_are_judged(tmp_path):
+    answer = _asked(tmp_path, Measured(1.0 - 1e-14, (0.1 + 0.2, 1.0 + 1e-14)))
+    assert (answer.measured, answer.interval, answer.verdict) == (1.0, (0.3, 1.0), "PASS")
+
+
+def test_the_environment_names_python_by_its_minor_version():
+    """A patch release of Python changes no number; a report is not void for it."""
+    assert environment()["python"] == f"{sys.version_info[0]}.{sys.version_info[1]}"
+
+
+def _below(tmp_path, gate, **candidates):
+    """A report of a gate that gives these verdicts."""
+    report = _judge(tmp_path, 1, 1).model_copy(update={"gate": gate, "candidates": candidates})
+    path = tmp_path / report_path(gate)
+    path.parent.mkdir(exist_ok=True)
+    path.write_bytes(report_bytes(report))
+    return path
+
+
+def test_who_passed_below_stands_and_why_the_others_do_not(tmp_path):
+    _below(tmp_path, "B", flow="PASS", act="FAIL", new="INCONCLUSIVE")
+    stands, why = promoted_below(tmp_path, "B", ["act", "flow", "other"])
+    assert stands == ["flow"]
+    assert [text.split()[0] for text in why] == ["act", "other"]
+    assert "gate B says FAIL" in why[0] and "gate B says nothing" in why[1]
+
+
+def test_gate_a_judges_no_method_and_lets_all_stand(tmp_path):
+    _below(tmp_path, "A")
+    assert promoted_below(tmp_path, "A", ["act", "flow"]) == (["act", "flow"], [])
+
+
+@pytest.mark.parametrize("data", [None, b"", b"{}", b"no report"])
+def test_on_a_report_that_cannot_be_read_no_method_stands(tmp_path, data):
+    path = _below(tmp_path, "B", flow="PASS")
+    path.unlink() if data is None else path.write_bytes(data)
+    stands, (why,) = promoted_below(tmp_path, "B", ["flow"])
+    assert stands == [] and "Gate B has no readable report" in why
+    # Gate A judges no method: they stand, and it is said that nothing is under them.
+    stands, (why,) = promoted_below(tmp_path, "A", ["flow"])
+    assert stands == ["flow"] and "Gate A has no readable report" in why
+
+
+def test_the_reports_below_are_bound_and_no_others(tmp_path):
+    for gate in "ABD":
+        _below(tmp_path, gate)
+    assert set(upstream_hashes(tmp_path, "D")) == {"A", "B"}
+    assert upstream_hashes(tmp_path, "A") == {}

@@ -144,7 +144,7 @@ def test_a_printed_page_that_was_changed_refuses(ladder):
     page = ladder / "reports/gate_a.html"
     page.write_text("<p>FAIL</p>")
     lock = yaml.safe_load((ladder / "dvc.lock").read_text())
-    md5 = pipeline._Disk(ladder, {}).md5("reports/gate_a.html")
+    md5 = pipeline.Disk(ladder, {}).md5("reports/gate_a.html")
     lock["stages"]["gate_a"] = {"outs": [{"path": "reports/gate_a.html", "md5": md5}]}
     (ladder / "dvc.lock").write_text(json.dumps(lock))
     admit("train_generators", ladder)
@@ -250,3 +250,101 @@ def test_an_output_that_is_missing_is_no_output_as_recorded(ladder):
     (ladder / "artifacts/latency").rmdir()
     with pytest.raises(IntegrityError, match="artifacts/latency is missing"):
         pipeline.check_record(ladder, "B", {})
+
+
+def _lock(root, change):
+    lock = yaml.safe_load((root / "dvc.lock").read_text())
+    change(lock["stages"])
+    (root / "dvc.lock").write_text(json.dumps(lock))
+
+
+@pytest.mark.parametrize("file", ["dvc.lock", "dvc.yaml"])
+def test_a_stage_without_a_record_hides_no_other_stage(ladder, file):
+    """The first of Gate A's has none; what a later one wrote is still held to its record."""
+    document = yaml.safe_load((ladder / file).read_text())
+    del document["stages"]["task"]
+    (ladder / file).write_text(json.dumps(document))
+    pipeline.check_record(ladder, "A", {})
+    (ladder / "artifacts/audit/summary.json").write_text("{}")
+    with pytest.raises(IntegrityError, match="artifacts/audit is other than recorded"):
+        pipeline.check_record(ladder, "A", {})
+
+
+def test_code_is_bound_wherever_it_stands_among_what_a_stage_reads(ladder):
+    """Data before it and after it in the list."""
+    document = json.loads((ladder / "dvc.yaml").read_text())
+    document["stages"]["stress"]["deps"] = ["params.yaml", evidence.CODE, "artifacts/ingest"]
+    document["stages"]["gate_d"]["deps"] = []
+    (ladder / "dvc.yaml").write_text(json.dumps(document))
+    before = pipeline.basis_of(ladder, "D").code
+    assert set(before) == {"genpolicy/robot"}
+    (ladder / evidence.CODE).write_text("STIFFNESS = 3\n")
+    assert pipeline.basis_of(ladder, "D").code != before
+
+
+def test_what_a_stage_reads_and_its_record_does_not_name_refuses(ladder):
+    _lock(ladder, lambda stages: stages["stress"].update(deps=[]))
+    with pytest.raises(IntegrityError, match=r"dvc\.lock: stress\.deps is without or beyond"):
+        pipeline.check_record(ladder, "D", {})
+
+
+def test_a_parameter_that_the_record_does_not_name_refuses(ladder):
+    _lock(ladder, lambda stages: stages["stress"].update(params={}))
+    with pytest.raises(IntegrityError, match=r"params\.yaml: stress is other than recorded"):
+        pipeline.check_record(ladder, "D", {})
+
+
+def test_every_printed_page_is_held_to_its_record_and_nothing_else_is(ladder):
+    for name in ("gate_a.html", "gate_a.md"):
+        (ladder / "reports" / name).write_text("FAIL")
+    md5 = pipeline._Disk(ladder, {}).md5("reports/gate_a.md")
+    outs = [
+        {"path": "artifacts/other", "md5": "0"},
+        {"path": "reports/gate_a.json", "md5": "0"},
+        {"path": "reports/gate_a.html", "md5": md5},
+        {"path": "reports/gate_a.md", "md5": md5},
+    ]
+    _lock(ladder, lambda stages: stages.update(gate_a={"outs": outs}))
+    assert pipeline.changed_pages(ladder, "A") == ""
+    (ladder / "reports/gate_a.md").write_text("PASS")
+    assert pipeline.changed_pages(ladder, "A") == "reports/gate_a.md"
+
+
+@pytest.mark.parametrize(
+    ("recorded", "now", "same"),
+    [
+        (1, 1.0, True),
+        ("1e-05", 1e-05, True),
+        ("1e-05", 2e-05, False),
+        ("text", 1.0, False),
+        ("1.0", "1.0", True),
+        (1, True, False),
+        (True, 1, False),
+        (True, True, True),
+        (0, False, False),
+        ([1, 2], [1], False),
+        ([1], [1, 2], False),
+        ([1, 2], [1, 3], False),
+        ([1, {"a": "1e-05"}], [1, {"a": 1e-05}], True),
+        ({"a": 1}, {"a": 1, "b": 2}, False),
+        ({"a": 1}, {"b": 1}, False),
+        ({"a": 1, "b": 2}, {"b": 2, "a": 1}, True),
+        ({"a": 1, "b": 2}, {"a": 1, "b": 3}, False),
+        ([1], {"a": 1}, False),
+        (None, 0, False),
+    ],
+)
+def test_two_values_are_the_same_setting(recorded, now, same):
+    assert pipeline._equal(recorded, now) is same
+
+
+def test_a_task_of_a_single_file_is_that_file_and_not_its_neighbours(tmp_path, ladder, monkeypatch):
+    folder = tmp_path / "site"
+    folder.mkdir()
+    (folder / "lone_task_of_one_file.py").write_text("TASK = 1\n")
+    (folder / "neighbour.py").write_text("")
+    monkeypatch.syspath_prepend(str(folder))
+    found = pipeline._package(ladder, "lone_task_of_one_file:TASK")
+    assert found == {"lone_task_of_one_file.py": sha256_file(folder / "lone_task_of_one_file.py")}
+    assert pipeline._package(ladder, "no_such_task_anywhere:TASK") == {}
+    assert pipeline._package(ladder, "") == {}

@@ -8,6 +8,7 @@ import yaml
 
 from gates.preregistration import (
     NONE,
+    PLANNED,
     PREREGISTRATION,
     moved_caveats,
     moves,
@@ -101,6 +102,38 @@ def test_without_a_plan_the_report_says_so(ladder, text):
     path.unlink() if text is None else path.write_text(text)
     assert read_plan(ladder) is None
     assert moved_caveats(ladder, evidence.PARAMS) == (NONE,)
+
+
+def _written(tmp_path, plan):
+    (tmp_path / PREREGISTRATION).write_text(yaml.safe_dump(plan))
+    return read_plan(tmp_path)
+
+
+@pytest.mark.parametrize("entry", [["<", 1], ["<="], ["<=", 1, 2], "<=", {"<=": 1}, [1, "<="]])
+def test_one_entry_of_another_form_voids_the_plan(tmp_path, entry):
+    plan = plan_of(evidence.PARAMS, COMPARISONS)
+    assert _written(tmp_path, plan) is not None
+    assert _written(tmp_path, {**plan, "gate_d.reset_upper": entry}) is None
+
+
+def test_a_plan_names_every_setting_that_is_planned_and_may_name_no_limit(tmp_path):
+    bare = {
+        place: entry for place, entry in plan_of(evidence.PARAMS, {}).items() if place in PLANNED
+    }
+    assert _written(tmp_path, bare) is not None
+    for place in bare:
+        assert _written(tmp_path, {k: v for k, v in bare.items() if k != place}) is None
+
+
+@pytest.mark.parametrize(("before", "now"), [(0.1, "derived"), ("derived", 0.1), (0.1, True)])
+def test_a_limit_that_is_no_number_any_more_changed(before, now):
+    plan = {"gate_d.reset_upper": ["<=", before]}
+    found = {move.place: move.kind for move in moves(plan, evidence.PARAMS)}
+    changed = copy.deepcopy(evidence.PARAMS)
+    evidence.set_limit("gate_d", "reset_upper", now)(changed)
+    found = {move.place: move.kind for move in moves(plan, changed)}
+    assert found["gate_d.reset_upper"] == "changed"
+    assert found["gate_d.force_peak_p95_n"] == "tightened"  # a limit that nobody planned
 
 
 def test_the_shipped_plan_can_be_read(request):

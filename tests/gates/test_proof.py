@@ -10,6 +10,7 @@ from gates.proof import STAGE_REQUIRES, admit, judge, prove_all
 from gates.report import report_bytes, report_path
 from genpolicy.errors import ConfigError, IntegrityError, RefusedError
 from genpolicy.integrity.atomic import write_bytes
+from genpolicy.integrity.hashing import sha256_file
 
 
 def _edit_report(root, gate, change):
@@ -139,6 +140,16 @@ def test_an_edited_report_refuses(ladder, forge):
         admit("train_generators", ladder)
 
 
+@pytest.mark.parametrize("absolute", [False, True])
+def test_a_material_outside_the_repository_refuses_though_its_hash_is_true(ladder, absolute):
+    outside = ladder.parent / "outside.txt"
+    outside.write_text("x")
+    name = str(outside) if absolute else "../outside.txt"
+    _edit_report(ladder, "A", lambda r: r["materials"].update({name: sha256_file(outside)}))
+    with pytest.raises(RefusedError, match="outside the repository"):
+        admit("train_generators", ladder)
+
+
 def test_a_promotion_written_by_hand_refuses(ladder):
     evidence.edit_table(
         ladder, "stress/rollouts.parquet", lambda f: f.assign(success=f["method"] == "bc")
@@ -186,7 +197,9 @@ def test_prove_all_reports_each_rung(ladder):
     rungs = {rung.gate: rung for rung in prove_all(ladder)}
     assert [rungs[g].verdict for g in "ABCD"] == ["PASS"] * 4
     assert rungs["E"].verdict == "NOT JUDGED"
+    assert [rungs[g].exit_code for g in "ABCDE"] == [0, 0, 0, 0, 3]
     _edit_report(ladder, "C", lambda r: r.update(decision="go"))
     rungs = {rung.gate: rung for rung in prove_all(ladder)}
     assert rungs["C"].verdict == "REFUSED"
     assert rungs["D"].verdict == "REFUSED"
+    assert [rungs[g].exit_code for g in "ABCDE"] == [0, 0, 3, 3, 3]

@@ -12,7 +12,14 @@ from gates.proof import Rung
 from gates.rederive import STRESS, rederive, rederived
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.errors import BadInputError, RefusedError
-from genpolicy.evidence.rows.stress import RolloutRow
+from genpolicy.evidence.rows.stress import (
+    AgeRow,
+    ConservationRow,
+    InvocationRow,
+    RolloutRow,
+    StressCountRow,
+    StressStubRow,
+)
 from genpolicy.execution.cell import Cell, ExecutionSettings
 from genpolicy.execution.executor import Executor
 from genpolicy.execution.journal import Journal, write_journal
@@ -21,18 +28,25 @@ from genpolicy.execution.supervisor import Supervisor
 from genpolicy.integrity.rows import write_rows
 from genpolicy.integrity.tables import read_table, write_table
 from genpolicy.verification.checker import check_journal
+from genpolicy.verification.commands import reach_of
 from genpolicy.verification.rollouts import derived_rollouts
+from genpolicy.verification.tables import derived_tables
 
 PARAMS = yaml.safe_load((Path(__file__).parents[2] / "params.yaml").read_text())
-NAMES = ("flow__nominal", "bc__nominal")
+NAMES = ("flow__nominal", "bc__nominal", "flow__envelope")
+TABLES = {
+    "invocations": InvocationRow, "counts": StressCountRow, "conservation": ConservationRow,
+    "stub": StressStubRow, "ages": AgeRow,
+}  # fmt: skip
 
 
-def _session(method: str, start: int) -> Journal:
+def _session(name: str, start: int) -> Journal:
     """A rollout in which nothing is delivered: it holds, touches something and ends."""
+    method, _, perturbation = name.partition("__")
     labels = {
-        "method": method, "perturbation": "nominal", "start": str(start), "start_sha256": "ab",
+        "method": method, "perturbation": perturbation, "start": str(start), "start_sha256": "ab",
     }  # fmt: skip
-    journal = Journal(f"{method}/nominal/{start}", labels)
+    journal = Journal(f"{method}/{perturbation}/{start}", labels)
     horizons = HorizonConfig(**PARAMS["horizons"])
     execution = ExecutionSettings(**PARAMS["execution"])
     cell = Cell(horizons, execution)
@@ -59,22 +73,42 @@ def root(tmp_path):
     (tmp_path / "params.yaml").write_text(yaml.safe_dump(PARAMS))
     folder = tmp_path / STRESS
     (folder / "journals").mkdir(parents=True)
-    expected = module._expected(tmp_path)
+    expected, _ = module._held_to(PARAMS)
     rows, documents = [], {}
     for name in NAMES:
         path = folder / "journals" / f"{name}.mcap"
-        write_journal(path, [_session(name.split("__")[0], start) for start in (0, 1)])
+        write_journal(path, [_session(name, start) for start in (0, 1)])
         documents[path.name] = check_journal(path, expected).as_document()
         for columns in derived_rollouts(path).values():
-            rows.append(RolloutRow(**columns, seed=0, duration_s=0.2))
+            rows.append(RolloutRow(**columns, seed=0))
     write_rows(folder / "rollouts.parquet", RolloutRow, rows)
+    for name, listed in derived_tables(sorted((folder / "journals").iterdir())).items():
+        seed = {"seed": 0} if name == "invocations" else {}
+        made = [TABLES[name](**row, **seed) for row in listed]
+        write_rows(folder / f"{name}.parquet", TABLES[name], made)
     _write_checker(folder, documents)
+    (folder / "envelope.json").write_text(json.dumps(_envelope(folder)))
     return tmp_path
 
 
+def _envelope(folder):
+    planned = {k: v for k, v in PARAMS["stress"]["perturbations"]["envelope"].items()
+               if k != "kind"}  # fmt: skip
+    reach = reach_of(folder / "journals" / "flow__envelope.mcap").as_document()
+    return {"condition": "envelope", **planned, "reached": {"flow": reach}}
+
+
 def _write_checker(folder, documents):
-    violations = [v for document in documents.values() for v in document["violations"]]
-    document = {"violations": violations, "checked_actions": 0, "journals": documents}
+    violations = [
+        {"journal": name, **violation}
+        for name, document in documents.items()
+        for violation in document["violations"]
+    ]
+    totals = {
+        name: sum(item[name] for item in documents.values())
+        for name in ("checked_actions", "reproved_actions")
+    }
+    document = {"violations": violations, **totals, "journals": documents}
     (folder / "checker.json").write_text(json.dumps(document))
 
 
@@ -91,7 +125,8 @@ def test_true_evidence_stands(root):
 FORGED = {
     "success": True, "outcome": "success", "force_peak_n": 1.0, "deadline_misses": 0,
     "interventions": 5, "latency_p95_s": 0.001, "start_sha256": "cd", "mode": "right",
-    "recovered": True, "rejections": 9, "hold_ticks": 1, "action_age_p95_s": 0.1,
+    "recovered": True, "rejections": 9, "hold_ticks": 1, "action_age_p95_s": 0.1, "seed": 7,
+    "duration_s": 0.1,
 }  # fmt: skip
 
 
@@ -139,6 +174,61 @@ def test_a_violation_left_out_of_the_list_is_found(root):
         rederive(root, "D")
 
 
+@pytest.mark.parametrize("key", ["checked_actions", "reproved_actions"])
+def test_actions_that_nobody_checked_are_found(root, key):
+    path = root / STRESS / "checker.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | {key: 5}))
+    with pytest.raises(RefusedError, match=rf"checker\.json: {key} is 5, required 0"):
+        rederive(root, "D")
+
+
+FORGED_TABLES = {
+    "invocations": ("latency_s", 0.001, "invocation bc/nominal/0/0: latency_s"),
+    "counts": ("count", 3, "count bc/nominal/: count"),
+    "conservation": ("generated", 9, "conservation bc/nominal: generated"),
+    "stub": ("stale", 1, "stub bc/nominal: stale"),
+}
+
+
+@pytest.mark.parametrize("name", FORGED_TABLES)
+def test_a_forged_cell_of_every_other_table_is_refused_by_name(root, name):
+    column, value, said = FORGED_TABLES[name]
+    path = root / STRESS / f"{name}.parquet"
+    rows = read_table(path).to_pylist()
+    write_rows(path, TABLES[name], [TABLES[name](**{**rows[0], column: value}),
+                                    *(TABLES[name](**row) for row in rows[1:])])  # fmt: skip
+    with pytest.raises(RefusedError, match=rf"{said} is {value}.*as its journal says"):
+        rederive(root, "D")
+    write_rows(path, TABLES[name], [TABLES[name](**row) for row in rows[1:]])
+    with pytest.raises(RefusedError, match="is only in a journal"):
+        rederive(root, "D")
+    write_rows(path, TABLES[name], [TABLES[name](**row) for row in (*rows, rows[0])])
+    with pytest.raises(RefusedError, match="is stated twice"):
+        rederive(root, "D")
+
+
+def test_ages_of_actions_that_no_journal_has_are_refused(root):
+    made = AgeRow("flow", "nominal", 0.95, 0.1, 40)
+    write_rows(root / STRESS / "ages.parquet", AgeRow, [made])
+    with pytest.raises(RefusedError, match=r"age flow/nominal/0\.95 is without a journal"):
+        rederive(root, "D")
+
+
+@pytest.mark.parametrize(("key", "value"), [
+    ("speed_limit_m_s", 0.5), ("workspace_lower_m", [0.0, 0.0, 0.0]), ("condition", "nominal"),
+    ("reached", {"flow": {"commands": 900, "fastest_m_s": 0.1, "lowest_m": None,
+                          "highest_m": None}}),
+])  # fmt: skip
+def test_an_envelope_that_was_not_planned_or_not_run_is_refused(root, key, value):
+    path = root / STRESS / "envelope.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | {key: value}))
+    with pytest.raises(RefusedError, match=rf"envelope\.json: {key} is .*as planned"):
+        rederive(root, "D")
+    path.unlink()
+    with pytest.raises(RefusedError, match=r"envelope\.json: condition is None"):
+        rederive(root, "D")
+
+
 def test_a_journal_that_nobody_checked_is_found(root):
     path = root / STRESS / "checker.json"
     document = json.loads(path.read_text())
@@ -163,3 +253,13 @@ def test_a_refused_rung_says_why_and_the_others_stand(root):
     assert "bc__nominal.mcap" in second.note
     judged = Rung("D", "n", "REFUSED", "", "before", "r", 2)
     assert rederived(root, [judged]) == [judged]
+
+
+@pytest.mark.parametrize("total", ["checked_actions", "reproved_actions"])
+def test_a_total_that_the_gates_judge_by_is_derived_again(root, total):
+    path = root / STRESS / "checker.json"
+    document = json.loads(path.read_text())
+    document[total] += 1000
+    path.write_text(json.dumps(document))
+    with pytest.raises(RefusedError, match=rf"checker\.json: {total} is 1\d\d\d, required \d+"):
+        rederive(root, "D")

@@ -8,7 +8,7 @@ import pytest
 from flows.workspace import merged
 from gates.card.card import CardSettings
 from gates.proof import SPECS, judge
-from gates.settings import read_limits, read_settings
+from gates.settings import read_limits, read_params, read_settings, section_of
 from genpolicy.errors import ConfigError
 from genpolicy.integrity.documents import read_yaml
 
@@ -140,3 +140,51 @@ def test_a_measure_sees_the_limits_that_its_gate_judges_by():
     settings = read_settings(_params(), "gate_a", SPECS["A"].settings)
     assert settings.limits.of == {} and settings.under(limits).limits is limits
     assert settings.under(limits).model_dump() == settings.model_dump()
+
+
+@pytest.mark.parametrize(
+    ("path", "good", "bad"),
+    [
+        (("confidence",), [0.51, 0.99], [0.5, 1.0, 0.0]),
+        (("stress", "margin"), [0.0, -0.99, 0.99], [1.0, -1.0]),
+        (("stress", "alpha"), [0.001, 0.999], [0.0, 1.0]),
+        (("stress", "starts"), [1], [0, -1]),
+        (("horizons", "execution_horizon"), [1], [0]),
+        (("horizons", "action_period_s"), [0.001], [0.0]),
+        (("train_generators", "samplers"), [{"flow": {}}], [{}]),
+    ],
+)
+def test_a_setting_of_gate_d_ends_where_it_means_nothing(path, good, bad):
+    def with_(value):
+        def change(params):
+            for part in path[:-1]:
+                params = params[part]
+            params[path[-1]] = value
+
+        return read_settings(_params(change), "gate_d", SPECS["D"].settings)
+
+    for value in good:
+        assert with_(value)
+    for value in bad:
+        with pytest.raises(ConfigError, match="gate_d"):
+            with_(value)
+
+
+def test_the_same_clusters_are_drawn_whenever_a_gate_is_judged():
+    settings = read_settings(_params(), "gate_d", SPECS["D"].settings)
+    one, again = (settings.draws("D", "force").integers(0, 1000, 5).tolist() for _ in range(2))
+    assert one == again != settings.draws("D", "latency").integers(0, 1000, 5).tolist()
+
+
+def test_a_settings_file_that_is_not_there_or_says_nothing_is_a_bad_setting(tmp_path):
+    with pytest.raises(ConfigError, match=r"params\.yaml"):
+        read_params(tmp_path)
+    (tmp_path / "moved.yaml").write_text("seed: 1")
+    (tmp_path / "params.yaml").symlink_to("moved.yaml")
+    with pytest.raises(ConfigError, match=r"params\.yaml"):
+        read_params(tmp_path)
+    (tmp_path / "params.yaml").unlink()
+    for text in ("", "[1]", "seed: 1", "gate_a: [1]"):
+        (tmp_path / "params.yaml").write_text(text)
+        with pytest.raises(ConfigError, match="gate_a is missing"):
+            section_of(read_params(tmp_path), "gate_a")

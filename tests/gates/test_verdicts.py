@@ -1,5 +1,6 @@
 """Verdicts: monotone, total, and never PASS for what is missing."""
 
+import itertools
 import math
 
 import pytest
@@ -7,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gates.report import Answer
-from gates.verdicts import SEVERITY, combine, first_unmet, judge_criterion, rounded
+from gates.verdicts import SEVERITY, best, combine, first_unmet, judge_criterion, rounded, worst
 
 NUMBERS = st.floats(allow_nan=False, allow_infinity=False, width=64)
 VERDICTS = st.sampled_from(sorted(SEVERITY))
@@ -60,6 +61,30 @@ def test_the_limit_itself_is_accepted():
     assert judge_criterion(1.0, 1.0, "<=") == judge_criterion(1.0, 1.0, ">=") == "PASS"
 
 
+@pytest.mark.parametrize(
+    ("measured", "limit", "comparison"),
+    [(0.9, 0.5, "<="), (0.5 + 1e-9, 0.5, "<="), (-0.9, -1.0, "<="), (0.1, 0.5, ">="),
+     (0.5 - 1e-9, 0.5, ">="), (-1.0, -0.9, ">="), (1.0, 0.0, "<="), (0.0, 1.0, ">=")],
+)  # fmt: skip
+def test_just_beyond_the_limit_fails_and_the_other_side_passes(measured, limit, comparison):
+    other: dict = {"<=": ">=", ">=": "<="}
+    assert judge_criterion(measured, limit, comparison) == "FAIL"
+    assert judge_criterion(measured, limit, other[comparison]) == "PASS"
+
+
+def test_a_number_is_known_to_twelve_digits():
+    assert rounded(0.1 + 0.2) == 0.3 and rounded(1.0000000000004) == 1.0
+    assert rounded(1.00000000001) == 1.00000000001  # the twelfth digit still counts
+    assert rounded(1.000000000001) == 1.0  # the thirteenth does not
+
+
+def test_what_fails_is_worse_than_what_is_missing_and_that_than_what_waits():
+    order = ["PASS", "PENDING_REVIEW", "INCONCLUSIVE", "FAIL"]
+    for better, worse in itertools.combinations(order, 2):
+        for pair in ([better, worse], [worse, better]):
+            assert (best(pair), worst(pair)) == (better, worse)
+
+
 def test_nothing_judged_is_inconclusive():
     assert combine([], expects_candidates=False)[0] == "INCONCLUSIVE"
     assert combine([criterion("PASS")], expects_candidates=True)[0] == "INCONCLUSIVE"
@@ -85,3 +110,5 @@ def test_the_first_unmet_criterion_is_named_required_before_candidates():
     rows = [criterion("FAIL", "m", name="own"), criterion("FAIL", name="common")]
     assert first_unmet(rows, "FAIL").id == "common"
     assert first_unmet(rows, "PASS") is None
+    assert first_unmet(rows[:1], "FAIL").id == "own"
+    assert first_unmet([criterion("PASS"), *rows], "INCONCLUSIVE") is None

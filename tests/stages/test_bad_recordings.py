@@ -103,6 +103,20 @@ def test_only_bad_recordings_are_bad_input(recordings, stage) -> None:
     assert sorted(p.name for p in Path("artifacts").iterdir()) == ["record", "task"]
 
 
+def test_recordings_of_another_task_are_refused(recordings, stage) -> None:
+    """Streams and units may be the same: the metadata say what was done."""
+
+    def of_a_drawer(episode: RecordedEpisode) -> RecordedEpisode:
+        return replace(episode, metadata={**episode.metadata, "task": "drawer_opening"})
+
+    for path in recordings:
+        rewrite(path, of_a_drawer)
+    code, said = stage("ingest")
+    assert (code, said.count("\n")) == (2, 1), said
+    assert "metadata task" in said and "drawer_opening" in said and "tabletop_insertion" in said
+    assert sorted(p.name for p in Path("artifacts").iterdir()) == ["record", "task"]
+
+
 def test_no_recording_is_bad_input(recordings, stage) -> None:
     for path in recordings:
         path.unlink()

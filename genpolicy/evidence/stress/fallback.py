@@ -5,8 +5,9 @@ from numpy.typing import NDArray
 
 from genpolicy.contract.chunk import ChunkMetadata
 from genpolicy.evidence.stress.state import Fixture
+from genpolicy.execution.cell import RecoveryState
 from genpolicy.execution.executor import Executor
-from genpolicy.execution.recovery import Primitive, Recovery, RecoveryState, fallback_metadata
+from genpolicy.execution.recovery import Primitive, Recovery, fallback_metadata
 from genpolicy.tasks.api import World
 
 Array = NDArray[np.float64]

@@ -22,10 +22,10 @@ from genpolicy.evidence.admission_context import (
 from genpolicy.evidence.stress.disturbance import Disturbance
 from genpolicy.evidence.stress.fallback import Fallback
 from genpolicy.evidence.stress.state import Fixture, InFlight, Outcome, Tally, in_flight
-from genpolicy.execution.cell import FALLBACK_HASH, Cell
+from genpolicy.execution.cell import FALLBACK_HASH, Cell, RecoveryState
 from genpolicy.execution.command import Command
 from genpolicy.execution.executor import Executor
-from genpolicy.execution.recovery import Recovery, RecoveryState, step
+from genpolicy.execution.recovery import Recovery, step
 from genpolicy.execution.stub import ControllerStub
 from genpolicy.execution.supervisor import Supervisor
 from genpolicy.feasibility.admission import Admitted, Rejected

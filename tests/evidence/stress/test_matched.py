@@ -165,7 +165,7 @@ def test_every_row_follows_from_its_journal(shard, kit, seconds):
     for row in result.rollouts:
         columns = derived[f"flow/nominal/{row.start}"]
         assert differences(asdict(row), columns) == [], (row, columns)
-        assert set(asdict(row)) - set(columns) == {"seed", "duration_s"}
+        assert set(asdict(row)) - set(columns) == {"seed"}
 
 
 @pytest.mark.parametrize("column", ["success", "force_peak_n", "outcome", "hold_ticks", "mode"])

@@ -6,11 +6,20 @@ import pytest
 from evidence import edit_document
 from team import FILLED
 
-from gates.card.card import TrialCard, envelope_violations, missing_fields, validity
+from gates.card.card import (
+    CardSettings,
+    TrialCard,
+    envelope_violations,
+    missing_fields,
+    promoted,
+    validity,
+)
 from gates.card.envelope import beyond_simulation, simulated_envelope
 from gates.card.signing import read_draft
+from gates.claim import CHECKPOINT_ONLY
 from gates.evidence import Evidence
-from genpolicy.errors import IntegrityError
+from gates.report import parse_section, read_report
+from genpolicy.errors import ConfigError, IntegrityError, RefusedError
 
 
 @pytest.fixture
@@ -65,7 +74,11 @@ def test_a_threshold_that_the_draft_lacks_is_missing_on_the_card(draft, simulate
         ("commands", 0, "was not run"),
         ("fastest_m_s", 0.251, "0.251 m/s"),
         ("fastest_m_s", None, "nan m/s"),
+        ("fastest_m_s", -0.1, "-0.1 m/s"),
         ("lowest_m", [0.34, -0.18, 0.03], "in x"),
+        ("lowest_m", None, "in x"),
+        ("highest_m", None, "in z"),
+        ("highest_m", [0.35, 0.2, 0.25], "in x"),
         ("highest_m", [0.69, 0.201, 0.25], "in y"),
     ],
 )
@@ -124,3 +137,65 @@ def test_both_days_count(card):
     assert not on("2026-11-05", last="2026-12-01")
     assert on("2026-11-05", "2026-11-05", "2026-11-05", 1)
     assert not on("2026-11-05", "2026-11-06", "2026-11-05")
+    assert not on("2026-11-05", last="2026-11-31")  # no day of the calendar
+    assert not on("2026-11-05", last="20261130")
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [("commands", 1), ("fastest_m_s", 0.0), ("highest_m", [0.36, -0.18, 0.03])],
+)
+def test_a_candidate_that_hardly_moves_stays_inside(team, key, value):
+    """One command, at no speed, at one point: little, but nothing beyond."""
+    edit_document(
+        team.root, "stress/envelope.json", lambda d: d["reached"]["flow"].__setitem__(key, value)
+    )
+    assert beyond_simulation(simulated_envelope(Evidence(team.root)), "flow") == []
+
+
+def test_the_whole_workspace_of_the_task_is_inside_it_and_a_flat_one_is_none(simulated):
+    whole = {
+        "task_lower_m": simulated.workspace_lower_m,
+        "task_upper_m": simulated.workspace_upper_m,
+    }
+    assert beyond_simulation(simulated.model_copy(update=whole), "flow") == []
+    x, y, _ = simulated.workspace_upper_m
+    flat = {"workspace_upper_m": (x, y, simulated.workspace_lower_m[2])}
+    found = beyond_simulation(simulated.model_copy(update=flat), "flow")
+    assert "workspace z not inside the task's" in found
+
+
+def test_borders_of_what_people_fill_in(draft, simulated, card):
+    def with_(**changes):
+        changed = card.model_copy(update=changes)
+        return missing_fields(changed) + envelope_violations(changed, draft, simulated)
+
+    assert with_(nonce="0123456789abcdef") == [] and with_(nonce="0123456789abcde") == ["nonce"]
+    assert with_(force_limit_n=0.5) == []
+    assert with_(abort_thresholds=dict.fromkeys(draft.abort_thresholds, 0.0)) == []
+    three = {key: value for key, value in card.reports.items() if key != "D"}
+    assert with_(reports=three) == ["reports"]
+
+
+def test_only_a_passing_method_of_a_passing_gate_is_promoted(team):
+    report = read_report(team.root, "D")[0]
+    assert promoted(report) == "flow"
+    for change in (
+        {"verdict": "FAIL"},
+        {"promoted": None},
+        {"candidates": {**report.candidates, "flow": "FAIL"}},
+        {"promoted": "another"},
+    ):
+        with pytest.raises(RefusedError, match="promoted"):
+            promoted(report.model_copy(update=change))
+
+
+def test_the_first_caveat_of_a_draft_is_what_was_tested(draft):
+    assert draft.caveats[0] == CHECKPOINT_ONLY
+
+
+def test_a_card_is_of_a_task_that_has_a_name():
+    section = {"name": "trial", "authors": ["ada"], "task": "t"}
+    assert parse_section(CardSettings, section, where="card").task == "t"
+    with pytest.raises(ConfigError, match=r"card\.task"):
+        parse_section(CardSettings, {**section, "task": ""}, where="card")

@@ -82,6 +82,34 @@ def test_without_git_nothing_came_first(tmp_path):
         require_no_commit_of(tmp_path, _person(["rita@example.org"]))
 
 
+def test_where_git_is_not_installed_nothing_came_first(history, monkeypatch):
+    root, commit = history
+    commit(plan="a: 1")
+    monkeypatch.setenv("PATH", str(root))
+    with pytest.raises(IntegrityError, match="without git"):
+        require_registered_first(root)
+
+
+@pytest.mark.parametrize("text", ["stages: {}", "stages: {stress: {}}", "[1]", "stages: [1]"])
+def test_a_lock_without_the_comparison_records_no_evidence(history, text):
+    root, commit = history
+    commit(plan="a: 1")
+    commit(lock=text)
+    with pytest.raises(IntegrityError, match="artifacts/stress is not committed"):
+        require_registered_first(root)
+
+
+def test_only_the_evidence_of_the_comparison_dates_it(history):
+    """Another output of the stage, older than the plan, is no evidence of it."""
+    root, commit = history
+    other = {"path": "artifacts/other", "md5": "fedcba9876543210.dir"}
+    own = {"path": "artifacts/stress", "md5": "0123456789abcdef.dir"}
+    commit(lock=yaml.safe_dump({"stages": {"stress": {"outs": [other]}}}))
+    commit(plan="a: 1")
+    commit(lock=yaml.safe_dump({"stages": {"stress": {"outs": [other, own]}}}))
+    require_registered_first(root)
+
+
 def _person(emails, role="reviewer"):
     return Person(id="rita", name="R", role=role, public_key="0" * 64, emails=tuple(emails))
 

@@ -8,6 +8,9 @@ import evidence
 import pytest
 from team import AUTHORS, PEOPLE
 
+from gates.card.judge import CardGateSettings
+from gates.report import parse_section
+from genpolicy.errors import ConfigError
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_file
 
@@ -141,7 +144,22 @@ def _other_draft(root):
     evidence.record(root)
 
 
+def _in_alphabet(document):
+    document["payload"] = f"!{document['payload']}"
+
+
 FORGERIES = {
+    "a character that is no base64": (_document(_in_alphabet), "signature_valid"),
+    "a field beside the payload": (_document(lambda d: d.update(note="ok")), "signature_valid"),
+    "a field beside a signature": (
+        _document(lambda d: d["signatures"][0].update(note="ok")),
+        "signature_valid",
+    ),
+    "signatures by name": (
+        _document(lambda d: d.update(signatures={"rita": 1})),
+        "signature_valid",
+    ),
+    "a payload that is no text": (_document(lambda d: d.update(payload=1)), "signature_valid"),
     "payload tampered": (_document(_tamper), "signature_valid"),
     "another payload type": (_other_type, "signature_valid"),
     "payload truncated": (_document(_truncate), "signature_valid"),
@@ -241,3 +259,30 @@ def test_outside_its_days_the_card_is_void(signed, day):
     report = signed.judge(today=day)
     assert report.verdict == "FAIL"
     assert _red(report) == {"not_expired"}
+
+
+@pytest.mark.parametrize(
+    ("path", "data", "criterion"),
+    [
+        ("card/card.json", b"{}", "upstream_passed"),
+        ("reload/identity.json", None, "upstream_passed"),
+        ("reload/identity.json", b'{"flow": 1}', "upstream_passed"),
+        ("stress/envelope.json", None, "envelope_within_limits"),
+    ],
+)
+def test_what_lacks_under_a_signed_card_is_named_and_no_fault_of_ours(
+    signed, path, data, criterion
+):
+    evidence.replace(signed.root, path, data)
+    report = signed.judge()
+    assert report.verdict == "FAIL" and criterion in _red(report)
+
+
+@pytest.mark.parametrize(("days", "good"), [(1, True), (0, False)])
+def test_a_card_may_last_a_day_and_no_less(days, good):
+    section = {"card": "trial", "maximum_days": days}
+    if good:
+        assert parse_section(CardGateSettings, section, where="gate_e").maximum_days == 1
+    else:
+        with pytest.raises(ConfigError, match="maximum_days"):
+            parse_section(CardGateSettings, section, where="gate_e")

@@ -42,3 +42,18 @@ def test_a_part_of_small_order_is_refused_and_people_s_keys_are_not():
     for _ in range(5):
         key = Ed25519PrivateKey.generate().public_key().public_bytes_raw()
         assert key_weakness(key) == ""
+
+
+def test_a_key_moved_by_the_point_of_order_two_is_refused():
+    """(-x, -y): of the curve, of no small order, and verifies under another encoding."""
+    for _ in range(4):
+        key = Ed25519PrivateKey.generate().public_key().public_bytes_raw()
+        number = int.from_bytes(key, "little")
+        sign, y = number >> 255, number & ((1 << 255) - 1)
+        moved = (PRIME - y) | ((1 - sign) << 255)
+        assert "prime-order" in key_weakness(moved.to_bytes(32, "little"))
+
+
+def test_zero_has_no_sign():
+    for y in (1, PRIME - 1):
+        assert "one encoding" in key_weakness((y | 1 << 255).to_bytes(32, "little"))

@@ -3,7 +3,9 @@
 import json
 
 import pytest
-from team import PEOPLE
+from cryptography.hazmat.primitives import serialization
+from cryptography.hazmat.primitives.asymmetric.x25519 import X25519PrivateKey
+from team import KEYS, PEOPLE
 
 from gates.card.signing import load_allow_list, sign_card
 from genpolicy.errors import BadInputError
@@ -100,3 +102,25 @@ def test_without_a_plan_nothing_is_signed_and_nothing_is_valid(team):
 
 def test_the_shipped_allow_list_names_nobody(request):
     assert load_allow_list(request.config.rootpath).people == ()
+
+
+def _pem(key, protection):
+    return key.private_bytes(
+        serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, protection
+    )
+
+
+@pytest.mark.parametrize("kind", ["missing", "text", "with a password", "of another kind"])
+def test_a_private_key_that_cannot_sign_is_bad_input(team, kind):
+    data = {
+        "text": b"no key",
+        "with a password": _pem(KEYS["rita"], serialization.BestAvailableEncryption(b"x")),
+        "of another kind": _pem(X25519PrivateKey.generate(), serialization.NoEncryption()),
+    }
+    file = team.folder / "odd"
+    file.unlink(missing_ok=True)
+    if kind in data:
+        file.write_bytes(data[kind])
+    with pytest.raises(BadInputError, match="the private key"):
+        sign_card(team.root, card_file=team.complete(), key_file=file, reviewer="rita")
+    assert not team.envelope.exists()

@@ -68,6 +68,19 @@ def test_no_reason_or_a_tried_fixture_excuses_nothing(changes, tmp_path):
     assert _undetected(tmp_path, [EXCUSED | changes, *ROWS[1:]]).value == 1
 
 
+@pytest.mark.parametrize("place", [0, 1])
+def test_an_excuse_does_not_undo_a_failure_of_the_same_check(place, tmp_path):
+    missed = {**ROWS[0], "detected": False}
+    rows = [missed, EXCUSED] if place else [EXCUSED, missed]
+    found = _undetected(tmp_path, [*rows, *ROWS[1:]])
+    assert found.value == 1 and "not detected: representation.first" in found.caveat
+
+
+def test_a_check_that_one_of_its_rows_missed_is_missed(tmp_path):
+    found = _undetected(tmp_path, [{**ROWS[0], "detected": False}, *ROWS])
+    assert found.value == 1
+
+
 @pytest.mark.parametrize("path", ["shadow/checker.json", "stress/checker.json"])
 @pytest.mark.parametrize(("proved", "counts"), [(7, True), (6, False), (0, False), (None, False)])
 def test_an_action_whose_motion_was_not_proved_is_not_proved(path, proved, counts, tmp_path):

@@ -41,3 +41,10 @@ def test_the_ladder_s_baselines_and_latent_are_read_from_their_homes(ladder):
     assert set(settings.baselines) == {*evidence.BASELINES, *evidence.REMEDIES, evidence.DRAWN}
     assert settings.redraws == evidence.PARAMS["stress"]["samples"]
     assert settings.latent_baseline == "act" and settings.confidence == 0.95
+
+
+@pytest.mark.parametrize("splits", [["train", "test"], ["train"], ["everything"], []])
+def test_what_trained_is_never_held_out(ladder, splits):
+    evidence.write_params(ladder, lambda params: params["gate_a"].update(held_out_splits=splits))
+    with pytest.raises(ConfigError, match=r"gate_a\.held_out_splits"):
+        settings_of(ladder, "A")

@@ -2,16 +2,25 @@
 
 import shutil
 
+import evidence
 import pytest
 
 from gates.evidence import Evidence
-from gates.pages import plots_factors, plots_feasibility, plots_need, plots_stress, plots_time
+from gates.pages import (
+    plots_convergence,
+    plots_factors,
+    plots_feasibility,
+    plots_need,
+    plots_stress,
+    plots_time,
+)
 from gates.pages.figures import draw_all
+from gates.pages.page import gate_page
 from gates.proof import judge
 
 MODULES = {
-    "A": (plots_need, plots_factors), "B": (plots_time,), "C": (plots_feasibility,),
-    "D": (plots_stress,),
+    "A": (plots_need, plots_factors), "B": (plots_convergence, plots_time),
+    "C": (plots_feasibility,), "D": (plots_stress,),
 }  # fmt: skip
 CASES = [(gate, module) for gate, modules in MODULES.items() for module in modules]
 NAMES = [module.__name__.rpartition(".")[2] for _, module in CASES]
@@ -42,3 +51,33 @@ def test_without_evidence_each_says_so(whole, tmp_path, gate, module):
     pictures = draw_all(module.PLOTS, Evidence(tmp_path), report)
     assert len(pictures) == len(module.PLOTS)
     assert all("missing" in picture.skipped for picture in pictures)
+
+
+def test_the_figure_of_convergence_says_in_words_what_it_draws(whole):
+    report = judge(whole, "B")
+    (picture,) = draw_all(plots_convergence.PLOTS, Evidence(whole), report)
+    heads, *rows = picture.table
+    by_method = {row[0]: dict(zip(heads, row, strict=True)) for row in rows}
+    limit = next(c.threshold for c in report.criteria if c.id == "baseline_fall_upper")
+    assert (
+        f"limit {limit:g}" in picture.svg and f"{limit:g}" == by_method["chunked_bc"]["its limit"]
+    )
+    assert by_method["flow"]["its limit"] == "asked by samples"
+    stated = next(c for c in report.criteria if c.id == "baseline_fall_upper")
+    low, high = stated.interval
+    fall = by_method["chunked_bc"]["fall over the last quarter"]
+    assert fall.endswith(f"({low:.3g} to {high:.3g})") and fall.startswith("0.04 ")
+    for row in by_method.values():
+        assert row["from"] in report.materials  # what is drawn is bound
+    page = gate_page(whole, report)
+    assert page.count("The same as a table") == 1 and f'<td class="n">{fall}</td>' in page
+
+
+def test_a_training_that_was_not_measured_at_three_quarters_is_not_drawn(whole, tmp_path):
+    root = tmp_path / "repo"
+    shutil.copytree(whole, root)
+    report = judge(whole, "B")
+    name = "train_generators/flow/seed_0/validation.parquet"
+    evidence.edit_table(root, name, lambda rows: rows[rows["step"] != 3000])
+    (picture,) = draw_all(plots_convergence.PLOTS, Evidence(root), report)
+    assert "lacks the loss after" in picture.skipped and not picture.table

@@ -80,6 +80,8 @@ def test_every_ordered_pair_is_tested_at_its_share_of_the_family(ladder):
     assert pair_alpha(settings) == settings.family_alpha / 2
     three = settings.model_copy(update={"candidates": ("a", "b", "c")})
     assert pair_alpha(three) == settings.family_alpha / 6
+    alone = settings.model_copy(update={"candidates": ("a",)})
+    assert pair_alpha(alone) == settings.family_alpha
 
 
 def test_equal_latency_is_decided_by_the_order_of_registration():

@@ -76,6 +76,18 @@ def test_the_fallback_is_not_counted_where_it_is_drilled(ladder):
     assert flow(ladder, cost.fallback_share_upper).value > 0.9
 
 
+def test_a_rollout_without_a_tick_is_missing_evidence_and_one_tick_is_enough(ladder):
+    def of_ticks(n):
+        for column, value in (("hold_ticks", 0), ("ticks", n)):
+            evidence.edit_table(ladder, ROLLOUTS, cells(column, value, where=of))
+
+    of_ticks(1)
+    assert flow(ladder, cost.hold_share_upper).value == clopper_pearson(0, N, 0.95)[1]
+    of_ticks(0)
+    with pytest.raises(MissingEvidenceError, match="no part of ticks"):
+        flow(ladder, cost.hold_share_upper)
+
+
 @pytest.mark.parametrize("ticks", [161, -1])
 def test_a_part_that_is_no_part_is_missing_evidence(ladder, ticks):
     evidence.edit_table(ladder, ROLLOUTS, cells("fallback_ticks", ticks, where=of, share=0.01))
@@ -135,6 +147,20 @@ def test_the_upper_end_is_judged_and_not_the_point(ladder):
     evidence.edit_table(ladder, INVOCATIONS, some)
     found = flow(ladder, cost.latency_p95_s)
     assert found.interval[0] < 0.4 < found.value == 0.5
+
+
+def test_a_rollout_that_states_one_answer_has_one_recorded(ladder):
+    """The answers of one rollout are gone, and it states that there was one, not none."""
+    one = lambda f: in_("nominal")(f) & (f["start"] == 3)  # noqa: E731
+    evidence.edit_table(ladder, INVOCATIONS, lambda f: f[~one(f)])
+    evidence.edit_table(ladder, ROLLOUTS, cells("invocations", 1, where=one))
+    with pytest.raises(MissingEvidenceError, match="other numbers"):
+        flow(ladder, cost.latency_p95_s)
+
+
+def test_an_answer_at_once_is_an_answer(ladder):
+    evidence.edit_table(ladder, INVOCATIONS, cells("latency_s", 0.0, where=of))
+    assert flow(ladder, cost.latency_p95_s).value == 0.0
 
 
 def test_the_cold_invocation_is_said_and_not_judged(ladder):

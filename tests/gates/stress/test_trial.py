@@ -65,3 +65,26 @@ def test_the_power_is_that_of_this_plan(ladder):
     evidence.edit_document(ladder, POWER, lambda d: d.update(pairs=evidence.STARTS + 1))
     with pytest.raises(MissingEvidenceError, match="for another pairs"):
         asked(ladder, verdict_reachable, gate="D")
+
+
+def test_a_gain_of_just_the_margin_is_none(ladder):
+    """0.3 - 0.2 is a little less than 0.1 in floating point, 0.6 - 0.5 a little more or less."""
+    assert settings_of(ladder, "D").margin == 0.1
+    for baseline, candidate in ((0.5, 0.6), (0.2, 0.3), (0.8, 0.9), (0.3, 0.4), (0.6, 0.7)):
+        changes = {"baseline_success": baseline, "candidate_success": candidate}
+        evidence.edit_document(
+            ladder, POWER, lambda d, c=changes: d["rows"][1].update(**c, return_share=0.6)
+        )
+        assert asked(ladder, verdict_reachable, gate="D").value == 0.6
+    evidence.edit_document(
+        ladder, POWER, lambda d: d["rows"][1].update(baseline_success=0.5, candidate_success=0.65)
+    )
+    with pytest.raises(MissingEvidenceError, match="a world without"):
+        asked(ladder, verdict_reachable, gate="D")
+
+
+@pytest.mark.parametrize("rows", [[], {}, None])
+def test_a_power_table_without_rows_is_missing_evidence(ladder, rows):
+    evidence.edit_document(ladder, POWER, lambda d: d.update(rows=rows))
+    with pytest.raises(MissingEvidenceError, match="no rows"):
+        asked(ladder, verdict_reachable, gate="D")

@@ -1,0 +1,1 @@
+"""How often the ladder is right: wrongs planted in small ladders, and honest changes."""

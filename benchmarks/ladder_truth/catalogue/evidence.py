@@ -1,0 +1,102 @@
+"""Evidence that is not what its stage wrote, and reports that are not what the judge said."""
+
+from pathlib import Path
+
+import pandas as pd
+
+from benchmarks.ladder_truth.outcome import Expected
+from benchmarks.ladder_truth.planting import Wrong, all_of, committed, document, silently, table
+from benchmarks.ladder_truth.workspace import set_limit
+
+RESTORED = (
+    "At first DVC, to which a copy is new, hashed the file and restored it; now it has seen it."
+)
+OTHER = {"flow": "diffusion", "diffusion": "flow"}
+
+
+def _forged_pass(workspace: Path) -> None:
+    """A limit that does not hold, and a report that says PASS all the same."""
+    set_limit(workspace, "gate_a", "held_out_situations", 1e6)
+    document("reports/gate_a.json", lambda report: report.update(verdict="PASS"))(workspace)
+
+
+def _swapped(frame: pd.DataFrame) -> pd.DataFrame:
+    return frame.assign(method=[OTHER.get(name, name) for name in frame["method"]])
+
+
+def _without_decode(frame: pd.DataFrame) -> pd.DataFrame:
+    return frame[~((frame["method"] == "flow") & (frame["component"] == "decode"))]
+
+
+def _only_successes(frame: pd.DataFrame) -> pd.DataFrame:
+    flow = frame["method"] == "flow"
+    return frame.assign(success=frame["success"] | flow)
+
+
+def _admissible(frame: pd.DataFrame) -> pd.DataFrame:
+    layers = ("representation", "kinematic", "geometric", "dynamic", "contact", "fresh")
+    frame = frame.copy()
+    for name in layers:
+        frame[name] = frame[name].dtype.type(True) if frame[name].dtype == bool else True
+    return frame.assign(first_reason="")
+
+
+def _fewer_rollouts(frame: pd.DataFrame) -> pd.DataFrame:
+    return frame[~((frame["method"] == "flow") & (frame["start"] == 1))]
+
+
+def _unjudged(workspace: Path) -> None:
+    (workspace / "artifacts/stress/journals/extra.mcap").write_bytes(b"nobody judged this")
+
+
+WRONGS = (
+    Wrong("bit_in_the_dataset", "evidence",
+          "One bit of the audited frames is flipped; size and times stay.",
+          "small", silently("artifacts/ingest/frames.parquet"),
+          Expected("A", refusal=r"sha256 of artifacts/ingest/frames\.parquet"), note=RESTORED),
+    Wrong("bit_in_a_stress_journal", "evidence",
+          "One bit of a closed-loop journal is flipped; size and times stay.",
+          "small", silently("artifacts/stress/journals/*.mcap"),
+          Expected("D", refusal=r"sha256 of artifacts/stress/journals"), note=RESTORED),
+    Wrong("forged_pass", "evidence", "Gate A does not pass, and its report says PASS.",
+          "small", _forged_pass, Expected("A", ("held_out_situations",))),
+    Wrong("rollouts_edited", "evidence",
+          "All rollouts of the flow are marked as successes, and committed.",
+          "small",
+          all_of(table("artifacts/stress/rollouts.parquet", _only_successes), committed("stress")),
+          Expected("D", refusal=r"rollout .*success")),
+    Wrong("rollouts_swapped", "evidence",
+          "The rollouts of the two candidates are exchanged, and committed.",
+          "small",
+          all_of(table("artifacts/stress/rollouts.parquet", _swapped), committed("stress")),
+          Expected("D", refusal=r"rollout ")),
+    Wrong("a_rollout_is_left_out", "evidence",
+          "The rollouts of the flow from one start are left out, and committed.",
+          "small",
+          all_of(table("artifacts/stress/rollouts.parquet", _fewer_rollouts), committed("stress")),
+          Expected("D", ("unmatched_starts",), refusal=r"rollout ")),
+    Wrong("shadow_candidates_edited", "evidence",
+          "Every shadow candidate is written down as admissible, and committed.",
+          "small",
+          all_of(table("artifacts/shadow/candidates.parquet", _admissible), committed("shadow")),
+          Expected("C", ("corrupted_refused_share",), refusal=r"candidates")),
+    Wrong("checker_says_more_than_it_saw", "evidence",
+          "The checker's document claims a thousand checked actions, and is committed.",
+          "small",
+          all_of(
+              document("artifacts/shadow/checker.json",
+                       lambda d: d.update(checked_actions=1000, reproved_actions=1000)),
+              committed("shadow"),
+          ),
+          Expected("C", ("checker_violations",), refusal=r"checker\.json")),
+    Wrong("a_latency_term_is_missing", "evidence",
+          "The flow's decoding time is in no table, and that is committed.",
+          "small",
+          all_of(table("artifacts/latency/latency.parquet", _without_decode), committed("latency")),
+          Expected("B", ("latency_terms_missing",), refusal=r"decode", candidate="flow")),
+    Wrong("a_file_that_nobody_judged", "evidence",
+          "A journal lies beside those that were judged.",
+          "small", _unjudged,
+          Expected("D", refusal=r"extra\.mcap"),
+          note="`dvc repro` checks the folder out anew and removes it: nothing is left to stop."),
+)  # fmt: skip

@@ -1,0 +1,93 @@
+"""Wrongs in the limits and settings by which gates judge."""
+
+from collections.abc import Callable
+from typing import Any
+
+from benchmarks.ladder_truth.outcome import Expected
+from benchmarks.ladder_truth.planting import Plant, Wrong, all_of
+from benchmarks.ladder_truth.workspace import edit_params, set_limit
+
+E = "E"
+CHAIN = ("upstream_passed", "signature_valid")
+
+
+def _params(change: Callable[[dict[str, Any]], Any]) -> Plant:
+    return lambda workspace: edit_params(workspace, change)
+
+
+def _entry(gate: str, name: str, change: Callable[[dict[str, Any], str], Any]) -> Plant:
+    """Change the entry of one criterion, whoever owns it."""
+
+    def edit(params: dict[str, Any]) -> None:
+        for entries in params[gate]["limits"].values():
+            if name in entries:
+                change(entries, name)
+
+    return _params(edit)
+
+
+def _waived(params: dict[str, Any]) -> None:
+    owners = params["gate_c"]
+    del owners["limits"]["safety"]["checker_violations"]
+    owners.setdefault("not_applicable", {}).setdefault("safety", {})["checker_violations"] = "no"
+
+
+def _loosened(gate: str, name: str, limit: float) -> Plant:
+    return lambda workspace: set_limit(workspace, gate, name, limit)
+
+
+WRONGS = (
+    Wrong("no_limits_at_all", "limits", "Gate C has no limit.",
+          "small", _params(lambda p: p["gate_c"]["limits"].clear()),
+          Expected("C", ("stub_stale", "mode_admissible_gap"), refusal=r"limit")),
+    Wrong("a_limit_is_missing", "limits", "Nobody says how far reloaded samples may differ.",
+          "small", _entry("gate_b", "samples_difference", lambda e, n: e.pop(n)),
+          Expected("B", ("samples_difference",), refusal=r"samples_difference")),
+    Wrong("a_limit_is_nan", "limits", "The limit on stale actions is not a number.",
+          "small", _entry("gate_c", "stub_stale", lambda e, n: e[n].__setitem__(0, float("nan"))),
+          Expected("C", ("stub_stale",), refusal=r"stub_stale|nan|NaN|finite")),
+    Wrong("a_limit_without_a_reason", "limits", "Somebody moved a limit and took its reason away.",
+          "small", _entry("gate_b", "nfe_mismatch", lambda e, n: e.__setitem__(n, 3)),
+          Expected("B", ("nfe_mismatch",), refusal=r"nfe_mismatch|reason")),
+    Wrong("the_checker_is_waived", "limits",
+          "The independent checker is declared not applicable.",
+          "small", _params(_waived), Expected("C", refusal=r"checker_violations")),
+    Wrong("training_split_is_held_out", "limits",
+          "Situations of the training split count as held out.",
+          "small",
+          _params(lambda p: p["gate_a"].update(held_out_splits=["train", "validation", "test"])),
+          Expected("A", ("held_out_situations",), refusal=r"held_out_splits|train"),
+          note="Not stopped at first; refused since, see `held_out_splits`."),
+    Wrong("a_misspelt_setting", "limits", "A setting is misspelt, so its default would stand.",
+          "small",
+          _params(lambda p: p["gate_c"].update(mode_observation=p["gate_c"].pop(
+              "mode_observations"))),
+          Expected("C", refusal=r"mode_observation")),
+    Wrong("fixtures_are_not_required", "limits",
+          "Gate C does not ask for the corrupted fixtures any more.",
+          "small", _params(lambda p: p["gate_c"].update(required_fixtures=["phase_change"])),
+          Expected("C", ("corrupted_refused_share",), refusal=r"required_fixtures")),
+    Wrong("stricter_than_it_is", "limits",
+          "A limit that the evidence does not hold stands in params.yaml.",
+          "small", _loosened("gate_b", "parameter_budget_deviation", 0.001),
+          Expected("B", ("parameter_budget_deviation",)),
+          note="Was `validation_fall_upper`, stopped as named; that criterion is no more."),
+    Wrong("protective_limit_loosened", "limits",
+          "Three stale actions at the stub are allowed, in a ladder that is no rehearsal.",
+          "signed", _loosened("gate_d", "stub_violations", 3),
+          Expected(E, CHAIN, refusal=r"stub_violations")),
+    Wrong("alpha_of_one_half", "limits",
+          "A wrong promotion every other time is allowed.",
+          "signed", _params(lambda p: p["stress"].update(alpha=0.5)),
+          Expected(E, CHAIN, refusal=r"alpha")),
+    Wrong("limit_loosened_after_signing", "limits",
+          "A limit of gate D was loosened after the card was signed.",
+          "signed", _loosened("gate_d", "nominal_success_lower", 0.1),
+          Expected(E, CHAIN, refusal=r"nominal_success_lower|gate_d")),
+    Wrong("becomes_a_rehearsal", "limits",
+          "The ladder of a signed card is declared a rehearsal, with looser limits.",
+          "signed",
+          all_of(_params(lambda p: p.update(rehearsal=True)),
+                 _loosened("gate_c", "stub_stale", 5)),
+          Expected(E, CHAIN, refusal=r"rehearsal")),
+)  # fmt: skip

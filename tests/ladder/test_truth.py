@@ -1,0 +1,75 @@
+"""The benchmark of planted wrongs tells its three outcomes apart, on real runs."""
+
+from pathlib import Path
+
+import pytest
+
+from benchmarks.ladder_truth.__main__ import chosen, try_one
+from benchmarks.ladder_truth.catalogue import WRONGS
+from benchmarks.ladder_truth.honest import HONEST
+from benchmarks.ladder_truth.outcome import Expected, Seen, Stop, count, look
+from benchmarks.ladder_truth.planting import Wrong, silently
+
+BIT = silently("artifacts/ingest/frames.parquet")
+AT_A = Expected("A", refusal=r"sha256 of artifacts/ingest/frames\.parquet")
+CASES = {
+    "right": ((BIT, AT_A), "right"),
+    "another gate was named": ((BIT, Expected("B", refusal=AT_A.refusal)), "elsewhere"),
+    "nothing was planted": ((lambda workspace: None, AT_A), "not at all"),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_planted_wrong_is_counted(finished: Path, tmp_path: Path, name: str) -> None:
+    (plant, expected), counted = CASES[name]
+    wrong = Wrong(name, "test", name, "small", plant, expected)
+    result = try_one(wrong, finished, tmp_path / "copy")
+    assert (result["count"], result["fault"]) == (counted, ""), result
+    assert not (tmp_path / "copy").exists()
+
+
+def test_a_plant_that_cannot_be_made_is_broken_and_counts_as_nothing(tmp_path: Path) -> None:
+    wrong = Wrong("broken", "test", "", "small", BIT, AT_A)
+    result = try_one(wrong, tmp_path / "no such base", tmp_path / "copy")
+    assert result["count"] == "broken"
+    assert "no such base" in str(result["fault"])
+
+
+STOPS = {
+    "the named criterion": (Stop("B", "nfe_mismatch", ""), "right"),
+    "another criterion of the gate": (Stop("B", "unpinned_items", ""), "elsewhere"),
+    "the criterion for another candidate": (Stop("B", "nfe_mismatch", "", "cvae"), "elsewhere"),
+    "the same criterion of another gate": (Stop("C", "nfe_mismatch", ""), "elsewhere"),
+    "a refusal in the named words": (Stop("B", "refusal", "sampler.steps is 3"), "right"),
+    "a refusal in other words": (Stop("B", "refusal", "no space left"), "elsewhere"),
+}
+
+
+@pytest.mark.parametrize("name", STOPS)
+def test_gate_and_reason_are_both_asked_for(name: str) -> None:
+    stop, counted = STOPS[name]
+    expected = Expected("B", ("nfe_mismatch",), r"sampler\.steps", candidate="flow")
+    assert count(expected, Seen((stop,))) == counted
+
+
+def test_a_stop_below_the_named_gate_is_elsewhere() -> None:
+    stops = (Stop("A", "data_defects", ""), Stop("B", "nfe_mismatch", ""))
+    assert count(Expected("B", ("nfe_mismatch",)), Seen(stops)) == "elsewhere"
+
+
+def test_a_finished_ladder_shows_no_stop_and_a_fail_is_one(finished: Path, tmp_path: Path) -> None:
+    assert look(finished, "small").stops == ()
+    (tmp_path / "reports").mkdir()
+    text = (finished / "reports" / "gate_a.json").read_text()
+    failed = text.replace('"verdict":"PASS"', '"verdict":"FAIL"')
+    (tmp_path / "reports" / "gate_a.json").write_text(failed)
+    assert {stop.gate for stop in look(tmp_path, "small").stops} == {"A"}
+
+
+def test_the_catalogue_is_large_enough_and_names_are_asked_for_exactly() -> None:
+    assert len(WRONGS) >= 60
+    assert len(HONEST) >= 20
+    assert {w.base for w in WRONGS} == {"small", "brought", "signed"}
+    assert [item.name for item in chosen(["two_cards"], [])] == ["two_cards"]
+    with pytest.raises(SystemExit, match="no_such_wrong"):
+        chosen(["no_such_wrong"], [])
