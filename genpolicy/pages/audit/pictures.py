@@ -54,8 +54,10 @@ def _clusters(evidence: AuditEvidence, limits: Limits) -> Figure:
         obstacles=summary["obstacles"],
     )
     for axes in figure.axes:
-        title = _in_users_words(axes.get_title(), evidence)
-        axes.set_title(title, fontsize=9, parse_math=False)
+        title = axes.get_title("left")  # the place of titles in the figures' style
+        if title:
+            told = _in_users_words(title, evidence)
+            axes.set_title(told, loc="left", fontsize=9, parse_math=False)
     return figure
 
 
