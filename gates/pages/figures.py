@@ -52,10 +52,10 @@ class Shown(Picture):
     """A figure of a gate's page.
 
     Attributes:
-        table: The same in words: heads, then rows of cells; empty without.
+        in_words: The same in words: heads, then rows of cells; empty without.
     """
 
-    table: Table = ()
+    in_words: Table = ()
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class Plot:
     def picture(self, evidence: Evidence, report: GateReport, salt: str) -> dict[str, Any]:
         """What this adds to a `Shown`."""
         svg = drawn(lambda: self.draw(evidence, report), self.title, salt=salt)
-        return {"svg": svg, "table": self.read(evidence, report) if self.read else ()}
+        return {"svg": svg, "in_words": self.read(evidence, report) if self.read else ()}
 
 
 @dataclass(frozen=True)

@@ -30,9 +30,9 @@ def imported(*folders: str) -> dict[str, set[str]]:
     found: dict[str, set[str]] = {}
     for folder in folders:
         own = {*PRODUCT, *SUPPORT}
-        if folder == "tests":  # its helpers and its task are found by their bare names
-            own |= {path.stem for path in (ROOT / folder).rglob("*.py")} - {"mcap"}
-            own |= {path.parent.name for path in (ROOT / folder).glob("*/*/__init__.py")}
+        if folder in SUPPORT:  # helpers and task of the tests are found by their bare names
+            own |= {path.stem for path in (ROOT / "tests").rglob("*.py")} - {"mcap"}
+            own |= {path.parent.name for path in (ROOT / "tests").glob("*/*/__init__.py")}
         for path in (ROOT / folder).rglob("*.py"):
             for name in top_level(path.read_text()):
                 if name not in sys.stdlib_module_names and name not in own:

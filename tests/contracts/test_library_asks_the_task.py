@@ -32,7 +32,7 @@ SHARED = {
 }
 # The same word with another meaning in one file.
 LOCAL = {
-    ("genpolicy/execution/recovery.py", "retreat"): "a primitive of recovery, not a phase",
+    ("genpolicy/execution/cell.py", "retreat"): "a primitive of recovery, not a phase",
     ("gates/pages/plots_stress.py", "post"): "matplotlib: a step behind the point",
     ("gates/pages/plots_feasibility.py", "post"): "matplotlib: a step behind the point",
     ("genpolicy/evidence/shadow/rig.py", "approach"): "a phase of the rig's own",

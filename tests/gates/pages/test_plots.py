@@ -56,7 +56,7 @@ def test_without_evidence_each_says_so(whole, tmp_path, gate, module):
 def test_the_figure_of_convergence_says_in_words_what_it_draws(whole):
     report = judge(whole, "B")
     (picture,) = draw_all(plots_convergence.PLOTS, Evidence(whole), report)
-    heads, *rows = picture.table
+    heads, *rows = picture.in_words
     by_method = {row[0]: dict(zip(heads, row, strict=True)) for row in rows}
     limit = next(c.threshold for c in report.criteria if c.id == "baseline_fall_upper")
     assert (
@@ -80,4 +80,4 @@ def test_a_training_that_was_not_measured_at_three_quarters_is_not_drawn(whole, 
     name = "train_generators/flow/seed_0/validation.parquet"
     evidence.edit_table(root, name, lambda rows: rows[rows["step"] != 3000])
     (picture,) = draw_all(plots_convergence.PLOTS, Evidence(root), report)
-    assert "lacks the loss after" in picture.skipped and not picture.table
+    assert "lacks the loss after" in picture.skipped and not picture.in_words
