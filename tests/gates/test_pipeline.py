@@ -297,7 +297,7 @@ def test_a_parameter_that_the_record_does_not_name_refuses(ladder):
 def test_every_printed_page_is_held_to_its_record_and_nothing_else_is(ladder):
     for name in ("gate_a.html", "gate_a.md"):
         (ladder / "reports" / name).write_text("FAIL")
-    md5 = pipeline._Disk(ladder, {}).md5("reports/gate_a.md")
+    md5 = pipeline.Disk(ladder, {}).md5("reports/gate_a.md")
     outs = [
         {"path": "artifacts/other", "md5": "0"},
         {"path": "reports/gate_a.json", "md5": "0"},

@@ -61,7 +61,8 @@ def test_a_finished_ladder_shows_no_stop_and_a_fail_is_one(finished: Path, tmp_p
     assert look(finished, "small").stops == ()
     (tmp_path / "reports").mkdir()
     text = (finished / "reports" / "gate_a.json").read_text()
-    failed = text.replace('"verdict":"PASS"', '"verdict":"FAIL"')
+    failed = text.replace('"verdict": "PASS"', '"verdict": "FAIL"')
+    assert failed != text
     (tmp_path / "reports" / "gate_a.json").write_text(failed)
     assert {stop.gate for stop in look(tmp_path, "small").stops} == {"A"}
 

@@ -127,7 +127,9 @@ def test_joints_beyond_their_limits_are_found(clean, shadow):
 
 def test_a_chunk_that_does_not_say_what_it_was_checked_against_is_found(clean, shadow):
     enqueued(clean)["motion"] = None
-    assert rules(clean, shadow) == {"P6.ground"}
+    report = check_messages(clean, None, expected_motion(shadow.checker.cell))
+    assert {violation.rule for violation in report.violations} == {"P6.ground"}
+    assert report.checked_actions > 0 == report.reproved_actions
 
 
 @pytest.mark.parametrize("change", [{"joints": 6}, {"q_rad": ""}])
