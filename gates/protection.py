@@ -8,10 +8,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from gates.asked_for import CHECKS_ASKED_FOR
 from gates.report import Gate, stage_of
 from genpolicy.errors import ConfigError
-from genpolicy.execution.checks import CHECKS as EXECUTION_CHECKS
-from genpolicy.feasibility.checks import CHECKS
 
 REHEARSAL = "rehearsal"
 REHEARSED = "A rehearsal: limits that protect people may be looser here, and no card can be signed."
@@ -93,10 +92,7 @@ NAMED: tuple[Named, ...] = (
     Named(
         "C",
         "required_checks",
-        (
-            *(f"{check.layer}.{check.name}" for check in CHECKS),
-            *(f"execution.{check.name}" for check in EXECUTION_CHECKS),
-        ),
+        CHECKS_ASKED_FOR,
         "a check that nobody asks for may be gone; evidence says which do not apply to a task",
     ),
     Named(

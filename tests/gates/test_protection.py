@@ -5,6 +5,7 @@ import pytest
 import yaml
 
 from flows.workspace import merged
+from gates.asked_for import CHECKS_ASKED_FOR
 from gates.criterion import Criterion
 from gates.proof import SPECS, judge
 from gates.protection import (
@@ -85,6 +86,10 @@ def test_a_list_that_leaves_out_a_check_is_bad_configuration_but_in_a_rehearsal(
         with pytest.raises(ConfigError, match=named.place) as refused:
             require_protection(params, "C")
         assert named.names[0] in str(refused.value) and named.reason in str(refused.value)
+
+
+def test_what_must_be_asked_for_is_every_row_of_both_tables():
+    assert list(CHECKS_ASKED_FOR) == [f"{layer}.{name}" for layer, name in evidence.CHECKS]
 
 
 def test_the_shipped_lists_name_what_they_must(request):
