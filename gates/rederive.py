@@ -110,13 +110,12 @@ def _check(root: Path, gate: Gate, params: Mapping[str, Any], journals: list[Pat
     expected, motion = _held_to(params)
     found = {path.name: check_journal(path, expected, motion).as_document() for path in journals}
     path = f"{FOLDERS[gate][0]}/checker.json"
-    stated = read_json(root / path)
-    claimed = stated.get("journals") if isinstance(stated, dict) else None
-    for name in sorted({*found, *(claimed if isinstance(claimed, dict) else ())}):
-        own = claimed.get(name) if isinstance(claimed, dict) else None
-        if own != found.get(name):
+    stated = _mapping(read_json(root / path))
+    claimed = _mapping(stated.get("journals"))
+    for name in sorted({*found, *claimed}):
+        if claimed.get(name) != found.get(name):
             again = f"{_totals(found.get(name))}, as checked again"
-            _refuse(gate, f"{path}: {name}", _totals(own), again)
+            _refuse(gate, f"{path}: {name}", _totals(claimed.get(name)), again)
     derived = {
         "violations": [
             {"journal": name, **violation}
@@ -196,13 +195,17 @@ def _envelope(root: Path, params: Mapping[str, Any]) -> None:
                 for journal in journals
             },
         }
-    stated = read_json(path) if path.is_file() else {}
-    stated = stated if isinstance(stated, dict) else {}
+    stated = _mapping(read_json(path)) if path.is_file() else {}
     for key in sorted({*stated, *expected}):
         if stated.get(key) != expected.get(key):
             where = f"{STRESS}/{ENVELOPE_FILE}: {key}"
             text = f"{_short(expected.get(key))}, as planned and as the journals say"
             _refuse("D", where, _short(stated.get(key)), text)
+
+
+def _mapping(document: Any) -> dict[str, Any]:
+    """A document as a mapping; empty where it is none, so that what is missing is refused."""
+    return document if isinstance(document, dict) else {}
 
 
 def _joined(key: tuple[Any, ...]) -> str:
