@@ -36,6 +36,19 @@ PLANNED: Mapping[str, str] = {
     "stress.samples": "",
 }
 """What the plan names beside limits, and on which side it is strict; '' where neither is."""
+CAUSE = "cause"
+CAUSE_STRICT: Mapping[str, str] = {
+    **dict.fromkeys(
+        (
+            "clock_disorder", "rate_deviation", "gap_share", "frozen_s", "jitter_share",
+            "lag_drift_steps", "gain_factor", "gain_epoch_factor", "magnitude_factor",
+            "frame_angle_rad", "swapped_columns", "faulty_episodes_share",
+        ),
+        "<=",
+    ),
+    **dict.fromkeys(("supported_episodes", "supported_share", "denial_share"), ">="),
+}  # fmt: skip
+"""On which side a limit of the cause is strict; of those left out, each side accepts something."""
 HEAD = (
     "# Written by `genpolicy gates preregister`. Commit it before the evidence exists; what moves\n"
     "# afterwards shows in the reports of gates D and E and on the card.\n"
@@ -70,10 +83,11 @@ def plan_of(
     found: dict[str, list[Any]] = {}
     for place, comparison in PLANNED.items():
         found[place] = [comparison, _at(params, place)]
-    for gate in GATES:
-        name = stage_of(gate)
-        for criterion, value in _limits(params, name).items():
-            found[f"{name}.{criterion}"] = [comparisons.get(name, {}).get(criterion, ""), value]
+    strict = {
+        f"{name}.{item}": side for name in comparisons for item, side in comparisons[name].items()
+    }
+    strict |= {f"{stage_of('A')}.{CAUSE}.{item}": side for item, side in CAUSE_STRICT.items()}
+    found |= {place: [strict.get(place, ""), value] for place, value in _all_limits(params).items()}
     return found
 
 
@@ -102,10 +116,7 @@ def moves(plan: Mapping[str, Sequence[Any]], params: Mapping[str, Any]) -> list[
 
     A limit that was dropped is loosened, a new one tightened.
     """
-    limits = {
-        f"{stage_of(g)}.{n}": v for g in GATES for n, v in _limits(params, stage_of(g)).items()
-    }
-    now = {**{place: _at(params, place) for place in PLANNED}, **limits}
+    now = {**{place: _at(params, place) for place in PLANNED}, **_all_limits(params)}
     found = []
     for place, (comparison, before) in plan.items():
         if place not in now:
@@ -146,8 +157,17 @@ def _is_number(value: object) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
-def _limits(params: Mapping[str, Any], section: str) -> dict[str, Any]:
-    limits = _at(params, f"{section}.limits")
+def _all_limits(params: Mapping[str, Any]) -> dict[str, Any]:
+    """Every limit of a criterion, and of the cause that Gate A judges by, by its place."""
+    found: dict[str, Any] = {}
+    for name in map(stage_of, GATES):
+        found |= {f"{name}.{item}": v for item, v in _limits(_at(params, f"{name}.limits")).items()}
+        cause = _limits(_at(params, f"{name}.{CAUSE}"))
+        found |= {f"{name}.{CAUSE}.{item}": value for item, value in cause.items()}
+    return found
+
+
+def _limits(limits: Any) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for entries in limits.values() if isinstance(limits, Mapping) else ():
         for name, entry in entries.items() if isinstance(entries, Mapping) else ():

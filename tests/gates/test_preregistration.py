@@ -6,7 +6,9 @@ import evidence
 import pytest
 import yaml
 
+from gates.cause.limits import OWN
 from gates.preregistration import (
+    CAUSE_STRICT,
     NONE,
     PLANNED,
     PREREGISTRATION,
@@ -67,6 +69,28 @@ def test_what_moved_is_told_from_what_was_planned(path, value, kind):
 def test_a_limit_moves_to_its_own_side(name, limit, kind):
     found = _moved(evidence.set_limit("gate_d", name, limit))
     assert found == [(f"gate_d.{name}", kind)]
+
+
+@pytest.mark.parametrize(
+    ("question", "limit", "kind"),
+    [
+        ("gain_factor", 30.0, "loosened"),
+        ("gain_factor", 1.5, "tightened"),
+        ("supported_share", 0.0, "loosened"),
+        ("supported_share", 0.9, "tightened"),
+        ("noise_ratio", 0.9, "changed"),
+    ],
+)
+def test_a_limit_of_the_cause_is_planned_as_well(question, limit, kind):
+    def change(params):
+        owner = next(part for part in params["gate_a"]["cause"].values() if question in part)
+        owner[question][0] = limit
+
+    assert _moved(change) == [(f"gate_a.cause.{question}", kind)]
+
+
+def test_every_strict_side_of_the_cause_belongs_to_a_question():
+    assert set(CAUSE_STRICT) < set(OWN)
 
 
 def test_a_limit_that_was_dropped_is_loosened_and_a_reason_or_owner_is_free():
