@@ -1,26 +1,35 @@
-"""Evidence derived again from the journals under it: what `genpolicy verify report` adds.
+"""Evidence derived again from what lies under it: what `genpolicy verify report` adds.
 
-The independent checker reads every journal again, and every table of the comparison that Gate D
-judges must be what the journals say. Slow beside hashing, so it is asked for by name and not at
-every admission.
+The independent checker reads every journal again, and every table that gates C and D judge must be
+what the journals say. What is computed and not recorded (power, mutants) is computed again. Slow
+beside hashing, so it is asked for by name and not at every admission.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeVar
-
-from pydantic import BaseModel
+from typing import Any
 
 from gates.proof import Rung
-from gates.report import Gate, report_path
+from gates.rederive_shadow import SHADOW, TaskSection, rederive_shadow
+from gates.report import Gate
 from gates.settings import PARAMS_FILE, read_params, section_of
+from gates.stated import (
+    compare_keys,
+    compare_rows,
+    mapping,
+    refuse,
+    root_seed,
+    section,
+    short,
+    training_seed,
+)
 from genpolicy.contract.horizons import HorizonConfig
-from genpolicy.contract.settings import Settings, parse_settings
-from genpolicy.errors import GenpolicyError, RefusedError
+from genpolicy.errors import ConfigError, GenpolicyError
 from genpolicy.evidence.stress.envelope import ENVELOPE_FILE
 from genpolicy.evidence.stress.perturbations import ReducedEnvelope
 from genpolicy.evidence.stress.settings import ENVELOPE, StressSettings
+from genpolicy.evidence.stress.tables import POWER_FILE, power_document
 from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.feasibility.cell import cell_of
 from genpolicy.feasibility.figures import expected_motion
@@ -30,24 +39,18 @@ from genpolicy.integrity.tables import read_table
 from genpolicy.tasks.api import load_task
 from genpolicy.verification.checker import ExpectedSettings, check_journal
 from genpolicy.verification.commands import reach_of
+from genpolicy.verification.journal_source import readable
 from genpolicy.verification.motion import ExpectedMotion
-from genpolicy.verification.rollouts import derived_rollouts, differences
+from genpolicy.verification.rollouts import derived_rollouts
 from genpolicy.verification.tables import KEYS, derived_tables
 
 STRESS = "artifacts/stress"
 FOLDERS: dict[Gate, tuple[str, str]] = {
-    "C": ("artifacts/shadow", "*.mcap"),
+    "C": (SHADOW, "*.mcap"),
     "D": (STRESS, "journals/*.mcap"),
 }
 """Evidence with journals: its folder, and where below it they lie."""
 ROLLOUT = ("method", "perturbation", "start")
-Model = TypeVar("Model", bound=BaseModel)
-
-
-class _Task(Settings):
-    """Which task the journals are of."""
-
-    name: str
 
 
 def rederived(root: Path, rungs: Sequence[Rung]) -> list[Rung]:
@@ -70,7 +73,8 @@ def rederive(root: Path, gate: Gate) -> None:
     """Hold the evidence of a gate against its journals; gates without journals have none.
 
     Raises:
-        RefusedError: A row, the envelope or a finding of the checker is not what the journals say.
+        RefusedError: A row, the envelope or a finding of the checker is not what the journals say,
+            or a power or a mutant is not what is computed again.
         IntegrityError: A journal or a table is missing or no regular file.
         BadInputError: A journal or a table cannot be read.
     """
@@ -79,19 +83,18 @@ def rederive(root: Path, gate: Gate) -> None:
     folder, pattern = FOLDERS[gate]
     journals, params = sorted((root / folder).glob(pattern)), read_params(root)
     _check(root, gate, params, journals)
-    if gate == "D":
+    if gate == "C":
+        rederive_shadow(root, params)
+    else:
         _tables(root, params, journals)
         _envelope(root, params)
-
-
-def _section(params: Mapping[str, Any], name: str, model: type[Model]) -> Model:
-    return parse_settings(model, section_of(params, name), where=f"{PARAMS_FILE}: {name}")
+        _power(root, params)
 
 
 def _held_to(params: Mapping[str, Any]) -> tuple[ExpectedSettings, ExpectedMotion]:
     """What every session must have declared, and what every executed row must have kept to."""
-    horizons = _section(params, "horizons", HorizonConfig)
-    execution = _section(params, "execution", ExecutionSettings)
+    horizons = section(params, "horizons", HorizonConfig)
+    execution = section(params, "execution", ExecutionSettings)
     expected = ExpectedSettings(
         execution_horizon=horizons.execution_horizon,
         action_period_s=horizons.action_period_s,
@@ -99,8 +102,8 @@ def _held_to(params: Mapping[str, Any]) -> tuple[ExpectedSettings, ExpectedMotio
         watchdog_s=execution.watchdog_s,
         queue_capacity=execution.queue_capacity,
     )
-    feasibility = _section(params, "feasibility", FeasibilitySettings)
-    task = load_task(_section(params, "task", _Task).name)
+    feasibility = section(params, "feasibility", FeasibilitySettings)
+    task = load_task(section(params, "task", TaskSection).name)
     cell = cell_of(task, feasibility, action_period_s=horizons.action_period_s)
     return expected, expected_motion(cell)
 
@@ -110,12 +113,12 @@ def _check(root: Path, gate: Gate, params: Mapping[str, Any], journals: list[Pat
     expected, motion = _held_to(params)
     found = {path.name: check_journal(path, expected, motion).as_document() for path in journals}
     path = f"{FOLDERS[gate][0]}/checker.json"
-    stated = _mapping(read_json(root / path))
-    claimed = _mapping(stated.get("journals"))
+    stated = mapping(read_json(root / path))
+    claimed = mapping(stated.get("journals"))
     for name in sorted({*found, *claimed}):
         if claimed.get(name) != found.get(name):
             again = f"{_totals(found.get(name))}, as checked again"
-            _refuse(gate, f"{path}: {name}", _totals(claimed.get(name)), again)
+            refuse(gate, f"{path}: {name}", _totals(claimed.get(name)), again)
     derived = {
         "violations": [
             {"journal": name, **violation}
@@ -127,7 +130,7 @@ def _check(root: Path, gate: Gate, params: Mapping[str, Any], journals: list[Pat
     }  # fmt: skip
     for key, value in derived.items():
         if stated.get(key) != value:
-            _refuse(gate, f"{path}: {key}", _short(stated.get(key)), f"{_short(value)}, as "
+            refuse(gate, f"{path}: {key}", short(stated.get(key)), f"{short(value)}, as "
                     "checked again")  # fmt: skip
 
 
@@ -141,45 +144,22 @@ def _totals(document: Any) -> str:
 
 def _tables(root: Path, params: Mapping[str, Any], journals: list[Path]) -> None:
     """Every table that journals speak of: each row what they say, and none without the other."""
-    seeds = section_of(params, "policy").get("seeds")
-    seed = seeds[0] if isinstance(seeds, list) and seeds else None
-    rollouts = [row for path in journals for row in derived_rollouts(path).values()]
-    _compare(root, "rollouts", ROLLOUT, rollouts, seed)
-    for name, rows in derived_tables(journals).items():
-        _compare(root, name, KEYS[name], rows, seed)
-
-
-def _compare(
-    root: Path, name: str, keys: tuple[str, ...], derived: list[dict[str, Any]], seed: object
-) -> None:
-    path = f"{STRESS}/{name}.parquet"
-    what = name.removesuffix("s") if name != "conservation" else name
-
-    def by_key(rows: list[dict[str, Any]]) -> dict[tuple[Any, ...], dict[str, Any]]:
-        found: dict[tuple[Any, ...], dict[str, Any]] = {}
-        for row in rows:
-            key = tuple(row.get(column) for column in keys)
-            if key in found:
-                _refuse("D", f"{what} {_joined(key)}", "stated twice", "one row")
-            found[key] = row
-        return found
-
-    stated, expected = by_key(read_table(root / path).to_pylist()), by_key(derived)
-    for key in sorted({*stated, *expected}, key=repr):
-        where = f"{what} {_joined(key)}"
-        if key not in stated or key not in expected:
-            found = "without a journal" if key in stated else "only in a journal"
-            _refuse("D", where, found, f"one row of {path} and what a journal says")
-        row = stated[key]
-        own = expected[key] | ({"seed": seed} if "seed" in row else {})
-        for column in differences(row, own)[:1]:
-            text = f"{own[column]!r}, as its journal says"
-            _refuse("D", f"{where}: {column}", f"{row.get(column)!r}", text)
+    seed = training_seed(params)
+    with readable(f"{STRESS}/journals"):
+        rollouts = [row for path in journals for row in derived_rollouts(path).values()]
+        tables = derived_tables(journals)
+    for name, keys, rows in (
+        ("rollouts", ROLLOUT, rollouts),
+        *((name, KEYS[name], rows) for name, rows in tables.items()),
+    ):
+        path = f"{STRESS}/{name}.parquet"
+        stated = read_table(root / path).to_pylist()
+        compare_rows("D", path, keys, stated, rows, seed=seed)
 
 
 def _envelope(root: Path, params: Mapping[str, Any]) -> None:
     """`envelope.json`: the planned limits, and how far the commands of each journal went."""
-    stress = _section(params, "stress", StressSettings)
+    stress = section(params, "stress", StressSettings)
     planned = stress.perturbations.get(ENVELOPE)
     path = root / STRESS / ENVELOPE_FILE
     expected: dict[str, Any] = {}
@@ -195,36 +175,25 @@ def _envelope(root: Path, params: Mapping[str, Any]) -> None:
                 for journal in journals
             },
         }
-    stated = _mapping(read_json(path)) if path.is_file() else {}
+    stated = mapping(read_json(path)) if path.is_file() else {}
     for key in sorted({*stated, *expected}):
         if stated.get(key) != expected.get(key):
             where = f"{STRESS}/{ENVELOPE_FILE}: {key}"
-            text = f"{_short(expected.get(key))}, as planned and as the journals say"
-            _refuse("D", where, _short(stated.get(key)), text)
+            text = f"{short(expected.get(key))}, as planned and as the journals say"
+            refuse("D", where, short(stated.get(key)), text)
 
 
-def _mapping(document: Any) -> dict[str, Any]:
-    """A document as a mapping; empty where it is none, so that what is missing is refused."""
-    return document if isinstance(document, dict) else {}
-
-
-def _joined(key: tuple[Any, ...]) -> str:
-    return "/".join(map(str, key))
-
-
-def _short(value: object) -> str:
-    if isinstance(value, list) and any(isinstance(entry, dict) for entry in value):
-        return f"{len(value)} entries"
-    text = str(value)
-    return text if len(text) <= 120 else f"{text[:119]}…"
-
-
-def _refuse(gate: Gate, criterion: str, measured: str, limit: str) -> None:
-    raise RefusedError(
-        gate=gate,
-        criterion=criterion,
-        measured=measured,
-        limit=limit,
-        report=report_path(gate),
-        action="The evidence was not written by its stage. Run it again (`dvc repro -f`).",
-    )
+def _power(root: Path, params: Mapping[str, Any]) -> None:
+    """`power.json`: simulated again from margin, alpha, starts and seed of `params.yaml`."""
+    path = f"{STRESS}/{POWER_FILE}"
+    samplers = section_of(params, "train_generators").get("samplers")
+    if not isinstance(samplers, dict):
+        raise ConfigError(
+            where=f"{PARAMS_FILE}: train_generators.samplers",
+            found=f"a {type(samplers).__name__}",
+            expected="a mapping",
+            action="Restore the file from version control.",
+        )
+    stress = section(params, "stress", StressSettings)
+    again = power_document(stress, candidates=len(samplers), root_seed=root_seed(params))
+    compare_keys("D", path, mapping(read_json(root / path)), again, "as simulated again")

@@ -2,11 +2,8 @@
 
 from pathlib import Path
 
-from pydantic import Field
-
 from gates.proof import admit
 from genpolicy.candidates.judged import GENERATORS, trained
-from genpolicy.contract.settings import Settings
 from genpolicy.data.dataset import load_dataset
 from genpolicy.evidence.admission_context import make_checker
 from genpolicy.evidence.shadow.layer_mutants import missing_checks_evidence
@@ -15,6 +12,7 @@ from genpolicy.evidence.shadow.observations import (
     spread,
     two_mode_observations,
 )
+from genpolicy.evidence.shadow.settings import ShadowSection
 from genpolicy.evidence.shadow.shadow import Shadow, shadow_policy
 from genpolicy.evidence.shadow.tables import write_shadow
 from genpolicy.execution.cell import Cell, ExecutionSettings
@@ -25,22 +23,6 @@ from genpolicy.seeds import stream
 from genpolicy.tasks.api import load_task
 from stages._contracts import require_one_contract
 from stages._stage import ARTIFACTS, Params, main
-
-
-class ShadowSection(Settings):
-    """Section `shadow`.
-
-    Attributes:
-        observations: Held-out observations, in equal numbers from every phase.
-        samples: Candidates per observation.
-        late_steps: Actions that are late when a chunk arrives.
-        mutant_observations: Observations on which each check is left out once.
-    """
-
-    observations: int = Field(ge=1)
-    samples: int = Field(ge=2)
-    late_steps: int = Field(ge=0)
-    mutant_observations: int = Field(ge=1)
 
 
 def work(params: Params) -> None:

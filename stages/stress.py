@@ -8,7 +8,12 @@ from genpolicy.evidence.reproducibility.latency import latency_models
 from genpolicy.evidence.rows.reproducibility import LatencyRow
 from genpolicy.evidence.stress.matched import Comparison, matched_starts
 from genpolicy.evidence.stress.settings import StressSettings
-from genpolicy.evidence.stress.tables import plan_shards, power_document, write_stress
+from genpolicy.evidence.stress.tables import (
+    POWER_FILE,
+    plan_shards,
+    power_document,
+    write_stress,
+)
 from genpolicy.execution.cell import Cell, ExecutionSettings
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import output_folder, write_bytes
@@ -56,7 +61,7 @@ def work(params: Params) -> None:
         write_stress(
             folder, shards, workers=params.compute.workers, scheduler=params.compute.scheduler
         )
-        write_bytes(folder / "power.json", canonical_json(power))
+        write_bytes(folder / POWER_FILE, canonical_json(power))
 
 
 if __name__ == "__main__":

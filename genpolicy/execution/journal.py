@@ -28,7 +28,7 @@ from genpolicy.integrity.hashing import sha256_bytes_of
 
 Array = NDArray[np.float64]
 
-JOURNAL_VERSION = 4
+JOURNAL_VERSION = 5
 MAXIMUM_UNCOMPRESSED_BYTES = 8 << 30
 MAXIMUM_RECORD_BYTES = 64 << 20
 
@@ -41,7 +41,7 @@ EVENT_FIELDS: dict[str, tuple[str, ...]] = {
     "epoch": ("event_time_ns", "old", "new"),
     "active": ("checkpoint", "sampler"),
     "invocation": ("id", "stage", "detail"),
-    "candidate": ("chunk_id", "method", "index", "layers", "first_reason"),
+    "candidate": ("chunk_id", "method", "index", "layers", "first_reason", "measures"),
     "enqueue": ("arrival", "chunk_id", "source", "method", "condition_ns", "start_ns", "period_ns",
                 "valid_until_ns", "phase", "calibration_epoch", "checkpoint", "sampler",
                 "session_epoch", "predecessor", "rows", "actions", "actions_sha256",
@@ -111,11 +111,15 @@ class Journal:
         index: int,
         layers: Mapping[str, bool | None],
         first_reason: str | None,
+        measures: Mapping[str, Any] | None = None,
     ) -> None:
-        """Record the verdict on one candidate: passed, failed or not reached, per layer."""
+        """Record the verdict on one candidate: passed, failed or not reached, per layer.
+
+        `measures` is what else was found of it, where a table states that too.
+        """
         payload = {
-            "chunk_id": chunk_id, "method": method, "index": index,
-            "layers": dict(layers), "first_reason": first_reason,
+            "chunk_id": chunk_id, "method": method, "index": index, "layers": dict(layers),
+            "first_reason": first_reason, "measures": dict(measures or {}),
         }  # fmt: skip
         self.add("candidate", self.clock(now_s), payload)
 

@@ -3,6 +3,7 @@
 import io
 import json
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -47,6 +48,24 @@ def read_messages(path: Path) -> Iterator[tuple[str, Message]]:
             where=str(path),
             found=f"no journal ({type(error).__name__}: {error})",
             expected="a whole MCAP journal",
+            action="Re-run the stage that writes it.",
+        ) from error
+
+
+@contextmanager
+def readable(where: str) -> Iterator[None]:
+    """What is made of events: a field that is missing or of another kind is bad input.
+
+    Raises:
+        BadInputError: A field cannot be read.
+    """
+    try:
+        yield
+    except (KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError) as error:
+        raise BadInputError(
+            where=where,
+            found=f"an event that cannot be read ({type(error).__name__}: {error})",
+            expected="the fields that its kind has",
             action="Re-run the stage that writes it.",
         ) from error
 

@@ -27,11 +27,12 @@ KEYS: dict[str, tuple[str, ...]] = {
 
 
 @dataclass
-class _Condition:
-    """Counts of one method under one perturbation while events go by."""
+class Condition:
+    """Counts of one method under one perturbation or fixture while events go by."""
 
     latencies_s: dict[int, list[float]] = field(default_factory=dict)
     generated: int = 0
+    enqueued: int = 0
     executed: int = 0
     discarded: Counter[str] = field(default_factory=Counter)
     ages_ns: list[int] = field(default_factory=list)
@@ -44,6 +45,7 @@ class _Condition:
             self.latencies_s.setdefault(start, []).append(float(m["detail"]))
         elif kind == "enqueue":
             self.generated += 1
+            self.enqueued += 1
         elif kind in ("discard", "finish"):
             self.generated += m.get("at") == "arrival"
             self.executed += m["ended"] == "executed"
@@ -106,15 +108,15 @@ def derived_tables(journals: Iterable[Path]) -> dict[str, list[dict[str, Any]]]:
         IntegrityError: No regular file.
         BadInputError: Not a whole journal, or an event that cannot be read.
     """
-    conditions: dict[tuple[str, str], _Condition] = {}
+    conditions: dict[tuple[str, str], Condition] = {}
     for path in journals:
-        sessions: dict[str, tuple[_Condition, int]] = {}
+        sessions: dict[str, tuple[Condition, int]] = {}
         for kind, message in read_messages(path):
             name = str(message.get("session"))
             if kind == "session":
                 labels = message["labels"]
                 key = (str(labels.get("method")), str(labels.get("perturbation")))
-                condition = conditions.setdefault(key, _Condition())
+                condition = conditions.setdefault(key, Condition())
                 sessions[name] = (condition, int(labels.get("start", -1)))
             elif name in sessions:
                 condition, start = sessions[name]

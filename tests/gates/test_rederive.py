@@ -11,7 +11,7 @@ from gates import rederive as module
 from gates.proof import Rung
 from gates.rederive import STRESS, rederive, rederived
 from genpolicy.contract.horizons import HorizonConfig
-from genpolicy.errors import BadInputError, RefusedError
+from genpolicy.errors import BadInputError, ConfigError, RefusedError
 from genpolicy.evidence.rows.stress import (
     AgeRow,
     ConservationRow,
@@ -20,11 +20,14 @@ from genpolicy.evidence.rows.stress import (
     StressCountRow,
     StressStubRow,
 )
+from genpolicy.evidence.stress.settings import StressSettings
+from genpolicy.evidence.stress.tables import power_document
 from genpolicy.execution.cell import Cell, ExecutionSettings
 from genpolicy.execution.executor import Executor
 from genpolicy.execution.journal import Journal, write_journal
 from genpolicy.execution.stub import ControllerStub
 from genpolicy.execution.supervisor import Supervisor
+from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.rows import write_rows
 from genpolicy.integrity.tables import read_table, write_table
 from genpolicy.verification.checker import check_journal
@@ -34,6 +37,13 @@ from genpolicy.verification.tables import derived_tables
 
 PARAMS = yaml.safe_load((Path(__file__).parents[2] / "params.yaml").read_text())
 NAMES = ("flow__nominal", "bc__nominal", "flow__envelope")
+POWER = canonical_json(
+    power_document(
+        StressSettings(**PARAMS["stress"]),
+        candidates=len(PARAMS["train_generators"]["samplers"]),
+        root_seed=PARAMS["seed"],
+    )
+)
 TABLES = {
     "invocations": InvocationRow, "counts": StressCountRow, "conservation": ConservationRow,
     "stub": StressStubRow, "ages": AgeRow,
@@ -88,6 +98,7 @@ def root(tmp_path):
         write_rows(folder / f"{name}.parquet", TABLES[name], made)
     _write_checker(folder, documents)
     (folder / "envelope.json").write_text(json.dumps(_envelope(folder)))
+    (folder / "power.json").write_bytes(POWER)
     return tmp_path
 
 
@@ -262,4 +273,40 @@ def test_a_total_that_the_gates_judge_by_is_derived_again(root, total):
     document[total] += 1000
     path.write_text(json.dumps(document))
     with pytest.raises(RefusedError, match=rf"checker\.json: {total} is 1\d\d\d, required \d+"):
+        rederive(root, "D")
+
+
+def _stronger(document):
+    document["rows"][3]["promote_share"] = 0.99
+
+
+def _fewer_worlds(document):
+    document["rows"].pop()
+
+
+@pytest.mark.parametrize(("key", "forge"), [
+    ("rows", _stronger), ("rows", _fewer_worlds),
+    ("alpha", lambda document: document.update(alpha=0.2)),
+    ("pairs", lambda document: document.pop("pairs")),
+    ("margin", lambda document: document.update(margin=0.0)),
+    ("more", lambda document: document.update(more=1)),
+])  # fmt: skip
+def test_a_power_that_no_simulation_gives_is_refused(root, key, forge):
+    path = root / STRESS / "power.json"
+    document = json.loads(path.read_text())
+    forge(document)
+    path.write_text(json.dumps(document))
+    with pytest.raises(RefusedError, match=rf"power\.json: {key} is .*as simulated again"):
+        rederive(root, "D")
+
+
+def test_power_is_that_of_the_registered_candidates_and_seed(root):
+    params = yaml.safe_load((root / "params.yaml").read_text())
+    params["train_generators"]["samplers"].pop("flow")
+    (root / "params.yaml").write_text(yaml.safe_dump(params))
+    with pytest.raises(RefusedError, match=r"power\.json: alpha is"):
+        rederive(root, "D")
+    params["train_generators"]["samplers"] = ["flow"]
+    (root / "params.yaml").write_text(yaml.safe_dump(params))
+    with pytest.raises(ConfigError, match=r"samplers is a list, expected a mapping"):
         rederive(root, "D")

@@ -1,7 +1,8 @@
 """One shadow session: a judged chunk through executor and stub, on the clock of its observation."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from genpolicy.contract.chunk import DiscardReason
 from genpolicy.evidence.shadow.case import Case
@@ -18,6 +19,8 @@ from genpolicy.feasibility.settings import LAYERS
 IN_FLIGHT_PHASE_CHANGE = "phase_change_in_flight"
 
 Judged = tuple[Case, Admitted | Rejected]
+Measures = Sequence[Mapping[str, Any]]
+"""What a table states of each candidate beside its verdict; written beside it in the journal."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +45,13 @@ class Played:
 
 
 def play(
-    cell: Cell, item: Observation, judged: Sequence[Judged], *, fixture: str, number: int
+    cell: Cell,
+    item: Observation,
+    judged: Sequence[Judged],
+    *,
+    fixture: str,
+    number: int,
+    measures: Measures = (),
 ) -> Played:
     """One session: deliver the first admitted candidate, tick until its horizon has passed.
 
@@ -52,25 +61,17 @@ def play(
         judged: Its candidates with their verdicts, in order.
         fixture: Name of what is tested.
         number: Number of the observation.
+        measures: What a table states of each candidate, if anything.
     """
     horizons = cell.horizons
     metadata = judged[0][0].proposal.metadata
-    journal = Journal(
-        f"{metadata.method}/{fixture}/{number}",
-        {"method": metadata.method, "fixture": fixture, "situation": item.episode_uuid},
-    )
-    supervisor = Supervisor(cell.execution, journal)
-    stub = ControllerStub(cell, journal, supervisor)
-    executor = Executor(cell, journal, stub)
-    active = judged[0][0].context
-    executor.set_active(0.0, active.active_checkpoint_hash, active.active_sampler_hash)
-    executor.observe(0.0, 0.0, item.phase, item.calibration_epoch)
-    journal.scene(0.0, judged[0][0].poses)
+    executor, stub, journal = _begin(cell, item, judged[0][0], fixture, number)
     executor.begin_invocation(0.0, metadata.chunk_id)
-    period_s, now_s = horizons.action_period_s, active.now_s
+    period_s, now_s = horizons.action_period_s, judged[0][0].context.now_s
     executor.observe(now_s, now_s, item.phase, item.calibration_epoch)
     executor.end_invocation(now_s, metadata.chunk_id, "answered")
-    delivered = _deliver(executor, journal, judged, now_s=now_s)
+    _note(journal, judged, measures, now_s=now_s)
+    delivered = _deliver(executor, judged, now_s=now_s)
     first = round(now_s / period_s)
     for tick in range(first, first + horizons.execution_horizon + 1):
         phase = item.phase
@@ -90,16 +91,49 @@ def play(
     )
 
 
-def _deliver(
-    executor: Executor,
-    journal: Journal,
+def note_only(
+    cell: Cell,
+    item: Observation,
     judged: Sequence[Judged],
     *,
-    now_s: float,
-) -> int:
-    """Hand over the first admitted candidate; write the others off. Returns 1 if one was."""
-    delivered = 0
-    for case, result in judged:
+    fixture: str,
+    number: int,
+    measures: Measures = (),
+) -> Journal:
+    """A session in which candidates are judged and nothing is asked for, delivered or executed.
+
+    Its arguments are those of `play`.
+    """
+    executor, _, journal = _begin(cell, item, judged[0][0], fixture, number)
+    now_s = judged[0][0].context.now_s
+    _note(journal, judged, measures, now_s=now_s)
+    executor.end_episode(now_s)
+    return journal
+
+
+def _begin(
+    cell: Cell, item: Observation, case: Case, fixture: str, number: int
+) -> tuple[Executor, ControllerStub, Journal]:
+    """A session in which the observation was made at time 0."""
+    method = case.proposal.metadata.method
+    labels = {
+        "method": method, "fixture": fixture, "situation": f"{item.episode_uuid}:{item.index}",
+        "observation": str(number),
+    }  # fmt: skip
+    journal = Journal(f"{method}/{fixture}/{number}", labels)
+    supervisor = Supervisor(cell.execution, journal)
+    stub = ControllerStub(cell, journal, supervisor)
+    executor = Executor(cell, journal, stub)
+    active = case.context
+    executor.set_active(0.0, active.active_checkpoint_hash, active.active_sampler_hash)
+    executor.observe(0.0, 0.0, item.phase, item.calibration_epoch)
+    journal.scene(0.0, case.poses)
+    return executor, stub, journal
+
+
+def _note(journal: Journal, judged: Sequence[Judged], measures: Measures, *, now_s: float) -> None:
+    """The verdict on each candidate, with what a table states of it."""
+    for number, (case, result) in enumerate(judged):
         metadata, verdict = case.proposal.metadata, result.verdict
         journal.candidate(
             now_s,
@@ -108,7 +142,15 @@ def _deliver(
             index=metadata.candidate_index,
             layers={layer.name: layer.passed for layer in verdict.layers},
             first_reason=verdict.first_reason or None,
+            measures=measures[number] if measures else None,
         )
+
+
+def _deliver(executor: Executor, judged: Sequence[Judged], *, now_s: float) -> int:
+    """Hand over the first admitted candidate; write the others off. Returns 1 if one was."""
+    delivered = 0
+    for case, result in judged:
+        metadata = case.proposal.metadata
         if isinstance(result, Admitted) and not delivered:
             delivered += executor.deliver(result, now_s) is None
         else:

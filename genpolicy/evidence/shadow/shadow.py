@@ -7,7 +7,7 @@ clock of its observation, and the journal of that is what the independent checke
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,13 +19,14 @@ from genpolicy.evidence.rows.shadow import CandidateRow
 from genpolicy.evidence.shadow.case import Case, decide
 from genpolicy.evidence.shadow.corruption import CORRUPTIONS
 from genpolicy.evidence.shadow.observations import Observation
-from genpolicy.evidence.shadow.session import IN_FLIGHT_PHASE_CHANGE, Judged, play
+from genpolicy.evidence.shadow.session import IN_FLIGHT_PHASE_CHANGE, Judged, note_only, play
 from genpolicy.execution.cell import Cell
 from genpolicy.execution.journal import Journal
 from genpolicy.execution.ledger import Account
 from genpolicy.feasibility.admission import Admitted, FeasibilityChecker, Rejected
 from genpolicy.feasibility.settings import LAYERS
 from genpolicy.feasibility.verdict import Verdict
+from genpolicy.integrity.hashing import sha256_bytes
 from genpolicy.policies.policy import Policy
 from genpolicy.tasks.api import Task
 
@@ -113,18 +114,19 @@ def shadow_policy(
         policy: The policy.
         observations: Held-out moments.
         seed: Number of its training seed.
-        two_mode: Moments at which modes were found: judged, neither corrupted nor executed.
+        two_mode: Moments at which modes were found: judged and journaled, neither corrupted nor
+            executed.
     """
     evidence = ShadowEvidence()
     of_phase: Counter[str] = Counter()
     for number, (item, cases) in enumerate(_answers(shadow, policy, [*observations, *two_mode])):
         seen = _Seen(shadow, evidence, item, number, seed)
         if number >= len(observations):
-            seen.judge(cases, fixture=TWO_MODES)
+            seen.note(seen.judge(cases, fixture=TWO_MODES), fixture=TWO_MODES)
             continue
         judged = seen.judge(cases, fixture=HELD_OUT)
         seen.play(judged, fixture=HELD_OUT)
-        if any(isinstance(result, Admitted) for _, result in judged):
+        if any(isinstance(result, Admitted) for _, result in judged.pairs):
             seen.play(judged, fixture=IN_FLIGHT_PHASE_CHANGE)
         skip_built = of_phase[item.phase] % BUILT_EVERY > 0
         of_phase[item.phase] += 1
@@ -157,6 +159,14 @@ def _answers(
 
 
 @dataclass(frozen=True)
+class _Judgement:
+    """Candidates with their verdicts, and what the table states of each."""
+
+    pairs: list[Judged]
+    measures: list[dict[str, Any]]
+
+
+@dataclass(frozen=True)
 class _Seen:
     """One observation under test, and where its evidence goes."""
 
@@ -166,18 +176,33 @@ class _Seen:
     number: int
     seed: int
 
-    def judge(self, cases: list[Case], *, fixture: str) -> list[Judged]:
+    def judge(self, cases: list[Case], *, fixture: str) -> _Judgement:
         """Judge chunks; every verdict is a row."""
         judged = [(case, admit(self.shadow, case)) for case in cases]
-        for candidate, (case, result) in enumerate(judged):
-            self.evidence.candidates.append(self._row(case, result, fixture, candidate))
-        return judged
+        rows = [
+            self._row(case, result, fixture, candidate)
+            for candidate, (case, result) in enumerate(judged)
+        ]
+        self.evidence.candidates.extend(rows)
+        return _Judgement(judged, [measures_of(row) for row in rows])
 
-    def play(self, judged: list[Judged], *, fixture: str) -> None:
+    def note(self, judged: _Judgement, *, fixture: str) -> None:
+        """Journal them without a session."""
+        self.evidence.sessions.append(
+            note_only(
+                self.shadow.cell, self.item, judged.pairs, fixture=fixture, number=self.number,
+                measures=judged.measures,
+            )
+        )  # fmt: skip
+
+    def play(self, judged: _Judgement, *, fixture: str) -> None:
         """Run a session with them."""
         evidence = self.evidence
-        played = play(self.shadow.cell, self.item, judged, fixture=fixture, number=self.number)
-        key = (judged[0][0].proposal.metadata.method, fixture)
+        played = play(
+            self.shadow.cell, self.item, judged.pairs, fixture=fixture, number=self.number,
+            measures=judged.measures,
+        )  # fmt: skip
+        key = (judged.pairs[0][0].proposal.metadata.method, fixture)
         for name in ("arrivals", "stale", "invalid", "delivered"):
             evidence.stub[(*key, name)] += getattr(played, name)
         evidence.accounts.setdefault(key, []).append(played.account)
@@ -212,6 +237,26 @@ class _Seen:
             raw=tuple(raw.ravel().tolist()),
             projected=tuple(projected.actions.ravel().tolist()),
         )
+
+
+def measures_of(row: CandidateRow) -> dict[str, Any]:
+    """What a row states beside the verdict, for the journal; arrays by their hash."""
+    return {
+        "mode": row.mode,
+        "layer_margin": row.layer_margin,
+        "position_change_m": row.position_change_m,
+        "rotation_change_rad": row.rotation_change_rad,
+        "boundary_jerk_m_s3": row.boundary_jerk_m_s3,
+        "raw_sha256": numbers_sha256(row.raw),
+        "projected_sha256": numbers_sha256(row.projected),
+    }
+
+
+def numbers_sha256(values: Sequence[float]) -> str:
+    """SHA-256 of numbers as little-endian float64; every NaN is the same one."""
+    numbers = np.array(values, dtype="<f8")
+    numbers[np.isnan(numbers)] = np.nan
+    return sha256_bytes(numbers.tobytes())
 
 
 def case_of(

@@ -50,9 +50,15 @@ def write_shadow(
     write_journal(journal, [session for item in found for session in item.sessions])
     checked = checker_document([journal], cell=cell, robot=robot)
     write_bytes(folder / "checker.json", canonical_json(checked))
-    # The executor's checks are owned by freshness and hand-over, layer six and beyond.
-    executor = [{**row, "layer": "execution"} for row in run_mutants()]
-    write_bytes(folder / "mutants.json", canonical_json([*mutants, *executor]))
+    write_bytes(folder / "mutants.json", canonical_json(all_mutants(mutants)))
+
+
+def all_mutants(layers: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Content of `mutants.json`: checks of the six layers, then those of the execution.
+
+    The executor's checks are owned by freshness and hand-over, layer six and beyond.
+    """
+    return [*layers, *({**row, "layer": "execution"} for row in run_mutants())]
 
 
 def account_rows(accounts: Sequence[Account]) -> list[dict[str, Any]]:

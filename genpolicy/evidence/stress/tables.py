@@ -35,6 +35,7 @@ from genpolicy.tasks.api import load_task
 from genpolicy.verification.commands import reach_of
 
 AGE_LEVELS = (0.0, 0.05, 0.25, 0.5, 0.75, 0.9, 0.95, 0.99, 1.0)
+POWER_FILE = "power.json"
 POWER_CORRELATION = 0.3
 POWER_TRIALS = 4000
 

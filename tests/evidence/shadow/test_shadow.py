@@ -104,7 +104,14 @@ def test_situations_with_modes_are_judged_neither_corrupted_nor_executed(shadow,
     alone = shadow_policy(shadow, Demonstrator(observations), few, seed=0)
     rest = [row for row in found.candidates if row.fixture != TWO_MODES]
     assert repr(rest) == repr(alone.candidates)
-    assert found.stub == alone.stub and len(found.sessions) == len(alone.sessions)
+    assert found.stub == alone.stub
+    told = {session.session: session for session in found.sessions}
+    noted = [name for name in told if f"/{TWO_MODES}/" in name]
+    assert len(noted) == len(more) and len(told) == len(alone.sessions) + len(more)
+    for name in noted:
+        kinds = [event.kind for event in told[name].events()]
+        assert kinds.count("candidate") == 3 and kinds[-1] == "end"
+        assert not {"enqueue", "accept", "invocation"} & set(kinds)
 
 
 def test_a_policy_that_answers_not_a_number_leaves_evidence(shadow, observations):

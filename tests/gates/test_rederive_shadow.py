@@ -1,0 +1,201 @@
+"""Gate C's evidence has second witnesses: its journal, and mutants that are tried again."""
+
+import json
+import shutil
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import yaml
+
+from gates import rederive_shadow as module
+from gates.rederive import rederive
+from gates.rederive_shadow import SHADOW, rederive_shadow
+from genpolicy.errors import BadInputError, ConfigError, RefusedError
+from genpolicy.evidence.rows.shadow import CandidateRow, ShadowCountRow, ShadowStubRow
+from genpolicy.evidence.shadow.observations import held_out_observations
+from genpolicy.evidence.shadow.settings import ShadowSection
+from genpolicy.evidence.shadow.shadow import Shadow, shadow_policy
+from genpolicy.evidence.shadow.tables import write_shadow
+from genpolicy.execution.cell import Cell
+from genpolicy.execution.journal import Journal, write_journal
+from genpolicy.integrity.rows import write_rows
+from genpolicy.integrity.tables import read_table
+from genpolicy.seeds import stream
+from genpolicy.verification.shadow import KEYS
+
+ROWS = {"candidates": CandidateRow, "stub": ShadowStubRow, "counts": ShadowCountRow}
+LAYERS_TRIED = [{"check": "shape", "layer": "representation", "detected": True, "violations": 3}]
+EXECUTION_TRIED = {"check": "expired", "detected": True, "violations": 2, "rules": ["P1"]}
+
+
+class Demonstrator:
+    """Answers with what the operator did, and with a NaN."""
+
+    method, checkpoint_hash, sampler_config_hash, stochastic = "operator", "w" * 64, "s" * 64, True
+
+    def __init__(self, observations):
+        self.chunks = {(o.episode_uuid, o.index): o.demonstrated for o in observations}
+
+    def sample(self, seen, *, noise_names, candidates):
+        good = np.stack([self.chunks[name[1:]] for name in noise_names])
+        actions = np.stack([good, np.full_like(good, np.nan)], axis=1)
+        return SimpleNamespace(actions=actions, nfe=1)
+
+
+@pytest.fixture(scope="module")
+def params(kit):
+    shadow = {"observations": 6, "samples": 2, "late_steps": 1, "mutant_observations": 1}
+    return {**kit.PARAMS, "shadow": shadow}
+
+
+@pytest.fixture(scope="module")
+def written(params, task, checker, data, kit, tmp_path_factory):
+    """The shadow evidence of one method, with two situations of two modes."""
+    root = tmp_path_factory.mktemp("shadow")
+    section = ShadowSection(**params["shadow"])
+    shadow = Shadow(
+        task=task, checker=checker, cell=Cell(kit.HORIZONS, kit.EXECUTION),
+        late_steps=section.late_steps, samples=section.samples,
+    )  # fmt: skip
+    seen = held_out_observations(
+        data, horizons=kit.HORIZONS, count=section.observations,
+        generator=stream(params["seed"], "shadow", "observations"),
+    )  # fmt: skip
+    first, more = seen[:2], seen[2:4]
+    seed = params["policy"]["seeds"][0]
+    found = shadow_policy(shadow, Demonstrator(seen), first, seed=seed, two_mode=more)
+    (root / SHADOW).mkdir(parents=True)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(
+            "genpolicy.evidence.shadow.tables.run_mutants", lambda: [dict(EXECUTION_TRIED)]
+        )
+        write_shadow(root / SHADOW, [found], LAYERS_TRIED, cell=shadow.cell, robot=checker.cell)
+    (root / "params.yaml").write_text(yaml.safe_dump(params))
+    return root
+
+
+@pytest.fixture
+def root(written, tmp_path, monkeypatch):
+    """A copy to forge; mutants are tried in a test of their own, since they take a while."""
+    monkeypatch.setattr(module, "_layer_mutants", lambda root, params: list(LAYERS_TRIED))
+    monkeypatch.setattr(
+        "genpolicy.evidence.shadow.tables.run_mutants", lambda: [dict(EXECUTION_TRIED)]
+    )
+    return shutil.copytree(written, tmp_path / "repo")
+
+
+def rows_of(root, name):
+    return read_table(root / SHADOW / f"{name}.parquet").to_pylist()
+
+
+def write(root, name, rows):
+    write_rows(root / SHADOW / f"{name}.parquet", ROWS[name], [ROWS[name](**row) for row in rows])
+
+
+def test_true_evidence_stands(root):
+    rederive(root, "C")
+    fixtures = {row["fixture"] for row in rows_of(root, "candidates")}
+    assert {"held_out", "two_modes", "expired"} <= fixtures
+    assert "two_modes" not in {row["fixture"] for row in rows_of(root, "stub")}
+
+
+FORGED = {
+    "dynamic": False, "first_reason": "expired", "mode": "left", "layer_margin": 9.0,
+    "position_change_m": 0.0001, "rotation_change_rad": 0.5, "boundary_jerk_m_s3": 1.0,
+    "phase": "release", "situation": "elsewhere:1", "seed": 77,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("fixture", ["held_out", "two_modes"])
+@pytest.mark.parametrize("column", FORGED)
+def test_a_forged_cell_of_a_candidate_is_refused_by_name(root, column, fixture):
+    rows = rows_of(root, "candidates")
+    place = next(i for i, row in enumerate(rows) if row["fixture"] == fixture)
+    rows[place][column] = FORGED[column]
+    write(root, "candidates", rows)
+    said = rf"candidate operator/{fixture}/\d/0: {column} is .*as its journal says"
+    with pytest.raises(RefusedError, match=said):
+        rederive(root, "C")
+
+
+@pytest.mark.parametrize("column", ["raw", "projected"])
+def test_forged_actions_of_a_candidate_are_refused(root, column):
+    rows = rows_of(root, "candidates")
+    rows[0][column] = [rows[0][column][0] + 1e-9, *rows[0][column][1:]]
+    write(root, "candidates", rows)
+    with pytest.raises(RefusedError, match=rf"candidate operator/\w+/0/0: {column}_sha256 is"):
+        rederive(root, "C")
+
+
+@pytest.mark.parametrize(("name", "column"), [
+    ("stub", "delivered"), ("stub", "arrivals"), ("stub", "stale"), ("stub", "invalid"),
+    ("counts", "generated"), ("counts", "executed"), ("counts", "queued"), ("counts", "count"),
+])  # fmt: skip
+def test_a_forged_count_is_refused_by_name(root, name, column):
+    rows = rows_of(root, name)
+    rows[0][column] += 1
+    write(root, name, rows)
+    with pytest.raises(RefusedError, match=rf"{name.removesuffix('s')} operator/.*: {column} is"):
+        rederive(root, "C")
+
+
+@pytest.mark.parametrize("name", KEYS)
+def test_rows_that_are_left_out_or_stated_twice_are_found(root, name):
+    rows = rows_of(root, name)
+    write(root, name, rows[1:])
+    with pytest.raises(RefusedError, match="only in a journal"):
+        rederive(root, "C")
+    write(root, name, [*rows, rows[0]])
+    with pytest.raises(RefusedError, match="stated twice"):
+        rederive(root, "C")
+    key = KEYS[name][-1]
+    write(root, name, [*rows, {**rows[0], key: 99 if key == "candidate" else "made up"}])
+    with pytest.raises(RefusedError, match="without a journal"):
+        rederive(root, "C")
+
+
+@pytest.mark.parametrize("forge", [
+    lambda rows: rows[:-1], lambda rows: rows[1:], lambda rows: [*rows, rows[0]],
+    lambda rows: [{**rows[0], "detected": False}, *rows[1:]],
+    lambda rows: [*rows[:-1], {**rows[-1], "violations": 5}],
+    lambda rows: {"check": "shape"}, lambda rows: [*rows, "shape"],
+])  # fmt: skip
+def test_mutants_that_are_not_those_found_again_are_refused(root, forge):
+    path = root / SHADOW / "mutants.json"
+    path.write_text(json.dumps(forge(json.loads(path.read_text()))))
+    with pytest.raises(RefusedError, match=r"mutants\.json: .*as tried again"):
+        rederive(root, "C")
+
+
+def test_the_checks_are_left_out_again_on_the_moments_of_the_dataset(
+    written, params, dataset, tmp_path, monkeypatch
+):
+    root = shutil.copytree(written, tmp_path / "repo")
+    shutil.copytree(dataset, root / module.DATASET)
+    seen = []
+    monkeypatch.setattr(
+        module, "missing_checks_evidence",
+        lambda shadow, observations: seen.append((shadow, observations)) or LAYERS_TRIED,
+    )  # fmt: skip
+    monkeypatch.setattr(
+        "genpolicy.evidence.shadow.tables.run_mutants", lambda: [dict(EXECUTION_TRIED)]
+    )
+    rederive_shadow(root, params)
+    ((shadow, observations),) = seen
+    assert len(observations) >= params["shadow"]["mutant_observations"]
+    assert (shadow.samples, shadow.late_steps) == (2, 1)
+    with pytest.raises(ConfigError, match=r"seed is True, expected a whole number"):
+        rederive_shadow(root, {**params, "seed": True})
+
+
+def test_an_event_that_cannot_be_read_is_bad_input(root):
+    journal = Journal("operator/held_out/0", {})
+    journal.add("candidate", 0, {"chunk_id": "a"})
+    path = root / SHADOW / "journal.mcap"
+    write_journal(path, [journal])
+    with pytest.raises(BadInputError, match="an event that cannot be read"):
+        rederive_shadow(root, {})
+    path.write_bytes(b"journal")
+    with pytest.raises(BadInputError, match="no journal"):
+        rederive_shadow(root, {})
