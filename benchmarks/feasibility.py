@@ -22,6 +22,7 @@ from genpolicy.feasibility.cell import cell_of
 from genpolicy.feasibility.context import Context
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.robot.collision import CollisionModel, Paths
+from genpolicy.robot.controller import CONTROLLER_MODE
 from genpolicy.robot.scene_state import SceneState
 from genpolicy.robot.shapes import fcl_geometry
 from genpolicy.tasks.api import load_task
@@ -57,7 +58,7 @@ def context(checker: FeasibilityChecker) -> Context:
         q_meas=q, q_cmd=q, last_action=join_action(start, DOWN, 0.0), now_s=10.0, phase="approach",
         calibration_epoch="e0", session_epoch=1, latest_observation_event_time_s=9.95,
         maximum_age_s=0.3, active_checkpoint_hash="w", active_sampler_hash="s",
-        scene=SceneState(), q_cmd_history=np.tile(q, (2, 1)),
+        scene=SceneState(), q_cmd_history=np.tile(q, (2, 1)), controller_mode=CONTROLLER_MODE,
     )  # fmt: skip
 
 

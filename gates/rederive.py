@@ -36,6 +36,7 @@ from genpolicy.feasibility.figures import expected_motion
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.documents import read_json
 from genpolicy.integrity.tables import read_table
+from genpolicy.robot.controller import CONTROLLER_MODE
 from genpolicy.tasks.api import load_task
 from genpolicy.verification.checker import ExpectedSettings, check_journal
 from genpolicy.verification.commands import reach_of
@@ -101,6 +102,7 @@ def _held_to(params: Mapping[str, Any]) -> tuple[ExpectedSettings, ExpectedMotio
         maximum_age_s=execution.maximum_age_s,
         watchdog_s=execution.watchdog_s,
         queue_capacity=execution.queue_capacity,
+        controller_mode=CONTROLLER_MODE,
     )
     feasibility = section(params, "feasibility", FeasibilitySettings)
     task = load_task(section(params, "task", TaskSection).name)

@@ -37,6 +37,7 @@ class Session:
         checkpoint: Weights in force.
         sampler: Sampler settings in force.
         maximum_age_s: Oldest observation that may still be acted on, by phase.
+        controller_mode: Mode that the controller is in.
     """
 
     calibration_epoch: str
@@ -44,6 +45,7 @@ class Session:
     checkpoint: str
     sampler: str
     maximum_age_s: dict[str, float]
+    controller_mode: str
 
 
 def make_checker(
@@ -150,6 +152,7 @@ def context_of(
         first_index=late_rows,
         dq_meas=moment.velocity(checker.cell.action_period_s),
         state_time_s=moment.measured_at_s,
+        controller_mode=session.controller_mode,
     )
 
 
@@ -168,7 +171,8 @@ def context_at_rest(task: Task, checker: FeasibilityChecker, observation: Array)
     action, phase = task.action_at(observation), task.phase_of(observation)
     q, _ = checker.ik_chunk(action[None], task.posture_rad)
     moment = Moment(observation, q[0], [action], now_s=0.0, phase=phase)
-    session = Session(RECORDED, 0, RECORDED, RECORDED, {phase: 0.0})
+    mode = checker.cell.controller_mode  # recordings are of the controller that they are for
+    session = Session(RECORDED, 0, RECORDED, RECORDED, {phase: 0.0}, mode)
     return context_of(task, checker, moment, session=session)
 
 

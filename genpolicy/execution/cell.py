@@ -17,6 +17,7 @@ from genpolicy.contract.settings import Settings
 from genpolicy.errors import ConfigError
 from genpolicy.execution.moment import View
 from genpolicy.execution.nanoseconds import to_ns
+from genpolicy.robot.controller import CONTROLLER_MODE
 
 DEFAULT = "default"
 """Key of a table by phase whose value holds for every phase that the table does not name."""
@@ -113,6 +114,7 @@ class Cell:
     Attributes:
         horizons: H_o, K, H_e and the period.
         execution: Settings of executor, stub, supervisor and recovery.
+        controller_mode: The one mode of the controller in which an action may be accepted.
 
     Raises:
         ConfigError: A watchdog shorter than a period.
@@ -120,6 +122,7 @@ class Cell:
 
     horizons: HorizonConfig
     execution: ExecutionSettings
+    controller_mode: str = CONTROLLER_MODE
 
     def __post_init__(self) -> None:
         if not self.execution.watchdog_s >= self.horizons.action_period_s:
@@ -176,6 +179,7 @@ class Cell:
             fallback=FALLBACK_HASH,
             execution_horizon=self.horizons.execution_horizon,
             period_ns=self.period_ns,
+            controller_mode=self.controller_mode,
         )
 
 

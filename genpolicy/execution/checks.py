@@ -127,6 +127,10 @@ def _within_horizon(m: Moment) -> bool:
     return m.row is not None and 0 <= m.row < usable
 
 
+def _in_declared_mode(m: Moment) -> bool:
+    return bool(m.view.controller) and m.view.controller == m.view.controller_mode
+
+
 def _awake(m: Moment) -> bool:
     return m.last_accept_ns is None or m.watchdog_ns - (m.now_ns - m.last_accept_ns) >= 0
 
@@ -177,6 +181,7 @@ CHECKS: Checks = (
          _R.INTERVENTION, *_LIVE),
     _row("stopped", lambda m: not m.view.stopped, _R.STOPPED, *_LIVE),
     _row("commander", lambda m: m.view.mode != MODE_OF_SOURCE[m.chunk.source], _R.STOPPED, *_LIVE),
+    _row("controller_mode", _in_declared_mode, _R.STOPPED, *_LIVE),
     _row("session_epoch", lambda m: m.chunk.metadata.session_epoch == m.view.session_epoch,
          _R.RESET, *_LIVE, _P.LAYER),
     _row("checkpoint_mismatch",

@@ -135,6 +135,16 @@ class Executor:
         self._drop(now_ns, DiscardReason.CHECKPOINT_MISMATCH)
         self._drop(now_ns, DiscardReason.SAMPLER_MISMATCH)
 
+    def controller(self, now_s: float, mode: str) -> None:
+        """The mode that the controller is in; another one than before voids what is here."""
+        now_ns, before = self._begin(now_s), self._view.controller
+        self._journal.add("controller", now_ns, {"mode": mode})
+        self.stub.note_controller(mode)
+        self._view = replace(self._view, controller=mode)
+        if before not in ("", mode):
+            self.stub.void(DiscardReason.STOPPED, now_ns)
+            self._void(now_ns, DiscardReason.STOPPED, now_ns)
+
     # -- who commands -------------------------------------------------------------------------
 
     def reset(self, now_s: float) -> None:
@@ -235,13 +245,9 @@ class Executor:
     def write_off(
         self, metadata: ChunkMetadata, rows: int, reason: DiscardReason, now_s: float
     ) -> None:
-        """Account for a chunk that never became deliverable.
+        """Account for a chunk of so many rows that never became deliverable.
 
-        Args:
-            metadata: Of the chunk.
-            rows: Its number of actions, K.
-            reason: `infeasible` if a layer rejected it; `expired` if it was lost or cancelled.
-            now_s: Time, s.
+        `infeasible` if a layer rejected it; `expired` if it was lost or cancelled.
         """
         self._arrivals.write_off(self._begin(now_s), metadata.chunk_id, rows, reason)
 

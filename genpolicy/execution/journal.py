@@ -34,12 +34,14 @@ MAXIMUM_RECORD_BYTES = 64 << 20
 
 EVENT_FIELDS: dict[str, tuple[str, ...]] = {
     "session": ("version", "labels", "execution_horizon", "period_ns", "maximum_age_ns",
-                "watchdog_ns", "queue_capacity", "fallback_hash", "checks_missing"),
+                "watchdog_ns", "queue_capacity", "fallback_hash", "controller_mode",
+                "checks_missing"),
     "observation": ("event_time_ns", "phase", "calibration_epoch", "used", "ignored_because"),
     "scene": ("bodies",),
     "phase": ("event_time_ns", "old", "new"),
     "epoch": ("event_time_ns", "old", "new"),
     "active": ("checkpoint", "sampler"),
+    "controller": ("mode",),
     "invocation": ("id", "stage", "detail"),
     "candidate": ("chunk_id", "method", "index", "layers", "first_reason", "measures"),
     "enqueue": ("arrival", "chunk_id", "source", "method", "condition_ns", "start_ns", "period_ns",
@@ -156,6 +158,7 @@ def session_payload(
         "watchdog_ns": cell.watchdog_ns,
         "queue_capacity": cell.execution.queue_capacity,
         "fallback_hash": FALLBACK_HASH,
+        "controller_mode": cell.controller_mode,
         "checks_missing": list(checks_missing),
     }
 

@@ -58,6 +58,8 @@ class View:
         voidings: Per reason, the event that voided last.
         execution_horizon: Actions of a chunk that may be executed.
         period_ns: Time between actions.
+        controller: Mode that the controller says it is in; empty before it said one.
+        controller_mode: The mode that it must be in.
     """
 
     phase: str = ""
@@ -73,6 +75,8 @@ class View:
     voidings: Mapping[DiscardReason, Voiding] = field(default_factory=dict)
     execution_horizon: int = 0
     period_ns: int = 0
+    controller: str = ""
+    controller_mode: str = ""
 
     def voided(self, reason: DiscardReason, before_ns: int, arrivals: int = 0) -> "View":
         """The view after an event; a later event of the same reason covers an earlier one."""

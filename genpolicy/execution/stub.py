@@ -85,6 +85,10 @@ class ControllerStub:
         """Which weights and sampler may command."""
         self._view = replace(self._view, checkpoint=checkpoint, sampler=sampler)
 
+    def note_controller(self, mode: str) -> None:
+        """Which mode the controller is in."""
+        self._view = replace(self._view, controller=mode)
+
     def note_mode(self, mode: str) -> None:
         """Who may command: run (the policy), fallback, intervention or ended (nobody)."""
         self._view = replace(self._view, mode=mode)

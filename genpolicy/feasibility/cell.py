@@ -13,6 +13,7 @@ from genpolicy.errors import ConfigError, ContractError
 from genpolicy.feasibility.context import Context
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.robot.collision import CollisionModel
+from genpolicy.robot.controller import CONTROLLER_MODE
 from genpolicy.robot.dynamics import ArmDynamics
 from genpolicy.robot.kinematics import ArmKinematics
 from genpolicy.robot.limits import RobotLimits
@@ -82,6 +83,7 @@ class Cell:
         phases: Phases that the task knows, in order.
         contact_phases: Those in which the held object may touch the target.
         opening_phases: Those in which the gripper may let go.
+        controller_mode: The one mode of the controller that the layers' questions are true of.
 
     Raises:
         ConfigError: A phase that the task does not know, no pair of the robot's own shapes to
@@ -97,6 +99,7 @@ class Cell:
     phases: tuple[str, ...]
     contact_phases: frozenset[str]
     opening_phases: frozenset[str]
+    controller_mode: str = CONTROLLER_MODE
 
     def __post_init__(self) -> None:
         if not (self.action_period_s > 0 and math.isfinite(self.action_period_s)):

@@ -87,6 +87,7 @@ CHECKS: tuple[Check, ...] = (
     Check("measured_acceleration", "dynamic", dynamic.margins,
           lambda cell: float(cell.limits.acceleration_rad_s2.min())),
     Check("state_age", "dynamic", dynamic.margins),
+    Check("controller_mode", "dynamic", dynamic.margins),
     Check("approach_direction", "contact", contact.margins),
     Check("contact_speed", "contact", contact.margins),
     Check("gripper_opening", "contact", contact.margins),

@@ -39,6 +39,7 @@ class Context:
         dq_meas: Measured joint velocities, rad/s, over the period before `q_meas`; None where only
             one state was measured: then nothing is assumed of them. Shape (J,).
         state_time_s: When `q_meas` was measured; None: now.
+        controller_mode: Mode that the controller is in; empty where it is not known.
     """
 
     q_meas: Array
@@ -58,6 +59,7 @@ class Context:
     first_index: int = 0
     dq_meas: Array | None = None
     state_time_s: float | None = None
+    controller_mode: str = ""
 
     def __post_init__(self) -> None:
         joints = np.size(self.q_cmd)

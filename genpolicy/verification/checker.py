@@ -35,6 +35,7 @@ class ExpectedSettings:
     maximum_age_s: dict[str, float]
     watchdog_s: float
     queue_capacity: int
+    controller_mode: str
 
     def declared(self) -> dict[str, Any]:
         """The same in the journal's words."""
@@ -44,6 +45,7 @@ class ExpectedSettings:
             "maximum_age_ns": {k: round(v * 1e9) for k, v in self.maximum_age_s.items()},
             "watchdog_ns": round(self.watchdog_s * 1e9),
             "queue_capacity": self.queue_capacity,
+            "controller_mode": self.controller_mode,
         }
 
 

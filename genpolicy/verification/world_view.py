@@ -1,6 +1,6 @@
 """What was true when: phase, calibration, weights, stops and voiding events, followed again."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 from genpolicy.verification.journal_source import Message
 
@@ -8,7 +8,7 @@ Finding = tuple[str, str]
 STOP_STATES = ("protective_stop", "emergency_stop")
 KINDS = frozenset({
     "observation", "phase", "epoch", "active", "invocation", "candidate", "refuse", "supervisor",
-    "recovery", "invalidate", "mode", "reset", "force", "outcome", "scene",
+    "recovery", "invalidate", "mode", "reset", "force", "outcome", "scene", "controller",
 })  # fmt: skip
 
 
@@ -26,31 +26,30 @@ class WorldView:
         self.active = ("", "")
         self.session_epoch = 0
         self.mode = "run"
+        self.controller = ""
         self.stopped = False
         self.scene: dict[str, str] = {}
         self.void_before: dict[str, int] = {}
+        self._followed: dict[str, Callable[[Message], Iterator[Finding]]] = {
+            "observation": self._observe, "mode": self._change_mode, "reset": self._reset,
+            "supervisor": self._supervise, "controller": self._change_controller,
+        }  # fmt: skip
 
     def follow(self, kind: str, m: Message) -> Iterator[Finding]:
         """Take an event in; yields what is wrong with the event itself."""
         if kind not in KINDS:
             yield "journal.kind", f"There is no event of kind {kind!r}."
-        elif kind == "observation":
-            yield from self._observe(m)
+        elif kind in self._followed:
+            yield from self._followed[kind](m)
         elif kind == "scene":
             self.scene = m["bodies"]
         elif kind == "active":
             self.active = (m["checkpoint"], m["sampler"])
-        elif kind == "mode":
-            yield from self._change_mode(m)
-        elif kind == "reset":
-            yield from self._reset(m)
         elif kind == "invalidate":
             if m["reason"] == "observation_divergence":
                 self._void("an observation divergence", self.newest_ns or m["t"])
             else:
                 self._void(f"a {m['reason']}", m["t"])
-        elif kind == "supervisor":
-            yield from self._supervise(m)
         elif kind == "phase" and m["new"] != self.phase:
             yield "journal.phase", f"Phase {m['new']!r} is noted, {self.phase!r} was observed."
         elif kind == "epoch" and m["new"] != self.epoch:
@@ -80,6 +79,8 @@ class WorldView:
         needed = {"accept": "run", "fallback": "fallback"}[kind]
         if chunk["source"] != source or self.mode != needed:
             yield "P1.state", f"A {chunk['source']} action in mode {self.mode!r}."
+        if not self.controller or self.controller != settings["controller_mode"]:
+            yield "P1.controller", f"The controller is in mode {self.controller!r}."
         if self.stopped:
             yield "P7.stop", "An action is accepted while the supervisor stops."
         for cause, before_ns in self.void_before.items():
@@ -92,6 +93,13 @@ class WorldView:
         self.mode = m["new"]
         if m["new"] == "run":
             self._void(f"the end of {m['old']}", m["t"])
+
+    def _change_controller(self, m: Message) -> Iterator[Finding]:
+        if not isinstance(m["mode"], str):
+            yield "journal.controller", f"The controller's mode is {m['mode']!r}."
+        if self.controller not in ("", m["mode"]):
+            self._void("another mode of the controller", m["t"])
+        self.controller = m["mode"]
 
     def _reset(self, m: Message) -> Iterator[Finding]:
         if m["session_epoch"] <= self.session_epoch:

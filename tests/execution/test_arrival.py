@@ -117,6 +117,7 @@ def test_only_what_feasibility_issued_is_taken_by_default():
     rig = Rig()
     strict = Executor(rig.cell, rig.journal, rig.stub)
     strict.set_active(0.0, CHECKPOINT, SAMPLER)
+    strict.controller(0.0, rig.cell.controller_mode)
     strict.observe(0.0, 0.0, "approach", "epoch-1")
     assert strict.deliver(rig.chunk(), 0.0) is R.INFEASIBLE
     assert strict.tick(0.0).kind == "hold"
@@ -162,6 +163,7 @@ def test_a_chunk_that_feasibility_issued_is_taken_and_a_tampered_one_is_not():
     rig = Rig()
     strict = Executor(rig.cell, rig.journal, rig.stub)
     strict.set_active(0.0, CHECKPOINT, SAMPLER)
+    strict.controller(0.0, rig.cell.controller_mode)
     strict.observe(0.0, 0.0, "approach", "epoch-1")
 
     def issued():

@@ -23,7 +23,7 @@ CHUNK = Chunk(
 VIEW = View(
     phase="approach", calibration_epoch="e", newest_observation_ns=150 * MS,
     maximum_age_ns=300 * MS, checkpoint="w", sampler="s", fallback="f", session_epoch=1,
-    execution_horizon=8, period_ns=50 * MS,
+    execution_horizon=8, period_ns=50 * MS, controller="m", controller_mode="m",
 )  # fmt: skip
 GOOD = Moment(
     now_ns=310 * MS, view=VIEW, about=CHUNK, row=2, known=False, issued=True, same_action=True,
@@ -64,6 +64,7 @@ BAD = {
     "intervention": view(mode=ExecutorMode.INTERVENTION),
     "stopped": view(stopped=True),
     "commander": view(mode=ExecutorMode.FALLBACK),
+    "controller_mode": view(controller="other"),
     "session_epoch": metadata(session_epoch=0),
     "checkpoint_mismatch": view(checkpoint="other"),
     "sampler_mismatch": view(sampler="other"),
@@ -150,3 +151,9 @@ def test_a_voiding_event_covers_what_was_there_and_a_later_one_covers_an_earlier
     assert failing(arrived_later) == set()
     both = VIEW.voided(DiscardReason.RESET, 200 * MS).voided(DiscardReason.RESET, 50 * MS)
     assert failing(replace(GOOD, view=both)) == {"after_reset"}
+
+
+def test_a_mode_of_the_controller_that_nobody_stated_does_not_hold():
+    for controller, declared in (("", ""), ("", "m"), ("m", "")):
+        moment = view(controller=controller, controller_mode=declared)
+        assert failing(moment) == {"controller_mode"}

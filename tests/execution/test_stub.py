@@ -25,6 +25,7 @@ def half_asleep(check):
         checks=without(check, IMITATED),
     )  # fmt: skip
     rig.executor.set_active(0.0, CHECKPOINT, SAMPLER)
+    rig.executor.controller(0.0, rig.cell.controller_mode)
     return rig
 
 

@@ -15,6 +15,7 @@ from genpolicy.feasibility.checks import CHECKS, without
 from genpolicy.feasibility.context import Context
 from genpolicy.feasibility.inverse import solved
 from genpolicy.feasibility.settings import LAYERS, FeasibilitySettings
+from genpolicy.robot.controller import CONTROLLER_MODE
 from genpolicy.robot.scene_state import SceneState
 from genpolicy.tasks.api import load_task
 
@@ -76,6 +77,7 @@ def context(checker, start, *, phase="approach", opening=0.0, history=2, **chang
         calibration_epoch="e0", session_epoch=1, latest_observation_event_time_s=9.95,
         maximum_age_s=0.3, active_checkpoint_hash="w", active_sampler_hash="s",
         scene=SCENE_STATE, q_cmd_history=np.tile(q, (history, 1)),
+        controller_mode=CONTROLLER_MODE,
     )  # fmt: skip
     return replace(base, **changes)
 

@@ -63,6 +63,7 @@ def _session(name: str, start: int) -> Journal:
     supervisor = Supervisor(execution, journal)
     executor = Executor(cell, journal, ControllerStub(cell, journal, supervisor))
     executor.set_active(0.0, "weights", "sampler")
+    executor.controller(0.0, cell.controller_mode)
     for tick in range(4):
         now_s = tick * horizons.action_period_s
         executor.observe(now_s, now_s, "approach", "epoch_1", 0.0)

@@ -33,6 +33,7 @@ from genpolicy.execution.journal import write_journal
 from genpolicy.feasibility.admission import Admitted, Rejected
 from genpolicy.feasibility.figures import expected_motion
 from genpolicy.feasibility.settings import FeasibilitySettings
+from genpolicy.robot.controller import CONTROLLER_MODE
 from genpolicy.seeds import stream
 from genpolicy.tasks.api import load_task
 from genpolicy.tasks.demonstrations import record_session
@@ -204,6 +205,7 @@ def test_ten_rollouts_of_the_scripted_operator(cell, tmp_path):
         maximum_age_s=cell.execution.maximum_age_s,
         watchdog_s=cell.execution.watchdog_s,
         queue_capacity=cell.execution.queue_capacity,
+        controller_mode=CONTROLLER_MODE,
     )
     motion = expected_motion(cell.checker.cell)
     report = check_journal(journal, expected, motion)

@@ -5,6 +5,7 @@ import copy
 import pytest
 
 from genpolicy.evidence.shadow.rig import EXECUTION, HORIZONS, Rig
+from genpolicy.robot.controller import CONTROLLER_MODE
 from genpolicy.verification.checker import ExpectedSettings, check_messages
 
 EXPECTED = ExpectedSettings(
@@ -13,6 +14,7 @@ EXPECTED = ExpectedSettings(
     maximum_age_s=dict(EXECUTION.maximum_age_s),
     watchdog_s=EXECUTION.watchdog_s,
     queue_capacity=EXECUTION.queue_capacity,
+    controller_mode=CONTROLLER_MODE,
 )
 
 
@@ -119,7 +121,7 @@ def test_a_stop_that_clears_itself_is_found():
 def test_declared_limits_are_compared_with_the_expected_ones(honest):
     report = check_messages(honest, EXPECTED)
     assert rules(report) == set()
-    looser = ExpectedSettings(8, 0.05, {"approach": 0.3}, 0.1, 2)
+    looser = ExpectedSettings(8, 0.05, {"approach": 0.3}, 0.1, 2, CONTROLLER_MODE)
     assert "settings.limits" in rules(check_messages(honest, looser))
 
 
@@ -127,3 +129,35 @@ def test_a_session_without_end_is_no_proof():
     rig = Rig()
     rig.run()
     assert "journal.no_end" in rules(check_messages(messages(rig.journal.events())))
+
+
+def test_an_action_in_another_mode_of_the_controller_is_found_whatever_it_claims(honest):
+    place = next(i for i, (kind, _) in enumerate(honest) if kind == "controller")
+    assert honest[place][1]["mode"] == CONTROLLER_MODE
+    for mode in ("joint_position", ""):
+        journal = copy.deepcopy(honest)
+        journal[place][1]["mode"] = mode
+        assert "P1.controller" in rules(check_messages(journal))
+    journal = copy.deepcopy(honest)
+    journal[0][1]["controller_mode"] = "joint_position"
+    assert "P1.controller" in rules(check_messages(journal))
+    assert "settings.limits" in rules(check_messages(journal, EXPECTED))
+
+
+def test_a_mode_that_changes_voids_what_was_seen_before():
+    rig = Rig()
+    rig.observe()
+    chunk = rig.chunk()
+    rig.deliver(chunk)
+    rig.tick(2)
+    kept = messages(rig.journal.events())
+    place = max(i for i, (kind, _) in enumerate(kept) if kind == "accept")
+    accept = kept[place][1]
+    for mode in ("joint_position", CONTROLLER_MODE):
+        event = {"session": accept["session"], "n": 0, "t": accept["t"], "mode": mode}
+        kept.insert(place, ("controller", event))
+        place += 1
+    for n, (_, message) in enumerate(kept):
+        message["n"] = n
+    found = rules(check_messages(kept))
+    assert "P1.void" in found and "P1.controller" not in found

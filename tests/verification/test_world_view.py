@@ -5,7 +5,7 @@ import pytest
 from genpolicy.verification.world_view import WorldView
 
 MS = 1_000_000
-SETTINGS = {"maximum_age_ns": {"approach": 600 * MS}}
+SETTINGS = {"maximum_age_ns": {"approach": 600 * MS}, "controller_mode": "m"}
 CHUNK = {
     "condition_ns": 1000 * MS, "phase": "approach", "calibration_epoch": "e1",
     "checkpoint": "w", "sampler": "s", "session_epoch": 0, "source": "policy",
@@ -25,6 +25,7 @@ def view():
     made = WorldView()
     made.fallback_hash = "f"
     assert list(made.follow("active", {"checkpoint": "w", "sampler": "s"})) == []
+    assert list(made.follow("controller", {"mode": "m", "t": 0})) == []
     assert observed(made, 1000) == []
     return made
 
@@ -111,3 +112,16 @@ def test_session_epochs_only_grow_and_a_reset_forgets(view):
 )
 def test_events_that_contradict_what_was_observed_are_named(view, kind, message, rule):
     assert [found for found, _ in view.follow(kind, message)] == [rule]
+
+
+def test_another_mode_of_the_controller_objects_and_voids_what_was_seen_before(view):
+    assert rules(view) == []
+    assert list(view.follow("controller", {"mode": "x", "t": 1100 * MS})) == []
+    assert set(rules(view)) == {"P1.controller", "P1.void"}
+    assert list(view.follow("controller", {"mode": "m", "t": 1150 * MS})) == []
+    assert rules(view) == ["P1.void"]
+    observed(view, 1160)
+    assert rules(view, condition_ns=1160 * MS) == []
+    ((rule, _),) = view.follow("controller", {"mode": None, "t": 1170 * MS})
+    assert rule == "journal.controller"
+    assert "P1.controller" in rules(WorldView())

@@ -131,6 +131,11 @@ def other_period(case: Case, _: FeasibilityChecker) -> Case:
     return case.with_metadata(action_period_s=case.proposal.metadata.action_period_s * 1.1)
 
 
+def other_controller(case: Case, _: FeasibilityChecker) -> Case:
+    """The controller is in another mode than the one that the figures are true of."""
+    return case.with_context(controller_mode=f"not {case.context.controller_mode}")
+
+
 def infeasible_rotation(case: Case, _: FeasibilityChecker) -> Case:
     """In one action the two rotation columns are parallel."""
     actions = np.array(case.proposal.actions)
@@ -246,6 +251,7 @@ CORRUPTIONS = (
     Corruption("left_behind", boundary.left_behind, "dynamic", "measured_velocity"),
     Corruption("pushed_aside", boundary.pushed_aside, "dynamic", "measured_acceleration"),
     Corruption("old_state", boundary.old_state, "dynamic", "state_age"),
+    Corruption("other_controller", other_controller, "dynamic", "controller_mode"),
     Corruption(
         "aside_in_contact", margin.aside_in_contact, "contact", "approach_direction", (), in_contact
     ),

@@ -124,6 +124,14 @@ def _new_chunk_while_stopped(rig: Rig) -> None:
     rig.tick(2)
 
 
+def _new_chunk_in_another_mode(rig: Rig) -> None:
+    _begin(rig)
+    rig.executor.controller(rig.now_s, "joint_position")
+    rig.observe()
+    rig.deliver(rig.chunk(predecessor_chunk_id=""))
+    rig.tick(2)
+
+
 def _same_chunk_twice(rig: Rig) -> None:
     rig.observe()
     chunk = rig.chunk()
@@ -237,6 +245,7 @@ SCENARIOS: dict[str, Scenario] = {
     "calibration_mismatch": _bad(calibration_epoch="epoch-2"),
     "checked_rows": _bad(verdict=passing_verdict(rows=(0, 1))),
     "checkpoint_mismatch": _bad(policy_checkpoint_hash="0" * 64),
+    "controller_mode": _new_chunk_in_another_mode,
     "commander": _then(lambda rig: rig.executor.begin_fallback(rig.now_s)),
     "duplicate": _same_chunk_twice,
     "early": _starts_later,

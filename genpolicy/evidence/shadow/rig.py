@@ -141,6 +141,7 @@ class Rig:
         self.phase, self.epoch = "approach", "epoch-1"
         self.made = 0
         self.executor.set_active(self.now_s, CHECKPOINT, SAMPLER)
+        self.executor.controller(self.now_s, self.cell.controller_mode)
 
     @property
     def now_s(self) -> float:

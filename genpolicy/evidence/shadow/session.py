@@ -126,6 +126,7 @@ def _begin(
     executor = Executor(cell, journal, stub)
     active = case.context
     executor.set_active(0.0, active.active_checkpoint_hash, active.active_sampler_hash)
+    executor.controller(0.0, cell.controller_mode)
     executor.observe(0.0, 0.0, item.phase, item.calibration_epoch)
     journal.scene(0.0, case.poses)
     return executor, stub, journal

@@ -304,6 +304,7 @@ def case_of(
         checkpoint=source.checkpoint_hash,
         sampler=source.sampler_config_hash,
         maximum_age_s=shadow.cell.execution.maximum_age_s,
+        controller_mode=shadow.cell.controller_mode,
     )
     now_s = shadow.late_steps * period_s
     moment = Moment(

@@ -91,6 +91,7 @@ def checker_document(
         maximum_age_s=execution.maximum_age_s,
         watchdog_s=execution.watchdog_s,
         queue_capacity=execution.queue_capacity,
+        controller_mode=cell.controller_mode,
     )
     motion = expected_motion(robot)
     documents = {

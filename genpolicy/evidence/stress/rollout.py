@@ -57,8 +57,8 @@ class Rollout:
     ) -> None:
         self.fixture = fixture
         self.start_index = start_index
-        epoch = WorldSettings(calibration_epoch=calibration_epoch)
-        self.world: World = fixture.task.make_world(start, settings=epoch)
+        settings = WorldSettings(calibration_epoch=calibration_epoch)
+        self.world: World = fixture.task.make_world(start, settings=settings)
         self.start_sha256 = self.world.state_sha256()
         self.journal = fixture.journal(start_index, self.start_sha256)
         cell = Cell(fixture.horizons, fixture.execution)
@@ -84,6 +84,7 @@ class Rollout:
         self._measured: deque[Array] = deque(maxlen=2)
         self._disturbance = Disturbance(fixture, self.world, start=start_index)
         self.executor.set_active(0.0, fixture.checkpoint, fixture.sampler)
+        self.executor.controller(0.0, cell.controller_mode)  # the simulated one has no other
 
     @property
     def now_s(self) -> float:
@@ -333,6 +334,7 @@ class Rollout:
             checkpoint=checkpoint,
             sampler=sampler,
             maximum_age_s=self.fixture.execution.maximum_age_s,
+            controller_mode=self.executor.cell.controller_mode,
         )
 
     def _apply(self, command: Command, now_s: float) -> None:
@@ -344,7 +346,5 @@ class Rollout:
         self.world.command(command.action)
         self._commanded.append(np.array(command.action))
         self._last_command_s = now_s
-        if command.kind == "fallback":
-            self.tally.fallback_ticks += 1
-        else:
-            self.tally.action_ticks += 1
+        self.tally.fallback_ticks += command.kind == "fallback"
+        self.tally.action_ticks += command.kind != "fallback"

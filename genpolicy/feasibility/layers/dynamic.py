@@ -38,6 +38,7 @@ def margins(batch: Batch, cell: Cell) -> Margins:
     measured_velocity     min over joints of limit - |q_1 - q_meas| / t, rad/s
     measured_acceleration min over joints of limit - |(q_1 - q_cmd) / T - dq_meas| / t, rad/s^2
     state_age             min of (allowed age - age of the measured state, that age), s
+    controller_mode       0 where the controller is in the cell's mode, else -1
     ====================  =====================================================================
 
     Source:
@@ -60,7 +61,15 @@ def margins(batch: Batch, cell: Cell) -> Margins:
         "tcp_turn": settings.tcp_turn_limit_rad_s * (1 + ROUNDING) - turn.max(axis=1),
         "joint_torque": _torque(batch, cell),
         **_from_measured(batch, cell),
+        "controller_mode": _mode(batch, cell),
     })  # fmt: skip
+
+
+def _mode(batch: Batch, cell: Cell) -> Array:
+    """0 where the controller is in the mode that the figures of this layer are true of, else -1."""
+    wanted = [bool(c.controller_mode) and c.controller_mode == cell.controller_mode
+              for c in batch.contexts]  # fmt: skip
+    return np.where(wanted, 0.0, -1.0)
 
 
 def _torque(batch: Batch, cell: Cell) -> Array:

@@ -34,6 +34,7 @@ def test_the_rule_that_breaks_is_the_one_that_the_check_guards():
     assert "P1.state" in rules["commander"] & rules["intervention"]
     assert all("P1.void" in rules[name] for name in rules if name.startswith("after_"))
     assert "P7.stop" in rules["stopped"]
+    assert rules["controller_mode"] == {"P1.controller"}
     assert rules["issued"] == {"P6.ground"}
 
 

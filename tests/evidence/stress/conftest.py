@@ -24,6 +24,7 @@ from genpolicy.execution.journal import write_journal
 from genpolicy.feasibility.figures import expected_motion
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.documents import read_yaml
+from genpolicy.robot.controller import CONTROLLER_MODE
 from genpolicy.tasks.api import load_task
 from genpolicy.tasks.tabletop_insertion.episodes import demonstrate
 from genpolicy.verification.checker import ExpectedSettings, check_journal
@@ -120,6 +121,7 @@ def check(rollouts, folder, *, execution=EXECUTION):
         maximum_age_s=execution.maximum_age_s,
         watchdog_s=execution.watchdog_s,
         queue_capacity=execution.queue_capacity,
+        controller_mode=CONTROLLER_MODE,
     )
     robot = rollouts[0].fixture.checker.cell if rollouts else None
     return check_journal(path, expected, robot and expected_motion(robot))

@@ -8,11 +8,14 @@ import pytest
 from genpolicy.contract.action import join_action
 from genpolicy.contract.chunk import Projected
 from genpolicy.feasibility.batch import Batch, Solution
+from genpolicy.feasibility.inverse import solved
 from genpolicy.feasibility.layers.dynamic import margins
 from genpolicy.robot.dynamics import ArmDynamics
 
 RATES = ("joint_velocity", "joint_acceleration", "joint_jerk", "tcp_speed")
-STATE = ("joint_torque", "measured_velocity", "measured_acceleration", "state_age")
+STATE = (
+    "joint_torque", "measured_velocity", "measured_acceleration", "state_age", "controller_mode",
+)  # fmt: skip
 
 
 def yaw(angle):
@@ -55,6 +58,7 @@ def cases(checker, kit):
         "measured_velocity": kit.Outside(good, replace(ctx, q_meas=ctx.q_cmd - 0.12)),
         "measured_acceleration": kit.Outside(good, replace(ctx, dq_meas=np.full(7, 0.5))),
         "state_age": kit.Outside(good, replace(ctx, state_time_s=ctx.now_s - 0.31)),
+        "controller_mode": kit.Outside(good, replace(ctx, controller_mode="joint_position")),
     }  # fmt: skip
 
 
@@ -166,3 +170,18 @@ def test_torque_is_that_of_the_path_with_what_it_knows(checker, cell, kit):
     assert of_one_row(kit, cell, ctx)["joint_torque"][0] == pytest.approx(left, abs=1e-2)
     alone = replace(ctx, q_cmd_history=np.zeros((0, 7)))
     assert of_one_row(kit, cell, alone)["joint_torque"][0] == np.inf
+
+
+def test_a_controller_whose_mode_is_not_known_is_in_no_mode(checker, cell, kit):
+    ctx = kit.context(checker, kit.START)
+    here = np.tile(ctx.last_action, (kit.K, 1))
+    for mode, passes in ((cell.controller_mode, True), ("", False), ("joint_position", False)):
+        found = margins(solved_batch(kit, checker, here, replace(ctx, controller_mode=mode)), cell)
+        assert (found.values["controller_mode"][0] >= 0) == passes
+    nameless = replace(cell, controller_mode="")
+    found = margins(solved_batch(kit, checker, here, replace(ctx, controller_mode="")), nameless)
+    assert found.values["controller_mode"][0] < 0
+
+
+def solved_batch(kit, checker, actions, ctx):
+    return solved(kit.batch_of((actions, ctx)), checker.cell)
