@@ -87,7 +87,7 @@ class PlainLoop:
         self.scene = [
             fcl.CollisionObject(fcl_geometry(s, inflation_m=0.0)) for s in model.shapes.scene
         ]
-        columns, self.pairs = model._broad.columns, []
+        columns, self.pairs = model.broad.columns, []
         for shape, body, other in zip(columns.shape, columns.body, columns.other, strict=True):
             if body < 0:
                 self.pairs.append((self.robot[shape], self.robot[other]))

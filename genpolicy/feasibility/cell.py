@@ -1,6 +1,7 @@
 """What stays the same from check to check: robot, scene, phases and thresholds of one cell."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -17,6 +18,7 @@ from genpolicy.robot.controller import CONTROLLER_MODE
 from genpolicy.robot.dynamics import ArmDynamics
 from genpolicy.robot.kinematics import ArmKinematics
 from genpolicy.robot.limits import RobotLimits
+from genpolicy.robot.payload import Payload, payload_of
 
 Array = NDArray[np.float64]
 
@@ -125,6 +127,14 @@ class Cell:
                 expected="at least one pair to test",
                 action="Give the links colliding geoms; an untested robot may fold into itself.",
             )
+        elsewhere = set(self.settings.contact_force_by_phase_n) - self.contact_phases
+        if elsewhere:
+            raise ConfigError(
+                where="feasibility.contact_force_by_phase_n",
+                found=f"naming {sorted(elsewhere)}",
+                expected=f"contact phases of the task: {sorted(self.contact_phases)}",
+                action="Correct params.yaml; in every other phase nothing may be touched at all.",
+            )
         self._require_one_robot()
 
     def _require_one_robot(self) -> None:
@@ -142,6 +152,30 @@ class Cell:
             )
 
     @cached_property
+    def force_envelope_n(self) -> dict[str, float]:
+        """Most that a command may press with, by contact phase, N; in no other phase anything."""
+        own, default = self.settings.contact_force_by_phase_n, self.settings.contact_force_limit_n
+        return {phase: own.get(phase, default) for phase in sorted(self.contact_phases)}
+
+    def require_within(self, stop_n: Mapping[str, float]) -> None:
+        """Refuse an envelope that allows what the supervisor stops at.
+
+        Args:
+            stop_n: Contact force at which the supervisor stops, by phase, N.
+
+        Raises:
+            ConfigError: A contact phase allows as much, or has no such force.
+        """
+        for phase, most_n in self.force_envelope_n.items():
+            if not most_n < stop_n.get(phase, 0.0):
+                raise ConfigError(
+                    where=f"feasibility: force envelope of phase {phase}",
+                    found=f"{most_n:g} N",
+                    expected=f"less than {stop_n.get(phase, 0.0):g} N, where the supervisor stops",
+                    action="Lower contact_force_limit_n, or name the phase by itself.",
+                )
+
+    @cached_property
     def usable_limits(self) -> RobotLimits:
         """The robot's rate limits times the factors of the settings."""
         limits, settings = self.limits, self.settings
@@ -156,6 +190,16 @@ class Cell:
     def dynamics(self) -> ArmDynamics:
         """What torques a motion of the arm needs."""
         return ArmDynamics(self.kinematics)
+
+    @cached_property
+    def payload(self) -> Payload | None:
+        """What a closed hand may hold, as the scene file says; None where there is nothing."""
+        return payload_of(self.kinematics.scene_path, joints=self.joint_count)
+
+    @cached_property
+    def loaded_dynamics(self) -> ArmDynamics:
+        """The same with the payload in the hand."""
+        return ArmDynamics(self.kinematics, self.payload)
 
     @property
     def joint_count(self) -> int:

@@ -3,6 +3,7 @@
 import numpy as np
 
 from genpolicy.feasibility.cell import Cell
+from genpolicy.robot.impedance import STIFFNESS_N_M
 from genpolicy.verification.motion import ExpectedMotion
 
 
@@ -19,4 +20,6 @@ def expected_motion(robot: Cell) -> ExpectedMotion:
         tcp_turn_rad_s=settings.tcp_turn_limit_rad_s,
         held_opening_m=settings.held_opening_m,
         contact_phases=robot.contact_phases,
+        contact_force_n=robot.force_envelope_n,
+        contact_stiffness_n_m=STIFFNESS_N_M,
     )

@@ -39,6 +39,9 @@ class FeasibilitySettings(BaseModel):
         approach_cone_rad: Half angle, about straight down, of motion while holding in contact.
         step_tolerance_m: Lateral or upward part of one action that the cone forgives.
         contact_speed_limit_m_s: Most for the TCP's speed while holding in a contact phase.
+        contact_force_limit_n: Most that a command may press what is held into the target, in a
+            contact phase; half of what the supervisor of the default task stops at there.
+        contact_force_by_phase_n: The same of contact phases that differ.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
@@ -66,3 +69,5 @@ class FeasibilitySettings(BaseModel):
     approach_cone_rad: float = Field(default=0.35, gt=0, lt=1.57)
     step_tolerance_m: float = Field(default=0.003, ge=0)
     contact_speed_limit_m_s: PositiveFloat = 0.15
+    contact_force_limit_n: PositiveFloat = 40.0
+    contact_force_by_phase_n: dict[str, PositiveFloat] = Field(default_factory=dict)

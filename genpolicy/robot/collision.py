@@ -9,6 +9,7 @@ motion carries them between two tested configurations.
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,6 +73,8 @@ class Paths:
         scenes: Scene of each path.
         contact_allowed: The held object may touch the target. Shape (B,).
         clearance_m: Distance that must be left, m, >= 0. Shape (B,).
+        asked: Which pairs: `all`, or, of what is held where contact is allowed, all pairs with the
+            scene but those with the target (`held`), or all pairs but those (`free`).
     """
 
     q_rad: Array
@@ -80,6 +83,7 @@ class Paths:
     scenes: tuple[SceneState, ...]
     contact_allowed: BoolArray
     clearance_m: Array
+    asked: Literal["all", "held", "free"] = "all"
 
 
 @dataclass(frozen=True)
@@ -135,14 +139,14 @@ class CollisionModel:
                 expected="at least one colliding geom of each",
                 action="Put robot geoms in group 1 and scene geoms in group 3.",
             )
-        self._broad = BroadPhase(self.shapes)
-        self.bodies = self._broad.bodies
-        self._narrow = NarrowPhase(self.shapes, self._broad.columns, self.bodies)
+        self.broad = BroadPhase(self.shapes)
+        self.bodies = self.broad.bodies
+        self.narrow = NarrowPhase(self.shapes, self.broad.columns, self.bodies)
 
     @property
     def self_pair_count(self) -> int:
         """How many pairs of the robot's own shapes are tested against each other."""
-        return int(np.sum(self._broad.columns.body < 0))
+        return int(np.sum(self.broad.columns.body < 0))
 
     def check_samples(self, paths: Paths) -> CollisionReport:
         """Collision at the waypoints 1 to P - 1 of each path (0 is where the arm stands)."""
@@ -152,8 +156,8 @@ class CollisionModel:
         index = index + 1
         frames = self.kinematics.frames(paths.q_rad[row, index])
         opening = self._opening(paths)[row, index]
-        bound = self._broad.lower_bounds(
-            self._broad.centres(frames, opening), self._poses(paths.scenes)[row]
+        bound = self.broad.lower_bounds(
+            self.broad.centres(frames, opening), self.poses(paths.scenes)[row]
         )
         left = bound - paths.clearance_m[row, None]
         enabled = self._enabled(paths, row, paths.held[row, index])
@@ -163,7 +167,7 @@ class CollisionModel:
         for i, column in np.argwhere(enabled & ~(left >= 0)):
             r = int(row[i])
             if hits[r] is None:
-                hit = self._narrow.test(
+                hit = self.narrow.test(
                     frames,
                     int(i),
                     opening_m=float(opening[i]),
@@ -183,7 +187,7 @@ class CollisionModel:
         """
         require_finite(paths.q_rad, paths.opening_m, paths.clearance_m)
         batch = len(paths.q_rad)
-        poses = self._poses(paths.scenes)
+        poses = self.poses(paths.scenes)
         pieces = self._first_pieces(paths)
         hits: list[Hit | None] = [None] * batch
         clearance = np.full(batch, np.inf)
@@ -236,12 +240,12 @@ class CollisionModel:
         """Rotation and position (m) of every robot shape at one configuration of shape (J,)."""
         frames = self.kinematics.frames(np.asarray(q_rad, dtype=float)[None])
         return [
-            self._narrow.placement(frames, 0, opening_m, i) for i in range(len(self.shapes.robot))
+            self.narrow.placement(frames, 0, opening_m, i) for i in range(len(self.shapes.robot))
         ]
 
     def scene_placements(self, scene: SceneState) -> list[tuple[Array, Array]]:
         """Rotation and position (m) of every scene shape."""
-        return [self._narrow.scene_placement(scene, i) for i in range(len(self.shapes.scene))]
+        return [self.narrow.scene_placement(scene, i) for i in range(len(self.shapes.scene))]
 
     def _opening(self, paths: Paths) -> Array:
         """Opening of the fingers; around a held object no narrower than it."""
@@ -249,11 +253,16 @@ class CollisionModel:
         return np.where(paths.held, np.maximum(paths.opening_m, width), paths.opening_m)
 
     def _enabled(self, paths: Paths, row: NDArray[np.int64], held: BoolArray) -> BoolArray:
-        columns = self._broad.columns
-        enabled: BoolArray = ~columns.held | held[:, None]
-        return enabled & ~(columns.target & paths.contact_allowed[row, None])
+        columns = self.broad.columns
+        allowed = paths.contact_allowed[row, None]
+        enabled: BoolArray = (~columns.held | held[:, None]) & ~(columns.target & allowed)
+        if paths.asked != "all":
+            touching = columns.held & (columns.body >= 0) & allowed
+            enabled &= touching if paths.asked == "held" else ~touching
+        return enabled
 
-    def _poses(self, scenes: tuple[SceneState, ...]) -> Array:
+    def poses(self, scenes: tuple[SceneState, ...]) -> Array:
+        """x, y, z (m), cosine and sine of the yaw of each body. Shape (B, bodies, 5)."""
         poses = np.empty((len(scenes), len(self.bodies), 5))
         for i, scene in enumerate(scenes):
             scene.require_known(self.shapes)
@@ -272,19 +281,19 @@ class CollisionModel:
             q=np.stack([paths.q_rad[row, segment], paths.q_rad[row, segment + 1]], axis=1),
             opening=np.stack([opening[row, segment], opening[row, segment + 1]], axis=1),
             held=paths.held[row, segment] | paths.held[row, segment + 1],
-            open=np.ones((len(row), len(self._broad.columns.shape)), dtype=bool),
+            open=np.ones((len(row), len(self.broad.columns.shape)), dtype=bool),
         )
 
     def _evaluate(self, pieces: _Pieces, poses: Array) -> _Ends:
         frames = [self.kinematics.frames(pieces.q[:, end]) for end in (0, 1)]
-        centres = [self._broad.centres(frames[end], pieces.opening[:, end]) for end in (0, 1)]
-        bounds = [self._broad.lower_bounds(c, poses[pieces.row]) for c in centres]
+        centres = [self.broad.centres(frames[end], pieces.opening[:, end]) for end in (0, 1)]
+        bounds = [self.broad.lower_bounds(c, poses[pieces.row]) for c in centres]
         turned = np.sum(np.abs(pieces.q[:, 1] - pieces.q[:, 0]), axis=1)
         opened = np.abs(pieces.opening[:, 1] - pieces.opening[:, 0])
         # A sliding finger on a turning hand bends by its opening times the turn, twice.
         bend = (self.kinematics.reach_m * turned**2 + 2 * opened * turned) / 8
         moved = np.linalg.norm(centres[1] - centres[0], axis=2)
-        travel = self._broad.travel(frames[0], frames[1], moved, bend)
+        travel = self.broad.travel(frames[0], frames[1], moved, bend)
         return _Ends((frames[0], frames[1]), np.minimum(*bounds), travel)
 
     def _piece(
@@ -296,7 +305,7 @@ class CollisionModel:
         inflated = clearance + float(ends.travel_m[i, column])
 
         def test(end: int, inflation_m: float) -> tuple[str, str, float] | None:
-            return self._narrow.test(
+            return self.narrow.test(
                 ends.frames[end],
                 i,
                 opening_m=float(pieces.opening[i, end]),

@@ -10,6 +10,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from genpolicy.robot.kinematics import ArmKinematics
+from genpolicy.robot.payload import Payload
 
 Array = NDArray[np.float64]
 
@@ -17,16 +18,18 @@ Array = NDArray[np.float64]
 class ArmDynamics:
     """Rigid body dynamics of an arm and of what hangs at it, with fingers closed.
 
-    What the hand holds is no part of the arm's tree, and its weight is not in these torques.
-
     Args:
         kinematics: The arm.
+        payload: What the hand holds, which is no part of the arm's tree; None: nothing.
     """
 
-    def __init__(self, kinematics: ArmKinematics) -> None:
+    def __init__(self, kinematics: ArmKinematics, payload: Payload | None = None) -> None:
         self.kinematics = kinematics
         model, joints = kinematics.model, kinematics.joint_count
         bodies = _lumped(model, joints)
+        if payload is not None:
+            load = pin.Inertia(payload.mass_kg, payload.centre_m, payload.inertia_kg_m2)
+            bodies[payload.joint] += load
         self._mass = np.array([body.mass for body in bodies])
         self._centre = np.array([body.lever for body in bodies])
         self._inertia = np.array([body.inertia for body in bodies])

@@ -61,6 +61,18 @@ class NarrowPhase:
                 return name, self.shapes.scene[member].name, depth
         return None
 
+    def depth_m(
+        self, frames: Frames, i: int, *, opening_m: float, column: int, scene: SceneState
+    ) -> float:
+        """How deep a robot shape lies in any shape of a scene body, m; 0 where it is free."""
+        shape, body = int(self.columns.shape[column]), int(self.columns.body[column])
+        robot, deepest = self._object(shape, 0.0), 0.0
+        place(robot, *self.placement(frames, i, opening_m, shape))
+        for member in self._members[body]:
+            place(self._plain[member], *self.scene_placement(scene, member))
+            deepest = max(deepest, penetration(robot, self._plain[member]) or 0.0)
+        return deepest
+
     def placement(
         self, frames: Frames, i: int, opening_m: float, shape: int
     ) -> tuple[Array, Array]:

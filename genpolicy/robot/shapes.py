@@ -100,8 +100,8 @@ def shapes_of(scene_path: Path, *, joints: int, tcp_site: str = TCP_SITE) -> Sce
     data = mujoco.MjData(model)
     data.qpos[:] = 0.0
     mujoco.mj_kinematics(model, data)
-    links = [int(model.jnt_bodyid[j]) for j in range(joints)]
-    held = _held_placement(model, data, links)
+    links = links_of(model, joints)
+    held = held_placement(model, data, links)
     robot, scene, held_shapes = [], [], []
     for geom in range(model.ngeom):
         if not (model.geom_contype[geom] or model.geom_conaffinity[geom]):
@@ -125,6 +125,11 @@ def shapes_of(scene_path: Path, *, joints: int, tcp_site: str = TCP_SITE) -> Sce
         target_body=target_body,
         target_offset_m=target_offset,
     )
+
+
+def links_of(model: Any, joints: int) -> list[int]:
+    """Bodies that the arm's joints carry."""
+    return [int(model.jnt_bodyid[joint]) for joint in range(joints)]
 
 
 def fcl_geometry(shape: Shape, *, inflation_m: float) -> Any:
@@ -162,10 +167,11 @@ def bounding_spheres(shape: Shape) -> tuple[Array, float]:
     return centres, radius
 
 
-def _matrix(quaternion: Array) -> Array:
-    matrix = np.zeros(9)
-    mujoco.mju_quat2Mat(matrix, np.asarray(quaternion, dtype=float))
-    return matrix.reshape(3, 3)
+def matrix(quaternion: Array) -> Array:
+    """Rotation (3, 3) of a quaternion w, x, y, z."""
+    flat = np.zeros(9)
+    mujoco.mju_quat2Mat(flat, np.asarray(quaternion, dtype=float))
+    return flat.reshape(3, 3)
 
 
 def _half_size(model: Any, geom: int) -> tuple[Kind, Array]:
@@ -203,7 +209,7 @@ def _relative(
 def _robot_shape(model: Any, data: Any, geom: int, links: list[int]) -> Shape:
     body = int(model.geom_bodyid[geom])
     frame = _carrier(model, body, links)
-    in_body = _matrix(model.geom_quat[geom])
+    in_body = matrix(model.geom_quat[geom])
     body_rotation = np.array(data.xmat[body]).reshape(3, 3)
     rotation, position = _relative(
         data, links, frame, body_rotation @ in_body,
@@ -220,9 +226,7 @@ def _robot_shape(model: Any, data: Any, geom: int, links: list[int]) -> Shape:
     return Shape(name, model.body(body).name, kind, half, frame, rotation, position, slide, tool)
 
 
-def _held_placement(
-    model: Any, data: Any, links: list[int]
-) -> tuple[int, int, Array, Array] | None:
+def held_placement(model: Any, data: Any, links: list[int]) -> tuple[int, int, Array, Array] | None:
     """Held body, frame, rotation and position of it in the frame, from the weld to the hand."""
     for i in range(model.neq):
         first, second = int(model.eq_obj1id[i]), int(model.eq_obj2id[i])
@@ -231,7 +235,7 @@ def _held_placement(
         # eq_data: anchor on the second body (3), position (3) and quaternion (4) in the first.
         values = np.array(model.eq_data[i])
         hand = np.array(data.xmat[first]).reshape(3, 3)
-        in_hand = _matrix(values[6:10])
+        in_hand = matrix(values[6:10])
         origin = data.xpos[first] + hand @ (values[3:6] - in_hand @ values[:3])
         frame = _carrier(model, first, links)
         rotation, position = _relative(data, links, frame, hand @ in_hand, origin)
@@ -244,7 +248,7 @@ def _held_shape(model: Any, geom: int, held: tuple[int, int, Array, Array]) -> S
     kind, half = _half_size(model, geom)
     return Shape(
         HELD, HELD, kind, half, frame,
-        rotation @ _matrix(model.geom_quat[geom]),
+        rotation @ matrix(model.geom_quat[geom]),
         position + rotation @ model.geom_pos[geom], np.zeros(3), tool=True,
     )  # fmt: skip
 
@@ -252,7 +256,7 @@ def _held_shape(model: Any, geom: int, held: tuple[int, int, Array, Array]) -> S
 def _scene_shape(model: Any, geom: int) -> Shape:
     kind, half = _half_size(model, geom)
     name, body = model.geom(geom).name, model.body(int(model.geom_bodyid[geom])).name
-    rotation, position = _matrix(model.geom_quat[geom]), np.array(model.geom_pos[geom])
+    rotation, position = matrix(model.geom_quat[geom]), np.array(model.geom_pos[geom])
     return Shape(name, body, kind, half, BASE_FRAME, rotation, position, np.zeros(3))
 
 
@@ -260,7 +264,7 @@ def _nominal_bodies(model: Any, scene: list[Shape]) -> dict[str, tuple[Array, fl
     bodies = {}
     for name in dict.fromkeys(shape.body for shape in scene):
         body = model.body(name)
-        rotation = _matrix(body.quat)
+        rotation = matrix(body.quat)
         bodies[name] = (np.array(body.pos), float(np.arctan2(rotation[1, 0], rotation[0, 0])))
     return bodies
 

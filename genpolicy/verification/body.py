@@ -49,10 +49,11 @@ class Driven:
     Args:
         scene_path: MJCF of robot and scene.
         joints: Joints of the arm, the first ones of the file.
+        held: The object that a weld holds in the hand is a part of the hand.
     """
 
-    def __init__(self, scene_path: Path, joints: int) -> None:
-        self._model: Any = mujoco.MjModel.from_xml_path(str(scene_path))
+    def __init__(self, scene_path: Path, joints: int, *, held: bool = False) -> None:
+        self._model: Any = _grown(scene_path) if held else _plain(scene_path)
         off = mujoco.mjtDisableBit.mjDSBL_CONSTRAINT, mujoco.mjtDisableBit.mjDSBL_CONTACT
         self._model.opt.disableflags |= int(off[0]) | int(off[1])
         self._data: Any = mujoco.MjData(self._model)
@@ -64,6 +65,28 @@ class Driven:
         data.qpos[:joints], data.qvel[:joints], data.qacc[:joints] = q_rad, dq_rad_s, ddq_rad_s2
         mujoco.mj_inverse(self._model, data)
         return np.array(data.qfrc_inverse[:joints])
+
+
+def _plain(scene_path: Path) -> Any:
+    return mujoco.MjModel.from_xml_path(str(scene_path))
+
+
+def _grown(scene_path: Path) -> Any:
+    """The scene with a twin of the welded object grown to the hand; as it is without a weld."""
+    model, spec = _plain(scene_path), mujoco.MjSpec.from_file(str(scene_path))
+    weld = next((i for i in range(model.neq) if model.eq_type[i] == mujoco.mjtEq.mjEQ_WELD), None)
+    if weld is None:
+        return model
+    hand, body = int(model.eq_obj1id[weld]), int(model.eq_obj2id[weld])
+    values = model.eq_data[weld]  # anchor on the object, position and turn in the hand
+    anchor = np.zeros(3)
+    mujoco.mju_rotVecQuat(anchor, values[:3], values[6:10])
+    spec.body(model.body(hand).name).add_body(
+        pos=values[3:6] - anchor, quat=values[6:10], mass=float(model.body_mass[body]),
+        ipos=model.body_ipos[body], iquat=model.body_iquat[body],
+        inertia=model.body_inertia[body], explicitinertial=True,
+    )  # fmt: skip
+    return spec.compile()
 
 
 def _depth(model: Any, body: int, joints: int) -> int:

@@ -6,7 +6,7 @@ executed is checked first, and then they are held against the robot's limits, th
 robot's own body; the first step also against where the arm was measured.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -46,6 +46,8 @@ class ExpectedMotion:
         tcp_turn_rad_s: Likewise.
         held_opening_m: Above this opening nothing is held.
         contact_phases: Phases in which the held object may touch the target.
+        contact_force_n: What a command may press it in there with, by phase.
+        contact_stiffness_n_m: Force of the controller per way that is missing.
     """
 
     scene_path: Path
@@ -57,6 +59,8 @@ class ExpectedMotion:
     tcp_turn_rad_s: float
     held_opening_m: float
     contact_phases: frozenset[str]
+    contact_force_n: Mapping[str, float]
+    contact_stiffness_n_m: float
 
 
 class MotionProof:
@@ -82,6 +86,7 @@ class MotionProof:
         )
         self._own = OwnBody(model, self._joints, self._weld)
         self._driven = Driven(expected.scene_path, self._joints)
+        self._loaded = Driven(expected.scene_path, self._joints, held=True)
         held = model.geom_group == HELD
         self._held_width_m = float(model.geom_size[held].min()) if held.any() else 0.0
         self._last: dict[str, Array] = {}
@@ -124,10 +129,11 @@ class MotionProof:
         self._pose(path[place], float(action[GRIPPER]), held, motion["scene"])
         yield from self._reached(action)
         yield from self._within(path[place], action, before, period_s)
-        yield from self._rates(path[: place + 1], period_s)
+        loaded = bool(np.all(openings[:-1] <= self.expected.held_opening_m))
+        yield from self._rates(path[: place + 1], period_s, loaded=loaded)
         if row == first:
             yield from self._from_measured(chunk, path[place - 1 : place + 1], period_s)
-        yield from self._touching(held, phase in self.expected.contact_phases)
+        yield from self._touching(held, phase)
 
     def _pose(self, q_rad: Array, opening_m: float, held: bool, scene: dict[str, str]) -> None:
         model, data = self._model, self._data
@@ -186,8 +192,11 @@ class MotionProof:
         if not turn <= expected.tcp_turn_rad_s * (1 + ROUNDING):
             yield "P6.tcp_turn", f"The TCP turns at {turn:.4g} rad/s."
 
-    def _rates(self, path: Array, period_s: float) -> Iterator[Finding]:
-        """Rates and torques of the path (n, J) that ends at the row, as far as it is known."""
+    def _rates(self, path: Array, period_s: float, *, loaded: bool) -> Iterator[Finding]:
+        """Rates and torques of the path (n, J) that ends at the row, as far as it is known.
+
+        Torques are those at the command before it; `loaded` says whether the hand held on there.
+        """
         expected = self.expected
         for order, (name, limit) in enumerate(zip(RATES, expected.rates, strict=True), start=1):
             if len(path) > order:
@@ -197,9 +206,11 @@ class MotionProof:
         if len(path) > 2:
             speed = (path[-1] - path[-3]) / (2 * period_s)
             acceleration = np.diff(path[-3:], n=2, axis=0)[0] / period_s**2
-            torque = np.abs(self._driven.torque_nm(path[-2], speed, acceleration))
-            if not np.all(torque <= expected.torque_nm + TORQUE_TOLERANCE_NM):
-                yield "P6.torque", f"The joints bear {torque.tolist()} N m."
+            arms = [("P6.torque", self._driven), ("P6.payload", self._loaded)]
+            for rule, arm in arms[: 1 + loaded]:
+                torque = np.abs(arm.torque_nm(path[-2], speed, acceleration))
+                if not np.all(torque <= expected.torque_nm + TORQUE_TOLERANCE_NM):
+                    yield rule, f"The joints bear {torque.tolist()} N m."
 
     def _from_measured(self, chunk: Message, ends: Array, period_s: float) -> Iterator[Finding]:
         """What the arm needs from where it was measured; `ends` are last command and row (2, J)."""
@@ -217,8 +228,10 @@ class MotionProof:
             if not np.all(np.abs(step) / time_s <= acceleration_limit * (1 + ROUNDING)):
                 yield "P6.measured_acceleration", f"The arm must change by {step.tolist()} rad/s."
 
-    def _touching(self, held: bool, in_contact: bool) -> Iterator[Finding]:
+    def _touching(self, held: bool, phase: str) -> Iterator[Finding]:
+        """What touches what may not, and how hard the held object is pressed where it may."""
         model, contact = self._model, self._data.contact
+        in_contact, pressed_m = phase in self.expected.contact_phases, 0.0
         for index in range(self._data.ncon):
             if not contact.dist[index] < -CONTACT_TOLERANCE_M:
                 continue
@@ -228,12 +241,17 @@ class MotionProof:
                 continue
             if SCENE not in groups and self._own.may_meet(*pair):
                 continue
-            allowed = in_contact and groups == [HELD, SCENE]
-            if allowed and int(model.geom_bodyid[pair[1]]) == self._target:
+            depth_m = -float(contact.dist[index])
+            leaning = in_contact and groups == [HELD, SCENE]
+            if leaning and int(model.geom_bodyid[pair[1]]) == self._target:
+                pressed_m = max(pressed_m, depth_m)
                 continue
             first, second = (model.geom(geom).name for geom in pair)
-            depth_m = -float(contact.dist[index])
-            yield "P6.collision", f"{first} is {depth_m:.3g} m deep in {second}."
+            rule = "P6.surface" if leaning else "P6.collision"
+            yield rule, f"{first} is {depth_m:.3g} m deep in {second}."
+        force_n = self.expected.contact_stiffness_n_m * (pressed_m - CONTACT_TOLERANCE_M)
+        if in_contact and not force_n <= self.expected.contact_force_n.get(phase, 0.0):
+            yield "P6.force", f"What is held is pressed in with {force_n:.3g} N."
 
 
 def _floats(text: str) -> Array:

@@ -7,7 +7,9 @@ import pytest
 
 from genpolicy.robot.dynamics import ArmDynamics
 from genpolicy.robot.kinematics import ArmKinematics
+from genpolicy.robot.payload import payload_of
 from genpolicy.tasks.api import load_task
+from genpolicy.verification.body import Driven
 
 
 @pytest.fixture(scope="module")
@@ -38,6 +40,16 @@ def test_it_is_what_mujoco_says(arm, scene, motion):
         data.qpos[:7], data.qvel[:7], data.qacc[:7] = q, dq, ddq
         mujoco.mj_inverse(model, data)
         np.testing.assert_allclose(torque, data.qfrc_inverse[:7], atol=1e-8)
+
+
+def test_what_the_hand_holds_weighs_as_mujoco_says(arm, scene, motion):
+    """A twin of the held object, grown to the hand in MuJoCo's own model."""
+    load = payload_of(scene, joints=7)
+    assert load.mass_kg == 0.05 and load.joint == 6
+    empty, full = ArmDynamics(arm).torque(*motion), ArmDynamics(arm, load).torque(*motion)
+    expected = [Driven(scene, 7, held=True).torque_nm(*row) for row in zip(*motion, strict=True)]
+    np.testing.assert_allclose(full, np.stack(expected), atol=1e-7)
+    assert np.max(np.abs(full - empty)) > 0.1
 
 
 def test_it_is_what_pinocchio_says(arm, motion):

@@ -39,7 +39,7 @@ def test_fcl_agrees_with_coal_outside_a_millimetre(arm, model, rng, random_scene
     """P10: verdicts of >= 2000 random scene poses; coal's signed distance is the oracle."""
     q = near_configurations(arm, rng, 2100)
     disagreements = checked = hits = 0
-    columns = model._broad.columns
+    columns = model.broad.columns
     for i in range(len(q)):
         scene = random_scene(rng)
         found = model.in_collision(q[i], scene) is not None

@@ -5,12 +5,15 @@ its commands came there, where it was measured, how fast, or when.
 """
 
 import numpy as np
+from scipy.optimize import bisect
 
 from genpolicy.evidence.shadow.at_the_margin import BEYOND
 from genpolicy.evidence.shadow.case import Case, alone, still
 from genpolicy.feasibility.admission import FeasibilityChecker
+from genpolicy.robot.dynamics import ArmDynamics
 
 UNSTOPPABLE = 4.0  # times the robot's acceleration: no projection can go on from it
+HARDEST = 100.0  # times the robot's acceleration: beyond the torque of any joint
 JOLTS = (4.0, 8.0, 16.0, -4.0, -8.0, -16.0)  # likewise; with gravity, and against it
 
 
@@ -44,7 +47,35 @@ def heavy_jolt(case: Case, checker: FeasibilityChecker) -> Case | None:
         for times in JOLTS
         for joint, step in enumerate(limit)
     ]
-    return alone(checker, cases, "joint_torque", ("joint_acceleration", "joint_jerk"))
+    behind = ("joint_acceleration", "joint_jerk", "payload_torque")
+    return alone(checker, cases, "joint_torque", behind)
+
+
+def heavy_load(case: Case, checker: FeasibilityChecker) -> Case | None:
+    """The commands came in so fast that stopping takes all that a joint has, less what is held."""
+    cell, cases = checker.cell, []
+    period_s, q_rad = cell.action_period_s, np.array(case.context.q_cmd)
+    limits = cell.limits.torque_nm, cell.limits.acceleration_rad_s2
+
+    def over(jolt: float, joint: int, dynamics: ArmDynamics) -> float:
+        """Torque beyond the limit that stopping this jolt takes, N m."""
+        speed, acceleration = np.zeros((2, 1, len(q_rad)))
+        speed[0, joint], acceleration[0, joint] = jolt * period_s / 2, -jolt
+        torque = dynamics.torque(q_rad[None], speed, acceleration)
+        return float(np.max(np.abs(torque[0]) - limits[0]))
+
+    for joint, size in enumerate(limits[1]):
+        for way in (1.0, -1.0):
+            most = float(way * size * HARDEST)
+            found = [
+                bisect(over, most, 0.0, args=(joint, dynamics))
+                for dynamics in (cell.dynamics, cell.loaded_dynamics)
+                if over(most, joint, dynamics) > 0 > over(0.0, joint, dynamics)
+            ]
+            if len(found) == 2 and abs(found[1]) < abs(found[0]):
+                jolt = sum(found) / 2
+                cases.append(_after(case, checker, joint, (-2 * jolt, -jolt)))
+    return alone(checker, cases, "payload_torque", ("joint_acceleration", "joint_jerk"))
 
 
 def left_behind(case: Case, checker: FeasibilityChecker) -> Case | None:

@@ -13,6 +13,7 @@ from genpolicy.contract.action import GRIPPER, POSITION, ROTATION, join_action
 from genpolicy.evidence.shadow.case import Case, alone, moving, still
 from genpolicy.evidence.shadow.postures import directions, joint_steps, postures_of, step_of
 from genpolicy.feasibility.admission import FeasibilityChecker
+from genpolicy.robot.impedance import STIFFNESS_N_M
 
 Array = NDArray[np.float64]
 Place = Callable[[Case], Case | None]
@@ -22,6 +23,8 @@ LEAPING = (*RATES, "measured_velocity")  # a leap is too fast, and so is the way
 
 BEYOND = 1.02  # of a limit
 WITHIN = 0.98
+DEEPER = np.array([1.0, 1.15, 1.3])  # times the depth at which what is held is pressed too hard
+ASIDE_M = (0.01, 0.02, 0.03, 0.04)  # beside the target's middle
 LEAPS = (4, 6, 8, 10)  # times the fastest step
 
 
@@ -172,6 +175,28 @@ def fast_in_contact(case: Case, checker: FeasibilityChecker) -> Case | None:
     step_m = BEYOND * checker.settings.contact_speed_limit_m_s * checker.cell.action_period_s
     down = np.array([0.0, 0.0, -step_m])
     return alone(checker, [_going(case, checker, linear_m=down)], "contact_speed")
+
+
+def pressed_in(case: Case, checker: FeasibilityChecker) -> Case | None:
+    """The arm stands where what is held is pressed into the target, and stays there."""
+    cell, context = checker.cell, case.context
+    held = context.last_action[GRIPPER] <= checker.settings.held_opening_m
+    if not held or context.phase not in cell.contact_phases:
+        return None
+    target = context.scene.target_position_m(cell.collision.shapes)
+    reach_m = cell.collision.shapes.held_reach_m
+    beyond_m = BEYOND * cell.force_envelope_n[context.phase] / STIFFNESS_N_M
+    rotation, level = checker.kinematics.forward(context.q_cmd)[1], np.zeros(3)
+    sides = [way for way in directions() if way[2] == 0.0]
+    cases = []
+    for deep_m in beyond_m * DEEPER:
+        for aside in [level, *(far * way for far in ASIDE_M for way in sides)]:
+            place = target + aside + np.array([0.0, 0.0, reach_m - deep_m])
+            action = join_action(place, rotation, context.last_action[GRIPPER])
+            q_rad, reached = checker.ik_chunk(action[None], context.q_cmd)
+            if reached[0]:
+                cases.append(still(case, checker, q_rad[0]))
+    return alone(checker, cases, "contact_force")
 
 
 def _going(

@@ -17,13 +17,14 @@ from numpy.typing import NDArray
 from genpolicy.contract.action import GRIPPER, POSITION, ROTATION
 from genpolicy.evidence.shadow import at_the_boundary as boundary
 from genpolicy.evidence.shadow import at_the_margin as margin
-from genpolicy.evidence.shadow.case import Case
+from genpolicy.evidence.shadow.case import Case, still
 from genpolicy.feasibility.admission import FeasibilityChecker
 from genpolicy.feasibility.cell import Cell
 from genpolicy.robot.scene_state import SceneState
 
 Array = NDArray[np.float64]
 
+STANDING_M = 0.004  # what is held reaches this deep into what it stands on
 OVERLAP_M = 0.02  # an obstacle in the way reaches at least this far above the tip of the tool
 
 Applicable = Callable[[Cell, tuple[str, ...]], str]
@@ -42,6 +43,26 @@ def in_contact(cell: Cell, obstacles: tuple[str, ...]) -> str:
 def with_obstacle(cell: Cell, obstacles: tuple[str, ...]) -> str:
     """Why nothing can be put in the way of a task without obstacles; else empty."""
     return "" if obstacles else "nothing in the task's scene can be put in the way"
+
+
+def on_a_surface(cell: Cell, obstacles: tuple[str, ...]) -> str:
+    """Why what is held cannot stand on anything but the target; else empty."""
+    return in_contact(cell, obstacles) or with_obstacle(cell, obstacles) or _holding(cell)
+
+
+def in_the_target(cell: Cell, obstacles: tuple[str, ...]) -> str:
+    """Why nothing can be pressed into a target; else empty."""
+    missing = "" if cell.collision.shapes.target_body else "the task's scene has no target"
+    return in_contact(cell, obstacles) or _holding(cell) or missing
+
+
+def _holding(cell: Cell) -> str:
+    return "" if cell.collision.shapes.held_reach_m > 0 else "the task's hand holds nothing"
+
+
+def with_payload(cell: Cell, obstacles: tuple[str, ...]) -> str:
+    """Why a task's hand holds nothing that weighs; else empty."""
+    return "" if cell.payload is not None else "the task's hand holds nothing"
 
 
 @dataclass(frozen=True)
@@ -192,6 +213,20 @@ def _obstructed(case: Case, checker: FeasibilityChecker, middle: Array) -> Case 
     return case.with_context(scene=SceneState({**case.poses, name: (at, quaternion)}))
 
 
+def on_another_surface(case: Case, checker: FeasibilityChecker) -> Case | None:
+    """In a contact phase, what is held stands in the obstacle's top instead of in the target."""
+    name = next((body for body in case.obstacles if body in case.poses), None)
+    held = case.context.last_action[GRIPPER] <= checker.settings.held_opening_m
+    if name is None or not held or case.context.phase not in checker.cell.contact_phases:
+        return None
+    here = still(case, checker, case.context.q_cmd)
+    place, (position, quaternion) = here.context.last_action[POSITION], case.poses[name]
+    tip_m = place[2] - checker.collision.shapes.held_reach_m
+    height_m = position[2] + tip_m + STANDING_M - _top_m(name, position, checker)
+    at = np.array([place[0], place[1], height_m])
+    return here.with_context(scene=SceneState({**case.poses, name: (at, quaternion)}))
+
+
 def _top_m(body: str, position: Array, checker: FeasibilityChecker) -> float:
     """Height of a body's highest shape where it stands at a position, m; inf without a shape."""
     own = [s for s in checker.collision.shapes.scene if s.body == body]
@@ -246,7 +281,11 @@ CORRUPTIONS = (
     Corruption("fast_turn", margin.fast_turn, "dynamic", "tcp_turn"),
     Corruption(
         "heavy_jolt", boundary.heavy_jolt, "dynamic", "joint_torque",
-        ("joint_acceleration", "joint_jerk"),
+        ("joint_acceleration", "joint_jerk", "payload_torque"),
+    ),
+    Corruption(
+        "heavy_load", boundary.heavy_load, "dynamic", "payload_torque",
+        ("joint_acceleration", "joint_jerk"), with_payload,
     ),
     Corruption("left_behind", boundary.left_behind, "dynamic", "measured_velocity"),
     Corruption("pushed_aside", boundary.pushed_aside, "dynamic", "measured_acceleration"),
@@ -259,6 +298,12 @@ CORRUPTIONS = (
         "fast_in_contact", margin.fast_in_contact, "contact", "contact_speed", (), in_contact
     ),
     Corruption("early_release", early_release, "contact", "gripper_opening"),
+    Corruption(
+        "on_another_surface", on_another_surface, "contact", "contact_surface", (), on_a_surface
+    ),
+    Corruption(
+        "pressed_in", margin.pressed_in, "contact", "contact_force", (), in_the_target
+    ),
     Corruption("earlier_session", earlier_session, "fresh", "reset"),
     Corruption("calibration_change", calibration_change, "fresh", "calibration_mismatch"),
     Corruption("phase_change", phase_change, "fresh", "phase_transition"),

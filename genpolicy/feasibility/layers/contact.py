@@ -1,4 +1,7 @@
-"""The contact layer: towards the target straight down and slowly; let go where that is meant."""
+"""The contact layer: towards the target straight down, slowly and not too hard, and nowhere else.
+
+What is held is let go where that is meant.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,6 +9,9 @@ from numpy.typing import NDArray
 from genpolicy.contract.action import GRIPPER, POSITION
 from genpolicy.feasibility.batch import Batch, Margins
 from genpolicy.feasibility.cell import Cell
+from genpolicy.feasibility.layers.geometric import depth_m, detail_of, paths_of
+from genpolicy.robot.impedance import STIFFNESS_N_M
+from genpolicy.robot.pressing import pressed_depth_m
 
 Array = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -43,6 +49,52 @@ def margins(batch: Batch, cell: Cell) -> Margins:
         "contact_speed": _smallest(speed, applies),
         "gripper_opening": _opening(batch, cell, held, in_contact),
     })  # fmt: skip
+
+
+def surface_margins(batch: Batch, cell: Cell) -> Margins:
+    """What is held touches nothing but the target, at the rows and between them.
+
+    ====================  =====================================================================
+    contact_surface       in a contact phase: lower bound on distance - clearance to all of the
+                          scene but the target, m; - depth (at least 1 nm) of a hit
+    ====================  =====================================================================
+
+    Outside the contact phases the geometric layer asks for what is held too; the margin is 0 here.
+    """
+    found, details = np.zeros(len(batch)), [""] * len(batch)
+    inside = np.flatnonzero(batch.in_phases(cell.contact_phases))
+    if len(inside):
+        paths = paths_of(batch.take(inside), cell, "held")
+        reports = cell.collision.check_samples(paths), cell.collision.check_swept(paths)
+        for place, i in enumerate(inside):
+            found[i] = min(float(report.clearance_m[place]) for report in reports)
+            hit = reports[0].hits[place] or reports[1].hits[place]
+            if hit is not None:
+                found[i], details[i] = -depth_m(hit), detail_of(hit)
+    return Margins({"contact_surface": found}, tuple(details))
+
+
+def force_margins(batch: Batch, cell: Cell) -> Margins:
+    """What is held is not pressed into the target harder than the phase allows.
+
+    ====================  =====================================================================
+    contact_force         limit of the phase - stiffness * deepest commanded depth in the target, N
+    ====================  =====================================================================
+
+    A lower bound of the force (`robot.pressing`). Outside the contact phases it is 0: there the
+    geometric layer allows no touch.
+
+    Source:
+        The controller is a spring of `impedance.STIFFNESS_N_M` between command and arm.
+    """
+    found = np.zeros(len(batch))
+    inside = np.flatnonzero(batch.in_phases(cell.contact_phases))
+    if len(inside):
+        some = batch.take(inside)
+        depth = pressed_depth_m(cell.collision, paths_of(some, cell, "held"))
+        limits = np.array([cell.force_envelope_n[context.phase] for context in some.contexts])
+        found[inside] = limits - STIFFNESS_N_M * depth
+    return Margins({"contact_force": found})
 
 
 def _opening(batch: Batch, cell: Cell, held: BoolArray, in_contact: BoolArray) -> Array:

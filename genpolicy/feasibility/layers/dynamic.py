@@ -15,6 +15,7 @@ from genpolicy.contract.action import ROTATION
 from genpolicy.contract.rotation import angle_between, rotation_from_6d
 from genpolicy.feasibility.batch import Batch, Margins
 from genpolicy.feasibility.cell import Cell
+from genpolicy.robot.dynamics import ArmDynamics
 
 Array = NDArray[np.float64]
 
@@ -35,6 +36,8 @@ def margins(batch: Batch, cell: Cell) -> Margins:
     tcp_speed             limit - |D p| / T, m/s
     tcp_turn              limit - angle of a step / T, rad/s
     joint_torque          min over joints of limit - |torque of the commanded motion|, N m
+    payload_torque        the same with the payload, at commands at which the hand holds it; inf
+                          where it holds none
     measured_velocity     min over joints of limit - |q_1 - q_meas| / t, rad/s
     measured_acceleration min over joints of limit - |(q_1 - q_cmd) / T - dq_meas| / t, rad/s^2
     state_age             min of (allowed age - age of the measured state, that age), s
@@ -59,7 +62,7 @@ def margins(batch: Batch, cell: Cell) -> Margins:
         **_joint_rates(batch, cell),
         "tcp_speed": settings.tcp_speed_limit_m_s * (1 + ROUNDING) - speed.max(axis=1),
         "tcp_turn": settings.tcp_turn_limit_rad_s * (1 + ROUNDING) - turn.max(axis=1),
-        "joint_torque": _torque(batch, cell),
+        **_torques(batch, cell),
         **_from_measured(batch, cell),
         "controller_mode": _mode(batch, cell),
     })  # fmt: skip
@@ -72,21 +75,31 @@ def _mode(batch: Batch, cell: Cell) -> Array:
     return np.where(wanted, 0.0, -1.0)
 
 
-def _torque(batch: Batch, cell: Cell) -> Array:
-    """Torques at every command with one known on either side; inf without any. Shape (B,)."""
+def _torques(batch: Batch, cell: Cell) -> dict[str, Array]:
+    """Torques at every command with one known on either side; inf without any. Shapes (B,).
+
+    A closed hand may be empty, so the arm must bear the motion with its payload and without.
+    """
     q, period_s = batch.solved.q_rad, cell.action_period_s
     histories = [c.q_cmd_history for c in batch.contexts]
     before = _history(histories, q.shape[-1])[:, -1:]
     path = np.concatenate([before, batch.q_cmd_rad[:, None], q], axis=1)
     speed = (path[:, 2:] - path[:, :-2]) / (2 * period_s)
     acceleration = np.diff(path, n=2, axis=1) / period_s**2
-    flat = (value.reshape(-1, q.shape[-1]) for value in (path[:, 1:-1], speed, acceleration))
-    torque = cell.dynamics.torque(*flat).reshape(speed.shape)
-    left = np.min(cell.limits.torque_nm - np.abs(torque), axis=2)
+    flat = [value.reshape(-1, q.shape[-1]) for value in (path[:, 1:-1], speed, acceleration)]
     unknown = np.array([not len(history) for history in histories])
-    left[unknown, 0] = np.inf
-    smallest: Array = left.min(axis=1)
-    return smallest
+
+    def left(dynamics: ArmDynamics) -> Array:
+        torque = dynamics.torque(*flat).reshape(speed.shape)
+        margin = np.min(cell.limits.torque_nm - np.abs(torque), axis=2)
+        margin[unknown, 0] = np.inf
+        return np.asarray(margin)
+
+    loaded = np.full(speed.shape[:2], np.inf)
+    if cell.payload is not None:
+        held = batch.held(cell.settings.held_opening_m)[:, :-1]
+        loaded = np.where(held, left(cell.loaded_dynamics), np.inf)
+    return {"joint_torque": left(cell.dynamics).min(axis=1), "payload_torque": loaded.min(axis=1)}
 
 
 def _from_measured(batch: Batch, cell: Cell) -> dict[str, Array]:

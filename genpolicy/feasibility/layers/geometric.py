@@ -1,5 +1,7 @@
 """The geometric layer: does arm, hand or held object touch anything, at or between the rows?"""
 
+from typing import Literal
+
 import numpy as np
 
 from genpolicy.feasibility.batch import Batch, Margins
@@ -17,10 +19,12 @@ def margins(batch: Batch, cell: Cell) -> Margins:
     self_collision      the same for pairs of the robot's own shapes
     ==================  =======================================================================
 
+    In contact phases what is held is left to the contact layer.
+
     The clearance is `contact_clearance_m` in contact phases and `clearance_m` elsewhere. Of a
     chunk that hits, the check that did not notice it has the margin 0.
     """
-    report = cell.collision.check_samples(_paths(batch, cell))
+    report = cell.collision.check_samples(paths_of(batch, cell, "free"))
     own_names = {shape.name for shape in cell.collision.shapes.robot}
     values = {
         "scene_collision": report.clearance_m.copy(),
@@ -30,8 +34,8 @@ def margins(batch: Batch, cell: Cell) -> Margins:
         if hit is not None:
             name = "self_collision" if hit.second in own_names else "scene_collision"
             values["scene_collision"][i] = values["self_collision"][i] = 0.0
-            values[name][i] = -_depth_m(hit)
-    return Margins(values, tuple(_detail(hit) for hit in report.hits))
+            values[name][i] = -depth_m(hit)
+    return Margins(values, tuple(detail_of(hit) for hit in report.hits))
 
 
 def swept_margins(batch: Batch, cell: Cell) -> Margins:
@@ -44,13 +48,16 @@ def swept_margins(batch: Batch, cell: Cell) -> Margins:
     The most expensive of all questions, and therefore asked of those chunks only whose rows
     passed.
     """
-    report = cell.collision.check_swept(_paths(batch, cell))
+    report = cell.collision.check_swept(paths_of(batch, cell, "free"))
     pairs = zip(report.hits, report.clearance_m, strict=True)
-    left = [clearance if hit is None else -_depth_m(hit) for hit, clearance in pairs]
-    return Margins({"swept_collision": np.array(left)}, tuple(_detail(hit) for hit in report.hits))
+    left = [clearance if hit is None else -depth_m(hit) for hit, clearance in pairs]
+    return Margins(
+        {"swept_collision": np.array(left)}, tuple(detail_of(hit) for hit in report.hits)
+    )
 
 
-def _paths(batch: Batch, cell: Cell) -> Paths:
+def paths_of(batch: Batch, cell: Cell, asked: Literal["held", "free"]) -> Paths:
+    """The motion of chunks from the last command on, and which pairs of it are asked about."""
     settings = cell.settings
     contact = batch.in_phases(cell.contact_phases)
     return Paths(
@@ -60,12 +67,15 @@ def _paths(batch: Batch, cell: Cell) -> Paths:
         scenes=tuple(c.scene for c in batch.contexts),
         contact_allowed=contact,
         clearance_m=np.where(contact, settings.contact_clearance_m, settings.clearance_m),
+        asked=asked,
     )
 
 
-def _depth_m(hit: Hit) -> float:
+def depth_m(hit: Hit) -> float:
+    """How deep a hit is, m; more than nothing."""
     return max(hit.depth_m, TOUCH_M)
 
 
-def _detail(hit: Hit | None) -> str:
+def detail_of(hit: Hit | None) -> str:
+    """What touched what, and where; empty without a hit."""
     return "" if hit is None else f"{hit.first} and {hit.second} at row {hit.index}"

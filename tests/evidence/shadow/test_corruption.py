@@ -70,10 +70,17 @@ def test_every_check_has_a_fixture_of_its_own():
 
 
 def test_what_a_task_is_not_asked_is_said(checker, task):
-    """Without contact phases or obstacles four checks have no fixture, and all others have."""
+    """Without contact phases or obstacles six checks have no fixture, and all others have."""
     bare = replace(checker.cell, contact_phases=frozenset())
     silent = {item.check for item in CORRUPTIONS if item.applicable(bare, ())}
-    assert silent == {"approach_direction", "contact_speed", "scene_collision", "swept_collision"}
+    assert silent == {
+        "approach_direction", "contact_speed", "contact_surface", "contact_force",
+        "scene_collision", "swept_collision",
+    }  # fmt: skip
+    weightless = replace(checker.cell)
+    weightless.__dict__["payload"] = None
+    silent = {c.check for c in CORRUPTIONS if c.applicable(weightless, task.obstacles)}
+    assert silent == {"payload_torque"}
     assert not [c.name for c in CORRUPTIONS if c.applicable(checker.cell, task.obstacles)]
 
 

@@ -27,6 +27,7 @@ RULES = {
     "joint_acceleration": "P6.joint_acceleration",
     "joint_jerk": "P6.joint_jerk",
     "joint_torque": "P6.torque",
+    "payload_torque": "P6.payload",
     "measured_velocity": "P6.measured_speed",
     "measured_acceleration": "P6.measured_acceleration",
     "state_age": "P6.state_age",

@@ -14,7 +14,7 @@ from genpolicy.robot.dynamics import ArmDynamics
 
 RATES = ("joint_velocity", "joint_acceleration", "joint_jerk", "tcp_speed")
 STATE = (
-    "joint_torque", "measured_velocity", "measured_acceleration", "state_age", "controller_mode",
+    "joint_torque", "payload_torque", "measured_velocity", "measured_acceleration", "state_age", "controller_mode",
 )  # fmt: skip
 
 
@@ -28,6 +28,20 @@ def jolted(ctx, acceleration, *, joint):
     history = np.tile(ctx.q_cmd, (2, 1))
     history[:, joint] += np.array([2.0, 1.0]) * acceleration * 0.05**2
     return replace(ctx, q_cmd_history=history)
+
+
+def only_when_loaded(cell, ctx):
+    """An acceleration of joint 1 that the empty arm just bears and the loaded one does not."""
+    sizes = np.arange(50.0, 400.0, 0.02)
+    q, acceleration = np.tile(ctx.q_cmd, (len(sizes), 1)), np.zeros((len(sizes), 7))
+    acceleration[:, 1] = sizes
+    speed = -acceleration * 0.05 / 2
+    empty, loaded = (
+        np.min(cell.limits.torque_nm - np.abs(d.torque(q, speed, acceleration)), axis=1)
+        for d in (cell.dynamics, cell.loaded_dynamics)
+    )
+    found = sizes[(empty >= 0) & (loaded < 0)]
+    return float(found[len(found) // 2])
 
 
 @pytest.fixture(scope="module")
@@ -53,6 +67,11 @@ def cases(checker, kit):
         "tcp_turn": kit.Outside(turned, ctx, others=("joint_acceleration", "joint_velocity")),
         "joint_torque": kit.Outside(
             np.tile(ctx.last_action, (kit.K, 1)), jolted(ctx, 300.0, joint=1),
+            others=("joint_acceleration", "joint_jerk", "payload_torque"),
+        ),
+        "payload_torque": kit.Outside(
+            np.tile(ctx.last_action, (kit.K, 1)),
+            jolted(ctx, only_when_loaded(checker.cell, ctx), joint=1),
             others=("joint_acceleration", "joint_jerk"),
         ),
         "measured_velocity": kit.Outside(good, replace(ctx, q_meas=ctx.q_cmd - 0.12)),
@@ -185,3 +204,27 @@ def test_a_controller_whose_mode_is_not_known_is_in_no_mode(checker, cell, kit):
 
 def solved_batch(kit, checker, actions, ctx):
     return solved(kit.batch_of((actions, ctx)), checker.cell)
+
+
+def test_only_a_closed_hand_carries_its_payload(checker, cell, kit):
+    """The gripper opens in the second row: the torque at the first row is asked with the load."""
+    ctx = kit.context(checker, kit.START)
+    here = np.tile(ctx.last_action, (4, 1))
+    closed, opening, opened = here.copy(), here.copy(), here.copy()
+    opening[1:, -1] = opened[:, -1] = 0.04
+    wide = replace(ctx, last_action=opened[0])
+    found = [
+        margins(solved_batch(kit, checker, actions, state), cell).values["payload_torque"][0]
+        for actions, state in ((closed, ctx), (opening, ctx), (opened, wide))
+    ]
+    empty = margins(solved_batch(kit, checker, here, ctx), cell).values["joint_torque"][0]
+    assert found[0] == pytest.approx(found[1]) and found[2] == np.inf
+    assert 0 < empty - found[0] < 5.0  # what 50 g weigh at the arm's length, and no more
+
+
+def test_a_scene_that_welds_nothing_has_no_payload(checker, cell, kit):
+    ctx = kit.context(checker, kit.START)
+    batch = solved_batch(kit, checker, np.tile(ctx.last_action, (4, 1)), ctx)
+    bare = replace(cell)
+    bare.__dict__["payload"] = None
+    assert margins(batch, bare).values["payload_torque"][0] == np.inf
