@@ -5,6 +5,7 @@ where everything that decides a verdict is as it was committed.
 """
 
 import subprocess
+from collections.abc import Sequence
 from pathlib import Path
 
 from genpolicy.errors import BadInputError
@@ -16,13 +17,13 @@ FIRST_REPORT_SEED = 10**9
 DIGITS = 12
 
 
-def frozen_commit(root: Path = ROOT) -> str:
-    """The commit whose detector stands in the working tree.
+def frozen_commit(root: Path = ROOT, watched: Sequence[str] = DETECTOR) -> str:
+    """The commit whose detector stands in the working tree; `watched` must be as committed.
 
     Raises:
         BadInputError: No repository, or a file of the detector is not as committed.
     """
-    changed = _git(root, "status", "--porcelain", "--untracked-files=all", "--", *DETECTOR)
+    changed = _git(root, "status", "--porcelain", "--untracked-files=all", "--", *watched)
     if changed:
         raise BadInputError(
             where="the working tree",
