@@ -28,6 +28,7 @@ from genpolicy.audit.semantics.drift import (
     episode_drifts,
     order_findings,
 )
+from genpolicy.audit.semantics.following import following
 from genpolicy.audit.semantics.frames import frame_findings
 from genpolicy.audit.semantics.frozen import frozen_findings, stream_gap_findings
 from genpolicy.audit.semantics.motion import Motion, make_motion
@@ -48,14 +49,15 @@ def measure(data: AuditInput, settings: AuditSettings) -> Semantics:
     if motion.wraps:
         notes.append(f"{motion.wraps} jumps by a whole turn were taken out of angles.")
     frozen, untold = frozen_findings(data, motion, settings)
-    findings, factors = gain_findings(data, motion, settings)
+    follows = following(motion, data.period_s, settings.maximum_lag_steps)
+    findings, factors = gain_findings(data, motion, follows, settings)
     findings += magnitude_findings(data, motion, settings)
     turned, answered = frame_findings(data, motion, settings)
     findings += turned
     repeated = np.repeat(factors, np.diff(motion.starts))[:, None]
     recorded, motion = motion, replace(motion, commanded=answered * repeated)
     if not findings:
-        findings += component_findings(data, motion, settings)
+        findings += component_findings(data, recorded, follows, settings)
     clocks, shift, found = _position(data, motion, settings)
     findings += found
     others, stream_shift, found, unclocked = _others(data, motion, shift, settings)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from genpolicy.audit.data import Array, AuditInput, Flags, Integers, Text
+from genpolicy.audit.semantics.directions import directional, one_sign
 from genpolicy.audit.semantics.robust import episode_medians
 
 TURNS = (2.0 * np.pi, 360.0)  # rad, degrees
@@ -29,6 +30,7 @@ class Motion:
             looks like a response without lag.
         epoch: Calibration epoch of each episode. Shape (E,).
         wraps: Jumps by a whole turn that were taken out.
+        directional: Columns of length one together, which have no unit. Shape (P,).
     """
 
     commanded: Array
@@ -38,6 +40,7 @@ class Motion:
     pieces: Integers
     epoch: Text
     wraps: int
+    directional: Flags
 
     @property
     def segment(self) -> Integers:
@@ -65,6 +68,7 @@ def make_motion(data: AuditInput) -> Motion:
         if turned:
             gap = commanded[:, component] - observed[:, component]
             observed[:, component] += turned * np.round(_repeated_medians(gap, starts) / turned)
+    one_sign(commanded, observed, np.asarray(starts, dtype=np.int64))
     return Motion(
         commanded=commanded,
         observed=observed,
@@ -73,6 +77,7 @@ def make_motion(data: AuditInput) -> Motion:
         pieces=_pieces(commanded, observed, data.episode, starts),
         epoch=data.episodes.calibration_epoch,
         wraps=wraps,
+        directional=directional(observed) | directional(commanded),
     )
 
 

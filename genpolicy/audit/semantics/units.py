@@ -1,13 +1,16 @@
 """Units: is the observed motion as large as the commanded one, and a value as large as its like?
 
-Standard deviations inside an episode are compared, so that neither lag nor frame matters. A factor
-that no arm produces is a unit; so is an epoch that answers by another factor than the others.
+Standard deviations inside an episode are compared, so that neither lag nor frame matters, where the
+one follows the other. A factor that no arm produces is a unit; so is an epoch that answers by
+another factor than the others. What stands, what is constant and what has length one has none.
 """
 
 import numpy as np
 
-from genpolicy.audit.data import Array, AuditInput, Flags
+from genpolicy.audit.data import Array, AuditInput, Flags, Integers
 from genpolicy.audit.rows import Finding
+from genpolicy.audit.semantics.directions import directional
+from genpolicy.audit.semantics.following import Following
 from genpolicy.audit.semantics.motion import Motion
 from genpolicy.audit.semantics.report import listed
 from genpolicy.audit.semantics.robust import (
@@ -20,8 +23,14 @@ from genpolicy.audit.semantics.robust import (
 from genpolicy.audit.settings import AuditSettings
 
 LEAST_EPISODES = 4
-# Motion below this share of the usual one has no gain.
-MOVING_SHARE = 0.1
+# Correlation with its command from which a single column has a factor.
+LIKE = 0.9
+# Spread of the logarithms of what is one factor: a fourth either way.
+ONE_FACTOR = 0.25
+# Size and travel of a position say one factor within this.
+SAME_FACTOR = 2.0
+# Share of the components of a channel that have a unit and must agree about another one.
+MOST = 0.5
 # A factor between episodes may be one of units if it is also this many spreads...
 MAGNITUDE_SPREADS = 8.0
 # ...and if the scatter of the episodes is larger by that factor too, within another one: an object
@@ -39,53 +48,118 @@ FACTORS = (
 
 
 def gain_findings(
-    data: AuditInput, motion: Motion, settings: AuditSettings
+    data: AuditInput, motion: Motion, found: Following, settings: AuditSettings
 ) -> tuple[list[Finding], Array]:
     """Factors between commanded and observed motion.
+
+    Args:
+        data: Canonical data.
+        motion: Commanded and observed motion.
+        found: How each column follows its command: where none does, there is no factor, and
+            where one does there is, however small the motion is.
+        settings: Limits.
 
     Returns:
         Findings, and the usual factor of each episode, which is taken out before clocks are
         measured. Shape (E,).
     """
     factors = np.ones(len(data.episodes))
-    if motion.commanded.shape[1] == 0:
+    sized = ~motion.directional
+    if not sized.any():
         return [], factors
-    asked = episode_deviation(motion.commanded, motion.starts)
-    seen = episode_deviation(motion.observed, motion.starts)
+    follows = found.follows[:, sized]
+    asked = episode_deviation(motion.commanded[:, sized], motion.starts) * follows
+    seen = episode_deviation(motion.observed[:, sized], motion.starts) * follows
     gains = _log_gain(np.linalg.norm(seen, axis=1), np.linalg.norm(asked, axis=1))
     findings = _epochs(data, gains, "position", settings, factors)
-    findings += _episodes(data, gains, settings, factors)
+    findings += _episodes(data, gains, "position", settings, factors)
     return findings, factors
 
 
-def component_findings(data: AuditInput, motion: Motion, settings: AuditSettings) -> list[Finding]:
-    """The same for single components, once no frame is turned and no column swapped."""
-    asked = episode_deviation(motion.commanded, motion.starts)
-    seen = episode_deviation(motion.observed, motion.starts)
+def component_findings(
+    data: AuditInput, motion: Motion, found: Following, settings: AuditSettings
+) -> list[Finding]:
+    """The same for single components, once no frame is turned and no column swapped.
+
+    A factor is a unit only where it is one factor: a finger that is stopped by what it grasps
+    follows by another one in each episode. A column that is commanded to hardly anything has no
+    factor, and a tremor is answered by less than slow motion.
+    """
+    columns = np.arange(data.observation.shape[1])[data.observation_position]
+    asked = found.mattering(data.observation_scale[columns[: len(motion.names)]])
+    alike = np.maximum(found.positive, found.negative) >= LIKE
+    with np.errstate(divide="ignore", invalid="ignore"):
+        every = np.where(alike & found.slow, np.log(found.seen) - np.log(found.asked), np.nan)
     findings = []
-    for column, name in enumerate(motion.names):
-        gains = _log_gain(seen[:, column], asked[:, column])
-        findings += _epochs(data, gains, name, settings, None)
+    for column in np.flatnonzero(asked & ~motion.directional):
+        name, gains = motion.names[column], every[:, column]
+        known = np.isfinite(gains)
+        if np.count_nonzero(known) < LEAST_EPISODES:
+            continue
+        if densest_half(gains[known])[1] <= ONE_FACTOR:
+            findings += _epochs(data, gains, name, settings, None)
+        if not findings:
+            findings += _episodes(data, gains, name, settings, np.ones(len(gains)))
     return findings
 
 
 def magnitude_findings(data: AuditInput, motion: Motion, settings: AuditSettings) -> list[Finding]:
     """Episodes whose positions or channels are larger or smaller than all others by a unit."""
     findings = []
-    if motion.commanded.shape[1]:
-        size = np.linalg.norm(episode_medians(np.abs(motion.commanded), motion.starts), axis=1)
-        travel = np.linalg.norm(episode_deviation(motion.commanded, motion.starts), axis=1)
+    sized = ~motion.directional
+    if sized.any():
+        values = motion.commanded[:, sized]
+        size = np.linalg.norm(episode_medians(np.abs(values), motion.starts), axis=1)
+        travel = np.linalg.norm(episode_deviation(values, motion.starts), axis=1)
         both = np.stack([_off(size, settings), _off(travel, settings)])
-        # Both must say the same factor: a start elsewhere or an arm that stands is no unit.
-        same = np.abs(both[0] - both[1]) <= np.log(2.0)
-        findings += _magnitude(data, "position", np.where(same, both[0], 0.0), settings)
+        # Both must say one factor: a start elsewhere or an arm that stands is no unit.
+        same = (both != 0.0).all(axis=0) & (np.sign(both[0]) == np.sign(both[1]))
+        if same.any():
+            apart = np.abs(np.median(both[0][same]) - np.median(both[1][same]))
+            same &= bool(np.log(SAME_FACTOR) - apart >= 0)
+        findings += _magnitude(data, "position", np.where(same, both[1], 0.0), settings)
     for name, part in data.context.items():
-        # Component by component: beside a direction cosine a length hardly counts.
-        medians = episode_medians(data.observation[:, part], motion.starts)
-        off = np.stack([_off(np.abs(values), settings) * _clear(values) for values in medians.T])
-        worst = off[np.argmax(np.abs(off), axis=0), np.arange(off.shape[1])]
-        findings += _magnitude(data, name, worst, settings)
+        findings += _magnitude(data, name, _channel(data, motion, part, settings), settings)
     return findings
+
+
+def _channel(data: AuditInput, motion: Motion, part: slice, settings: AuditSettings) -> Array:
+    """Logarithm of the factor by which a channel is off in each episode; 0 where it is not.
+
+    Component by component: beside a direction cosine a length hardly counts. Directions, counters
+    and constants have no unit that could be another; of those that have one most must agree, for
+    a state of many numbers holds some that differ for reasons of their own.
+    """
+    values = data.observation[:, part]
+    sized = ~directional(values) & ~_counting(values, motion.starts)
+    medians = episode_medians(values[:, sized], motion.starts)
+    off = [_off(np.abs(column), settings) * _clear(column) for column in medians.T]
+    asked = [row for row, column in zip(off, medians.T, strict=True) if _usual(np.abs(column))]
+    if not asked:
+        return np.zeros(len(data.episodes))
+    table = np.stack(asked)
+    agreed = np.count_nonzero(table, axis=0) >= MOST * len(table)
+    worst = table[np.argmax(np.abs(table), axis=0), np.arange(table.shape[1])]
+    return np.where(agreed, worst, 0.0)
+
+
+def _counting(values: Array, starts: Integers) -> Flags:
+    """Columns that only rise inside episodes: times and counters. Shape (D,)."""
+    steps = np.diff(values, axis=0)
+    inside = np.ones(len(steps), dtype=bool)
+    edges = starts[1:-1] - 1
+    inside[edges[(edges >= 0) & (edges < len(steps))]] = False
+    steps = steps[inside]
+    return np.asarray((steps >= 0).all(axis=0) & (steps > 0).any(axis=0))
+
+
+def _usual(sizes: Array) -> bool:
+    """Whether there is a usual size, and it is not one and the same number."""
+    known = sizes[np.isfinite(sizes)]
+    if len(known) < LEAST_EPISODES:
+        return False
+    centre, spread = densest_half(known)
+    return 0.5 * centre - spread > 0 and spread > 1e-9 * centre
 
 
 def _clear(values: Array) -> Array:
@@ -96,11 +170,9 @@ def _clear(values: Array) -> Array:
 
 
 def _log_gain(seen: Array, asked: Array) -> Array:
-    """Logarithm of the gain; NaN where next to nothing is commanded. Shape (E,)."""
-    typical = np.median(asked)
-    valid = (asked > MOVING_SHARE * typical) & (seen > 0)
+    """Logarithm of the gain; NaN where nothing follows its command. Shape (E,)."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(valid, np.log(seen) - np.log(asked), np.nan)
+        return np.where((asked > 0) & (seen > 0), np.log(seen) - np.log(asked), np.nan)
 
 
 def _epochs(
@@ -130,9 +202,9 @@ def _epochs(
 
 
 def _episodes(
-    data: AuditInput, gains: Array, settings: AuditSettings, factors: Array
+    data: AuditInput, gains: Array, name: str, settings: AuditSettings, factors: Array
 ) -> list[Finding]:
-    """Single episodes whose gain is another than that of all."""
+    """Some episodes whose gain is another than that of all, by one factor."""
     left = gains - np.log(factors)
     known = np.isfinite(left)
     if np.count_nonzero(known) < LEAST_EPISODES:
@@ -142,34 +214,41 @@ def _episodes(
     off = np.abs(gap) > max(np.log(settings.gain_floor), settings.significance * 2.0 * spread)
     lone = off & (np.abs(gap) > np.log(LONE_FACTOR))
     total = int(np.count_nonzero(known))
+    if name != "position":
+        # A joint that is hindered follows by less, each time by another factor.
+        lone &= False
+        for side in (off & (gap > 0), off & (gap < 0)):
+            few = np.count_nonzero(side) < LEAST_SCATTER
+            if few or densest_half(gap[side])[1] > max(ONE_FACTOR, SCATTER * spread):
+                off &= ~side
     if not (lone.any() or some(off, total, settings.outlier_share)):
         return []
     factors[off] *= np.exp(gap[off])
     names = data.episodes.uuid[off]
     # Episodes may be off both ways: the size is the usual one, the side that of most.
     size = float(np.copysign(np.median(np.abs(gap[off])), np.median(gap[off])))
-    return [_gain("position", listed(names), size, "gain_factor", settings.gain_floor)]
+    return [_gain(name, listed(names), size, "gain_factor", settings.gain_floor)]
 
 
 def _off(size: Array, settings: AuditSettings) -> Array:
     """Logarithm of each episode's size against the usual one; 0 where it may be no unit."""
-    known = np.isfinite(size)
+    known = np.isfinite(size) & (size > 0)
     result = np.zeros(len(size))
     if np.count_nonzero(known) < max(LEAST_EPISODES, 0.9 * len(size)):
         return result
-    centre, spread = densest_half(size[known])
-    if not 0.5 * centre - spread > 0:  # nothing is usual
-        return result
-    gap = np.log(np.maximum(np.where(known, size, centre), 1e-12 * centre) / centre)
-    beyond = np.abs(size - centre) > MAGNITUDE_SPREADS * spread
-    far = known & beyond & (np.abs(gap) > np.log(settings.magnitude_floor))
+    # In logarithms smaller by a unit is as far as larger.
+    logs = np.log(np.where(known, size, 1.0))
+    centre, spread = densest_half(logs[known])
+    gap = np.where(known, logs - centre, 0.0)
+    least = max(np.log(settings.magnitude_floor), MAGNITUDE_SPREADS * spread)
+    far = np.abs(gap) > least
     scattered = densest_half(size[known & ~far])[1]
     for side in (far & (gap > 0), far & (gap < 0)):
         if np.count_nonzero(side) >= LEAST_SCATTER:
-            factor = float(np.exp(np.median(gap[side])))
+            expected = float(np.exp(np.median(gap[side]))) * scattered
             scatter = densest_half(size[side])[1]
-            expected = factor * scattered
-            if expected > 0 and not expected / SCATTER <= scatter <= expected * SCATTER:
+            # What does not scatter is a constant, and another constant is no unit.
+            if not (expected > 0 and expected / SCATTER <= scatter <= expected * SCATTER):
                 continue
             result[side] = gap[side]
         else:
