@@ -12,6 +12,8 @@ from scipy.optimize import linear_sum_assignment
 
 from genpolicy.audit.data import Array, AuditInput, Flags, Integers
 from genpolicy.audit.rows import Finding
+from genpolicy.audit.semantics.crossed import crossed_findings
+from genpolicy.audit.semantics.following import Following
 from genpolicy.audit.semantics.motion import Motion
 from genpolicy.audit.semantics.report import listed
 from genpolicy.audit.semantics.robust import densest_half, episode_sums, some
@@ -74,9 +76,9 @@ class Displacements:
 
 
 def frame_findings(
-    data: AuditInput, motion: Motion, settings: AuditSettings
+    data: AuditInput, motion: Motion, follows: Following, settings: AuditSettings
 ) -> tuple[list[Finding], Array]:
-    """Swapped columns and turned frames by epoch.
+    """Swapped columns and turned frames by epoch, and in a part of the episodes.
 
     Returns:
         Findings, and the commanded motion as it is answered, so that clocks can be measured in
@@ -85,13 +87,14 @@ def frame_findings(
     width = motion.commanded.shape[1]
     commanded = motion.commanded
     findings: list[Finding] = []
-    if width < 2:
+    if width == 0:
         return findings, commanded
     commanded = commanded.copy()
     clean = np.zeros(len(motion.epoch), dtype=bool)
     for name in np.unique(motion.epoch):
         episodes = np.flatnonzero(motion.epoch == name)
-        found = _frame(motion, episodes, settings) if len(episodes) >= LEAST_EPISODES else None
+        enough = len(episodes) >= LEAST_EPISODES and width >= 2
+        found = _frame(motion, episodes, settings) if enough else None
         clean[episodes] = found is None or not found.kind
         if found is None:
             continue
@@ -101,7 +104,14 @@ def frame_findings(
             continue
         where = f"epoch {name or '-'}"
         findings.append(_finding(data, motion, where, found, settings))
-    # A few episodes inside an epoch: those that follow worst, read on their own.
+    # A part of an epoch, column by column; then those that follow worst, read on their own.
+    crossed, answered, hit = crossed_findings(data, motion, follows, clean, settings)
+    findings += crossed
+    rows = np.repeat(hit, np.diff(motion.starts))
+    commanded[rows] = answered[rows]
+    clean &= ~hit
+    if width not in CARTESIAN:
+        return findings, commanded
     odd = _follow_badly(motion, clean, settings.maximum_lag_steps)
     if some(np.isin(np.arange(len(clean)), odd), len(clean), settings.outlier_share):
         found = _frame(motion, odd, settings)

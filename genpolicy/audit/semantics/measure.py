@@ -52,7 +52,7 @@ def measure(data: AuditInput, settings: AuditSettings) -> Semantics:
     follows = following(motion, data.period_s, settings.maximum_lag_steps)
     findings, factors = gain_findings(data, motion, follows, settings)
     findings += magnitude_findings(data, motion, settings)
-    turned, answered = frame_findings(data, motion, settings)
+    turned, answered = frame_findings(data, motion, follows, settings)
     findings += turned
     repeated = np.repeat(factors, np.diff(motion.starts))[:, None]
     recorded, motion = motion, replace(motion, commanded=answered * repeated)

@@ -29,6 +29,11 @@ LIKE = 0.9
 ONE_FACTOR = 0.25
 # Size and travel of a position say one factor within this.
 SAME_FACTOR = 2.0
+# The middle part of the way between two units, in logarithms, and how many may stand there, as a
+# share of those beyond.
+VALLEY, BETWEEN = 1.0 / 3.0, 0.1
+# Shares of positive values may differ by this between two units.
+SIGNS = 0.25
 # Share of the components of a channel that have a unit and must agree about another one.
 MOST = 0.5
 # A factor between episodes may be one of units if it is also this many spreads...
@@ -133,7 +138,7 @@ def _channel(data: AuditInput, motion: Motion, part: slice, settings: AuditSetti
     values = data.observation[:, part]
     sized = ~directional(values) & ~_counting(values, motion.starts)
     medians = episode_medians(values[:, sized], motion.starts)
-    off = [_off(np.abs(column), settings) * _clear(column) for column in medians.T]
+    off = [_off(column, settings) * _clear(column) for column in medians.T]
     asked = [row for row, column in zip(off, medians.T, strict=True) if _usual(np.abs(column))]
     if not asked:
         return np.zeros(len(data.episodes))
@@ -230,8 +235,9 @@ def _episodes(
     return [_gain(name, listed(names), size, "gain_factor", settings.gain_floor)]
 
 
-def _off(size: Array, settings: AuditSettings) -> Array:
+def _off(values: Array, settings: AuditSettings) -> Array:
     """Logarithm of each episode's size against the usual one; 0 where it may be no unit."""
+    size = np.abs(values)
     known = np.isfinite(size) & (size > 0)
     result = np.zeros(len(size))
     if np.count_nonzero(known) < max(LEAST_EPISODES, 0.9 * len(size)):
@@ -245,10 +251,19 @@ def _off(size: Array, settings: AuditSettings) -> Array:
     scattered = densest_half(size[known & ~far])[1]
     for side in (far & (gap > 0), far & (gap < 0)):
         if np.count_nonzero(side) >= LEAST_SCATTER:
-            expected = float(np.exp(np.median(gap[side]))) * scattered
+            typical = float(np.median(gap[side]))
+            # Two units leave nothing between them; a range that reaches down to zero does.
+            between = known & (np.sign(gap) == np.sign(typical))
+            between &= np.abs(np.abs(gap / typical) - 0.5) <= VALLEY / 2.0
+            if np.count_nonzero(between) > BETWEEN * np.count_nonzero(side):
+                continue
+            expected = float(np.exp(typical)) * scattered
             scatter = densest_half(size[side])[1]
             # What does not scatter is a constant, and another constant is no unit.
             if not (expected > 0 and expected / SCATTER <= scatter <= expected * SCATTER):
+                continue
+            # Nor does a unit change signs: what passes through zero is small there.
+            if abs(np.mean(values[side] > 0) - np.mean(values[known & ~far] > 0)) > SIGNS:
                 continue
             result[side] = gap[side]
         else:
