@@ -5,10 +5,13 @@ receive delay and, where its channels move with the arm, by the lag behind that 
 held against all episodes, an episode against its epoch.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from genpolicy.audit.data import Array, AuditInput, Flags, Integers, Text
 from genpolicy.audit.rows import Clock, Finding
+from genpolicy.audit.semantics.following import Following
 from genpolicy.audit.semantics.lags import Lags
 from genpolicy.audit.semantics.lags import episode_lags as piecewise_lags
 from genpolicy.audit.semantics.motion import Motion, make_motion
@@ -31,6 +34,16 @@ EPISODE_SPREADS = 6.0
 # ...and this many steps, or, by delays, this many clock limits.
 EPISODE_STEPS = 0.75
 EPISODE_DELAYS = 2.5
+# Two clusters of episodes lie apart by this many of their spreads (an even spread cut in its middle
+# by 3.5, the arcsine law by 4.1), and by this many steps: plants differ by less between slow and
+# fast motion. Fewer than this share of the episodes are no cluster.
+CLUSTER_SPREADS = 4.5
+CLUSTER_STEPS = 1.5
+CLUSTER_SHARE = 0.1
+# A lag this near to the largest that was looked for may be larger.
+EDGE_STEPS = 0.5
+# Columns whose lags differ by less are not aligned, steps.
+LEAST_ALIGNED = 2
 
 
 def episode_lags(data: AuditInput, maximum_steps: int) -> Array:
@@ -145,10 +158,47 @@ def offset_findings(
         own = settings.significance * np.nan_to_num(errors_s)
         off &= np.abs(np.nan_to_num(deviations)) > own
     known = int(np.count_nonzero(np.isfinite(offsets_s)))
+    if not some(off, known, settings.outlier_share):
+        # Half of the episodes may be off: then neither half is usual, but there are two.
+        apart = CLUSTER_STEPS * data.period_s
+        off, deviations = two_clusters(offsets_s, max(apart, settings.clock_floor_s))
+        least = max(apart, settings.clock_floor_s)
     if some(off, known, settings.outlier_share):
         taken[off] += deviations[off]
         findings.append(_episode_finding(stream, table.uuid[off], deviations[off], known, least))
     return findings, taken
+
+
+def two_clusters(values: Array, least: float) -> tuple[Flags, Array]:
+    """The smaller of two clusters of values, and how far each value lies from the larger.
+
+    Two are seen where the values of each scatter far less than both lie apart: more than the
+    halves of any one hill, of an even spread, or of one that crowds at its ends.
+
+    Args:
+        values: NaN where unknown. Shape (E,).
+        least: Clusters lie at least this far apart.
+    """
+    known = np.flatnonzero(np.isfinite(values))
+    chosen, gaps = np.zeros(len(values), dtype=bool), np.full(len(values), np.nan)
+    order = known[np.argsort(values[known], kind="stable")]
+    fewest = max(LEAST_EPISODES, int(np.ceil(CLUSTER_SHARE * len(order))))
+    best = (0.0, 0)
+    ordered = values[order]
+    for cut in range(fewest, len(order) - fewest + 1):
+        low, high = ordered[:cut], ordered[cut:]
+        spread = np.sqrt((low.var() * cut + high.var() * len(high)) / len(ordered))
+        apart = float(np.median(high) - np.median(low))
+        clear = apart / max(float(spread), 1e-3 * least)
+        if apart - least >= 0 and clear > best[0]:
+            best = (clear, cut)
+    if not best[0] - CLUSTER_SPREADS >= 0:
+        return chosen, gaps
+    low, high = order[: best[1]], order[best[1] :]
+    larger, smaller = (low, high) if len(low) >= len(high) else (high, low)
+    chosen[smaller] = True
+    gaps[known] = values[known] - np.median(values[larger])
+    return chosen, gaps
 
 
 def shift_steps(taken_s: Array, period_s: float) -> Integers:
@@ -233,8 +283,37 @@ def _quantile(values: Array | None, rows: Flags, share: float) -> float | None:
 
 
 def measure_lags(motion: Motion, settings: AuditSettings) -> Lags:
-    """Lag of the response behind the command, by episode."""
-    return _lags(motion, settings.maximum_lag_steps)
+    """Lag of the response behind the command, by episode; looked for further where some reach on."""
+    maximum_steps = settings.maximum_lag_steps
+    lags = _lags(motion, maximum_steps)
+    edge = np.abs(np.nan_to_num(lags.steps)) >= maximum_steps - EDGE_STEPS
+    if some(edge, len(edge), settings.outlier_share):
+        return _lags(motion, 2 * maximum_steps)
+    return lags
+
+
+def aligned(motion: Motion, follows: Following) -> Motion:
+    """The same with the commands of each column later by what its joint trails the others.
+
+    A hand that closes slowly trails an arm by several rows in every episode: that is its build and
+    no clock, and the lag of an episode must not depend on which of both moved more.
+    """
+    # Against the episode's own lag, in which a fault of its clock counts for all columns.
+    behind = np.where(follows.follows, follows.lag - follows.common_lag[:, None], np.nan)
+    offsets = np.array(
+        [np.median(c[np.isfinite(c)]) if np.isfinite(c).any() else 0.0 for c in behind.T]
+    )
+    rows = np.round(offsets).astype(np.int64)
+    rows[np.abs(rows) < LEAST_ALIGNED] = 0
+    if not rows.any():
+        return motion
+    first = np.repeat(motion.starts[:-1], np.diff(motion.starts))
+    last = np.repeat(motion.starts[1:], np.diff(motion.starts)) - 1
+    commanded = motion.commanded.copy()
+    for column in np.flatnonzero(rows):
+        at = np.clip(np.arange(len(commanded)) - rows[column], first, last)
+        commanded[:, column] = motion.commanded[at, column]
+    return replace(motion, commanded=commanded)
 
 
 def _lags(motion: Motion, maximum_steps: int) -> Lags:

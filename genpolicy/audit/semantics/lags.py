@@ -58,11 +58,13 @@ def segment_lags(leading: Array, trailing: Array, starts: Integers, maximum_step
     length = np.diff(starts)
     gaps[length[:, None] - np.abs(shifts) < np.maximum(8, 0.5 * length)[:, None]] = np.inf
     weights = _weights(gaps, leading, trailing, starts)
-    total = np.where(np.isfinite(gaps[:, :, 0]), gaps @ weights, np.inf)
+    with np.errstate(invalid="ignore"):
+        summed = np.einsum("stp,sp->st", gaps, weights)
+    total = np.where(np.isfinite(gaps[:, :, 0]), summed, np.inf)
     usable = (length >= LEAST_ROWS) & np.isfinite(total).any(axis=1)
     best = shifts[np.argmin(total, axis=1)]
     left, centre, right, rows = _around(leading, trailing, starts, best, weights)
-    power = episode_sums(trailing**2 @ weights, starts) / np.maximum(length, 1)
+    power = (episode_sums(trailing**2, starts) * weights).sum(axis=1) / np.maximum(length, 1)
     bend = left - 2.0 * centre + right
     with np.errstate(divide="ignore", invalid="ignore"):
         offset = np.clip(0.5 * (left - right) / bend, -1.0, 1.0)
@@ -107,7 +109,14 @@ def _gap_variances(leading: Array, trailing: Array, starts: Integers, shifts: In
 
 
 def _weights(gaps: Array, leading: Array, trailing: Array, starts: Integers) -> Array:
-    """One over the noise of each component; 0 for one that does not move. Shape (P,)."""
+    """One over the noise of each component in each segment; 0 for one that does not move.
+
+    A component that follows its command worse than usual in one segment (a finger that is stopped)
+    counts for less there.
+
+    Returns:
+        Shape (S, P).
+    """
     length = np.maximum(np.diff(starts), 1)[:, None]
     motion = np.median(episode_sums(leading**2, starts) / length, axis=0)
     motion = np.minimum(motion, np.median(episode_sums(trailing**2, starts) / length, axis=0))
@@ -116,10 +125,9 @@ def _weights(gaps: Array, leading: Array, trailing: Array, starts: Integers) -> 
     best = np.min(gaps, axis=1)
     known = np.isfinite(best[:, 0])
     noise = np.median(best[known], axis=0) if known.any() else motion
-    weights = np.zeros(len(motion))
-    moving = motion > 0
-    weights[moving] = 1.0 / np.maximum(noise[moving], NOISE_SHARE * motion[moving])
-    return weights
+    own = np.where(np.isfinite(best), best, 0.0)
+    floor = np.maximum(noise, NOISE_SHARE * motion)
+    return np.where(motion > 0, 1.0 / np.maximum(np.maximum(own, floor), 1e-300), 0.0)
 
 
 def _around(
@@ -138,7 +146,8 @@ def _around(
         at = np.clip(target + step, 0, len(rows) - 1)
         gap = np.where(valid[:, None], trailing[at] - leading, 0.0)
         mean = episode_sums(gap, starts) / safe
-        found.append((episode_sums(gap**2, starts) / safe - mean**2) @ weights)
+        variance = episode_sums(gap**2, starts) / safe - mean**2
+        found.append((variance * weights).sum(axis=1))
     return found[0], found[1], found[2], count
 
 

@@ -15,6 +15,7 @@ from genpolicy.audit.semantics import calibration, continuity, copies
 from genpolicy.audit.semantics.clocks import (
     EPISODE_DELAYS,
     EPISODE_STEPS,
+    aligned,
     delay_clocks,
     leading_findings,
     measure_lags,
@@ -58,6 +59,7 @@ def measure(data: AuditInput, settings: AuditSettings) -> Semantics:
     recorded, motion = motion, replace(motion, commanded=answered * repeated)
     if not findings:
         findings += component_findings(data, recorded, follows, settings)
+    motion = aligned(motion, follows)
     clocks, shift, found = _position(data, motion, settings)
     findings += found
     others, stream_shift, found, unclocked = _others(data, motion, shift, settings)
