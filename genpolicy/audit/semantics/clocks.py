@@ -154,15 +154,14 @@ def offset_findings(
             findings.append(_epoch_finding(stream, name, gap, limit))
     least = max(episode_limit_s, EPISODE_SPREADS * spread)
     off = np.isfinite(deviations) & (np.abs(np.nan_to_num(deviations)) > least)
-    if errors_s is not None:
-        own = settings.significance * np.nan_to_num(errors_s)
-        off &= np.abs(np.nan_to_num(deviations)) > own
+    own = settings.significance * np.nan_to_num(errors_s if errors_s is not None else 0.0 * taken)
+    off &= np.abs(np.nan_to_num(deviations)) > own
     known = int(np.count_nonzero(np.isfinite(offsets_s)))
-    if not some(off, known, settings.outlier_share):
+    if not findings and not some(off, known, settings.outlier_share):
         # Half of the episodes may be off: then neither half is usual, but there are two.
-        apart = CLUSTER_STEPS * data.period_s
-        off, deviations = two_clusters(offsets_s, max(apart, settings.clock_floor_s))
-        least = max(apart, settings.clock_floor_s)
+        least = max(CLUSTER_STEPS * data.period_s, settings.clock_floor_s)
+        off, deviations = two_clusters(offsets_s, least)
+        off &= np.abs(np.nan_to_num(deviations)) > own
     if some(off, known, settings.outlier_share):
         taken[off] += deviations[off]
         findings.append(_episode_finding(stream, table.uuid[off], deviations[off], known, least))

@@ -10,7 +10,6 @@ import numpy as np
 from genpolicy.audit.data import Array, AuditInput, Flags
 from genpolicy.audit.rows import Finding
 from genpolicy.audit.semantics.following import (
-    BETTER,
     FOLLOWS,
     Following,
     column_correlations,
@@ -23,6 +22,11 @@ from genpolicy.audit.settings import AuditSettings
 # A flipped joint moves by as much as it usually does, within this factor: what is dragged along by
 # the others moves by less.
 ALIKE = 2.0
+# Log likelihood ratio of one column of one episode: joints of a short and single movement are all
+# alike. At e^5, twice in one place, there is less than one among ten million readings.
+CLEAR = 5.0
+# Correlations are not believed nearer to one.
+ROUNDING = 1e-4
 
 
 def crossed_findings(
@@ -68,7 +72,7 @@ def crossed_findings(
 def flipped(found: Following, directional: Flags) -> Flags:
     """Columns that answer the negative of their command, by episode. Shape (E, P)."""
     minus, plus = np.nan_to_num(found.negative), np.maximum(np.nan_to_num(found.positive), 0.0)
-    clear = (minus >= FOLLOWS) & (1.0 - minus**2 <= BETTER * (1.0 - plus**2))
+    clear = (minus >= FOLLOWS) & (_evidence(found, plus, minus) >= CLEAR)
     with np.errstate(divide="ignore", invalid="ignore"):
         gains = np.where(found.follows, np.log(found.seen) - np.log(found.asked), np.nan)
     usual = np.array([np.median(g[np.isfinite(g)]) if np.isfinite(g).any() else 0.0 for g in gains.T])
@@ -79,10 +83,17 @@ def flipped(found: Following, directional: Flags) -> Flags:
 def swapped(found: Following, correlation: Array) -> Flags:
     """Pairs of columns that answer each other's command, by episode. Shape (E, P, P)."""
     own = np.maximum(np.nan_to_num(found.positive), 0.0)[:, :, None]
-    other = (correlation >= FOLLOWS) & (1.0 - correlation**2 <= BETTER * (1.0 - own**2))
+    other = (correlation >= FOLLOWS) & (_evidence(found, own, correlation) >= CLEAR)
     both = other & other.transpose(0, 2, 1)
     both[:, np.arange(both.shape[1]), np.arange(both.shape[1])] = False
     return np.asarray(both)
+
+
+def _evidence(found: Following, own: Array, other: Array) -> Array:
+    """Log likelihood ratio of the other reading against a column's own, of independent rows."""
+    left = [np.log(np.maximum(1.0 - value**2, ROUNDING)) for value in (own, other)]
+    count = found.independent.reshape(-1, *[1] * (own.ndim - 1))
+    return np.asarray(0.5 * count * (left[0] - left[1]))
 
 
 def _flipped(

@@ -24,8 +24,6 @@ LEAST_ROWS = 10
 SLOW_SHARE = 0.5
 # Correlation with which a column follows a command...
 FOLLOWS = 0.8
-# ...and the share of the unexplained motion that the better reading of two must leave.
-BETTER = 0.5
 # Columns whose motion is below this share of the usual one have no motion to compare.
 MATTERS = 0.1
 
@@ -41,6 +39,7 @@ class Following:
         seen: The same of the observed ones.
         slow: Whether slow motion makes most of both.
         lag: Shift of the larger of both correlations, rows.
+        independent: Displacements of each episode that share no row. Shape (E,).
         moves: Displacements, commanded and observed, 0 where there are none. Shape (N, P).
     """
 
@@ -50,6 +49,7 @@ class Following:
     seen: Array
     slow: Flags
     lag: Integers
+    independent: Array
     moves: tuple[Array, Array]
 
     @property
@@ -115,6 +115,7 @@ def following(motion: Motion, period_s: float, maximum_steps: int) -> Following:
         seen=np.sqrt(episode_sums(y**2, starts) / count),
         slow=x_slow & y_slow,
         lag=np.where(highest >= -lowest, at_high, at_low),
+        independent=np.asarray(rows[:, 0] / span),
         moves=(x, y),
     )
 
