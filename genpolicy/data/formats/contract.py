@@ -16,6 +16,7 @@ from pydantic import Field
 from genpolicy.contract.observation import Channel, ObservationContract
 from genpolicy.contract.settings import Settings, parse_settings
 from genpolicy.data.contract import TCP_ACTION, ActionContract
+from genpolicy.data.formats.commands import CommandForm, check_commands
 from genpolicy.data.recording.episode import JOINTS_STREAM
 from genpolicy.errors import ConfigError
 from genpolicy.integrity.atomic import write_bytes
@@ -147,8 +148,11 @@ class ImportContract(Settings):
         channels: The observation.
         action: The action.
         pairing: Component of the action to `channel.component` that it commands; null where
-            they have nothing in common (a leader of another build, a velocity, a difference).
+            they have nothing in common (a leader of another build, or what it moves unseen).
         pairing_guessed: The pairing was found in the numbers, not in the names.
+        forms: What each component of the action means: a place, a change, a rate. One that is not
+            listed is a place in the unit of what it commands.
+        forms_guessed: The forms were found in the numbers.
         labels: Columns of labels and clocks.
         time_unit: Unit of the time column.
         time_origin: `episode` where the clock begins anew with every episode.
@@ -170,6 +174,8 @@ class ImportContract(Settings):
     action: ActionSource
     pairing: dict[str, str] | None = None
     pairing_guessed: bool = False
+    forms: dict[str, CommandForm] = Field(default_factory=dict)
+    forms_guessed: bool = False
     labels: Labels = Labels()
     time_unit: Literal["s", "ms", "us", "ns"] = "s"
     time_origin: Literal["episode", "recording"] = "episode"
@@ -278,6 +284,11 @@ class _Dumper(yaml.SafeDumper):
         plain = all(isinstance(v, str | int | float) and " " not in str(v) for v in sequence)
         return super().represent_sequence(tag, sequence, flow_style=plain or flow_style)
 
+    def represent_mapping(self, tag: str, mapping: Any, flow_style: Any = None) -> Any:
+        """One line for the form of a command: a robot has dozens of them."""
+        line = set(mapping) == set(CommandForm.model_fields)
+        return super().represent_mapping(tag, mapping, flow_style=line or flow_style)
+
     def ignore_aliases(self, data: Any) -> bool:
         return True
 
@@ -297,7 +308,7 @@ def _check(contract: ImportContract, where: str) -> None:
         found = f"{len(contract.action.units)} units for {len(contract.action.components)} numbers"
         _refuse(f"{where}: action.units", found, "one for each component")
     actions = {f"action.{component}" for component in contract.action.components}
-    _check_pairing(contract, names, where)
+    _check_pairing(contract, where)
     for name, bounds in contract.ranges.items():
         if name not in names | actions:
             _refuse(f"{where}: ranges", f"for {name!r}", "names of the observation and the action")
@@ -320,25 +331,18 @@ def _check_width(columns: list[str], components: list[str], place: str, doubled:
         _refuse(f"{place}.components", "a name that stands twice", "unique names")
 
 
-def _check_pairing(contract: ImportContract, names: set[str], where: str) -> None:
-    pairing = contract.pairing
-    if pairing is None:
-        return
-    place = f"{where}: pairing"
-    if not pairing or len(set(pairing.values())) != len(pairing):
-        _refuse(place, "empty, or one observed number twice", "one to one; null for no pairing")
-    units = dict(zip(contract.action.components, contract.action_contract.units, strict=True))
-    observed = {
-        f"{channel.name}.{component}": channel.unit
-        for channel in contract.observation.channels
-        for component in channel.components
-    }
-    for commanded, seen in pairing.items():
-        if commanded not in units or seen not in names:
-            _refuse(place, f"{commanded!r}: {seen!r}", "names of the action and the observation")
-        if units[commanded] != observed[seen]:
-            found = f"{commanded} in {units[commanded]} with {seen} in {observed[seen]}"
-            _refuse(place, found, "one unit on both sides")
+def _check_pairing(contract: ImportContract, where: str) -> None:
+    check_commands(
+        contract.pairing,
+        contract.forms,
+        units=dict(zip(contract.action.components, contract.action_contract.units, strict=True)),
+        observed={
+            f"{channel.name}.{component}": channel.unit
+            for channel in contract.observation.channels
+            for component in channel.components
+        },
+        where=where,
+    )
 
 
 def _refuse(where: str, found: str, expected: str) -> NoReturn:

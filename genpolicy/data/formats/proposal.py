@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 
 from genpolicy.data.assemble import Refusal
 from genpolicy.data.formats.columns import BOOKKEEPING
+from genpolicy.data.formats.commanding import Commands, propose_commands
 from genpolicy.data.formats.contract import (
     SI,
-    UNKNOWN_UNIT,
-    ActionSource,
     ChannelSource,
     Format,
     Frozen,
@@ -20,7 +19,6 @@ from genpolicy.data.formats.contract import (
     Labels,
     contract_of,
 )
-from genpolicy.data.formats.pairing import are_differences, pair_by_name, pair_by_numbers
 from genpolicy.data.formats.sample import Sample, action_of, channels_of
 from genpolicy.data.formats.source import Column, RawEpisode, Source, as_float
 from genpolicy.data.formats.units import BULK, tokens
@@ -54,17 +52,19 @@ def propose_contract(source: Source, kind: Format, *, task: str | None = None) -
     rate_hz, rate_guessed, unit = _rate(source, sample, labels, notes)
     action = action_of(actions, sample, notes)
     channels = channels_of(observed, sample, notes)
-    pairing, by_numbers = _pairing(channels, action, sample, notes)
-    action = _with_units_of(action, channels, pairing)
+    commands = propose_commands(channels, action, sample, period_s=1.0 / rate_hz)
+    notes += commands.notes
     values = ImportContract(
         format=kind,
         task=task or _task(source),
         rate_hz=rate_hz,
         rate_guessed=rate_guessed,
         channels=channels,
-        action=action,
-        pairing=pairing,
-        pairing_guessed=by_numbers,
+        action=commands.action,
+        pairing=commands.pairing,
+        pairing_guessed=commands.by_numbers,
+        forms=commands.forms,
+        forms_guessed=True,
         labels=labels,
         time_unit=unit,  # type: ignore[arg-type]  # one of TIME_UNITS or s
         time_origin="recording" if _is_one_clock(sample, labels) else "episode",
@@ -72,7 +72,7 @@ def propose_contract(source: Source, kind: Format, *, task: str | None = None) -
             np.clip(np.ceil(SHORTEST_DEMONSTRATION_S * rate_hz), FEWEST_ROWS, MOST_ROWS)
         ),
         maximum_gap_s=round(max(LONGEST_GAP_S, LONGEST_GAP_ROWS / rate_hz), 6),
-        frozen=_frozen(channels, action, pairing, sample),
+        frozen=_frozen(channels, commands, sample),
         notes=list(dict.fromkeys(notes)),
     )
     return contract_of(values.model_dump(), where="the proposed contract")
@@ -145,58 +145,6 @@ def _is_finite(episode: RawEpisode, columns: Sequence[str]) -> bool:
     return all(bool(np.isfinite(as_float(episode.columns[name])).all()) for name in columns)
 
 
-def _pairing(
-    channels: Sequence[ChannelSource], action: ActionSource, sample: Sample, notes: list[str]
-) -> tuple[dict[str, str] | None, bool]:
-    observed, names = _matrix(channels, sample)
-    commanded = sample.selected(action.columns)
-    pairing = pair_by_name(channels, action)
-    if pairing is not None:
-        left = [action.components.index(name) for name in pairing]
-        right = [names.index(name) for name in pairing.values()]
-        if are_differences(observed[:, right], commanded[:, left], sample.number):
-            notes.append("The action follows the change of what bears its name, not its value.")
-            return None, False
-        if len(pairing) < len(action.components):
-            rest = [name for name in action.components if name not in pairing]
-            notes.append(f"Nothing observed bears the name of the action's {', '.join(rest)}.")
-        return pairing, False
-    pairs = pair_by_numbers(observed, commanded, sample.number)
-    units = _units(channels)
-    found = {
-        action.components[a]: names[o]
-        for a, o in pairs or ()
-        if action.units[a] in (units[names[o]], UNKNOWN_UNIT)
-    }
-    return found or None, bool(found)
-
-
-def _with_units_of(
-    action: ActionSource, channels: Sequence[ChannelSource], pairing: dict[str, str] | None
-) -> ActionSource:
-    """What commands a number has its unit, where nothing else tells it."""
-    units = _units(channels)
-    known = {name: units[observed] for name, observed in (pairing or {}).items()}
-    told = [
-        known.get(name, unit) if unit == UNKNOWN_UNIT else unit
-        for name, unit in zip(action.components, action.units, strict=True)
-    ]
-    return action.model_copy(update={"units": told})
-
-
-def _units(channels: Sequence[ChannelSource]) -> dict[str, str]:
-    return {f"{c.name}.{part}": c.unit for c in channels for part in c.components}
-
-
-def _matrix(channels: Sequence[ChannelSource], sample: Sample) -> tuple[Array, list[str]]:
-    """The observed numbers as recorded, angles that jump left out, and their names."""
-    plain = [channel for channel in channels if channel.transform == "none"]
-    if not plain:
-        return np.zeros((len(sample.number), 0)), []
-    names = [f"{c.name}.{component}" for c in plain for component in c.components]
-    return np.concatenate([sample.selected(c.columns) for c in plain], axis=1), names
-
-
 def _rate(
     source: Source, sample: Sample, labels: Labels, notes: list[str]
 ) -> tuple[float, bool, str]:
@@ -252,14 +200,13 @@ def _rows_numbered(source: Source, labels: Labels, notes: list[str]) -> Labels:
     return labels.model_copy(update={"frame": None})
 
 
-def _frozen(
-    channels: Sequence[ChannelSource],
-    action: ActionSource,
-    pairing: dict[str, str] | None,
-    sample: Sample,
-) -> Frozen | None:
+def _frozen(channels: Sequence[ChannelSource], commands: Commands, sample: Sample) -> Frozen | None:
     """Only a stream that holds what the action commands must move with it."""
-    paired = set((pairing or {}).values())
+    action, pairing = commands.action, commands.pairing or {}
+    paired = set(pairing.values())
+    # A change that stays the same is a motion: how far it varies says nothing.
+    if any(not commands.forms[name].is_plain for name in pairing):
+        return None
     streams = [c.stream for c in channels if paired & {f"{c.name}.{part}" for part in c.components}]
     factors = [SI.get(unit, (unit, 1.0))[1] for unit in action.units]
     low, high = np.quantile(sample.selected(action.columns) * factors, BULK, axis=0)
