@@ -17,6 +17,7 @@ import numpy as np
 
 from genpolicy.audit.component_rows import OTHER, POSITION
 from genpolicy.audit.data import Array, AuditInput, Integers, chunk_rows, relative_paths
+from genpolicy.audit.forms import before
 from genpolicy.audit.modes import ROUTE_CHUNKS, SMOOTHING_SHARE, distances, features, progress
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.contract.rotation import rotation_from_6d
@@ -52,6 +53,8 @@ class Component:
         spread: Median RMS spread inside situations; NaN if unknown.
         signal: Values whose Euclidean distance is in that unit, row by row; None for the
             position and its timing, which are taken from the path. Shape (N, d).
+        begin: Where the values stand before the command of a row; 0 but for what is added up.
+            None for 0. Shape (N, d).
     """
 
     name: str
@@ -61,6 +64,7 @@ class Component:
     scale: float = float("nan")
     spread: float = float("nan")
     signal: Array | None = None
+    begin: Array | None = None
 
     @property
     def looked_at(self) -> bool:
@@ -131,7 +135,8 @@ def series(
         return np.asarray(np.diff(along, axis=1, prepend=0.0)[..., None] * steps)
     if component.signal is None:
         return np.zeros((len(rows), steps, 0))
-    return component.signal[chunk_rows(data, rows, steps)]
+    values = component.signal[chunk_rows(data, rows, steps)]
+    return values if component.begin is None else values - component.begin[rows][:, None]
 
 
 def joined(component: Component, values: Array) -> Array:
@@ -172,7 +177,8 @@ def _stroke(data: AuditInput, name: str, columns: slice | Integers | None) -> Co
     """Columns without a common unit, each as a share of its own stroke in the training data."""
     if columns is None:
         return Component(name, "absent", "strokes", STROKE_SHARE)
-    values = data.action[:, columns]
+    chosen = np.arange(data.action.shape[1])[columns]
+    values = data.placed[:, chosen]
     training = (data.episodes.split == "train")[data.episode]
     known = values[training] if np.any(training) else values
     low, high = np.quantile(known, [0.01, 0.99], axis=0)
@@ -181,7 +187,11 @@ def _stroke(data: AuditInput, name: str, columns: slice | Integers | None) -> Co
     if not np.any(moving):
         return Component(name, "hardly_varies", "strokes", STROKE_SHARE)
     signal = values[:, moving] / stroke[moving]
-    return Component(name, "varies", "strokes", STROKE_SHARE, signal=signal)
+    begin = None
+    if data.forms is not None and data.forms.added[chosen[moving]].any():
+        stood = before(data, chosen[moving], np.arange(len(values)))
+        begin = np.where(data.forms.added[chosen[moving]], stood, 0.0) / stroke[moving]
+    return Component(name, "varies", "strokes", STROKE_SHARE, signal=signal, begin=begin)
 
 
 def _white(data: AuditInput, values: Array) -> Array:

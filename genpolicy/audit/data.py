@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from genpolicy.audit.forms import Forms, before, in_place
 from genpolicy.errors import ContractError, NonFiniteError
 
 Array = NDArray[np.float64]
@@ -56,7 +57,7 @@ class AuditInput:
 
     Attributes:
         observation: Shape (N, D_o).
-        action: Shape (N, D_a).
+        action: As recorded. Shape (N, D_a).
         phase: Shape (N,).
         episode: Position in `episodes`. Shape (N,).
         index: Row of its episode. Shape (N,).
@@ -78,6 +79,7 @@ class AuditInput:
         paired: Whether the action commands something observed. If not (a leader arm of another
             build), there is no lag, and a chunk is taken relative to its own first action.
         phase_observed: Whether a policy sees the phase.
+        forms: What the numbers of the action mean; None where all are plain places.
     """
 
     observation: Array
@@ -102,6 +104,7 @@ class AuditInput:
     streams: dict[str, Index] = field(default_factory=dict)
     paired: bool = True
     phase_observed: bool = True
+    forms: Forms | None = None
 
     def __post_init__(self) -> None:
         n = len(self.observation)
@@ -136,8 +139,15 @@ class AuditInput:
 
     @property
     def commanded(self) -> Array:
-        """What is commanded of the position. Shape (N, P)."""
-        return self.action[:, self.action_position]
+        """What is commanded of the position, as places. Shape (N, P)."""
+        return self.placed[:, self.action_position]
+
+    @cached_property
+    def placed(self) -> Array:
+        """The action with every number as a place (canonical order). Shape (N, D_a)."""
+        if self.forms is None:
+            return self.action
+        return in_place(self.action, self.observation, self.episode, self.forms)
 
     @property
     def grouping(self) -> Text:
@@ -192,19 +202,50 @@ def relative_paths(data: AuditInput, rows: Integers, steps: int) -> Array:
     Returns:
         Shape (n, steps, P).
     """
-    commanded = data.action[chunk_rows(data, rows, steps)][..., data.action_position]
-    return np.asarray(commanded - origin(data, rows)[:, None, :])
+    commanded = data.placed[chunk_rows(data, rows, steps)][..., data.action_position]
+    begin = origin(data, rows)
+    if data.forms is not None:
+        columns = np.arange(data.action.shape[1])[data.action_position]
+        begin = np.where(data.forms.added[columns], before(data, columns, rows), begin)
+    return np.asarray(commanded - begin[:, None, :])
 
 
 def origin(data: AuditInput, rows: Integers) -> Array:
-    """Where chunks at `rows` begin: the observed position, or the first action if none pairs.
+    """Where chunks at `rows` begin: the observed position, or the first command if none pairs.
+
+    Of what is added up without a partner, where it stood before.
 
     Returns:
         Shape (n, P).
     """
     if data.paired:
         return np.asarray(data.observation[rows][:, data.observation_position])
-    return np.asarray(data.action[rows][:, data.action_position])
+    first = np.asarray(data.placed[rows][:, data.action_position])
+    if data.forms is None:
+        return first
+    columns = np.arange(data.action.shape[1])[data.action_position]
+    return np.where(data.forms.added[columns], before(data, columns, rows), first)
+
+
+def commanded_path(data: AuditInput, actions: Array, row: int) -> Array:
+    """Where a chunk of recorded numbers, sent at `row`, commands the position to be.
+
+    Args:
+        data: Canonical audit input.
+        actions: Shape (K, D_a).
+        row: Row that it is sent at.
+
+    Returns:
+        Shape (K, P).
+    """
+    columns = np.arange(data.action.shape[1])[data.action_position]
+    chosen = actions[:, columns]
+    if data.forms is None:
+        return np.asarray(chosen)
+    added = data.forms.added[columns]
+    moved = chosen * data.forms.gain[columns] + np.where(added, 0.0, data.forms.offset[columns])
+    begin = origin(data, np.array([row], dtype=np.int64))
+    return np.where(added, begin + np.cumsum(moved, axis=0), moved)
 
 
 def observation_history(data: AuditInput, rows: Integers, horizon: int) -> Array:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from genpolicy.audit.component_rows import ComponentModes
-from genpolicy.audit.data import AuditInput, Integers
+from genpolicy.audit.data import AuditInput, Integers, commanded_path
 from genpolicy.audit.examples import (
     alignment,
     example_chunks,
@@ -139,7 +139,10 @@ def _defeated(item: Situation) -> bool:
 def _situation(data: AuditInput, item: Situation) -> SituationRow:
     query = item.neighbourhood.query
     episode = int(data.episode[query])
-    position = data.action_position
+
+    def path(actions: np.ndarray) -> tuple[float, ...]:
+        return tuple(commanded_path(data, actions, item.neighbourhood.query).ravel().tolist())
+
     return SituationRow(
         split=str(data.episodes.split[episode]),
         phase=item.phase,
@@ -154,8 +157,8 @@ def _situation(data: AuditInput, item: Situation) -> SituationRow:
         mean_reason=item.chunks.mean_reason,
         median_admissible=item.chunks.median_admissible,
         modes_admissible=sum(item.chunks.mode_admissible),
-        mean_path=tuple(item.chunks.mean[:, position].ravel().tolist()),
-        mode_paths=tuple(tuple(mode[:, position].ravel().tolist()) for mode in item.chunks.modes),
+        mean_path=path(item.chunks.mean),
+        mode_paths=tuple(path(mode) for mode in item.chunks.modes),
         persistent=persistent(item.identity),
         component=item.component,
     )

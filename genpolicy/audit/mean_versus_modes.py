@@ -64,6 +64,10 @@ def compare(
     actions = data.action[chunk_rows(data, members, settings.chunk_steps)].copy()
     start = origin(data, members)
     move = start[-1] - start  # the query is the last member
+    if data.forms is not None:
+        columns = np.arange(data.action.shape[1])[data.action_position]
+        # Changes and rates are the same wherever the chunk begins.
+        move = np.where(data.forms.added[columns], 0.0, move / data.forms.gain[columns])
     actions[:, :, data.action_position] += move[:, None, :]
     mean = _orthonormal(data, actions.mean(axis=0))
     median = _orthonormal(data, np.median(actions, axis=0))

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from genpolicy.audit.forms import forms_of, in_place
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.contract.observation import Channel, ObservationContract
 from genpolicy.contract.settings import parse_settings
@@ -30,6 +31,7 @@ CHUNK_S = 0.8
 MINIMUM_CHUNK, MAXIMUM_CHUNK = 8, 64
 # Two routes can only lie apart by what was travelled: a chunk covers three times that distance.
 TRAVELLED = 3.0
+FORMS = ("action_forms", "action_gains", "action_offsets")
 
 
 def observation_contract(dataset: Dataset) -> ObservationContract:
@@ -74,10 +76,11 @@ def propose_settings(
         "phase_observed": (source.get("labels") or {}).get("phase") is None,
     }
     values["channel_scale"] = _scales(contract, training.observation)
-    values |= _separations(dataset, values["action_components"])
-    values["chunk_steps"] = _chunk_steps(
-        dataset, values["action_components"], values["minimum_separation_m"]
-    )
+    values |= _forms(source.get("forms") or {})
+    values |= {name: stated[name] for name in FORMS if name in stated}
+    placed = _placed(dataset, contract, pairing, values)
+    values |= _separations(dataset, contract, pairing, placed)
+    values["chunk_steps"] = _chunk_steps(dataset, placed, values["minimum_separation_m"])
     values["persistence_lag_steps"] = values["chunk_steps"]
     values |= {name: value for name, value in stated.items() if name != "channel_scale"}
     values["channel_scale"] |= stated.get("channel_scale", {})
@@ -107,24 +110,52 @@ def _context(contract: ObservationContract, paired: set[str]) -> list[str]:
     ]
 
 
-def _chunk_steps(dataset: Dataset, names: list[str] | None, separation: float) -> int:
+def _forms(stated: Mapping[str, Any]) -> dict[str, Any]:
+    """What the import contract says of the action's numbers, where they are no plain places."""
+    return {
+        "action_forms": {
+            name: item["form"] for name, item in stated.items() if item["form"] != "place"
+        },
+        "action_gains": {
+            name: float(item["gain"]) for name, item in stated.items() if item["gain"] != 1.0
+        },
+        "action_offsets": {
+            name: float(item["offset"]) for name, item in stated.items() if item["offset"] != 0.0
+        },
+    }
+
+
+def _placed(
+    dataset: Dataset,
+    contract: ObservationContract,
+    pairing: Mapping[str, str],
+    values: Mapping[str, Any],
+) -> np.ndarray:
+    """What pairs of the training data's action, as places; all of it where nothing pairs."""
+    frames = dataset.split("train").frames
+    stated = list(dataset.manifest["action_contract"]["components"])
+    names = list(contract.component_names)
+    settings = parse_settings(
+        AuditSettings, {name: values[name] for name in FORMS}, where="contract.yaml: forms"
+    )
+    partners = {name: names.index(seen) for name, seen in pairing.items() if seen in names}
+    forms = forms_of(settings, stated, partners)
+    action = frames.action
+    if forms is not None:
+        action = in_place(action, frames.observation, frames.episode, forms)
+    return action[:, [k for k, name in enumerate(stated) if not pairing or name in pairing]]
+
+
+def _chunk_steps(dataset: Dataset, placed: np.ndarray, separation: float) -> int:
     """As many actions as go into 0.8 s, or as it takes to travel far enough to part ways."""
     period_s = float(dataset.manifest["action_contract"]["period_s"])
     frames = dataset.split("train").frames
     inside = np.diff(frames.episode) == 0
-    steps = np.linalg.norm(
-        np.diff(frames.action[:, _columns(dataset, names)], axis=0)[inside], axis=1
-    )
+    steps = np.linalg.norm(np.diff(placed, axis=0)[inside], axis=1)
     moving = steps[steps > 0.0]
     speed = float(np.median(moving)) if len(moving) else 0.0
     far = TRAVELLED * separation / speed if speed > 0.0 else 0.0
     return int(np.clip(round(max(CHUNK_S / period_s, far)), MINIMUM_CHUNK, MAXIMUM_CHUNK))
-
-
-def _columns(dataset: Dataset, names: list[str] | None) -> list[int]:
-    """Columns of the action that pair with the observation; all where none is named."""
-    stated = dataset.manifest["action_contract"]["components"]
-    return [k for k, name in enumerate(stated) if names is None or name in names]
 
 
 def _scales(contract: ObservationContract, observation: np.ndarray) -> dict[str, float]:
@@ -142,14 +173,25 @@ def _spread_scale(values: np.ndarray) -> float:
     return scale if scale > 0.0 else 1.0
 
 
-def _separations(dataset: Dataset, names: list[str] | None) -> dict[str, float]:
-    """Least distance of two modes and of epochs, and the metre, in the unit commanded."""
+def _separations(
+    dataset: Dataset,
+    contract: ObservationContract,
+    pairing: Mapping[str, str],
+    placed: np.ndarray,
+) -> dict[str, float]:
+    """Least distance of two modes and of epochs, and the metre, in the unit commanded.
+
+    That is the unit of what is moved: a change or a normalised place has none of its own.
+    """
     stated = dataset.manifest["action_contract"]
-    columns = _columns(dataset, names)
-    units = {stated["units"][k] for k in columns}
+    known = {
+        f"{channel.name}.{part}": channel.unit
+        for channel in contract.channels
+        for part in channel.components
+    }
+    units = {known.get(seen, "") for seen in pairing.values()} or set(stated["units"])
     unit = next(iter(units)) if len(units) == 1 else ""
-    commanded = dataset.split("train").frames.action[:, columns]
-    scale = SCALES.get(unit, _spread_scale(commanded))
+    scale = SCALES.get(unit, _spread_scale(placed))
     return {
         "minimum_separation_m": APART * scale,
         "calibration_floor_m": SHIFTED * scale,

@@ -23,6 +23,10 @@ class AuditSettings(BaseModel):
             not one whole channel; overrides `position_channel`.
         action_components: Names of the action's components that pair with them, in their order;
             None takes the first ones.
+        action_forms: What a component of the action is, where it is no place: a `change` per row or
+            a `rate` is added up; `unknown` is read as it stands.
+        action_gains: How far one of it moves what it commands (per row where it is added up).
+        action_offsets: What a place of 0 commands.
         phase_observed: Whether the policy sees the phase. If not, situations are looked for
             across phases and the phase is tested as a hidden variable.
         reference_channel: Observed pose of what is released into; None where there is none.
@@ -100,6 +104,11 @@ class AuditSettings(BaseModel):
     position_channel: str | None = "tcp_position_m"
     position_components: list[str] | None = None
     action_components: list[str] | None = None
+    action_forms: dict[str, Literal["place", "change", "rate", "unknown"]] = Field(
+        default_factory=dict
+    )
+    action_gains: dict[str, float] = Field(default_factory=dict)
+    action_offsets: dict[str, float] = Field(default_factory=dict)
     phase_observed: bool = True
     reference_channel: str | None = None
     calibration_phase: str = ""

@@ -14,6 +14,7 @@ from genpolicy.audit.data import (
     Text,
     canonical,
 )
+from genpolicy.audit.forms import forms_of
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.contract.action import ACTION_COMPONENTS, POSITION, ROTATION
 from genpolicy.contract.observation import Channel, ObservationContract
@@ -44,6 +45,14 @@ def from_dataset(
             _refuse(f"naming the channel {name}", f"one of {', '.join(slices)}")
     observed, commanded, stream = _pairing(dataset, contract, settings)
     width = len(np.arange(contract.dim)[observed])
+    components = list(dataset.manifest["action_contract"]["components"])
+    partners = dict(
+        zip(
+            np.asarray(components)[commanded].tolist() if width else [],
+            np.arange(contract.dim)[observed].tolist(),
+            strict=True,
+        )
+    )
     return canonical(
         AuditInput(
             observation=frames.observation,
@@ -76,6 +85,7 @@ def from_dataset(
             streams=_streams(contract),
             paired=width > 0,
             phase_observed=settings.phase_observed,
+            forms=forms_of(settings, components, partners),
         )
     )
 

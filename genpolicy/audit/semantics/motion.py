@@ -54,6 +54,7 @@ def make_motion(data: AuditInput) -> Motion:
     columns = np.arange(data.observation.shape[1])[data.observation_position]
     if not data.paired:
         columns = columns[:0]
+    # What is a change or a rate, added up: gains, lags and frames can be asked of it as well.
     commanded = np.array(data.commanded if data.paired else data.action[:, :0], dtype=np.float64)
     observed = np.array(data.observation[:, columns], dtype=np.float64)
     inside = data.episode[1:] == data.episode[:-1]
