@@ -137,6 +137,8 @@ def judged(report: AuditReport, cause: Cause, limits: CauseLimits) -> dict[str, 
         "kind": cause.kind,
         "layer": cause.layer.value,
         "confidence": cause.confidence,
+        "agreeing_draws": list(cause.agreeing),
+        "found": list(cause.found),
         "next_action": cause.next_action,
         "questions": [answer.as_json() for answer in cause.answers],
         "limits": limits.as_json(),
@@ -155,9 +157,11 @@ def as_text(report: AuditReport, cause: Cause, opened: Opened, out: Path) -> str
     said = f"{cause.name} ({', '.join(dict.fromkeys(parts))})" if parts else cause.name.value
     red = "no layer is red" if cause.layer is Layer.NONE else f"first red layer: {cause.layer}"
     beyond = tuple(_beyond(answer) for answer in cause.answers if answer.layer is cause.layer)
-    sure = "unknown" if cause.confidence is None else f"{cause.confidence:.2f}"
+    same, draws = cause.agreeing
+    sure = f"{same} of {draws} resampled audits say the same" if draws else "confidence unknown"
     lines = [
-        *_block("verdict", (said, f"{TITLES[cause.name]}; confidence {sure}; {red}")),
+        *_block("verdict", (said, f"{TITLES[cause.name]}; {sure}; {red}")),
+        *_block("found", cause.found),
         *_block("judged", beyond),
         *_block("evidence", report.evidence),
         *_block("rests on", report.rests_on),

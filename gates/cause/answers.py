@@ -105,7 +105,10 @@ class Cause:
         layer: First red layer of the diagnosis, `none` where all are green.
         next_action: What to do.
         answers: Every question with its number and limit, in the order of diagnosis.
-        confidence: Share of resampled audits with the same cause and variable; None without any.
+        confidence: Share of resampled audits with the same cause and variable, of one more than
+            there were, so that no number of draws makes certainty; None without any.
+        agreeing: How many of how many resampled audits name the same.
+        found: What was found of modes and hidden variables, a sentence each, whatever the verdict.
     """
 
     name: CauseName
@@ -115,6 +118,8 @@ class Cause:
     next_action: str
     answers: tuple[Answer, ...]
     confidence: float | None
+    agreeing: tuple[int, int] = (0, 0)
+    found: tuple[str, ...] = ()
 
     @property
     def text(self) -> str:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from genpolicy.audit.component_rows import ComponentModes
+from genpolicy.audit.reach_rows import LOCAL, FindingDraw, Reach, StructureDraw
 from genpolicy.audit.rows import Finding, ModeOutcome, Prediction, Resample, Stratum
 from genpolicy.errors import BadInputError
 from genpolicy.integrity.documents import read_json
@@ -43,6 +44,7 @@ class Counts:
     persistent: int
     noise_ratio: float
     noise_spread: float
+    white_share: float
 
     @property
     def share(self) -> float:
@@ -76,6 +78,7 @@ class Numbers:
         modes: Modes of the phase with most situations.
         components: Where in the action modes were looked for; counts, strata and modes are about
             the one followed.
+        reach: How far neighbours reach in each fifth of the way; none where it was not measured.
     """
 
     findings: tuple[Finding, ...]
@@ -89,6 +92,7 @@ class Numbers:
     told: tuple[Prediction, ...]
     modes: tuple[ModeOutcome, ...]
     components: tuple[ComponentModes, ...]
+    reach: tuple[Reach, ...] = ()
 
 
 def read_numbers(
@@ -125,8 +129,16 @@ def read_numbers(
                 if row.phase == summary["primary_phase"]
             ),
             components=tuple(rows("components.parquet", ComponentModes)),
+            reach=tuple(row for row in rows("reach.parquet", Reach) if row.kind == LOCAL),
         )
-        return numbers, tuple(_draws(numbers, rows("resamples.parquet", Resample)))
+        return numbers, tuple(
+            _draws(
+                numbers,
+                rows("resamples.parquet", Resample),
+                rows("structure_draws.parquet", StructureDraw),
+                rows("finding_draws.parquet", FindingDraw),
+            )
+        )
     except (KeyError, TypeError, ValueError) as error:
         raise BadInputError(
             where="the audit's evidence",
@@ -148,13 +160,25 @@ def folder_numbers(folder: Path) -> tuple[Numbers, tuple[Numbers, ...]]:
     )
 
 
-def _draws(measured: Numbers, rows: Iterable[Resample]) -> Iterator[Numbers]:
+def _draws(
+    measured: Numbers,
+    rows: Iterable[Resample],
+    structures: Iterable[StructureDraw],
+    findings: Iterable[FindingDraw],
+) -> Iterator[Numbers]:
     """What was measured, with the numbers of each resample in their places."""
-    for row in rows:
+    halves: dict[int, list[Finding]] = {}
+    for item in findings:
+        halves.setdefault(item.draw, []).append(item.finding)
+    for row, drawn in zip(rows, structures, strict=True):
         tests = zip(row.p_adjusted, row.effect, row.effect_lower, strict=True)
         outcomes = zip(row.success_lower, row.admissible, strict=True)
         yield replace(
             measured,
+            findings=measured.findings
+            if drawn.findings < 0
+            else tuple(halves.get(drawn.findings, ())),
+            reach=_reach(measured.reach, drawn),
             labels=replace(
                 measured.labels,
                 disagreements=row.disagreements,
@@ -162,6 +186,14 @@ def _draws(measured: Numbers, rows: Iterable[Resample]) -> Iterator[Numbers]:
             ),
             counts=replace(
                 measured.counts,
+                queries=drawn.queries,
+                analysed=drawn.analysed,
+                analysed_episodes=drawn.analysed_episodes,
+                primary_episodes=drawn.primary_episodes,
+                resolved=drawn.resolved,
+                noise_ratio=drawn.noise_ratio,
+                noise_spread=drawn.noise_spread,
+                white_share=drawn.white_share,
                 two_mode=row.two_mode,
                 two_mode_episodes=row.two_mode_episodes,
                 incoherent=row.incoherent,
@@ -180,6 +212,12 @@ def _draws(measured: Numbers, rows: Iterable[Resample]) -> Iterator[Numbers]:
                 for mode, (lower, admissible) in zip(measured.modes, outcomes, strict=True)
             ),
         )
+
+
+def _reach(measured: tuple[Reach, ...], drawn: StructureDraw) -> tuple[Reach, ...]:
+    """The fifths of the way with the numbers of a draw."""
+    numbers = zip(measured, drawn.reach_queries, drawn.reach_spoke, strict=True)
+    return tuple(replace(row, queries=queries, spoke=spoke) for row, queries, spoke in numbers)
 
 
 def _moved(row: Prediction, told: float) -> Prediction:

@@ -28,6 +28,8 @@ class Counts:
         persistent: Situations with several modes that persist.
         noise_ratio: Median von Neumann ratio of the spread inside situations: 1 white, 0 smooth.
         noise_spread: Median spread inside situations, unit of the position.
+        white_share: Median share of that white noise in all of the spread, constant differences
+            between the chunks counted as well.
     """
 
     queries: int
@@ -41,6 +43,7 @@ class Counts:
     persistent: int
     noise_ratio: float
     noise_spread: float
+    white_share: float
 
 
 def count(
@@ -67,6 +70,7 @@ def count(
         persistent=sum(persistent(item.identity) for item in several),
         noise_ratio=_middle([item.noise_ratio for item in situations]),
         noise_spread=_middle([item.noise_spread for item in situations]),
+        white_share=_middle([item.white_share for item in situations]),
     )
 
 

@@ -18,6 +18,7 @@ from genpolicy.audit.examples import (
 )
 from genpolicy.audit.labels import disagreement
 from genpolicy.audit.persistence import persistent
+from genpolicy.audit.reach_rows import FURTHER_TABLES
 from genpolicy.audit.rows import TABLES, Demonstration, ReplayRow, SituationRow
 from genpolicy.audit.run import AuditResult
 from genpolicy.audit.settings import AuditSettings
@@ -53,6 +54,7 @@ def write_evidence(
         "components": _components(result),
         "demonstrated": _demonstrated(result),
         "examples": example_chunks(result, settings),
+        "finding_draws": result.finding_draws,
         "findings": result.semantics.findings,
         "modes": result.modes,
         "neighbourhoods": [_situation(result.data, item) for item in result.situations],
@@ -60,10 +62,12 @@ def write_evidence(
         "recovery": result.recovery,
         "replay": _replays(result),
         "resamples": result.resamples,
+        "reach": result.reach,
         "strata": result.strata,
+        "structure_draws": result.structure_draws,
         "support": support_points(result),
     }
-    for name, row in TABLES.items():
+    for name, row in (TABLES | FURTHER_TABLES).items():
         write_rows(folder / f"{name}.parquet", row, [_known(item) for item in rows[name]])
     write_bytes(folder / "persistence.json", canonical_json(asdict(result.persistence)))
     write_bytes(folder / "settings.json", canonical_json(settings.model_dump(mode="json")))

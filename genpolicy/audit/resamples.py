@@ -10,12 +10,15 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import norm
 
-from genpolicy.audit.data import Array, AuditInput, Integers
+from genpolicy.audit.counts import Counts
+from genpolicy.audit.data import Array, Integers
 from genpolicy.audit.labels import Replayed, disagreement
 from genpolicy.audit.persistence import NULL_QUANTILE, Persistence, persistent
+from genpolicy.audit.reach_rows import StructureDraw
 from genpolicy.audit.rows import ModeOutcome, Prediction, Resample, Stratum
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.audit.situations import Claim, Situation, claims_of, coherent_phases
+from genpolicy.audit.structure_draws import Queries, structure_draw
 from genpolicy.seeds import stream
 from genpolicy.statistics.intervals import clopper_pearson
 
@@ -32,6 +35,8 @@ class Measures:
         strata: Tests of variables, in the order of `strata.parquet`.
         told: What variables tell of the modes, in the order of `predictions.parquet`.
         modes: Modes of the phase with most situations, in the order of `modes.parquet`.
+        counts: Support and structure.
+        halves: Halves of the episodes whose data semantics were measured again.
     """
 
     replayed: tuple[Replayed, ...]
@@ -39,6 +44,8 @@ class Measures:
     strata: tuple[Stratum, ...]
     told: tuple[Prediction, ...]
     modes: tuple[ModeOutcome, ...]
+    counts: Counts
+    halves: int = 0
 
 
 @dataclass(frozen=True)
@@ -46,8 +53,8 @@ class Table:
     """Situations as arrays, to draw episodes from.
 
     Attributes:
-        episodes: Held-out episodes with an analysed situation. Shape (E,).
-        place: Position in `episodes` of each situation. Shape (n,).
+        queries: Every query, and the held-out episodes to draw.
+        place: Position among those episodes of each situation. Shape (n,).
         phases: Phase of each situation. Length n.
         claims: What speaks for the modes of those claimed, before phases were held to persist.
         claimed: Several clusters claimed as modes, per situation. Shape (n,).
@@ -55,7 +62,7 @@ class Table:
         identity: Situation, identity kept, and its null, of those measured.
     """
 
-    episodes: Integers
+    queries: Queries
     place: Integers
     phases: list[str]
     claims: list[Claim]
@@ -65,34 +72,38 @@ class Table:
 
 
 def resamples(
-    data: AuditInput,
     settings: AuditSettings,
     measured: Measures,
     situations: tuple[Situation, ...],
+    queries: Queries,
     *,
     root_seed: int,
-) -> tuple[Resample, ...]:
+) -> tuple[tuple[Resample, ...], tuple[StructureDraw, ...]]:
     """Measures of resampled data, `settings.resamples` of them.
 
     Args:
-        data: Canonical audit input.
         settings: Number of draws, and what makes modes persist.
         measured: What was measured.
         situations: Every analysed situation, before phases were held to persist.
+        queries: Every query behind them.
         root_seed: Seed of the draws.
     """
     rng = stream(root_seed, "audit", "confidence")
-    table = _table(data, situations)
-    return tuple(_draw(settings, measured, table, rng) for _ in range(settings.resamples))
+    table = _table(situations, queries)
+    pairs: list[tuple[Resample, StructureDraw]] = []
+    for number in range(settings.resamples):
+        row, times, kept = _draw(settings, measured, table, rng)
+        half = number % measured.halves if measured.halves else -1
+        drawn = structure_draw(queries, times, kept, measured=measured.counts, findings=half)
+        pairs.append((row, drawn))
+    return tuple(row for row, _ in pairs), tuple(drawn for _, drawn in pairs)
 
 
-def _table(data: AuditInput, situations: tuple[Situation, ...]) -> Table:
-    queries = np.array([item.neighbourhood.query for item in situations], dtype=np.int64)
-    episodes, place = np.unique(data.episode[queries], return_inverse=True)
+def _table(situations: tuple[Situation, ...], queries: Queries) -> Table:
     known = [(n, item.identity) for n, item in enumerate(situations) if item.identity is not None]
     return Table(
-        episodes=episodes,
-        place=place.reshape(-1),
+        queries=queries,
+        place=queries.place[: len(situations)],
         phases=[item.phase for item in situations],
         claims=claims_of(situations),
         claimed=np.array([item.two_mode for item in situations], dtype=np.float64),
@@ -107,9 +118,9 @@ def _table(data: AuditInput, situations: tuple[Situation, ...]) -> Table:
 
 def _draw(
     settings: AuditSettings, measured: Measures, table: Table, rng: np.random.Generator
-) -> Resample:
-    count = len(table.episodes)
-    times = np.bincount(rng.integers(0, count, count), minlength=count) if count else table.episodes
+) -> tuple[Resample, Integers, Array]:
+    count = len(table.queries.episodes)
+    times = np.bincount(rng.integers(0, max(count, 1), count), minlength=count)
     weights = times[table.place].astype(np.float64)
     good = coherent_phases(settings, table.claims, weights)
     kept = table.claimed * np.array([phase in good for phase in table.phases])
@@ -119,7 +130,7 @@ def _draw(
     strata = [_stratum(row, rng) for row in measured.strata]
     modes = [_mode(mode, rng) for mode in measured.modes]
     told = [_told(row, rng) for row in measured.told]
-    return Resample(
+    row = Resample(
         disagreements=wrong,
         disagreement_upper=upper,
         two_mode=int(np.sum(weights * kept)),
@@ -136,6 +147,7 @@ def _draw(
         success_lower=tuple(mode[0] for mode in modes),
         admissible=tuple(mode[1] for mode in modes),
     )
+    return row, times, kept
 
 
 def _persistence(measured: Persistence, table: Table, weight: Array) -> Persistence:

@@ -14,6 +14,8 @@ AXES = (2, 3)
 # times the noise of its sensor.
 ONSET = 0.25
 JITTER = 0.01  # a tenth of a scale, squared: flat clouds stay solvable
+# Of the usual step: a course that differs by less (about 15 degrees) is no other course.
+COURSE = 0.25
 
 
 def resolved_by_observation(
@@ -32,10 +34,13 @@ def resolved_by_observation(
     need not lie along an axis; more components would always have such a line among so few members.
     Routes part little by little, so less than a scale is no sign of them. Where something else
     than the route differs, a hand that has begun to close or turn shows it at once, and a history
-    shows how fast the arm goes: there a fraction of a scale is enough.
+    shows how fast the arm goes: there a fraction of a scale is enough. It also shows where all
+    that is observed goes: who passes one place on two courses does not choose there.
     """
     least = 1.0 if route else ONSET
     if not route and _told_by_speed(data, settings, situation, clustering):
+        return True
+    if _told_by_course(data, settings, situation, clustering):
         return True
     place = _place(data)
     for values, inside in _observed(data, settings, situation, clustering):
@@ -63,6 +68,53 @@ def _told_by_speed(
         _auc(speeds[:, 0], clustering.labels == mode) >= settings.resolved_auc
         for mode in range(clustering.count)
     )
+
+
+def _told_by_course(
+    data: AuditInput, settings: AuditSettings, situation: Neighbourhood, clustering: Clustering
+) -> bool:
+    """Whether the last observed step orders the clusters (nearly) perfectly.
+
+    The members stand within several scales of each other, and a step is a fraction of one: places
+    cannot show what their difference shows. A component of the step, or the way across the course
+    in the plane or in space, must differ by a quarter of the usual step.
+    """
+    if settings.observation_horizon < 2:
+        return False
+    rows = situation.members
+    before = np.maximum(rows - 1, data.first_row[rows])
+    used = np.flatnonzero(np.isfinite(data.observation_scale))
+    steps = data.observation[np.ix_(rows, used)] - data.observation[np.ix_(before, used)]
+    steps = steps / data.observation_scale[used]
+    least = COURSE * float(np.median(np.linalg.norm(steps, axis=1)))
+    if least <= 0.0:
+        return False
+    place = _place(data)
+    for mode in range(clustering.count):
+        inside = clustering.labels == mode
+        gap = np.abs(np.median(steps[inside], axis=0) - np.median(steps[~inside], axis=0))
+        far = np.flatnonzero(gap >= least)
+        if any(_auc(steps[:, j], inside) >= settings.resolved_auc for j in far):
+            return True
+        if len(place):
+            line = _across(steps[:, place], inside)
+            if _apart(line, inside) >= least and _auc(line, inside) >= settings.resolved_auc:
+                return True
+    return False
+
+
+def _across(values: Array, inside: Flags) -> Array:
+    """Coordinate along the line between the middles of the others, each left out. Shape (n,).
+
+    Left out of the middles, no member draws the line to itself.
+    """
+    result = np.empty(len(values))
+    for number in range(len(values)):
+        rest = np.arange(len(values)) != number
+        line = values[rest & inside].mean(axis=0) - values[rest & ~inside].mean(axis=0)
+        length = float(np.linalg.norm(line))
+        result[number] = float(values[number] @ line) / (length if length > 0.0 else 1.0)
+    return result
 
 
 def _place(data: AuditInput) -> Integers:

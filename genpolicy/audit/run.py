@@ -23,6 +23,8 @@ from genpolicy.audit.neighbourhoods import Support
 from genpolicy.audit.persistence import Persistence, summarise
 from genpolicy.audit.predictability import predictions
 from genpolicy.audit.progress import Progress, silent
+from genpolicy.audit.reach import reaches
+from genpolicy.audit.reach_rows import LOCAL, FindingDraw, Reach, StructureDraw
 from genpolicy.audit.recovery import demonstrated, recovery_outcomes
 from genpolicy.audit.resamples import Measures, resamples
 from genpolicy.audit.rows import Asked, ModeOutcome, Prediction, RecoveryOutcome, Resample, Stratum
@@ -38,6 +40,7 @@ from genpolicy.audit.situations import (
     primary_phase,
 )
 from genpolicy.audit.strata import examine_strata
+from genpolicy.audit.structure_draws import finding_draws, queries_of
 
 
 @dataclass(frozen=True)
@@ -66,6 +69,9 @@ class AuditResult:
         resamples: The measures on resampled data.
         component: Component of the action whose modes all else is about.
         components: Modes in every component.
+        reach: What could be looked at in each fifth of the way.
+        structure_draws: Support and structure of each draw.
+        finding_draws: Findings of halves of the episodes.
     """
 
     data: AuditInput
@@ -87,6 +93,9 @@ class AuditResult:
     resamples: tuple[Resample, ...]
     component: Component
     components: tuple[ComponentModes, ...]
+    reach: tuple[Reach, ...] = ()
+    structure_draws: tuple[StructureDraw, ...] = ()
+    finding_draws: tuple[FindingDraw, ...] = ()
 
     @property
     def primary_phase(self) -> str:
@@ -131,7 +140,12 @@ def audit(
     primary = primary_phase(several)
     persistence = summarise([item.identity for item in situations if item.two_mode])
     main = several.get(primary, []), links.get(primary)
-    measured = Measures(replayed, persistence, strata, told, _of_phase(modes, primary))
+    halves, again = finding_draws(data, settings, root_seed=root_seed)
+    measured = Measures(
+        replayed, persistence, strata, told, _of_phase(modes, primary), counts, halves
+    )
+    queries = queries_of(data, settings, situations, support)
+    draws, structures = resamples(settings, measured, claims, queries, root_seed=root_seed)
     after = _after_realignment(data, settings, semantics, counts, component, root_seed=root_seed)
     return AuditResult(
         data=data,
@@ -152,7 +166,10 @@ def audit(
         modes_other_phases=_other_phases(data, settings, component, root_seed),
         component=component,
         components=component_modes(data, looks, component.name),
-        resamples=resamples(data, settings, measured, claims, root_seed=root_seed),
+        resamples=draws,
+        reach=reaches(LOCAL, queries.fifth, queries.analysed > 0),
+        structure_draws=structures,
+        finding_draws=again,
     )
 
 

@@ -42,6 +42,7 @@ class Situation:
         noise_spread: RMS of that spread, unit of the position.
         component: Component of the action whose clusters these are.
         roughness: The same ratio of that component; None where it is that of the position.
+        white_share: Share of white noise in all of the spread of the position.
     """
 
     phase: str
@@ -54,6 +55,7 @@ class Situation:
     noise_spread: float
     component: str = POSITION
     roughness: float | None = None
+    white_share: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -149,10 +151,11 @@ def examine(
                 rough = roughness(series(data, settings, component, item.members))
     check = None if seed is None else admissible
     chunks = compare(data, settings, item, clustering, admissible=check)
-    ratio, spread = von_neumann(relative_paths(data, item.members, settings.chunk_steps))
+    paths = relative_paths(data, item.members, settings.chunk_steps)
+    ratio, spread = von_neumann(paths)
     return Situation(
         phase, item, clustering, seed is not None, identity, chunks, ratio, spread,
-        component.name, rough,
+        component.name, rough, min(1.0, roughness(paths)),
     )  # fmt: skip
 
 

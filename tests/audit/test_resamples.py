@@ -6,17 +6,23 @@ import numpy as np
 import pytest
 from planar import SETTINGS
 
+from genpolicy.audit.counts import count
 from genpolicy.audit.labels import Replayed
 from genpolicy.audit.modes import Clustering
-from genpolicy.audit.neighbourhoods import Neighbourhood
+from genpolicy.audit.neighbourhoods import Neighbourhood, Support
 from genpolicy.audit.persistence import Persistence
 from genpolicy.audit.resamples import Measures, resamples
 from genpolicy.audit.rows import ModeOutcome, Prediction, Stratum
 from genpolicy.audit.situations import Situation
+from genpolicy.audit.structure_draws import queries_of
 from genpolicy.statistics.intervals import clopper_pearson
 
 NULL = np.linspace(0.0, 0.5, 99)
-DATA = SimpleNamespace(episode=np.arange(12))
+# One row to each of twelve episodes: nothing moves, and rows are counted.
+DATA = SimpleNamespace(
+    episode=np.arange(12), position=np.zeros((12, 0)), first_row=np.arange(12),
+    last_row=np.arange(12),
+)  # fmt: skip
 
 
 def situations(kept=0.9, two_mode=True):
@@ -29,14 +35,18 @@ def situations(kept=0.9, two_mode=True):
     )  # fmt: skip
 
 
-def drawn(items=None, *, wrong=0, strata=(), told=(), modes=(), seed=1, count=60):
+def drawn(items=None, *, wrong=0, strata=(), told=(), modes=(), seed=1, draws=60):
     replayed = tuple(
         Replayed(str(n), "success", "failure" if n < wrong else "success") for n in range(40)
     )
-    measured = Measures(replayed, Persistence(0.9, 0.4, 0.2, 12), strata, told, modes)
-    settings = SETTINGS.model_copy(update={"resamples": count})
     found = situations() if items is None else items
-    return resamples(DATA, settings, measured, found, root_seed=seed)
+    reach = (Support("approach", 12, len(found)),)
+    measured = Measures(
+        replayed, Persistence(0.9, 0.4, 0.2, 12), strata, told, modes, count(DATA, found, reach, 0)
+    )
+    settings = SETTINGS.model_copy(update={"resamples": draws})
+    queries = queries_of(DATA, settings, found, reach)
+    return resamples(settings, measured, found, queries, root_seed=seed)[0]
 
 
 def stratum(**changes):
@@ -50,11 +60,11 @@ def stratum(**changes):
 
 def test_a_seed_decides_the_draws_and_the_settings_their_number():
     assert drawn(wrong=10) == drawn(wrong=10) != drawn(wrong=10, seed=2)
-    assert len(drawn(count=7)) == 7
+    assert len(drawn(draws=7)) == 7
 
 
 def test_labels_are_drawn_around_their_share():
-    wrong = [row.disagreements for row in drawn(wrong=10, count=400)]
+    wrong = [row.disagreements for row in drawn(wrong=10, draws=400)]
     assert np.mean(wrong) == pytest.approx(10, abs=0.6)
     # Binomial: n p (1 - p) = 7.5.
     assert np.var(wrong) == pytest.approx(7.5, rel=0.3)
@@ -77,7 +87,7 @@ def test_modes_that_do_not_persist_are_incoherent_in_every_draw():
 
 def test_what_was_not_tested_stays_unknown_and_effects_stay_in_their_range():
     blank = {"p_value": None, "p_adjusted": None, "effect": None, "effect_lower": None}
-    rows = drawn(strata=(stratum(), stratum(**blank, effect_upper=None)), count=400)
+    rows = drawn(strata=(stratum(), stratum(**blank, effect_upper=None)), draws=400)
     assert {(r.p_adjusted[1], r.effect[1], r.effect_lower[1]) for r in rows} == {(None,) * 3}
     effects = np.array([row.effect[0] for row in rows])
     # The interval of +-0.2 is two-sided at 95 %: a standard deviation of 0.4 / 3.92.
@@ -88,7 +98,7 @@ def test_what_was_not_tested_stays_unknown_and_effects_stay_in_their_range():
 
 def test_what_is_told_is_drawn_from_its_interval():
     row = Prediction("operator", "approach", 0.3, 0.1355, 0.4645, 0.65, 0.5, 100)
-    found = np.array([draw.told for draw in drawn(told=(row, row), count=400)])
+    found = np.array([draw.told for draw in drawn(told=(row, row), draws=400)])
     assert found.shape == (400, 2)
     assert np.mean(found) == pytest.approx(0.3, abs=0.02)
     # Each end is a bound of 95 %: 0.1645 is 1.645 standard deviations.
@@ -105,6 +115,10 @@ def test_a_mode_that_always_succeeds_does_so_in_every_draw():
 
 
 def test_no_situation_and_no_replay_are_drawn_as_nothing():
-    empty = Measures((), Persistence(0.0, 1.0, 1.0, 0), (), (), ())
-    (row,) = resamples(DATA, SETTINGS.model_copy(update={"resamples": 1}), empty, (), root_seed=1)
+    nothing = count(DATA, (), (Support("approach", 0, 0),), 0)
+    empty = Measures((), Persistence(0.0, 1.0, 1.0, 0), (), (), (), nothing)
+    settings = SETTINGS.model_copy(update={"resamples": 1})
+    queries = queries_of(DATA, settings, (), ())
+    (row,), (drawn,) = resamples(settings, empty, (), queries, root_seed=1)
     assert (row.two_mode, row.kept_n, row.disagreement_upper) == (0, 0, 1.0)
+    assert (drawn.queries, drawn.analysed, drawn.findings) == (0, 0, -1)

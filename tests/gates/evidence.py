@@ -19,6 +19,7 @@ from gates.feasibility.settings import LAYERS
 from gates.preregistration import PREREGISTRATION, plan_bytes
 from gates.reproducibility.timing import MEASURED_HERE, TERMS
 from genpolicy.audit.component_rows import ComponentModes
+from genpolicy.audit.reach_rows import FindingDraw, Reach, StructureDraw
 from genpolicy.audit.rows import (
     Asked,
     Calibration,
@@ -554,6 +555,14 @@ def _audit(root: Path) -> None:
             {"split": "recovery", "mode": "right", "episodes": 40, "successes": 8},
         ],
     )
+    table(
+        root,
+        "audit/reach.parquet",
+        Reach,
+        [{"kind": "local", "fifth": k, "queries": 20, "spoke": 18} for k in range(1, 6)],
+    )
+    table(root, "audit/structure_draws.parquet", StructureDraw, [_structure_draw()] * 4)
+    table(root, "audit/finding_draws.parquet", FindingDraw, [])
     document(
         root,
         "audit/summary.json",
@@ -576,6 +585,7 @@ def _audit(root: Path) -> None:
                 "persistent": 45,
                 "noise_ratio": 0.1,
                 "noise_spread": 0.01,
+                "white_share": 0.02,
             },
             "modes_before_realignment": 3,
             "modes_after_realignment": 2,
@@ -619,6 +629,22 @@ def _draw() -> dict[str, Any]:
         "told": [0.05] * 2,
         "success_lower": [0.8] * 2,
         "admissible": [49] * 2,
+    }
+
+
+def _structure_draw() -> dict[str, Any]:
+    return {
+        "queries": 100,
+        "analysed": 90,
+        "analysed_episodes": 40,
+        "primary_episodes": 40,
+        "resolved": 0,
+        "noise_ratio": 0.1,
+        "noise_spread": 0.01,
+        "white_share": 0.02,
+        "reach_queries": [20] * 5,
+        "reach_spoke": [18] * 5,
+        "findings": -1,
     }
 
 

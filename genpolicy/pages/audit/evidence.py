@@ -7,6 +7,7 @@ from typing import Any
 
 import pandas as pd
 
+from genpolicy.audit.reach_rows import FURTHER_TABLES
 from genpolicy.audit.rows import TABLES
 from genpolicy.integrity.documents import read_json
 from genpolicy.integrity.hashing import sha256_file
@@ -52,7 +53,7 @@ def read_evidence(folder: Path) -> AuditEvidence:
     """
     tables = {
         name: read_columns(folder / f"{name}.parquet", row).to_pandas()
-        for name, row in TABLES.items()
+        for name, row in (TABLES | FURTHER_TABLES).items()
     }
     documents = {
         name: read_json(folder / f"{name}.json") for name in ("summary", "settings", "persistence")

@@ -5,6 +5,7 @@ from dataclasses import replace
 from gates.cause import Cause, CauseLimits, default_limits, name_cause
 from gates.cause.numbers import Counts, Kept, Labels, Numbers
 from genpolicy.audit.component_rows import ComponentModes
+from genpolicy.audit.reach_rows import LOCAL, Reach
 from genpolicy.audit.rows import Finding, ModeOutcome, Prediction, Stratum
 from genpolicy.audit.settings import AuditSettings
 
@@ -41,7 +42,7 @@ TOLD = Prediction("operator", "approach", 0.05, -0.1, 0.2, 0.52, 0.5, 120)
 VALID = Numbers(
     findings=(), floors=AuditSettings().floors, metre=1.0, unit="m",
     labels=Labels(60, 0, 0.06),
-    counts=Counts(200, 180, 50, 120, 45, 50, 0, 0, 110, 0.1, 0.01),
+    counts=Counts(200, 180, 50, 120, 45, 50, 0, 0, 110, 0.1, 0.01, 0.02),
     kept=Kept(0.95, 0.6, 118), strata=(STRATUM,), told=(TOLD,),
     modes=(
         ModeOutcome("m0", "approach", 40, 40, 0.91, 1.0, 50, 50),
@@ -54,6 +55,7 @@ VALID = Numbers(
         component("other", state="absent", unit="strokes", separation=0.2, situations=0),
         component("timing"),
     ),
+    reach=tuple(Reach(LOCAL, fifth, 40, 36) for fifth in range(1, 6)),
 )  # fmt: skip
 
 

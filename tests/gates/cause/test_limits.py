@@ -53,7 +53,10 @@ def _of_findings() -> set[str]:
 
 def test_every_limit_is_asked_for_and_every_finding_has_one():
     watched = Watched(LIMITS.by_question)
-    others = (counts(two_mode_episodes=0), counts(two_mode_episodes=0, noise_ratio=0.9))
+    others = (
+        counts(two_mode_episodes=0),
+        counts(two_mode_episodes=0, noise_ratio=0.9, white_share=0.3),
+    )
     for numbers in (VALID, *others, *(item[0] for item in BROKEN.values())):
         named(numbers, watched)
     of_findings = _of_findings()

@@ -57,9 +57,9 @@ def test_clusters_that_do_not_persist_and_white_spread_are_noise():
     fading = replace(VALID, kept=Kept(0.65, 0.6, 118))
     assert named(fading).name is CauseName.POINTWISE_NOISE
     assert named(fading, limit(persistence_margin=0.04)).name is CauseName.VALID_MODES
-    white = counts(two_mode_episodes=0, noise_ratio=0.9)
+    white = counts(two_mode_episodes=0, noise_ratio=0.9, white_share=0.3)
     assert named(white).name is CauseName.POINTWISE_NOISE
-    quiet = counts(two_mode_episodes=0, noise_ratio=0.9, noise_spread=0.001)
+    quiet = counts(two_mode_episodes=0, noise_ratio=0.9, white_share=0.3, noise_spread=0.001)
     assert named(quiet).name is CauseName.UNIMODAL
     # In pixels a metre is a thousand of them, and a spread of a hundredth of one is nothing.
     assert named(replace(white, metre=1000.0)).name is CauseName.UNIMODAL
@@ -67,5 +67,8 @@ def test_clusters_that_do_not_persist_and_white_spread_are_noise():
 
 def test_confidence_is_the_share_of_draws_that_name_the_same():
     draws = [VALID] * 3 + [BROKEN["hidden"][0]]
-    assert named(VALID, draws=draws).confidence == 0.75
+    assert named(VALID, draws=draws).confidence == 3 / 5
+    assert named(VALID, draws=draws).agreeing == (3, 4)
     assert named(VALID).confidence is None
+    # Of no number of draws is one sure.
+    assert named(VALID, draws=[VALID] * 200).confidence == 200 / 201

@@ -1,0 +1,67 @@
+"""How far an evidence reaches along the route: what it could look at in every fifth of it.
+
+Situations crowd where episodes do: at a common start, and where all arrive. There the choice is
+not yet made, or over. So to deny modes it takes support in every fifth of the way, and a verdict
+says in which of them nothing could be looked at.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from genpolicy.audit.data import AuditInput, Integers
+from genpolicy.audit.reach_rows import Reach
+from genpolicy.audit.settings import AuditSettings
+
+FIFTHS = 5
+
+
+def fifth_of(data: AuditInput, settings: AuditSettings, rows: Integers) -> Integers:
+    """Fifth of its episode's way in which each row lies, 0 to 4.
+
+    The way is what the observed position travels until the last row of which a situation is
+    looked for, so that waiting makes none of it; where nothing travels, rows are counted.
+
+    Args:
+        data: Canonical audit input.
+        settings: Chunk length: situations are looked for while half a chunk is left.
+        rows: Shape (n,).
+
+    Returns:
+        Shape (n,).
+    """
+    moved = data.position if data.position.shape[1] else np.zeros((len(data.episode), 1))
+    steps = np.zeros(len(data.episode))
+    steps[1:] = np.linalg.norm(np.diff(moved, axis=0), axis=1)
+    steps[data.first_row[data.first_row]] = 0.0
+    travelled = np.cumsum(steps)
+    first = data.first_row[rows]
+    last = np.maximum(data.last_row[rows] - settings.chunk_steps // 2, first)
+    whole = travelled[last] - travelled[first]
+    by_rows = (rows - first) / np.maximum(last - first, 1)
+    along = np.where(whole > 0.0, (travelled[rows] - travelled[first]) / _positive(whole), by_rows)
+    return np.asarray(np.clip(along * FIFTHS, 0, FIFTHS - 1), dtype=np.int64)
+
+
+def reaches(kind: str, fifths: Integers, spoke: Sequence[bool] | np.ndarray) -> tuple[Reach, ...]:
+    """Queries and those that could be answered, in each fifth.
+
+    Args:
+        kind: `local` or `learned`.
+        fifths: Fifth of each query. Shape (n,).
+        spoke: Whether the evidence could speak of it. Shape (n,).
+    """
+    answered = np.asarray(spoke, dtype=bool)
+    return tuple(
+        Reach(
+            kind,
+            number + 1,
+            int(np.count_nonzero(fifths == number)),
+            int(np.count_nonzero(answered[fifths == number])),
+        )
+        for number in range(FIFTHS)
+    )
+
+
+def _positive(values: np.ndarray) -> np.ndarray:
+    return np.where(values > 0.0, values, 1.0)

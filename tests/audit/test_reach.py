@@ -1,0 +1,39 @@
+"""Fifths of the way: what an episode travels, not how long it stands."""
+
+from types import SimpleNamespace
+
+import numpy as np
+from planar import SETTINGS
+
+from genpolicy.audit.reach import fifth_of, reaches
+from genpolicy.audit.reach_rows import LOCAL
+
+HALF = SETTINGS.chunk_steps // 2
+
+
+def episode(position):
+    n = len(position)
+    return SimpleNamespace(
+        episode=np.zeros(n, int), position=np.asarray(position, float),
+        first_row=np.zeros(n, int), last_row=np.full(n, n - 1),
+    )  # fmt: skip
+
+
+def test_who_waits_does_not_come_forward():
+    way = np.linspace(0.0, 1.0, 21)[:, None]
+    waiting = np.concatenate([np.zeros((50, 1)), way, np.full((50 + HALF, 1), 1.0)])
+    found = fifth_of(episode(waiting), SETTINGS, np.array([0, 49, 55, 60, 65, 69, 71, 100]))
+    assert found.tolist() == [0, 0, 1, 2, 3, 4, 4, 4]
+
+
+def test_where_nothing_travels_rows_are_counted():
+    still = fifth_of(episode(np.zeros((100 + HALF, 0))), SETTINGS, np.array([0, 30, 50, 99]))
+    assert still.tolist() == [0, 1, 2, 4]
+
+
+def test_each_fifth_says_of_how_much_it_could_speak():
+    rows = reaches(LOCAL, np.array([0, 0, 4]), [True, False, True])
+    assert [(row.fifth, row.queries, row.spoke) for row in rows] == [
+        (1, 2, 1), (2, 0, 0), (3, 0, 0), (4, 0, 0), (5, 1, 1),
+    ]  # fmt: skip
+    assert (rows[0].share, rows[1].share) == (0.5, 1.0)
