@@ -9,8 +9,10 @@ from genpolicy.data.contract import SplitRule
 from genpolicy.data.formats.accept import PHASE_ALL, accept, wanted_columns
 from genpolicy.data.formats.contract import ImportContract, selectors
 from genpolicy.data.formats.open_questions import open_questions
+from genpolicy.data.formats.recorded import Reasons
 from genpolicy.data.formats.result import Opened
 from genpolicy.data.formats.source import Column, Progress, Source, refusal_of, refuse
+from genpolicy.data.variables import completed
 from genpolicy.errors import BadInputError, ConfigError
 
 SOURCE_KINDS = {"zarr": "zarr_replay_buffer"}
@@ -48,7 +50,8 @@ def import_source(
     accepted: list[AcceptedEpisode] = []
     refused: list[Refusal] = []
     seen: dict[str, str] = {}
-    for outcome in _outcomes(source, contract, seen):
+    reasons = Reasons(contract)
+    for outcome in _outcomes(source, contract, seen, reasons):
         if isinstance(outcome, Refusal):
             refused.append(outcome)
         else:
@@ -56,32 +59,32 @@ def import_source(
         if progress is not None:
             progress(len(accepted) + len(refused), source.count)
     phases = contract.phases or sorted({str(p) for e in accepted for p in set(e.rows.phase)})
-    notes = tuple(dict.fromkeys([*contract.notes, *source.notes, *open_questions(contract)]))
-    write_dataset(
-        out,
-        accepted=accepted,
-        refused=refused,
-        found=len(accepted) + len(refused),
-        description=Description(
-            source_kind=SOURCE_KINDS.get(contract.format, contract.format),
-            observation=contract.observation,
-            action=contract.action_contract,
-            phases=tuple(phases) or (PHASE_ALL,),
-            action_period_s=contract.period_s,
-            split=split,
-            clock_note=CLOCK_ROWS if contract.labels.time is None else CLOCK_COLUMN,
-            notes=notes,
-            import_contract=contract.model_dump(mode="json"),
-        ),
+    stated = [*contract.notes, *source.notes, *open_questions(contract)]
+    notes = tuple(dict.fromkeys([*stated, *reasons.notes(source.columns)]))
+    description = Description(
+        source_kind=SOURCE_KINDS.get(contract.format, contract.format),
+        observation=contract.observation,
+        action=contract.action_contract,
+        phases=tuple(phases) or (PHASE_ALL,),
+        action_period_s=contract.period_s,
+        split=split,
+        clock_note=CLOCK_ROWS if contract.labels.time is None else CLOCK_COLUMN,
+        notes=notes,
+        import_contract=contract.model_dump(mode="json"),
     )
     found = len(accepted) + len(refused)
+    with completed(out, reasons.recorded()) as folder:
+        write_dataset(
+            folder, accepted=accepted, refused=refused, found=found, description=description
+        )
     return Opened(out, contract, found, len(accepted), tuple(refused), notes)
 
 
 def _outcomes(
-    source: Source, contract: ImportContract, seen: dict[str, str]
+    source: Source, contract: ImportContract, seen: dict[str, str], reasons: Reasons
 ) -> Iterator[AcceptedEpisode | Refusal]:
-    for raw in source.episodes(wanted_columns(contract), contract.labels.episode):
+    wanted, episode_column = wanted_columns(contract), contract.labels.episode
+    for raw in source.episodes(wanted, episode_column, reasons.wants):
         if isinstance(raw, Refusal):
             yield raw
             continue
@@ -92,6 +95,7 @@ def _outcomes(
                     what = "the samples" if key == episode.content_sha256 else "the episode_uuid"
                     refuse(raw.label, f"{what} of {seen[key]} again", "every episode once")
             seen[episode.content_sha256] = seen[episode.episode_uuid] = raw.label
+            reasons.add(raw, episode.episode_uuid)
             yield episode
         except BadInputError as error:
             yield refusal_of(raw.label, error)

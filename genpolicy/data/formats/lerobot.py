@@ -19,9 +19,11 @@ from genpolicy.data.formats.lerobot_meta import data_files, read_episodes, read_
 from genpolicy.data.formats.segments import episodes_of, find_segments
 from genpolicy.data.formats.source import (
     MAXIMUM_EPISODE_ROWS,
+    Also,
     Column,
     RawEpisode,
     check_columns,
+    nothing,
     refusal_of,
     refuse,
 )
@@ -30,6 +32,7 @@ from genpolicy.errors import BadInputError
 
 EPISODE, FRAME, INDEX, TASK = "episode_index", "frame_index", "index", "task_index"
 TIME, SUCCESS = "timestamp", "next.success"
+SWITCHING_TASK = "instruction"
 OWN = ("episode_index", "length", "tasks", "task")
 
 
@@ -69,7 +72,7 @@ class LeRobotDataset:
         self.notes = (*notes, *self._disagreements())
 
     def episodes(
-        self, wanted: Sequence[str], episode: str | None = None
+        self, wanted: Sequence[str], episode: str | None = None, also: Also = nothing
     ) -> Iterator[RawEpisode | Refusal]:
         """Each episode in the order of the data files; listed ones without data are refused."""
         done = 0
@@ -79,7 +82,8 @@ class LeRobotDataset:
             try:
                 with open_table(path, label=label) as table:
                     reader = self._one if self._by_file else self._many
-                    done += yield from reader(table, number, wanted, done, seen)
+                    names = self._stored(table, wanted, also)
+                    done += yield from reader(table, number, names, done, seen)
             except BadInputError as error:
                 yield refusal_of(label, error)
                 seen.add(number)
@@ -88,22 +92,22 @@ class LeRobotDataset:
             yield Refusal(label, label, f"{label} is listed in the metadata and has no data.")
 
     def _one(
-        self, table: Table, number: int, wanted: Sequence[str], done: int, seen: set[int]
+        self, table: Table, number: int, names: Sequence[str], done: int, seen: set[int]
     ) -> Generator[RawEpisode | Refusal, None, int]:
         """A file of one episode."""
         seen.add(number)
         if table.rows > MAXIMUM_EPISODE_ROWS:
             refuse(table.label, f"{table.rows} rows long", f"at most {MAXIMUM_EPISODE_ROWS}")
-        columns = read_columns(table, self._stored(table, wanted))
+        columns = read_columns(table, names)
         yield self._raw(table, number, columns, table.label, done)
         return table.rows
 
     def _many(
-        self, table: Table, number: int, wanted: Sequence[str], done: int, seen: set[int]
+        self, table: Table, number: int, names: Sequence[str], done: int, seen: set[int]
     ) -> Generator[RawEpisode | Refusal, None, int]:
         """A file of several episodes, one after the other."""
         segments = find_segments(table, EPISODE)
-        for segment, columns in episodes_of(table, segments, self._stored(table, wanted)):
+        for segment, columns in episodes_of(table, segments, names):
             if isinstance(columns, Refusal):
                 yield columns
                 seen |= {int(segment.key)} if segment.key.isdigit() else set()
@@ -126,26 +130,38 @@ class LeRobotDataset:
         label: str,
         first_row: int,
     ) -> RawEpisode:
-        known = {column.name: column for column in self.columns} | table.columns
-        declared = {column.name: column for column in self.columns if not column.per_episode}
-        check_columns(columns, label=label, known=known | declared)
+        declared = {c.name: c for c in self.columns if not c.per_episode and c.width is not None}
+        check_columns(columns, label=label, known=table.columns | declared)
         _check_indices(columns, number, label)
         attributes = {
             key: value for key, value in self._listed.get(number, {}).items() if key not in OWN
         }
         if TASK in columns and self._tasks and len(columns[TASK]):
-            _check_one(columns[TASK], f"{label}: {TASK}")
-            attributes["task"] = self._tasks.get(int(columns[TASK][0]), "not_recorded")
+            texts = self._texts(columns[TASK], f"{label}: {TASK}")
+            switches = bool((texts != texts[0]).any())
+            attributes["task"] = "not_recorded" if switches else texts[0]
+            if switches:
+                # Another instruction on the way: a value by row, and none for the episode.
+                columns = {**columns, SWITCHING_TASK: texts}
         if SUCCESS in columns:
             # It becomes true in the row that reaches the goal, and only there.
             attributes["success"] = str(bool(np.any(columns[SUCCESS]))).lower()
         return RawEpisode(label, table.digest, columns, attributes, first_row)
 
-    def _stored(self, table: Table, wanted: Sequence[str]) -> list[str]:
+    def _texts(self, numbers: NDArray[Any], where: str) -> NDArray[Any]:
+        """The instruction of each row; a change to one that nobody described is damage (n,)."""
+        known, place = np.unique(numbers, return_inverse=True)
+        if any(int(number) not in self._tasks for number in known):
+            _check_one(numbers, where)
+        texts = [self._tasks.get(int(number), "not_recorded") for number in known]
+        return np.array(texts, dtype=object)[place.reshape(-1)]
+
+    def _stored(self, table: Table, wanted: Sequence[str], also: Also) -> list[str]:
         """Columns to read: those wanted and the indices, which are always checked."""
         per_episode = {column.name for column in self.columns if column.per_episode}
         names = [name for name in wanted if name not in per_episode or name in table.columns]
         names += [n for n in (EPISODE, FRAME, INDEX, TASK, SUCCESS) if n in table.columns]
+        names += [c.name for c in table.columns.values() if also(c)]
         return list(dict.fromkeys(names))
 
     def _columns(self, stored: dict[str, Column], notes: list[str]) -> tuple[Column, ...]:

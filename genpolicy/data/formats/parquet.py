@@ -9,9 +9,11 @@ from genpolicy.data.formats.contract import ImportContract
 from genpolicy.data.formats.segments import episode_label, episodes_of, find_segments
 from genpolicy.data.formats.source import (
     MAXIMUM_EPISODE_ROWS,
+    Also,
     Column,
     RawEpisode,
     check_columns,
+    nothing,
     refusal_of,
     refuse,
 )
@@ -46,7 +48,7 @@ class ParquetFiles:
         self.count = None if self.labels.episode is not None else len(self._files)
 
     def episodes(
-        self, wanted: Sequence[str], episode: str | None = None
+        self, wanted: Sequence[str], episode: str | None = None, also: Also = nothing
     ) -> Iterator[RawEpisode | Refusal]:
         """Each episode of each file, files by name; an unreadable file is one refusal."""
         done = 0
@@ -54,7 +56,7 @@ class ParquetFiles:
             label = path.relative_to(self._root).as_posix()
             try:
                 with open_table(path, label=label) as table:
-                    done += yield from self._of(table, wanted, episode, done)
+                    done += yield from self._of(table, wanted, episode, also, done)
             except BadInputError as error:
                 yield refusal_of(label, error)
 
@@ -70,10 +72,12 @@ class ParquetFiles:
         raise first or AssertionError("no file was tried")
 
     def _of(
-        self, table: Table, wanted: Sequence[str], episode: str | None, done: int
+        self, table: Table, wanted: Sequence[str], episode: str | None, also: Also, done: int
     ) -> Generator[RawEpisode | Refusal, None, int]:
-        known = {column.name: column for column in self.columns}
-        names = list(dict.fromkeys(wanted))
+        # What is read beside the contract may differ from file to file.
+        more = [c.name for c in table.columns.values() if c.name not in wanted and also(c)]
+        known = table.columns | {c.name: c for c in self.columns if c.name not in more}
+        names = list(dict.fromkeys([*wanted, *more]))
         if episode is None:
             if table.rows > MAXIMUM_EPISODE_ROWS:
                 refuse(table.label, f"{table.rows} rows long", f"at most {MAXIMUM_EPISODE_ROWS}")

@@ -10,6 +10,7 @@ import re
 import stat
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -21,12 +22,15 @@ from numpy.typing import NDArray
 from genpolicy.data.assemble import Refusal
 from genpolicy.data.formats.columns import labels_of
 from genpolicy.data.formats.contract import ImportContract
+from genpolicy.data.formats.hdf5_single import REWRITE, check_storage, member, read_single
 from genpolicy.data.formats.source import (
     MAXIMUM_EPISODE_ROWS,
     MAXIMUM_VALUE_BYTES,
+    Also,
     Column,
     RawEpisode,
     check_columns,
+    nothing,
     refusal_of,
     refuse,
 )
@@ -35,11 +39,8 @@ from genpolicy.errors import BadInputError, IntegrityError
 DATA, OBSERVATIONS, MASK = "data", "obs", "mask"
 ACTIONS = "actions"
 PER_ROW = ("actions", "rewards", "dones")
-# Filters of the library itself: deflate, shuffle, fletcher32, szip, nbit, scale-offset, lzf.
-FILTERS = (1, 2, 3, 4, 5, 6, 32000)
 MAXIMUM_ATTRIBUTE = 1 << 20
 HASH_BYTES = 1 << 20
-REWRITE = "Write the file again with plain, internal data sets (h5repack)."
 READ_ERRORS = (OSError, KeyError, RuntimeError, ValueError, TypeError, MemoryError)
 
 
@@ -80,7 +81,7 @@ class RobomimicFile:
         self.count = len(self._demos)
 
     def episodes(
-        self, wanted: Sequence[str], episode: str | None = None
+        self, wanted: Sequence[str], episode: str | None = None, also: Also = nothing
     ) -> Iterator[RawEpisode | Refusal]:
         """Each demonstration by number."""
         per_episode = {column.name for column in self.columns if column.per_episode}
@@ -94,6 +95,13 @@ class RobomimicFile:
                 label = f"{self.name}#{demo}"
                 try:
                     raw = self._read(data, demo, names, label, (digest, done))
+                    group = _group(data, demo, label)
+                    columns, single = read_single(group, raw.columns, self.columns, also)
+                    raw = replace(
+                        raw,
+                        columns=raw.columns | columns,
+                        attributes=raw.attributes | single,
+                    )
                     done += len(raw.columns[ACTIONS])
                     yield raw
                 except BadInputError as error:
@@ -174,21 +182,8 @@ def _state(path: Path) -> tuple[int, int, int]:
     return status.st_ino, status.st_size, status.st_mtime_ns
 
 
-def _member(group: Any, name: str, where: str) -> Any:
-    """A member by a hard link, part by part; every other link is refused unresolved."""
-    found = group
-    for part in name.split("/"):
-        link = found.get(part, getlink=True) if isinstance(found, h5py.Group) else None
-        if link is None:
-            refuse(f"{where}: {name}", "missing", "as in the other demonstrations")
-        if not isinstance(link, h5py.HardLink):
-            refuse(f"{where}: {name}", f"a {type(link).__name__}", "data in this file", REWRITE)
-        found = found[part]
-    return found
-
-
 def _group(parent: Any, name: str, where: str) -> Any:
-    found = _member(parent, name, where)
+    found = member(parent, name, where)
     if not isinstance(found, h5py.Group):
         refuse(f"{where}: {name}", "no group", "a group")
     return found
@@ -196,11 +191,11 @@ def _group(parent: Any, name: str, where: str) -> Any:
 
 def _values(group: Any, name: str, where: str) -> NDArray[Any]:
     """A data set, whole, after everything that reaches out of the file has been refused."""
-    data = _member(group, name, where)
+    data = member(group, name, where)
     place = f"{where}: {name}"
     if not isinstance(data, h5py.Dataset):
         refuse(place, "no data set", "a data set")
-    _check_storage(data, place)
+    check_storage(data, place)
     if data.ndim not in (1, 2) or data.dtype.kind not in "fiub":
         refuse(place, f"of shape {data.shape} and type {data.dtype}", "numbers by row")
     if (
@@ -209,17 +204,6 @@ def _values(group: Any, name: str, where: str) -> NDArray[Any]:
     ):
         refuse(place, f"of shape {data.shape}", f"at most {MAXIMUM_EPISODE_ROWS} rows")
     return np.asarray(data[...])
-
-
-def _check_storage(data: Any, place: str) -> None:
-    properties = data.id.get_create_plist()
-    codes = [properties.get_filter(i)[0] for i in range(properties.get_nfilters())]
-    if data.external or properties.get_external_count():
-        refuse(place, "stored in another file", "data in this file", REWRITE)
-    if data.is_virtual:
-        refuse(place, "a virtual data set", "data in this file", REWRITE)
-    if not set(codes) <= set(FILTERS):
-        refuse(place, f"compressed by the filters {codes}", f"some of {FILTERS}", REWRITE)
 
 
 def _columns(demo: Any, where: str) -> tuple[list[Column], set[str], list[str]]:
@@ -231,12 +215,12 @@ def _columns(demo: Any, where: str) -> tuple[list[Column], set[str], list[str]]:
     columns: list[Column] = []
     skipped: list[str] = []
     for name in names:
-        data = _member(demo, name, where)
+        data = member(demo, name, where)
         plain = isinstance(data, h5py.Dataset) and data.ndim in (1, 2) and data.dtype.kind in "fiub"
         if not plain:
             skipped.append(name)
             continue
-        _check_storage(data, f"{where}: {name}")
+        check_storage(data, f"{where}: {name}")
         columns.append(Column(name, int(data.shape[1]) if data.ndim == 2 else None))
     if ACTIONS not in [column.name for column in columns]:
         refuse(f"{where}: {ACTIONS}", "missing", "the actions of the demonstration")
@@ -281,10 +265,10 @@ def _operators(file: Any, where: str, demos: set[str], notes: list[str]) -> dict
     result: dict[str, str] = {}
     unknown: set[str] = set()
     for name in sorted(masks):
-        data = _member(masks, name, f"{where}: {MASK}")
+        data = member(masks, name, f"{where}: {MASK}")
         if not isinstance(data, h5py.Dataset) or data.ndim != 1 or data.dtype.kind not in "SO":
             continue
-        _check_storage(data, f"{where}: {MASK}/{name}")
+        check_storage(data, f"{where}: {MASK}/{name}")
         members = {v.decode("utf-8", "replace") for v in data[...] if isinstance(v, bytes)}
         unknown |= members - demos
         if re.fullmatch(r".*operator[_ ]?\w*", name):

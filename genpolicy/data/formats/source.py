@@ -64,6 +64,15 @@ class RawEpisode:
     first_row: int = 0
 
 
+Also = Callable[[Column], bool]
+"""Whether a column is to be read although nothing depends on it."""
+
+
+def nothing(column: Column) -> bool:
+    """No column beside those wanted."""
+    return False
+
+
 class Source(Protocol):
     """Recordings of one layout, opened and described, not yet read."""
 
@@ -103,13 +112,14 @@ class Source(Protocol):
         ...
 
     def episodes(
-        self, wanted: Sequence[str], episode: str | None = None
+        self, wanted: Sequence[str], episode: str | None = None, also: Also = nothing
     ) -> Iterator[RawEpisode | Refusal]:
         """Each episode with the `wanted` columns, or why it could not be read, in order.
 
         Args:
-            wanted: Columns to read.
+            wanted: Columns to read; an episode that lacks one is refused.
             episode: Column of the episodes, for layouts that do not define it.
+            also: Says which other columns to read where they are there.
         """
         ...
 

@@ -22,13 +22,14 @@ from genpolicy.data.formats.contract import (
     ImportContract,
     Labels,
 )
-from genpolicy.data.formats.source import Column, RawEpisode
+from genpolicy.data.formats.source import Also, Column, RawEpisode, nothing
 from genpolicy.errors import BadInputError, ContractError, IntegrityError
 from genpolicy.integrity.documents import canonical_json, read_json
 from genpolicy.integrity.hashing import sha256_bytes, sha256_tree
 
 MAXIMUM_ARRAY_BYTES = 1 << 30
-NUMERIC_TYPES = ("<f4", "<f8", "<i4", "<i8")
+NUMERIC_TYPES = ("<f4", "<f8", "<i4", "<i8", "<i2", "<u2", "<u4", "|i1", "|u1", "|b1")
+TEXT = "<U"
 COMPRESSORS = ("blosc", "zstd", "zlib", "lz4")
 ACTION = "Fetch the buffer again, or leave this episode out."
 BOARD_PX = [-64.0, 576.0]
@@ -93,6 +94,11 @@ class ReplayBuffer:
                 skipped.append(folder.parent.name)
             else:
                 columns.append(column)
+        self._described = [
+            folder.parent.name
+            for folder in sorted((path / "meta").glob("*/.zarray"))
+            if folder.parent != ends and _is_single(folder.parent)
+        ]
         # Described before it is hashed, hashed before it is decoded.
         self.digest = sha256_bytes(canonical_json(sha256_tree(path)))
         self._ends = _array(ends)
@@ -110,9 +116,9 @@ class ReplayBuffer:
         return PUSHT if PUSHT_ARRAYS.items() <= widths.items() else None
 
     def episodes(
-        self, wanted: Sequence[str], episode: str | None = None
+        self, wanted: Sequence[str], episode: str | None = None, also: Also = nothing
     ) -> Iterator[RawEpisode | Refusal]:
-        """Each episode with the wanted arrays.
+        """Each episode with the wanted arrays, and others of one value a row or an episode.
 
         Raises:
             BadInputError: An array is missing, incomplete, or of another length than the ends.
@@ -123,14 +129,28 @@ class ReplayBuffer:
             if len(values) != rows:
                 place = f"{self.path}/meta/episode_ends"
                 _refuse(place, f"{rows} at its end", f"{len(values)}, the rows of {name}")
+        single = self._single(wanted, also)
+        arrays |= {name: values for name, values in single.items() if len(values) == rows}
+        by_episode = {n: v for n, v in single.items() if len(v) == len(self._ends) != rows}
         for number, end in enumerate(self._ends.tolist()):
             start = int(self._ends[number - 1]) if number else 0
             yield RawEpisode(
                 label=f"{self.name}#episode_{number:06d}",
                 digest=self.digest,
                 columns={name: values[start:end] for name, values in arrays.items()},
+                attributes={name: str(values[number]) for name, values in by_episode.items()},
                 first_row=start,
             )
+
+    def _single(self, wanted: Sequence[str], also: Also) -> dict[str, NDArray[Any]]:
+        """Arrays of one axis beside those wanted, of the rows or of the episodes."""
+        places = {c.name: self.path / "data" / c.name for c in self.columns if c.width is None}
+        places |= {name: self.path / "meta" / name for name in self._described}
+        return {
+            name: _array(place)
+            for name, place in sorted(places.items())
+            if name not in wanted and also(Column(name, None))
+        }
 
 
 def open_source(path: Path) -> ReplayBuffer:
@@ -144,7 +164,15 @@ def _column(folder: Path) -> Column | None:
     if not (isinstance(head["shape"], list) and len(head["shape"]) <= 2):
         return None
     _check_head(head, str(folder))
-    return Column(folder.name, int(head["shape"][1]) if len(head["shape"]) == 2 else None)
+    width = int(head["shape"][1]) if len(head["shape"]) == 2 else None
+    if str(head["dtype"]).startswith(TEXT):
+        return Column(folder.name, width, "text")
+    return Column(folder.name, width)
+
+
+def _is_single(folder: Path) -> bool:
+    column = _column(folder)
+    return column is not None and column.width is None
 
 
 def _head(folder: Path) -> dict[str, Any]:
@@ -160,8 +188,10 @@ def _check_head(head: dict[str, Any], place: str) -> None:
     try:
         kind, shape, compressor = head["dtype"], list(head["shape"]), head["compressor"]
         size = math.prod(int(n) for n in shape) * int(str(kind)[2:])
+        text = str(kind).startswith(TEXT) and len(shape) == 1
         codec = None if compressor is None else compressor["id"]
-        plain = kind in NUMERIC_TYPES and not head["filters"] and head["zarr_format"] == 2
+        known = kind in NUMERIC_TYPES or text
+        plain = known and not head["filters"] and head["zarr_format"] == 2
     except (KeyError, TypeError, ValueError) as error:
         raise ContractError(
             where=f"{place}/.zarray",
