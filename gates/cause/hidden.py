@@ -15,6 +15,7 @@ CONCRETE = (
     "time_in_episode", HISTORY,
 )  # fmt: skip
 LEAST_CONCRETE = 3
+START = "start_position."
 # Time and the past show whatever else was recorded: they must explain more to be named.
 EVERYTHING = ("time_in_episode", HISTORY)
 SHOWN = 8
@@ -104,6 +105,9 @@ def _foremost(found: list[Stratum], limits: CauseLimits) -> Stratum:
     def rank(row: Stratum) -> tuple[int, float, str]:
         name = row.variable
         place = CONCRETE.index(name) if name in CONCRETE else len(CONCRETE) - LEAST_CONCRETE
+        # What was recorded of an episode is as concrete as who demonstrated it.
+        column = name not in CONCRETE and not row.observed and not name.startswith(START)
+        place = CONCRETE.index("operator") if column else place
         return place, -(row.effect or 0.0), name
 
     return min(near, key=rank)

@@ -5,6 +5,7 @@ the limit is a hidden state, what is surely below is none, and what lies astride
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from gates.cause.answers import Answer, CauseName, Diagnosis, Layer
 from gates.cause.limits import CauseLimits
@@ -20,6 +21,9 @@ CONCRETE = (
     "every_other_episode", "episode_order", "recording_sequence", "everything_together", "history",
 )  # fmt: skip
 EVERYTHING = 2
+OTHER_PHASE = "mode_of_"
+# The best of all recorded columns, which are one question; by itself a column is not left open.
+COLUMNS = "recorded_columns"
 SHOWN = 8
 
 
@@ -49,11 +53,30 @@ def told(rows: Sequence[Prediction], limits: CauseLimits) -> list[Answer]:
 def teller(rows: Sequence[Prediction], limits: CauseLimits) -> Diagnosis | None:
     """The variable that surely tells too much, else the one of which that is not decided."""
     limit = limits[QUESTION]
-    beyond = [row for row in rows if surely(row, limit)]
+    beyond = [_by_name(row, rows) for row in rows if surely(row, limit)]
     if beyond:
         return _hidden(_foremost(beyond, limits["nearly_equal_effect"]))
-    open_ = [row for row in rows if surely(row, limit) is None]
+    together = {row.phase for row in rows if row.variable == COLUMNS}
+    open_ = [
+        row
+        for row in rows
+        if surely(row, limit) is None and not (is_column(row.variable) and row.phase in together)
+    ]
     return _undecided(max(open_, key=lambda row: row.told_upper), limit) if open_ else None
+
+
+def is_column(variable: str) -> bool:
+    """Whether it is a recorded column, which the audit knows by no name of its own."""
+    known = variable in (*CONCRETE, COLUMNS)
+    return not known and not variable.startswith(OTHER_PHASE)
+
+
+def _by_name(row: Prediction, rows: Sequence[Prediction]) -> Prediction:
+    """The column that was the best of all, with what the choice of it left to tell."""
+    if row.variable != COLUMNS:
+        return row
+    named = [r for r in rows if (r.variable, r.phase) == (row.detail, row.phase)]
+    return replace(row, variable=row.detail) if named else row
 
 
 def _judged(row: Prediction, limit: float) -> float:
@@ -72,6 +95,7 @@ def _foremost(rows: Sequence[Prediction], nearly: float) -> Prediction:
     def rank(row: Prediction) -> tuple[int, float, str]:
         known = row.variable in CONCRETE
         place = CONCRETE.index(row.variable) if known else len(CONCRETE) - EVERYTHING
+        place = CONCRETE.index("operator") if is_column(row.variable) else place
         return place, -row.told, row.variable
 
     return min((row for row in rows if row.told >= best - nearly), key=rank)

@@ -15,6 +15,8 @@ from genpolicy.audit.rows import Asked, Prediction
 from genpolicy.audit.semantics import Semantics
 from genpolicy.audit.settings import AuditSettings
 
+COLUMN = "column."
+
 
 @dataclass(frozen=True)
 class Given:
@@ -71,6 +73,8 @@ def questions(
     for name in EPISODE_VARIABLES:
         values = getattr(data.episodes, name)
         found[name] = "" if recorded(values) else "not recorded, so it may decide modes unseen"
+    found |= {f"{COLUMN}{item.name}": "" for item in data.variables}
+    found |= {f"{COLUMN}{name}": reason for name, reason in data.left_out}
     ordered = bool(np.all(np.isfinite(data.episodes.order)))
     found["order"] = "" if ordered else "not recorded: habits and drifts cannot be seen"
     past = {row.phase for row in told if row.variable == HISTORY}

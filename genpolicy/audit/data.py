@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.audit.forms import Forms, before, in_place
+from genpolicy.audit.variable import Variable
 from genpolicy.errors import ContractError, NonFiniteError
 
 Array = NDArray[np.float64]
@@ -80,6 +81,9 @@ class AuditInput:
             build), there is no lag, and a chunk is taken relative to its own first action.
         phase_observed: Whether a policy sees the phase.
         forms: What the numbers of the action mean; None where all are plain places.
+        variables: Other recorded columns that may be why demonstrations differ.
+        left_out: Recorded columns that cannot be, with the reason.
+        phase_name: What the recordings call the phase.
     """
 
     observation: Array
@@ -105,6 +109,9 @@ class AuditInput:
     paired: bool = True
     phase_observed: bool = True
     forms: Forms | None = None
+    variables: tuple[Variable, ...] = ()
+    left_out: tuple[tuple[str, str], ...] = ()
+    phase_name: str = "phase"
 
     def __post_init__(self) -> None:
         n = len(self.observation)
@@ -184,6 +191,7 @@ def canonical(data: AuditInput) -> AuditInput:
         event_time_s=data.event_time_s[rows],
         delay_s={name: values[rows] for name, values in sorted(data.delay_s.items())},
         stream_time_s={name: item[rows] for name, item in sorted(data.stream_time_s.items())},
+        variables=tuple(item.reordered(rows, order) for item in data.variables),
         episodes=Episodes(
             **{name: getattr(table, name)[order] for name in Episodes.__dataclass_fields__}
         ),

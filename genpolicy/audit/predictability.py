@@ -6,12 +6,14 @@ episodes that were left out when it was learned, as the share of wrong guesses t
 0 is a guess, 1 is certainty. Of two even modes, 0.4 is 7 right of 10.
 """
 
+from collections import Counter
 from dataclasses import replace
 
 import numpy as np
 from scipy import stats
 
 from genpolicy.audit.choices import Choices, choices
+from genpolicy.audit.columns import COLUMNS, column_guesses
 from genpolicy.audit.data import Array, AuditInput, Integers, Text, recorded
 from genpolicy.audit.guesses import Guess, by_all, by_best_column, by_nearest, by_value, right
 from genpolicy.audit.history import past_features, present_features, shortest_gap
@@ -65,6 +67,7 @@ def predictions(
         none, and too few episodes leave an interval from below chance to certainty.
     """
     rows: list[Prediction] = []
+    keys = {item.name: item.key for item in data.variables}
     for phase, items in sorted(situations.items()):
         chosen = choices(data, items, links[phase])
         codes = _codes(data, chosen, links, phase)
@@ -79,12 +82,17 @@ def predictions(
             guesses[ORDER] = by_best_column(np.stack([place, middle], axis=1))
             guesses[SEQUENCE] = by_nearest(place, NEXT_TO)
             columns.append(place[:, None])
+        more, numbers, times = column_guesses(data, chosen, _rows_of(items))
+        guesses |= more
+        columns += numbers
         if len(guesses) > 1:
             guesses[TOGETHER] = by_all(np.concatenate(columns, axis=1))
         for name, guess in guesses.items():
-            rng = stream(root_seed, "audit", "predictability", phase, name)
-            hits = _hits(chosen, guess, rng, repeats=1 if name == TOGETHER else REPEATS)
-            rows.append(_row(name, phase, chosen, hits))
+            once = name in (TOGETHER, COLUMNS)
+            rng = stream(root_seed, "audit", "predictability", phase, keys.get(name, name))
+            hits = _hits(chosen, guess, rng, repeats=1 if once else REPEATS)
+            row = _row(name, phase, chosen, hits, of=len(more) if name in keys else 1)
+            rows.append(replace(row, detail=_best(times)) if name == COLUMNS else row)
         past = _past(data, settings, items, chosen, (phase, root_seed))
         rows += [past] if past is not None else []
     return tuple(rows)
@@ -211,10 +219,22 @@ def _seen(
     return past, present
 
 
-def _row(variable: str, phase: str, chosen: Choices, hits: Array) -> Prediction:
+def _rows_of(items: Items) -> Integers:
+    """Every row of the situations, each once."""
+    members = [situation.members for situation, _ in items]
+    return np.unique(np.concatenate(members)) if members else np.zeros(0, dtype=np.int64)
+
+
+def _best(times: Counter[str]) -> str:
+    """The column that was most often the best one."""
+    return min(times, key=lambda name: (-times[name], name)) if times else ""
+
+
+def _row(variable: str, phase: str, chosen: Choices, hits: Array, *, of: int = 1) -> Prediction:
     """Share of right guesses with an interval for weighted shares. Source: Korn, Graubard 1998.
 
-    Whoever is misled by a variable would not use it: no share is less than that of a guess.
+    Whoever is misled by a variable would not use it: no share is less than that of a guess. Of
+    several variables of one kind (`of`) all intervals hold at once (Bonferroni).
     """
     weight, chance = chosen.weight, chosen.chance
     n = len(weight)
@@ -223,7 +243,7 @@ def _row(variable: str, phase: str, chosen: Choices, hits: Array) -> Prediction:
         return Prediction(variable, phase, 0.0, low, 1.0, chance, chance, n, "too few episodes")
     share = max(float(weight @ hits / weight.sum()), chance)
     effective = float(weight.sum() ** 2 / np.sum(weight**2))
-    k, tail = share * effective, (1.0 - CONFIDENCE) / 2.0
+    k, tail = share * effective, (1.0 - CONFIDENCE) / 2.0 / of
     low = float(stats.beta.ppf(tail, k, effective - k + 1.0)) if k > 0.0 else 0.0
     high = float(stats.beta.isf(tail, k + 1.0, effective - k)) if k < effective else 1.0
     told, lower, upper = ((x - chance) / (1.0 - chance) for x in (share, low, high))

@@ -3,6 +3,7 @@
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from genpolicy.audit.asked import COLUMN
 from genpolicy.audit.component_rows import NOT_LOOKED_AT, OTHER
 from genpolicy.audit.labels import Replay, disagreement
 from genpolicy.audit.mean_versus_modes import Admissible
@@ -163,14 +164,31 @@ def _evidence(result: AuditResult, settings: AuditSettings) -> list[str]:
     return lines
 
 
+def _reasons(result: AuditResult) -> list[str]:
+    """Which recorded columns were held against the modes, and which not and why."""
+    looked = sorted(
+        f"{item.name} ({', '.join(item.also)} says the same)" if item.also else item.name
+        for item in result.data.variables
+    )
+    lines = [f"Looked at as reasons: {', '.join(looked)}."] if looked else []
+    why: dict[str, list[str]] = {}
+    for name, reason in result.data.left_out:
+        why.setdefault(reason, []).append(name)
+    return lines + [
+        f"Not looked at as a reason: {', '.join(names)} ({reason})."
+        for reason, names in why.items()
+    ]
+
+
 def _rests_on(dataset: Dataset, result: AuditResult) -> list[str]:
     """Everything that was guessed, not recorded or not asked."""
     lines = [str(note) for note in dataset.manifest.get("notes", ())]
     lines += result.semantics.notes
+    lines += _reasons(result)
     lines += [
         f"Not asked: {row.check.replace('_', ' ')} ({row.reason})."
         for row in result.asked
-        if not row.asked
+        if not row.asked and not row.check.startswith(COLUMN)
     ]
     if not any(result.data.episodes.outcome):
         lines.append("outcome: not recorded, so no mode can be called valid.")

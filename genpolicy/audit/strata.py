@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from genpolicy.audit.columns import Asking, column_strata
 from genpolicy.audit.data import Array, AuditInput, Integers, Text, recorded
 from genpolicy.audit.history import history_test
 from genpolicy.audit.modes import Clustering
@@ -75,6 +76,7 @@ def examine_strata(
         for variable, values, observed, place in tested:
             seeds = (root_seed, phase, variable)
             rows.append(_tested(settings, seeds, values, place, observed=observed))
+        rows += column_strata(data, settings, hidden, Asking(phase, root_seed))
         rows.append(_history(data, settings, phase, past, root_seed))
     return _adjusted(rows)
 
@@ -82,7 +84,8 @@ def examine_strata(
 def _enough_permutations(data: AuditInput, settings: AuditSettings, phases: int) -> AuditSettings:
     """So many permutations that the smallest p-value survives the correction for all tests."""
     context = sum(part.stop - part.start for part in data.context.values())
-    tests = phases * (len(EPISODE_VARIABLES) + 5 + data.position.shape[1] + context)
+    tests = len(EPISODE_VARIABLES) + 5 + data.position.shape[1] + context + len(data.variables)
+    tests *= phases
     least = int(np.ceil(2 * tests / settings.strata_resolution))
     if settings.permutations >= least:
         return settings
@@ -187,7 +190,7 @@ def _hidden_variables(data: AuditInput, rows: Integers, links: Integers) -> list
     result: list[Variable] = []
     if not data.phase_observed:
         known = len(np.unique(data.phase)) > 1
-        result.append(("phase", data.phase[rows] if known else None, False))
+        result.append((data.phase_name, data.phase[rows] if known else None, False))
     for name in EPISODE_VARIABLES:
         values: Text = getattr(table, name)
         result.append((name, values[episode] if recorded(values) else None, False))

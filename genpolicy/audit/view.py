@@ -1,9 +1,11 @@
 """The audit's view of an ingested dataset: which columns pair, how far apart is far."""
 
+from dataclasses import replace
 from typing import Any, NoReturn
 
 import numpy as np
 
+from genpolicy.audit.candidates import candidates
 from genpolicy.audit.data import (
     NOT_RECORDED,
     Array,
@@ -53,7 +55,7 @@ def from_dataset(
             strict=True,
         )
     )
-    return canonical(
+    data = canonical(
         AuditInput(
             observation=frames.observation,
             action=frames.action,
@@ -87,6 +89,13 @@ def from_dataset(
             phase_observed=settings.phase_observed,
             forms=forms_of(settings, components, partners),
         )
+    )
+    found = candidates(table, dataset.manifest, data)
+    return replace(
+        data,
+        variables=found.variables,
+        left_out=found.left_out,
+        phase_name=found.phase_name,
     )
 
 

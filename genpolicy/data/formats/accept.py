@@ -141,7 +141,10 @@ def _check_ranges(observation: Array, action: Array, contract: ImportContract, l
 def _ticks(raw: RawEpisode, contract: ImportContract, length: int) -> Times:
     """When each row was recorded, ns, strictly increasing and without a gap."""
     period_ns = contract.period_s * 1e9
-    begin = round(raw.first_row * period_ns) + 1
+    # The place in the recordings is a time only where the contract says so: else the same
+    # episodes in another order would train and test in another way.
+    placed = contract.labels.time is None and contract.time_origin == "recording"
+    begin = round(raw.first_row * period_ns) + 1 if placed else 1
     name = contract.labels.time
     if name is None:
         return begin + np.round(np.arange(length) * period_ns).astype(np.int64)

@@ -16,10 +16,9 @@ from genpolicy.data.variables import completed
 from genpolicy.errors import BadInputError, ConfigError
 
 SOURCE_KINDS = {"zarr": "zarr_replay_buffer"}
-CLOCK_ROWS = (
-    "no clock was recorded: event and receive time are row / rate, recording time is the order "
-    "of the episodes in the recordings"
-)
+CLOCK_ROWS = "no clock was recorded: event and receive time are row / rate; "
+PLACED = "recording time is the place of the episodes in the recordings, as the contract says"
+UNPLACED = "which episode was recorded before which is not known, and splits go by their samples"
 CLOCK_COLUMN = (
     "event and receive time are both the recorded time of the row; when each sensor was exposed "
     "was not recorded"
@@ -68,7 +67,7 @@ def import_source(
         phases=tuple(phases) or (PHASE_ALL,),
         action_period_s=contract.period_s,
         split=split,
-        clock_note=CLOCK_ROWS if contract.labels.time is None else CLOCK_COLUMN,
+        clock_note=_clock_note(contract),
         notes=notes,
         import_contract=contract.model_dump(mode="json"),
     )
@@ -80,11 +79,17 @@ def import_source(
     return Opened(out, contract, found, len(accepted), tuple(refused), notes)
 
 
+def _clock_note(contract: ImportContract) -> str:
+    if contract.labels.time is not None:
+        return CLOCK_COLUMN
+    return CLOCK_ROWS + (PLACED if contract.time_origin == "recording" else UNPLACED)
+
+
 def _outcomes(
     source: Source, contract: ImportContract, seen: dict[str, str], reasons: Reasons
 ) -> Iterator[AcceptedEpisode | Refusal]:
     wanted, episode_column = wanted_columns(contract), contract.labels.episode
-    for raw in source.episodes(wanted, episode_column, reasons.wants):
+    for raw in source.episodes(wanted, episode_column, also=reasons.wants):
         if isinstance(raw, Refusal):
             yield raw
             continue

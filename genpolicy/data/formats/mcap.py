@@ -4,6 +4,7 @@ Reading, checking and resampling are `genpolicy.data.ingest`'s; here is only whi
 """
 
 from collections.abc import Sequence
+from hashlib import sha256
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any, NoReturn
@@ -42,6 +43,7 @@ from genpolicy.robot.limits import LIMITS
 from genpolicy.tasks.api import ENTRY_POINT_GROUP, Task, load_task
 
 LOOKED_AT = 5
+HEAD_BYTES = 1 << 16
 MAXIMUM_AGE_S = 0.3
 FROZEN = {"seconds": 0.5, "motion": 0.01}
 # Metadata that every recording carries; see genpolicy.data.recording.episode.REQUIRED_METADATA.
@@ -167,7 +169,7 @@ def _check_whole(contract: ImportContract) -> None:
 def _readable(files: Sequence[Path]) -> list[RecordedEpisode]:
     episodes: list[RecordedEpisode] = []
     first: BadInputError | None = None
-    for path in files:
+    for path in sorted(files, key=_head):
         try:
             episodes.append(read_episode(path))
         except BadInputError as error:
@@ -180,6 +182,15 @@ def _readable(files: Sequence[Path]) -> list[RecordedEpisode]:
     if first is not None and not episodes:
         raise first
     _refuse(str(files[0]), "without an action stream and a sensor", "a recorded demonstration")
+
+
+def _head(path: Path) -> tuple[str, str]:
+    """What orders recordings whatever they are called: the bytes that they begin with."""
+    try:
+        with path.open("rb") as stream:
+            return sha256(stream.read(HEAD_BYTES)).hexdigest(), path.name
+    except OSError:
+        return "", path.name
 
 
 def _fits(observation: ObservationContract, episode: RecordedEpisode) -> bool:

@@ -1,7 +1,12 @@
 """Plain Parquet: a long table with a column of episodes, or one file per episode, or a folder."""
 
+from collections import Counter
 from collections.abc import Generator, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
 
 from genpolicy.data.assemble import Refusal
 from genpolicy.data.formats.columns import labels_of
@@ -61,12 +66,22 @@ class ParquetFiles:
                 yield refusal_of(label, error)
 
     def _first(self) -> Table:
+        """The file that describes all, whatever the files are called.
+
+        One of the commonest kind, of equally common ones that with fewer columns. What only few
+        files have cannot be observed or commanded in all.
+        """
+        names = {path: _names(path) for path in self._files}
+        kinds = Counter(names.values())
+        having = Counter(name for found in names.values() for name in found)
+        rank = {kind: (not kind, -kinds[kind], len(kind), kind) for kind in kinds}
         first: BadInputError | None = None
-        for path in self._files:
+        for path in sorted(self._files, key=lambda path: rank[names[path]]):
             try:
                 label = path.relative_to(self._root).as_posix()
                 with open_table(path, label=label, hashed=False) as table:
-                    return table
+                    many = {n: c for n, c in table.columns.items() if 2 * having[n] > len(names)}
+                    return replace(table, columns=many or table.columns)
             except BadInputError as error:
                 first = first or error
         raise first or AssertionError("no file was tried")
@@ -105,6 +120,14 @@ class ParquetFiles:
                 first_row=done + segment.start,
             )
         return table.rows
+
+
+def _names(path: Path) -> tuple[str, ...]:
+    """Names of the columns; none where it is no readable table."""
+    try:
+        return tuple(pq.read_schema(path).names)
+    except (pa.ArrowException, OSError, ValueError):
+        return ()
 
 
 def open_source(path: Path) -> ParquetFiles:

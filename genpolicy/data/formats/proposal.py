@@ -1,7 +1,7 @@
 """A contract proposed from the recordings: names as given, units and pairs guessed and marked."""
 
 from collections.abc import Sequence
-from itertools import islice, pairwise
+from itertools import islice
 from pathlib import PurePath
 
 import numpy as np
@@ -20,13 +20,13 @@ from genpolicy.data.formats.contract import (
     contract_of,
 )
 from genpolicy.data.formats.sample import Sample, action_of, channels_of
-from genpolicy.data.formats.source import Column, RawEpisode, Source, as_float
+from genpolicy.data.formats.sampling import sample_episodes
+from genpolicy.data.formats.source import Column, Source, as_float
 from genpolicy.data.formats.units import BULK, tokens
 from genpolicy.errors import BadInputError, ContractError
 
 Array = NDArray[np.float64]
 
-SAMPLE_EPISODES = 12
 SAMPLE_LOOKED_AT = 40
 DEFAULT_RATE_HZ = 10.0
 SHORTEST_DEMONSTRATION_S = 0.5
@@ -67,7 +67,7 @@ def propose_contract(source: Source, kind: Format, *, task: str | None = None) -
         forms_guessed=True,
         labels=labels,
         time_unit=unit,  # type: ignore[arg-type]  # one of TIME_UNITS or s
-        time_origin="recording" if _is_one_clock(sample, labels) else "episode",
+        time_origin="recording" if sample.one_clock else "episode",
         minimum_rows=int(
             np.clip(np.ceil(SHORTEST_DEMONSTRATION_S * rate_hz), FEWEST_ROWS, MOST_ROWS)
         ),
@@ -117,32 +117,17 @@ def _is_action(name: str, words: tuple[str, ...]) -> bool:
 
 
 def _sample(source: Source, columns: Sequence[str], labels: Labels) -> Sample:
-    wanted = list(dict.fromkeys([*columns, *labels.named().values()]))
-    episodes: list[RawEpisode] = []
-    reason = "it holds no episode"
-    for item in islice(source.episodes(wanted, labels.episode), SAMPLE_LOOKED_AT):
-        if isinstance(item, Refusal):
-            reason = item.reason
-            continue
-        if len(item.columns[columns[0]]):
-            episodes.append(item)
-        if len(episodes) == SAMPLE_EPISODES:
-            break
-    # What the import will refuse must not decide what is proposed.
-    episodes = [e for e in episodes if _is_finite(e, columns)] or episodes
-    if not episodes:
+    found = sample_episodes(source, columns, labels)
+    if not found.episodes:
         raise BadInputError(
             where=source.name,
-            found=f"without a readable episode (first: {reason})",
+            found=f"without a readable episode (first: {found.reason})",
             expected="at least one",
             action="Correct the recordings.",
         )
-    lengths = [len(episode.columns[columns[0]]) for episode in episodes]
-    return Sample(episodes, np.repeat(np.arange(len(lengths)), lengths))
-
-
-def _is_finite(episode: RawEpisode, columns: Sequence[str]) -> bool:
-    return all(bool(np.isfinite(as_float(episode.columns[name])).all()) for name in columns)
+    lengths = [len(episode.columns[columns[0]]) for episode in found.episodes]
+    number = np.repeat(np.arange(len(lengths)), lengths)
+    return Sample(found.episodes, number, one_clock=found.one_clock)
 
 
 def _rate(
@@ -176,14 +161,6 @@ def _time_unit(name: str, times: Array, steps: Array) -> str:
         return "s"
     # A row every 20 s and more would be no control: the clock counts smaller units.
     return "ns" if np.median(steps) >= 1e5 else "ms"
-
-
-def _is_one_clock(sample: Sample, labels: Labels) -> bool:
-    """Whether each episode begins after the one before has ended: one clock for all."""
-    if labels.time is None or len(sample.episodes) < 2:
-        return False
-    times = [as_float(episode.columns[labels.time]) for episode in sample.episodes]
-    return all(after[0] > before[-1] for before, after in pairwise(times))
 
 
 def _rows_numbered(source: Source, labels: Labels, notes: list[str]) -> Labels:

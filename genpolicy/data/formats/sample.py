@@ -24,10 +24,12 @@ class Sample:
     Attributes:
         episodes: The episodes.
         number: Which of them each row belongs to. Shape (n,).
+        one_clock: Whether one clock ran on through all episodes of the recordings.
     """
 
     episodes: list[RawEpisode]
     number: Integers
+    one_clock: bool = False
 
     def values(self, column: str) -> NDArray[np.generic]:
         """All rows of a column."""

@@ -36,7 +36,7 @@ class Recordings:
     def count(self):
         return len(self.handed)
 
-    def episodes(self, wanted, episode=None):
+    def episodes(self, wanted, episode=None, also=None):
         self.reads.append(tuple(wanted))
         yield from self.handed
 
