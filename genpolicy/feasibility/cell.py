@@ -158,20 +158,20 @@ class Cell:
         return {phase: own.get(phase, default) for phase in sorted(self.contact_phases)}
 
     def require_within(self, stop_n: Mapping[str, float]) -> None:
-        """Refuse an envelope that allows what the supervisor stops at.
+        """Refuse an envelope that allows more than the supervisor does.
 
         Args:
-            stop_n: Contact force at which the supervisor stops, by phase, N.
+            stop_n: Contact force beyond which the supervisor stops, by phase, N.
 
         Raises:
-            ConfigError: A contact phase allows as much, or has no such force.
+            ConfigError: A contact phase allows more, or the supervisor knows no such phase.
         """
         for phase, most_n in self.force_envelope_n.items():
-            if not most_n < stop_n.get(phase, 0.0):
+            if not most_n <= stop_n.get(phase, 0.0):
                 raise ConfigError(
                     where=f"feasibility: force envelope of phase {phase}",
                     found=f"{most_n:g} N",
-                    expected=f"less than {stop_n.get(phase, 0.0):g} N, where the supervisor stops",
+                    expected=f"at most {stop_n.get(phase, 0.0):g} N, where the supervisor stops",
                     action="Lower contact_force_limit_n, or name the phase by itself.",
                 )
 

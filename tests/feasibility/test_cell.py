@@ -72,3 +72,16 @@ def test_the_state_of_another_arm_is_refused(checker, kit):
     assert six.q_cmd_history.shape == (0, 6)
     with pytest.raises(ContractError, match="of 6 joints, expected 7"):
         kit.judge(checker, kit.line(kit.START, kit.SIDE), six)
+
+
+def test_the_force_envelope_is_of_contact_phases_and_below_what_the_supervisor_stops_at(cell):
+    settings = FeasibilitySettings(contact_force_by_phase_n={"insert": 55.0})
+    other = replace(cell, settings=settings)
+    assert other.force_envelope_n == {"insert": 55.0, "release": 40.0}
+    other.require_within({"insert": 55.0, "release": 40.0, "approach": 1.0})
+    with pytest.raises(ConfigError, match=r"phase insert is 55 N, expected at most 54.9 N"):
+        other.require_within({"insert": 54.9, "release": 80.0})
+    with pytest.raises(ConfigError, match=r"phase release is 40 N, expected at most 0 N"):
+        other.require_within({"insert": 80.0})
+    with pytest.raises(ConfigError, match=r"naming \['approach'\], expected contact phases"):
+        replace(cell, settings=FeasibilitySettings(contact_force_by_phase_n={"approach": 5.0}))

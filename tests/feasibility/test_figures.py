@@ -24,6 +24,8 @@ def test_every_figure_is_that_of_the_cell(cell):
     assert found.tcp_turn_rad_s == cell.settings.tcp_turn_limit_rad_s
     assert found.held_opening_m == cell.settings.held_opening_m
     assert found.contact_phases == cell.contact_phases
+    assert found.contact_force_n == {"insert": 40.0, "release": 40.0}
+    assert found.contact_stiffness_n_m == 2500.0
 
 
 def test_a_stricter_cell_gives_stricter_figures(cell):

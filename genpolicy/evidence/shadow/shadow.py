@@ -97,6 +97,7 @@ class Shadow:
 
     def __post_init__(self) -> None:
         self.cell.require_task(self.task.phases)
+        self.checker.cell.require_within(self.cell.execution.force_limit_n)
 
 
 def shadow_policy(

@@ -58,6 +58,9 @@ class Fixture:
     checkpoint: str
     sampler: str
 
+    def __post_init__(self) -> None:
+        self.checker.cell.require_within(self.execution.force_limit_n)
+
     def journal(self, start: int, start_sha256: str) -> Journal:
         """The empty journal of one rollout."""
         labels = {

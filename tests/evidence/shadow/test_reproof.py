@@ -28,6 +28,8 @@ RULES = {
     "joint_jerk": "P6.joint_jerk",
     "joint_torque": "P6.torque",
     "payload_torque": "P6.payload",
+    "contact_surface": "P6.surface",
+    "contact_force": "P6.force",
     "measured_velocity": "P6.measured_speed",
     "measured_acceleration": "P6.measured_acceleration",
     "state_age": "P6.state_age",
@@ -150,6 +152,8 @@ def test_what_is_held_may_touch_the_target_in_contact_phases_only(shadow, items)
     move(messages, shadow.checker.collision.shapes.target_body, 0.012)  # a wall in what is held
     assert not rules(messages, shadow)
     assert "P6.collision" in rules(messages, shadow, contact_phases=frozenset())
+    assert rules(messages, shadow, contact_force_n={"insert": 5.0}) == {"P6.force"}
+    assert rules(messages, shadow, contact_force_n={}) == {"P6.force"}
 
 
 def test_a_scene_that_nobody_saw_is_found(clean, shadow):

@@ -14,7 +14,8 @@ from genpolicy.robot.dynamics import ArmDynamics
 
 RATES = ("joint_velocity", "joint_acceleration", "joint_jerk", "tcp_speed")
 STATE = (
-    "joint_torque", "payload_torque", "measured_velocity", "measured_acceleration", "state_age", "controller_mode",
+    "joint_torque", "payload_torque", "measured_velocity", "measured_acceleration", "state_age",
+    "controller_mode",
 )  # fmt: skip
 
 
