@@ -180,8 +180,7 @@ def fast_in_contact(case: Case, checker: FeasibilityChecker) -> Case | None:
 def pressed_in(case: Case, checker: FeasibilityChecker) -> Case | None:
     """The arm stands where what is held is pressed into the target, and stays there."""
     cell, context = checker.cell, case.context
-    held = context.last_action[GRIPPER] <= checker.settings.held_opening_m
-    if not held or context.phase not in cell.contact_phases:
+    if not holding_in_contact(case, checker) or not cell.collision.shapes.target_body:
         return None
     target = context.scene.target_position_m(cell.collision.shapes)
     reach_m = cell.collision.shapes.held_reach_m
@@ -197,6 +196,13 @@ def pressed_in(case: Case, checker: FeasibilityChecker) -> Case | None:
             if reached[0]:
                 cases.append(still(case, checker, q_rad[0]))
     return alone(checker, cases, "contact_force")
+
+
+def holding_in_contact(case: Case, checker: FeasibilityChecker) -> bool:
+    """The task's hand holds something, which may touch its target in the case's phase."""
+    closed = case.context.last_action[GRIPPER] <= checker.settings.held_opening_m
+    something = checker.collision.shapes.held_reach_m > 0
+    return bool(closed and something and case.context.phase in checker.cell.contact_phases)
 
 
 def _going(

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from genpolicy.contract.action import GRIPPER, POSITION, ROTATION
 from genpolicy.evidence.shadow import at_the_boundary as boundary
 from genpolicy.evidence.shadow import at_the_margin as margin
-from genpolicy.evidence.shadow.case import Case, still
+from genpolicy.evidence.shadow.case import Case, alone, still
 from genpolicy.feasibility.admission import FeasibilityChecker
 from genpolicy.feasibility.cell import Cell
 from genpolicy.robot.scene_state import SceneState
@@ -216,15 +216,15 @@ def _obstructed(case: Case, checker: FeasibilityChecker, middle: Array) -> Case 
 def on_another_surface(case: Case, checker: FeasibilityChecker) -> Case | None:
     """In a contact phase, what is held stands in the obstacle's top instead of in the target."""
     name = next((body for body in case.obstacles if body in case.poses), None)
-    held = case.context.last_action[GRIPPER] <= checker.settings.held_opening_m
-    if name is None or not held or case.context.phase not in checker.cell.contact_phases:
+    if name is None or not margin.holding_in_contact(case, checker):
         return None
     here = still(case, checker, case.context.q_cmd)
     place, (position, quaternion) = here.context.last_action[POSITION], case.poses[name]
     tip_m = place[2] - checker.collision.shapes.held_reach_m
     height_m = position[2] + tip_m + STANDING_M - _top_m(name, position, checker)
     at = np.array([place[0], place[1], height_m])
-    return here.with_context(scene=SceneState({**case.poses, name: (at, quaternion)}))
+    there = here.with_context(scene=SceneState({**case.poses, name: (at, quaternion)}))
+    return alone(checker, [there], "contact_surface")
 
 
 def _top_m(body: str, position: Array, checker: FeasibilityChecker) -> float:
