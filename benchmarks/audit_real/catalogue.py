@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
-from benchmarks.audit_real.bases import arms, planar
+from benchmarks.audit_real.bases import arms, planar, published, real
 from benchmarks.audit_real.changes.change import Change, Place
 from benchmarks.audit_real.changes.columns import COLUMN_CHANGES, DECIDED
 from benchmarks.audit_real.changes.defects import DEFECTS
@@ -23,6 +23,11 @@ BASES: dict[str, Callable[[Plan], Recording]] = {
     "arm_two": arms.arm_two,
     "planner": arms.planner,
     "humanoid": arms.humanoid,
+    "aloha": published.aloha,
+    "blocks": published.blocks,
+    "kitchen": published.kitchen,
+    "pusht": real.pusht,
+    "g1": real.g1,
 }
 CHANGES: dict[str, Change] = {
     change.name: change for change in (*FORMS, *DECIDED, *COLUMN_CHANGES, *TIMES, *DEFECTS)
@@ -42,6 +47,8 @@ CROSSINGS = (
     ("only one name shared", "hand decides"), ("leader of another build", "a sign flipped"),
     ("outcomes absent", "names absent"), ("columns in another order", "lag in half"),
     ("waits at first", "what decides is observed"), ("delta", "what decides is observed"),
+    ("as robomimic", "delta"), ("as Parquet files", "task decides"), ("as LeRobot v3", "velocity"),
+    ("as one Parquet table", "two columns swapped"), ("as LeRobot v2.1", "zq7 decides"),
 )  # fmt: skip
 
 
@@ -73,9 +80,9 @@ class Case:
         )
 
 
-def made(case: Case) -> Recording:
-    """The recording of a case, with its truth."""
-    plan = Plan(case.seed)
+def made(case: Case, *, episodes: int | None = None) -> Recording:
+    """The recording of a case, with its truth; a small one has the same truth."""
+    plan = Plan(case.seed, episodes=episodes)
     ordered = sorted(case.changes, key=lambda item: CHANGES[item[0]].stage)
     for name, strength in ordered:
         plan = CHANGES[name].plan(plan, strength)

@@ -76,6 +76,7 @@ class Recording:
         form: How the action is written: absolute, delta, velocity, normalised.
         truth: What is true of it.
         scale: How far the ways lie apart, in units of the command; never written.
+        real: Recorded by others: what is true of the whole is a specialist's judgement.
     """
 
     name: str
@@ -88,6 +89,7 @@ class Recording:
     form: str
     truth: Facts
     scale: float = 1.0
+    real: bool = False
 
     def each(self, change: Callable[[Episode], Episode]) -> "Recording":
         """The recording with every episode changed."""

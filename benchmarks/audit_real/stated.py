@@ -6,6 +6,8 @@ from pathlib import Path
 from benchmarks.audit_real.catalogue import AS_IS, BASES, CHANGES, Case, made
 
 TRUTH = ("<!-- truth, before any run -->", "<!-- end of the truth -->")
+# The truth does not depend on how many episodes there are.
+FEW = 24
 RESULTS = ("<!-- tables of the report -->", "<!-- end of the report -->")
 
 
@@ -18,7 +20,7 @@ def truth_tables(cases: Sequence[Case]) -> str:
         "|---|---|---|---|---|",
     ]
     for name, make in BASES.items():
-        recording = made(Case(name, ((AS_IS, 1.0),), 1))
+        recording = made(Case(name, ((AS_IS, 1.0),), 1), episodes=FEW)
         truth = recording.truth
         text = (make.__doc__ or "").strip().splitlines()[0]
         reason = truth.undecided or "repeated or shared places: one can look"
@@ -34,7 +36,7 @@ def truth_tables(cases: Sequence[Case]) -> str:
         "| recording | seed | right |",
         "|---|---|---|",
     ]
-    rows += [f"| {c.title} | {c.seed} | {made(c).truth.as_text()} |" for c in cases]
+    rows += [f"| {c.title} | {c.seed} | {made(c, episodes=FEW).truth.as_text()} |" for c in cases]
     return "\n".join(rows) + "\n"
 
 

@@ -30,7 +30,8 @@ class Facts:
     """What is true of a recording.
 
     Attributes:
-        modes: Ways in which one and the same situation was answered; 1 is a single way.
+        modes: Ways in which one and the same situation was answered; 1 is a single way; 0 is not
+            known, and nobody could tell from what was recorded.
         decided_by: What decides them: empty is a free choice that leaves no trace; `start`, `past` and
             `order` leave one outside the present observation; else the recorded column.
         names: Words of which one must occur where a recorded column is named.
@@ -63,6 +64,8 @@ class Facts:
     def _structure(self) -> tuple[Answer, ...]:
         if self.tremor:
             return (Answer("pointwise_noise"),)
+        if self.modes == 0:
+            return (Answer(OPEN),)
         if self.modes < 2 or self.observed:
             return (UNIMODAL,)
         if self.decided_by in ("past", "order"):

@@ -58,7 +58,7 @@ def _lerobot_rows(recording: Recording, number: int, first: int) -> pa.Table:
         done[-1] = bool(episode.facts["success"])
         columns["next.success"] = pa.array(done)
     for name, values in episode.rows.items():
-        columns[name] = pa.array(values.tolist())
+        columns[name] = pa.array(np.ravel(values).tolist())
     return pa.table(columns)
 
 
@@ -212,7 +212,7 @@ def _table(recording: Recording, number: int, *, counted: bool) -> pa.Table:
     for name, value in episode.facts.items():
         columns[name] = [value] * len(episode)
     for name, more in episode.rows.items():
-        columns[name] = more.tolist()
+        columns[name] = np.ravel(more).tolist()
     return pa.table(columns)
 
 

@@ -125,11 +125,12 @@ def planner(plan: Plan) -> Recording:
     for k, mode in enumerate(ways.tolist()):
         rng = plan.drawn("episode", k)
         out = basis @ np.array([np.cos(angles[mode]), np.sin(angles[mode])])
-        begin = starts[k % 8] + rng.normal(0.0, 0.001, 7)
+        begin = starts[k % 8] + rng.normal(0.0, 0.003, 7)
         if plan.decided_by == "start":
             begin = begin + 0.12 * out
-        via = home + 0.45 * (goal - home) + (0.55 + 0.03 * rng.normal()) * out
-        end = goal + rng.normal(0.0, 0.005, 7)
+        # A restart finds another way through the same passage.
+        via = home + 0.45 * (goal - home) + 0.55 * out + rng.normal(0.0, 0.04, 7)
+        end = goal + rng.normal(0.0, 0.01, 7)
         command = way(np.stack([begin, via, end]), rows=int(60 * rng.uniform(0.9, 1.2)))
         command = command + plan.tremor * 0.9 * rng.normal(size=command.shape)
         done = plant(command, rate_hz=rate, lag_rows=0.6, constant_rows=1.0)

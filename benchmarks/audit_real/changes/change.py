@@ -11,7 +11,7 @@ from benchmarks.audit_real.recording import Episode, Recording
 Make = Callable[[Plan], Recording]
 # Changes are made in this order: what is done to the action's form before what goes wrong in it, names
 # and the order of the files last.
-FORM, COLUMNS, TIME, DEFECT, NAMES = range(5)
+MERGE, LAYOUT, FORM, COLUMNS, TIME, DEFECT, NAMES = range(7)
 
 
 @dataclass(frozen=True)
@@ -76,6 +76,16 @@ def at_places(
     return replace(recording, episodes=episodes)
 
 
+def published(recording: Recording) -> bool:
+    """Known by its arrays, with a contract of its own: columns and forms are as it states them."""
+    return recording.real and recording.layout == "zarr"
+
+
 def free(recording: Recording) -> bool:
     """Several ways, and nothing that decides them yet."""
     return recording.truth.modes > 1 and not recording.truth.decided_by
+
+
+def steady(recording: Recording) -> bool:
+    """Nobody changes the way within an episode."""
+    return all(bool(np.all(e.mode == e.mode[0])) for e in recording.episodes)

@@ -5,7 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.audit_real.changes.change import COLUMNS, Change, Place, free, unchanged
+from benchmarks.audit_real.changes.change import (
+    COLUMNS,
+    Change,
+    Place,
+    free,
+    steady,
+    unchanged,
+)
 from benchmarks.audit_real.changes.forms import SAME
 from benchmarks.audit_real.recording import Episode, Recording
 
@@ -21,6 +28,8 @@ TEXTS: dict[str, tuple[str, ...]] = {
     "subtask": ("a", "b", "c", "d"),
 }  # fmt: skip
 NOISE_COLUMNS = 30
+# Recordings whose maker can begin on one side.
+BY_START = ("pushing", "can_pillar", "planned_reach")
 FIDELITY = "share of episodes that obey"
 
 
@@ -43,11 +52,19 @@ def _fact(name: str, values: tuple[str, ...]) -> Change:
         names = (name, "phase") if name == "subtask" else (name,)
         names = (name, "object", "instruction") if name.startswith("instr") else names
         return replace(recording, episodes=episodes).true(
-            decided_by=name, names=(*names, "task") if name == "task" else names, undecided=""
+            decided_by=name,
+            names=names,
+            undecided=recording.truth.undecided if recording.real else "",
         )
 
     return Change(
-        f"{name} decides", COLUMNS, apply, f"hidden_state({name})", (1.0, 0.95), FIDELITY, fits=free
+        f"{name} decides",
+        COLUMNS,
+        apply,
+        f"hidden_state({name})",
+        (1.0, 0.95),
+        FIDELITY,
+        fits=lambda r: free(r) and steady(r) and r.layout != "zarr",
     )
 
 
@@ -61,12 +78,14 @@ def _row(name: str, value: Callable[[int, np.random.Generator, int], np.ndarray]
             for e, k in zip(recording.episodes, said, strict=True)
         )
         return replace(recording, episodes=episodes).true(
-            decided_by=name, names=(name, "task"), undecided=""
+            decided_by=name,
+            names=(name,),
+            undecided=recording.truth.undecided if recording.real else "",
         )
 
     return Change(
         f"{name} decides, in every row", COLUMNS, apply, f"hidden_state({name})", (1.0, 0.95),
-        FIDELITY, fits=lambda r: free(r) and r.layout != "robomimic",
+        FIDELITY, fits=lambda r: free(r) and steady(r) and r.layout != "robomimic",
     )  # fmt: skip
 
 
@@ -165,7 +184,8 @@ DECIDED = (
     _row("latent", lambda way, rng, rows: np.full(rows, way)),
     _row("embedding", lambda way, rng, rows: np.full(rows, 1.7 * way + 0.2 * rng.normal())),
     Change(
-        "what decides is observed", COLUMNS, _observed, "unimodal", fits=lambda r: r.truth.modes > 1
+        "what decides is observed", COLUMNS, _observed, "unimodal",
+        fits=lambda r: r.truth.modes > 1 and not r.real,
     ),
     Change(
         "what decides is not recorded", COLUMNS, _absent,
@@ -174,11 +194,12 @@ DECIDED = (
     ),
     Change(
         "turns", COLUMNS, unchanged, "hidden_state(unrecorded): sides by session",
-        fits=free, plan=lambda plan, s: replace(plan, decided_by="order"),
+        fits=lambda r: free(r) and not r.real,
+        plan=lambda plan, s: replace(plan, decided_by="order"),
     ),
     Change(
         "start decides", COLUMNS, unchanged, "unimodal, or hidden_state(start) where it is past",
-        fits=lambda r: free(r) and r.name not in ("avoiding",),
+        fits=lambda r: free(r) and r.name in BY_START,
         plan=lambda plan, s: replace(plan, decided_by="start"),
     ),
 )  # fmt: skip

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.audit_real.changes.change import DEFECT, Change, Place, at_places, some
+from benchmarks.audit_real.changes.change import DEFECT, Change, Place, at_places, published, some
 from benchmarks.audit_real.recording import Episode, Recording
 
 DEFECT_SAID = "data_defect({})"
@@ -13,6 +13,8 @@ DEFECT_SAID = "data_defect({})"
 
 def _unit(both: bool) -> Callable[[Recording, Place, float], Recording]:
     def apply(recording: Recording, place: Place, factor: float) -> Recording:
+        if published(recording) and factor > 1.0:
+            return recording  # its contract states the range of a pixel: such episodes are refused
         columns = {at[0]: [] for at in recording.follows if at is not None}
         for at in recording.follows:
             if at is not None:

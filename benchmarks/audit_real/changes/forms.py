@@ -4,10 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.audit_real.changes.change import FORM, NAMES, Change, Place
+from benchmarks.audit_real.changes.change import FORM, LAYOUT, NAMES, Change, Place, published
 from benchmarks.audit_real.recording import Array, Episode, Recording
 
 SAME = "nothing: the verdict of the same recording without it"
+LAYOUTS = {
+    "as LeRobot v2.1": "lerobot2", "as LeRobot v3": "lerobot3", "as robomimic": "robomimic",
+    "as Parquet files": "parquet_files", "as one Parquet table": "parquet",
+}  # fmt: skip
 WORDS = (
     "amble", "birch", "cove", "dune", "ember", "fjord", "glade", "heron", "islet", "jetty", "kelp",
     "larch", "moor", "nook", "oriel", "pique", "quill", "reed", "shale", "tarn", "umber", "vale",
@@ -51,7 +55,13 @@ def _form(name: str, form: str, like_state: bool) -> Change:
         changed = _in_form(recording, form)
         return _like_state(changed) if like_state else _action_unnamed(changed)
 
-    return Change(name, FORM, apply, SAME, fits=lambda r: r.form != form and bool(r.paired))
+    return Change(
+        name,
+        FORM,
+        apply,
+        SAME,
+        fits=lambda r: r.form != form and bool(r.paired) and not published(r),
+    )
 
 
 def _like_state(recording: Recording) -> Recording:
@@ -126,6 +136,46 @@ def _permuted(recording: Recording, place: Place, strength: float) -> Recording:
     return replace(changed, follows=follows, names=names, action_names=acts)
 
 
+def _all_names(recording: Recording) -> list[tuple[str, ...]]:
+    return [*recording.names.values(), recording.action_names]
+
+
+def _layout(name: str, layout: str) -> Change:
+    """Written by another recorder, under the names that it gives its columns."""
+
+    def apply(recording: Recording, place: Place, strength: float) -> Recording:
+        before = list(recording.names)
+        after = [_column(column, k, layout) for k, column in enumerate(before)]
+        new = dict(zip(before, after, strict=True))
+        changed = recording.each(
+            lambda e: replace(
+                e, seen={new[n]: v for n, v in e.seen.items()},
+                time_s=np.arange(len(e)) / recording.rate_hz if e.time_s is None else e.time_s,
+            )
+        )  # fmt: skip
+        nameless = layout == "robomimic"
+        return replace(
+            changed, layout=layout,
+            names={new[n]: () if nameless else parts for n, parts in recording.names.items()},
+            action_names=() if nameless else recording.action_names,
+            follows=tuple(None if at is None else (new[at[0]], at[1]) for at in recording.follows),
+        )  # fmt: skip
+
+    return Change(
+        name, LAYOUT, apply, SAME,
+        fits=lambda r: r.layout != layout and (layout != "robomimic" or not r.episodes[0].rows),
+    )  # fmt: skip
+
+
+def _column(name: str, place: int, layout: str) -> str:
+    word = name.replace("observation.", "").replace("obs/", "")
+    if layout == "robomimic":
+        return f"obs/{word}"
+    if layout.startswith("lerobot"):
+        return "observation.state" if place == 0 else f"observation.{word}"
+    return f"obs_{word}"
+
+
 def _named(recording: Recording) -> bool:
     return bool(_like_state(recording).action_names)
 
@@ -145,7 +195,8 @@ FORMS = (
         "only one name shared", NAMES, _gripper_only, SAME,
         fits=lambda r: r.form == "absolute" and _named(r),
     ),
-    Change("names absent", NAMES, _unnamed, SAME),
+    Change("names absent", NAMES, _unnamed, SAME, fits=lambda r: any(map(any, _all_names(r)))),
     Change("names are nonsense", NAMES, _nonsense, SAME, fits=lambda r: bool(r.action_names)),
-    Change("columns in another order", NAMES, _permuted, SAME),
+    Change("columns in another order", NAMES, _permuted, SAME, fits=lambda r: not published(r)),
+    *(_layout(name, layout) for name, layout in LAYOUTS.items()),
 )  # fmt: skip

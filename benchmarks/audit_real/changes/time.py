@@ -5,12 +5,13 @@ from dataclasses import replace
 import numpy as np
 
 from benchmarks.audit_real.changes.change import (
-    COLUMNS,
     DEFECT,
+    MERGE,
     NAMES,
     TIME,
     Change,
     Place,
+    published,
     some,
     unchanged,
 )
@@ -67,6 +68,9 @@ def _reversed(recording: Recording, place: Place, strength: float) -> Recording:
 
 def _merged(first: bool) -> Change:
     def apply(recording: Recording, place: Place, strength: float) -> Recording:
+        if recording.real:
+            halves = (recording.episodes[::2], recording.episodes[1::2])
+            return replace(recording, episodes=sum(halves if first else halves[::-1], ()))
         count = round(0.6 * len(recording.episodes))
         own = place.make(replace(place.plan, episodes=count))
         other = place.make(replace(place.plan, seed=place.plan.seed + 500_000, episodes=count))
@@ -74,7 +78,7 @@ def _merged(first: bool) -> Change:
         return replace(recording, episodes=(*parts[0].episodes, *parts[1].episodes))
 
     return Change(
-        f"two collections merged, {'one' if first else 'the other'} first", COLUMNS - 2, apply, SAME
+        f"two collections merged, {'one' if first else 'the other'} first", MERGE, apply, SAME
     )
 
 
@@ -206,7 +210,7 @@ def _loud(recording: Recording, place: Place, strength: float) -> Recording:
 
 
 def _one_way(recording: Recording) -> bool:
-    return recording.truth.modes == 1 and bool(recording.paired)
+    return recording.truth.modes < 2 and bool(recording.paired)
 
 
 TIMES = (
@@ -228,7 +232,7 @@ TIMES = (
     Change("signs of quaternions", TIME, _signs, SAME, fits=_has_quaternions),
     Change(
         "all in another unit", TIME, _millimetres, SAME, (1000.0,), "factor",
-        fits=lambda r: bool(r.paired) and r.form == "absolute",
+        fits=lambda r: bool(r.paired) and r.form == "absolute" and not published(r),
     ),
     Change("rounded", TIME, _rounded, SAME, (1e-4, 1e-3), "of the ways apart"),
     Change("a small tremor", TIME, _tremor, SAME, (0.02,), "of its spread", fits=_one_way),
