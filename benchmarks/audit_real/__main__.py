@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from benchmarks.audit.frozen import DETECTOR, frozen_commit, report_seed
-from benchmarks.audit_real.catalogue import Case, development, report
+from benchmarks.audit_real.catalogue import AS_IS, Case, development, report
 from benchmarks.audit_real.runner import Result, run
 from benchmarks.audit_real.stated import RESULTS, TRUTH, into_page, truth_tables
 from benchmarks.audit_real.tables import markdown
@@ -31,16 +31,19 @@ FIRST_DEVELOPMENT_SEED = 100
 
 
 def sampled(cases: Sequence[Case], root_seed: int, largest: int | None) -> list[Case]:
-    """At most so many cases of each base, at random, in the order of the catalogue."""
-    if largest is None:
-        return list(cases)
+    """At most so many cases of each base, at random; each beginning of them is a fair sample.
+
+    Every base as it is comes first.
+    """
     taken: dict[str, int] = defaultdict(int)
-    chosen = set()
-    for place in stream(root_seed, "audit_real", "sample").permutation(len(cases)).tolist():
-        if taken[cases[place].base] < largest:
-            taken[cases[place].base] += 1
-            chosen.add(place)
-    return [case for place, case in enumerate(cases) if place in chosen]
+    ranked = []
+    order = stream(root_seed, "audit_real", "sample").permutation(len(cases)).tolist()
+    for place in sorted(order, key=lambda place: cases[place].change != AS_IS):
+        base = cases[place].base
+        ranked.append((taken[base], place))
+        taken[base] += 1
+    ranked.sort(key=lambda item: item[0])
+    return [cases[place] for rank, place in ranked if largest is None or rank < largest]
 
 
 def measured(todo: Sequence[Case], file: Path, *, jobs: int) -> list[Result]:
