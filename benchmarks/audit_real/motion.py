@@ -22,8 +22,7 @@ def way(points: Array, *, rows: int, rests: tuple[tuple[float, int], ...] = ()) 
     knots = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     fine = np.linspace(0.0, knots[-1], FINE)
     curve = PchipInterpolator(knots, points, axis=0)(fine)
-    # Corners are cut as a hand cuts them.
-    curve = gaussian_filter1d(curve, FINE / 25.0, axis=0, mode="nearest")
+    curve = _rounded(curve, FINE / 25.0)
     u = np.linspace(0.0, 1.0, rows)
     share = u + 0.8 * (u**3 * (10.0 - 15.0 * u + 6.0 * u**2) - u)
     for place, long in sorted(rests, reverse=True):
@@ -33,6 +32,15 @@ def way(points: Array, *, rows: int, rests: tuple[tuple[float, int], ...] = ()) 
     length = length + 1e-12 * np.arange(FINE)
     columns = [np.interp(share * length[-1], length, column) for column in curve.T]
     return np.stack(columns, axis=1)
+
+
+def _rounded(curve: Array, width: float) -> Array:
+    """Corners cut as a hand cuts them; both ends stay, or the start would tell the way."""
+    reach = int(4 * width)
+    before = 2.0 * curve[0] - curve[reach:0:-1]
+    after = 2.0 * curve[-1] - curve[-2 : -reach - 2 : -1]
+    smooth = gaussian_filter1d(np.concatenate([before, curve, after]), width, axis=0)
+    return np.asarray(smooth[reach:-reach])
 
 
 def wobble(rng: np.random.Generator, rows: int, width: int, *, size: float, slow: float) -> Array:

@@ -1,0 +1,357 @@
+"""What the recordings of `benchmarks.audit_real` claim of themselves is so, seen without an audit."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.audit_real.bases.real import here
+from benchmarks.audit_real.catalogue import (
+    AS_IS,
+    BASES,
+    CHANGES,
+    CROSSINGS,
+    Case,
+    base_of,
+    development,
+    fits,
+    made,
+    report,
+)
+from benchmarks.audit_real.plan import Plan
+from benchmarks.audit_real.runner import Result, run
+from benchmarks.audit_real.stated import TRUTH, into_page, truth_tables
+from benchmarks.audit_real.tables import markdown, reliability
+from benchmarks.audit_real.truth import ALLOWED, RIGHT, UNDECIDED, WRONG, Facts
+from benchmarks.audit_real.writers import write
+from genpolicy.data.dataset import load_dataset
+from genpolicy.data.formats import open_dataset
+
+OWN = [name for name in BASES if name not in ("pusht", "g1")]
+WITH_WAYS = [name for name in OWN if base_of(name).truth.modes > 1 and name not in ("goals",)]
+SEED = 11
+
+
+def small(base, *names, seed=SEED, episodes=24):
+    """A small recording with these changes at their first strengths."""
+    changes = tuple((name, CHANGES[name].strengths[0]) for name in names)
+    return made(Case(base, changes, seed), episodes=episodes)
+
+
+def resampled(episode, rows=40):
+    """The commanded way of an episode at equal shares of its length. Shape (rows, P)."""
+    steps = np.linalg.norm(np.diff(episode.command, axis=0), axis=1)
+    along = np.concatenate([[0.0], np.cumsum(steps)]) + 1e-9 * np.arange(len(episode))
+    at = np.linspace(0.0, along[-1], rows)
+    return np.stack([np.interp(at, along, column) for column in episode.command.T], axis=1)
+
+
+def paired(recording, episode):
+    """What is observed of each commanded number. Shape (T, P)."""
+    places = [place for place in recording.follows if place is not None]
+    return np.stack([episode.seen[name][:, k] for name, k in places], axis=1)
+
+
+@pytest.mark.parametrize("base", OWN)
+def test_the_same_seed_gives_the_same_rows_and_another_does_not(base):
+    first, again, other = (BASES[base](Plan(seed, episodes=6)) for seed in (3, 3, 4))
+    assert [e.action.tobytes() for e in first.episodes] == [
+        e.action.tobytes() for e in again.episodes
+    ]
+    assert first.episodes[0].action.tobytes() != other.episodes[0].action.tobytes()
+
+
+@pytest.mark.parametrize("base", WITH_WAYS)
+def test_ways_lie_apart_by_more_than_they_scatter(base):
+    recording = BASES[base](Plan(SEED, episodes=48))
+    # As far as the first choice: a person in the kitchen comes back and chooses again.
+    ways = np.array([int(e.mode[0]) for e in recording.episodes])
+    cut = [e.taken(np.flatnonzero(e.mode == e.mode[0])) for e in recording.episodes]
+    routes = np.stack([resampled(e)[:, : len(recording.paired)] for e in cut])
+    means = {way: routes[ways == way].mean(axis=0) for way in np.unique(ways)}
+    scatter = max(
+        np.sqrt(((routes[ways == way] - mean) ** 2).sum(axis=2).mean())
+        for way, mean in means.items()
+    )
+    apart = min(
+        np.sqrt(((means[a] - means[b]) ** 2).sum(axis=1).max())
+        for a in means for b in means if a < b
+    )  # fmt: skip
+    assert apart > 2.0 * scatter
+    assert len(np.unique(ways)) >= min(recording.truth.modes, 3)
+
+
+@pytest.mark.parametrize("base", [b for b in OWN if base_of(b).truth.modes == 1])
+def test_one_way_is_one_way(base):
+    recording = BASES[base](Plan(SEED, episodes=40))
+    routes = np.stack([resampled(e) for e in recording.episodes])[:, :, recording.paired]
+    spread = np.sqrt(((routes - routes.mean(axis=0)) ** 2).sum(axis=2).mean())
+    assert spread < 0.5 * np.sqrt(
+        ((routes.mean(axis=0) - routes.mean(axis=(0, 1))) ** 2).sum(1).mean()
+    )
+
+
+def told_by_start(recording):
+    """Share of held-out episodes whose first way the first observed row tells, a linear guess."""
+    begin = np.stack([np.concatenate([v[0] for v in e.seen.values()]) for e in recording.episodes])
+    begin = (begin - begin.mean(axis=0)) / np.maximum(begin.std(axis=0), 1e-9)
+    begin = np.column_stack([begin, np.ones(len(begin))])
+    ways = np.array([int(e.mode[0]) for e in recording.episodes])
+    kinds = np.eye(ways.max() + 1)[ways]
+    half = np.arange(len(ways)) % 2 == 0
+    guess = begin[~half] @ np.linalg.lstsq(begin[half], kinds[half], rcond=1e-6)[0]
+    return np.mean(guess.argmax(axis=1) == ways[~half])
+
+
+@pytest.mark.parametrize("base", WITH_WAYS)
+def test_a_way_by_chance_shows_in_no_start(base):
+    recording = BASES[base](Plan(SEED, episodes=240))
+    kinds = len({int(e.mode[0]) for e in recording.episodes})
+    assert told_by_start(recording) < 1.0 / kinds + 0.17
+
+
+@pytest.mark.parametrize("base", ["pushing", "arm_two", "planner"])
+def test_a_way_by_the_start_shows_in_it(base):
+    assert told_by_start(BASES[base](Plan(SEED, decided_by="start", episodes=240))) > 0.9
+
+
+def test_the_goal_of_a_row_is_where_the_point_then_goes():
+    recording = small("goals")
+    for episode in recording.episodes:
+        for goal in np.unique(episode.rows["goal"]):
+            rows = np.flatnonzero(episode.rows["goal"] == goal)
+            last = rows[np.append(np.flatnonzero(np.diff(rows) > 1), len(rows) - 1)]
+            corner = np.array([[0.2, 0.2], [0.8, 0.2], [0.8, 0.8], [0.2, 0.8]])[goal]
+            assert np.linalg.norm(episode.command[last] - corner, axis=1).max() < 0.1
+
+
+@pytest.mark.parametrize("base", OWN)
+@pytest.mark.parametrize("form", ["delta", "velocity"])
+def test_differences_add_up_to_the_command(base, form):
+    if not fits(base, [form]):
+        pytest.skip("the base has that form already")
+    recording = small(base, form, episodes=4)
+    factor = 1.0 / recording.rate_hz if form == "velocity" else 1.0
+    for episode in recording.episodes:
+        moved = factor * np.cumsum(episode.action[:, recording.paired], axis=0)
+        wanted = episode.command[:, recording.paired]
+        assert moved == pytest.approx(wanted - wanted[:1], abs=1e-9)
+
+
+@pytest.mark.parametrize("base", OWN)
+def test_what_is_observed_follows_what_is_commanded(base):
+    recording = BASES[base](Plan(SEED, episodes=6))
+    for episode in recording.episodes:
+        seen, told = paired(recording, episode), episode.command[:, recording.paired]
+        moving = np.ptp(told, axis=0) > 0.2 * np.ptp(told, axis=0).max()
+        errors = [
+            np.sqrt(np.mean((seen[lag:] - told[: len(told) - lag])[:, moving] ** 2))
+            for lag in range(12)
+        ]
+        assert min(errors) < 0.1 * np.ptp(told[:, moving], axis=0).max()
+
+
+FAULTS = {
+    "a third in another unit": 1 / 3, "a third in another unit, all of it": 1 / 3,
+    "lag in half": 0.5, "a sign flipped": 0.3, "two columns swapped": 0.25, "glued to a copy": 0.3,
+    "a frozen sensor": 1 / 3,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("base", ["pushing", "arm", "planner", "goals"])
+@pytest.mark.parametrize("name", list(FAULTS))
+def test_a_fault_is_in_the_episodes_said_and_in_no_other(base, name):
+    clean, faulty = small(base), small(base, name)
+    assert faulty.truth.defect and not clean.truth.defect
+    wrong = [e.faulty for e in faulty.episodes]
+    assert np.mean(wrong) == pytest.approx(FAULTS[name], abs=0.05)
+    for before, after in zip(clean.episodes, faulty.episodes, strict=True):
+        same = len(before) == len(after) and np.array_equal(before.action, after.action)
+        same = same and all(np.array_equal(v, after.seen[n]) for n, v in before.seen.items())
+        assert same is not after.faulty
+
+
+def test_each_fault_is_what_it_is_called():
+    clean = small("planner")
+    pairs = {
+        name: [
+            (a, b)
+            for a, b in zip(clean.episodes, small("planner", name).episodes, strict=True)
+            if b.faulty
+        ]
+        for name in FAULTS
+    }
+    for a, b in pairs["a third in another unit"]:
+        assert b.action == pytest.approx(0.01 * a.action)
+    for a, b in pairs["lag in half"]:
+        late = len(a) - len(b)
+        assert late == 3 and np.array_equal(a.action[late:], b.action)
+        assert np.array_equal(a.seen["observation.state"][:-late], b.seen["observation.state"])
+    for a, b in pairs["a sign flipped"]:
+        turned = np.flatnonzero((a.action != b.action).any(axis=0))
+        assert len(turned) == 1 and np.array_equal(a.action[:, turned], -b.action[:, turned])
+    for a, b in pairs["two columns swapped"]:
+        one, two = np.flatnonzero((a.action != b.action).any(axis=0))
+        assert np.array_equal(a.action[:, [one, two]], b.action[:, [two, one]])
+    for _, b in pairs["glued to a copy"]:
+        half = len(b) // 2
+        assert np.array_equal(b.action[:half], b.action[half:])
+    for _, b in pairs["a frozen sensor"]:
+        still = np.flatnonzero((np.diff(b.seen["observation.state"], axis=0) == 0).all(axis=1))
+        assert len(still) >= 15 and np.ptp(b.action[still], axis=0).max() > 0.05
+
+
+@pytest.mark.parametrize("name", ["task decides", "zq7 decides", "latent decides, in every row"])
+@pytest.mark.parametrize("fidelity", [1.0, 0.95])
+def test_a_column_that_decides_says_the_way_as_often_as_it_is_said_to(name, fidelity):
+    recording = made(Case("pushing", ((name, fidelity),), SEED), episodes=120)
+    column = recording.truth.decided_by
+    said = [str(e.facts.get(column, e.rows.get(column, [0])[0])) for e in recording.episodes]
+    values = sorted(set(said))
+    told = np.mean([values.index(s) == way for s, way in zip(said, recording.modes, strict=True)])
+    assert max(told, 1.0 - told) == pytest.approx(fidelity, abs=0.01)
+    assert [a.cause for a in recording.truth.answers()] == ["hidden_state"]
+
+
+def test_turns_are_seen_in_the_order_and_chance_is_not():
+    for name, low, high in ((AS_IS, 0.3, 0.7), ("turns", 0.75, 1.0)):
+        ways = small("pushing", name, episodes=120).modes
+        assert low < np.mean(ways[1:] == ways[:-1]) <= high
+
+
+@pytest.mark.parametrize("base", ["pushing", "arm", "avoiding", "humanoid"])
+def test_waits_are_equal_rows_in_which_nothing_is_commanded(base):
+    clean, waiting = small(base), small(base, "waits at first")
+    for before, after in zip(clean.episodes, waiting.episodes, strict=True):
+        rows = len(after) - len(before)
+        assert rows >= 3
+        for values in after.seen.values():
+            assert (values[: rows + 1] == values[0]).all()
+        moved = after.action[:rows, waiting.paired]
+        wanted = paired(waiting, after)[:rows] if waiting.form == "absolute" else 0.0
+        assert moved == pytest.approx(wanted * np.ones_like(moved))
+
+
+def test_quaternions_change_their_sign_and_nothing_else_changes():
+    clean, flipped = small("arm"), small("arm", "signs of quaternions")
+    changed = False
+    for before, after in zip(clean.episodes, flipped.episodes, strict=True):
+        for name, values in before.seen.items():
+            assert np.abs(after.seen[name]) == pytest.approx(np.abs(values))
+            if name.endswith("quat"):
+                assert np.linalg.norm(after.seen[name], axis=1) == pytest.approx(1.0)
+                changed |= not np.array_equal(values, after.seen[name])
+            if name.endswith("eef_pos"):
+                assert np.array_equal(values, after.seen[name])
+    assert changed
+
+
+def test_order_and_names_change_no_number_of_any_episode():
+    clean = {e.number: e for e in small("planner").episodes}
+    for name in ("episodes shuffled", "episodes in reverse", "names absent", "names are nonsense"):
+        for episode in small("planner", name).episodes:
+            assert np.array_equal(episode.action, clean[episode.number].action)
+    order = [e.number for e in small("planner", "episodes shuffled").episodes]
+    assert order != sorted(order) and sorted(order) == sorted(clean)
+
+
+@pytest.mark.parametrize("ahead", ["one", "the other"])
+def test_merged_by_side_holds_one_side_after_the_other(ahead):
+    merged = small("pushing", f"each collection has its side, {ahead} first")
+    ways = merged.modes
+    assert np.count_nonzero(np.diff(ways)) == 1 and ways[0] == (0 if ahead == "one" else 1)
+    sources = [e.facts["collection"] for e in merged.episodes]
+    assert len(set(sources)) == 2 and all((s == sources[0]) == (w == ways[0])
+                                          for s, w in zip(sources, ways, strict=True))  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "layout", ["as LeRobot v2.1", "as LeRobot v3", "as robomimic", "as Parquet files",
+               "as one Parquet table", AS_IS],
+)  # fmt: skip
+def test_the_import_reads_back_what_was_written(layout, tmp_path):
+    base = "arm_two" if layout == "as LeRobot v2.1" else "pushing"
+    recording = small(base, *([] if fits(base, [layout]) is False else [layout]))
+    opened = open_dataset(write(recording, tmp_path / "r"), out=tmp_path / "dataset")
+    assert opened.accepted == len(recording.episodes)
+    frames = load_dataset(tmp_path / "dataset").frames
+    wanted = np.concatenate([e.action for e in recording.episodes])
+    assert frames.action == pytest.approx(wanted, rel=1e-5, abs=1e-4)
+    assert frames.observation.shape[1] == sum(
+        v.shape[1] for v in recording.episodes[0].seen.values()
+    )
+
+
+@pytest.mark.skipif(not here(), reason="the two real sets are not here")
+def test_the_real_sets_are_read_as_they_are():
+    pusht, g1 = base_of("pusht"), base_of("g1")
+    whole = BASES["pusht"](Plan(1))
+    assert len(whole.episodes) == 206 and sum(map(len, whole.episodes)) == 25_650
+    assert 0.3 < np.mean([e.mode[0] for e in whole.episodes]) < 0.7
+    assert g1.episodes[0].action.shape[1] == 26 and len(pusht.episodes) == 24
+
+
+def test_the_right_answer_follows_the_order_of_diagnosis():
+    free = Facts(modes=2, outcomes=True)
+    assert free.judged("valid_modes", "", "") == RIGHT
+    assert free.judged("insufficient_support", "", "neighbourhoods") == UNDECIDED
+    assert free.judged("unimodal", "", "") == WRONG
+    assert replace(free, outcomes=False).judged("valid_modes", "", "") == WRONG
+    open_ = replace(free, outcomes=False, undecided="far apart")
+    assert open_.judged("insufficient_support", "outcome", "not_recorded") == RIGHT
+    assert open_.judged("insufficient_support", "", "neighbourhoods") == ALLOWED
+    broken = replace(open_, defect="unit", decided_by="task", names=("task",))
+    assert broken.judged("insufficient_support", "", "") == UNDECIDED
+    assert broken.judged("hidden_state", "task", "") == WRONG
+    assert broken.judged("data_defect", "action", "unit") == RIGHT
+    assert broken.judged("data_defect", "action", "clock") == WRONG
+    assert replace(free, failing=True).judged("unimodal", "mode 1", "one_valid_mode") == RIGHT
+    assert Facts().judged("unimodal", "mode 1", "one_valid_mode") == WRONG
+
+
+def test_a_report_is_drawn_from_its_seed_and_shares_no_data_with_development():
+    first, again, other = report(10**9 + 1), report(10**9 + 1), report(10**9 + 2)
+    assert first == again and first != other
+    assert len({case.seed for case in first}) == len(first)
+    assert not {case.seed for case in first} & {case.seed for case in development(100)}
+    for name in BASES:
+        inside = [case for case in first if case.base == name]
+        assert inside[0].change == AS_IS and len(inside) > 20
+
+
+def test_every_change_and_every_crossing_fits_some_base():
+    cases = development(100)
+    used = {name for case in cases for name, _ in case.changes}
+    assert used == set(CHANGES) and len(CHANGES) >= 40
+    crossed = {tuple(name for name, _ in case.changes) for case in cases}
+    assert set(CROSSINGS) <= crossed
+
+
+def test_the_truth_on_the_page_is_the_truth_of_the_code(tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text(f"before\n{TRUTH[0]}\nold\n{TRUTH[1]}\nafter\n")
+    cases = [Case("pushing", (("lag in half", 3.0),), 5), Case("goals", ((AS_IS, 1.0),), 5)]
+    into_page(page, truth_tables(cases), TRUTH)
+    text = page.read_text()
+    assert "| pushing/lag in half 3 | 5 | data_defect(clock/drift/lag) |" in text
+    assert "| goals/as it is | 5 | hidden_state(goal) |" in text
+    assert "old" not in text and text.startswith("before") and text.endswith("after\n")
+
+
+def test_a_recording_is_audited_and_its_result_read_back():
+    result = run(Case("blocks", (("a third in another unit", 1000.0),), 3))
+    row = json.loads(json.dumps(result.as_row()))
+    assert Result.from_row(row) == result
+    text = markdown([result], what="a test")
+    assert ("1 recordings (a test)" in text and result.case.title in text) or result.judged == RIGHT
+
+
+def test_the_reliability_table_counts_by_confidence():
+    def said(judged, confidence):
+        return Result("pushing", ((AS_IS, 1.0),), 1, "valid_modes", "unimodal", "", "", confidence,
+                      judged, 10, 1.0)  # fmt: skip
+
+    rows = reliability([said(RIGHT, 1.0), said(WRONG, 0.995), said(RIGHT, 0.6), said(WRONG, None)])
+    assert rows[2].startswith("| 0.50 to 0.70 | 1 | 1 | 1.00")
+    assert rows[3].startswith("| 0.99 to 1.00 | 2 | 1 | 0.50")
