@@ -261,13 +261,13 @@ def waiting(
 
     def change(command, seen, k):
         n = int(rng.integers(*rows))
-        first_c, first_s = (home_c, home_s) if same else (command[0], seen[0])
         if same:  # begin there: a smooth way from home into the episode
             ramp = np.minimum(np.arange(len(command)) / 15.0, 1.0)[:, None]
             answer = _trailing(ramp, lag_rows)
-            command = command + (1.0 - ramp) * (home_c - command[0])
-            seen = seen + (1.0 - answer) * (home_s - seen[0])
-        wait_c, wait_s = np.repeat([first_c], n, axis=0), np.repeat([first_s], n, axis=0)
+            free_c, free_s = _free(data.action), _free(data.observation)
+            command = command + (1.0 - ramp) * (home_c - command[0]) * free_c
+            seen = seen + (1.0 - answer) * (home_s - seen[0]) * free_s
+        wait_c, wait_s = np.repeat(command[:1], n, axis=0), np.repeat(seen[:1], n, axis=0)
         return np.vstack([wait_c, command]), np.vstack([wait_s, seen])
 
     return by_episode(data, change)

@@ -1,12 +1,13 @@
 """Copies: episodes recorded once and filed twice, and episodes glued to others or to themselves.
 
-Every window of a few rows is a point; the windows of an episode at which it moves are looked up
-among all others in a tree, so the cost is n log n. Two stretches that meet at a window are then
-compared row by row for as long as both last: a copy agrees in the small movements too, where two
-demonstrations of one way differ.
+Rows in which nothing moves are left out first: all episodes may wait at one place, and a copy may
+have lost its rests. Every window of a few of the others is a point; the windows of an episode are
+looked up among all others in a tree, so the cost is n log n. Two stretches that meet at a window
+are then compared row by row, both ways, as far as they agree: a copy agrees in the small movements
+too, where two demonstrations of one way differ.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -19,7 +20,7 @@ from genpolicy.audit.semantics.robust import episode_centred, episode_sums, some
 from genpolicy.audit.settings import AuditSettings
 
 WINDOW = 8
-PROBES = 4
+PROBES = 6
 NEIGHBOURS = 6
 LARGEST_WIDTH = 12
 COMPONENTS = 6
@@ -27,42 +28,73 @@ COMPONENTS = 6
 CLOSE = 0.05
 # A copy's difference in second differences, as a share of those of the episode.
 SMALL_MOVEMENT = 0.2
-# Share of the shorter episode that a copy covers; of an episode glued to itself, its half.
-COVER = 0.5
-SELF_COVER = 0.4
+# Share of the rows of the shorter episode that a copy covers (two scripted ones share their begin);
+# of an episode glued to itself, the share that comes again.
+COVER = 0.7
+SELF_COVER = 0.3
 LEAST_OVERLAP = 12
+# A row in which the signal changes by less than this share of its usual step repeats the one before.
+REST_STEP = 1e-6
 
 
 @dataclass(frozen=True)
 class Copies:
-    """Episodes that hold what another, or themselves, hold already; masks of shape (E,)."""
+    """Episodes that hold what another, or themselves, hold already.
+
+    Attributes:
+        duplicate: Shape (E,).
+        of: The episode that a duplicate is a copy of, else -1. Shape (E,).
+        repeats_itself: Shape (E,).
+        joins: Rows at which the second copy begins in an episode that repeats itself.
+    """
 
     duplicate: Flags
     of: Integers
     repeats_itself: Flags
+    joins: set[int] = field(default_factory=set)
+
+
+@dataclass(frozen=True)
+class Moving:
+    """The rows that move, closed up.
+
+    Attributes:
+        signal: Scaled columns. Shape (M, D).
+        rows: Their rows. Shape (M,).
+        starts: First of each episode, and their number. Shape (E + 1,).
+        usual: Usual distance between two episodes.
+        covered: Rows of each pair of episodes that agree, as stretches.
+    """
+
+    signal: Array
+    rows: Integers
+    starts: Integers
+    usual: float = 0.0
+    covered: dict[tuple[int, int], list[tuple[int, int]]] = field(default_factory=dict)
 
 
 def find_copies(data: AuditInput, motion: Motion) -> Copies:
-    """Duplicated episodes (up to a time offset, a cut, tiny noise) and self-repeating ones."""
+    """Duplicated episodes (up to a time offset, a cut, rests, tiny noise) and self-repeating ones."""
     count = len(motion.starts) - 1
     result = Copies(np.zeros(count, bool), np.full(count, -1), np.zeros(count, bool))
-    signal = _signal(data, motion)
-    if signal is None:
+    every = _signal(data, motion)
+    if every is None:
         return result
-    places, segment = _windows(motion)
+    moving = _moving(every, motion)
+    places, segment = _windows(moving.starts)
     if len(places) < NEIGHBOURS + 1:
         return result
-    points = _points(signal, places)
-    probes = _probes(signal, motion, places)
+    points = _points(moving.signal, places)
+    probes = _probes(moving, places)
     tree = cKDTree(points)
     nearest = tree.query(points[probes], k=NEIGHBOURS)
     distance, found = np.asarray(nearest[0]), np.asarray(nearest[1])
-    usual = _usual_distance(points, segment, probes)
+    moving = replace(moving, usual=_usual_distance(points, segment, probes))
     for number, probe in enumerate(probes):
         for near, other in zip(distance[number], found[number], strict=True):
-            if near > CLOSE * usual or other == probe:
+            if near > CLOSE * moving.usual or other == probe:
                 continue
-            _judge(result, signal, motion, (int(places[probe]), int(places[other])), usual=usual)
+            _judge(result, moving, int(places[probe]), int(places[other]))
     return result
 
 
@@ -137,11 +169,24 @@ def _signal(data: AuditInput, motion: Motion) -> Array | None:
     return np.asarray(columns[:, chosen] / power[chosen])
 
 
-def _windows(motion: Motion) -> tuple[Integers, Integers]:
+def _moving(signal: Array, motion: Motion) -> Moving:
+    """The rows in which something moves; the first of each episode is one."""
+    steps = np.linalg.norm(np.diff(signal, axis=0, prepend=signal[:1]), axis=1)
+    first = motion.starts[:-1][np.diff(motion.starts) > 0]
+    steps[first] = 0.0
+    usual = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
+    kept = steps > REST_STEP * usual
+    kept[first] = True
+    counts = np.concatenate([[0], np.cumsum(kept)])
+    rows = np.flatnonzero(kept)
+    return Moving(signal[rows], rows, np.asarray(counts[motion.starts], dtype=np.int64))
+
+
+def _windows(starts: Integers) -> tuple[Integers, Integers]:
     """First row of every window inside an episode, and its episode."""
-    rows = np.arange(motion.starts[-1])
-    segment = motion.segment
-    fits = rows + WINDOW <= motion.starts[1:][segment]
+    rows = np.arange(starts[-1])
+    segment = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
+    fits = rows + WINDOW <= starts[1:][segment]
     return rows[fits], segment[fits]
 
 
@@ -156,11 +201,12 @@ def _points(signal: Array, places: Integers) -> Array:
     return np.asarray(wide @ vectors[:, -COMPONENTS:])
 
 
-def _probes(signal: Array, motion: Motion, places: Integers) -> Integers:
+def _probes(moving: Moving, places: Integers) -> Integers:
     """Windows of each episode at which it moves: at even shares of its path."""
+    signal = moving.signal
     steps = np.linalg.norm(np.diff(signal, axis=0, prepend=signal[:1]), axis=1)
     probes = []
-    for first, last in zip(motion.starts[:-1], motion.starts[1:], strict=True):
+    for first, last in zip(moving.starts[:-1], moving.starts[1:], strict=True):
         if last - first < WINDOW + 2:
             continue
         path = np.cumsum(steps[first + 1 : last])
@@ -182,27 +228,46 @@ def _usual_distance(points: Array, segment: Integers, probes: Integers) -> float
     return float(np.median(distance[other])) if other.any() else 0.0
 
 
-def _judge(
-    result: Copies, signal: Array, motion: Motion, rows: tuple[int, int], *, usual: float
-) -> None:
+def _judge(result: Copies, moving: Moving, row: int, other: int) -> None:
     """Compare two episodes, or one with itself, from a common window on, both ways."""
-    row, other = rows
-    a = int(np.searchsorted(motion.starts, row, side="right")) - 1
-    b = int(np.searchsorted(motion.starts, other, side="right")) - 1
-    if a == b and abs(row - other) < LEAST_OVERLAP:
+    row, other = min(row, other), max(row, other)
+    starts = moving.starts
+    a = int(np.searchsorted(starts, row, side="right")) - 1
+    b = int(np.searchsorted(starts, other, side="right")) - 1
+    if a == b and other - row < LEAST_OVERLAP:
         return
-    back = min(row - motion.starts[a], other - motion.starts[b])
-    on = min(motion.starts[a + 1] - row, motion.starts[b + 1] - other)
-    first, second = signal[row - back : row + on], signal[other - back : other + on]
-    length = np.diff(motion.starts)
-    cover = SELF_COVER * length[a] if a == b else COVER * min(length[a], length[b])
-    if len(first) < max(LEAST_OVERLAP, cover) or not _same(first, second, usual):
+    back = min(row - int(starts[a]), other - int(starts[b]))
+    on = min(int(starts[a + 1]) - row, int(starts[b + 1]) - other)
+    first, second = moving.signal[row - back : row + on], moving.signal[other - back : other + on]
+    apart = np.linalg.norm(first - second, axis=1) > CLOSE * moving.usual
+    before, after = np.flatnonzero(apart[:back]), np.flatnonzero(apart[back:])
+    begin = int(before[-1]) + 1 if len(before) else 0
+    end = back + int(after[0]) if len(after) else len(apart)
+    if end - begin < LEAST_OVERLAP or not _same(first[begin:end], second[begin:end], moving.usual):
+        return
+    # A copy without its rests agrees in several stretches, each at another distance.
+    later = other - back
+    stretches = moving.covered.setdefault((a, b), [])
+    stretches.append((later + begin, later + end))
+    covered = _union(stretches)
+    length = np.diff(starts)
+    needed = SELF_COVER * length[a] if a == b else COVER * min(length[a], length[b])
+    if covered - needed < 0:
         return
     if a == b:
         result.repeats_itself[a] = True
+        result.joins.add(int(moving.rows[min(first for first, _ in stretches)]))
     else:
-        later, kept = max(a, b), min(a, b)
-        result.duplicate[later], result.of[later] = True, kept
+        result.duplicate[b], result.of[b] = True, a
+
+
+def _union(stretches: list[tuple[int, int]]) -> int:
+    """Rows in any of the stretches."""
+    total, reached = 0, -1
+    for first, last in sorted(stretches):
+        total += max(0, last - max(first, reached))
+        reached = max(reached, last)
+    return total
 
 
 def _same(first: Array, second: Array, usual: float) -> bool:

@@ -24,9 +24,6 @@ LEAST_ROWS = 10
 SLOW_SHARE = 0.5
 # Correlation with which a column follows a command...
 FOLLOWS = 0.8
-# Columns whose motion is below this share of the usual one have no motion to compare.
-MATTERS = 0.1
-
 
 @dataclass(frozen=True)
 class Following:
@@ -66,17 +63,6 @@ class Following:
         some = np.isfinite(known).any(axis=1)
         result[some] = np.nanmedian(known[some], axis=1)
         return np.asarray(np.round(result), dtype=np.int64)
-
-    def mattering(self, scale: Array) -> Flags:
-        """Columns that move enough, commanded or observed, to be compared. Shape (P,).
-
-        Args:
-            scale: Difference that matters in each column; inf where none is known. Shape (P,).
-        """
-        both = np.nan_to_num(np.maximum(self.asked, self.seen))
-        size = np.median(both, axis=0) / np.where(np.isfinite(scale), scale, 1.0)
-        usual = float(np.median(size[size > 0])) if (size > 0).any() else 0.0
-        return np.asarray(size > MATTERS * usual)
 
 
 def following(motion: Motion, period_s: float, maximum_steps: int) -> Following:

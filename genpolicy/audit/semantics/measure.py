@@ -45,7 +45,11 @@ ORDER_STEPS = 1.0
 
 def measure(data: AuditInput, settings: AuditSettings) -> Semantics:
     """Clocks, frames, units, continuity, copies and calibration of canonical data."""
-    motion = make_motion(data)
+    made = make_motion(data)
+    copied = copies.find_copies(data, made)
+    # Where a second copy begins both jump together, which looks like a response without lag.
+    pieces = np.union1d(made.pieces, sorted(copied.joins)).astype(np.int64)
+    motion = replace(made, pieces=pieces)
     notes: list[str] = []
     if motion.wraps:
         notes.append(f"{motion.wraps} jumps by a whole turn were taken out of angles.")
@@ -73,8 +77,8 @@ def measure(data: AuditInput, settings: AuditSettings) -> Semantics:
         *continuity.negative_findings(negative),
         *continuity.time_findings(data, settings),
         *stubs,
-        *copies.splice_findings(data, motion, settings),
-        *copies.copy_findings(copies.find_copies(data, motion), data, settings),
+        *copies.splice_findings(data, made, settings),
+        *copies.copy_findings(copied, data, settings),
         *calibration.release_findings(data, releases, settings),
     ]
     if not any(finding.kind in ("unit", "frame", "swapped_columns") for finding in findings):

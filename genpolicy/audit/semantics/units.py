@@ -23,6 +23,8 @@ from genpolicy.audit.semantics.robust import (
 from genpolicy.audit.settings import AuditSettings
 
 LEAST_EPISODES = 4
+# Columns that move by less than this share of what columns usually move have no factor.
+MATTERS = 0.1
 # Correlation with its command from which a single column has a factor.
 LIKE = 0.9
 # Spread of the logarithms of what is one factor: a fourth either way.
@@ -90,8 +92,7 @@ def component_findings(
     follows by another one in each episode. A column that is commanded to hardly anything has no
     factor, and a tremor is answered by less than slow motion.
     """
-    columns = np.arange(data.observation.shape[1])[data.observation_position]
-    asked = found.mattering(data.observation_scale[columns[: len(motion.names)]])
+    asked = _mattering(data, motion)
     alike = np.maximum(found.positive, found.negative) >= LIKE
     with np.errstate(divide="ignore", invalid="ignore"):
         every = np.where(alike & found.slow, np.log(found.seen) - np.log(found.asked), np.nan)
@@ -106,6 +107,16 @@ def component_findings(
         if not findings:
             findings += _episodes(data, gains, name, settings, np.ones(len(gains)))
     return findings
+
+
+def _mattering(data: AuditInput, motion: Motion) -> Flags:
+    """Columns that move, commanded or observed, beside the others. Shape (P,)."""
+    columns = np.arange(data.observation.shape[1])[data.observation_position]
+    scale = data.observation_scale[columns[: len(motion.names)]]
+    both = [episode_deviation(values, motion.starts) for values in (motion.commanded, motion.observed)]
+    size = np.median(np.maximum(*both), axis=0) / np.where(np.isfinite(scale), scale, 1.0)
+    usual = float(np.median(size[size > 0])) if (size > 0).any() else 0.0
+    return np.asarray(size > MATTERS * usual)
 
 
 def magnitude_findings(data: AuditInput, motion: Motion, settings: AuditSettings) -> list[Finding]:
