@@ -28,6 +28,10 @@ COMPONENTS = 6
 CLOSE = 0.05
 # A copy's difference in second differences, as a share of those of the episode.
 SMALL_MOVEMENT = 0.2
+# Differences up to this share of the usual distance are rounding.
+ROUNDING = 1e-5
+# Power of the steps of a difference over its own: 2 for noise, next to 0 for a smooth one.
+ROUGH = 0.5
 # Share of the rows of the shorter episode that a copy covers (two scripted ones share their begin);
 # of an episode glued to itself, the share that comes again.
 COVER = 0.7
@@ -271,9 +275,18 @@ def _union(stretches: list[tuple[int, int]]) -> int:
 
 
 def _same(first: Array, second: Array, usual: float) -> bool:
-    """Whether two stretches agree in place and in their small movements."""
+    """Whether two stretches agree in place and in their small movements.
+
+    What is left between a copy and its original is rounding or noise; between two smooth ways that
+    lie close it is smooth itself.
+    """
     gap = first - second
     if not CLOSE * usual - float(np.sqrt((gap**2).sum(axis=1).mean())) >= 0:
+        return False
+    if float(np.abs(gap).max()) <= ROUNDING * usual:
+        return True
+    rough = float((np.diff(gap, axis=0) ** 2).sum()) / max(float((gap**2).sum()), 1e-300)
+    if not rough - ROUGH >= 0:
         return False
     small, left = np.diff(first, n=2, axis=0), np.diff(gap, n=2, axis=0)
     power = (small**2).sum(axis=0)

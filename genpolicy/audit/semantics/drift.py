@@ -27,6 +27,8 @@ CUT_SPREADS = 3.0
 LEAST_SIDE = 8
 # The spread of lags from one recording to the next is not believed below this, steps.
 FINEST_STEPS = 0.02
+# The growth of a lag is carried on over this many times the rows in which the arm moves.
+CARRIED_ON = 1.5
 
 
 def episode_drifts(motion: Motion, lags: Array, settings: AuditSettings) -> Array:
@@ -35,7 +37,7 @@ def episode_drifts(motion: Motion, lags: Array, settings: AuditSettings) -> Arra
     result = np.full(count, np.nan)
     if motion.commanded.shape[1] == 0:
         return result
-    cut, distance = _halves(motion)
+    cut, distance, extent = _halves(motion)
     edges = np.stack([motion.starts[:-1], cut], axis=1).ravel()
     edges = np.append(edges, motion.starts[-1])
     halves = segment_lags(
@@ -45,7 +47,8 @@ def episode_drifts(motion: Motion, lags: Array, settings: AuditSettings) -> Arra
         motion.starts[1:], motion.pieces[1:][np.isin(motion.pieces[:-1], motion.starts)]
     )
     known = whole & np.isfinite(lags) & np.isfinite(halves).all(axis=1) & (distance >= 4.0)
-    length = np.diff(motion.starts)
+    # While an arm waits its lag is not seen: what is seen is not carried on over long waits.
+    length = np.minimum(np.diff(motion.starts), CARRIED_ON * extent)
     growth = (halves[known, 1] - halves[known, 0]) * (length[known] / distance[known])
     result[known] = growth
     return result
@@ -152,8 +155,11 @@ def order_findings(
     ]
 
 
-def _halves(motion: Motion) -> tuple[Integers, Array]:
-    """First row of the second half of each episode's motion, and the rows between both halves."""
+def _halves(motion: Motion) -> tuple[Integers, Array, Array]:
+    """First row of the second half of each episode's motion, and of rows: between both, and moved.
+
+    Moved in are the rows from the first to the last twentieth of the way.
+    """
     scale = np.std(motion.commanded, axis=0)
     steps = np.abs(np.diff(motion.commanded, axis=0, prepend=motion.commanded[:1]))
     length = np.diff(motion.starts)
@@ -164,14 +170,18 @@ def _halves(motion: Motion) -> tuple[Integers, Array]:
     begin = np.concatenate([[0.0], gone])[motion.starts[:-1]]
     total = episode_sums(travel, motion.starts)
     rows = np.arange(len(travel))
-    later = gone - np.repeat(begin, length) >= np.repeat(0.5 * total, length)
+    share = gone - np.repeat(begin, length)
+    later = share >= np.repeat(0.5 * total, length)
+    ends = [np.repeat(part * total, length) for part in (0.05, 0.95)]
+    moved = (share >= ends[0]) & (share <= ends[1])
     weight = episode_sums(np.where(later, travel, 0.0), motion.starts)
     late = episode_sums(np.where(later, travel * rows, 0.0), motion.starts)
     early = episode_sums(np.where(later, 0.0, travel * rows), motion.starts)
     with np.errstate(divide="ignore", invalid="ignore"):
         distance = np.nan_to_num(late / weight - early / (total - weight), posinf=0.0, neginf=0.0)
     cut = motion.starts[1:] - episode_sums(later.astype(np.float64), motion.starts).astype(int)
-    return np.asarray(cut, dtype=np.int64), distance
+    extent = episode_sums(moved.astype(np.float64), motion.starts)
+    return np.asarray(cut, dtype=np.int64), distance, extent
 
 
 def _best_cut(values: Array) -> tuple[int, float, float]:

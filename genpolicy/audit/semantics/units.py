@@ -36,6 +36,9 @@ SAME_FACTOR = 2.0
 VALLEY, BETWEEN = 1.0 / 3.0, 0.1
 # Shares of positive values may differ by this between two units.
 SIGNS = 0.25
+# Gains nearer to one are left in: where an episode ends before its last command is reached, the
+# gain is too small, and taking that out would look like a lag that changes on the way.
+TAKEN_OUT = 1.5
 # Share of the components of a channel that have a unit and must agree about another one.
 MOST = 0.5
 # A factor between episodes may be one of units if it is also this many spreads...
@@ -204,7 +207,7 @@ def _epochs(
         noise = settings.significance * error
         beyond = abs(gain) > max(np.log(settings.gain_floor), noise)
         beside = abs(gap) > max(np.log(ratio), noise)
-        if factors is not None:
+        if factors is not None and abs(gain) > np.log(TAKEN_OUT):
             factors[groups == epoch] = np.exp(gain)
         if count < LEAST_EPISODES or not (beyond or beside):
             continue
