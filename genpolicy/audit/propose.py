@@ -15,6 +15,7 @@ from genpolicy.audit.settings import AuditSettings
 from genpolicy.contract.observation import Channel, ObservationContract
 from genpolicy.contract.settings import parse_settings
 from genpolicy.data.dataset import Dataset
+from genpolicy.data.grips import is_two_valued
 
 # Length that makes another observation; another mode is three of them, and a
 # calibration is off from three tenths of one on.
@@ -31,6 +32,7 @@ CHUNK_S = 0.8
 MINIMUM_CHUNK, MAXIMUM_CHUNK = 8, 64
 # Two routes can only lie apart by what was travelled: a chunk covers three times that distance.
 TRAVELLED = 3.0
+LENGTHS = ("m", "px")
 FORMS = ("action_forms", "action_gains", "action_offsets")
 
 
@@ -64,15 +66,16 @@ def propose_settings(
     source = source or dataset.manifest.get("import_contract") or {}
     contract = observation_contract(dataset)
     stated = {**(source.get("audit") or {}), **(overrides or {})}
-    pairing: Mapping[str, str] = source.get("pairing") or {}
+    paired: Mapping[str, str] = source.get("pairing") or {}
     training = dataset.split("train").frames
+    pairing = _route(dataset, contract, paired)
     values: dict[str, Any] = {
         "position_channel": None,
         "position_components": list(pairing.values()) or None,
         "action_components": list(pairing) or None,
         "reference_channel": None,
         "ignored_channels": [],
-        "context_channels": _context(contract, set(pairing.values())),
+        "context_channels": _context(contract, set(paired.values())),
         "phase_observed": (source.get("labels") or {}).get("phase") is None,
     }
     values["channel_scale"] = _scales(contract, training.observation)
@@ -108,6 +111,32 @@ def _context(contract: ObservationContract, paired: set[str]) -> list[str]:
         and not (alone and channel.stream in body)
         and not OWN_BODY & set(channel.name.lower().split("_"))
     ]
+
+
+def _route(
+    dataset: Dataset, contract: ObservationContract, paired: Mapping[str, str]
+) -> dict[str, str]:
+    """The pairs that are one route: lengths where there are two of them, and no hand.
+
+    A turn or a grip beside lengths has its own unit and its own component: its spread must not
+    drown two routes.
+    """
+    units = _units(contract)
+    lengths = {a: o for a, o in paired.items() if units.get(o) in LENGTHS}
+    if len(lengths) > 1:
+        return lengths
+    stated = list(dataset.manifest["action_contract"]["components"])
+    training = dataset.split("train").frames.action
+    moving = {a: o for a, o in paired.items() if not is_two_valued(training[:, stated.index(a)])}
+    return moving or dict(paired)
+
+
+def _units(contract: ObservationContract) -> dict[str, str]:
+    return {
+        f"{channel.name}.{part}": channel.unit
+        for channel in contract.channels
+        for part in channel.components
+    }
 
 
 def _forms(stated: Mapping[str, Any]) -> dict[str, Any]:
@@ -184,11 +213,7 @@ def _separations(
     That is the unit of what is moved: a change or a normalised place has none of its own.
     """
     stated = dataset.manifest["action_contract"]
-    known = {
-        f"{channel.name}.{part}": channel.unit
-        for channel in contract.channels
-        for part in channel.components
-    }
+    known = _units(contract)
     units = {known.get(seen, "") for seen in pairing.values()} or set(stated["units"])
     unit = next(iter(units)) if len(units) == 1 else ""
     scale = SCALES.get(unit, _spread_scale(placed))

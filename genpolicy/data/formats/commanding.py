@@ -1,19 +1,24 @@
 """The commands of a proposed contract: pairs, forms and units of the action, and what was odd."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.data.formats.commands import CommandForm
 from genpolicy.data.formats.contract import SI, UNKNOWN_UNIT, ActionSource, ChannelSource
-from genpolicy.data.formats.forms import SAME_SCALE, Reading, read_forms
+from genpolicy.data.formats.following import changes
+from genpolicy.data.formats.forms import CHANGED, SAME_SCALE, Reading, added_up, read_forms
 from genpolicy.data.formats.pairing import pair_by_name
 from genpolicy.data.formats.quaternions import is_quaternion
 from genpolicy.data.formats.sample import Sample
+from genpolicy.data.formats.turning import turned
 
 Array = NDArray[np.float64]
+
+# What a reading of a rotation may leave unexplained more than the best one, and yet be taken first.
+CLEARLY = 2.0
 
 
 @dataclass(frozen=True)
@@ -51,6 +56,7 @@ def propose_commands(
         observed, commanded, sample.number, named=named, period_s=period_s, no_partner=parts
     )
     known = [units[name] for name in names]
+    reading = _with_turns(reading, turned(channels, sample), commanded, sample, period_s=period_s)
     told = _with_units(action, reading, known, period_s)
     pairs = {
         a: o
@@ -86,6 +92,25 @@ def _observed(
                 parts += range(first, first + 4)
         begin += width
     return names, units, values, sorted(set(parts))
+
+
+def _with_turns(
+    reading: Reading, seen: Array, commanded: Array, sample: Sample, *, period_s: float
+) -> Reading:
+    """What moves nothing by itself may turn something: then it is a change without a partner."""
+    unknown = [a for a, form in enumerate(reading.forms) if form.form == "unknown"]
+    if not unknown or not seen.shape[1]:
+        return reading
+    found = changes(seen, commanded[:, unknown], sample.number)
+    holds = (found.explained >= CHANGED) & found.beyond
+    forms = list(reading.forms)
+    for number, a in enumerate(unknown):
+        if holds[number].any():
+            left = np.where(holds[number], 1.0 - found.explained[number], np.inf)
+            # About the axes of the base, unless another reading is clearly better.
+            best = int(np.flatnonzero(left <= CLEARLY * left.min() + 1e-9)[0])
+            forms[a] = added_up(float(found.gain[number, best]), period_s)
+    return replace(reading, forms=tuple(forms))
 
 
 def _with_units(

@@ -24,7 +24,7 @@ MOST_EPISODES = 40
 STILL = 0.05
 # What is left unexplained, against what the command of another episode leaves; and the share from
 # which on chance is no explanation.
-BEYOND_CHANCE, NEARLY_ALL = 0.5, 0.95
+BEYOND_CHANCE, NEARLY_ALL = 0.5, 0.98
 # Below this share of its size, what is left of a number is rounding.
 ROUNDING = 1e-9
 
@@ -161,7 +161,8 @@ def _displacements(
     for piece in pieces:
         command, answer = told[piece], seen[piece]
         first, last = max(0, -lag), len(command) - span - max(0, lag)
-        if last - first < LEAST_ROWS:
+        # The few windows of a long lag show one part of every episode: there, all is constant.
+        if last - first < max(LEAST_ROWS, len(command) // 2):
             continue
         if summed:
             command = np.concatenate([np.zeros((1, command.shape[1])), np.cumsum(command, axis=0)])

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from genpolicy.data.formats.commands import CommandForm, Form
+from genpolicy.data.formats.commands import CommandForm
 from genpolicy.data.formats.following import (
     MINIMUM_SAMPLES,
     Following,
@@ -22,6 +22,7 @@ from genpolicy.data.formats.following import (
     places,
     varies,
 )
+from genpolicy.data.grips import is_two_valued
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -30,7 +31,7 @@ Flags = NDArray[np.bool_]
 # Share of the motion that a command must explain to be believed: a place (half of a standard
 # deviation is left), a change, which is noisier, a place whose scale and origin are free as well;
 # and one that bears the name of what it commands.
-EXPLAINED, CHANGED, RESCALED, NAMED = 0.75, 0.5, 0.8, 0.25
+EXPLAINED, CHANGED, RESCALED, NAMED = 0.75, 0.5, 0.8, 0.5
 # A place in its own unit may look like a change (a fast target leads its response by a quarter
 # turn), but where a change leaves this share of what the place leaves, and that is no rounding.
 FAR_BETTER, LITTLE_LEFT = 0.2, 0.05
@@ -42,8 +43,8 @@ NEAR_BONUS, NAME_BONUS, ORDER_BONUS = 0.05, 0.03, 0.01
 RATE_OF, EXACT = 0.9, (0.8, 1.25)
 # Fewer pairs than this share of the numbers that vary are not what the action is about.
 LEAST_PAIRED = 0.25
-# A hand that is told to open or to close knows two values.
-TWO_VALUES = 0.9
+# Rows that an echo of the command repeats.
+ECHOES = 0.9
 
 
 @dataclass(frozen=True)
@@ -138,6 +139,7 @@ def read_forms(
             a,
             found.get(a, pairs.get(a)),
             named=a in pairs and named.get(a) == pairs[a],
+            moves=bool(moves[a]),
             values=(observed, commanded),
             period_s=period_s,
         )
@@ -161,13 +163,8 @@ def _evidence(observed: Array, commanded: Array, episode: Integers) -> _Evidence
         scaled=places(observed, commanded, episode),
         change=changes(observed, commanded, episode),
         near=np.nan_to_num(near),
-        two_valued=np.array([_is_two_valued(values) for values in commanded.T], dtype=bool),
+        two_valued=np.array([is_two_valued(values) for values in commanded.T], dtype=bool),
     )
-
-
-def _is_two_valued(values: Array) -> bool:
-    counts = np.sort(np.unique(values, return_counts=True)[1])[::-1]
-    return bool(counts[:2].sum() >= TWO_VALUES * len(values))
 
 
 def _score(evidence: _Evidence) -> Array:
@@ -213,7 +210,7 @@ def _is_echo(observed: Array, commanded: Array, episode: Integers) -> bool:
     for lag in range(3):
         same = episode[lag:] == episode[: len(episode) - lag]
         repeats = observed[lag:] == commanded[: len(commanded) - lag]
-        if np.mean(repeats[same]) >= TWO_VALUES:
+        if np.mean(repeats[same]) >= ECHOES:
             return True
     return False
 
@@ -276,6 +273,7 @@ def _form(
     partner: int | None,
     *,
     named: bool,
+    moves: bool,
     values: tuple[Array, Array],
     period_s: float,
 ) -> CommandForm:
@@ -283,12 +281,13 @@ def _form(
     if partner is None:
         held = np.flatnonzero(evidence.change_holds()[a])
         if not len(held):
-            return CommandForm()
+            known = evidence.two_valued[a] or not moves
+            return CommandForm(form="place" if known else "unknown")
         partner = int(held[np.argmax(evidence.change.explained[a, held])])
     if evidence.is_change()[a, partner]:
         gain = float(evidence.change.gain[a, partner])
         gain = abs(gain) if named else gain
-        return CommandForm(form=_word(abs(gain), period_s), gain=_rounded(gain))
+        return added_up(gain, period_s)
     if named or not evidence.scaled_holds()[a, partner]:
         return CommandForm()
     if evidence.same.explained[a, partner] >= EXPLAINED:
@@ -299,11 +298,11 @@ def _form(
     return CommandForm(gain=gain, offset=_rounded(offset))
 
 
-def _word(gain: float, period_s: float) -> Form:
+def added_up(gain: float, period_s: float) -> CommandForm:
     """A rate where one of it moves by the period in a row; else a change, maybe normalised."""
-    is_change = SAME_SCALE[0] <= gain <= SAME_SCALE[1]
-    is_rate = SAME_SCALE[0] <= gain / period_s <= SAME_SCALE[1]
-    return "rate" if is_rate and not is_change else "change"
+    is_change = SAME_SCALE[0] <= abs(gain) <= SAME_SCALE[1]
+    is_rate = SAME_SCALE[0] <= abs(gain) / period_s <= SAME_SCALE[1]
+    return CommandForm(form="rate" if is_rate and not is_change else "change", gain=_rounded(gain))
 
 
 def _rounded(value: float) -> float:

@@ -2,6 +2,11 @@
 
 from genpolicy.data.formats.contract import UNKNOWN_UNIT, ImportContract
 
+WORDS = {
+    "place": "a place in another unit or from another origin",
+    "change": "a change per row",
+    "rate": "a rate per second",
+}
 ASKED = ("phase", "object", "operator", "calibration_epoch", "outcome", "is_recovery")
 
 
@@ -26,16 +31,38 @@ def open_questions(contract: ImportContract) -> list[str]:
         notes.append(f"The rate was guessed: {contract.rate_hz:g} Hz.")
     if contract.pairing is None:
         notes.append(
-            "The action commands nothing that is observed (other names, a velocity or a "
-            "difference): lag and calibration cannot be measured."
+            "The action commands nothing that is observed: lag and calibration cannot be measured."
         )
     elif contract.pairing_guessed:
         pairs = ", ".join(f"{a} with {o}" for a, o in contract.pairing.items())
         notes.append(f"What the action commands was found in the numbers, not in names: {pairs}.")
+    notes += forms_notes(contract)
     if contract.format not in ("mcap", "dataset"):
         missing = [name for name in ASKED if getattr(contract.labels, name) is None]
         if missing:
             notes.append(f"Not recorded: {', '.join(missing)}.")
         if contract.labels.time is None:
             notes.append("No clock was recorded: times are row / rate.")
+    return notes
+
+
+def forms_notes(contract: ImportContract) -> list[str]:
+    """What the action's numbers mean where they are no plain places, and where nobody knows."""
+    kinds: dict[tuple[str, str], list[str]] = {}
+    for name, form in contract.forms.items():
+        if form.form == "unknown" or form.is_plain:
+            continue
+        partner = (contract.pairing or {}).get(name)
+        key = WORDS[form.form], f"{abs(form.gain):.3g}"
+        minus = "minus " if form.gain < 0 else ""
+        kinds.setdefault(key, []).append(name + (f" of {minus}{partner}" if partner else ""))
+    said = [f"{word} (gain {gain}): {', '.join(names)}" for (word, gain), names in kinds.items()]
+    how = "was found in the numbers" if contract.forms_guessed else "is declared"
+    notes = [f"What the action means {how}: {'; '.join(said)}."] if said else []
+    unknown = [name for name, form in contract.forms.items() if form.form == "unknown"]
+    if unknown:
+        notes.append(
+            f"Nothing tells whether the action's {', '.join(unknown)} say where, how far or how "
+            "fast: they are read as places. Declare `forms` in the contract if you know."
+        )
     return notes
