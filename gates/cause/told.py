@@ -56,12 +56,7 @@ def teller(rows: Sequence[Prediction], limits: CauseLimits) -> Diagnosis | None:
     beyond = [_by_name(row, rows) for row in rows if surely(row, limit)]
     if beyond:
         return _hidden(_foremost(beyond, limits["nearly_equal_effect"]))
-    together = {row.phase for row in rows if row.variable == COLUMNS}
-    open_ = [
-        row
-        for row in rows
-        if surely(row, limit) is None and not (is_column(row.variable) and row.phase in together)
-    ]
+    open_ = [_by_name(row, rows) for row in rows if _is_open(row, rows, limit)]
     return _undecided(max(open_, key=lambda row: row.told_upper), limit) if open_ else None
 
 
@@ -69,6 +64,28 @@ def is_column(variable: str) -> bool:
     """Whether it is a recorded column, which the audit knows by no name of its own."""
     known = variable in (*CONCRETE, COLUMNS)
     return not known and not variable.startswith(OTHER_PHASE)
+
+
+def _is_open(row: Prediction, rows: Sequence[Prediction], limit: float) -> bool:
+    """Whether a variable may tell too much.
+
+    Of several recorded columns only the best is asked about. Which one that is rests on the same
+    episodes, so its share scatters more than its interval says: where there are episodes enough
+    to show a column that tells too much (its interval is narrower than half the limit), it must
+    by itself beat a guess at the level that all columns share.
+    """
+    if surely(row, limit) is not None:
+        return False
+    if row.variable != COLUMNS:
+        return not is_column(row.variable) or not _best(rows, row.phase)
+    best = [r for r in rows if (r.variable, r.phase) == (row.detail, row.phase)]
+    telling = row.told_upper - row.told < limit / 2.0
+    return not telling or not best or best[0].told_lower > 0.0
+
+
+def _best(rows: Sequence[Prediction], phase: str) -> bool:
+    """Whether the best of several columns was asked about in this phase."""
+    return any((row.variable, row.phase) == (COLUMNS, phase) for row in rows)
 
 
 def _by_name(row: Prediction, rows: Sequence[Prediction]) -> Prediction:

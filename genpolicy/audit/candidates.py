@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from genpolicy.audit.data import NOT_RECORDED, Array, AuditInput, Integers
+from genpolicy.audit.data import NOT_RECORDED, Array, AuditInput, Integers, recorded
 from genpolicy.audit.variable import Values, Variable, numbered
 from genpolicy.data.variables import Runs, stored
 
@@ -28,10 +28,18 @@ ENDS = re.compile(r"_?(index|idx|id|uuid|number|code)$", re.IGNORECASE)
 CLOCK = re.compile(r"(\d{1,2}):(\d{2})(?::(\d{2}(?:\.\d+)?))?")
 # What the audit itself calls a variable; a column of that name is told apart.
 RESERVED = {
-    *("phase", "object", "operator", "calibration_epoch", "episode_order", "time_in_episode"),
-    *("recording_sequence", "history", "everything_together", "recorded_columns"),
+    *(
+        "phase",
+        "episode_order",
+        "time_in_episode",
+        "recording_sequence",
+        "history",
+        "everything_together",
+        "recorded_columns",
+    ),
     *("previous_episodes", "previous_episodes_of_operator", "every_other_episode"),
 }
+LABELS = ("operator", "object", "calibration_epoch")
 PREFIXES = ("mode_of_", "start_position.")
 TASK, FILE, FOLDER = "task", "file", "folder"
 # In these layouts files are filled one after the other: which one an episode is in is its place.
@@ -176,6 +184,8 @@ def _names_episodes(values: NDArray[np.str_]) -> str:
 
 def _called(name: str, data: AuditInput) -> str:
     """The name, told apart from what the audit itself calls by it."""
+    if name in LABELS:
+        return f"{name} (column)" if recorded(getattr(data.episodes, name)) else name
     taken = name in RESERVED or name in data.observation_names or name.startswith(PREFIXES)
     return f"{name} (column)" if taken else name
 
@@ -184,7 +194,7 @@ def _distinct(
     found: list[Variable], left: list[tuple[str, str]], data: AuditInput, phase_name: str
 ) -> Candidates:
     """Columns that say the same as one; labels that the audit knows stay what they are."""
-    known = {_says(_of_label(data, label)) for label in ("operator", "object", "calibration_epoch")}
+    known = {_says(_of_label(data, label)) for label in LABELS}
     outcome, phase = _says(_of_label(data, "outcome")), _says_phase(data)
     groups: dict[bytes, list[Variable]] = {}
     for item in sorted(found, key=lambda item: item.is_measure):

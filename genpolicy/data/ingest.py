@@ -17,15 +17,17 @@ from genpolicy.data.assemble import (
 )
 from genpolicy.data.checks import check_metadata, check_recording, clock_offset_ns
 from genpolicy.data.contract import IngestContract, SplitRule
-from genpolicy.data.recording.episode import ACTION_STREAM, RecordedEpisode
+from genpolicy.data.recording.episode import ACTION_STREAM, REQUIRED_METADATA, RecordedEpisode
 from genpolicy.data.recording.reader import read_hashed_episode
 from genpolicy.data.resample import remove_clock_offsets, resample
+from genpolicy.data.variables import MAXIMUM_TEXT, Runs, completed, varying
 from genpolicy.errors import BadInputError, ContractError
 
 CLOCK_NOTE = (
     "event_time_s: exposure on the host's monotonic clock, after the declared offset of each "
     "stream was subtracted; receive_time_s: arrival on the same clock"
 )
+CLOCK_OFFSET = "clock_offset_"
 
 
 def ingest_recordings(
@@ -58,32 +60,33 @@ def ingest_recordings(
     """
     accepted: list[AcceptedEpisode] = []
     refused: list[Refusal] = []
+    recorded: dict[str, dict[str, Runs]] = {}
     names = _labels(files)
     for name, path in sorted(zip(names, files, strict=True)):
         try:
-            episode = accept_recording(path, contract=contract, label=name)
+            episode, more = _accepted(path, contract, name)
             _refuse_other_task(episode, task)
             _refuse_duplicate(episode, accepted)
             accepted.append(episode)
+            for key, text in more.items():
+                recorded.setdefault(key, {})[episode.episode_uuid] = Runs((0,), (text,))
         except BadInputError as error:
             refused.append(Refusal(file=name, where=error.where, reason=str(error)))
-    write_dataset(
-        out,
-        accepted=accepted,
-        refused=refused,
-        found=len(files),
-        description=Description(
-            source_kind="mcap",
-            observation=contract.observation,
-            action=contract.action,
-            phases=contract.phases,
-            action_period_s=contract.action_period_s,
-            split=split or SplitRule(),
-            clock_note=CLOCK_NOTE,
-            notes=notes,
-            import_contract=import_contract,
-        ),
+    description = Description(
+        source_kind="mcap",
+        observation=contract.observation,
+        action=contract.action,
+        phases=contract.phases,
+        action_period_s=contract.action_period_s,
+        split=split or SplitRule(),
+        clock_note=CLOCK_NOTE,
+        notes=notes,
+        import_contract=import_contract,
     )
+    with completed(out, varying(recorded, len(accepted))) as folder:
+        write_dataset(
+            folder, accepted=accepted, refused=refused, found=len(files), description=description
+        )
 
 
 def accept_recording(path: Path, *, contract: IngestContract, label: str) -> AcceptedEpisode:
@@ -97,13 +100,25 @@ def accept_recording(path: Path, *, contract: IngestContract, label: str) -> Acc
     Raises:
         BadInputError: It is not a recording, or it breaks the contract.
     """
+    return _accepted(path, contract, label)[0]
+
+
+def _accepted(
+    path: Path, contract: IngestContract, label: str
+) -> tuple[AcceptedEpisode, dict[str, str]]:
+    """The recording, and what else its metadata say of it."""
     raw, digest = read_hashed_episode(path, where=label)
     check_metadata(raw, contract, where=label)
-    episode = remove_clock_offsets(raw, where=label)
-    check_recording(episode, contract, where=label)
-    rows = resample(episode, contract, where=label)
+    stamped = remove_clock_offsets(raw, where=label)
+    check_recording(stamped, contract, where=label)
+    rows = resample(stamped, contract, where=label)
     metadata = raw.metadata
-    return AcceptedEpisode(
+    more = {
+        key: text[:MAXIMUM_TEXT]
+        for key, text in metadata.items()
+        if key not in REQUIRED_METADATA and not key.startswith(CLOCK_OFFSET)
+    }
+    episode = AcceptedEpisode(
         episode_uuid=raw.episode_uuid,
         rows=rows,
         strata={name: metadata[name] for name in STRATA},
@@ -112,11 +127,12 @@ def accept_recording(path: Path, *, contract: IngestContract, label: str) -> Acc
         source_file=label,
         source_sha256=digest,
         content_sha256=_samples_hash(raw),
-        recorded_at_ns=int(episode.streams[ACTION_STREAM].event_time_ns[0]),
+        recorded_at_ns=int(stamped.streams[ACTION_STREAM].event_time_ns[0]),
         clock_offsets_ns={
             name: clock_offset_ns(raw, name, where=label) for name in sorted(raw.streams)
         },
     )
+    return episode, more
 
 
 def _samples_hash(episode: RecordedEpisode) -> str:

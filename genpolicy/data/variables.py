@@ -64,6 +64,24 @@ def runs_of(values: NDArray[Any]) -> Runs:
     return Runs(tuple(starts.tolist()), tuple(_text(value) for value in values[starts].tolist()))
 
 
+def varying(recorded: Recorded, episodes: int) -> Recorded:
+    """The columns that are not the same everywhere.
+
+    Args:
+        recorded: What was recorded of the accepted episodes.
+        episodes: How many were accepted.
+    """
+    return {name: runs for name, runs in recorded.items() if _varies(runs, episodes)}
+
+
+def _varies(by_episode: Mapping[str, Runs], episodes: int) -> bool:
+    values = {value for runs in by_episode.values() for value in runs.values}
+    # NaN differs from itself; a column of NaN alone holds nothing.
+    some = {value for value in values if not (isinstance(value, float) and np.isnan(value))}
+    missing = len(by_episode) < episodes or len(some) < len(values)
+    return len(some) + missing > 1 and bool(some - {""})
+
+
 @contextlib.contextmanager
 def completed(out: Path, recorded: Recorded) -> Iterator[Path]:
     """Where to write a dataset, which gets its variables before it appears at `out`.

@@ -20,7 +20,7 @@ from genpolicy.data.formats.contract import (
     contract_of,
 )
 from genpolicy.data.formats.sample import Sample, action_of, channels_of
-from genpolicy.data.formats.sampling import sample_episodes
+from genpolicy.data.formats.sampling import labels_among, sample_episodes, settled
 from genpolicy.data.formats.source import Column, Source, as_float
 from genpolicy.data.formats.units import BULK, tokens
 from genpolicy.errors import BadInputError, ContractError
@@ -35,6 +35,7 @@ LONGEST_GAP_S = 0.25
 LONGEST_GAP_ROWS = 3.0
 FROZEN_S = 2.0
 FROZEN_SHARE = 0.1
+STATED = {"observation", "obs", "state"}
 TIME_UNITS = {"ns": 1e9, "us": 1e6, "ms": 1e3}
 ACTION_WORDS = (("action", "actions"), ("command", "cmd", "commanded"), ("target", "goal"))
 
@@ -49,6 +50,8 @@ def propose_contract(source: Source, kind: Format, *, task: str | None = None) -
     labels = _rows_numbered(source, source.labels, notes)
     actions, observed = _roles(source, labels)
     sample = _sample(source, [c.name for c in (*actions, *observed)], labels)
+    labels = settled(labels, sample.episodes, notes)
+    observed = _without_labels(observed, sample, notes)
     rate_hz, rate_guessed, unit = _rate(source, sample, labels, notes)
     action = action_of(actions, sample, notes)
     channels = channels_of(observed, sample, notes)
@@ -96,9 +99,9 @@ def _roles(source: Source, labels: Labels) -> tuple[tuple[Column, ...], tuple[Co
         for c in numeric
         if c not in actions
         and not _is_action(c.name, ACTION_WORDS[0])
-        and not BOOKKEEPING & {tokens(c.name)[0], tokens(c.name)[-1]}
+        and not BOOKKEEPING & {*tokens(c.name)[:1], *tokens(c.name)[-1:]}
     ]
-    stated = [c for c in observed if {"observation", "obs", "state"} & set(tokens(c.name))]
+    stated = [c for c in observed if STATED & set(tokens(c.name))]
     observed = stated or observed
     for found, what in ((actions, "an action"), (observed, "an observation")):
         if not found:
@@ -109,6 +112,22 @@ def _roles(source: Source, labels: Labels) -> tuple[tuple[Column, ...], tuple[Co
                 action="Write the contract by hand (docs/import.md) and give it with --contract.",
             )
     return tuple(actions), tuple(observed)
+
+
+def _without_labels(
+    observed: tuple[Column, ...], sample: Sample, notes: list[str]
+) -> tuple[Column, ...]:
+    """Without columns that look like labels, where no name says what is observed."""
+    if any(STATED & set(tokens(c.name)) for c in observed):
+        return observed
+    found = labels_among(observed, sample.episodes)
+    if not found or len(found) == len(observed):
+        return observed
+    notes.append(
+        f"Taken as labels, not as observed: {', '.join(found)}. If the policy sees them, add them "
+        "to the channels."
+    )
+    return tuple(c for c in observed if c.name not in found)
 
 
 def _is_action(name: str, words: tuple[str, ...]) -> bool:

@@ -6,16 +6,14 @@ changes from row to row is a signal, and what counts rows or judges the episode 
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from genpolicy.data.formats.contract import ImportContract, selectors
 from genpolicy.data.formats.source import Column, RawEpisode
 from genpolicy.data.formats.units import tokens
-from genpolicy.data.variables import Recorded, Runs, runs_of
+from genpolicy.data.variables import Recorded, Runs, runs_of, varying
 
 # What counts rows, episodes or files, and what comes of an episode instead of before it.
 COUNTERS = {
-    *("index", "frame_index", "step_index", "episode_index", "frame", "step", "t", "timestamp"),
+    *("index", "frame_index", "step_index", "episode_index", "frame", "step", "timestamp"),
     *("episode_uuid", "num_samples", "rows", "n_rows", "chunk_index", "file_index"),
 }
 OUTCOMES = {
@@ -76,11 +74,8 @@ class Reasons:
 
     def recorded(self) -> Recorded:
         """What varies; a value that is the same everywhere tells nothing."""
-        return {
-            name: by_episode
-            for name, by_episode in self._runs.items()
-            if not self._is_signal(name) and self._varies(by_episode)
-        }
+        kept = {name: runs for name, runs in self._runs.items() if not self._is_signal(name)}
+        return varying(kept, self._episodes)
 
     def notes(self, columns: Sequence[Column]) -> list[str]:
         """What was recorded and is not looked at as a reason, a sentence each."""
@@ -95,13 +90,6 @@ class Reasons:
 
     def _is_signal(self, name: str) -> bool:
         return self._flickering.get(name, 0) > FLICKERING_SHARE * self._episodes
-
-    def _varies(self, by_episode: dict[str, Runs]) -> bool:
-        values = {value for runs in by_episode.values() for value in runs.values}
-        # NaN differs from itself; a column of NaN alone holds nothing.
-        some = {value for value in values if not (isinstance(value, float) and np.isnan(value))}
-        missing = len(by_episode) < self._episodes or len(some) < len(values)
-        return len(some) + missing > 1 and bool(some - {""})
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -14,10 +14,16 @@ import numpy as np
 
 from genpolicy.data.assemble import Refusal
 from genpolicy.data.formats.contract import Labels
-from genpolicy.data.formats.source import RawEpisode, Source, as_float
+from genpolicy.data.formats.source import Column, RawEpisode, Source, as_float
+from genpolicy.data.formats.units import tokens
 
 SAMPLE_EPISODES = 12
 FROM_ONE_CLOCK = 2
+# Of whole numbers: so few are labels, and so many rows on average make no flicker.
+MOST_LABELS, LONGEST_FLICKER = 12, 8
+HANDS = {"gripper", "hand", "finger", "jaw", "grasp", "contact", "contacts"}
+SETTLED = ("task", "object", "operator", "calibration_epoch")
+SWITCHING_SHARE = 0.25
 
 
 @dataclass(frozen=True)
@@ -89,3 +95,48 @@ def _is_one_clock(spans: list[tuple[float, float]]) -> bool:
     ordered = sorted(spans)
     apart = all(after[0] > before[1] for before, after in pairwise(ordered))
     return len(ordered) >= FROM_ONE_CLOCK and apart
+
+
+def settled(labels: Labels, sample: Sequence[RawEpisode], notes: list[str]) -> Labels:
+    """The labels without those whose value switches inside episodes: they are values by row.
+
+    One episode in which a label changes is damaged; if it is a quarter of them, they mean it so.
+    """
+    unsettled = {
+        label: column
+        for label in SETTLED
+        if (column := getattr(labels, label)) is not None
+        and _switching(column, sample) >= max(2.0, SWITCHING_SHARE * len(sample))
+    }
+    for column in unsettled.values():
+        notes.append(f"{column} switches inside episodes: it is held against the modes row by row.")
+    return labels.model_copy(update=dict.fromkeys(unsettled))
+
+
+def labels_among(columns: Sequence[Column], sample: Sequence[RawEpisode]) -> list[str]:
+    """Columns that look like labels of the episodes, and not like what a sensor measures.
+
+    A few whole numbers that hold for the whole episode, or for long; the state of a hand may
+    switch like that, and is measured.
+    """
+    return [c.name for c in columns if c.width is None and _is_label(c.name, sample)]
+
+
+def _is_label(name: str, sample: Sequence[RawEpisode]) -> bool:
+    parts = [episode.columns[name] for episode in sample]
+    values = np.unique(np.concatenate(parts))
+    if values.dtype.kind not in "iub" or not 1 < len(values) <= MOST_LABELS:
+        return False
+    switches = [int(np.count_nonzero(part[1:] != part[:-1])) for part in parts]
+    if not any(switches):
+        return True
+    held = sum(map(len, parts)) / (sum(switches) + len(parts))
+    return held >= LONGEST_FLICKER and not HANDS & set(tokens(name))
+
+
+def _switching(column: str, sample: Sequence[RawEpisode]) -> int:
+    return sum(
+        bool(np.any(values != values[0]))
+        for episode in sample
+        if len(values := episode.columns.get(column, np.zeros(0)))
+    )
