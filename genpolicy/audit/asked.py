@@ -72,8 +72,8 @@ def questions(
     }
     for name in EPISODE_VARIABLES:
         values = getattr(data.episodes, name)
-        told = recorded(values) or name in {item.name for item in data.variables}
-        found[name] = "" if told else "not recorded, so it may decide modes unseen"
+        known = recorded(values) or name in {item.name for item in data.variables}
+        found[name] = "" if known else "not recorded, so it may decide modes unseen"
     found |= {f"{COLUMN}{item.name}": "" for item in data.variables}
     found |= {f"{COLUMN}{name}": reason for name, reason in data.left_out}
     ordered = bool(np.all(np.isfinite(data.episodes.order)))

@@ -28,16 +28,9 @@ ENDS = re.compile(r"_?(index|idx|id|uuid|number|code)$", re.IGNORECASE)
 CLOCK = re.compile(r"(\d{1,2}):(\d{2})(?::(\d{2}(?:\.\d+)?))?")
 # What the audit itself calls a variable; a column of that name is told apart.
 RESERVED = {
-    *(
-        "phase",
-        "episode_order",
-        "time_in_episode",
-        "recording_sequence",
-        "history",
-        "everything_together",
-        "recorded_columns",
-    ),
-    *("previous_episodes", "previous_episodes_of_operator", "every_other_episode"),
+    *("phase", "episode_order", "time_in_episode", "recording_sequence", "history"),
+    *("everything_together", "recorded_columns", "every_other_episode"),
+    *("previous_episodes", "previous_episodes_of_operator"),
 }
 LABELS = ("operator", "object", "calibration_epoch")
 PREFIXES = ("mode_of_", "start_position.")

@@ -33,17 +33,19 @@ def file(layouts, tmp_path):
     return path
 
 
-def test_demonstrations_in_order_of_their_number(file, layouts, tmp_path):
+def test_every_demonstration_under_its_number(file, layouts, tmp_path):
     opened = open_dataset(file, out=tmp_path / "out")
     assert (opened.found, opened.accepted) == (12, 12)
     assert opened.contract.rate_hz == 20.0
     dataset = load_dataset(tmp_path / "out")
-    assert dataset.episodes["source_file"].tolist()[10] == "demo.hdf5#demo_10"
+    files = dataset.episodes["source_file"].tolist()
     state, action = layouts.samples(10)
-    rows = dataset.frames.episode == 10
+    rows = dataset.frames.episode == files.index("demo.hdf5#demo_10")
     np.testing.assert_array_equal(dataset.frames.observation[rows], state)
     np.testing.assert_array_equal(dataset.frames.action[rows], action)
-    assert dataset.episodes["operator"].tolist()[:2] == ["ann_operator", "bob_operator"]
+    operators = dict(zip(files, dataset.episodes["operator"], strict=True))
+    assert operators["demo.hdf5#demo_0"] == "ann_operator"
+    assert operators["demo.hdf5#demo_1"] == "bob_operator"
     notes = " ".join(opened.notes)
     assert "obs/agentview_image" in notes
     assert "operator was taken from the file's masks" in notes
