@@ -80,7 +80,8 @@ def _is_open(row: Prediction, rows: Sequence[Prediction], limit: float) -> bool:
         return not is_column(row.variable) or not _best(rows, row.phase)
     best = [r for r in rows if (r.variable, r.phase) == (row.detail, row.phase)]
     telling = row.told_upper - row.told < limit / 2.0
-    return not telling or not best or best[0].told_lower > 0.0
+    # NaN proves nothing.
+    return not telling or not best or not best[0].told_lower <= 0.0
 
 
 def _best(rows: Sequence[Prediction], phase: str) -> bool:

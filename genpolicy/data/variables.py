@@ -152,7 +152,8 @@ def _column(runs: list[Runs | None]) -> pa.Array:
 
 
 def _runs(value: Any) -> Runs | None:
-    if value is None:
+    # A table of pandas says NaN for whatever is missing.
+    if value is None or (isinstance(value, float) and np.isnan(value)):
         return None
     if isinstance(value, str | float):
         return Runs((0,), (value,))
