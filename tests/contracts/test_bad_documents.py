@@ -14,6 +14,7 @@ import pytest
 import yaml
 
 from genpolicy.data.dataset import load_dataset
+from genpolicy.evidence.shadow.settings import ShadowSection
 from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.documents import canonical_json
@@ -51,7 +52,7 @@ def section_models() -> dict[str, type]:
 def test_params(monkeypatch, fallen_over):
     models = section_models() | {
         "execution": ExecutionSettings, "feasibility": FeasibilitySettings,
-        "policy": PolicySettings, "source": SourceSection,
+        "policy": PolicySettings, "source": SourceSection, "shadow": ShadowSection,
     }  # fmt: skip
     assert len(models) > 8
 
