@@ -14,6 +14,7 @@ A number has one home. What another section says already is read from there (`Ga
 """
 
 import functools
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -30,6 +31,7 @@ from genpolicy.integrity.hashing import sha256_bytes_of
 from genpolicy.seeds import stream
 
 PARAMS_FILE = "params.yaml"
+DEEPEST = 30  # levels of `params.yaml`; it has six
 DERIVED = "derived"
 LIMITS, NOT_APPLICABLE = "limits", "not_applicable"
 
@@ -136,7 +138,42 @@ def read_params(root: Path, *, name: str = PARAMS_FILE) -> dict[str, Any]:
 
 @functools.lru_cache(maxsize=4)
 def _parsed(data: bytes) -> Any:
-    return parse_yaml(data, where=PARAMS_FILE)
+    document = parse_yaml(data, where=PARAMS_FILE)
+    require_plain(document, where=PARAMS_FILE)
+    return document
+
+
+def require_plain(document: Any, *, where: str, depth: int = 0) -> None:
+    """Refuse what YAML can say and JSON cannot: it could be neither hashed nor compared.
+
+    Raises:
+        ConfigError: A date, bytes, a set, a number that is not finite, a key that is no text, or
+            a value that holds itself.
+    """
+    if depth > DEEPEST:
+        _refuse_plain(where, f"more than {DEEPEST} levels deep")
+    if isinstance(document, dict):
+        for key, value in document.items():
+            if not isinstance(key, str):
+                _refuse_plain(where, f"the key {key!r}")
+            inside = f"{where}.{key}" if depth else f"{where}: {key}"
+            require_plain(value, where=inside, depth=depth + 1)
+    elif isinstance(document, list):
+        for value in document:
+            require_plain(value, where=where, depth=depth + 1)
+    elif isinstance(document, float) and not math.isfinite(document):
+        _refuse_plain(where, repr(document))
+    elif not isinstance(document, str | int | float | None):
+        _refuse_plain(where, f"a {type(document).__name__}")
+
+
+def _refuse_plain(where: str, found: str) -> NoReturn:
+    raise ConfigError(
+        where=where,
+        found=found,
+        expected="plain values: texts, finite numbers, true, false, null, lists and mappings",
+        action="Put a text into quotation marks, or correct the value.",
+    )
 
 
 def section_of(params: Mapping[str, Any], name: str) -> dict[str, Any]:

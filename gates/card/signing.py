@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from cryptography.exceptions import UnsupportedAlgorithm
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 from cryptography.hazmat.primitives.serialization import load_pem_private_key
 from securesystemslib.dsse import Envelope as DsseEnvelope
@@ -216,6 +217,8 @@ def _parse_envelope(data: bytes, where: str) -> tuple[bytes, list[dict[str, str]
     for entry in signatures:
         if not isinstance(entry, dict) or set(entry) != {"keyid", "sig"}:
             raise _bad(f"{where}: signatures", "another form", "keyid and sig")
+        if not isinstance(entry["keyid"], str):
+            raise _bad(f"{where}: keyid", repr(entry["keyid"])[:60], "a text")
         _decoded(entry["sig"], f"{where}: sig")
     return _decoded(document["payload"], f"{where}: payload"), signatures
 
@@ -251,7 +254,7 @@ def _dsse(payload: bytes, signatures: list[dict[str, str]], where: str) -> DsseE
 def _private_key(path: Path) -> Ed25519PrivateKey:
     try:
         key = load_pem_private_key(path.read_bytes(), password=None)
-    except (OSError, ValueError, TypeError) as error:
+    except (OSError, ValueError, TypeError, UnsupportedAlgorithm) as error:
         raise _bad("the private key", "not readable", "a PEM file without password") from error
     if not isinstance(key, Ed25519PrivateKey):
         raise _bad("the private key", type(key).__name__, "an Ed25519 key")

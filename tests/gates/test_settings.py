@@ -188,3 +188,15 @@ def test_a_settings_file_that_is_not_there_or_says_nothing_is_a_bad_setting(tmp_
         (tmp_path / "params.yaml").write_text(text)
         with pytest.raises(ConfigError, match="gate_a is missing"):
             section_of(read_params(tmp_path), "gate_a")
+
+
+@pytest.mark.parametrize(("text", "said"), [
+    ("a: 2026-11-20", r"params\.yaml: a is a date"), ("a: {b: .nan}", r"params\.yaml: a\.b is nan"),
+    ("a: {b: [!!binary aGk=]}", r"params\.yaml: a\.b is a bytes"), ("1: 2", r"is the key 1,"),
+    ("a: !!set {b}", r"params\.yaml: a is a set"), ("a: &x [*x]", r"a is more than 30 levels deep"),
+    ("a: {null: 1}", r"params\.yaml: a is the key None"),
+])  # fmt: skip
+def test_what_json_cannot_say_is_bad_configuration(tmp_path, text, said):
+    (tmp_path / "params.yaml").write_text(text)
+    with pytest.raises(ConfigError, match=said):
+        read_params(tmp_path)

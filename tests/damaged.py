@@ -68,9 +68,12 @@ def broken_bytes(data: bytes) -> Iterator[tuple[str, bytes]]:
     yield "a text", b'"text"'
     yield "a number", b"7"
     first = data.lstrip().splitlines()[:2]
-    yield "two keys", b"{" + first[-1].strip(b", ") + b"," + data.lstrip()[1:] if (
-        data.lstrip().startswith(b"{")
-    ) else data + b"\n" + data
+    yield (
+        "two keys",
+        b"{" + first[-1].strip(b", ") + b"," + data.lstrip()[1:]
+        if (data.lstrip().startswith(b"{"))
+        else data + b"\n" + data,
+    )
 
 
 def damaged(
