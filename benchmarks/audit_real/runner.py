@@ -1,4 +1,4 @@
-"""One recording: written, imported, audited as `genpolicy audit` does, and held against its truth."""
+"""One recording: written, imported, audited as a user would, and held against its truth."""
 
 import tempfile
 import time

@@ -1,4 +1,4 @@
-"""What was said against what is true: right, open and wrong, and how often a confidence is right."""
+"""What was said against what is true, and how often a verdict of some confidence is right."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Sequence

@@ -1,7 +1,7 @@
 """What is true of a recording, and which verdicts are right of it.
 
-A generator and the changes made to its recording say what is so, as `Facts`. The right verdict follows
-from them in the order of diagnosis, never from what an audit says.
+A generator and the changes made to its recording say what is so, as `Facts`. The right verdict
+follows from them in the order of diagnosis, never from what an audit says.
 """
 
 from dataclasses import dataclass
@@ -32,8 +32,8 @@ class Facts:
     Attributes:
         modes: Ways in which one and the same situation was answered; 1 is a single way; 0 is not
             known, and nobody could tell from what was recorded.
-        decided_by: What decides them: empty is a free choice that leaves no trace; `start`, `past` and
-            `order` leave one outside the present observation; else the recorded column.
+        decided_by: What decides them: empty is a free choice that leaves no trace; `start`, `past`
+            and `order` leave one outside the present observation; else the recorded column.
         names: Words of which one must occur where a recorded column is named.
         observed: The observation shows what decides.
         outcomes: Whether each episode succeeded is recorded.

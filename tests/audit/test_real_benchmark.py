@@ -1,4 +1,4 @@
-"""What the recordings of `benchmarks.audit_real` claim of themselves is so, seen without an audit."""
+"""What the recordings of `benchmarks.audit_real` claim is so, seen without an audit."""
 
 import json
 from dataclasses import replace
@@ -218,6 +218,18 @@ def test_turns_are_seen_in_the_order_and_chance_is_not():
     for name, low, high in ((AS_IS, 0.3, 0.7), ("turns", 0.75, 1.0)):
         ways = small("pushing", name, episodes=120).modes
         assert low < np.mean(ways[1:] == ways[:-1]) <= high
+
+
+def test_turns_that_are_shuffled_leave_no_trace_and_a_sensor_freezes_while_the_arm_moves():
+    shuffled = small("pushing", "turns", "episodes shuffled", episodes=120)
+    assert np.mean(shuffled.modes[1:] == shuffled.modes[:-1]) < 0.7
+    assert [a.cause for a in shuffled.truth.answers()] == ["valid_modes"]
+    assert [a.cause for a in small("pushing", "turns").truth.answers()] == ["hidden_state"]
+    for episode in small("pushing", "waits at first", "a frozen sensor").episodes:
+        seen = episode.seen["observation.state"]
+        still = (np.diff(seen, axis=0) == 0).all(axis=1)
+        moves = (np.diff(episode.command, axis=0) != 0).any(axis=1)
+        assert np.count_nonzero(still & moves) >= 7 or not episode.faulty
 
 
 @pytest.mark.parametrize("base", ["pushing", "arm", "avoiding", "humanoid"])

@@ -29,7 +29,7 @@ JOINTS_G1 = tuple(
 
 
 def arm(plan: Plan) -> Recording:
-    """robomimic low_dim: a person lifts and carries a can, one way; normalised differences, 20 Hz."""
+    """robomimic low_dim: a person carries a can, one way; normalised differences at 20 Hz."""
     return _teleoperated(plan, 1, "can_ph")
 
 
@@ -54,12 +54,12 @@ def _teleoperated(plan: Plan, count: int, name: str) -> Recording:
         pace = rng.uniform(0.85, 1.3)
         reach = way(
             np.stack([home, [0.0, 0.11 * side + rng.normal(0, 0.008), 1.0],
-                      can + [-0.03, 0.02 * side, 0.08], can]),
+                      can + np.array([-0.03, 0.02 * side, 0.08]), can]),
             rows=int(40 * pace), rests=rests(rng, chance=0.25, longest=12),
         )  # fmt: skip
         hold = np.repeat(can[None], 5, axis=0)
         carry = way(
-            np.stack([can, can + [0.02, 0.0, 0.14], [0.1, 0.28, 1.0], [0.1, 0.28, 0.92]]),
+            np.stack([can, can + np.array([0.02, 0.0, 0.14]), [0.1, 0.28, 1.0], [0.1, 0.28, 0.92]]),
             rows=int(34 * pace),
         )
         place = np.concatenate([reach, hold, carry])
@@ -89,7 +89,8 @@ def _teleoperated(plan: Plan, count: int, name: str) -> Recording:
             Episode(
                 seen={
                     EEF: done[:, :3], QUAT: own,
-                    GRIP: np.concatenate([width, -width], axis=1) + rng.normal(0, 1e-5, (len(at), 2)),
+                    GRIP: np.concatenate([width, -width], axis=1)
+                    + rng.normal(0, 1e-5, (len(at), 2)),
                     OBJECT: np.concatenate(
                         [at, other, at - done[:, :3], quaternion(turned - done[:, 3])], axis=1
                     ),
@@ -166,8 +167,8 @@ def humanoid(plan: Plan) -> Recording:
         target = begin + np.where(still, 0.02, 1.0) * reach + rng.normal(0.0, 0.02, 26)
         up = target + np.where(still, 0.02, 1.0) * lift
         command = np.concatenate([
-            way(np.stack([begin, (begin + target) / 2, target]), rows=int(62 * rng.uniform(0.85, 1.2)),
-                rests=rests(rng, chance=0.2, longest=15)),
+            way(np.stack([begin, (begin + target) / 2, target]),
+                rows=int(62 * rng.uniform(0.85, 1.2)), rests=rests(rng, chance=0.2, longest=15)),
             way(np.stack([target, up]), rows=int(45 * rng.uniform(0.85, 1.2))),
         ])  # fmt: skip
         command = command + wobble(rng, len(command), 26, size=0.008, slow=8.0)

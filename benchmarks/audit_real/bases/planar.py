@@ -94,7 +94,7 @@ def goals(plan: Plan) -> Recording:
 
 
 def pushing(plan: Plan) -> Recording:
-    """A block pushed in pixels as in PushT, from six starts that are repeated, round either side."""
+    """A block pushed in pixels as in PushT, from six repeated starts, round either side."""
     count, rate = plan.episodes or 120, 10.0
     ways = plan.ways(count, 2)
     success = plan.outcomes(ways)

@@ -9,8 +9,8 @@ from benchmarks.audit_real.plan import Plan
 from benchmarks.audit_real.recording import Episode, Recording
 
 Make = Callable[[Plan], Recording]
-# Changes are made in this order: what is done to the action's form before what goes wrong in it, names
-# and the order of the files last.
+# Changes are made in this order: what is done to the action's form before what goes wrong in it,
+# names and the order of columns last.
 MERGE, LAYOUT, FORM, COLUMNS, TIME, DEFECT, NAMES = range(7)
 
 

@@ -1,4 +1,4 @@
-"""Columns: what decides, under any name, recorded, observed or absent; constants, noise, outcomes."""
+"""Columns: what decides, recorded, observed or absent; constants, noise, outcomes."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -50,7 +50,6 @@ def _fact(name: str, values: tuple[str, ...]) -> Change:
             for e, k in zip(recording.episodes, said, strict=True)
         )
         names = (name, "phase") if name == "subtask" else (name,)
-        names = (name, "object", "instruction") if name.startswith("instr") else names
         return replace(recording, episodes=episodes).true(
             decided_by=name,
             names=names,

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from benchmarks.audit_real.changes.change import DEFECT, Change, Place, at_places, published, some
 from benchmarks.audit_real.recording import Episode, Recording
@@ -79,12 +80,17 @@ def _swap(recording: Recording, place: Place, share: float) -> Recording:
     return at_places(recording, some(recording, place, share), change).true(defect="swap")
 
 
+def _in_motion(episode: Episode) -> NDArray[np.int64]:
+    """Rows in which the commands move."""
+    steps = np.linalg.norm(np.diff(episode.command, axis=0), axis=1)
+    return np.flatnonzero(steps > 0.2 * np.median(steps[steps > 0.0]))
+
+
 def _glue(recording: Recording, place: Place, share: float) -> Recording:
     """Played twice in one episode, the rows at rest left out between."""
 
     def change(episode: Episode) -> Episode:
-        steps = np.linalg.norm(np.diff(episode.command, axis=0), axis=1)
-        moving = np.flatnonzero(steps > 0.2 * np.median(steps))
+        moving = _in_motion(episode)
         inner = np.arange(moving[0], moving[-1] + 1)
         return episode.taken(np.concatenate([inner, inner]))
 
@@ -111,7 +117,8 @@ def _frozen(recording: Recording, place: Place, seconds: float) -> Recording:
     held = max(2, round(seconds * recording.rate_hz))
 
     def change(episode: Episode) -> Episode:
-        begin = int(place.rng.integers(len(episode) // 4, max(len(episode) // 2, 1) + 1))
+        moves = _in_motion(episode)
+        begin = int(moves[int(place.rng.integers(len(moves) // 4, len(moves) // 2 + 1))])
         rows = np.arange(len(episode))
         rows[begin : begin + held] = begin
         return replace(episode, seen={n: v[rows] for n, v in episode.seen.items()})

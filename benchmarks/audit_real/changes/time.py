@@ -17,6 +17,7 @@ from benchmarks.audit_real.changes.change import (
 )
 from benchmarks.audit_real.changes.forms import SAME
 from benchmarks.audit_real.recording import Array, Episode, Recording
+from benchmarks.audit_real.truth import UNRECORDED
 
 
 def _still(recording: Recording, episode: Episode) -> Array:
@@ -59,7 +60,9 @@ def _no_clock(recording: Recording, place: Place, strength: float) -> Recording:
 
 def _shuffled(recording: Recording, place: Place, strength: float) -> Recording:
     order = place.rng.permutation(len(recording.episodes))
-    return replace(recording, episodes=tuple(recording.episodes[k] for k in order))
+    shuffled = replace(recording, episodes=tuple(recording.episodes[k] for k in order))
+    # What only the order told is a free choice now.
+    return shuffled.true(decided_by="") if recording.truth.decided_by == "order" else shuffled
 
 
 def _reversed(recording: Recording, place: Place, strength: float) -> Recording:
@@ -91,8 +94,8 @@ def _by_side(ahead: bool, recorded: bool) -> Change:
         )
         order = np.argsort(sides if ahead else 1 - sides, kind="stable")
         return replace(recording, episodes=tuple(episodes[k] for k in order)).true(
-            decided_by="collection", undecided="",
-            names=("collection", "order", "sequence", "unrecorded"),
+            decided_by="collection" if recorded else "order", undecided="",
+            names=("collection", *UNRECORDED),
         )  # fmt: skip
 
     which = "one" if ahead else "the other"
