@@ -15,6 +15,11 @@ from benchmarks.audit_real.recording import Recording
 from genpolicy.seeds import stream
 
 AS_IS = "as it is"
+# One recording in another order or under other names: the verdict must be the same.
+ORDER_AND_NAMES = (
+    AS_IS, "episodes shuffled", "episodes in reverse", "columns in another order", "names absent",
+    "names are nonsense", "only one name shared",
+)  # fmt: skip
 BASES: dict[str, Callable[[Plan], Recording]] = {
     "avoiding": planar.avoiding,
     "goals": planar.goals,
@@ -138,7 +143,8 @@ def report(first_seed: int, *, singles: int = 26, crossings: int = 10) -> list[C
     """Cases drawn from a seed that nobody knew while the detector was made.
 
     Each base as it is, with so many changes of a strength drawn from those stated, and with so many
-    crossings of any two that fit; every case has data of its own.
+    crossings of any two that fit; each has data of its own, but for changes of order and names,
+    which are made on the data of the base as it is.
 
     Args:
         first_seed: Root of the draws and first seed of the data.
@@ -156,7 +162,8 @@ def report(first_seed: int, *, singles: int = 26, crossings: int = 10) -> list[C
             if CHANGES[pair[0]].stage != CHANGES[pair[1]].stage and fits(base, pair):
                 pairs.append(pair)
         for number, group in enumerate([(AS_IS,), *chosen, *pairs]):
-            seed = first_seed + 1000 * place + number
+            same = all(name in ORDER_AND_NAMES for name in group)
+            seed = first_seed + 1000 * place + (0 if same else number)
             drawn = tuple((name, float(rng.choice(CHANGES[name].strengths))) for name in group)
             found.append(Case(base, drawn, seed))
     return found

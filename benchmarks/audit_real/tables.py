@@ -3,7 +3,7 @@
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 
-from benchmarks.audit_real.catalogue import AS_IS
+from benchmarks.audit_real.catalogue import ORDER_AND_NAMES
 from benchmarks.audit_real.runner import Result
 from benchmarks.audit_real.truth import ALLOWED, RIGHT, UNDECIDED, WRONG
 from genpolicy.statistics.intervals import clopper_pearson
@@ -11,11 +11,6 @@ from genpolicy.statistics.intervals import clopper_pearson
 BINS = (0.0, 0.5, 0.7, 0.8, 0.9, 0.95, 0.99)
 ROUND_UP = 1.0 + 1e-9
 SHARES = (RIGHT, ALLOWED, UNDECIDED, WRONG)
-# One recording in another order or under other names: the verdict must be the same.
-ORDER_AND_NAMES = (
-    AS_IS, "episodes shuffled", "episodes in reverse", "columns in another order", "names absent",
-    "names are nonsense", "only one name shared",
-)  # fmt: skip
 VALID = "valid_modes"
 
 

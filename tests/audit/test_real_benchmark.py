@@ -12,6 +12,7 @@ from benchmarks.audit_real.catalogue import (
     BASES,
     CHANGES,
     CROSSINGS,
+    ORDER_AND_NAMES,
     Case,
     base_of,
     development,
@@ -325,7 +326,10 @@ def test_the_right_answer_follows_the_order_of_diagnosis():
 def test_a_report_is_drawn_from_its_seed_and_shares_no_data_with_development():
     first, again, other = report(10**9 + 1), report(10**9 + 1), report(10**9 + 2)
     assert first == again and first != other
-    assert len({case.seed for case in first}) == len(first)
+    for one in first:
+        alike = [case for case in first if case.seed == one.seed]
+        same = all(name in ORDER_AND_NAMES for case in alike for name, _ in case.changes)
+        assert len(alike) == 1 or (same and {case.base for case in alike} == {one.base})
     assert not {case.seed for case in first} & {case.seed for case in development(100)}
     for name in BASES:
         inside = [case for case in first if case.base == name]

@@ -2,9 +2,9 @@
 
 *PushT*: 206 human episodes, no start repeated, no outcome, no operator. Over whole episodes the
 hand goes round the block clockwise in 71 and counter-clockwise in 81 of 152: there are several
-ways, but hardly two episodes stand at one place. So `insufficient_support`, whatever its reason, is
-right; modes that are found stay without validity. To say `valid_modes`, `unimodal`, `pointwise_noise`, a
-defect or a hidden variable is wrong: none of these was recorded or can be seen.
+ways, but hardly two episodes stand at one place. So `insufficient_support`, whatever its reason,
+is right; modes that are found stay without validity. To say `valid_modes`, `unimodal`,
+`pointwise_noise`, a defect or a hidden variable is wrong: none was recorded or can be seen.
 
 *G1*: 100 episodes of one humanoid, the bottle only in the video. What looks like modes could be the
 bottle, and no start is repeated: `insufficient_support`, or `hidden_state(unrecorded)`.
