@@ -142,6 +142,34 @@ def test_what_is_observed_follows_what_is_commanded(base):
         assert min(errors) < 0.1 * np.ptp(told[:, moving], axis=0).max()
 
 
+def test_an_hour_tells_the_way_and_is_never_the_same_twice():
+    recording = small("avoiding", "hour decides, in every row", episodes=40)
+    hours = np.array([e.rows["hour"][0] for e in recording.episodes])
+    assert len(np.unique(hours)) == 40
+    by_time = recording.modes[np.argsort(hours)]
+    assert np.count_nonzero(np.diff(by_time)) == 3
+
+
+def test_rows_that_are_lost_leave_their_stamps():
+    clean, lossy = small("pushing"), small("pushing", "rows lost in a third")
+    for before, after in zip(clean.episodes, lossy.episodes, strict=True):
+        rows = np.searchsorted(before.time_s, after.time_s)
+        assert np.array_equal(before.action[rows], after.action)
+        gaps = np.diff(after.time_s) * clean.rate_hz
+        assert gaps.max() == pytest.approx(2.0 if after.faulty else 1.0)
+
+
+@pytest.mark.parametrize("base", ["pushing", "avoiding", "arm"])
+def test_a_turned_frame_keeps_lengths_and_the_angle_is_the_one_said(base):
+    clean, turned = small(base), small(base, "a frame turned in 30 %")
+    for before, after in zip(clean.episodes, turned.episodes, strict=True):
+        a, b = np.diff(before.action[:, :2], axis=0), np.diff(after.action[:, :2], axis=0)
+        dot, cross = (a * b).sum(), (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum()
+        wanted = 30.0 if after.faulty else 0.0
+        assert np.rad2deg(np.arctan2(cross, dot)) == pytest.approx(wanted, abs=1e-6)
+        assert np.linalg.norm(b, axis=1) == pytest.approx(np.linalg.norm(a, axis=1))
+
+
 FAULTS = {
     "a third in another unit": 1 / 3, "a third in another unit, all of it": 1 / 3,
     "lag in half": 0.5, "a sign flipped": 0.3, "two columns swapped": 0.25, "glued to a copy": 0.3,
