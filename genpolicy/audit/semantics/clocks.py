@@ -154,7 +154,8 @@ def offset_findings(
             findings.append(_epoch_finding(stream, name, gap, limit))
     least = max(episode_limit_s, EPISODE_SPREADS * spread)
     off = np.isfinite(deviations) & (np.abs(np.nan_to_num(deviations)) > least)
-    own = settings.significance * np.nan_to_num(errors_s if errors_s is not None else 0.0 * taken)
+    errors = np.zeros(len(table)) if errors_s is None else np.nan_to_num(errors_s)
+    own = settings.significance * errors
     off &= np.abs(np.nan_to_num(deviations)) > own
     known = int(np.count_nonzero(np.isfinite(offsets_s)))
     if not findings and not some(off, known, settings.outlier_share):
@@ -193,8 +194,8 @@ def two_clusters(values: Array, least: float) -> tuple[Flags, Array]:
             best = (clear, cut)
     if not best[0] - CLUSTER_SPREADS >= 0:
         return chosen, gaps
-    low, high = order[: best[1]], order[best[1] :]
-    larger, smaller = (low, high) if len(low) >= len(high) else (high, low)
+    early, late = order[: best[1]], order[best[1] :]
+    larger, smaller = (early, late) if len(early) >= len(late) else (late, early)
     chosen[smaller] = True
     gaps[known] = values[known] - np.median(values[larger])
     return chosen, gaps
@@ -282,7 +283,7 @@ def _quantile(values: Array | None, rows: Flags, share: float) -> float | None:
 
 
 def measure_lags(motion: Motion, settings: AuditSettings) -> Lags:
-    """Lag of the response behind the command, by episode; looked for further where some reach on."""
+    """Lag of the response behind the command, by episode; further away where some reach on."""
     maximum_steps = settings.maximum_lag_steps
     lags = _lags(motion, maximum_steps)
     edge = np.abs(np.nan_to_num(lags.steps)) >= maximum_steps - EDGE_STEPS

@@ -37,7 +37,7 @@ ROUGH = 0.5
 COVER = 0.7
 SELF_COVER = 0.3
 LEAST_OVERLAP = 12
-# A row in which the signal changes by less than this share of its usual step repeats the one before.
+# A row whose step is below this share of the usual one repeats the row before.
 REST_STEP = 1e-6
 
 
@@ -78,7 +78,7 @@ class Moving:
 
 
 def find_copies(data: AuditInput, motion: Motion) -> Copies:
-    """Duplicated episodes (up to a time offset, a cut, rests, tiny noise) and self-repeating ones."""
+    """Duplicates (up to a time offset, a cut, rests, tiny noise) and self-repeating episodes."""
     count = len(motion.starts) - 1
     result = Copies(np.zeros(count, bool), np.full(count, -1), np.zeros(count, bool))
     every = _signal(data, motion)

@@ -22,8 +22,8 @@ from genpolicy.audit.settings import AuditSettings
 # A flipped joint moves by as much as it usually does, within this factor: what is dragged along by
 # the others moves by less.
 ALIKE = 2.0
-# Log likelihood ratio of one column of one episode: joints of a short and single movement are all
-# alike. At e^5, twice in one place, there is less than one among ten million readings.
+# Log likelihood ratio of the other reading of one column in one episode; a swap needs it of both
+# columns, and a finding of two episodes. Joints of a short and single movement are all alike.
 CLEAR = 5.0
 # Correlations are not believed nearer to one.
 ROUNDING = 1e-4
@@ -59,13 +59,13 @@ def crossed_findings(
         findings.append(_flipped(data, motion, minus, turned, settings))
     exchanged = swapped(found, column_correlations(found, motion.starts)) & among[:, None, None]
     for first, second in np.argwhere(np.triu(exchanged.any(axis=0))):
-        chosen = exchanged[:, first, second]
-        if not some(chosen, total, settings.outlier_share):
+        both = exchanged[:, first, second]
+        if not some(both, total, settings.outlier_share):
             continue
-        rows = np.flatnonzero(np.repeat(chosen, np.diff(motion.starts)))
-        commanded[rows[:, None], [first, second]] = commanded[rows[:, None], [second, first]]
-        hit |= chosen
-        findings.append(_swapped(data, motion, chosen, (int(first), int(second))))
+        at = np.flatnonzero(np.repeat(both, np.diff(motion.starts)))
+        commanded[at[:, None], [first, second]] = commanded[at[:, None], [second, first]]
+        hit |= both
+        findings.append(_swapped(data, motion, both, (int(first), int(second))))
     return findings, commanded, hit
 
 
@@ -75,7 +75,9 @@ def flipped(found: Following, directional: Flags) -> Flags:
     clear = (minus >= FOLLOWS) & (_evidence(found, plus, minus) >= CLEAR)
     with np.errstate(divide="ignore", invalid="ignore"):
         gains = np.where(found.follows, np.log(found.seen) - np.log(found.asked), np.nan)
-    usual = np.array([np.median(g[np.isfinite(g)]) if np.isfinite(g).any() else 0.0 for g in gains.T])
+    usual = np.array(
+        [np.median(g[np.isfinite(g)]) if np.isfinite(g).any() else 0.0 for g in gains.T]
+    )
     alike = np.abs(np.nan_to_num(gains - usual, nan=np.inf)) <= np.log(ALIKE)
     return np.asarray(clear & alike & ~directional)
 

@@ -17,15 +17,22 @@ QUATERNION = 4
 USUAL_LENGTH, LARGEST_LENGTH, NEARLY_ALL = 1e-3, 2e-2, 0.99
 # Of two readings the more exact is taken; beyond rounding both are alike, and the narrower is.
 EXACT_DIGITS = 6
+# Rows that are looked at, about.
+LARGEST_SAMPLE = 50_000
 # Columns that never change by this are no direction: a flag of one beside a zero has length one.
 LEAST_RANGE = 1e-2
 
 
 def blocks(values: Array) -> tuple[slice, ...]:
-    """Runs of columns of length one, from left to right; of several the most exact. Shape (N, D)."""
+    """Runs of columns of length one, from left to right; of several readings the most exact.
+
+    Args:
+        values: Shape (N, D).
+    """
     found: list[slice] = []
     if len(values) == 0:
         return ()
+    values = values[:: max(1, len(values) // LARGEST_SAMPLE)]
     square = values**2
     spans = np.ptp(values, axis=0) > LEAST_RANGE
     first = 0

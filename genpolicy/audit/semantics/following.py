@@ -25,6 +25,7 @@ SLOW_SHARE = 0.5
 # Correlation with which a column follows a command...
 FOLLOWS = 0.8
 
+
 @dataclass(frozen=True)
 class Following:
     """Shapes (E, P); NaN where an episode is too short or a column stands.
@@ -83,7 +84,7 @@ def following(motion: Motion, period_s: float, maximum_steps: int) -> Following:
     at_high, at_low = np.zeros(shape, dtype=np.int64), np.zeros(shape, dtype=np.int64)
     power_x, power_y = _running(x), _running(y)
     # Means of a span change little over a part of it.
-    stride = max(1, span // 4)
+    stride = max(1, span // 3)
     reach = stride * -(-maximum_steps // stride)
     for shift in range(-reach, reach + 1, stride):
         value = _correlation(x, y, (power_x, power_y), starts, shift)
@@ -126,9 +127,7 @@ def column_correlations(found: Following, starts: Integers) -> Array:
     return result
 
 
-def _moves(
-    values: Array, pieces: Integers, span: int, starts: Integers
-) -> tuple[Array, Flags]:
+def _moves(values: Array, pieces: Integers, span: int, starts: Integers) -> tuple[Array, Flags]:
     """Displacements between neighbouring means, 0 at the ends of pieces; and whether they are slow.
 
     Returns:
@@ -180,4 +179,3 @@ def _correlation(
     power = (powers[0][last] - powers[0][first]) * (powers[1][until] - powers[1][then])
     both = np.sqrt(np.maximum(power, 0.0))
     return np.asarray(np.where(both > 0, cross / np.where(both > 0, both, 1.0), np.nan))
-

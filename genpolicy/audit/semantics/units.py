@@ -105,10 +105,10 @@ def component_findings(
         known = np.isfinite(gains)
         if np.count_nonzero(known) < LEAST_EPISODES:
             continue
+        whole: list[Finding] = []
         if densest_half(gains[known])[1] <= ONE_FACTOR:
-            findings += _epochs(data, gains, name, settings, None)
-        if not findings:
-            findings += _episodes(data, gains, name, settings, np.ones(len(gains)))
+            whole = _epochs(data, gains, name, settings, None)
+        findings += whole or _episodes(data, gains, name, settings, np.ones(len(gains)))
     return findings
 
 
@@ -116,8 +116,9 @@ def _mattering(data: AuditInput, motion: Motion) -> Flags:
     """Columns that move, commanded or observed, beside the others. Shape (P,)."""
     columns = np.arange(data.observation.shape[1])[data.observation_position]
     scale = data.observation_scale[columns[: len(motion.names)]]
-    both = [episode_deviation(values, motion.starts) for values in (motion.commanded, motion.observed)]
-    size = np.median(np.maximum(*both), axis=0) / np.where(np.isfinite(scale), scale, 1.0)
+    asked = episode_deviation(motion.commanded, motion.starts)
+    seen = episode_deviation(motion.observed, motion.starts)
+    size = np.median(np.maximum(asked, seen), axis=0) / np.where(np.isfinite(scale), scale, 1.0)
     usual = float(np.median(size[size > 0])) if (size > 0).any() else 0.0
     return np.asarray(size > MATTERS * usual)
 
