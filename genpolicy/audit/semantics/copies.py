@@ -36,6 +36,8 @@ ROUGH = 0.5
 # of an episode glued to itself, the share that comes again.
 COVER = 0.7
 SELF_COVER = 0.3
+# Of rows that are the same bit by bit, so many in a row that no way passes twice, and their share.
+EXACT_ROWS, EXACT_COVER = 4, 0.2
 LEAST_OVERLAP = 12
 # A row whose step is below this share of the usual one repeats the row before.
 REST_STEP = 1e-6
@@ -85,6 +87,7 @@ def find_copies(data: AuditInput, motion: Motion) -> Copies:
     if every is None:
         return result
     moving = _moving(every, motion)
+    _repeats(result, moving)
     places, segment = _windows(moving.starts)
     if len(places) < NEIGHBOURS + 1:
         return result
@@ -103,7 +106,7 @@ def find_copies(data: AuditInput, motion: Motion) -> Copies:
 
 
 def copy_findings(copies: Copies, data: AuditInput, settings: AuditSettings) -> list[Finding]:
-    """Duplicates and self-repeating episodes as findings."""
+    """Duplicates as a finding."""
     names, total = data.episodes.uuid, len(data.episodes)
     findings = []
     if some(copies.duplicate, total, settings.outlier_share):
@@ -124,26 +127,35 @@ def copy_findings(copies: Copies, data: AuditInput, settings: AuditSettings) -> 
                 "keep one of each and repeat the audit.",
             )
         )
-    if some(copies.repeats_itself, total, settings.outlier_share):
-        count = int(copies.repeats_itself.sum())
-        findings.append(
-            _glued(names[copies.repeats_itself], count, total, settings, "hold the same rows twice")
-        )
     return findings
 
 
-def splice_findings(data: AuditInput, motion: Motion, settings: AuditSettings) -> list[Finding]:
-    """Episodes that jump in their middle as no motion of this data set does."""
+def glued_findings(
+    copies: Copies, data: AuditInput, motion: Motion, settings: AuditSettings
+) -> list[Finding]:
+    """Episodes that hold their rows twice, or jump in their middle as no motion of these data.
+
+    Args:
+        copies: What was found of copies.
+        data: Canonical data.
+        motion: The motion as it was recorded, with its pieces.
+        settings: Share of episodes from which it is said.
+    """
     total = len(motion.starts) - 1
     jumps = np.zeros(total, dtype=bool)
     jumps[motion.segment[np.setdiff1d(motion.pieces[:-1], motion.starts)]] = True
-    if not some(jumps, total, settings.outlier_share):
+    either = copies.repeats_itself | jumps
+    if not some(either, total, settings.outlier_share):
         return []
-    names = data.episodes.uuid[jumps]
-    return [_glued(names, int(jumps.sum()), total, settings, "jump in their middle")]
+    twice = int(copies.repeats_itself.sum())
+    what = [f"hold the same rows twice ({twice})"] if twice else []
+    if (jumps & ~copies.repeats_itself).any():
+        what.append("jump in their middle")
+    return [_glued(data.episodes.uuid[either], total, settings, " or ".join(what))]
 
 
-def _glued(names: Text, count: int, total: int, settings: AuditSettings, what: str) -> Finding:
+def _glued(names: Text, total: int, settings: AuditSettings, what: str) -> Finding:
+    count = len(names)
     return Finding(
         kind="glued",
         variable="episode",
@@ -184,6 +196,31 @@ def _moving(signal: Array, motion: Motion) -> Moving:
     counts = np.concatenate([[0], np.cumsum(kept)])
     rows = np.flatnonzero(kept)
     return Moving(signal[rows], rows, np.asarray(counts[motion.starts], dtype=np.int64))
+
+
+def _repeats(result: Copies, moving: Moving) -> None:
+    """Episodes of which some moving rows come again bit by bit, whatever was cut out between."""
+    total = len(moving.rows)
+    if total < EXACT_ROWS:
+        return
+    # One number stands for a row: equal rows have equal ones, and others hardly ever.
+    weights = np.sqrt(np.arange(2, moving.signal.shape[1] + 2))
+    rows = (moving.signal * weights).sum(axis=1)
+    keys = np.zeros(total - EXACT_ROWS + 1)
+    for offset in range(EXACT_ROWS):
+        keys += np.sqrt(3.0 + offset) * rows[offset : offset + len(keys)]
+    segment = np.repeat(np.arange(len(moving.starts) - 1), np.diff(moving.starts))
+    inside = np.flatnonzero(segment[: len(keys)] == segment[EXACT_ROWS - 1 :])
+    order = inside[np.lexsort((inside, keys[inside], segment[inside]))]
+    same = segment[order[1:]] == segment[order[:-1]]
+    again = order[1:][same & (keys[order[1:]] == keys[order[:-1]])]
+    count = np.bincount(segment[again], minlength=len(moving.starts) - 1)
+    length = np.diff(moving.starts)
+    found = (count >= LEAST_OVERLAP) & (count - EXACT_COVER * length >= 0)
+    result.repeats_itself[found] = True
+    later = np.sort(again[found[segment[again]]])
+    _, first = np.unique(segment[later], return_index=True)
+    result.joins.update(moving.rows[later[first]].tolist())
 
 
 def _windows(starts: Integers) -> tuple[Integers, Integers]:

@@ -40,7 +40,8 @@ def blocks(values: Array) -> tuple[slice, ...]:
         fits = []
         for width in WIDTHS:
             part = slice(first, first + width)
-            if part.stop <= values.shape[1] and np.count_nonzero(spans[part]) >= 2:
+            within = part.stop <= values.shape[1] and bool(spans[first])
+            if within and np.count_nonzero(spans[part]) >= 2:
                 off = _off_length(square[:, part])
                 if off <= USUAL_LENGTH:
                     fits.append((round(off, EXACT_DIGITS), width))

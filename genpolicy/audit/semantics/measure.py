@@ -77,7 +77,7 @@ def measure(data: AuditInput, settings: AuditSettings) -> Semantics:
         *continuity.negative_findings(negative),
         *continuity.time_findings(data, settings),
         *stubs,
-        *copies.splice_findings(data, made, settings),
+        *copies.glued_findings(copied, data, made, settings),
         *copies.copy_findings(copied, data, settings),
         *calibration.release_findings(data, releases, settings),
     ]
