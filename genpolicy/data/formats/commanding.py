@@ -49,7 +49,7 @@ def propose_commands(
     commanded = sample.selected(action.columns) * factors
     named = {
         action.components.index(a): names.index(o)
-        for a, o in (pair_by_name(channels, action) or {}).items()
+        for a, o in _namesakes(channels, action).items()
         if names.index(o) not in parts
     }
     reading = read_forms(
@@ -71,6 +71,18 @@ def propose_commands(
         forms=dict(zip(action.components, reading.forms, strict=True)),
         notes=notes,
     )
+
+
+def _namesakes(channels: Sequence[ChannelSource], action: ActionSource) -> dict[str, str]:
+    """Pairs of one name, and of one unit where the action's was not guessed from its range."""
+    if action.guessed:
+        units = [UNKNOWN_UNIT] * len(action.units)
+        action = action.model_copy(update={"units": units})
+        channels = [
+            c if c.transform != "none" else c.model_copy(update={"unit": UNKNOWN_UNIT})
+            for c in channels
+        ]
+    return pair_by_name(channels, action) or {}
 
 
 def _observed(

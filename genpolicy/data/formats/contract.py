@@ -308,7 +308,17 @@ def _check(contract: ImportContract, where: str) -> None:
         found = f"{len(contract.action.units)} units for {len(contract.action.components)} numbers"
         _refuse(f"{where}: action.units", found, "one for each component")
     actions = {f"action.{component}" for component in contract.action.components}
-    _check_pairing(contract, where)
+    check_commands(
+        contract.pairing,
+        contract.forms,
+        units=dict(zip(contract.action.components, contract.action_contract.units, strict=True)),
+        observed={
+            f"{c.name}.{component}": c.unit
+            for c in contract.observation.channels
+            for component in c.components
+        },
+        where=where,
+    )
     for name, bounds in contract.ranges.items():
         if name not in names | actions:
             _refuse(f"{where}: ranges", f"for {name!r}", "names of the observation and the action")
@@ -329,20 +339,6 @@ def _check_width(columns: list[str], components: list[str], place: str, doubled:
         _refuse(f"{place}.components", f"{len(components)} names", f"{width}, as its columns")
     if len(set(components)) != len(components):
         _refuse(f"{place}.components", "a name that stands twice", "unique names")
-
-
-def _check_pairing(contract: ImportContract, where: str) -> None:
-    check_commands(
-        contract.pairing,
-        contract.forms,
-        units=dict(zip(contract.action.components, contract.action_contract.units, strict=True)),
-        observed={
-            f"{channel.name}.{component}": channel.unit
-            for channel in contract.observation.channels
-            for component in channel.components
-        },
-        where=where,
-    )
 
 
 def _refuse(where: str, found: str, expected: str) -> NoReturn:

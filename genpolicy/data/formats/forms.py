@@ -35,6 +35,8 @@ EXPLAINED, CHANGED, RESCALED, NAMED = 0.75, 0.5, 0.8, 0.5
 # A place in its own unit may look like a change (a fast target leads its response by a quarter
 # turn), but where a change leaves this share of what the place leaves, and that is no rounding.
 FAR_BETTER, LITTLE_LEFT = 0.2, 0.05
+# A place in its own unit stays one, unless with a free gain it explains so much more.
+SCALED_LEAD = 0.1
 # A gain within these is one: what follows late or softly.
 SAME_SCALE = (0.7, 1.4)
 # Ties are broken by where numbers lie, by names, and by their order, in shares of the motion.
@@ -43,6 +45,9 @@ NEAR_BONUS, NAME_BONUS, ORDER_BONUS = 0.05, 0.03, 0.01
 RATE_OF, EXACT = 0.9, (0.8, 1.25)
 # Fewer pairs than this share of the numbers that vary are not what the action is about.
 LEAST_PAIRED = 0.25
+# Factors between units that people confuse (m, cm, mm, inch, degree), and how well they are met.
+UNIT_FACTORS = (1000.0, 100.0, 10.0, 180.0 / np.pi, 25.4, 2.54)
+UNIT_TOLERANCE = 0.02
 # Rows that an echo of the command repeats.
 ECHOES = 0.9
 
@@ -93,11 +98,12 @@ class _Evidence:
         return self.change_holds() & better & ~self.surely_place()
 
     def surely_place(self) -> Flags:
-        """Where the same number comes back about the same place, and a change explains no more."""
+        """Where a number comes back about the same place, and no change explains far more."""
         left = 1.0 - self.same.explained
-        far_better = 1.0 - self.change.explained <= FAR_BETTER * left
+        changed = np.where(self.change_holds(), 1.0 - self.change.explained, np.inf)
+        far_better = changed.min(axis=1, keepdims=True) <= FAR_BETTER * left
         surely: Flags = (self.same.explained >= EXPLAINED) & (self.near > 0.0)
-        return surely & ~(far_better & (left > LITTLE_LEFT))
+        return np.asarray(surely & ~(far_better & (left > LITTLE_LEFT)))
 
 
 def read_forms(
@@ -123,10 +129,12 @@ def read_forms(
     if len(observed) < MINIMUM_SAMPLES:
         return Reading(dict(named), plain, frozenset(named))
     moves = varies(commanded)
+    observed = observed.copy()
+    observed[:, list(no_partner)] = 0.0
     evidence = _evidence(observed, commanded, episode)
     score = _score(evidence)
     score[~moves] = -np.inf
-    score[:, [*no_partner, *np.flatnonzero(~varies(observed))]] = -np.inf
+    score[:, ~varies(observed)] = -np.inf
     _forget_rates(score, evidence, (observed, commanded), episode, period_s)
     # Its own unit and its own place are a simpler reading than any gain or derivative of others.
     simple: Flags = np.asarray(np.isfinite(score) & evidence.surely_place())
@@ -288,14 +296,22 @@ def _form(
         gain = float(evidence.change.gain[a, partner])
         gain = abs(gain) if named else gain
         return added_up(gain, period_s)
-    if named or not evidence.scaled_holds()[a, partner]:
-        return CommandForm()
-    if evidence.same.explained[a, partner] >= EXPLAINED:
+    same, scaled = evidence.same.explained[a, partner], evidence.scaled.explained[a, partner]
+    if same >= max(EXPLAINED, scaled - SCALED_LEAD) or not evidence.scaled_holds()[a, partner]:
         return CommandForm()
     observed, commanded = values
     gain = _rounded(float(evidence.scaled.gain[a, partner]))
+    if named and _is_mistake(gain):
+        return CommandForm()
     offset = float(np.median(observed[:, partner]) - gain * np.median(commanded[:, a]))
     return CommandForm(gain=gain, offset=_rounded(offset))
+
+
+def _is_mistake(gain: float) -> bool:
+    """Whether a gain under one name is a sign or a unit: then the audit shall find it."""
+    size = abs(np.log(abs(gain))) if gain else np.inf
+    known = [abs(size - np.log(factor)) <= UNIT_TOLERANCE for factor in UNIT_FACTORS]
+    return gain < 0.0 or any(known)
 
 
 def added_up(gain: float, period_s: float) -> CommandForm:

@@ -9,6 +9,7 @@ import pytest
 
 from genpolicy.data.dataset import load_dataset
 from genpolicy.data.formats import open_dataset, propose
+from genpolicy.data.formats.open_questions import open_questions
 from genpolicy.errors import BadInputError
 
 REAL = Path(__file__).parents[4] / "shared/data/g1_bottle_lerobot_v21"
@@ -161,7 +162,7 @@ def test_a_link_inside_the_dataset_is_not_followed(layouts, tmp_path):
 
 
 def test_leader_and_follower_of_different_build(layouts, tmp_path):
-    """Seven joints of a leader, three of a follower: what bears the same name pairs, no more."""
+    """Four joints of a leader, three of a follower: what follows pairs, no more."""
     root = layouts.v2(tmp_path / "recordings")
     leader = ["base", "shoulder_pan", "wrist_a", "wrist_b"]
     layouts.write(
@@ -174,13 +175,14 @@ def test_leader_and_follower_of_different_build(layouts, tmp_path):
         ),
     )
     for i in range(6):
-        action = np.concatenate([layouts.samples(i + 50)[1], layouts.samples(i)[1][:, :1]], axis=1)
+        others = np.random.default_rng(i + 50).normal(0.0, 0.1, (30, 3)).cumsum(axis=0)
+        action = np.concatenate([others, layouts.samples(i)[1][:, :1]], axis=1)
         action = action[:, [1, 3, 0, 2]]
         table = layouts.table(i, first=30 * i, action=layouts.vectors(action))
         layouts.write(layouts.file(root, i), table)
     contract = propose(root)
     assert contract.pairing == {"shoulder_pan": "state_rad.shoulder_pan"}
-    assert any("base, wrist_a, wrist_b" in note for note in contract.notes)
+    assert any("base, wrist_a, wrist_b say where" in note for note in open_questions(contract))
     features = json.loads((root / "meta/info.json").read_text())["features"]
     features["action"]["names"] = ["base", "torso", "wrist_a", "wrist_b"]
     layouts.write(root / "meta/info.json", layouts.info(features=features))
@@ -188,15 +190,17 @@ def test_leader_and_follower_of_different_build(layouts, tmp_path):
     assert opened.accepted == 6
 
 
-def test_a_difference_under_the_same_name_pairs_with_nothing(layouts, tmp_path):
+def test_a_difference_under_the_same_name_is_a_change(layouts, tmp_path):
     root = layouts.v2(tmp_path / "recordings")
     for i in range(6):
         state = layouts.samples(i)[0]
         change = layouts.vectors(np.diff(state, axis=0, append=state[-1:]))
         layouts.write(layouts.file(root, i), layouts.table(i, first=30 * i, action=change))
     contract = propose(root)
-    assert contract.pairing is None
-    assert any("follows the change of what bears its name" in note for note in contract.notes)
+    assert list(contract.pairing or {}) == ["shoulder_pan", "elbow_flex", "gripper"]
+    assert {form.form for form in contract.forms.values()} == {"change"}
+    assert not contract.pairing_guessed and contract.forms_guessed
+    assert any("a change per row (gain 1): shoulder_pan" in n for n in open_questions(contract))
 
 
 @pytest.mark.skipif(not REAL.is_dir(), reason="the G1 recordings are not on this machine")

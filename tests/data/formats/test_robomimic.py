@@ -169,12 +169,15 @@ def test_without_a_rate_it_is_guessed_and_said(file, tmp_path):
     assert any("env_args could not be read" in note for note in opened.notes)
 
 
-def test_differences_pair_with_nothing(file, layouts, tmp_path):
-    """The action of an operational-space controller is a step, whatever it is called."""
+def test_normalised_differences_are_changes(file, layouts, tmp_path):
+    """The action of an operational-space controller is a step of its own size."""
     with h5py.File(file, "a") as edited:
         for i in range(12):
             state = layouts.samples(i)[0]
             steps = np.diff(state, axis=0, append=state[-1:])
-            edited[f"data/demo_{i}/actions"][...] = steps / np.abs(steps).max()
+            edited[f"data/demo_{i}/actions"][...] = steps / 0.125
     contract = propose(file)
-    assert contract.pairing is None
+    assert list(contract.pairing or {}) == ["actions_0", "actions_1", "actions_2"]
+    for form in contract.forms.values():
+        assert (form.form, form.gain) == ("change", pytest.approx(0.125, rel=0.05))
+    assert contract.frozen is None  # a change that stays the same is a motion
