@@ -16,7 +16,7 @@ from genpolicy.audit.data import (
     Text,
     canonical,
 )
-from genpolicy.audit.forms import forms_of
+from genpolicy.audit.forms import Forms, forms_of
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.contract.action import ACTION_COMPONENTS, POSITION, ROTATION
 from genpolicy.contract.observation import Channel, ObservationContract
@@ -47,14 +47,6 @@ def from_dataset(
             _refuse(f"naming the channel {name}", f"one of {', '.join(slices)}")
     observed, commanded, stream = _pairing(dataset, contract, settings)
     width = len(np.arange(contract.dim)[observed])
-    components = list(dataset.manifest["action_contract"]["components"])
-    partners = dict(
-        zip(
-            np.asarray(components)[commanded].tolist() if width else [],
-            np.arange(contract.dim)[observed].tolist(),
-            strict=True,
-        )
-    )
     data = canonical(
         AuditInput(
             observation=frames.observation,
@@ -87,7 +79,7 @@ def from_dataset(
             streams=_streams(contract),
             paired=width > 0,
             phase_observed=settings.phase_observed,
-            forms=forms_of(settings, components, partners),
+            forms=_forms(dataset, settings, observed, commanded),
         )
     )
     found = candidates(table, dataset.manifest, data)
@@ -135,6 +127,16 @@ def _pairing(
     commanded = _columns([columns.index(name) for name in chosen])
     stream = streams[names.index(wanted[0])] if wanted else contract.streams[0]
     return observed, commanded, stream
+
+
+def _forms(
+    dataset: Dataset, settings: AuditSettings, observed: Index, commanded: Index
+) -> Forms | None:
+    """What the numbers of the action mean, and which observed column each of them moves."""
+    names = list(dataset.manifest["action_contract"]["components"])
+    seen = np.arange(dataset.frames.observation.shape[1])[observed].tolist()
+    told = np.asarray(names)[commanded].tolist() if seen else []
+    return forms_of(settings, names, dict(zip(told, seen, strict=True)))
 
 
 def _streams(contract: ObservationContract) -> dict[str, Index]:

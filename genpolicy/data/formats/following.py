@@ -24,7 +24,7 @@ MOST_EPISODES = 40
 STILL = 0.05
 # What is left unexplained, against what the command of another episode leaves; and the share from
 # which on chance is no explanation.
-BEYOND_CHANCE, NEARLY_ALL = 0.5, 0.98
+BEYOND_CHANCE, CERTAIN = 0.5, 0.98
 # Below this share of its size, what is left of a number is rounding.
 ROUNDING = 1e-9
 
@@ -189,7 +189,7 @@ def _votes(parts: list[tuple[Array, Array]], fixed: Array | None) -> Following:
     chance = _explained(_sums(swapped), fixed)
     explained = np.nan_to_num(_median(own[0]), nan=-np.inf)
     left = [1.0 - _mean(np.clip(found[0], 0.0, 1.0)) for found in (own, chance)]
-    beyond = (left[0] <= BEYOND_CHANCE * left[1]) | (explained >= NEARLY_ALL)
+    beyond = (left[0] <= BEYOND_CHANCE * left[1]) | (explained >= CERTAIN)
     return Following(explained, np.nan_to_num(own[1], nan=1.0), beyond)
 
 
