@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from genpolicy.audit.component_rows import ComponentModes
-from genpolicy.audit.reach_rows import LOCAL, FindingDraw, Reach, StructureDraw
+from genpolicy.audit.reach_rows import LOCAL, FindingDraw, Reach, Side, StructureDraw
 from genpolicy.audit.rows import Finding, ModeOutcome, Prediction, Resample, Stratum
 from genpolicy.errors import BadInputError
 from genpolicy.integrity.documents import read_json
@@ -78,7 +78,11 @@ class Numbers:
         modes: Modes of the phase with most situations.
         components: Where in the action modes were looked for; counts, strata and modes are about
             the one followed.
-        reach: How far neighbours reach in each fifth of the way; none where it was not measured.
+        reach: How far the evidence that is followed reaches in each fifth of the way; none where
+            it was not measured.
+        kind: Which that is, `local` or `learned`.
+        other: What the other one found; None where there is none.
+        other_reach: How far that reaches.
     """
 
     findings: tuple[Finding, ...]
@@ -93,6 +97,9 @@ class Numbers:
     modes: tuple[ModeOutcome, ...]
     components: tuple[ComponentModes, ...]
     reach: tuple[Reach, ...] = ()
+    kind: str = LOCAL
+    other: Side | None = None
+    other_reach: tuple[Reach, ...] = ()
 
 
 def read_numbers(
@@ -109,6 +116,8 @@ def read_numbers(
     """
     summary, kept = document("summary.json"), document("persistence.json")
     try:
+        sides, reach = rows("sides.parquet", Side), rows("reach.parquet", Reach)
+        kind = next(side.kind for side in sides if side.followed)
         numbers = Numbers(
             findings=tuple(rows("findings.parquet", Finding)),
             floors={str(key): float(value) for key, value in summary["floors"].items()},
@@ -129,7 +138,10 @@ def read_numbers(
                 if row.phase == summary["primary_phase"]
             ),
             components=tuple(rows("components.parquet", ComponentModes)),
-            reach=tuple(row for row in rows("reach.parquet", Reach) if row.kind == LOCAL),
+            reach=tuple(row for row in reach if row.kind == kind),
+            kind=kind,
+            other=next((side for side in sides if not side.followed), None),
+            other_reach=tuple(row for row in reach if row.kind != kind),
         )
         return numbers, tuple(
             _draws(
@@ -139,7 +151,7 @@ def read_numbers(
                 rows("finding_draws.parquet", FindingDraw),
             )
         )
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, StopIteration, TypeError, ValueError) as error:
         raise BadInputError(
             where="the audit's evidence",
             found=f"{type(error).__name__}: {error}",
@@ -218,6 +230,27 @@ def _reach(measured: tuple[Reach, ...], drawn: StructureDraw) -> tuple[Reach, ..
     """The fifths of the way with the numbers of a draw."""
     numbers = zip(measured, drawn.reach_queries, drawn.reach_spoke, strict=True)
     return tuple(replace(row, queries=queries, spoke=spoke) for row, queries, spoke in numbers)
+
+
+def turned(numbers: Numbers) -> Numbers:
+    """The same with the other evidence in place of the one that is followed."""
+    side, fields = numbers.other, Counts.__dataclass_fields__
+    if side is None:
+        return numbers
+    own = {name: getattr(numbers.counts, name) for name in fields}
+    kept = numbers.kept
+    return replace(
+        numbers,
+        counts=Counts(**{name: getattr(side, name) for name in fields}),
+        kept=Kept(side.kept, side.kept_null_q95, side.kept_n),
+        reach=numbers.other_reach,
+        kind=side.kind,
+        other=Side(
+            kind=numbers.kind, followed=True, **own, kept=kept.observed,
+            kept_null_q95=kept.null_q95, kept_n=kept.n, confirmed=0, contradicted=0,
+        ),
+        other_reach=numbers.reach,
+    )  # fmt: skip
 
 
 def _moved(row: Prediction, told: float) -> Prediction:

@@ -1,56 +1,136 @@
 """Are there enough comparable demonstrations to answer, and are there modes that persist?"""
 
+from dataclasses import replace
+
 from gates.cause.answers import Answer, CauseName, Diagnosis, Layer, Named
 from gates.cause.components import components, looked_in, unreadable
 from gates.cause.limits import CauseLimits
-from gates.cause.numbers import Numbers
-from genpolicy.audit.reach_rows import Reach
+from gates.cause.numbers import Numbers, turned
+from genpolicy.audit.reach_rows import LEARNED, LOCAL, Reach
 
+WORDS = {
+    LOCAL: "enough comparable demonstrations",
+    LEARNED: "enough demonstrations alike in what predicts the action",
+}
+OF_BOTH = ("two_mode_episodes", "denial_share")
+# Situations asked again in which the other evidence must speak before it can contradict.
+LEAST_ASKED = 30
+# Share of them that it must show as well. Not most: a cluster that has begun to move apart is still
+# one place by declared scales, and told already by what a forest learned to see.
+LEAST_CONFIRMED = 0.2
 ORDINALS = ("first", "second", "third", "fourth", "last")
 
 
 def support(numbers: Numbers, limits: CauseLimits) -> Named:
-    """Enough held-out episodes and situations with comparable demonstrations."""
-    counts = numbers.counts
-
-    def least(question: str, what: str, measured: float, note: str = "") -> Answer:
-        return Answer(question, Layer.SUPPORT, what, measured, limits[question], ">=", note=note)
-
-    answers = [
-        least(
-            "supported_episodes",
-            "held-out episodes with enough comparable demonstrations",
-            counts.analysed_episodes,
-        ),
-        least(
-            "held_out_situations",
-            "held-out situations with enough of them",
-            counts.analysed,
-        ),
-        least(
-            "supported_share",
-            "share of held-out situations with enough of them",
-            counts.share,
-            f"{counts.analysed} of {counts.queries}",
-        ),
-    ]
+    """Enough held-out episodes and situations with comparable demonstrations, of either kind."""
+    answers = _enough(numbers, limits)
     red = next((answer for answer in answers if answer.red), None)
     if red is None:
         return answers, None
+    other = _enough(turned(numbers), limits) if numbers.other is not None else []
+    if other and not any(answer.red for answer in other):
+        # Shown without a limit: the other evidence speaks in their place.
+        return [*(replace(answer, limit=None) for answer in answers), *other], None
+    counts = numbers.counts
     if red.question == "supported_share":
         found = f"{counts.share:.0%} of the held-out situations have"
         needed = f"{limits[red.question]:.0%}"
     else:
         what = "episodes" if red.question == "supported_episodes" else "situations"
         found, needed = f"{red.measured:g} held-out {what} have", f"{limits[red.question]:g}"
-    return answers, thin(
-        f"Only {found} enough comparable training episodes ({needed} needed): record more, from "
-        "fewer starts."
+    return [*answers, *other], thin(
+        f"Only {found} enough comparable training episodes ({needed} needed), and by what predicts "
+        "the action too few can be compared as well: record more, from fewer starts."
     )
 
 
+def _enough(numbers: Numbers, limits: CauseLimits) -> list[Answer]:
+    counts, what = numbers.counts, WORDS[numbers.kind]
+
+    def least(question: str, which: str, measured: float, note: str = "") -> Answer:
+        return Answer(
+            question, Layer.SUPPORT, f"{which} {what}", measured, limits[question], ">=", note=note
+        )
+
+    share = f"{counts.analysed} of {counts.queries}"
+    return [
+        least("supported_episodes", "held-out episodes with", counts.analysed_episodes),
+        least("held_out_situations", "held-out situations with", counts.analysed),
+        least("supported_share", "share of held-out situations with", counts.share, share),
+    ]
+
+
 def structure(numbers: Numbers, limits: CauseLimits) -> Named:
-    """Several modes that persist, or support along the whole way to say that there are none."""
+    """Several modes that persist, or support along the whole way to say that there are none.
+
+    Two kinds of evidence look for them. Where one cannot speak the other does; where both do they
+    must agree.
+    """
+    thin_here = any(answer.red for answer in _enough(numbers, limits))
+    first = turned(numbers) if thin_here and numbers.other is not None else numbers
+    answers, said = _seen(first, limits)
+    if first.other is None:
+        return answers, said
+    second = turned(first)
+    spoke = not any(answer.red for answer in _enough(second, limits))
+    found, opinion = _seen(second, limits)
+    shown = [replace(answer, limit=None) for answer in found if answer.question in OF_BOTH]
+    against = _disagree(first, said, second, opinion, spoke=spoke)
+    if against is not None:
+        return [*answers, *shown], against
+    # What is too thin to deny here may be denied by the other.
+    open_ = said is not None and (said.name, said.kind) == (
+        CauseName.INSUFFICIENT_SUPPORT, "neighbourhoods",
+    )  # fmt: skip
+    if open_ and spoke and opinion is not None and opinion.name is CauseName.UNIMODAL:
+        rest = [replace(answer, limit=None) for answer in answers]
+        return [*rest, *found], opinion
+    return [*answers, *shown], said
+
+
+def _disagree(
+    first: Numbers,
+    said: Diagnosis | None,
+    second: Numbers,
+    opinion: Diagnosis | None,
+    *,
+    spoke: bool,
+) -> Diagnosis | None:
+    """Where the two contradict each other, with the numbers of both; None where they do not."""
+    here, there = WORDS[first.kind], WORDS[second.kind]
+    learned = second.other if second.kind == LOCAL else first.other
+    asked = (learned.confirmed, learned.contradicted) if learned else (0, 0)
+    modes, denied = first.counts.two_mode_episodes, said is not None
+    few = LEAST_CONFIRMED * sum(asked) - asked[0] > 0
+    if not denied and few and asked[1] >= LEAST_ASKED:
+        text = (
+            f"{modes} held-out episodes show modes by {here}; of their situations {asked[0]} show "
+            f"them by {there} as well, and {asked[1]} do not, though they would be seen"
+        )
+    elif (
+        denied
+        and said is not None
+        and said.name is CauseName.UNIMODAL
+        and spoke
+        and (
+            opinion is None
+            or (opinion.kind == "persistence" and second.counts.two_mode_episodes > 0)
+        )
+    ):
+        text = (
+            f"No modes were found by {here}, and in {second.counts.two_mode_episodes} of "
+            f"{second.counts.primary_episodes} held-out episodes by {there}"
+        )
+    else:
+        return None
+    return thin(
+        f"{text}: the two kinds of evidence disagree. Record more, from fewer starts.",
+        kind="evidence_disagrees",
+    )
+
+
+def _seen(numbers: Numbers, limits: CauseLimits) -> Named:
+    """What one kind of evidence says."""
     counts, kept = numbers.counts, numbers.kept
     needed = max(limits["two_mode_episodes"], limits["two_mode_share"] * counts.primary_episodes)
     modes = Answer(

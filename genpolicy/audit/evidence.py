@@ -63,6 +63,7 @@ def write_evidence(
         "replay": _replays(result),
         "resamples": result.resamples,
         "reach": result.reach,
+        "sides": result.sides,
         "strata": result.strata,
         "structure_draws": result.structure_draws,
         "support": support_points(result),

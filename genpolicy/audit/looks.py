@@ -48,6 +48,14 @@ def look_everywhere(
     return tuple(_look(data, settings, item, found, root_seed) for item in components)
 
 
+def look_at_route(
+    data: AuditInput, settings: AuditSettings, found: list[Found], root_seed: int
+) -> Look:
+    """The route alone, of situations that may differ in what is expected of other components."""
+    component = components_of(data, settings, [item.members for _, item, _ in found])[0]
+    return _look(data, settings, component, found, root_seed)
+
+
 def foremost(looks: tuple[Look, ...]) -> Look:
     """The component that the audit follows; of equal ones the first."""
     route = looks[0]

@@ -31,6 +31,53 @@ class Reach:
 
 
 @dataclass(frozen=True)
+class Side:
+    """`sides.parquet`: what one kind of evidence found.
+
+    Attributes:
+        kind: `local` or `learned`.
+        followed: Whether modes, links, variables and outcomes are about its situations.
+        queries: As in `genpolicy.audit.counts`, and so are those up to `white_share`.
+        analysed: The same: those of which it could speak.
+        analysed_episodes: The same.
+        two_mode: The same.
+        two_mode_episodes: The same.
+        primary_episodes: The same.
+        resolved: The same.
+        incoherent: The same.
+        persistent: The same.
+        noise_ratio: The same.
+        noise_spread: The same.
+        white_share: The same.
+        kept: Share of episodes that keep their mode.
+        kept_null_q95: What chance reaches in 95 of 100.
+        kept_n: Situations in which it could be measured.
+        confirmed: Situations with modes of the other kind that have them here as well.
+        contradicted: Those that have none here, though modes as far apart would have been found.
+    """
+
+    kind: str
+    followed: bool
+    queries: int
+    analysed: int
+    analysed_episodes: int
+    two_mode: int
+    two_mode_episodes: int
+    primary_episodes: int
+    resolved: int
+    incoherent: int
+    persistent: int
+    noise_ratio: float
+    noise_spread: float
+    white_share: float
+    kept: float
+    kept_null_q95: float
+    kept_n: int
+    confirmed: int
+    contradicted: int
+
+
+@dataclass(frozen=True)
 class StructureDraw:
     """`structure_draws.parquet`: support and structure of one draw, beside `resamples.parquet`.
 
@@ -99,6 +146,7 @@ class FindingDraw:
 FURTHER_TABLES: dict[str, type] = {
     "finding_draws": FindingDraw,
     "reach": Reach,
+    "sides": Side,
     "structure_draws": StructureDraw,
 }
 """Row of each table that stands beside those of `genpolicy.audit.rows.TABLES`."""

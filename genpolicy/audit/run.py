@@ -7,40 +7,36 @@ import numpy as np
 from genpolicy.audit.asked import Given, questions
 from genpolicy.audit.component_rows import ComponentModes
 from genpolicy.audit.components import Component
-from genpolicy.audit.counts import Counts, count
+from genpolicy.audit.counts import Counts
 from genpolicy.audit.data import AuditInput, Integers, canonical
 from genpolicy.audit.labels import Replay, Replayed, mode_outcomes, replay_sample
 from genpolicy.audit.linking import link
 from genpolicy.audit.looks import (
-    Look,
     claimed_episodes,
     component_modes,
-    foremost,
     look_everywhere,
 )
-from genpolicy.audit.mean_versus_modes import Admissible, compare
+from genpolicy.audit.mean_versus_modes import Admissible
 from genpolicy.audit.neighbourhoods import Support
 from genpolicy.audit.persistence import Persistence, summarise
 from genpolicy.audit.predictability import predictions
 from genpolicy.audit.progress import Progress, silent
-from genpolicy.audit.reach import reaches
-from genpolicy.audit.reach_rows import LOCAL, FindingDraw, Reach, StructureDraw
+from genpolicy.audit.reach_rows import FindingDraw, Reach, Side, StructureDraw
 from genpolicy.audit.recovery import demonstrated, recovery_outcomes
 from genpolicy.audit.resamples import Measures, resamples
 from genpolicy.audit.rows import Asked, ModeOutcome, Prediction, RecoveryOutcome, Resample, Stratum
 from genpolicy.audit.semantics import Semantics, measure, realigned
 from genpolicy.audit.settings import AuditSettings
+from genpolicy.audit.sides import View, chosen_view, learned_view, local_view
 from genpolicy.audit.situations import (
     Several,
     Situation,
     by_phase,
-    coherent,
-    examine,
     find_situations,
     primary_phase,
 )
 from genpolicy.audit.strata import examine_strata
-from genpolicy.audit.structure_draws import finding_draws, queries_of
+from genpolicy.audit.structure_draws import finding_draws
 
 
 @dataclass(frozen=True)
@@ -69,7 +65,8 @@ class AuditResult:
         resamples: The measures on resampled data.
         component: Component of the action whose modes all else is about.
         components: Modes in every component.
-        reach: What could be looked at in each fifth of the way.
+        reach: What could be looked at in each fifth of the way, by both kinds of evidence.
+        sides: What each of them found.
         structure_draws: Support and structure of each draw.
         finding_draws: Findings of halves of the episodes.
     """
@@ -94,6 +91,7 @@ class AuditResult:
     component: Component
     components: tuple[ComponentModes, ...]
     reach: tuple[Reach, ...] = ()
+    sides: tuple[Side, ...] = ()
     structure_draws: tuple[StructureDraw, ...] = ()
     finding_draws: tuple[FindingDraw, ...] = ()
 
@@ -126,9 +124,12 @@ def audit(
     semantics = measure(data, settings)
     found, support = find_situations(data, settings, root_seed, progress=progress)
     looks = look_everywhere(data, settings, found, root_seed)
-    followed, component = foremost(looks), foremost(looks).component
-    claims = _examined(data, settings, followed, admissible=admissible, progress=progress)
-    situations, incoherent = coherent(settings, claims)
+    local = local_view(data, settings, looks, support, admissible=admissible, progress=progress)
+    learned = learned_view(
+        data, settings, local, admissible=admissible, root_seed=root_seed, progress=progress
+    )
+    view = chosen_view((local, learned))
+    situations, component, counts = view.situations, view.look.component, view.counts
     several = by_phase(situations)
     replayed = replay_sample(data, settings, replay=replay, root_seed=root_seed, progress=progress)
     links = _links(data, settings, several)
@@ -136,7 +137,6 @@ def audit(
     told = predictions(data, settings, several, links, root_seed=root_seed)
     given = Given(replays=len(replayed), feasibility=admissible is not None)
     strata = examine_strata(data, settings, several, links, root_seed=root_seed)
-    counts = count(data, situations, support, incoherent)
     primary = primary_phase(several)
     persistence = summarise([item.identity for item in situations if item.two_mode])
     main = several.get(primary, []), links.get(primary)
@@ -144,13 +144,14 @@ def audit(
     measured = Measures(
         replayed, persistence, strata, told, _of_phase(modes, primary), counts, halves
     )
-    queries = queries_of(data, settings, situations, support)
-    draws, structures = resamples(settings, measured, claims, queries, root_seed=root_seed)
-    after = _after_realignment(data, settings, semantics, counts, component, root_seed=root_seed)
+    draws, structures = resamples(
+        settings, measured, view.claims, view.queries, root_seed=root_seed
+    )
+    after = _after_realignment(data, settings, semantics, view, root_seed=root_seed)
     return AuditResult(
         data=data,
         semantics=semantics,
-        support=support,
+        support=view.support,
         situations=situations,
         persistence=persistence,
         modes=modes,
@@ -165,9 +166,12 @@ def audit(
         modes_after_realignment=after,
         modes_other_phases=_other_phases(data, settings, component, root_seed),
         component=component,
-        components=component_modes(data, looks, component.name),
+        components=component_modes(data, (view.look, *looks[1:]), component.name)
+        if view is learned
+        else component_modes(data, looks, component.name),
         resamples=draws,
-        reach=reaches(LOCAL, queries.fifth, queries.analysed > 0),
+        reach=(*local.reach(), *learned.reach()),
+        sides=tuple(item.row(followed=item is view) for item in (local, learned)),
         structure_draws=structures,
         finding_draws=again,
     )
@@ -177,44 +181,20 @@ def _of_phase(modes: tuple[ModeOutcome, ...], phase: str) -> tuple[ModeOutcome, 
     return tuple(mode for mode in modes if mode.phase == phase)
 
 
-def _examined(
-    data: AuditInput,
-    settings: AuditSettings,
-    look: Look,
-    *,
-    admissible: Admissible | None,
-    progress: Progress,
-) -> tuple[Situation, ...]:
-    """Every situation, looked at in turn; those of a claim are split into modes."""
-    examined: list[Situation] = []
-    for number, entry in enumerate(look.found):
-        item = look.claims.get(number)
-        if item is None:
-            item = examine(data, settings, entry, look.component, admissible=None, seed=None)
-        else:
-            _, situation, split = entry
-            chunks = compare(data, settings, situation, split, admissible=admissible)
-            item = replace(item, chunks=chunks)
-        examined.append(item)
-        progress("situations examined", number + 1, len(look.found))
-    return tuple(examined)
-
-
 def _after_realignment(
     data: AuditInput,
     settings: AuditSettings,
     semantics: Semantics,
-    counts: Counts,
-    component: Component,
+    view: View,
     *,
     root_seed: int,
 ) -> int:
     """Held-out episodes with several modes once every epoch is shifted by its measured offset."""
     shifted, moved = realigned(data, semantics)
     if not moved:
-        return counts.two_mode_episodes
+        return view.counts.two_mode_episodes
     found, _ = find_situations(shifted, settings, root_seed)
-    return claimed_episodes(shifted, settings, component, found)
+    return claimed_episodes(shifted, settings, view.look.component, found)
 
 
 def _other_phases(

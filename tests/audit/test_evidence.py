@@ -19,7 +19,8 @@ FILES = {
     "strata.parquet", "replay.parquet", "recovery.parquet", "persistence.json", "summary.json",
     "settings.json", "findings.parquet", "resamples.parquet", "examples.parquet",
     "alignment.parquet", "support.parquet", "demonstrated.parquet",
-    "predictions.parquet", "asked.parquet",
+    "predictions.parquet", "asked.parquet", "reach.parquet", "structure_draws.parquet",
+    "finding_draws.parquet",
 }  # fmt: skip
 
 
