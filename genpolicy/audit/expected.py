@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.distance import cdist
 from sklearn.linear_model import Ridge
+from sklearn.utils.extmath import randomized_svd
 
 from genpolicy.audit.data import Array, Integers
 
@@ -65,10 +66,7 @@ def expected_chunks(
     spread = known.std(axis=0)
     weight = np.sqrt(importance) / np.where(spread > 0.0, spread, 1.0)
     known, asked = known * weight, asked * weight
-    centred = chunks - chunks.mean(axis=0)
-    _, _, axes = np.linalg.svd(centred[_some(len(centred), 2000, rng)], full_matrices=False)
-    axes = axes[:COMPONENTS]
-    scores = centred @ axes.T
+    scores, axes = principal(chunks, rng)
     marks = known[_some(len(known), LANDMARKS, rng)]
     gaps, asked_gaps = cdist(known, marks, "sqeuclidean"), cdist(asked, marks, "sqeuclidean")
     usual = float(np.median(gaps)) or 1.0
@@ -91,6 +89,18 @@ def expected_chunks(
     model = Ridge(alpha=strength).fit(inputs, scores)
     further = np.hstack([np.exp(-asked_gaps / (2.0 * width**2 * usual)), asked])
     return Expected(out, np.asarray(model.predict(further)), axes)
+
+
+def principal(values: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+    """Scores of the first principal components, at most `COMPONENTS`, and their axes.
+
+    Returns:
+        Shapes (n, c) and (c, d).
+    """
+    centred = values - values.mean(axis=0)
+    count = min(COMPONENTS, *centred.shape)
+    _, _, axes = randomized_svd(centred, count, random_state=int(rng.integers(2**31)))
+    return np.asarray(centred @ axes.T, dtype=np.float64), np.asarray(axes, dtype=np.float64)
 
 
 def _folds(episode: Integers, rng: np.random.Generator) -> Integers:

@@ -17,7 +17,7 @@ import numpy as np
 from sklearn.tree import ExtraTreeRegressor
 
 from genpolicy.audit.data import Array, AuditInput, Integers, relative_paths
-from genpolicy.audit.expected import Expected, expected_chunks
+from genpolicy.audit.expected import Expected, expected_chunks, principal
 from genpolicy.audit.modes import (
     ROUTE_CHUNKS,
     Clustering,
@@ -210,7 +210,7 @@ def forest_weights(
         Weights, shape (q, n), and the predicted chunks of the queries, shape (q, d).
     """
     known, asked = inputs(data, settings, pool), inputs(data, settings, queries)
-    chunks = targets(data, settings, pool)
+    chunks, _ = principal(targets(data, settings, pool), rng)
     episode = data.episode[pool]
     episodes = np.unique(episode)
     weights = np.zeros((len(queries), len(pool)))

@@ -19,7 +19,7 @@ from gates.feasibility.settings import LAYERS
 from gates.preregistration import PREREGISTRATION, plan_bytes
 from gates.reproducibility.timing import MEASURED_HERE, TERMS
 from genpolicy.audit.component_rows import ComponentModes
-from genpolicy.audit.reach_rows import FindingDraw, Reach, StructureDraw
+from genpolicy.audit.reach_rows import FindingDraw, Reach, Side, StructureDraw
 from genpolicy.audit.rows import (
     Asked,
     Calibration,
@@ -563,6 +563,7 @@ def _audit(root: Path) -> None:
     )
     table(root, "audit/structure_draws.parquet", StructureDraw, [_structure_draw()] * 4)
     table(root, "audit/finding_draws.parquet", FindingDraw, [])
+    table(root, "audit/sides.parquet", Side, [_side("local"), _side("learned")])
     document(
         root,
         "audit/summary.json",
@@ -629,6 +630,24 @@ def _draw() -> dict[str, Any]:
         "told": [0.05] * 2,
         "success_lower": [0.8] * 2,
         "admissible": [49] * 2,
+    }
+
+
+def _side(kind: str) -> dict[str, Any]:
+    counts = {name: value for name, value in _structure_draw().items() if "reach" not in name}
+    del counts["findings"]
+    return counts | {
+        "kind": kind,
+        "followed": kind == "local",
+        "two_mode": 50,
+        "two_mode_episodes": 30,
+        "incoherent": 0,
+        "persistent": 45,
+        "kept": 0.95,
+        "kept_null_q95": 0.6,
+        "kept_n": 200,
+        "confirmed": 0,
+        "contradicted": 0,
     }
 
 

@@ -6,6 +6,7 @@ import pytest
 from planted import VALID, counts, named
 
 from gates.cause import CauseName
+from genpolicy.audit.reach_rows import LEARNED, Reach, Side
 
 ABSENT = counts(two_mode_episodes=0, two_mode=0, persistent=0)
 
@@ -38,3 +39,47 @@ def test_white_noise_must_be_a_share_of_what_chunks_differ_by():
     trembling = {"noise_ratio": 0.9, "noise_spread": 0.01, "two_mode_episodes": 0}
     assert named(counts(**trembling, white_share=0.3)).name is CauseName.POINTWISE_NOISE
     assert named(counts(**trembling, white_share=0.05)).name is CauseName.UNIMODAL
+
+
+def learned(*, modes=0, spoke=0.9, confirmed=0, contradicted=0):
+    """What the learned evidence found, and how far it reaches."""
+    side = Side(
+        LEARNED, followed=False, queries=600, analysed=round(600 * spoke), analysed_episodes=50,
+        two_mode=3 * modes, two_mode_episodes=modes, primary_episodes=50 if modes else 0,
+        resolved=0, incoherent=0, persistent=3 * modes, noise_ratio=0.1, noise_spread=0.01,
+        white_share=0.02, kept=0.9, kept_null_q95=0.6, kept_n=3 * modes, confirmed=confirmed,
+        contradicted=contradicted,
+    )  # fmt: skip
+    reach = tuple(Reach(LEARNED, k, 120, round(120 * spoke)) for k in range(1, 6))
+    return {"other": side, "other_reach": reach}
+
+
+THIN = counts(two_mode_episodes=0, two_mode=0, persistent=0, analysed=0, analysed_episodes=0)
+
+
+@pytest.mark.parametrize(
+    ("numbers", "name", "kind"),
+    [
+        # Where neighbours are missing the other evidence speaks, as far as it reaches.
+        (replace(THIN, **learned()), "unimodal", ""),
+        (replace(THIN, **learned(spoke=0.1)), "insufficient_support", "neighbourhoods"),
+        (replace(THIN, **learned(spoke=0.4)), "insufficient_support", "neighbourhoods"),
+        (replace(THIN, reach=reach(0, 0, 0, 0, 0)), "insufficient_support", "neighbourhoods"),
+        # Where both speak they must agree.
+        (replace(ABSENT, **learned()), "unimodal", ""),
+        (replace(ABSENT, **learned(modes=40)), "insufficient_support", "evidence_disagrees"),
+        (replace(VALID, **learned(modes=40)), "valid_modes", ""),
+        (replace(VALID, **learned(confirmed=2, contradicted=60)), "insufficient_support",
+         "evidence_disagrees"),
+        (replace(VALID, **learned(confirmed=20, contradicted=38)), "valid_modes", ""),
+        (replace(VALID, **learned(confirmed=0, contradicted=5)), "valid_modes", ""),
+    ],
+)  # fmt: skip
+def test_two_kinds_of_evidence_speak_for_each_other_and_must_agree(numbers, name, kind):
+    cause = named(numbers)
+    assert (cause.name.value, cause.kind) == (name, kind)
+
+
+def test_a_disagreement_says_the_numbers_of_both():
+    text = named(replace(VALID, **learned(confirmed=2, contradicted=60))).next_action
+    assert "45 held-out episodes" in text and "2 show them" in text and "60 do not" in text
