@@ -66,3 +66,35 @@ def test_every_answer_says_which_end_was_judged():
     first, second = (a for a in cause.answers if a.question == "told_share")
     assert first.red and first.measured == pytest.approx(0.5) and "lower end" in first.note
     assert second.holds and second.measured == pytest.approx(0.2) and "upper end" in second.note
+
+
+def columns(best, *rows, half=0.1):
+    """The best of several recorded columns, and each by itself."""
+    named_first = rows[0].variable
+    return of(told("recorded_columns", best, half, detail=named_first), *rows)
+
+
+def test_of_several_columns_only_the_best_is_asked_about():
+    noise = [told(f"n{k}", 0.1, 0.4) for k in range(30)]
+    # Each by itself may tell more than the limit; together they are one question.
+    assert named(of(noise[0])).kind == UNDECIDED
+    assert named(columns(0.05, *noise)).name == "valid_modes"
+    assert named(columns(0.6, told("scenario", 0.6, 0.3), *noise)).variable == "scenario"
+    assert named(columns(0.5, told("scenario", 0.6, 0.15), *noise)).text == "hidden_state(scenario)"
+
+
+def test_the_best_of_several_must_beat_a_guess_where_there_are_episodes_enough():
+    luck, telling = told("luck", 0.2, 0.3), told("scenario", 0.35, 0.3)
+    assert named(columns(0.35, luck)).name == "valid_modes"
+    found = named(columns(0.35, telling))
+    assert (found.kind, found.variable) == (UNDECIDED, "scenario")
+    # With few episodes nothing of the kind can be said.
+    assert named(columns(0.35, luck, half=0.25)).kind == UNDECIDED
+    assert named(columns(0.35, told("nan", math.nan, 0.1))).kind == UNDECIDED
+
+
+def test_a_recorded_column_is_as_concrete_as_who_demonstrated():
+    order, column = told("episode_order", 0.75), told("scenario", 0.7)
+    assert named(of(order, column)).variable == "scenario"
+    assert named(of(told("operator", 0.7), told("scenario", 0.75))).variable == "scenario"
+    assert named(of(told("object", 0.7), told("scenario", 0.75))).variable == "object"
