@@ -1,4 +1,4 @@
-"""Any recorded column can be named as the reason, by any name; thirty without one change nothing."""
+"""Any recorded column can be named as the reason; thirty that say nothing change nothing."""
 
 from collections import Counter
 from dataclasses import replace

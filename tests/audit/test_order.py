@@ -17,7 +17,7 @@ from genpolicy.data.formats.opening import open_dataset
 from genpolicy.integrity.rows import read_rows
 from genpolicy.seeds import stream
 
-EPISODES, ROWS = 90, 40
+EPISODES, ROWS = 120, 40
 
 
 @pytest.fixture(scope="module")
@@ -85,7 +85,7 @@ def test_any_order_and_any_name_of_the_file(episodes, tmp_path):
 
 
 def test_two_collections_merged_either_way(episodes, tmp_path):
-    first, second = list(range(35)), list(range(35, EPISODES))
+    first, second = list(range(45)), list(range(45, EPISODES))
     one = audited(tmp_path / "a", {"A.parquet": first, "B.parquet": second}, episodes)
     other = audited(tmp_path / "b", {"A.parquet": second[::-1], "B.parquet": first}, episodes)
     assert one[0].text == "hidden_state(scenario)"
