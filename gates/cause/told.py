@@ -37,12 +37,14 @@ def surely(row: Prediction, limit: float) -> bool | None:
 def told(rows: Sequence[Prediction], limits: CauseLimits) -> list[Answer]:
     """What tells most, each by the end of its interval that decides."""
     limit = limits[QUESTION]
-    ranked = sorted(rows, key=lambda row: (-_judged(row, limit), row.variable))
+    ranked = sorted(
+        rows, key=lambda row: (not counts(row, rows, limit), -_judged(row, limit), row.variable)
+    )
     return [
         Answer(
             QUESTION, Layer.HIDDEN,
             f"what {row.variable.replace('_', ' ')} tells of the mode, beyond a guess",
-            _judged(row, limit), limit,
+            _judged(row, limit), limit if counts(row, rows, limit) else None,
             note=f"{row.told:.2f} ({row.told_lower:.2f} to {row.told_upper:.2f}) in {row.phase}, "
             f"{row.n} held-out episodes; {_end(row, limit)}",
         )
@@ -64,6 +66,11 @@ def is_column(variable: str) -> bool:
     """Whether it is a recorded column, which the audit knows by no name of its own."""
     known = variable in (*CONCRETE, COLUMNS)
     return not known and not variable.startswith(OTHER_PHASE)
+
+
+def counts(row: Prediction, rows: Sequence[Prediction], limit: float) -> bool:
+    """Whether a row is held to the limit; of several columns only the best is, or a sure one."""
+    return surely(row, limit) is not None or _is_open(row, rows, limit)
 
 
 def _is_open(row: Prediction, rows: Sequence[Prediction], limit: float) -> bool:

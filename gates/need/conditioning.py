@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from gates.bounds import counted_interval
-from gates.cause.told import UNDECIDED
+from gates.cause.told import UNDECIDED, counts
 from gates.criterion import Measured, criterion
 from gates.evidence import Evidence, number, numbers
 from gates.need.cause import found_cause
@@ -47,6 +47,12 @@ def told_share(evidence: Evidence, settings: NeedSettings) -> Measured:
     frame = evidence.rows(f"{AUDIT}/predictions.parquet", Prediction)
     limit = settings.limits.of.get("told_share")
     least = math.inf if limit is None or limit.limit is None else limit.limit
+    names = list(Prediction.__dataclass_fields__)
+    records = frame[names].to_dict("records")
+    rows = [Prediction(**{str(name): value for name, value in row.items()}) for row in records]
+    frame = frame[[counts(row, rows, least) for row in rows]]
+    if rows and frame.empty:
+        return Measured(0.0, caveat="by itself no recorded column beats a guess")
     lower, upper = numbers(frame, "told_lower"), numbers(frame, "told_upper")
     beyond = bool(np.any(lower > least))
     row = int(np.argmax(lower if beyond else upper))

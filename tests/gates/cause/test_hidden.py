@@ -21,3 +21,16 @@ def test_of_equal_variables_the_most_concrete_is_named_and_the_past_must_show_mo
     assert (named(seen).name, named(seen).kind) == (CauseName.UNIMODAL, "observed_variable")
     epoch = replace(VALID, strata=(replace(HIDDEN, variable="calibration_epoch"),))
     assert named(epoch).name is CauseName.DATA_DEFECT
+
+
+def test_a_recorded_column_is_named_before_the_order_and_by_its_strength():
+    column = replace(HIDDEN, variable="scenario", effect=0.8)
+    order = replace(HIDDEN, variable="episode_order", effect=0.9)
+    assert named(replace(VALID, strata=(order, column))).text == "hidden_state(scenario)"
+    weaker = replace(HIDDEN, effect=0.75)
+    assert named(replace(VALID, strata=(weaker, column))).variable == "scenario"
+    assert (
+        named(replace(VALID, strata=(replace(column, effect=0.7), weaker))).variable == "operator"
+    )
+    seen = replace(column, observed=True)
+    assert named(replace(VALID, strata=(seen, order))).variable == "episode_order"

@@ -98,3 +98,11 @@ def test_a_recorded_column_is_as_concrete_as_who_demonstrated():
     assert named(of(order, column)).variable == "scenario"
     assert named(of(told("operator", 0.7), told("scenario", 0.75))).variable == "scenario"
     assert named(of(told("object", 0.7), told("scenario", 0.75))).variable == "object"
+
+
+def test_what_is_not_held_to_the_limit_is_shown_without_one():
+    answers = named(columns(0.05, told("n0", 0.1, 0.4), told("sure", 0.1, 0.1))).answers
+    shown = {a.what: a.limit for a in answers if a.question == "told_share"}
+    limits_of = {what.split()[1]: value for what, value in shown.items()}
+    assert limits_of["n0"] is None
+    assert limits_of["sure"] == limits_of["recorded"] == 0.4
