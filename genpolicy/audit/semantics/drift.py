@@ -28,7 +28,7 @@ LEAST_SIDE = 8
 # The spread of lags from one recording to the next is not believed below this, steps.
 FINEST_STEPS = 0.02
 # The growth of a lag is carried on over this many times the rows in which the arm moves.
-CARRIED_ON = 1.5
+CARRIED_ON = 1.25
 
 
 def episode_drifts(motion: Motion, lags: Array, settings: AuditSettings) -> Array:

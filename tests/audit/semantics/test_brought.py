@@ -151,7 +151,9 @@ def test_episodes_glued_to_themselves_without_their_rests_are_named(name, copies
     assert {finding.kind for finding in found} == {"glued"}
     assert len(found) == 1
     assert noise or f"hold the same rows twice ({hit.sum()})" in found[0].action
-    assert 0.9 * hit.sum() <= int(found[0].action.split()[0]) <= hit.sum()
+    # With noise a copy without its rests is seen by the jump to it, where there is one.
+    least = 0.6 if noise else 1.0
+    assert least * hit.sum() <= int(found[0].action.split()[0]) <= hit.sum()
 
 
 def planned(goals, noise, wait):
