@@ -37,12 +37,17 @@ def episode_drifts(motion: Motion, lags: Array, settings: AuditSettings) -> Arra
     result = np.full(count, np.nan)
     if motion.commanded.shape[1] == 0:
         return result
-    cut, distance, extent = _halves(motion)
-    edges = np.stack([motion.starts[:-1], cut], axis=1).ravel()
+    cut, distance, ends = _halves(motion)
+    extent = np.diff(ends, axis=1)[:, 0]
+    # A wait shows no lag and would only change the means that the halves are taken about.
+    reach = settings.maximum_lag_steps
+    begin = np.clip(ends[:, 0] - reach, motion.starts[:-1], cut)
+    end = np.clip(ends[:, 1] + reach, cut, motion.starts[1:])
+    edges = np.stack([motion.starts[:-1], begin, cut, end], axis=1).ravel()
     edges = np.append(edges, motion.starts[-1])
     halves = segment_lags(
         motion.commanded, motion.observed, edges, settings.maximum_lag_steps
-    ).steps.reshape(count, 2)
+    ).steps.reshape(count, 4)[:, 1:3]
     whole = np.isin(
         motion.starts[1:], motion.pieces[1:][np.isin(motion.pieces[:-1], motion.starts)]
     )
@@ -155,10 +160,10 @@ def order_findings(
     ]
 
 
-def _halves(motion: Motion) -> tuple[Integers, Array, Array]:
-    """First row of the second half of each episode's motion, and of rows: between both, and moved.
+def _halves(motion: Motion) -> tuple[Integers, Array, Integers]:
+    """First row of the second half of each episode's motion, the rows between both, and its ends.
 
-    Moved in are the rows from the first to the last twentieth of the way.
+    It begins and ends with the first and the last twentieth of the way. Ends: shape (E, 2).
     """
     scale = np.std(motion.commanded, axis=0)
     steps = np.abs(np.diff(motion.commanded, axis=0, prepend=motion.commanded[:1]))
@@ -172,16 +177,18 @@ def _halves(motion: Motion) -> tuple[Integers, Array, Array]:
     rows = np.arange(len(travel))
     share = gone - np.repeat(begin, length)
     later = share >= np.repeat(0.5 * total, length)
-    ends = [np.repeat(part * total, length) for part in (0.05, 0.95)]
-    moved = (share >= ends[0]) & (share <= ends[1])
+    before = [
+        episode_sums((share < np.repeat(part * total, length)).astype(np.float64), motion.starts)
+        for part in (0.05, 0.95)
+    ]
     weight = episode_sums(np.where(later, travel, 0.0), motion.starts)
     late = episode_sums(np.where(later, travel * rows, 0.0), motion.starts)
     early = episode_sums(np.where(later, 0.0, travel * rows), motion.starts)
     with np.errstate(divide="ignore", invalid="ignore"):
         distance = np.nan_to_num(late / weight - early / (total - weight), posinf=0.0, neginf=0.0)
     cut = motion.starts[1:] - episode_sums(later.astype(np.float64), motion.starts).astype(int)
-    extent = episode_sums(moved.astype(np.float64), motion.starts)
-    return np.asarray(cut, dtype=np.int64), distance, extent
+    ends = motion.starts[:-1, None] + np.stack(before, axis=1).astype(np.int64)
+    return np.asarray(cut, dtype=np.int64), distance, ends
 
 
 def _best_cut(values: Array) -> tuple[int, float, float]:
