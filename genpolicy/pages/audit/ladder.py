@@ -126,7 +126,22 @@ def _support(evidence: AuditEvidence) -> list[Check]:
     settings = evidence.settings
     note = f"within {settings['radius']:.3g} scales"
     least = float(settings["minimum_neighbours"])
-    return [Check("training episodes that make a comparison", least, note=note)]
+    checks = [Check("training episodes that make a comparison", least, note=note)]
+    for _, side in evidence["sides"].iterrows():
+        fifths = evidence["reach"][evidence["reach"]["kind"] == side["kind"]].sort_values("fifth")
+        shares = ", ".join(
+            f"{int(row['spoke'])} of {int(row['queries'])}" for _, row in fifths.iterrows()
+        )
+        what = EVIDENCE[str(side["kind"])]
+        several = f"modes in {int(side['two_mode_episodes'])} held-out episodes"
+        checks.append(
+            Check(
+                f"situations of which {what} can speak",
+                float(side["analysed"]),
+                note=f"by fifths of the way {shares}; {several}",
+            )
+        )
+    return checks
 
 
 def _structure(evidence: AuditEvidence) -> list[Check]:
@@ -164,6 +179,7 @@ def _largest(frame: pd.DataFrame, column: str) -> pd.Series | None:
     return known.iloc[int(np.argmax(np.abs(known[column].to_numpy(dtype=np.float64))))]
 
 
+EVIDENCE = {"local": "near neighbours", "learned": "demonstrations alike in what predicts"}
 LAYERS: dict[str, tuple[str, Callable[[AuditEvidence], list[Check]]]] = {
     "data": ("Are clocks, frames, units and calibration what they claim to be?", _data),
     "labels": ("Do the outcome labels agree with what a replay does?", _nothing),
