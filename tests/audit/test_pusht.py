@@ -1,7 +1,7 @@
 """PushT: real demonstrations without clock, operator, epoch or outcome.
 
-No start is repeated, so few stand near each other. By what predicts the action more can be compared:
-some episodes go either way about the block, in too few situations to say that it lasts.
+No start is repeated, so few stand near each other. By what predicts the action more can be
+compared: some episodes go either way about the block, in too few situations to say that it lasts.
 """
 
 from pathlib import Path
