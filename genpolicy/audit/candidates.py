@@ -58,6 +58,16 @@ class Candidates:
     phase_name: str
 
 
+def with_candidates(
+    data: AuditInput, table: pd.DataFrame, manifest: Mapping[str, object]
+) -> AuditInput:
+    """The same data with what was recorded of its episodes; see `candidates`."""
+    found = candidates(table, manifest, data)
+    return replace(
+        data, variables=found.variables, left_out=found.left_out, phase_name=found.phase_name
+    )
+
+
 def candidates(table: pd.DataFrame, manifest: Mapping[str, object], data: AuditInput) -> Candidates:
     """Every recorded column that may be why demonstrations differ.
 

@@ -1,11 +1,10 @@
 """The audit's view of an ingested dataset: which columns pair, how far apart is far."""
 
-from dataclasses import replace
 from typing import Any, NoReturn
 
 import numpy as np
 
-from genpolicy.audit.candidates import candidates
+from genpolicy.audit.candidates import with_candidates
 from genpolicy.audit.data import (
     NOT_RECORDED,
     Array,
@@ -82,13 +81,7 @@ def from_dataset(
             forms=_forms(dataset, settings, observed, commanded),
         )
     )
-    found = candidates(table, dataset.manifest, data)
-    return replace(
-        data,
-        variables=found.variables,
-        left_out=found.left_out,
-        phase_name=found.phase_name,
-    )
+    return with_candidates(data, table, dataset.manifest)
 
 
 def scales(contract: ObservationContract, settings: AuditSettings) -> Array:

@@ -64,7 +64,7 @@ def ingest_recordings(
     names = _labels(files)
     for name, path in sorted(zip(names, files, strict=True)):
         try:
-            episode, more = _accepted(path, contract, name)
+            episode, more = accept_recording(path, contract=contract, label=name)
             _refuse_other_task(episode, task)
             _refuse_duplicate(episode, accepted)
             accepted.append(episode)
@@ -89,7 +89,9 @@ def ingest_recordings(
         )
 
 
-def accept_recording(path: Path, *, contract: IngestContract, label: str) -> AcceptedEpisode:
+def accept_recording(
+    path: Path, *, contract: IngestContract, label: str
+) -> tuple[AcceptedEpisode, dict[str, str]]:
     """Read, check and resample one recording.
 
     Args:
@@ -97,16 +99,12 @@ def accept_recording(path: Path, *, contract: IngestContract, label: str) -> Acc
         contract: What it must satisfy.
         label: What texts and tables call it.
 
+    Returns:
+        The episode, and what else its metadata say of it.
+
     Raises:
         BadInputError: It is not a recording, or it breaks the contract.
     """
-    return _accepted(path, contract, label)[0]
-
-
-def _accepted(
-    path: Path, contract: IngestContract, label: str
-) -> tuple[AcceptedEpisode, dict[str, str]]:
-    """The recording, and what else its metadata say of it."""
     raw, digest = read_hashed_episode(path, where=label)
     check_metadata(raw, contract, where=label)
     stamped = remove_clock_offsets(raw, where=label)
