@@ -20,9 +20,10 @@ LIMITS = ((-2.9,) * 7, (2.9,) * 7)
 def accept(factory, tmp_path):
     def run(recorded, **changes):
         write_episode(tmp_path / "one.mcap", recorded)
-        return accept_recording(
+        episode, _ = accept_recording(
             tmp_path / "one.mcap", contract=factory.contract(**changes), label="one.mcap"
         )
+        return episode
 
     return run
 
