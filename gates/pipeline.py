@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 from typing import Any
 
+from gates.recorded import require_form
 from gates.report import GATES, Gate, report_path, stage_of
 from genpolicy.errors import ConfigError, IntegrityError
 from genpolicy.integrity.documents import canonical_json, parse_json, parse_yaml
@@ -331,6 +332,7 @@ def stages_of(root: Path, name: str) -> dict[str, Any]:
             expected="a mapping",
             action="Restore the file from version control.",
         )
+    require_form(name, stages or {})
     return {key: value for key, value in (stages or {}).items() if isinstance(value, dict)}
 
 

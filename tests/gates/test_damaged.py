@@ -157,7 +157,7 @@ def test_what_recorded_the_runs(name, place):
     root, _ = place
     path, kept = root / name, (root / name).read_bytes()
     whole = json.loads(kept)["stages"]
-    few = {"stages": {stage: whole[stage] for stage in ("shadow", "gate_c")}}
+    few = {"stages": {stage: whole[stage] for stage in ("shadow", "stress")}}
     tried = [*damaged(name, few, each=1, limit=40, yaml_too=False), *broken_bytes(kept)]
     refused = 0
     try:
