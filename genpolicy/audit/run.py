@@ -1,6 +1,7 @@
 """The whole audit: from rows to numbers, each kept as evidence. It measures and names no cause."""
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -122,13 +123,9 @@ def audit(
     """
     data = canonical(data)
     semantics = measure(data, settings)
-    found, support = find_situations(data, settings, root_seed, progress=progress)
-    looks = look_everywhere(data, settings, found, root_seed)
-    local = local_view(data, settings, looks, support, admissible=admissible, progress=progress)
-    learned = learned_view(
-        data, settings, local, admissible=admissible, root_seed=root_seed, progress=progress
+    shown, view = _views(
+        data, settings, admissible=admissible, root_seed=root_seed, progress=progress
     )
-    view = chosen_view((local, learned))
     situations, component, counts = view.situations, view.look.component, view.counts
     several = by_phase(situations)
     replayed = replay_sample(data, settings, replay=replay, root_seed=root_seed, progress=progress)
@@ -140,13 +137,7 @@ def audit(
     primary = primary_phase(several)
     persistence = summarise([item.identity for item in situations if item.two_mode])
     main = several.get(primary, []), links.get(primary)
-    halves, again = finding_draws(data, settings, root_seed=root_seed)
-    measured = Measures(
-        replayed, persistence, strata, told, _of_phase(modes, primary), counts, halves
-    )
-    draws, structures = resamples(
-        settings, measured, view.claims, view.queries, root_seed=root_seed
-    )
+    measured = Measures(replayed, persistence, strata, told, _of_phase(modes, primary), counts)
     after = _after_realignment(data, settings, semantics, view, root_seed=root_seed)
     return AuditResult(
         data=data,
@@ -166,15 +157,43 @@ def audit(
         modes_after_realignment=after,
         modes_other_phases=_other_phases(data, settings, component, root_seed),
         component=component,
-        components=component_modes(data, (view.look, *looks[1:]), component.name)
-        if view is learned
-        else component_modes(data, looks, component.name),
-        resamples=draws,
-        reach=(*local.reach(), *learned.reach()),
-        sides=tuple(item.row(followed=item is view) for item in (local, learned)),
-        structure_draws=structures,
-        finding_draws=again,
+        **shown,
+        **_draws(data, settings, measured, view, root_seed=root_seed),
     )
+
+
+def _views(
+    data: AuditInput,
+    settings: AuditSettings,
+    *,
+    admissible: Admissible | None,
+    root_seed: int,
+    progress: Progress,
+) -> tuple[dict[str, Any], View]:
+    """What both kinds of evidence show, as fields of the result, and the one that is followed."""
+    found, support = find_situations(data, settings, root_seed, progress=progress)
+    looks = look_everywhere(data, settings, found, root_seed)
+    local = local_view(data, settings, looks, support, admissible=admissible, progress=progress)
+    learned = learned_view(
+        data, settings, local, admissible=admissible, root_seed=root_seed, progress=progress
+    )
+    view = chosen_view((local, learned))
+    seen = looks if view is local else (view.look, *looks[1:])
+    return {
+        "components": component_modes(data, seen, view.look.component.name),
+        "reach": (*local.reach(), *learned.reach()),
+        "sides": tuple(item.row(followed=item is view) for item in (local, learned)),
+    }, view
+
+
+def _draws(
+    data: AuditInput, settings: AuditSettings, measured: Measures, view: View, *, root_seed: int
+) -> dict[str, Any]:
+    """The measures on resampled data, as fields of the result."""
+    halves, again = finding_draws(data, settings, root_seed=root_seed)
+    measured = replace(measured, halves=halves)
+    rows, structures = resamples(settings, measured, view.claims, view.queries, root_seed=root_seed)
+    return {"resamples": rows, "structure_draws": structures, "finding_draws": again}
 
 
 def _of_phase(modes: tuple[ModeOutcome, ...], phase: str) -> tuple[ModeOutcome, ...]:
