@@ -37,8 +37,6 @@ class Following:
         seen: The same of the observed ones.
         slow: Whether slow motion makes most of both.
         lag: Shift of the larger of both correlations, rows.
-        slope: Factor of the observed displacements on the commanded ones at that shift, over the
-            rows that both have.
         independent: Displacements of each episode that share no row. Shape (E,).
         moves: Displacements, commanded and observed, 0 where there are none. Shape (N, P).
     """
@@ -49,7 +47,6 @@ class Following:
     seen: Array
     slow: Flags
     lag: Integers
-    slope: Array
     independent: Array
     moves: tuple[Array, Array]
 
@@ -85,18 +82,17 @@ def following(motion: Motion, period_s: float, maximum_steps: int) -> Following:
     shape = (len(starts) - 1, x.shape[1])
     highest, lowest = np.full(shape, -np.inf), np.full(shape, np.inf)
     at_high, at_low = np.zeros(shape, dtype=np.int64), np.zeros(shape, dtype=np.int64)
-    high, low = np.full(shape, np.nan), np.full(shape, np.nan)
     power_x, power_y = _running(x), _running(y)
     # Means of a span change little over a part of it.
     stride = max(1, span // 3)
     reach = stride * -(-maximum_steps // stride)
     for shift in range(-reach, reach + 1, stride):
-        value, ratio = _correlation(x, y, (power_x, power_y), starts, shift)
+        value = _correlation(x, y, (power_x, power_y), starts, shift)
         value[np.broadcast_to(rows - abs(shift) < LEAST_ROWS, shape)] = np.nan
         with np.errstate(invalid="ignore"):
             higher, lower = value > highest, value < lowest
-        highest[higher], at_high[higher], high[higher] = value[higher], shift, ratio[higher]
-        lowest[lower], at_low[lower], low[lower] = value[lower], shift, ratio[lower]
+        highest[higher], at_high[higher] = value[higher], shift
+        lowest[lower], at_low[lower] = value[lower], shift
     known = np.isfinite(highest)
     count = np.maximum(rows, 1)
     return Following(
@@ -106,7 +102,6 @@ def following(motion: Motion, period_s: float, maximum_steps: int) -> Following:
         seen=np.sqrt(episode_sums(y**2, starts) / count),
         slow=x_slow & y_slow,
         lag=np.where(highest >= -lowest, at_high, at_low),
-        slope=np.abs(np.where(highest >= -lowest, high, low)),
         independent=np.asarray(rows[:, 0] / span),
         moves=(x, y),
     )
@@ -168,16 +163,11 @@ def _running(values: Array) -> Array:
 
 def _correlation(
     x: Array, y: Array, powers: tuple[Array, Array], starts: Integers, shift: int
-) -> tuple[Array, Array]:
-    """Correlation of y, later by a shift, with x over the rows that both have, and its slope.
-
-    Returns:
-        Shapes (E, P); NaN where either stands.
-    """
+) -> Array:
+    """Correlation of y, later by a shift, with x over the rows that both have. Shape (E, P)."""
     size = len(x) - abs(shift)
     if size <= 0:
-        nothing = np.full((len(starts) - 1, x.shape[1]), np.nan)
-        return nothing, nothing
+        return np.full((len(starts) - 1, x.shape[1]), np.nan)
     lead, trail = max(-shift, 0), max(shift, 0)
     product = np.zeros((len(x) + 1, x.shape[1]))
     np.multiply(x[lead : lead + size], y[trail : trail + size], out=product[lead : lead + size])
@@ -189,5 +179,4 @@ def _correlation(
     power = np.maximum(powers[0][last] - powers[0][first], 0.0)
     both = np.sqrt(power * np.maximum(powers[1][until] - powers[1][then], 0.0))
     with np.errstate(divide="ignore", invalid="ignore"):
-        value, slope = np.where(both > 0, (cross / both, cross / power), np.nan)
-    return np.asarray(value), np.asarray(slope)
+        return np.asarray(np.where(both > 0, cross / both, np.nan))

@@ -36,6 +36,9 @@ SAME_FACTOR = 2.0
 VALLEY, BETWEEN = 1.0 / 3.0, 0.1
 # Shares of positive values may differ by this between two units.
 SIGNS = 0.25
+# Gains nearer to one are left in: where an episode ends before its last command is reached, the
+# gain is a little too small, and taking that out would look like a lag that changes on the way.
+TAKEN_OUT = 1.1
 # Share of the components of a channel that have a unit and must agree about another one.
 MOST = 0.5
 # A factor between episodes may be one of units if it is also this many spreads...
@@ -80,27 +83,7 @@ def gain_findings(
     gains = _log_gain(np.linalg.norm(seen, axis=1), np.linalg.norm(asked, axis=1))
     findings = _epochs(data, gains, "position", settings, factors)
     findings += _episodes(data, gains, "position", settings, factors)
-    return findings, factors * _bias(data, gains, found, sized)
-
-
-def _bias(data: AuditInput, gains: Array, found: Following, sized: Flags) -> Array:
-    """By what the slopes of an epoch differ from its gains. Shape (E,).
-
-    Where an episode ends before its last command is reached, the gain is too small, and taking that
-    out would look like a lag that changes on the way. A slope looks at the rows that both have.
-    """
-    weights = np.where(found.follows & np.isfinite(found.slope), found.asked**2, 0.0)[:, sized]
-    slopes = np.nan_to_num(found.slope[:, sized])
-    total = weights.sum(axis=1)
-    slope = (weights * slopes).sum(axis=1) / np.where(total > 0, total, 1.0)
-    known = (total > 0) & (slope > 0) & np.isfinite(gains)
-    gap = np.where(known, np.log(np.where(known, slope, 1.0)) - gains, np.nan)
-    result = np.ones(len(gap))
-    for epoch in np.unique(data.episodes.calibration_epoch):
-        member = data.episodes.calibration_epoch == epoch
-        if (member & known).any():
-            result[member] = np.exp(np.median(gap[member & known]))
-    return result
+    return findings, np.where(np.abs(np.log(factors)) > np.log(TAKEN_OUT), factors, 1.0)
 
 
 def component_findings(
