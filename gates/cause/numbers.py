@@ -6,7 +6,14 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from genpolicy.audit.component_rows import ComponentModes
-from genpolicy.audit.reach_rows import LOCAL, FindingDraw, Reach, Side, StructureDraw
+from genpolicy.audit.reach_rows import (
+    LOCAL,
+    Alternative,
+    FindingDraw,
+    Reach,
+    Side,
+    StructureDraw,
+)
 from genpolicy.audit.rows import Finding, ModeOutcome, Prediction, Resample, Stratum
 from genpolicy.errors import BadInputError
 from genpolicy.integrity.documents import read_json
@@ -76,6 +83,7 @@ class Numbers:
         strata: Tests of variables.
         told: What variables, order and past tell of the modes.
         modes: Modes of the phase with most situations.
+        alternatives: Which of them stand beside each other in a situation.
         components: Where in the action modes were looked for; counts, strata and modes are about
             the one followed.
         reach: How far the evidence that is followed reaches in each fifth of the way; none where
@@ -96,6 +104,7 @@ class Numbers:
     told: tuple[Prediction, ...]
     modes: tuple[ModeOutcome, ...]
     components: tuple[ComponentModes, ...]
+    alternatives: tuple[Alternative, ...] = ()
     reach: tuple[Reach, ...] = ()
     kind: str = LOCAL
     other: Side | None = None
@@ -138,6 +147,11 @@ def read_numbers(
                 if row.phase == summary["primary_phase"]
             ),
             components=tuple(rows("components.parquet", ComponentModes)),
+            alternatives=tuple(
+                row
+                for row in rows("alternatives.parquet", Alternative)
+                if row.phase == summary["primary_phase"]
+            ),
             reach=tuple(row for row in reach if row.kind == kind),
             kind=kind,
             other=next((side for side in sides if not side.followed), None),

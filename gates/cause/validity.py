@@ -7,6 +7,9 @@ from gates.cause.numbers import Numbers
 from gates.cause.structure import thin
 from gates.cause.told import QUESTION
 from genpolicy.audit.rows import ModeOutcome
+from genpolicy.statistics.intervals import clopper_pearson
+
+SUCCESS_UNDECIDED = "success_undecided"
 
 
 def validity(numbers: Numbers, limits: CauseLimits) -> Named:
@@ -32,14 +35,83 @@ def validity(numbers: Numbers, limits: CauseLimits) -> Named:
             "recorded: record whether each episode succeeded."
         ).strip()
         return answers, Diagnosis(CauseName.INSUFFICIENT_SUPPORT, "outcome", "not_recorded", text)
-    if len(valid) >= 2:
-        return answers, None
-    weak = ", ".join(mode.mode for mode in modes if mode not in valid)
+    return answers, _choice(numbers, limits, {mode.mode for mode in valid})
+
+
+def _choice(numbers: Numbers, limits: CauseLimits, valid: set[str]) -> Diagnosis | None:
+    """What is wrong with the choices between modes; None if one of them is between valid modes.
+
+    Modes are a choice only where they stand beside each other under one observation. One that
+    surely fails is none; one of which too few episodes are known leaves the choice open.
+    """
+    pairs = [{row.mode, row.other} for row in numbers.alternatives]
+    if any(pair <= valid for pair in pairs) or _valid_together(numbers, limits):
+        return None
+    if not pairs:
+        text = "No situation holds two of the modes: record more, from fewer starts."
+        return thin(text, kind="linking")
+    weak = [mode.mode for mode in numbers.modes if _fails(mode, limits)]
+    if all(pair & set(weak) for pair in pairs):
+        names = ", ".join(weak)
+        text = (
+            f"Leave out the episodes of {names}, which do not succeed or are not feasible often "
+            "enough; what remains has one mode."
+        )
+        return Diagnosis(CauseName.UNIMODAL, names, "one_valid_mode", text)
+    known = min(mode.episodes for mode in numbers.modes)
     text = (
-        f"Leave out the episodes of {weak}, which do not succeed or are not feasible often "
-        "enough; what remains has one mode."
-    )
-    return answers, Diagnosis(CauseName.UNIMODAL, weak, "one_valid_mode", text)
+        f"{' '.join(found_words(numbers, limits))} Whether two of them succeed in "
+        f"{limits['mode_success_lower']:.0%} is not decided, by as few as {known} episodes of a "
+        "mode: record more of each."
+    ).strip()
+    return Diagnosis(CauseName.INSUFFICIENT_SUPPORT, "outcome", SUCCESS_UNDECIDED, text)
+
+
+def _fails(mode: ModeOutcome, limits: CauseLimits) -> bool:
+    """Whether a mode surely succeeds too rarely, or is not feasible."""
+    feasible = _feasible(mode, limits)
+    rarely = not mode.success_upper - limits["mode_success_lower"] >= 0
+    return rarely or (feasible is not None and feasible.red)
+
+
+def _valid_together(numbers: Numbers, limits: CauseLimits) -> bool:
+    """Whether the choices of all starts together are between modes that succeed.
+
+    Where each start has modes of its own, a dozen episodes of each prove nothing, and all of them
+    together do: the most frequent modes of all starts are taken together, and so are the second
+    ones. Frequencies know nothing of outcomes. No mode may stay below the limit by itself.
+    """
+    limit = limits["mode_success_lower"]
+    by_name = {mode.mode: mode for mode in numbers.modes}
+    starts = [
+        sorted((by_name[name] for name in start), key=_frequent) for start in _starts(numbers)
+    ]
+    chosen = [mode for start in starts for mode in start]
+    if len(starts) < 2 or any(
+        _fails(mode, limits) or mode.successes < limit * mode.episodes for mode in chosen
+    ):
+        return False
+    for rank in (0, 1):
+        same = [start[rank] for start in starts]
+        lower, _ = clopper_pearson(sum(m.successes for m in same), sum(m.episodes for m in same))
+        if not lower - limit >= 0:
+            return False
+    return True
+
+
+def _frequent(mode: ModeOutcome) -> tuple[int, str]:
+    return -mode.episodes, mode.mode
+
+
+def _starts(numbers: Numbers) -> list[set[str]]:
+    """Modes that are connected by situations that they share; each by itself is none."""
+    starts: list[set[str]] = []
+    for row in numbers.alternatives:
+        pair = {row.mode, row.other}
+        touching = [start for start in starts if start & pair]
+        starts = [start for start in starts if not start & pair]
+        starts.append(pair.union(*touching))
+    return starts
 
 
 def _success(mode: ModeOutcome, limits: CauseLimits) -> Answer:

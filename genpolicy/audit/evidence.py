@@ -48,6 +48,7 @@ def write_evidence(
     """
     rows: dict[str, Sequence[Any]] = {
         "alignment": alignment(result, settings),
+        "alternatives": result.alternatives,
         "asked": result.asked,
         "calibration": result.semantics.calibrations,
         "clocks": result.semantics.clocks,

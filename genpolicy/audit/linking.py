@@ -6,6 +6,8 @@ episodes that they share, and voted on until nothing changes.
 """
 
 import heapq
+from collections import Counter
+from itertools import combinations
 
 import numpy as np
 from scipy.cluster.hierarchy import fcluster, linkage
@@ -48,6 +50,28 @@ def link(memberships: Memberships, episodes: int, minimum: int) -> Integers:
     large = np.bincount(groups)[groups] >= minimum
     result[seen] = np.where(large, groups, -1)
     return result
+
+
+def alternatives(memberships: Memberships, modes: Integers) -> dict[tuple[int, int], int]:
+    """In how many situations two modes stand beside each other.
+
+    Args:
+        memberships: Per situation the episodes and their local modes. Shapes (n,) and (n,).
+        modes: What `link` says of the episodes. Shape (episodes,).
+
+    Returns:
+        By pair of modes, the smaller first. A local mode stands for that of most of its episodes.
+    """
+    found: Counter[tuple[int, int]] = Counter()
+    for members, labels in memberships:
+        inside = modes[members]
+        stands = {
+            int(np.argmax(np.bincount(inside[mine])))
+            for local in np.unique(labels)
+            if (mine := (labels == local) & (inside >= 0)).any()
+        }
+        found.update(combinations(sorted(stands), 2))
+    return dict(found)
 
 
 def paired(memberships: Memberships, count: int) -> Integers:

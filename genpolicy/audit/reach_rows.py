@@ -1,4 +1,4 @@
-"""Rows about how far each kind of evidence reaches, and how stable the structure is."""
+"""Rows about the reach of each kind of evidence, alternative modes, and a stable structure."""
 
 from dataclasses import dataclass
 
@@ -78,6 +78,25 @@ class Side:
 
 
 @dataclass(frozen=True)
+class Alternative:
+    """`alternatives.parquet`: two modes between which there was a choice under one observation.
+
+    Modes of starts that have no situation in common were followed apart: they are no choice.
+
+    Attributes:
+        phase: Task phase.
+        mode: Name, as in `modes.parquet`.
+        other: Name of the other one.
+        situations: Situations that hold both.
+    """
+
+    phase: str
+    mode: str
+    other: str
+    situations: int
+
+
+@dataclass(frozen=True)
 class StructureDraw:
     """`structure_draws.parquet`: support and structure of one draw, beside `resamples.parquet`.
 
@@ -144,6 +163,7 @@ class FindingDraw:
 
 
 FURTHER_TABLES: dict[str, type] = {
+    "alternatives": Alternative,
     "finding_draws": FindingDraw,
     "reach": Reach,
     "sides": Side,

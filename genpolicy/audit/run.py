@@ -1,5 +1,6 @@
 """The whole audit: from rows to numbers, each kept as evidence. It measures and names no cause."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,18 +12,19 @@ from genpolicy.audit.components import Component
 from genpolicy.audit.counts import Counts
 from genpolicy.audit.data import AuditInput, Integers, canonical
 from genpolicy.audit.labels import Replay, Replayed, mode_outcomes, replay_sample
-from genpolicy.audit.linking import link
+from genpolicy.audit.linking import Memberships, alternatives, link
 from genpolicy.audit.looks import (
     claimed_episodes,
     component_modes,
     look_everywhere,
 )
 from genpolicy.audit.mean_versus_modes import Admissible
-from genpolicy.audit.neighbourhoods import Support
+from genpolicy.audit.modes import Clustering
+from genpolicy.audit.neighbourhoods import Neighbourhood, Support
 from genpolicy.audit.persistence import Persistence, summarise
 from genpolicy.audit.predictability import predictions
 from genpolicy.audit.progress import Progress, silent
-from genpolicy.audit.reach_rows import FindingDraw, Reach, Side, StructureDraw
+from genpolicy.audit.reach_rows import Alternative, FindingDraw, Reach, Side, StructureDraw
 from genpolicy.audit.recovery import demonstrated, recovery_outcomes
 from genpolicy.audit.resamples import Measures, resamples
 from genpolicy.audit.rows import Asked, ModeOutcome, Prediction, RecoveryOutcome, Resample, Stratum
@@ -66,6 +68,7 @@ class AuditResult:
         resamples: The measures on resampled data.
         component: Component of the action whose modes all else is about.
         components: Modes in every component.
+        alternatives: Modes that stand beside each other in a situation, in pairs.
         reach: What could be looked at in each fifth of the way, by both kinds of evidence.
         sides: What each of them found.
         structure_draws: Support and structure of each draw.
@@ -91,6 +94,7 @@ class AuditResult:
     resamples: tuple[Resample, ...]
     component: Component
     components: tuple[ComponentModes, ...]
+    alternatives: tuple[Alternative, ...] = ()
     reach: tuple[Reach, ...] = ()
     sides: tuple[Side, ...] = ()
     structure_draws: tuple[StructureDraw, ...] = ()
@@ -157,6 +161,7 @@ def audit(
         modes_after_realignment=after,
         modes_other_phases=_other_phases(data, settings, component, root_seed),
         component=component,
+        alternatives=_alternatives(data, several, links),
         **shown,
         **_draws(data, settings, measured, view, root_seed=root_seed),
     )
@@ -234,13 +239,27 @@ def _other_phases(
 def _links(data: AuditInput, settings: AuditSettings, several: Several) -> dict[str, Integers]:
     """Modes followed over situations: the mode of each episode, per phase."""
     return {
-        phase: link(
-            [(data.episode[item.members], split.labels) for item, split in items],
-            len(data.episodes),
-            settings.minimum_neighbours // 2,
-        )
+        phase: link(_memberships(data, items), len(data.episodes), settings.minimum_neighbours // 2)
         for phase, items in sorted(several.items())
     }
+
+
+def _memberships(
+    data: AuditInput, items: Sequence[tuple[Neighbourhood, Clustering]]
+) -> Memberships:
+    return [(data.episode[item.members], split.labels) for item, split in items]
+
+
+def _alternatives(
+    data: AuditInput, several: Several, links: dict[str, Integers]
+) -> tuple[Alternative, ...]:
+    return tuple(
+        Alternative(phase, f"m{mode}", f"m{other}", count)
+        for phase, linked in links.items()
+        for (mode, other), count in sorted(
+            alternatives(_memberships(data, several[phase]), linked).items()
+        )
+    )
 
 
 def _modes(

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from genpolicy.audit.linking import carried, link, paired
+from genpolicy.audit.linking import alternatives, carried, link, paired
 from genpolicy.audit.modes import by_size
 from genpolicy.seeds import stream
 
@@ -75,3 +75,13 @@ def test_many_episodes_need_no_table_of_pairs(monkeypatch):
     monkeypatch.setattr("genpolicy.audit.linking.paired", refuse)
     share, count = purity(link(memberships, 3000, 6), truth, memberships)
     assert count == 2 and share >= 0.97
+
+
+def test_alternatives_are_modes_beside_each_other_and_not_those_of_another_start():
+    modes = np.array([0, 0, 1, 1, 2, 2, 3, 3, -1])
+    near = (np.array([0, 1, 2, 3, 8]), np.array([0, 0, 1, 1, 1]))
+    far = (np.array([4, 5, 6, 7]), np.array([1, 1, 0, 0]))
+    alone = (np.array([0, 8]), np.array([0, 1]))
+    found = alternatives([near, far, far, alone], modes)
+    assert found == {(0, 1): 1, (2, 3): 2}
+    assert alternatives([], modes) == {}

@@ -19,7 +19,7 @@ from gates.feasibility.settings import LAYERS
 from gates.preregistration import PREREGISTRATION, plan_bytes
 from gates.reproducibility.timing import MEASURED_HERE, TERMS
 from genpolicy.audit.component_rows import ComponentModes
-from genpolicy.audit.reach_rows import FindingDraw, Reach, Side, StructureDraw
+from genpolicy.audit.reach_rows import Alternative, FindingDraw, Reach, Side, StructureDraw
 from genpolicy.audit.rows import (
     Asked,
     Calibration,
@@ -560,6 +560,12 @@ def _audit(root: Path) -> None:
         "audit/reach.parquet",
         Reach,
         [{"kind": "local", "fifth": k, "queries": 20, "spoke": 18} for k in range(1, 6)],
+    )
+    table(
+        root,
+        "audit/alternatives.parquet",
+        Alternative,
+        [{"phase": "approach", "mode": "m0", "other": "m1", "situations": 40}],
     )
     table(root, "audit/structure_draws.parquet", StructureDraw, [_structure_draw()] * 4)
     table(root, "audit/finding_draws.parquet", FindingDraw, [])

@@ -5,7 +5,7 @@ from dataclasses import replace
 from gates.cause import Cause, CauseLimits, default_limits, name_cause
 from gates.cause.numbers import Counts, Kept, Labels, Numbers
 from genpolicy.audit.component_rows import ComponentModes
-from genpolicy.audit.reach_rows import LOCAL, Reach
+from genpolicy.audit.reach_rows import LOCAL, Alternative, Reach
 from genpolicy.audit.rows import Finding, ModeOutcome, Prediction, Stratum
 from genpolicy.audit.settings import AuditSettings
 
@@ -55,6 +55,7 @@ VALID = Numbers(
         component("other", state="absent", unit="strokes", separation=0.2, situations=0),
         component("timing"),
     ),
+    alternatives=(Alternative("approach", "m0", "m1", 120),),
     reach=tuple(Reach(LOCAL, fifth, 40, 36) for fifth in range(1, 6)),
 )  # fmt: skip
 
@@ -73,7 +74,10 @@ BROKEN = {
     "structure": (counts(two_mode_episodes=9), "unimodal", ""),
     "hidden": (replace(VALID, strata=(HIDDEN,)), "hidden_state", "stratum"),
     "validity": (
-        replace(VALID, modes=(VALID.modes[0], replace(VALID.modes[1], success_lower=0.69))),
+        replace(
+            VALID,
+            modes=(VALID.modes[0], replace(VALID.modes[1], success_lower=0.4, success_upper=0.69)),
+        ),
         "unimodal", "one_valid_mode",
     ),
 }  # fmt: skip
