@@ -1,9 +1,9 @@
 """The audit's numbers, read from its evidence: only what a cause is named from."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 from genpolicy.audit.component_rows import ComponentModes
 from genpolicy.audit.reach_rows import (
@@ -18,6 +18,8 @@ from genpolicy.audit.rows import Finding, ModeOutcome, Prediction, Resample, Str
 from genpolicy.errors import BadInputError
 from genpolicy.integrity.documents import read_json
 from genpolicy.integrity.rows import Row, read_rows
+
+_OfPhase = TypeVar("_OfPhase", ModeOutcome, Alternative)
 
 
 class Rows(Protocol):
@@ -141,17 +143,9 @@ def read_numbers(
             kept=_of(Kept, kept),
             strata=tuple(rows("strata.parquet", Stratum)),
             told=tuple(rows("predictions.parquet", Prediction)),
-            modes=tuple(
-                row
-                for row in rows("modes.parquet", ModeOutcome)
-                if row.phase == summary["primary_phase"]
-            ),
+            modes=_of_phase(rows("modes.parquet", ModeOutcome), summary),
             components=tuple(rows("components.parquet", ComponentModes)),
-            alternatives=tuple(
-                row
-                for row in rows("alternatives.parquet", Alternative)
-                if row.phase == summary["primary_phase"]
-            ),
+            alternatives=_of_phase(rows("alternatives.parquet", Alternative), summary),
             reach=tuple(row for row in reach if row.kind == kind),
             kind=kind,
             other=next((side for side in sides if not side.followed), None),
@@ -172,6 +166,11 @@ def read_numbers(
             expected="what this version of the audit writes",
             action="Run the audit again.",
         ) from error
+
+
+def _of_phase(rows: Sequence[_OfPhase], summary: Mapping[str, Any]) -> tuple[_OfPhase, ...]:
+    """Those of the phase with most situations."""
+    return tuple(row for row in rows if row.phase == summary["primary_phase"])
 
 
 def folder_numbers(folder: Path) -> tuple[Numbers, tuple[Numbers, ...]]:

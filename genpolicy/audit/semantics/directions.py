@@ -14,7 +14,7 @@ from genpolicy.audit.semantics.robust import episode_sums
 WIDTHS = (2, 3, 4)
 QUATERNION = 4
 # Lengths of stored directions: rounding for most rows, interpolation for the others.
-USUAL_LENGTH, LARGEST_LENGTH, NEARLY_ALL = 1e-3, 2e-2, 0.99
+USUAL_LENGTH, LARGEST_LENGTH, MOST_ROWS = 1e-3, 2e-2, 0.99
 # Of two readings the more exact is taken; beyond rounding both are alike, and the narrower is.
 EXACT_DIGITS = 6
 # Rows that are looked at, about.
@@ -95,5 +95,5 @@ def _continuous(quaternion: Array, starts: Integers) -> Array:
 def _off_length(square: Array) -> float:
     """How far the usual row is from length one; infinite where some are far."""
     off = np.abs(np.sqrt(square.sum(axis=1)) - 1.0)
-    near = np.count_nonzero(off <= LARGEST_LENGTH) >= NEARLY_ALL * len(off)
+    near = np.count_nonzero(off <= LARGEST_LENGTH) >= MOST_ROWS * len(off)
     return float(np.median(off)) if near else np.inf

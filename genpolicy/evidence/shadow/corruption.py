@@ -24,7 +24,7 @@ from genpolicy.robot.scene_state import SceneState
 
 Array = NDArray[np.float64]
 
-STANDING_M = 0.004  # what is held reaches this deep into what it stands on
+REST_DEPTH_M = 0.004  # what is held reaches this deep into what it stands on
 OVERLAP_M = 0.02  # an obstacle in the way reaches at least this far above the tip of the tool
 
 Applicable = Callable[[Cell, tuple[str, ...]], str]
@@ -221,7 +221,7 @@ def on_another_surface(case: Case, checker: FeasibilityChecker) -> Case | None:
     here = still(case, checker, case.context.q_cmd)
     place, (position, quaternion) = here.context.last_action[POSITION], case.poses[name]
     tip_m = place[2] - checker.collision.shapes.held_reach_m
-    height_m = position[2] + tip_m + STANDING_M - _top_m(name, position, checker)
+    height_m = position[2] + tip_m + REST_DEPTH_M - _top_m(name, position, checker)
     at = np.array([place[0], place[1], height_m])
     there = here.with_context(scene=SceneState({**case.poses, name: (at, quaternion)}))
     return alone(checker, [there], "contact_surface")
