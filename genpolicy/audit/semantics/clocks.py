@@ -5,13 +5,10 @@ receive delay and, where its channels move with the arm, by the lag behind that 
 held against all episodes, an episode against its epoch.
 """
 
-from dataclasses import replace
-
 import numpy as np
 
 from genpolicy.audit.data import Array, AuditInput, Flags, Integers, Text
 from genpolicy.audit.rows import Clock, Finding
-from genpolicy.audit.semantics.following import Following
 from genpolicy.audit.semantics.lags import Lags
 from genpolicy.audit.semantics.lags import episode_lags as piecewise_lags
 from genpolicy.audit.semantics.motion import Motion, make_motion
@@ -42,8 +39,6 @@ CLUSTER_STEPS = 1.5
 CLUSTER_SHARE = 0.1
 # A lag this near to the largest that was looked for may be larger.
 EDGE_STEPS = 0.5
-# Columns whose lags differ by less are not aligned, steps.
-LEAST_ALIGNED = 2
 
 
 def episode_lags(data: AuditInput, maximum_steps: int) -> Array:
@@ -290,30 +285,6 @@ def measure_lags(motion: Motion, settings: AuditSettings) -> Lags:
     if some(edge, len(edge), settings.outlier_share):
         return _lags(motion, 2 * maximum_steps)
     return lags
-
-
-def aligned(motion: Motion, follows: Following) -> Motion:
-    """The same with the commands of each column later by what its joint trails the others.
-
-    A hand that closes slowly trails an arm by several rows in every episode: that is its build and
-    no clock, and the lag of an episode must not depend on which of both moved more.
-    """
-    # Against the episode's own lag, in which a fault of its clock counts for all columns.
-    behind = np.where(follows.follows, follows.lag - follows.common_lag[:, None], np.nan)
-    offsets = np.array(
-        [np.median(c[np.isfinite(c)]) if np.isfinite(c).any() else 0.0 for c in behind.T]
-    )
-    rows = np.round(offsets).astype(np.int64)
-    rows[np.abs(rows) < LEAST_ALIGNED] = 0
-    if not rows.any():
-        return motion
-    first = np.repeat(motion.starts[:-1], np.diff(motion.starts))
-    last = np.repeat(motion.starts[1:], np.diff(motion.starts)) - 1
-    commanded = motion.commanded.copy()
-    for column in np.flatnonzero(rows):
-        at = np.clip(np.arange(len(commanded)) - rows[column], first, last)
-        commanded[:, column] = motion.commanded[at, column]
-    return replace(motion, commanded=commanded)
 
 
 def _lags(motion: Motion, maximum_steps: int) -> Lags:

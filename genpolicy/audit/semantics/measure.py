@@ -12,10 +12,10 @@ import numpy as np
 from genpolicy.audit.data import Array, AuditInput, Integers
 from genpolicy.audit.rows import Clock, Finding
 from genpolicy.audit.semantics import calibration, continuity, copies
+from genpolicy.audit.semantics.alignment import aligned
 from genpolicy.audit.semantics.clocks import (
     EPISODE_DELAYS,
     EPISODE_STEPS,
-    aligned,
     delay_clocks,
     leading_findings,
     measure_lags,
@@ -63,7 +63,7 @@ def measure(data: AuditInput, settings: AuditSettings) -> Semantics:
     recorded, motion = motion, replace(motion, commanded=answered * repeated)
     if not findings:
         findings += component_findings(data, recorded, follows, settings)
-    motion = aligned(motion, follows)
+    motion = aligned(motion, follows, settings.maximum_lag_steps)
     clocks, shift, found = _position(data, motion, settings)
     findings += found
     others, stream_shift, found, unclocked = _others(data, motion, shift, settings)
