@@ -151,6 +151,7 @@ def read_numbers(
             other=next((side for side in sides if not side.followed), None),
             other_reach=tuple(row for row in reach if row.kind != kind),
         )
+        _check_alternatives(numbers)
         return numbers, tuple(
             _draws(
                 numbers,
@@ -171,6 +172,13 @@ def read_numbers(
 def _of_phase(rows: Sequence[_OfPhase], summary: Mapping[str, Any]) -> tuple[_OfPhase, ...]:
     """Those of the phase with most situations."""
     return tuple(row for row in rows if row.phase == summary["primary_phase"])
+
+
+def _check_alternatives(numbers: Numbers) -> None:
+    known = {mode.mode for mode in numbers.modes}
+    named = {name for row in numbers.alternatives for name in (row.mode, row.other)}
+    if not named <= known:
+        raise ValueError(f"alternatives names the modes {sorted(named - known)}, which are none")
 
 
 def folder_numbers(folder: Path) -> tuple[Numbers, tuple[Numbers, ...]]:

@@ -41,8 +41,8 @@ def test_two_routes_are_two_modes_in_every_form(free, tmp_path, form):
     assert contract.pairing == {"action_0": "state_m.x", "action_1": "state_m.y"}
     assert (cause.name, cause.variable) == ("valid_modes", "")
     assert len(report.modes) == 2
-    # Not one situation more or less than in the form of places, which has 54.
-    assert report.result.counts.two_mode == 54
+    # Not one situation more or less than in the form of places, which has 44.
+    assert report.result.counts.two_mode == 44
     assert not report.result.semantics.findings
     if form != "absolute":
         assert any("What the action means was found" in line for line in report.rests_on)
@@ -83,7 +83,7 @@ def test_a_fault_in_some_episodes_is_found_and_not_absorbed(
 ):
     action = spoiled(free, share, change, 1)(forms(free)[form])
     contract, _, cause = audited(free, action, tmp_path, FEW, names=names)
-    assert list((contract.pairing or {}).values()) == ["state_m.x", "state_m.y"]
+    assert sorted((contract.pairing or {}).values()) == ["state_m.x", "state_m.y"]
     assert (cause.name, cause.kind) == ("data_defect", kind)
 
 

@@ -565,7 +565,7 @@ def _audit(root: Path) -> None:
         root,
         "audit/alternatives.parquet",
         Alternative,
-        [{"phase": "approach", "mode": "m0", "other": "m1", "situations": 40}],
+        [{"phase": "approach", "mode": "left", "other": "right", "situations": 40}],
     )
     table(root, "audit/structure_draws.parquet", StructureDraw, [_structure_draw()] * 4)
     table(root, "audit/finding_draws.parquet", FindingDraw, [])

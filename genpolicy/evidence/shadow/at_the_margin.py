@@ -13,7 +13,9 @@ from genpolicy.contract.action import GRIPPER, POSITION, ROTATION, join_action
 from genpolicy.evidence.shadow.case import Case, alone, moving, still
 from genpolicy.evidence.shadow.postures import directions, joint_steps, postures_of, step_of
 from genpolicy.feasibility.admission import FeasibilityChecker
+from genpolicy.robot.collision import Paths
 from genpolicy.robot.impedance import STIFFNESS_N_M
+from genpolicy.robot.pressing import pressed_depth_m
 
 Array = NDArray[np.float64]
 Place = Callable[[Case], Case | None]
@@ -23,7 +25,8 @@ LEAPING = (*RATES, "measured_velocity")  # a leap is too fast, and so is the way
 
 BEYOND = 1.02  # of a limit
 WITHIN = 0.98
-DEEPER = np.array([1.0, 1.15, 1.3])  # times the depth at which what is held is pressed too hard
+# Times the depth at which what is held is pressed too hard.
+DEEPER = np.array([1.0, 1.15, 1.3, 1.5])
 ASIDE_M = (0.01, 0.02, 0.03, 0.04)  # beside the target's middle
 LEAPS = (4, 6, 8, 10)  # times the fastest step
 
@@ -193,9 +196,21 @@ def pressed_in(case: Case, checker: FeasibilityChecker) -> Case | None:
             place = target + aside + np.array([0.0, 0.0, reach_m - deep_m])
             action = join_action(place, rotation, context.last_action[GRIPPER])
             q_rad, reached = checker.ik_chunk(action[None], context.q_cmd)
-            if reached[0]:
+            # The shortest way out may lead aside: told deeper is not always deeper.
+            if reached[0] and _pressed_m(case, checker, q_rad[0]) >= beyond_m:
                 cases.append(still(case, checker, q_rad[0]))
     return alone(checker, cases, "contact_force")
+
+
+def _pressed_m(case: Case, checker: FeasibilityChecker, q_rad: Array) -> float:
+    """How deep what is held lies in the target at a pose `q_rad` (J,), m."""
+    opening_m = float(case.context.last_action[GRIPPER])
+    path = Paths(
+        q_rad=np.stack([q_rad, q_rad])[None], opening_m=np.full((1, 2), opening_m),
+        held=np.ones((1, 2), dtype=bool), scenes=(case.context.scene,),
+        contact_allowed=np.array([True]), clearance_m=np.zeros(1),
+    )  # fmt: skip
+    return float(pressed_depth_m(checker.cell.collision, path)[0])
 
 
 def holding_in_contact(case: Case, checker: FeasibilityChecker) -> bool:

@@ -266,7 +266,8 @@ CORRUPTIONS = (
     Corruption("awkward_posture", margin.awkward_posture, "kinematic", "joint_position"),
     Corruption("singular_posture", margin.singular_posture, "kinematic", "singular"),
     Corruption(
-        "collision", collision, "geometric", "scene_collision", ("swept_collision",), with_obstacle
+        "collision", collision, "geometric", "scene_collision",
+        ("swept_collision", "contact_surface"), with_obstacle,
     ),
     Corruption(
         "folded_posture", margin.folded_posture, "geometric", "self_collision",
