@@ -12,6 +12,7 @@ WORDS = {
     LOCAL: "enough comparable demonstrations",
     LEARNED: "enough demonstrations alike in what predicts the action",
 }
+BY = {LOCAL: "by near neighbours", LEARNED: "by what predicts the action"}
 OF_BOTH = ("two_mode_episodes", "denial_share")
 # Situations asked again in which the other evidence must speak before it can contradict.
 LEAST_ASKED = 30
@@ -74,6 +75,7 @@ def structure(numbers: Numbers, limits: CauseLimits) -> Named:
     second = turned(first)
     spoke = not any(answer.red for answer in _enough(second, limits))
     found, opinion = _seen(second, limits)
+    found = [replace(answer, what=f"{answer.what}, {BY[second.kind]}") for answer in found]
     shown = [replace(answer, limit=None) for answer in found if answer.question in OF_BOTH]
     against = _disagree(first, said, second, opinion, spoke=spoke)
     if against is not None:

@@ -159,9 +159,11 @@ def _tells(numbers: Numbers, limits: CauseLimits) -> str:
     if not numbers.told:
         return "No variable was recorded that could tell them."
     best = max(numbers.told, key=lambda row: (row.told, row.variable))
+    name, tried = best.variable.replace("_", " "), len({row.variable for row in numbers.told})
+    of = f"Of {tried} variable{'s' if tried > 1 else ''} {name}"
+    if not best.told > 0:
+        return f"{of} tells most of them, and no more than a guess."
     return (
-        f"Of {len({row.variable for row in numbers.told})} variables "
-        f"{best.variable.replace('_', ' ')} tells most of them: {best.told:.0%} of the wrong "
-        f"guesses ({best.told_lower:.0%} to {best.told_upper:.0%}; {limits[QUESTION]:.0%} is too "
-        "much)."
+        f"{of} tells most of them: {best.told:.0%} of the wrong guesses ({best.told_lower:.0%} to "
+        f"{best.told_upper:.0%}; {limits[QUESTION]:.0%} is too much)."
     )

@@ -24,6 +24,13 @@ def test_modes_without_outcomes_are_reported_and_not_called_valid():
     assert "operator tells most of them: 5%" in " ".join(cause.found)
 
 
+def test_what_tells_no_more_than_a_guess_is_said_so():
+    told = replace(VALID.told[0], told=-0.9, told_lower=-1.2, told_upper=-0.5)
+    assert named(replace(VALID, told=(told,))).found[-1] == (
+        "Of 1 variable operator tells most of them, and no more than a guess."
+    )
+
+
 def test_a_hidden_variable_stays_one_whatever_the_outcomes():
     cause = named(replace(BLANK, strata=(HIDDEN,)))
     assert (cause.name, cause.variable) == (CauseName.HIDDEN_STATE, "operator")
