@@ -17,6 +17,7 @@ CONCRETE = (
 LEAST_CONCRETE = 3
 START = "start_position."
 # Time and the past show whatever else was recorded: they must explain more to be named.
+OBSERVED = "observed_variable"
 EVERYTHING = ("time_in_episode", HISTORY)
 SHOWN = 8
 
@@ -91,7 +92,7 @@ def _said(row: Stratum) -> Diagnosis:
         return Diagnosis(CauseName.HIDDEN_STATE, "unrecorded", HISTORY, text)
     if row.observed:
         text = f"{share}, and the policy sees it: use the simple baselines."
-        return Diagnosis(CauseName.UNIMODAL, row.variable, "observed_variable", text)
+        return Diagnosis(CauseName.UNIMODAL, row.variable, OBSERVED, text)
     text = f"{share}: add it to the observation or standardise it, then repeat the audit."
     return Diagnosis(CauseName.HIDDEN_STATE, row.variable, "stratum", text)
 

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 from gates.cause.answers import Answer, CauseName, Diagnosis, Layer, Named
 from gates.cause.components import components, looked_in, unreadable
+from gates.cause.hidden import OBSERVED, hidden
 from gates.cause.limits import CauseLimits
 from gates.cause.numbers import Numbers, turned
 from genpolicy.audit.reach_rows import LEARNED, LOCAL, Reach
@@ -77,7 +78,7 @@ def structure(numbers: Numbers, limits: CauseLimits) -> Named:
     found, opinion = _seen(second, limits)
     found = [replace(answer, what=f"{answer.what}, {BY[second.kind]}") for answer in found]
     shown = [replace(answer, limit=None) for answer in found if answer.question in OF_BOTH]
-    against = _disagree(first, said, second, opinion, spoke=spoke)
+    against = _disagree((first, said), (second, opinion), limits, spoke=spoke)
     if against is not None:
         return [*answers, *shown], against
     # What is too thin to deny here may be denied by the other.
@@ -91,20 +92,23 @@ def structure(numbers: Numbers, limits: CauseLimits) -> Named:
 
 
 def _disagree(
-    first: Numbers,
-    said: Diagnosis | None,
-    second: Numbers,
-    opinion: Diagnosis | None,
+    one: tuple[Numbers, Diagnosis | None],
+    other: tuple[Numbers, Diagnosis | None],
+    limits: CauseLimits,
     *,
     spoke: bool,
 ) -> Diagnosis | None:
     """Where the two contradict each other, with the numbers of both; None where they do not."""
+    (first, said), (second, opinion) = one, other
     here, there = WORDS[first.kind], WORDS[second.kind]
     learned = second.other if second.kind == LOCAL else first.other
     asked = (learned.confirmed, learned.contradicted) if learned else (0, 0)
     modes, denied = first.counts.two_mode_episodes, said is not None
     few = LEAST_CONFIRMED * sum(asked) - asked[0] > 0
-    if not denied and few and asked[1] >= LEAST_ASKED:
+    # What the policy sees and takes for near is told by what predicts: that is no contradiction.
+    told = hidden(first, limits)[1]
+    seen = told is not None and told.kind == OBSERVED
+    if not denied and few and asked[1] >= LEAST_ASKED and not seen:
         text = (
             f"{modes} held-out episodes show modes by {here}; of their situations {asked[0]} show "
             f"them by {there} as well, and {asked[1]} do not, though they would be seen"

@@ -12,8 +12,8 @@ from genpolicy.feasibility.layers.geometric import margins, swept_margins
 
 BESIDE, BEYOND = (0.5, -0.15, 0.15), (0.5, 0.15, 0.15)
 RATES = (
-    "joint_velocity", "joint_acceleration", "joint_jerk", "joint_torque", "tcp_speed", "tcp_turn",
-    "measured_velocity",
+    "joint_velocity", "joint_acceleration", "joint_jerk", "joint_torque", "payload_torque",
+    "tcp_speed", "tcp_turn", "measured_velocity",
 )  # fmt: skip
 KINEMATIC = ("workspace", "joint_position", "singular", "unreachable")
 
