@@ -32,6 +32,8 @@ export PREFECT_SERVER_ANALYTICS_ENABLED := false
 export PREFECT_HOME := $(CURDIR)/.prefect
 export OMP_NUM_THREADS := 1
 export PYTHONHASHSEED := 0
+# With wider registers torch's sums depend on where a tensor lies in memory (decision 92).
+export ATEN_CPU_CAPABILITY := avx2
 export MPLBACKEND := Agg
 export MPLCONFIGDIR := $(CURDIR)/build/matplotlib
 export PATH := $(BIN):$(PATH)
