@@ -16,8 +16,8 @@ CONCRETE = (
 )  # fmt: skip
 LEAST_CONCRETE = 3
 START = "start_position."
-# Time and the past show whatever else was recorded: they must explain more to be named.
 OBSERVED = "observed_variable"
+# Time and the past show whatever else was recorded: they must explain more to be named.
 EVERYTHING = ("time_in_episode", HISTORY)
 SHOWN = 8
 

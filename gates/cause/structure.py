@@ -105,10 +105,11 @@ def _disagree(
     asked = (learned.confirmed, learned.contradicted) if learned else (0, 0)
     modes, denied = first.counts.two_mode_episodes, said is not None
     few = LEAST_CONFIRMED * sum(asked) - asked[0] > 0
-    # What the policy sees and takes for near is told by what predicts: that is no contradiction.
-    told = hidden(first, limits)[1]
-    seen = told is not None and told.kind == OBSERVED
-    if not denied and few and asked[1] >= LEAST_ASKED and not seen:
+    if not denied and few and asked[1] >= LEAST_ASKED:
+        # What the policy sees and takes for near is told by what predicts: no contradiction.
+        told = hidden(first, limits)[1]
+        if told is not None and told.kind == OBSERVED:
+            return None
         text = (
             f"{modes} held-out episodes show modes by {here}; of their situations {asked[0]} show "
             f"them by {there} as well, and {asked[1]} do not, though they would be seen"
