@@ -112,13 +112,14 @@ def reproduce(
 
 
 def stage_environment(workspace: Path) -> dict[str, str]:
-    """The environment of every stage: no telemetry, one thread, this interpreter first in PATH."""
+    """What every stage runs with: no telemetry, one thread, AVX2, this interpreter first in PATH."""
     return {
         **os.environ,
         "PATH": os.pathsep.join((str(Path(sys.executable).parent), os.environ.get("PATH", ""))),
         "DVC_NO_ANALYTICS": "1",
         "DO_NOT_TRACK": "1",
         "OMP_NUM_THREADS": "1",
+        "ATEN_CPU_CAPABILITY": "avx2",
         "PYTHONHASHSEED": "0",
         "PYTHONUNBUFFERED": "1",
         "MPLBACKEND": "Agg",

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import stages  # noqa: F401  one thread and AVX2 for the tests too
 from genpolicy.audit.rows import SituationRow
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.data.contract import TCP_ACTION, IngestContract, plausible_ranges

@@ -2,6 +2,7 @@
 
 import configparser
 import importlib.metadata
+import os
 import re
 import subprocess
 import sys
@@ -64,6 +65,7 @@ def test_telemetry_is_off_wherever_it_could_start() -> None:
         "DO_NOT_TRACK := 1",
         "PREFECT_SERVER_ANALYTICS_ENABLED := false",
         "OMP_NUM_THREADS := 1",
+        "ATEN_CPU_CAPABILITY := avx2",
         "PYTHONHASHSEED := 0",
     ):
         assert f"export {line}" in MAKEFILE
@@ -78,6 +80,20 @@ def test_telemetry_is_off_wherever_it_could_start() -> None:
     )
     clean = {k: v for k, v in environment.items() if not k.startswith("PREFECT") and k != "PATH"}
     subprocess.run([sys.executable, "-c", code], env=clean, cwd=ROOT, check=True)
+
+
+def test_a_stage_by_hand_keeps_to_one_thread_and_to_avx2() -> None:
+    # Asked of torch, which reads the variable when it first computes and keeps what it read.
+    code = (
+        "import stages, torch\n"
+        "torch.ones(3).sum()\n"
+        "assert torch.get_num_threads() == 1\n"
+        "assert torch.backends.cpu.get_cpu_capability() in ('AVX2', 'DEFAULT')\n"
+    )
+    fixed = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "ATEN_CPU_CAPABILITY")
+    bare = {name: value for name, value in os.environ.items() if name not in fixed}
+    subprocess.run([sys.executable, "-c", code], env=bare, cwd=ROOT, check=True)
+    assert stage_environment(ROOT)["ATEN_CPU_CAPABILITY"] == "avx2"
 
 
 def test_dvc_names_no_remote_and_no_place_outside() -> None:
