@@ -29,6 +29,7 @@ class Layer(StrEnum):
     STRUCTURE = "structure"
     HIDDEN = "hidden"
     VALIDITY = "validity"
+    AGREEMENT = "agreement"
     NONE = "none"
 
 
@@ -106,8 +107,9 @@ class Cause:
         next_action: What to do.
         answers: Every question with its number and limit, in the order of diagnosis.
         confidence: Share of resampled audits with the same cause and variable, of one more than
-            there were, so that no number of draws makes certainty; None without any.
-        agreeing: How many of how many resampled audits name the same.
+            there were, so that no number of draws makes certainty; None without any. Where most of
+            them deny it, it is not said, and this is the share of those that deny it.
+        agreeing: How many of how many resampled audits name the same, or deny what is not said.
         found: What was found of modes and hidden variables, a sentence each, whatever the verdict.
     """
 

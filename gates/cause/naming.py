@@ -4,6 +4,7 @@ Order: clocks and frames, calibration, labels, support, modes at all, persistenc
 variables, validity of each mode. A later layer is not believed while an earlier one is red.
 """
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -16,6 +17,11 @@ from gates.cause.structure import structure, support
 from gates.cause.validity import found_words, validity
 from genpolicy.errors import ConfigError
 
+# What is said of modes; a defect that is found stands, and so does what is missing.
+CLAIMS = (
+    CauseName.VALID_MODES, CauseName.HIDDEN_STATE, CauseName.UNIMODAL, CauseName.POINTWISE_NOISE,
+)  # fmt: skip
+UNSTABLE = "unstable"
 IN_METRES = ("calibration_residual_m", "noise_spread_m")
 __all__ = ["Answer", "Cause", "CauseName", "Layer", "cause_of", "name_cause"]
 
@@ -54,7 +60,14 @@ def name_cause(numbers: Numbers, draws: Sequence[Numbers], limits: CauseLimits) 
         answers += found
         if said is not None and red is Layer.NONE:
             verdict, red = said, layer
-    same = [(v.name, v.variable) == (verdict.name, verdict.variable) for v in _all(draws, limits)]
+    again = _all(draws, limits)
+    same = [(v.name, v.variable) == (verdict.name, verdict.variable) for v in again]
+    if same:
+        other = [_words(said) for said, agrees in zip(again, same, strict=True) if not agrees]
+        answer, said = _agreement(verdict, sum(same), other, limits)
+        answers.append(answer)
+        if said is not None:
+            verdict, red, same = said, Layer.AGREEMENT, [not item for item in same]
     return Cause(
         name=verdict.name,
         variable=verdict.variable,
@@ -78,6 +91,31 @@ def _first_red(numbers: Numbers, limits: CauseLimits) -> Diagnosis:
         if said is not None:
             return said
     return Diagnosis(CauseName.VALID_MODES, "", "", NEXT)
+
+
+def _agreement(
+    verdict: Diagnosis, same: int, others_say: Sequence[str], limits: CauseLimits
+) -> tuple[Answer, Diagnosis | None]:
+    """Whether most resampled audits deny what the whole data say of modes."""
+    total = same + len(others_say)
+    answer = Answer(
+        "cause_agreement", Layer.AGREEMENT, "share of resampled audits that name the same cause",
+        same / total, limits["cause_agreement"] if verdict.name in CLAIMS else None, ">=",
+        note=f"{same} of {total}",
+    )  # fmt: skip
+    if not answer.red:
+        return answer, None
+    other, count = min(Counter(others_say).items(), key=lambda item: (-item[1], item[0]))
+    text = (
+        f"All recordings together say {_words(verdict)}, but only {same} of {total} resampled "
+        f"audits do, and {count} say {other}: record more, from fewer starts."
+    )
+    return answer, Diagnosis(CauseName.INSUFFICIENT_SUPPORT, "", UNSTABLE, text)
+
+
+def _words(said: Diagnosis) -> str:
+    detail = said.variable or said.kind
+    return f"{said.name.value}({detail})" if detail else said.name.value
 
 
 def _check_floors(numbers: Numbers, limits: CauseLimits) -> None:

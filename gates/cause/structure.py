@@ -20,6 +20,8 @@ LEAST_ASKED = 30
 # Share of them that it must show as well. Not most: a cluster that has begun to move apart is still
 # one place by declared scales, and told already by what a forest learned to see.
 LEAST_CONFIRMED = 0.2
+# What changes inside an episode says nothing of how long its mode lasts.
+BY_ROW = ("unrecorded", "time_in_episode", "phase")
 ORDINALS = ("first", "second", "third", "fourth", "last")
 
 
@@ -171,6 +173,9 @@ def _seen(numbers: Numbers, limits: CauseLimits) -> Named:
         # Clusters that fall apart are noise, however many there are.
         if margin.red and not long_enough.red:
             return answers, _noise("Clusters do not persist over a chunk")
+        if _told_by_episode(numbers, limits):
+            few = (long_enough, margin, persistent)
+            return [replace(a, limit=None) if a in few else a for a in answers], None
         return answers, thin(
             f"Only {number} situations with several modes "
             f"{'go on long enough to see whether the modes' if long_enough.red else 'are seen to'} "
@@ -179,6 +184,13 @@ def _seen(numbers: Numbers, limits: CauseLimits) -> Named:
             kind="persistence",
         )
     return answers, _noise("Clusters do not persist over a chunk") if margin.red else None
+
+
+def _told_by_episode(numbers: Numbers, limits: CauseLimits) -> bool:
+    """Whether what is recorded once of an episode tells the modes: then they last as long as it."""
+    said = hidden(numbers, limits)[1]
+    undecided = said is None or said.name is CauseName.INSUFFICIENT_SUPPORT
+    return not undecided and said is not None and said.variable not in BY_ROW
 
 
 def _absent(

@@ -2,12 +2,14 @@
 
 Each column of each episode is read by itself. A joint is flipped where it follows the negative of
 its command and not its command, by as much as it usually does; two are swapped where each follows
-the command of the other and not its own. What is said of fewer episodes than a mishap is not said.
+the command of the other and not its own. In a short movement all joints are alike and one episode
+proves little; so all episodes are asked together whether a share of them is swapped. What is
+said of fewer episodes than a mishap is not said.
 """
 
 import numpy as np
 
-from genpolicy.audit.data import Array, AuditInput, Flags
+from genpolicy.audit.data import Array, AuditInput, Flags, Integers
 from genpolicy.audit.rows import Finding
 from genpolicy.audit.semantics.following import (
     FOLLOWS,
@@ -22,9 +24,13 @@ from genpolicy.audit.settings import AuditSettings
 # A flipped joint moves by as much as it usually does, within this factor: what is dragged along by
 # the others moves by less.
 ALIKE = 2.0
-# Log likelihood ratio of the other reading of one column in one episode; a swap needs it of both
-# columns, and a finding of two episodes. Joints of a short and single movement are all alike.
-CLEAR = 5.0
+# Log likelihood ratio of the other reading: of a flipped column in one episode, and of a share of
+# swapped episodes against none, beyond the number of pairs that are asked.
+CLEAR, CLEAR_SHARE = 5.0, 10.0
+# Shares of swapped episodes that are tried.
+SHARES = (0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5)
+# A swapped column leaves so many times as much of its own command, taken by its usual gain.
+MISFIT = 4.0
 # Correlations are not believed nearer to one.
 ROUNDING = 1e-4
 
@@ -48,7 +54,7 @@ def crossed_findings(
     commanded = motion.commanded.copy()
     hit = np.zeros(len(among), dtype=bool)
     findings: list[Finding] = []
-    minus = flipped(found, motion.directional) & among[:, None]
+    minus = flipped(found, motion.directional, settings.maximum_lag_steps) & among[:, None]
     total = int(np.count_nonzero(among))
     turned = [k for k in range(minus.shape[1]) if some(minus[:, k], total, settings.outlier_share)]
     if turned:
@@ -57,7 +63,8 @@ def crossed_findings(
             commanded[rows, column] *= -1.0
             hit |= minus[:, column]
         findings.append(_flipped(data, motion, minus, turned, settings))
-    exchanged = swapped(found, column_correlations(found, motion.starts)) & among[:, None, None]
+    near = _near(found, found.common_lag, settings.maximum_lag_steps)
+    exchanged = swapped(found, column_correlations(found, motion.starts), among & near)
     for first, second in np.argwhere(np.triu(exchanged.any(axis=0))):
         both = exchanged[:, first, second]
         if not some(both, total, settings.outlier_share):
@@ -69,26 +76,65 @@ def crossed_findings(
     return findings, commanded, hit
 
 
-def flipped(found: Following, directional: Flags) -> Flags:
+def flipped(found: Following, directional: Flags, maximum_steps: int) -> Flags:
     """Columns that answer the negative of their command, by episode. Shape (E, P)."""
-    minus, plus = np.nan_to_num(found.negative), np.maximum(np.nan_to_num(found.positive), 0.0)
+    minus, plus = np.nan_to_num(found.negative), _own(found)
     clear = (minus >= FOLLOWS) & (_evidence(found, plus, minus) >= CLEAR)
+    gains, usual = _gains(found)
+    alike = np.abs(np.nan_to_num(gains - usual, nan=np.inf)) <= np.log(ALIKE)
+    near = _near(found, found.lag, maximum_steps)
+    return np.asarray(clear & alike & near & ~directional)
+
+
+def swapped(found: Following, correlation: Array, among: Flags) -> Flags:
+    """Pairs of columns that answer each other's command, by episode. Shape (E, P, P)."""
+    own = _own(found)
+    each = _evidence(found, own[:, :, None], correlation)
+    follows = (correlation >= FOLLOWS) & (each > 0) & among[:, None, None]
+    odd = _misfits(found, own)
+    both = each + each.transpose(0, 2, 1)
+    both[~(follows & follows.transpose(0, 2, 1))] = -np.inf
+    both[~(odd[:, :, None] | odd[:, None, :])] = -np.inf
+    width = both.shape[1]
+    both[:, np.arange(width), np.arange(width)] = -np.inf
+    shares = np.array(SHARES)
+    total = np.stack([np.logaddexp(np.log1p(-p), np.log(p) + both).sum(axis=0) for p in shares])
+    share = shares[total.argmax(axis=0)]
+    enough = CLEAR_SHARE + np.log(max(width * (width - 1) // 2, 1))
+    pairs = (both + np.log(share / (1.0 - share)) > 0) & (total.max(axis=0) >= enough)
+    # A column answers one command. What answers many is read wrong, behind a lag or at rest.
+    alone = pairs.sum(axis=2) == 1
+    return np.asarray(pairs & alone[:, :, None] & alone[:, None, :])
+
+
+def _near(found: Following, lag: Integers, maximum_steps: int) -> Flags:
+    """Lags about the usual one: what goes to and fro answers its negative half a round later."""
+    known = found.lag[_own(found) >= FOLLOWS]
+    usual = float(np.median(known)) if len(known) else 0.0
+    return np.asarray(np.abs(lag - usual) <= maximum_steps / 2.0)
+
+
+def _own(found: Following) -> Array:
+    """Correlation of each column with its own command, 0 where there is none. Shape (E, P)."""
+    return np.asarray(np.maximum(np.nan_to_num(found.positive), 0.0))
+
+
+def _gains(found: Following) -> tuple[Array, Array]:
+    """Logarithm of each gain, NaN where nothing is followed; and the usual ones. Shape (P,)."""
     with np.errstate(divide="ignore", invalid="ignore"):
         gains = np.where(found.follows, np.log(found.seen) - np.log(found.asked), np.nan)
-    usual = np.array(
-        [np.median(g[np.isfinite(g)]) if np.isfinite(g).any() else 0.0 for g in gains.T]
-    )
-    alike = np.abs(np.nan_to_num(gains - usual, nan=np.inf)) <= np.log(ALIKE)
-    return np.asarray(clear & alike & ~directional)
+    usual = [np.median(g[np.isfinite(g)]) if np.isfinite(g).any() else 0.0 for g in gains.T]
+    return gains, np.array(usual)
 
 
-def swapped(found: Following, correlation: Array) -> Flags:
-    """Pairs of columns that answer each other's command, by episode. Shape (E, P, P)."""
-    own = np.maximum(np.nan_to_num(found.positive), 0.0)[:, :, None]
-    other = (correlation >= FOLLOWS) & (_evidence(found, own, correlation) >= CLEAR)
-    both = other & other.transpose(0, 2, 1)
-    both[:, np.arange(both.shape[1]), np.arange(both.shape[1])] = False
-    return np.asarray(both)
+def _misfits(found: Following, own: Array) -> Flags:
+    """Columns that follow their own command worse than usual, in size or shape. Shape (E, P)."""
+    asked = found.asked * np.exp(_gains(found)[1])
+    power = found.seen**2 + asked**2
+    left = np.where(power > 0, power - 2.0 * own * found.seen * asked, np.nan)
+    left = left / np.where(power > 0, power, 1.0)
+    usual = [np.median(x[np.isfinite(x)]) if np.isfinite(x).any() else 0.0 for x in left.T]
+    return np.asarray(np.nan_to_num(left) >= MISFIT * np.maximum(usual, ROUNDING))
 
 
 def _evidence(found: Following, own: Array, other: Array) -> Array:

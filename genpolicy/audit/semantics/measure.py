@@ -55,10 +55,11 @@ def measure(data: AuditInput, settings: AuditSettings) -> Semantics:
         notes.append(f"{motion.wraps} jumps by a whole turn were taken out of angles.")
     frozen, untold = frozen_findings(data, motion, settings)
     follows = following(motion, data.period_s, settings.maximum_lag_steps)
-    findings, factors = gain_findings(data, motion, follows, settings)
-    findings += magnitude_findings(data, motion, settings)
     turned, answered = frame_findings(data, motion, follows, settings)
-    findings += turned
+    # A column that answers another's command is larger or smaller than its own, and no unit.
+    asked = replace(motion, commanded=answered)
+    findings, factors = gain_findings(data, asked, follows, settings)
+    findings += [*magnitude_findings(data, motion, settings), *turned]
     repeated = np.repeat(factors, np.diff(motion.starts))[:, None]
     recorded, motion = motion, replace(motion, commanded=answered * repeated)
     if not findings:

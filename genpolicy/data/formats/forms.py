@@ -82,6 +82,14 @@ class _Evidence:
     near: Array
     two_valued: Flags
 
+    def without(self, pairs: Flags) -> "_Evidence":
+        """The same, with nothing to be said for some pairs."""
+        none = [
+            replace(found, explained=np.where(pairs, -np.inf, found.explained))
+            for found in (self.same, self.scaled, self.change)
+        ]
+        return replace(self, same=none[0], scaled=none[1], change=none[2])
+
     def change_holds(self) -> Flags:
         """Where the change follows the command, beyond what any episode's would explain."""
         return (self.change.explained >= CHANGED) & self.change.beyond
@@ -132,6 +140,9 @@ def read_forms(
     observed = observed.copy()
     observed[:, list(no_partner)] = 0.0
     evidence = _evidence(observed, commanded, episode)
+    # What is one number in an episode is a goal or a cue, and answers nothing that moves in it.
+    still = _stands(observed, episode)[None, :] & ~_stands(commanded, episode)[:, None]
+    evidence = evidence.without(still)
     score = _score(evidence)
     score[~moves] = -np.inf
     score[:, ~varies(observed)] = -np.inf
@@ -157,6 +168,13 @@ def read_forms(
         pairs = {}
     same = frozenset(a for a, o in pairs.items() if named.get(a) == o)
     return Reading(pairs, tuple(forms), same, contradicted, strangers)
+
+
+def _stands(values: Array, episode: Integers) -> Flags:
+    """Columns that are one number, and its rounding, in most of the episodes. Shape (D,)."""
+    edges = np.flatnonzero(np.diff(episode, prepend=episode[0] - 1))
+    moves = [varies(part) for part in np.split(values, edges[1:])]
+    return np.asarray(np.mean(moves, axis=0) < 0.5)
 
 
 def _evidence(observed: Array, commanded: Array, episode: Integers) -> _Evidence:

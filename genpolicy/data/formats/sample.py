@@ -14,6 +14,8 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 SUFFIX = {"m": "m", "mm": "m", "cm": "m", "rad": "rad", "deg": "rad", "px": "px", "N": "n"}
+# Episodes in which a number is so many times as large as usual have another unit, or are broken.
+MUCH_LARGER = 10.0
 PREFIXES = ("observation.", "observations.", "obs/", "obs.", "obs_", "data/")
 
 
@@ -38,6 +40,17 @@ class Sample:
     def numbers(self, column: str) -> Array:
         """All rows of a column as numbers. Shape (n, width)."""
         return as_float(self.values(column)).reshape(len(self.number), -1)
+
+    def usual(self, values: Array) -> Array:
+        """A number in the episodes where it is about as large as in the median episode.
+
+        Some that are in another unit, or are broken, must not decide the unit of all.
+        """
+        edges = np.flatnonzero(np.diff(self.number, prepend=self.number[:1] - 1))
+        sizes = np.maximum.reduceat(np.nan_to_num(np.abs(values)), edges) if len(edges) else edges
+        common = sizes <= MUCH_LARGER * np.median(sizes) if len(sizes) else sizes > 0
+        kept = np.repeat(common, np.diff(np.append(edges, len(values))))
+        return values[kept] if 2 * np.count_nonzero(common) > len(common) else values
 
     def selected(self, columns: list[str]) -> Array:
         """The numbers that selectors choose. Shape (n, width)."""
@@ -122,7 +135,8 @@ def _atoms(column: Column, sample: Sample, notes: list[str]) -> list[Atom]:
         names = [f"{group}_{i}" for i in range(width)]
     atoms: list[Atom] = []
     for i, name in enumerate(names):
-        unit = column.unit or guess_unit(column.name, "" if name == group else name, values[:, i])
+        usual = sample.usual(values[:, i])
+        unit = column.unit or guess_unit(column.name, "" if name == group else name, usual)
         wrapped = unit in ("rad", "unknown") and is_wrapped_angle(values[:, i], sample.number)
         if unit == "rad" and not wrapped and turns(values[:, i]) > 1.0:
             notes.append(f"{column.name}: {name} spans {turns(values[:, i]):.1f} turns.")

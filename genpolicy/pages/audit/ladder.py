@@ -59,7 +59,7 @@ class LayerRow:
 
 
 def ladder(document: Mapping[str, Any], evidence: AuditEvidence) -> list[LayerRow]:
-    """The six layers in the order in which they are believed.
+    """The layers in the order in which they are believed.
 
     Args:
         document: `audit.json`; its `questions` carry number, limit and answer.
@@ -187,5 +187,6 @@ LAYERS: dict[str, tuple[str, Callable[[AuditEvidence], list[Check]]]] = {
     "structure": ("Has one observation several actions, and do they persist?", _structure),
     "hidden": ("Does a recorded variable, or the past, explain which one was taken?", _hidden),
     "validity": ("Does each mode succeed, and is it feasible?", _validity),
+    "agreement": ("Do resampled audits say the same?", _nothing),
 }
 """Question of each layer, and its numbers that no limit is held against."""

@@ -188,3 +188,19 @@ def test_a_fast_target_is_a_place_although_it_looks_like_a_change():
     turn = np.arange(400)[:, None] * 0.4 + np.arange(3)
     found = read(np.sin(turn), np.sin(turn + np.pi / 2))
     assert {item.form for item in found.forms} == {"place"}
+
+
+@pytest.mark.parametrize("named", [{}, {0: 3}])
+def test_what_is_one_number_in_an_episode_answers_no_command(named):
+    # A cue that says which way the first column will go is followed by nothing.
+    path = paths()
+    cue = np.repeat(np.sign(change(path)[:, 0].reshape(10, 40).sum(axis=1)), 40)
+    noise = np.random.default_rng(1).normal(0, 2e-3, path.shape)
+    observed = np.column_stack([later(path, 1) + noise, cue])
+    for written in (change(path), np.column_stack([0.5 * cue + 0.05 * path[:, 0], path[:, 1:]])):
+        found = read(observed, written, named=named)
+        assert 3 not in found.pairs.values()
+    # But a height that is commanded once in an episode is, also where nothing disturbs it.
+    high = np.repeat(np.random.default_rng(2).normal(0, 0.3, 10), 40)
+    held = read(np.column_stack([path[:, 1:], high]), np.column_stack([path[:, 1:], high]))
+    assert held.pairs == {0: 0, 1: 1, 2: 2}

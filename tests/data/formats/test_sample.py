@@ -1,6 +1,7 @@
 """Channels and actions from a sample of the columns."""
 
 import numpy as np
+import pytest
 
 from genpolicy.data.formats.sample import Sample, action_of, channels_of
 from genpolicy.data.formats.source import Column, RawEpisode
@@ -45,3 +46,24 @@ def test_scalar_columns_of_one_beginning_and_unit_are_one_channel():
     ]  # fmt: skip
     told = action_of([Column("tool_x_m", None), Column("x", None)], few, [])
     assert told.components == ["tool_x_m", "x"]
+
+
+@pytest.mark.parametrize(("faulty", "unit"), [(3, "rad"), (6, "deg")])
+def test_a_minority_in_another_unit_does_not_decide_the_unit_of_all(faulty, unit):
+    joint = np.random.default_rng(0).uniform(-2.5, 2.5, (10, 40))
+    joint[:faulty] *= 180.0 / np.pi
+    few = Sample(
+        [RawEpisode(f"e{k}", "0", {"joint": part}) for k, part in enumerate(joint)],
+        np.repeat(np.arange(10), 40),
+    )
+    assert action_of([Column("joint", None)], few, []).units == [unit]
+
+
+def test_the_usual_episodes_are_those_of_the_usual_size_and_all_where_there_is_none():
+    number = np.repeat(np.arange(4), 2)
+    few = Sample([], number)
+    wild = np.array([1.0, -2.0, 3.0, 1.0, 2.0, 1.0, 900.0, 0.0])
+    assert few.usual(wild).tolist() == wild[:6].tolist()
+    rests = np.array([0.0, 0.0, 0.0, 0.0, 1.0, 2.0, 3.0, 1.0])
+    assert few.usual(rests).tolist() == rests.tolist()
+    assert Sample([], number[:0]).usual(wild[:0]).tolist() == []

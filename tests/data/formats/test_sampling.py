@@ -35,21 +35,21 @@ def labels_of(sampled):
 
 
 def test_the_same_episodes_in_any_order():
-    episodes = [episode(k) for k in range(40)]
+    episodes = [episode(k) for k in range(90)]
     chosen = labels_of(sample_episodes(Recordings(episodes), ["x"], Labels()))
     assert len(chosen) == SAMPLE_EPISODES
     for seed in range(3):
-        order = np.random.default_rng(seed).permutation(40)
+        order = np.random.default_rng(seed).permutation(90)
         again = sample_episodes(Recordings([episodes[k] for k in order]), ["x"], Labels())
         assert labels_of(again) == chosen
     assert chosen != [f"e{k}" for k in range(SAMPLE_EPISODES)]
 
 
 def test_what_will_be_refused_decides_only_where_there_is_nothing_else():
-    bad = [episode(k, finite=False) for k in range(20)]
-    good = [episode(k) for k in range(20, 23)]
+    bad = [episode(k, finite=False) for k in range(60)]
+    good = [episode(k) for k in range(60, 63)]
     assert set(labels_of(sample_episodes(Recordings(bad + good), ["x"], Labels()))) == {
-        "e20", "e21", "e22",
+        "e60", "e61", "e62",
     }  # fmt: skip
     assert len(sample_episodes(Recordings(bad), ["x"], Labels()).episodes) == SAMPLE_EPISODES
     refused = sample_episodes(Recordings([Refusal("a", "a", "why")]), ["x"], Labels())

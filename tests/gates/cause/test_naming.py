@@ -14,6 +14,9 @@ from gates.cause.numbers import Kept, Labels
 from genpolicy.audit.rows import Finding
 from genpolicy.errors import ConfigError
 
+ABSENT = counts(two_mode_episodes=0, two_mode=0)
+WHITE = counts(two_mode_episodes=0, noise_ratio=0.9, white_share=0.3)
+
 
 def test_all_green_is_valid_modes():
     cause = named(VALID)
@@ -63,6 +66,22 @@ def test_clusters_that_do_not_persist_and_white_spread_are_noise():
     assert named(quiet).name is CauseName.UNIMODAL
     # In pixels a metre is a thousand of them, and a spread of a hundredth of one is nothing.
     assert named(replace(white, metre=1000.0)).name is CauseName.UNIMODAL
+
+
+@pytest.mark.parametrize("name", [VALID, BROKEN["hidden"][0], ABSENT, WHITE])
+def test_what_most_resampled_audits_deny_is_not_said(name):
+    hidden = BROKEN["data"][0]
+    half = named(name, draws=[name] * 4 + [hidden] * 4)
+    assert half.name is named(name).name and half.agreeing == (4, 8)
+    most = named(name, draws=[name] * 3 + [hidden] * 4 + [BROKEN["labels"][0]])
+    assert (most.name, most.kind) == (CauseName.INSUFFICIENT_SUPPORT, "unstable")
+    assert (most.layer.value, most.agreeing, most.confidence) == ("agreement", (5, 8), 5 / 9)
+    assert f"say {named(name).text}, but only 3 of 8" in most.next_action
+    assert f"4 say {named(hidden).text}" in most.next_action
+    # What stands in the rows stands, and so does what is missing.
+    for said in ("data", "labels", "support"):
+        found = BROKEN[said][0]
+        assert named(found, draws=[VALID] * 8).name is named(found).name
 
 
 def test_confidence_is_the_share_of_draws_that_name_the_same():

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import pytest
-from planted import VALID, counts, named
+from planted import HIDDEN, VALID, counts, named
 
 from gates.cause import CauseName
 from genpolicy.audit.reach_rows import LEARNED, Reach, Side
@@ -78,6 +78,33 @@ THIN = counts(two_mode_episodes=0, two_mode=0, persistent=0, analysed=0, analyse
 def test_two_kinds_of_evidence_speak_for_each_other_and_must_agree(numbers, name, kind):
     cause = named(numbers)
     assert (cause.name.value, cause.kind) == (name, kind)
+
+
+FEW = replace(VALID, kept=replace(VALID.kept, n=29))
+OBSERVED = replace(HIDDEN, observed=True)
+
+
+@pytest.mark.parametrize(
+    ("row", "name", "variable"),
+    [
+        # What is known once of an episode and tells the modes lasts as long as they do.
+        (HIDDEN, "hidden_state", "operator"),
+        (OBSERVED, "unimodal", "operator"),
+        # What changes inside an episode does not; nor does what tells too little, or by chance.
+        (replace(HIDDEN, variable="time_in_episode"), "insufficient_support", ""),
+        (replace(HIDDEN, variable="history"), "insufficient_support", ""),
+        (replace(HIDDEN, variable="phase"), "insufficient_support", ""),
+        (replace(HIDDEN, effect=0.2, effect_lower=0.1), "insufficient_support", ""),
+        (replace(HIDDEN, p_adjusted=0.2), "insufficient_support", ""),
+    ],
+)  # fmt: skip
+def test_few_situations_are_enough_where_an_episode_tells_its_mode(row, name, variable):
+    for few in (FEW, counts(persistent=29)):
+        cause = named(replace(few, strata=(row,)))
+        assert (cause.name.value, cause.variable) == (name, variable)
+    # Clusters that fall apart are noise, whoever made them.
+    apart = replace(VALID, kept=replace(VALID.kept, observed=0.6), strata=(row,))
+    assert named(apart).name is CauseName.POINTWISE_NOISE
 
 
 def test_a_disagreement_says_the_numbers_of_both():
