@@ -112,7 +112,7 @@ def reproduce(
 
 
 def stage_environment(workspace: Path) -> dict[str, str]:
-    """What every stage runs with: no telemetry, one thread, AVX2, this interpreter first in PATH."""
+    """What stages run with: no telemetry, one thread, AVX2, this interpreter first in PATH."""
     return {
         **os.environ,
         "PATH": os.pathsep.join((str(Path(sys.executable).parent), os.environ.get("PATH", ""))),

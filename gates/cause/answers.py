@@ -108,8 +108,9 @@ class Cause:
         answers: Every question with its number and limit, in the order of diagnosis.
         confidence: Share of resampled audits with the same cause and variable, of one more than
             there were, so that no number of draws makes certainty; None without any. Where most of
-            them deny it, it is not said, and this is the share of those that deny it.
-        agreeing: How many of how many resampled audits name the same, or deny what is not said.
+            them name another cause it is not said, and this is the share of those.
+        agreeing: How many of how many resampled audits name the same; where it is not said, how
+            many name another.
         found: What was found of modes and hidden variables, a sentence each, whatever the verdict.
     """
 

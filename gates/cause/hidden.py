@@ -4,7 +4,9 @@ from gates.cause.answers import Answer, CauseName, Diagnosis, Layer, Named
 from gates.cause.limits import CauseLimits
 from gates.cause.numbers import Numbers
 from gates.cause.told import teller, told
+from genpolicy.audit.columns import INSIDE
 from genpolicy.audit.rows import Stratum
+from genpolicy.audit.strata import EPISODE_VARIABLES
 
 DATA_VARIABLES = ("calibration_epoch",)
 HISTORY, SEQUENCE = "history", "recording_sequence"
@@ -43,6 +45,19 @@ def hidden(numbers: Numbers, limits: CauseLimits) -> Named:
     if found:
         return answers, _said(_foremost(found, limits))
     return answers, teller(numbers.told, limits)
+
+
+def told_by_episode(numbers: Numbers, limits: CauseLimits) -> bool:
+    """Whether something that holds for a whole episode explains the modes: then they last."""
+    return any(
+        _clear(row, limits) and _wide_of(row, limits) and _of_episode(row) for row in numbers.strata
+    )
+
+
+def _of_episode(row: Stratum) -> bool:
+    """Not the past, nor what switches inside an episode, nor what a channel shows row by row."""
+    known = row.variable in EPISODE_VARIABLES or row.variable.startswith(START)
+    return known or not (row.observed or row.variable == HISTORY or INSIDE in row.detail)
 
 
 def _clear(row: Stratum, limits: CauseLimits) -> bool:

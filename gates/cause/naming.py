@@ -22,6 +22,8 @@ CLAIMS = (
     CauseName.VALID_MODES, CauseName.HIDDEN_STATE, CauseName.UNIMODAL, CauseName.POINTWISE_NOISE,
 )  # fmt: skip
 UNSTABLE = "unstable"
+# Fewer resampled audits do not overturn a verdict.
+LEAST_DRAWS = 20
 IN_METRES = ("calibration_residual_m", "noise_spread_m")
 __all__ = ["Answer", "Cause", "CauseName", "Layer", "cause_of", "name_cause"]
 
@@ -62,12 +64,12 @@ def name_cause(numbers: Numbers, draws: Sequence[Numbers], limits: CauseLimits) 
             verdict, red = said, layer
     again = _all(draws, limits)
     same = [(v.name, v.variable) == (verdict.name, verdict.variable) for v in again]
-    if same:
-        other = [_words(said) for said, agrees in zip(again, same, strict=True) if not agrees]
-        answer, said = _agreement(verdict, sum(same), other, limits)
+    if len(again) >= LEAST_DRAWS:
+        answer, said = _agreement(verdict, again, limits)
         answers.append(answer)
         if said is not None:
-            verdict, red, same = said, Layer.AGREEMENT, [not item for item in same]
+            same = [other.name is not verdict.name for other in again]
+            verdict, red = said, Layer.AGREEMENT
     return Cause(
         name=verdict.name,
         variable=verdict.variable,
@@ -94,10 +96,14 @@ def _first_red(numbers: Numbers, limits: CauseLimits) -> Diagnosis:
 
 
 def _agreement(
-    verdict: Diagnosis, same: int, others_say: Sequence[str], limits: CauseLimits
+    verdict: Diagnosis, draws: Sequence[Diagnosis], limits: CauseLimits
 ) -> tuple[Answer, Diagnosis | None]:
-    """Whether most resampled audits deny what the whole data say of modes."""
-    total = same + len(others_say)
+    """Whether most resampled audits name another cause than the whole data do, of modes.
+
+    Which of several variables that tell nearly the same is named may change; the cause does not.
+    """
+    others_say = [said for said in draws if said.name is not verdict.name]
+    total, same = len(draws), len(draws) - len(others_say)
     answer = Answer(
         "cause_agreement", Layer.AGREEMENT, "share of resampled audits that name the same cause",
         same / total, limits["cause_agreement"] if verdict.name in CLAIMS else None, ">=",
@@ -105,16 +111,19 @@ def _agreement(
     )  # fmt: skip
     if not answer.red:
         return answer, None
-    other, count = min(Counter(others_say).items(), key=lambda item: (-item[1], item[0]))
+    words = Counter(_words(said) for said in others_say)
+    other, count = min(words.items(), key=lambda item: (-item[1], item[0]))
+    instead = min(said.next_action for said in others_say if _words(said) == other)
     text = (
         f"All recordings together say {_words(verdict)}, but only {same} of {total} resampled "
-        f"audits do, and {count} say {other}: record more, from fewer starts."
+        f"audits say {verdict.name.value}, and {count} say {other}. If that is so: {instead} "
+        "Otherwise record more, from fewer starts."
     )
     return answer, Diagnosis(CauseName.INSUFFICIENT_SUPPORT, "", UNSTABLE, text)
 
 
 def _words(said: Diagnosis) -> str:
-    detail = said.variable or said.kind
+    detail = ", ".join(dict.fromkeys(part for part in (said.variable, said.kind) if part))
     return f"{said.name.value}({detail})" if detail else said.name.value
 
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from gates.cause.answers import Answer, CauseName, Diagnosis, Layer, Named
 from gates.cause.components import components, looked_in, unreadable
-from gates.cause.hidden import OBSERVED, hidden
+from gates.cause.hidden import OBSERVED, hidden, told_by_episode
 from gates.cause.limits import CauseLimits
 from gates.cause.numbers import Numbers, turned
 from genpolicy.audit.reach_rows import LEARNED, LOCAL, Reach
@@ -20,8 +20,6 @@ LEAST_ASKED = 30
 # Share of them that it must show as well. Not most: a cluster that has begun to move apart is still
 # one place by declared scales, and told already by what a forest learned to see.
 LEAST_CONFIRMED = 0.2
-# What changes inside an episode says nothing of how long its mode lasts.
-BY_ROW = ("unrecorded", "time_in_episode", "phase")
 ORDINALS = ("first", "second", "third", "fourth", "last")
 
 
@@ -173,8 +171,8 @@ def _seen(numbers: Numbers, limits: CauseLimits) -> Named:
         # Clusters that fall apart are noise, however many there are.
         if margin.red and not long_enough.red:
             return answers, _noise("Clusters do not persist over a chunk")
-        if _told_by_episode(numbers, limits):
-            few = (long_enough, margin, persistent)
+        if not margin.red and told_by_episode(numbers, limits):
+            few = (long_enough, persistent)
             return [replace(a, limit=None) if a in few else a for a in answers], None
         return answers, thin(
             f"Only {number} situations with several modes "
@@ -184,13 +182,6 @@ def _seen(numbers: Numbers, limits: CauseLimits) -> Named:
             kind="persistence",
         )
     return answers, _noise("Clusters do not persist over a chunk") if margin.red else None
-
-
-def _told_by_episode(numbers: Numbers, limits: CauseLimits) -> bool:
-    """Whether what is recorded once of an episode tells the modes: then they last as long as it."""
-    said = hidden(numbers, limits)[1]
-    undecided = said is None or said.name is CauseName.INSUFFICIENT_SUPPORT
-    return not undecided and said is not None and said.variable not in BY_ROW
 
 
 def _absent(

@@ -30,6 +30,8 @@ INNER_FOLDS = 5
 # The observation tells a column's values apart where it does so in most situations.
 MOST = 0.5
 LEAST_APART = 3
+# Said of what has another value in one episode.
+INSIDE = "switches inside episodes"
 Drawn = tuple[Integers, Integers, Integers]
 Knows = Callable[[Choices, Flags, Flags], Array]
 """Scores of each mode: choices, which are known, which are wanted -> (wanted, K)."""
@@ -75,10 +77,15 @@ def column_strata(
                 n=test.n,
                 recorded=True,
                 observed=_is_seen(data, settings, (rows, values, blocks)),
-                detail=f"the same as {', '.join(item.also)}" if item.also else "",
+                detail=_words(item),
             )
         )
     return result
+
+
+def _words(item: Variable) -> str:
+    also = [f"the same as {', '.join(item.also)}"] if item.also else []
+    return "; ".join([*also, INSIDE] if item.by_row else also)
 
 
 def column_guesses(

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from genpolicy.audit.columns import Asking, column_strata
+from genpolicy.audit.columns import INSIDE, Asking, column_strata
 from genpolicy.audit.data import Array, AuditInput, Integers, Text, recorded
 from genpolicy.audit.history import history_test
 from genpolicy.audit.modes import Clustering
@@ -75,7 +75,9 @@ def examine_strata(
         tested += [(*entry, seen) for entry in _observed_variables(data, seen[0])]
         for variable, values, observed, place in tested:
             seeds = (root_seed, phase, variable)
-            rows.append(_tested(settings, seeds, values, place, observed=observed))
+            row = _tested(settings, seeds, values, place, observed=observed)
+            inside = variable in (data.phase_name, "time_in_episode") and row.recorded
+            rows.append(replace(row, detail=INSIDE if inside else ""))
         rows += column_strata(data, settings, hidden, Asking(phase, root_seed))
         rows.append(_history(data, settings, phase, past, root_seed))
     return _adjusted(rows)

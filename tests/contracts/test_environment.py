@@ -85,7 +85,8 @@ def test_telemetry_is_off_wherever_it_could_start() -> None:
 def test_a_stage_by_hand_keeps_to_one_thread_and_to_avx2() -> None:
     # Asked of torch, which reads the variable when it first computes and keeps what it read.
     code = (
-        "import stages, torch\n"
+        "import os, stages, torch\n"
+        "assert os.environ['ATEN_CPU_CAPABILITY'] == 'avx2'\n"
         "torch.ones(3).sum()\n"
         "assert torch.get_num_threads() == 1\n"
         "assert torch.backends.cpu.get_cpu_capability() in ('AVX2', 'DEFAULT')\n"

@@ -2,9 +2,9 @@
 
 Each column of each episode is read by itself. A joint is flipped where it follows the negative of
 its command and not its command, by as much as it usually does; two are swapped where each follows
-the command of the other and not its own. In a short movement all joints are alike and one episode
-proves little; so all episodes are asked together whether a share of them is swapped. What is
-said of fewer episodes than a mishap is not said.
+the command of the other better than its own. In a short movement all joints are alike and one
+episode proves little; so all episodes are asked together whether a share of them is swapped. What
+is said of fewer episodes than a mishap is not said.
 """
 
 import numpy as np
@@ -28,8 +28,9 @@ ALIKE = 2.0
 # swapped episodes against none, beyond the number of pairs that are asked.
 CLEAR, CLEAR_SHARE = 5.0, 10.0
 # Shares of swapped episodes that are tried.
-SHARES = (0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5)
-# A swapped column leaves so many times as much of its own command, taken by its usual gain.
+SHARES = (0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.7, 0.9)
+# One of both columns leaves so many times as much of its own command, by the usual gain, as of the
+# other's: two that move alike in shape differ in size.
 MISFIT = 4.0
 # Correlations are not believed nearer to one.
 ROUNDING = 1e-4
@@ -90,18 +91,25 @@ def swapped(found: Following, correlation: Array, among: Flags) -> Flags:
     """Pairs of columns that answer each other's command, by episode. Shape (E, P, P)."""
     own = _own(found)
     each = _evidence(found, own[:, :, None], correlation)
-    follows = (correlation >= FOLLOWS) & (each > 0) & among[:, None, None]
-    odd = _misfits(found, own)
+    better = (correlation >= FOLLOWS) & (each > 0)
+    odd = _misfits(found, own)[:, :, None] >= MISFIT * np.maximum(1.0 - correlation**2, ROUNDING)
     both = each + each.transpose(0, 2, 1)
-    both[~(follows & follows.transpose(0, 2, 1))] = -np.inf
-    both[~(odd[:, :, None] | odd[:, None, :])] = -np.inf
+    both[~(better & better.transpose(0, 2, 1))] = -np.inf
+    both[~(odd | odd.transpose(0, 2, 1))] = -np.inf
     width = both.shape[1]
     both[:, np.arange(width), np.arange(width)] = -np.inf
+    # Episodes in which one of both stands, or that are not asked, speak for nothing.
+    read = among[:, None] & np.isfinite(found.positive)
+    asked = read[:, :, None] & read[:, None, :]
     shares = np.array(SHARES)
-    total = np.stack([np.logaddexp(np.log1p(-p), np.log(p) + both).sum(axis=0) for p in shares])
+    total = np.stack([
+        np.where(asked, np.logaddexp(np.log1p(-p), np.log(p) + both), 0.0).sum(axis=0)
+        for p in shares
+    ])  # fmt: skip
     share = shares[total.argmax(axis=0)]
     enough = CLEAR_SHARE + np.log(max(width * (width - 1) // 2, 1))
-    pairs = (both + np.log(share / (1.0 - share)) > 0) & (total.max(axis=0) >= enough)
+    clear = (both + np.log(share / (1.0 - share)) > 0) & (total.max(axis=0) >= enough)
+    pairs = asked & clear
     # A column answers one command. What answers many is read wrong, behind a lag or at rest.
     alone = pairs.sum(axis=2) == 1
     return np.asarray(pairs & alone[:, :, None] & alone[:, None, :])
@@ -109,7 +117,8 @@ def swapped(found: Following, correlation: Array, among: Flags) -> Flags:
 
 def _near(found: Following, lag: Integers, maximum_steps: int) -> Flags:
     """Lags about the usual one: what goes to and fro answers its negative half a round later."""
-    known = found.lag[_own(found) >= FOLLOWS]
+    follows = _own(found) >= FOLLOWS
+    known = found.lag[follows if follows.any() else found.follows]
     usual = float(np.median(known)) if len(known) else 0.0
     return np.asarray(np.abs(lag - usual) <= maximum_steps / 2.0)
 
@@ -127,14 +136,17 @@ def _gains(found: Following) -> tuple[Array, Array]:
     return gains, np.array(usual)
 
 
-def _misfits(found: Following, own: Array) -> Flags:
-    """Columns that follow their own command worse than usual, in size or shape. Shape (E, P)."""
-    asked = found.asked * np.exp(_gains(found)[1])
-    power = found.seen**2 + asked**2
-    left = np.where(power > 0, power - 2.0 * own * found.seen * asked, np.nan)
-    left = left / np.where(power > 0, power, 1.0)
-    usual = [np.median(x[np.isfinite(x)]) if np.isfinite(x).any() else 0.0 for x in left.T]
-    return np.asarray(np.nan_to_num(left) >= MISFIT * np.maximum(usual, ROUNDING))
+def _misfits(found: Following, own: Array) -> Array:
+    """What each column leaves of its own command, in size and shape, of its motion. Shape (E, P).
+
+    By one gain for all columns: that of a column would be the wrong one where most are swapped.
+    """
+    gains = _gains(found)[0]
+    usual = np.exp(np.median(gains[np.isfinite(gains)])) if np.isfinite(gains).any() else 1.0
+    with np.errstate(divide="ignore", invalid="ignore"):
+        asked = usual * found.asked / found.seen
+        left = 1.0 + asked**2 - 2.0 * own * asked
+    return np.asarray(np.where(np.isfinite(left), left, 0.0))
 
 
 def _evidence(found: Following, own: Array, other: Array) -> Array:

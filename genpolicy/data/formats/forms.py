@@ -171,10 +171,10 @@ def read_forms(
 
 
 def _stands(values: Array, episode: Integers) -> Flags:
-    """Columns that are one number, and its rounding, in most of the episodes. Shape (D,)."""
+    """Columns that are one number, and its rounding, in every episode. Shape (D,)."""
     edges = np.flatnonzero(np.diff(episode, prepend=episode[0] - 1))
     moves = [varies(part) for part in np.split(values, edges[1:])]
-    return np.asarray(np.mean(moves, axis=0) < 0.5)
+    return np.asarray(~np.any(moves, axis=0))
 
 
 def _evidence(observed: Array, commanded: Array, episode: Integers) -> _Evidence:

@@ -14,8 +14,9 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 SUFFIX = {"m": "m", "mm": "m", "cm": "m", "rad": "rad", "deg": "rad", "px": "px", "N": "n"}
-# Episodes in which a number is so many times as large as usual have another unit, or are broken.
-MUCH_LARGER = 10.0
+# Episodes in which an angle is so many times as large as in most may be in degrees; then they are
+# larger by the degrees of a radian, within a factor.
+APART, ALIKE = 10.0, 1.5
 PREFIXES = ("observation.", "observations.", "obs/", "obs.", "obs_", "data/")
 
 
@@ -41,16 +42,27 @@ class Sample:
         """All rows of a column as numbers. Shape (n, width)."""
         return as_float(self.values(column)).reshape(len(self.number), -1)
 
-    def usual(self, values: Array) -> Array:
-        """A number in the episodes where it is about as large as in the median episode.
+    def usual(self, values: Array) -> NDArray[np.bool_]:
+        """Rows without the episodes in which an angle is larger by a turn's degrees than in most.
 
-        Some that are in another unit, or are broken, must not decide the unit of all.
+        Some that are in another unit must not decide the unit of all. Episodes in which a number
+        rests at zero have no unit.
         """
+        everything = np.ones(len(values), dtype=bool)
         edges = np.flatnonzero(np.diff(self.number, prepend=self.number[:1] - 1))
-        sizes = np.maximum.reduceat(np.nan_to_num(np.abs(values)), edges) if len(edges) else edges
-        common = sizes <= MUCH_LARGER * np.median(sizes) if len(sizes) else sizes > 0
-        kept = np.repeat(common, np.diff(np.append(edges, len(values))))
-        return values[kept] if 2 * np.count_nonzero(common) > len(common) else values
+        if not len(edges):
+            return everything
+        sizes = np.maximum.reduceat(np.nan_to_num(np.abs(values)), edges)
+        moving = sizes[sizes > 0.0]
+        large = moving[moving > APART * np.median(moving)] if len(moving) else moving
+        if not len(large):
+            return everything
+        common = moving[moving <= APART * np.median(moving)]
+        factor = float(np.median(large) / np.median(common))
+        if abs(np.log(factor / (180.0 / np.pi))) > np.log(ALIKE):
+            return everything
+        kept = sizes <= APART * np.median(moving)
+        return np.asarray(np.repeat(kept, np.diff(np.append(edges, len(values)))))
 
     def selected(self, columns: list[str]) -> Array:
         """The numbers that selectors choose. Shape (n, width)."""
@@ -135,11 +147,12 @@ def _atoms(column: Column, sample: Sample, notes: list[str]) -> list[Atom]:
         names = [f"{group}_{i}" for i in range(width)]
     atoms: list[Atom] = []
     for i, name in enumerate(names):
-        usual = sample.usual(values[:, i])
+        kept = sample.usual(values[:, i])
+        usual, number = values[kept, i], sample.number[kept]
         unit = column.unit or guess_unit(column.name, "" if name == group else name, usual)
-        wrapped = unit in ("rad", "unknown") and is_wrapped_angle(values[:, i], sample.number)
-        if unit == "rad" and not wrapped and turns(values[:, i]) > 1.0:
-            notes.append(f"{column.name}: {name} spans {turns(values[:, i]):.1f} turns.")
+        wrapped = unit in ("rad", "unknown") and is_wrapped_angle(usual, number)
+        if unit == "rad" and not wrapped and turns(usual) > 1.0:
+            notes.append(f"{column.name}: {name} spans {turns(usual):.1f} turns.")
         selector = column.name if column.width is None else f"{column.name}[{i}]"
         atoms.append(Atom(group, stream, name, selector, unit, not column.unit, wrapped))
     return atoms

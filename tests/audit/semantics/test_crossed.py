@@ -59,7 +59,7 @@ def alike(seed=0, *, episodes=100, noise=1e-3):
     return build(commands, seen, epochs=1, period_s=0.05)
 
 
-@pytest.mark.parametrize("share", [0.1, 0.25])
+@pytest.mark.parametrize("share", [0.1, 0.25, 0.5, 0.6, 0.85])
 @pytest.mark.parametrize("seed", range(3))
 def test_joints_that_move_alike_are_found_swapped_by_all_episodes_together(seed, share):
     data = alike(seed)
@@ -112,10 +112,25 @@ def test_a_swap_needs_both_ways_a_bad_fit_and_one_partner():
     one_way[:, 2, 1] *= 0.9
     assert not exchanged(odd, one_way, EVERYONE).any()
     # As large and as near as always to its own command: a twin of the other, no swap.
-    assert not exchanged(read_as(0.9), crossing(0.99), EVERYONE).any()
+    assert not exchanged(read_as(0.9), crossing(0.955), EVERYONE).any()
+    assert exchanged(odd, crossing(0.955), EVERYONE)[FIFTH, 1, 2].all()
     # What answers every command is read wrong.
     ring = ((0, 1), (1, 2), (2, 0))
     assert not exchanged(odd, crossing(0.99, ring), EVERYONE).any()
+
+
+def test_one_of_both_fits_its_command_badly_and_those_not_asked_count_for_nothing():
+    one = ODD.copy()
+    one[:, [0, 2, 3]] = 1.0
+    assert exchanged(read_as(0.9, seen=one), crossing(0.99), EVERYONE)[FIFTH, 1, 2].all()
+    # Eight of a hundred prove nothing, eight of the sixteen that can be read do.
+    few = np.arange(100) < 8
+    odd = read_as(0.9, seen=np.where(few[:, None], 4.0, 1.0) * np.ones((100, 4)))
+    weak = crossing(0.93, hit=few)
+    assert not exchanged(odd, weak, EVERYONE).any()
+    assert exchanged(odd, weak, np.arange(100) < 16)[few, 1, 2].all()
+    unread = replace(odd, positive=np.where(np.arange(100)[:, None] < 16, 0.9, np.nan))
+    assert exchanged(unread, weak, EVERYONE)[few, 1, 2].all()
 
 
 def test_two_episodes_of_which_neither_is_clear_are_a_mishap():

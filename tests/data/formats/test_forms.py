@@ -204,3 +204,12 @@ def test_what_is_one_number_in_an_episode_answers_no_command(named):
     high = np.repeat(np.random.default_rng(2).normal(0, 0.3, 10), 40)
     held = read(np.column_stack([path[:, 1:], high]), np.column_stack([path[:, 1:], high]))
     assert held.pairs == {0: 0, 1: 1, 2: 2}
+
+
+def test_an_arm_that_is_parked_in_most_episodes_keeps_its_pairs():
+    path = paths(width=4)
+    parked = np.repeat(np.arange(10) < 6, 40)
+    seen, asked = later(path, 1), path.copy()
+    seen[parked, 2:], asked[parked, 2:] = 0.0, 0.0
+    asked += np.random.default_rng(3).normal(0, 1e-4, asked.shape)
+    assert read(seen, asked, named={k: k for k in range(4)}).pairs == {k: k for k in range(4)}

@@ -56,14 +56,33 @@ def test_a_minority_in_another_unit_does_not_decide_the_unit_of_all(faulty, unit
         [RawEpisode(f"e{k}", "0", {"joint": part}) for k, part in enumerate(joint)],
         np.repeat(np.arange(10), 40),
     )
-    assert action_of([Column("joint", None)], few, []).units == [unit]
+    notes: list[str] = []
+    assert action_of([Column("joint", None)], few, notes).units == [unit]
+    channels_of([Column("joint", None)], few, notes)
+    assert not notes
 
 
-def test_the_usual_episodes_are_those_of_the_usual_size_and_all_where_there_is_none():
-    number = np.repeat(np.arange(4), 2)
+def test_a_joint_that_rests_or_moves_little_in_most_episodes_is_not_outvoted():
+    number = np.repeat(np.arange(10), 2)
     few = Sample([], number)
-    wild = np.array([1.0, -2.0, 3.0, 1.0, 2.0, 1.0, 900.0, 0.0])
-    assert few.usual(wild).tolist() == wild[:6].tolist()
-    rests = np.array([0.0, 0.0, 0.0, 0.0, 1.0, 2.0, 3.0, 1.0])
-    assert few.usual(rests).tolist() == rests.tolist()
-    assert Sample([], number[:0]).usual(wild[:0]).tolist() == []
+    for small in (0.0, 4.0):
+        values = np.where(number < 6, small, 90.0)
+        assert few.usual(values).all()
+    radians = np.where(number < 6, 1.5, np.degrees(1.5))
+    assert few.usual(radians).tolist() == (number < 6).tolist()
+    # Those that rest have no unit, and do not make the others large.
+    resting = np.where(number < 6, 0.0, np.where(number < 9, 1.5, np.degrees(1.5)))
+    assert few.usual(resting).tolist() == (number < 9).tolist()
+    # By another factor it is no degree; a half is no minority.
+    assert few.usual(np.where(number < 6, 1.5, 1500.0)).all()
+    assert few.usual(np.where(number < 5, 1.5, np.degrees(1.5))).all()
+    assert Sample([], number[:0]).usual(np.zeros(0)).tolist() == []
+
+
+def test_an_angle_that_jumps_is_seen_beside_some_in_degrees():
+    turning = np.mod(np.linspace(0, 9 * np.pi, 400).reshape(10, 40) + 0.5, 2 * np.pi)
+    turning[:3] *= 180.0 / np.pi
+    episodes = [RawEpisode(f"e{k}", "0", {"yaw": part}) for k, part in enumerate(turning)]
+    few, notes = Sample(episodes, np.repeat(np.arange(10), 40)), []
+    assert [c.transform for c in channels_of([Column("yaw", None)], few, notes)] == ["cos_sin"]
+    assert not any("spans" in note for note in notes)

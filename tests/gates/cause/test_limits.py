@@ -58,7 +58,7 @@ def test_every_limit_is_asked_for_and_every_finding_has_one():
         counts(two_mode_episodes=0, noise_ratio=0.9, white_share=0.3),
     )
     for numbers in (VALID, *others, *(item[0] for item in BROKEN.values())):
-        named(numbers, watched)
+        named(numbers, watched, draws=[VALID] * 20)
     of_findings = _of_findings()
     assert {"clock_disorder", "gain_epoch_factor", "calibration_residual_m"} <= of_findings
     assert ASKED | of_findings == {*SHARED, *OWN}

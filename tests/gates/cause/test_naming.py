@@ -68,20 +68,29 @@ def test_clusters_that_do_not_persist_and_white_spread_are_noise():
     assert named(replace(white, metre=1000.0)).name is CauseName.UNIMODAL
 
 
-@pytest.mark.parametrize("name", [VALID, BROKEN["hidden"][0], ABSENT, WHITE])
-def test_what_most_resampled_audits_deny_is_not_said(name):
-    hidden = BROKEN["data"][0]
-    half = named(name, draws=[name] * 4 + [hidden] * 4)
-    assert half.name is named(name).name and half.agreeing == (4, 8)
-    most = named(name, draws=[name] * 3 + [hidden] * 4 + [BROKEN["labels"][0]])
+@pytest.mark.parametrize("said", [VALID, BROKEN["hidden"][0], ABSENT, WHITE])
+def test_what_most_resampled_audits_do_not_name_is_not_said(said):
+    fault, label = BROKEN["data"][0], BROKEN["labels"][0]
+    half = named(said, draws=[said] * 10 + [fault] * 10)
+    assert half.name is named(said).name and half.agreeing == (10, 20)
+    most = named(said, draws=[said] * 9 + [fault] * 8 + [label] * 3)
     assert (most.name, most.kind) == (CauseName.INSUFFICIENT_SUPPORT, "unstable")
-    assert (most.layer.value, most.agreeing, most.confidence) == ("agreement", (5, 8), 5 / 9)
-    assert f"say {named(name).text}, but only 3 of 8" in most.next_action
-    assert f"4 say {named(hidden).text}" in most.next_action
-    # What stands in the rows stands, and so does what is missing.
-    for said in ("data", "labels", "support"):
-        found = BROKEN[said][0]
-        assert named(found, draws=[VALID] * 8).name is named(found).name
+    assert (most.layer.value, most.agreeing, most.confidence) == ("agreement", (11, 20), 11 / 21)
+    assert f"say {named(said).name}" in most.next_action and "only 9 of 20" in most.next_action
+    assert f"8 say data_defect({named(fault).variable}, clock). If" in most.next_action
+    assert named(fault).next_action in most.next_action
+    # A few draws overturn nothing; what stands in the rows stands, and so does what is missing.
+    assert named(said, draws=[fault] * 19).name is named(said).name
+    for layer in ("data", "labels", "support"):
+        found = BROKEN[layer][0]
+        assert named(found, draws=[VALID] * 20).name is named(found).name
+
+
+def test_which_of_two_variables_is_named_is_no_other_cause():
+    one = BROKEN["hidden"][0]
+    other = replace(one, strata=tuple(replace(row, variable="zq7") for row in one.strata))
+    cause = named(one, draws=[one] * 9 + [other] * 11)
+    assert (cause.name, cause.agreeing) == (CauseName.HIDDEN_STATE, (9, 20))
 
 
 def test_confidence_is_the_share_of_draws_that_name_the_same():

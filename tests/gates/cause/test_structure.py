@@ -3,9 +3,10 @@
 from dataclasses import replace
 
 import pytest
-from planted import HIDDEN, VALID, counts, named
+from planted import HIDDEN, TOLD, VALID, counts, named
 
 from gates.cause import CauseName
+from genpolicy.audit.columns import INSIDE
 from genpolicy.audit.reach_rows import LEARNED, Reach, Side
 
 ABSENT = counts(two_mode_episodes=0, two_mode=0, persistent=0)
@@ -81,20 +82,25 @@ def test_two_kinds_of_evidence_speak_for_each_other_and_must_agree(numbers, name
 
 
 FEW = replace(VALID, kept=replace(VALID.kept, n=29))
-OBSERVED = replace(HIDDEN, observed=True)
+TELLS = replace(TOLD, told=0.8, told_lower=0.6, told_upper=0.9)
 
 
 @pytest.mark.parametrize(
     ("row", "name", "variable"),
     [
-        # What is known once of an episode and tells the modes lasts as long as they do.
+        # What holds for an episode and explains the modes lasts as long as they do.
         (HIDDEN, "hidden_state", "operator"),
-        (OBSERVED, "unimodal", "operator"),
-        # What changes inside an episode does not; nor does what tells too little, or by chance.
-        (replace(HIDDEN, variable="time_in_episode"), "insufficient_support", ""),
-        (replace(HIDDEN, variable="history"), "insufficient_support", ""),
-        (replace(HIDDEN, variable="phase"), "insufficient_support", ""),
+        (replace(HIDDEN, observed=True), "unimodal", "operator"),
+        (replace(HIDDEN, variable="start_position.0", observed=True), "unimodal",
+         "start_position.0"),
+        (replace(HIDDEN, variable="zq7"), "hidden_state", "zq7"),
+        # What changes inside an episode does not; nor does what explains too little, or by chance.
+        (replace(HIDDEN, variable="time_in_episode", detail=INSIDE), "insufficient_support", ""),
+        (replace(HIDDEN, variable="subtask", detail=INSIDE), "insufficient_support", ""),
+        (replace(HIDDEN, variable="history", detail="x at first"), "insufficient_support", ""),
+        (replace(HIDDEN, variable="grip.width", observed=True), "insufficient_support", ""),
         (replace(HIDDEN, effect=0.2, effect_lower=0.1), "insufficient_support", ""),
+        (replace(HIDDEN, effect_lower=0.05), "insufficient_support", ""),
         (replace(HIDDEN, p_adjusted=0.2), "insufficient_support", ""),
     ],
 )  # fmt: skip
@@ -102,9 +108,16 @@ def test_few_situations_are_enough_where_an_episode_tells_its_mode(row, name, va
     for few in (FEW, counts(persistent=29)):
         cause = named(replace(few, strata=(row,)))
         assert (cause.name.value, cause.variable) == (name, variable)
-    # Clusters that fall apart are noise, whoever made them.
-    apart = replace(VALID, kept=replace(VALID.kept, observed=0.6), strata=(row,))
-    assert named(apart).name is CauseName.POINTWISE_NOISE
+    # Clusters that fall apart last for nobody, however few were seen.
+    for n in (10, 60):
+        apart = replace(VALID, kept=replace(VALID.kept, observed=0.6, n=n), strata=(row,))
+        assert named(apart).name in (CauseName.POINTWISE_NOISE, CauseName.INSUFFICIENT_SUPPORT)
+
+
+def test_what_is_only_told_and_not_tested_does_not_show_that_modes_last():
+    for variable in ("operator", "history", "everything_together"):
+        cause = named(replace(FEW, told=(replace(TELLS, variable=variable),)))
+        assert (cause.name, cause.kind) == (CauseName.INSUFFICIENT_SUPPORT, "persistence")
 
 
 def test_a_disagreement_says_the_numbers_of_both():
