@@ -158,7 +158,7 @@ def as_text(report: AuditReport, cause: Cause, opened: Opened, out: Path) -> str
     red = "no layer is red" if cause.layer is Layer.NONE else f"first red layer: {cause.layer}"
     beyond = tuple(_beyond(answer) for answer in cause.answers if answer.layer is cause.layer)
     same, draws = cause.agreeing
-    agree = "do not say what all of them say" if cause.layer is Layer.AGREEMENT else "say the same"
+    agree = "contradict what all of them say" if cause.layer is Layer.AGREEMENT else "say the same"
     sure = f"{same} of {draws} resampled audits {agree}" if draws else "confidence unknown"
     lines = [
         *_block("verdict", (said, f"{TITLES[cause.name]}; {sure}; {red}")),

@@ -107,10 +107,10 @@ class Cause:
         next_action: What to do.
         answers: Every question with its number and limit, in the order of diagnosis.
         confidence: Share of resampled audits with the same cause and variable, of one more than
-            there were, so that no number of draws makes certainty; None without any. Where most of
-            them name another cause it is not said, and this is the share of those.
+            there were, so that no number of draws makes certainty; None without any. Where more
+            of them contradict the cause it is not said, and this is the share of those.
         agreeing: How many of how many resampled audits name the same; where it is not said, how
-            many name another.
+            many contradict it.
         found: What was found of modes and hidden variables, a sentence each, whatever the verdict.
     """
 

@@ -68,7 +68,7 @@ def name_cause(numbers: Numbers, draws: Sequence[Numbers], limits: CauseLimits) 
         answer, said = _agreement(verdict, again, limits)
         answers.append(answer)
         if said is not None:
-            same = [other.name is not verdict.name for other in again]
+            same = [_contradicts(other, verdict) for other in again]
             verdict, red = said, Layer.AGREEMENT
     return Cause(
         name=verdict.name,
@@ -95,29 +95,34 @@ def _first_red(numbers: Numbers, limits: CauseLimits) -> Diagnosis:
     return Diagnosis(CauseName.VALID_MODES, "", "", NEXT)
 
 
+def _contradicts(other: Diagnosis, verdict: Diagnosis) -> bool:
+    """Whether it names another cause; another variable is none, nor is leaving it open."""
+    return other.name not in (verdict.name, CauseName.INSUFFICIENT_SUPPORT)
+
+
 def _agreement(
     verdict: Diagnosis, draws: Sequence[Diagnosis], limits: CauseLimits
 ) -> tuple[Answer, Diagnosis | None]:
-    """Whether most resampled audits name another cause than the whole data do, of modes.
-
-    Which of several variables that tell nearly the same is named may change; the cause does not.
-    """
-    others_say = [said for said in draws if said.name is not verdict.name]
-    total, same = len(draws), len(draws) - len(others_say)
+    """Whether most resampled audits that name a cause name another than the whole data do."""
+    against = [said for said in draws if _contradicts(said, verdict)]
+    same = sum(said.name is verdict.name for said in draws)
+    total = same + len(against)
     answer = Answer(
-        "cause_agreement", Layer.AGREEMENT, "share of resampled audits that name the same cause",
-        same / total, limits["cause_agreement"] if verdict.name in CLAIMS else None, ">=",
-        note=f"{same} of {total}",
+        "cause_agreement", Layer.AGREEMENT,
+        "resampled audits that name the same cause, of those that name one",
+        same / total if total else None,
+        limits["cause_agreement"] if verdict.name in CLAIMS else None, ">=",
+        note=f"{same} of {total}; {len(draws) - total} leave it open",
     )  # fmt: skip
     if not answer.red:
         return answer, None
-    words = Counter(_words(said) for said in others_say)
+    words = Counter(_words(said) for said in against)
     other, count = min(words.items(), key=lambda item: (-item[1], item[0]))
-    instead = min(said.next_action for said in others_say if _words(said) == other)
+    instead = min(said.next_action for said in against if _words(said) == other)
     text = (
-        f"All recordings together say {_words(verdict)}, but only {same} of {total} resampled "
-        f"audits say {verdict.name.value}, and {count} say {other}. If that is so: {instead} "
-        "Otherwise record more, from fewer starts."
+        f"All recordings together say {_words(verdict)}, but of the resampled audits {same} say "
+        f"{verdict.name.value}, {len(against)} another cause, and {count} of them {other}. If that "
+        f"is so: {instead} Otherwise record more, from fewer starts."
     )
     return answer, Diagnosis(CauseName.INSUFFICIENT_SUPPORT, "", UNSTABLE, text)
 

@@ -69,18 +69,20 @@ def test_clusters_that_do_not_persist_and_white_spread_are_noise():
 
 
 @pytest.mark.parametrize("said", [VALID, BROKEN["hidden"][0], ABSENT, WHITE])
-def test_what_most_resampled_audits_do_not_name_is_not_said(said):
-    fault, label = BROKEN["data"][0], BROKEN["labels"][0]
+def test_what_most_resampled_audits_contradict_is_not_said(said):
+    fault, label, thin = (BROKEN[layer][0] for layer in ("data", "labels", "support"))
     half = named(said, draws=[said] * 10 + [fault] * 10)
     assert half.name is named(said).name and half.agreeing == (10, 20)
-    most = named(said, draws=[said] * 9 + [fault] * 8 + [label] * 3)
+    most = named(said, draws=[said] * 9 + [fault] * 8 + [label] * 3 + [thin] * 4)
     assert (most.name, most.kind) == (CauseName.INSUFFICIENT_SUPPORT, "unstable")
-    assert (most.layer.value, most.agreeing, most.confidence) == ("agreement", (11, 20), 11 / 21)
-    assert f"say {named(said).name}" in most.next_action and "only 9 of 20" in most.next_action
-    assert f"8 say data_defect({named(fault).variable}, clock). If" in most.next_action
+    assert (most.layer.value, most.agreeing, most.confidence) == ("agreement", (11, 24), 11 / 25)
+    assert f"9 say {named(said).name}, 11 another cause" in most.next_action
+    assert f"8 of them data_defect({named(fault).variable}, clock). If" in most.next_action
     assert named(fault).next_action in most.next_action
-    # A few draws overturn nothing; what stands in the rows stands, and so does what is missing.
-    assert named(said, draws=[fault] * 19).name is named(said).name
+    # Leaving it open contradicts nothing, and a few draws overturn nothing.
+    for draws in ([said] * 2 + [thin] * 18, [thin] * 20, [fault] * 19):
+        assert named(said, draws=draws).name is named(said).name
+    # What stands in the rows stands, and so does what is missing.
     for layer in ("data", "labels", "support"):
         found = BROKEN[layer][0]
         assert named(found, draws=[VALID] * 20).name is named(found).name
