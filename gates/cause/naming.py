@@ -128,7 +128,9 @@ def _agreement(
 
 
 def _words(said: Diagnosis) -> str:
-    detail = ", ".join(dict.fromkeys(part for part in (said.variable, said.kind) if part))
+    defect = said.name is CauseName.DATA_DEFECT
+    parts = (said.variable, said.kind) if defect else (said.variable or said.kind,)
+    detail = ", ".join(dict.fromkeys(part for part in parts if part))
     return f"{said.name.value}({detail})" if detail else said.name.value
 
 

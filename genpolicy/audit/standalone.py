@@ -150,10 +150,10 @@ def _evidence(result: AuditResult, settings: AuditSettings) -> list[str]:
     tested = [row for row in result.strata if row.p_adjusted is not None and row.n]
     if tested:
         row = max(tested, key=lambda item: (item.effect or 0.0, item.variable))
+        detail = f" ({row.detail})" if row.detail else ""
         lines.append(
-            f"hidden: {len(tested)} variables tested; the strongest is {row.variable} "
-            f"{row.detail}".rstrip()
-            + f", effect {row.effect:.2f}, adjusted p {row.p_adjusted:.3f}"
+            f"hidden: {len(tested)} variables tested; the strongest is {row.variable}{detail}, "
+            f"effect {row.effect:.2f}, adjusted p {row.p_adjusted:.3f}"
         )
     lines += [
         f"validity: {mode.mode} in {mode.phase}: {mode.successes} of {mode.episodes} succeed "
