@@ -1,13 +1,17 @@
 """Does the observation itself tell the clusters of a situation apart? Then they are no modes."""
 
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy import stats
 
 from genpolicy.audit.data import Array, AuditInput, Flags, Integers
 from genpolicy.audit.modes import Clustering
 from genpolicy.audit.neighbourhoods import Neighbourhood
 from genpolicy.audit.settings import AuditSettings
+from genpolicy.seeds import stream
 
 AXES = (2, 3)
 # Share of a scale by which what is no route must differ to be seen: a declared scale is several
@@ -16,6 +20,26 @@ ONSET = 0.25
 JITTER = 0.01  # a tenth of a scale, squared: flat clouds stay solvable
 # Of the usual step: a course that differs by less (about 15 degrees) is no other course.
 COURSE = 0.25
+# Family-wise chance, over all components, that one which says nothing is believed to tell.
+LEVEL = 0.05
+# Draws of clusters by which it is known what chance tells.
+DRAWS = 4
+
+
+@dataclass(frozen=True)
+class Told:
+    """What tells the clusters of one situation apart.
+
+    Attributes:
+        together: The place, the course or the speed does.
+        columns: Observed components that do: their number, and that of their last step behind all
+            of those.
+        chance: Those that tell clusters of the same sizes, but drawn; once for each of `DRAWS`.
+    """
+
+    together: bool
+    columns: frozenset[int]
+    chance: tuple[frozenset[int], ...] = ()
 
 
 def resolved_by_observation(
@@ -25,7 +49,7 @@ def resolved_by_observation(
     clustering: Clustering,
     *,
     route: bool = True,
-) -> bool:
+) -> Told:
     """Whether one observed component, or the place, already tells the clusters apart.
 
     Then the members do not share one observation, and a deterministic policy can follow both.
@@ -38,21 +62,82 @@ def resolved_by_observation(
     that is observed goes: who passes one place on two courses does not choose there.
     """
     least = 1.0 if route else ONSET
-    if not route and _told_by_speed(data, settings, situation, clustering):
-        return True
-    if _told_by_course(data, settings, situation, clustering):
-        return True
+    together = not route and _told_by_speed(data, settings, situation, clustering)
     place = _place(data)
-    for values, inside in _observed(data, settings, situation, clustering):
-        if len(place):
+    if len(place):
+        for values, inside in _observed(data, settings, situation, clustering):
             line = _along(values[:, place], inside)
-            if _apart(line, inside) >= least and _auc(line, inside) >= settings.resolved_auc:
-                return True
-        gap = np.abs(np.median(values[inside], axis=0) - np.median(values[~inside], axis=0))
-        far = np.flatnonzero(gap >= least)
-        if any(_auc(values[:, j], inside) >= settings.resolved_auc for j in far):
-            return True
-    return False
+            far = _apart(line, inside) >= least
+            together |= far and _auc(line, inside) >= settings.resolved_auc
+        together = together or _told_by_course(data, settings, situation, clustering)
+    uuid = str(data.episodes.uuid[data.episode[situation.query]])
+    rng = stream(0, "audit", "resolution", uuid, int(data.index[situation.query]))
+    drawn = [replace(clustering, labels=rng.permutation(clustering.labels)) for _ in range(DRAWS)]
+    real, *chance = (
+        _columns(data, settings, situation, split, least) for split in (clustering, *drawn)
+    )
+    return Told(bool(together), real, tuple(chance))
+
+
+def credible(told: Sequence[tuple[int, Told]], columns: int) -> frozenset[int]:
+    """Components that tell clusters apart in more episodes than chance gives any of so many.
+
+    Of fifty components that say nothing one orders a few chunks by luck, another one in every
+    situation; one that tells does so again and again. What chance gives is what components tell of
+    clusters that are drawn: a component's own number, and at least that of the usual one.
+
+    Args:
+        told: Episode of the query, and what tells the clusters, of every situation with some.
+        columns: How many components were looked at.
+    """
+    hits = _episodes((episode, item.columns) for episode, item in told)
+    drawn: Counter[int] = Counter()
+    for number in range(DRAWS):
+        once = _episodes((episode, item.chance[number]) for episode, item in told)
+        drawn.update({column: len(episodes) for column, episodes in once.items()})
+    # One more than was seen: of no number of draws follows that chance gives nothing.
+    usual = (sum(drawn.values()) + 1) / columns
+    return frozenset(
+        column
+        for column, episodes in hits.items()
+        if float(stats.poisson.sf(len(episodes) - 1, max(usual, drawn[column]) / DRAWS))
+        <= LEVEL / columns
+    )
+
+
+def _episodes(told: Iterable[tuple[int, frozenset[int]]]) -> dict[int, set[int]]:
+    """Episodes in which each component tells something."""
+    found: dict[int, set[int]] = {}
+    for episode, columns in told:
+        for column in columns:
+            found.setdefault(column, set()).add(episode)
+    return found
+
+
+def _columns(
+    data: AuditInput,
+    settings: AuditSettings,
+    situation: Neighbourhood,
+    clustering: Clustering,
+    least: float,
+) -> frozenset[int]:
+    """Observed components, and behind them their last steps, that tell a cluster from the rest."""
+    width = int(np.count_nonzero(np.isfinite(data.observation_scale)))
+    found: set[int] = set()
+    for values, inside in _observed(data, settings, situation, clustering):
+        found |= _tell(values, inside, least, settings.resolved_auc)
+    steps, step = _steps(data, settings, situation)
+    if step > 0.0:
+        for mode in range(clustering.count):
+            inside = clustering.labels == mode
+            part = _tell(steps, inside, COURSE * step, settings.resolved_auc)
+            found |= {width + column for column in part}
+    return frozenset(found)
+
+
+def _tell(values: Array, inside: Flags, least: float, auc: float) -> set[int]:
+    gap = np.abs(np.median(values[inside], axis=0) - np.median(values[~inside], axis=0))
+    return {int(j) for j in np.flatnonzero(gap >= least) if _auc(values[:, j], inside) >= auc}
 
 
 def _told_by_speed(
@@ -73,34 +158,34 @@ def _told_by_speed(
 def _told_by_course(
     data: AuditInput, settings: AuditSettings, situation: Neighbourhood, clustering: Clustering
 ) -> bool:
-    """Whether the last observed step orders the clusters (nearly) perfectly.
+    """Whether the way across the course, in the plane or in space, orders the clusters.
 
     The members stand within several scales of each other, and a step is a fraction of one: places
-    cannot show what their difference shows. A component of the step, or the way across the course
-    in the plane or in space, must differ by a quarter of the usual step.
+    cannot show what their difference shows. It must differ by a quarter of the usual step.
     """
-    if settings.observation_horizon < 2:
+    place, (steps, step) = _place(data), _steps(data, settings, situation)
+    if step <= 0.0:
         return False
-    rows = situation.members
-    before = np.maximum(rows - 1, data.first_row[rows])
-    used = np.flatnonzero(np.isfinite(data.observation_scale))
-    steps = data.observation[np.ix_(rows, used)] - data.observation[np.ix_(before, used)]
-    steps = steps / data.observation_scale[used]
-    least = COURSE * float(np.median(np.linalg.norm(steps, axis=1)))
-    if least <= 0.0:
-        return False
-    place = _place(data)
     for mode in range(clustering.count):
         inside = clustering.labels == mode
-        gap = np.abs(np.median(steps[inside], axis=0) - np.median(steps[~inside], axis=0))
-        far = np.flatnonzero(gap >= least)
-        if any(_auc(steps[:, j], inside) >= settings.resolved_auc for j in far):
+        line = _across(steps[:, place], inside)
+        if _apart(line, inside) >= COURSE * step and _auc(line, inside) >= settings.resolved_auc:
             return True
-        if len(place):
-            line = _across(steps[:, place], inside)
-            if _apart(line, inside) >= least and _auc(line, inside) >= settings.resolved_auc:
-                return True
     return False
+
+
+def _steps(
+    data: AuditInput, settings: AuditSettings, situation: Neighbourhood
+) -> tuple[Array, float]:
+    """Last observed step of each member, in scales, and the usual length; 0 without a history."""
+    rows = situation.members
+    used = np.flatnonzero(np.isfinite(data.observation_scale))
+    if settings.observation_horizon < 2:
+        return np.zeros((len(rows), len(used))), 0.0
+    before = np.maximum(rows - 1, data.first_row[rows])
+    steps = data.observation[np.ix_(rows, used)] - data.observation[np.ix_(before, used)]
+    steps = steps / data.observation_scale[used]
+    return steps, float(np.median(np.linalg.norm(steps, axis=1)))
 
 
 def _across(values: Array, inside: Flags) -> Array:

@@ -19,7 +19,7 @@ from genpolicy.audit.persistence import (
     von_neumann,
 )
 from genpolicy.audit.progress import Progress, silent
-from genpolicy.audit.resolution import resolved_by_observation
+from genpolicy.audit.resolution import Told, credible, resolved_by_observation
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.seeds import stream
 
@@ -102,14 +102,20 @@ def claimed(
     A phase in which too few held-out episodes show them is said to have one mode: a handful
     among many situations is what chance gives.
     """
-    numbers: dict[str, list[int]] = {}
+    told: dict[str, list[tuple[int, int, Told]]] = {}
     analysed: dict[str, list[Neighbourhood]] = {}
     for number, (phase, item, split) in enumerate(found):
         analysed.setdefault(phase, []).append(item)
-        if split.count > 1 and not resolved_by_observation(
-            data, settings, item, split, route=component == POSITION
-        ):
-            numbers.setdefault(phase, []).append(number)
+        if split.count > 1:
+            seen = resolved_by_observation(data, settings, item, split, route=component == POSITION)
+            told.setdefault(phase, []).append((number, int(data.episode[item.query]), seen))
+    columns = 2 * int(np.count_nonzero(np.isfinite(data.observation_scale)))
+    numbers: dict[str, list[int]] = {}
+    for phase, entries in told.items():
+        believed = credible([(episode, seen) for _, episode, seen in entries], columns)
+        numbers[phase] = [
+            number for number, _, seen in entries if not (seen.together or seen.columns & believed)
+        ]
     return {
         number
         for phase, chosen in numbers.items()
