@@ -4,9 +4,8 @@ from gates.cause.answers import Answer, CauseName, Diagnosis, Layer, Named
 from gates.cause.limits import CauseLimits
 from gates.cause.numbers import Numbers
 from gates.cause.told import teller, told
-from genpolicy.audit.columns import INSIDE
 from genpolicy.audit.rows import Stratum
-from genpolicy.audit.strata import EPISODE_VARIABLES
+from genpolicy.audit.variable import EPISODE_VARIABLES, INSIDE
 
 DATA_VARIABLES = ("calibration_epoch",)
 HISTORY, SEQUENCE = "history", "recording_sequence"

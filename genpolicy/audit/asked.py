@@ -10,10 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from genpolicy.audit.data import AuditInput, recorded
-from genpolicy.audit.predictability import EPISODE_VARIABLES, HISTORY
+from genpolicy.audit.predictability import HISTORY
 from genpolicy.audit.rows import Asked, Prediction
 from genpolicy.audit.semantics import Semantics
 from genpolicy.audit.settings import AuditSettings
+from genpolicy.audit.variable import EPISODE_VARIABLES
 
 COLUMN = "column."
 

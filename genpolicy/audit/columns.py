@@ -16,7 +16,7 @@ from genpolicy.audit.data import Array, AuditInput, Flags, Integers
 from genpolicy.audit.guesses import Guess
 from genpolicy.audit.rows import Stratum
 from genpolicy.audit.settings import AuditSettings
-from genpolicy.audit.variable import Values, Variable
+from genpolicy.audit.variable import INSIDE, Values, Variable
 from genpolicy.seeds import stream
 from genpolicy.statistics.conditional import ConditionalTest, conditional_test
 
@@ -30,8 +30,6 @@ INNER_FOLDS = 5
 # The observation tells a column's values apart where it does so in most situations.
 MOST = 0.5
 LEAST_APART = 3
-# Said of what has another value in one episode.
-INSIDE = "switches inside episodes"
 Drawn = tuple[Integers, Integers, Integers]
 Knows = Callable[[Choices, Flags, Flags], Array]
 """Scores of each mode: choices, which are known, which are wanted -> (wanted, K)."""

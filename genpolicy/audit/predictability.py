@@ -23,12 +23,12 @@ from genpolicy.audit.resolution import observed_gap
 from genpolicy.audit.rows import Prediction
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.audit.situations import Several
+from genpolicy.audit.variable import EPISODE_VARIABLES
 from genpolicy.seeds import stream
 
 CONFIDENCE = 0.9  # each end of the interval is a bound of 95 %
 REPEATS = 5
 LEAST_EPISODES = 20
-EPISODE_VARIABLES = ("operator", "object", "calibration_epoch")
 ORDER, SEQUENCE, HISTORY, TOGETHER = (
     "episode_order", "recording_sequence", "history", "everything_together",
 )  # fmt: skip

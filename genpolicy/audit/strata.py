@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from genpolicy.audit.columns import INSIDE, Asking, column_strata
+from genpolicy.audit.columns import Asking, column_strata
 from genpolicy.audit.data import Array, AuditInput, Integers, Text, recorded
 from genpolicy.audit.history import history_test
 from genpolicy.audit.modes import Clustering
@@ -18,6 +18,7 @@ from genpolicy.audit.neighbourhoods import Neighbourhood
 from genpolicy.audit.resolution import observed_gap
 from genpolicy.audit.rows import Stratum
 from genpolicy.audit.settings import AuditSettings
+from genpolicy.audit.variable import EPISODE_VARIABLES, INSIDE
 from genpolicy.seeds import stream
 from genpolicy.statistics.conditional import conditional_test
 from genpolicy.statistics.multiplicity import holm
@@ -25,7 +26,6 @@ from genpolicy.statistics.multiplicity import holm
 BINS = 3
 Variable = tuple[str, NDArray[np.generic] | None, bool]
 
-EPISODE_VARIABLES = ("operator", "object", "calibration_epoch")
 HISTORY = "history"
 SEQUENCE = "recording_sequence"
 # Same side in turns of two, or for a session: both show in the episodes two and four places off.

@@ -6,6 +6,10 @@ from hashlib import sha256
 import numpy as np
 from numpy.typing import NDArray
 
+# Said of what has another value in one episode.
+INSIDE = "switches inside episodes"
+# What is known by name of every episode, where it is recorded.
+EPISODE_VARIABLES = ("operator", "object", "calibration_epoch")
 Integers = NDArray[np.int64]
 Values = NDArray[np.int64] | NDArray[np.float64]
 

@@ -6,8 +6,8 @@ import pytest
 from planted import HIDDEN, TOLD, VALID, counts, named
 
 from gates.cause import CauseName
-from genpolicy.audit.columns import INSIDE
 from genpolicy.audit.reach_rows import LEARNED, Reach, Side
+from genpolicy.audit.variable import INSIDE
 
 ABSENT = counts(two_mode_episodes=0, two_mode=0, persistent=0)
 
