@@ -127,5 +127,10 @@ class Cause:
     @property
     def text(self) -> str:
         """The cause with the variable, else the kind, that it names."""
-        detail = self.variable or self.kind
-        return f"{self.name}({detail})" if detail else str(self.name)
+        return in_words(self.name, self.variable or self.kind)
+
+
+def in_words(name: CauseName, *details: str) -> str:
+    """A cause with what it names, each once."""
+    named = ", ".join(dict.fromkeys(part for part in details if part))
+    return f"{name}({named})" if named else str(name)

@@ -8,7 +8,16 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from gates.cause.answers import NEXT, Answer, Cause, CauseName, Diagnosis, Layer, Named
+from gates.cause.answers import (
+    NEXT,
+    Answer,
+    Cause,
+    CauseName,
+    Diagnosis,
+    Layer,
+    Named,
+    in_words,
+)
 from gates.cause.components import others
 from gates.cause.hidden import hidden
 from gates.cause.limits import CauseLimits
@@ -128,10 +137,9 @@ def _agreement(
 
 
 def _words(said: Diagnosis) -> str:
-    defect = said.name is CauseName.DATA_DEFECT
-    parts = (said.variable, said.kind) if defect else (said.variable or said.kind,)
-    detail = ", ".join(dict.fromkeys(part for part in parts if part))
-    return f"{said.name.value}({detail})" if detail else said.name.value
+    if said.name is CauseName.DATA_DEFECT:
+        return in_words(said.name, said.variable, said.kind)
+    return in_words(said.name, said.variable or said.kind)
 
 
 def _check_floors(numbers: Numbers, limits: CauseLimits) -> None:

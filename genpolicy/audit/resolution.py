@@ -1,8 +1,8 @@
 """Does the observation itself tell the clusters of a situation apart? Then they are no modes."""
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import stats
@@ -63,20 +63,24 @@ def resolved_by_observation(
     """
     least = 1.0 if route else ONSET
     together = not route and _told_by_speed(data, settings, situation, clustering)
-    place = _place(data)
+    observed, steps = _observed(data, settings, situation), _steps(data, settings, situation)
+    place, auc = _place(data), settings.resolved_auc
     if len(place):
-        for values, inside in _observed(data, settings, situation, clustering):
-            line = _along(values[:, place], inside)
-            far = _apart(line, inside) >= least
-            together |= far and _auc(line, inside) >= settings.resolved_auc
-        together = together or _told_by_course(data, settings, situation, clustering)
+        masks = _masks(clustering.labels, clustering.count)
+        together = together or any(
+            _parts(_along(values[:, place], inside), inside, least, auc)
+            for values in observed
+            for inside in masks
+        )
+        together = together or _told_by_course(steps, place, masks, auc)
     uuid = str(data.episodes.uuid[data.episode[situation.query]])
     rng = stream(0, "audit", "resolution", uuid, int(data.index[situation.query]))
-    drawn = [replace(clustering, labels=rng.permutation(clustering.labels)) for _ in range(DRAWS)]
+    drawn = [rng.permutation(clustering.labels) for _ in range(DRAWS)]
     real, *chance = (
-        _columns(data, settings, situation, split, least) for split in (clustering, *drawn)
+        _columns(observed, steps, _masks(labels, clustering.count), least, auc)
+        for labels in (clustering.labels, *drawn)
     )
-    return Told(bool(together), real, tuple(chance))
+    return Told(together, real, tuple(chance))
 
 
 def credible(told: Sequence[tuple[int, Told]], columns: int) -> frozenset[int]:
@@ -115,29 +119,31 @@ def _episodes(told: Iterable[tuple[int, frozenset[int]]]) -> dict[int, set[int]]
 
 
 def _columns(
-    data: AuditInput,
-    settings: AuditSettings,
-    situation: Neighbourhood,
-    clustering: Clustering,
+    observed: Sequence[Array],
+    steps: tuple[Array, float],
+    masks: Sequence[Flags],
     least: float,
+    auc: float,
 ) -> frozenset[int]:
     """Observed components, and behind them their last steps, that tell a cluster from the rest."""
-    width = int(np.count_nonzero(np.isfinite(data.observation_scale)))
     found: set[int] = set()
-    for values, inside in _observed(data, settings, situation, clustering):
-        found |= _tell(values, inside, least, settings.resolved_auc)
-    steps, step = _steps(data, settings, situation)
-    if step > 0.0:
-        for mode in range(clustering.count):
-            inside = clustering.labels == mode
-            part = _tell(steps, inside, COURSE * step, settings.resolved_auc)
-            found |= {width + column for column in part}
+    last, step = steps
+    for inside in masks:
+        for values in observed:
+            found |= _tell(values, inside, least, auc)
+        if step > 0.0:
+            found |= {last.shape[1] + j for j in _tell(last, inside, COURSE * step, auc)}
     return frozenset(found)
 
 
 def _tell(values: Array, inside: Flags, least: float, auc: float) -> set[int]:
     gap = np.abs(np.median(values[inside], axis=0) - np.median(values[~inside], axis=0))
     return {int(j) for j in np.flatnonzero(gap >= least) if _auc(values[:, j], inside) >= auc}
+
+
+def _masks(labels: Integers, count: int) -> list[Flags]:
+    """Members of each cluster."""
+    return [labels == mode for mode in range(count)]
 
 
 def _told_by_speed(
@@ -156,22 +162,17 @@ def _told_by_speed(
 
 
 def _told_by_course(
-    data: AuditInput, settings: AuditSettings, situation: Neighbourhood, clustering: Clustering
+    steps: tuple[Array, float], place: Integers, masks: Sequence[Flags], auc: float
 ) -> bool:
     """Whether the way across the course, in the plane or in space, orders the clusters.
 
     The members stand within several scales of each other, and a step is a fraction of one: places
     cannot show what their difference shows. It must differ by a quarter of the usual step.
     """
-    place, (steps, step) = _place(data), _steps(data, settings, situation)
-    if step <= 0.0:
-        return False
-    for mode in range(clustering.count):
-        inside = clustering.labels == mode
-        line = _across(steps[:, place], inside)
-        if _apart(line, inside) >= COURSE * step and _auc(line, inside) >= settings.resolved_auc:
-            return True
-    return False
+    last, step = steps
+    return step > 0.0 and any(
+        _parts(_across(last[:, place], inside), inside, COURSE * step, auc) for inside in masks
+    )
 
 
 def _steps(
@@ -222,8 +223,10 @@ def _along(values: Array, inside: Flags) -> Array:
     return np.asarray(values @ (line / length if length > 0.0 else line))
 
 
-def _apart(values: Array, inside: Flags) -> float:
-    return abs(float(np.median(values[inside]) - np.median(values[~inside])))
+def _parts(values: Array, inside: Flags, least: float, auc: float) -> bool:
+    """Whether a coordinate differs by so much and orders a cluster and the rest."""
+    apart = abs(float(np.median(values[inside]) - np.median(values[~inside])))
+    return apart >= least and _auc(values, inside) >= auc
 
 
 def observed_gap(
@@ -235,24 +238,17 @@ def observed_gap(
     """Largest difference of a component's median between a cluster and the rest, in scales."""
     return max(
         float(np.max(np.abs(np.median(v[inside], axis=0) - np.median(v[~inside], axis=0))))
-        for v, inside in _observed(data, settings, situation, clustering)
+        for v in _observed(data, settings, situation)
+        for inside in _masks(clustering.labels, clustering.count)
     )
 
 
-def _observed(
-    data: AuditInput,
-    settings: AuditSettings,
-    situation: Neighbourhood,
-    clustering: Clustering,
-) -> Iterator[tuple[Array, Flags]]:
-    """Scaled observations of the members, per row of the history, and each cluster against all."""
+def _observed(data: AuditInput, settings: AuditSettings, situation: Neighbourhood) -> list[Array]:
+    """Scaled observations of the members, one table per row of the history."""
     used = np.flatnonzero(np.isfinite(data.observation_scale))
     first = data.first_row[situation.members]
-    for back in range(settings.observation_horizon):
-        rows = np.maximum(situation.members - back, first)
-        values = data.observation[np.ix_(rows, used)] / data.observation_scale[used]
-        for mode in range(clustering.count):
-            yield values, clustering.labels == mode
+    rows = [np.maximum(situation.members - k, first) for k in range(settings.observation_horizon)]
+    return [data.observation[np.ix_(part, used)] / data.observation_scale[used] for part in rows]
 
 
 def _auc(values: Array, inside: Flags) -> float:

@@ -54,14 +54,14 @@ class Sample:
             return everything
         sizes = np.maximum.reduceat(np.nan_to_num(np.abs(values)), edges)
         moving = sizes[sizes > 0.0]
-        large = moving[moving > APART * np.median(moving)] if len(moving) else moving
+        limit = APART * float(np.median(moving)) if len(moving) else np.inf
+        large, common = moving[moving > limit], moving[moving <= limit]
         if not len(large):
             return everything
-        common = moving[moving <= APART * np.median(moving)]
         factor = float(np.median(large) / np.median(common))
         if abs(np.log(factor / (180.0 / np.pi))) > np.log(ALIKE):
             return everything
-        kept = sizes <= APART * np.median(moving)
+        kept = sizes <= limit
         return np.asarray(np.repeat(kept, np.diff(np.append(edges, len(values)))))
 
     def selected(self, columns: list[str]) -> Array:
