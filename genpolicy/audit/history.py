@@ -76,8 +76,8 @@ def history_test(
         return HistoryTest(1.0, 0.0, 0.0, 1.0, 0.0, "", 0)
     cell = np.unique(blocks, return_inverse=True)[1].reshape(-1)
     features, names = past_features(data, settings, rows)
-    past_values = _standardised(features, cell)
-    now_values = _standardised(present_features(data, settings, rows), cell)
+    past_values = centred_ranks(features, cell)
+    now_values = centred_ranks(present_features(data, settings, rows), cell)
     draws = np.stack([_dealt(labels, cell, rng) for _ in range(settings.permutations)])
     null = np.array([_ratio(past_values, draw, cell).max(initial=0.0) for draw in draws])
     null_now = np.array([_ratio(now_values, draw, cell).max(initial=0.0) for draw in draws[:99]])
@@ -164,8 +164,16 @@ def _several(labels: Integers, blocks: Integers, keep: Flags) -> Flags:
     return result
 
 
-def _standardised(values: Array, cell: Integers) -> Array:
-    """Ranks inside the blocks, centred: one far value must not decide. Shape (n, F)."""
+def centred_ranks(values: Array, cell: Integers) -> Array:
+    """Ranks inside the blocks, centred: one far value must not decide.
+
+    Args:
+        values: Shape (n, F).
+        cell: Block of each row. Shape (n,).
+
+    Returns:
+        Shape (n, F).
+    """
     result = np.zeros_like(values)
     for block in np.unique(cell):
         inside = np.flatnonzero(cell == block)

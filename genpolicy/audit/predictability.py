@@ -15,11 +15,18 @@ from scipy import stats
 from genpolicy.audit.choices import Choices, choices
 from genpolicy.audit.columns import COLUMNS, column_guesses
 from genpolicy.audit.data import Array, AuditInput, Integers, Text, recorded
-from genpolicy.audit.guesses import Guess, by_all, by_best_column, by_nearest, by_value, right
-from genpolicy.audit.history import past_features, present_features, shortest_gap
+from genpolicy.audit.before import Before, seen_before
+from genpolicy.audit.guesses import (
+    Guess,
+    by_all,
+    by_best_column,
+    by_nearest,
+    by_one_more,
+    by_value,
+    right,
+)
 from genpolicy.audit.modes import Clustering
 from genpolicy.audit.neighbourhoods import Neighbourhood
-from genpolicy.audit.resolution import observed_gap
 from genpolicy.audit.rows import Prediction
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.audit.situations import Several
@@ -36,13 +43,10 @@ HABIT, OWN_HABIT, TURNS = (
     "previous_episodes", "previous_episodes_of_operator", "every_other_episode",
 )  # fmt: skip
 Items = list[tuple[Neighbourhood, Clustering]]
-Seeds = tuple[str, int]
 NEXT_TO = 4  # episodes recorded next to one another that speak for each other
 HABIT_LENGTH = 2
 # Of what the present tells, no more than this is taken for granted: something must be left to tell.
 MOST_SEEN = 0.9
-# Clusters that differ this much in what is observed have begun to move apart, in scales.
-STILL_TOGETHER = 0.5
 
 
 def predictions(
@@ -93,8 +97,10 @@ def predictions(
             hits = _hits(chosen, guess, rng, repeats=1 if once else REPEATS)
             row = _row(name, phase, chosen, hits, of=len(more) if name in keys else 1)
             rows.append(replace(row, detail=_best(times)) if name == COLUMNS else row)
-        past = _past(data, settings, items, chosen, (phase, root_seed))
-        rows += [past] if past is not None else []
+        keys = "audit", "predictability", phase, HISTORY
+        seen = seen_before(data, settings, items, chosen)
+        if len(seen.choices.mode) >= LEAST_EPISODES:
+            rows.append(_past(phase, seen, stream(root_seed, *keys)))
     return tuple(rows)
 
 
@@ -160,63 +166,17 @@ def _before(links: Integers, order: Array, group: Integers) -> Integers:
     return result
 
 
-def _past(
-    data: AuditInput, settings: AuditSettings, items: Items, chosen: Choices, seeds: Seeds
-) -> Prediction | None:
-    """What was seen earlier in the episode tells, beyond what is seen now.
-
-    Looked at where the clusters still stand in one place; None where they nowhere do. An episode
-    that has no past that long is a guess.
-    """
-    phase, root_seed = seeds
-    past, present = _seen(data, settings, items, chosen)
-    known = np.isfinite(present[:, 0]) if present.size else np.zeros(0, dtype=bool)
-    if np.count_nonzero(known) < LEAST_EPISODES:
-        return None
-    part = Choices(chosen.episode[known], chosen.mode[known], chosen.share[known])
-    rows = [
-        _row(
-            HISTORY, phase, part,
-            _hits(part, by_best_column(values[known]),
-                  stream(root_seed, "audit", "predictability", phase, HISTORY), repeats=1),
-        )
-        for values in (past, present)
-    ]  # fmt: skip
-    told, seen = rows[0], min(rows[1].told, MOST_SEEN)
-    ends = (told.told, told.told_lower, told.told_upper)
-    middle, lower, upper = ((end - seen) / (1.0 - seen) for end in ends)
-    return replace(told, told=middle, told_lower=lower, told_upper=upper)
-
-
-def _seen(
-    data: AuditInput, settings: AuditSettings, items: Items, chosen: Choices
-) -> tuple[Array, Array]:
-    """Past and present of each episode from the middle of its situation; NaN where there is none.
-
-    Its situation is the one whose clusters differ least in what is observed now.
-    """
-    gaps = np.array([observed_gap(data, settings, *item) for item in items])
-    first = np.unique(data.first_row)[:1]
-    past = np.full((len(chosen.episode), past_features(data, settings, first)[0].shape[1]), np.nan)
-    now = present_features(data, settings, first)
-    present = np.full((len(chosen.episode), now.shape[1]), np.nan)
-    place = {int(episode): number for number, episode in enumerate(chosen.episode)}
-    for number in np.argsort(np.round(gaps, 6), kind="stable"):
-        if not STILL_TOGETHER - gaps[int(number)] > 0:
-            break
-        members = items[int(number)][0].members
-        members = members[[int(data.episode[row]) in place for row in members]]
-        at = np.array([place[int(data.episode[row])] for row in members], dtype=np.int64)
-        new = ~np.isfinite(present[at, 0]) if len(at) else np.zeros(0, dtype=bool)
-        if not new.any():
-            continue
-        seen = present_features(data, settings, members)
-        present[at[new]] = (seen - np.median(seen, axis=0))[new]
-        old = members - data.first_row[members] >= shortest_gap(settings)
-        if np.any(old & new):
-            features = past_features(data, settings, members[old])[0]
-            past[at[old & new]] = (features - np.median(features, axis=0))[new[old]]
-    return past, present
+def _past(phase: str, seen: Before, rng: np.random.Generator) -> Prediction:
+    """What was seen earlier in the episode tells, beyond what is seen now."""
+    guesses = by_best_column(seen.present), by_one_more(seen.present, seen.past)
+    now, both = (
+        _row(HISTORY, phase, seen.choices, _hits(seen.choices, guess, rng, repeats=1))
+        for guess in guesses
+    )
+    known = min(now.told, MOST_SEEN)
+    ends = (both.told, both.told_lower, both.told_upper)
+    middle, lower, upper = ((end - known) / (1.0 - known) for end in ends)
+    return replace(both, told=middle, told_lower=lower, told_upper=upper)
 
 
 def _rows_of(items: Items) -> Integers:

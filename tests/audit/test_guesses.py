@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from genpolicy.audit.choices import Choices
-from genpolicy.audit.guesses import by_nearest, by_value, right
+from genpolicy.audit.guesses import by_best_column, by_nearest, by_one_more, by_value, right
 from genpolicy.seeds import stream
 
 
@@ -56,3 +56,30 @@ def test_a_free_choice_rarely_seems_told():
         found.append((chosen.weight @ hits / chosen.weight.sum() - 0.5) / 0.5)
     # The standard error is .08: 0.25 lies three of them away.
     assert np.mean(found) < 0.05 and np.max(found) < 0.25
+
+
+def skill(chosen, guess, rng):
+    """Weighted share of right guesses."""
+    return chosen.weight @ right(chosen, guess, rng, repeats=2) / chosen.weight.sum()
+
+
+def test_one_more_column_adds_what_the_first_leaves_and_nothing_that_follows_from_it():
+    chosen, rng = free(11, n=400)
+    sign = 2.0 * chosen.mode - 1.0
+    now = sign + 1.5 * rng.normal(size=400)
+    early = sign + 1.5 * rng.normal(size=400)
+    base, noise = now[:, None], rng.normal(size=(400, 6))
+    alone = skill(chosen, by_best_column(base), rng)
+    more = skill(chosen, by_one_more(base, np.column_stack([noise, early])), rng)
+    same = skill(chosen, by_one_more(base, np.column_stack([noise, 3.0 * now + 1.0])), rng)
+    # Two equal looks of 1.5 spreads: right in .75 with one, in .83 with both.
+    assert alone == pytest.approx(0.75, abs=0.05)
+    assert more - alone > 0.04
+    assert abs(same - alone) < 0.03
+
+
+def test_a_cue_without_error_is_no_division_by_zero():
+    chosen, rng = free(12)
+    flat, cue = np.zeros((150, 2)), chosen.mode[:, None].astype(float)
+    assert skill(chosen, by_one_more(flat, cue), rng) == pytest.approx(1.0)
+    assert skill(chosen, by_one_more(flat, flat), rng) == pytest.approx(0.5, abs=0.1)

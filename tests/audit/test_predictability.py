@@ -56,6 +56,17 @@ def test_where_an_episode_came_from_tells_where_it_goes():
     assert found.told_lower > 0.4
 
 
+def test_a_lamp_that_has_gone_out_tells_though_it_shows_one_of_two_values():
+    # As a deviation from the median of a situation it told -.12 to .10 of the mode, and whoever
+    # obeyed it three times of five was said to choose freely.
+    often, always = (
+        told(planned(decided_by="lamp_early", fidelity=share), stride=6)[HISTORY]
+        for share in (0.6, 0.95)
+    )
+    assert often.told >= 0.25 and often.told_upper > 0.4
+    assert always.told_lower > 0.5
+
+
 @pytest.mark.parametrize(
     "plan",
     [planned(), planned(correlation=0.9), replace(planned(), shares=(0.75, 0.25)),

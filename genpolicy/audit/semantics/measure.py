@@ -127,6 +127,10 @@ def _position(
             settings,
             limit_s=max(ORDER_STEPS * period, settings.clock_floor_s),
         )
+    if not findings and stream in data.delay_s:
+        # A stamp that says too early is held back until it was received: rows stay as they are,
+        # and only the delay shows that the ages are wrong.
+        findings += _by_delay(data, stream, motion, settings)[0]
     findings += drift_findings(episode_drifts(motion, lags.steps, settings), data, settings)
     return position_clocks(data, lags.steps, settings), shift_steps(taken, period), findings
 

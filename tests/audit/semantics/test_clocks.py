@@ -1,5 +1,7 @@
 """Clocks: lag by episode, offsets of epochs and single episodes, drift, streams, realignment."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from arms import SETTINGS, arms, last_epoch, late
@@ -50,3 +52,19 @@ def test_a_response_before_its_command_is_named_everywhere():
     assert kinds(late(data, -3.0, np.ones(60, dtype=bool))) == ["clock"]
     declared = SETTINGS.model_copy(update={"declared_lag_steps": 4.0})
     assert "clock" in kinds(data, declared)
+
+
+def test_stamps_that_say_too_early_show_in_the_delay_where_no_row_could_move():
+    # A row holds what was received; a sample stamped 80 ms early is no earlier there.
+    data = arms(17)
+    name, rng = data.position_stream, stream(17, "delay")
+    delay = 0.002 + 0.0005 * rng.random(len(data.episode))
+    honest = replace(data, delay_s={name: delay})
+    assert kinds(honest) == []
+    off = delay + 0.08 * last_epoch(data)[data.episode]
+    found = measure(replace(data, delay_s={name: off}), SETTINGS)
+    (finding,) = found.findings
+    assert (finding.kind, finding.variable) == ("clock", name) and "epoch e" in finding.where
+    assert finding.measured == pytest.approx(0.08, abs=0.001)
+    # Its rows stand where they were recorded: nothing is to be moved.
+    assert not found.shift_steps.any()

@@ -1,0 +1,83 @@
+"""What episodes that had a choice saw well before it, beside what they see now.
+
+Situations show one observation, so an episode's past and present are said as its place among those
+who saw the same: a rank. A median would not do. Of a lamp that shone green or red it is one of the
+two, and which one changes from situation to situation.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from genpolicy.audit.choices import Choices
+from genpolicy.audit.data import Array, AuditInput
+from genpolicy.audit.history import centred_ranks, past_features, present_features, shortest_gap
+from genpolicy.audit.modes import Clustering
+from genpolicy.audit.neighbourhoods import Neighbourhood
+from genpolicy.audit.resolution import observed_gap
+from genpolicy.audit.settings import AuditSettings
+
+# Clusters that differ this much in what is observed have begun to move apart, in scales.
+STILL_TOGETHER = 0.5
+
+
+@dataclass(frozen=True)
+class Before:
+    """Episodes with a choice, and a past to look at where they had it.
+
+    Attributes:
+        choices: Their choices. Length n.
+        past: Features of the past, as centred ranks between -0.5 and 0.5. Shape (n, P).
+        present: The same of the present. Shape (n, F).
+    """
+
+    choices: Choices
+    past: Array
+    present: Array
+
+
+def seen_before(
+    data: AuditInput,
+    settings: AuditSettings,
+    items: list[tuple[Neighbourhood, Clustering]],
+    choices: Choices,
+) -> Before:
+    """Past and present of each episode in one situation: of those long enough after its start the
+    one whose clusters differ least in what is observed now.
+
+    Episodes that have no such situation had nothing to see before, or moved apart at once; they
+    are left out.
+
+    Args:
+        data: Canonical audit input.
+        settings: Horizons.
+        items: Situations of one phase with several modes.
+        choices: Who chose what in that phase.
+    """
+    gap = shortest_gap(settings)
+    gaps = np.array([observed_gap(data, settings, *item) for item in items])
+    first = np.unique(data.first_row)[:1]
+    n = len(choices.episode)
+    past = np.full((n, past_features(data, settings, first)[0].shape[1]), np.nan)
+    present = np.full((n, present_features(data, settings, first).shape[1]), np.nan)
+    place = {int(episode): number for number, episode in enumerate(choices.episode)}
+    missing = np.ones(n, dtype=bool)
+    for number in np.argsort(np.round(gaps, 6), kind="stable"):
+        if not STILL_TOGETHER - gaps[int(number)] > 0:
+            break
+        rows = items[int(number)][0].members
+        rows = rows[[int(data.episode[row]) in place for row in rows]]
+        rows = rows[rows - data.first_row[rows] >= gap]
+        at = np.array([place[int(data.episode[row])] for row in rows], dtype=np.int64)
+        new = missing[at]
+        if not new.any() or len(np.unique(choices.mode[at])) < 2:
+            continue
+        earlier = past_features(data, settings, rows)[0]
+        now = present_features(data, settings, rows)
+        one = np.zeros(len(rows), dtype=np.int64)
+        past[at[new]] = centred_ranks(earlier, one)[new] / len(rows)
+        present[at[new]] = centred_ranks(now, one)[new] / len(rows)
+        missing[at] = False
+    known = ~missing
+    part = Choices(choices.episode[known], choices.mode[known], choices.share[known])
+    return Before(part, past[known], present[known])

@@ -1,0 +1,49 @@
+"""What was seen before a choice: ranks among those who saw the same, where there is a past."""
+
+import numpy as np
+from planar import SETTINGS
+
+from benchmarks.audit.plan import Plan
+from benchmarks.audit.recorder import record
+from genpolicy.audit.before import STILL_TOGETHER, seen_before
+from genpolicy.audit.choices import choices
+from genpolicy.audit.data import canonical
+from genpolicy.audit.history import past_features, shortest_gap
+from genpolicy.audit.linking import link
+from genpolicy.audit.resolution import observed_gap
+from genpolicy.audit.situations import find_situations
+
+PLAN = Plan(5, shares=(0.5, 0.5), episodes=90, exact=True, decided_by="lamp_early", fidelity=1.0)
+
+
+def chosen(stride=10):
+    data = canonical(record("planar", PLAN).data)
+    settings = SETTINGS.model_copy(update={"query_stride": stride})
+    items = [(i, c) for _, i, c in find_situations(data, settings, 0)[0] if c.count > 1]
+    links = link([(data.episode[i.members], c.labels) for i, c in items], len(data.episodes), 6)
+    return data, settings, items, choices(data, items, links)
+
+
+def test_a_lamp_is_high_or_low_among_those_who_saw_the_same_whichever_is_the_rarer():
+    data, settings, items, who = chosen()
+    seen = seen_before(data, settings, items, who)
+    names = past_features(data, settings, np.unique(data.first_row)[:1])[1]
+    lamp = seen.past[:, names.index("lamp at the start")]
+    shown = {int(e): data.observation[data.first_row[data.episode == e][0], 4]
+             for e in seen.choices.episode}  # fmt: skip
+    lit = np.array([shown[int(episode)] for episode in seen.choices.episode])
+    assert np.mean(np.sign(lamp) == np.sign(lit)) > 0.95
+    assert np.abs(seen.past).max() <= 0.5 and np.abs(seen.present).max() <= 0.5
+
+
+def test_only_situations_that_have_a_past_and_stand_together_are_asked():
+    data, settings, items, who = chosen()
+    gap = shortest_gap(settings)
+    fit = [item for item in items if observed_gap(data, settings, *item) < STILL_TOGETHER]
+    rows = np.concatenate([item.members for item, _ in fit])
+    late = {int(e) for e in data.episode[rows[rows - data.first_row[rows] >= gap]]}
+    seen = seen_before(data, settings, items, who)
+    assert len(seen.choices.episode) and set(map(int, seen.choices.episode)) <= late
+    assert np.all(np.isfinite(seen.past)) and np.all(np.isfinite(seen.present))
+    apart = [item for item in items if observed_gap(data, settings, *item) >= STILL_TOGETHER]
+    assert len(seen_before(data, settings, apart, who).choices.episode) == 0
