@@ -184,10 +184,8 @@ def _chain_error(root: Path, chain: Chain, draft: TrialCard | None) -> str:
         return "the draft names other reports than lie here; run `dvc repro card`"
     if draft.candidate != candidate or draft.candidate_checkpoint_sha256 != pinned:
         return "the draft is for another candidate than gate D promotes; run `dvc repro card`"
-    lacking = left_out(caveats_of(chain.reports), draft)
-    if lacking:
-        return f"the draft leaves out a caveat ({lacking[0][:60]!r}); run `dvc repro card`"
-    return ""
+    lacking = "".join(left_out(caveats_of(chain.reports), draft)[:1])
+    return lacking and f"the draft leaves out a caveat ({lacking[:60]!r}); run `dvc repro card`"
 
 
 def _waiting(what: str) -> Measured:
