@@ -43,8 +43,12 @@ def history(tmp_path):
         git(*named, "commit", "-q", "--allow-empty", "-m", "x")
         return git("rev-parse", "HEAD")
 
+    def merge(branch, *options):
+        named = ("-c", "user.name=ada", "-c", "user.email=ada@example.org")
+        git(*named, "merge", "-q", "--no-ff", "-m", "x", *options, branch)
+
     git("init", "-q", "-b", "main")
-    commit.git = git
+    commit.git, commit.merge = git, merge
     return root, commit
 
 
@@ -131,17 +135,31 @@ def test_evidence_seen_before_the_plan_stays_seen(history):
         require_registered_first(root)
 
 
-def test_evidence_from_a_branch_that_had_no_plan_yet_is_found_through_the_merge(history):
+@pytest.mark.parametrize("again", [False, True])
+def test_evidence_of_a_branch_without_a_plan_is_found_through_the_merge(history, again):
+    """Also where the same bytes came to the main branch by themselves, after the plan."""
     root, commit = history
     commit(params="a: 1")
     commit.git("checkout", "-q", "-b", "side")
     commit(lock=_lock())
     commit.git("checkout", "-q", "main")
     commit(plan="a: 1")
-    mail = ("-c", "user.name=ada", "-c", "user.email=ada@example.org")
-    commit.git(*mail, "merge", "-q", "--no-ff", "-m", "x", "side")
+    if again:
+        commit(lock=_lock())
+    commit.merge("side")
     with pytest.raises(IntegrityError, match="no older than artifacts/audit"):
         require_registered_first(root)
+
+
+def test_evidence_that_came_with_a_merge_came_after_the_plan(history):
+    root, commit = history
+    commit(plan="a: 1")
+    commit.git("checkout", "-q", "-b", "side")
+    commit(params="a: 2")
+    commit.git("checkout", "-q", "main")
+    commit.merge("side", "--no-commit")
+    commit(lock=_lock())
+    require_registered_first(root)
 
 
 def test_an_untracked_plan_is_none(history):
@@ -218,7 +236,8 @@ def test_only_the_evidence_of_a_stage_dates_it(history):
     lock = yaml.safe_load(_lock())
     commit(lock=yaml.safe_dump({"stages": {"stress": {"outs": [other]}}}))
     commit(plan="a: 1")
-    lock["stages"]["stress"]["outs"].insert(0, other)
+    outs = lock["stages"]["stress"]["outs"]
+    lock["stages"]["stress"]["outs"] = [other, *outs, other]
     commit(lock=yaml.safe_dump(lock))
     require_registered_first(root)
 
@@ -282,6 +301,13 @@ def test_what_is_not_committed_has_no_author(history, people, name):
     require_makers_known(root, ["ada"], people)
     (root / name).write_text("by whom?")
     with pytest.raises(IntegrityError, match=f"{name} is not committed as it lies here"):
+        require_makers_known(root, ["ada"], people)
+
+
+def test_a_history_without_the_candidate_does_not_say_who_made_it(history, people):
+    root, commit = history
+    commit("ada", plan="a: 1")
+    with pytest.raises(IntegrityError, match="the candidate is not committed"):
         require_makers_known(root, ["ada"], people)
 
 
