@@ -76,8 +76,11 @@ def check(
     """Prove the chain.
 
     Exit 0 if every gate up to `--through` passes, 3 if one does not or its
-    report is untrue, 2 if a report or a setting cannot be read.
+    report is untrue, 2 if a report or a setting cannot be read. Through E, git
+    must show that the plan was committed before the evidence, and that nobody
+    but the authors committed to the candidate; 2 where it does not.
     """
+    from gates.card.history import require_history
     from gates.proof import prove_all
     from gates.report import GATES
 
@@ -85,6 +88,8 @@ def check(
     rungs = prove_all(root)[: GATES.index(last) + 1]
     _print_rungs(rungs, as_json)
     codes = {rung.exit_code for rung in rungs if rung.verdict != "PASS"}
+    if last == "E" and not codes:
+        require_history(root)
     return 2 if 2 in codes else max(codes, default=0)
 
 
@@ -171,18 +176,14 @@ def sign(
     """Add your signature to a trial card.
 
     Before, gates A to D are proved again, the plan must have been committed
-    before the evidence, and a reviewer must not have committed to the candidate.
+    before the evidence, nobody but the authors may have committed to the
+    candidate, and the evidence must be what its journals say (minutes).
     """
-    from gates.card.history import require_no_commit_of, require_registered_first
-    from gates.card.people import load_allow_list
     from gates.card.signing import sign_card
     from gates.proof import prove_chain
 
     prove_chain(root, "D")
-    require_registered_first(root)
-    person = load_allow_list(root).find(reviewer)
-    if person is not None:
-        require_no_commit_of(root, person)
+    _require_beneath(root)
     path = sign_card(root, card_file=card, key_file=key, reviewer=reviewer)
     print(f"Signed {path.name} as {reviewer}. Judge gate E again to see what is missing.")
     return 0
@@ -195,13 +196,15 @@ def verify_card(
     today: Annotated[str, typer.Option(help="Day to judge for, YYYY-MM-DD; default today.")] = "",
     as_json: AsJson = False,
 ) -> int:
-    """Judge gate E without writing. Exit 0 only for a valid, complete, signed card."""
-    from gates.card.history import require_registered_first
+    """Judge gate E without writing. Exit 0 only for a valid, complete, signed card.
+
+    Where it would pass, all is asked that `sign` asks before a signature.
+    """
     from gates.proof import judge
 
     report = judge(root, "E", today=_day(today) if today else None)
     if report.verdict == "PASS":
-        require_registered_first(root)
+        _require_beneath(root)
     if as_json:
         print(report.model_dump_json(indent=2))
     else:
@@ -225,6 +228,17 @@ def summary(root: Root = Path(), as_json: AsJson = False) -> int:
     if (root / INDEX).is_file():
         print(f"Reports: {INDEX}")
     return 0
+
+
+def _require_beneath(root: Path) -> None:
+    """What a proved chain does not show: its history, and that its journals say the same."""
+    from gates.card.history import require_history
+    from gates.rederive import rederive
+    from gates.report import GATES
+
+    require_history(root)
+    for gate in GATES[:-1]:
+        rederive(root, gate)
 
 
 def _gate(letter: str) -> "Gate":

@@ -6,7 +6,7 @@ measured for this cell would look like a safe one. An empty field keeps the card
 
 import datetime
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
@@ -25,6 +25,7 @@ DRAFT_PATH = "artifacts/card/card.json"
 CardName = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]{0,63}$")]
 
 # What the draft fixes; a signed card may not differ here from the draft of this very chain.
+# Caveats are not among them, since people may add some: see `left_out`.
 FIXED = (
     "schema_version",
     "name",
@@ -84,6 +85,7 @@ class TrialCard(StrictModel):
         stop_path: How the robot is stopped, from hand to drive.
         abort_thresholds: What ends the trial, by name; may be lowered, never raised.
         rollback: What runs instead.
+        caveats: What the reports do not show, or what moved since the plan; people may add some.
         not_before: First day of validity, YYYY-MM-DD.
         expires: Last day of validity, YYYY-MM-DD.
         nonce: Makes this card unlike any other; at least 16 characters.
@@ -134,8 +136,6 @@ def draft_card(
     """
     candidate = promoted(reports["D"])
     limits = {c.id: c.threshold for c in reports["D"].criteria if c.threshold is not None}
-    caveats = [caveat for gate in sorted(reports) for caveat in reports[gate].caveats]
-    caveats.insert(0, CHECKPOINT_ONLY)
     baselines = reports["D"].settings.get("baselines", ())
     return TrialCard(
         schema_version=CARD_SCHEMA_VERSION,
@@ -157,12 +157,23 @@ def draft_card(
             name: limits[criterion] for name, criterion in ABORT_FROM.items() if criterion in limits
         },
         rollback=f"stop, then the simpler policy (one of {', '.join(baselines)}) or manual control",
-        caveats=tuple(dict.fromkeys(caveats)),
+        caveats=caveats_of(reports),
         reviewer="",
         not_before="",
         expires="",
         nonce="",
     )
+
+
+def caveats_of(reports: Mapping[Gate, GateReport]) -> tuple[str, ...]:
+    """Caveats of the reports, each once, after the one that speaks of what was tested."""
+    found = [caveat for gate in sorted(reports) for caveat in reports[gate].caveats]
+    return tuple(dict.fromkeys([CHECKPOINT_ONLY, *found]))
+
+
+def left_out(required: Sequence[str], card: TrialCard) -> list[str]:
+    """Caveats that the card does not repeat, word for word; others beside them may stand."""
+    return [caveat for caveat in required if caveat not in card.caveats]
 
 
 def promoted(report: GateReport) -> str:

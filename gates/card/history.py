@@ -1,93 +1,151 @@
 """What only the history of the repository knows: what came first, and who committed.
 
-Asked by the commands `sign` and `verify card`, not by the judge: the same evidence gives the same
-report, whatever is committed afterwards.
+Asked by the commands `sign`, `verify card` and `gates check --through E`, not by the judge: the
+same evidence gives the same report, whatever is committed afterwards.
+
+Git shows the order of commits, not when a run took place or whose hands typed. What was measured
+and left out of the history until the plan was committed looks like evidence that came after it.
 """
 
 import subprocess
+from collections.abc import Sequence
 from pathlib import Path
 
-from gates.card.people import REVIEWER, Person
+from gates.card.people import ALLOW_LIST, AllowList, load_allow_list
+from gates.card.signing import read_draft
+from gates.pipeline import LOCK, RUNGS
 from gates.preregistration import PREREGISTRATION
 from genpolicy.errors import IntegrityError
 from genpolicy.integrity.documents import read_yaml
 
-LOCK = "dvc.lock"
-EVIDENCE = "artifacts/stress"
+MADE = (
+    "task", "record", "ingest", "train_baselines", "train_factors", "train_generators", "card",
+)  # fmt: skip
+"""Stages that make what is measured, or the card: no gate holds a figure of theirs to a limit."""
+MEASURED = tuple(stage for stages in RUNGS.values() for stage in stages if stage not in MADE)
+"""Stages whose evidence a plan has to precede."""
 CANDIDATE = ("genpolicy", "gates", "stages", "params.yaml", "dvc.yaml")
 """Whoever committed to these made the candidate, or the yardstick that it is held against."""
+PLAN_FIRST = "Plan, commit, run, commit, and have it reviewed by somebody else; then sign."
+NAME_ALL = (
+    f"Name all who made it in `card.authors`, by their addresses on {ALLOW_LIST}; let others sign."
+)
+
+
+def require_history(root: Path) -> None:
+    """Require of the draft below `root` that its plan came first and its makers are its authors.
+
+    Raises:
+        IntegrityError: As `require_registered_first` and `require_makers_known`.
+        BadInputError: The draft is missing or malformed.
+        ConfigError: A malformed allow-list.
+    """
+    require_registered_first(root)
+    require_makers_known(root, read_draft(root).authors, load_allow_list(root))
 
 
 def require_registered_first(root: Path) -> None:
-    """Require that the plan was committed before the evidence, and not touched since.
+    """Require that the plan was committed before all evidence, and not touched since.
+
+    Evidence is dated by the commits that brought its hash into the lock file, the oldest of them
+    included: who has seen these bytes once has seen them, and the same run gives the same bytes.
 
     Raises:
-        IntegrityError: No git repository, the plan or the evidence is not committed, or the plan
-            is no older than the evidence.
+        IntegrityError: No git history or not all of it, the plan or the evidence is not committed,
+            or the plan is no older than the evidence of a stage.
     """
-    if _git(root, "rev-parse", "--git-dir") is None:
-        _refuse("the repository", "without git history", "a plan committed before the evidence")
+    _require_whole(root)
     if _git(root, "diff", "--quiet", "HEAD", "--", PREREGISTRATION) is None:
         _refuse(PREREGISTRATION, "not committed as it lies here", "committed before the evidence")
     planned = _git(root, "log", "-1", "--format=%H", "--", PREREGISTRATION)
     if not planned:
         _refuse(PREREGISTRATION, "not committed", "committed before the evidence")
-    digest = _evidence_digest(root)
-    commits = _git(root, "log", "--reverse", "--format=%H", f"-S{digest}", "--", LOCK) or ""
-    if not digest or not commits:
-        _refuse(f"{LOCK}: {EVIDENCE}", "not committed", "committed after the plan")
-    first = commits.split()[0]
-    ancestor = _git(root, "merge-base", "--is-ancestor", str(planned), first) is not None
-    if first == planned or not ancestor:
-        _refuse(PREREGISTRATION, "no older than the evidence", "committed before the evidence")
+    after = {*(_git(root, "rev-list", "--ancestry-path", f"{planned}..HEAD") or "").split()}
+    digests = _evidence_digests(root)
+    for stage in MEASURED:
+        evidence, digest = f"artifacts/{stage}", digests.get(stage)
+        brought = _brought(root, digest) if digest else set()
+        if not brought:
+            _refuse(f"{LOCK}: {evidence}", "not committed", "committed after the plan")
+        if not brought <= after:
+            text = f"no older than {evidence}"
+            _refuse(PREREGISTRATION, text, "committed before the evidence")
 
 
-def require_no_commit_of(root: Path, person: Person) -> None:
-    """Require of a reviewer that no commit of what makes the candidate is theirs.
+def require_makers_known(root: Path, authors: Sequence[str], allowed: AllowList) -> None:
+    """Require that nobody but the authors committed to what makes the candidate.
+
+    Since an address belongs to one person of the list, and authors sign nothing, nobody who signs
+    has made it, as reviewer or as owner.
+
+    Args:
+        root: Repository root.
+        authors: Identifiers that the card names.
+        allowed: The allow-list; everybody on it needs an address, so that none of theirs can stand
+            under the name of an author.
 
     Raises:
-        IntegrityError: No git repository, no address of the reviewer, or a commit under one.
+        IntegrityError: No git history or not all of it, a file of the candidate that is not
+            committed, somebody on the list without an address, or a commit by another than the
+            authors.
     """
-    if person.role != REVIEWER:
-        return
-    found = _git(root, "log", "--format=%ae", "--", *CANDIDATE)
-    if found is None:
-        _refuse("the repository", "without git history", "one that says who made the candidate")
-    if not person.emails:
-        _refuse(f"the reviewer {person.id}", "without addresses", "those of their commits")
-    own = {mail.casefold() for mail in person.emails}
-    committed = sorted(own & {mail.casefold() for mail in str(found).split()})
-    if committed:
-        text = f"who committed to the candidate as {committed[0]}"
-        _refuse(f"the reviewer {person.id}", text, "a reviewer who did not make it")
+    _require_whole(root)
+    for person in allowed.people:
+        if not person.emails:
+            found = "without addresses"
+            _refuse(f"{ALLOW_LIST}: {person.id}", found, "those of their commits", NAME_ALL)
+    changed = _git(root, "status", "--porcelain", "--untracked-files=all", "--", *CANDIDATE)
+    committed = _git(root, "log", "--format=%ae", "--", *CANDIDATE)
+    if changed or not committed:
+        name = str(changed).splitlines()[0].split(maxsplit=1)[-1] if changed else "the candidate"
+        _refuse(name, "not committed as it lies here", "a commit that says who made it")
+    owner = {mail.casefold(): person.id for person in allowed.people for mail in person.emails}
+    for mail in sorted({mail.casefold() for mail in str(committed).split()}):
+        if owner.get(mail) not in authors:
+            who = owner.get(mail, f"somebody not on {ALLOW_LIST}")
+            found = f"by {who}, who committed as {mail}"
+            expected = f"commits of its authors alone ({', '.join(authors) or 'none is named'})"
+            _refuse("the candidate", found, expected, NAME_ALL)
 
 
-def _evidence_digest(root: Path) -> str:
-    """Hash of the comparison's evidence, as the lock file records it; empty without."""
+def _brought(root: Path, digest: str) -> set[str]:
+    """Commits that brought a hash into the lock file or took it out, on whatever branch."""
+    found = _git(root, "log", "--full-history", "-m", "--format=%H", f"-S{digest}", "--", LOCK)
+    return {*(found or "").split()}
+
+
+def _evidence_digests(root: Path) -> dict[str, str]:
+    """Hash of the evidence of each stage, as the lock file records it; none where it does not."""
     lock = read_yaml(root / LOCK)
     stages = lock.get("stages") if isinstance(lock, dict) else None
-    stage = stages.get("stress") if isinstance(stages, dict) else None
-    for out in (stage.get("outs") or ()) if isinstance(stage, dict) else ():
-        if isinstance(out, dict) and out.get("path") == EVIDENCE:
-            return str(out.get("md5") or "")
-    return ""
+    digests = {}
+    for name, stage in stages.items() if isinstance(stages, dict) else ():
+        for out in (stage.get("outs") or ()) if isinstance(stage, dict) else ():
+            if isinstance(out, dict) and out.get("path") == f"artifacts/{name}":
+                digests[name] = str(out.get("md5") or "")
+    return digests
+
+
+def _require_whole(root: Path) -> None:
+    """Require a repository of git whose history goes back to its beginning."""
+    cut = _git(root, "rev-parse", "--is-shallow-repository")
+    if cut is None:
+        expected = "one that says what was committed first, and by whom"
+        _refuse("the repository", "without git history", expected)
+    if cut != "false":
+        expected = "the whole history (`git fetch --unshallow`)"
+        _refuse("the repository", "a shallow clone", expected)
 
 
 def _git(root: Path, *args: str) -> str | None:
     """Output of a git command; None if it fails or there is no git."""
+    command = ["git", "--no-replace-objects", "-C", str(root), *args]
     try:
-        done = subprocess.run(
-            ["git", "-C", str(root), *args], capture_output=True, text=True, check=False
-        )
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
     except OSError:
         return None
     return done.stdout.strip() if done.returncode == 0 else None
 
 
-def _refuse(where: str, found: str, expected: str) -> None:
-    raise IntegrityError(
-        where=where,
-        found=found,
-        expected=expected,
-        action="Plan, commit, run, commit, and have it reviewed by somebody else; then sign.",
-    )
+def _refuse(where: str, found: str, expected: str, action: str = PLAN_FIRST) -> None:
+    raise IntegrityError(where=where, found=found, expected=expected, action=action)

@@ -15,7 +15,9 @@ from gates.card.card import (
     DRAFT_PATH,
     CardName,
     TrialCard,
+    caveats_of,
     envelope_violations,
+    left_out,
     missing_fields,
     promoted,
     read_card,
@@ -182,7 +184,8 @@ def _chain_error(root: Path, chain: Chain, draft: TrialCard | None) -> str:
         return "the draft names other reports than lie here; run `dvc repro card`"
     if draft.candidate != candidate or draft.candidate_checkpoint_sha256 != pinned:
         return "the draft is for another candidate than gate D promotes; run `dvc repro card`"
-    return ""
+    lacking = "".join(left_out(caveats_of(chain.reports), draft)[:1])
+    return lacking and f"the draft leaves out a caveat ({lacking[:60]!r}); run `dvc repro card`"
 
 
 def _waiting(what: str) -> Measured:

@@ -20,7 +20,14 @@ from securesystemslib.dsse import Envelope as DsseEnvelope
 from securesystemslib.exceptions import VerificationError
 from securesystemslib.signer import CryptoSigner, SSlibKey  # type: ignore[attr-defined]
 
-from gates.card.card import FIXED, TrialCard, draft_path, missing_fields, read_card
+from gates.card.card import (
+    FIXED,
+    TrialCard,
+    draft_path,
+    left_out,
+    missing_fields,
+    read_card,
+)
 from gates.card.people import ALLOW_LIST, REVIEWER, AllowList, Person, dependence, load_allow_list
 from gates.preregistration import PREREGISTRATION, read_plan
 from gates.protection import is_rehearsal
@@ -203,6 +210,10 @@ def _check_fixed(root: Path, card: TrialCard, where: str) -> None:
     for name in FIXED:
         if getattr(card, name) != getattr(draft, name):
             raise _bad(f"{where}: {name}", "another value", f"that of {draft_path(root).name}")
+    lacking = left_out(draft.caveats, card)
+    if lacking:
+        text = f"all {len(draft.caveats)} of {draft_path(root).name}; more may be added"
+        raise _bad(f"{where}: caveats", f"without {lacking[0][:60]!r}", text)
 
 
 def _parse_envelope(data: bytes, where: str) -> tuple[bytes, list[dict[str, str]]]:

@@ -1,64 +1,121 @@
 """What came first, and who committed: asked of a small repository."""
 
+import os
 import subprocess
 
 import pytest
 import yaml
+from team import KEYS
 
-from gates.card.history import require_no_commit_of, require_registered_first
-from gates.card.people import Person
+from gates.card.history import (
+    MADE,
+    MEASURED,
+    require_history,
+    require_makers_known,
+    require_registered_first,
+)
+from gates.card.people import AllowList, Person
+from gates.pipeline import RUNGS
 from genpolicy.errors import IntegrityError
+from genpolicy.integrity.documents import canonical_json
 
 PLAN, LOCK = "preregistration.yaml", "dvc.lock"
+FILES = {"plan": PLAN, "lock": LOCK, "params": "params.yaml", "code": "genpolicy/code.py"}
 
 
 @pytest.fixture
 def history(tmp_path):
+    root = tmp_path / "repo"
+    root.mkdir()
+
     def git(*args):
-        subprocess.run(["git", "-C", str(tmp_path), *args], check=True, capture_output=True)
+        done = ["git", "-C", str(root), *args]
+        return subprocess.run(done, check=True, capture_output=True, text=True).stdout.strip()
 
     def commit(author="ada", **files):
         for name, text in files.items():
-            (tmp_path / {"plan": PLAN, "lock": LOCK, "params": "params.yaml"}[name]).write_text(
-                text
-            )
+            path = root / FILES[name]
+            path.parent.mkdir(exist_ok=True)
+            path.write_text(text)
         git("add", "-A")
         mail = f"{author}@example.org"
-        git("-c", f"user.name={author}", "-c", f"user.email={mail}", "commit", "-q", "-m", "x")
+        named = ("-c", f"user.name={author}", "-c", f"user.email={mail}")
+        git(*named, "commit", "-q", "--allow-empty", "-m", "x")
+        return git("rev-parse", "HEAD")
 
-    git("init", "-q")
-    return tmp_path, commit
+    def merge(branch, *options):
+        named = ("-c", "user.name=ada", "-c", "user.email=ada@example.org")
+        git(*named, "merge", "-q", "--no-ff", "-m", "x", *options, branch)
+
+    git("init", "-q", "-b", "main")
+    commit.git, commit.merge = git, merge
+    return root, commit
 
 
-def _lock(digest):
-    outs = [{"path": "artifacts/stress", "md5": digest}]
-    return yaml.safe_dump({"stages": {"stress": {"outs": outs}}})
+def _lock(digest="0", **other):
+    """A lock file in which each stage wrote something of its own."""
+    digests = {stage: f"{digest:0>4}{number:0>28}.dir" for number, stage in enumerate(MEASURED)}
+    digests |= {stage: digest for stage, digest in other.items() if stage in digests}
+    stages = {
+        stage: {"outs": [{"path": f"artifacts/{stage}", "md5": digests[stage]}]}
+        for stage in MEASURED
+    }
+    return yaml.safe_dump({"stages": stages})
+
+
+def test_every_stage_that_measures_for_a_gate_is_dated():
+    """A new stage is, until somebody says that it makes things and measures nothing."""
+    assert set(MEASURED) | set(MADE) == {stage for stages in RUNGS.values() for stage in stages}
+    assert {"audit", "reload", "latency", "shadow", "stress"} < set(MEASURED)
+    assert all(set(MEASURED) & set(RUNGS[gate]) for gate in "ABCD")
 
 
 def test_a_plan_before_the_evidence_is_one(history):
     root, commit = history
     commit(plan="a: 1")
-    commit(lock=_lock("0123456789abcdef.dir"))
+    commit(lock=_lock())
     require_registered_first(root)
     commit(params="later: 1")
     require_registered_first(root)
 
 
+def test_evidence_made_again_after_the_plan_is_dated_by_itself(history):
+    """A rehearsal, or a run under an earlier plan, is not what is judged."""
+    root, commit = history
+    commit(lock=_lock("old"))
+    commit(plan="a: 1")
+    commit(lock=_lock("new"))
+    require_registered_first(root)
+
+
+@pytest.mark.parametrize("stage", MEASURED)
+def test_one_gates_evidence_before_the_plan_is_enough(history, stage):
+    root, commit = history
+    commit(lock=_lock("old"))
+    commit(plan="a: 1")
+    commit(
+        lock=_lock(
+            "new", **{stage: yaml.safe_load(_lock("old"))["stages"][stage]["outs"][0]["md5"]}
+        )
+    )
+    with pytest.raises(IntegrityError, match=f"no older than artifacts/{stage}, expected"):
+        require_registered_first(root)
+
+
 @pytest.mark.parametrize("order", ["after", "together", "moved after", "edited", "uncommitted"])
 def test_a_plan_that_came_with_or_after_the_evidence_is_none(history, order):
     root, commit = history
-    lock = _lock("0123456789abcdef.dir")
     if order == "after":
-        commit(lock=lock)
+        commit(lock=_lock())
         commit(plan="a: 1")
     elif order == "together":
-        commit(lock=lock, plan="a: 1")
+        commit(lock=_lock(), plan="a: 1")
     else:
         commit(plan="a: 1")
         if order == "uncommitted":
-            (root / LOCK).write_text(lock)
+            (root / LOCK).write_text(_lock())
         else:
-            commit(lock=lock)
+            commit(lock=_lock())
         if order == "moved after":
             commit(plan="a: 2")
         elif order == "edited":
@@ -67,19 +124,69 @@ def test_a_plan_that_came_with_or_after_the_evidence_is_none(history, order):
         require_registered_first(root)
 
 
+def test_evidence_seen_before_the_plan_stays_seen(history):
+    """Its bytes lay there, went and came back: the plan was written by who had seen them."""
+    root, commit = history
+    commit(lock=_lock("seen"))
+    commit(lock=_lock("other"))
+    commit(plan="a: 1")
+    commit(lock=_lock("seen"))
+    with pytest.raises(IntegrityError, match="no older than artifacts/audit"):
+        require_registered_first(root)
+
+
+@pytest.mark.parametrize("again", [False, True])
+def test_evidence_of_a_branch_without_a_plan_is_found_through_the_merge(history, again):
+    """Also where the same bytes came to the main branch by themselves, after the plan."""
+    root, commit = history
+    commit(params="a: 1")
+    commit.git("checkout", "-q", "-b", "side")
+    commit(lock=_lock())
+    commit.git("checkout", "-q", "main")
+    commit(plan="a: 1")
+    if again:
+        commit(lock=_lock())
+    commit.merge("side")
+    with pytest.raises(IntegrityError, match="no older than artifacts/audit"):
+        require_registered_first(root)
+
+
+def test_evidence_that_came_with_a_merge_came_after_the_plan(history):
+    root, commit = history
+    commit(plan="a: 1")
+    commit.git("checkout", "-q", "-b", "side")
+    commit(params="a: 2")
+    commit.git("checkout", "-q", "main")
+    commit.merge("side", "--no-commit")
+    commit(lock=_lock())
+    require_registered_first(root)
+
+
 def test_an_untracked_plan_is_none(history):
     root, commit = history
-    commit(lock=_lock("0123456789abcdef.dir"))
+    commit(lock=_lock())
     (root / PLAN).write_text("a: 1")
     with pytest.raises(IntegrityError, match="not committed"):
         require_registered_first(root)
 
 
-def test_without_git_nothing_came_first(tmp_path):
-    with pytest.raises(IntegrityError, match="without git"):
-        require_registered_first(tmp_path)
-    with pytest.raises(IntegrityError, match="without git"):
-        require_no_commit_of(tmp_path, _person(["rita@example.org"]))
+@pytest.fixture
+def people():
+    return _people(ada="author", rita="reviewer", mo="model")
+
+
+def _people(**roles):
+    return AllowList(people=tuple(
+        Person(id=name, name=name.title(), role=role, public_key="0" * 64,
+               emails=(f"{name}@example.org",))
+        for name, role in roles.items()
+    ))  # fmt: skip
+
+
+def test_without_git_nothing_came_first_and_nobody_made_it(tmp_path, people):
+    for ask in (require_registered_first, lambda root: require_makers_known(root, ["ada"], people)):
+        with pytest.raises(IntegrityError, match="the repository is without git history"):
+            ask(tmp_path)
 
 
 def test_where_git_is_not_installed_nothing_came_first(history, monkeypatch):
@@ -90,38 +197,156 @@ def test_where_git_is_not_installed_nothing_came_first(history, monkeypatch):
         require_registered_first(root)
 
 
-@pytest.mark.parametrize("text", ["stages: {}", "stages: {stress: {}}", "[1]", "stages: [1]"])
-def test_a_lock_without_the_comparison_records_no_evidence(history, text):
+def test_a_clone_that_was_cut_off_does_not_know_who_came_first(history, tmp_path, people):
+    """Git gives the whole candidate to who committed last, where the history begins."""
+    root, commit = history
+    commit("mo", params="a: 1", plan="a: 1")
+    commit("ada", lock=_lock())
+    commit("ada", params="a: 2")
+    cut = tmp_path / "cut"
+    commit.git("clone", "-q", "--depth", "1", f"file://{root}", str(cut))
+    for ask in (require_registered_first, lambda root: require_makers_known(root, ["ada"], people)):
+        with pytest.raises(IntegrityError, match="the repository is a shallow clone"):
+            ask(cut)
+
+
+@pytest.mark.parametrize("text", ["stages: {}", "stages: {audit: {}}", "[1]", "stages: [1]"])
+def test_a_lock_without_the_evidence_records_none(history, text):
     root, commit = history
     commit(plan="a: 1")
     commit(lock=text)
+    with pytest.raises(IntegrityError, match="artifacts/audit is not committed"):
+        require_registered_first(root)
+
+
+def test_a_lock_without_the_evidence_of_one_stage_records_none_of_it(history):
+    root, commit = history
+    commit(plan="a: 1")
+    lock = yaml.safe_load(_lock())
+    del lock["stages"]["stress"]
+    commit(lock=yaml.safe_dump(lock))
     with pytest.raises(IntegrityError, match="artifacts/stress is not committed"):
         require_registered_first(root)
 
 
-def test_only_the_evidence_of_the_comparison_dates_it(history):
+def test_only_the_evidence_of_a_stage_dates_it(history):
     """Another output of the stage, older than the plan, is no evidence of it."""
     root, commit = history
     other = {"path": "artifacts/other", "md5": "fedcba9876543210.dir"}
-    own = {"path": "artifacts/stress", "md5": "0123456789abcdef.dir"}
+    lock = yaml.safe_load(_lock())
     commit(lock=yaml.safe_dump({"stages": {"stress": {"outs": [other]}}}))
     commit(plan="a: 1")
-    commit(lock=yaml.safe_dump({"stages": {"stress": {"outs": [other, own]}}}))
+    outs = lock["stages"]["stress"]["outs"]
+    lock["stages"]["stress"]["outs"] = [other, *outs, other]
+    commit(lock=yaml.safe_dump(lock))
     require_registered_first(root)
 
 
-def _person(emails, role="reviewer"):
-    return Person(id="rita", name="R", role=role, public_key="0" * 64, emails=tuple(emails))
-
-
-def test_a_reviewer_committed_nothing_of_the_candidate(history):
+def test_authors_alone_made_the_candidate(history, people):
     root, commit = history
     commit("ada", params="a: 1")
     commit("rita", plan="a: 1")
-    require_no_commit_of(root, _person(["rita@example.org"]))
-    with pytest.raises(IntegrityError, match="without addresses"):
-        require_no_commit_of(root, _person([]))
-    commit("rita", params="a: 2")
-    with pytest.raises(IntegrityError, match="committed to the candidate"):
-        require_no_commit_of(root, _person(["other@example.org", "Rita@Example.org".lower()]))
-    require_no_commit_of(root, _person(["rita@example.org"], role="safety"))
+    require_makers_known(root, ["ada"], people)
+    for name in ("rita", "mo"):
+        before = commit.git("rev-parse", "HEAD")
+        commit(name, code=f"by {name}")
+        with pytest.raises(IntegrityError, match=f"{name}, who committed as {name}@example.org"):
+            require_makers_known(root, ["ada"], people)
+        commit.git("reset", "-q", "--hard", before)
+    commit("mo", code="by mo")
+    require_makers_known(root, ["ada", "mo"], people)  # mo then signs nothing: `dependence`
+    for authors, named in ((["mo"], r"\(mo\)"), ([], r"\(none is named\)")):
+        with pytest.raises(IntegrityError, match=f"ada, who committed.* alone {named}"):
+            require_makers_known(root, authors, people)
+
+
+def test_a_committer_whom_nobody_lists_is_not_known(history, people):
+    root, commit = history
+    commit("ada", params="a: 1")
+    commit("eve", code="by eve")
+    commit("ada", code="by ada")
+    with pytest.raises(
+        IntegrityError, match=r"somebody not on reviewers.yaml, who committed as eve@"
+    ):
+        require_makers_known(root, ["ada"], people)
+    with pytest.raises(IntegrityError, match="somebody not on"):
+        require_makers_known(root, ["ada", "eve"], people)
+
+
+def test_an_address_is_one_however_it_is_capitalised(history, people):
+    root, commit = history
+    commit("Ada", params="a: 1")
+    require_makers_known(root, ["ada"], people)
+    commit("MO", code="by mo")
+    with pytest.raises(IntegrityError, match="mo, who committed as mo@"):
+        require_makers_known(root, ["ada"], people)
+
+
+def test_whoever_may_sign_has_addresses(history, people):
+    """Else one of theirs could stand under the name of an author."""
+    root, commit = history
+    commit("ada", params="a: 1")
+    for nameless in people.people:
+        changed = [
+            p.model_copy(update={"emails": ()}) if p == nameless else p for p in people.people
+        ]
+        with pytest.raises(IntegrityError, match=f"{nameless.id} is without addresses"):
+            require_makers_known(root, ["ada"], AllowList(people=tuple(changed)))
+
+
+@pytest.mark.parametrize("name", ["params.yaml", "genpolicy/code.py", "genpolicy/new.py"])
+def test_what_is_not_committed_has_no_author(history, people, name):
+    root, commit = history
+    commit("ada", params="a: 1", code="by ada")
+    require_makers_known(root, ["ada"], people)
+    (root / name).write_text("by whom?")
+    with pytest.raises(IntegrityError, match=f"{name} is not committed as it lies here"):
+        require_makers_known(root, ["ada"], people)
+
+
+def test_a_history_without_the_candidate_does_not_say_who_made_it(history, people):
+    root, commit = history
+    commit("ada", plan="a: 1")
+    with pytest.raises(IntegrityError, match="the candidate is not committed"):
+        require_makers_known(root, ["ada"], people)
+
+
+def test_a_replaced_commit_is_read_as_it_was(history, people):
+    root, commit = history
+    first = commit("mo", params="a: 1")
+    other = commit("ada", params="a: 1", code="x")
+    commit.git("replace", first, other)
+    with pytest.raises(IntegrityError, match="mo, who committed"):
+        require_makers_known(root, ["ada"], people)
+
+
+def test_both_are_asked_of_the_card_that_lies_here(history):
+    """Of the draft's authors, by the allow-list of the repository."""
+    root, commit = history
+    entries = [
+        {"id": n, "name": n, "role": r, "emails": [f"{n}@example.org"],
+         "public_key": KEYS[n].public_key().public_bytes_raw().hex()}
+        for n, r in {"ada": "author", "mo": "model"}.items()
+    ]  # fmt: skip
+    (root / "reviewers.yaml").write_text(yaml.safe_dump({"people": entries}))
+    commit("ada", plan="a: 1", params="a: 1")
+    commit("ada", lock=_lock())
+    os.makedirs(root / "artifacts/card")
+    (root / "artifacts/card/card.json").write_bytes(canonical_json(CARD))
+    require_history(root)
+    commit("mo", code="by mo")
+    with pytest.raises(IntegrityError, match="mo, who committed"):
+        require_history(root)
+    commit("ada", plan="a: 2")
+    with pytest.raises(IntegrityError, match="no older than"):
+        require_history(root)
+
+
+CARD = {
+    "schema_version": 2, "name": "trial", "task": "t", "candidate": "flow",
+    "candidate_checkpoint_sha256": "0", "robot_model": "r", "authors": ["ada"], "reports": {},
+    "workspace_lower_m": [0.0, 0.0, 0.0], "workspace_upper_m": [1.0, 1.0, 1.0],
+    "speed_limit_m_s": 0.1, "force_limit_n": None, "force_limit_reason": "", "spotter": "",
+    "stop_path": "", "abort_thresholds": {}, "rollback": "stop", "caveats": [], "reviewer": "",
+    "not_before": "", "expires": "", "nonce": "",
+}  # fmt: skip

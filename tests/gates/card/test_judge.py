@@ -9,6 +9,7 @@ import pytest
 from team import AUTHORS, PEOPLE
 
 from gates.card.judge import CardGateSettings
+from gates.claim import CHECKPOINT_ONLY
 from gates.report import parse_section
 from genpolicy.errors import ConfigError
 from genpolicy.integrity.documents import canonical_json
@@ -144,6 +145,11 @@ def _other_draft(root):
     evidence.record(root)
 
 
+def _without_caveats(team, kept):
+    """A draft that leaves caveats of the reports out, and a card that was signed over it."""
+    _redraft(team, caveats=kept)
+
+
 def _in_alphabet(document):
     document["payload"] = f"!{document['payload']}"
 
@@ -193,6 +199,15 @@ FORGERIES = {
     ),
     "card of another robot": (lambda t: t.forge(_edit(robot_model="fr3")), "signature_valid"),
     "other authors on the card": (lambda t: t.forge(_edit(authors=["mo"])), "signature_valid"),
+    "every caveat dropped": (lambda t: t.forge(_edit(caveats=[])), "signature_valid"),
+    "every caveat dropped from the draft too": (
+        lambda t: _without_caveats(t, []),
+        "upstream_passed",
+    ),
+    "only what was tested kept in the draft": (
+        lambda t: _without_caveats(t, [CHECKPOINT_ONLY]),
+        "upstream_passed",
+    ),
     "subject of another chain": (lambda t: t.forge(_subject), "signature_valid"),
     "force limit empty": (lambda t: t.forge(_edit(force_limit_n=None)), "draft_complete"),
     "force limit zero": (lambda t: t.forge(_edit(force_limit_n=0.0)), "envelope_within_limits"),
@@ -252,6 +267,24 @@ def test_forged_cards_are_refused(signed, kind):
     report = signed.judge()
     assert report.verdict not in ("PASS", "PENDING_REVIEW"), kind
     assert criterion in _red(report), (kind, _red(report))
+
+
+def test_a_caveat_that_people_add_stays(signed):
+    draft = json.loads((signed.root / "artifacts/card/card.json").read_bytes())
+    signed.forge(_edit(caveats=["The floor is wet.", *reversed(draft["caveats"])]))
+    assert signed.judge().verdict == "PASS"
+
+
+def test_what_moved_since_the_plan_is_no_caveat_to_leave_out(signed):
+    """Each caveat of the draft by itself, whatever else the card says."""
+    draft = json.loads((signed.root / "artifacts/card/card.json").read_bytes())
+    for left_out in draft["caveats"]:
+        kept = [text for text in draft["caveats"] if text != left_out]
+        signed.forge(_edit(caveats=[*kept, f"{left_out} "]))
+        report = signed.judge()
+        assert report.verdict == "FAIL", left_out
+        said = {c.id: c.caveat for c in report.criteria}["signature_valid"]
+        assert "caveats is without" in said and left_out[:40] in said
 
 
 @pytest.mark.parametrize("day", [datetime.date(2026, 11, 19), datetime.date(2026, 12, 1)])

@@ -26,6 +26,8 @@ def test_signing_in_turns_waits_for_the_last_owner(team):
         ({"force_limit_n": None}, "rita", "incomplete"),
         ({"candidate": "another"}, "rita", "candidate"),
         ({"reviewer": "Someone Else"}, "rita", "Someone Else"),
+        ({"caveats": []}, "rita", "caveats is without"),
+        ({"caveats": ["All is well."]}, "rita", "caveats is without"),
         ({}, "eve", "listed person"),
     ],
 )
