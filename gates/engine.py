@@ -98,9 +98,7 @@ def judge_gate(spec: GateSpec, root: Path) -> GateReport:
     """
     params = read_params(root)
     settings = read_settings(params, stage_of(spec.gate), spec.settings)
-    said = require_protection(params, spec.gate)
-    if spec.gate == "D":
-        said = (*said, *moved_caveats(root, params))
+    said = (*require_protection(params, spec.gate), *moved_caveats(root, params, spec.gate))
     limits = read_limits(params, spec.gate, spec.criteria)
     names: Sequence[str] = ()
     caveats: Sequence[str] = ()
