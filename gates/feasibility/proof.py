@@ -1,7 +1,7 @@
 """Who watches the watchers: the independent checker, and the mutants that it must find."""
 
 from gates.criterion import Measured, criterion
-from gates.evidence import Evidence, MissingEvidenceError, count, number
+from gates.evidence import Evidence, MissingEvidenceError, count
 from gates.feasibility.settings import SHADOW, FeasibilitySettings
 
 
@@ -23,8 +23,8 @@ def checked_violations(evidence: Evidence, path: str) -> Measured:
         MissingEvidenceError: It checked nothing, or did not prove the motion of what it checked.
     """
     document = evidence.document(path)
-    checked = number(document, "checked_actions")
-    proved = number(document, "reproved_actions")
+    checked = count(document, "checked_actions")
+    proved = count(document, "reproved_actions")
     if checked <= 0:
         raise MissingEvidenceError("the checker saw no action")
     if not proved >= checked:

@@ -5,7 +5,7 @@ import pandas as pd
 
 from gates.bounds import counted_interval, share_interval
 from gates.criterion import Measured, criterion
-from gates.evidence import Evidence, MissingEvidenceError, numbers
+from gates.evidence import Evidence, MissingEvidenceError, counts, numbers
 from gates.reproducibility.settings import MODES, ReproducibilitySettings, chosen_nfe
 from genpolicy.evidence.rows.need import ModeRow
 
@@ -48,7 +48,7 @@ def outside_modes_upper(
     """Upper bound of the share of samples between two modes, or far from all of them."""
     found = []
     for _, rows in situations_of(evidence, candidate).groupby("seed"):
-        between, far = numbers(rows, "between_modes"), numbers(rows, "far_from_modes")
+        between, far = counts(rows, "between_modes"), counts(rows, "far_from_modes")
         share, lower, upper = share_interval(
             (between + far) / numbers(rows, "samples"),
             list(rows["episode_uuid"]),
