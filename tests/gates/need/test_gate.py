@@ -142,6 +142,30 @@ def test_where_a_simpler_policy_may_do_the_page_sends_nobody_to_the_data(ladder)
     assert "run the simpler policy" not in judge(ladder, "A").diagnosis
 
 
+def _independent(entries):
+    return [{**entry, "exceeding": entry["permutations"] // 2} for entry in entries]
+
+
+def test_a_latent_that_answers_nothing_sends_nobody_to_train_what_was_trained(ladder):
+    evidence.edit_document(ladder, "measure_baselines/latent.json", _independent)
+    report = judge(ladder, "A")
+    assert {name for name, verdict in verdicts(report).items() if verdict != "PASS"} == {
+        "latent_dependence_p"
+    }
+    assert "Train the simple baselines" not in report.diagnosis
+    assert "run the simpler policy" not in report.diagnosis
+    assert "clean the demonstrations first" in report.diagnosis
+    evidence.edit_table(
+        ladder,
+        "measure_baselines/modes.parquet",
+        lambda f: f.assign(valid=f["samples"], modes_valid=1, admissible=f["samples"]),
+    )
+    report = judge(ladder, "A")
+    assert verdicts(report)["remedy_valid_share"] == "FAIL"
+    assert "run the simpler policy" in report.diagnosis
+    assert "Train the simple baselines" not in report.diagnosis
+
+
 def test_a_pass_says_first_that_one_mode_may_be_enough(ladder):
     report = judge(ladder, "A")
     assert report.verdict == "PASS" and "one_mode_bc" in report.diagnosis
