@@ -8,7 +8,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from gates.asked_for import CHECKS_ASKED_FOR
 from gates.report import Gate, stage_of
 from genpolicy.errors import ConfigError
 
@@ -114,12 +113,6 @@ class Named:
 
 
 NAMED: tuple[Named, ...] = (
-    Named(
-        "C",
-        "required_checks",
-        CHECKS_ASKED_FOR,
-        "a check that nobody asks for may be gone; evidence says which do not apply to a task",
-    ),
     Named(
         "C",
         "required_fixtures",
