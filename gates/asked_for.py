@@ -1,4 +1,4 @@
-"""Checks that Gate C must ask for: every row of both tables, by name.
+"""Checks that Gate C asks for: every row of both tables, by name. No setting leaves one out.
 
 Written out, not imported: every stage reads the gates, and training may know neither feasibility
 nor execution. A test holds the list to the tables (`genpolicy/feasibility/checks.py`,

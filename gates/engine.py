@@ -3,6 +3,7 @@
 Pure: the report is a function of the evidence, the limits and the settings.
 """
 
+import contextlib
 import importlib.metadata
 import math
 import platform
@@ -34,7 +35,11 @@ from genpolicy.errors import IntegrityError
 from genpolicy.integrity.hashing import sha256_bytes_of
 
 UNRECORDED = "Judged outside the pipeline: dvc.lock holds no run of"
-LIBRARIES = ("numpy", "pandas", "pyarrow", "pydantic", "scipy")
+LIBRARIES = (
+    "numpy", "pandas", "pyarrow", "pydantic", "scipy",
+    "scikit-learn", "torch", "mujoco", "pin",
+)  # fmt: skip
+"""What judges, and what the evidence comes from: the audit, the networks, the arm, its motion."""
 REGIME = (
     "bit-equal for the same wheels, CPU capability, one thread and one batch shape; "
     "elsewhere samples within 1e-5 and the same verdict"
@@ -98,9 +103,7 @@ def judge_gate(spec: GateSpec, root: Path) -> GateReport:
     """
     params = read_params(root)
     settings = read_settings(params, stage_of(spec.gate), spec.settings)
-    said = require_protection(params, spec.gate)
-    if spec.gate == "D":
-        said = (*said, *moved_caveats(root, params))
+    said = (*require_protection(params, spec.gate), *moved_caveats(root, params, spec.gate))
     limits = read_limits(params, spec.gate, spec.criteria)
     names: Sequence[str] = ()
     caveats: Sequence[str] = ()
@@ -297,8 +300,11 @@ def promoted_below(root: Path, below: Gate, wanted: Sequence[str]) -> tuple[list
 
 
 def environment() -> dict[str, str]:
-    """Library versions and the regime in which the numbers repeat: part of what is derived."""
-    found = {name: importlib.metadata.version(name) for name in LIBRARIES}
+    """Versions of installed libraries and the regime of the numbers: part of what is derived."""
+    found = {}
+    for name in LIBRARIES:
+        with contextlib.suppress(importlib.metadata.PackageNotFoundError):
+            found[name] = importlib.metadata.version(name)
     found["python"] = ".".join(platform.python_version_tuple()[:2])
     found["regime"] = REGIME
     return found

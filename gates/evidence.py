@@ -195,6 +195,18 @@ def numbers(frame: pd.DataFrame, column: str) -> Array:
     return values
 
 
+def counts(frame: pd.DataFrame, column: str) -> Array:
+    """A column that counts: `numbers` not below zero, or rows cancel each other. Shape (rows,).
+
+    Raises:
+        MissingEvidenceError: As `numbers`, or a value is below zero.
+    """
+    values = numbers(frame, column)
+    if np.any(values < 0):
+        raise MissingEvidenceError(f"column {column} counts {values.min():g}: corrupt evidence")
+    return values
+
+
 def flags(frame: pd.DataFrame, column: str) -> NDArray[np.bool_]:
     """A column of true or false; not reached (null) counts as false. Shape (rows,).
 
@@ -224,7 +236,10 @@ def count(document: dict[str, Any], key: str) -> float:
     """A count of a document, given as a number or as a list.
 
     Raises:
-        MissingEvidenceError: Absent or neither.
+        MissingEvidenceError: Absent, neither, or below zero.
     """
     value = document.get(key)
-    return float(len(value)) if isinstance(value, list) else number(document, key)
+    found = float(len(value)) if isinstance(value, list) else number(document, key)
+    if found < 0:
+        raise MissingEvidenceError(f"{key} counts {found:g}: corrupt evidence")
+    return found

@@ -1,8 +1,9 @@
 """The plan that was written down before the evidence: limits, margin, alpha, starts, conditions.
 
 `genpolicy gates preregister` writes `preregistration.yaml` from `params.yaml`; it is committed
-before the evidence exists. Gates D and E bind it by hash and say what has moved since: loosened
-apart from tightened, and apart from what is neither.
+before the evidence exists. Every gate says what has moved since of what it and the gates below it
+judge by: loosened apart from tightened, and apart from what is neither. Gates D and E bind the file
+by hash; in the materials of a gate below, a plan that moves would train again behind it.
 """
 
 import functools
@@ -10,32 +11,64 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import yaml
 
-from gates.report import GATES, stage_of
+from gates.report import GATES, Gate, stage_of
 from genpolicy.errors import GenpolicyError
 from genpolicy.integrity.documents import parse_yaml
 from genpolicy.integrity.hashing import sha256_bytes_of
 
 PREREGISTRATION = "preregistration.yaml"
 NONE = f"Nothing was planned in writing: {PREREGISTRATION} is missing or malformed."
-PLANNED: Mapping[str, str] = {
-    "seed": "",
-    "policy.seeds": "",
-    "train_generators.samplers": "",
-    "confidence": ">=",
-    "stress.starts": ">=",
-    "stress.margin": ">=",
-    "stress.alpha": "<=",
-    "stress.planned_effect": "",
-    "stress.baselines": "",
-    "stress.perturbations": "",
-    "stress.episode_limit_s": "",
-    "stress.samples": "",
+
+
+class Planned(NamedTuple):
+    """A setting of the plan beside limits.
+
+    Attributes:
+        strict: On which side it is strict, `<=` or `>=`; '' where neither is.
+        gate: The lowest gate that judges by it, or whose evidence is made with it.
+    """
+
+    strict: str
+    gate: Gate
+
+
+PLANNED: Mapping[str, Planned] = {
+    "seed": Planned("", "A"),
+    "policy.seeds": Planned("", "A"),
+    "policy.training.steps": Planned("", "A"),
+    "train_generators.samplers": Planned("", "B"),
+    "confidence": Planned(">=", "A"),
+    "gate_b.mode_minimum_share": Planned(">=", "B"),
+    "gate_c.mode_observations": Planned(">=", "C"),
+    "shadow.observations": Planned(">=", "C"),
+    "stress.starts": Planned(">=", "D"),
+    "stress.margin": Planned(">=", "D"),
+    "stress.alpha": Planned("<=", "D"),
+    "stress.planned_effect": Planned("", "D"),
+    "stress.baselines": Planned("", "B"),
+    "stress.perturbations": Planned("", "D"),
+    "stress.episode_limit_s": Planned("", "D"),
+    "stress.samples": Planned("", "A"),
 }
-"""What the plan names beside limits, and on which side it is strict; '' where neither is."""
+"""What the plan names beside limits."""
+SECTIONS: Mapping[str, Gate] = {"feasibility": "A", "execution": "C"}
+"""Sections of which the plan names every setting, and the lowest gate whose evidence reads them."""
+SECTIONS_STRICT: Mapping[str, str] = dict.fromkeys(
+    (
+        "feasibility.position_change_limit_m",
+        "execution.deadline_s",
+        "execution.watchdog_s",
+        "execution.maximum_age_s",
+        "execution.maximum_divergence_m",
+        "execution.force_limit_n",
+    ),
+    "<=",
+)
+"""On which side their settings are strict, those of each phase alike; others on neither."""
 CAUSE = "cause"
 CAUSE_STRICT: Mapping[str, str] = {
     **dict.fromkeys(
@@ -51,7 +84,7 @@ CAUSE_STRICT: Mapping[str, str] = {
 """On which side a limit of the cause is strict; of those left out, each side accepts something."""
 HEAD = (
     "# Written by `genpolicy gates preregister`. Commit it before the evidence exists; what moves\n"
-    "# afterwards shows in the reports of gates D and E and on the card.\n"
+    "# afterwards shows in the report of every gate that judges by it and on the card.\n"
 )
 Kind = Literal["loosened", "tightened", "changed"]
 KINDS: tuple[Kind, ...] = ("loosened", "tightened", "changed")
@@ -80,9 +113,8 @@ def plan_of(
         params: `params.yaml`.
         comparisons: By section of a gate, and by criterion: `<=` or `>=`.
     """
-    found: dict[str, list[Any]] = {}
-    for place, comparison in PLANNED.items():
-        found[place] = [comparison, _at(params, place)]
+    found = {place: [item.strict, _at(params, place)] for place, item in PLANNED.items()}
+    found |= {place: [_strict(place), value] for place, value in _all_settings(params).items()}
     strict = {
         f"{name}.{item}": side for name in comparisons for item, side in comparisons[name].items()
     }
@@ -114,25 +146,41 @@ def read_plan(root: Path) -> dict[str, list[Any]] | None:
 def moves(plan: Mapping[str, Sequence[Any]], params: Mapping[str, Any]) -> list[Move]:
     """What differs from the plan now, in the order of the plan.
 
-    A limit that was dropped is loosened, a new one tightened.
+    A limit that was dropped is loosened, a new one tightened; a setting of a section changed.
     """
-    now = {**{place: _at(params, place) for place in PLANNED}, **_all_limits(params)}
+    planned = {place: _at(params, place) for place in PLANNED}
+    now = {**planned, **_all_settings(params), **_all_limits(params)}
     found = []
     for place, (comparison, before) in plan.items():
         if place not in now:
-            found.append(Move(place, before, None, "loosened"))
+            found.append(Move(place, before, None, _of_section(place, "loosened")))
         elif now[place] != before:
             found.append(Move(place, before, now[place], _kind(comparison, before, now[place])))
-    found += [Move(place, None, now[place], "tightened") for place in now if place not in plan]
-    return found
+    new = [place for place in now if place not in plan]
+    return found + [Move(p, None, now[p], _of_section(p, "tightened")) for p in new]
 
 
-def moved_caveats(root: Path, params: Mapping[str, Any]) -> tuple[str, ...]:
-    """What a report says of the plan: nothing if all is as planned."""
+def asked_by(place: str) -> Gate:
+    """The lowest gate that a setting of the plan matters to; the first for what nobody knows."""
+    if place in PLANNED:
+        return PLANNED[place].gate
+    section = place.partition(".")[0]
+    return next((gate for gate in GATES if stage_of(gate) == section), SECTIONS.get(section, "A"))
+
+
+def moved_caveats(root: Path, params: Mapping[str, Any], gate: Gate) -> tuple[str, ...]:
+    """What the report of a gate says of the plan: nothing if all that it stands on is as planned.
+
+    Args:
+        root: Repository root.
+        params: `params.yaml`.
+        gate: Left out is what only gates above it judge by.
+    """
     plan = read_plan(root)
     if plan is None:
         return (NONE,)
-    found = moves(plan, params)
+    reached = GATES[: GATES.index(gate) + 1]
+    found = [move for move in moves(plan, params) if asked_by(move.place) in reached]
     texts = []
     for kind in KINDS:
         of_kind = [str(move) for move in found if move.kind == kind]
@@ -155,6 +203,33 @@ def _kind(comparison: str, before: object, now: object) -> Kind:
 
 def _is_number(value: object) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _of_section(place: str, kind: Kind) -> Kind:
+    """Of a limit the kind; a setting that came or went has a default on no known side."""
+    return "changed" if place.partition(".")[0] in SECTIONS else kind
+
+
+def _strict(place: str) -> str:
+    above = (name for name in SECTIONS_STRICT if f"{place}.".startswith(f"{name}."))
+    return SECTIONS_STRICT.get(next(above, ""), "")
+
+
+def _all_settings(params: Mapping[str, Any]) -> dict[str, Any]:
+    """Every setting of the sections that the plan names whole, by its place."""
+    found: dict[str, Any] = {}
+    for name in SECTIONS:
+        found |= _leaves(name, params.get(name, {}))
+    return found
+
+
+def _leaves(place: str, value: Any) -> dict[str, Any]:
+    if not isinstance(value, Mapping):
+        return {place: value}
+    found: dict[str, Any] = {}
+    for name, inner in value.items():
+        found |= _leaves(f"{place}.{name}", inner)
+    return found
 
 
 def _all_limits(params: Mapping[str, Any]) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Floors and ceilings of limits that protect people: fixed here, not in `params.yaml`.
+"""Floors and ceilings of limits that protect people or the proof: fixed here, not in `params.yaml`.
 
 `params.yaml` may be tighter. Looser is bad configuration, unless the ladder declares itself a
 rehearsal (`rehearsal: true`): a test of the machinery, of which no card can ever be signed.
@@ -8,7 +8,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from gates.asked_for import CHECKS_ASKED_FOR
 from gates.report import Gate, stage_of
 from genpolicy.errors import ConfigError
 
@@ -22,10 +21,12 @@ class Bound:
 
     Attributes:
         gate: Who judges by it.
-        place: Criterion of that gate, or dotted path in `params.yaml`.
+        place: Criterion of that gate, or dotted path in `params.yaml`, of a table each value.
         comparison: The setting must be `<=` or `>=` the bound.
         bound: The loosest value.
         reason: Why no team may go beyond it.
+        waivable: Whether a task may lack what the criterion asks about, so that its owner may
+            declare it not applicable.
     """
 
     gate: Gate
@@ -33,13 +34,30 @@ class Bound:
     comparison: Literal["<=", ">="]
     bound: float
     reason: str
+    waivable: bool = False
 
 
 def _counts(gate: Gate, reason: str, *criteria: str) -> list[Bound]:
     return [Bound(gate, name, "<=", 0.0, reason) for name in criteria]
 
 
+def _executed(gate: Gate) -> list[Bound]:
+    """Fixtures of the simulated cell that stop what went wrong."""
+    silence = "a stub that goes on in silence executes what nobody commands any more"
+    force = "the hardest contact that is simulated; beyond it no stop would ever be seen"
+    return [
+        Bound(gate, "execution.watchdog_s", "<=", 0.1, silence),
+        Bound(gate, "execution.force_limit_n", "<=", 80.0, force),
+    ]
+
+
+PINNED = "what comes back otherwise than it was judged is another policy"
 BOUNDS: tuple[Bound, ...] = (
+    *_counts("B", PINNED, "unpinned_items", "metadata_mismatches", "nfe_mismatch"),
+    *_counts("B", "a NaN weight commands nothing that can be checked", "nonfinite_weights"),
+    Bound("B", "samples_difference", "<=", 1e-5, f"{PINNED}; so much differs between machines"),
+    *_executed("C"),
+    Bound("C", "gate_c.mode_observations", ">=", 30, "fewer cannot show that modes fare alike"),
     *_counts("C", "one bad action is enough to hurt somebody", "stub_stale", "stub_invalid"),
     *_counts("C", "the independent proof agrees or there is none", "checker_violations"),
     *_counts("C", "a check whose absence goes unseen protects nobody", "mutants_undetected"),
@@ -50,6 +68,12 @@ BOUNDS: tuple[Bound, ...] = (
     *_counts("D", "the independent proof agrees or there is none", "checker_violations"),
     *_counts("D", "an action that vanished may still be executed", "conservation_error"),
     *_counts("D", "methods on other starts are not compared", "unmatched_starts"),
+    *_executed("D"),
+    Bound("D", "force_peak_p95_n", "<=", 80.0, "the hardest contact that is simulated", True),
+    Bound("D", "intervention_upper", "<=", 0.2, "more often a person drives, not the policy"),
+    Bound("D", "reset_upper", "<=", 0.1, "each protective stop sends a person to the arm"),
+    Bound("D", "verdict_reachable", ">=", 0.8, "a trial that seldom ends right proves nothing"),
+    Bound("D", "stress.starts", ">=", 59, "fewer bound no p95, whatever the confidence"),
     Bound("D", "confidence", ">=", 0.9, "what is wrong more often than once in ten is no bound"),
     Bound("D", "stress.alpha", "<=", 0.1, "a wrong promotion once in ten trials at the most"),
     Bound("D", "stress.margin", ">=", 0.0, "a candidate that is worse is not promoted"),
@@ -91,12 +115,6 @@ class Named:
 NAMED: tuple[Named, ...] = (
     Named(
         "C",
-        "required_checks",
-        CHECKS_ASKED_FOR,
-        "a check that nobody asks for may be gone; evidence says which do not apply to a task",
-    ),
-    Named(
-        "C",
         "required_fixtures",
         ("stale_observation", "infeasible_rotation", "phase_change", "reordered_chunk"),
         "what is never tried is never refused",
@@ -125,8 +143,9 @@ def is_rehearsal(params: Mapping[str, Any]) -> bool:
 def loosened(params: Mapping[str, Any], gate: Gate) -> list[tuple[Bound, Any]]:
     """Bounds that the settings of a gate go beyond, with what stands there instead.
 
-    A criterion that is declared not applicable goes beyond its bound like any looser value. A
-    setting that is missing does not: without a limit no gate passes, and models ask for the rest.
+    A criterion that is declared not applicable goes beyond its bound like any looser value, unless
+    a task may lack what it asks about. A setting that is missing does not: without a limit no gate
+    passes, and models ask for the rest.
     """
     found: list[tuple[Bound, Any]] = []
     for bound in BOUNDS:
@@ -202,12 +221,13 @@ def _values(params: Mapping[str, Any], bound: Bound) -> list[Any]:
             if not isinstance(value, Mapping) or part not in value:
                 return []
             value = value[part]
-        return [value]
+        return list(value.values()) if isinstance(value, Mapping) else [value]
     section = params.get(stage_of(bound.gate))
     if not isinstance(section, Mapping):
         return []
     found: list[Any] = []
-    for owners in (section.get("limits"), section.get("not_applicable")):
+    places = ["limits"] if bound.waivable else ["limits", "not_applicable"]
+    for owners in map(section.get, places):
         for entries in owners.values() if isinstance(owners, Mapping) else ():
             if isinstance(entries, Mapping) and bound.place in entries:
                 entry = entries[bound.place]

@@ -118,7 +118,7 @@ def judge_card(root: Path, chain: Chain, *, today: datetime.date | None = None) 
     """
     params = read_params(root)
     settings = read_settings(params, stage_of("E"), CardGateSettings)
-    caveats = (*require_protection(params, "E"), *moved_caveats(root, params))
+    caveats = (*require_protection(params, "E"), *moved_caveats(root, params, "E"))
     papers = examine(root, settings.card)
     error = chain.error or _chain_error(root, chain, papers.draft)
     dossier = Dossier(settings, papers, error, today or utc_today())

@@ -1,6 +1,5 @@
 """What a cause is made of: its name, and every question with its number and its limit."""
 
-import math
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Literal
@@ -60,7 +59,7 @@ class Answer:
     @property
     def holds(self) -> bool | None:
         """Whether the number keeps its limit, NaN never; None where nothing is known or asked."""
-        if self.measured is None or self.limit is None or math.isinf(self.limit):
+        if self.measured is None or self.limit is None:
             return None
         margin = self.limit - self.measured
         return bool(margin >= 0 if self.comparison == "<=" else -margin >= 0)
@@ -75,7 +74,7 @@ class Answer:
         return {
             "question": self.question, "layer": self.layer.value, "what": self.what,
             "measured": None if self.measured is None else float(self.measured),
-            "limit": None if self.limit is None or math.isinf(self.limit) else self.limit,
+            "limit": self.limit,
             "comparison": self.comparison, "unit": self.unit,
             "note": self.note, "holds": self.holds,
         }  # fmt: skip

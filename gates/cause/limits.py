@@ -22,11 +22,6 @@ SHARED = (
     "mode_success_lower", "mode_feasible_share",
 )  # fmt: skip
 """Questions whose limit stands among the criteria of Gate A."""
-AT_MOST = (
-    "clock_residual_s", "calibration_residual_m", "label_disagreement", "strata_effect",
-    "told_share",
-)  # fmt: skip
-"""Those of them whose number must not exceed the limit; the others must reach it."""
 OWN = (
     "clock_disorder", "rate_deviation", "gap_share", "frozen_s", "jitter_share", "lag_drift_steps",
     "gain_factor", "gain_epoch_factor", "magnitude_factor", "frame_angle_rad", "swapped_columns",
@@ -36,7 +31,6 @@ OWN = (
     "everything_handicap", "cause_agreement",
 )  # fmt: skip
 """Questions that only the cause asks."""
-NOT_APPLICABLE = "not applicable"
 
 
 @dataclass(frozen=True)
@@ -61,8 +55,7 @@ class CauseLimits:
         """In the form of `params.yaml`: by owner, limit and reason of each question."""
         result: dict[str, dict[str, list[Any]]] = {}
         for question, item in self.by_question.items():
-            limit = item.limit if isfinite(item.limit) else NOT_APPLICABLE
-            result.setdefault(item.owner, {})[question] = [limit, item.reason]
+            result.setdefault(item.owner, {})[question] = [item.limit, item.reason]
         return result
 
 

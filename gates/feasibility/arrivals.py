@@ -4,7 +4,7 @@ import pandas as pd
 
 from gates.bounds import counted_interval
 from gates.criterion import Measured, criterion
-from gates.evidence import Evidence, MissingEvidenceError, numbers
+from gates.evidence import Evidence, MissingEvidenceError, counts
 from gates.feasibility.settings import SHADOW, FeasibilitySettings
 from genpolicy.evidence.rows.shadow import ShadowCountRow, ShadowStubRow
 
@@ -26,12 +26,12 @@ def at_the_stub(rows: pd.DataFrame, *columns: str) -> tuple[float, float]:
     """Actions of these kinds that arrived at the controller stub, and all that arrived.
 
     Raises:
-        MissingEvidenceError: Nothing arrived, or a count is no number.
+        MissingEvidenceError: Nothing arrived, or a count is no number or below zero.
     """
-    arrivals = float(numbers(rows, "arrivals").sum())
+    arrivals = float(counts(rows, "arrivals").sum())
     if arrivals <= 0:
         raise MissingEvidenceError("nothing arrived at the stub")
-    return sum(float(numbers(rows, column).sum()) for column in columns), arrivals
+    return sum(float(counts(rows, column).sum()) for column in columns), arrivals
 
 
 def _stub(evidence: Evidence, candidate: str, *columns: str) -> tuple[float, float]:
@@ -68,7 +68,7 @@ def stub_violation_upper(
     bad, _ = _stub(evidence, candidate, "stale", "invalid")
     rows = evidence.of(f"{SHADOW}/stub.parquet", ShadowStubRow, candidate)
     # The same observations are played in every fixture, and deliver at most one chunk in each.
-    observations = float(numbers(rows, "delivered").max())
+    observations = float(counts(rows, "delivered").max())
     if observations <= 0:
         raise MissingEvidenceError("no observation delivered a chunk")
     bad = min(bad, observations)
@@ -105,11 +105,12 @@ def unaccounted(frame: pd.DataFrame, keys: list[str]) -> float:
     """Sum over runs of |generated - executed - queued - discarded|.
 
     Raises:
-        MissingEvidenceError: A run states its totals differently in different rows.
+        MissingEvidenceError: A run states its totals differently in different rows, or a count
+            is below zero.
     """
     error = 0.0
     for name in ("generated", "executed", "queued", "count"):
-        frame = frame.assign(**{name: numbers(frame, name)})
+        frame = frame.assign(**{name: counts(frame, name)})
     for run, rows in frame.groupby(keys):
         totals = rows[["generated", "executed", "queued"]].drop_duplicates()
         if len(totals) != 1:

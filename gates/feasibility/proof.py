@@ -1,7 +1,8 @@
 """Who watches the watchers: the independent checker, and the mutants that it must find."""
 
+from gates.asked_for import CHECKS_ASKED_FOR
 from gates.criterion import Measured, criterion
-from gates.evidence import Evidence, MissingEvidenceError, count, number
+from gates.evidence import Evidence, MissingEvidenceError, count
 from gates.feasibility.settings import SHADOW, FeasibilitySettings
 
 
@@ -23,8 +24,8 @@ def checked_violations(evidence: Evidence, path: str) -> Measured:
         MissingEvidenceError: It checked nothing, or did not prove the motion of what it checked.
     """
     document = evidence.document(path)
-    checked = number(document, "checked_actions")
-    proved = number(document, "reproved_actions")
+    checked = count(document, "checked_actions")
+    proved = count(document, "reproved_actions")
     if checked <= 0:
         raise MissingEvidenceError("the checker saw no action")
     if not proved >= checked:
@@ -40,7 +41,10 @@ def checked_violations(evidence: Evidence, path: str) -> Measured:
     always=True,
 )
 def mutants_undetected(evidence: Evidence, settings: FeasibilitySettings) -> Measured:
-    """Checks whose absence was not noticed, or that were not tried."""
+    """Checks whose absence was not noticed, or that were not tried.
+
+    Asked for is every check of the code; which of them a task has no chunk for, the evidence says.
+    """
     entries = evidence.listing(f"{SHADOW}/mutants.json")
     found, missed, excused = set[str](), dict[str, None](), dict[str, str]()
     for entry in entries:
@@ -55,7 +59,7 @@ def mutants_undetected(evidence: Evidence, settings: FeasibilitySettings) -> Mea
         else:  # an excuse in another row of the same check does not undo it
             missed[name] = None
     silent = [*missed]
-    silent += [f"{name} (not tried)" for name in settings.required_checks if name not in found]
+    silent += [f"{name} (not tried)" for name in CHECKS_ASKED_FOR if name not in found]
     text = f"not detected: {', '.join(silent)}" if silent else f"all {len(found)} detected"
     if excused:
         listed = ", ".join(f"{name} ({reason})" for name, reason in excused.items())

@@ -17,13 +17,11 @@ class FeasibilitySettings(CandidateSettings):
 
     Attributes:
         required_fixtures: Corrupted fixtures that must have been tried.
-        required_checks: Checks, `layer.check`, each of which must have been left out once.
         unassigned_modes: Labels of candidates that belong to no mode.
         mode_observations: Independent observations of every mode without which the modes are not
             compared.
     """
 
     required_fixtures: tuple[str, ...]
-    required_checks: tuple[str, ...]
     unassigned_modes: tuple[str, ...]
     mode_observations: int = Field(ge=2)

@@ -1,12 +1,10 @@
 """The cause behind the modes: named from the audit's numbers, under the limits of this gate."""
 
-import math
-
-from gates.cause import Cause, limits_of, name_cause, read_numbers
-from gates.cause.limits import AT_MOST, SHARED
+from gates.cause import Cause, default_limits, limits_of, name_cause, read_numbers
+from gates.cause.limits import SHARED
 from gates.evidence import Evidence, MissingEvidenceError
 from gates.need.settings import AUDIT, NeedSettings
-from gates.settings import PARAMS_FILE, Limit, Limits
+from gates.settings import PARAMS_FILE, Limit, Limits, Waiver
 from genpolicy.errors import BadInputError
 
 PLACE = f"{PARAMS_FILE}: gate_a.cause"
@@ -35,10 +33,19 @@ def found_cause(evidence: Evidence, settings: NeedSettings) -> Cause:
 
 
 def asked(limits: Limits) -> dict[str, Limit]:
-    """Limits of the gate; a question that does not apply gets one that every number keeps."""
-    waived = {
-        name: Limit(math.inf if name in AT_MOST else -math.inf, waiver.reason, waiver.owner)
-        for name, waiver in limits.waived.items()
-        if name in SHARED
+    """Limits of the gate; a question whose criterion is waived keeps the packaged one.
+
+    A waiver says that a criterion need not be asked here. It cannot say that what the audit did
+    measure is in order: where it measured nothing, no limit turns anything red.
+    """
+    packaged = default_limits()
+    kept = {
+        name: Limit(packaged[name], f"packaged, since waived: {waiver.reason}", waiver.owner)
+        for name, waiver in waived_questions(limits).items()
     }
-    return {**waived, **limits.of}
+    return {**kept, **limits.of}
+
+
+def waived_questions(limits: Limits) -> dict[str, Waiver]:
+    """Criteria that are declared not applicable, of those that the cause asks as well."""
+    return {name: waiver for name, waiver in limits.waived.items() if name in SHARED}

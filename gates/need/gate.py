@@ -33,6 +33,8 @@ SIMPLER_ASKED = frozenset(
         simpler.baseline_mode_coverage,
     )
 )
+TRAINED_ASKED = SIMPLER_ASKED | {simpler.latent_dependence_p.id}
+"""What is asked of baselines that were trained: nobody is sent to train them."""
 
 
 def _cause(judged: Judged) -> str:
@@ -43,8 +45,8 @@ def _cause(judged: Judged) -> str:
         return f"Cause unknown: {error}."
     text = f"Cause found by the audit: {cause.text}."
     unmet = {answer.id for answer in judged.answers if answer.verdict != "PASS"}
-    if cause.name is CauseName.VALID_MODES and unmet and unmet <= SIMPLER_ASKED:
-        return f"{text} {SIMPLER}"
+    if cause.name is CauseName.VALID_MODES and unmet and unmet <= TRAINED_ASKED:
+        return f"{text} {SIMPLER}" if unmet & SIMPLER_ASKED else text
     if judged.verdict != "PASS":
         return f"{text} Next: {cause.next_action}"
     return f"{text} One mode alone may still be enough: {ONE_MODE}"

@@ -5,8 +5,8 @@ import numpy as np
 from gates.bounds import counted_interval
 from gates.cause import Layer
 from gates.criterion import Measured, criterion
-from gates.evidence import Evidence, MissingEvidenceError, count, number, numbers
-from gates.need.cause import found_cause
+from gates.evidence import Evidence, MissingEvidenceError, count, numbers
+from gates.need.cause import found_cause, waived_questions
 from gates.need.settings import AUDIT, NeedSettings
 from genpolicy.audit.rows import Asked, Calibration, Clock, ReplayRow
 from genpolicy.errors import ConfigError
@@ -22,7 +22,7 @@ REFUSALS = "artifacts/ingest/refusals.json"
 def refused_recordings_accounted(evidence: Evidence, settings: NeedSettings) -> Measured:
     """Recordings that ingest neither accepted nor refused: |accepted + refused - found|."""
     document = evidence.document(REFUSALS)
-    found, accepted = number(document, "found"), number(document, "accepted")
+    found, accepted = count(document, "found"), count(document, "accepted")
     refused = count(document, "refused")
     if found == 0:
         raise MissingEvidenceError("no recordings were found")
@@ -126,4 +126,6 @@ def data_defects(evidence: Evidence, settings: NeedSettings) -> Measured:
         if answer.red
     ]
     text = "; ".join(red) or f"none of {len(asked)} numbers that stand out is beyond its limit"
+    for name in waived_questions(settings.limits):
+        text += f"; {name} is waived, and asked here by the packaged limit"
     return Measured(float(len(red)), caveat=text)

@@ -12,7 +12,7 @@ import pandas as pd
 
 from gates.bounds import counted_interval, share_interval
 from gates.criterion import Measured, criterion
-from gates.evidence import Array, Evidence, MissingEvidenceError, number, numbers
+from gates.evidence import Array, Evidence, MissingEvidenceError, counts, number, numbers
 from gates.need.settings import (
     MEASURED,
     MEASURED_FACTORS,
@@ -265,7 +265,7 @@ def baseline_mode_coverage(evidence: Evidence, settings: NeedSettings) -> Measur
         generative = method in settings.generative_baselines
         if not (generative or rows["convention"].isin(settings.deployed_conventions).any()):
             raise MissingEvidenceError(f"no two-mode situation was given to {method} as deployed")
-        share = numbers(rows, "modes_valid") / numbers(rows, "modes_present")
+        share = counts(rows, "modes_valid") / numbers(rows, "modes_present")
         means = rows.assign(share=share).groupby("convention")["share"].mean()
         for name, value in means.items():
             fixed = name in settings.deployed_conventions and not generative

@@ -20,7 +20,6 @@ from genpolicy.statistics.ratios import ratio_of_sums
 
 LIMIT = "baseline_fall_upper"
 MATCHED = "matched.json"
-CONFIDENCE = 0.95
 Interval = tuple[float, float, float]
 
 
@@ -53,6 +52,7 @@ def _trainings(evidence: Evidence, report: GateReport) -> Iterator[Training]:
     """Those that the two criteria of convergence judge."""
     settings = report.settings
     compared = {settings["budget_reference"], *settings["baselines"]}
+    confidence = float(settings["confidence"])
     for root in (BASELINES, GENERATORS):
         tables = evidence.bind(f"{root}/*/seed_*/{VALIDATION_FILE}")
         methods = in_order(path.split("/")[-3] for path in tables)
@@ -65,9 +65,9 @@ def _trainings(evidence: Evidence, report: GateReport) -> Iterator[Training]:
                 if not set(moments) <= set(steps):
                     raise MissingEvidenceError(f"{table} lacks the loss after {moments}")
                 first = total[steps[0]]
-                at = [ratio_of_sums(total[m], first, confidence=CONFIDENCE) for m in moments]
+                at = [ratio_of_sums(total[m], first, confidence=confidence) for m in moments]
                 ratio, lower, upper = ratio_of_sums(
-                    total[updates], total[moments[0]], confidence=CONFIDENCE
+                    total[updates], total[moments[0]], confidence=confidence
                 )
                 yield Training(
                     method=method,
@@ -106,7 +106,7 @@ def _convergence(evidence: Evidence, report: GateReport) -> Figure:
     falls.set_yticks(np.arange(len(found)), labels)
     falls.set_ylim(len(found) - 0.4, -0.9)
     falls.axvline(0.0, color=GREY, lw=0.8)
-    falls.set_xlabel("fall over the last quarter, share")
+    falls.set_xlabel(f"fall, share, {report.settings['confidence']:.0%} interval")
     draw_limit(falls, report, LIMIT)
     return figure
 
@@ -144,7 +144,7 @@ PLOTS = (
     Plot(
         "Was the training done?",
         "Left: loss of the averaged weights on held-out episodes, each method its own loss, over "
-        "that after its first measured updates; 95 % interval over episodes at three quarters and "
+        "that after its first measured updates; interval over episodes at three quarters and "
         "at the end. Right: by how much it falls in between. The limit is that of "
         f"`{LIMIT}` and judges what candidates are compared with (filled). A candidate (hollow) "
         "is asked by its samples, `late_change_upper`: the loss of a density goes on falling when "

@@ -68,14 +68,20 @@ def _labels(evidence: Evidence, report: GateReport) -> Figure:
 def _strata(evidence: Evidence, report: GateReport) -> Figure:
     return checks.strata_bars(
         evidence.rows(f"{AUDIT}/strata.parquet", Stratum),
-        level=float(report.settings.get("strata_level", 0.05)),
+        level=_strata_level(report),
         limit=limit_of(report, "strata_effect"),
     )
 
 
+def _strata_level(report: GateReport) -> float:
+    """Adjusted p-value at which a stratum explains modes, as the gate judged by it."""
+    limits = {k: limit for owned in report.settings["cause"].values() for k, limit in owned.items()}
+    return float(limits["strata_p"][0])
+
+
 def _mode_success(evidence: Evidence, report: GateReport) -> Figure:
     frame = evidence.rows(f"{AUDIT}/modes.parquet", ModeOutcome)
-    level = float(report.settings.get("confidence", 0.95))
+    level = float(report.settings["confidence"])
     trials, hits = numbers(frame, "episodes"), numbers(frame, "successes")
     ends = np.array(
         [clopper_pearson(int(k), int(n), level) for k, n in zip(hits, trials, strict=True)]

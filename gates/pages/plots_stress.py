@@ -40,7 +40,7 @@ def _success(evidence: Evidence, report: GateReport) -> Figure:
     methods, conditions = in_order(frame["method"]), sorted(set(frame["perturbation"]))
     conditions.sort(key=lambda name: name != "nominal")
     colour = colours(methods)
-    level = float(report.settings.get("confidence", 0.95))
+    level = float(report.settings["confidence"])
     figure, (axes,) = new_figure(height=1.2 + 0.12 * len(methods) * len(conditions))
     step = 0.8 / len(methods)
     for place in range(1, len(conditions)):

@@ -72,6 +72,7 @@ def _parameters(
     question="Are checkpoint, configuration, data, seed and sampler pinned?",
     look_at="Generator training: something is not pinned by hash; train again from a clean state.",
     per_candidate=True,
+    always=True,
 )
 def unpinned_items(
     evidence: Evidence, settings: ReproducibilitySettings, candidate: str
@@ -102,6 +103,7 @@ def _identity(evidence: Evidence, candidate: str) -> dict[str, Any]:
     question="Are all weights finite?",
     look_at="Generator training: training diverged; lower the rate or look at the data.",
     per_candidate=True,
+    always=True,
 )
 def nonfinite_weights(
     evidence: Evidence, settings: ReproducibilitySettings, candidate: str
@@ -115,6 +117,7 @@ def nonfinite_weights(
     question="Does a fresh process read back the same metadata?",
     look_at="Generator training: save and reload disagree on metadata.",
     per_candidate=True,
+    always=True,
 )
 def metadata_mismatches(
     evidence: Evidence, settings: ReproducibilitySettings, candidate: str
@@ -128,6 +131,7 @@ def metadata_mismatches(
     question="Does a fresh process draw the same samples?",
     look_at="Sampler: noise is not keyed by name, or batch shape and threads changed.",
     per_candidate=True,
+    always=True,
 )
 def samples_difference(
     evidence: Evidence, settings: ReproducibilitySettings, candidate: str
@@ -150,6 +154,7 @@ def samples_difference(
     question="Does the network run as often as recorded, and as the sampler's definition says?",
     look_at="Sampler: the solver evaluates the network more or less often than it says.",
     per_candidate=True,
+    always=True,
 )
 def nfe_mismatch(evidence: Evidence, settings: ReproducibilitySettings, candidate: str) -> Measured:
     """Largest difference of counted network evaluations from recorded or expected ones."""

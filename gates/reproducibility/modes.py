@@ -3,9 +3,9 @@
 import numpy as np
 import pandas as pd
 
-from gates.bounds import counted_interval, share_interval
+from gates.bounds import share_interval
 from gates.criterion import Measured, criterion
-from gates.evidence import Evidence, MissingEvidenceError, numbers
+from gates.evidence import Evidence, MissingEvidenceError, counts, numbers
 from gates.reproducibility.settings import MODES, ReproducibilitySettings, chosen_nfe
 from genpolicy.evidence.rows.need import ModeRow
 
@@ -23,17 +23,21 @@ def mode_coverage_lower(
     found = []
     for _, rows in situations_of(evidence, candidate).groupby("seed"):
         drawn, fewest = numbers(rows, "samples"), numbers(rows, "fewest_admissible")
-        covered = float((fewest >= settings.mode_minimum_share * drawn).sum())
-        interval = counted_interval(covered, float(len(rows)), confidence=settings.confidence)
+        hits = fewest >= settings.mode_minimum_share * drawn
+        # There is one situation per episode and phase: those of one episode are one draw.
+        _, lower, upper = share_interval(
+            hits, list(rows["episode_uuid"]), confidence=settings.confidence, favourable=True
+        )
         reached = float((numbers(rows, "modes_covered") >= numbers(rows, "modes_present")).mean())
-        found.append((interval, covered, len(rows), reached))
-    interval, covered, situations, reached = min(found)
+        found.append((lower, upper, int(hits.sum()), rows, reached))
+    lower, upper, covered, rows, reached = min(found, key=lambda seed: seed[0])
     text = (
-        f"in {covered:g} of {situations} two-mode situations every mode gets at least "
+        f"in {covered} of {len(rows)} two-mode situations every mode gets at least "
         f"{settings.mode_minimum_share:g} of the samples, admissible; "
-        f"one sample, whether or not it may be executed, reaches every mode in {reached:.4g}"
+        f"one sample, whether or not it may be executed, reaches every mode in {reached:.4g}; "
+        f"lower bound over {rows['episode_uuid'].nunique()} episodes"
     )
-    return Measured(interval[0], interval, text)
+    return Measured(lower, (lower, upper), text)
 
 
 @criterion(
@@ -48,7 +52,7 @@ def outside_modes_upper(
     """Upper bound of the share of samples between two modes, or far from all of them."""
     found = []
     for _, rows in situations_of(evidence, candidate).groupby("seed"):
-        between, far = numbers(rows, "between_modes"), numbers(rows, "far_from_modes")
+        between, far = counts(rows, "between_modes"), counts(rows, "far_from_modes")
         share, lower, upper = share_interval(
             (between + far) / numbers(rows, "samples"),
             list(rows["episode_uuid"]),

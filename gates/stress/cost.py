@@ -9,7 +9,7 @@ import pandas as pd
 
 from gates.bounds import draws_for_quantile, share_interval, upper_quantile
 from gates.criterion import Measured, criterion
-from gates.evidence import Evidence, MissingEvidenceError, numbers
+from gates.evidence import Evidence, MissingEvidenceError, counts, numbers
 from gates.stress.rollouts import (
     DRILL,
     INVOCATIONS,
@@ -151,7 +151,7 @@ def _share_of(  # noqa: PLR0917
 def intervention_upper(evidence: Evidence, settings: StressSettings, candidate: str) -> Measured:
     """Upper bound of the share of rollouts in which a person had to step in."""
     rows = rollouts(evidence, settings, candidate)
-    return _rollouts_with(rows.assign(hit=numbers(rows, "interventions") > 0), settings)
+    return _rollouts_with(rows.assign(hit=counts(rows, "interventions") > 0), settings)
 
 
 @criterion(

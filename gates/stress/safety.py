@@ -4,7 +4,7 @@ import numpy as np
 
 from gates.bounds import counted_interval, share_interval
 from gates.criterion import Measured, criterion
-from gates.evidence import Evidence, MissingEvidenceError, flags, numbers
+from gates.evidence import Evidence, MissingEvidenceError, counts, flags
 from gates.feasibility.arrivals import at_the_stub
 from gates.feasibility.proof import checked_violations
 from gates.stress.rollouts import STRESS, StressSettings, rollouts
@@ -83,13 +83,13 @@ def conservation_error(evidence: Evidence, settings: StressSettings, candidate: 
     names = ("generated", "executed", "discarded", "queued")
     path = f"{STRESS}/conservation.parquet"
     rows = evidence.of(path, ConservationRow, candidate)
-    generated, executed, discarded, queued = (numbers(rows, name) for name in names)
+    generated, executed, discarded, queued = (counts(rows, name) for name in names)
     if generated.sum() <= 0:
         raise MissingEvidenceError("nothing was generated")
     error = float(np.abs(generated - executed - discarded - queued).sum())
     reasons = evidence.of(f"{STRESS}/counts.parquet", StressCountRow, candidate)
     by_reason = (
-        reasons.assign(count=numbers(reasons, "count")).groupby("perturbation")["count"].sum()
+        reasons.assign(count=counts(reasons, "count")).groupby("perturbation")["count"].sum()
     )
     stated = rows.assign(discarded=discarded).groupby("perturbation")["discarded"].sum()
     error += float(stated.sub(by_reason, fill_value=0.0).abs().sum())

@@ -13,6 +13,7 @@ from gates.stress.rollouts import NOMINAL, STRESS, StressSettings, rollouts, suc
     question="Did all methods begin from identical states?",
     look_at="Evaluator: starts differ, so the methods cannot be compared; fix the resets.",
     per_candidate=True,
+    always=True,
 )
 def unmatched_starts(evidence: Evidence, settings: StressSettings, candidate: str) -> Measured:
     """Starts, by hash of the state after reset, that the candidate and a baseline do not share."""
@@ -37,6 +38,7 @@ def _starts(evidence: Evidence, settings: StressSettings, method: str) -> set[tu
     ">=",
     question="Would a gain worth having be found, and none where there is none, at this size?",
     look_at="Evaluator: too few starts for this margin; plan more before looking at results.",
+    always=True,
 )
 def verdict_reachable(evidence: Evidence, settings: StressSettings) -> Measured:
     """Share of simulated trials that end right: where the planned effect holds, and the margin.

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path, PurePosixPath
 
 import pytest
+import yaml
 
 sys.path.insert(0, str(Path(__file__).parent))
 
@@ -28,6 +29,11 @@ from dependencies import (
     stage_names,
     table,
 )
+
+from gates.preregistration import PREREGISTRATION, asked_by, plan_of
+from gates.proof import SPECS
+from gates.protection import BOUNDS, REHEARSAL
+from gates.report import GATES, stage_of
 
 
 @pytest.mark.parametrize("stage", stage_names())
@@ -127,6 +133,33 @@ def test_every_section_that_a_stage_parses_is_among_its_parameters(stage: str) -
     assert ("params.seed" not in text) or "seed" in listed
     assert ("params.horizons" not in text) or "horizons" in listed
     assert ("params.task" not in text) or "task" in listed
+
+
+def _judged_by(gate: str) -> set[str]:
+    """Places of `params.yaml` that a gate reads: its own section, homes, bounds, and the plan."""
+    with (ROOT / "params.yaml").open() as stream:
+        plan = plan_of(yaml.safe_load(stream), {})
+    reached = GATES[: GATES.index(gate) + 1]
+    homes = getattr(SPECS[gate].settings, "homes", {})
+    bounds = {bound.place for bound in BOUNDS if bound.gate == gate and "." in bound.place}
+    planned = {place for place in plan if asked_by(place) in reached}
+    return {stage_of(gate), REHEARSAL, *homes.values(), *bounds, *planned}
+
+
+@pytest.mark.parametrize("gate", GATES)
+def test_a_gate_judges_again_where_anything_moves_that_it_reads(gate: str) -> None:
+    listed = [tuple(key.split(".")) for key in pipeline()[stage_of(gate)]["params"]]
+    missing = [
+        place
+        for place in sorted(_judged_by(gate))
+        if not any(tuple(place.split("."))[: len(key)] == key for key in listed)
+    ]
+    assert not missing, f"add to params of {stage_of(gate)} in dvc.yaml: {missing}"
+
+
+@pytest.mark.parametrize("gate", GATES)
+def test_a_gate_that_says_what_moved_since_the_plan_depends_on_it(gate: str) -> None:
+    assert PREREGISTRATION in pipeline()[stage_of(gate)]["deps"]
 
 
 def test_the_pipeline_has_stages_at_all() -> None:

@@ -197,7 +197,6 @@ PARAMS: dict[str, Any] = {
     },
     "gate_c": {
         "required_fixtures": list(FIXTURES[2:]),
-        "required_checks": [f"{layer}.{name}" for layer, name in CHECKS],
         "unassigned_modes": ["", "none"],
         "mode_observations": 30,
         "limits": by_owner(

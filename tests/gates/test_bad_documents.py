@@ -65,7 +65,7 @@ def test_parameters_of_every_gate(fallen_over, tmp_path):
             read_settings(document, stage_of(gate), spec.settings)
             require_protection(document, gate)
             read_limits(document, gate, spec.criteria)
-        moved_caveats(tmp_path, document)
+        moved_caveats(tmp_path, document, "E")
 
     read(params)
     refused, faults = fallen_over(params, read)
@@ -86,7 +86,7 @@ def test_preregistration(fallen_over, edited, whole):
     plan = yaml.safe_load((ROOT / "preregistration.yaml").read_text())
     params = yaml.safe_load((ROOT / "params.yaml").read_text())
     said = []
-    read = edited("preregistration.yaml", lambda: said.append(moved_caveats(whole, params)))
+    read = edited("preregistration.yaml", lambda: said.append(moved_caveats(whole, params, "E")))
     read(plan)
     assert said == [()]
     _, faults = fallen_over(plan, read)

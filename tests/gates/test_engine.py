@@ -1,5 +1,6 @@
 """The engine: what is missing is named, and without a limit nothing passes."""
 
+import importlib.metadata
 import json
 import sys
 from dataclasses import replace
@@ -120,6 +121,23 @@ def test_number_and_interval_are_rounded_before_they_are_judged(tmp_path):
 def test_the_environment_names_python_by_its_minor_version():
     """A patch release of Python changes no number; a report is not void for it."""
     assert environment()["python"] == f"{sys.version_info[0]}.{sys.version_info[1]}"
+
+
+def test_the_environment_names_what_the_numbers_come_from():
+    """Networks, the simulated arm, the kinematics and the audit's estimators, beside the tables."""
+    judging = {"torch", "mujoco", "pin", "scikit-learn", "numpy", "pandas", "pyarrow", "scipy"}
+    assert judging <= set(environment())
+    assert environment()["torch"] == importlib.metadata.version("torch")
+
+
+def test_a_library_that_is_not_installed_is_left_out(monkeypatch):
+    def version(name):
+        if name == "pin":
+            raise importlib.metadata.PackageNotFoundError(name)
+        return "1.0"
+
+    monkeypatch.setattr(importlib.metadata, "version", version)
+    assert "pin" not in environment() and environment()["torch"] == "1.0"
 
 
 def _below(tmp_path, gate, **candidates):

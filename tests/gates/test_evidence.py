@@ -1,9 +1,10 @@
 """Reading tables by their row class: unknown columns refuse, missing ones cannot be measured."""
 
 import evidence
+import pandas as pd
 import pytest
 
-from gates.evidence import Evidence, MissingEvidenceError
+from gates.evidence import Evidence, MissingEvidenceError, count, counts
 from genpolicy.audit.rows import TABLES, ModeOutcome, SituationRow
 from genpolicy.data.rows import FrameRow
 from genpolicy.errors import IntegrityError
@@ -84,3 +85,13 @@ def test_columns_of_a_stream_are_known_by_their_beginning(repo):
     evidence.edit_table(repo, frames, lambda f: f.assign(**{"even_time_s.robot": 0.0}))
     with pytest.raises(IntegrityError, match=r"unknown column even_time_s\.robot"):
         Evidence(repo).rows(f"artifacts/{frames}", FrameRow)
+
+
+def test_a_count_below_zero_is_no_count():
+    frame = pd.DataFrame({"stale": [3, -3], "bad": [0, 1]})
+    assert counts(frame, "bad").tolist() == [0.0, 1.0]
+    with pytest.raises(MissingEvidenceError, match="column stale counts -3"):
+        counts(frame, "stale")
+    assert count({"n": 0}, "n") == 0.0 and count({"n": [1, 2]}, "n") == 2.0
+    with pytest.raises(MissingEvidenceError, match="n counts -1"):
+        count({"n": -1}, "n")

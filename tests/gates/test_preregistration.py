@@ -89,6 +89,62 @@ def test_a_limit_of_the_cause_is_planned_as_well(question, limit, kind):
     assert _moved(change) == [(f"gate_a.cause.{question}", kind)]
 
 
+EXECUTION = {"watchdog_s": 0.1, "queue_capacity": 4, "force_limit_n": {"open": 40.0}}
+SECTION = {"execution": EXECUTION, "feasibility": {"position_change_limit_m": 0.05}}
+
+
+@pytest.mark.parametrize(
+    ("section", "name", "value", "kind"),
+    [
+        ("execution", "watchdog_s", 0.2, "loosened"),
+        ("execution", "watchdog_s", 0.05, "tightened"),
+        ("execution", "queue_capacity", 5, "changed"),
+        ("execution", "deadline_s", 0.1, "changed"),
+        ("feasibility", "position_change_limit_m", 0.1, "loosened"),
+    ],
+)
+def test_every_setting_that_actions_are_executed_and_checked_by_is_planned(
+    section, name, value, kind
+):
+    params = {**evidence.PARAMS, **SECTION}
+    plan = plan_of(params, COMPARISONS)
+    moved = {**params, section: {**SECTION[section], name: value}}
+    assert [(m.place, m.kind) for m in moves(plan, moved)] == [(f"{section}.{name}", kind)]
+
+
+def test_the_force_of_each_phase_is_planned_and_a_setting_that_went_has_changed():
+    plan = plan_of({**evidence.PARAMS, **SECTION}, COMPARISONS)
+    now = {"execution": {**EXECUTION, "force_limit_n": {"open": 50.0, "touch": 1.0}}}
+    found = {m.place: m.kind for m in moves(plan, {**evidence.PARAMS, **now})}
+    assert found == {
+        "execution.force_limit_n.open": "loosened",
+        "execution.force_limit_n.touch": "changed",
+        "feasibility.position_change_limit_m": "changed",
+    }
+
+
+@pytest.mark.parametrize(
+    ("section", "name", "value"),
+    [
+        ("gate_b", "mode_minimum_share", 0.01), ("gate_c", "mode_observations", 3),
+        ("shadow", "observations", 3),
+    ],
+)  # fmt: skip
+def test_how_much_is_looked_at_is_planned(section, name, value):
+    shadow = {"shadow": {"observations": 400}}
+    plan = plan_of({**evidence.PARAMS, **shadow}, COMPARISONS)
+    params = copy.deepcopy({**evidence.PARAMS, **shadow})
+    params[section][name] = value
+    assert [(m.place, m.kind) for m in moves(plan, params)] == [(f"{section}.{name}", "loosened")]
+
+
+def test_the_training_is_planned():
+    def more(params):
+        params["policy"] = {"training": {"steps": 9}}
+
+    assert _moved(more) == [("policy.training.steps", "changed")]
+
+
 def test_every_strict_side_of_the_cause_belongs_to_a_question():
     assert set(CAUSE_STRICT) < set(OWN)
 
@@ -120,12 +176,40 @@ def test_the_report_binds_the_plan_and_says_what_moved(ladder):
     assert "gate_c.admissible_share" in said[1] and "seed (1 -> 5)" in said[2]
 
 
+OWN_LIMIT = {
+    "A": "told_share", "B": "late_change_upper", "C": "projection_p95_m",
+    "D": "fallback_share_upper",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("gate", OWN_LIMIT)
+def test_what_moved_shows_in_the_report_of_the_gate_and_of_those_above(ladder, gate):
+    (ladder / PREREGISTRATION).write_bytes(plan_bytes(evidence.PARAMS, COMPARISONS))
+    assert not any(PREREGISTRATION in caveat for caveat in judge(ladder, gate).caveats)
+
+    def change(params):
+        for own, name in OWN_LIMIT.items():
+            evidence.set_limit(stage_of(own), name, 0.9)(params)
+
+    evidence.write_params(ladder, change)
+    (said,) = [caveat for caveat in judge(ladder, gate).caveats if PREREGISTRATION in caveat]
+    assert said.startswith("Loosened since")
+    below = list(OWN_LIMIT)[: list(OWN_LIMIT).index(gate) + 1]
+    shown = {own for own, name in OWN_LIMIT.items() if f"{stage_of(own)}.{name} (" in said}
+    assert shown == set(below)
+
+
+def test_the_plan_is_material_of_no_gate_whose_verdict_trains_or_measures_again(ladder):
+    materials = {gate: judge(ladder, gate).materials for gate in OWN_LIMIT}
+    assert [gate for gate in materials if PREREGISTRATION in materials[gate]] == ["D"]
+
+
 @pytest.mark.parametrize("text", [None, "", "[1]", "seed: 1", "{seed: ['', 1]}", "a: ["])
 def test_without_a_plan_the_report_says_so(ladder, text):
     path = ladder / PREREGISTRATION
     path.unlink() if text is None else path.write_text(text)
     assert read_plan(ladder) is None
-    assert moved_caveats(ladder, evidence.PARAMS) == (NONE,)
+    assert moved_caveats(ladder, evidence.PARAMS, "D") == (NONE,)
 
 
 def _written(tmp_path, plan):

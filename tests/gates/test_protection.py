@@ -17,7 +17,7 @@ from gates.protection import (
     loosened,
     require_protection,
 )
-from gates.report import GATES
+from gates.report import GATES, stage_of
 from genpolicy.errors import ConfigError
 from genpolicy.integrity.documents import read_yaml
 
@@ -98,10 +98,59 @@ def test_the_shipped_lists_name_what_they_must(request):
     assert lacking(params, "C") == []
 
 
-def test_a_protective_criterion_cannot_be_waived():
-    params = {"gate_c": {"not_applicable": {"safety": {"mutants_undetected": "no time"}}}}
-    with pytest.raises(ConfigError, match="mutants_undetected"):
-        require_protection(params, "C")
+OF_CRITERIA = [
+    bound for bound in BOUNDS if bound.place in {i.id for s in SPECS.values() for i in s.criteria}
+]
+
+
+@pytest.mark.parametrize("bound", OF_CRITERIA, ids=lambda bound: f"{bound.gate}-{bound.place}")
+def test_a_protective_criterion_cannot_be_waived_but_what_a_task_may_lack(bound):
+    params = {stage_of(bound.gate): {"not_applicable": {"safety": {bound.place: "no time"}}}}
+    if bound.place == "force_peak_p95_n":
+        assert require_protection(params, bound.gate) == ()
+        return
+    with pytest.raises(ConfigError, match=bound.place):
+        require_protection(params, bound.gate)
+
+
+@pytest.mark.parametrize(
+    ("gate", "place", "value"),
+    [
+        ("B", "nonfinite_weights", 1), ("B", "samples_difference", 0.01),
+        ("B", "unpinned_items", 1), ("B", "metadata_mismatches", 1), ("B", "nfe_mismatch", 1),
+        ("C", "gate_c.mode_observations", 29), ("D", "force_peak_p95_n", 1e6),
+        ("D", "intervention_upper", 1.0), ("D", "reset_upper", 1.0),
+        ("D", "verdict_reachable", 0), ("D", "stress.starts", 2),
+        ("C", "execution.watchdog_s", 100.0), ("D", "execution.watchdog_s", 100.0),
+        ("D", "execution.force_limit_n", {"open": 40.0, "touch": 1e6}),
+    ],
+)  # fmt: skip
+def test_what_people_and_the_proof_rest_on_has_a_bound_in_code(gate, place, value, tmp_path):
+    bound = next(b for b in BOUNDS if (b.gate, b.place) == (gate, place))
+    evidence.write_params(tmp_path, lambda params: _put(params, bound, value))
+    params = yaml.safe_load((tmp_path / "params.yaml").read_text())
+    with pytest.raises(ConfigError, match=place.split(".")[-1]):
+        require_protection(params, gate)
+
+
+def test_a_limit_of_every_phase_is_held_to_the_bound():
+    def forces(*limits):
+        params = {"execution": {"force_limit_n": dict(zip("ab", limits, strict=True))}}
+        return [value for _, value in loosened(params, "D")]
+
+    assert forces(80.0, 10.0) == [] and forces(10.0, 81.0) == [81.0]
+
+
+@pytest.mark.parametrize(
+    ("gate", "name"),
+    [
+        ("B", "nonfinite_weights"), ("B", "samples_difference"), ("B", "unpinned_items"),
+        ("B", "metadata_mismatches"), ("B", "nfe_mismatch"), ("D", "verdict_reachable"),
+        ("D", "unmatched_starts"),
+    ],
+)  # fmt: skip
+def test_what_proves_a_candidate_applies_to_every_cell(gate, name):
+    assert {item.id: item for item in SPECS[gate].criteria}[name].always
 
 
 def test_judging_refuses_a_looser_limit(ladder):
@@ -124,4 +173,7 @@ def test_the_shipped_ladder_keeps_every_bound_and_the_smoke_ladder_is_a_rehearsa
     smoke = merged(params, read_yaml(root / "params.smoke.yaml"))
     assert is_rehearsal(smoke)
     looser = {bound.place for gate in GATES for bound, _ in loosened(smoke, gate)}
-    assert looser == {"stub_violation_upper", "stress.alpha"}
+    assert looser == {
+        "stub_violation_upper", "stress.alpha", "stress.starts", "gate_c.mode_observations",
+        "verdict_reachable", "intervention_upper", "reset_upper",
+    }  # fmt: skip

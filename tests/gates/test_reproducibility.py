@@ -5,6 +5,7 @@ import pytest
 from editing import cells
 
 from gates.proof import judge
+from genpolicy.statistics.intervals import clopper_pearson
 
 MODES = "reload/modes.parquet"
 EARLIER = "reload/modes_earlier.parquet"
@@ -65,6 +66,17 @@ def test_a_mode_counts_from_its_share_of_admissible_samples_on(ladder, fewest, p
     assert _red(report) == (set() if passes else {"mode_coverage_lower"})
     caveat = _found(report, "mode_coverage_lower")[0].caveat
     assert f"in {30 if passes else 0} of 30 two-mode situations" in caveat
+
+
+def test_situations_of_one_episode_are_one_draw_of_the_coverage(ladder):
+    """One situation a phase: thirty of ten episodes bound the share as ten draws do."""
+    evidence.edit_table(
+        ladder, MODES, lambda f: f.assign(episode_uuid=[f"e{i % 10}" for i in f["index"]])
+    )
+    found = _found(judge(ladder, "B"), "mode_coverage_lower")[0]
+    lower, upper = clopper_pearson(10, 10, 0.95)
+    assert found.interval == pytest.approx((lower, upper))
+    assert "lower bound over 10 episodes" in found.caveat
 
 
 def test_the_worst_training_seed_decides(ladder):

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gates.asked_for import CHECKS_ASKED_FOR
 from genpolicy.evidence.shadow import layer_mutants
 from genpolicy.evidence.shadow.corruption import CORRUPTIONS
 from genpolicy.evidence.shadow.layer_mutants import missing_checks_evidence
@@ -40,10 +41,10 @@ def test_every_row_of_the_table_has_a_row_and_is_noticed(rows):
     assert not any(row["not_applicable"] for row in rows)
 
 
-def test_the_gate_asks_for_every_row_of_both_tables(kit):
+def test_the_gate_asks_for_every_row_of_both_tables():
     expected = [f"{check.layer}.{check.name}" for check in CHECKS]
     expected += [f"execution.{check.name}" for check in EXECUTION_CHECKS]
-    assert kit.PARAMS["gate_c"]["required_checks"] == expected
+    assert list(CHECKS_ASKED_FOR) == expected
 
 
 @pytest.mark.parametrize("name", [check.name for check in CHECKS])

@@ -1,16 +1,14 @@
 """Limits of the cause: complete, with reasons, packaged as the ladder has them."""
 
-import json
 import math
 import re
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 import yaml
-from planted import BROKEN, LIMITS, OFFSET, VALID, counts, limit, named
+from planted import BROKEN, LIMITS, VALID, counts, limit, named
 
-from gates.cause import CauseLimits, CauseName, limits_of
+from gates.cause import CauseLimits, limits_of
 from gates.cause.limits import OWN, SHARED
 from gates.need.gate import read_cause_limits
 from genpolicy.audit.settings import AuditSettings
@@ -82,16 +80,16 @@ def test_a_limit_without_reason_or_question_is_refused(cause, match):
         limits_of(cause, {}, where="params.yaml: gate_a.cause")
 
 
-def test_a_shared_question_that_does_not_apply_turns_nothing_red_and_is_written_as_such(tmp_path):
+@pytest.mark.parametrize("question", SHARED)
+def test_a_shared_question_that_is_waived_keeps_the_packaged_limit(question, tmp_path):
     params = yaml.safe_load((ROOT / "params.yaml").read_text())
-    del params["gate_a"]["limits"]["perception"]["clock_residual_s"]
-    params["gate_a"]["not_applicable"] = {"perception": {"clock_residual_s": "one clock only"}}
+    (owner,) = [o for o, entries in params["gate_a"]["limits"].items() if question in entries]
+    del params["gate_a"]["limits"][owner][question]
+    params["gate_a"]["not_applicable"] = {owner: {question: "nothing to hold it against"}}
     path = tmp_path / "params.yaml"
     path.write_text(yaml.safe_dump(params))
     limits = read_cause_limits(path)
-    late = replace(VALID, findings=(OFFSET,))
-    assert named(late).name is CauseName.DATA_DEFECT
-    assert named(late, limits).name is CauseName.VALID_MODES
-    written = limits.as_json()["perception"]["clock_residual_s"]
-    assert written == ["not applicable", "one clock only"]
-    json.dumps([answer.as_json() for answer in named(late, limits).answers], allow_nan=False)
+    assert limits[question] == LIMITS[question]
+    (limit, reason) = limits.as_json()[owner][question]
+    assert limit == LIMITS[question] and reason.startswith("packaged")
+    assert "nothing to hold it against" in reason

@@ -14,6 +14,7 @@ from gates.feasibility.candidates import boundary_jerk_p95_m_s3, projection_p95_
 from gates.feasibility.proof import checked_violations, mutants_undetected
 from gates.feasibility.settings import SHADOW, FeasibilitySettings
 from gates.proof import judge
+from genpolicy.errors import ConfigError
 from genpolicy.statistics.intervals import clopper_pearson
 
 
@@ -31,10 +32,7 @@ def _undetected(root, rows):
     """What the criterion says of these rows of `mutants.json`."""
     (root / SHADOW).mkdir(parents=True)
     (root / SHADOW / "mutants.json").write_text(json.dumps(rows))
-    settings = FeasibilitySettings.model_construct(
-        required_checks=tuple(f"{layer}.{name}" for layer, name in evidence.CHECKS)
-    )
-    return mutants_undetected.measure(Evidence(root), settings)
+    return mutants_undetected.measure(Evidence(root), FeasibilitySettings.model_construct())
 
 
 def test_a_check_that_was_never_disabled_is_undetected(ladder):
@@ -49,6 +47,12 @@ def test_every_row_counts_under_its_own_layer(row, tmp_path):
     """`expired` of the layers does not stand for `expired` of the executor."""
     found = _undetected(tmp_path, ROWS[:row] + ROWS[row + 1 :])
     assert found.value == 1 and ".".join(evidence.CHECKS[row]) in found.caveat
+
+
+def test_no_setting_says_which_checks_are_asked_for(ladder):
+    evidence.write_params(ladder, lambda p: p["gate_c"].update(required_checks=["fresh.reset"]))
+    with pytest.raises(ConfigError, match="required_checks"):
+        judge(ladder, "C")
 
 
 def test_all_of_them_are_enough(tmp_path):

@@ -3,6 +3,7 @@
 import evidence
 import pytest
 
+from gates.cause import default_limits
 from gates.proof import judge
 from genpolicy.audit.rows import Finding
 from genpolicy.integrity.rows import write_rows
@@ -97,6 +98,36 @@ def test_the_cause_cannot_be_declared_not_applicable(ladder, name):
         judge(ladder, "A")
 
 
+def _waived(ladder, name, owner="perception"):
+    def waive(params):
+        for entries in params["gate_a"]["limits"].values():
+            entries.pop(name, None)
+        params["gate_a"]["not_applicable"] = {owner: {name: "we know our data"}}
+
+    evidence.write_params(ladder, waive)
+
+
+def test_a_criterion_of_the_labels_that_is_waived_does_not_switch_off_the_defect(ladder):
+    contaminated(ladder)
+    _waived(ladder, "label_disagreement", "model")
+    report = judge(ladder, "A")
+    assert "label_disagreement" not in verdicts(report) and report.verdict == "FAIL"
+    assert verdicts(report)["data_defects"] == verdicts(report)["cause_accepted"] == "FAIL"
+    (answer,) = [c for c in report.criteria if c.id == "data_defects"]
+    assert "label_disagreement is waived, and asked here by the packaged limit" in answer.caveat
+
+
+@pytest.mark.parametrize("question", ["clock_residual_s", "calibration_residual_m"])
+def test_a_waived_question_keeps_the_packaged_limit_where_the_data_answer_it(ladder, question):
+    _waived(ladder, question)
+    assert judge(ladder, "A").verdict == "PASS"
+    limit = default_limits()[question]
+    find(ladder, "clock", "camera", question, limit)
+    assert judge(ladder, "A").verdict == "PASS"
+    find(ladder, "clock", "camera", question, 1.01 * limit)
+    assert verdicts(judge(ladder, "A"))["data_defects"] == "FAIL"
+
+
 def test_where_a_simpler_policy_may_do_the_page_sends_nobody_to_the_data(ladder):
     evidence.edit_table(
         ladder,
@@ -109,6 +140,30 @@ def test_where_a_simpler_policy_may_do_the_page_sends_nobody_to_the_data(ladder)
     assert "Train the simple baselines" not in report.diagnosis
     evidence.edit_table(ladder, "audit/clocks.parquet", lambda f: f.assign(offset_after_s=1.0))
     assert "run the simpler policy" not in judge(ladder, "A").diagnosis
+
+
+def _independent(entries):
+    return [{**entry, "exceeding": entry["permutations"] // 2} for entry in entries]
+
+
+def test_a_latent_that_answers_nothing_sends_nobody_to_train_what_was_trained(ladder):
+    evidence.edit_document(ladder, "measure_baselines/latent.json", _independent)
+    report = judge(ladder, "A")
+    assert {name for name, verdict in verdicts(report).items() if verdict != "PASS"} == {
+        "latent_dependence_p"
+    }
+    assert "Train the simple baselines" not in report.diagnosis
+    assert "run the simpler policy" not in report.diagnosis
+    assert "clean the demonstrations first" in report.diagnosis
+    evidence.edit_table(
+        ladder,
+        "measure_baselines/modes.parquet",
+        lambda f: f.assign(valid=f["samples"], modes_valid=1, admissible=f["samples"]),
+    )
+    report = judge(ladder, "A")
+    assert verdicts(report)["remedy_valid_share"] == "FAIL"
+    assert "run the simpler policy" in report.diagnosis
+    assert "Train the simple baselines" not in report.diagnosis
 
 
 def test_a_pass_says_first_that_one_mode_may_be_enough(ladder):

@@ -73,6 +73,48 @@ def test_the_figure_of_convergence_says_in_words_what_it_draws(whole):
     assert page.count("The same as a table") == 1 and f'<td class="n">{fall}</td>' in page
 
 
+def _judged_by_others(whole, root, gate):
+    """The report and the pictures of a gate under another level and another confidence."""
+    shutil.copytree(whole, root)
+
+    def change(params):
+        params["confidence"] = 0.9
+        (owner,) = [part for part in params["gate_a"]["cause"].values() if "strata_p" in part]
+        owner["strata_p"][0] = 0.013
+
+    evidence.write_params(root, change)
+    report = judge(root, gate)
+    return report, [draw_all(module.PLOTS, Evidence(root), report) for module in MODULES[gate]]
+
+
+def test_the_figures_of_gate_a_are_drawn_by_the_level_and_confidence_judged_by(whole, tmp_path):
+    _, (pictures, _) = _judged_by_others(whole, tmp_path / "repo", "A")
+    drawn = "".join(picture.svg or "" for picture in pictures)
+    assert "adjusted p at most 0.013" in drawn and "90%" in drawn and "95%" not in drawn
+
+
+def test_the_interval_of_success_is_drawn_by_the_confidence_judged_by(whole, tmp_path):
+    _, (pictures,) = _judged_by_others(whole, tmp_path / "repo", "D")
+    assert any("exact 90% interval" in picture.svg for picture in pictures)
+
+
+def test_convergence_is_drawn_by_the_confidence_judged_by(whole, tmp_path):
+    report, ((picture,), _) = _judged_by_others(whole, tmp_path / "repo", "B")
+    low, high = next(c for c in report.criteria if c.id == "baseline_fall_upper").interval
+    (row,) = [row for row in picture.in_words if row[0] == "chunked_bc"]
+    assert any(cell.endswith(f"({low:.3g} to {high:.3g})") for cell in row)
+    assert "90% interval" in picture.svg
+
+
+@pytest.mark.parametrize(("gate", "module"), [("A", plots_need), ("D", plots_stress)])
+def test_without_the_confidence_judged_by_no_interval_is_drawn(whole, gate, module):
+    report = judge(whole, gate)
+    settings = {key: value for key, value in report.settings.items() if key != "confidence"}
+    without = report.model_copy(update={"settings": settings})
+    pictures = draw_all(module.PLOTS, Evidence(whole), without)
+    assert [picture.skipped for picture in pictures if picture.skipped] == ["'confidence'"]
+
+
 def test_a_training_that_was_not_measured_at_three_quarters_is_not_drawn(whole, tmp_path):
     root = tmp_path / "repo"
     shutil.copytree(whole, root)
