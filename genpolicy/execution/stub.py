@@ -67,7 +67,7 @@ class ControllerStub:
     ) -> None:
         """Its own view of phase, calibration and newest observation."""
         old, seen_ns = self._view, self._view.newest_observation_ns
-        if event_ns > now_ns or (seen_ns is not None and event_ns < seen_ns):
+        if old.ignores(event_ns, now_ns):
             return
         if old.phase != phase and seen_ns is not None:
             self.void(DiscardReason.PHASE_TRANSITION, event_ns)
