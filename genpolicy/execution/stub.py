@@ -160,7 +160,7 @@ class ControllerStub:
         self.accepted += 1
         self._last_sequence = sequence
         self._last_due_ns = moment.due_ns
-        self.supervisor.heard_accept(now_ns)
+        self.supervisor.note_accepted(now_ns)
         payload = {**place, "sequence": sequence, "age_ns": now_ns - about.times.condition_ns}
         payload["action"] = encode_actions(action)
         self._journal.add("fallback" if source == "fallback" else "accept", now_ns, payload)

@@ -11,9 +11,10 @@ from genpolicy.evidence.shadow.corruption import CORRUPTIONS
 from genpolicy.evidence.shadow.observations import spread
 from genpolicy.evidence.shadow.session import play
 from genpolicy.evidence.shadow.shadow import admit, case_of
+from genpolicy.execution.checks import without
 from genpolicy.execution.journal import encode_actions
 from genpolicy.feasibility.admission import Admitted, FeasibilityChecker
-from genpolicy.feasibility.checks import without
+from genpolicy.feasibility.checks import CHECKS
 from genpolicy.feasibility.figures import expected_motion
 from genpolicy.verification.checker import check_messages
 from genpolicy.verification.motion import MotionProof
@@ -103,7 +104,7 @@ def test_what_the_operator_did_is_proved_in_every_phase(shadow, items):
 @pytest.mark.parametrize("check", RULES)
 def test_an_executed_row_that_a_missing_check_let_through_is_found(check, shadow, items):
     corruption = BY_CHECK[check]
-    table = without(check, *corruption.behind)
+    table = without(CHECKS, check, *corruption.behind)
     blind = replace(shadow, checker=FeasibilityChecker(shadow.checker.cell, checks=table))
     found = []
     for item in items:

@@ -86,7 +86,7 @@ def test_nothing_is_lost_and_the_reason_is_its_own(evidence, tmp_path):
     report = check_journal(path)
     assert report.violations == [] and report.checked_actions > 0
     expected = {
-        "reordered_chunk": "out_of_order", "stale_observation": "stale_observation",
+        "reordered_chunk": "superseded", "stale_observation": "stale_observation",
         "phase_change": "phase_transition", "expired": "expired", "earlier_session": "reset",
         "calibration_change": "calibration_mismatch", "not_a_number": "infeasible",
     }  # fmt: skip
