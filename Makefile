@@ -11,10 +11,10 @@
 #            PYTHON=<path>      another Python 3.11 (3.12 should do, 3.11 is tested)
 #            JOBS=<n>           test processes, default 2
 #
-# An end of `make ladder`: 0 the ladder ran to its end, gate E's report included; otherwise make
-# prints "Error 3" (refused by a gate, the table says which), "Error 2" (bad configuration or
-# input) or "Error 1" (a fault of ours). make itself always turns these into its own code 2;
-# scripts that need the code call `genpolicy reproduce`.
+# An end of `make ladder`: 0 the ladder ran to its end, and gate E passes or waits for people;
+# otherwise make prints "Error 3" (refused by a gate, the table says which), "Error 2" (bad
+# configuration or input) or "Error 1" (a fault of ours). make itself always turns these into its
+# own code 2; scripts that need the code call `genpolicy reproduce`.
 
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c

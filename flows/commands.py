@@ -26,7 +26,8 @@ def reproduce(
 ) -> int:
     """Run `dvc repro`, and leave with a code that says why it ended.
 
-    0 done, 1 a fault of ours, 2 bad input, 3 refused by a gate.
+    0 done, 1 a fault of ours, 2 bad input, 3 refused by a gate. Without named
+    stages also 3 where the last gate does not pass and waits for nobody.
     """
     from flows.reproduce import reproduce_here
 

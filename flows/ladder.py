@@ -31,6 +31,7 @@ from prefect.artifacts import create_link_artifact, create_markdown_artifact  # 
 from prefect.settings import PREFECT_API_URL  # noqa: E402
 from prefect.states import Completed, Failed  # noqa: E402
 
+from flows.judged import GOES_ON, PENDING, judged  # noqa: E402
 from flows.reproduce import (  # noqa: E402
     EXIT_BAD_INPUT,
     EXIT_DONE,
@@ -40,8 +41,8 @@ from flows.reproduce import (  # noqa: E402
     stop_all,
 )
 from genpolicy.cli.shell import run_program  # noqa: E402
-from genpolicy.errors import BadInputError, ConfigError  # noqa: E402
-from genpolicy.integrity.documents import read_json, read_yaml  # noqa: E402
+from genpolicy.errors import ConfigError  # noqa: E402
+from genpolicy.integrity.documents import read_yaml  # noqa: E402
 
 GATES = ("a", "b", "c", "d", "e")
 RETRIES = 2
@@ -51,7 +52,6 @@ FIRST_ANSWER_S = 10.0
 SILENCE_S = 30.0
 PROBE_PERIOD_S = 3.0
 
-PENDING = "PENDING_REVIEW"
 RED = ("FAIL", "INCONCLUSIVE")
 STATE_NAMES = {EXIT_FAULT: "Fault", EXIT_BAD_INPUT: "Bad input", EXIT_REFUSED: "Refused"}
 
@@ -106,29 +106,9 @@ def reproduce_stage(workspace: str, stage: str) -> float:
         raise StageStoppedError(outcome.code, outcome.sentence, outcome.infrastructure)
     if stage.startswith("gate_"):
         verdict, sentence = judged(Path(workspace), stage)
-        if verdict not in ("PASS", PENDING):
+        if verdict not in GOES_ON:
             raise StageStoppedError(EXIT_REFUSED, sentence, False, verdict)
     return outcome.duration_s
-
-
-def judged(workspace: Path, stage: str) -> tuple[str, str]:
-    """Verdict of a gate stage that has just run, and one sentence about it.
-
-    Raises:
-        BadInputError: It left no report, or one without verdict.
-    """
-    path = workspace / "reports" / f"{stage}.json"
-    document = read_json(path)
-    verdict = document.get("verdict") if isinstance(document, dict) else None
-    if not isinstance(verdict, str):
-        raise BadInputError(
-            where=str(path),
-            found="without a verdict",
-            expected="the report of a gate",
-            action=f"Run `dvc repro -f {stage}`.",
-        )
-    words = (f"{stage}: {verdict}.", document.get("decision"), document.get("diagnosis"))
-    return verdict, " ".join(str(word) for word in words if word)
 
 
 def stages_by_gate(pipeline: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:

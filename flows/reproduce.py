@@ -1,8 +1,9 @@
 """One `dvc repro` as a subprocess, with an exit code that says why it ended.
 
 DVC itself ends with 255 whatever a stage did. This reads which stage failed and with which code,
-so that a refusal (3), a bad input (2) and a fault (1) stay apart. `python -m flows.reproduce`
-runs the whole ladder, or the stages named, without any server.
+so that a refusal (3), a bad input (2) and a fault (1) stay apart. A whole ladder is also asked for
+the verdict of its last gate, behind which no stage could refuse. `python -m flows.reproduce` runs
+the whole ladder, or the stages named, without any server.
 """
 
 import contextlib
@@ -17,6 +18,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from flows.judged import GOES_ON, judged, last_gate
 from genpolicy.cli.shell import run_program
 from genpolicy.errors import BadInputError
 
@@ -51,6 +53,7 @@ class RunEnd:
         sentence: What the stage (or DVC) said, one line; empty when all went well.
         infrastructure: Whether a second try could help: a lock, a full disk, a killed process.
         duration_s: Wall time.
+        verdict: Of the last gate, where all ran and it does not pass; otherwise empty.
     """
 
     code: int
@@ -58,6 +61,7 @@ class RunEnd:
     sentence: str
     infrastructure: bool
     duration_s: float
+    verdict: str = ""
 
 
 def reproduce(
@@ -72,13 +76,16 @@ def reproduce(
 
     Args:
         workspace: Folder that holds `dvc.yaml`.
-        stages: Stages to bring up to date; none means all.
+        stages: Stages to bring up to date; none means all, and the last gate's verdict counts.
         single_item: Only these stages, without what they depend on.
         force: Run them even where nothing changed.
         echo: Called with every line that DVC and the stages print.
 
     Returns:
         How it ended. Nothing is raised for a stage that fails: that is an answer.
+
+    Raises:
+        BadInputError: All ran, and the last gate left no report, or one without verdict.
     """
     command = [sys.executable, "-m", "dvc", "repro", *stages]
     command += ["--single-item"] if single_item else []
@@ -108,7 +115,10 @@ def reproduce(
         if process.poll() is None:
             stop_group(process)
         _running.discard(process)
-    return _outcome(code, list(lines), time.monotonic() - started)
+    duration_s = time.monotonic() - started
+    if code == 0 and not stages:
+        return _of_the_last_gate(workspace, duration_s)
+    return _outcome(code, list(lines), duration_s)
 
 
 def stage_environment(workspace: Path) -> dict[str, str]:
@@ -174,6 +184,15 @@ def reproduce_here(
 
 def _interrupt(number: int, frame: object) -> None:
     raise KeyboardInterrupt
+
+
+def _of_the_last_gate(workspace: Path, duration_s: float) -> RunEnd:
+    """All stages ran: the end is the verdict that no stage has asked for."""
+    gate = last_gate(workspace)
+    verdict, sentence = judged(workspace, gate) if gate else ("", "")
+    if not gate or verdict in GOES_ON:
+        return RunEnd(EXIT_DONE, "", "", infrastructure=False, duration_s=duration_s)
+    return RunEnd(EXIT_REFUSED, gate, sentence, False, duration_s, verdict)
 
 
 def _outcome(dvc_code: int, lines: list[str], duration_s: float) -> RunEnd:

@@ -140,7 +140,7 @@ def run(workspace: Path, base: str) -> Seen:
     if end.infrastructure or (end.code == 1 and not end.stage):
         raise RuntimeError(f"the machine failed, not the ladder: {end.sentence}")
     stops: list[Stop] = []
-    if end.code != 0:
+    if end.code != 0 and not end.verdict:  # the report of a gate that judged says it better
         refused = _refusal(end.stage, _said(end.sentence, runs.lines))
         stops = [refused] if refused else []
     seen = look(workspace, base)

@@ -144,7 +144,7 @@ class AuditSettings(BaseModel):
     frame_floor_rad: float = Field(default=0.14, gt=0)
     magnitude_floor: float = Field(default=5.0, gt=1)
     rate_floor: float = Field(default=0.1, gt=0, lt=1)
-    frozen_floor_s: float = Field(default=0.35, gt=0)
+    frozen_floor_s: float = Field(default=0.3, gt=0)
     gap_share_floor: float = Field(default=0.01, gt=0, lt=1)
     jitter_floor_share: float = Field(default=0.5, gt=0)
     negative_delay_tolerance_s: float = Field(default=0.001, ge=0)

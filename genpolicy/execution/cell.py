@@ -56,9 +56,9 @@ class ExecutionSettings(Settings):
         watchdog_s: Silence after which the stub holds; at least one period. Polled every period,
             the hold comes within `period + watchdog` (P2).
         queue_capacity: Chunks kept; the oldest is dropped beyond it.
-        maximum_age_s: Largest action age by phase, less than a chunk's validity (execution
-            horizon times period), or it would refuse nothing; one number for all. A phase without
-            one accepts nothing.
+        maximum_age_s: Largest action age by phase, less than the age of a chunk's last executable
+            action on the controller's ticks (execution horizon minus one, times period), or it
+            would refuse nothing; one number for all. A phase without one accepts nothing.
         maximum_divergence_m: Measured against commanded TCP, beyond which chunks are void.
         force_limit_n: Contact force by phase at which the simulated supervisor stops; a phase
             without one has limit 0. A fixture of the simulation, not a value for any robot.
@@ -153,7 +153,7 @@ class Cell:
 
         Raises:
             ConfigError: A phase has no limits, limits are for a phase that does not exist, or no
-                chunk can reach an age limit: it is void before.
+                action can exceed an age limit: its chunk is void before.
         """
         limits_n = self.execution.force_limit_n
         if set(phases) != set(limits_n):
@@ -163,14 +163,15 @@ class Cell:
                 expected=f"the task's: {sorted(phases)}",
                 action="Name a force limit for each phase of the task and for no other.",
             )
-        valid_s = self.horizons.execution_horizon * self.horizons.action_period_s
+        # Controllers accept at whole periods, so no valid action is older than its last row then.
+        oldest_s = (self.horizons.execution_horizon - 1) * self.horizons.action_period_s
         for phase, age_s in self.execution.maximum_age_s.items():
-            if not age_s < valid_s - 1e-9:
+            if not age_s < oldest_s - 1e-9:
                 raise ConfigError(
                     where=f"execution.maximum_age_s of phase {phase}",
                     found=f"{age_s} s",
-                    expected=f"less than {valid_s:g} s, after which a chunk is no longer valid",
-                    action="Lower it: a limit that nothing can reach refuses nothing.",
+                    expected=f"less than {oldest_s:g} s, the age of a chunk's last valid action",
+                    action="Lower it: a limit that nothing can exceed refuses nothing.",
                 )
 
     def first_view(self) -> View:

@@ -11,9 +11,10 @@ All times are whole nanoseconds. A fact that is unknown does not hold.
 
 from collections.abc import Callable
 from enum import StrEnum
-from typing import NamedTuple
+from typing import NamedTuple, Protocol, TypeVar
 
 from genpolicy.contract.chunk import DiscardReason
+from genpolicy.errors import ConfigError
 from genpolicy.execution.moment import FALLBACK, MODE_OF_SOURCE, ExecutorMode, Moment
 from genpolicy.execution.nanoseconds import NEVER_NS, ChunkTimes
 
@@ -59,9 +60,37 @@ class Check(NamedTuple):
 Checks = tuple[Check, ...]
 
 
+class Named(Protocol):
+    """A row of a table of checks."""
+
+    @property
+    def name(self) -> str:
+        """Its name, unique in its table."""
+
+
+Row = TypeVar("Row", bound=Named)
+
+
 def refusal(checks: Checks, place: Place, moment: Moment) -> Check | None:
     """The first row of this place that does not hold; None if all do."""
     return next((c for c in checks if place in c.places and not c.holds(moment)), None)
+
+
+def without(table: tuple[Row, ...], *names: str) -> tuple[Row, ...]:
+    """A table of checks, this one or that of the layers, minus the rows of these names.
+
+    Raises:
+        ConfigError: It has no row of such a name.
+    """
+    unknown = set(names) - {row.name for row in table}
+    if unknown:
+        raise ConfigError(
+            where="the checks to leave out",
+            found=f"{sorted(unknown)}",
+            expected=f"names out of {[row.name for row in table]}",
+            action="Correct the name.",
+        )
+    return tuple(row for row in table if row.name not in names)
 
 
 def at(checks: Checks, place: Place) -> Checks:

@@ -82,10 +82,7 @@ class Executor:
         """
         now_ns = self._begin(now_s)
         event_ns = to_ns(event_time_s) if math.isfinite(event_time_s * NS_PER_S) else now_ns + 1
-        newest_ns = self._view.newest_observation_ns
-        ignored = "future" if event_ns > now_ns else ""
-        if not ignored and newest_ns is not None and event_ns < newest_ns:
-            ignored = "older"
+        ignored = self._view.ignores(event_ns, now_ns)
         payload = {
             "event_time_ns": event_ns, "phase": phase, "calibration_epoch": calibration_epoch,
             "used": not ignored, "ignored_because": ignored,
@@ -108,7 +105,7 @@ class Executor:
         ):  # fmt: skip
             if old != new:
                 self._journal.add(kind, now_ns, {"event_time_ns": event_ns, "old": old, "new": new})
-                if newest_ns is not None:
+                if before.newest_observation_ns is not None:
                     self._void(now_ns, reason, event_ns)
         limit_m = self.cell.execution.maximum_divergence_m
         if divergence_m is not None and not limit_m - divergence_m >= 0:

@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 
 JOURNAL_VERSION = 5
 MAXIMUM_UNCOMPRESSED_BYTES = 8 << 30
-MAXIMUM_RECORD_BYTES = 64 << 20
+MAXIMUM_CHUNK_BYTES = 64 << 20  # what is unpacked at once; every record lies in such a piece
 
 EVENT_FIELDS: dict[str, tuple[str, ...]] = {
     "session": ("version", "labels", "execution_horizon", "period_ns", "maximum_age_ns",
@@ -236,9 +236,9 @@ def read_journal(path: Path) -> dict[str, list[Event]]:
         summary = reader.get_summary()
         if summary is None or summary.statistics is None:
             raise ValueError("no summary")
-        size = sum(index.uncompressed_size for index in summary.chunk_indexes)
-        if size > MAXIMUM_UNCOMPRESSED_BYTES:
-            raise ValueError(f"{size} bytes uncompressed")
+        sizes = [index.uncompressed_size for index in summary.chunk_indexes]
+        if sum(sizes) > MAXIMUM_UNCOMPRESSED_BYTES or max(sizes, default=0) > MAXIMUM_CHUNK_BYTES:
+            raise ValueError(f"{sum(sizes)} bytes uncompressed, {max(sizes)} in one piece")
         for _, channel, message in reader.iter_messages(log_time_order=False):
             payload = json.loads(message.data)
             session, n, time_ns = payload.pop("session"), payload.pop("n"), payload.pop("t")

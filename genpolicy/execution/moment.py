@@ -78,6 +78,16 @@ class View:
     controller: str = ""
     controller_mode: str = ""
 
+    def ignores(self, event_ns: int, now_ns: int) -> str:
+        """Why an observation of this event time is not used now; empty where it is.
+
+        `future`: it has not happened yet. `older`: than the newest one; an equal one is used.
+        """
+        if event_ns > now_ns:
+            return "future"
+        newest_ns = self.newest_observation_ns
+        return "older" if newest_ns is not None and event_ns < newest_ns else ""
+
     def voided(self, reason: DiscardReason, before_ns: int, arrivals: int = 0) -> "View":
         """The view after an event; a later event of the same reason covers an earlier one."""
         old = self.voidings.get(reason, Voiding())

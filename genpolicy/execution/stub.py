@@ -67,7 +67,7 @@ class ControllerStub:
     ) -> None:
         """Its own view of phase, calibration and newest observation."""
         old, seen_ns = self._view, self._view.newest_observation_ns
-        if event_ns > now_ns or (seen_ns is not None and event_ns < seen_ns):
+        if old.ignores(event_ns, now_ns):
             return
         if old.phase != phase and seen_ns is not None:
             self.void(DiscardReason.PHASE_TRANSITION, event_ns)
@@ -160,7 +160,7 @@ class ControllerStub:
         self.accepted += 1
         self._last_sequence = sequence
         self._last_due_ns = moment.due_ns
-        self.supervisor.heard_accept(now_ns)
+        self.supervisor.note_accepted(now_ns)
         payload = {**place, "sequence": sequence, "age_ns": now_ns - about.times.condition_ns}
         payload["action"] = encode_actions(action)
         self._journal.add("fallback" if source == "fallback" else "accept", now_ns, payload)

@@ -83,14 +83,8 @@ class Supervisor:
             self._stop(self._journal.clock(now_s), SupervisorState.PROTECTIVE_STOP, "collision", "")
         return collision
 
-    def protective_stop(self, now_s: float, detail: str) -> None:
-        """Stop on any other cause named in `detail`."""
-        self._stop(
-            self._journal.clock(now_s), SupervisorState.PROTECTIVE_STOP, "protective_stop", detail
-        )
-
     def emergency_stop(self, now_s: float, detail: str = "") -> None:
-        """E-stop; from every state."""
+        """E-stop, by a person or for any cause named in `detail`; from every state."""
         self._stop(
             self._journal.clock(now_s), SupervisorState.EMERGENCY_STOP, "emergency_stop", detail
         )
@@ -115,7 +109,7 @@ class Supervisor:
         self.resumed_ns = now_ns
         self._record(now_ns, "human_reset", person)
 
-    def heard_accept(self, now_ns: int) -> None:
+    def note_accepted(self, now_ns: int) -> None:
         """An accepted command: feeds the watchdog and ends a watchdog hold, never a stop."""
         self._last_accept_ns = now_ns
         if self.state is SupervisorState.WATCHDOG_HOLD:

@@ -1,7 +1,7 @@
 """The one table of checks: name, layer, what measures it, and the size of its limit.
 
 A checker is made with a tuple of these rows, by default all of them. A mutant is the tuple minus
-a row (`without`); no check can be switched off in a checker that exists.
+a row (`execution.checks.without`); no check can be switched off in a checker that exists.
 """
 
 from collections.abc import Callable
@@ -96,34 +96,17 @@ CHECKS: tuple[Check, ...] = (
     Check("contact_surface", "contact", contact.surface_margins, _close),
     Check("contact_force", "contact", contact.force_margins,
           lambda cell: cell.settings.contact_force_limit_n),
-    Check("reset", "fresh", fresh_margins),
+    Check("session_epoch", "fresh", fresh_margins),
     Check("calibration_mismatch", "fresh", fresh_margins),
     Check("phase_transition", "fresh", fresh_margins),
     Check("checkpoint_mismatch", "fresh", fresh_margins),
     Check("sampler_mismatch", "fresh", fresh_margins),
     Check("future_observation", "fresh", fresh_margins),
-    Check("out_of_order", "fresh", fresh_margins),
+    Check("behind_accepted", "fresh", fresh_margins),
     Check("stale_observation", "fresh", fresh_margins),
     Check("expired", "fresh", fresh_margins),
 )  # fmt: skip
 """Every check, in the order in which they decide."""
-
-
-def without(*names: str, checks: tuple[Check, ...] = CHECKS) -> tuple[Check, ...]:
-    """The table minus some rows, for the evidence that each of them is needed.
-
-    Raises:
-        ConfigError: There is no row of that name.
-    """
-    unknown = set(names) - {check.name for check in checks}
-    if unknown:
-        raise ConfigError(
-            where="the checks to leave out",
-            found=f"{sorted(unknown)}",
-            expected=f"names out of {[check.name for check in checks]}",
-            action="Correct the name.",
-        )
-    return tuple(check for check in checks if check.name not in names)
 
 
 def require_table(checks: tuple[Check, ...]) -> None:

@@ -4,6 +4,7 @@ import numpy as np
 
 from genpolicy.feasibility.cell import Cell
 from genpolicy.robot.impedance import STIFFNESS_N_M
+from genpolicy.verification.contact import ExpectedContact
 from genpolicy.verification.motion import ExpectedMotion
 
 
@@ -18,8 +19,16 @@ def expected_motion(robot: Cell) -> ExpectedMotion:
         torque_nm=robot.limits.torque_nm,
         tcp_speed_m_s=settings.tcp_speed_limit_m_s,
         tcp_turn_rad_s=settings.tcp_turn_limit_rad_s,
+        condition=settings.condition_limit,
         held_opening_m=settings.held_opening_m,
-        contact_phases=robot.contact_phases,
-        contact_force_n=robot.force_envelope_n,
-        contact_stiffness_n_m=STIFFNESS_N_M,
+        contact=ExpectedContact(
+            phases=robot.contact_phases,
+            opening_phases=robot.opening_phases,
+            force_n=robot.force_envelope_n,
+            stiffness_n_m=STIFFNESS_N_M,
+            speed_m_s=settings.contact_speed_limit_m_s,
+            cone_rad=settings.approach_cone_rad,
+            forgiven_m=settings.step_tolerance_m,
+            release_depth_m=settings.release_depth_m,
+        ),
     )

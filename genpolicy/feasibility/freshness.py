@@ -9,8 +9,8 @@ from genpolicy.execution.moment import Chunk, Moment, View
 from genpolicy.execution.nanoseconds import NS_PER_S, ChunkTimes, to_ns
 from genpolicy.feasibility.context import Context
 
-NAMES = {"session_epoch": "reset", "behind_accepted": "out_of_order"}
-"""Rows of the table whose verdict has another name in this layer."""
+REASONS = {check.name: check.reason for check in at(CHECKS, Place.LAYER) if check.reason}
+"""Why a chunk is discarded that this layer refuses, by the name of the check."""
 
 
 def fresh(
@@ -32,8 +32,8 @@ def fresh(
     try:
         moment = _moment(metadata, context)
     except NonFiniteError:
-        return {NAMES.get(row.name, row.name): math.nan for row in rows}
-    return {NAMES.get(row.name, row.name): _margin(row, moment) for row in rows}
+        return {row.name: math.nan for row in rows}
+    return {row.name: _margin(row, moment) for row in rows}
 
 
 def _margin(check: Check, moment: Moment) -> float:

@@ -20,8 +20,7 @@ from genpolicy.robot.limits import RobotLimits
 from genpolicy.tasks.api import Task, find_task, load_task
 
 IDENTITY_FILE = "identity.json"
-IDENTITY = f"artifacts/task/{IDENTITY_FILE}"
-"""Where the stage `task` writes it, from the root of a workspace."""
+"""Name of the file that the stage `task` writes."""
 
 COMPILED = (".pyc", ".pyo")
 

@@ -14,6 +14,7 @@ from genpolicy.integrity.hashing import sha256_bytes_of
 
 TOPIC = "/journal/"
 MAXIMUM_UNCOMPRESSED_BYTES = 8 << 30
+MAXIMUM_PIECE_BYTES = 64 << 20  # unpacked at once; a journal's own writer ends one after 1 MiB
 Message = dict[str, Any]
 
 
@@ -32,6 +33,8 @@ def read_messages(path: Path) -> Iterator[tuple[str, Message]]:
             raise ValueError("no summary at its end")
         if sum(c.uncompressed_size for c in summary.chunk_indexes) > MAXIMUM_UNCOMPRESSED_BYTES:
             raise ValueError(f"more than {MAXIMUM_UNCOMPRESSED_BYTES} bytes uncompressed")
+        if any(c.uncompressed_size > MAXIMUM_PIECE_BYTES for c in summary.chunk_indexes):
+            raise ValueError(f"a piece of more than {MAXIMUM_PIECE_BYTES} bytes uncompressed")
         count = 0
         for _, channel, message in reader.iter_messages(log_time_order=False):
             count += 1

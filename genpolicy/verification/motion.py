@@ -3,10 +3,12 @@
 It believes no layer. The journal says from which commands a chunk went on, where the scene stood
 and which joint positions its rows have; that these joint positions are the poses that were
 executed is checked first, and then they are held against the robot's limits, the scene and the
-robot's own body; the first step also against where the arm was measured.
+robot's own body, the way to them too; the first step also against where the arm was measured.
+What may be done with a held object is `contact`'s.
 """
 
-from collections.abc import Iterator, Mapping
+import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,6 +20,7 @@ from numpy.typing import NDArray
 from genpolicy.contract.action import GRIPPER, POSITION, ROTATION
 from genpolicy.contract.rotation import angle_between, rotation_from_6d
 from genpolicy.verification.body import Driven, OwnBody
+from genpolicy.verification.contact import ROUNDING, ExpectedContact
 from genpolicy.verification.journal_source import Message
 
 Array = NDArray[np.float64]
@@ -28,7 +31,7 @@ POSE_TOLERANCE_M = POSE_TOLERANCE_RAD = 1e-5  # ten times what feasibility lets 
 RATES = ("speed", "acceleration", "jerk")
 TORQUE_TOLERANCE_NM = 1e-6
 CONTACT_TOLERANCE_M = 1e-4  # less than this deep, two libraries may disagree whether shapes touch
-ROUNDING = 1e-6  # relative: a step that was limited to its limit is within it
+SWEPT_RAD = 0.02  # no joint turns further between two looks at the way: 16 mm at 0.8 m from it
 
 
 @dataclass(frozen=True)
@@ -44,10 +47,9 @@ class ExpectedMotion:
         torque_nm: What each joint can bear. Shape (J,).
         tcp_speed_m_s: What the TCP may do.
         tcp_turn_rad_s: Likewise.
+        condition: Largest over smallest singular value that the TCP's Jacobian may have.
         held_opening_m: Above this opening nothing is held.
-        contact_phases: Phases in which the held object may touch the target.
-        contact_force_n: What a command may press it in there with, by phase.
-        contact_stiffness_n_m: Force of the controller per way that is missing.
+        contact: What touching the target must keep to.
     """
 
     scene_path: Path
@@ -57,10 +59,9 @@ class ExpectedMotion:
     torque_nm: Array
     tcp_speed_m_s: float
     tcp_turn_rad_s: float
+    condition: float
     held_opening_m: float
-    contact_phases: frozenset[str]
-    contact_force_n: Mapping[str, float]
-    contact_stiffness_n_m: float
+    contact: ExpectedContact
 
 
 class MotionProof:
@@ -77,8 +78,10 @@ class MotionProof:
         self._joints = len(expected.torque_nm)
         model = self._model
         self._tcp = int(model.site("tcp").id)
-        sites = {model.site(i).name: int(model.site_bodyid[i]) for i in range(model.nsite)}
-        self._target = sites.get("target", -1)
+        sites = {model.site(i).name: i for i in range(model.nsite)}
+        self._target_site = sites.get("target", -1)
+        known = self._target_site >= 0
+        self._target = int(model.site_bodyid[self._target_site]) if known else -1
         slides = model.jnt_type == mujoco.mjtJoint.mjJNT_SLIDE
         self._slides = model.jnt_qposadr[slides].tolist()
         self._weld = next(
@@ -87,8 +90,10 @@ class MotionProof:
         self._own = OwnBody(model, self._joints, self._weld)
         self._driven = Driven(expected.scene_path, self._joints)
         self._loaded = Driven(expected.scene_path, self._joints, held=True)
-        held = model.geom_group == HELD
-        self._held_width_m = float(model.geom_size[held].min()) if held.any() else 0.0
+        colliding = (model.geom_contype | model.geom_conaffinity) != 0
+        self._held = np.flatnonzero(colliding & (model.geom_group == HELD))
+        sizes = model.geom_size[self._held]
+        self._held_width_m = float(sizes.min()) if sizes.size else 0.0
         self._last: dict[str, Array] = {}
 
     def forget(self, session: str) -> None:
@@ -129,11 +134,19 @@ class MotionProof:
         self._pose(path[place], float(action[GRIPPER]), held, motion["scene"])
         yield from self._reached(action)
         yield from self._within(path[place], action, before, period_s)
+        yield from self._turning_freely()
         loaded = bool(np.all(openings[:-1] <= self.expected.held_opening_m))
         yield from self._rates(path[: place + 1], period_s, loaded=loaded)
+        ends = path[place - 1 : place + 1]
         if row == first:
-            yield from self._from_measured(chunk, path[place - 1 : place + 1], period_s)
+            yield from self._from_measured(chunk, ends, period_s)
         yield from self._touching(held, phase)
+        contact = self.expected.contact
+        if held and phase in contact.phases:
+            yield from contact.coming(action[POSITION] - before[POSITION], period_s)
+        if loaded and not held:
+            yield from contact.letting_go(phase, self._depth_m())
+        yield from self._swept(ends, openings[-2:], held, phase, motion["scene"])
 
     def _pose(self, q_rad: Array, opening_m: float, held: bool, scene: dict[str, str]) -> None:
         model, data = self._model, self._data
@@ -231,7 +244,7 @@ class MotionProof:
     def _touching(self, held: bool, phase: str) -> Iterator[Finding]:
         """What touches what may not, and how hard the held object is pressed where it may."""
         model, contact = self._model, self._data.contact
-        in_contact, pressed_m = phase in self.expected.contact_phases, 0.0
+        contact_phase, pressed_m = phase in self.expected.contact.phases, 0.0
         for index in range(self._data.ncon):
             if not contact.dist[index] < -CONTACT_TOLERANCE_M:
                 continue
@@ -242,16 +255,51 @@ class MotionProof:
             if SCENE not in groups and self._own.may_meet(*pair):
                 continue
             depth_m = -float(contact.dist[index])
-            leaning = in_contact and groups == [HELD, SCENE]
+            leaning = contact_phase and groups == [HELD, SCENE]
             if leaning and int(model.geom_bodyid[pair[1]]) == self._target:
                 pressed_m = max(pressed_m, depth_m)
                 continue
             first, second = (model.geom(geom).name for geom in pair)
             rule = "P6.surface" if leaning else "P6.collision"
             yield rule, f"{first} is {depth_m:.3g} m deep in {second}."
-        force_n = self.expected.contact_stiffness_n_m * (pressed_m - CONTACT_TOLERANCE_M)
-        if in_contact and not force_n <= self.expected.contact_force_n.get(phase, 0.0):
+        force_n = self.expected.contact.stiffness_n_m * (pressed_m - CONTACT_TOLERANCE_M)
+        if contact_phase and not force_n <= self.expected.contact.force_n.get(phase, 0.0):
             yield "P6.force", f"What is held is pressed in with {force_n:.3g} N."
+
+    def _turning_freely(self) -> Iterator[Finding]:
+        """Whether the arm can move its TCP any way, by MuJoCo's Jacobian at the pose set last."""
+        model, data = self._model, self._data
+        jacobian = np.zeros((6, model.nv))
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_jacSite(model, data, jacobian[:3], jacobian[3:], self._tcp)
+        sizes = np.linalg.svd(jacobian[:, : self._joints], compute_uv=False)
+        if not sizes[0] <= self.expected.condition * (1 + ROUNDING) * sizes[-1]:
+            yield "P6.singular", f"The Jacobian's singular values are {sizes.tolist()}."
+
+    def _depth_m(self) -> float:
+        """How deep what the hand holds reaches below the target's site; -inf without either."""
+        if self._target < 0 or self._weld is None or not len(self._held):
+            return -math.inf
+        self._grasp()
+        model, data = self._model, self._data
+        boxes = model.geom_aabb[self._held]
+        turns = data.geom_xmat[self._held].reshape(-1, 3, 3)[:, 2]
+        middle = data.geom_xpos[self._held, 2] + np.sum(turns * boxes[:, :3], axis=1)
+        lowest = float(np.min(middle - np.sum(np.abs(turns) * boxes[:, 3:], axis=1)))
+        return float(data.site_xpos[self._target_site, 2]) - lowest
+
+    def _swept(
+        self, ends: Array, openings: Array, held: bool, phase: str, scene: dict[str, str]
+    ) -> Iterator[Finding]:
+        """What the way to a row hits, looked at between its `ends` (2, J); the first hit only."""
+        pieces = math.ceil(float(np.max(np.abs(ends[1] - ends[0]))) / SWEPT_RAD)
+        for share in np.arange(1, pieces) / max(pieces, 1):
+            q_rad, opening_m = ends[0] + share * (ends[1] - ends[0]), openings @ (1 - share, share)
+            self._pose(q_rad, float(opening_m), held, scene)
+            for rule, sentence in self._touching(held, phase):
+                if rule != "P6.force":
+                    yield "P6.sweep", f"{share:.0%} of the way there, {sentence}"
+                    return
 
 
 def _floats(text: str) -> Array:

@@ -12,7 +12,8 @@ from genpolicy.evidence.admission_context import (
     make_checker,
     recorded_proposal,
 )
-from genpolicy.feasibility.checks import CHECKS, without
+from genpolicy.execution.checks import without
+from genpolicy.feasibility.checks import CHECKS
 from genpolicy.tasks.api import WorldSettings
 from genpolicy.tasks.tabletop_insertion.episodes import demonstrate
 
@@ -66,5 +67,7 @@ def test_a_checker_has_all_checks_unless_it_is_given_fewer(task, kit):
     period_s = kit.HORIZONS.action_period_s
     whole = make_checker(task, kit.FEASIBILITY, action_period_s=period_s)
     assert whole.checks == CHECKS and whole.cell.action_period_s == period_s
-    less = make_checker(task, kit.FEASIBILITY, action_period_s=period_s, checks=without("expired"))
-    assert less.checks == without("expired")
+    less = make_checker(
+        task, kit.FEASIBILITY, action_period_s=period_s, checks=without(CHECKS, "expired")
+    )
+    assert less.checks == without(CHECKS, "expired")

@@ -89,13 +89,26 @@ def test_a_plan_of_other_primitives_is_refused(kit, names):
         section(kit, recovery_plans={"approach": names})
 
 
-@pytest.mark.parametrize("age_s", [0.4, 0.45, {"default": 0.35, "insert": 0.4}])
-def test_an_age_limit_that_a_chunk_never_reaches_is_refused(kit, task, age_s):
-    """Eight actions of 0.05 s: a chunk is void after 0.4 s, and 0.45 s would refuse nothing."""
+@pytest.mark.parametrize("age_s", [0.35, 0.4, 0.45, {"default": 0.3, "insert": 0.35}])
+def test_an_age_limit_that_no_action_exceeds_is_refused(kit, task, age_s):
+    """Eight actions of 0.05 s: the last one is 0.35 s old, and 0.35 s would refuse nothing."""
     cell = Cell(kit.HORIZONS, section(kit, maximum_age_s=age_s))
-    with pytest.raises(ConfigError, match=r"maximum_age_s of phase .* less than 0\.4 s"):
+    with pytest.raises(ConfigError, match=r"maximum_age_s of phase .* less than 0\.35 s"):
         cell.require_task(task.phases)
-    Cell(kit.HORIZONS, kit.EXECUTION).require_task(task.phases)
+    Cell(kit.HORIZONS, section(kit, maximum_age_s=0.349)).require_task(task.phases)
+
+
+def test_the_shipped_age_limit_refuses_what_its_chunk_still_allows(kit):
+    """On the ticks of a rollout: with the limit fewer actions of a chunk move than without."""
+
+    def moved(age_s):
+        rig = Rig(maximum_age_s={"approach": age_s, "insert": age_s})
+        assert rig.cell.horizons.execution_horizon == kit.HORIZONS.execution_horizon
+        assert rig.cell.horizons.action_period_s == kit.HORIZONS.action_period_s
+        return sum(command.kind == "action" for command in rig.run())
+
+    assert moved(1.0) == kit.HORIZONS.execution_horizon
+    assert 0 < moved(kit.EXECUTION.maximum_age_s["approach"]) < kit.HORIZONS.execution_horizon
 
 
 def test_a_watchdog_shorter_than_a_period_is_refused():

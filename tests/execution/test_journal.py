@@ -18,6 +18,7 @@ from genpolicy.execution.journal import (
     read_journal,
     write_journal,
 )
+from genpolicy.verification.checker import check_journal
 
 
 def played(name):
@@ -88,6 +89,16 @@ def test_damage_is_refused(tmp_path):
             read_journal(path)
     with pytest.raises(IntegrityError):
         read_journal(tmp_path / "missing.mcap")
+
+
+@pytest.mark.parametrize("read", [read_journal, check_journal])
+def test_a_small_file_that_swells_beyond_a_record_is_refused(tmp_path, read):
+    path, journal = tmp_path / "j.mcap", Journal("a")
+    journal.add("hold", 0, {"reason": "a" * (65 << 20)})
+    write_journal(path, [journal])
+    assert path.stat().st_size < 1 << 20
+    with pytest.raises(BadInputError, match="whole MCAP journal"):
+        read(path)
 
 
 def test_time_never_goes_back_within_a_session():

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from genpolicy.contract.chunk import DiscardReason
-from genpolicy.evidence.shadow.mutants import SCENARIOS, without
+from genpolicy.evidence.shadow.mutants import SCENARIOS
 from genpolicy.evidence.shadow.rig import CHECKPOINT, IMITATED, SAMPLER, Rig
-from genpolicy.execution.checks import CHECKS, Place
+from genpolicy.execution.checks import CHECKS, Place, without
 from genpolicy.execution.executor import Executor
 from genpolicy.verification.checker import check_messages
 
@@ -22,7 +22,7 @@ def half_asleep(check):
     rig = Rig()
     rig.executor = Executor(
         rig.cell, rig.journal, rig.stub,
-        checks=without(check, IMITATED),
+        checks=without(IMITATED, check),
     )  # fmt: skip
     rig.executor.set_active(0.0, CHECKPOINT, SAMPLER)
     rig.executor.controller(0.0, rig.cell.controller_mode)

@@ -37,8 +37,8 @@ def test_collision_gate(supervisor):
 
 
 def test_any_cause_may_stop_it_and_a_limit_of_zero_is_a_limit(supervisor):
-    supervisor.protective_stop(0.0, "light curtain")
-    assert supervisor.state is SupervisorState.PROTECTIVE_STOP and supervisor.stops == 1
+    supervisor.emergency_stop(0.0, "light curtain")
+    assert supervisor.state is SupervisorState.EMERGENCY_STOP and supervisor.stops == 1
     limits = {"approach": 0.0, "insert": 40.0}
     touchless = Supervisor(rig_cell(force_limit_n=limits).execution, Journal("s"))
     limits["approach"] = 99.0  # the settings keep their own copy
@@ -47,18 +47,18 @@ def test_any_cause_may_stop_it_and_a_limit_of_zero_is_a_limit(supervisor):
 
 
 def test_watchdog_holds_within_period_plus_watchdog(supervisor):
-    supervisor.heard_accept(to_ns(1.0))
+    supervisor.note_accepted(to_ns(1.0))
     held = [supervisor.poll(to_ns(1.0 + n * 0.05)) for n in range(6)]
     assert held == [False, False, False, True, False, False]  # 0.15 s = 0.05 + 0.1
     assert supervisor.state is SupervisorState.WATCHDOG_HOLD and not supervisor.stopped
-    supervisor.heard_accept(to_ns(1.3))
+    supervisor.note_accepted(to_ns(1.3))
     assert supervisor.state is SupervisorState.RUN
 
 
 def test_long_silence_ends_in_a_protective_stop():
     quiet = rig_cell(silence_stop_s=1.0)
     supervisor = Supervisor(quiet.execution, Journal("s"))
-    supervisor.heard_accept(0)
+    supervisor.note_accepted(0)
     supervisor.poll(to_ns(0.2))
     supervisor.poll(to_ns(1.0))
     assert not supervisor.stopped
@@ -88,7 +88,7 @@ def test_nothing_but_a_person_clears_a_stop(events):
     rig.tick()
     rig.supervisor.emergency_stop(rig.now_s)
     actions = {
-        "accept": lambda: rig.supervisor.heard_accept(rig.now_ns),
+        "accept": lambda: rig.supervisor.note_accepted(rig.now_ns),
         "poll": lambda: rig.advance(0.2),
         "reset": lambda: rig.executor.reset(rig.now_s),
         "hand_back": lambda: rig.executor.hand_back(rig.now_s),
@@ -115,7 +115,7 @@ def test_a_protective_stop_does_not_replace_an_emergency_stop(supervisor):
 def test_a_person_clears_it_by_name_and_old_observations_stay_void():
     rig = Rig()
     rig.observe()
-    rig.supervisor.protective_stop(0.0, "test")
+    rig.supervisor.observe_collision(0.0, True)
     with pytest.raises(ContractError, match="without a person"):
         rig.supervisor.human_reset(0.1, "  ")
     before = rig.chunk()

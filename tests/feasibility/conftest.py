@@ -8,10 +8,11 @@ import pytest
 
 from genpolicy.contract.action import join_action
 from genpolicy.contract.chunk import ChunkMetadata, Projected, Proposal
+from genpolicy.execution.checks import without
 from genpolicy.feasibility.admission import FeasibilityChecker
 from genpolicy.feasibility.batch import Batch
 from genpolicy.feasibility.cell import cell_of
-from genpolicy.feasibility.checks import CHECKS, without
+from genpolicy.feasibility.checks import CHECKS
 from genpolicy.feasibility.context import Context
 from genpolicy.feasibility.inverse import solved
 from genpolicy.feasibility.settings import LAYERS, FeasibilitySettings
@@ -175,7 +176,7 @@ def build(cell):
 
     def make(*names, **changes):
         settings = FeasibilitySettings(**(cell.settings.model_dump() | changes))
-        return FeasibilityChecker(replace(cell, settings=settings), checks=without(*names))
+        return FeasibilityChecker(replace(cell, settings=settings), checks=without(CHECKS, *names))
 
     return make
 

@@ -23,9 +23,16 @@ def test_every_figure_is_that_of_the_cell(cell):
     assert found.tcp_speed_m_s == cell.settings.tcp_speed_limit_m_s
     assert found.tcp_turn_rad_s == cell.settings.tcp_turn_limit_rad_s
     assert found.held_opening_m == cell.settings.held_opening_m
-    assert found.contact_phases == cell.contact_phases
-    assert found.contact_force_n == {"insert": 40.0, "release": 40.0}
-    assert found.contact_stiffness_n_m == 2500.0
+    assert found.condition == cell.settings.condition_limit
+    contact, settings = found.contact, cell.settings
+    assert contact.phases == cell.contact_phases
+    assert contact.opening_phases == cell.opening_phases
+    assert contact.force_n == {"insert": 40.0, "release": 40.0}
+    assert contact.stiffness_n_m == 2500.0
+    assert contact.speed_m_s == settings.contact_speed_limit_m_s
+    assert contact.cone_rad == settings.approach_cone_rad
+    assert contact.forgiven_m == settings.step_tolerance_m
+    assert contact.release_depth_m == settings.release_depth_m
 
 
 def test_a_stricter_cell_gives_stricter_figures(cell):

@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 
 NAMES = (
-    "reset", "calibration_mismatch", "phase_transition", "checkpoint_mismatch",
-    "sampler_mismatch", "future_observation", "out_of_order", "stale_observation", "expired",
+    "session_epoch", "calibration_mismatch", "phase_transition", "checkpoint_mismatch",
+    "sampler_mismatch", "future_observation", "behind_accepted", "stale_observation", "expired",
 )  # fmt: skip
 
 
@@ -15,18 +15,18 @@ def cases(checker, kit):
     good, ctx = kit.line(kit.START, kit.SIDE), kit.context(checker, kit.START)
     later = replace(ctx, newest_accepted_observation_s=9.91)
     changes = {
-        "reset": {"session_epoch": 0},
+        "session_epoch": {"session_epoch": 0},
         "calibration_mismatch": {"calibration_epoch": "e1"},
         "phase_transition": {"task_phase": "align"},
         "checkpoint_mismatch": {"policy_checkpoint_hash": "x"},
         "sampler_mismatch": {"sampler_config_hash": "x"},
         "future_observation": {"condition_observation_event_time_s": 9.96},
-        "out_of_order": {},
+        "behind_accepted": {},
         "stale_observation": {"condition_observation_event_time_s": 9.69},
         "expired": {"valid_until_s": 9.999},
     }
     return {
-        name: kit.Outside(good, later if name == "out_of_order" else ctx, change)
+        name: kit.Outside(good, later if name == "behind_accepted" else ctx, change)
         for name, change in changes.items()
     }
 

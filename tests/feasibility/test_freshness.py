@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from genpolicy.execution.checks import CHECKS, Place, at
+from genpolicy.execution.checks import CHECKS, Place, at, without
 from genpolicy.feasibility.checks import CHECKS as TABLE
 from genpolicy.feasibility.context import Context
-from genpolicy.feasibility.freshness import NAMES, fresh
+from genpolicy.feasibility.freshness import REASONS, fresh
 
 
 @pytest.fixture(scope="module")
@@ -23,13 +23,13 @@ def moment(kit):
 
 
 FAULTS = {
-    "reset": {"session_epoch": 2},
+    "session_epoch": {"session_epoch": 2},
     "calibration_mismatch": {"calibration_epoch": "e1"},
     "phase_transition": {"phase": "insert"},
     "checkpoint_mismatch": {"active_checkpoint_hash": "v"},
     "sampler_mismatch": {"active_sampler_hash": "t"},
     "future_observation": {"latest_observation_event_time_s": 9.89},
-    "out_of_order": {"newest_accepted_observation_s": 9.91},
+    "behind_accepted": {"newest_accepted_observation_s": 9.91},
     "stale_observation": {"maximum_age_s": 0.09},
     "expired": {"now_s": 10.41, "maximum_age_s": 1.0},
 }
@@ -41,7 +41,7 @@ def test_the_layer_asks_exactly_its_rows(kit, moment):
     assert all(margin >= 0 for margin in margins.values())
     assert margins["stale_observation"] == pytest.approx(0.2, abs=1e-9)
     assert margins["future_observation"] == pytest.approx(0.05, abs=1e-9)
-    assert margins["out_of_order"] == math.inf and margins["reset"] == 0.0
+    assert margins["behind_accepted"] == math.inf and margins["session_epoch"] == 0.0
 
 
 @pytest.mark.parametrize("name", FAULTS)
@@ -49,9 +49,15 @@ def test_each_fault_is_named_alone_and_a_table_without_its_row_does_not_know_it(
     faulty = replace(moment, **FAULTS[name])
     margins = fresh(kit.metadata(), faulty)
     assert [key for key, margin in margins.items() if not margin >= 0] == [name]
-    row = next(c for c in at(CHECKS, Place.LAYER) if NAMES.get(c.name, c.name) == name)
-    rest = fresh(kit.metadata(), faulty, checks=tuple(c for c in CHECKS if c is not row))
+    rest = fresh(kit.metadata(), faulty, checks=without(CHECKS, name))
     assert set(rest) == set(margins) - {name} and all(margin >= 0 for margin in rest.values())
+
+
+def test_a_row_has_one_name_and_one_reason_wherever_it_is_asked():
+    rows = {check.name: check.reason for check in at(CHECKS, Place.LAYER)}
+    assert rows == REASONS and set(rows) == {c.name for c in TABLE if c.layer == "fresh"}
+    named = {check.name for check in TABLE} & {check.name for check in CHECKS}
+    assert named - {"controller_mode"} == set(rows), "one name, one question"
 
 
 @pytest.mark.parametrize("field", ["now_s", "maximum_age_s", "latest_observation_event_time_s"])

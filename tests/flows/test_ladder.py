@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from flows import ladder
+from flows.judged import judged
 from flows.workspace import make_workspace
 from genpolicy.errors import BadInputError, ConfigError
 
@@ -126,7 +127,7 @@ def test_a_gate_without_a_verdict_is_bad_input(tmp_path: Path, text: str) -> Non
     (tmp_path / "reports").mkdir()
     (tmp_path / "reports" / "gate_a.json").write_text(text)
     with pytest.raises(BadInputError, match="without a verdict"):
-        ladder.judged(tmp_path, "gate_a")
+        judged(tmp_path, "gate_a")
 
 
 def _run(workspace: Path, home: Path, **variables: str) -> "subprocess.CompletedProcess[str]":

@@ -44,6 +44,34 @@ def test_a_ladder_runs_once_stops_at_a_refusal_and_goes_on_when_it_is_lifted(
 
 
 @pytest.mark.parametrize(
+    ("verdict", "code"), [("FAIL", 3), ("INCONCLUSIVE", 3), ("PENDING_REVIEW", 0), ("PASS", 0)]
+)
+def test_the_last_gate_has_no_stage_behind_it_and_is_asked_itself(
+    checkout: Path,
+    tmp_path: Path,
+    verdict: str,
+    code: int,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    target = make_workspace(checkout, tmp_path / "run", {"gate_b": {"verdict": verdict}})
+    assert main(["--workspace", str(target)]) == code
+    said = f"The ladder stopped: gate_b: {verdict}. Return to the dataset."
+    assert (said in capfd.readouterr().err) == (code == 3)
+    outcome = reproduce(target, echo=lambda _: None)  # nothing is left to run, the answer stands
+    judged = ("gate_b", verdict) if code else ("", "")
+    assert (outcome.code, outcome.stage, outcome.verdict) == (code, *judged)
+    assert not outcome.infrastructure
+    assert reproduce(target, stages=("gate_b",), echo=lambda _: None).code == 0
+
+
+def test_a_gate_in_the_middle_is_asked_by_the_stage_behind_it(
+    checkout: Path, tmp_path: Path
+) -> None:
+    target = make_workspace(checkout, tmp_path / "run", {"gate_a": {"verdict": "FAIL"}})
+    assert reproduce(target, echo=lambda _: None).code == 0
+
+
+@pytest.mark.parametrize(
     "broken",
     [
         "stages: [",

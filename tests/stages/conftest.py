@@ -88,6 +88,18 @@ def gate_evidence() -> ModuleType:
     return module
 
 
+@pytest.fixture
+def evidence(workspace: Path, gate_evidence: ModuleType) -> Path:
+    """A workspace with evidence on which gates A to D pass, and all sections of the settings."""
+    shared = yaml.safe_load((workspace / "params.yaml").read_text())
+    gate_evidence.build(workspace)
+    own = yaml.safe_load((workspace / "params.yaml").read_text())
+    horizons = {**shared["horizons"], **own["horizons"]}
+    params = {**shared, **own, "horizons": horizons}
+    (workspace / "params.yaml").write_text(yaml.safe_dump(params, sort_keys=False))
+    return workspace
+
+
 EPISODES = 14
 
 

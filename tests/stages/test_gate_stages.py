@@ -4,21 +4,8 @@ import csv
 import json
 
 import pytest
-import yaml
 
 GATES = ("gate_a", "gate_b", "gate_c", "gate_d")
-
-
-@pytest.fixture
-def evidence(workspace, gate_evidence):
-    """A workspace with evidence on which gates A to D pass, and all sections of the settings."""
-    shared = yaml.safe_load((workspace / "params.yaml").read_text())
-    gate_evidence.build(workspace)
-    own = yaml.safe_load((workspace / "params.yaml").read_text())
-    horizons = {**shared["horizons"], **own["horizons"]}
-    params = {**shared, **own, "horizons": horizons}
-    (workspace / "params.yaml").write_text(yaml.safe_dump(params, sort_keys=False))
-    return workspace
 
 
 def judge(stage, *gates):

@@ -305,13 +305,13 @@ CORRUPTIONS = (
     Corruption(
         "pressed_in", margin.pressed_in, "contact", "contact_force", (), in_the_target
     ),
-    Corruption("earlier_session", earlier_session, "fresh", "reset"),
+    Corruption("earlier_session", earlier_session, "fresh", "session_epoch"),
     Corruption("calibration_change", calibration_change, "fresh", "calibration_mismatch"),
     Corruption("phase_change", phase_change, "fresh", "phase_transition"),
     Corruption("checkpoint_swap", checkpoint_swap, "fresh", "checkpoint_mismatch"),
     Corruption("sampler_swap", sampler_swap, "fresh", "sampler_mismatch"),
     Corruption("future_observation", future_observation, "fresh", "future_observation"),
-    Corruption("reordered_chunk", reordered_chunk, "fresh", "out_of_order"),
+    Corruption("reordered_chunk", reordered_chunk, "fresh", "behind_accepted"),
     Corruption("stale_observation", stale_observation, "fresh", "stale_observation"),
     Corruption("expired", expired, "fresh", "expired"),
 )  # fmt: skip

@@ -7,6 +7,7 @@ from genpolicy.evidence.shadow.case import Case, decide
 from genpolicy.evidence.shadow.corruption import CORRUPTIONS, Corruption
 from genpolicy.evidence.shadow.observations import Observation
 from genpolicy.evidence.shadow.shadow import Shadow, admit, case_of
+from genpolicy.execution.checks import without
 from genpolicy.feasibility.admission import Admitted, FeasibilityChecker, Rejected
 from genpolicy.feasibility.checks import CHECKS, Check
 
@@ -65,8 +66,8 @@ def _noticed(
 ) -> int:
     """How many cases the check refuses by its name and a checker without it admits."""
     cell = shadow.checker.cell
-    whole = tuple(check for check in checks if check.name not in corruption.behind)
-    rest = tuple(check for check in whole if check.name != corruption.check)
+    whole = without(checks, *corruption.behind)
+    rest = without(whole, corruption.check)
     seeing, blind = (FeasibilityChecker(cell, checks=table) for table in (whole, rest))
     found = 0
     for case in cases:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from genpolicy.evidence.shadow.rig import IMITATED, Rig, passing_verdict
-from genpolicy.execution.checks import CHECKS, Checks
+from genpolicy.execution.checks import CHECKS, Checks, without
 from genpolicy.execution.journal import write_journal
 from genpolicy.execution.moment import POLICY
 from genpolicy.verification.checker import check_journal
@@ -34,7 +34,7 @@ def run_mutants() -> list[dict[str, Any]]:
     for check in CHECKS:
         table = IMITATED if check in IMITATED else CHECKS
         unchanged = play(check.name, table)
-        mutant = play(check.name, without(check.name, table))
+        mutant = play(check.name, without(table, check.name))
         results.append({
             "check": check.name,
             "detected": bool(mutant) and not unchanged,
@@ -43,11 +43,6 @@ def run_mutants() -> list[dict[str, Any]]:
             "violations_unchanged": len(unchanged),
         })  # fmt: skip
     return results
-
-
-def without(name: str, table: Checks = CHECKS) -> Checks:
-    """A table minus one row."""
-    return tuple(check for check in table if check.name != name)
 
 
 def play(check: str, checks: Checks) -> list[Violation]:

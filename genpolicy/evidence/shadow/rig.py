@@ -16,7 +16,7 @@ from genpolicy.contract.chunk import ChunkMetadata, DiscardReason, actions_sha25
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.execution.arrival import LAYER_COUNT
 from genpolicy.execution.cell import PRIMITIVES, Cell, ExecutionSettings
-from genpolicy.execution.checks import CHECKS, Checks
+from genpolicy.execution.checks import CHECKS, Checks, without
 from genpolicy.execution.command import Command
 from genpolicy.execution.executor import Executor
 from genpolicy.execution.journal import Event, Journal
@@ -48,7 +48,7 @@ EXECUTION = ExecutionSettings(
 )
 
 
-IMITATED: Checks = tuple(check for check in CHECKS if check.name != "issued")
+IMITATED: Checks = without(CHECKS, "issued")
 """The table minus the one row that no imitation passes."""
 
 

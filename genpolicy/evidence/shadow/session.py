@@ -14,6 +14,7 @@ from genpolicy.execution.ledger import Account
 from genpolicy.execution.stub import ControllerStub
 from genpolicy.execution.supervisor import Supervisor
 from genpolicy.feasibility.admission import Admitted, Rejected
+from genpolicy.feasibility.freshness import REASONS
 from genpolicy.feasibility.settings import LAYERS
 
 IN_FLIGHT_PHASE_CHANGE = "phase_change_in_flight"
@@ -164,5 +165,5 @@ def _reason(result: Admitted | Rejected) -> DiscardReason:
     if isinstance(result, Admitted):
         return DiscardReason.SUPERSEDED
     if result.verdict.first_layer == LAYERS[-1]:
-        return DiscardReason(result.verdict.first_reason)
+        return REASONS[result.verdict.first_reason]
     return DiscardReason.INFEASIBLE

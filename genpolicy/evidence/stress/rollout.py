@@ -30,6 +30,7 @@ from genpolicy.execution.stub import ControllerStub
 from genpolicy.execution.supervisor import Supervisor
 from genpolicy.feasibility.admission import Admitted, Rejected
 from genpolicy.feasibility.context import Context
+from genpolicy.feasibility.freshness import REASONS
 from genpolicy.feasibility.settings import LAYERS
 from genpolicy.tasks.api import Start, World, WorldSettings
 
@@ -155,7 +156,7 @@ class Rollout:
         counts[verdict.first_reason] = counts.get(verdict.first_reason, 0) + 1
         # What made one candidate late or void holds for all of its invocation.
         if verdict.first_layer == FRESH:
-            self._not_fresh = DiscardReason(verdict.first_reason)
+            self._not_fresh = REASONS[verdict.first_reason]
         self._candidate += 1
         if self._candidate == len(flying.chunks):
             reason = self._not_fresh or DiscardReason.INFEASIBLE

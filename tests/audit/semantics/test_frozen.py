@@ -10,7 +10,7 @@ from genpolicy.audit.semantics import measure
 from genpolicy.audit.semantics.frozen import late_share, longest_holds
 from genpolicy.seeds import stream
 
-ROWS_OF_LIMIT = 7  # 0.35 s at 20 Hz
+ROWS_OF_LIMIT = 6  # 0.3 s at 20 Hz
 
 
 def found(data, settings=SETTINGS):
@@ -46,7 +46,7 @@ def test_a_stream_that_freezes_in_some_episodes_is_named_before_its_clock(column
     assert found(data) == ()
     first = found(frozen(data, (3, 17, 40), 25, columns))[0]
     assert (first.kind, first.variable, first.question) == ("frozen", name, "frozen_s")
-    assert first.measured == pytest.approx(25 / 20, abs=0.15) and first.floor == 0.35
+    assert first.measured == pytest.approx(25 / 20, abs=0.15) and first.floor == 0.3
     assert "ep0003, ep0017, ep0040" in first.where
 
 

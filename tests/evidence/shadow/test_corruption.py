@@ -11,8 +11,9 @@ from genpolicy.evidence.shadow.corruption import CORRUPTIONS
 from genpolicy.evidence.shadow.observations import held_out_observations
 from genpolicy.evidence.shadow.shadow import Shadow, admit, case_of
 from genpolicy.execution.cell import Cell
+from genpolicy.execution.checks import without
 from genpolicy.feasibility.admission import Admitted, FeasibilityChecker, Rejected
-from genpolicy.feasibility.checks import CHECKS, without
+from genpolicy.feasibility.checks import CHECKS
 from genpolicy.seeds import stream
 
 BY_NAME = {item.name: item for item in CORRUPTIONS}
@@ -101,8 +102,8 @@ def test_refused_with_all_checks_on(name, applied, shadow):
 @pytest.mark.parametrize("check", OWNERS)
 def test_refused_by_its_check_alone_and_admitted_without_it(check, applied, shadow):
     corruption, cell = OWNERS[check], shadow.checker.cell
-    seeing = FeasibilityChecker(cell, checks=without(*corruption.behind))
-    blind = FeasibilityChecker(cell, checks=without(check, *corruption.behind))
+    seeing = FeasibilityChecker(cell, checks=without(CHECKS, *corruption.behind))
+    blind = FeasibilityChecker(cell, checks=without(CHECKS, check, *corruption.behind))
     for case in applied(corruption):
         assert decide(seeing, case).reason == check
         assert isinstance(decide(blind, case), Admitted)
@@ -111,7 +112,7 @@ def test_refused_by_its_check_alone_and_admitted_without_it(check, applied, shad
 @pytest.mark.parametrize("check", [name for name, item in OWNERS.items() if item.behind])
 def test_what_stands_behind_a_check_does_refuse_its_fixture(check, applied, shadow):
     """Else the fixture would show its check alone, and should be said to."""
-    blind = FeasibilityChecker(shadow.checker.cell, checks=without(check))
+    blind = FeasibilityChecker(shadow.checker.cell, checks=without(CHECKS, check))
     found = frozenset().union(*refusals(blind, applied(OWNERS[check])))
     assert found and found <= set(OWNERS[check].behind)
 

@@ -11,8 +11,9 @@ from genpolicy.evidence.shadow.corruption import CORRUPTIONS
 from genpolicy.evidence.shadow.layer_mutants import missing_checks_evidence
 from genpolicy.evidence.shadow.observations import spread
 from genpolicy.execution.checks import CHECKS as EXECUTION_CHECKS
+from genpolicy.execution.checks import without
 from genpolicy.feasibility.batch import Margins
-from genpolicy.feasibility.checks import CHECKS, without
+from genpolicy.feasibility.checks import CHECKS
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +52,7 @@ def test_the_gate_asks_for_every_row_of_both_tables():
 def test_a_row_that_is_gone_or_blind_is_not_claimed_to_be_noticed(name, shadow, few, monkeypatch):
     own = tuple(item for item in CORRUPTIONS if item.check == name)
     monkeypatch.setattr(layer_mutants, "CORRUPTIONS", own)
-    for table in (without(name), blinded(name)):
+    for table in (without(CHECKS, name), blinded(name)):
         (row,) = missing_checks_evidence(shadow, few[-2:], checks=table)
         assert row["check"] == name and not row["detected"]
 

@@ -1,5 +1,6 @@
 """What layers let through is found again in the journal, by MuJoCo, whatever the layers claim."""
 
+import math
 from copy import deepcopy
 from dataclasses import replace
 
@@ -10,9 +11,10 @@ from genpolicy.evidence.shadow.corruption import CORRUPTIONS
 from genpolicy.evidence.shadow.observations import spread
 from genpolicy.evidence.shadow.session import play
 from genpolicy.evidence.shadow.shadow import admit, case_of
+from genpolicy.execution.checks import without
 from genpolicy.execution.journal import encode_actions
 from genpolicy.feasibility.admission import Admitted, FeasibilityChecker
-from genpolicy.feasibility.checks import without
+from genpolicy.feasibility.checks import CHECKS
 from genpolicy.feasibility.figures import expected_motion
 from genpolicy.verification.checker import check_messages
 from genpolicy.verification.motion import MotionProof
@@ -35,6 +37,11 @@ RULES = {
     "state_age": "P6.state_age",
     "tcp_speed": "P6.tcp_speed",
     "tcp_turn": "P6.tcp_turn",
+    "approach_direction": "P6.approach",
+    "contact_speed": "P6.contact_speed",
+    "gripper_opening": "P6.release",
+    "singular": "P6.singular",
+    "swept_collision": "P6.sweep",
 }
 
 
@@ -97,7 +104,7 @@ def test_what_the_operator_did_is_proved_in_every_phase(shadow, items):
 @pytest.mark.parametrize("check", RULES)
 def test_an_executed_row_that_a_missing_check_let_through_is_found(check, shadow, items):
     corruption = BY_CHECK[check]
-    table = without(check, *corruption.behind)
+    table = without(CHECKS, check, *corruption.behind)
     blind = replace(shadow, checker=FeasibilityChecker(shadow.checker.cell, checks=table))
     found = []
     for item in items:
@@ -151,9 +158,12 @@ def test_what_is_held_may_touch_the_target_in_contact_phases_only(shadow, items)
     messages = journal(shadow, item, case, "held_out")
     move(messages, shadow.checker.collision.shapes.target_body, 0.012)  # a wall in what is held
     assert not rules(messages, shadow)
-    assert "P6.collision" in rules(messages, shadow, contact_phases=frozenset())
-    assert rules(messages, shadow, contact_force_n={"insert": 5.0}) == {"P6.force"}
-    assert rules(messages, shadow, contact_force_n={}) == {"P6.force"}
+    contact = expected_motion(shadow.checker.cell).contact
+    elsewhere = replace(contact, phases=frozenset())
+    assert "P6.collision" in rules(messages, shadow, contact=elsewhere)
+    for force_n in ({"insert": 5.0}, {}):
+        gentle = replace(contact, force_n=force_n)
+        assert rules(messages, shadow, contact=gentle) == {"P6.force"}
 
 
 def test_a_scene_that_nobody_saw_is_found(clean, shadow):
@@ -183,6 +193,38 @@ def test_commands_before_that_do_not_fit_are_found(clean, shadow):
     before[-1] += 0.2
     motion["q_before_rad"] = encode_actions(before)
     assert "P6.joint_acceleration" in rules(clean, shadow)
+
+
+def test_an_honest_chunk_is_held_to_each_limit_of_contact_in_its_phases_only(shadow, items):
+    contact = expected_motion(shadow.checker.cell).contact
+    tight = {"speed_m_s": 1e-3, "cone_rad": 1e-6, "forgiven_m": 1e-6}
+    for phase, broken in (("insert", {"P6.contact_speed", "P6.approach"}), ("approach", set())):
+        item = next(item for item in items if item.phase == phase)
+        case = case_of(shadow, item, item.demonstrated, number=0)
+        messages = journal(shadow, item, case, "held_out")
+        assert not rules(messages, shadow)
+        assert rules(messages, shadow, contact=replace(contact, **tight)) == broken
+
+
+def test_the_hand_may_let_go_where_that_is_meant_or_deep_enough(shadow, items):
+    """The depth is that of the object's lowest point below the target, by MuJoCo."""
+    contact = expected_motion(shadow.checker.cell).contact
+    assert not list(contact.letting_go("release", -math.inf))
+    assert not list(contact.letting_go("insert", contact.release_depth_m))
+    for phase, depth_m in (("insert", 0.019), ("insert", math.nan), ("approach", 1.0)):
+        assert [rule for rule, _ in contact.letting_go(phase, depth_m)] == ["P6.release"]
+    item = next(item for item in items if item.phase == "insert")
+    result = admit(shadow, case_of(shadow, item, item.demonstrated, number=0))
+    shapes = shadow.checker.collision.shapes
+    proof = MotionProof(expected_motion(shadow.checker.cell))
+    proof._pose(result.verdict.q_rad[-1], 0.0, True, {})
+    target_m = shapes.nominal_bodies[shapes.target_body][0] + shapes.target_offset_m
+    tip_m = proof._data.site_xpos[proof._tcp] - [0.0, 0.0, shapes.held_reach_m]
+    assert proof._depth_m() == pytest.approx(target_m[2] - tip_m[2], abs=5e-4)
+
+
+def test_a_robot_that_must_turn_more_freely_is_not_proved(clean, shadow):
+    assert rules(clean, shadow, condition=2.0) == {"P6.singular"}
 
 
 def test_a_robot_with_weaker_joints_is_not_proved(clean, shadow):

@@ -29,8 +29,8 @@ def played(shadow, judged, *pairs, fixture=HELD_OUT):
 def test_an_admitted_chunk_reaches_the_stub_for_its_horizon(shadow, judged):
     found = played(shadow, judged, judged[1])
     assert found.delivered == 1 and (found.stale, found.invalid) == (0, 0)
-    # One row is late.
-    assert found.arrivals == shadow.cell.horizons.execution_horizon - 1
+    # One row is late, and the last one is too old when its time comes.
+    assert found.arrivals == shadow.cell.horizons.execution_horizon - 2
     assert (found.account.generated, found.account.executed, found.account.error) == (1, 1, 0)
 
 

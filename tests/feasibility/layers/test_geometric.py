@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from genpolicy.contract.action import join_action
+from genpolicy.execution.checks import without
 from genpolicy.feasibility.admission import FeasibilityChecker
-from genpolicy.feasibility.checks import without
+from genpolicy.feasibility.checks import CHECKS
 from genpolicy.feasibility.layers.geometric import margins, swept_margins
 
 BESIDE, BEYOND = (0.5, -0.15, 0.15), (0.5, 0.15, 0.15)
@@ -84,13 +85,13 @@ def test_what_no_check_asks_is_not_computed(cell, kit, checker, monkeypatch):
         raise AssertionError("a test that no check asked for")
 
     monkeypatch.setattr(cell.collision, "check_swept", never)
-    blind = FeasibilityChecker(cell, checks=without("swept_collision"))
+    blind = FeasibilityChecker(cell, checks=without(CHECKS, "swept_collision"))
     assert kit.judge(blind, good, ctx).passed
     with pytest.raises(AssertionError, match="no check asked for"):
         kit.judge(checker, good, ctx)
     monkeypatch.setattr(cell.collision, "check_samples", never)
     names = ("scene_collision", "self_collision", "swept_collision")
-    blind = FeasibilityChecker(cell, checks=without(*names))
+    blind = FeasibilityChecker(cell, checks=without(CHECKS, *names))
     assert kit.judge(blind, good, ctx).passed
 
 

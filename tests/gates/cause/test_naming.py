@@ -39,7 +39,7 @@ def test_a_frozen_stream_is_a_defect_beyond_its_own_limit_and_no_other():
     assert (cause.name, cause.variable, cause.kind) == (CauseName.DATA_DEFECT, "camera", "frozen")
     assert named(replace(VALID, findings=(stuck,)), limit(frozen_s=0.5)).layer is Layer.NONE
     with pytest.raises(ConfigError, match="frozen_s"):
-        named(VALID, limit(frozen_s=0.3))  # below what the audit looks for
+        named(VALID, limit(frozen_s=0.25))  # below what the audit looks for
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,94 @@
+"""A candidate that failed a gate does not run in the stage behind it, while others go on."""
+
+import json
+from types import SimpleNamespace
+
+import pytest
+
+from genpolicy.candidates import judged
+from stages import shadow, stress
+from stages._stage import load_params
+
+ALL = ("diffusion", "flow")
+
+
+@pytest.fixture
+def params(evidence, monkeypatch):
+    """Settings of the checkout, whose methods are more than those that were admitted."""
+    root = __file__.partition("/tests/")[0]
+    monkeypatch.chdir(root)
+    found = load_params()
+    monkeypatch.chdir(evidence)
+    assert set(found.raw["train_generators"]["samplers"]) > set(ALL)
+    return found
+
+
+@pytest.fixture
+def weightless(monkeypatch):
+    """Checkpoints without weights; what is loaded says its method."""
+
+    def load(folder, **_):
+        return SimpleNamespace(method=folder.parent.name, checkpoint_hash=folder.parent.name)
+
+    monkeypatch.setattr(judged, "load_policy", load)
+
+
+def nothing(*_, **__):
+    return SimpleNamespace(cell=None, checker=SimpleNamespace(cell=None))
+
+
+def without(monkeypatch, module, *names):
+    for name in names:
+        monkeypatch.setattr(module, name, nothing)
+
+
+def verdicts(evidence, stage, *gates):
+    for gate in gates:
+        assert stage(gate)[0] == 0
+    return json.loads((evidence / "reports" / f"{gates[-1]}.json").read_text())["candidates"]
+
+
+@pytest.mark.parametrize("failed", [None, *ALL])
+def test_shadow_samples_what_passed_gate_b(
+    evidence, stage, gate_evidence, params, weightless, monkeypatch, failed
+):
+    def slow(frame):
+        hit = (frame["method"] == failed) & (frame["run"] == 2)
+        return frame.assign(seconds=frame["seconds"].where(~hit, frame["seconds"] * 9))
+
+    gate_evidence.edit_table(evidence, "latency/latency.parquet", slow)
+    said = verdicts(evidence, stage, "gate_a", "gate_b")
+    assert said == {name: "FAIL" if name == failed else "PASS" for name in ALL}
+    ran = []
+    without(
+        monkeypatch, shadow, "require_one_contract", "load_task", "make_checker", "load_dataset",
+        "two_mode_observations", "held_out_observations", "spread", "missing_checks_evidence",
+        "Shadow", "write_shadow",
+    )  # fmt: skip
+    monkeypatch.setattr(shadow, "shadow_policy", lambda _, policy, *__, **___: ran.append(policy))
+    shadow.work(params)
+    assert [policy.method for policy in ran] == [name for name in ALL if name != failed]
+
+
+@pytest.mark.parametrize("failed", [None, *ALL])
+def test_stress_rolls_out_what_passed_gate_c(
+    evidence, stage, gate_evidence, params, weightless, monkeypatch, failed
+):
+    def invalid(frame):
+        hit = frame["method"] == failed
+        return frame.assign(invalid=frame["invalid"].where(~hit, 1))
+
+    gate_evidence.edit_table(evidence, "shadow/stub.parquet", invalid)
+    said = verdicts(evidence, stage, "gate_a", "gate_b", "gate_c")
+    assert said == {name: "FAIL" if name == failed else "PASS" for name in ALL}
+    ran = []
+    without(
+        monkeypatch, stress, "require_one_contract", "load_task", "Comparison", "latency_models",
+        "write_stress",
+    )  # fmt: skip
+    monkeypatch.setattr(stress, "matched_starts", lambda *_, **__: ())
+    monkeypatch.setattr(stress, "power_document", lambda *_, **__: {})
+    monkeypatch.setattr(stress, "plan_shards", lambda _, judged, *__, **___: ran.extend(judged))
+    stress.work(params)
+    baselines = params.raw["stress"]["baselines"]
+    assert [policy.name for policy in ran] == [*baselines, *(n for n in ALL if n != failed)]
