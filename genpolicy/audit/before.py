@@ -42,11 +42,11 @@ def seen_before(
     items: list[tuple[Neighbourhood, Clustering]],
     choices: Choices,
 ) -> Before:
-    """Past and present of each episode in one situation: of those long enough after its start the
-    one whose clusters differ least in what is observed now.
+    """Past and present of each episode in one situation.
 
-    Episodes that have no such situation had nothing to see before, or moved apart at once; they
-    are left out.
+    Of its situations long enough after the start it is the one whose clusters differ least in what
+    is observed now. Episodes that have none had nothing to see before, or moved apart at once;
+    they are left out.
 
     Args:
         data: Canonical audit input.

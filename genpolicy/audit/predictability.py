@@ -12,10 +12,10 @@ from dataclasses import replace
 import numpy as np
 from scipy import stats
 
+from genpolicy.audit.before import Before, seen_before
 from genpolicy.audit.choices import Choices, choices
 from genpolicy.audit.columns import COLUMNS, column_guesses
 from genpolicy.audit.data import Array, AuditInput, Integers, Text, recorded
-from genpolicy.audit.before import Before, seen_before
 from genpolicy.audit.guesses import (
     Guess,
     by_all,
@@ -97,10 +97,10 @@ def predictions(
             hits = _hits(chosen, guess, rng, repeats=1 if once else REPEATS)
             row = _row(name, phase, chosen, hits, of=len(more) if name in keys else 1)
             rows.append(replace(row, detail=_best(times)) if name == COLUMNS else row)
-        keys = "audit", "predictability", phase, HISTORY
         seen = seen_before(data, settings, items, chosen)
         if len(seen.choices.mode) >= LEAST_EPISODES:
-            rows.append(_past(phase, seen, stream(root_seed, *keys)))
+            rng = stream(root_seed, "audit", "predictability", phase, HISTORY)
+            rows.append(_past(phase, seen, rng))
     return tuple(rows)
 
 
