@@ -14,16 +14,19 @@ from pathlib import Path
 from gates.card.people import ALLOW_LIST, AllowList, load_allow_list
 from gates.card.signing import read_draft
 from gates.pipeline import LOCK, RUNGS
-from gates.preregistration import PREREGISTRATION
+from gates.preregistration import PREREGISTRATION, asked_by
+from gates.report import GATES, Gate
 from genpolicy.errors import IntegrityError
-from genpolicy.integrity.documents import read_yaml
+from genpolicy.integrity.documents import parse_yaml, read_yaml
 
 MADE = (
     "task", "record", "ingest", "train_baselines", "train_factors", "train_generators", "card",
 )  # fmt: skip
 """Stages that make what is measured, or the card: no gate holds a figure of theirs to a limit."""
-MEASURED = tuple(stage for stages in RUNGS.values() for stage in stages if stage not in MADE)
-"""Stages whose evidence a plan has to precede."""
+MEASURED: dict[str, Gate] = {
+    stage: gate for gate, stages in RUNGS.items() for stage in stages if stage not in MADE
+}
+"""Stages whose evidence a plan has to precede, and the gate that judges it."""
 CANDIDATE = ("genpolicy", "gates", "stages", "params.yaml", "dvc.yaml")
 """Whoever committed to these made the candidate, or the yardstick that it is held against."""
 PLAN_FIRST = "Plan, commit, run, commit, and have it reviewed by somebody else; then sign."
@@ -45,10 +48,12 @@ def require_history(root: Path) -> None:
 
 
 def require_registered_first(root: Path) -> None:
-    """Require that the plan was committed before all evidence, and not touched since.
+    """Require that the plan was committed before the evidence that it is held against.
 
-    Evidence is dated by the commits that brought its hash into the lock file, the oldest of them
-    included: who has seen these bytes once has seen them, and the same run gives the same bytes.
+    Of the plan counts what the gate of the evidence and those below it judge by: a limit of Gate D
+    may be planned after the audit, and not after the first rollout. Evidence is dated by the
+    commits that brought its hash into the lock file, the oldest of them included: who has seen
+    these bytes once has seen them, and the same run gives the same bytes.
 
     Raises:
         IntegrityError: No git history or not all of it, the plan or the evidence is not committed,
@@ -57,19 +62,18 @@ def require_registered_first(root: Path) -> None:
     _require_whole(root)
     if _git(root, "diff", "--quiet", "HEAD", "--", PREREGISTRATION) is None:
         _refuse(PREREGISTRATION, "not committed as it lies here", "committed before the evidence")
-    planned = _git(root, "log", "-1", "--format=%H", "--", PREREGISTRATION)
-    if not planned:
+    digests, versions = _evidence_digests(root), _versions(root)
+    if not versions:
         _refuse(PREREGISTRATION, "not committed", "committed before the evidence")
-    after = {*(_git(root, "rev-list", "--ancestry-path", f"{planned}..HEAD") or "").split()}
-    digests = _evidence_digests(root)
-    for stage in MEASURED:
+    after = {gate: _after(root, versions, gate) for gate in RUNGS}
+    for stage, gate in MEASURED.items():
         evidence, digest = f"artifacts/{stage}", digests.get(stage)
         brought = _brought(root, digest) if digest else set()
         if not brought:
             _refuse(f"{LOCK}: {evidence}", "not committed", "committed after the plan")
-        if not brought <= after:
+        if not brought <= after[gate]:
             text = f"no older than {evidence}"
-            _refuse(PREREGISTRATION, text, "committed before the evidence")
+            _refuse(f"{PREREGISTRATION}, what gate {gate} judges by", text, "committed before it")
 
 
 def require_makers_known(root: Path, authors: Sequence[str], allowed: AllowList) -> None:
@@ -106,6 +110,26 @@ def require_makers_known(root: Path, authors: Sequence[str], allowed: AllowList)
             found = f"by {who}, who committed as {mail}"
             expected = f"commits of its authors alone ({', '.join(authors) or 'none is named'})"
             _refuse("the candidate", found, expected, NAME_ALL)
+
+
+def _versions(root: Path) -> list[tuple[str, dict[str, object]]]:
+    """Commits that changed the plan, the newest first, each with the plan as it left it."""
+    commits = (_git(root, "log", "--format=%H", "--", PREREGISTRATION) or "").split()
+    found = []
+    for commit in commits:
+        text = _git(root, "show", f"{commit}:{PREREGISTRATION}")
+        plan = parse_yaml(text.encode(), where=f"{commit[:7]}:{PREREGISTRATION}") if text else {}
+        found.append((commit, plan if isinstance(plan, dict) else {}))
+    return found
+
+
+def _after(root: Path, versions: Sequence[tuple[str, dict[str, object]]], gate: Gate) -> set[str]:
+    """Commits behind the one that last moved what a gate, or one below it, judges by."""
+    reached = GATES[: GATES.index(gate) + 1]
+    parts = [{p: v for p, v in plan.items() if asked_by(p) in reached} for _, plan in versions]
+    same = next((n for n, part in enumerate(parts) if part != parts[0]), len(parts))
+    planned = versions[same - 1][0]
+    return {*(_git(root, "rev-list", "--ancestry-path", f"{planned}..HEAD") or "").split()}
 
 
 def _brought(root: Path, digest: str) -> set[str]:

@@ -129,10 +129,20 @@ def test_a_history_that_holds_lets_pass(asked, commit):
 
 
 def test_a_plan_that_moved_after_the_evidence(asked, run, team, commit):
-    (team.root / PLAN).write_text((team.root / PLAN).read_text() + "# moved\n")
-    commit(PLAN)
+    """Also where it moved back: what it was held against has been seen by then."""
+    written = (team.root / PLAN).read_text()
+    for text in (written + "gate_a.more: ['<=', 1]\n", written):
+        (team.root / PLAN).write_text(text)
+        commit(PLAN)
     for code, said in (*asked(), _sign(team, run, "rita")):
-        assert code == 2 and f"{PLAN} is no older than artifacts/audit" in said, said
+        assert code == 2, said
+        assert f"{PLAN}, what gate A judges by is no older than artifacts/audit" in said, said
+
+
+def test_a_plan_that_is_only_worded_better_is_the_same_plan(asked, team, commit):
+    (team.root / PLAN).write_text((team.root / PLAN).read_text() + "# Read again.\n")
+    commit(PLAN)
+    assert [code for code, _ in asked()] == [0, 0]
 
 
 @pytest.mark.parametrize("name", ["rita", "sam"])

@@ -102,6 +102,25 @@ def test_one_gates_evidence_before_the_plan_is_enough(history, stage):
         require_registered_first(root)
 
 
+def test_a_limit_of_a_higher_gate_may_be_planned_until_its_own_evidence_is_there(history):
+    """The trial may be planned when it is known what there is to try; not after the trial."""
+    root, commit = history
+    first = "gate_a.unasked_checks: ['<=', 0]\nstress.starts: ['>=', 90]\n"
+    commit(plan=first)
+    old = {s: o["outs"][0]["md5"] for s, o in yaml.safe_load(_lock("old"))["stages"].items()}
+    commit(lock=_lock("old"))
+    commit(plan=first.replace("90", "120"))
+    with pytest.raises(IntegrityError, match=r"what gate D judges by is no older than .*stress"):
+        require_registered_first(root)
+    commit(lock=_lock("old", stress="f" * 32))
+    require_registered_first(root)
+    commit(plan=first.replace("0]\nstress", "1]\nstress").replace("90", "120"))
+    commit(lock=_lock("old", stress="e" * 32))
+    with pytest.raises(IntegrityError, match=r"what gate A judges by is no older than .*audit"):
+        require_registered_first(root)
+    assert old["audit"] in (root / LOCK).read_text()
+
+
 @pytest.mark.parametrize("order", ["after", "together", "moved after", "edited", "uncommitted"])
 def test_a_plan_that_came_with_or_after_the_evidence_is_none(history, order):
     root, commit = history
