@@ -65,8 +65,10 @@ def _noticed(
     shadow: Shadow, corruption: Corruption, cases: Sequence[Case], checks: tuple[Check, ...]
 ) -> int:
     """How many cases the check refuses by its name and a checker without it admits."""
-    cell = shadow.checker.cell
-    whole = without(checks, *corruption.behind)
+    cell, names = shadow.checker.cell, {check.name for check in checks}
+    if corruption.check not in names:
+        return 0  # a row that is gone refuses nothing, by whatever name
+    whole = without(checks, *names.intersection(corruption.behind))
     rest = without(whole, corruption.check)
     seeing, blind = (FeasibilityChecker(cell, checks=table) for table in (whole, rest))
     found = 0

@@ -271,9 +271,8 @@ class Rollout:
         self._not_fresh = None
 
     def _write_off(self, flying: InFlight, reason: DiscardReason) -> None:
-        rows = self.fixture.horizons.prediction_horizon
-        if flying.chunks is not None:
-            rows = int(flying.chunks.shape[1])
+        chunks = flying.chunks
+        rows = self.fixture.horizons.prediction_horizon if chunks is None else chunks.shape[1]
         self.executor.write_off(flying.metadata, rows, reason, self.now_s)
 
     def _delivery_context(self, late: int) -> Context:
