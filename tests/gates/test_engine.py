@@ -178,3 +178,18 @@ def test_the_reports_below_are_bound_and_no_others(tmp_path):
         _below(tmp_path, gate)
     assert set(upstream_hashes(tmp_path, "D")) == {"A", "B"}
     assert upstream_hashes(tmp_path, "A") == {}
+
+
+def test_a_pass_needs_no_diagnosis_and_what_no_criterion_stops_is_said(tmp_path):
+    limits = {
+        "second_in_the_alphabet": Limit(0.0, "for a test", "model"),
+        "first_in_the_alphabet": Limit(2.0, "for a test", "model"),
+    }
+    passed = _judge(tmp_path, 1, 1, of=limits)
+    (tmp_path / TASK_IDENTITY).unlink()
+    lacking = judge(SPEC, Evidence(tmp_path), Limits(of=limits), GateSettings())
+    # A record of the pipeline lacks in both: `_judge` writes the task's identity alone.
+    for report in (passed, lacking):
+        assert all(answer.verdict == "PASS" for answer in report.criteria)
+        assert (report.diagnosis == "") == (report.verdict == "PASS"), report.diagnosis
+    assert lacking.verdict != "PASS" and lacking.diagnosis.startswith("No criterion decided")

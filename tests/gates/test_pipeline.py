@@ -57,7 +57,8 @@ def test_forged_evidence_is_refused_when_it_is_judged(ladder):
 
 def test_a_file_added_to_the_evidence_is_refused_by_its_name(ladder):
     (ladder / "artifacts/shadow/notes.txt").write_text("all fine")
-    with pytest.raises(RefusedError, match=r"shadow/notes\.txt is a file that nobody judged"):
+    judged = r"shadow/notes\.txt is a file that nobody judged.*Run `dvc repro shadow` and judge"
+    with pytest.raises(RefusedError, match=judged):
         admit("stress", ladder)
     with pytest.raises(IntegrityError, match="artifacts/shadow"):
         judge(ladder, "C")

@@ -226,3 +226,29 @@ def test_a_trained_baseline_without_its_loss_is_inconclusive_one_without_trainin
     report = judge(ladder, "B")
     assert report.verdict == "PASS"
     assert "no training of its own: act" in _found(report, "baseline_fall_upper")[0].caveat
+
+
+LATENCY = "latency/latency.parquet"
+
+
+@pytest.mark.parametrize(("run", "seconds"), [(1, 0.004), (2, 0.004)])
+def test_the_slower_of_two_runs_is_held_against_the_faster_whichever_it_is(ladder, run, seconds):
+    """Of what was measured warm: cold calls and declared terms are no part of the question."""
+
+    def change(frame):
+        warm = (frame["source"] == "measured") & (frame["temperature"] == "warm")
+        frame.loc[warm, "seconds"] = 0.001
+        frame.loc[warm & (frame["run"] == run), "seconds"] = seconds
+        frame.loc[~warm & (frame["run"] == 3 - run), "seconds"] = 9.0
+        return frame
+
+    evidence.edit_table(ladder, LATENCY, change)
+    for found in _found(judge(ladder, "B"), "latency_median_ratio"):
+        assert found.measured == pytest.approx(4.0)
+        assert found.caveat.endswith("at 4") and found.verdict == "FAIL"
+
+
+def test_a_run_that_took_no_time_was_not_measured(ladder):
+    evidence.edit_table(ladder, LATENCY, cells("seconds", 0.0))
+    found = _found(judge(ladder, "B"), "latency_median_ratio")[0]
+    assert found.measured is None and "took no time" in found.caveat

@@ -5,9 +5,15 @@ import pandas as pd
 import pytest
 from asked import settings_of
 from editing import cells
+from pydantic import ValidationError
 
 from gates.evidence import Evidence, MissingEvidenceError
-from gates.stress.rollouts import in_every_condition, rollouts, success_lower
+from gates.stress.rollouts import (
+    StressSettings,
+    in_every_condition,
+    rollouts,
+    success_lower,
+)
 from genpolicy.statistics.intervals import clopper_pearson
 
 TABLE = "stress/rollouts.parquet"
@@ -72,3 +78,10 @@ def test_the_highest_bound_of_all_conditions_is_judged_and_the_others_are_said()
     )
     assert (found.value, found.interval) == (3.0, (0.0, 3.0))
     assert found.caveat == "worst in storm: 2.5, bounded by 3; calm 1"
+
+
+def test_the_undisturbed_condition_alone_is_no_comparison(ladder):
+    known = settings_of(ladder, "D").model_dump()
+    for names in (("nominal",), ("camera_delay", "network_jitter"), ()):
+        with pytest.raises(ValidationError, match="at least one more condition"):
+            StressSettings.model_validate(known | {"perturbations": names})
