@@ -1,8 +1,8 @@
 """The limits of the cause: one for each question, with its reason and its owner.
 
 A question that a criterion of Gate A asks as well takes that criterion's limit, so each limit is
-written once in `params.yaml`. Where there is no ladder, the packaged defaults hold; a test keeps
-them equal to `params.yaml`.
+written once in `params.yaml`. Where there is no ladder, the packaged defaults hold: a test keeps
+their numbers equal to `params.yaml`, and their reasons speak of no task.
 """
 
 from collections.abc import Mapping
