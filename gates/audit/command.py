@@ -142,6 +142,7 @@ def judged(report: AuditReport, cause: Cause, limits: CauseLimits) -> dict[str, 
         "next_action": cause.next_action,
         "questions": [answer.as_json() for answer in cause.answers],
         "limits": limits.as_json(),
+        "coverage": limits.confidence,
     }
 
 
@@ -181,7 +182,8 @@ def limits_text(limits: CauseLimits, path: Path | None) -> str:
     lines = [
         f"{question} {item.limit:g} ({item.owner})" for question, item in limits.by_question.items()
     ]
-    return "\n".join(_block("limits", (origin, *lines)))
+    sure = f"intervals cover {limits.confidence:.0%}"
+    return "\n".join(_block("limits", (origin, *lines, sure)))
 
 
 def _beyond(answer: Answer) -> str:

@@ -46,6 +46,7 @@ class Answer:
         comparison: How the two must stand to each other.
         unit: Unit of both; empty for counts and shares.
         note: Where, or why it is not known.
+        interval: Interval of the number, where it has one.
     """
 
     question: str
@@ -56,6 +57,7 @@ class Answer:
     comparison: Literal["<=", ">="] = "<="
     unit: str = ""
     note: str = ""
+    interval: tuple[float, float] | None = None
 
     @property
     def holds(self) -> bool | None:
