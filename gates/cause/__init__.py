@@ -8,7 +8,7 @@ from gates.cause.naming import (
     Answer,
     Cause,
     CauseName,
-    Layer,
+    Topic,
     cause_of,
     deciding_answer,
     name_cause,
@@ -17,6 +17,18 @@ from gates.cause.numbers import Numbers
 from gates.cause.reading import read_measured, read_numbers
 
 __all__ = [
-    "Answer", "Cause", "CauseLimits", "CauseName", "Layer", "Limit", "Numbers", "cause_of",
-    "deciding_answer", "default_limits", "limits_of", "name_cause", "read_measured", "read_numbers",
+    "Answer",
+    "Cause",
+    "CauseLimits",
+    "CauseName",
+    "Limit",
+    "Numbers",
+    "Topic",
+    "cause_of",
+    "deciding_answer",
+    "default_limits",
+    "limits_of",
+    "name_cause",
+    "read_measured",
+    "read_numbers",
 ]  # fmt: skip

@@ -1,6 +1,6 @@
 """Does a recorded variable, the order of recording or the past explain the modes?"""
 
-from gates.cause.answers import Answer, CauseName, Diagnosis, Layer, Named
+from gates.cause.answers import Answer, CauseName, Diagnosis, Named, Topic
 from gates.cause.limits import CauseLimits
 from gates.cause.numbers import Numbers
 from gates.cause.told import teller, told
@@ -35,7 +35,7 @@ def hidden(numbers: Numbers, limits: CauseLimits) -> Named:
         answers.insert(
             0,
             Answer(
-                "strata_effect", Layer.HIDDEN,
+                "strata_effect", Topic.HIDDEN,
                 "largest share that a variable surely explains beyond chance", 0.0,
                 limits["strata_effect"],
                 note=f"none of {len(numbers.strata)}; smallest adjusted p "
@@ -87,7 +87,7 @@ def _answer(row: Stratum, limits: CauseLimits) -> Answer:
     detail = f"{row.detail}; " if row.detail else ""
     unsure = "" if sure else f", its interval begins at {row.effect_lower or 0.0:.2f}"
     return Answer(
-        "strata_effect", Layer.HIDDEN,
+        "strata_effect", Topic.HIDDEN,
         f"share of the modes that {_plain(row.variable)} explains{seen}", row.effect,
         limits["strata_effect"] if _held(row, limits) else None,
         note=f"{detail}{row.phase}, adjusted p {row.p_adjusted or 0.0:.3g}{unsure}",

@@ -1,7 +1,7 @@
-"""The cause: the first red layer in the order of diagnosis decides, and says what to do next.
+"""The cause: the first red topic in the order of diagnosis decides, and says what to do next.
 
 Order: clocks and frames, calibration, labels, support, modes at all, persistence, recorded
-variables, validity of each mode. A later layer is not believed while an earlier one is red.
+variables, validity of each mode. A later topic is not believed while an earlier one is red.
 """
 
 from collections import Counter
@@ -14,8 +14,8 @@ from gates.cause.answers import (
     Cause,
     CauseName,
     Diagnosis,
-    Layer,
     Named,
+    Topic,
     in_words,
 )
 from gates.cause.components import others
@@ -40,7 +40,7 @@ RESIDUALS = {
     "clock_residual_s": "clock offset left after realignment, largest of streams and epochs",
     "calibration_residual_m": "calibration residual, largest of epochs",
 }
-__all__ = ["Answer", "Cause", "CauseName", "Layer", "cause_of", "deciding_answer", "name_cause"]
+__all__ = ["Answer", "Cause", "CauseName", "Topic", "cause_of", "deciding_answer", "name_cause"]
 
 
 def cause_of(evidence: Path, limits: CauseLimits) -> Cause:
@@ -71,12 +71,12 @@ def name_cause(numbers: Numbers, draws: Sequence[Numbers], limits: CauseLimits) 
     check_floors(numbers, limits)
     answers: list[Answer] = []
     verdict = Diagnosis(CauseName.VALID_MODES, "", "", NEXT)
-    red = Layer.NONE
-    for layer, judge in LAYERS.items():
+    red = Topic.NONE
+    for topic, judge in TOPICS.items():
         found, said = judge(numbers, limits)
         answers += found
-        if said is not None and red is Layer.NONE:
-            verdict, red = said, layer
+        if said is not None and red is Topic.NONE:
+            verdict, red = said, topic
     again = _all(draws, limits)
     same = [(v.name, v.variable) == (verdict.name, verdict.variable) for v in again]
     if len(again) >= LEAST_DRAWS:
@@ -84,12 +84,12 @@ def name_cause(numbers: Numbers, draws: Sequence[Numbers], limits: CauseLimits) 
         answers.append(answer)
         if said is not None:
             same = [_contradicts(other, verdict) for other in again]
-            verdict, red = said, Layer.AGREEMENT
+            verdict, red = said, Topic.AGREEMENT
     return Cause(
         name=verdict.name,
         variable=verdict.variable,
         kind=verdict.kind,
-        layer=red,
+        topic=red,
         next_action=f"{verdict.next_action}{others(numbers, red)}",
         answers=tuple(answers),
         confidence=sum(same) / (len(same) + 1) if same else None,
@@ -111,7 +111,7 @@ def deciding_answer(question: str, numbers: Numbers, limits: CauseLimits) -> Ans
         ConfigError: A limit lies below what the audit looked for.
     """
     check_floors(numbers, limits)
-    found = [answer for judge in LAYERS.values() for answer in judge(numbers, limits)[0]]
+    found = [answer for judge in TOPICS.values() for answer in judge(numbers, limits)[0]]
     held = [item for item in found if item.question == question and item.limit is not None]
 
     def margin(item: Answer) -> tuple[int, float]:
@@ -128,7 +128,7 @@ def _all(draws: Sequence[Numbers], limits: CauseLimits) -> list[Diagnosis]:
 
 
 def _first_red(numbers: Numbers, limits: CauseLimits) -> Diagnosis:
-    for judge in LAYERS.values():
+    for judge in TOPICS.values():
         said = judge(numbers, limits)[1]
         if said is not None:
             return said
@@ -148,7 +148,7 @@ def _agreement(
     same = sum(said.name is verdict.name for said in draws)
     total = same + len(against)
     answer = Answer(
-        "cause_agreement", Layer.AGREEMENT,
+        "cause_agreement", Topic.AGREEMENT,
         "resampled audits that name the same cause, of those that name one",
         same / total if total else None,
         limits["cause_agreement"] if verdict.name in CLAIMS else None, ">=",
@@ -196,7 +196,7 @@ def _data(numbers: Numbers, limits: CauseLimits) -> Named:
         in_metres = item.question in IN_METRES
         answer = Answer(
             question=item.question,
-            layer=Layer.DATA,
+            topic=Topic.DATA,
             what=f"{item.kind} {item.variable}".replace("_", " ").strip(),
             measured=item.measured,
             limit=limits[item.question] * (numbers.metre if in_metres else 1.0),
@@ -230,7 +230,7 @@ def _residual(
     elif not known:
         note = f"{residual:.4g} is beyond the limit, and {note}: too little to say"
     return Answer(
-        question, Layer.DATA, RESIDUALS[question], residual if known else None, limit,
+        question, Topic.DATA, RESIDUALS[question], residual if known else None, limit,
         unit=numbers.unit if in_metres else "s", note=note,
     )  # fmt: skip
 
@@ -241,7 +241,7 @@ def _labels(numbers: Numbers, limits: CauseLimits) -> Named:
     ends = clopper_pearson(labels.disagreements, labels.replays, limits.confidence)
     answer = Answer(
         question="label_disagreement",
-        layer=Layer.LABELS,
+        topic=Topic.LABELS,
         what="labels that disagree with a replay, upper bound",
         measured=ends[1] if known else None,
         limit=limit if known else None,
@@ -265,11 +265,11 @@ def _labels(numbers: Numbers, limits: CauseLimits) -> Named:
     return [answer], Diagnosis(CauseName.LABEL_CONTAMINATION, "outcome", "replay", text)
 
 
-LAYERS: dict[Layer, Callable[[Numbers, CauseLimits], Named]] = {
-    Layer.DATA: _data,
-    Layer.LABELS: _labels,
-    Layer.SUPPORT: support,
-    Layer.STRUCTURE: structure,
-    Layer.HIDDEN: hidden,
-    Layer.VALIDITY: validity,
+TOPICS: dict[Topic, Callable[[Numbers, CauseLimits], Named]] = {
+    Topic.DATA: _data,
+    Topic.LABELS: _labels,
+    Topic.SUPPORT: support,
+    Topic.STRUCTURE: structure,
+    Topic.HIDDEN: hidden,
+    Topic.VALIDITY: validity,
 }

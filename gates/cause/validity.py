@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from gates.cause.answers import Answer, CauseName, Diagnosis, Layer, Named
+from gates.cause.answers import Answer, CauseName, Diagnosis, Named, Topic
 from gates.cause.components import followed
 from gates.cause.limits import CauseLimits
 from gates.cause.numbers import Numbers
@@ -21,7 +21,7 @@ def validity(numbers: Numbers, limits: CauseLimits) -> Named:
     all are held to it.
     """
     modes = numbers.modes
-    count = Answer("modes", Layer.VALIDITY, "modes followed over situations", len(modes), 2.0, ">=")
+    count = Answer("modes", Topic.VALIDITY, "modes followed over situations", len(modes), 2.0, ">=")
     chosen = _best_choice(numbers, limits)
     together = [] if chosen or len(modes) < 2 else _together(numbers, limits)
     answers = [count, *together]
@@ -145,7 +145,7 @@ def _success(mode: ModeOutcome, limits: CauseLimits) -> Answer:
 def _success_of(who: str, successes: int, episodes: int, limits: CauseLimits) -> Answer:
     ends, known = _ends(successes, episodes, limits), episodes > 0
     return Answer(
-        "mode_success_lower", Layer.VALIDITY, f"success of {who}, lower bound",
+        "mode_success_lower", Topic.VALIDITY, f"success of {who}, lower bound",
         ends[0] if known else None, limits["mode_success_lower"], ">=",
         note=f"{successes} of {episodes} succeed" if known else "not recorded",
         interval=ends if known else None,
@@ -159,7 +159,7 @@ def _ends(successes: int, episodes: int, limits: CauseLimits) -> tuple[float, fl
 def _feasible(mode: ModeOutcome, limits: CauseLimits) -> Answer:
     known = mode.checked > 0
     return Answer(
-        "mode_feasible_share", Layer.VALIDITY, f"feasible chunks of {mode.mode}",
+        "mode_feasible_share", Topic.VALIDITY, f"feasible chunks of {mode.mode}",
         mode.admissible / mode.checked if known else None, limits["mode_feasible_share"], ">=",
         note=f"{mode.admissible} of {mode.checked}" if known else "no chunk was checked",
     )  # fmt: skip

@@ -1,6 +1,6 @@
 """Data semantics: is what was recorded what it claims to be, before anything is made of it?"""
 
-from gates.cause import Layer
+from gates.cause import Topic
 from gates.criterion import Measured, criterion
 from gates.evidence import Evidence, MissingEvidenceError, count, number, numbers
 from gates.need.cause import as_the_cause, found_cause
@@ -109,7 +109,7 @@ def data_defects(evidence: Evidence, settings: NeedSettings) -> Measured:
     by the cause; its limits hold here as well, whatever the modes look like.
     """
     cause = found_cause(evidence, settings)
-    asked = [answer for answer in cause.answers if answer.layer in (Layer.DATA, Layer.LABELS)]
+    asked = [answer for answer in cause.answers if answer.topic in (Topic.DATA, Topic.LABELS)]
     red = [
         f"{answer.what} {answer.measured:.4g}{f' {answer.unit}' if answer.unit else ''}"
         f"{f' ({answer.note})' if answer.note else ''}, limit {answer.limit:.4g}"

@@ -59,7 +59,7 @@ def audit_page(document: Mapping[str, Any], evidence: AuditEvidence, *, name: st
         tone=TONES.get(cause, "open"),
         named=_named(said),
         marks=MARKS,
-        layers=ladder(said, evidence),
+        topics=ladder(said, evidence),
         pictures=draw_all(evidence, {row["question"]: row["limit"] for row in limits}),
         limits=limits,
         labels=label_table(evidence),
