@@ -35,7 +35,7 @@ from genpolicy.evidence.stress.latency import (
 from genpolicy.evidence.stress.matched import step
 from genpolicy.evidence.stress.perturbations import Nominal
 from genpolicy.evidence.stress.rollout import Rollout
-from genpolicy.evidence.stress.state import Fixture, Outcome
+from genpolicy.evidence.stress.state import Outcome, Setup
 from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.execution.executor import Executor
 from genpolicy.feasibility.admission import FeasibilityChecker
@@ -149,11 +149,11 @@ class Timer:
         return call
 
 
-def closed_loop(policy: Rehearsed, fixture: Fixture, starts: Sequence[Any]) -> tuple[float, Any]:
+def closed_loop(policy: Rehearsed, setup: Setup, starts: Sequence[Any]) -> tuple[float, Any]:
     """Processor seconds of all rollouts in lockstep, and the rollouts."""
-    epoch = fixture.task.calibration_epochs[-1]
+    epoch = setup.task.calibration_epochs[-1]
     rollouts = [
-        Rollout(fixture, start, number, calibration_epoch=epoch)
+        Rollout(setup, start, number, calibration_epoch=epoch)
         for number, start in enumerate(starts)
     ]
     policy.rollouts, policy.memory = {r.start_index: r for r in rollouts}, {}
@@ -183,7 +183,7 @@ def main() -> None:
     specs = task.episode_specs(3, ROLLOUTS, shares={"nominal": 1.0})
     plans = {number: demonstrate(spec).actions for number, spec in enumerate(specs)}
     starts = [spec.start for spec in specs]
-    fixture = Fixture(
+    setup = Setup(
         task=task, checker=make_checker(
             task, FeasibilitySettings(**PARAMS["feasibility"]),
             action_period_s=HORIZONS.action_period_s,
@@ -199,8 +199,8 @@ def main() -> None:
     )  # fmt: skip
     with TemporaryDirectory() as scratch:
         policy = Rehearsed(network(Path(scratch) / "flow"), plans)
-    closed_loop(policy, fixture, starts[:2])  # imports, caches
-    loop_s, rollouts = closed_loop(policy, fixture, starts)
+    closed_loop(policy, setup, starts[:2])  # imports, caches
+    loop_s, rollouts = closed_loop(policy, setup, starts)
     ticks = sum(rollout.tick for rollout in rollouts)
     simulated_s = ticks * HORIZONS.action_period_s
     world: Any = rollouts[0].world
@@ -212,10 +212,10 @@ def main() -> None:
     print(f"{simulated_s / loop_s:.0f} x real time, {1e3 * loop_s / ticks:.2f} ms a tick")
     print(f"raw mj_step  {raw_s:6.2f} s: {simulated_s / raw_s:.0f} x real time")
     print(f"ratio {loop_s / raw_s:.2f}")
-    profile(policy, fixture, starts)
+    profile(policy, setup, starts)
 
 
-def profile(policy: Rehearsed, fixture: Fixture, starts: Sequence[Any]) -> None:
+def profile(policy: Rehearsed, setup: Setup, starts: Sequence[Any]) -> None:
     """Where the closed loop's time goes; indented parts are inside the one above."""
     timer = Timer()
     parts: dict[str, tuple[Any, str]] = {
@@ -232,7 +232,7 @@ def profile(policy: Rehearsed, fixture: Fixture, starts: Sequence[Any]) -> None:
         "observation": (TabletopWorld, "observe"),
     }
     with timer.over(parts):
-        total_s, _ = closed_loop(policy, fixture, starts)
+        total_s, _ = closed_loop(policy, setup, starts)
     print(f"\n{'part (timed run, nested parts count twice)':44s} {'share':>6s} {'ms':>8s} calls")
     for name in parts:
         seconds = timer.seconds[name]

@@ -122,7 +122,7 @@ def run(job: Job, *, keep: Path | None = None) -> Result:
         job=job, name=cause.name, group=cause.group, strong=strong,
         verdict=said[0], variable=said[1], kind=said[2], named=named, right=named or weak,
         detail={
-            "layer": str(verdict.layer.value), "action": verdict.next_action,
+            "layer": str(verdict.topic.value), "action": verdict.next_action,
             "confidence": verdict.confidence, **asdict(result.counts),
         },
         cpu_s=time.process_time() - begin,

@@ -14,7 +14,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from gates.cause import Answer, Cause, CauseLimits, Layer, cause_of, default_limits
+from gates.cause import Answer, Cause, CauseLimits, Topic, cause_of, default_limits
 from gates.need.gate import read_cause_limits
 from genpolicy.audit.evidence import write_evidence
 from genpolicy.audit.propose import propose_settings
@@ -135,13 +135,14 @@ def judged(report: AuditReport, cause: Cause, limits: CauseLimits) -> dict[str, 
         "verdict": cause.name.value,
         "variable": cause.variable,
         "kind": cause.kind,
-        "layer": cause.layer.value,
+        "layer": cause.topic.value,
         "confidence": cause.confidence,
         "agreeing_draws": list(cause.agreeing),
         "found": list(cause.found),
         "next_action": cause.next_action,
         "questions": [answer.as_json() for answer in cause.answers],
         "limits": limits.as_json(),
+        "coverage": limits.confidence,
     }
 
 
@@ -155,10 +156,10 @@ def as_text(report: AuditReport, cause: Cause, opened: Opened, out: Path) -> str
     """The verdict for a person at a terminal."""
     parts = [part.replace("_", " ") for part in (cause.variable, cause.kind) if part]
     said = f"{cause.name} ({', '.join(dict.fromkeys(parts))})" if parts else cause.name.value
-    red = "no layer is red" if cause.layer is Layer.NONE else f"first red layer: {cause.layer}"
-    beyond = tuple(_beyond(answer) for answer in cause.answers if answer.layer is cause.layer)
+    red = "no topic is red" if cause.topic is Topic.NONE else f"first red topic: {cause.topic}"
+    beyond = tuple(_beyond(answer) for answer in cause.answers if answer.topic is cause.topic)
     same, draws = cause.agreeing
-    agree = "contradict what all of them say" if cause.layer is Layer.AGREEMENT else "say the same"
+    agree = "contradict what all of them say" if cause.topic is Topic.AGREEMENT else "say the same"
     sure = f"{same} of {draws} resampled audits {agree}" if draws else "confidence unknown"
     lines = [
         *_block("verdict", (said, f"{TITLES[cause.name]}; {sure}; {red}")),
@@ -181,7 +182,8 @@ def limits_text(limits: CauseLimits, path: Path | None) -> str:
     lines = [
         f"{question} {item.limit:g} ({item.owner})" for question, item in limits.by_question.items()
     ]
-    return "\n".join(_block("limits", (origin, *lines)))
+    sure = f"intervals cover {limits.confidence:.0%}"
+    return "\n".join(_block("limits", (origin, *lines, sure)))
 
 
 def _beyond(answer: Answer) -> str:

@@ -4,10 +4,31 @@ One function and one set of limits for Gate A, the command `genpolicy audit` and
 """
 
 from gates.cause.limits import CauseLimits, Limit, default_limits, limits_of
-from gates.cause.naming import Answer, Cause, CauseName, Layer, cause_of, name_cause
-from gates.cause.numbers import Numbers, read_numbers
+from gates.cause.naming import (
+    Answer,
+    Cause,
+    CauseName,
+    Topic,
+    cause_of,
+    deciding_answer,
+    name_cause,
+)
+from gates.cause.numbers import Numbers
+from gates.cause.reading import read_measured, read_numbers
 
 __all__ = [
-    "Answer", "Cause", "CauseLimits", "CauseName", "Layer", "Limit", "Numbers", "cause_of",
-    "default_limits", "limits_of", "name_cause", "read_numbers",
+    "Answer",
+    "Cause",
+    "CauseLimits",
+    "CauseName",
+    "Limit",
+    "Numbers",
+    "Topic",
+    "cause_of",
+    "deciding_answer",
+    "default_limits",
+    "limits_of",
+    "name_cause",
+    "read_measured",
+    "read_numbers",
 ]  # fmt: skip

@@ -19,8 +19,8 @@ class CauseName(StrEnum):
     INSUFFICIENT_SUPPORT = "insufficient_support"
 
 
-class Layer(StrEnum):
-    """The layers of the diagnosis, in the order in which they are believed."""
+class Topic(StrEnum):
+    """The topics of the diagnosis, in the order in which they are believed."""
 
     DATA = "data"
     LABELS = "labels"
@@ -38,23 +38,25 @@ class Answer:
 
     Attributes:
         question: Name of the limit.
-        layer: Layer of the diagnosis.
+        topic: Topic of the diagnosis.
         what: What was measured, in words.
         measured: The number; None where it is not known.
         limit: Its limit; None where nothing is held against it.
         comparison: How the two must stand to each other.
         unit: Unit of both; empty for counts and shares.
         note: Where, or why it is not known.
+        interval: Interval of the number, where it has one.
     """
 
     question: str
-    layer: Layer
+    topic: Topic
     what: str
     measured: float | None
     limit: float | None
     comparison: Literal["<=", ">="] = "<="
     unit: str = ""
     note: str = ""
+    interval: tuple[float, float] | None = None
 
     @property
     def holds(self) -> bool | None:
@@ -72,7 +74,7 @@ class Answer:
     def as_json(self) -> dict[str, Any]:
         """A row of `audit.json`."""
         return {
-            "question": self.question, "layer": self.layer.value, "what": self.what,
+            "question": self.question, "layer": self.topic.value, "what": self.what,
             "measured": None if self.measured is None else float(self.measured),
             "limit": self.limit,
             "comparison": self.comparison, "unit": self.unit,
@@ -82,7 +84,7 @@ class Answer:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """What a red layer says: a cause, the variable and kind that it names, and what to do."""
+    """What a red topic says: a cause, the variable and kind that it names, and what to do."""
 
     name: CauseName
     variable: str
@@ -91,7 +93,7 @@ class Diagnosis:
 
 
 Named = tuple[list[Answer], Diagnosis | None]
-"""The answers of a layer, and what it says where it is red."""
+"""The answers of a topic, and what it says where it is red."""
 
 
 @dataclass(frozen=True)
@@ -102,7 +104,7 @@ class Cause:
         name: The cause.
         variable: The variable or stream that it names; empty where it names none.
         kind: The kind of defect or of evidence; empty where there is none.
-        layer: First red layer of the diagnosis, `none` where all are green.
+        topic: First red topic of the diagnosis, `none` where all are green.
         next_action: What to do.
         answers: Every question with its number and limit, in the order of diagnosis.
         confidence: Share of resampled audits with the same cause and variable, of one more than
@@ -116,7 +118,7 @@ class Cause:
     name: CauseName
     variable: str
     kind: str
-    layer: Layer
+    topic: Topic
     next_action: str
     answers: tuple[Answer, ...]
     confidence: float | None

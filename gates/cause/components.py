@@ -1,11 +1,11 @@
 """In which components of the action modes were looked for, so that no verdict claims more."""
 
-from gates.cause.answers import Answer, Layer
+from gates.cause.answers import Answer, Topic
 from gates.cause.numbers import Numbers
 from genpolicy.audit.component_rows import NOT_LOOKED_AT, OTHER, ComponentModes
 
-# The causes of these layers speak of modes, or of their absence.
-SPEAK_OF_MODES = (Layer.STRUCTURE, Layer.HIDDEN, Layer.VALIDITY, Layer.NONE)
+# The causes of these topics speak of modes, or of their absence.
+SPEAK_OF_MODES = (Topic.STRUCTURE, Topic.HIDDEN, Topic.VALIDITY, Topic.NONE)
 
 
 def components(numbers: Numbers) -> list[Answer]:
@@ -40,7 +40,7 @@ def looked_in(numbers: Numbers) -> str:
     return f"{words} ({'; '.join(rest)})" if rest else words
 
 
-def others(numbers: Numbers, red: Layer) -> str:
+def others(numbers: Numbers, red: Topic) -> str:
     """What was found beside the component that was followed, a sentence; empty where nothing."""
     found = [item for item in numbers.components if item.two_mode and not item.followed]
     if not found or red not in SPEAK_OF_MODES:
@@ -62,7 +62,7 @@ def _answer(item: ComponentModes) -> Answer:
     else:
         note = f"not looked at: {NOT_LOOKED_AT.get(item.state, item.state)}"
     return Answer(
-        "component_modes", Layer.STRUCTURE,
+        "component_modes", Topic.STRUCTURE,
         f"held-out episodes with several modes of {item.component}",
         float(item.two_mode_episodes) if looked else None, None, ">=", note=note,
     )  # fmt: skip

@@ -1,6 +1,6 @@
 """Does a recorded variable, the order of recording or the past explain the modes?"""
 
-from gates.cause.answers import Answer, CauseName, Diagnosis, Layer, Named
+from gates.cause.answers import Answer, CauseName, Diagnosis, Named, Topic
 from gates.cause.limits import CauseLimits
 from gates.cause.numbers import Numbers
 from gates.cause.told import teller, told
@@ -26,19 +26,22 @@ SHOWN = 8
 def hidden(numbers: Numbers, limits: CauseLimits) -> Named:
     """Variables that explain the modes significantly or tell them, and what the foremost says."""
     clear = [row for row in numbers.strata if _clear(row, limits)]
-    clear.sort(key=lambda row: (-(row.effect or 0.0), row.variable))
+    # Those that are held to the limit come first, so that no red one is ever left out.
+    clear.sort(key=lambda row: (not _held(row, limits), -(row.effect or 0.0), row.variable))
     answers = [_answer(row, limits) for row in clear[:SHOWN]]
     tested = [row for row in numbers.strata if row.p_adjusted is not None and row.n > 0]
-    if tested and not clear:
+    if tested and not any(_held(row, limits) for row in clear):
         row = min(tested, key=lambda item: (item.p_adjusted or 0.0, item.variable))
-        answers = [
+        answers.insert(
+            0,
             Answer(
-                "strata_effect", Layer.HIDDEN,
-                "largest share that a variable explains beyond chance", 0.0,
+                "strata_effect", Topic.HIDDEN,
+                "largest share that a variable surely explains beyond chance", 0.0,
                 limits["strata_effect"],
-                note=f"smallest adjusted p {row.p_adjusted or 0.0:.3g} ({_plain(row.variable)})",
-            )
-        ]  # fmt: skip
+                note=f"none of {len(numbers.strata)}; smallest adjusted p "
+                f"{row.p_adjusted or 0.0:.3g} ({_plain(row.variable)})",
+            ),
+        )  # fmt: skip
     found = [row for row in clear if _wide_of(row, limits)]
     answers += told(numbers.told, limits)
     if found:
@@ -64,6 +67,12 @@ def _clear(row: Stratum, limits: CauseLimits) -> bool:
     return known and limits["strata_p"] - (row.p_adjusted or 0.0) >= 0
 
 
+def _held(row: Stratum, limits: CauseLimits) -> bool:
+    """Whether its share is held to the limit: a large one must be clear of chance for that."""
+    small = limits["strata_effect"] - (row.effect or 0.0) >= 0
+    return small or _wide_of(row, limits)
+
+
 def _wide_of(row: Stratum, limits: CauseLimits) -> bool:
     """Whether the share that it explains is too large, and its interval clear of chance."""
     large = not limits["strata_effect"] - (row.effect or 0.0) >= 0
@@ -72,16 +81,17 @@ def _wide_of(row: Stratum, limits: CauseLimits) -> bool:
 
 def _answer(row: Stratum, limits: CauseLimits) -> Answer:
     """A large share whose interval reaches down to chance is shown without a limit."""
-    limit = limits["strata_effect"]
     sure = (row.effect_lower or 0.0) - limits["strata_effect_lower"] >= 0
+    known = row.effect_lower is not None and row.effect_upper is not None
     seen = ", which the policy sees" if row.observed else ""
     detail = f"{row.detail}; " if row.detail else ""
     unsure = "" if sure else f", its interval begins at {row.effect_lower or 0.0:.2f}"
     return Answer(
-        "strata_effect", Layer.HIDDEN,
+        "strata_effect", Topic.HIDDEN,
         f"share of the modes that {_plain(row.variable)} explains{seen}", row.effect,
-        limit if sure or limit - (row.effect or 0.0) >= 0 else None,
+        limits["strata_effect"] if _held(row, limits) else None,
         note=f"{detail}{row.phase}, adjusted p {row.p_adjusted or 0.0:.3g}{unsure}",
+        interval=(row.effect_lower or 0.0, row.effect_upper or 0.0) if known else None,
     )  # fmt: skip
 
 

@@ -1,8 +1,8 @@
 """The limits of the cause: one for each question, with its reason and its owner.
 
 A question that a criterion of Gate A asks as well takes that criterion's limit, so each limit is
-written once in `params.yaml`. Where there is no ladder, the packaged defaults hold; a test keeps
-them equal to `params.yaml`.
+written once in `params.yaml`. Where there is no ladder, the packaged defaults hold: a test keeps
+their numbers equal to `params.yaml`, and their reasons speak of no task.
 """
 
 from collections.abc import Mapping
@@ -44,9 +44,15 @@ class Limit:
 
 @dataclass(frozen=True)
 class CauseLimits:
-    """Every limit of the cause, by question."""
+    """Every limit of the cause.
+
+    Attributes:
+        by_question: Limit of each question.
+        confidence: Coverage of every interval whose end is held to one of them.
+    """
 
     by_question: Mapping[str, Limit]
+    confidence: float
 
     def __getitem__(self, question: str) -> float:
         return self.by_question[question].limit
@@ -59,13 +65,16 @@ class CauseLimits:
         return result
 
 
-def limits_of(cause: Any, criteria: Mapping[str, Any], *, where: str) -> CauseLimits:
+def limits_of(
+    cause: Any, criteria: Mapping[str, Any], *, confidence: float, where: str
+) -> CauseLimits:
     """Limits from the settings of Gate A.
 
     Args:
         cause: `owner: {question: [limit, reason]}` of the questions that only the cause asks.
         criteria: Thresholds of Gate A by criterion, each with `limit`, `reason` and `owner`; those
             of the shared questions are taken, others left alone.
+        confidence: Coverage of every interval.
         where: For errors.
 
     Raises:
@@ -78,20 +87,22 @@ def limits_of(cause: Any, criteria: Mapping[str, Any], *, where: str) -> CauseLi
         if question in criteria:
             item = criteria[question]
             found[question] = Limit(float(item.limit), str(item.reason), str(item.owner))
-    return _whole(found, where)
+    return _whole(found, confidence, where)
 
 
 def default_limits() -> CauseLimits:
     """The packaged limits, for an audit without a ladder."""
     text = files("gates.cause").joinpath(DEFAULTS).read_bytes()
-    return _whole(_entries(parse_yaml(text, where=DEFAULTS), where=DEFAULTS), DEFAULTS)
+    document = dict(parse_yaml(text, where=DEFAULTS))
+    confidence = float(document.pop("confidence"))
+    return _whole(_entries(document, where=DEFAULTS), confidence, DEFAULTS)
 
 
-def _whole(found: dict[str, Limit], where: str) -> CauseLimits:
+def _whole(found: dict[str, Limit], confidence: float, where: str) -> CauseLimits:
     for question in (*SHARED, *OWN):
         if question not in found:
             raise _wrong(f"{where}.{question}", "missing", "a limit, a reason and an owner")
-    return CauseLimits({question: found[question] for question in (*SHARED, *OWN)})
+    return CauseLimits({question: found[question] for question in (*SHARED, *OWN)}, confidence)
 
 
 def _entries(section: Any, *, where: str) -> dict[str, Limit]:

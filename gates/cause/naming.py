@@ -1,7 +1,7 @@
-"""The cause: the first red layer in the order of diagnosis decides, and says what to do next.
+"""The cause: the first red topic in the order of diagnosis decides, and says what to do next.
 
 Order: clocks and frames, calibration, labels, support, modes at all, persistence, recorded
-variables, validity of each mode. A later layer is not believed while an earlier one is red.
+variables, validity of each mode. A later topic is not believed while an earlier one is red.
 """
 
 from collections import Counter
@@ -14,17 +14,19 @@ from gates.cause.answers import (
     Cause,
     CauseName,
     Diagnosis,
-    Layer,
     Named,
+    Topic,
     in_words,
 )
 from gates.cause.components import others
 from gates.cause.hidden import hidden
 from gates.cause.limits import CauseLimits
-from gates.cause.numbers import Numbers, folder_numbers
+from gates.cause.numbers import Numbers
+from gates.cause.reading import folder_numbers
 from gates.cause.structure import structure, support
 from gates.cause.validity import found_words, validity
 from genpolicy.errors import ConfigError
+from genpolicy.statistics.intervals import clopper_pearson
 
 # What is said of modes; a defect that is found stands, and so does what is missing.
 CLAIMS = (
@@ -34,7 +36,11 @@ UNSTABLE = "unstable"
 # Fewer resampled audits do not overturn a verdict.
 LEAST_DRAWS = 20
 IN_METRES = ("calibration_residual_m", "noise_spread_m")
-__all__ = ["Answer", "Cause", "CauseName", "Layer", "cause_of", "name_cause"]
+RESIDUALS = {
+    "clock_residual_s": "clock offset left after realignment, largest of streams and epochs",
+    "calibration_residual_m": "calibration residual, largest of epochs",
+}
+__all__ = ["Answer", "Cause", "CauseName", "Topic", "cause_of", "deciding_answer", "name_cause"]
 
 
 def cause_of(evidence: Path, limits: CauseLimits) -> Cause:
@@ -62,15 +68,15 @@ def name_cause(numbers: Numbers, draws: Sequence[Numbers], limits: CauseLimits) 
     Raises:
         ConfigError: A limit lies below what the audit looked for.
     """
-    _check_floors(numbers, limits)
+    check_floors(numbers, limits)
     answers: list[Answer] = []
     verdict = Diagnosis(CauseName.VALID_MODES, "", "", NEXT)
-    red = Layer.NONE
-    for layer, judge in LAYERS.items():
+    red = Topic.NONE
+    for topic, judge in TOPICS.items():
         found, said = judge(numbers, limits)
         answers += found
-        if said is not None and red is Layer.NONE:
-            verdict, red = said, layer
+        if said is not None and red is Topic.NONE:
+            verdict, red = said, topic
     again = _all(draws, limits)
     same = [(v.name, v.variable) == (verdict.name, verdict.variable) for v in again]
     if len(again) >= LEAST_DRAWS:
@@ -78,12 +84,12 @@ def name_cause(numbers: Numbers, draws: Sequence[Numbers], limits: CauseLimits) 
         answers.append(answer)
         if said is not None:
             same = [_contradicts(other, verdict) for other in again]
-            verdict, red = said, Layer.AGREEMENT
+            verdict, red = said, Topic.AGREEMENT
     return Cause(
         name=verdict.name,
         variable=verdict.variable,
         kind=verdict.kind,
-        layer=red,
+        topic=red,
         next_action=f"{verdict.next_action}{others(numbers, red)}",
         answers=tuple(answers),
         confidence=sum(same) / (len(same) + 1) if same else None,
@@ -92,12 +98,37 @@ def name_cause(numbers: Numbers, draws: Sequence[Numbers], limits: CauseLimits) 
     )
 
 
+def deciding_answer(question: str, numbers: Numbers, limits: CauseLimits) -> Answer | None:
+    """The answer to a question on which it rests whether its limit is kept.
+
+    The one furthest beyond the limit; where all that are known keep it, one that is not known, else
+    the one nearest to it. Those without a limit are only shown.
+
+    Returns:
+        None where no number is held to the limit.
+
+    Raises:
+        ConfigError: A limit lies below what the audit looked for.
+    """
+    check_floors(numbers, limits)
+    found = [answer for judge in TOPICS.values() for answer in judge(numbers, limits)[0]]
+    held = [item for item in found if item.question == question and item.limit is not None]
+
+    def margin(item: Answer) -> tuple[int, float]:
+        if item.measured is None or item.limit is None:
+            return 1, 0.0
+        left = item.limit - item.measured
+        return (0 if item.red else 2), left if item.comparison == "<=" else -left
+
+    return min(held, key=margin, default=None)
+
+
 def _all(draws: Sequence[Numbers], limits: CauseLimits) -> list[Diagnosis]:
     return [_first_red(draw, limits) for draw in draws]
 
 
 def _first_red(numbers: Numbers, limits: CauseLimits) -> Diagnosis:
-    for judge in LAYERS.values():
+    for judge in TOPICS.values():
         said = judge(numbers, limits)[1]
         if said is not None:
             return said
@@ -117,7 +148,7 @@ def _agreement(
     same = sum(said.name is verdict.name for said in draws)
     total = same + len(against)
     answer = Answer(
-        "cause_agreement", Layer.AGREEMENT,
+        "cause_agreement", Topic.AGREEMENT,
         "resampled audits that name the same cause, of those that name one",
         same / total if total else None,
         limits["cause_agreement"] if verdict.name in CLAIMS else None, ">=",
@@ -142,7 +173,12 @@ def _words(said: Diagnosis) -> str:
     return in_words(said.name, said.variable or said.kind)
 
 
-def _check_floors(numbers: Numbers, limits: CauseLimits) -> None:
+def check_floors(numbers: Numbers, limits: CauseLimits) -> None:
+    """Refuse limits of which the evidence says nothing.
+
+    Raises:
+        ConfigError: A limit lies below what the audit looked for.
+    """
     for question, floor in sorted(numbers.floors.items()):
         # Floors may have been converted to metres and back.
         if not limits[question] - floor * (1.0 - 1e-9) >= 0:
@@ -160,7 +196,7 @@ def _data(numbers: Numbers, limits: CauseLimits) -> Named:
         in_metres = item.question in IN_METRES
         answer = Answer(
             question=item.question,
-            layer=Layer.DATA,
+            topic=Topic.DATA,
             what=f"{item.kind} {item.variable}".replace("_", " ").strip(),
             measured=item.measured,
             limit=limits[item.question] * (numbers.metre if in_metres else 1.0),
@@ -170,28 +206,56 @@ def _data(numbers: Numbers, limits: CauseLimits) -> Named:
         answers.append(answer)
         if answer.red and verdict is None:
             verdict = Diagnosis(CauseName.DATA_DEFECT, item.variable, item.kind, item.action)
+    found = {item.question for item in numbers.findings}
+    for question, residual in numbers.residuals.items():
+        if question not in found:
+            answers.append(_residual(question, residual, numbers, limits))
     return answers, verdict
+
+
+def _residual(
+    question: str, residual: float | None, numbers: Numbers, limits: CauseLimits
+) -> Answer:
+    """A residual where no finding speaks of it: what noise explains is never red.
+
+    One beyond the limit that does not stand out of what the episodes scatter by is not known to
+    lie on either side.
+    """
+    in_metres = question in IN_METRES
+    limit = limits[question] * (numbers.metre if in_metres else 1.0)
+    known = residual is not None and limit - residual >= 0
+    note = "nothing stands out of what the episodes scatter by"
+    if residual is None:
+        note = "not measured in every epoch"
+    elif not known:
+        note = f"{residual:.4g} is beyond the limit, and {note}: too little to say"
+    return Answer(
+        question, Topic.DATA, RESIDUALS[question], residual if known else None, limit,
+        unit=numbers.unit if in_metres else "s", note=note,
+    )  # fmt: skip
 
 
 def _labels(numbers: Numbers, limits: CauseLimits) -> Named:
     labels, limit = numbers.labels, limits["label_disagreement"]
     known = labels.replays > 0
+    ends = clopper_pearson(labels.disagreements, labels.replays, limits.confidence)
     answer = Answer(
         question="label_disagreement",
-        layer=Layer.LABELS,
+        topic=Topic.LABELS,
         what="labels that disagree with a replay, upper bound",
-        measured=labels.upper if known else None,
+        measured=ends[1] if known else None,
         limit=limit if known else None,
         note=f"{labels.disagreements} of {labels.replays} replayed"
         if known
         else "no replay: labels are taken as they are",
+        interval=ends if known else None,
     )
     if not answer.red:
         return [answer], None
     if labels.disagreements == 0:
         text = (
             f"Replay more episodes: {labels.replays} without a disagreement only show a share "
-            f"below {labels.upper:.3f}."
+            f"below {ends[1]:.3f}."
         )
         return [answer], Diagnosis(CauseName.INSUFFICIENT_SUPPORT, "outcome", "replay", text)
     text = (
@@ -201,11 +265,11 @@ def _labels(numbers: Numbers, limits: CauseLimits) -> Named:
     return [answer], Diagnosis(CauseName.LABEL_CONTAMINATION, "outcome", "replay", text)
 
 
-LAYERS: dict[Layer, Callable[[Numbers, CauseLimits], Named]] = {
-    Layer.DATA: _data,
-    Layer.LABELS: _labels,
-    Layer.SUPPORT: support,
-    Layer.STRUCTURE: structure,
-    Layer.HIDDEN: hidden,
-    Layer.VALIDITY: validity,
+TOPICS: dict[Topic, Callable[[Numbers, CauseLimits], Named]] = {
+    Topic.DATA: _data,
+    Topic.LABELS: _labels,
+    Topic.SUPPORT: support,
+    Topic.STRUCTURE: structure,
+    Topic.HIDDEN: hidden,
+    Topic.VALIDITY: validity,
 }

@@ -1,41 +1,19 @@
-"""The audit's numbers, read from its evidence: only what a cause is named from."""
+"""The audit's numbers: only what a cause is named from."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 from genpolicy.audit.component_rows import ComponentModes
-from genpolicy.audit.reach_rows import (
-    LOCAL,
-    Alternative,
-    FindingDraw,
-    Reach,
-    Side,
-    StructureDraw,
-)
-from genpolicy.audit.rows import Finding, ModeOutcome, Prediction, Resample, Stratum
-from genpolicy.errors import BadInputError
-from genpolicy.integrity.documents import read_json
-from genpolicy.integrity.rows import Row, read_rows
-
-_OfPhase = TypeVar("_OfPhase", ModeOutcome, Alternative)
-
-
-class Rows(Protocol):
-    """A table of the evidence by file name, as rows of its class."""
-
-    def __call__(self, name: str, row: type[Row], /) -> list[Row]:
-        """The rows, possibly none."""
+from genpolicy.audit.reach_rows import LOCAL, Alternative, Reach, Side
+from genpolicy.audit.rows import Finding, ModeOutcome, Prediction, Stratum
 
 
 @dataclass(frozen=True)
 class Labels:
-    """Labels against replay; `upper` is the exact upper bound of the share that disagrees."""
+    """Labels against replay."""
 
     replays: int
     disagreements: int
-    upper: float
 
 
 @dataclass(frozen=True)
@@ -93,6 +71,8 @@ class Numbers:
         kind: Which that is, `local` or `learned`.
         other: What the other one found; None where there is none.
         other_reach: How far that reaches.
+        residuals: Largest residual over epochs by question, of those that are measured whether or
+            not they stand out; None where some epoch's is not known.
     """
 
     findings: tuple[Finding, ...]
@@ -111,146 +91,7 @@ class Numbers:
     kind: str = LOCAL
     other: Side | None = None
     other_reach: tuple[Reach, ...] = ()
-
-
-def read_numbers(
-    document: Callable[[str], Mapping[str, Any]], rows: Rows
-) -> tuple[Numbers, tuple[Numbers, ...]]:
-    """The numbers of an audit, and those of its resamples.
-
-    Args:
-        document: A JSON document of the evidence by name.
-        rows: A table of the evidence by name and class of its rows.
-
-    Raises:
-        BadInputError: A document or table lacks something.
-    """
-    summary, kept = document("summary.json"), document("persistence.json")
-    try:
-        sides, reach = rows("sides.parquet", Side), rows("reach.parquet", Reach)
-        kind = next(side.kind for side in sides if side.followed)
-        numbers = Numbers(
-            findings=tuple(rows("findings.parquet", Finding)),
-            floors={str(key): float(value) for key, value in summary["floors"].items()},
-            metre=float(summary["metre"]),
-            unit=str(summary["position_unit"]),
-            labels=Labels(
-                int(summary["label_replays"]),
-                int(summary["label_disagreements"]),
-                float(summary["label_disagreement_upper"]),
-            ),
-            counts=_of(Counts, summary["counts"]),
-            kept=_of(Kept, kept),
-            strata=tuple(rows("strata.parquet", Stratum)),
-            told=tuple(rows("predictions.parquet", Prediction)),
-            modes=_of_phase(rows("modes.parquet", ModeOutcome), summary),
-            components=tuple(rows("components.parquet", ComponentModes)),
-            alternatives=_of_phase(rows("alternatives.parquet", Alternative), summary),
-            reach=tuple(row for row in reach if row.kind == kind),
-            kind=kind,
-            other=next((side for side in sides if not side.followed), None),
-            other_reach=tuple(row for row in reach if row.kind != kind),
-        )
-        _check_alternatives(numbers)
-        return numbers, tuple(
-            _draws(
-                numbers,
-                rows("resamples.parquet", Resample),
-                rows("structure_draws.parquet", StructureDraw),
-                rows("finding_draws.parquet", FindingDraw),
-            )
-        )
-    except (KeyError, StopIteration, TypeError, ValueError) as error:
-        raise BadInputError(
-            where="the audit's evidence",
-            found=f"{type(error).__name__}: {error}",
-            expected="what this version of the audit writes",
-            action="Run the audit again.",
-        ) from error
-
-
-def _of_phase(rows: Sequence[_OfPhase], summary: Mapping[str, Any]) -> tuple[_OfPhase, ...]:
-    """Those of the phase with most situations."""
-    return tuple(row for row in rows if row.phase == summary["primary_phase"])
-
-
-def _check_alternatives(numbers: Numbers) -> None:
-    known = {mode.mode for mode in numbers.modes}
-    named = {name for row in numbers.alternatives for name in (row.mode, row.other)}
-    if not named <= known:
-        raise ValueError(f"alternatives names the modes {sorted(named - known)}, which are none")
-
-
-def folder_numbers(folder: Path) -> tuple[Numbers, tuple[Numbers, ...]]:
-    """`read_numbers` of an evidence folder.
-
-    Raises:
-        BadInputError: A file is missing or damaged.
-    """
-    return read_numbers(
-        lambda name: read_json(folder / name),
-        lambda name, row: read_rows(folder / name, row),
-    )
-
-
-def _draws(
-    measured: Numbers,
-    rows: Iterable[Resample],
-    structures: Iterable[StructureDraw],
-    findings: Iterable[FindingDraw],
-) -> Iterator[Numbers]:
-    """What was measured, with the numbers of each resample in their places."""
-    halves: dict[int, list[Finding]] = {}
-    for item in findings:
-        halves.setdefault(item.draw, []).append(item.finding)
-    for row, drawn in zip(rows, structures, strict=True):
-        tests = zip(row.p_adjusted, row.effect, row.effect_lower, strict=True)
-        outcomes = zip(row.success_lower, row.admissible, strict=True)
-        yield replace(
-            measured,
-            findings=measured.findings
-            if drawn.findings < 0
-            else tuple(halves.get(drawn.findings, ())),
-            reach=_reach(measured.reach, drawn),
-            labels=replace(
-                measured.labels,
-                disagreements=row.disagreements,
-                upper=row.disagreement_upper,
-            ),
-            counts=replace(
-                measured.counts,
-                queries=drawn.queries,
-                analysed=drawn.analysed,
-                analysed_episodes=drawn.analysed_episodes,
-                primary_episodes=drawn.primary_episodes,
-                resolved=drawn.resolved,
-                noise_ratio=drawn.noise_ratio,
-                noise_spread=drawn.noise_spread,
-                white_share=drawn.white_share,
-                two_mode=row.two_mode,
-                two_mode_episodes=row.two_mode_episodes,
-                incoherent=row.incoherent,
-                persistent=row.persistent,
-            ),
-            kept=Kept(row.kept, row.kept_null_q95, row.kept_n),
-            strata=tuple(
-                replace(stratum, p_adjusted=p, effect=effect, effect_lower=lower)
-                for stratum, (p, effect, lower) in zip(measured.strata, tests, strict=True)
-            ),
-            told=tuple(
-                _moved(told, value) for told, value in zip(measured.told, row.told, strict=True)
-            ),
-            modes=tuple(
-                replace(mode, success_lower=lower, admissible=admissible)
-                for mode, (lower, admissible) in zip(measured.modes, outcomes, strict=True)
-            ),
-        )
-
-
-def _reach(measured: tuple[Reach, ...], drawn: StructureDraw) -> tuple[Reach, ...]:
-    """The fifths of the way with the numbers of a draw."""
-    numbers = zip(measured, drawn.reach_queries, drawn.reach_spoke, strict=True)
-    return tuple(replace(row, queries=queries, spoke=spoke) for row, queries, spoke in numbers)
+    residuals: Mapping[str, float | None] = field(default_factory=dict)
 
 
 def turned(numbers: Numbers) -> Numbers:
@@ -272,16 +113,3 @@ def turned(numbers: Numbers) -> Numbers:
         ),
         other_reach=numbers.reach,
     )  # fmt: skip
-
-
-def _moved(row: Prediction, told: float) -> Prediction:
-    """The same row with another number, and the interval about it."""
-    away = told - row.told
-    return replace(
-        row, told=told, told_lower=row.told_lower + away, told_upper=row.told_upper + away
-    )
-
-
-def _of(kind: Any, row: Mapping[str, Any]) -> Any:
-    """A result class from the values of its fields; others are left out."""
-    return kind(**{name: row[name] for name in kind.__dataclass_fields__})

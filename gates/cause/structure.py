@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from gates.cause.answers import Answer, CauseName, Diagnosis, Layer, Named
+from gates.cause.answers import Answer, CauseName, Diagnosis, Named, Topic
 from gates.cause.components import components, looked_in, unreadable
 from gates.cause.hidden import OBSERVED, hidden, told_by_episode
 from gates.cause.limits import CauseLimits
@@ -51,7 +51,7 @@ def _enough(numbers: Numbers, limits: CauseLimits) -> list[Answer]:
 
     def least(question: str, which: str, measured: float, note: str = "") -> Answer:
         return Answer(
-            question, Layer.SUPPORT, f"{which} {what}", measured, limits[question], ">=", note=note
+            question, Topic.SUPPORT, f"{which} {what}", measured, limits[question], ">=", note=note
         )
 
     share = f"{counts.analysed} of {counts.queries}"
@@ -141,24 +141,24 @@ def _seen(numbers: Numbers, limits: CauseLimits) -> Named:
     counts, kept = numbers.counts, numbers.kept
     needed = max(limits["two_mode_episodes"], limits["two_mode_share"] * counts.primary_episodes)
     modes = Answer(
-        "two_mode_episodes", Layer.STRUCTURE, "held-out episodes with several modes",
+        "two_mode_episodes", Topic.STRUCTURE, "held-out episodes with several modes",
         counts.two_mode_episodes, needed, ">=",
         note=f"{counts.two_mode} situations; {counts.resolved} more have clusters that the "
         "observation tells apart",
     )  # fmt: skip
     long_enough = Answer(
-        "multimodal_situations", Layer.STRUCTURE,
+        "multimodal_situations", Topic.STRUCTURE,
         "situations that go on long enough to see them persist", kept.n,
         limits["multimodal_situations"], ">=",
     )  # fmt: skip
     margin = Answer(
-        "persistence_margin", Layer.STRUCTURE,
+        "persistence_margin", Topic.STRUCTURE,
         "episodes that keep their mode a chunk later, beyond what chance reaches in 95 of 100",
         kept.observed - kept.null_q95 if kept.n else None, limits["persistence_margin"], ">=",
         note=f"{kept.observed:.2f} against {kept.null_q95:.2f}" if kept.n else "not measured",
     )  # fmt: skip
     persistent = Answer(
-        "multimodal_situations", Layer.STRUCTURE, "situations whose modes persist",
+        "multimodal_situations", Topic.STRUCTURE, "situations whose modes persist",
         counts.persistent, limits["multimodal_situations"], ">=",
     )  # fmt: skip
     answers = [modes, *components(numbers), long_enough, margin, persistent]
@@ -218,7 +218,7 @@ def _denied(numbers: Numbers, limits: CauseLimits) -> list[Answer]:
     counts, limit = numbers.counts, limits["denial_share"]
     answers = [
         Answer(
-            "denial_share", Layer.STRUCTURE,
+            "denial_share", Topic.STRUCTURE,
             "share of situations with enough demonstrations to deny modes", counts.share,
             limit, ">=", note="modes may hide in the others",
         )
@@ -228,7 +228,7 @@ def _denied(numbers: Numbers, limits: CauseLimits) -> list[Answer]:
         listed = ", ".join(f"{row.share:.2f}" for row in numbers.reach)
         answers.append(
             Answer(
-                "denial_share", Layer.STRUCTURE,
+                "denial_share", Topic.STRUCTURE,
                 f"the same share in the {ORDINALS[least.fifth - 1]} fifth of the way, the least",
                 least.share, limit, ">=", note=f"from the first to the last fifth: {listed}",
             )
@@ -239,7 +239,7 @@ def _denied(numbers: Numbers, limits: CauseLimits) -> list[Answer]:
 def _falling_apart(numbers: Numbers, limits: CauseLimits, apart: float) -> Answer:
     counts = numbers.counts
     return Answer(
-        "incoherent_share", Layer.STRUCTURE, "share of situations whose clusters fall apart",
+        "incoherent_share", Topic.STRUCTURE, "share of situations whose clusters fall apart",
         apart, limits["incoherent_share"], "<=", note=f"{counts.incoherent} of {counts.analysed}",
     )  # fmt: skip
 

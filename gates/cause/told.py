@@ -7,7 +7,7 @@ the limit is a hidden state, what is surely below is none, and what lies astride
 from collections.abc import Sequence
 from dataclasses import replace
 
-from gates.cause.answers import Answer, CauseName, Diagnosis, Layer
+from gates.cause.answers import Answer, CauseName, Diagnosis, Topic
 from gates.cause.limits import CauseLimits
 from genpolicy.audit.rows import Prediction
 
@@ -42,7 +42,7 @@ def told(rows: Sequence[Prediction], limits: CauseLimits) -> list[Answer]:
     )
     return [
         Answer(
-            QUESTION, Layer.HIDDEN,
+            QUESTION, Topic.HIDDEN,
             f"what {row.variable.replace('_', ' ')} tells of the mode, beyond a guess",
             _judged(row, limit), limit if counts(row, rows, limit) else None,
             note=f"{row.told:.2f} ({row.told_lower:.2f} to {row.told_upper:.2f}) in {row.phase}, "
@@ -114,7 +114,7 @@ def _end(row: Prediction, limit: float) -> str:
     ]
 
 
-def _foremost(rows: Sequence[Prediction], nearly: float) -> Prediction:
+def _foremost(rows: Sequence[Prediction], close: float) -> Prediction:
     best = max(row.told for row in rows)
 
     def rank(row: Prediction) -> tuple[int, float, str]:
@@ -123,7 +123,7 @@ def _foremost(rows: Sequence[Prediction], nearly: float) -> Prediction:
         place = CONCRETE.index("operator") if is_column(row.variable) else place
         return place, -row.told, row.variable
 
-    return min((row for row in rows if row.told >= best - nearly), key=rank)
+    return min((row for row in rows if row.told >= best - close), key=rank)
 
 
 def _hidden(row: Prediction) -> Diagnosis:

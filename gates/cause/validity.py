@@ -1,6 +1,8 @@
 """Does each mode succeed, and is it feasible? And what was found, whatever the outcomes."""
 
-from gates.cause.answers import Answer, CauseName, Diagnosis, Layer, Named
+from dataclasses import replace
+
+from gates.cause.answers import Answer, CauseName, Diagnosis, Named, Topic
 from gates.cause.components import followed
 from gates.cause.limits import CauseLimits
 from gates.cause.numbers import Numbers
@@ -13,19 +15,21 @@ SUCCESS_UNDECIDED = "success_undecided"
 
 
 def validity(numbers: Numbers, limits: CauseLimits) -> Named:
-    """Every mode's success and feasibility."""
+    """Every mode's success and feasibility; held to the limit are those of the best choice.
+
+    One good choice is enough, so modes beside it are shown without a limit. Where there is none
+    all are held to it.
+    """
     modes = numbers.modes
-    answers = [
-        Answer("modes", Layer.VALIDITY, "modes followed over situations", len(modes), 2.0, ">=")
-    ]
-    valid: list[ModeOutcome] = []
+    count = Answer("modes", Topic.VALIDITY, "modes followed over situations", len(modes), 2.0, ">=")
+    chosen = _best_choice(numbers, limits)
+    together = [] if chosen or len(modes) < 2 else _together(numbers, limits)
+    answers = [count, *together]
     for mode in modes:
-        success, feasible = _success(mode, limits), _feasible(mode, limits)
-        answers.append(success)
-        if feasible is not None:
-            answers.append(feasible)
-        if success.holds and (feasible is None or feasible.holds):
-            valid.append(mode)
+        beside = chosen and mode.mode not in chosen
+        for answer in (_success(mode, limits), _feasible(mode, limits)):
+            spoken_for = together and answer.question == "mode_success_lower"
+            answers.append(replace(answer, limit=None) if beside or spoken_for else answer)
     if len(modes) < 2:
         text = "The situations overlap too little to follow a mode: record more, from fewer starts."
         return answers, thin(text, kind="linking")
@@ -35,18 +39,34 @@ def validity(numbers: Numbers, limits: CauseLimits) -> Named:
             "recorded: record whether each episode succeeded."
         ).strip()
         return answers, Diagnosis(CauseName.INSUFFICIENT_SUPPORT, "outcome", "not_recorded", text)
-    return answers, _choice(numbers, limits, {mode.mode for mode in valid})
+    return answers, None if chosen or together else _no_choice(numbers, limits)
 
 
-def _choice(numbers: Numbers, limits: CauseLimits, valid: set[str]) -> Diagnosis | None:
-    """What is wrong with the choices between modes; None if one of them is between valid modes.
+def _pairs(numbers: Numbers) -> list[set[str]]:
+    """Modes that stand beside each other under one observation; only they are a choice."""
+    return [{row.mode, row.other} for row in numbers.alternatives]
 
-    Modes are a choice only where they stand beside each other under one observation. One that
-    surely fails is none; one of which too few episodes are known leaves the choice open.
+
+def _best_choice(numbers: Numbers, limits: CauseLimits) -> set[str]:
+    """The pair of valid modes whose less successful one succeeds most; empty without one."""
+    lowest = {
+        mode.mode: _ends(mode.successes, mode.episodes, limits)[0]
+        for mode in numbers.modes
+        if _success(mode, limits).holds and not _feasible(mode, limits).red
+    }
+    valid = [pair for pair in _pairs(numbers) if pair <= set(lowest)]
+    return max(
+        valid, key=lambda pair: (min(lowest[name] for name in pair), sorted(pair)), default=set()
+    )
+
+
+def _no_choice(numbers: Numbers, limits: CauseLimits) -> Diagnosis:
+    """What is wrong with the choices between modes, none of which is between valid ones.
+
+    A mode that surely fails is no part of one; one of which too few episodes are known leaves the
+    choice open.
     """
-    pairs = [{row.mode, row.other} for row in numbers.alternatives]
-    if any(pair <= valid for pair in pairs) or _valid_together(numbers, limits):
-        return None
+    pairs = _pairs(numbers)
     if not pairs:
         text = "No situation holds two of the modes: record more, from fewer starts."
         return thin(text, kind="linking")
@@ -69,13 +89,13 @@ def _choice(numbers: Numbers, limits: CauseLimits, valid: set[str]) -> Diagnosis
 
 def _fails(mode: ModeOutcome, limits: CauseLimits) -> bool:
     """Whether a mode surely succeeds too rarely, or is not feasible."""
-    feasible = _feasible(mode, limits)
-    rarely = not mode.success_upper - limits["mode_success_lower"] >= 0
-    return rarely or (feasible is not None and feasible.red)
+    upper = _ends(mode.successes, mode.episodes, limits)[1]
+    rarely = not upper - limits["mode_success_lower"] >= 0
+    return rarely or _feasible(mode, limits).red
 
 
-def _valid_together(numbers: Numbers, limits: CauseLimits) -> bool:
-    """Whether the choices of all starts together are between modes that succeed.
+def _together(numbers: Numbers, limits: CauseLimits) -> list[Answer]:
+    """Success of the choices of all starts together; empty where that is not enough.
 
     Where each start has modes of its own, a dozen episodes of each prove nothing, and all of them
     together do: the most frequent modes of all starts are taken together, and so are the second
@@ -90,13 +110,17 @@ def _valid_together(numbers: Numbers, limits: CauseLimits) -> bool:
     if len(starts) < 2 or any(
         _fails(mode, limits) or mode.successes < limit * mode.episodes for mode in chosen
     ):
-        return False
-    for rank in (0, 1):
-        same = [start[rank] for start in starts]
-        lower, _ = clopper_pearson(sum(m.successes for m in same), sum(m.episodes for m in same))
-        if not lower - limit >= 0:
-            return False
-    return True
+        return []
+    answers = [
+        _success_of(
+            f"the {which} modes of all starts together",
+            sum(start[rank].successes for start in starts),
+            sum(start[rank].episodes for start in starts),
+            limits,
+        )
+        for rank, which in enumerate(("most frequent", "second"))
+    ]
+    return answers if all(answer.holds for answer in answers) else []
 
 
 def _frequent(mode: ModeOutcome) -> tuple[int, str]:
@@ -115,21 +139,29 @@ def _starts(numbers: Numbers) -> list[set[str]]:
 
 
 def _success(mode: ModeOutcome, limits: CauseLimits) -> Answer:
-    known = mode.episodes > 0
+    return _success_of(mode.mode, mode.successes, mode.episodes, limits)
+
+
+def _success_of(who: str, successes: int, episodes: int, limits: CauseLimits) -> Answer:
+    ends, known = _ends(successes, episodes, limits), episodes > 0
     return Answer(
-        "mode_success_lower", Layer.VALIDITY, f"success of {mode.mode}, lower bound",
-        mode.success_lower if known else None, limits["mode_success_lower"], ">=",
-        note=f"{mode.successes} of {mode.episodes} succeed" if known else "not recorded",
+        "mode_success_lower", Topic.VALIDITY, f"success of {who}, lower bound",
+        ends[0] if known else None, limits["mode_success_lower"], ">=",
+        note=f"{successes} of {episodes} succeed" if known else "not recorded",
+        interval=ends if known else None,
     )  # fmt: skip
 
 
-def _feasible(mode: ModeOutcome, limits: CauseLimits) -> Answer | None:
-    if mode.checked == 0:
-        return None
+def _ends(successes: int, episodes: int, limits: CauseLimits) -> tuple[float, float]:
+    return clopper_pearson(successes, episodes, limits.confidence)
+
+
+def _feasible(mode: ModeOutcome, limits: CauseLimits) -> Answer:
+    known = mode.checked > 0
     return Answer(
-        "mode_feasible_share", Layer.VALIDITY, f"feasible chunks of {mode.mode}",
-        mode.admissible / mode.checked, limits["mode_feasible_share"], ">=",
-        note=f"{mode.admissible} of {mode.checked}",
+        "mode_feasible_share", Topic.VALIDITY, f"feasible chunks of {mode.mode}",
+        mode.admissible / mode.checked if known else None, limits["mode_feasible_share"], ">=",
+        note=f"{mode.admissible} of {mode.checked}" if known else "no chunk was checked",
     )  # fmt: skip
 
 

@@ -1,7 +1,19 @@
 """The cause behind the modes: named from the audit's numbers, under the limits of this gate."""
 
-from gates.cause import Cause, default_limits, limits_of, name_cause, read_numbers
+from gates.cause import (
+    Cause,
+    CauseLimits,
+    deciding_answer,
+    default_limits,
+    limits_of,
+    name_cause,
+    read_measured,
+    read_numbers,
+)
 from gates.cause.limits import SHARED
+from gates.cause.naming import IN_METRES
+from gates.cause.reading import Document, Rows
+from gates.criterion import Measured
 from gates.evidence import Evidence, MissingEvidenceError
 from gates.need.settings import AUDIT, NeedSettings
 from gates.settings import PARAMS_FILE, Limit, Limits, Waiver
@@ -17,19 +29,59 @@ def found_cause(evidence: Evidence, settings: NeedSettings) -> Cause:
         MissingEvidenceError: Numbers, or limits of shared questions, are missing.
         ConfigError: A limit lies below what the audit looked for, or a question has none.
     """
+    limits = _limits(settings)
+    try:
+        numbers, draws = read_numbers(*_readers(evidence))
+    except BadInputError as error:
+        raise MissingEvidenceError(str(error)) from error
+    return name_cause(numbers, draws, limits)
+
+
+def as_the_cause(
+    question: str, evidence: Evidence, settings: NeedSettings, *, also: str = ""
+) -> Measured:
+    """What the cause itself answers to a question that a criterion asks as well.
+
+    One function, so that this gate and `genpolicy audit` cannot disagree about it.
+
+    Args:
+        question: The criterion, which is the question.
+        evidence: What the audit wrote.
+        settings: Limits and confidence.
+        also: What the criterion shows beside it.
+
+    Raises:
+        MissingEvidenceError: As `found_cause`; or nothing, or nothing known, stands to the limit.
+        ConfigError: As `found_cause`.
+    """
+    limits = _limits(settings)
+    try:
+        numbers = read_measured(*_readers(evidence))
+    except BadInputError as error:
+        raise MissingEvidenceError(str(error)) from error
+    answer = deciding_answer(question, numbers, limits)
+    if answer is None:
+        raise MissingEvidenceError(f"the audit holds no number to the limit of {question}")
+    if answer.measured is None:
+        raise MissingEvidenceError(f"{answer.what}: {answer.note}")
+    unit = numbers.metre if question in IN_METRES else 1.0
+    text = "; ".join(filter(None, [answer.what, answer.note, also]))
+    return Measured(answer.measured / unit, answer.interval, text)
+
+
+def _limits(settings: NeedSettings) -> CauseLimits:
     shared = asked(settings.limits)
     absent = [question for question in SHARED if question not in shared]
     if absent:
         raise MissingEvidenceError(f"params.yaml: gate_a has no limit of {', '.join(absent)}")
-    limits = limits_of(settings.cause, shared, where=PLACE)
-    try:
-        numbers, draws = read_numbers(
-            lambda name: evidence.document(f"{AUDIT}/{name}"),
-            lambda name, row: evidence.records(f"{AUDIT}/{name}", row),
-        )
-    except BadInputError as error:
-        raise MissingEvidenceError(str(error)) from error
-    return name_cause(numbers, draws, limits)
+    return limits_of(settings.cause, shared, confidence=settings.confidence, where=PLACE)
+
+
+def _readers(evidence: Evidence) -> tuple[Document, Rows]:
+    return (
+        lambda name: evidence.document(f"{AUDIT}/{name}"),
+        lambda name, row: evidence.records(f"{AUDIT}/{name}", row),
+    )
 
 
 def asked(limits: Limits) -> dict[str, Limit]:

@@ -8,9 +8,9 @@ from gates.bounds import counted_interval
 from gates.cause.told import UNDECIDED, counts
 from gates.criterion import Measured, criterion
 from gates.evidence import Evidence, number, numbers
-from gates.need.cause import found_cause
+from gates.need.cause import as_the_cause, found_cause
 from gates.need.settings import AUDIT, VALID_CAUSE, NeedSettings
-from genpolicy.audit.rows import Prediction, Stratum
+from genpolicy.audit.rows import Prediction
 
 
 @criterion(
@@ -19,18 +19,8 @@ from genpolicy.audit.rows import Prediction, Stratum
     look_at="Conditioning: a recorded variable explains the modes; give it to the policy.",
 )
 def strata_effect(evidence: Evidence, settings: NeedSettings) -> Measured:
-    """Largest effect among strata that are significant after correction; 0 if none is."""
-    frame = evidence.rows(f"{AUDIT}/strata.parquet", Stratum)
-    effects = np.abs(numbers(frame, "effect"))
-    significant = numbers(frame, "p_adjusted") <= settings.strata_level
-    if not significant.any():
-        return Measured(0.0, caveat=f"none of {len(frame)} strata is significant after Holm")
-    row = int(np.argmax(np.where(significant, effects, -np.inf)))
-    chosen = frame.iloc[row]
-    ends = (chosen["effect_lower"], chosen["effect_upper"])
-    interval = (float(ends[0]), float(ends[1])) if np.all(np.isfinite(ends)) else None
-    text = f"{chosen['variable']} in {chosen['phase']} explains modes"
-    return Measured(float(effects[row]), interval, text)
+    """Largest effect among strata that explain modes for sure; 0 if none does."""
+    return as_the_cause("strata_effect", evidence, settings)
 
 
 @criterion(

@@ -95,4 +95,5 @@ def read_cause_limits(path: Path) -> CauseLimits:
     params = read_params(path.parent, name=path.name)
     settings = read_settings(params, stage_of(GATE.gate), NeedSettings)
     limits = read_limits(params, GATE.gate, GATE.criteria)
-    return limits_of(settings.cause, asked(limits), where=f"{path}: gate_a.cause")
+    shared, where = asked(limits), f"{path}: gate_a.cause"
+    return limits_of(settings.cause, shared, confidence=settings.confidence, where=where)

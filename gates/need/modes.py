@@ -3,11 +3,12 @@
 import numpy as np
 import pandas as pd
 
-from gates.bounds import counted_interval, share_interval
+from gates.bounds import share_interval
 from gates.criterion import Measured, criterion
-from gates.evidence import Evidence, MissingEvidenceError, flags, number, numbers
+from gates.evidence import Evidence, MissingEvidenceError, flags, numbers
+from gates.need.cause import as_the_cause
 from gates.need.settings import AUDIT, NeedSettings
-from genpolicy.audit.rows import ModeOutcome, RecoveryOutcome, SituationRow
+from genpolicy.audit.rows import RecoveryOutcome, SituationRow
 
 
 def _held_out(evidence: Evidence, settings: NeedSettings) -> pd.DataFrame:
@@ -22,8 +23,7 @@ def _held_out(evidence: Evidence, settings: NeedSettings) -> pd.DataFrame:
 )
 def held_out_situations(evidence: Evidence, settings: NeedSettings) -> Measured:
     """Held-out situations that were examined."""
-    rows = _held_out(evidence, settings)
-    return Measured(float(len(rows)), caveat=f"from {rows['episode_uuid'].nunique()} episodes")
+    return as_the_cause("held_out_situations", evidence, settings)
 
 
 @criterion(
@@ -33,10 +33,7 @@ def held_out_situations(evidence: Evidence, settings: NeedSettings) -> Measured:
 )
 def multimodal_situations(evidence: Evidence, settings: NeedSettings) -> Measured:
     """Held-out situations with two clusters that persist."""
-    rows = _held_out(evidence, settings)
-    kept = rows[flags(rows, "two_mode") & flags(rows, "persistent")]
-    text = f"from {kept['episode_uuid'].nunique()} episodes; two clusters that persist"
-    return Measured(float(len(kept)), caveat=text)
+    return as_the_cause("multimodal_situations", evidence, settings)
 
 
 @criterion(
@@ -46,32 +43,18 @@ def multimodal_situations(evidence: Evidence, settings: NeedSettings) -> Measure
 )
 def persistence_margin(evidence: Evidence, settings: NeedSettings) -> Measured:
     """Persistence of mode identity above the 95 % quantile of the shuffled-time null."""
-    document = evidence.document(f"{AUDIT}/persistence.json")
-    observed, null = number(document, "observed"), number(document, "null_q95")
-    text = f"observed {observed:.4g}, 95 % quantile of the shuffled-time null {null:.4g}"
-    return Measured(observed - null, caveat=text)
+    return as_the_cause("persistence_margin", evidence, settings)
 
 
 @criterion(
     ">=",
-    question="Does each mode succeed?",
+    question="Does each mode of a choice succeed?",
     look_at="Multimodality: a mode fails; separate failed and intervention targets.",
 )
 def mode_success_lower(evidence: Evidence, settings: NeedSettings) -> Measured:
-    """Lowest exact lower bound of success over the modes."""
-    frame = evidence.rows(f"{AUDIT}/modes.parquet", ModeOutcome)
-    bounds = [
-        (counted_interval(hits, trials, confidence=settings.confidence), str(mode))
-        for mode, trials, hits in zip(
-            frame["mode"],
-            numbers(frame, "episodes"),
-            numbers(frame, "successes"),
-            strict=True,
-        )
-    ]
-    interval, mode = min(bounds)
-    text = f"lowest over {len(bounds)} modes, at {mode}; exact lower bound; {_recovered(evidence)}"
-    return Measured(interval[0], interval, text)
+    """Lowest exact lower bound of success over the modes of the best choice."""
+    also = _recovered(evidence)
+    return as_the_cause("mode_success_lower", evidence, settings, also=also)
 
 
 def _recovered(evidence: Evidence) -> str:
@@ -90,19 +73,12 @@ def _recovered(evidence: Evidence) -> str:
 
 @criterion(
     ">=",
-    question="Is each mode feasible in all layers?",
+    question="Is each mode of a choice feasible in all layers?",
     look_at="Multimodality: a mode breaks limits or collides; it is no valid target.",
 )
 def mode_feasible_share(evidence: Evidence, settings: NeedSettings) -> Measured:
-    """Lowest share of admissible modal chunks over the modes."""
-    frame = evidence.rows(f"{AUDIT}/modes.parquet", ModeOutcome)
-    checked = numbers(frame, "checked")
-    if not np.all(checked > 0):
-        raise MissingEvidenceError("a mode has no checked chunk")
-    shares = numbers(frame, "admissible") / checked
-    worst = int(np.argmin(shares))
-    text = f"lowest over {len(shares)} modes, at {frame['mode'].iloc[worst]}"
-    return Measured(float(shares[worst]), caveat=text)
+    """Lowest share of admissible modal chunks over the modes of the best choice."""
+    return as_the_cause("mode_feasible_share", evidence, settings)
 
 
 @criterion(

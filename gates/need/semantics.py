@@ -1,14 +1,11 @@
 """Data semantics: is what was recorded what it claims to be, before anything is made of it?"""
 
-import numpy as np
-
-from gates.bounds import counted_interval
-from gates.cause import Layer
+from gates.cause import Topic
 from gates.criterion import Measured, criterion
 from gates.evidence import Evidence, MissingEvidenceError, count, numbers
-from gates.need.cause import found_cause, waived_questions
+from gates.need.cause import as_the_cause, found_cause, waived_questions
 from gates.need.settings import AUDIT, NeedSettings
-from genpolicy.audit.rows import Asked, Calibration, Clock, ReplayRow
+from genpolicy.audit.rows import Asked, Clock
 from genpolicy.errors import ConfigError
 
 REFUSALS = "artifacts/ingest/refusals.json"
@@ -59,13 +56,12 @@ def unasked_checks(evidence: Evidence, settings: NeedSettings) -> Measured:
 
 @criterion(
     "<=",
-    question="Do the clocks of all streams agree after realignment?",
+    question="Do the clocks of all streams agree?",
     look_at="Data semantics: recheck timestamps per stream and epoch before anything else.",
 )
 def clock_residual_s(evidence: Evidence, settings: NeedSettings) -> Measured:
-    """Largest clock offset left after realignment over streams and epochs, s."""
-    frame = evidence.rows(f"{AUDIT}/clocks.parquet", Clock)
-    return Measured(float(np.abs(numbers(frame, "offset_after_s")).max()))
+    """Largest clock offset that stands out; else the largest left after realignment, s."""
+    return as_the_cause("clock_residual_s", evidence, settings)
 
 
 @criterion(
@@ -87,8 +83,7 @@ def lag_spread_steps(evidence: Evidence, settings: NeedSettings) -> Measured:
 )
 def calibration_residual_m(evidence: Evidence, settings: NeedSettings) -> Measured:
     """Largest calibration residual over epochs, m."""
-    frame = evidence.rows(f"{AUDIT}/calibration.parquet", Calibration)
-    return Measured(float(np.abs(numbers(frame, "residual_m")).max()), caveat="largest over epochs")
+    return as_the_cause("calibration_residual_m", evidence, settings)
 
 
 @criterion(
@@ -98,11 +93,7 @@ def calibration_residual_m(evidence: Evidence, settings: NeedSettings) -> Measur
 )
 def label_disagreement(evidence: Evidence, settings: NeedSettings) -> Measured:
     """Upper exact bound of the share of labels that replay contradicts."""
-    frame = evidence.rows(f"{AUDIT}/replay.parquet", ReplayRow)
-    wrong = int((frame["label"] != frame["replayed"]).sum())
-    interval = counted_interval(wrong, len(frame), confidence=settings.confidence)
-    text = f"{wrong} of {len(frame)} replayed episodes disagree; judged by the upper bound"
-    return Measured(interval[1], interval, text)
+    return as_the_cause("label_disagreement", evidence, settings)
 
 
 @criterion(
@@ -118,14 +109,14 @@ def data_defects(evidence: Evidence, settings: NeedSettings) -> Measured:
     by the cause; its limits hold here as well, whatever the modes look like.
     """
     cause = found_cause(evidence, settings)
-    asked = [answer for answer in cause.answers if answer.layer in (Layer.DATA, Layer.LABELS)]
+    asked = [answer for answer in cause.answers if answer.topic in (Topic.DATA, Topic.LABELS)]
     red = [
         f"{answer.what} {answer.measured:.4g}{f' {answer.unit}' if answer.unit else ''}"
         f"{f' ({answer.note})' if answer.note else ''}, limit {answer.limit:.4g}"
         for answer in asked
         if answer.red
     ]
-    text = "; ".join(red) or f"none of {len(asked)} numbers that stand out is beyond its limit"
+    text = "; ".join(red) or f"none of {len(asked)} numbers is beyond its limit"
     for name in waived_questions(settings.limits):
         text += f"; {name} is waived, and asked here by the packaged limit"
     return Measured(float(len(red)), caveat=text)

@@ -7,7 +7,6 @@ from pydantic import Field
 
 from gates.report import Owner
 from gates.settings import GateSettings
-from genpolicy.errors import ConfigError
 
 AUDIT = "artifacts/audit"
 TRAINED = "artifacts/train_baselines"
@@ -74,17 +73,4 @@ class NeedSettings(GateSettings):
             f"{check} need not be asked of the data: the {owner} owner answers for it ({reason})."
             for owner, checks in self.waived_checks.items()
             for check, reason in checks.items()
-        )
-
-    @property
-    def strata_level(self) -> float:
-        """Adjusted p-value at which a stratum explains modes; the cause asks by the same limit."""
-        for questions in self.cause.values():
-            if "strata_p" in questions:
-                return questions["strata_p"][0]
-        raise ConfigError(
-            where="params.yaml: gate_a.cause.strata_p",
-            found="missing",
-            expected="a limit, a reason and an owner",
-            action="Add it; without a level no stratum would ever explain modes.",
         )

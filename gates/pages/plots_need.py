@@ -17,7 +17,6 @@ from genpolicy.audit.shown_rows import Alignment, ExampleChunk
 from genpolicy.evidence.rows.need import ModeRow
 from genpolicy.pages.figures import captions, checks, situations
 from genpolicy.pages.figures.drawing import BLUE, new_figure
-from genpolicy.statistics.intervals import clopper_pearson
 
 EXAMPLES = f"{AUDIT}/examples.parquet"
 ALIGNMENT = f"{AUDIT}/alignment.parquet"
@@ -74,21 +73,16 @@ def _strata(evidence: Evidence, report: GateReport) -> Figure:
 
 
 def _strata_level(report: GateReport) -> float:
-    """Adjusted p-value at which a stratum explains modes, as the gate judged by it."""
-    limits = {k: limit for owned in report.settings["cause"].values() for k, limit in owned.items()}
-    return float(limits["strata_p"][0])
+    """Level at which a variable counts; the cause asks by the same limit."""
+    by_owner = report.settings["cause"].values()
+    return float(next(found["strata_p"][0] for found in by_owner if "strata_p" in found))
 
 
 def _mode_success(evidence: Evidence, report: GateReport) -> Figure:
     frame = evidence.rows(f"{AUDIT}/modes.parquet", ModeOutcome)
-    level = float(report.settings["confidence"])
-    trials, hits = numbers(frame, "episodes"), numbers(frame, "successes")
-    ends = np.array(
-        [clopper_pearson(int(k), int(n), level) for k, n in zip(hits, trials, strict=True)]
-    ).reshape(-1, 2)
     return checks.mode_success(
-        frame.assign(success_lower=ends[:, 0], success_upper=ends[:, 1]),
-        confidence=level,
+        frame,
+        confidence=float(report.settings["confidence"]),
         limit=limit_of(report, "mode_success_lower"),
     )
 

@@ -56,7 +56,7 @@ def questions(
     found = {
         "units_frames_and_lag": pairs,
         "constant_lag": pairs or ("" if clock else late),
-        "calibration_at_release": _releases(data, settings, semantics) or alone,
+        "calibration_at_reference": _releases(data, settings, semantics) or alone,
         "calibration_at_rest": pairs or alone,
         "labels": "" if given.replays else "no episode was replayed",
         "feasibility": ""

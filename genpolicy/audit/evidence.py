@@ -81,7 +81,7 @@ def write_evidence(
 
 def summary(result: AuditResult, settings: AuditSettings) -> dict[str, Any]:
     """Counts and floors, as written to `summary.json`."""
-    wrong, replays, upper = disagreement(result.replayed)
+    wrong, replays = disagreement(result.replayed)
     several = [item for item in result.situations if item.two_mode]
     checked = [item for item in several if item.chunks.mean_admissible is not None]
     return {
@@ -109,7 +109,6 @@ def summary(result: AuditResult, settings: AuditSettings) -> dict[str, Any]:
         "median_defeated": sum(not item.chunks.median_admissible for item in checked),
         "label_disagreements": wrong,
         "label_replays": replays,
-        "label_disagreement_upper": upper,
         "gaps": result.semantics.gaps,
         "negative_delays": result.semantics.negative_delays,
         "start_drift": result.semantics.start_drift,

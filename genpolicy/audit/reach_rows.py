@@ -112,6 +112,7 @@ class StructureDraw:
         reach_queries: Queries of each fifth.
         reach_spoke: Of them with enough neighbours.
         findings: Which set of re-measured findings belongs to the draw; -1 for those measured.
+        successes: Successes of each mode of the phase with most situations.
     """
 
     queries: int
@@ -125,6 +126,7 @@ class StructureDraw:
     reach_queries: tuple[int, ...]
     reach_spoke: tuple[int, ...]
     findings: int
+    successes: tuple[int, ...]
 
 
 @dataclass(frozen=True)

@@ -92,9 +92,11 @@ def resamples(
     table = _table(situations, queries)
     pairs: list[tuple[Resample, StructureDraw]] = []
     for number in range(settings.resamples):
-        row, times, kept = _draw(settings, measured, table, rng)
+        row, times, kept, successes = _draw(settings, measured, table, rng)
         half = number % measured.halves if measured.halves else -1
-        drawn = structure_draw(queries, times, kept, measured=measured.counts, findings=half)
+        drawn = structure_draw(
+            queries, times, kept, measured=measured.counts, findings=half, successes=successes
+        )
         pairs.append((row, drawn))
     return tuple(row for row, _ in pairs), tuple(drawn for _, drawn in pairs)
 
@@ -118,21 +120,22 @@ def _table(situations: tuple[Situation, ...], queries: Queries) -> Table:
 
 def _draw(
     settings: AuditSettings, measured: Measures, table: Table, rng: np.random.Generator
-) -> tuple[Resample, Integers, Array]:
+) -> tuple[Resample, Integers, Array, tuple[int, ...]]:
+    """One draw, how often it has each episode, which situations keep modes, and successes."""
     count = len(table.queries.episodes)
     times = np.bincount(rng.integers(0, max(count, 1), count), minlength=count)
     weights = times[table.place].astype(np.float64)
     good = coherent_phases(settings, table.claims, weights)
     kept = table.claimed * np.array([phase in good for phase in table.phases])
     two_mode = np.bincount(table.place, weights=kept, minlength=len(times)) > 0
-    wrong, _, upper = disagreement(_replayed(measured.replayed, rng))
+    wrong, replays = disagreement(_replayed(measured.replayed, rng))
     identity = _persistence(measured.persistence, table, weights * kept)
     strata = [_stratum(row, rng) for row in measured.strata]
     modes = [_mode(mode, rng) for mode in measured.modes]
     told = [_told(row, rng) for row in measured.told]
     row = Resample(
         disagreements=wrong,
-        disagreement_upper=upper,
+        disagreement_upper=_ends(wrong, replays)[1],
         two_mode=int(np.sum(weights * kept)),
         two_mode_episodes=int(np.sum(times * two_mode)),
         incoherent=int(np.sum(weights * (table.claimed - kept))),
@@ -144,10 +147,18 @@ def _draw(
         effect=tuple(row[1] for row in strata),
         effect_lower=tuple(row[2] for row in strata),
         told=tuple(told),
-        success_lower=tuple(mode[0] for mode in modes),
+        success_lower=tuple(
+            _ends(drawn, mode.episodes)[0]
+            for (drawn, _), mode in zip(modes, measured.modes, strict=True)
+        ),
         admissible=tuple(mode[1] for mode in modes),
     )
-    return row, times, kept
+    return row, times, kept, tuple(mode[0] for mode in modes)
+
+
+def _ends(count: int, total: int) -> tuple[float, float]:
+    """Ends at 95 % for a reader of the table; who judges bounds the counts."""
+    return clopper_pearson(count, total)
 
 
 def _persistence(measured: Persistence, table: Table, weight: Array) -> Persistence:
@@ -189,11 +200,11 @@ def _told(row: Prediction, rng: np.random.Generator) -> float:
     return row.told + wide * float(rng.normal())
 
 
-def _mode(mode: ModeOutcome, rng: np.random.Generator) -> tuple[float, int]:
-    """Lower end of the success, and admissible chunks."""
+def _mode(mode: ModeOutcome, rng: np.random.Generator) -> tuple[int, int]:
+    """Successes and admissible chunks."""
     successes, admissible = mode.successes, mode.admissible
     if mode.episodes:
         successes = int(rng.binomial(mode.episodes, mode.successes / mode.episodes))
     if mode.checked:
         admissible = int(rng.binomial(mode.checked, mode.admissible / mode.checked))
-    return clopper_pearson(successes, mode.episodes)[0], admissible
+    return successes, admissible

@@ -125,14 +125,14 @@ def _support(result: AuditResult) -> dict[str, Any]:
 def _evidence(result: AuditResult, settings: AuditSettings) -> list[str]:
     """What the layers measured, in the order of the diagnosis."""
     counts, persistence = result.counts, result.persistence
-    wrong, replays, upper = disagreement(result.replayed)
+    wrong, replays = disagreement(result.replayed)
     found = [
         f"{item.kind} {item.variable}".strip() + f" {item.measured:.3g} {item.unit}"
         for item in result.semantics.findings
     ]
     lines = [
         f"data: {', '.join(found)}" if found else "data: nothing stands out of the noise",
-        f"labels: {wrong} of {replays} replayed episodes disagree, at most {upper:.1%}"
+        f"labels: {wrong} of {replays} replayed episodes disagree"
         if replays
         else "labels: not replayed",
         f"support: {counts.analysed} of {counts.queries} held-out situations have "
@@ -156,9 +156,8 @@ def _evidence(result: AuditResult, settings: AuditSettings) -> list[str]:
             f"effect {row.effect:.2f}, adjusted p {row.p_adjusted:.3f}"
         )
     lines += [
-        f"validity: {mode.mode} in {mode.phase}: {mode.successes} of {mode.episodes} succeed "
-        f"(at least {mode.success_lower:.2f}), {mode.admissible} of {mode.checked} "
-        "modal chunks pass"
+        f"validity: {mode.mode} in {mode.phase}: {mode.successes} of {mode.episodes} succeed, "
+        f"{mode.admissible} of {mode.checked} modal chunks pass"
         for mode in result.modes
     ]
     return lines

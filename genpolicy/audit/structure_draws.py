@@ -75,7 +75,13 @@ def queries_of(
 
 
 def structure_draw(
-    queries: Queries, times: Integers, kept: Array, *, measured: Counts, findings: int
+    queries: Queries,
+    times: Integers,
+    kept: Array,
+    *,
+    measured: Counts,
+    findings: int,
+    successes: tuple[int, ...],
 ) -> StructureDraw:
     """Support and structure of one draw.
 
@@ -85,6 +91,7 @@ def structure_draw(
         kept: Situations whose modes are kept in this draw. Shape (n,).
         measured: What was measured, for the medians where nothing was drawn.
         findings: Which half of the episodes gives the findings of this draw, -1 for the whole.
+        successes: Drawn successes of each mode.
     """
     weight = times[queries.place].astype(np.float64)
     spoke = weight * queries.analysed
@@ -107,6 +114,7 @@ def structure_draw(
         reach_queries=_by_fifth(queries.fifth, weight),
         reach_spoke=_by_fifth(queries.fifth, spoke),
         findings=findings,
+        successes=successes,
     )
 
 

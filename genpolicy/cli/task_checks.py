@@ -48,12 +48,14 @@ def task_checks(dataset: Dataset, *, task: str | None, chunk_steps: int) -> Task
     known = {point.name for point in entry_points(group=ENTRY_POINT_GROUP)}
     if len(names) != 1 or names[0] not in known:
         return TaskChecks()
-    from genpolicy.evidence.admission_context import make_checker  # noqa: PLC0415
+    from genpolicy.evidence.admission_context import (  # noqa: PLC0415
+        admissible,
+        make_checker,
+    )
     from genpolicy.evidence.need.audit_task import (  # noqa: PLC0415  (loads a simulator)
         replay_episode,
         round_obstacles,
     )
-    from genpolicy.evidence.need.held_out import admissible  # noqa: PLC0415
     from genpolicy.feasibility.settings import FeasibilitySettings  # noqa: PLC0415
 
     plugin = load_task(names[0])

@@ -196,3 +196,25 @@ def recorded_proposal(
         candidate_index=0,
     )
     return Proposal(metadata, actions, selected_by=RECORDED)
+
+
+def admissible(
+    task: Task,
+    checker: FeasibilityChecker,
+    actions: Array,
+    observation: Array,
+    *,
+    action_period_s: float,
+) -> tuple[bool, str]:
+    """Whether a whole chunk (K, D_a) passes all six layers at a recorded observation, and why not.
+
+    Returns:
+        The verdict, and `layer: reason` where it is a no.
+    """
+    context = context_at_rest(task, checker, observation)
+    proposal = recorded_proposal(
+        task, actions, observation, action_period_s=action_period_s, chunk_id="recorded"
+    )
+    verdict = checker.check(checker.project(proposal, context=context), context=context)
+    reason = f"{verdict.first_layer}: {verdict.first_reason}" if not verdict.passed else ""
+    return verdict.passed, reason

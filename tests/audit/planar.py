@@ -33,7 +33,7 @@ def limits_with(**changes):
     return CauseLimits({
         question: replace(item, limit=changes.get(question, item.limit))
         for question, item in found.items()
-    })  # fmt: skip
+    }, default_limits().confidence)  # fmt: skip
 
 
 LIMITS = limits_with(supported_episodes=15)

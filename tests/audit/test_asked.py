@@ -44,9 +44,9 @@ def text(data, value):
     [(lambda d: episodes(d, operator=text(d, "")), {"operator"}),
      (lambda d: episodes(d, object=text(d, "not_recorded")), {"object"}),
      (lambda d: episodes(d, calibration_epoch=text(d, "e1")),
-      {"calibration_at_release", "calibration_at_rest"}),
+      {"calibration_at_reference", "calibration_at_rest"}),
      (lambda d: episodes(d, order=np.full(len(d.episodes), np.nan)), {"order"}),
-     (lambda d: replace(d, reference=None), {"calibration_at_release"}),
+     (lambda d: replace(d, reference=None), {"calibration_at_reference"}),
      (lambda d: replace(d, streams={**d.streams, "scale": slice(4, 5)}),
       {"clock.scale", "frozen.scale"})],
 )  # fmt: skip
@@ -56,8 +56,8 @@ def test_what_was_not_recorded_is_not_asked(data, change, expected):
 
 @pytest.mark.parametrize(
     ("changes", "expected"),
-    [({"calibration_phase": ""}, {"calibration_at_release"}),
-     ({"calibration_phase": "no such phase"}, {"calibration_at_release"}),
+    [({"calibration_phase": ""}, {"calibration_at_reference"}),
+     ({"calibration_phase": "no such phase"}, {"calibration_at_reference"}),
      ({"declared_lag_steps": None}, {"constant_lag"})],
 )  # fmt: skip
 def test_what_the_settings_do_not_name_is_not_asked(data, changes, expected):

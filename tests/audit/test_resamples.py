@@ -35,7 +35,11 @@ def situations(kept=0.9, two_mode=True):
     )  # fmt: skip
 
 
-def drawn(items=None, *, wrong=0, strata=(), told=(), modes=(), seed=1, draws=60):
+def drawn(items=None, **changes):
+    return both(items, **changes)[0]
+
+
+def both(items=None, *, wrong=0, strata=(), told=(), modes=(), seed=1, draws=60):
     replayed = tuple(
         Replayed(str(n), "success", "failure" if n < wrong else "success") for n in range(40)
     )
@@ -46,7 +50,7 @@ def drawn(items=None, *, wrong=0, strata=(), told=(), modes=(), seed=1, draws=60
     )
     settings = SETTINGS.model_copy(update={"resamples": draws})
     queries = queries_of(DATA, settings, found, reach)
-    return resamples(settings, measured, found, queries, root_seed=seed)[0]
+    return resamples(settings, measured, found, queries, root_seed=seed)
 
 
 def stratum(**changes):
@@ -108,7 +112,12 @@ def test_what_is_told_is_drawn_from_its_interval():
 def test_a_mode_that_always_succeeds_does_so_in_every_draw():
     modes = (ModeOutcome("m0", "approach", 30, 30, 0.88, 1.0, 5, 5),
              ModeOutcome("m1", "approach", 30, 15, 0.3, 0.7, 0, 0))  # fmt: skip
-    rows = drawn(modes=modes)
+    rows, structures = both(modes=modes)
+    assert {row.successes[0] for row in structures} == {30}
+    assert all(
+        row.success_lower[1] == clopper_pearson(structure.successes[1], 30)[0]
+        for row, structure in zip(rows, structures, strict=True)
+    )
     assert {row.success_lower[0] for row in rows} == {clopper_pearson(30, 30)[0]}
     assert {row.admissible for row in rows} == {(5, 0)}
     assert len({row.success_lower[1] for row in rows}) > 3

@@ -7,7 +7,7 @@ import pytest
 from planar import SETTINGS, admissible, named, planar
 from planar_dataset import dataset_of
 
-from gates.cause import Layer
+from gates.cause import Topic
 from genpolicy.audit import AuditReport, audit
 from genpolicy.audit.run import audit as audit_rows
 from genpolicy.integrity.documents import canonical_json, parse_json
@@ -32,7 +32,7 @@ def test_it_says_what_the_audit_of_the_rows_says(valid):
     assert isinstance(report, AuditReport)
     cause = named(report.result, settings)
     assert cause == named(direct, settings)
-    assert cause.name == "valid_modes" and cause.layer is Layer.NONE
+    assert cause.name == "valid_modes" and cause.topic is Topic.NONE
     # Some draws leave open what is told: 150 episodes are not many to deny it.
     # k of 200 is told as k of 201.
     assert cause.confidence > 0.69

@@ -33,12 +33,15 @@ def drawn(*times):
     queries = queries_of(DATA, SETTINGS, ITEMS, SUPPORT)
     measured = count(DATA, ITEMS, SUPPORT, 0)
     kept = np.array([1.0, 1.0, 0.0])
-    return structure_draw(queries, np.array(times), kept, measured=measured, findings=2)
+    return structure_draw(
+        queries, np.array(times), kept, measured=measured, findings=2, successes=(3,)
+    )
 
 
 def test_every_episode_once_gives_what_was_measured():
     row = drawn(1, 1, 1, 1)
     assert (row.queries, row.analysed, row.analysed_episodes) == (5, 3, 2)
+    assert (row.findings, row.successes) == (2, (3,))
     assert (row.primary_episodes, row.resolved, row.noise_ratio) == (1, 1, 0.1)
     assert sum(row.reach_queries) == 5 and sum(row.reach_spoke) == 3 and row.findings == 2
 

@@ -25,8 +25,8 @@ TASK_STAGE, IDENTITY = "task", "artifacts/task/identity.json"
 # what it decides about (`artifacts/gate_x/verdict.json`), so that an edit of a gate or of a report
 # template re-judges, and re-trains only if the verdict changed.
 ADMISSION = "gates.proof"
-# The table of checks is read by feasibility too (decision 30), so it stands below it: an edit of
-# these files has a row of its own.
+# The table of checks is read by feasibility too (decision 30), so it stands below it: each of these
+# files has a row of its own, and the row of the folder is that of the others.
 BELOW = {
     "genpolicy/execution/__init__.py",
     "genpolicy/execution/checks.py",
@@ -263,9 +263,7 @@ def packages() -> list[str]:
         for parent in ("data", "evidence", "tasks")
         for path in sorted((ROOT / "genpolicy" / parent).glob("*/__init__.py"))
     ]
-    return sorted(
-        {*own, *rooms, "gates", "gates/pages", *(BELOW & {"genpolicy/execution/checks.py"})}
-    )
+    return sorted({*own, *rooms, "gates", "gates/pages", *BELOW})
 
 
 def table() -> str:
@@ -277,6 +275,13 @@ def table() -> str:
         "test holds it there. *Runs again*: a dependency of the stage lies in the package. *May",
         "follow*: reads what one of those writes, and runs only if that came out different; behind",
         "a gate, only if the verdict or the evidence under it did.",
+        "",
+        "Two things are left out or added on purpose. A stage that asks a gate for admission does",
+        f"not depend on the code of `{ADMISSION}`, only on the verdict, so an edit of a gate measures",
+        "nothing again; and a gate depends on all code and parameters of the evidence stages under",
+        "it, since its report names them, so it judges again when they change. The files of",
+        "`genpolicy/execution/` that feasibility reads as well have rows of their own, and are not",
+        "meant by the row of that folder.",
         "",
         "| edit in | runs again | may follow |",
         "|---|---|---|",

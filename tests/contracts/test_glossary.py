@@ -8,17 +8,15 @@ from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parent))
-
-from test_dead_code import ROOT, definitions
-
+ROOT = Path(__file__).parents[2]
 GLOSSARY = ROOT / "docs" / "glossary.md"
 PRODUCT = ("genpolicy", "gates", "stages", "flows")
 MOST_LINES = 40
 # Words of the design that the glossary must explain.
 WORDS = ("action step", "sampler step", "NFE", "invocation", "candidate", "proposal", "event time",
          "action age", "mode", "calibration epoch", "evidence", "criterion", "verdict", "situation",
-         "layer", "session", "phase", "cause", "promotion", "mutant")  # fmt: skip
+         "layer", "topic", "fixture", "session", "phase", "cause", "promotion",
+         "mutant")  # fmt: skip
 
 
 def listed(start: str) -> list[str]:
@@ -32,14 +30,32 @@ def parts(name: str) -> list[str]:
     return [part.lower() for part in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+", name)]
 
 
+def given_names(source: str) -> set[str]:
+    """Every name that a module gives: definitions, parameters, variables, attributes, keywords."""
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(source)):
+        match node:
+            case ast.FunctionDef() | ast.AsyncFunctionDef() | ast.ClassDef():
+                found.add(node.name)
+            case ast.arg() | ast.keyword():
+                found |= {node.arg or ""}
+            case ast.Name(ctx=ast.Store()):
+                found.add(node.id)
+            case ast.Attribute(ctx=ast.Store()):
+                found.add(node.attr)
+            case ast.alias():
+                found |= {node.asname or ""}
+    return found
+
+
 @cache
 def defined() -> dict[str, str]:
-    """Name by `module:place` of every public definition of the product."""
+    """Name by `module:name` of everything that the product gives a name to, private or local."""
     return {
-        f"{path.relative_to(ROOT).with_suffix('').as_posix().replace('/', '.')}:{place}": name
+        f"{path.relative_to(ROOT).with_suffix('').as_posix().replace('/', '.')}:{name}": name
         for folder in PRODUCT
         for path in sorted((ROOT / folder).rglob("*.py"))
-        for name, place in definitions(path.read_text())
+        for name in given_names(path.read_text())
     }
 
 
@@ -75,6 +91,15 @@ def test_no_word_is_explained_twice() -> None:
 
 def test_banned_words_name_nothing() -> None:
     assert sorted(banned_names()) == []
+
+
+def test_parameters_variables_and_private_names_are_read() -> None:
+    source = (
+        "import seam_a as seam_b\nclass _SeamC: ...\ndef f(seam_d, *, g=1):\n"
+        "    seam_e, self.seam_f = 1, 2\n    return h(seam_g=1), lambda seam_h: seam_h\n"
+    )
+    found = {name for name in given_names(source) if "seam" in parts(name)}
+    assert found == {"_SeamC", *(f"seam_{letter}" for letter in "bdefgh")}
 
 
 def test_a_word_names_one_class() -> None:

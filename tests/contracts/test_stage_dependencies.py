@@ -11,6 +11,7 @@ import yaml
 sys.path.insert(0, str(Path(__file__).parent))
 
 from dependencies import (
+    BELOW,
     IDENTITY,
     ROOT,
     TABLE,
@@ -93,11 +94,27 @@ def test_an_edit_of_the_executor_runs_shadow_and_stress_again_and_no_other_evide
     assert [name for name in (*direct, *behind) if name in EVIDENCE] == ["shadow", "stress"]
 
 
+def test_each_file_that_is_left_out_of_its_folder_has_a_row_and_says_what_it_runs() -> None:
+    rows = [line for line in TABLE.read_text().splitlines() if line.startswith("| `")]
+    for file in sorted(BELOW):
+        (row,) = [line for line in rows if line.startswith(f"| `{file}` |")]
+        direct, _ = rerun_after_edit(file)
+        assert {"measure_baselines", "shadow", "stress"} <= set(direct), file
+        assert f"| {' '.join(direct)} |" in row
+        listed = [name for name, stage in pipeline().items() if uncovered([file], stage["deps"])]
+        assert not set(listed) & set(direct)
+
+
 @pytest.mark.parametrize("package", ["feasibility", "execution", "robot", "tasks", "evidence"])
 def test_an_edit_of_what_judges_actions_trains_nothing_again(package: str) -> None:
     direct, _ = rerun_after_edit(f"genpolicy/{package}")
     # Gates take the names of columns from the evidence, and admission proves gates.
     assert not set(direct) & set(TRAINING)
+
+
+def test_an_edit_of_a_network_or_sampler_audits_nothing_again() -> None:
+    direct, _ = rerun_after_edit("genpolicy/policies")
+    assert "train_baselines" in direct and "audit" not in direct
 
 
 def test_an_edit_of_a_gate_judges_again_and_measures_nothing() -> None:

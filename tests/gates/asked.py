@@ -2,12 +2,14 @@
 
 from gates.evidence import Evidence
 from gates.proof import SPECS
-from gates.settings import read_params, read_settings
+from gates.settings import read_limits, read_params, read_settings
 
 
 def settings_of(root, gate):
-    """The settings of a gate of this ladder."""
-    return read_settings(read_params(root), f"gate_{gate.lower()}", SPECS[gate].settings)
+    """The settings of a gate of this ladder, with its limits."""
+    params, spec = read_params(root), SPECS[gate]
+    settings = read_settings(params, f"gate_{gate.lower()}", spec.settings)
+    return settings.under(read_limits(params, gate, spec.criteria))
 
 
 def asked(root, criterion, *candidate, gate):

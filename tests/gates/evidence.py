@@ -296,6 +296,20 @@ def edit_table(root: Path, path: str, change: Any) -> None:
     record(root)
 
 
+def lags_apart(frame: pd.DataFrame) -> pd.DataFrame:
+    """Clocks whose epochs lag by 2 and by 6 steps: one criterion of gate A fails, no other."""
+    return frame.assign(lag_steps=frame["epoch"].map({"e1": 2.0, "e2": 6.0}))
+
+
+def finding(question: str, measured: float) -> pd.DataFrame:
+    """`findings.parquet` with one deviation."""
+    row = Finding(
+        kind="clock", variable="robot", where="epoch e1", question=question,
+        measured=measured, floor=0.0, unit="", action="Correct it.",
+    )  # fmt: skip
+    return pd.DataFrame([vars(row)])
+
+
 def edit_document(root: Path, path: str, change: Any) -> None:
     """Apply `change` (in place, or returning the new value) to one JSON document."""
     file = root / "artifacts" / path
@@ -576,9 +590,8 @@ def _audit(root: Path) -> None:
             "floors": {},
             "metre": 1.0,
             "primary_phase": "approach",
-            "label_replays": 60,
+            "label_replays": 40,
             "label_disagreements": 0,
-            "label_disagreement_upper": 0.06,
             "counts": {
                 "queries": 100,
                 "analysed": 90,
@@ -640,7 +653,7 @@ def _draw() -> dict[str, Any]:
 
 def _side(kind: str) -> dict[str, Any]:
     counts = {name: value for name, value in _structure_draw().items() if "reach" not in name}
-    del counts["findings"]
+    del counts["findings"], counts["successes"]
     return counts | {
         "kind": kind,
         "followed": kind == "local",
@@ -669,6 +682,7 @@ def _structure_draw() -> dict[str, Any]:
         "reach_queries": [20] * 5,
         "reach_spoke": [18] * 5,
         "findings": -1,
+        "successes": [24] * 2,
     }
 
 

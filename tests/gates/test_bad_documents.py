@@ -14,7 +14,7 @@ from gates.card.drafting import draft
 from gates.card.envelope import ENVELOPE, simulated_envelope
 from gates.card.history import _evidence_digests
 from gates.card.people import load_allow_list
-from gates.cause.numbers import folder_numbers
+from gates.cause.reading import folder_numbers
 from gates.engine import judge_gate
 from gates.evidence import Evidence
 from gates.pipeline import TASK_IDENTITY, basis_of, changed_pages, changed_task, check_record

@@ -40,7 +40,7 @@ def test_check_passes_through_d_and_not_through_e(ladder, _run):
 
 
 def test_check_says_3_for_a_verdict_2_for_what_cannot_be_read_and_never_1(ladder, _run):
-    evidence.edit_table(ladder, "audit/clocks.parquet", lambda f: f.assign(offset_after_s=0.5))
+    evidence.edit_table(ladder, "audit/clocks.parquet", evidence.lags_apart)
     assert _run(ladder, "judge", "A").exit_code == 0
     assert _run(ladder, "check", "--through", "A").exit_code == 3
     (ladder / "reports" / "gate_a.json").write_text("{")
@@ -98,10 +98,10 @@ def test_show_and_judge(ladder, _run):
 
 
 def test_judge_exits_0_on_fail(ladder, _run):
-    evidence.edit_table(ladder, "audit/clocks.parquet", lambda f: f.assign(offset_after_s=0.5))
+    evidence.edit_table(ladder, "audit/clocks.parquet", evidence.lags_apart)
     result = _run(ladder, "judge", "A")
     assert result.exit_code == 0
-    assert "Gate A: FAIL. clock_residual_s: 0.5, required <= 0.01" in result.output
+    assert "Gate A: FAIL. lag_spread_steps: 4, required <= 1" in result.output
 
 
 def test_verify_card_waits_for_people(ladder, _run):

@@ -20,6 +20,8 @@ from gates.settings import Limits, read_limits, read_params, read_settings
 from genpolicy.errors import IntegrityError
 from genpolicy.integrity.atomic import write_bytes
 
+AUDIT, SHADOW, STRESS = "audit/", "shadow/", "stress/"
+
 
 def _of(method):
     return lambda frame: frame["method"] == method
@@ -45,6 +47,21 @@ def _identity(key):
     return lambda s: lambda d: [e.__setitem__(key, int(3 * s) + 1) for e in d.values()] and None
 
 
+def _finding(question):
+    """A deviation of the data, of the severity."""
+    found = lambda s: lambda _: evidence.finding(question, s)  # noqa: E731
+    return _table(AUDIT + "findings.parquet", found)
+
+
+def _spoken_of(root, s):
+    """Fewer situations of which either kind of evidence can speak."""
+    left = 90 - int(85 * s)
+    evidence.edit_table(root, AUDIT + "sides.parquet", lambda f: f.assign(analysed=left))
+    evidence.edit_document(
+        root, AUDIT + "summary.json", lambda d: d["counts"].__setitem__("analysed", left)
+    )
+
+
 def _each_training(stage, methods):
     """A validation loss that falls by another tenth and more in the last quarter."""
 
@@ -65,9 +82,6 @@ def _collapse(frame, share):
     return frame
 
 
-AUDIT, SHADOW, STRESS = "audit/", "shadow/", "stress/"
-
-
 TRAINED, BASE, GEN = "train_baselines/", "measure_baselines/", "train_generators/"
 
 
@@ -79,24 +93,20 @@ WORSE = {
         "refused_recordings_accounted": _document(
             "ingest/refusals.json", lambda s: _set("accepted", 48 - int(9 * s))
         ),
-        "data_defects": _document(
-            AUDIT + "summary.json", lambda s: _set("label_disagreement_upper", 0.06 + s)
+        "data_defects": _table(
+            AUDIT + "replay.parquet", lambda s: cells("replayed", "failure", share=s)
         ),
-        "clock_residual_s": _table(AUDIT + "clocks.parquet", lambda s: cells("offset_after_s", -s)),
+        "clock_residual_s": _finding("clock_residual_s"),
         "lag_spread_steps": _table(
             AUDIT + "clocks.parquet", lambda s: cells("lag_steps", 2 + 4 * s, share=0.25)
         ),
-        "calibration_residual_m": _table(
-            AUDIT + "calibration.parquet", lambda s: cells("residual_m", s)
-        ),
+        "calibration_residual_m": _finding("calibration_residual_m"),
         "label_disagreement": _table(
             AUDIT + "replay.parquet", lambda s: cells("replayed", "failure", share=s)
         ),
-        "held_out_situations": _table(
-            AUDIT + "neighbourhoods.parquet", lambda s: cells("split", "train", share=s)
-        ),
-        "multimodal_situations": _table(
-            AUDIT + "neighbourhoods.parquet", lambda s: cells("persistent", False, share=s)
+        "held_out_situations": _spoken_of,
+        "multimodal_situations": _document(
+            AUDIT + "persistence.json", lambda s: _set("n", 200 - int(195 * s))
         ),
         "persistence_margin": _document(
             AUDIT + "persistence.json", lambda s: _set("observed", 0.95 - 0.5 * s)
@@ -112,7 +122,7 @@ WORSE = {
         ),
         "strata_effect": _table(
             AUDIT + "strata.parquet",
-            lambda s: lambda f: cells("effect", s)(cells("p_adjusted", 0.001)(f)),
+            lambda s: lambda f: f.assign(effect=s, effect_lower=s / 2, p_adjusted=0.001),
         ),
         "unasked_checks": _table(
             AUDIT + "asked.parquet",
@@ -122,8 +132,8 @@ WORSE = {
             AUDIT + "predictions.parquet",
             lambda s: lambda f: f.assign(told_lower=0.9 * s - 0.1, told_upper=0.9 * s + 0.1),
         ),
-        "cause_accepted": _document(
-            AUDIT + "summary.json", lambda s: _set("label_disagreement_upper", 0.06 + s)
+        "cause_accepted": _table(
+            AUDIT + "replay.parquet", lambda s: cells("replayed", "failure", share=s)
         ),
         "baselines_matched": _document(
             TRAINED + "matched.json",

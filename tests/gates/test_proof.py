@@ -50,13 +50,13 @@ def test_a_missing_report_refuses(ladder, stage, gate):
 
 
 def test_the_sentence_names_gate_criterion_numbers_report_and_next_step(ladder):
-    evidence.write_params(ladder, evidence.set_limit("gate_a", "clock_residual_s", 0.001))
+    evidence.write_params(ladder, evidence.set_limit("gate_a", "mode_feasible_share", 0.99))
     with pytest.raises(RefusedError, match="derived again"):
         admit("train_generators", ladder)
     _judge_again(ladder, "A")
     with pytest.raises(
         RefusedError,
-        match=r"Gate A refuses: clock_residual_s is 0\.002, required <= 0\.001; "
+        match=r"Gate A refuses: mode_feasible_share is 0\.98, required >= 0\.99; "
         r"see reports/gate_a\.json\. Return to",
     ):
         admit("train_generators", ladder)
@@ -112,7 +112,7 @@ def test_a_link_in_place_of_a_material_refuses(ladder):
 
 
 def _failing_a(root):
-    evidence.edit_table(root, "audit/clocks.parquet", lambda f: f.assign(offset_after_s=0.5))
+    evidence.edit_table(root, "audit/clocks.parquet", evidence.lags_apart)
     _judge_again(root, "A")
 
 

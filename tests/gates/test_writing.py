@@ -60,10 +60,10 @@ def test_same_evidence_same_bytes(pages, gate):
 
 
 def test_a_fail_is_written_like_any_verdict(ladder):
-    evidence.edit_table(ladder, "audit/clocks.parquet", lambda f: f.assign(offset_after_s=0.5))
+    evidence.edit_table(ladder, "audit/clocks.parquet", evidence.lags_apart)
     assert write_gate(ladder, "A").verdict == "FAIL"
     text = _page(ladder, "A")
-    assert "clock_residual_s" in text.split("<h2>Criteria</h2>")[0]
+    assert "lag_spread_steps" in text.split("<h2>Criteria</h2>")[0]
     assert "FAIL" in index_page(ladder)
 
 

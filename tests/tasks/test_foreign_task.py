@@ -27,7 +27,7 @@ from genpolicy.evidence.stress.latency import (
 from genpolicy.evidence.stress.matched import step
 from genpolicy.evidence.stress.perturbations import Nominal
 from genpolicy.evidence.stress.rollout import Rollout
-from genpolicy.evidence.stress.state import Fixture, Outcome
+from genpolicy.evidence.stress.state import Outcome, Setup
 from genpolicy.execution.cell import Cell, ExecutionSettings
 from genpolicy.execution.journal import write_journal
 from genpolicy.feasibility.admission import Admitted, Rejected
@@ -184,14 +184,14 @@ def test_ten_rollouts_of_the_scripted_operator(cell, tmp_path):
     plans = [cell.task.record_episode(spec).streams["action"].values for spec in specs]
     terms = {name: np.full(8, 0.03 / len(MEASURED_TERMS)) for name in MEASURED_TERMS}
     declared = {name: DeclaredTerm(0.001, 0.002) for name in DECLARED_TERMS}
-    fixture = Fixture(
+    setup = Setup(
         task=cell.task, checker=cell.checker, horizons=cell.horizons, execution=cell.execution,
         latency=LatencyModel(declared, terms, 0.0), perturbation="nominal",
         schedule=Nominal(), root_seed=SEED, method="scripted",
         checkpoint="w" * 64, sampler="s" * 64,
     )  # fmt: skip
     rollouts = [
-        Rollout(fixture, spec.start, number, calibration_epoch=cell.task.calibration_epochs[0])
+        Rollout(setup, spec.start, number, calibration_epoch=cell.task.calibration_epochs[0])
         for number, spec in enumerate(specs)
     ]
     policy = Operator(plans, rollouts, cell.horizons.prediction_horizon)

@@ -10,8 +10,7 @@ from genpolicy.audit.settings import AuditSettings
 from genpolicy.audit.view import from_dataset
 from genpolicy.data.dataset import Dataset, load_dataset
 from genpolicy.data.recording.episode import PHASE_STREAM
-from genpolicy.evidence.admission_context import make_checker
-from genpolicy.evidence.need.held_out import admissible
+from genpolicy.evidence.admission_context import admissible, make_checker
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.robot.collision import CollisionModel
 from genpolicy.robot.kinematics import ArmKinematics

@@ -14,7 +14,6 @@ from genpolicy.evidence.rows.need import EffectRow, FactorErrorRow, FactorModeRo
 Array = NDArray[np.float64]
 Measured = TypeVar("Measured", FactorErrorRow, FactorModeRow)
 
-CONFIDENCE = 0.95
 SEVERAL = 2
 
 
@@ -28,6 +27,7 @@ class Compared:
         factor: The factor that it changes.
         reference: Variant and convention to hold it against.
         error: Which error; that of the first action for a policy of one action.
+        confidence: Coverage of the interval of each effect.
     """
 
     variant: str
@@ -35,6 +35,7 @@ class Compared:
     factor: str
     reference: tuple[str, str]
     error: Literal["chunk_error", "first_error"]
+    confidence: float
 
 
 def effect_rows(
@@ -48,8 +49,8 @@ def effect_rows(
         compared: Who is held against whom.
 
     Returns:
-        One row per measure: value, reference value, effect, its interval (t over episodes, of
-        confidence 0.95), episodes. NaN where nothing was measured.
+        One row per measure: value, reference value, effect, its interval (t over episodes),
+        episodes. NaN where nothing was measured.
     """
     own = (compared.variant, compared.convention)
     several = [row for row in modes if row.modes_present >= SEVERAL]
@@ -68,7 +69,7 @@ def effect_rows(
     for name, (mine, base) in measures.items():
         shared = sorted(mine.keys() & base.keys())
         gains = np.array([mine[episode] - base[episode] for episode in shared])
-        half = half_width(gains)
+        half = half_width(gains, compared.confidence)
         effect = float(gains.mean()) if len(gains) else math.nan
         result.append(
             EffectRow(
@@ -92,11 +93,11 @@ def valid(row: FactorModeRow) -> float:
     return row.admissible / row.samples if row.modes_covered >= 1 else 0.0
 
 
-def half_width(gains: Array) -> float:
-    """Half of the t interval of a mean; NaN below two values."""
+def half_width(gains: Array, confidence: float) -> float:
+    """Half of the t interval of a mean, which covers it with `confidence`; NaN below two values."""
     if len(gains) < SEVERAL:
         return math.nan
-    quantile = float(stats.t.isf((1.0 - CONFIDENCE) / 2.0, len(gains) - 1))
+    quantile = float(stats.t.isf((1.0 - confidence) / 2.0, len(gains) - 1))
     return quantile * float(gains.std(ddof=1)) / math.sqrt(len(gains))
 
 

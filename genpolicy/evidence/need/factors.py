@@ -42,6 +42,7 @@ class FactorPlan:
         conventions: Further samplers to measure a checkpoint with, by method and name.
         samples: Candidates per situation of a convention that draws.
         stride: Every so many held-out windows are compared.
+        confidence: Coverage of the interval of an effect.
     """
 
     task: str
@@ -54,6 +55,7 @@ class FactorPlan:
     conventions: Mapping[str, Mapping[str, SamplerConfig]]
     samples: int
     stride: int
+    confidence: float
 
     def samplers_of(self, name: str) -> dict[str, SamplerConfig]:
         """Samplers that a variant is measured with, its own first, by convention."""
@@ -112,6 +114,7 @@ def effects(plan: FactorPlan, rows: FactorRows, *, reference: str) -> list[Effec
                 factor=variant.factor,
                 reference=base,
                 error="first_error" if variant.factor == "temporal" else "chunk_error",
+                confidence=plan.confidence,
             ),
         )
     ]

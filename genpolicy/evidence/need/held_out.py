@@ -11,7 +11,7 @@ from genpolicy.contract.action import POSITION
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.data.dataset import Dataset
 from genpolicy.errors import ContractError
-from genpolicy.evidence.admission_context import context_at_rest, recorded_proposal
+from genpolicy.evidence.admission_context import admissible
 from genpolicy.evidence.need.method_modes import (
     ModeSituation,
     one_per_episode,
@@ -114,28 +114,6 @@ def admissible_chunks(
         for chunk in chunks
     ]
     return np.array(verdicts, dtype=np.bool_)
-
-
-def admissible(
-    task: Task,
-    checker: FeasibilityChecker,
-    actions: Array,
-    observation: Array,
-    *,
-    action_period_s: float,
-) -> tuple[bool, str]:
-    """Whether a whole chunk (K, D_a) passes all six layers at a recorded observation, and why not.
-
-    Returns:
-        The verdict, and `layer: reason` where it is a no.
-    """
-    context = context_at_rest(task, checker, observation)
-    proposal = recorded_proposal(
-        task, actions, observation, action_period_s=action_period_s, chunk_id="recorded"
-    )
-    verdict = checker.check(checker.project(proposal, context=context), context=context)
-    reason = f"{verdict.first_layer}: {verdict.first_reason}" if not verdict.passed else ""
-    return verdict.passed, reason
 
 
 def _rows(dataset: Dataset, wanted: Sequence[tuple[str, int]]) -> NDArray[np.int64]:

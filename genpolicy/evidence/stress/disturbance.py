@@ -3,7 +3,7 @@
 import numpy as np
 
 from genpolicy.evidence.stress.perturbations import drill_s, pushes
-from genpolicy.evidence.stress.state import Fixture
+from genpolicy.evidence.stress.state import Setup
 from genpolicy.tasks.api import World
 
 
@@ -11,15 +11,15 @@ class Disturbance:
     """Pushes and drill of one rollout, each of which happens once.
 
     Args:
-        fixture: What all rollouts share.
+        setup: What all rollouts share.
         world: What is pushed.
         start: Index of the initial state; key of the draws.
     """
 
-    def __init__(self, fixture: Fixture, world: World, *, start: int) -> None:
-        schedule, seed, name = fixture.schedule, fixture.root_seed, fixture.perturbation
+    def __init__(self, setup: Setup, world: World, *, start: int) -> None:
+        schedule, seed, name = setup.schedule, setup.root_seed, setup.perturbation
         self._world = world
-        self._contact_phases = fixture.task.contact_phases
+        self._contact_phases = setup.task.contact_phases
         self._contact_since_s: float | None = None
         self._pushes = list(pushes(schedule, root_seed=seed, name=name, start=start))
         self._drill_s = drill_s(schedule, root_seed=seed, name=name, start=start)

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.contract.chunk import ChunkMetadata
-from genpolicy.evidence.stress.state import Fixture
+from genpolicy.evidence.stress.state import Setup
 from genpolicy.execution.cell import RecoveryState
 from genpolicy.execution.executor import Executor
 from genpolicy.execution.recovery import Primitive, Recovery, fallback_metadata
@@ -17,16 +17,14 @@ class Fallback:
     """Trajectory of the primitive in force, and how much of it has been commanded.
 
     Args:
-        fixture: What all rollouts share.
+        setup: What all rollouts share.
         world: From where a primitive begins.
         executor: Holds the epochs.
         recovery: Counts the attempts.
     """
 
-    def __init__(
-        self, fixture: Fixture, world: World, executor: Executor, recovery: Recovery
-    ) -> None:
-        self._fixture = fixture
+    def __init__(self, setup: Setup, world: World, executor: Executor, recovery: Recovery) -> None:
+        self._setup = setup
         self._world = world
         self._executor = executor
         self._recovery = recovery
@@ -54,8 +52,8 @@ class Fallback:
         """
         key = (str(state), self._recovery.attempts, self._recovery.failures)
         if self._planned is None or self._planned[0] != key:
-            planned = self._fixture.task.fallback(self._world, str(state))
+            planned = self._setup.task.fallback(self._world, str(state))
             self._planned = (key, planned, ticks)
         _, actions, begun = self._planned
         rest = actions[ticks - begun :]
-        return Primitive(rest[: self._fixture.horizons.prediction_horizon], reached=len(rest) == 0)
+        return Primitive(rest[: self._setup.horizons.prediction_horizon], reached=len(rest) == 0)

@@ -17,7 +17,7 @@ from genpolicy.evidence.stress.envelope import checker_under
 from genpolicy.evidence.stress.latency import LatencyModel
 from genpolicy.evidence.stress.perturbations import Perturbation
 from genpolicy.evidence.stress.rollout import Rollout
-from genpolicy.evidence.stress.state import Fixture, Outcome
+from genpolicy.evidence.stress.state import Outcome, Setup
 from genpolicy.execution.cell import Cell
 from genpolicy.execution.journal import write_journal
 from genpolicy.execution.ledger import Account
@@ -104,7 +104,7 @@ def run_shard(shard: Shard) -> ShardResult:
     comparison = shard.comparison
     horizons = comparison.cell.horizons
     task, policy = load_task(comparison.task), shard.judged.load()
-    fixture = Fixture(
+    setup = Setup(
         task=task,
         checker=checker_under(
             shard.schedule,
@@ -124,7 +124,7 @@ def run_shard(shard: Shard) -> ShardResult:
     )
     epoch = task.calibration_epochs[-1]
     rollouts = [
-        Rollout(fixture, task.start_from_json(text), index, calibration_epoch=epoch)
+        Rollout(setup, task.start_from_json(text), index, calibration_epoch=epoch)
         for index, text in enumerate(comparison.starts)
     ]
     ticks = round(comparison.episode_limit_s / horizons.action_period_s)
@@ -171,7 +171,7 @@ def step(active: Sequence[Rollout], policy: Policy, *, samples: int) -> None:
         drawn = policy.sample(
             np.stack([rollout.conditioning() for rollout in asking]),
             noise_names=[
-                ("stress", rollout.fixture.perturbation, rollout.start_index, rollout.invocations)
+                ("stress", rollout.setup.perturbation, rollout.start_index, rollout.invocations)
                 for rollout in asking
             ],
             candidates=samples if policy.stochastic else 1,
@@ -186,7 +186,7 @@ def step(active: Sequence[Rollout], policy: Policy, *, samples: int) -> None:
 
 def _judge_deliveries(active: Sequence[Rollout]) -> None:
     """Feasibility of everything that arrived, one candidate per rollout and batch."""
-    checker = active[0].fixture.checker
+    checker = active[0].setup.checker
     while True:
         asked = [(rollout, rollout.pending()) for rollout in active]
         open_ones = [(rollout, question) for rollout, question in asked if question is not None]

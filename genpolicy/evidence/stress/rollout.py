@@ -21,7 +21,7 @@ from genpolicy.evidence.admission_context import (
 )
 from genpolicy.evidence.stress.disturbance import Disturbance
 from genpolicy.evidence.stress.fallback import Fallback
-from genpolicy.evidence.stress.state import Fixture, InFlight, Outcome, Tally, in_flight
+from genpolicy.evidence.stress.state import InFlight, Outcome, Setup, Tally, in_flight
 from genpolicy.execution.cell import FALLBACK_HASH, Cell, RecoveryState
 from genpolicy.execution.command import Command
 from genpolicy.execution.executor import Executor
@@ -47,23 +47,23 @@ class Rollout:
     `wanted` invocation with samples; `act`.
 
     Args:
-        fixture: What it shares with the others.
+        setup: What it shares with the others.
         start: Initial state.
         start_index: Its number; keys of all draws.
         calibration_epoch: Calibration in force.
     """
 
     def __init__(
-        self, fixture: Fixture, start: Start, start_index: int, *, calibration_epoch: str
+        self, setup: Setup, start: Start, start_index: int, *, calibration_epoch: str
     ) -> None:
-        self.fixture = fixture
+        self.setup = setup
         self.start_index = start_index
         settings = WorldSettings(calibration_epoch=calibration_epoch)
-        self.world: World = fixture.task.make_world(start, settings=settings)
+        self.world: World = setup.task.make_world(start, settings=settings)
         self.start_sha256 = self.world.state_sha256()
-        self.journal = fixture.journal(start_index, self.start_sha256)
-        cell = Cell(fixture.horizons, fixture.execution)
-        cell.require_task(fixture.task.phases)
+        self.journal = setup.journal(start_index, self.start_sha256)
+        cell = Cell(setup.horizons, setup.execution)
+        cell.require_task(setup.task.phases)
         self.supervisor = Supervisor(cell.execution, self.journal)
         self.stub = ControllerStub(cell, self.journal, self.supervisor)
         self.executor = Executor(cell, self.journal, self.stub)
@@ -76,21 +76,21 @@ class Rollout:
         self._arrived: deque[tuple[InFlight, int]] = deque()
         self._candidate = 0
         self._not_fresh: DiscardReason | None = None
-        self._fallback = Fallback(fixture, self.world, self.executor, self.recovery)
+        self._fallback = Fallback(setup, self.world, self.executor, self.recovery)
         self._newest_accepted_s: float | None = None
         self._last_command_s: float | None = None
         before = [self.world.last_action] * COMMANDS_AT_THE_BOUNDARY
         self._commanded: deque[Array] = deque(before, maxlen=COMMANDS_AT_THE_BOUNDARY)
-        self.history: deque[Array] = deque(maxlen=fixture.horizons.observation_horizon)
+        self.history: deque[Array] = deque(maxlen=setup.horizons.observation_horizon)
         self._measured: deque[Array] = deque(maxlen=2)
-        self._disturbance = Disturbance(fixture, self.world, start=start_index)
-        self.executor.set_active(0.0, fixture.checkpoint, fixture.sampler)
+        self._disturbance = Disturbance(setup, self.world, start=start_index)
+        self.executor.set_active(0.0, setup.checkpoint, setup.sampler)
         self.executor.controller(0.0, cell.controller_mode)  # the simulated one has no other
 
     @property
     def now_s(self) -> float:
         """Virtual time, s."""
-        return self.tick * self.fixture.horizons.action_period_s
+        return self.tick * self.setup.horizons.action_period_s
 
     @property
     def done(self) -> bool:
@@ -99,7 +99,7 @@ class Rollout:
 
     def conditioning(self) -> Array:
         """The last H_o observations, oldest first, the first one repeated. Shape (H_o, D_o)."""
-        missing = self.fixture.horizons.observation_horizon - len(self.history)
+        missing = self.setup.horizons.observation_horizon - len(self.history)
         return np.stack([self.history[0]] * missing + list(self.history))
 
     def sense(self) -> None:
@@ -108,7 +108,7 @@ class Rollout:
         observation = world.observe()
         self.history.append(observation)
         self._measured.append(world.q_meas)
-        self.journal.scene(now_s, self.fixture.task.scene_poses(observation))
+        self.journal.scene(now_s, self.setup.task.scene_poses(observation))
         position, _ = world.tcp_pose
         self.tally.path_m.append(np.array(position))
         divergence_m = float(np.linalg.norm(position - world.last_action[:3]))
@@ -141,7 +141,7 @@ class Rollout:
         self.journal.candidate(
             now_s,
             chunk_id=flying.metadata.chunk_id,
-            method=self.fixture.method,
+            method=self.setup.method,
             index=self._candidate,
             layers={layer.name: layer.passed for layer in verdict.layers},
             first_reason=verdict.first_reason or None,
@@ -198,7 +198,7 @@ class Rollout:
             self._write_off(flying, DiscardReason.END_OF_EPISODE)
         self._flying.clear()
         self._arrived.clear()
-        self.tally.conclude(self.journal, self.fixture.task, outcome, self.history[-1])
+        self.tally.conclude(self.journal, self.setup.task, outcome, self.history[-1])
         self.executor.end_episode(self.now_s)
 
     def _supervise(self, now_s: float) -> None:
@@ -213,13 +213,13 @@ class Rollout:
             self._end(Outcome.FORCE_STOP)
 
     def _begin_invocation(self, now_s: float) -> InFlight:
-        horizons, number = self.fixture.horizons, self.invocations
+        horizons, number = self.setup.horizons, self.invocations
         self.invocations += 1
         metadata = ChunkMetadata(
             chunk_id=f"{self.journal.session}/{number}",
             condition_observation_event_time_s=now_s,
-            policy_checkpoint_hash=self.fixture.checkpoint,
-            sampler_config_hash=self.fixture.sampler,
+            policy_checkpoint_hash=self.setup.checkpoint,
+            sampler_config_hash=self.setup.sampler,
             action_start_time_s=now_s,
             action_period_s=horizons.action_period_s,
             valid_until_s=now_s + horizons.execution_horizon * horizons.action_period_s,
@@ -227,11 +227,11 @@ class Rollout:
             calibration_epoch=self.world.calibration_epoch,
             predecessor_chunk_id=self.executor.chain_head,
             session_epoch=self.executor.session_epoch,
-            method=self.fixture.method,
+            method=self.setup.method,
             candidate_index=0,
         )
         flying = in_flight(
-            self.fixture, metadata, self.history[-1], start=self.start_index, number=number
+            self.setup, metadata, self.history[-1], start=self.start_index, number=number
         )
         self.executor.begin_invocation(now_s, metadata.chunk_id, repr(flying.total_s))
         self.tally.latencies_s.append(flying.total_s)
@@ -242,7 +242,7 @@ class Rollout:
             if flying.arrival_s <= now_s and not flying.dropped:
                 self._flying.remove(flying)
                 self._arrive(flying, now_s)
-            elif now_s - flying.begun_s >= self.fixture.execution.deadline_s - 1e-9:
+            elif now_s - flying.begun_s >= self.setup.execution.deadline_s - 1e-9:
                 self._miss(flying, now_s)
 
     def _miss(self, flying: InFlight, now_s: float) -> None:
@@ -258,7 +258,7 @@ class Rollout:
     def _arrive(self, flying: InFlight, now_s: float) -> None:
         if not flying.given_up:
             self.executor.end_invocation(now_s, flying.metadata.chunk_id, "answered")
-        horizons = self.fixture.horizons
+        horizons = self.setup.horizons
         late = round((now_s - flying.metadata.action_start_time_s) / horizons.action_period_s)
         if late >= horizons.execution_horizon:
             self._write_off(flying, DiscardReason.EXPIRED)
@@ -272,22 +272,22 @@ class Rollout:
 
     def _write_off(self, flying: InFlight, reason: DiscardReason) -> None:
         chunks = flying.chunks
-        rows = self.fixture.horizons.prediction_horizon if chunks is None else chunks.shape[1]
+        rows = self.setup.horizons.prediction_horizon if chunks is None else int(chunks.shape[1])
         self.executor.write_off(flying.metadata, rows, reason, self.now_s)
 
     def _delivery_context(self, late: int) -> Context:
         return context_of(
-            self.fixture.task,
-            self.fixture.checker,
+            self.setup.task,
+            self.setup.checker,
             self._moment(),
-            session=self._session(self.fixture.checkpoint, self.fixture.sampler),
+            session=self._session(self.setup.checkpoint, self.setup.sampler),
             late_rows=late,
             newest_accepted_observation_s=self._newest_accepted_s,
         )
 
     def _recover(self, now_s: float) -> None:
         last_s = self._last_command_s if self._last_command_s is not None else 0.0
-        silent = now_s - last_s >= self.fixture.execution.hold_before_recovery_s - 1e-9
+        silent = now_s - last_s >= self.setup.execution.hold_before_recovery_s - 1e-9
         if not self.recovery.active and (silent or self._disturbance.drill(now_s)):
             self.recovery.trigger(now_s, self.world.phase, "silence" if silent else "drill")
         if not self.recovery.active:
@@ -309,12 +309,12 @@ class Rollout:
 
     def _admit_fallback(self, proposal: Proposal) -> Admitted | None:
         context = context_of(
-            self.fixture.task,
-            self.fixture.checker,
+            self.setup.task,
+            self.setup.checker,
             self._moment(),
             session=self._session(FALLBACK_HASH, FALLBACK_HASH),
         )
-        result = self.fixture.checker.admit(proposal, context=context)
+        result = self.setup.checker.admit(proposal, context=context)
         return result if isinstance(result, Admitted) else None
 
     def _moment(self) -> Moment:
@@ -333,7 +333,7 @@ class Rollout:
             session_epoch=self.executor.session_epoch,
             checkpoint=checkpoint,
             sampler=sampler,
-            maximum_age_s=self.fixture.execution.maximum_age_s,
+            maximum_age_s=self.setup.execution.maximum_age_s,
             controller_mode=self.executor.cell.controller_mode,
         )
 

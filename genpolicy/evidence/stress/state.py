@@ -29,7 +29,7 @@ class Outcome(StrEnum):
 
 
 @dataclass(frozen=True)
-class Fixture:
+class Setup:
     """What all rollouts of one method under one perturbation share.
 
     Attributes:
@@ -127,28 +127,28 @@ class Tally:
 
 
 def in_flight(
-    fixture: Fixture, metadata: ChunkMetadata, observation: Array, *, start: int, number: int
+    setup: Setup, metadata: ChunkMetadata, observation: Array, *, start: int, number: int
 ) -> InFlight:
     """An invocation that begins now: how long it takes, and what it suffers.
 
     Args:
-        fixture: What all rollouts share.
+        setup: What all rollouts share.
         metadata: Of the chunk to come; it begins at `action_start_time_s`.
         observation: What it is conditioned on. Shape (D_o,).
         start: Index of the initial state; key of the draws.
         number: Count of invocations in this rollout; key of the draws.
     """
     hit = injection(
-        fixture.schedule,
-        root_seed=fixture.root_seed,
-        name=fixture.perturbation,
+        setup.schedule,
+        root_seed=setup.root_seed,
+        name=setup.perturbation,
         start=start,
         invocation=number,
     )
     draw = draw_latency(
-        fixture.latency,
-        root_seed=fixture.root_seed,
-        perturbation=fixture.perturbation,
+        setup.latency,
+        root_seed=setup.root_seed,
+        perturbation=setup.perturbation,
         start=start,
         invocation=number,
         extra_s=hit.extra_s,

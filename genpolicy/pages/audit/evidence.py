@@ -1,5 +1,6 @@
 """The audit's evidence folder, read back: a page can show only what was written."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -25,6 +26,7 @@ class AuditEvidence:
         persistence: Identity over time, `persistence.json`.
         digests: SHA-256 of every file, by name.
         origins: What the user calls an episode, by identifier; none is in the folder itself.
+        coverage: Coverage of every interval that is shown; NaN where nobody said which.
     """
 
     tables: Mapping[str, pd.DataFrame]
@@ -33,6 +35,7 @@ class AuditEvidence:
     persistence: Mapping[str, Any]
     digests: Mapping[str, str]
     origins: Mapping[str, str] = field(default_factory=dict)
+    coverage: float = math.nan
 
     def __getitem__(self, name: str) -> pd.DataFrame:
         return self.tables[name]

@@ -1,6 +1,6 @@
-"""The layers of the diagnosis as they were judged: every question with its number and its limit.
+"""The topics of the diagnosis as they were judged: every question with its number and its limit.
 
-Nothing is compared here. What lies below the first red layer is shown too, and marked as not to be
+Nothing is compared here. What lies below the first red topic is shown too, and marked as not to be
 believed; numbers that no limit is held against stand beside the questions.
 """
 
@@ -42,8 +42,8 @@ class Check:
 
 
 @dataclass(frozen=True)
-class LayerRow:
-    """One layer of the diagnosis.
+class TopicRow:
+    """One topic of the diagnosis.
 
     Attributes:
         name: As in the verdict.
@@ -58,17 +58,17 @@ class LayerRow:
     state: str
 
 
-def ladder(document: Mapping[str, Any], evidence: AuditEvidence) -> list[LayerRow]:
-    """The layers in the order in which they are believed.
+def ladder(document: Mapping[str, Any], evidence: AuditEvidence) -> list[TopicRow]:
+    """The topics in the order in which they are believed.
 
     Args:
         document: `audit.json`; its `questions` carry number, limit and answer.
         evidence: The evidence beside it.
     """
-    names = list(LAYERS)
-    red = names.index(document["layer"]) if document["layer"] in LAYERS else len(names)
+    names = list(TOPICS)
+    red = names.index(document["layer"]) if document["layer"] in TOPICS else len(names)
     result = []
-    for place, (name, (question, beside)) in enumerate(LAYERS.items()):
+    for place, (name, (question, beside)) in enumerate(TOPICS.items()):
         judged = [_judged(item) for item in document["questions"] if item["layer"] == name]
         checks = (*judged, *beside(evidence))
         if place >= red:
@@ -77,7 +77,7 @@ def ladder(document: Mapping[str, Any], evidence: AuditEvidence) -> list[LayerRo
             # That no fault of the data was found is an answer; elsewhere no number is none.
             known = name == "data" or any(check.holds is not None for check in judged)
             state = HOLDS if known else OPEN
-        result.append(LayerRow(name, question, checks, state))
+        result.append(TopicRow(name, question, checks, state))
     return result
 
 
@@ -180,7 +180,7 @@ def _largest(frame: pd.DataFrame, column: str) -> pd.Series | None:
 
 
 EVIDENCE = {"local": "near neighbours", "learned": "demonstrations alike in what predicts"}
-LAYERS: dict[str, tuple[str, Callable[[AuditEvidence], list[Check]]]] = {
+TOPICS: dict[str, tuple[str, Callable[[AuditEvidence], list[Check]]]] = {
     "data": ("Are clocks, frames, units and calibration what they claim to be?", _data),
     "labels": ("Do the outcome labels agree with what a replay does?", _nothing),
     "support": ("Are there enough comparable demonstrations to answer at all?", _support),
@@ -189,4 +189,4 @@ LAYERS: dict[str, tuple[str, Callable[[AuditEvidence], list[Check]]]] = {
     "validity": ("Does each mode succeed, and is it feasible?", _validity),
     "agreement": ("Do resampled audits say the same?", _nothing),
 }
-"""Question of each layer, and its numbers that no limit is held against."""
+"""Question of each topic, and its numbers that no limit is held against."""

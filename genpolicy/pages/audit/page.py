@@ -31,8 +31,8 @@ def audit_page(document: Mapping[str, Any], evidence: AuditEvidence, *, name: st
     """HTML of one audit; the same inputs give the same bytes.
 
     Args:
-        document: `audit.json`, with the cause, its questions and its limits; `episodes`, if it is
-            there, says what the user calls the episodes that are named.
+        document: `audit.json`, with the cause, its questions, its limits and the coverage of their
+            intervals; `episodes`, if it is there, says what the user calls the episodes named.
         evidence: The evidence beside it.
         name: What the dataset is called.
     """
@@ -47,7 +47,9 @@ def audit_page(document: Mapping[str, Any], evidence: AuditEvidence, *, name: st
     cause, limits = str(document["verdict"]), _limits(document["limits"])
     origins = document.get("episodes", {})
     said, summary = named(document, origins), named(evidence.summary, origins)
-    evidence = replace(evidence, summary=summary, origins=origins)
+    evidence = replace(
+        evidence, summary=summary, origins=origins, coverage=float(document["coverage"])
+    )
     return environment.get_template("audit.html").render(
         style=page_style() + Markup(own),
         name=name,
@@ -57,12 +59,12 @@ def audit_page(document: Mapping[str, Any], evidence: AuditEvidence, *, name: st
         tone=TONES.get(cause, "open"),
         named=_named(said),
         marks=MARKS,
-        layers=ladder(said, evidence),
+        topics=ladder(said, evidence),
         pictures=draw_all(evidence, {row["question"]: row["limit"] for row in limits}),
         limits=limits,
         labels=label_table(evidence),
         wrong=_wrong(evidence["replay"], origins),
-        recovery=recovery_table(evidence["recovery"]),
+        recovery=recovery_table(evidence),
         phases=_phases(summary),
         summary=summary,
         settings=evidence.settings,
@@ -99,15 +101,15 @@ def label_table(evidence: AuditEvidence) -> list[dict[str, Any]]:
     parts = [(str(mode), frame[modes == mode]) for mode in sorted(set(modes))]
     if len(parts) > 1:
         parts.append(("all", frame))
-    return [_labels(mode, part) for mode, part in parts]
+    return [_labels(mode, part, evidence.coverage) for mode, part in parts]
 
 
-def recovery_table(frame: pd.DataFrame) -> list[dict[str, Any]]:
+def recovery_table(evidence: AuditEvidence) -> list[dict[str, Any]]:
     """Disturbed episodes per split and mode, with the exact interval of their success."""
     rows = []
-    for _, row in frame.sort_values(["split", "mode"]).iterrows():
+    for _, row in evidence["recovery"].sort_values(["split", "mode"]).iterrows():
         successes, episodes = int(row["successes"]), int(row["episodes"])
-        lower, upper = clopper_pearson(successes, episodes)
+        lower, upper = clopper_pearson(successes, episodes, evidence.coverage)
         rows.append(
             {
                 "split": str(row["split"]),
@@ -121,10 +123,10 @@ def recovery_table(frame: pd.DataFrame) -> list[dict[str, Any]]:
     return rows
 
 
-def _labels(mode: str, part: pd.DataFrame) -> dict[str, Any]:
+def _labels(mode: str, part: pd.DataFrame, coverage: float) -> dict[str, Any]:
     good, replayed = part["label"] == "success", part["replayed"] == "success"
     wrong, count = int((part["label"] != part["replayed"]).sum()), len(part)
-    lower, upper = clopper_pearson(wrong, count)
+    lower, upper = clopper_pearson(wrong, count, coverage)
     return {
         "mode": mode,
         "count": count,

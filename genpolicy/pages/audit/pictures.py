@@ -12,7 +12,6 @@ from genpolicy.pages.figures import captions, checks, situations
 from genpolicy.pages.figures.drawing import Picture, drawn
 from genpolicy.pages.figures.situations import NothingToDrawError
 
-CONFIDENCE = 0.95
 Limits = Mapping[str, float]
 
 
@@ -88,7 +87,7 @@ def _strata(evidence: AuditEvidence, limits: Limits) -> Figure:
 
 def _modes(evidence: AuditEvidence, limits: Limits) -> Figure:
     limit = limits["mode_success_lower"]
-    return checks.mode_success(evidence["modes"], confidence=CONFIDENCE, limit=limit)
+    return checks.mode_success(evidence["modes"], confidence=evidence.coverage, limit=limit)
 
 
 def _realignment(evidence: AuditEvidence, limits: Limits) -> Figure:

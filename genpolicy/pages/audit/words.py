@@ -37,7 +37,7 @@ TONES = {
 MARKS = {"holds": "✓", "red": "✕", "open": "?", "not believed": "·"}
 READING = (
     "The verdict and what it rests on: would you accept what was guessed or not recorded?",
-    "The layers: the first red one decides; layers below it are not believed.",
+    "The topics: the first red one decides; topics below it are not believed.",
     "The situations: from nearly the same observation, do the actions fall into separate bundles?",
     "The mean and the modes: does the mean of what was demonstrated run into something?",
     "What explains the modes: is there a variable that nobody recorded and that would?",

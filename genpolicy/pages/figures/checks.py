@@ -10,6 +10,7 @@ from genpolicy.pages.figures.drawing import BLUE, GREY, INK, ORANGE, PALETTE, RE
 from genpolicy.pages.figures.limits import limit_line
 from genpolicy.pages.figures.plane import scatter_of
 from genpolicy.pages.figures.situations import NothingToDrawError
+from genpolicy.statistics.intervals import clopper_pearson
 
 POINTS = 1200
 ROWS = 24
@@ -57,8 +58,7 @@ def mode_success(frame: pd.DataFrame, *, confidence: float, limit: float | None)
     """Success of each mode with its exact interval.
 
     Args:
-        frame: Rows of `modes.parquet`: mode, phase, episodes, successes, success_lower,
-            success_upper.
+        frame: Rows of `modes.parquet`: mode, phase, episodes, successes.
         confidence: Of the interval.
         limit: Lower end that makes a mode valid.
 
@@ -70,7 +70,8 @@ def mode_success(frame: pd.DataFrame, *, confidence: float, limit: float | None)
         raise NothingToDrawError("no mode was followed over situations")
     trials = frame["episodes"].to_numpy(dtype=np.float64)
     hits = frame["successes"].to_numpy(dtype=np.float64)
-    ends = zip(frame["success_lower"], frame["success_upper"], strict=True)
+    counts = zip(hits, trials, strict=True)
+    ends = [clopper_pearson(int(k), int(n), confidence) for k, n in counts]
     figure, (axes,) = new_figure(height=1.0 + 0.24 * len(frame))
     for place, (low, high) in enumerate(ends):
         axes.hlines(place, low, high, color=BLUE, lw=2)

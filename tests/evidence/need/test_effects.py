@@ -24,7 +24,9 @@ def situation(variant, episode, covered, admissible, present=2):
 
 
 def measured(errors, modes, kind="chunk_error"):
-    compared = Compared("b", "direct", "trunk", reference=("a", "direct"), error=kind)
+    compared = Compared(
+        "b", "direct", "trunk", reference=("a", "direct"), error=kind, confidence=0.95
+    )
     return {row.measure: row for row in effect_rows(errors, modes, compared)}
 
 
@@ -40,6 +42,14 @@ def test_pairs_by_episode_and_leaves_out_what_has_no_partner():
     assert found.upper - found.lower == pytest.approx(2 * half)
     assert (found.episodes, found.reference) == (2, 3.0)
     assert measured(errors, [], "first_error")["first_error"].effect == pytest.approx(0.1)
+
+
+def test_an_interval_covers_what_it_is_asked_to():
+    gains = np.array([0.1, 0.3, 0.2])
+    quantiles = {0.95: 4.303, 0.8: 1.886}  # of t with two degrees of freedom, both sides
+    for confidence, quantile in quantiles.items():
+        half = quantile * 0.1 / math.sqrt(3)
+        assert half_width(gains, confidence) == pytest.approx(half, rel=1e-3)
 
 
 def test_situations_with_one_mode_do_not_count_and_nothing_measured_is_nan():
@@ -65,5 +75,5 @@ def test_intervals_cover_by_simulation():
     """2000 draws of 30 normal differences around 1: the 95 % interval covers, within its noise."""
     rng = np.random.default_rng(0)
     draws = rng.normal(1.0, 2.0, (2000, 30))
-    covered = sum(abs(row.mean() - 1.0) <= half_width(row) for row in draws)
+    covered = sum(abs(row.mean() - 1.0) <= half_width(row, 0.95) for row in draws)
     assert 0.935 < covered / 2000 < 0.965

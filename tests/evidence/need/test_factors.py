@@ -42,6 +42,7 @@ def measure(variants, folder, *, dataset, audit, kit):
         task="tabletop_insertion", dataset=dataset, audit=audit, horizons=kit.HORIZONS,
         feasibility=kit.FEASIBILITY, variants=variants, samplers=SAMPLERS,
         conventions={"act": {"z_prior": SamplerConfig(name="z_prior")}}, samples=3, stride=16,
+        confidence=0.95,
     )  # fmt: skip
     checkpoints = trained(folder, variants, seeds=[0])
     write_factors(study, checkpoints, folder, workers=1, scheduler="local")

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from genpolicy.errors import ContractError
+from genpolicy.evidence.admission_context import admissible
 from genpolicy.evidence.need import held_out
 from genpolicy.evidence.need.held_out import (
-    admissible,
     admissible_chunks,
     held_out_situations,
     modes_of_policy,

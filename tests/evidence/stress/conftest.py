@@ -18,7 +18,7 @@ from genpolicy.evidence.stress.latency import (
 from genpolicy.evidence.stress.matched import step
 from genpolicy.evidence.stress.perturbations import Nominal
 from genpolicy.evidence.stress.rollout import Rollout
-from genpolicy.evidence.stress.state import Fixture, Outcome
+from genpolicy.evidence.stress.state import Outcome, Setup
 from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.execution.journal import write_journal
 from genpolicy.feasibility.figures import expected_motion
@@ -123,7 +123,7 @@ def check(rollouts, folder, *, execution=EXECUTION):
         queue_capacity=execution.queue_capacity,
         controller_mode=CONTROLLER_MODE,
     )
-    robot = rollouts[0].fixture.checker.cell if rollouts else None
+    robot = rollouts[0].setup.checker.cell if rollouts else None
     return check_journal(path, expected, robot and expected_motion(robot))
 
 
@@ -161,7 +161,7 @@ def make_fixture(task, checker):
             "schedule": Nominal(), "root_seed": ROOT_SEED,
             "method": "scripted", "checkpoint": "w" * 64, "sampler": "s" * 64,
         }  # fmt: skip
-        return Fixture(**(parts | changes))
+        return Setup(**(parts | changes))
 
     return make
 
@@ -171,9 +171,9 @@ def run(make_fixture, plans):
     """Rollouts of some of the planned starts under a scripted policy, to their end."""
 
     def go(plan, *, starts=(0,), ticks=300, **changes):
-        fixture = make_fixture(**changes)
+        setup = make_fixture(**changes)
         rollouts = [
-            Rollout(fixture, plans.starts[number], number, calibration_epoch=EPOCH)
+            Rollout(setup, plans.starts[number], number, calibration_epoch=EPOCH)
             for number in starts
         ]
         return drive(rollouts, plan, ticks=ticks)

@@ -20,7 +20,7 @@ def limit(**changes: float) -> CauseLimits:
     found = dict(LIMITS.by_question)
     for question, value in changes.items():
         found[question] = replace(found[question], limit=value)
-    return CauseLimits(found)
+    return CauseLimits(found, LIMITS.confidence)
 
 
 STRATUM = Stratum("operator", "approach", 0.9, 0.9, 0.05, 0.0, 0.1, 100, True, False, "")
@@ -41,7 +41,7 @@ TOLD = Prediction("operator", "approach", 0.05, -0.1, 0.2, 0.52, 0.5, 120)
 
 VALID = Numbers(
     findings=(), floors=AuditSettings().floors, metre=1.0, unit="m",
-    labels=Labels(60, 0, 0.06),
+    labels=Labels(60, 0),
     counts=Counts(200, 180, 50, 120, 45, 50, 0, 0, 110, 0.1, 0.01, 0.02),
     kept=Kept(0.95, 0.6, 118), strata=(STRATUM,), told=(TOLD,),
     modes=(
@@ -69,14 +69,14 @@ def counts(**changes) -> Numbers:
 
 BROKEN = {
     "data": (replace(VALID, findings=(OFFSET,)), "data_defect", "clock"),
-    "labels": (replace(VALID, labels=Labels(60, 12, 0.32)), "label_contamination", "replay"),
+    "labels": (replace(VALID, labels=Labels(60, 12)), "label_contamination", "replay"),
     "support": (counts(analysed_episodes=19), "insufficient_support", "neighbourhoods"),
     "structure": (counts(two_mode_episodes=9), "unimodal", ""),
     "hidden": (replace(VALID, strata=(HIDDEN,)), "hidden_state", "stratum"),
     "validity": (
         replace(
             VALID,
-            modes=(VALID.modes[0], replace(VALID.modes[1], success_lower=0.4, success_upper=0.69)),
+            modes=(VALID.modes[0], replace(VALID.modes[1], successes=20)),
         ),
         "unimodal", "one_valid_mode",
     ),

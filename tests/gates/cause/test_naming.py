@@ -8,7 +8,7 @@ from planted import BROKEN, OFFSET, VALID, counts, limit, named
 
 from gates.cause import (
     CauseName,
-    Layer,
+    Topic,
 )
 from gates.cause.numbers import Kept, Labels
 from genpolicy.audit.rows import Finding
@@ -20,7 +20,7 @@ WHITE = counts(two_mode_episodes=0, noise_ratio=0.9, white_share=0.3)
 
 def test_all_green_is_valid_modes():
     cause = named(VALID)
-    assert (cause.name, cause.layer, cause.text) == ("valid_modes", Layer.NONE, "valid_modes")
+    assert (cause.name, cause.topic, cause.text) == ("valid_modes", Topic.NONE, "valid_modes")
     judged = [answer for answer in cause.answers if answer.question != "component_modes"]
     assert all(answer.holds for answer in judged)
     assert json.loads(json.dumps([a.as_json() for a in cause.answers]))
@@ -37,7 +37,7 @@ def test_a_frozen_stream_is_a_defect_beyond_its_own_limit_and_no_other():
     stuck = Finding("frozen", "camera", "ep1", "frozen_s", 0.5, 0.35, "s", "Leave it out.")
     cause = named(replace(VALID, findings=(stuck,)))
     assert (cause.name, cause.variable, cause.kind) == (CauseName.DATA_DEFECT, "camera", "frozen")
-    assert named(replace(VALID, findings=(stuck,)), limit(frozen_s=0.5)).layer is Layer.NONE
+    assert named(replace(VALID, findings=(stuck,)), limit(frozen_s=0.5)).topic is Topic.NONE
     with pytest.raises(ConfigError, match="frozen_s"):
         named(VALID, limit(frozen_s=0.25))  # below what the audit looks for
 
@@ -48,7 +48,7 @@ def test_a_frozen_stream_is_a_defect_beyond_its_own_limit_and_no_other():
      (replace(VALID, kept=Kept(0.95, 0.6, 29)), "persistence"),
      (counts(persistent=29), "persistence"),
      (counts(two_mode_episodes=0, queries=500), "neighbourhoods"),
-     (replace(VALID, labels=Labels(10, 0, 0.31)), "replay"),
+     (replace(VALID, labels=Labels(10, 0)), "replay"),
      (replace(VALID, modes=VALID.modes[:1]), "linking")],
 )  # fmt: skip
 def test_too_little_is_said_to_be_too_little(numbers, kind):
@@ -75,7 +75,7 @@ def test_what_most_resampled_audits_contradict_is_not_said(said):
     assert half.name is named(said).name and half.agreeing == (10, 20)
     most = named(said, draws=[said] * 9 + [fault] * 8 + [label] * 3 + [thin] * 4)
     assert (most.name, most.kind) == (CauseName.INSUFFICIENT_SUPPORT, "unstable")
-    assert (most.layer.value, most.agreeing, most.confidence) == ("agreement", (11, 24), 11 / 25)
+    assert (most.topic.value, most.agreeing, most.confidence) == ("agreement", (11, 24), 11 / 25)
     assert f"9 say {named(said).name}, 11 another cause" in most.next_action
     assert f"8 of them data_defect({named(fault).variable}, clock). If" in most.next_action
     assert named(fault).next_action in most.next_action

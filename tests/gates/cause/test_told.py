@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 from planted import HIDDEN, TOLD, VALID, limit, named
 
-from gates.cause import CauseName, Layer
+from gates.cause import CauseName, Topic
 from gates.cause.told import UNDECIDED, surely
 
 
@@ -33,7 +33,7 @@ def test_the_interval_decides_on_which_side_of_the_limit_it_is(value, half, expe
 def test_what_tells_too_much_is_named_and_what_may_is_not_decided():
     sure = named(of(told("operator", 0.6)))
     assert (sure.name, sure.variable, sure.kind) == ("hidden_state", "operator", "prediction")
-    assert sure.layer is Layer.HIDDEN
+    assert sure.topic is Topic.HIDDEN
     open_ = named(of(told("operator", 0.45)))
     assert (open_.name, open_.variable, open_.kind) == (
         CauseName.INSUFFICIENT_SUPPORT, "operator", UNDECIDED,

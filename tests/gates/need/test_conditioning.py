@@ -5,6 +5,7 @@ import pytest
 from asked import asked, settings_of
 from editing import cells
 
+from gates.cause import default_limits
 from gates.evidence import MissingEvidenceError
 from gates.need import conditioning
 from gates.proof import judge
@@ -12,13 +13,16 @@ from genpolicy.statistics.intervals import clopper_pearson
 
 
 def test_an_effect_counts_only_where_it_is_significant(ladder):
-    level = settings_of(ladder, "A").strata_level
+    level = default_limits()["strata_p"]
     table = "audit/strata.parquet"
     evidence.edit_table(ladder, table, lambda f: f.assign(effect=0.9, p_adjusted=level * 1.01))
     quiet = asked(ladder, conditioning.strata_effect, gate="A")
     assert quiet.value == 0.0 and "none of" in quiet.caveat
     evidence.edit_table(ladder, table, cells("p_adjusted", level, share=0.01))
-    evidence.edit_table(ladder, table, cells("effect", -0.4, share=0.01))
+    evidence.edit_table(ladder, table, cells("effect", 0.4, share=0.01))
+    chance = asked(ladder, conditioning.strata_effect, gate="A")
+    assert chance.value == 0.0  # its interval begins at 0
+    evidence.edit_table(ladder, table, cells("effect_lower", 0.2, share=0.01))
     assert asked(ladder, conditioning.strata_effect, gate="A").value == 0.4
 
 

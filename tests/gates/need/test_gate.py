@@ -2,6 +2,7 @@
 
 import evidence
 import pytest
+from editing import cells
 
 from gates.cause import default_limits
 from gates.proof import judge
@@ -35,12 +36,8 @@ def find(root, kind, variable, question, measured):
 
 
 def contaminated(root):
-    """More labels disagree with the replay than the limit allows; the replay table says nothing."""
-    evidence.edit_document(
-        root,
-        "audit/summary.json",
-        lambda d: {**d, "label_disagreements": 30, "label_disagreement_upper": 0.6},
-    )
+    """More labels disagree with the replay than the limit allows."""
+    evidence.edit_table(root, "audit/replay.parquet", cells("replayed", "failure", share=0.75))
 
 
 def verdicts(report):
@@ -138,7 +135,7 @@ def test_where_a_simpler_policy_may_do_the_page_sends_nobody_to_the_data(ladder)
     assert report.verdict == "FAIL"
     assert "run the simpler policy" in report.diagnosis
     assert "Train the simple baselines" not in report.diagnosis
-    evidence.edit_table(ladder, "audit/clocks.parquet", lambda f: f.assign(offset_after_s=1.0))
+    evidence.edit_table(ladder, "audit/clocks.parquet", evidence.lags_apart)
     assert "run the simpler policy" not in judge(ladder, "A").diagnosis
 
 

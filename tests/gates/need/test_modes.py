@@ -20,21 +20,36 @@ def value(ladder, criterion):
 
 
 def test_situations_of_training_episodes_do_not_count(ladder):
-    everything = value(ladder, modes.held_out_situations)
-    assert value(ladder, modes.multimodal_situations) == everything > 0
+    def judged():
+        return int(re.search(r"of (\d+) situations", said())[1])
+
+    def said():
+        return asked(ladder, modes.mean_defeated_share, gate="A").caveat
+
+    everything = judged()
     first = lambda frame: frame["split"] == "validation"  # noqa: E731
     evidence.edit_table(ladder, SITUATIONS, cells("split", "train", where=first))
-    left = value(ladder, modes.held_out_situations)
-    assert 0 < left < everything
+    assert 0 < judged() < everything
 
 
-@pytest.mark.parametrize("column", ["two_mode", "persistent"])
-def test_a_situation_needs_two_modes_that_persist(ladder, column):
-    test = lambda frame: frame["split"] == "test"  # noqa: E731
+@pytest.mark.parametrize(
+    ("path", "key"), [("audit/summary.json", "persistent"), ("audit/persistence.json", "n")]
+)
+def test_a_situation_needs_two_modes_that_persist_and_long_enough_to_see_it(ladder, path, key):
     before = value(ladder, modes.multimodal_situations)
-    evidence.edit_table(ladder, SITUATIONS, cells(column, False, where=test))
-    assert 0 < value(ladder, modes.multimodal_situations) < before
-    assert value(ladder, modes.held_out_situations) == before
+
+    def fewer(document):
+        (document if key in document else document["counts"])[key] = 12
+
+    evidence.edit_document(ladder, path, fewer)
+    assert value(ladder, modes.multimodal_situations) == 12 < before
+    assert value(ladder, modes.held_out_situations) == 90
+
+
+def test_counts_that_cannot_be_are_missing_evidence(ladder):
+    evidence.edit_table(ladder, "audit/modes.parquet", cells("successes", 26, share=0.01))
+    with pytest.raises(MissingEvidenceError, match="26 of 25 episodes of left, which cannot be"):
+        value(ladder, modes.mode_success_lower)
 
 
 def test_the_worst_mode_decides_by_its_exact_lower_bound(ladder):
@@ -50,7 +65,8 @@ def test_the_worst_mode_decides_by_its_exact_lower_bound(ladder):
 
 def test_a_mode_without_a_checked_chunk_is_missing_evidence(ladder):
     evidence.edit_table(ladder, "audit/modes.parquet", cells("checked", 0, share=0.01))
-    with pytest.raises(MissingEvidenceError, match="no checked chunk"):
+    evidence.edit_table(ladder, "audit/modes.parquet", cells("admissible", 0, share=0.01))
+    with pytest.raises(MissingEvidenceError, match="of left: no chunk was checked"):
         value(ladder, modes.mode_feasible_share)
 
 

@@ -5,26 +5,27 @@ from pathlib import Path
 import evidence
 import pytest
 import yaml
-from asked import settings_of
+from asked import asked, settings_of
 
+from gates.need import conditioning
 from gates.need.settings import NeedSettings
 from genpolicy.errors import ConfigError
 
 
 def test_the_level_of_the_strata_has_one_home(ladder):
+    evidence.edit_table(
+        ladder, "audit/strata.parquet",
+        lambda f: f.assign(effect=0.8, effect_lower=0.6, p_adjusted=0.03),
+    )  # fmt: skip
+    assert asked(ladder, conditioning.strata_effect, gate="A").value == 0.8
+
     def lower(params):
         for questions in params["gate_a"]["cause"].values():
             if "strata_p" in questions:
                 questions["strata_p"][0] = 0.01
 
     evidence.write_params(ladder, lower)
-    assert settings_of(ladder, "A").strata_level == 0.01
-
-
-def test_without_a_level_nothing_is_judged_rather_than_every_stratum_let_through(ladder):
-    settings = settings_of(ladder, "A").model_copy(update={"cause": {"model": {}}})
-    with pytest.raises(ConfigError, match=r"gate_a\.cause\.strata_p is missing"):
-        _ = settings.strata_level
+    assert asked(ladder, conditioning.strata_effect, gate="A").value == 0.0
 
 
 def test_every_remedy_of_gate_a_is_a_baseline_that_gate_d_runs():

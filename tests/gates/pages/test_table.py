@@ -10,11 +10,11 @@ from gates.writing import write_gate
 
 
 def test_a_required_failure_is_never_waived(ladder):
-    evidence.edit_table(ladder, "audit/clocks.parquet", lambda f: f.assign(offset_after_s=0.5))
+    evidence.edit_table(ladder, "audit/clocks.parquet", evidence.lags_apart)
     report = write_gate(ladder, "A")
     (failed,) = [c for c in report.criteria if c.verdict == "FAIL"]
     assert waived(failed, report) == ""
-    assert deciding(report) == "clock_residual_s: 0.5 s, required ≤ 0.01 s"
+    assert deciding(report) == "lag_spread_steps: 4 action steps, required ≤ 1 action steps"
     assert passed_by(report) == "" and tally(report) == "23 of 24 hold; 1 fails"
     text = markdown(report)
     assert text.index("## Not met") < text.index("All 24 criteria")

@@ -20,8 +20,9 @@ def document(folder):
     cause = cause_of(folder, LIMITS)
     return {
         "verdict": cause.name.value, "variable": cause.variable, "kind": cause.kind,
-        "layer": cause.layer.value, "confidence": cause.confidence,
+        "layer": cause.topic.value, "confidence": cause.confidence,
         "next_action": cause.next_action, "limits": LIMITS.as_json(), **BLANK,
+        "coverage": LIMITS.confidence,
         "questions": [answer.as_json() for answer in cause.answers],
         "dataset_manifest_sha256": "0" * 64,
     }  # fmt: skip

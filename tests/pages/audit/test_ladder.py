@@ -4,8 +4,7 @@ import pytest
 from audited_cases import document
 from planar import SETTINGS, planar
 
-from gates.cause import Answer
-from gates.cause import Layer as CauseLayer
+from gates.cause import Answer, Topic
 from genpolicy.audit.evidence import write_evidence
 from genpolicy.audit.run import audit
 from genpolicy.pages.audit.evidence import read_evidence
@@ -21,7 +20,7 @@ from genpolicy.pages.audit.page import audit_page, label_table
 def test_the_first_red_layer_is_marked_and_what_lies_below_is_not_believed(audits, name, red):
     evidence = read_evidence(audits[name])
     layers = ladder(document(audits[name]), evidence)
-    assert [layer.name for layer in layers] == [layer.value for layer in CauseLayer][:-1]
+    assert [layer.name for layer in layers] == [layer.value for layer in Topic][:-1]
     states = {layer.name: layer.state for layer in layers}
     assert [n for n, state in states.items() if state == RED] == ([red] if red else [])
     names = list(states)
@@ -54,7 +53,7 @@ def test_nothing_replayed_leaves_the_labels_open_not_green(audits, tmp_path):
      (None, 1.0, "<=", None), (1.0, None, "<=", None)],
 )  # fmt: skip
 def test_a_number_holds_only_if_it_is_one(measured, limit, comparison, holds):
-    assert Answer("x", CauseLayer.DATA, "x", measured, limit, comparison).holds is holds
+    assert Answer("x", Topic.DATA, "x", measured, limit, comparison).holds is holds
 
 
 def test_the_page_compares_nothing_of_its_own(audits):

@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
@@ -12,6 +13,7 @@ from planar import LIMITS
 
 from genpolicy.pages.audit.evidence import read_evidence
 from genpolicy.pages.audit.page import audit_page, label_table, recovery_table
+from genpolicy.statistics.intervals import clopper_pearson
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +64,8 @@ def test_numbers_on_the_page_are_those_of_the_evidence(audits, pages):
     summary = json.loads((audits["valid"] / "summary.json").read_text())
     values = Reader(pages["valid"]).values
     for number in (
-        document(audits["valid"])["confidence"], summary["label_disagreement_upper"],
+        document(audits["valid"])["confidence"],
+        clopper_pearson(0, summary["label_replays"])[1],
         float(summary["counts"]["two_mode_episodes"]), LIMITS["label_disagreement"],
     ):  # fmt: skip
         assert json.dumps(number) in values
@@ -72,7 +75,7 @@ def test_numbers_on_the_page_are_those_of_the_evidence(audits, pages):
 
 
 def test_labels_are_told_by_mode_and_in_all(audits):
-    evidence = read_evidence(audits["labels"])
+    evidence = replace(read_evidence(audits["labels"]), coverage=0.95)
     rows = label_table(evidence)
     assert rows[-1]["mode"] == "all" and len(rows) >= 3
     for key in ("count", "agree", "lost", "gained"):
@@ -82,11 +85,13 @@ def test_labels_are_told_by_mode_and_in_all(audits):
     assert total["count"] - total["agree"] == evidence.summary["label_disagreements"]
 
 
-def test_recovery_has_an_exact_interval():
+@pytest.mark.parametrize(("coverage", "tail"), [(0.95, 0.025), (0.99, 0.005)])
+def test_recovery_has_an_exact_interval_of_the_coverage_that_judges(audits, coverage, tail):
     frame = pd.DataFrame([{"split": "train", "mode": "m0", "episodes": 10, "successes": 10}])
-    (row,) = recovery_table(frame)
-    # Clopper-Pearson for 10 of 10 at 95 %: lower end 0.025 ** (1 / 10).
-    assert row["upper"] == 1.0 and np.isclose(row["lower"], 0.025**0.1)
+    evidence = read_evidence(audits["valid"])
+    (row,) = recovery_table(replace(evidence, tables={"recovery": frame}, coverage=coverage))
+    # Clopper-Pearson for 10 of 10: the lower end is the tail to the power of 1 / 10.
+    assert row["upper"] == 1.0 and np.isclose(row["lower"], tail**0.1)
 
 
 def test_figures_and_tables_have_names_for_those_who_do_not_see_them(pages):

@@ -1,0 +1,242 @@
+"""Reading the audit's numbers, and those of its resamples, from its evidence."""
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Protocol, TypeVar
+
+from gates.cause.numbers import Counts, Kept, Labels, Numbers
+from gates.evidence import MissingEvidenceError
+from genpolicy.audit.component_rows import ComponentModes
+from genpolicy.audit.reach_rows import Alternative, FindingDraw, Reach, Side, StructureDraw
+from genpolicy.audit.rows import (
+    Calibration,
+    Clock,
+    Finding,
+    ModeOutcome,
+    Prediction,
+    ReplayRow,
+    Resample,
+    Stratum,
+)
+from genpolicy.errors import BadInputError
+from genpolicy.integrity.documents import read_json
+from genpolicy.integrity.rows import Row, read_rows
+
+Document = Callable[[str], Mapping[str, Any]]
+RESIDUALS: tuple[tuple[str, str, type[Any], str], ...] = (
+    ("clock_residual_s", "clocks.parquet", Clock, "offset_after_s"),
+    ("calibration_residual_m", "calibration.parquet", Calibration, "residual_m"),
+)
+"""Question, table, its rows and the column that answers where no finding does."""
+_OfPhase = TypeVar("_OfPhase", ModeOutcome, Alternative)
+
+
+class Rows(Protocol):
+    """A table of the evidence by file name, as rows of its class."""
+
+    def __call__(self, name: str, row: type[Row], /) -> list[Row]:
+        """The rows, possibly none."""
+
+
+def read_numbers(document: Document, rows: Rows) -> tuple[Numbers, tuple[Numbers, ...]]:
+    """The numbers of an audit, and those of its resamples.
+
+    Args:
+        document: A JSON document of the evidence by name.
+        rows: A table of the evidence by name and class of its rows.
+
+    Raises:
+        BadInputError: A document or table lacks something.
+    """
+    numbers = read_measured(document, rows)
+    with _written_by_this_version():
+        drawn = _draws(
+            numbers,
+            rows("resamples.parquet", Resample),
+            rows("structure_draws.parquet", StructureDraw),
+            rows("finding_draws.parquet", FindingDraw),
+        )
+        return numbers, tuple(drawn)
+
+
+def read_measured(document: Document, rows: Rows) -> Numbers:
+    """The numbers of an audit without its resamples; arguments and errors as `read_numbers`."""
+    summary, kept = document("summary.json"), document("persistence.json")
+    with _written_by_this_version():
+        sides, reach = rows("sides.parquet", Side), rows("reach.parquet", Reach)
+        kind = next(side.kind for side in sides if side.followed)
+        replayed = rows("replay.parquet", ReplayRow)
+        numbers = Numbers(
+            findings=tuple(rows("findings.parquet", Finding)),
+            floors={str(key): float(value) for key, value in summary["floors"].items()},
+            metre=float(summary["metre"]),
+            unit=str(summary["position_unit"]),
+            labels=_labels(len(replayed), sum(row.label != row.replayed for row in replayed)),
+            counts=_of(Counts, summary["counts"]),
+            kept=_of(Kept, kept),
+            strata=tuple(rows("strata.parquet", Stratum)),
+            told=tuple(rows("predictions.parquet", Prediction)),
+            modes=tuple(
+                _with_counts(mode, mode.successes, mode.admissible)
+                for mode in _of_phase(rows("modes.parquet", ModeOutcome), summary)
+            ),
+            components=tuple(rows("components.parquet", ComponentModes)),
+            alternatives=_of_phase(rows("alternatives.parquet", Alternative), summary),
+            reach=tuple(row for row in reach if row.kind == kind),
+            kind=kind,
+            other=next((side for side in sides if not side.followed), None),
+            other_reach=tuple(row for row in reach if row.kind != kind),
+            residuals=_residuals(rows),
+        )
+        _check_alternatives(numbers)
+        _check_known((*numbers.told, *reach, *sides))
+        return numbers
+
+
+def _labels(replays: int, disagreements: int) -> Labels:
+    _check_counts("replayed labels", disagreements, replays)
+    return Labels(replays, disagreements)
+
+
+def _with_counts(mode: ModeOutcome, successes: int, admissible: int) -> ModeOutcome:
+    _check_counts(f"episodes of {mode.mode}", successes, mode.episodes)
+    _check_counts(f"chunks of {mode.mode}", admissible, mode.checked)
+    return replace(mode, successes=successes, admissible=admissible)
+
+
+def _check_counts(what: str, count: int, total: int) -> None:
+    if not 0 <= count <= total:
+        raise ValueError(f"{count} of {total} {what}, which cannot be")
+
+
+def _residuals(rows: Rows) -> dict[str, float | None]:
+    """Largest residual of each question; a table that is not there leaves only its own open."""
+    found: dict[str, float | None] = {}
+    for question, name, kind, column in RESIDUALS:
+        found[question] = None
+        with suppress(MissingEvidenceError):
+            found[question] = _largest(getattr(row, column) for row in rows(name, kind))
+    return found
+
+
+def _largest(values: Iterable[float | None]) -> float | None:
+    """Largest absolute value; None of none, and where one is not known or not finite."""
+    found = [math.nan if value is None else abs(value) for value in values]
+    return max(found) if found and all(math.isfinite(value) for value in found) else None
+
+
+@contextmanager
+def _written_by_this_version() -> Iterator[None]:
+    try:
+        yield
+    except (KeyError, StopIteration, TypeError, ValueError) as error:
+        raise BadInputError(
+            where="the audit's evidence",
+            found=f"{type(error).__name__}: {error}",
+            expected="what this version of the audit writes",
+            action="Run the audit again.",
+        ) from error
+
+
+def _of_phase(rows: Sequence[_OfPhase], summary: Mapping[str, Any]) -> tuple[_OfPhase, ...]:
+    """Those of the phase with most situations."""
+    return tuple(row for row in rows if row.phase == summary["primary_phase"])
+
+
+def _check_known(rows: Iterable[object]) -> None:
+    """These are numbers throughout; one that is not there is no number."""
+    for row in rows:
+        for name, value in vars(row).items():
+            if value is None:
+                raise ValueError(f"{type(row).__name__}.{name} is not known")
+
+
+def _check_alternatives(numbers: Numbers) -> None:
+    known = {mode.mode for mode in numbers.modes}
+    named = {name for row in numbers.alternatives for name in (row.mode, row.other)}
+    if not named <= known:
+        raise ValueError(f"alternatives names the modes {sorted(named - known)}, which are none")
+
+
+def folder_numbers(folder: Path) -> tuple[Numbers, tuple[Numbers, ...]]:
+    """`read_numbers` of an evidence folder.
+
+    Raises:
+        BadInputError: A file is missing or damaged.
+    """
+    return read_numbers(
+        lambda name: read_json(folder / name),
+        lambda name, row: read_rows(folder / name, row),
+    )
+
+
+def _draws(
+    measured: Numbers,
+    rows: Iterable[Resample],
+    structures: Iterable[StructureDraw],
+    findings: Iterable[FindingDraw],
+) -> Iterator[Numbers]:
+    """What was measured, with the numbers of each resample in their places."""
+    halves: dict[int, list[Finding]] = {}
+    for item in findings:
+        halves.setdefault(item.draw, []).append(item.finding)
+    for row, drawn in zip(rows, structures, strict=True):
+        tests = zip(row.p_adjusted, row.effect, row.effect_lower, strict=True)
+        outcomes = zip(drawn.successes, row.admissible, strict=True)
+        yield replace(
+            measured,
+            findings=measured.findings
+            if drawn.findings < 0
+            else tuple(halves.get(drawn.findings, ())),
+            reach=_reach(measured.reach, drawn),
+            labels=_labels(measured.labels.replays, row.disagreements),
+            counts=replace(
+                measured.counts,
+                queries=drawn.queries,
+                analysed=drawn.analysed,
+                analysed_episodes=drawn.analysed_episodes,
+                primary_episodes=drawn.primary_episodes,
+                resolved=drawn.resolved,
+                noise_ratio=drawn.noise_ratio,
+                noise_spread=drawn.noise_spread,
+                white_share=drawn.white_share,
+                two_mode=row.two_mode,
+                two_mode_episodes=row.two_mode_episodes,
+                incoherent=row.incoherent,
+                persistent=row.persistent,
+            ),
+            kept=Kept(row.kept, row.kept_null_q95, row.kept_n),
+            strata=tuple(
+                replace(stratum, p_adjusted=p, effect=effect, effect_lower=lower)
+                for stratum, (p, effect, lower) in zip(measured.strata, tests, strict=True)
+            ),
+            told=tuple(
+                _moved(told, value) for told, value in zip(measured.told, row.told, strict=True)
+            ),
+            modes=tuple(
+                _with_counts(mode, successes, admissible)
+                for mode, (successes, admissible) in zip(measured.modes, outcomes, strict=True)
+            ),
+        )
+
+
+def _reach(measured: tuple[Reach, ...], drawn: StructureDraw) -> tuple[Reach, ...]:
+    """The fifths of the way with the numbers of a draw."""
+    numbers = zip(measured, drawn.reach_queries, drawn.reach_spoke, strict=True)
+    return tuple(replace(row, queries=queries, spoke=spoke) for row, queries, spoke in numbers)
+
+
+def _moved(row: Prediction, told: float) -> Prediction:
+    """The same row with another number, and the interval about it."""
+    away = told - row.told
+    return replace(
+        row, told=told, told_lower=row.told_lower + away, told_upper=row.told_upper + away
+    )
+
+
+def _of(kind: Any, row: Mapping[str, Any]) -> Any:
+    """A result class from the values of its fields; others are left out."""
+    return kind(**{name: row[name] for name in kind.__dataclass_fields__})
