@@ -68,7 +68,7 @@ def name_cause(numbers: Numbers, draws: Sequence[Numbers], limits: CauseLimits) 
     Raises:
         ConfigError: A limit lies below what the audit looked for.
     """
-    check_floors(numbers, limits)
+    check_reach(numbers, limits)
     answers: list[Answer] = []
     verdict = Diagnosis(CauseName.VALID_MODES, "", "", NEXT)
     red = Topic.NONE
@@ -110,7 +110,7 @@ def deciding_answer(question: str, numbers: Numbers, limits: CauseLimits) -> Ans
     Raises:
         ConfigError: A limit lies below what the audit looked for.
     """
-    check_floors(numbers, limits)
+    check_reach(numbers, limits)
     found = [answer for judge in TOPICS.values() for answer in judge(numbers, limits)[0]]
     held = [item for item in found if item.question == question and item.limit is not None]
 
@@ -173,21 +173,31 @@ def _words(said: Diagnosis) -> str:
     return in_words(said.name, said.variable or said.kind)
 
 
-def check_floors(numbers: Numbers, limits: CauseLimits) -> None:
-    """Refuse limits of which the evidence says nothing.
+def check_reach(numbers: Numbers, limits: CauseLimits) -> None:
+    """Refuse limits that would be without effect on this evidence.
 
     Raises:
-        ConfigError: A limit lies below what the audit looked for.
+        ConfigError: A limit lies below what the audit looked for, or above where modes were taken
+            back.
     """
+    # Both may have been converted to metres and back.
     for question, floor in sorted(numbers.floors.items()):
-        # Floors may have been converted to metres and back.
         if not limits[question] - floor * (1.0 - 1e-9) >= 0:
-            raise ConfigError(
-                where=f"the limit of {question}",
-                found=f"{limits[question]:g}",
-                expected=f"at least {floor:g}, from where on the audit looks",
-                action="Raise the limit, or lower the audit's floor and audit again.",
-            )
+            where = f"at least {floor:g}, from where on the audit looks"
+            raise _without_effect(question, limits, where, "Raise the limit, or lower the floor")
+    for question, ceiling in sorted(numbers.ceilings.items()):
+        if not ceiling * (1.0 + 1e-9) - limits[question] >= 0:
+            where = f"at most {ceiling:g}, from where on the audit takes modes back"
+            raise _without_effect(question, limits, where, "Lower the limit, or raise the ceiling")
+
+
+def _without_effect(question: str, limits: CauseLimits, expected: str, action: str) -> ConfigError:
+    return ConfigError(
+        where=f"the limit of {question}",
+        found=f"{limits[question]:g}",
+        expected=expected,
+        action=f"{action} in the audit's settings and audit again.",
+    )
 
 
 def _data(numbers: Numbers, limits: CauseLimits) -> Named:

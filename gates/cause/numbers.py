@@ -55,6 +55,7 @@ class Numbers:
     Attributes:
         findings: Deviations of the data, in the order of diagnosis.
         floors: Where the audit begins to report, by question.
+        ceilings: Where the audit takes modes back, by question.
         metre: How much of the position's unit stands for a metre.
         unit: Unit of the position.
         labels: Labels against replay.
@@ -77,6 +78,7 @@ class Numbers:
 
     findings: tuple[Finding, ...]
     floors: Mapping[str, float]
+    ceilings: Mapping[str, float]
     metre: float
     unit: str
     labels: Labels

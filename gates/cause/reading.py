@@ -72,6 +72,7 @@ def read_measured(document: Document, rows: Rows) -> Numbers:
         numbers = Numbers(
             findings=tuple(rows("findings.parquet", Finding)),
             floors={str(key): float(value) for key, value in summary["floors"].items()},
+            ceilings={str(key): float(value) for key, value in summary["ceilings"].items()},
             metre=float(summary["metre"]),
             unit=str(summary["position_unit"]),
             labels=_labels(len(replayed), sum(row.label != row.replayed for row in replayed)),

@@ -89,6 +89,7 @@ def summary(result: AuditResult, settings: AuditSettings) -> dict[str, Any]:
         "modes_after_realignment": result.modes_after_realignment,
         "episodes": len(result.data.episodes),
         "floors": settings.floors,
+        "ceilings": settings.ceilings,
         "metre": settings.metre,
         "primary_phase": result.primary_phase,
         "rows": len(result.data.observation),

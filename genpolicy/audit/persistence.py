@@ -20,7 +20,6 @@ from genpolicy.audit.settings import AuditSettings
 
 NULL_QUANTILE = 0.95
 MINIMUM_PER_MODE = 2
-POINTWISE_RATIO = 0.5  # half way from a smooth spread to white noise
 
 
 @dataclass(frozen=True)

@@ -91,6 +91,9 @@ class AuditSettings(BaseModel):
             looked at in ten situations an episode up to a tenth of them.
         minimum_persistent_share: Share of a phase's situations with clusters that must keep them,
             each beyond its own shuffled-time null, for the clusters to be modes: most of them.
+        white_ratio: Median von Neumann ratio along the chunk (0 smooth, 1 white noise) from which
+            on a phase's clusters are no modes: half way. The ceiling of the limit on noise, since a
+            higher one would find the modes taken back already.
         strata_resolution: Smallest adjusted p-value that the permutations must be able to reach,
             doubled.
         permutations: Permutations per test.
@@ -154,6 +157,7 @@ class AuditSettings(BaseModel):
     minimum_two_mode_situations: int = Field(default=5, ge=1)
     minimum_two_mode_share: float = Field(default=0.2, gt=0, lt=1)
     minimum_persistent_share: float = Field(default=0.5, gt=0, le=1)
+    white_ratio: float = Field(default=0.5, gt=0, le=1)
     strata_resolution: float = Field(default=0.05, gt=0, lt=1)
     permutations: int = Field(default=999, ge=99)
     resamples: int = Field(default=200, ge=20)
@@ -177,6 +181,11 @@ class AuditSettings(BaseModel):
             "two_mode_episodes": self.minimum_two_mode_situations,
             "two_mode_share": self.minimum_two_mode_share,
         }
+
+    @property
+    def ceilings(self) -> dict[str, float]:
+        """Where modes are taken back, by the question whose limit may not lie above it."""
+        return {"noise_ratio": self.white_ratio}
 
     def least_two_mode_episodes(self, analysed: int) -> int:
         """Held-out episodes with several modes that it takes among so many analysed ones."""

@@ -11,7 +11,6 @@ from genpolicy.audit.mean_versus_modes import Admissible, MeanVersusModes, compa
 from genpolicy.audit.modes import ROUTE_CHUNKS, Clustering, cluster_chunks
 from genpolicy.audit.neighbourhoods import Neighbourhood, Support, find
 from genpolicy.audit.persistence import (
-    POINTWISE_RATIO,
     kept_between,
     kept_identity,
     persistent,
@@ -175,7 +174,7 @@ def coherent(
     soon to tell are kept only if no other phase has modes.
 
     Args:
-        settings: Share of the measured situations that must persist.
+        settings: Share of the measured situations that must persist, and how white is too white.
         situations: Every analysed situation.
 
     Returns:
@@ -215,14 +214,14 @@ def coherent_phases(settings: AuditSettings, claims: list[Claim], weights: Array
             measured[phase] = measured.get(phase, 0.0) + known
             persist[phase] = persist.get(phase, 0.0) + known * claim.persists
             ratios.setdefault(phase, []).append(claim.noise_ratio)
-    least = settings.minimum_two_mode_situations
+    least, white = settings.minimum_two_mode_situations, settings.white_ratio
     good = {
         phase
         for phase, count in measured.items()
         if count >= least and persist[phase] - settings.minimum_persistent_share * count >= 0
     }
     good = good or {phase for phase, count in measured.items() if count < least}
-    return good - {phase for phase, found in ratios.items() if np.median(found) >= POINTWISE_RATIO}
+    return good - {phase for phase, found in ratios.items() if np.median(found) >= white}
 
 
 def by_phase(situations: tuple[Situation, ...]) -> Several:

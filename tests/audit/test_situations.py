@@ -40,3 +40,10 @@ def test_clusters_of_white_noise_are_no_modes():
     white = [situation("approach", True, ratio=0.9)] * 10
     assert phases(white) == (set(), 10)
     assert phases([*white, *[situation("align", True)] * 6]) == ({"align"}, 10)
+
+
+def test_how_white_is_too_white_is_a_setting_and_the_ceiling_of_the_limit_on_noise():
+    rough = tuple([situation("approach", True, ratio=0.3)] * 10)
+    stricter = SETTINGS.model_copy(update={"white_ratio": 0.3})
+    assert coherent(SETTINGS, rough)[1] == 0 and coherent(stricter, rough)[1] == 10
+    assert (SETTINGS.ceilings, stricter.ceilings) == ({"noise_ratio": 0.5}, {"noise_ratio": 0.3})

@@ -10,7 +10,7 @@ TOP = ("benchmarks", "flows", "gates", "genpolicy", "stages", "tests")
 
 def rows(text: str) -> list[tuple[str, str]]:
     """Folder and what it holds, of each row of the map."""
-    section = text.split("## Where things live")[1].split("\n## ")[0]
+    section = text.partition("## Where things live")[2].partition("\n## ")[0]
     found = [line.strip("|").split("|") for line in section.splitlines() if line.startswith("| `")]
     return [(row[0], row[1]) for row in found]
 

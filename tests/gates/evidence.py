@@ -588,6 +588,7 @@ def _audit(root: Path) -> None:
         "audit/summary.json",
         {
             "floors": {},
+            "ceilings": {},
             "metre": 1.0,
             "primary_phase": "approach",
             "label_replays": 40,

@@ -40,7 +40,8 @@ TOLD = Prediction("operator", "approach", 0.05, -0.1, 0.2, 0.52, 0.5, 120)
 
 
 VALID = Numbers(
-    findings=(), floors=AuditSettings().floors, metre=1.0, unit="m",
+    findings=(), floors=AuditSettings().floors, ceilings=AuditSettings().ceilings,
+    metre=1.0, unit="m",
     labels=Labels(60, 0),
     counts=Counts(200, 180, 50, 120, 45, 50, 0, 0, 110, 0.1, 0.01, 0.02),
     kept=Kept(0.95, 0.6, 118), strata=(STRATUM,), told=(TOLD,),

@@ -24,6 +24,14 @@ def test_a_limit_below_what_the_audit_looked_for_is_refused(question):
         named(VALID, limit(**{question: below}))
 
 
+@pytest.mark.parametrize("question", sorted(AuditSettings().ceilings))
+def test_a_limit_above_where_the_audit_takes_modes_back_is_refused(question):
+    ceiling = AuditSettings().ceilings[question]
+    assert LIMITS[question] <= ceiling
+    with pytest.raises(ConfigError, match=rf"limit of {question} is .*, expected at most"):
+        named(VALID, limit(**{question: 1.1 * ceiling}))
+
+
 def test_every_deviation_above_zero_that_is_looked_for_has_a_floor():
     # A finding is made beyond its floor only: without one a lower limit would be without effect.
     zero = {"clock_disorder", "swapped_columns"}

@@ -30,7 +30,8 @@ TABLES = {
 }
 DOCUMENTS = {
     "summary.json": {
-        "floors": {}, "metre": 1.0, "position_unit": "m", "primary_phase": "approach",
+        "floors": {}, "ceilings": {}, "metre": 1.0, "position_unit": "m",
+        "primary_phase": "approach",
         "counts": vars(VALID.counts),
     },
     "persistence.json": vars(VALID.kept),
