@@ -26,7 +26,7 @@ OWN = (
     "clock_disorder", "rate_deviation", "gap_share", "frozen_s", "jitter_share", "lag_drift_steps",
     "gain_factor", "gain_epoch_factor", "magnitude_factor", "frame_angle_rad", "swapped_columns",
     "faulty_episodes_share", "supported_episodes", "supported_share", "denial_share",
-    "two_mode_episodes", "two_mode_share", "incoherent_share", "noise_ratio",
+    "two_mode_episodes", "two_mode_share", "two_mode_chance", "incoherent_share", "noise_ratio",
     "noise_spread_m", "white_share", "strata_p", "strata_effect_lower", "nearly_equal_effect",
     "everything_handicap", "cause_agreement",
 )  # fmt: skip

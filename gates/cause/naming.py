@@ -24,7 +24,7 @@ from gates.cause.limits import CauseLimits
 from gates.cause.numbers import Numbers
 from gates.cause.reading import folder_numbers
 from gates.cause.structure import structure, support
-from gates.cause.validity import found_words, validity
+from gates.cause.validity import beside_the_choice, found_words, validity
 from genpolicy.errors import ConfigError
 from genpolicy.statistics.intervals import clopper_pearson
 
@@ -102,7 +102,8 @@ def deciding_answer(question: str, numbers: Numbers, limits: CauseLimits) -> Ans
     """The answer to a question on which it rests whether its limit is kept.
 
     The one furthest beyond the limit; where all that are known keep it, one that is not known, else
-    the one nearest to it. Those without a limit are only shown.
+    the one nearest to it. Those without a limit are only shown; modes beside a choice are held to
+    it here, and not where the cause is named.
 
     Returns:
         None where no number is held to the limit.
@@ -112,6 +113,7 @@ def deciding_answer(question: str, numbers: Numbers, limits: CauseLimits) -> Ans
     """
     check_reach(numbers, limits)
     found = [answer for judge in TOPICS.values() for answer in judge(numbers, limits)[0]]
+    found += beside_the_choice(numbers, limits)
     held = [item for item in found if item.question == question and item.limit is not None]
 
     def margin(item: Answer) -> tuple[int, float]:

@@ -8,6 +8,7 @@ from gates.cause.hidden import OBSERVED, hidden, told_by_episode
 from gates.cause.limits import CauseLimits
 from gates.cause.numbers import Numbers, turned
 from genpolicy.audit.reach_rows import LEARNED, LOCAL, Reach
+from genpolicy.statistics.intervals import clopper_pearson
 
 WORDS = {
     LOCAL: "enough comparable demonstrations",
@@ -191,13 +192,22 @@ def _absent(
     counts, unread = numbers.counts, unreadable(numbers)
     blank = [row for row in numbers.reach if limits["denial_share"] - row.share > 0]
     apart = counts.incoherent / counts.analysed if counts.analysed else 0.0
-    answers = [*_denied(numbers, limits), _falling_apart(numbers, limits, apart)]
-    if any(answer.red for answer in answers[:2]):
+    denied, falling = _denied(numbers, limits), _falling_apart(numbers, limits, apart)
+    few = _few(numbers, limits)
+    answers = [*denied, falling, few]
+    if any(answer.red for answer in denied):
         return answers, thin(_where(numbers, limits, blank))
     if white:
         return answers, _noise("The spread is noise from action to action")
-    if answers[-1].red:
+    if falling.red:
         return answers, _noise(f"The clusters of {apart:.0%} of the situations do not persist")
+    if few.red:
+        text = (
+            f"Clusters were found in {counts.two_mode_episodes} of {counts.primary_episodes} "
+            f"held-out episodes: more than chance gives ({limits['two_mode_chance']:.0%}), fewer "
+            f"than show modes ({limits['two_mode_share']:.0%}): record more, from fewer starts."
+        )
+        return answers, thin(text, kind="few_clusters")
     if unread:
         text = (
             f"No modes were found, but those of {', '.join(unread)} could not be looked for: "
@@ -234,6 +244,20 @@ def _denied(numbers: Numbers, limits: CauseLimits) -> list[Answer]:
             )
         )  # fmt: skip
     return answers
+
+
+def _few(numbers: Numbers, limits: CauseLimits) -> Answer:
+    """Too few episodes with clusters to show modes; may they be more than chance gives?"""
+    counts = numbers.counts
+    # One side is asked, so that side alone has the confidence.
+    coverage = 2.0 * limits.confidence - 1.0
+    lower = clopper_pearson(counts.two_mode_episodes, counts.primary_episodes, coverage)[0]
+    return Answer(
+        "two_mode_chance", Topic.STRUCTURE,
+        "share of held-out episodes with several modes, lower bound", lower,
+        limits["two_mode_chance"], "<=",
+        note=f"{counts.two_mode_episodes} of {counts.primary_episodes}",
+    )  # fmt: skip
 
 
 def _falling_apart(numbers: Numbers, limits: CauseLimits, apart: float) -> Answer:

@@ -60,6 +60,26 @@ def _best_choice(numbers: Numbers, limits: CauseLimits) -> set[str]:
     )
 
 
+def beside_the_choice(numbers: Numbers, limits: CauseLimits) -> list[Answer]:
+    """Modes that stand beside the best choice, held to what no demonstration may fall below.
+
+    The cause is a choice between valid modes whatever stands beside them. Whoever trains on all
+    of the recordings trains on those as well, so Gate A refuses a mode that surely fails (by its
+    upper bound), or that is not feasible; of one with few episodes nothing is claimed.
+    """
+    chosen, found = _best_choice(numbers, limits), []
+    for mode in numbers.modes if chosen else ():
+        if mode.mode in chosen:
+            continue
+        upper = _ends(mode.successes, mode.episodes, limits)[1]
+        if not upper - limits["mode_success_lower"] >= 0:
+            success = _success(mode, limits)
+            text = f"success of {mode.mode}, upper bound: it surely fails"
+            found.append(replace(success, what=text, measured=upper))
+        found += [_feasible(mode, limits)] if mode.checked else []
+    return found
+
+
 def _no_choice(numbers: Numbers, limits: CauseLimits) -> Diagnosis:
     """What is wrong with the choices between modes, none of which is between valid ones.
 

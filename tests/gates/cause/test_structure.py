@@ -28,6 +28,21 @@ def test_one_action_is_not_said_where_situations_crowd_at_the_end():
     assert named(replace(VALID, reach=crowded.reach)).name is CauseName.VALID_MODES
 
 
+@pytest.mark.parametrize(
+    ("episodes", "name", "kind"),
+    [(0, "unimodal", ""), (5, "unimodal", ""), (8, "unimodal", ""),
+     (9, "insufficient_support", "few_clusters")],
+)  # fmt: skip
+def test_clusters_surely_more_often_than_by_luck_are_not_denied(episodes, name, kind):
+    """Nine of 48: modes take a fifth, and luck gives less than a tenth in 19 of 20 cases."""
+    few = {"two_mode": 3 * episodes, "two_mode_episodes": episodes, "persistent": 0}
+    cause = named(counts(**few, primary_episodes=48))
+    assert (cause.name.value, cause.kind) == (name, kind)
+    assert ("9 of 48 held-out episodes: more than chance gives (10%)" in cause.next_action) == (
+        episodes == 9
+    )
+
+
 @pytest.mark.parametrize(("apart", "name"), [(60, "unimodal"), (900, "pointwise_noise")])
 def test_a_handful_of_clusters_that_fall_apart_is_no_noise(apart, name):
     numbers = counts(
