@@ -44,12 +44,14 @@ NO_FRAMES = {
     "event.payload": "an event of a journal",
     "error.errors()[0]": "an error of pydantic",
     "Literal": "a type",
-    "terms": "latency terms by name",
 }
 # A column that a library makes: (file, column).
 MADE = {
     ("genpolicy/pages/figures/checks.py", "size"): "pandas: `agg` names it so",
     ("genpolicy/pages/figures/checks.py", "sum"): "the same",
+    ("gates/pages/plots_need.py", "mean"): "the same",
+    ("gates/pages/plots_need.py", "size"): "the same",
+    ("gates/pages/plots_convergence.py", "total"): "made in `gates.reproducibility.convergence`",
 }
 # Methods of a frame that take names of columns, and functions that take one after the frame.
 METHODS = {"groupby", "sort_values", "drop_duplicates", "set_index", "pivot", "dropna"}
@@ -82,17 +84,14 @@ def made(tree: ast.AST) -> set[str]:
     """Columns that a module makes: by `assign`, by a name for what is aggregated, by storing."""
     found: set[str] = set()
     for node in ast.walk(tree):
-        if isinstance(node, ast.Subscript) and isinstance(node.ctx, ast.Store):
-            found |= texts(node.slice)
-        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
-            if node.func.attr in {"assign", "agg", "rename", "DataFrame"}:
+        match node:
+            case ast.Subscript(ctx=ast.Store(), slice=name):
+                found |= texts(name)
+            case ast.Call(func=ast.Attribute(attr="assign" | "agg" | "rename" | "DataFrame")):
                 found |= {keyword.arg for keyword in node.keywords if keyword.arg}
+                tables = [part for part in ast.walk(node) if isinstance(part, ast.Dict)]
                 found |= {
-                    key.value
-                    for part in ast.walk(node)
-                    if isinstance(part, ast.Dict)
-                    for key in part.keys
-                    if isinstance(key, ast.Constant) and isinstance(key.value, str)
+                    name for part in tables for key in part.keys if key for name in texts(key)
                 }
     return found
 
