@@ -46,7 +46,9 @@ def _fewer_rollouts(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def _unjudged(workspace: Path) -> None:
-    (workspace / "artifacts/stress/journals/extra.mcap").write_bytes(b"nobody judged this")
+    folder = workspace / "artifacts/stress/journals"
+    folder.mkdir(exist_ok=True)  # synthetic evidence has none
+    (folder / "extra.mcap").write_bytes(b"nobody judged this")
 
 
 WRONGS = (
