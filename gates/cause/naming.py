@@ -21,7 +21,7 @@ from gates.cause.answers import (
 from gates.cause.components import others
 from gates.cause.hidden import hidden
 from gates.cause.limits import CauseLimits
-from gates.cause.numbers import Numbers
+from gates.cause.numbers import Numbers, Residual
 from gates.cause.reading import folder_numbers
 from gates.cause.structure import structure, support
 from gates.cause.validity import beside_the_choice, found_words, validity
@@ -225,9 +225,7 @@ def _data(numbers: Numbers, limits: CauseLimits) -> Named:
     return answers, verdict
 
 
-def _residual(
-    question: str, residual: float | None, numbers: Numbers, limits: CauseLimits
-) -> Answer:
+def _residual(question: str, residual: Residual, numbers: Numbers, limits: CauseLimits) -> Answer:
     """A residual where no finding speaks of it: what noise explains is never red.
 
     One beyond the limit that does not stand out of what the episodes scatter by is not known to
@@ -235,14 +233,15 @@ def _residual(
     """
     in_metres = question in IN_METRES
     limit = limits[question] * (numbers.metre if in_metres else 1.0)
-    known = residual is not None and limit - residual >= 0
+    value = residual.value
+    known = value is not None and limit - value >= 0
     note = "nothing stands out of what the episodes scatter by"
-    if residual is None:
-        note = "not measured in every epoch"
+    if value is None:
+        note = residual.why
     elif not known:
-        note = f"{residual:.4g} is beyond the limit, and {note}: too little to say"
+        note = f"{value:.4g} is beyond the limit, and {note}: too little to say"
     return Answer(
-        question, Topic.DATA, RESIDUALS[question], residual if known else None, limit,
+        question, Topic.DATA, RESIDUALS[question], value if known else None, limit,
         unit=numbers.unit if in_metres else "s", note=note,
     )  # fmt: skip
 

@@ -49,6 +49,14 @@ class Kept:
 
 
 @dataclass(frozen=True)
+class Residual:
+    """Largest residual over epochs; None where it is not known, and then why."""
+
+    value: float | None
+    why: str = ""
+
+
+@dataclass(frozen=True)
 class Numbers:
     """All that a cause is named from.
 
@@ -72,8 +80,7 @@ class Numbers:
         kind: Which that is, `local` or `learned`.
         other: What the other one found; None where there is none.
         other_reach: How far that reaches.
-        residuals: Largest residual over epochs by question, of those that are measured whether or
-            not they stand out; None where some epoch's is not known.
+        residuals: By question, of those that are measured whether or not they stand out.
     """
 
     findings: tuple[Finding, ...]
@@ -93,7 +100,7 @@ class Numbers:
     kind: str = LOCAL
     other: Side | None = None
     other_reach: tuple[Reach, ...] = ()
-    residuals: Mapping[str, float | None] = field(default_factory=dict)
+    residuals: Mapping[str, Residual] = field(default_factory=dict)
 
 
 def turned(numbers: Numbers) -> Numbers:

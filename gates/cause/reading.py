@@ -2,12 +2,12 @@
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
-from gates.cause.numbers import Counts, Kept, Labels, Numbers
+from gates.cause.numbers import Counts, Kept, Labels, Numbers, Residual
 from gates.evidence import MissingEvidenceError
 from genpolicy.audit.component_rows import ComponentModes
 from genpolicy.audit.reach_rows import Alternative, FindingDraw, Reach, Side, StructureDraw
@@ -113,20 +113,23 @@ def _check_counts(what: str, count: int, total: int) -> None:
         raise ValueError(f"{count} of {total} {what}, which cannot be")
 
 
-def _residuals(rows: Rows) -> dict[str, float | None]:
+def _residuals(rows: Rows) -> dict[str, Residual]:
     """Largest residual of each question; a table that is not there leaves only its own open."""
-    found: dict[str, float | None] = {}
+    found: dict[str, Residual] = {}
     for question, name, kind, column in RESIDUALS:
-        found[question] = None
-        with suppress(MissingEvidenceError):
+        try:
             found[question] = _largest(getattr(row, column) for row in rows(name, kind))
+        except MissingEvidenceError as error:
+            found[question] = Residual(None, str(error))
     return found
 
 
-def _largest(values: Iterable[float | None]) -> float | None:
-    """Largest absolute value; None of none, and where one is not known or not finite."""
+def _largest(values: Iterable[float | None]) -> Residual:
+    """Largest absolute value; not known of none, and where one is not known or not finite."""
     found = [math.nan if value is None else abs(value) for value in values]
-    return max(found) if found and all(math.isfinite(value) for value in found) else None
+    if not found or not all(math.isfinite(value) for value in found):
+        return Residual(None, "not measured in every epoch")
+    return Residual(max(found))
 
 
 @contextmanager

@@ -47,7 +47,8 @@ def test_numbers_are_read_as_they_were_measured():
     numbers = read()
     assert (numbers.modes, numbers.strata, numbers.kept) == (VALID.modes, VALID.strata, VALID.kept)
     assert (numbers.labels.replays, numbers.labels.disagreements) == (40, 0)
-    assert numbers.residuals == {"clock_residual_s": 0.002, "calibration_residual_m": None}
+    assert numbers.residuals["clock_residual_s"].value == 0.002
+    assert numbers.residuals["calibration_residual_m"].value is None
     assert numbers == read_numbers(
         DOCUMENTS.__getitem__, lambda name, _: list(TABLES.get(name, ()))
     )[0]  # fmt: skip
@@ -56,7 +57,8 @@ def test_numbers_are_read_as_they_were_measured():
 def test_a_residual_of_which_one_epoch_is_not_known_is_not_known():
     for value in (None, math.nan):
         found = read(clocks=[CLOCK, replace(CLOCK, offset_after_s=value)]).residuals
-        assert found["clock_residual_s"] is None
+        assert found["clock_residual_s"].value is None
+        assert found["clock_residual_s"].why == "not measured in every epoch"
 
 
 def test_a_table_of_residuals_that_is_not_there_leaves_only_its_question_open():
@@ -65,7 +67,8 @@ def test_a_table_of_residuals_that_is_not_there_leaves_only_its_question_open():
             raise MissingEvidenceError(name)
         return list(TABLES.get(name, ()))
 
-    assert read_measured(DOCUMENTS.__getitem__, rows).residuals["clock_residual_s"] is None
+    found = read_measured(DOCUMENTS.__getitem__, rows).residuals["clock_residual_s"]
+    assert (found.value, found.why) == (None, "clocks.parquet")
 
 
 @pytest.mark.parametrize(
