@@ -29,11 +29,14 @@ class Before:
         choices: Their choices. Length n.
         past: Features of the past, as centred ranks between -0.5 and 0.5. Shape (n, P).
         present: The same of the present. Shape (n, F).
+        reached: Episodes with a choice anywhere that long after their start, whether or not the
+            clusters still stood together there. At the start nothing was seen before.
     """
 
     choices: Choices
     past: Array
     present: Array
+    reached: int
 
 
 def seen_before(
@@ -61,16 +64,15 @@ def seen_before(
     past = np.full((n, past_features(data, settings, first)[0].shape[1]), np.nan)
     present = np.full((n, present_features(data, settings, first).shape[1]), np.nan)
     place = {int(episode): number for number, episode in enumerate(choices.episode)}
-    missing = np.ones(n, dtype=bool)
+    missing, reached = np.ones(n, dtype=bool), np.zeros(n, dtype=bool)
     for number in np.argsort(np.round(gaps, 6), kind="stable"):
-        if not STILL_TOGETHER - gaps[int(number)] > 0:
-            break
         rows = items[int(number)][0].members
         rows = rows[[int(data.episode[row]) in place for row in rows]]
         rows = rows[rows - data.first_row[rows] >= gap]
         at = np.array([place[int(data.episode[row])] for row in rows], dtype=np.int64)
-        new = missing[at]
-        if not new.any() or len(np.unique(choices.mode[at])) < 2:
+        reached[at] = True
+        new, together = missing[at], STILL_TOGETHER - gaps[int(number)] > 0
+        if not together or not new.any() or len(np.unique(choices.mode[at])) < 2:
             continue
         earlier = past_features(data, settings, rows)[0]
         now = present_features(data, settings, rows)
@@ -80,4 +82,4 @@ def seen_before(
         missing[at] = False
     known = ~missing
     part = Choices(choices.episode[known], choices.mode[known], choices.share[known])
-    return Before(part, past[known], present[known])
+    return Before(part, past[known], present[known], int(np.count_nonzero(reached)))

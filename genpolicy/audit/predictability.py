@@ -36,6 +36,7 @@ from genpolicy.seeds import stream
 CONFIDENCE = 0.9  # each end of the interval is a bound of 95 %
 REPEATS = 5
 LEAST_EPISODES = 20
+NOTHING_BEFORE = "the choice is at the start: nothing was seen before it"
 ORDER, SEQUENCE, HISTORY, TOGETHER = (
     "episode_order", "recording_sequence", "history", "everything_together",
 )  # fmt: skip
@@ -101,6 +102,10 @@ def predictions(
         if len(seen.choices.mode) >= LEAST_EPISODES:
             rng = stream(root_seed, "audit", "predictability", phase, HISTORY)
             rows.append(_past(phase, seen, rng))
+        elif seen.reached < LEAST_EPISODES <= len(chosen.mode):
+            by_luck, n = chosen.chance, len(chosen.mode)
+            none = 0.0, 0.0, 0.0, by_luck, by_luck
+            rows.append(Prediction(HISTORY, phase, *none, n, NOTHING_BEFORE))
     return tuple(rows)
 
 

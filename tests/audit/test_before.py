@@ -1,5 +1,7 @@
 """What was seen before a choice: ranks among those who saw the same, where there is a past."""
 
+from dataclasses import replace
+
 import numpy as np
 from planar import SETTINGS
 
@@ -16,8 +18,8 @@ from genpolicy.audit.situations import find_situations
 PLAN = Plan(5, shares=(0.5, 0.5), episodes=90, exact=True, decided_by="lamp_early", fidelity=1.0)
 
 
-def chosen(stride=10):
-    data = canonical(record("planar", PLAN).data)
+def chosen(stride=10, plan=PLAN):
+    data = canonical(record("planar", plan).data)
     settings = SETTINGS.model_copy(update={"query_stride": stride})
     items = [(i, c) for _, i, c in find_situations(data, settings, 0)[0] if c.count > 1]
     links = link([(data.episode[i.members], c.labels) for i, c in items], len(data.episodes), 6)
@@ -46,4 +48,13 @@ def test_only_situations_that_have_a_past_and_stand_together_are_asked():
     assert len(seen.choices.episode) and set(map(int, seen.choices.episode)) <= late
     assert np.all(np.isfinite(seen.past)) and np.all(np.isfinite(seen.present))
     apart = [item for item in items if observed_gap(data, settings, *item) >= STILL_TOGETHER]
-    assert len(seen_before(data, settings, apart, who).choices.episode) == 0
+    later = seen_before(data, settings, apart, who)
+    assert len(later.choices.episode) == 0 and later.reached > 0
+    assert seen.reached >= len(seen.choices.episode)
+
+
+def test_at_the_start_of_an_episode_nothing_was_seen_before():
+    data, settings, items, who = chosen(stride=4, plan=replace(PLAN, decided_by="chance"))
+    gap = shortest_gap(settings)
+    first = [(i, c) for i, c in items if np.all(i.members - data.first_row[i.members] < gap)]
+    assert first and seen_before(data, settings, first, who).reached == 0

@@ -10,9 +10,17 @@ from benchmarks.audit.plan import Plan
 from benchmarks.audit.planar import admissible
 from benchmarks.audit.recorder import record
 from gates.cause import CauseName
+from genpolicy.audit.before import STILL_TOGETHER
 from genpolicy.audit.data import canonical
+from genpolicy.audit.history import shortest_gap
 from genpolicy.audit.linking import link
-from genpolicy.audit.predictability import HISTORY, LEAST_EPISODES, predictions
+from genpolicy.audit.predictability import (
+    HISTORY,
+    LEAST_EPISODES,
+    NOTHING_BEFORE,
+    predictions,
+)
+from genpolicy.audit.resolution import observed_gap
 from genpolicy.audit.run import audit
 from genpolicy.audit.situations import find_situations
 from genpolicy.seeds import stream
@@ -99,6 +107,29 @@ def test_what_only_a_combination_tells_is_told_by_everything_together():
     found = {row.variable: row for row in rows}
     assert found["everything_together"].told_lower > 0.7
     assert max(found["operator"].told, found["object"].told) < 0.4
+
+
+def test_a_choice_at_the_start_has_no_past_that_could_tell_and_that_is_an_answer():
+    data = canonical(record("planar", planned()).data)
+    settings = SETTINGS.model_copy(update={"query_stride": 4})
+    several = [(i, c) for _, i, c in find_situations(data, settings, 0)[0] if c.count > 1]
+    links = {"approach": link([(data.episode[i.members], c.labels) for i, c in several], N, 6)}
+    gap = shortest_gap(settings)
+    early, late = [], []
+    for item, split in several:
+        steps = item.members - data.first_row[item.members]
+        (early if np.all(steps < gap) else late).append((item, split))
+
+    def history(items):
+        rows = predictions(data, settings, {"approach": items}, links, root_seed=0)
+        return [row for row in rows if row.variable == HISTORY]
+
+    (row,) = history(early)
+    assert (row.told, row.told_upper) == (0.0, 0.0) and row.detail == NOTHING_BEFORE
+    assert row.n >= LEAST_EPISODES
+    # Later the clusters have moved apart: the past was there, and could not be held to them.
+    assert all(observed_gap(data, settings, *item) >= STILL_TOGETHER for item in late)
+    assert history(late) == []
 
 
 def test_too_few_episodes_decide_nothing():
