@@ -85,6 +85,8 @@ WORDS = {
     ("genpolicy/feasibility/checks.py", "approach"): "the same",
     ("genpolicy/feasibility/layers/contact.py", "approach"): "the same",
     ("gates/asked_for.py", "approach"): "the same",
+    ("genpolicy/verification/contact.py", "approach"): "name of the proof's rule of the same",
+    ("genpolicy/verification/contact.py", "release"): "the same, of letting go",
 }
 
 

@@ -29,11 +29,16 @@ def test_every_gate_asks_each_question_once():
 
 def test_what_guards_people_or_the_proof_always_applies():
     always = {gate: {i.id for i in s.criteria if i.always} for gate, s in SPECS.items()}
+    assert always["B"] == {
+        "unpinned_items", "metadata_mismatches", "nfe_mismatch", "nonfinite_weights",
+        "samples_difference",
+    }  # fmt: skip
     assert always["C"] == {
         "stub_stale", "stub_invalid", "stub_violation_upper", "conservation_error",
         "checker_violations", "mutants_undetected",
     }  # fmt: skip
     assert always["D"] == {
         "stub_violations", "conservation_error", "checker_violations", "promotion_e_value",
+        "unmatched_starts", "verdict_reachable",
     }  # fmt: skip
     assert always["E"] == {item.id for item in SPECS["E"].criteria}

@@ -116,7 +116,8 @@ CASES: dict[str, tuple[Tamper, str, int, str]] = {
     ),
     "threshold relaxed after judging": (
         lambda w: set_limit(w, "gate_b", "nfe_mismatch", 2e9), "shadow", 3,
-        rf"Gate B refuses: reports/gate_b\.json\.criteria\[\d+\]\S* is .*{DERIVED}",
+        # What moved since the plan is said in the caveats, which stand before the criteria.
+        rf"Gate B refuses: reports/gate_b\.json\.(criteria|caveats)\[\d+\]\S* is .*{DERIVED}",
     ),
     "report missing": (
         lambda w: (w / "reports" / "gate_b.json").unlink(), "shadow", 3,

@@ -59,9 +59,9 @@ def test_judging_twice_gives_the_same_bytes(evidence, stage) -> None:
 def test_the_verdict_file_moves_with_verdict_or_evidence_and_not_with_a_limit(
     evidence, stage, edit, gate_evidence
 ) -> None:
-    def limit(value):
+    def limit(value, owner="perception", name="clock_residual_s"):
         def change(params):
-            params["gate_a"]["limits"]["perception"]["clock_residual_s"][0] = value
+            params["gate_a"]["limits"][owner][name][0] = value
 
         return change
 
@@ -72,11 +72,11 @@ def test_the_verdict_file_moves_with_verdict_or_evidence_and_not_with_a_limit(
     judge(stage, "gate_a")
     assert read(evidence, "gate_a", "verdict.json") == before
     assert (evidence / "reports" / "gate_a.json").read_bytes() != report
-    edit(evidence, limit(-1.0))
+    edit(evidence, limit(1e9, "model", "held_out_situations"))
     judge(stage, "gate_a")
     failed = json.loads(read(evidence, "gate_a", "verdict.json"))
     assert failed["verdict"] == "FAIL"
-    edit(evidence, limit(0.5))
+    edit(evidence, limit(20, "model", "held_out_situations"))
     gate_evidence.edit_document(
         evidence, "audit/persistence.json", lambda d: {**d, "null_mean": d["null_mean"] * 0.99}
     )
