@@ -16,7 +16,7 @@ from gates.card.signing import read_draft
 from gates.pipeline import LOCK, RUNGS
 from gates.preregistration import PREREGISTRATION, asked_by
 from gates.report import GATES, Gate
-from genpolicy.errors import IntegrityError
+from genpolicy.errors import GenpolicyError, IntegrityError
 from genpolicy.integrity.documents import parse_yaml, read_yaml
 
 MADE = (
@@ -99,15 +99,16 @@ def require_makers_known(root: Path, authors: Sequence[str], allowed: AllowList)
             found = "without addresses"
             _refuse(f"{ALLOW_LIST}: {person.id}", found, "those of their commits", NAME_ALL)
     changed = _git(root, "status", "--porcelain", "--untracked-files=all", "--", *CANDIDATE)
-    committed = _git(root, "log", "--format=%ae", "--", *CANDIDATE)
+    committed = _git(root, "log", "--format=<%ae>", "--", *CANDIDATE)
     if changed or not committed:
         name = str(changed).splitlines()[0].split(maxsplit=1)[-1] if changed else "the candidate"
         _refuse(name, "not committed as it lies here", "a commit that says who made it")
     owner = {mail.casefold(): person.id for person in allowed.people for mail in person.emails}
-    for mail in sorted({mail.casefold() for mail in str(committed).split()}):
+    # In brackets, or a commit without an address would be none.
+    for mail in sorted({line[1:-1].casefold() for line in str(committed).splitlines()}):
         if owner.get(mail) not in authors:
             who = owner.get(mail, f"somebody not on {ALLOW_LIST}")
-            found = f"by {who}, who committed as {mail}"
+            found = f"by {who}, who committed as {mail or 'nobody: the address is empty'}"
             expected = f"commits of its authors alone ({', '.join(authors) or 'none is named'})"
             _refuse("the candidate", found, expected, NAME_ALL)
 
@@ -117,9 +118,13 @@ def _versions(root: Path) -> list[tuple[str, dict[str, object]]]:
     commits = (_git(root, "log", "--format=%H", "--", PREREGISTRATION) or "").split()
     found = []
     for commit in commits:
-        text = _git(root, "show", f"{commit}:{PREREGISTRATION}")
-        plan = parse_yaml(text.encode(), where=f"{commit[:7]}:{PREREGISTRATION}") if text else {}
-        found.append((commit, plan if isinstance(plan, dict) else {}))
+        text = _git(root, "show", f"{commit}:{PREREGISTRATION}") or ""
+        try:
+            plan = parse_yaml(text.encode(), where=f"{commit[:7]}:{PREREGISTRATION}")
+        except GenpolicyError:
+            plan = None  # what could not be read was another plan than the one that can
+        known = plan.items() if isinstance(plan, dict) else ()
+        found.append((commit, {place: value for place, value in known if isinstance(place, str)}))
     return found
 
 
@@ -165,7 +170,9 @@ def _git(root: Path, *args: str) -> str | None:
     """Output of a git command; None if it fails or there is no git."""
     command = ["git", "--no-replace-objects", "-C", str(root), *args]
     try:
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        done = subprocess.run(
+            command, capture_output=True, text=True, check=False, errors="replace"
+        )
     except OSError:
         return None
     return done.stdout.strip() if done.returncode == 0 else None

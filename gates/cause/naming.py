@@ -218,9 +218,10 @@ def _data(numbers: Numbers, limits: CauseLimits) -> Named:
         answers.append(answer)
         if answer.red and verdict is None:
             verdict = Diagnosis(CauseName.DATA_DEFECT, item.variable, item.kind, item.action)
-    found = {item.question for item in numbers.findings}
+    # What stands out and is harmless says nothing of the other epochs and streams.
+    red = {answer.question for answer in answers if answer.red}
     for question, residual in numbers.residuals.items():
-        if question not in found:
+        if question not in red:
             answers.append(_residual(question, residual, numbers, limits))
     return answers, verdict
 

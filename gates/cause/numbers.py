@@ -73,6 +73,7 @@ class Numbers:
         told: What variables, order and past tell of the modes.
         modes: Modes of the phase with most situations.
         alternatives: Which of them stand beside each other in a situation.
+        elsewhere: Modes of the other phases, which name no cause.
         components: Where in the action modes were looked for; counts, strata and modes are about
             the one followed.
         reach: How far the evidence that is followed reaches in each fifth of the way; none where
@@ -96,6 +97,7 @@ class Numbers:
     modes: tuple[ModeOutcome, ...]
     components: tuple[ComponentModes, ...]
     alternatives: tuple[Alternative, ...] = ()
+    elsewhere: tuple[ModeOutcome, ...] = ()
     reach: tuple[Reach, ...] = ()
     kind: str = LOCAL
     other: Side | None = None

@@ -84,6 +84,11 @@ def read_measured(document: Document, rows: Rows) -> Numbers:
                 _with_counts(mode, mode.successes, mode.admissible)
                 for mode in _of_phase(rows("modes.parquet", ModeOutcome), summary)
             ),
+            elsewhere=tuple(
+                mode
+                for mode in rows("modes.parquet", ModeOutcome)
+                if mode.phase != summary["primary_phase"]
+            ),
             components=tuple(rows("components.parquet", ComponentModes)),
             alternatives=_of_phase(rows("alternatives.parquet", Alternative), summary),
             reach=tuple(row for row in reach if row.kind == kind),

@@ -64,19 +64,21 @@ def beside_the_choice(numbers: Numbers, limits: CauseLimits) -> list[Answer]:
     """Modes that stand beside the best choice, held to what no demonstration may fall below.
 
     The cause is a choice between valid modes whatever stands beside them. Whoever trains on all
-    of the recordings trains on those as well, so Gate A refuses a mode that surely fails (by its
-    upper bound), or that is not feasible; of one with few episodes nothing is claimed.
+    of the recordings trains on those as well, whatever their phase, so Gate A refuses a mode that
+    surely fails (by its upper bound), or that is not feasible. Of one with few episodes nothing is
+    claimed; one of which no outcome or no chunk is known is not known.
     """
     chosen, found = _best_choice(numbers, limits), []
-    for mode in numbers.modes if chosen else ():
-        if mode.mode in chosen:
-            continue
+    here = numbers.modes if chosen or _together(numbers, limits) else ()
+    for mode in (*(mode for mode in here if mode.mode not in chosen), *numbers.elsewhere):
+        success = _success(mode, limits)
         upper = _ends(mode.successes, mode.episodes, limits)[1]
-        if not upper - limits["mode_success_lower"] >= 0:
-            success = _success(mode, limits)
+        if success.measured is None:
+            found.append(success)
+        elif not upper - limits["mode_success_lower"] >= 0:
             text = f"success of {mode.mode}, upper bound: it surely fails"
             found.append(replace(success, what=text, measured=upper))
-        found += [_feasible(mode, limits)] if mode.checked else []
+        found.append(_feasible(mode, limits))
     return found
 
 

@@ -117,6 +117,7 @@ def data_defects(evidence: Evidence, settings: NeedSettings) -> Measured:
         if answer.red
     ]
     text = "; ".join(red) or f"none of {len(asked)} numbers is beyond its limit"
-    for name in waived_questions(settings.limits):
+    asked_here = {answer.question for answer in asked}
+    for name in sorted(asked_here & set(waived_questions(settings.limits))):
         text += f"; {name} is waived, and asked here by the packaged limit"
     return Measured(float(len(red)), caveat=text)

@@ -59,10 +59,8 @@ def seen_before(
     """
     gap = shortest_gap(settings)
     gaps = np.array([observed_gap(data, settings, *item) for item in items])
-    first = np.unique(data.first_row)[:1]
     n = len(choices.episode)
-    past = np.full((n, past_features(data, settings, first)[0].shape[1]), np.nan)
-    present = np.full((n, present_features(data, settings, first).shape[1]), np.nan)
+    past, present = np.zeros((n, 0)), np.zeros((n, 0))
     place = {int(episode): number for number, episode in enumerate(choices.episode)}
     missing, reached = np.ones(n, dtype=bool), np.zeros(n, dtype=bool)
     for number in np.argsort(np.round(gaps, 6), kind="stable"):
@@ -77,6 +75,9 @@ def seen_before(
         earlier = past_features(data, settings, rows)[0]
         now = present_features(data, settings, rows)
         one = np.zeros(len(rows), dtype=np.int64)
+        if missing.all():
+            past = np.full((n, earlier.shape[1]), np.nan)
+            present = np.full((n, now.shape[1]), np.nan)
         past[at[new]] = centred_ranks(earlier, one)[new] / len(rows)
         present[at[new]] = centred_ranks(now, one)[new] / len(rows)
         missing[at] = False

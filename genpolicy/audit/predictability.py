@@ -102,7 +102,7 @@ def predictions(
         if len(seen.choices.mode) >= LEAST_EPISODES:
             rng = stream(root_seed, "audit", "predictability", phase, HISTORY)
             rows.append(_past(phase, seen, rng))
-        elif seen.reached < LEAST_EPISODES <= len(chosen.mode):
+        elif seen.reached == 0 and len(chosen.mode) >= LEAST_EPISODES:
             by_luck, n = chosen.chance, len(chosen.mode)
             none = 0.0, 0.0, 0.0, by_luck, by_luck
             rows.append(Prediction(HISTORY, phase, *none, n, NOTHING_BEFORE))

@@ -31,6 +31,7 @@ POSE_TOLERANCE_M = POSE_TOLERANCE_RAD = 1e-5  # ten times what feasibility lets 
 RATES = ("speed", "acceleration", "jerk")
 TORQUE_TOLERANCE_NM = 1e-6
 CONTACT_TOLERANCE_M = 1e-4  # less than this deep, two libraries may disagree whether shapes touch
+MOST_PIECES = 1000  # no arm turns 20 rad in a row; whoever writes that shall not keep us busy
 SWEPT_RAD = 0.02  # no joint turns further between two looks at the way: 16 mm at 0.8 m from it
 
 
@@ -293,6 +294,9 @@ class MotionProof:
     ) -> Iterator[Finding]:
         """What the way to a row hits, looked at between its `ends` (2, J); the first hit only."""
         pieces = math.ceil(float(np.max(np.abs(ends[1] - ends[0]))) / SWEPT_RAD)
+        if pieces > MOST_PIECES:
+            yield "P6.sweep", f"A joint turns {pieces * SWEPT_RAD:.3g} rad in one row."
+            return
         for share in np.arange(1, pieces) / max(pieces, 1):
             q_rad, opening_m = ends[0] + share * (ends[1] - ends[0]), openings @ (1 - share, share)
             self._pose(q_rad, float(opening_m), held, scene)

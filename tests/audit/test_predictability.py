@@ -10,7 +10,9 @@ from benchmarks.audit.plan import Plan
 from benchmarks.audit.planar import admissible
 from benchmarks.audit.recorder import record
 from gates.cause import CauseName
-from genpolicy.audit.before import STILL_TOGETHER
+from genpolicy.audit import predictability
+from genpolicy.audit.before import STILL_TOGETHER, seen_before
+from genpolicy.audit.choices import choices
 from genpolicy.audit.data import canonical
 from genpolicy.audit.history import shortest_gap
 from genpolicy.audit.linking import link
@@ -159,3 +161,16 @@ def test_four_right_of_five_are_no_valid_modes(decided_by, fidelity, names):
     cause = named(result, limits=LIMITS)
     assert cause.name is not CauseName.VALID_MODES
     assert cause.variable in names
+
+
+def test_a_few_episodes_with_a_past_are_no_proof_that_there_was_none(monkeypatch):
+    data = canonical(record("planar", planned()).data)
+    settings = SETTINGS.model_copy(update={"query_stride": 4})
+    several = [(i, c) for _, i, c in find_situations(data, settings, 0)[0] if c.count > 1]
+    links = {"approach": link([(data.episode[i.members], c.labels) for i, c in several], N, 6)}
+    nothing = seen_before(data, settings, [], choices(data, several, links["approach"]))
+    for reached, rows in ((0, 1), (1, 0), (LEAST_EPISODES - 1, 0)):
+        seen = replace(nothing, reached=reached)
+        monkeypatch.setattr(predictability, "seen_before", lambda *_, seen=seen: seen)
+        found = predictions(data, settings, {"approach": several}, links, root_seed=0)
+        assert len([row for row in found if row.variable == HISTORY]) == rows

@@ -369,3 +369,24 @@ CARD = {
     "stop_path": "", "abort_thresholds": {}, "rollback": "stop", "caveats": [], "reviewer": "",
     "not_before": "", "expires": "", "nonce": "",
 }  # fmt: skip
+
+
+def test_a_commit_without_an_address_is_by_nobody_who_is_known(history):
+    root, commit = history
+    commit(code="x = 1\n")
+    (root / FILES["code"]).write_text("x = 2\n")
+    commit.git("add", "-A")
+    named = ("-c", "user.name=ada", "-c", "user.email=ada@example.org")
+    commit.git(*named, "commit", "-q", "-m", "x", "--author=Somebody <>")
+    people = _people(ada="author")
+    with pytest.raises(IntegrityError, match="the address is empty"):
+        require_makers_known(root, ["ada"], people)
+
+
+@pytest.mark.parametrize("broken", ["<<<<<<< HEAD\na: 1\n", "1: 2\n", "[]\n"])
+def test_a_plan_that_once_could_not_be_read_is_another_plan_and_no_end(history, broken):
+    root, commit = history
+    commit(plan=broken)
+    commit(plan="a: 1")
+    commit(lock=_lock())
+    require_registered_first(root)

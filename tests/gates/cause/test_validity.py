@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 from planted import HIDDEN, VALID, limit, named
 
-from gates.cause import CauseName
+from gates.cause import CauseName, deciding_answer
 from genpolicy.audit.reach_rows import Alternative
 from genpolicy.audit.rows import ModeOutcome
 from genpolicy.statistics.intervals import clopper_pearson
@@ -98,3 +98,26 @@ def test_a_mode_that_is_not_feasible_is_no_part_of_a_choice():
     numbers = starts((GOOD, GOOD))
     blocked = replace(numbers.modes[1], checked=40, admissible=4)
     assert named(replace(numbers, modes=(numbers.modes[0], blocked))).kind == "one_valid_mode"
+
+
+def asked_of_every_mode(numbers, question="mode_success_lower"):
+    return deciding_answer(question, numbers, limit())
+
+
+def test_a_mode_that_surely_fails_is_held_to_the_limit_wherever_it_stands():
+    """Beside a good pair, beside a choice that all starts show together, and in another phase."""
+    failing = ModeOutcome("lost", "approach", 40, 0, 0.0, 0.1, 40, 40)
+    pooled = starts(*[(FEW, FEW)] * 4)
+    for numbers in (starts((GOOD, GOOD)), pooled):
+        assert not asked_of_every_mode(numbers).red
+        beside = replace(numbers, modes=(*numbers.modes, failing))
+        elsewhere = replace(numbers, elsewhere=(replace(failing, phase="retreat"),))
+        for found in map(asked_of_every_mode, (beside, elsewhere)):
+            assert found.red and "lost" in found.what and found.measured < 0.2
+
+
+def test_a_mode_elsewhere_of_which_nothing_was_checked_is_not_known():
+    blank = ModeOutcome("lost", "retreat", 40, 40, 0.9, 1.0, 0, 0)
+    assert asked_of_every_mode(VALID, "mode_feasible_share").measured == 0.96
+    found = asked_of_every_mode(replace(VALID, elsewhere=(blank,)), "mode_feasible_share")
+    assert found.measured is None and "lost" in found.what

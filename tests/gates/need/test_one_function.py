@@ -73,7 +73,6 @@ CASES = {
         table("strata", effect=0.8, p_adjusted=0.001, effect_lower=0.05), True),
     "a large share that is sure": (
         table("strata", effect=0.8, p_adjusted=0.001, effect_lower=0.6), False),
-    "a failing mode of another phase": (another_mode("retreat"), True),
     "a failing mode of the only pair": (
         table("modes", successes=5, success_lower=0.07, success_upper=0.41), False),
     "an infeasible mode of the only pair": (table("modes", admissible=10), False),
@@ -98,9 +97,10 @@ def test_gate_and_cause_give_one_answer_to_a_question_that_both_ask(ladder, name
     assert bool(red_here) == (not valid)
 
 
-def test_a_mode_that_surely_fails_beside_a_good_pair_is_no_target_and_no_cause(ladder):
+@pytest.mark.parametrize("phase", ["approach", "retreat"])
+def test_a_mode_that_surely_fails_beside_a_good_pair_is_no_target_and_no_cause(ladder, phase):
     """The need is real, and whoever trains on all of the recordings trains on failures too."""
-    another_mode("approach")(ladder)
+    another_mode(phase)(ladder)
     report = judge(ladder, "A")
     red = {answer.id: answer for answer in report.criteria if answer.verdict == "FAIL"}
     assert set(red) == {"mode_success_lower", "mode_feasible_share"} and report.verdict == "FAIL"
@@ -121,7 +121,6 @@ def test_a_residual_beyond_the_limit_that_noise_explains_is_not_decided(ladder, 
 
 
 def test_the_number_of_a_pair_is_that_of_its_weaker_mode(ladder):
-    another_mode("retreat")(ladder)
     answers = {answer.id: answer for answer in judge(ladder, "A").criteria}
     assert "24 of 25 succeed" in answers["mode_success_lower"].caveat
     assert answers["mode_success_lower"].interval is not None
