@@ -24,7 +24,6 @@ from genpolicy.data.recording.episode import (
 from genpolicy.errors import ContractError, NonFiniteError
 
 Array = NDArray[np.float64]
-Times = NDArray[np.int64]
 
 NS_PER_S = 1e9
 PERIOD_TOLERANCE = 0.25

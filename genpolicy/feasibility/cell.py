@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from genpolicy.errors import ConfigError, ContractError
 from genpolicy.feasibility.context import Context
@@ -19,8 +18,6 @@ from genpolicy.robot.dynamics import ArmDynamics
 from genpolicy.robot.kinematics import ArmKinematics
 from genpolicy.robot.limits import RobotLimits
 from genpolicy.robot.payload import Payload, payload_of
-
-Array = NDArray[np.float64]
 
 
 class Workspace(Protocol):

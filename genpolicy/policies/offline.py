@@ -15,8 +15,6 @@ from genpolicy.policies.normalisation import Normalisation
 from genpolicy.policies.policy import NoiseName, Policy
 from genpolicy.policies.windows import Windows
 
-Array = NDArray[np.float64]
-
 
 @dataclass(frozen=True)
 class OfflineError:

@@ -146,19 +146,3 @@ FR3 = RobotLimits(
 )
 
 LIMITS: dict[str, RobotLimits] = {"panda": PANDA, "fr3": FR3}
-
-
-def limits_of(robot: str) -> RobotLimits:
-    """The table of one robot.
-
-    Raises:
-        ConfigError: No table of that name.
-    """
-    if robot not in LIMITS:
-        raise ConfigError(
-            where="robot",
-            found=repr(robot),
-            expected=f"one of {sorted(LIMITS)}",
-            action="Name a robot whose limits are known, or add a table with its source.",
-        )
-    return LIMITS[robot]

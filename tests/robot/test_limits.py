@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from genpolicy.errors import ConfigError, ContractError, NonFiniteError
-from genpolicy.robot.limits import FR3, LIMITS, PANDA, RobotLimits, limits_of
+from genpolicy.robot.limits import FR3, LIMITS, PANDA, RobotLimits
 
 
 def test_panda_golden():
@@ -44,11 +44,9 @@ def test_a_limit_is_never_raised(factor):
         PANDA.scaled(factor)
 
 
-def test_tables_are_read_only_and_named():
+def test_tables_are_read_only():
     with pytest.raises(ValueError, match="read-only"):
         PANDA.velocity_rad_s[0] = 9
-    with pytest.raises(ConfigError, match="one of"):
-        limits_of("iiwa")
 
 
 def test_a_bad_table_is_refused():

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from genpolicy.candidates.judged import JudgedPolicy
 from genpolicy.contract.chunk import Proposal
@@ -22,8 +21,6 @@ from genpolicy.evidence.stress.latency import DeclaredTerm, LatencyModel
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.policies.fixtures import fixture_observations
 from genpolicy.tasks.api import load_task
-
-Array = NDArray[np.float64]
 
 RUNS = (1, 2)
 OBSERVATIONS = 32

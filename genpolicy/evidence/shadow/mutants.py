@@ -60,9 +60,7 @@ def play(check: str, checks: Checks) -> list[Violation]:
 
 def _begin(rig: Rig, **changes: Any) -> None:
     """A valid (or changed) chunk of which two actions are due."""
-    rig.observe()
-    rig.deliver(rig.chunk(**changes))
-    rig.tick(2)
+    rig.run(2, **changes)
 
 
 def _then(event: Callable[[Rig], object]) -> Scenario:
@@ -84,9 +82,7 @@ def _begun_before(event: Callable[[Rig], object]) -> Scenario:
     def scenario(rig: Rig) -> None:
         _begin(rig)
         event(rig)
-        rig.observe()
-        rig.deliver(rig.chunk(condition_observation_event_time_s=0.0, predecessor_chunk_id=""))
-        rig.tick(2)
+        rig.run(2, condition_observation_event_time_s=0.0, predecessor_chunk_id="")
 
     return scenario
 
@@ -114,17 +110,13 @@ def _stop_and_reset(rig: Rig) -> None:
 def _new_chunk_while_stopped(rig: Rig) -> None:
     _begin(rig)
     rig.supervisor.emergency_stop(rig.now_s)
-    rig.observe()
-    rig.deliver(rig.chunk(predecessor_chunk_id=""))
-    rig.tick(2)
+    rig.run(2, predecessor_chunk_id="")
 
 
 def _new_chunk_in_another_mode(rig: Rig) -> None:
     _begin(rig)
     rig.executor.controller(rig.now_s, "joint_position")
-    rig.observe()
-    rig.deliver(rig.chunk(predecessor_chunk_id=""))
-    rig.tick(2)
+    rig.run(2, predecessor_chunk_id="")
 
 
 def _same_chunk_twice(rig: Rig) -> None:

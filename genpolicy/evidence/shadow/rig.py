@@ -211,11 +211,11 @@ class Rig:
             self.now_ns += round(PERIOD_S * 1e9)
         return commands
 
-    def run(self, **changes: Any) -> list[Command]:
-        """Observe, deliver a (changed) chunk, tick it through."""
+    def run(self, count: int | None = None, **changes: Any) -> list[Command]:
+        """Observe, deliver a (changed) chunk, tick it through, or so many of its actions."""
         self.observe()
         self.deliver(self.chunk(**changes))
-        return self.tick(self.cell.horizons.execution_horizon)
+        return self.tick(self.cell.horizons.execution_horizon if count is None else count)
 
     def end(self) -> list[Event]:
         """End the episode and return the journal's events."""

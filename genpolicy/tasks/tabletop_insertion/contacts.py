@@ -2,11 +2,8 @@
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from genpolicy.tasks.tabletop_insertion.scene import PEG_GROUP, ROBOT_GROUP
-
-Array = NDArray[np.float64]
 
 
 class ContactMonitor:
