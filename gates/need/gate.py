@@ -61,6 +61,7 @@ GATE = GateSpec(
         "artifacts/ingest/episodes.parquet",
         "artifacts/ingest/manifest.json",
         f"{AUDIT}/scene.png",
+        f"{AUDIT}/demonstrated.parquet",
         f"{AUDIT}/examples.parquet",
         f"{AUDIT}/alignment.parquet",
         f"{TRAINED}/*/seed_*/model.safetensors",

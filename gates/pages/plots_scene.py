@@ -1,5 +1,6 @@
-"""What was demonstrated, in Gate A: the cell, and every recorded path around its obstacle."""
+"""What was demonstrated, in Gate A: the cell, and every recorded path by the mode it followed."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,18 +14,20 @@ from gates.evidence import Array, Evidence, MissingEvidenceError
 from gates.need.settings import AUDIT
 from gates.pages.figures import Photo, Plot
 from gates.report import GateReport
+from genpolicy.audit.rows import Demonstration
 from genpolicy.data.rows import EpisodeRow, FrameRow
-from genpolicy.pages.figures.drawing import BLUE, GREY, ORANGE, RED, new_figure
-from genpolicy.pages.figures.situations import STONE, draw_obstacles
+from genpolicy.pages.figures.drawing import GREY, RED, new_figure
+from genpolicy.pages.figures.situations import MODES, STONE, draw_obstacles
 
 SCENE = f"{AUDIT}/scene.png"
 FRAMES = "artifacts/ingest/frames.parquet"
 EPISODES = "artifacts/ingest/episodes.parquet"
+DEMONSTRATED = f"{AUDIT}/demonstrated.parquet"
 SUMMARY = f"{AUDIT}/summary.json"
 POINTS = 32
 """Points kept of each path; the recorded ones lie a few millimetres apart."""
-LEFT, RIGHT, BETWEEN = "left", "right", "does not pass"
-SIDES = {LEFT: BLUE, RIGHT: ORANGE, BETWEEN: GREY}
+UNTOLD = "no mode"
+"""Episodes that the audit saw near no situation with several modes."""
 
 
 @dataclass(frozen=True)
@@ -34,10 +37,12 @@ class Path:
     Attributes:
         points_m: Positions in the base frame. Shape (n, 3).
         success: Whether the episode is labelled a success.
+        mode: The mode that it followed, by the audit's name.
     """
 
     points_m: Array
     success: bool
+    mode: str
 
 
 def obstacles(evidence: Evidence) -> list[dict[str, float]]:
@@ -49,26 +54,15 @@ def obstacles(evidence: Evidence) -> list[dict[str, float]]:
     return [item for item in found if isinstance(item, dict)]
 
 
-def side(points_m: Array, x_m: float, y_m: float) -> str:
-    """Side on which a path first passes a place: `left` at larger y, `right` at smaller y.
-
-    Args:
-        points_m: Path. Shape (n, 3).
-        x_m: Where the obstacle stands; paths come from smaller x.
-        y_m: Where the obstacle stands.
-    """
-    beyond = np.flatnonzero(points_m[:, 0] >= x_m)
-    if len(beyond) == 0 or beyond[0] == 0:
-        return BETWEEN
-    return LEFT if points_m[beyond[0], 1] > y_m else RIGHT
-
-
 def paths(evidence: Evidence) -> list[Path]:
     """The path of every accepted episode, in the order of the episodes.
+
+    Only the audit says which mode an episode followed: what a mode is depends on the task.
 
     Raises:
         MissingEvidenceError: No such table or column, or an action without a position.
     """
+    modes = {row.episode_uuid: row.mode for row in evidence.records(DEMONSTRATED, Demonstration)}
     frames = evidence.rows(FRAMES, FrameRow, lists=True)
     episodes = evidence.rows(EPISODES, EpisodeRow)
     frames = frames.sort_values(["episode_uuid", "index"], kind="stable")
@@ -77,7 +71,7 @@ def paths(evidence: Evidence) -> list[Path]:
         raise MissingEvidenceError(f"{FRAMES} has actions without a finite position")
     rows = pd.Series(np.arange(len(frames))).groupby(frames["episode_uuid"].to_numpy()).indices
     return [
-        Path(positions[rows[uuid]], outcome == "success")
+        Path(positions[rows[uuid]], outcome == "success", modes.get(uuid, UNTOLD))
         for uuid, outcome in zip(episodes["episode_uuid"], episodes["outcome"], strict=True)
         if uuid in rows
     ]
@@ -87,20 +81,13 @@ def _demonstrations(evidence: Evidence, report: GateReport) -> Figure:
     every = paths(evidence)
     if not every:
         raise MissingEvidenceError(f"{FRAMES} has no rows of an accepted episode")
-    first = next(iter(obstacles(evidence)), None)
-    if first is None:
-        sides = [BETWEEN] * len(every)
-    else:
-        sides = [side(path.points_m, first["x_m"], first["y_m"]) for path in every]
     figure, (above, aside) = new_figure(height=3.5, columns=2)
-    for name, colour in SIDES.items():
-        of_side = [path for path, one in zip(every, sides, strict=True) if one == name]
-        if not of_side:
-            continue
-        _draw_paths(above, of_side, 1, colour)
-        _draw_paths(aside, of_side, 2, colour)
-        good = sum(path.success for path in of_side)
-        label = f"{name}: {len(of_side)} episodes, {good} succeed"
+    for name, colour in colours(path.mode for path in every).items():
+        of_mode = [path for path in every if path.mode == name]
+        _draw_paths(above, of_mode, 1, colour)
+        _draw_paths(aside, of_mode, 2, colour)
+        good = sum(path.success for path in of_mode)
+        label = f"{name}: {len(of_mode)} episodes, {good} succeed"
         above.plot([], [], color=colour, lw=2, label=label)
     failed = np.array([path.points_m[-1] for path in every if not path.success]).reshape(-1, 3)
     for axes, second in ((above, 1), (aside, 2)):
@@ -125,6 +112,15 @@ def _demonstrations(evidence: Evidence, report: GateReport) -> Figure:
     return figure
 
 
+def colours(modes: Iterable[str]) -> dict[str, str]:
+    """One colour per mode, in the order of the names; grey and last where there is none."""
+    names = sorted(set(modes), key=lambda name: (name == UNTOLD, name))
+    return {
+        name: GREY if name == UNTOLD else MODES[place % len(MODES)]
+        for place, name in enumerate(names)
+    }
+
+
 def _draw_paths(axes: Axes, chosen: list[Path], second: int, colour: str) -> None:
     lines = [
         path.points_m[np.linspace(0, len(path.points_m) - 1, POINTS).round().astype(int)][
@@ -145,11 +141,12 @@ PLOTS: tuple[Plot | Photo, ...] = (
     ),
     Plot(
         "What was demonstrated",
-        "Commanded tool path of every accepted episode, coloured by the side on which it passes "
-        "the obstacle (grey; spikes are disturbances and recoveries). Two separate bundles that "
-        "both succeed are what a generator is for; one bundle, or one that fails, is not.",
+        "Commanded tool path of every accepted episode, coloured by the mode that the audit saw it "
+        "follow (grey line: none; grey shape: an obstacle; spikes are disturbances and "
+        "recoveries). Two separate bundles that both succeed are what a generator is for; one "
+        "bundle, or one that fails, is not.",
         FRAMES,
         _demonstrations,
-        also=(EPISODES, SUMMARY),
+        also=(EPISODES, DEMONSTRATED, SUMMARY),
     ),
 )

@@ -36,8 +36,14 @@ SHARED = {
     "hand": "word by which columns of foreign datasets are recognised",
     "grasp": "the same",
 }
+# Arguments of numpy and matplotlib whose values are words of theirs.
+PLACING = {"side", "ha", "loc", "alignment"}
 # The same word with another meaning in one file.
 LOCAL = {
+    ("genpolicy/audit/learned.py", "left"): "numpy: the side of equals in `searchsorted`",
+    ("genpolicy/audit/learned.py", "right"): "the same",
+    ("genpolicy/pages/audit/pictures.py", "left"): "matplotlib: where a title stands",
+    ("genpolicy/pages/figures/drawing.py", "left"): "the same",
     ("genpolicy/execution/cell.py", "retreat"): "a primitive of recovery, not a phase",
     ("gates/pages/plots_stress.py", "post"): "matplotlib: a step behind the point",
     ("gates/pages/plots_feasibility.py", "post"): "matplotlib: a step behind the point",
@@ -92,7 +98,7 @@ WORDS = {
 
 @cache
 def names() -> frozenset[str]:
-    """Bodies, sites, geoms, joints, phases, channels and their components of the task."""
+    """Bodies, sites, geoms, joints, phases, channels and modes of the task."""
     task = load_task(TASK)
     model = mujoco.MjModel.from_xml_path(str(task.scene_path))
     of_scene = {
@@ -104,11 +110,12 @@ def names() -> frozenset[str]:
         for i in range(count)
     }  # fmt: skip
     of_contract = {*task.phases, *(channel.name for channel in task.observation.channels)}
-    return frozenset(of_scene | of_contract) - {""}
+    modes = {spec.mode for spec in task.episode_specs(0, 40)}
+    return frozenset(of_scene | of_contract | modes) - {""}
 
 
 def literals(path: Path) -> set[str]:
-    """String literals of a module, without docstrings."""
+    """String literals of a module, without docstrings and words that place something in a plot."""
     tree = ast.parse(path.read_text())
     docs = {
         id(node.body[0].value)
@@ -116,6 +123,11 @@ def literals(path: Path) -> set[str]:
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef)
         and node.body
         and isinstance(node.body[0], ast.Expr)
+    } | {
+        id(part)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.keyword) and node.arg in PLACING
+        for part in ast.walk(node.value)
     }
     return {
         node.value
@@ -183,6 +195,7 @@ def found_words() -> frozenset[tuple[str, str]]:
 
 def test_the_names_come_from_the_task_itself() -> None:
     expected = {"post", "peg", "link3", "grasp", "insert", "hole_pose", "finger_left", "torque7"}
+    expected |= {"left", "right"}  # its modes
     assert expected <= names()
 
 
@@ -216,6 +229,12 @@ def test_a_literal_is_found_and_a_docstring_is_not(tmp_path: Path) -> None:
         '"""post"""\n# hole\ndef f(x="peg"):\n    "insert"\n    return {"align": 1}\n'
     )
     assert literals(module) & names() == {"peg", "align"}
+
+
+def test_a_mode_is_found_and_a_place_in_a_plot_is_not(tmp_path: Path) -> None:
+    module = tmp_path / "m.py"
+    module.write_text('LEFT = "left"\naxes.text("a", ha="right" if low else "center")\n')
+    assert literals(module) & names() == {"left"}
 
 
 def test_sentences_documents_and_templates_are_read_word_by_word(tmp_path: Path) -> None:

@@ -24,6 +24,7 @@ from genpolicy.audit.rows import (
     Asked,
     Calibration,
     Clock,
+    Demonstration,
     Finding,
     ModeOutcome,
     Prediction,
@@ -429,7 +430,7 @@ def _dataset(root: Path) -> None:
 
 
 def _bow(episode: int, index: int) -> float:
-    """Lateral position of a path that passes on the left in even episodes, else on the right."""
+    """Lateral position of a path: to larger y in even episodes, else to smaller."""
     return 0.13 * (1 if episode % 2 == 0 else -1) * (1 - ((index - 4) / 4) ** 2)
 
 
@@ -552,6 +553,10 @@ def _audit(root: Path) -> None:
             for i in range(10)
         ],
     )
+    followed = [
+        {"episode_uuid": f"e{e}", "phase": "approach", "mode": f"m{e % 2}"} for e in range(4)
+    ]
+    table(root, "audit/demonstrated.parquet", Demonstration, followed)
     table(root, "audit/findings.parquet", Finding, [])
     table(root, "audit/resamples.parquet", Resample, [_draw() for _ in range(4)])
     document(

@@ -1,10 +1,14 @@
 """A task outside the tree goes the whole way: nothing on it was written for the default task."""
 
+import shutil
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from gates.evidence import Evidence
+from gates.pages import plots_scene
+from genpolicy.audit.evidence import write_evidence
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.contract.action import GRIPPER, split_action
 from genpolicy.data.contract import TCP_ACTION, IngestContract, plausible_ranges
@@ -133,15 +137,28 @@ def test_the_robot_is_read_from_the_scene(cell):
     assert {shape.body for shape in scene} == {"world", "pillar", "pad"}
 
 
-def test_the_audit_reads_the_tasks_own_channels(cell, kit):
+def test_the_audit_reads_the_tasks_own_channels(cell, kit, tmp_path):
+    settings = AuditSettings(neighbours=4, minimum_neighbours=4, query_stride=8)
     result = audit_task(
-        cell.root / "dataset", task_name=cell.task.name,
-        settings=AuditSettings(neighbours=4, minimum_neighbours=4, query_stride=8),
+        cell.root / "dataset", task_name=cell.task.name, settings=settings,
         feasibility=cell.feasibility, action_period_s=cell.horizons.action_period_s, root_seed=SEED,
     )  # fmt: skip
     assert result is not None
     (pillar,) = round_obstacles(cell.task)
     assert pillar == pytest.approx({"x_m": 0.44, "y_m": 0.0, "radius_m": 0.02})
+    shutil.copytree(cell.root / "dataset", tmp_path / "artifacts/ingest")
+    (tmp_path / "artifacts/audit").mkdir()
+    write_evidence(result, tmp_path / "artifacts/audit", settings=settings, obstacles=[pillar])
+    # Two bundles, and too few episodes for the audit to tell them: nobody else does.
+    assert _drawn_demonstrations(tmp_path) == [
+        "end of a failure (0)", f"no mode: {EPISODES} episodes, {EPISODES} succeed", "obstacle",
+    ]  # fmt: skip
+
+
+def _drawn_demonstrations(root):
+    """What the legend of Gate A's figure of the demonstrations says."""
+    figure = plots_scene.PLOTS[1].draw(Evidence(root), None)
+    return sorted(text.get_text() for text in figure.legends[0].get_texts())
 
 
 def test_its_picture_is_its_own_and_the_same_every_time(cell):

@@ -1,4 +1,4 @@
-"""Pictures of the demonstrations: the cell, the sides of the paths, colours, bytes."""
+"""Pictures of the demonstrations: the cell, the modes of the paths, colours, bytes."""
 
 import base64
 import re
@@ -10,10 +10,12 @@ import pytest
 from gates.evidence import Evidence, MissingEvidenceError
 from gates.pages import plots_scene
 from gates.pages.figures import LARGEST_PHOTO_BYTES, draw_all
-from gates.pages.plots_scene import BETWEEN, LEFT, RIGHT, SCENE, paths, side
+from gates.pages.plots_scene import DEMONSTRATED, SCENE, UNTOLD, colours, paths
 from gates.proof import judge
 from gates.writing import write_gate
+from genpolicy.pages.figures.drawing import GREY
 
+MODES = "audit/demonstrated.parquet"
 SHOWN = re.compile(r'<img src="data:image/png;base64,([A-Za-z0-9+/=]*)"')
 
 
@@ -53,22 +55,44 @@ def test_without_a_scene_the_gate_is_judged_all_the_same(ladder):
     assert f"Not drawn: {SCENE} is missing." in page and not SHOWN.search(page)
 
 
-def test_every_episode_is_drawn_on_its_side(ladder):
-    page = write_gate(ladder, "A") and (ladder / "reports/gate_a.html").read_text()
-    assert "left: 2 episodes, 2 succeed" in page
-    assert "right: 2 episodes, 1 succeed" in page
+def test_every_episode_is_drawn_by_the_mode_that_it_followed(ladder):
+    report = write_gate(ladder, "A")
+    page = (ladder / "reports/gate_a.html").read_text()
+    assert "m0: 2 episodes, 2 succeed" in page
+    assert "m1: 2 episodes, 1 succeed" in page
     assert "end of a failure (1)" in page
-    assert "does not pass:" not in page
+    assert f"{UNTOLD}:" not in page
+    assert report.materials[DEMONSTRATED][:12] in page  # what is drawn is bound
 
 
-@pytest.mark.parametrize("flip", [1, -1])
-def test_side_is_mirrored_with_the_path(flip):
-    x_m = np.linspace(0.38, 0.65, 40)
-    bow = 0.13 * np.sin(np.linspace(0, np.pi, 40))
-    path = np.stack([x_m, flip * bow, np.full(40, 0.15)], axis=1)
-    assert side(path, 0.5, 0.0) == (LEFT if flip > 0 else RIGHT)
-    assert side(path[:10], 0.5, 0.0) == BETWEEN
-    assert side(path[30:], 0.5, 0.0) == BETWEEN
+def _drawn(ladder):
+    (picture,) = draw_all(plots_scene.PLOTS[1:], Evidence(ladder), judge(ladder, "A"))
+    return picture
+
+
+def test_modes_are_told_and_never_seen_by_where_a_path_runs(ladder):
+    """Modes of another task, one of both bundles: no obstacle, no side and no axis tells them."""
+    names = ["over", "under", "over", "around"]
+    evidence.edit_table(ladder, MODES, lambda f: f.assign(mode=names).iloc[:3])
+    evidence.edit_document(ladder, "audit/summary.json", lambda d: {**d, "obstacles": []})
+    picture = _drawn(ladder)
+    told = re.findall(r">([\w ]+): (\d) episodes, (\d) succeed<", picture.svg)
+    assert told == [("over", "2", "2"), ("under", "1", "1"), (UNTOLD, "1", "0")]
+
+
+def test_without_modes_all_are_grey_and_without_the_table_it_is_said(ladder):
+    evidence.edit_table(ladder, MODES, lambda f: f.iloc[:0])
+    picture = _drawn(ladder)
+    assert f"{UNTOLD}: 4 episodes, 3 succeed" in picture.svg and "m0:" not in picture.svg
+    evidence.replace(ladder, MODES, None)
+    assert _drawn(ladder).skipped == f"{DEMONSTRATED} is missing"
+
+
+def test_a_mode_has_a_colour_of_its_own_and_none_is_grey():
+    found = colours(["m1", UNTOLD, "m0", "m1"])
+    assert list(found) == ["m0", "m1", UNTOLD] and len(set(found.values())) == 3
+    assert found == colours(["m0", "m1", UNTOLD])  # whatever the order of the episodes
+    assert GREY == found[UNTOLD] not in colours(f"m{i}" for i in range(9)).values()
 
 
 def test_rows_of_a_path_are_put_in_order(ladder):
