@@ -43,7 +43,7 @@ TESTS = {
     "gates/pages": ("tests/gates/pages", "tests/gates/test_overview.py"),
     "gates/stress": ("tests/gates/stress", *JUDGED),
     "gates/feasibility": ("tests/gates/feasibility", *JUDGED),
-    "gates/reproducibility": ("tests/gates/test_reproducibility.py", *JUDGED),
+    "gates/reproducibility": ("tests/gates/reproducibility", *JUDGED),
     "gates/bounds.py": ("tests/gates/stress",),
     "gates/criterion.py": ("tests/gates/test_engine.py",),
     "gates/evidence.py": JUDGED,

@@ -15,3 +15,13 @@ def settings_of(root, gate):
 def asked(root, criterion, *candidate, gate):
     """What a criterion measures, before any limit."""
     return criterion.measure(Evidence(root), settings_of(root, gate), *candidate)
+
+
+def found_in(report, name):
+    """What a report says of one criterion, of each candidate."""
+    return [criterion for criterion in report.criteria if criterion.id == name]
+
+
+def red(report):
+    """Criteria that failed."""
+    return {criterion.id for criterion in report.criteria if criterion.verdict == "FAIL"}

@@ -1,0 +1,79 @@
+"""What arrives at the stub: observations are the trials, and no action is lost."""
+
+import evidence
+import pandas as pd
+import pytest
+from asked import asked, found_in
+from editing import cells
+
+from gates.evidence import MissingEvidenceError
+from gates.feasibility.arrivals import at_the_stub, stub_violation_upper, unaccounted
+from gates.proof import judge
+from genpolicy.statistics.intervals import clopper_pearson
+
+STUB = "shadow/stub.parquet"
+
+
+def of(frame):
+    return frame["method"] == "flow"
+
+
+def bound(root):
+    return asked(root, stub_violation_upper, "flow", gate="C")
+
+
+def test_a_bad_arrival_is_one_of_the_observations_and_not_of_the_rows(ladder):
+    """Eight actions of one chunk arrive together: 400 observations are 400 trials, not 5400."""
+    assert bound(ladder).value == clopper_pearson(0, 400, 0.95)[1]
+    evidence.edit_table(ladder, STUB, cells("stale", 1, where=of, share=0.01))
+    assert bound(ladder).value == clopper_pearson(1, 400, 0.95)[1]
+    assert "1 of 400 observations" in bound(ladder).caveat
+
+
+def test_too_few_observations_are_no_proof_of_a_small_share_and_no_failure(ladder):
+    evidence.edit_table(ladder, STUB, cells("delivered", 120, where=of))
+    report = judge(ladder, "C")
+    found = next(c for c in found_in(report, "stub_violation_upper") if c.candidate == "flow")
+    assert (found.verdict, found.measured) == ("INCONCLUSIVE", None)
+    assert "none bad of 120 observations" in found.caveat and "0.03027" in found.caveat
+    evidence.edit_table(ladder, STUB, cells("delivered", 0, where=of))
+    assert judge(ladder, "C").candidates["flow"] == "INCONCLUSIVE"
+    # One that is bad among 120 is no want of evidence.
+    evidence.edit_table(ladder, STUB, cells("delivered", 120, where=of))
+    evidence.edit_table(ladder, STUB, cells("invalid", 1, where=of, share=0.01))
+    assert judge(ladder, "C").candidates["flow"] == "FAIL"
+
+
+def test_kinds_are_counted_together_and_nothing_that_arrived_is_no_answer():
+    rows = pd.DataFrame({"arrivals": [8, 0, 16], "stale": [1, 0, 2], "invalid": [0, 0, 4]})
+    assert at_the_stub(rows, "stale", "invalid") == (7, 24)
+    assert at_the_stub(rows.iloc[::-1], "stale") == (3, 24)
+    with pytest.raises(MissingEvidenceError, match="nothing arrived"):
+        at_the_stub(rows.iloc[1:2], "stale")
+    with pytest.raises(MissingEvidenceError, match="corrupt evidence"):
+        at_the_stub(rows.assign(stale=[1, 0, -2]), "stale")
+
+
+def _runs(**changes):
+    """Two fixtures: 24 generated of which 16 executed, and 8 discarded for two reasons."""
+    runs = {
+        "fixture": ["a", "a", "b"], "generated": [24, 24, 8], "executed": [16, 16, 8],
+        "queued": [0, 0, 0], "count": [5, 3, 0],
+    }  # fmt: skip
+    return pd.DataFrame(runs | changes)
+
+
+def test_what_is_lost_in_one_run_is_not_made_good_by_what_appears_in_another():
+    assert unaccounted(_runs(), ["fixture"]) == 0
+    assert unaccounted(_runs(count=[5, 2, 0]), ["fixture"]) == 1
+    assert unaccounted(_runs(count=[5, 2, 1]), ["fixture"]) == 2
+    assert unaccounted(_runs(count=[5, 2, 1]).iloc[::-1], ["fixture"]) == 2
+
+
+@pytest.mark.parametrize(
+    ("changes", "why"),
+    [({"executed": [16, 15, 8]}, "several totals"), ({"count": [9, -1, 0]}, "corrupt evidence")],
+)
+def test_totals_that_differ_or_count_below_zero_are_missing_evidence(changes, why):
+    with pytest.raises(MissingEvidenceError, match=why):
+        unaccounted(_runs(**changes), ["fixture"])

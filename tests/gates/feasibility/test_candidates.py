@@ -1,0 +1,132 @@
+"""The sampled chunks: modes alike, projection and jerk at the worse end, corruption refused."""
+
+import evidence
+import numpy as np
+import pandas as pd
+import pytest
+from asked import asked, found_in
+
+from gates.evidence import MissingEvidenceError
+from gates.feasibility.candidates import (
+    admissible,
+    boundary_jerk_p95_m_s3,
+    projection_p95_m,
+)
+from gates.feasibility.settings import LAYERS
+from gates.proof import judge
+
+CANDIDATES = "shadow/candidates.parquet"
+
+
+def of(frame):
+    return frame["method"] == "flow"
+
+
+@pytest.mark.parametrize(
+    ("criterion", "column"),
+    [(projection_p95_m, "position_change_m"), (boundary_jerk_p95_m_s3, "boundary_jerk_m_s3")],
+)
+def test_a_p95_is_judged_at_the_upper_end_over_observations(ladder, criterion, column):
+    """One observation of twenty is far off in all its candidates: p95 may lie there by luck."""
+
+    def change(frame):
+        far = of(frame) & (frame["fixture"] == "held_out") & (frame["observation"] == 3)
+        near = of(frame) & (frame["fixture"] == "held_out") & ~far
+        values = np.where(far, 900.0, np.where(near, 0.001, frame[column].astype(float)))
+        return frame.assign(**{column: values})
+
+    evidence.edit_table(ladder, CANDIDATES, change)
+    found = asked(ladder, criterion, "flow", gate="C")
+    assert found.interval == (0.001, 900.0) and found.value == 900.0
+    assert "p95 0.001, largest 900" in found.caveat or "p95 900" in found.caveat
+    assert judge(ladder, "C").candidates["flow"] == "FAIL"
+
+
+def test_a_p95_of_a_few_observations_is_not_measured(ladder):
+    few = lambda f: f[~(of(f) & (f["fixture"] == "held_out") & (f["observation"] > 9))]  # noqa: E731
+    evidence.edit_table(ladder, CANDIDATES, few)
+    with pytest.raises(MissingEvidenceError, match="10 independent draws"):
+        asked(ladder, projection_p95_m, "flow", gate="C")
+
+
+def _reject(mode, episodes):
+    """Reject a mode in the first so many of the 60 situations with two modes."""
+
+    def change(frame):
+        bad = (frame["fixture"] == "two_modes") & (frame["mode"] == mode)
+        frame.loc[bad & (frame["observation"] < episodes), "geometric"] = False
+        return frame
+
+    return change
+
+
+def _gap(ladder):
+    report = judge(ladder, "C")
+    return report, found_in(report, "mode_admissible_gap")[0]
+
+
+def test_the_worse_end_of_the_gap_decides(ladder):
+    """8 of 60 rejected on one side: the gap is .13, its upper end is not; .3 is the limit."""
+    evidence.edit_table(ladder, CANDIDATES, _reject("right", 8))
+    report, found = _gap(ladder)
+    assert found.verdict == "PASS" and 8 / 60 < found.interval[1] == found.measured < 0.3
+    evidence.edit_table(ladder, CANDIDATES, _reject("right", 16))
+    report, found = _gap(ladder)
+    assert report.verdict == found.verdict == "FAIL"
+    assert found.interval[0] < 16 / 60 < 0.3 < found.measured
+    assert "upper bound of left minus right" in found.caveat
+    assert "left 1 of 60, right 0.7333 of 60 episodes" in found.caveat
+
+
+def test_the_gap_counts_whichever_mode_is_removed(ladder):
+    evidence.edit_table(ladder, CANDIDATES, _reject("left", 30))
+    assert "right minus left" in _gap(ladder)[1].caveat
+
+
+def _answered_on_the_right(episodes):
+    """Only so many situations are answered on the right as well."""
+    return lambda f: f.assign(
+        mode=f["mode"].where((f["observation"] < episodes) | (f["mode"] != "right"), "none")
+    )
+
+
+@pytest.mark.parametrize(("episodes", "verdict"), [(30, "PASS"), (29, "INCONCLUSIVE")])
+def test_a_handful_of_observations_compares_no_modes(ladder, episodes, verdict):
+    """Six decided before, and one rejection more would have flipped them."""
+    evidence.edit_table(ladder, CANDIDATES, _answered_on_the_right(episodes))
+    report, found = _gap(ladder)
+    assert report.verdict == found.verdict == verdict
+    if verdict != "PASS":
+        assert "left 29, right 29; at least 30 of each" in found.caveat
+
+
+def test_without_situations_with_two_modes_nothing_is_compared(ladder):
+    evidence.edit_table(ladder, CANDIDATES, lambda f: f[f["fixture"] != "two_modes"])
+    report, found = _gap(ladder)
+    assert report.verdict == "INCONCLUSIVE" and "no situation with several" in found.caveat
+
+
+def test_situations_of_one_episode_are_one_observation(ladder):
+    three_each = [f"e{number // 3}:{number}" for number in range(60)]
+    evidence.edit_table(
+        ladder,
+        CANDIDATES,
+        lambda f: f.assign(situation=[three_each[number] for number in f["observation"]]),
+    )
+    found = _gap(ladder)[1]
+    assert found.verdict == "INCONCLUSIVE" and "left 20, right 20" in found.caveat
+
+
+def test_situations_with_two_modes_are_no_corruption(ladder):
+    """They are intact: what is admissible there was not let through."""
+    found = found_in(judge(ladder, "C"), "corrupted_refused_share")[0]
+    assert found.verdict == "PASS" and "of 5 corrupted fixtures" in found.caveat
+
+
+@pytest.mark.parametrize("layer", LAYERS)
+@pytest.mark.parametrize("answer", [False, None])
+def test_a_layer_that_refused_or_was_not_reached_is_not_passed(layer, answer):
+    rows = pd.DataFrame({name: [True, True, True] for name in LAYERS}, dtype=object)
+    assert admissible(rows).tolist() == [1.0, 1.0, 1.0]
+    rows.loc[1, layer] = answer
+    assert admissible(rows).tolist() == [1.0, 0.0, 1.0]

@@ -1,0 +1,40 @@
+"""What each part earns: one row per variant, one panel per measure, at its effect."""
+
+import evidence
+import numpy as np
+
+from gates.evidence import Evidence
+from gates.pages.figures import draw_all
+from gates.pages.plots_factors import EFFECTS, PANELS, PLOTS
+from genpolicy.evidence.rows.need import EffectRow
+
+TABLE = EFFECTS.removeprefix("artifacts/")
+
+
+def _effects(root, judged):
+    """By panel: effects as drawn, from the top."""
+    figure = PLOTS[0].draw(Evidence(root), judged("A"))
+    assert len(figure.axes) == len(PANELS)
+    return [
+        [float(line.get_xdata()[0]) for line in axes.lines if line.get_marker() == "o"]
+        for axes in figure.axes
+    ]
+
+
+def test_every_effect_is_drawn_once_in_the_panel_of_its_measure(whole, judged):
+    frame = Evidence(whole).rows(EFFECTS, EffectRow)
+    for drawn, (measures, _) in zip(_effects(whole, judged), PANELS, strict=True):
+        expected = frame.loc[frame["measure"].isin(measures), "effect"]
+        assert sorted(drawn) == sorted(expected) and len(drawn) > 0
+
+
+def test_the_order_of_the_rows_is_no_order_of_the_figure(copied, whole, judged):
+    evidence.edit_table(copied, TABLE, lambda f: f.iloc[::-1])
+    for one, other in zip(_effects(copied, judged), _effects(whole, judged), strict=True):
+        assert sorted(one) == sorted(other)
+
+
+def test_a_value_that_is_no_number_is_not_drawn(copied, judged):
+    evidence.edit_table(copied, TABLE, lambda f: f.assign(value=np.nan))
+    (picture,) = draw_all(PLOTS, Evidence(copied), judged("A"))
+    assert picture.skipped == "column value has missing or non-finite values"

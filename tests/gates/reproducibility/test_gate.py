@@ -1,0 +1,60 @@
+"""What pins a candidate and what a fresh process must give back."""
+
+import evidence
+import pytest
+from asked import asked, found_in, red
+from editing import cells
+
+from gates.evidence import MissingEvidenceError
+from gates.proof import judge
+from gates.reproducibility.gate import (
+    PINNED,
+    parameter_budget_deviation,
+    samples_difference,
+    unpinned_items,
+)
+
+MODES = "reload/modes.parquet"
+
+
+def test_a_candidate_of_another_dataset_is_not_pinned(ladder):
+    evidence.document(ladder, "ingest/manifest.json", {"schema_version": 2})
+    report = judge(ladder, "B")
+    assert report.verdict == "FAIL"
+    assert "another one than the audited" in found_in(report, "unpinned_items")[0].caveat
+
+
+def test_a_solver_that_agrees_with_itself_but_not_with_its_definition_is_red(ladder):
+    """One evaluation too often, at training and after reload: recorded and counted agree."""
+    evidence.edit_table(
+        ladder, "reload/nfe.parquet", lambda f: f.assign(recorded=9, counted=9, expected=8)
+    )
+    evidence.edit_table(ladder, MODES, cells("nfe", 9))
+    report = judge(ladder, "B")
+    assert red(report) == {"nfe_mismatch"}
+    found = found_in(report, "nfe_mismatch")[0]
+    assert found.measured == 1 and "8 by the definition" in found.caveat
+
+
+@pytest.mark.parametrize("factor", [0.9, 1.0, 1.1])
+def test_the_budget_is_missed_by_a_share_either_way(ladder, factor):
+    def scaled(document):
+        parts = document["methods"]["flow"]["parameters"]
+        parts.update({name: round(factor * number) for name, number in parts.items()})
+
+    evidence.edit_document(ladder, "train_generators/matched.json", scaled)
+    found = asked(ladder, parameter_budget_deviation, "flow", gate="B")
+    assert found.value == pytest.approx(abs(factor - 1.0))
+
+
+@pytest.mark.parametrize("item", PINNED)
+def test_each_item_that_is_not_pinned_is_named(ladder, item):
+    evidence.edit_document(ladder, "reload/identity.json", lambda d: d["flow"].update({item: ""}))
+    found = asked(ladder, unpinned_items, "flow", gate="B")
+    assert found.value >= 1 and item in found.caveat
+
+
+def test_hashes_that_differ_without_a_difference_are_no_measurement(ladder):
+    evidence.edit_table(ladder, "reload/samples.parquet", cells("sha256_reloaded", "0" * 64))
+    with pytest.raises(MissingEvidenceError, match="hashes differ although no sample is said to"):
+        asked(ladder, samples_difference, "flow", gate="B")

@@ -1,0 +1,69 @@
+"""Modes at the chosen NFE: what covers a mode, what lies outside, over which draws."""
+
+import evidence
+import pytest
+from asked import found_in, red
+from editing import cells
+
+from gates.proof import judge
+from genpolicy.statistics.intervals import clopper_pearson
+
+MODES = "reload/modes.parquet"
+EARLIER = "reload/modes_earlier.parquet"
+
+
+def test_a_noisy_point_policy_that_samples_between_the_modes_is_red(ladder):
+    """Every mode is reached, with admissible samples enough, and 45 % lie between."""
+    for table in (MODES, EARLIER):
+        evidence.edit_table(
+            ladder, table,
+            lambda f: f.assign(
+                samples=20, modes_covered=2, between_modes=9, admissible=8, fewest_admissible=4
+            ),
+        )  # fmt: skip
+    report = judge(ladder, "B")
+    assert red(report) == {"outside_modes_upper"}
+    assert "share 0.45" in found_in(report, "outside_modes_upper")[0].caveat
+
+
+def test_samples_far_from_every_mode_lie_outside_as_well(ladder):
+    evidence.edit_table(ladder, MODES, cells("far_from_modes", 6))
+    assert red(judge(ladder, "B")) == {"outside_modes_upper"}
+
+
+@pytest.mark.parametrize(("fewest", "passes"), [(0, False), (1, False), (2, True)])
+def test_a_mode_counts_from_its_share_of_admissible_samples_on(ladder, fewest, passes):
+    """Reached by half of the samples, a mode whose samples may not be executed is lost: 2 of 16."""
+    evidence.edit_table(ladder, MODES, cells("fewest_admissible", fewest))
+    report = judge(ladder, "B")
+    assert (report.verdict == "PASS") is passes
+    assert red(report) == (set() if passes else {"mode_coverage_lower"})
+    caveat = found_in(report, "mode_coverage_lower")[0].caveat
+    assert f"in {30 if passes else 0} of 30 two-mode situations" in caveat
+
+
+def test_situations_of_one_episode_are_one_draw_of_the_coverage(ladder):
+    """One situation a phase: thirty of ten episodes bound the share as ten draws do."""
+    evidence.edit_table(
+        ladder, MODES, lambda f: f.assign(episode_uuid=[f"e{i % 10}" for i in f["index"]])
+    )
+    found = found_in(judge(ladder, "B"), "mode_coverage_lower")[0]
+    lower, upper = clopper_pearson(10, 10, 0.95)
+    assert found.interval == pytest.approx((lower, upper))
+    assert "lower bound over 10 episodes" in found.caveat
+
+
+def test_the_worst_training_seed_decides(ladder):
+    def second_seed(frame):
+        other = frame.assign(seed=1, fewest_admissible=0, between_modes=12)
+        return evidence.pd.concat([frame, other], ignore_index=True)
+
+    evidence.edit_table(ladder, MODES, second_seed)
+    assert red(judge(ladder, "B")) == {"mode_coverage_lower", "outside_modes_upper"}
+
+
+def test_modes_counted_at_another_nfe_say_nothing(ladder):
+    evidence.edit_table(ladder, MODES, cells("nfe", 4))
+    report = judge(ladder, "B")
+    assert report.verdict == "INCONCLUSIVE"
+    assert "chosen NFE" in found_in(report, "mode_coverage_lower")[0].caveat

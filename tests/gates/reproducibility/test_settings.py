@@ -1,0 +1,33 @@
+"""Settings of Gate B: a mode's least share, and one number of evaluations per candidate."""
+
+import evidence
+import pytest
+
+from gates.evidence import Evidence, MissingEvidenceError
+from gates.proof import judge
+from gates.reproducibility.settings import chosen_nfe
+from genpolicy.errors import ConfigError
+
+NFE = "reload/nfe.parquet"
+
+
+def test_the_chosen_nfe_is_the_one_recorded(ladder):
+    assert chosen_nfe(Evidence(ladder), "flow") == 8
+    evidence.edit_table(ladder, NFE, lambda f: f.assign(recorded=4))
+    assert chosen_nfe(Evidence(ladder), "flow") == 4
+
+
+def test_a_candidate_that_records_several_nfe_has_chosen_none(ladder):
+    def second(frame):
+        return evidence.pd.concat([frame, frame.assign(seed=1, recorded=16)], ignore_index=True)
+
+    evidence.edit_table(ladder, NFE, second)
+    with pytest.raises(MissingEvidenceError, match=r"flow records several NFE: \[8.0, 16.0\]"):
+        chosen_nfe(Evidence(ladder), "flow")
+
+
+@pytest.mark.parametrize("share", [0.0, 0.6])
+def test_no_mode_may_count_without_samples_or_need_more_than_half(ladder, share):
+    evidence.write_params(ladder, lambda p: p["gate_b"].update(mode_minimum_share=share))
+    with pytest.raises(ConfigError, match="mode_minimum_share"):
+        judge(ladder, "B")
