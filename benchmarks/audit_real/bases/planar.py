@@ -1,4 +1,9 @@
-"""Points in a plane: posts to go round, goals to go to, a block to push."""
+"""Points in a plane: posts to go round, goals to go to, a block to push.
+
+Not the planar task of `benchmarks.audit`, with which they share the plant alone: there one task
+with goal, lamp, operators and epochs is varied by the cause that is planted, while each of these
+imitates one published layout, with its own ways, starts, units (pixels too) and form of the action.
+"""
 
 import numpy as np
 
