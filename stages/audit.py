@@ -2,7 +2,7 @@
 
 from genpolicy.audit.evidence import write_evidence
 from genpolicy.audit.settings import AuditSettings
-from genpolicy.evidence.need.audit_task import audit_task, round_obstacles, with_channels
+from genpolicy.evidence.need.audit_task import audit_task, round_obstacles, settings_of
 from genpolicy.evidence.need.pictures import scene_png
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import output_folder, write_bytes
@@ -15,7 +15,7 @@ def work(params: Params) -> None:
     """Audit the dataset and write the evidence."""
     require_one_contract()
     task = load_task(params.task.name)
-    settings = with_channels(params.section("audit", AuditSettings), task)
+    settings = settings_of(params.section("audit", AuditSettings), task, params.horizons)
     feasibility = params.section("feasibility", FeasibilitySettings)
     with output_folder(ARTIFACTS / "audit") as folder:
         result = audit_task(

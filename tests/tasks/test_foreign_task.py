@@ -11,7 +11,7 @@ from genpolicy.data.contract import TCP_ACTION, IngestContract, plausible_ranges
 from genpolicy.data.dataset import load_dataset
 from genpolicy.data.ingest import ingest_recordings
 from genpolicy.evidence.admission_context import make_checker
-from genpolicy.evidence.need.audit_task import audit_task, round_obstacles
+from genpolicy.evidence.need.audit_task import audit_task, round_obstacles, settings_of
 from genpolicy.evidence.need.pictures import scene_png
 from genpolicy.evidence.shadow.corruption import CORRUPTIONS
 from genpolicy.evidence.shadow.layer_mutants import missing_checks_evidence
@@ -134,9 +134,10 @@ def test_the_robot_is_read_from_the_scene(cell):
 
 
 def test_the_audit_reads_the_tasks_own_channels(cell, kit):
+    few = AuditSettings(neighbours=4, minimum_neighbours=4, query_stride=8)
     result = audit_task(
         cell.root / "dataset", task_name=cell.task.name,
-        settings=AuditSettings(neighbours=4, minimum_neighbours=4, query_stride=8),
+        settings=settings_of(few, cell.task, cell.horizons),
         feasibility=cell.feasibility, action_period_s=cell.horizons.action_period_s, root_seed=SEED,
     )  # fmt: skip
     assert result is not None

@@ -8,8 +8,10 @@ from numpy.typing import NDArray
 from genpolicy.audit.run import AuditResult, audit
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.audit.view import from_dataset
+from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.data.dataset import Dataset, load_dataset
 from genpolicy.data.recording.episode import PHASE_STREAM
+from genpolicy.errors import ConfigError
 from genpolicy.evidence.admission_context import admissible, make_checker
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.robot.collision import CollisionModel
@@ -33,13 +35,12 @@ def audit_task(
     Args:
         dataset: Folder of the dataset.
         task_name: Registered name.
-        settings: What counts as near, as two modes, as red.
+        settings: What counts as near, as two modes, as red; from `settings_of`.
         feasibility: Thresholds of the six layers.
         action_period_s: Time between actions, s.
         root_seed: Root seed.
     """
     task = load_task(task_name)
-    settings = with_channels(settings, task)
     data = load_dataset(dataset)
     checker = make_checker(task, feasibility, action_period_s=action_period_s)
 
@@ -61,18 +62,36 @@ def audit_task(
     )
 
 
-def with_channels(settings: AuditSettings, task: Task) -> AuditSettings:
-    """Settings that read the task's own channels, where they do not name others themselves."""
+def settings_of(settings: AuditSettings, task: Task, horizons: HorizonConfig) -> AuditSettings:
+    """Settings with the horizons of the ladder, and the task's own channels where none are named.
+
+    Raises:
+        ConfigError: A horizon stands among the settings: the ladder would audit other chunks than
+            it trains.
+    """
+    of_chunks: dict[str, object] = {
+        "observation_horizon": horizons.observation_horizon,
+        "chunk_steps": horizons.prediction_horizon,
+    }
+    twice = sorted(set(of_chunks) & settings.model_fields_set)
+    if twice:
+        raise ConfigError(
+            where=f"audit.{twice[0]}",
+            found=f"{getattr(settings, twice[0])}",
+            expected="nothing: `horizons` says it for the whole ladder",
+            action="Remove the line; set it under `horizons`.",
+        )
     channels = task.audit_channels
-    values: dict[str, object] = {
+    unless_named: dict[str, object] = {
         "position_channel": channels.position,
         "reference_channel": channels.reference,
         "calibration_phase": channels.calibration_phase,
         "context_channels": list(channels.context),
         "ignored_channels": [c.name for c in task.observation.channels if c.stream == PHASE_STREAM],
+        "persistence_lag_steps": horizons.prediction_horizon,
     }
-    missing = {k: v for k, v in values.items() if k not in settings.model_fields_set}
-    return settings.model_copy(update=missing)
+    missing = {k: v for k, v in unless_named.items() if k not in settings.model_fields_set}
+    return settings.model_copy(update=of_chunks | missing)
 
 
 def replay_episode(task: Task, data: Dataset, episode_uuid: str) -> str:

@@ -1,12 +1,39 @@
-"""What the audit gets from the task: replay of an episode, round obstacles."""
+"""What the audit gets from task and ladder: horizons, channels, replay, round obstacles."""
 
 import json
 
 import numpy as np
 import pytest
 
-from genpolicy.evidence.need.audit_task import replay_episode, round_obstacles
+from genpolicy.audit.settings import AuditSettings
+from genpolicy.contract.horizons import HorizonConfig
+from genpolicy.errors import ConfigError
+from genpolicy.evidence.need.audit_task import replay_episode, round_obstacles, settings_of
 from genpolicy.tasks.tabletop_insertion import scene
+
+HORIZONS = HorizonConfig(
+    observation_horizon=3, prediction_horizon=12, execution_horizon=6, action_period_s=0.05
+)
+
+
+def test_the_chunks_audited_are_those_that_train(task):
+    settings = settings_of(AuditSettings(), task, HORIZONS)
+    found = settings.observation_horizon, settings.chunk_steps, settings.persistence_lag_steps
+    assert found == (3, 12, 12)
+    assert settings_of(AuditSettings(persistence_lag_steps=4), task, HORIZONS).chunk_steps == 12
+
+
+@pytest.mark.parametrize("name", ["observation_horizon", "chunk_steps"])
+def test_a_horizon_said_twice_is_refused_even_if_equal(task, name):
+    with pytest.raises(ConfigError, match=rf"audit\.{name}.*horizons"):
+        settings_of(AuditSettings(**{name: 12}), task, HORIZONS)
+
+
+def test_a_named_setting_stands_before_the_tasks_and_before_a_chunk(task):
+    named = AuditSettings(persistence_lag_steps=4, calibration_phase="elsewhere")
+    settings = settings_of(named, task, HORIZONS)
+    assert (settings.persistence_lag_steps, settings.calibration_phase) == (4, "elsewhere")
+    assert settings.position_channel == task.audit_channels.position
 
 
 def test_a_recorded_success_replays_as_one(task, data):
