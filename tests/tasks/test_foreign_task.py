@@ -137,7 +137,7 @@ def test_the_audit_reads_the_tasks_own_channels(cell, kit):
     few = AuditSettings(neighbours=4, minimum_neighbours=4, query_stride=8)
     result = audit_task(
         cell.root / "dataset", task_name=cell.task.name,
-        settings=settings_of(few, cell.task, cell.horizons),
+        settings=settings_of(few, cell.task, cell.horizons, confidence=0.95),
         feasibility=cell.feasibility, action_period_s=cell.horizons.action_period_s, root_seed=SEED,
     )  # fmt: skip
     assert result is not None

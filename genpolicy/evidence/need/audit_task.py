@@ -62,25 +62,35 @@ def audit_task(
     )
 
 
-def settings_of(settings: AuditSettings, task: Task, horizons: HorizonConfig) -> AuditSettings:
-    """Settings with the horizons of the ladder, and the task's own channels where none are named.
+def settings_of(
+    settings: AuditSettings, task: Task, horizons: HorizonConfig, *, confidence: float
+) -> AuditSettings:
+    """Settings with what the ladder shares, and the task's own channels where none are named.
+
+    Args:
+        settings: The audit's own; those with a home elsewhere are left out.
+        task: Whose channels are read.
+        horizons: Of the chunks that are trained, and so of those that are audited.
+        confidence: Coverage of every interval.
 
     Raises:
-        ConfigError: A horizon stands among the settings: the ladder would audit other chunks than
-            it trains.
+        ConfigError: Something shared stands among the settings as well.
     """
-    of_chunks: dict[str, object] = {
-        "observation_horizon": horizons.observation_horizon,
-        "chunk_steps": horizons.prediction_horizon,
+    shared: dict[str, tuple[str, object]] = {
+        "observation_horizon": ("horizons", horizons.observation_horizon),
+        "chunk_steps": ("horizons", horizons.prediction_horizon),
+        "confidence": ("confidence", confidence),
     }
-    twice = sorted(set(of_chunks) & settings.model_fields_set)
+    twice = sorted(set(shared) & settings.model_fields_set)
     if twice:
+        home = shared[twice[0]][0]
         raise ConfigError(
             where=f"audit.{twice[0]}",
             found=f"{getattr(settings, twice[0])}",
-            expected="nothing: `horizons` says it for the whole ladder",
-            action="Remove the line; set it under `horizons`.",
+            expected=f"nothing: `{home}` says it for the whole ladder",
+            action=f"Remove the line; set it under `{home}`.",
         )
+    of_ladder = {name: value for name, (_, value) in shared.items()}
     channels = task.audit_channels
     unless_named: dict[str, object] = {
         "position_channel": channels.position,
@@ -91,7 +101,7 @@ def settings_of(settings: AuditSettings, task: Task, horizons: HorizonConfig) ->
         "persistence_lag_steps": horizons.prediction_horizon,
     }
     missing = {k: v for k, v in unless_named.items() if k not in settings.model_fields_set}
-    return settings.model_copy(update=of_chunks | missing)
+    return settings.model_copy(update=of_ladder | missing)
 
 
 def replay_episode(task: Task, data: Dataset, episode_uuid: str) -> str:

@@ -17,21 +17,30 @@ HORIZONS = HorizonConfig(
 
 
 def test_the_chunks_audited_are_those_that_train(task):
-    settings = settings_of(AuditSettings(), task, HORIZONS)
+    settings = settings_of(AuditSettings(), task, HORIZONS, confidence=0.9)
     found = settings.observation_horizon, settings.chunk_steps, settings.persistence_lag_steps
-    assert found == (3, 12, 12)
-    assert settings_of(AuditSettings(persistence_lag_steps=4), task, HORIZONS).chunk_steps == 12
+    assert (*found, settings.confidence) == (3, 12, 12, 0.9)
+    assert (
+        settings_of(
+            AuditSettings(persistence_lag_steps=4), task, HORIZONS, confidence=0.9
+        ).chunk_steps
+        == 12
+    )
 
 
-@pytest.mark.parametrize("name", ["observation_horizon", "chunk_steps"])
-def test_a_horizon_said_twice_is_refused_even_if_equal(task, name):
-    with pytest.raises(ConfigError, match=rf"audit\.{name}.*horizons"):
-        settings_of(AuditSettings(**{name: 12}), task, HORIZONS)
+@pytest.mark.parametrize(
+    ("name", "value", "home"),
+    [("observation_horizon", 3, "horizons"), ("chunk_steps", 12, "horizons"),
+     ("confidence", 0.9, "confidence")],
+)  # fmt: skip
+def test_what_is_said_twice_is_refused_even_if_equal(task, name, value, home):
+    with pytest.raises(ConfigError, match=rf"audit\.{name}.*`{home}`"):
+        settings_of(AuditSettings(**{name: value}), task, HORIZONS, confidence=0.9)
 
 
 def test_a_named_setting_stands_before_the_tasks_and_before_a_chunk(task):
     named = AuditSettings(persistence_lag_steps=4, calibration_phase="elsewhere")
-    settings = settings_of(named, task, HORIZONS)
+    settings = settings_of(named, task, HORIZONS, confidence=0.9)
     assert (settings.persistence_lag_steps, settings.calibration_phase) == (4, "elsewhere")
     assert settings.position_channel == task.audit_channels.position
 
