@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from genpolicy.audit.documents import Obstacle
 from genpolicy.audit.run import AuditResult, audit
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.audit.view import from_dataset
@@ -117,7 +118,7 @@ def replay_episode(task: Task, data: Dataset, episode_uuid: str) -> str:
     return task.replay(start, np.concatenate([before, actions]))
 
 
-def round_obstacles(task: Task) -> list[dict[str, float]]:
+def round_obstacles(task: Task) -> list[Obstacle]:
     """Standing cylinders of the scene file, as circles in the base frame's plane, m."""
     shapes = CollisionModel(task.scene_path, ArmKinematics(task.scene_path)).shapes
     found = []
@@ -127,10 +128,8 @@ def round_obstacles(task: Task) -> list[dict[str, float]]:
         origin, _ = shapes.nominal_bodies[shape.body]
         centre = origin + shape.position_m
         found.append(
-            {
-                "x_m": float(centre[0]),
-                "y_m": float(centre[1]),
-                "radius_m": float(shape.half_size_m[0]),
-            }
+            Obstacle(
+                x_m=float(centre[0]), y_m=float(centre[1]), radius_m=float(shape.half_size_m[0])
+            )
         )
     return found

@@ -68,5 +68,5 @@ def test_an_unknown_episode_is_an_error(task, data):
 def test_the_post_is_the_one_round_obstacle(task):
     (post,) = round_obstacles(task)
     # Scene file: cylinder of 25 mm radius at x = 0.50 m.
-    assert post["radius_m"] == pytest.approx(0.025)
-    np.testing.assert_allclose([post["x_m"], post["y_m"]], [scene.POST_X_M, 0.0])
+    assert post.radius_m == pytest.approx(0.025)
+    np.testing.assert_allclose([post.x_m, post.y_m], [scene.POST_X_M, 0.0])
