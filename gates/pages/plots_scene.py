@@ -14,6 +14,7 @@ from gates.evidence import Array, Evidence, MissingEvidenceError
 from gates.need.settings import AUDIT
 from gates.pages.figures import Photo, Plot
 from gates.report import GateReport
+from genpolicy.audit.documents import SUMMARY
 from genpolicy.audit.rows import Demonstration
 from genpolicy.data.rows import EpisodeRow, FrameRow
 from genpolicy.pages.figures.drawing import GREY, RED, new_figure
@@ -23,7 +24,7 @@ SCENE = f"{AUDIT}/scene.png"
 FRAMES = "artifacts/ingest/frames.parquet"
 EPISODES = "artifacts/ingest/episodes.parquet"
 DEMONSTRATED = f"{AUDIT}/demonstrated.parquet"
-SUMMARY = f"{AUDIT}/summary.json"
+SUMMARY_FILE = f"{AUDIT}/{SUMMARY.file}"
 POINTS = 32
 """Points kept of each path; the recorded ones lie a few millimetres apart."""
 UNTOLD = "no mode"
@@ -43,15 +44,6 @@ class Path:
     points_m: Array
     success: bool
     mode: str
-
-
-def obstacles(evidence: Evidence) -> list[dict[str, float]]:
-    """Round obstacles of the scene plane as the audit wrote them; none where it wrote none."""
-    try:
-        found = evidence.document(SUMMARY).get("obstacles", [])
-    except MissingEvidenceError:
-        return []
-    return [item for item in found if isinstance(item, dict)]
 
 
 def paths(evidence: Evidence) -> list[Path]:
@@ -81,6 +73,7 @@ def _demonstrations(evidence: Evidence, report: GateReport) -> Figure:
     every = paths(evidence)
     if not every:
         raise MissingEvidenceError(f"{FRAMES} has no rows of an accepted episode")
+    obstacles = evidence.document(AUDIT, SUMMARY).obstacles
     figure, (above, aside) = new_figure(height=3.5, columns=2)
     for name, colour in colours(path.mode for path in every).items():
         of_mode = [path for path in every if path.mode == name]
@@ -94,14 +87,12 @@ def _demonstrations(evidence: Evidence, report: GateReport) -> Figure:
         axes.scatter(failed[:, 0], failed[:, second], marker="x", s=22, color=RED, lw=1.2, zorder=6)
         axes.set_xlabel("x, m (base frame)")
     above.scatter([], [], marker="x", s=22, color=RED, label=f"end of a failure ({len(failed)})")
-    draw_obstacles(above, obstacles(evidence))
-    for item in obstacles(evidence):
+    draw_obstacles(above, obstacles)
+    for item in obstacles:
         low, high = aside.get_ylim()
-        corner = (item["x_m"] - item["radius_m"], low)
+        corner = (item.x_m - item.radius_m, low)
         aside.add_patch(
-            Rectangle(
-                corner, 2 * item["radius_m"], high - low, color=STONE, alpha=0.6, lw=0, zorder=1
-            )
+            Rectangle(corner, 2 * item.radius_m, high - low, color=STONE, alpha=0.6, lw=0, zorder=1)
         )
     above.set_title("from above")
     aside.set_title("from the side")
@@ -147,6 +138,6 @@ PLOTS: tuple[Plot | Photo, ...] = (
         "bundle, or one that fails, is not.",
         FRAMES,
         _demonstrations,
-        also=(EPISODES, DEMONSTRATED, SUMMARY),
+        also=(EPISODES, DEMONSTRATED, SUMMARY_FILE),
     ),
 )
