@@ -3,7 +3,7 @@
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from genpolicy.audit.asked import COLUMN
+from genpolicy.audit.question_names import COLUMN
 from genpolicy.audit.component_rows import NOT_LOOKED_AT, OTHER
 from genpolicy.audit.labels import Replay, disagreement
 from genpolicy.audit.mean_versus_modes import Admissible
