@@ -35,7 +35,7 @@ from genpolicy.seeds import integer_seed
 
 ALLOWED_DIFFERENCES = (
     "method", "sampler.name", "sampler.steps", "sampler.clip", "sampler.population",
-    "training_seed",
+    "sampler.tolerance", "sampler.nfe_cap", "training_seed",
 )  # fmt: skip
 DERIVED = ("weights_sha256", "parameters", "training_only_parameters", "flops")
 

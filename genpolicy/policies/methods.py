@@ -11,7 +11,9 @@ from torch import Tensor
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.errors import ConfigError
 from genpolicy.policies.derivative_free import noise_length, search_codes
+from genpolicy.policies.diffusion_samplers import DIFFUSION_SAMPLERS, sample_diffusion
 from genpolicy.policies.energy import CODE_BOUND, EnergyContrast, EnergyNetwork
+from genpolicy.policies.evaluations import allowed_evaluations
 from genpolicy.policies.networks import Dimensions, HeadInput, PolicyNetwork
 from genpolicy.policies.objectives import (
     ConditionalVae,
@@ -21,15 +23,14 @@ from genpolicy.policies.objectives import (
     flow_matching,
     squared_error,
 )
-from genpolicy.policies.offset import OffsetError, OffsetNetwork
-from genpolicy.policies.samplers import (
-    DIFFUSION_SAMPLERS,
+from genpolicy.policies.ode_samplers import (
+    ADAPTIVE_TABLEAUS,
     ODE_SAMPLERS,
-    CountedNetwork,
-    NoiseFunction,
-    sample_diffusion,
+    sample_adaptive,
     sample_ode,
 )
+from genpolicy.policies.offset import OffsetError, OffsetNetwork
+from genpolicy.policies.samplers import CountedNetwork, NoiseFunction
 from genpolicy.policies.schedules import (
     Gains,
     flow_gains,
@@ -121,7 +122,7 @@ METHODS = {
         Method(
             "diffusion", True, "chunk", NoisePrediction, ("ddim", "ddpm", "dpm_2m"), _noise_gains
         ),
-        Method("flow", True, "chunk", flow_matching, ("euler", "heun", "rk4"), _flow_gains),
+        Method("flow", True, "chunk", flow_matching, ODE_SAMPLERS, _flow_gains),
     )
 }
 
@@ -147,8 +148,8 @@ def check_sampler(method: Method, sampler: SamplerConfig, head: HeadConfig) -> N
 
     Raises:
         ConfigError: Wrong kind, fewer than one step, more steps than training levels,
-            several steps of a method that evaluates its network once, or a population of a
-            sampler that has none.
+            several steps of a method that evaluates its network once, a population of a
+            sampler that has none, or a cap that is missing or too low to ever finish.
     """
     if sampler.name not in method.samplers:
         raise ConfigError(
@@ -175,6 +176,19 @@ def check_sampler(method: Method, sampler: SamplerConfig, head: HeadConfig) -> N
             expected="at least 2" if searches else "exactly 1",
             action="Set a population for the energy's search, and for no other sampler.",
         )
+    _check_cap(method, sampler)
+
+
+def _check_cap(method: Method, sampler: SamplerConfig) -> None:
+    """An adaptive solver must have a cap, and no sampler one that it cannot keep."""
+    least = allowed_evaluations(sampler).least
+    if sampler.nfe_cap is not None and sampler.nfe_cap < least:
+        raise ConfigError(
+            where=f"sampler.nfe_cap of {method.name}",
+            found=str(sampler.nfe_cap),
+            expected=f"at least {least}",
+            action="Allow as many network evaluations as the deadline has time for.",
+        )
 
 
 def generate(
@@ -195,7 +209,11 @@ def generate(
         head: Head settings of the training.
 
     Returns:
-        Chunks (B, K, D_a) and the counted NFE.
+        Chunks (B, K, D_a) and the counted NFE: calls of the network, as many as its slowest row
+        needed.
+
+    Raises:
+        EvaluationCapError: The sampler's cap was reached.
     """
 
     def evaluate(values: Tensor, time: Tensor) -> Tensor:
@@ -205,7 +223,7 @@ def generate(
             return network.evaluate(condition, values)
         return network.evaluate(condition, values, time)
 
-    counted = CountedNetwork(evaluate)
+    counted = CountedNetwork(evaluate, cap=sampler.nfe_cap)
     if sampler.name in DIFFUSION_SAMPLERS:
         chunks = sample_diffusion(
             counted,
@@ -219,6 +237,10 @@ def generate(
         assert isinstance(network, EnergyNetwork)
         codes = search_codes(counted, noise, iterations=sampler.steps, bound=CODE_BOUND)
         chunks = network.code.decode(codes)
+    elif sampler.name in ADAPTIVE_TABLEAUS:
+        chunks = sample_adaptive(
+            counted, noise, name=sampler.name, steps=sampler.steps, tolerance=sampler.tolerance
+        )
     elif sampler.name in ODE_SAMPLERS:
         chunks = sample_ode(counted, noise, name=sampler.name, steps=sampler.steps)
     else:

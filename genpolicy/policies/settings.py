@@ -103,22 +103,29 @@ class SamplerConfig(Settings):
 
     Attributes:
         name: The sampler.
-        steps: Sampler steps (not NFE: Heun evaluates the network twice a step).
+        steps: Sampler steps (not NFE: Heun evaluates the network twice a step); of an adaptive
+            solver, one over the first step that it tries.
         clip: Bound of the predicted clean chunk, normalised units; diffusion samplers only.
         population: Candidates that every pass of the energy's search scores; other samplers draw
             none and leave it at 1.
         batch_rows: Rows of every network call; shorter batches are padded, so that one row's
             sample does not depend on how many others there are.
+        tolerance: Error of one step that an adaptive solver accepts, normalised units; of the
+            defaults' kind a thousandth of the action's range, far below what a controller sees.
+        nfe_cap: Network evaluations after which a sample is given up, with an error; an adaptive
+            solver must have one. Set it by what the deadline has time for.
     """
 
     name: Literal[
-        "direct", "z_zero", "z_prior", "ddpm", "ddim", "dpm_2m", "euler", "heun", "rk4",
-        "derivative_free", "offset",
+        "direct", "z_zero", "z_prior", "ddpm", "ddim", "dpm_2m", "euler", "midpoint", "heun",
+        "rk4", "bosh3", "derivative_free", "offset",
     ]  # fmt: skip
     steps: int = Field(default=1, le=10_000)
     clip: float | None = Field(default=1.0, gt=0.0)
     population: int = Field(default=1, ge=1, le=65_536)
     batch_rows: int = Field(default=16, ge=1, le=65_536)
+    tolerance: float = Field(default=1e-3, gt=0.0, le=1.0)
+    nfe_cap: int | None = Field(default=None, ge=1, le=1_000_000)
 
     def hash(self) -> str:
         """SHA-256 of the settings."""

@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 import torch
 
-from genpolicy.errors import ConfigError, ContractError, IntegrityError, NonFiniteError
+from genpolicy.errors import (
+    ConfigError,
+    ContractError,
+    EvaluationCapError,
+    IntegrityError,
+    NonFiniteError,
+)
 from genpolicy.policies.methods import METHODS
 from genpolicy.policies.policy import load_policy
 from genpolicy.policies.settings import SamplerConfig
@@ -22,7 +28,10 @@ POPULATION = {"derivative_free": 32}
 
 
 def sampler_of(name, steps):
-    return SamplerConfig(name=name, steps=steps, population=POPULATION.get(name, 1))
+    return SamplerConfig(
+        name=name, steps=steps, population=POPULATION.get(name, 1),
+        nfe_cap=200 if name == "bosh3" else None,
+    )  # fmt: skip
 
 
 def names(count):
@@ -79,7 +88,8 @@ def test_two_loads_give_equal_bytes(folders, method, two_mode_windows):
         ("bc", "direct", 1, 1), ("chunked_bc", "direct", 1, 1), ("act", "z_zero", 1, 1),
         ("act", "z_prior", 1, 1), ("diffusion", "ddim", 7, 7), ("diffusion", "ddpm", 100, 100),
         ("diffusion", "dpm_2m", 6, 6), ("flow", "euler", 5, 5), ("flow", "heun", 5, 10),
-        ("flow", "rk4", 3, 12), ("chunked_l1", "direct", 1, 1), ("ibc", "derivative_free", 6, 7),
+        ("flow", "rk4", 3, 12), ("flow", "midpoint", 3, 6),
+        ("chunked_l1", "direct", 1, 1), ("ibc", "derivative_free", 6, 7),
         ("bc_noise", "offset", 1, 1),
     ],
 )  # fmt: skip
@@ -120,6 +130,39 @@ def test_samplers_that_do_not_fit_are_refused(folders, method, name, steps):
 def test_a_population_belongs_to_the_search_only(folders, method, name, population):
     with pytest.raises(ConfigError, match="population"):
         load_policy(folders[method], sampler=SamplerConfig(name=name, population=population))
+
+
+def test_an_adaptive_row_takes_its_own_steps_whatever_the_others_take(folders, two_mode_windows):
+    """Together they wait for the slowest; padding, of a batch of one, waits for nobody else."""
+    sampler = SamplerConfig(name="bosh3", steps=4, tolerance=1e-4, nfe_cap=400)
+    policy = load_policy(folders["flow"], sampler=sampler)
+    observations = two_mode_windows(3, seed=9).observations
+    together = policy.sample(observations, noise_names=names(3), candidates=1)
+    alone = [
+        policy.sample(observations[row : row + 1], noise_names=[("row", row)], candidates=1)
+        for row in range(3)
+    ]
+    assert all(
+        np.array_equal(one.actions[0], together.actions[row]) for row, one in enumerate(alone)
+    )
+    counts = [one.nfe for one in alone]
+    assert len(set(counts)) > 1, "the rows must differ, or nothing is shown"
+    assert together.nfe == max(counts)
+    slow = SamplerConfig(**{**sampler.model_dump(), "nfe_cap": max(counts) - 1})
+    policy = load_policy(folders["flow"], sampler=slow)
+    with pytest.raises(EvaluationCapError, match=f"at most sampler.nfe_cap, {slow.nfe_cap}"):
+        policy.sample(observations, noise_names=names(3), candidates=1)
+    fast = counts.index(min(counts))
+    again = policy.sample(observations[fast : fast + 1], noise_names=[("row", fast)], candidates=1)
+    assert np.array_equal(again.actions, alone[fast].actions)
+
+
+@pytest.mark.parametrize(
+    ("name", "steps", "cap"), [("bosh3", 1, None), ("bosh3", 6, 6), ("rk4", 2, 7)]
+)
+def test_a_cap_that_is_missing_or_too_low_is_refused(folders, name, steps, cap):
+    with pytest.raises(ConfigError, match="nfe_cap"):
+        load_policy(folders["flow"], sampler=SamplerConfig(name=name, steps=steps, nfe_cap=cap))
 
 
 def test_wrong_observations_are_refused(folders, two_mode_windows):
