@@ -1,19 +1,121 @@
 """Diffusion samplers: from noise to a clean chunk over the levels of the training.
 
-DDPM (Ho et al., arXiv 2006.11239), DDIM with eta 0 (Song et al., arXiv 2010.02502),
-DPM-Solver++(2M) (Lu et al., arXiv 2211.01095).
+Every sampler is one update function of the same step; the walk over the levels, the conversion
+of the prediction and the bound of the clean estimate are common. DDPM (Ho et al., arXiv
+2006.11239), DDIM (Song et al., arXiv 2010.02502), DPM-Solver++ of first and second order and
+its stochastic form (Lu et al., arXiv 2211.01095).
 """
 
+import functools
 import math
+from collections.abc import Callable
+from dataclasses import dataclass
 
-import numpy as np
 import torch
 from torch import Tensor
 
+from genpolicy.policies.predictions import PREDICTIONS
 from genpolicy.policies.samplers import NetworkFunction, NoiseFunction, refuse_name
 from genpolicy.policies.schedules import DiffusionSchedule, trailing_levels
+from genpolicy.policies.settings import SamplerConfig
 
-DIFFUSION_SAMPLERS = ("ddpm", "ddim", "dpm_2m")
+
+@dataclass(frozen=True)
+class Step:
+    """One step from a noise level to the next lower one, or to the clean chunk.
+
+    Attributes:
+        x: Noisy chunks. Shape (B, K, D).
+        clean: Estimate of the clean chunks at this level.
+        clean_before: That of the step before; None at the first.
+        now: Share of the clean variance left at this level, < 1.
+        after: At the next; 1 at the end.
+        before: At the level of the step before; NaN at the first.
+        eta: Share of the ancestral noise that DDIM adds.
+        draw: New standard normal numbers for this step. Shape (B, K, D).
+    """
+
+    x: Tensor
+    clean: Tensor
+    clean_before: Tensor | None
+    now: float
+    after: float
+    before: float
+    eta: float
+    draw: Callable[[], Tensor]
+
+    @property
+    def deviation(self) -> float:
+        """Standard deviation of the ancestral noise, the smaller ("fixed small") choice."""
+        return math.sqrt((1.0 - self.after) / (1.0 - self.now) * (1.0 - self.now / self.after))
+
+    @property
+    def length(self) -> float:
+        """Length in half the logarithm of signal to noise; where noise is left after it."""
+        return _half_log_snr(self.after) - _half_log_snr(self.now)
+
+
+def _ddpm(step: Step) -> Tensor:
+    """One ancestral step."""
+    alpha = step.now / step.after
+    mean = (
+        math.sqrt(step.after) * (1.0 - alpha) / (1.0 - step.now) * step.clean
+        + math.sqrt(alpha) * (1.0 - step.after) / (1.0 - step.now) * step.x
+    )
+    return mean + step.deviation * step.draw() if step.after < 1.0 else mean
+
+
+def _ddim(step: Step) -> Tensor:
+    """One step with the noise that the bounded clean estimate leaves, and eta of fresh noise."""
+    rest = (step.x - math.sqrt(step.now) * step.clean) / math.sqrt(1.0 - step.now)
+    fresh = step.eta * step.deviation
+    x = math.sqrt(step.after) * step.clean + math.sqrt(1.0 - step.after - fresh**2) * rest
+    return x + fresh * step.draw() if fresh > 0.0 else x
+
+
+def _dpm_1(step: Step) -> Tensor:
+    """First order: exact where the clean estimate does not change along the step."""
+    return _exponential(step, step.clean)
+
+
+def _dpm_2m(step: Step) -> Tensor:
+    """Second order from the estimate of the step before; the last step is of first order."""
+    return _exponential(step, _extrapolated(step))
+
+
+def _dpm_sde(step: Step) -> Tensor:
+    """As `_dpm_2m` for the diffusion's stochastic equation: the noise is renewed on the way."""
+    if step.after == 1.0:
+        return step.clean
+    h = step.length
+    scale = math.sqrt((1.0 - step.after) / (1.0 - step.now)) * math.exp(-h)
+    x = scale * step.x - math.sqrt(step.after) * math.expm1(-2.0 * h) * _extrapolated(step)
+    return x + math.sqrt(-(1.0 - step.after) * math.expm1(-2.0 * h)) * step.draw()
+
+
+def _exponential(step: Step, clean: Tensor) -> Tensor:
+    if step.after == 1.0:
+        return step.clean
+    scale = math.sqrt((1.0 - step.after) / (1.0 - step.now))
+    return scale * step.x - math.sqrt(step.after) * math.expm1(-step.length) * clean
+
+
+def _extrapolated(step: Step) -> Tensor:
+    """The clean estimate half a step ahead, along the line through the last two."""
+    if step.clean_before is None or step.after == 1.0:
+        return step.clean
+    ratio = step.length / (2.0 * (_half_log_snr(step.now) - _half_log_snr(step.before)))
+    return (1.0 + ratio) * step.clean - ratio * step.clean_before
+
+
+UPDATES: dict[str, Callable[[Step], Tensor]] = {
+    "ddim": _ddim,
+    "ddpm": _ddpm,
+    "dpm_1": _dpm_1,
+    "dpm_2m": _dpm_2m,
+    "dpm_sde": _dpm_sde,
+}
+DIFFUSION_SAMPLERS = tuple(UPDATES)
 
 
 def sample_diffusion(
@@ -21,20 +123,18 @@ def sample_diffusion(
     noise: NoiseFunction,
     *,
     schedule: DiffusionSchedule,
-    name: str,
-    steps: int,
-    clip: float | None,
+    sampler: SamplerConfig,
+    prediction: str = "noise",
 ) -> Tensor:
-    """Clean chunks from a noise-predicting network.
+    """Clean chunks from a trained diffusion network.
 
     Args:
-        network: Noise estimate of chunks at time level / T.
-        noise: Noise of each sampler step; step 0 is the start, DDPM draws one more per step.
+        network: Its prediction of chunks at time level / T.
+        noise: Noise of each sampler step; step 0 is the start, stochastic ones draw one a step.
         schedule: Levels of the training.
-        name: `ddpm`, `ddim` or `dpm_2m`.
-        steps: Sampler steps, trailing spacing.
-        clip: Bound of the clean estimate at every step; the noise estimate is recomputed from
-            the bounded value. None leaves it free.
+        sampler: Name, steps (trailing spacing), `eta`, and `clip`: bound of the clean estimate
+            at every step, from which the noise estimate is computed again.
+        prediction: What the network predicts, a key of `PREDICTIONS`.
 
     Returns:
         Normalised chunks. Shape (B, K, D).
@@ -42,62 +142,31 @@ def sample_diffusion(
     Raises:
         ConfigError: Unknown sampler, fewer than one step or more steps than levels.
     """
-    if name not in DIFFUSION_SAMPLERS:
-        refuse_name(name, DIFFUSION_SAMPLERS)
-    visited = trailing_levels(schedule.levels, steps)
+    if sampler.name not in UPDATES:
+        refuse_name(sampler.name, DIFFUSION_SAMPLERS)
+    update, kind = UPDATES[sampler.name], PREDICTIONS[prediction]
+    visited = trailing_levels(schedule.levels, sampler.steps)
     kept = [float(schedule.alpha_bar[level]) for level in visited] + [1.0]
     x = noise(0)
-    previous_clean: Tensor | None = None
-    for step, level in enumerate(visited):
-        now, after = kept[step], kept[step + 1]
+    before: Tensor | None = None
+    for index, level in enumerate(visited):
         time = schedule.level_time(torch.full(x.shape[:1], level, dtype=x.dtype, device=x.device))
-        estimate = network(x, time)
-        clean = (x - math.sqrt(1.0 - now) * estimate) / math.sqrt(now)
-        if clip is not None:
-            clean = clean.clamp(-clip, clip)
-        if name == "ddpm":
-            x = _ddpm_update(x, clean, now=now, after=after)
-            if after < 1.0:
-                x = x + _ddpm_deviation(now=now, after=after) * noise(step + 1)
-        elif name == "ddim":
-            rest = (x - math.sqrt(now) * clean) / math.sqrt(1.0 - now)
-            x = math.sqrt(after) * clean + math.sqrt(1.0 - after) * rest
-        else:
-            x = _dpm_update(x, clean, previous_clean, kept=kept, step=step)
-            previous_clean = clean
+        clean = kind.clean(x, network(x, time), kept[index])
+        if sampler.clip is not None:
+            clean = clean.clamp(-sampler.clip, sampler.clip)
+        step = Step(
+            x=x,
+            clean=clean,
+            clean_before=before,
+            now=kept[index],
+            after=kept[index + 1],
+            before=kept[index - 1] if index else math.nan,
+            eta=sampler.eta,
+            draw=functools.partial(noise, index + 1),
+        )
+        x, before = update(step), clean
     return x
 
 
-def _ddpm_update(x: Tensor, clean: Tensor, *, now: float, after: float) -> Tensor:
-    """Mean of one ancestral step."""
-    alpha = now / after
-    return (
-        math.sqrt(after) * (1.0 - alpha) / (1.0 - now) * clean
-        + math.sqrt(alpha) * (1.0 - after) / (1.0 - now) * x
-    )
-
-
-def _ddpm_deviation(*, now: float, after: float) -> float:
-    """Standard deviation of one ancestral step, the smaller ("fixed small") choice."""
-    return math.sqrt((1.0 - after) / (1.0 - now) * (1.0 - now / after))
-
-
-def _dpm_update(
-    x: Tensor, clean: Tensor, previous: Tensor | None, *, kept: list[float], step: int
-) -> Tensor:
-    """One second-order multistep update in half-log-SNR; the last one is the clean estimate."""
-    after = kept[step + 1]
-    if after == 1.0:
-        return clean
-    h = _half_log_snr(after) - _half_log_snr(kept[step])
-    blend = clean
-    if previous is not None:
-        h_before = _half_log_snr(kept[step]) - _half_log_snr(kept[step - 1])
-        ratio = h / (2.0 * h_before)
-        blend = (1.0 + ratio) * clean - ratio * previous
-    scale = math.sqrt((1.0 - after) / (1.0 - kept[step]))
-    return scale * x - math.sqrt(after) * math.expm1(-h) * blend
-
-
 def _half_log_snr(alpha_bar: float) -> float:
-    return 0.5 * float(np.log(alpha_bar / (1.0 - alpha_bar)))
+    return 0.5 * math.log(alpha_bar / (1.0 - alpha_bar))

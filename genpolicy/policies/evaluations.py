@@ -54,11 +54,13 @@ EVALUATIONS = {
     "z_zero": Evaluations(1),
     "z_prior": Evaluations(1),
     "offset": Evaluations(1),
-    # One noise estimate a level. DPM-Solver++(2M) takes the earlier one of its two from the step
+    # One prediction a level. DPM-Solver++(2M) takes the earlier one of its two from the step
     # before, and its last step is of first order.
     "ddpm": Evaluations(1),
     "ddim": Evaluations(1),
+    "dpm_1": Evaluations(1),
     "dpm_2m": Evaluations(1),
+    "dpm_sde": Evaluations(1),
     # The stages of the Runge-Kutta tableau; none of them is shared between steps.
     "euler": Evaluations(1),
     "heun": Evaluations(2),

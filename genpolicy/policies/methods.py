@@ -17,7 +17,7 @@ from genpolicy.policies.evaluations import allowed_evaluations
 from genpolicy.policies.networks import Dimensions, HeadInput, PolicyNetwork
 from genpolicy.policies.objectives import (
     ConditionalVae,
-    NoisePrediction,
+    Denoising,
     ObjectiveFactory,
     absolute_error,
     flow_matching,
@@ -30,11 +30,11 @@ from genpolicy.policies.ode_samplers import (
     sample_ode,
 )
 from genpolicy.policies.offset import OffsetError, OffsetNetwork
+from genpolicy.policies.predictions import PREDICTIONS
 from genpolicy.policies.samplers import CountedNetwork, NoiseFunction
 from genpolicy.policies.schedules import (
     Gains,
     flow_gains,
-    noise_gains,
     squared_cosine,
     trailing_levels,
 )
@@ -96,8 +96,9 @@ class Method:
         return PolicyNetwork(dimensions, network, head_input=head_input)
 
 
-def _noise_gains(head: HeadConfig, time: Tensor) -> Gains:
-    return noise_gains(squared_cosine(head.diffusion_levels), time, data_std=head.conditional_std)
+def _diffusion_gains(head: HeadConfig, time: Tensor) -> Gains:
+    gains = PREDICTIONS[head.prediction].gains
+    return gains(squared_cosine(head.diffusion_levels), time, data_std=head.conditional_std)
 
 
 def _flow_gains(head: HeadConfig, time: Tensor) -> Gains:
@@ -119,9 +120,7 @@ METHODS = {
         # stands for promotion like the others.
         Method("cvae", True, "latent", ConditionalVae, ("z_prior",)),
         Method("ibc", True, "codes", EnergyContrast, (ENERGY_SAMPLER,)),
-        Method(
-            "diffusion", True, "chunk", NoisePrediction, ("ddim", "ddpm", "dpm_2m"), _noise_gains
-        ),
+        Method("diffusion", True, "chunk", Denoising, DIFFUSION_SAMPLERS, _diffusion_gains),
         Method("flow", True, "chunk", flow_matching, ODE_SAMPLERS, _flow_gains),
     )
 }
@@ -149,7 +148,8 @@ def check_sampler(method: Method, sampler: SamplerConfig, head: HeadConfig) -> N
     Raises:
         ConfigError: Wrong kind, fewer than one step, more steps than training levels,
             several steps of a method that evaluates its network once, a population of a
-            sampler that has none, or a cap that is missing or too low to ever finish.
+            sampler that has none, fresh noise of another than DDIM, or a cap that is missing or
+            too low to ever finish.
     """
     if sampler.name not in method.samplers:
         raise ConfigError(
@@ -175,6 +175,13 @@ def check_sampler(method: Method, sampler: SamplerConfig, head: HeadConfig) -> N
             found=str(sampler.population),
             expected="at least 2" if searches else "exactly 1",
             action="Set a population for the energy's search, and for no other sampler.",
+        )
+    if sampler.eta != 0.0 and sampler.name != "ddim":
+        raise ConfigError(
+            where=f"sampler.eta of {method.name}",
+            found=str(sampler.eta),
+            expected=f"0 for {sampler.name}",
+            action="Only `ddim` chooses its share of fresh noise.",
         )
     _check_cap(method, sampler)
 
@@ -229,9 +236,8 @@ def generate(
             counted,
             noise,
             schedule=squared_cosine(head.diffusion_levels),
-            name=sampler.name,
-            steps=sampler.steps,
-            clip=sampler.clip,
+            sampler=sampler,
+            prediction=head.prediction,
         )
     elif sampler.name == ENERGY_SAMPLER:
         assert isinstance(network, EnergyNetwork)

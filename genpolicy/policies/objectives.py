@@ -10,6 +10,7 @@ import torch
 from torch import Tensor, nn
 
 from genpolicy.policies.networks import Dimensions, PolicyNetwork
+from genpolicy.policies.predictions import PREDICTIONS
 from genpolicy.policies.schedules import squared_cosine, straight_path
 from genpolicy.policies.settings import HeadConfig, NetworkConfig
 
@@ -93,15 +94,16 @@ class ConditionalVae(Objective):
         return total
 
 
-class NoisePrediction(Objective):
-    """Noise prediction at a random level of the squared-cosine schedule (DDPM training)."""
+class Denoising(Objective):
+    """What `head.prediction` says, at a random level of the squared-cosine schedule."""
 
     def __init__(self, dimensions: Dimensions, network: NetworkConfig, head: HeadConfig) -> None:
         super().__init__()
         self._schedule = squared_cosine(head.diffusion_levels)
+        self._prediction = PREDICTIONS[head.prediction]
 
     def loss(self, network: PolicyNetwork, batch: Batch, generator: torch.Generator) -> Tensor:
-        """Masked mean squared error of the noise."""
+        """Masked mean squared error of the prediction."""
         device = batch.actions.device
         level = torch.randint(
             self._schedule.levels, (len(batch.actions),), generator=generator, device=device
@@ -110,7 +112,9 @@ class NoisePrediction(Objective):
         noisy = self._schedule.add_noise(batch.actions, noise, level)
         time = self._schedule.level_time(level.to(noisy.dtype))
         predicted = network.evaluate(network.encode(batch.observations), noisy, time)
-        return masked_mean((predicted - noise).square(), batch.weight)
+        kept = self._schedule.kept(time)[:, None, None]
+        target = self._prediction.target(batch.actions, noise, kept)
+        return masked_mean((predicted - target).square(), batch.weight)
 
 
 class FlowMatching(Objective):

@@ -87,7 +87,8 @@ def test_two_loads_give_equal_bytes(folders, method, two_mode_windows):
     [
         ("bc", "direct", 1, 1), ("chunked_bc", "direct", 1, 1), ("act", "z_zero", 1, 1),
         ("act", "z_prior", 1, 1), ("diffusion", "ddim", 7, 7), ("diffusion", "ddpm", 100, 100),
-        ("diffusion", "dpm_2m", 6, 6), ("flow", "euler", 5, 5), ("flow", "heun", 5, 10),
+        ("diffusion", "dpm_2m", 6, 6), ("diffusion", "dpm_1", 6, 6), ("diffusion", "dpm_sde", 6, 6),
+        ("flow", "euler", 5, 5), ("flow", "heun", 5, 10),
         ("flow", "rk4", 3, 12), ("flow", "midpoint", 3, 6),
         ("chunked_l1", "direct", 1, 1), ("ibc", "derivative_free", 6, 7),
         ("bc_noise", "offset", 1, 1),
@@ -155,6 +156,12 @@ def test_an_adaptive_row_takes_its_own_steps_whatever_the_others_take(folders, t
     fast = counts.index(min(counts))
     again = policy.sample(observations[fast : fast + 1], noise_names=[("row", fast)], candidates=1)
     assert np.array_equal(again.actions, alone[fast].actions)
+
+
+def test_fresh_noise_is_a_choice_of_ddim_only(folders):
+    load_policy(folders["diffusion"], sampler=SamplerConfig(name="ddim", steps=4, eta=1.0))
+    with pytest.raises(ConfigError, match=r"sampler\.eta of diffusion is 0.5"):
+        load_policy(folders["diffusion"], sampler=SamplerConfig(name="ddpm", steps=4, eta=0.5))
 
 
 @pytest.mark.parametrize(

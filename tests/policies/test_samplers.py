@@ -13,7 +13,7 @@ def test_nothing_is_evaluated_beyond_the_cap():
     x = torch.ones(5, 1, 1)
     for _ in range(2):
         counted(x, torch.zeros(5))
-    with pytest.raises(EvaluationCapError, match="more than 2.*at most sampler.nfe_cap, 2"):
+    with pytest.raises(EvaluationCapError, match=r"more than 2.*at most sampler\.nfe_cap, 2"):
         counted(x, torch.zeros(5))
     assert seen == [5, 5] and counted.nfe == 2
 
