@@ -10,6 +10,7 @@ from torch import Tensor
 
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.errors import ConfigError
+from genpolicy.policies.consistency import SegmentConsistency
 from genpolicy.policies.derivative_free import noise_length, search_codes
 from genpolicy.policies.diffusion_samplers import DIFFUSION_SAMPLERS, sample_diffusion
 from genpolicy.policies.energy import CODE_BOUND, EnergyContrast, EnergyNetwork
@@ -25,6 +26,8 @@ from genpolicy.policies.objectives import (
 )
 from genpolicy.policies.ode_samplers import (
     ADAPTIVE_TABLEAUS,
+    CONSISTENCY,
+    EQUAL_STEPS,
     ODE_SAMPLERS,
     sample_adaptive,
     sample_ode,
@@ -42,7 +45,9 @@ from genpolicy.policies.settings import HeadConfig, NetworkConfig, SamplerConfig
 
 SINGLE_EVALUATION = ("direct", "z_zero", "z_prior", "offset")
 ENERGY_SAMPLER = "derivative_free"
-STOCHASTIC_SAMPLERS = ("z_prior", "offset", ENERGY_SAMPLER, *DIFFUSION_SAMPLERS, *ODE_SAMPLERS)
+STOCHASTIC_SAMPLERS = (
+    "z_prior", "offset", ENERGY_SAMPLER, CONSISTENCY, *DIFFUSION_SAMPLERS, *ODE_SAMPLERS,
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -122,6 +127,8 @@ METHODS = {
         Method("ibc", True, "codes", EnergyContrast, (ENERGY_SAMPLER,)),
         Method("diffusion", True, "chunk", Denoising, DIFFUSION_SAMPLERS, _diffusion_gains),
         Method("flow", True, "chunk", flow_matching, ODE_SAMPLERS, _flow_gains),
+        # The network of `flow`, trained to say where the flow leads, for one or few evaluations.
+        Method("flow_policy", True, "chunk", SegmentConsistency, (CONSISTENCY,), _flow_gains),
     )
 }
 
@@ -149,7 +156,7 @@ def check_sampler(method: Method, sampler: SamplerConfig, head: HeadConfig) -> N
         ConfigError: Wrong kind, fewer than one step, more steps than training levels,
             several steps of a method that evaluates its network once, a population of a
             sampler that has none, fresh noise of another than DDIM, or a cap that is missing or
-            too low to ever finish.
+            too low to ever finish; jumps that do not fit the segments of the training.
     """
     if sampler.name not in method.samplers:
         raise ConfigError(
@@ -182,6 +189,13 @@ def check_sampler(method: Method, sampler: SamplerConfig, head: HeadConfig) -> N
             found=str(sampler.eta),
             expected=f"0 for {sampler.name}",
             action="Only `ddim` chooses its share of fresh noise.",
+        )
+    if sampler.name == CONSISTENCY and sampler.steps % head.flow_segments != 0:
+        raise ConfigError(
+            where=f"sampler_steps of {method.name}",
+            found=str(sampler.steps),
+            expected=f"a multiple of the {head.flow_segments} segments of the training",
+            action="A jump must not cross the end of a segment; train with other segments.",
         )
     _check_cap(method, sampler)
 
@@ -247,7 +261,7 @@ def generate(
         chunks = sample_adaptive(
             counted, noise, name=sampler.name, steps=sampler.steps, tolerance=sampler.tolerance
         )
-    elif sampler.name in ODE_SAMPLERS:
+    elif sampler.name in EQUAL_STEPS:
         chunks = sample_ode(counted, noise, name=sampler.name, steps=sampler.steps)
     else:
         latent = torch.zeros(len(condition), head.latent_dim, device=condition.device)

@@ -85,7 +85,7 @@ class ConditionalVae(Objective):
         condition = network.encode(batch.observations)
         seen = (batch.actions * batch.weight).flatten(1)
         mean, log_variance = self.posterior(torch.cat([seen, condition], dim=-1)).chunk(2, dim=-1)
-        latent = mean + (0.5 * log_variance).exp() * _normal_like(mean, generator)
+        latent = mean + (0.5 * log_variance).exp() * normal_like(mean, generator)
         error = masked_mean(
             (network.evaluate(condition, latent) - batch.actions).abs(), batch.weight
         )
@@ -108,7 +108,7 @@ class Denoising(Objective):
         level = torch.randint(
             self._schedule.levels, (len(batch.actions),), generator=generator, device=device
         )
-        noise = _normal_like(batch.actions, generator)
+        noise = normal_like(batch.actions, generator)
         noisy = self._schedule.add_noise(batch.actions, noise, level)
         time = self._schedule.level_time(level.to(noisy.dtype))
         predicted = network.evaluate(network.encode(batch.observations), noisy, time)
@@ -126,7 +126,7 @@ class FlowMatching(Objective):
 
     def loss(self, network: PolicyNetwork, batch: Batch, generator: torch.Generator) -> Tensor:
         """Masked mean squared error of the velocity."""
-        noise = _normal_like(batch.actions, generator)
+        noise = normal_like(batch.actions, generator)
         time = torch.rand(len(noise), generator=generator, dtype=noise.dtype, device=noise.device)
         point, velocity = straight_path(noise, batch.actions, time)
         predicted = network.evaluate(network.encode(batch.observations), point, time)
@@ -156,5 +156,6 @@ def masked_mean(values: Tensor, weight: Tensor) -> Tensor:
     return (values * weight).sum() / (weight.sum() * values.shape[-1]).clamp(min=1.0)
 
 
-def _normal_like(values: Tensor, generator: torch.Generator) -> Tensor:
+def normal_like(values: Tensor, generator: torch.Generator) -> Tensor:
+    """Standard normal numbers of the shape, type and device of `values`."""
     return torch.randn(values.shape, generator=generator, dtype=values.dtype, device=values.device)

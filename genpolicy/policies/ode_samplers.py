@@ -91,6 +91,10 @@ ADAPTIVE_TABLEAUS = {
 
 ODE_SAMPLERS = (*FIXED_TABLEAUS, *ADAPTIVE_TABLEAUS)
 
+# A jump along the mean velocity of the way left in a segment is an Euler step.
+CONSISTENCY = "consistency"
+EQUAL_STEPS = {**FIXED_TABLEAUS, CONSISTENCY: EULER}
+
 
 def sample_ode(velocity: NetworkFunction, noise: NoiseFunction, *, name: str, steps: int) -> Tensor:
     """Clean chunks by equal steps.
@@ -98,7 +102,7 @@ def sample_ode(velocity: NetworkFunction, noise: NoiseFunction, *, name: str, st
     Args:
         velocity: Velocity of chunks at a flow time.
         noise: Noise function; only step 0, the start, is drawn.
-        name: A key of `FIXED_TABLEAUS`.
+        name: A key of `EQUAL_STEPS`.
         steps: Equal steps.
 
     Returns:
@@ -107,10 +111,10 @@ def sample_ode(velocity: NetworkFunction, noise: NoiseFunction, *, name: str, st
     Raises:
         ConfigError: Unknown sampler or fewer than one step.
     """
-    if name not in FIXED_TABLEAUS:
-        refuse_name(name, tuple(FIXED_TABLEAUS))
+    if name not in EQUAL_STEPS:
+        refuse_name(name, tuple(EQUAL_STEPS))
     _check_steps(steps)
-    tableau = FIXED_TABLEAUS[name]
+    tableau = EQUAL_STEPS[name]
     x = noise(0)
     h = 1.0 / steps
     for step in range(steps):

@@ -48,6 +48,8 @@ class HeadConfig(Settings):
             the clean chunk `x0`, or `v`, which is between the two (`predictions`).
         conditional_std: Assumed spread of normalised actions at one observation; sets the fixed
             gains around the networks of diffusion and flow (`schedules.Gains`).
+        flow_segments: Segments of the flow in which `flow_policy` is consistent: its fewest
+            network evaluations.
         latent_dim: Length of ACT's latent z. Small, because z = 0 is one of the two conventions:
             training draws z near a sphere of radius sqrt(latent_dim), and the more dimensions,
             the further from anything seen is its centre.
@@ -62,6 +64,7 @@ class HeadConfig(Settings):
     diffusion_levels: int = Field(default=100, ge=1, le=10_000)
     prediction: Literal["noise", "v", "x0"] = "noise"
     conditional_std: float = Field(default=0.2, gt=0.0, le=10.0)
+    flow_segments: int = Field(default=2, ge=1, le=64)
     latent_dim: int = Field(default=2, ge=1, le=1024)
     posterior_width: int = Field(default=256, ge=4, le=4096)
     kl_weight: float = Field(default=0.01, ge=0.0)
@@ -122,7 +125,7 @@ class SamplerConfig(Settings):
 
     name: Literal[
         "direct", "z_zero", "z_prior", "ddpm", "ddim", "dpm_1", "dpm_2m", "dpm_sde", "euler",
-        "midpoint", "heun", "rk4", "bosh3", "derivative_free", "offset",
+        "midpoint", "heun", "rk4", "bosh3", "consistency", "derivative_free", "offset",
     ]  # fmt: skip
     steps: int = Field(default=1, le=10_000)
     clip: float | None = Field(default=1.0, gt=0.0)
