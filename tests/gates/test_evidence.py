@@ -18,7 +18,15 @@ NFE = "artifacts/reload/nfe.parquet"
 
 def test_rows_come_whole_but_for_lists(repo):
     rows = Evidence(repo).rows(NFE, NfeRow)
-    assert list(rows.columns) == ["method", "seed", "recorded", "counted", "expected"]
+    assert list(rows.columns) == [
+        "method",
+        "seed",
+        "recorded",
+        "counted",
+        "expected",
+        "least",
+        "most",
+    ]
     shadow = Evidence(repo).of("artifacts/shadow/candidates.parquet", CandidateRow, "flow")
     assert "raw" not in shadow.columns and set(shadow["method"]) == {"flow"}
 
