@@ -20,7 +20,8 @@ from pathlib import Path
 
 from flows.judged import GOES_ON, judged, last_gate
 from genpolicy.cli.shell import run_program
-from genpolicy.errors import BadInputError
+from genpolicy.errors import BadInputError, GenpolicyError
+from genpolicy.outputs import require_own_files
 
 EXIT_DONE, EXIT_FAULT, EXIT_BAD_INPUT, EXIT_REFUSED = 0, 1, 2, 3
 KEPT_LINES = 400
@@ -91,6 +92,10 @@ def reproduce(
     command += ["--single-item"] if single_item else []
     command += ["--force"] if force else []
     started = time.monotonic()
+    try:
+        require_own_files(workspace)  # DVC would remove the others without a word
+    except GenpolicyError as error:
+        return RunEnd(error.exit_code, "", str(error), infrastructure=False, duration_s=0.0)
     lines: deque[str] = deque(maxlen=KEPT_LINES)
     process = subprocess.Popen(
         command,

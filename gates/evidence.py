@@ -5,6 +5,8 @@ becomes the `materials` of its report, and what one criterion read becomes its `
 """
 
 import contextlib
+import dataclasses
+import typing
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar
@@ -12,6 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 import pandas as pd
 import pyarrow as pa
+import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from gates.pipeline import Basis
@@ -80,7 +83,8 @@ class Evidence:
             lists: Whether columns that hold lists come too; they take long.
 
         Raises:
-            MissingEvidenceError: No such file or row, or a column of `row` is missing.
+            MissingEvidenceError: No such file or row, or a column of `row` is missing, or has
+                empty cells where `row` has none; of numbers `numbers` says so.
             IntegrityError: A column that `row` does not know: other code wrote it. Or the file
                 is not a whole table.
         """
@@ -109,10 +113,13 @@ class Evidence:
         """All rows of a table of the class `row`, possibly none, as that class.
 
         Raises:
-            MissingEvidenceError: No such file, or a column of `row` is missing.
+            MissingEvidenceError: No such file, or a column of `row` is missing, or has empty cells
+                where `row` has none.
             IntegrityError: An unknown column, or no whole table.
         """
-        return rows_of_table(self._known(path, row), row, where=path)
+        table = self._known(path, row)
+        _require_filled(table, _filled(row), path)
+        return rows_of_table(table, row, where=path)
 
     def _known(self, path: str, row: type) -> pa.Table:
         """The table with the columns of its class: an unknown one refuses, by name."""
@@ -122,6 +129,8 @@ class Evidence:
         absent = missing_columns(row, table.column_names)
         if absent:
             raise MissingEvidenceError(f"{path} has no column {', '.join(absent)}")
+        texts = {name: kind for name, kind in _filled(row).items() if kind is not float}
+        _require_filled(table, texts, path)
         return table
 
     def document(self, folder: str, of: Document[Content]) -> Content:
@@ -177,6 +186,34 @@ class Evidence:
             raise MissingEvidenceError(f"{path} is missing")
         self._materials[path], data = sha256_bytes_of(file, keep=True)
         return data
+
+
+def _filled(row: type) -> dict[str, Any]:
+    """Type of every column that has a value in each row: those that are not `... | None`."""
+    hints = typing.get_type_hints(row)
+    kinds = {item.name: hints[item.name] for item in dataclasses.fields(row)}
+    return {name: kind for name, kind in kinds.items() if not _may_be_empty(kind)}
+
+
+def _may_be_empty(kind: Any) -> bool:
+    return type(None) in typing.get_args(kind)
+
+
+def _require_filled(table: pa.Table, columns: dict[str, Any], path: str) -> None:
+    """Refuse empty cells: what groups or chooses rows would leave theirs out without a word."""
+    empty = [name for name, kind in columns.items() if _has_empty(table.column(name), kind)]
+    if empty:
+        raise MissingEvidenceError(f"{path} has empty cells in column {', '.join(empty)}")
+
+
+def _has_empty(column: pa.ChunkedArray, kind: Any) -> bool:
+    if _may_be_empty(kind):
+        return False
+    if column.null_count > 0 or typing.get_origin(kind) is not tuple:
+        return bool(column.null_count > 0)
+    if not pa.types.is_nested(column.type):
+        return False
+    return _has_empty(pc.list_flatten(column), typing.get_args(kind)[0])
 
 
 def numbers(frame: pd.DataFrame, column: str) -> Array:

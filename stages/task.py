@@ -11,6 +11,7 @@ from pathlib import Path
 from genpolicy.documents.task import IDENTITY
 from genpolicy.integrity.atomic import output_folder, write_bytes
 from genpolicy.integrity.documents import canonical_json
+from genpolicy.outputs import require_own_files
 from genpolicy.tasks.fixtures import fixture_hashes, require_pinned
 from genpolicy.tasks.identity import task_identity
 from stages._source import SOURCE_FILE, SourceSection, refuse_foreign_files, source_document
@@ -20,6 +21,7 @@ from stages._stage import ARTIFACTS, Params, main
 def work(params: Params) -> None:
     """Write both identities."""
     refuse_foreign_files()
+    require_own_files(Path.cwd())
     identity = task_identity(params.task.name)
     require_pinned(Path.cwd(), params.task.name, fixture_hashes(identity))
     source = source_document(params.section("source", SourceSection))

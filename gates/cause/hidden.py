@@ -1,5 +1,7 @@
 """Does a recorded variable, the order of recording or the past explain the modes?"""
 
+import math
+
 from gates.cause.answers import Answer, CauseName, Diagnosis, Named, Topic
 from gates.cause.limits import CauseLimits
 from gates.cause.numbers import Numbers
@@ -27,11 +29,11 @@ def hidden(numbers: Numbers, limits: CauseLimits) -> Named:
     """Variables that explain the modes significantly or tell them, and what the foremost says."""
     clear = [row for row in numbers.strata if _clear(row, limits)]
     # Those that are held to the limit come first, so that no red one is ever left out.
-    clear.sort(key=lambda row: (not _held(row, limits), -(row.effect or 0.0), row.variable))
+    clear.sort(key=lambda row: (not _held(row, limits), -_number(row.effect), row.variable))
     answers = [_answer(row, limits) for row in clear[:SHOWN]]
     tested = [row for row in numbers.strata if row.p_adjusted is not None and row.n > 0]
     if tested and not any(_held(row, limits) for row in clear):
-        row = min(tested, key=lambda item: (item.p_adjusted or 0.0, item.variable))
+        row = min(tested, key=lambda item: (_number(item.p_adjusted), item.variable))
         answers.insert(
             0,
             Answer(
@@ -39,7 +41,7 @@ def hidden(numbers: Numbers, limits: CauseLimits) -> Named:
                 "largest share that a variable surely explains beyond chance", 0.0,
                 limits["strata_effect"],
                 note=f"none of {len(numbers.strata)}; smallest adjusted p "
-                f"{row.p_adjusted or 0.0:.3g} ({_plain(row.variable)})",
+                f"{_number(row.p_adjusted):.3g} ({_plain(row.variable)})",
             ),
         )  # fmt: skip
     found = [row for row in clear if _wide_of(row, limits)]
@@ -62,41 +64,50 @@ def _of_episode(row: Stratum) -> bool:
     return known or not (row.observed or row.variable == HISTORY or INSIDE in row.detail)
 
 
+def _number(value: float | None) -> float:
+    """A number of a test; NaN, and never 0, where it is not known."""
+    return math.nan if value is None else value
+
+
 def _clear(row: Stratum, limits: CauseLimits) -> bool:
-    known = row.p_adjusted is not None and row.effect is not None
-    return known and limits["strata_p"] - (row.p_adjusted or 0.0) >= 0
+    return limits["strata_p"] - _number(row.p_adjusted) >= 0
 
 
 def _held(row: Stratum, limits: CauseLimits) -> bool:
     """Whether its share is held to the limit: a large one must be clear of chance for that."""
-    small = limits["strata_effect"] - (row.effect or 0.0) >= 0
+    small = limits["strata_effect"] - _number(row.effect) >= 0
     return small or _wide_of(row, limits)
 
 
 def _wide_of(row: Stratum, limits: CauseLimits) -> bool:
     """Whether the share that it explains is too large, and its interval clear of chance."""
-    large = not limits["strata_effect"] - (row.effect or 0.0) >= 0
-    return large and (row.effect_lower or 0.0) - limits["strata_effect_lower"] >= 0
+    large = not limits["strata_effect"] - _number(row.effect) >= 0
+    return large and not _reaches_chance(row, limits)
+
+
+def _reaches_chance(row: Stratum, limits: CauseLimits) -> bool:
+    """Whether chance explains as much; an interval that is not known shows no such thing."""
+    return limits["strata_effect_lower"] - _number(row.effect_lower) > 0
 
 
 def _answer(row: Stratum, limits: CauseLimits) -> Answer:
     """A large share whose interval reaches down to chance is shown without a limit."""
-    sure = (row.effect_lower or 0.0) - limits["strata_effect_lower"] >= 0
-    known = row.effect_lower is not None and row.effect_upper is not None
+    lower, upper = _number(row.effect_lower), _number(row.effect_upper)
     seen = ", which the policy sees" if row.observed else ""
     detail = f"{row.detail}; " if row.detail else ""
-    unsure = "" if sure else f", its interval begins at {row.effect_lower or 0.0:.2f}"
+    begins = f", its interval begins at {lower:.2f}"
+    unsure = begins if _reaches_chance(row, limits) else ""
     return Answer(
         "strata_effect", Topic.HIDDEN,
         f"share of the modes that {_plain(row.variable)} explains{seen}", row.effect,
         limits["strata_effect"] if _held(row, limits) else None,
-        note=f"{detail}{row.phase}, adjusted p {row.p_adjusted or 0.0:.3g}{unsure}",
-        interval=(row.effect_lower or 0.0, row.effect_upper or 0.0) if known else None,
+        note=f"{detail}{row.phase}, adjusted p {_number(row.p_adjusted):.3g}{unsure}",
+        interval=(lower, upper) if math.isfinite(lower + upper) else None,
     )  # fmt: skip
 
 
 def _said(row: Stratum) -> Diagnosis:
-    effect = row.effect or 0.0
+    effect = _number(row.effect)
     share = f"{row.variable} explains {effect:.0%} of the modes in {row.phase}"
     if row.variable in DATA_VARIABLES:
         text = f"{share}: correct the epochs."
@@ -124,8 +135,8 @@ def _said(row: Stratum) -> Diagnosis:
 def _foremost(found: list[Stratum], limits: CauseLimits) -> Stratum:
     """The variable to name: the strongest, and of nearly equal ones the most concrete."""
     handicap = limits["everything_handicap"]
-    best = max((row.effect or 0.0) - handicap * (row.variable in EVERYTHING) for row in found)
-    near = [row for row in found if (row.effect or 0.0) >= best - limits["nearly_equal_effect"]]
+    best = max(_number(row.effect) - handicap * (row.variable in EVERYTHING) for row in found)
+    near = [row for row in found if _number(row.effect) >= best - limits["nearly_equal_effect"]]
 
     def rank(row: Stratum) -> tuple[int, float, str]:
         name = row.variable
@@ -133,7 +144,7 @@ def _foremost(found: list[Stratum], limits: CauseLimits) -> Stratum:
         # What was recorded of an episode is as concrete as who demonstrated it.
         column = name not in CONCRETE and not row.observed and not name.startswith(START)
         place = CONCRETE.index("operator") if column else place
-        return place, -(row.effect or 0.0), name
+        return place, -_number(row.effect), name
 
     return min(near, key=rank)
 

@@ -98,7 +98,8 @@ def read_measured(document: Document, rows: Rows) -> Numbers:
             residuals=_residuals(rows),
         )
         _check_alternatives(numbers)
-        _check_known((*numbers.told, *reach, *sides))
+        _check_known((*numbers.told, *reach, *sides, numbers.counts, numbers.kept))
+        _check_tests(numbers.strata)
         return numbers
 
 
@@ -163,6 +164,15 @@ def _check_known(rows: Iterable[object]) -> None:
                 raise ValueError(f"{type(row).__name__}.{name} is not known")
 
 
+def _check_tests(rows: Iterable[Stratum]) -> None:
+    """Of a recorded variable all that its test gives is known, of another one nothing."""
+    for row in rows:
+        found = (row.p_value, row.p_adjusted, row.effect, row.effect_lower, row.effect_upper)
+        known = {value is not None and math.isfinite(value) for value in found}
+        if known != {row.recorded}:
+            raise ValueError(f"the test of {row.variable} in {row.phase} is not known")
+
+
 def _check_alternatives(numbers: Numbers) -> None:
     known = {mode.mode for mode in numbers.modes}
     named = {name for row in numbers.alternatives for name in (row.mode, row.other)}
@@ -194,6 +204,11 @@ def _draws(
         halves.setdefault(item.draw, []).append(item.finding)
     for row, drawn in zip(rows, structures, strict=True):
         tests = zip(row.p_adjusted, row.effect, row.effect_lower, strict=True)
+        strata = tuple(
+            replace(stratum, p_adjusted=p, effect=effect, effect_lower=lower)
+            for stratum, (p, effect, lower) in zip(measured.strata, tests, strict=True)
+        )
+        _check_tests(strata)
         outcomes = zip(drawn.successes, row.admissible, strict=True)
         yield replace(
             measured,
@@ -218,10 +233,7 @@ def _draws(
                 persistent=row.persistent,
             ),
             kept=Kept(row.kept, row.kept_null_q95, row.kept_n),
-            strata=tuple(
-                replace(stratum, p_adjusted=p, effect=effect, effect_lower=lower)
-                for stratum, (p, effect, lower) in zip(measured.strata, tests, strict=True)
-            ),
+            strata=strata,
             told=tuple(
                 _moved(told, value) for told, value in zip(measured.told, row.told, strict=True)
             ),

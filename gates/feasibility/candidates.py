@@ -53,7 +53,6 @@ def mode_admissible_gap(
         raise MissingEvidenceError("no situation with several modes was sampled")
     rows = rows.assign(
         admissible=admissible(rows),
-        mode=rows["mode"].fillna("").astype(str),
         episode=rows["situation"].astype(str).str.rpartition(":")[0],
     )
     rows = rows[~rows["mode"].isin(settings.unassigned_modes)]
@@ -158,7 +157,7 @@ def corrupted_refused_share(
     absent = sorted(set(settings.required_fixtures) - set(rows["fixture"]))
     if absent:
         raise MissingEvidenceError(f"corrupted fixtures not tried: {', '.join(absent)}")
-    named = rows["first_reason"].fillna("").astype(str).str.len().to_numpy() > 0
+    named = rows["first_reason"].ne("").to_numpy()
     refused = (admissible(rows) == 0.0) & named
     interval = counted_interval(
         float(refused.sum()), float(len(rows)), confidence=settings.confidence

@@ -5,8 +5,8 @@ from gates.criterion import Measured, criterion
 from gates.evidence import Evidence, MissingEvidenceError, numbers
 from gates.need.cause import as_the_cause, found_cause, waived_questions
 from gates.need.settings import AUDIT, NeedSettings
+from gates.need.waivers import require_questions
 from genpolicy.audit.rows import Asked, Clock
-from genpolicy.errors import ConfigError
 from genpolicy.evidence.documents.given import REFUSALS
 
 INGEST = "artifacts/ingest"
@@ -37,21 +37,17 @@ def unasked_checks(evidence: Evidence, settings: NeedSettings) -> Measured:
     """Questions that could not be asked and that nobody waived; with any, nothing can be said."""
     frame = evidence.rows(f"{AUDIT}/asked.parquet", Asked)
     answered = {check for checks in settings.waived_checks.values() for check in checks}
-    for check in sorted(answered - set(frame["check"])):
-        raise ConfigError(
-            where=f"params.yaml: gate_a.waived_checks: {check}",
-            found="a waiver of no question",
-            expected=f"one of {', '.join(sorted(frame['check']))}",
-            action="Correct the name; a misspelt waiver would waive nothing.",
-        )
+    require_questions(answered - set(frame["check"]), evidence)
     silent = frame[~frame["asked"].astype(bool)]
     left = silent[~silent["check"].isin(answered)]
+    idle = ", ".join(sorted(answered - set(silent["check"])))
+    remark = f"; waived without need here: {idle}" if idle else ""
     if len(left) == 0:
         waived = f", {len(silent)} of them waived" if len(silent) else ""
-        return Measured(0.0, caveat=f"{len(frame)} questions{waived}")
+        return Measured(0.0, caveat=f"{len(frame)} questions{waived}{remark}")
     rows = zip(left["check"], left["reason"], strict=True)
     text = "; ".join(f"{check} ({reason})" for check, reason in rows)
-    return Measured(None, caveat=f"not asked: {text}")
+    return Measured(None, caveat=f"not asked: {text}{remark}")
 
 
 @criterion(

@@ -163,7 +163,7 @@ def intervention_upper(evidence: Evidence, settings: StressSettings, candidate: 
 def reset_upper(evidence: Evidence, settings: StressSettings, candidate: str) -> Measured:
     """Upper bound of the share of rollouts that end in a protective stop."""
     rows = rollouts(evidence, settings, candidate)
-    if rows["outcome"].fillna("").eq("").any():
+    if rows["outcome"].eq("").any():
         raise MissingEvidenceError("a rollout has no outcome")
     return _rollouts_with(rows.assign(hit=rows["outcome"].isin(STOPS)), settings)
 

@@ -29,7 +29,7 @@ def _starts(evidence: Evidence, settings: StressSettings, method: str) -> set[tu
     rows = rollouts(evidence, settings, method)
     if rows[["seed", "perturbation", "start"]].duplicated().any():
         raise MissingEvidenceError(f"{method} has two rows of one seed, condition and start")
-    if rows["start_sha256"].fillna("").astype(str).eq("").any():
+    if rows["start_sha256"].eq("").any():
         raise MissingEvidenceError(f"{method} has a start without hash")
     return set(zip(rows["perturbation"], rows["start"], rows["start_sha256"], strict=True))
 

@@ -11,12 +11,11 @@ import numpy as np
 
 from genpolicy.audit.data import AuditInput, recorded
 from genpolicy.audit.predictability import HISTORY
+from genpolicy.audit.question_names import CLOCK, COLUMN, FROZEN, PAST
 from genpolicy.audit.rows import Asked, Prediction
 from genpolicy.audit.semantics import Semantics
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.audit.variable import EPISODE_VARIABLES
-
-COLUMN = "column."
 
 
 @dataclass(frozen=True)
@@ -64,11 +63,11 @@ def questions(
         else "neither the mean nor a mode was held against limits",
     }
     found |= {
-        f"clock.{name}": "neither receive times nor motion that the arm's explains"
+        f"{CLOCK}{name}": "neither receive times nor motion that the arm's explains"
         for name in semantics.unclocked
     }
     found |= {
-        f"frozen.{name}": "stands still for long in most episodes: a freeze would look the same"
+        f"{FROZEN}{name}": "stands still for long in most episodes: a freeze would look the same"
         for name in semantics.untold_freezes
     }
     for name in EPISODE_VARIABLES:
@@ -82,7 +81,7 @@ def questions(
     past = {row.phase for row in told if row.variable == HISTORY}
     for phase in sorted(phases):
         apart = "where modes are, the observation differs: what came before was not held to them"
-        found[f"past.{phase}"] = "" if phase in past else apart
+        found[f"{PAST}{phase}"] = "" if phase in past else apart
     return tuple(Asked(name, not reason, reason) for name, reason in found.items())
 
 

@@ -3,12 +3,12 @@
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from genpolicy.audit.asked import COLUMN
 from genpolicy.audit.component_rows import NOT_LOOKED_AT, OTHER
 from genpolicy.audit.labels import Replay, disagreement
 from genpolicy.audit.mean_versus_modes import Admissible
 from genpolicy.audit.progress import Progress, silent
 from genpolicy.audit.propose import observation_contract, propose_settings
+from genpolicy.audit.question_names import COLUMN
 from genpolicy.audit.run import AuditResult
 from genpolicy.audit.run import audit as audit_rows
 from genpolicy.audit.settings import AuditSettings

@@ -9,10 +9,11 @@ from planar import SETTINGS, planar
 from genpolicy.audit.asked import Given, questions
 from genpolicy.audit.data import canonical
 from genpolicy.audit.predictability import HISTORY, Prediction
+from genpolicy.audit.question_names import ALWAYS, CLOCK, COLUMN, FROZEN, PAST
 from genpolicy.audit.semantics import measure
 
 WHOLE = SETTINGS.model_copy(update={"declared_lag_steps": 1.0})
-PAST = Prediction(HISTORY, "approach", 0.0, -0.1, 0.1, 0.5, 0.5, 90)
+PAST_ROW = Prediction(HISTORY, "approach", 0.0, -0.1, 0.1, 0.5, 0.5, 90)
 
 
 @pytest.fixture(scope="module")
@@ -20,7 +21,9 @@ def data():
     return canonical(planar(episodes=40)[0])
 
 
-def silent(data, settings=WHOLE, *, told=(PAST,), phases=("approach",), replays=60, checked=True):
+def silent(
+    data, settings=WHOLE, *, told=(PAST_ROW,), phases=("approach",), replays=60, checked=True
+):
     found = measure(data, settings)
     rows = questions(data, settings, found, told, phases, given=Given(replays, checked))
     assert all(row.asked == (row.reason == "") for row in rows)
@@ -76,3 +79,21 @@ def test_what_the_audit_was_not_given_is_not_asked(data):
     assert silent(data, told=(), phases=()) == set()
     alone = replace(data, paired=False, observation_position=slice(0, 0), reference=None)
     assert {"units_frames_and_lag", "constant_lag", "calibration_at_rest"} <= silent(alone)
+
+
+def test_every_question_has_a_name_that_may_be_waived(data):
+    """Nothing else may be asked, and what is asked of all data is there whatever they hold."""
+    seen = replace(
+        data,
+        streams={"robot": slice(0, 2), "camera": slice(2, 4)},
+        left_out=(("serial", "names the episode"),),
+    )
+    for given in (data, seen):
+        found = measure(given, WHOLE)
+        rows = questions(given, WHOLE, found, (PAST_ROW,), ("approach",), given=Given(60, True))
+        names = [row.check for row in rows]
+        kinds = {name[: name.find(".") + 1] for name in names} - {""}
+        assert set(ALWAYS) == {name for name in names if "." not in name}
+        assert len(names) == len(set(names))
+        assert kinds <= {CLOCK, FROZEN, COLUMN, PAST}
+    assert kinds == {CLOCK, FROZEN, COLUMN, PAST}

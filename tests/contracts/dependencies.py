@@ -142,7 +142,8 @@ def reached_files(stage: str) -> set[str]:
 
 def bound_outputs(stage: str) -> list[str]:
     """What the evidence stages below a gate write: it binds all of it."""
-    return [out for name in rung(stage) for out in pipeline()[name]["outs"]]
+    outs = [out for name in rung(stage) for out in pipeline()[name]["outs"]]
+    return [name for out in outs for name in ([out] if isinstance(out, str) else out)]
 
 
 def bound_parameters(stage: str) -> list[str]:

@@ -71,6 +71,25 @@ def test_a_gate_in_the_middle_is_asked_by_the_stage_behind_it(
     assert reproduce(target, echo=lambda _: None).code == 0
 
 
+def test_a_file_that_no_stage_wrote_stops_the_ladder_before_dvc_removes_it(
+    checkout: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """DVC empties an output both when it runs a stage and when it brings back what it wrote."""
+    target = make_workspace(checkout, tmp_path / "run", {})
+    assert reproduce(target, echo=lambda _: None).code == 0
+    mine = target / "artifacts" / "generators" / "notes.txt"
+    mine.write_text("mine")
+    for value in (1, 2):
+        make_workspace(checkout, target, {"generators": {"value": value}})
+        assert main(["--workspace", str(target)]) == 2
+        assert "artifacts/generators/notes.txt is a file that" in capfd.readouterr().err
+        assert mine.read_text() == "mine" and len(runs(target)) == 4
+    mine.rename(tmp_path / "notes.txt")
+    (target / "artifacts" / "record" / "value.txt").write_text("edited")  # what DVC repairs
+    assert main(["--workspace", str(target)]) == 0
+    assert (target / "artifacts" / "generators" / "value.txt").read_text() == "2"
+
+
 @pytest.mark.parametrize(
     "broken",
     [

@@ -947,7 +947,16 @@ def _reload(root: Path) -> None:
         root,
         "reload/nfe.parquet",
         NfeRow,
-        [{"method": m, "seed": 0, "recorded": 8, "counted": 8, "expected": 8} for m in CANDIDATES],
+        [
+            {
+                "method": m,
+                "seed": 0,
+                **dict.fromkeys(("recorded", "counted", "expected"), 8),
+                "least": 8,
+                "most": 8,
+            }
+            for m in CANDIDATES
+        ],
     )
     table(
         root,

@@ -435,6 +435,22 @@ def test_nan_is_inconclusive_never_pass(gate, path, column, ladder):
     assert judge(ladder, gate).verdict == "INCONCLUSIVE"
 
 
+def test_a_tested_variable_without_lower_end_is_not_taken_for_chance(ladder):
+    """An effect of 0.9 whose interval is not known passed as one that begins at 0."""
+
+    def damage(frame):
+        frame.loc[0, ["p_adjusted", "effect"]] = [0.001, 0.9]
+        frame.loc[0, "effect_lower"] = np.nan
+        return frame
+
+    evidence.edit_table(ladder, "audit/strata.parquet", damage)
+    report = judge(ladder, "A")
+    assert report.verdict == "INCONCLUSIVE"
+    assert (
+        "the test of operator in approach is not known" in _found(report, "strata_effect")[0].caveat
+    )
+
+
 @pytest.mark.parametrize("gate", "ABCD")
 def test_the_task_is_material_and_without_its_identity_nothing_passes(gate, ladder):
     assert TASK_IDENTITY in judge(ladder, gate).materials

@@ -10,6 +10,7 @@ from genpolicy.data.rows import FrameRow
 from genpolicy.errors import IntegrityError
 from genpolicy.evidence.rows.reproducibility import NfeRow
 from genpolicy.evidence.rows.shadow import CandidateRow
+from genpolicy.evidence.rows.stress import RolloutRow
 from genpolicy.integrity.rows import columns_of
 
 NFE = "artifacts/reload/nfe.parquet"
@@ -17,7 +18,15 @@ NFE = "artifacts/reload/nfe.parquet"
 
 def test_rows_come_whole_but_for_lists(repo):
     rows = Evidence(repo).rows(NFE, NfeRow)
-    assert list(rows.columns) == ["method", "seed", "recorded", "counted", "expected"]
+    assert list(rows.columns) == [
+        "method",
+        "seed",
+        "recorded",
+        "counted",
+        "expected",
+        "least",
+        "most",
+    ]
     shadow = Evidence(repo).of("artifacts/shadow/candidates.parquet", CandidateRow, "flow")
     assert "raw" not in shadow.columns and set(shadow["method"]) == {"flow"}
 
@@ -92,3 +101,43 @@ def test_a_count_below_zero_is_no_count():
     assert counts(frame, "bad").tolist() == [0.0, 1.0]
     with pytest.raises(MissingEvidenceError, match="column stale counts -3"):
         counts(frame, "stale")
+
+
+def _empty(column, row=0):
+    def change(frame):
+        frame[column] = frame[column].astype(object)
+        frame.at[row, column] = None
+        return frame
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("path", "row", "column"),
+    [("audit/clocks", TABLES["clocks"], "stream"), ("audit/asked", TABLES["asked"], "check"),
+     ("audit/components", TABLES["components"], "two_mode_episodes"),
+     ("audit/neighbourhoods", SituationRow, "two_mode"),
+     ("shadow/candidates", CandidateRow, "mode"), ("stress/rollouts", RolloutRow, "perturbation"),
+     ("stress/rollouts", RolloutRow, "recovery_attempted")],
+)  # fmt: skip
+def test_an_empty_cell_is_no_value_and_drops_no_row(repo, path, row, column):
+    """What groups, counts or chooses rows would leave that row out, and judge the others."""
+    evidence.edit_table(repo, f"{path}.parquet", _empty(column))
+    for read in (Evidence(repo).rows, Evidence(repo).records):
+        with pytest.raises(MissingEvidenceError, match=rf"{path}\.parquet.* empty .*{column}"):
+            read(f"artifacts/{path}.parquet", row)
+
+
+def test_a_list_has_no_empty_places(repo):
+    path = "audit/resamples.parquet"
+    evidence.edit_table(repo, path, lambda f: f.assign(told=[[None, 0.1]] * len(f)))
+    with pytest.raises(MissingEvidenceError, match=r"empty .*told"):
+        Evidence(repo).records(f"artifacts/{path}", TABLES["resamples"])
+
+
+def test_what_may_be_unknown_may_be_empty(repo):
+    evidence.edit_table(repo, "audit/clocks.parquet", _empty("offset_after_s"))
+    path = "audit/resamples.parquet"
+    evidence.edit_table(repo, path, lambda f: f.assign(effect=[[None] * 3] * len(f)))
+    assert len(Evidence(repo).rows("artifacts/audit/clocks.parquet", TABLES["clocks"]))
+    assert len(Evidence(repo).records(f"artifacts/{path}", TABLES["resamples"]))

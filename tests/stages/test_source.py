@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+import yaml
 
 from genpolicy.data.assemble import MANIFEST_FILE
 from genpolicy.data.dataset import DATA_FILES
@@ -79,6 +80,24 @@ def test_a_file_of_somebody_beside_the_dataset_stops_the_ladder(run, dataset, st
     (run / "artifacts" / "ingest" / "mine.parquet").write_bytes(b"mine")
     code, said = stage("task")
     assert code == 2 and "mine.parquet" in said
+
+
+def test_a_file_of_somebody_where_a_later_stage_writes_stops_the_ladder(run, stage):
+    """Bare `dvc repro` as well: this stage runs first, and before DVC empties the others."""
+    (run / "dvc.yaml").write_text("stages:\n  audit: {cmd: x, outs: [artifacts/audit]}\n")
+    mine = run / "artifacts" / "audit" / "notes.txt"
+    mine.parent.mkdir()
+    mine.write_bytes(b"mine")
+    code, said = stage("task")
+    assert code == 2 and "artifacts/audit/notes.txt" in said
+    assert mine.read_bytes() == b"mine"
+
+
+def test_dvc_leaves_its_folder_to_the_stage_that_always_runs():
+    """Otherwise DVC empties it before the stage can look for files of somebody."""
+    stages = yaml.safe_load((Path(__file__).parents[2] / "dvc.yaml").read_text())["stages"]
+    assert [name for name, stage in stages.items() if stage.get("always_changed")] == ["task"]
+    assert stages["task"]["outs"] == [{"artifacts/task": {"persist": True}}]
 
 
 def test_what_the_stages_wrote_themselves_stops_nothing(run, dataset, stage):

@@ -100,7 +100,7 @@ WRONGS = (
           "A journal lies beside those that were judged.",
           "small", _unjudged,
           Expected("D", refusal=r"extra\.mcap"),
-          note="`dvc repro` checks the folder out anew and removes it: nothing is left to stop."),
+          note="Stopped before DVC, which would check the folder out anew and remove it."),
     Wrong("a_file_beside_signed_evidence", "evidence",
           "A journal lies beside those on which a signed card stands.",
           "signed", _unjudged, Expected("E", ("upstream_passed",), refusal=r"extra\.mcap")),

@@ -23,7 +23,7 @@ from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_bytes, sha256_file
 from genpolicy.integrity.rows import read_rows, write_rows
 from genpolicy.policies.checkpoint import CONFIG_FILE
-from genpolicy.policies.evaluations import expected_evaluations
+from genpolicy.policies.evaluations import allowed_evaluations
 from genpolicy.policies.fixtures import FixtureRow, compare_fixtures, reload_fixture
 from genpolicy.policies.policy import NetworkPolicy, load_policy
 from genpolicy.policies.validation_row import EARLIER_FOLDER
@@ -154,9 +154,18 @@ def _reloaded(
     rows.samples += [
         SampleRow(candidate.name, candidate.seed, **asdict(fixture)) for fixture in compared
     ]
-    expected = expected_evaluations(candidate.load().sampler)
-    nfe = (before[0].nfe, after[0].nfe, expected)
-    rows.nfe.append(NfeRow(candidate.name, candidate.seed, *nfe))
+    allowed, counted = allowed_evaluations(candidate.load().sampler), after[0].nfe
+    rows.nfe.append(
+        NfeRow(
+            method=candidate.name,
+            seed=candidate.seed,
+            recorded=before[0].nfe,
+            counted=counted,
+            expected=allowed.nearest(counted),
+            least=allowed.least,
+            most=allowed.most,
+        )
+    )
     return differing
 
 
@@ -199,7 +208,7 @@ def coverage_row(found: Sequence[ModeRow], *, steps: int) -> CoverageRow:
         method=found[0].method,
         seed=found[0].seed,
         steps=steps,
-        nfe=found[0].nfe,
+        nfe=max(row.nfe for row in found),
         situations=len(found),
         modes_covered_share=whole / len(found),
         coverage_lower=clopper_pearson(whole, len(found))[0],

@@ -1,5 +1,6 @@
 """Which hidden variable is named."""
 
+import math
 from dataclasses import replace
 
 from planted import HIDDEN, VALID, limit, named
@@ -34,3 +35,12 @@ def test_a_recorded_column_is_named_before_the_order_and_by_its_strength():
     )
     seen = replace(column, observed=True)
     assert named(replace(VALID, strata=(seen, order))).variable == "episode_order"
+
+
+def test_a_lower_end_that_is_not_known_spares_nothing():
+    """A large share whose interval is not known is held to the limit, never taken for chance."""
+    for missing in (None, math.nan):
+        damaged = replace(VALID, strata=(replace(HIDDEN, effect_lower=missing),))
+        cause = named(damaged)
+        assert (cause.name, cause.variable) == (CauseName.HIDDEN_STATE, "operator")
+        assert any(answer.red for answer in cause.answers if answer.question == "strata_effect")

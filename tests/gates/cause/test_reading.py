@@ -8,8 +8,8 @@ from planted import VALID
 
 from gates.cause.reading import read_measured, read_numbers
 from gates.evidence import MissingEvidenceError
-from genpolicy.audit.reach_rows import LOCAL, Side
-from genpolicy.audit.rows import Calibration, Clock, ReplayRow
+from genpolicy.audit.reach_rows import LOCAL, Side, StructureDraw
+from genpolicy.audit.rows import Calibration, Clock, ReplayRow, Resample
 from genpolicy.errors import BadInputError
 
 SIDE = Side(
@@ -36,6 +36,24 @@ DOCUMENTS = {
     },
     "persistence.json": vars(VALID.kept),
 }  # fmt: skip
+
+
+DRAW = Resample(
+    disagreements=0, disagreement_upper=0.1, two_mode=120, two_mode_episodes=45, incoherent=0,
+    persistent=110, kept=0.95, kept_null_q95=0.6, kept_n=118, p_adjusted=(0.9,), effect=(0.05,),
+    effect_lower=(0.0,), told=(0.05,), success_lower=(0.9, 0.9), admissible=(50, 48),
+)  # fmt: skip
+STRUCTURE = StructureDraw(
+    queries=200, analysed=180, analysed_episodes=50, primary_episodes=50, resolved=0,
+    noise_ratio=0.1, noise_spread=0.01, white_share=0.02, reach_queries=(40,) * 5,
+    reach_spoke=(36,) * 5, findings=-1, successes=(40, 39),
+)  # fmt: skip
+
+
+def draws(**changed):
+    tables = TABLES | {"structure_draws.parquet": [STRUCTURE], "resamples.parquet": [DRAW]}
+    tables |= {f"{name}.parquet": rows for name, rows in changed.items()}
+    return read_numbers(DOCUMENTS.__getitem__, lambda name, _: list(tables.get(name, ())))[1]
 
 
 def read(**changed):
@@ -82,3 +100,48 @@ def test_a_table_of_residuals_that_is_not_there_leaves_only_its_question_open():
 def test_what_cannot_be_is_refused_by_name(changed, match):
     with pytest.raises(BadInputError, match=match):
         read(**changed)
+
+
+TEST = ("p_value", "p_adjusted", "effect", "effect_lower", "effect_upper")
+UNTESTED = replace(VALID.strata[0], recorded=False, n=0, **dict.fromkeys(TEST))
+
+
+@pytest.mark.parametrize("column", TEST)
+@pytest.mark.parametrize("value", [None, math.nan])
+def test_a_test_that_was_run_is_known_in_all_its_numbers(column, value):
+    damaged = replace(VALID.strata[0], **{column: value})
+    with pytest.raises(BadInputError, match="the test of operator in approach is not known"):
+        read(strata=[UNTESTED, damaged])
+
+
+def test_what_was_not_recorded_was_not_tested():
+    assert read(strata=[UNTESTED]).strata == (UNTESTED,)
+    for contradicting in (
+        replace(UNTESTED, recorded=True),
+        replace(UNTESTED, effect=0.9),
+        replace(VALID.strata[0], recorded=False),
+    ):
+        with pytest.raises(BadInputError, match="the test of operator in approach is not known"):
+            read(strata=[contradicting])
+
+
+@pytest.mark.parametrize("place", ["p_adjusted", "effect", "effect_lower"])
+def test_a_test_of_a_resample_is_known_as_well(place):
+    drawn = replace(DRAW, **{place: (None,)})
+    with pytest.raises(BadInputError, match="the test of operator in approach is not known"):
+        draws(resamples=[drawn])
+    assert len(draws(resamples=[DRAW])) == 1
+
+
+@pytest.mark.parametrize(
+    ("document", "place"),
+    [("counts", "noise_ratio"), ("counts", "incoherent"), ("kept", "null_q95"), ("kept", "n")],
+)
+def test_a_count_that_is_not_there_is_no_number(document, place, monkeypatch):
+    if document == "kept":
+        monkeypatch.setitem(DOCUMENTS, "persistence.json", vars(VALID.kept) | {place: None})
+    else:
+        changed = {"counts": vars(VALID.counts) | {place: None}}
+        monkeypatch.setitem(DOCUMENTS, "summary.json", DOCUMENTS["summary.json"] | changed)
+    with pytest.raises(BadInputError, match=f"{place} is not known"):
+        read()

@@ -29,6 +29,15 @@ def _waive(check, reason, owner="perception"):
     return change
 
 
+def _declare(ladder):
+    """The phases of the task and the streams of its contract."""
+    evidence.edit_document(
+        ladder, "task/identity.json", lambda d: d | {"phases": {"all": ["approach", "insert"]}}
+    )
+    times = {"event_time_s.camera": 0.0, "event_time_s.robot": 0.0}
+    evidence.edit_table(ladder, "ingest/frames.parquet", lambda f: f.assign(**times))
+
+
 def test_what_was_not_asked_is_inconclusive_until_somebody_answers_for_it(ladder):
     evidence.edit_table(ladder, "audit/asked.parquet", _unasked)
     report = judge(ladder, "A")
@@ -50,11 +59,63 @@ def test_a_waiver_waives_only_what_it_names(ladder):
 
 
 @pytest.mark.parametrize(
+    "name",
+    ["past.approach", "clock.camera", "frozen.camera", "column.height", "calibration_at_rest"],
+)
+@pytest.mark.parametrize("silent", [False, True])
+def test_a_waiver_that_these_data_do_not_need_is_remarked(ladder, name, silent):
+    """Other data of the same task ask it: the plan that waived it beforehand stays a plan."""
+    _declare(ladder)
+    if silent:
+        evidence.edit_table(ladder, "audit/asked.parquet", _unasked)
+    evidence.write_params(ladder, _waive(name, "too few episodes"))
+    report = judge(ladder, "A")
+    found = _found(report, "unasked_checks")[0]
+    assert report.verdict == ("INCONCLUSIVE" if silent else "PASS")
+    assert f"waived without need here: {name}" in found.caveat
+    assert any(text.startswith(name) and "too few" in text for text in report.caveats)
+
+
+def test_a_waiver_of_what_was_asked_after_all_is_remarked(ladder):
+    evidence.write_params(ladder, _waive("labels", "x"))
+    found = _found(judge(ladder, "A"), "unasked_checks")[0]
+    assert (found.verdict, found.measured) == ("PASS", 0.0)
+    assert "waived without need here: labels" in found.caveat
+
+
+def test_a_waiver_that_is_needed_is_no_remark(ladder):
+    evidence.edit_table(ladder, "audit/asked.parquet", _unasked)
+    evidence.write_params(ladder, _waive("operator", "one person demonstrated"))
+    found = _found(judge(ladder, "A"), "unasked_checks")[0]
+    assert found.verdict == "PASS" and "1 of them waived" in found.caveat
+    assert "without need" not in found.caveat
+
+
+@pytest.mark.parametrize(
+    ("name", "file"),
+    [("past.approach", "task/identity.json"), ("clock.camera", "ingest/frames.parquet")],
+)
+def test_what_can_be_asked_is_not_known_without_task_or_frames(ladder, name, file):
+    _declare(ladder)
+    (ladder / "artifacts" / file).unlink()
+    evidence.write_params(ladder, _waive(name, "x"))
+    report = judge(ladder, "A")
+    found = _found(report, "unasked_checks")[0]
+    assert (report.verdict, found.measured) == ("INCONCLUSIVE", None)
+    assert file in found.caveat
+
+
+@pytest.mark.parametrize(
     ("change", "match"),
     [(_waive("operater", "x"), "a waiver of no question"), (_waive("operator", " "), "waived"),
+     (_waive("past.aproach", "x"), "a waiver of no question.*past.approach"),
+     (_waive("clock.kamera", "x"), "a waiver of no question.*clock.camera"),
+     (_waive("past.", "x"), "a waiver of no question"),
+     (_waive("column.", "x"), "a waiver of no question"),
      (_waive("operator", "x", owner="nobody"), "waived")],
 )  # fmt: skip
 def test_a_waiver_without_name_or_reason_is_refused(ladder, change, match):
+    _declare(ladder)
     evidence.write_params(ladder, change)
     with pytest.raises(ConfigError, match=match):
         judge(ladder, "A")

@@ -104,9 +104,9 @@ def test_rows_of_a_path_are_put_in_order(ladder):
         assert np.all(np.diff(one.points_m[:, 0]) > 0)
 
 
-def test_an_action_that_is_nan_is_named_and_not_drawn(ladder):
+def test_an_action_that_is_not_finite_is_named_and_not_drawn(ladder):
     evidence.edit_table(
-        ladder, "ingest/frames.parquet", lambda f: f.assign(action=[[np.nan] * 9] * len(f))
+        ladder, "ingest/frames.parquet", lambda f: f.assign(action=[[np.inf] * 9] * len(f))
     )
     with pytest.raises(MissingEvidenceError, match="finite position"):
         paths(Evidence(ladder))

@@ -67,3 +67,10 @@ def test_modes_counted_at_another_nfe_say_nothing(ladder):
     report = judge(ladder, "B")
     assert report.verdict == "INCONCLUSIVE"
     assert "chosen NFE" in found_in(report, "mode_coverage_lower")[0].caveat
+
+
+def test_modes_beyond_what_an_adaptive_solver_may_take_say_nothing(ladder):
+    evidence.edit_table(ladder, "reload/nfe.parquet", lambda f: f.assign(least=4, most=61))
+    evidence.edit_table(ladder, MODES, cells("nfe", 64))
+    report = judge(ladder, "B")
+    assert "chosen NFE" in found_in(report, "mode_coverage_lower")[0].caveat

@@ -12,9 +12,14 @@ NFE = "reload/nfe.parquet"
 
 
 def test_the_chosen_nfe_is_the_one_recorded(ladder):
-    assert chosen_nfe(Evidence(ladder), "flow") == 8
+    assert chosen_nfe(Evidence(ladder), "flow") == (8, 8)
     evidence.edit_table(ladder, NFE, lambda f: f.assign(recorded=4))
-    assert chosen_nfe(Evidence(ladder), "flow") == 4
+    assert chosen_nfe(Evidence(ladder), "flow") == (4, 4)
+
+
+def test_a_sampler_that_chooses_its_steps_may_take_what_its_definition_allows(ladder):
+    evidence.edit_table(ladder, NFE, lambda f: f.assign(recorded=22, least=4, most=61))
+    assert chosen_nfe(Evidence(ladder), "flow") == (4, 61)
 
 
 def test_a_candidate_that_records_several_nfe_has_chosen_none(ladder):

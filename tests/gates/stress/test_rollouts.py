@@ -67,7 +67,7 @@ def test_the_lowest_bound_over_the_conditions_decides_and_the_starts_are_the_tri
 def test_a_rollout_without_outcome_is_missing_evidence(ladder):
     first = lambda frame: (frame["method"] == "flow") & (frame["start"] == 0)  # noqa: E731
     evidence.edit_table(ladder, TABLE, cells("success", None, where=first))
-    with pytest.raises(MissingEvidenceError, match="no outcome"):
+    with pytest.raises(MissingEvidenceError, match="empty cells in column success"):
         success_lower(Evidence(ladder), settings_of(ladder, "D"), "flow", ("nominal",))
 
 
