@@ -9,7 +9,7 @@ import dataclasses
 import typing
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -18,6 +18,8 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from gates.pipeline import Basis
+from genpolicy.documents.document import Document
+from genpolicy.errors import IntegrityError
 from genpolicy.integrity.documents import parse_json
 from genpolicy.integrity.hashing import sha256_bytes_of, sha256_file
 from genpolicy.integrity.rows import (
@@ -30,6 +32,7 @@ from genpolicy.integrity.rows import (
 from genpolicy.integrity.tables import table_of
 
 Array = NDArray[np.float64]
+Content = TypeVar("Content")
 
 
 class MissingEvidenceError(Exception):
@@ -130,24 +133,26 @@ class Evidence:
         _require_filled(table, texts, path)
         return table
 
-    def document(self, path: str) -> dict[str, Any]:
-        """A JSON document whose top is an object.
+    def document(self, folder: str, of: Document[Content]) -> Content:
+        """A JSON document as its class.
+
+        Args:
+            folder: Folder that it lies in.
+            of: What kind it is.
 
         Raises:
-            MissingEvidenceError: No such file, or not an object.
+            MissingEvidenceError: No such file, an unknown or missing key, or a value of another
+                type.
             BadInputError: Not strict JSON.
         """
-        document = self._document(path)
-        if not isinstance(document, dict):
-            raise MissingEvidenceError(f"{path} holds no object")
-        return document
-
-    def listing(self, path: str) -> list[Any]:
-        """A JSON document whose top is a list; otherwise as `document`."""
-        document = self._document(path)
-        if not isinstance(document, list):
-            raise MissingEvidenceError(f"{path} holds no list")
-        return document
+        path = f"{folder}/{of.file}"
+        self._touched[path] = None
+        if path not in self._documents:
+            self._documents[path] = parse_json(self._read(path), where=path)
+        try:
+            return of.parse(self._documents[path], where=path)
+        except IntegrityError as error:
+            raise MissingEvidenceError(str(error)) from error
 
     def bind(self, *patterns: str) -> list[str]:
         """Hash files by glob pattern without reading them; returns their paths, sorted."""
@@ -168,12 +173,6 @@ class Evidence:
         """SHA-256 of one file, without reading it further; empty where it is missing."""
         self._touched[path] = None
         return self._materials[path] if self.bind(path) else ""
-
-    def _document(self, path: str) -> Any:
-        self._touched[path] = None
-        if path not in self._documents:
-            self._documents[path] = parse_json(self._read(path), where=path)
-        return self._documents[path]
 
     def _table(self, path: str) -> pa.Table:
         self._touched[path] = None
@@ -255,28 +254,3 @@ def flags(frame: pd.DataFrame, column: str) -> NDArray[np.bool_]:
     if not all(isinstance(value, bool | np.bool_) for value in known):
         raise MissingEvidenceError(f"column {column} holds other values than true and false")
     return np.asarray(values.fillna(False).astype(bool).to_numpy(), dtype=np.bool_)
-
-
-def number(document: dict[str, Any], key: str) -> float:
-    """A finite number of a document.
-
-    Raises:
-        MissingEvidenceError: Absent, null or not a number.
-    """
-    value = document.get(key)
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise MissingEvidenceError(f"{key} is missing or not a number")
-    return float(value)
-
-
-def count(document: dict[str, Any], key: str) -> float:
-    """A count of a document, given as a number or as a list.
-
-    Raises:
-        MissingEvidenceError: Absent, neither, or below zero.
-    """
-    value = document.get(key)
-    found = float(len(value)) if isinstance(value, list) else number(document, key)
-    if found < 0:
-        raise MissingEvidenceError(f"{key} counts {found:g}: corrupt evidence")
-    return found

@@ -18,12 +18,14 @@ from typing import Any
 
 from gates.recorded import require_form
 from gates.report import GATES, Gate, report_path, stage_of
+from genpolicy.documents.task import IDENTITY
 from genpolicy.errors import ConfigError, IntegrityError
 from genpolicy.integrity.documents import canonical_json, parse_json, parse_yaml
 from genpolicy.integrity.hashing import sha256_bytes, sha256_bytes_of, sha256_file
 
 PIPELINE, LOCK, IGNORED, PARAMS = "dvc.yaml", "dvc.lock", ".dvcignore", "params.yaml"
-TASK_IDENTITY = "artifacts/task/identity.json"
+TASK = "artifacts/task"
+TASK_IDENTITY = f"{TASK}/{IDENTITY.file}"
 """What the task is, by hash: material of every gate."""
 CODE = ("genpolicy", "gates", "stages")
 RUNGS: dict[Gate, tuple[str, ...]] = {
@@ -273,13 +275,11 @@ def changed_task(root: Path) -> str:
     file = root / TASK_IDENTITY
     if not file.is_file():
         return ""
-    identity = parse_json(sha256_bytes_of(file, keep=True)[1], where=TASK_IDENTITY)
-    package = identity.get("package") if isinstance(identity, dict) else None
-    if not isinstance(package, dict):
-        return ""
-    found = _package(root, str(identity.get("entry_point")))
+    stated = parse_json(sha256_bytes_of(file, keep=True)[1], where=TASK_IDENTITY)
+    identity = IDENTITY.parse(stated, where=TASK_IDENTITY)
+    package, found = identity.package, _package(root, identity.entry_point)
     other = [name for name in {*package, *found} if package.get(name) != found.get(name)]
-    return f"the task {identity.get('name')}: {min(other)}" if other else ""
+    return f"the task {identity.name}: {min(other)}" if other else ""
 
 
 def _package(root: Path, entry_point: str) -> dict[str, str]:

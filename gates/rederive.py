@@ -21,15 +21,18 @@ from gates.stated import (
     refuse,
     root_seed,
     section,
-    short,
     training_seed,
 )
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.errors import ConfigError, GenpolicyError
-from genpolicy.evidence.stress.envelope import ENVELOPE_FILE
+from genpolicy.evidence.documents.shadow import CHECKER
+from genpolicy.evidence.documents.stress import ENVELOPE, POWER
+from genpolicy.evidence.shadow.tables import checked
+from genpolicy.evidence.stress.envelope import envelope_document
 from genpolicy.evidence.stress.perturbations import ReducedEnvelope
-from genpolicy.evidence.stress.settings import ENVELOPE, StressSettings
-from genpolicy.evidence.stress.tables import POWER_FILE, power_document
+from genpolicy.evidence.stress.settings import ENVELOPE as CONDITION
+from genpolicy.evidence.stress.settings import StressSettings
+from genpolicy.evidence.stress.tables import power_document
 from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.feasibility.cell import cell_of
 from genpolicy.feasibility.figures import expected_motion
@@ -42,6 +45,7 @@ from genpolicy.verification.checker import ExpectedSettings, check_journal
 from genpolicy.verification.commands import reach_of
 from genpolicy.verification.journal_source import readable
 from genpolicy.verification.motion import ExpectedMotion
+from genpolicy.verification.report import JournalReport
 from genpolicy.verification.rollouts import derived_rollouts
 from genpolicy.verification.tables import KEYS, derived_tables
 
@@ -113,35 +117,23 @@ def _held_to(params: Mapping[str, Any]) -> tuple[ExpectedSettings, ExpectedMotio
 def _check(root: Path, gate: Gate, params: Mapping[str, Any], journals: list[Path]) -> None:
     """The checker's document, made again under the settings of `params.yaml`."""
     expected, motion = _held_to(params)
-    found = {path.name: check_journal(path, expected, motion).as_document() for path in journals}
-    path = f"{FOLDERS[gate][0]}/checker.json"
-    stated = mapping(read_json(root / path))
-    claimed = mapping(stated.get("journals"))
-    for name in sorted({*found, *claimed}):
-        if claimed.get(name) != found.get(name):
-            again = f"{_totals(found.get(name))}, as checked again"
-            refuse(gate, f"{path}: {name}", _totals(claimed.get(name)), again)
-    derived = {
-        "violations": [
-            {"journal": name, **violation}
-            for name, document in found.items()
-            for violation in document["violations"]
-        ],
-        **{key: sum(d[key] for d in found.values()) for key in ("checked_actions",
-                                                                "reproved_actions")},
-    }  # fmt: skip
-    for key, value in derived.items():
-        if stated.get(key) != value:
-            refuse(gate, f"{path}: {key}", short(stated.get(key)), f"{short(value)}, as "
-                    "checked again")  # fmt: skip
+    again = checked(
+        {path.name: check_journal(path, expected, motion).as_document() for path in journals}
+    )
+    folder = FOLDERS[gate][0]
+    path, stated = f"{folder}/{CHECKER.file}", CHECKER.read(root / folder)
+    for name in sorted({*again.journals, *stated.journals}):
+        claimed, found = stated.journals.get(name), again.journals.get(name)
+        if claimed != found:
+            limit = f"{_totals(found)}, as checked again"
+            refuse(gate, f"{path}: {name}", _totals(claimed), limit)
+    compare_keys(gate, path, CHECKER.plain(stated), CHECKER.plain(again), "as checked again")
 
 
-def _totals(document: Any) -> str:
-    if not isinstance(document, dict):
+def _totals(report: JournalReport | None) -> str:
+    if report is None:
         return "nothing"
-    listed = document.get("violations")
-    count = len(listed) if isinstance(listed, list) else 0
-    return f"{count} violations in {document.get('checked_actions', '?')} actions"
+    return f"{len(report.violations)} violations in {report.checked_actions} actions"
 
 
 def _tables(root: Path, params: Mapping[str, Any], journals: list[Path]) -> None:
@@ -162,32 +154,21 @@ def _tables(root: Path, params: Mapping[str, Any], journals: list[Path]) -> None
 def _envelope(root: Path, params: Mapping[str, Any]) -> None:
     """`envelope.json`: the planned limits, and how far the commands of each journal went."""
     stress = section(params, "stress", StressSettings)
-    planned = stress.perturbations.get(ENVELOPE)
-    path = root / STRESS / ENVELOPE_FILE
+    planned = stress.perturbations.get(CONDITION)
+    path = root / STRESS / ENVELOPE.file
     expected: dict[str, Any] = {}
     if isinstance(planned, ReducedEnvelope):
-        journals = (root / STRESS / "journals").glob(f"*__{ENVELOPE}.mcap")
-        expected = {
-            "condition": ENVELOPE,
-            "workspace_lower_m": list(planned.workspace_lower_m),
-            "workspace_upper_m": list(planned.workspace_upper_m),
-            "speed_limit_m_s": planned.speed_limit_m_s,
-            "reached": {
-                journal.name.partition("__")[0]: reach_of(journal).as_document()
-                for journal in journals
-            },
-        }
+        journals = (root / STRESS / "journals").glob(f"*__{CONDITION}.mcap")
+        reached = {journal.name.partition("__")[0]: reach_of(journal) for journal in journals}
+        expected = ENVELOPE.plain(envelope_document(CONDITION, planned, reached))
     stated = mapping(read_json(path)) if path.is_file() else {}
-    for key in sorted({*stated, *expected}):
-        if stated.get(key) != expected.get(key):
-            where = f"{STRESS}/{ENVELOPE_FILE}: {key}"
-            text = f"{short(expected.get(key))}, as planned and as the journals say"
-            refuse("D", where, short(stated.get(key)), text)
+    how = "as planned and as the journals say"
+    compare_keys("D", f"{STRESS}/{ENVELOPE.file}", stated, expected, how)
 
 
 def _power(root: Path, params: Mapping[str, Any]) -> None:
     """`power.json`: simulated again from margin, alpha, starts and seed of `params.yaml`."""
-    path = f"{STRESS}/{POWER_FILE}"
+    path = f"{STRESS}/{POWER.file}"
     samplers = section_of(params, "train_generators").get("samplers")
     if not isinstance(samplers, dict):
         raise ConfigError(
@@ -198,4 +179,6 @@ def _power(root: Path, params: Mapping[str, Any]) -> None:
         )
     stress = section(params, "stress", StressSettings)
     again = power_document(stress, candidates=len(samplers), root_seed=root_seed(params))
-    compare_keys("D", path, mapping(read_json(root / path)), again, "as simulated again")
+    compare_keys(
+        "D", path, mapping(read_json(root / path)), POWER.plain(again), "as simulated again"
+    )

@@ -1,6 +1,6 @@
 """Gate C's evidence derived again: tables from the journal, mutants by trying them again."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +9,7 @@ from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.contract.settings import Settings
 from genpolicy.data.dataset import load_dataset
 from genpolicy.evidence.admission_context import make_checker
+from genpolicy.evidence.documents.shadow import MUTANTS, LayerMutant, Mutant
 from genpolicy.evidence.shadow.layer_mutants import missing_checks_evidence
 from genpolicy.evidence.shadow.observations import held_out_observations, spread
 from genpolicy.evidence.shadow.settings import ShadowSection
@@ -16,7 +17,6 @@ from genpolicy.evidence.shadow.shadow import Shadow, numbers_sha256
 from genpolicy.evidence.shadow.tables import all_mutants
 from genpolicy.execution.cell import Cell, ExecutionSettings
 from genpolicy.feasibility.settings import FeasibilitySettings
-from genpolicy.integrity.documents import canonical_json, parse_json, read_json
 from genpolicy.integrity.tables import read_table
 from genpolicy.seeds import stream
 from genpolicy.tasks.api import load_task
@@ -50,9 +50,9 @@ def rederive_shadow(root: Path, params: Mapping[str, Any]) -> None:
         path = f"{SHADOW}/{name}.parquet"
         stated = [_hashed(row) for row in read_table(root / path).to_pylist()]
         compare_rows("C", path, keys, stated, derived[name], seed=training_seed(params))
-    path = f"{SHADOW}/mutants.json"
-    again = parse_json(canonical_json(all_mutants(_layer_mutants(root, params))), where=path)
-    stated_mutants, found = (_by_check(rows) for rows in (read_json(root / path), again))
+    path = f"{SHADOW}/{MUTANTS.file}"
+    again = all_mutants(_layer_mutants(root, params))
+    stated_mutants, found = (_by_check(rows) for rows in (MUTANTS.read(root / SHADOW), again))
     compare_keys("C", path, stated_mutants, found, "as tried again")
 
 
@@ -62,17 +62,16 @@ def _hashed(row: dict[str, Any]) -> Row:
     return short | {f"{key}_sha256": numbers_sha256(row[key]) for key in HASHED if key in row}
 
 
-def _by_check(rows: Any) -> dict[str, Any]:
-    """Rows of `mutants.json` by layer and check; what is no list of rows stands for nothing."""
-    listed = rows if isinstance(rows, list) else []
+def _by_check(rows: Sequence[Mutant]) -> dict[str, Any]:
+    """Rows of `mutants.json` by layer and check."""
     found: dict[str, Any] = {}
-    for row in listed:
-        name = f"{row.get('layer')}.{row.get('check')}" if isinstance(row, dict) else repr(row)
-        found[name if name not in found else f"{name}, again"] = row
+    for row in rows:
+        name = f"{row.layer}.{row.check}"
+        found[name if name not in found else f"{name}, again"] = vars(row)
     return found
 
 
-def _layer_mutants(root: Path, params: Mapping[str, Any]) -> list[dict[str, Any]]:
+def _layer_mutants(root: Path, params: Mapping[str, Any]) -> list[LayerMutant]:
     """Each check of the six layers left out again, on the held-out moments of the dataset."""
     shadow = section(params, "shadow", ShadowSection)
     horizons = section(params, "horizons", HorizonConfig)

@@ -55,6 +55,10 @@ class NonFiniteError(ContractError):
     """A number that must be finite is NaN or infinite."""
 
 
+class EvaluationCapError(ContractError):
+    """A sampler asked for more network evaluations than it is allowed; there is no chunk."""
+
+
 class IntegrityError(BadInputError):
     """Bytes differ from the hash that names them, or are not what they claim to be."""
 

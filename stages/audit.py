@@ -2,11 +2,12 @@
 
 from genpolicy.audit.evidence import write_evidence
 from genpolicy.audit.settings import AuditSettings
-from genpolicy.evidence.need.audit_task import audit_task, round_obstacles, with_channels
+from genpolicy.evidence.need.audit_task import audit_task, round_obstacles, settings_of
 from genpolicy.evidence.need.pictures import scene_png
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import output_folder, write_bytes
 from genpolicy.tasks.api import load_task
+from stages._confidence import confidence_of
 from stages._contracts import require_one_contract
 from stages._stage import ARTIFACTS, Params, main
 
@@ -15,7 +16,8 @@ def work(params: Params) -> None:
     """Audit the dataset and write the evidence."""
     require_one_contract()
     task = load_task(params.task.name)
-    settings = with_channels(params.section("audit", AuditSettings), task)
+    own = params.section("audit", AuditSettings)
+    settings = settings_of(own, task, params.horizons, confidence=confidence_of(params))
     feasibility = params.section("feasibility", FeasibilitySettings)
     with output_folder(ARTIFACTS / "audit") as folder:
         result = audit_task(

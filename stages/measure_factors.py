@@ -3,14 +3,15 @@
 from pydantic import Field
 
 from genpolicy.candidates.judged import trained
-from genpolicy.contract.settings import Settings, parse_settings
+from genpolicy.contract.settings import Settings
 from genpolicy.evidence.need.factors import FactorPlan, write_factors
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import output_folder
 from genpolicy.policies.matched_training import PolicySettings
+from stages._confidence import confidence_of
 from stages._contracts import require_one_contract
 from stages._measuring import MeasureBaselinesSection
-from stages._stage import ARTIFACTS, PARAMS, Params, main
+from stages._stage import ARTIFACTS, Params, main
 from stages._training import FactorsSection, MethodsSection
 
 
@@ -24,26 +25,6 @@ class MeasureFactorsSection(Settings):
 
     samples: int = Field(ge=1)
     stride: int = Field(ge=1)
-
-
-class SharedConfidence(Settings):
-    """Key `confidence`, by which the gates judge as well.
-
-    Attributes:
-        confidence: Coverage of every interval.
-    """
-
-    confidence: float = Field(gt=0.5, lt=1.0)
-
-
-def confidence_of(params: Params) -> float:
-    """Coverage of every interval.
-
-    Raises:
-        ConfigError: Missing, or no such share.
-    """
-    found = {name: params.raw[name] for name in ("confidence",) if name in params.raw}
-    return parse_settings(SharedConfidence, found, where=str(PARAMS)).confidence
 
 
 def work(params: Params) -> None:

@@ -4,20 +4,19 @@ from pathlib import Path
 
 from gates.proof import admit
 from genpolicy.candidates.judged import compared
+from genpolicy.evidence.documents.stress import POWER
 from genpolicy.evidence.reproducibility.latency import latency_models
 from genpolicy.evidence.rows.reproducibility import LatencyRow
 from genpolicy.evidence.stress.matched import Comparison, matched_starts
 from genpolicy.evidence.stress.settings import StressSettings
 from genpolicy.evidence.stress.tables import (
-    POWER_FILE,
     plan_shards,
     power_document,
     write_stress,
 )
 from genpolicy.execution.cell import Cell, ExecutionSettings
 from genpolicy.feasibility.settings import FeasibilitySettings
-from genpolicy.integrity.atomic import output_folder, write_bytes
-from genpolicy.integrity.documents import canonical_json
+from genpolicy.integrity.atomic import output_folder
 from genpolicy.integrity.rows import read_columns
 from genpolicy.policies.matched_training import PolicySettings
 from genpolicy.tasks.api import load_task
@@ -61,7 +60,7 @@ def work(params: Params) -> None:
         write_stress(
             folder, shards, workers=params.compute.workers, scheduler=params.compute.scheduler
         )
-        write_bytes(folder / POWER_FILE, canonical_json(power))
+        POWER.write(folder, power)
 
 
 if __name__ == "__main__":

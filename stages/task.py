@@ -8,11 +8,12 @@ where a fixture (controller, limits, supervisor, scene) is not the one that is p
 
 from pathlib import Path
 
+from genpolicy.documents.task import IDENTITY
 from genpolicy.integrity.atomic import output_folder, write_bytes
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.outputs import require_own_files
 from genpolicy.tasks.fixtures import fixture_hashes, require_pinned
-from genpolicy.tasks.identity import IDENTITY_FILE, task_identity
+from genpolicy.tasks.identity import task_identity
 from stages._source import SOURCE_FILE, SourceSection, refuse_foreign_files, source_document
 from stages._stage import ARTIFACTS, Params, main
 
@@ -25,7 +26,7 @@ def work(params: Params) -> None:
     require_pinned(Path.cwd(), params.task.name, fixture_hashes(identity))
     source = source_document(params.section("source", SourceSection))
     with output_folder(ARTIFACTS / "task") as folder:
-        write_bytes(folder / IDENTITY_FILE, canonical_json(identity))
+        write_bytes(folder / IDENTITY.file, canonical_json(identity))
         write_bytes(folder / SOURCE_FILE, canonical_json(source))
 
 

@@ -1,6 +1,6 @@
 """Stage `train_baselines`: the simpler policies, trained under one configuration."""
 
-from genpolicy.audit.rows import Demonstration
+from genpolicy.audit.followed_rows import Demonstration
 from genpolicy.integrity.atomic import output_folder
 from genpolicy.integrity.rows import read_rows
 from genpolicy.policies.matched_training import train_matched

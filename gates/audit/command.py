@@ -16,6 +16,7 @@ from typing import Any
 
 from gates.cause import Answer, Cause, CauseLimits, Topic, cause_of, default_limits
 from gates.need.gate import read_cause_limits
+from genpolicy.audit.documents import Obstacle
 from genpolicy.audit.evidence import write_evidence
 from genpolicy.audit.propose import propose_settings
 from genpolicy.audit.settings import AuditSettings
@@ -101,7 +102,7 @@ def write_report(
     *,
     limits: CauseLimits,
     name: str,
-    obstacles: list[dict[str, float]],
+    obstacles: list[Obstacle],
     origins: Mapping[str, str] | None = None,
 ) -> Cause:
     """Write audit.json, audit.html and the evidence into an existing folder.

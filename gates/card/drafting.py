@@ -7,11 +7,10 @@ from gates.card.card import CardSettings, TrialCard, draft_card, promoted
 from gates.card.envelope import simulated_envelope, was_judged
 from gates.evidence import Evidence
 from gates.report import Gate, GateReport
+from gates.reproducibility.settings import RELOAD
 from gates.settings import read_params, read_settings
 from genpolicy.errors import IntegrityError
-from genpolicy.integrity.documents import read_json
-
-IDENTITY = "artifacts/reload/identity.json"
+from genpolicy.evidence.documents.reproducibility import CANDIDATES
 
 
 def draft(root: Path, reports: Mapping[Gate, GateReport], hashes: Mapping[Gate, str]) -> TrialCard:
@@ -38,14 +37,12 @@ def draft(root: Path, reports: Mapping[Gate, GateReport], hashes: Mapping[Gate, 
             expected="the condition that ran inside the card's envelope",
             action="Judge gate D again: `dvc repro gate_d`.",
         )
-    identity = read_json(root / IDENTITY)
-    entry = identity.get(candidate) if isinstance(identity, dict) else None
-    checkpoint = entry.get("checkpoint") if isinstance(entry, dict) else None
-    if not isinstance(checkpoint, str) or not checkpoint:
+    pinned = CANDIDATES.read(root / RELOAD).get(candidate)
+    if pinned is None or not pinned.checkpoint:
         raise IntegrityError(
-            where=f"{IDENTITY}: {candidate}.checkpoint",
+            where=f"{RELOAD}/{CANDIDATES.file}: {candidate}.checkpoint",
             found="missing",
             expected="the hash of the promoted checkpoint",
             action="Run `dvc repro reload`.",
         )
-    return draft_card(settings, reports, hashes, checkpoint, simulated)
+    return draft_card(settings, reports, hashes, pinned.checkpoint, simulated)

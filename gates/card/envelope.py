@@ -1,47 +1,30 @@
 """The envelope that a card may allow: the one that the comparison ran inside, and nothing else."""
 
 import math
+from dataclasses import dataclass
 
 from gates.evidence import Evidence, MissingEvidenceError
-from gates.pipeline import TASK_IDENTITY
-from gates.report import GateReport, Point, StrictModel, parse_section
+from gates.pipeline import TASK
+from gates.report import GateReport
+from gates.stress.rollouts import STRESS
+from genpolicy.documents.task import IDENTITY, Point
 from genpolicy.errors import IntegrityError
+from genpolicy.evidence.documents.stress import ENVELOPE, Envelope
 
-ENVELOPE = "artifacts/stress/envelope.json"
+ENVELOPE_FILE = f"{STRESS}/{ENVELOPE.file}"
 """Written by the comparison: the limits of the condition, and how far its commands went."""
 ROUNDING = 1e-6
 """Of a position in m, and of a speed as a share: what rounding of commands may add."""
 
 
-class Reached(StrictModel):
-    """How far the commands of one method went, read from its journal; None without commands."""
-
-    commands: int
-    fastest_m_s: float | None
-    lowest_m: Point | None
-    highest_m: Point | None
-
-
-class _Condition(StrictModel):
-    condition: str
-    workspace_lower_m: Point
-    workspace_upper_m: Point
-    speed_limit_m_s: float
-    reached: dict[str, Reached]
-
-
-class Simulated(_Condition):
-    """What the rollouts were held to.
+@dataclass(frozen=True)
+class Simulated(Envelope):
+    """What the rollouts were held to, and what the task allows.
 
     Attributes:
-        condition: Name of the planned condition.
-        workspace_lower_m: Lower corner, base frame. Shape (3,).
-        workspace_upper_m: Upper corner. Shape (3,).
-        speed_limit_m_s: Most for the speed of the TCP.
-        reached: By method.
         robot: Name of the robot in the scene.
-        task_lower_m: Lower corner of the task's own workspace. Shape (3,).
-        task_upper_m: Upper corner. Shape (3,).
+        task_lower_m: Lower corner of the task's own workspace.
+        task_upper_m: Upper corner.
     """
 
     robot: str
@@ -56,17 +39,17 @@ def simulated_envelope(evidence: Evidence) -> Simulated:
         IntegrityError: No condition ran inside an envelope, or a document of another form.
     """
     try:
-        document, identity = evidence.document(ENVELOPE), evidence.document(TASK_IDENTITY)
-        lower, upper = identity["workspace_m"]
-        task = {"robot": identity["robot"], "task_lower_m": lower, "task_upper_m": upper}
-        return parse_section(Simulated, {**document, **task}, where=ENVELOPE)
-    except (MissingEvidenceError, KeyError, TypeError, ValueError) as error:
+        envelope = evidence.document(STRESS, ENVELOPE)
+        identity = evidence.document(TASK, IDENTITY)
+    except MissingEvidenceError as error:
         raise IntegrityError(
-            where=ENVELOPE,
+            where=ENVELOPE_FILE,
             found=f"no envelope ({error})",
             expected="rollouts inside the card's envelope, and the task's identity",
             action="Plan the condition `envelope` in `stress.perturbations`; run `dvc repro`.",
         ) from error
+    lower, upper = identity.workspace_m
+    return Simulated(**vars(envelope), robot=identity.robot, task_lower_m=lower, task_upper_m=upper)
 
 
 def was_judged(report: GateReport, condition: str) -> bool:

@@ -23,8 +23,7 @@ from gates.card.card import (
     read_card,
     validity,
 )
-from gates.card.drafting import IDENTITY
-from gates.card.envelope import ENVELOPE, simulated_envelope, was_judged
+from gates.card.envelope import ENVELOPE_FILE, simulated_envelope, was_judged
 from gates.card.people import ALLOW_LIST, load_allow_list
 from gates.card.signing import (
     CARDS,
@@ -41,9 +40,11 @@ from gates.pipeline import check_record
 from gates.preregistration import NONE, PREREGISTRATION, moved_caveats, read_plan
 from gates.protection import REHEARSED, is_rehearsal, require_protection
 from gates.report import OWNERS, Gate, GateReport, stage_of
+from gates.reproducibility.settings import RELOAD
 from gates.running import require_running_code
 from gates.settings import GateSettings, read_limits, read_params, read_settings
 from genpolicy.errors import BadInputError, GenpolicyError, IntegrityError
+from genpolicy.evidence.documents.reproducibility import CANDIDATES
 from genpolicy.integrity.hashing import sha256_bytes_of
 
 
@@ -176,10 +177,10 @@ def _chain_error(root: Path, chain: Chain, draft: TrialCard | None) -> str:
         simulated = simulated_envelope(Evidence(root))
         if not was_judged(chain.reports["D"], simulated.condition):
             return f"gate D did not judge the condition {simulated.condition!r} of the card"
-        entry = Evidence(root).document(IDENTITY).get(candidate)
+        entry = Evidence(root).document(RELOAD, CANDIDATES).get(candidate)
     except (MissingEvidenceError, GenpolicyError) as error:
         return str(error)
-    pinned = entry.get("checkpoint") if isinstance(entry, dict) else None
+    pinned = entry.checkpoint if entry else None
     if draft.reports != chain.hashes:
         return "the draft names other reports than lie here; run `dvc repro card`"
     if draft.candidate != candidate or draft.candidate_checkpoint_sha256 != pinned:
@@ -328,7 +329,7 @@ GATE = GateSpec(
     criteria=criteria_of(globals()),
     bind=(
         DRAFT_PATH,
-        ENVELOPE,
+        ENVELOPE_FILE,
         PREREGISTRATION,
         f"{CARDS}/*.dsse.json",
         ALLOW_LIST,

@@ -28,7 +28,7 @@ OWN = (
     "faulty_episodes_share", "supported_episodes", "supported_share", "denial_share",
     "two_mode_episodes", "two_mode_share", "two_mode_chance", "incoherent_share", "noise_ratio",
     "noise_spread_m", "white_share", "strata_p", "strata_effect_lower", "nearly_equal_effect",
-    "everything_handicap", "cause_agreement",
+    "everything_handicap", "cause_agreement", "contradicted_situations", "confirmed_share",
 )  # fmt: skip
 """Questions that only the cause asks."""
 

@@ -33,8 +33,6 @@ CLAIMS = (
     CauseName.VALID_MODES, CauseName.HIDDEN_STATE, CauseName.UNIMODAL, CauseName.POINTWISE_NOISE,
 )  # fmt: skip
 UNSTABLE = "unstable"
-# Fewer resampled audits do not overturn a verdict.
-LEAST_DRAWS = 20
 IN_METRES = ("calibration_residual_m", "noise_spread_m")
 RESIDUALS = {
     "clock_residual_s": "clock offset left after realignment, largest of streams and epochs",
@@ -79,7 +77,7 @@ def name_cause(numbers: Numbers, draws: Sequence[Numbers], limits: CauseLimits) 
             verdict, red = said, topic
     again = _all(draws, limits)
     same = [(v.name, v.variable) == (verdict.name, verdict.variable) for v in again]
-    if len(again) >= LEAST_DRAWS:
+    if again:
         answer, said = _agreement(verdict, again, limits)
         answers.append(answer)
         if said is not None:

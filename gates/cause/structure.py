@@ -16,11 +16,6 @@ WORDS = {
 }
 BY = {LOCAL: "by near neighbours", LEARNED: "by what predicts the action"}
 OF_BOTH = ("two_mode_episodes", "denial_share")
-# Situations asked again in which the other evidence must speak before it can contradict.
-LEAST_ASKED = 30
-# Share of them that it must show as well. Not most: a cluster that has begun to move apart is still
-# one place by declared scales, and told already by what a forest learned to see.
-LEAST_CONFIRMED = 0.2
 ORDINALS = ("first", "second", "third", "fourth", "last")
 
 
@@ -105,8 +100,8 @@ def _disagree(
     learned = second.other if second.kind == LOCAL else first.other
     asked = (learned.confirmed, learned.contradicted) if learned else (0, 0)
     modes, denied = first.counts.two_mode_episodes, said is not None
-    few = LEAST_CONFIRMED * sum(asked) - asked[0] > 0
-    if not denied and few and asked[1] >= LEAST_ASKED:
+    few = limits["confirmed_share"] * sum(asked) - asked[0] > 0
+    if not denied and few and asked[1] - limits["contradicted_situations"] >= 0:
         # What the policy sees and takes for near is told by what predicts: no contradiction.
         told = hidden(first, limits)[1]
         if told is not None and told.kind == OBSERVED:

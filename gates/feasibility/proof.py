@@ -2,8 +2,9 @@
 
 from gates.asked_for import CHECKS_ASKED_FOR
 from gates.criterion import Measured, criterion
-from gates.evidence import Evidence, MissingEvidenceError, count
+from gates.evidence import Evidence, MissingEvidenceError
 from gates.feasibility.settings import SHADOW, FeasibilitySettings
+from genpolicy.evidence.documents.shadow import CHECKER, MUTANTS, LayerMutant
 
 
 @criterion(
@@ -14,24 +15,23 @@ from gates.feasibility.settings import SHADOW, FeasibilitySettings
 )
 def checker_violations(evidence: Evidence, settings: FeasibilitySettings) -> Measured:
     """Violations that the independent checker found in the journal."""
-    return checked_violations(evidence, f"{SHADOW}/checker.json")
+    return checked_violations(evidence, SHADOW)
 
 
-def checked_violations(evidence: Evidence, path: str) -> Measured:
+def checked_violations(evidence: Evidence, folder: str) -> Measured:
     """Violations that the independent checker found; none counts only if it proved every action.
 
     Raises:
         MissingEvidenceError: It checked nothing, or did not prove the motion of what it checked.
     """
-    document = evidence.document(path)
-    checked = count(document, "checked_actions")
-    proved = count(document, "reproved_actions")
+    found = evidence.document(folder, CHECKER)
+    checked, proved = found.checked_actions, found.reproved_actions
     if checked <= 0:
         raise MissingEvidenceError("the checker saw no action")
     if not proved >= checked:
-        raise MissingEvidenceError(f"the motion of {proved:g} of {checked:g} actions was proved")
-    text = f"{checked:g} actions proved again, their motion by other geometry"
-    return Measured(count(document, "violations"), caveat=text)
+        raise MissingEvidenceError(f"the motion of {proved} of {checked} actions was proved")
+    text = f"{checked} actions proved again, their motion by other geometry"
+    return Measured(float(len(found.violations)), caveat=text)
 
 
 @criterion(
@@ -45,17 +45,14 @@ def mutants_undetected(evidence: Evidence, settings: FeasibilitySettings) -> Mea
 
     Asked for is every check of the code; which of them a task has no chunk for, the evidence says.
     """
-    entries = evidence.listing(f"{SHADOW}/mutants.json")
     found, missed, excused = set[str](), dict[str, None](), dict[str, str]()
-    for entry in entries:
-        if not isinstance(entry, dict) or not isinstance(entry.get("detected"), bool):
-            raise MissingEvidenceError("mutants.json has an entry without check or detected")
-        name = f"{entry.get('layer')}.{entry.get('check')}"
+    for entry in evidence.document(SHADOW, MUTANTS):
+        name = f"{entry.layer}.{entry.check}"
         found.add(name)
-        if entry["detected"]:
+        if entry.detected:
             continue
-        if entry.get("not_applicable") and not entry.get("tried"):
-            excused[name] = str(entry["not_applicable"])
+        if isinstance(entry, LayerMutant) and entry.not_applicable and not entry.tried:
+            excused[name] = entry.not_applicable
         else:  # an excuse in another row of the same check does not undo it
             missed[name] = None
     silent = [*missed]

@@ -1,5 +1,7 @@
 """The cause behind the modes: named from the audit's numbers, under the limits of this gate."""
 
+from typing import Any
+
 from gates.cause import (
     Cause,
     CauseLimits,
@@ -12,11 +14,14 @@ from gates.cause import (
 )
 from gates.cause.limits import SHARED
 from gates.cause.naming import IN_METRES
-from gates.cause.reading import Document, Rows
+from gates.cause.reading import Document as ReadDocument
+from gates.cause.reading import Rows
 from gates.criterion import Measured
 from gates.evidence import Evidence, MissingEvidenceError
 from gates.need.settings import AUDIT, NeedSettings
 from gates.settings import PARAMS_FILE, Limit, Limits, Waiver
+from genpolicy.audit.documents import PERSISTENCE, SUMMARY
+from genpolicy.documents.document import Document
 from genpolicy.errors import BadInputError
 
 PLACE = f"{PARAMS_FILE}: gate_a.cause"
@@ -77,11 +82,13 @@ def _limits(settings: NeedSettings) -> CauseLimits:
     return limits_of(settings.cause, shared, confidence=settings.confidence, where=PLACE)
 
 
-def _readers(evidence: Evidence) -> tuple[Document, Rows]:
-    return (
-        lambda name: evidence.document(f"{AUDIT}/{name}"),
-        lambda name, row: evidence.records(f"{AUDIT}/{name}", row),
-    )
+def _readers(evidence: Evidence) -> tuple[ReadDocument, Rows]:
+    def document(name: str) -> dict[str, Any]:
+        kind: Document[Any] = {kind.file: kind for kind in (SUMMARY, PERSISTENCE)}[name]
+        plain: dict[str, Any] = kind.plain(evidence.document(AUDIT, kind))
+        return plain
+
+    return document, lambda name, row: evidence.records(f"{AUDIT}/{name}", row)
 
 
 def asked(limits: Limits) -> dict[str, Limit]:

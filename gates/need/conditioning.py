@@ -7,9 +7,10 @@ import numpy as np
 from gates.bounds import counted_interval
 from gates.cause.told import UNDECIDED, counts
 from gates.criterion import Measured, criterion
-from gates.evidence import Evidence, number, numbers
+from gates.evidence import Evidence, numbers
 from gates.need.cause import as_the_cause, found_cause
 from gates.need.settings import AUDIT, VALID_CAUSE, NeedSettings
+from genpolicy.audit.documents import SUMMARY
 from genpolicy.audit.rows import Prediction
 
 
@@ -77,14 +78,14 @@ def cause_accepted(evidence: Evidence, settings: NeedSettings) -> Measured:
 )
 def phase_collapse_share(evidence: Evidence, settings: NeedSettings) -> Measured:
     """Upper bound of the share of episodes whose modes the task phase takes away."""
-    document = evidence.document(f"{AUDIT}/summary.json")
-    without, seen = number(document, "modes_without_phase"), number(document, "modes_with_phase")
+    summary = evidence.document(AUDIT, SUMMARY)
+    without, seen = summary.modes_without_phase, summary.modes_with_phase
     if without == 0:
         return Measured(0.0, caveat="no episode has modes without the phase")
-    lost = max(0.0, without - seen)
+    lost = max(0, without - seen)
     interval = counted_interval(lost, without, confidence=settings.confidence)
     text = (
-        f"episodes with modes: {without:g} without the phase, {seen:g} with it; upper bound. With "
+        f"episodes with modes: {without} without the phase, {seen} with it; upper bound. With "
         "one phase only both are the same, because there is nothing to look at"
     )
     return Measured(interval[1], interval, text)

@@ -2,13 +2,14 @@
 
 from gates.cause import Topic
 from gates.criterion import Measured, criterion
-from gates.evidence import Evidence, MissingEvidenceError, count, numbers
+from gates.evidence import Evidence, MissingEvidenceError, numbers
 from gates.need.cause import as_the_cause, found_cause, waived_questions
 from gates.need.settings import AUDIT, NeedSettings
 from gates.need.waivers import require_questions
 from genpolicy.audit.rows import Asked, Clock
+from genpolicy.evidence.documents.given import REFUSALS
 
-REFUSALS = "artifacts/ingest/refusals.json"
+INGEST = "artifacts/ingest"
 
 
 @criterion(
@@ -18,13 +19,12 @@ REFUSALS = "artifacts/ingest/refusals.json"
 )
 def refused_recordings_accounted(evidence: Evidence, settings: NeedSettings) -> Measured:
     """Recordings that ingest neither accepted nor refused: |accepted + refused - found|."""
-    document = evidence.document(REFUSALS)
-    found, accepted = count(document, "found"), count(document, "accepted")
-    refused = count(document, "refused")
+    document = evidence.document(INGEST, REFUSALS)
+    found, accepted, refused = document.found, document.accepted, len(document.refused)
     if found == 0:
         raise MissingEvidenceError("no recordings were found")
-    text = f"{found:g} found, {accepted:g} accepted, {refused:g} refused"
-    return Measured(abs(accepted + refused - found), caveat=text)
+    text = f"{found} found, {accepted} accepted, {refused} refused"
+    return Measured(float(abs(accepted + refused - found)), caveat=text)
 
 
 @criterion(

@@ -12,7 +12,7 @@ import pandas as pd
 
 from gates.bounds import counted_interval, share_interval
 from gates.criterion import Measured, criterion
-from gates.evidence import Array, Evidence, MissingEvidenceError, counts, number, numbers
+from gates.evidence import Array, Evidence, MissingEvidenceError, counts, numbers
 from gates.need.settings import (
     MEASURED,
     MEASURED_FACTORS,
@@ -20,10 +20,10 @@ from gates.need.settings import (
     TRAINED_FACTORS,
     NeedSettings,
 )
+from genpolicy.evidence.documents.given import MATCHED, VARIANTS, TrainedVariant
+from genpolicy.evidence.documents.need import LATENT
 from genpolicy.evidence.rows.need import FactorModeRow, ModeRow
 
-LATENT = f"{MEASURED}/latent.json"
-VARIANTS = f"{TRAINED_FACTORS}/variants.json"
 MODES = f"{MEASURED}/modes.parquet"
 
 
@@ -34,25 +34,23 @@ MODES = f"{MEASURED}/modes.parquet"
 )
 def baselines_matched(evidence: Evidence, settings: NeedSettings) -> Measured:
     """Settings in which the baselines differ although no whitelist allows it."""
-    return unmatched(evidence, f"{TRAINED}/matched.json", settings.baselines)
+    return unmatched(evidence, TRAINED, settings.baselines)
 
 
-def unmatched(evidence: Evidence, path: str, methods: Sequence[str]) -> Measured:
+def unmatched(evidence: Evidence, folder: str, methods: Sequence[str]) -> Measured:
     """Settings in which methods differ although no whitelist allows it.
 
     Raises:
         MissingEvidenceError: A method is not compared.
     """
-    document = evidence.document(path)
-    differing, allowed = document.get("differing_keys"), document.get("whitelist")
-    if not isinstance(differing, dict) or not isinstance(allowed, list):
-        raise MissingEvidenceError(f"{path} has no differing_keys or no whitelist")
+    found = evidence.document(folder, MATCHED)
+    differing, allowed = found.differing_keys, found.whitelist
     bad = []
     for method in methods:
-        if not isinstance(differing.get(method), list):
-            raise MissingEvidenceError(f"{path} does not compare {method}")
+        if method not in differing:
+            raise MissingEvidenceError(f"{folder}/{MATCHED.file} does not compare {method}")
         bad += [f"{method}.{key}" for key in differing[method] if key not in allowed]
-    text = "; ".join(bad) or f"only whitelisted keys differ ({', '.join(map(str, allowed))})"
+    text = "; ".join(bad) or f"only whitelisted keys differ ({', '.join(allowed)})"
     return Measured(float(len(bad)), caveat=text)
 
 
@@ -161,26 +159,21 @@ def valid_share(rows: pd.DataFrame, *, confidence: float) -> tuple[float, float,
 def latent_dependence_p(evidence: Evidence, settings: NeedSettings) -> Measured:
     """Upper end of the p-value that a latent's effect is unrelated to the observation."""
     method = settings.latent_baseline
-    entries = [
-        entry
-        for entry in evidence.listing(LATENT)
-        if isinstance(entry, dict) and entry.get("method") == method
-    ]
+    entries = [entry for entry in evidence.document(MEASURED, LATENT) if entry.method == method]
     if not entries:
-        raise MissingEvidenceError(f"{LATENT} has no test of {method}")
+        raise MissingEvidenceError(f"{MEASURED}/{LATENT.file} has no test of {method}")
     found = []
     for entry in entries:
-        trials, exceeding = number(entry, "permutations"), number(entry, "exceeding")
-        ends = counted_interval(exceeding, trials, confidence=settings.confidence)
+        ends = counted_interval(entry.exceeding, entry.permutations, confidence=settings.confidence)
         found.append((ends, entry))
     interval, worst = max(found, key=lambda item: item[0][1])
-    unit = 1000.0 * number(worst, "spread_m")
     text = (
-        f"{method} drawn by {worst.get('convention')}: its latent moves chunks by {unit:.3g} mm, "
-        f"of which {100 * number(worst, 'condition_share'):.3g} % (squared) differs between "
-        f"{number(worst, 'situations'):g} situations; distance correlation with the observation "
-        f"{number(worst, 'distance_correlation'):.3g}; p-value with the interval of "
-        f"{number(worst, 'permutations'):g} permutations"
+        f"{method} drawn by {worst.convention}: its latent moves chunks by "
+        f"{1000.0 * worst.spread_m:.3g} mm, "
+        f"of which {100 * worst.condition_share:.3g} % (squared) differs between "
+        f"{worst.situations} situations; distance correlation with the observation "
+        f"{worst.distance_correlation:.3g}; p-value with the interval of "
+        f"{worst.permutations} permutations"
     )
     return Measured(interval[1], interval, text)
 
@@ -193,14 +186,13 @@ def latent_dependence_p(evidence: Evidence, settings: NeedSettings) -> Measured:
 def factors_isolated(evidence: Evidence, settings: NeedSettings) -> Measured:
     """Settings in which a variant differs from the reference beyond its own factor."""
     variants = _variants(evidence)
-    bad, factors = [], set()
-    for name, item in variants.items():
-        changed, allowed = item.get("changed"), item.get("allowed")
-        if not isinstance(changed, list) or not isinstance(allowed, list):
-            raise MissingEvidenceError(f"{VARIANTS} does not compare {name}")
-        factors.add(str(item.get("factor")))
-        bad += [f"{name}.{key}" for key in changed if key not in allowed]
-    missing = sorted(set(settings.factors) - factors)
+    bad = [
+        f"{name}.{key}"
+        for name, item in variants.items()
+        for key in item.changed
+        if key not in item.allowed
+    ]
+    missing = sorted(set(settings.factors) - {item.factor for item in variants.values()})
     if missing:
         raise MissingEvidenceError(f"no variant changes {', '.join(missing)}")
     text = "; ".join(bad) or f"{len(variants)} variants, each with one factor changed"
@@ -218,7 +210,7 @@ def factor_valid_share(evidence: Evidence, settings: NeedSettings) -> Measured:
     names = [
         name
         for name, item in _variants(evidence).items()
-        if item.get("factor") in settings.conditioning_factors
+        if item.factor in settings.conditioning_factors
     ]
     if not names:
         raise MissingEvidenceError("no variant changes the encoder, the history or the trunk")
@@ -237,10 +229,10 @@ def factor_valid_share(evidence: Evidence, settings: NeedSettings) -> Measured:
     return Measured(upper, (lower, upper), text)
 
 
-def _variants(evidence: Evidence) -> dict[str, dict[str, object]]:
-    variants = evidence.document(VARIANTS).get("variants")
-    if not isinstance(variants, dict) or not variants:
-        raise MissingEvidenceError(f"{VARIANTS} lists no variants")
+def _variants(evidence: Evidence) -> dict[str, TrainedVariant]:
+    variants = evidence.document(TRAINED_FACTORS, VARIANTS).variants
+    if not variants:
+        raise MissingEvidenceError(f"{TRAINED_FACTORS}/{VARIANTS.file} lists no variants")
     return variants
 
 

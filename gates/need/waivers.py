@@ -5,15 +5,15 @@ against what these data happen to ask: one that they do not need is a remark, no
 """
 
 from collections.abc import Iterable
-from typing import Any
 
 from gates.evidence import Evidence, MissingEvidenceError
-from gates.pipeline import TASK_IDENTITY
+from gates.pipeline import TASK
 from genpolicy.audit.question_names import ALWAYS, CLOCK, COLUMN, FROZEN, PAST
+from genpolicy.data.rows import FrameRow
+from genpolicy.documents.task import IDENTITY
 from genpolicy.errors import ConfigError
 
-MANIFEST = "artifacts/ingest/manifest.json"
-"""Holds the observation contract, which the stages hold to that of the task."""
+FRAMES = "artifacts/ingest/frames.parquet"
 
 
 def require_questions(names: Iterable[str], evidence: Evidence) -> None:
@@ -51,18 +51,14 @@ def _like(name: str, evidence: Evidence) -> tuple[str, ...]:
 
 
 def _phases(evidence: Evidence) -> list[str]:
-    return [str(phase) for phase in _list_at(evidence, TASK_IDENTITY, "phases", "all")]
+    phases = evidence.document(TASK, IDENTITY).phases
+    if "all" not in phases:
+        raise MissingEvidenceError(f"{TASK}/{IDENTITY.file} does not say which phases there are")
+    return phases["all"]
 
 
 def _streams(evidence: Evidence) -> list[str]:
-    channels = _list_at(evidence, MANIFEST, "observation_contract", "channels")
-    return sorted({str(item.get("stream")) for item in channels if isinstance(item, dict)})
-
-
-def _list_at(evidence: Evidence, path: str, *keys: str) -> list[Any]:
-    value: Any = evidence.document(path)
-    for key in keys:
-        value = value.get(key) if isinstance(value, dict) else None
-    if not isinstance(value, list):
-        raise MissingEvidenceError(f"{path} holds no list {'.'.join(keys)}")
-    return value
+    """Streams of the contract: ingest gives each its columns of times."""
+    columns = evidence.rows(FRAMES, FrameRow).columns
+    families = tuple(FrameRow.FAMILIES)
+    return sorted({name.partition(".")[2] for name in columns if name.startswith(families)})

@@ -70,12 +70,12 @@ PLOTS: tuple[Plot, ...] = (
     Plot(
         "What each part earns, changed alone",
         "Point: change against the reference (chunked BC with the MLP encoder and trunk) on the "
-        "same held-out episodes; line: 95 % interval; number: its own value. Left: "
-        "distance to the demonstrated chunk, normalised, for one action that of the first action; "
-        "a generator is further from any one demonstration by design. Middle and right: modes "
-        "reached, and chunks that reach one and pass all six layers. A point right of zero in blue "
-        "or orange is an encoder's or a trunk's merit, not a head's. All variants had the same "
-        "short training, one seed.",
+        "same held-out episodes; line: interval at the ladder's confidence; number: its own value. "
+        "Left: distance to the demonstrated chunk, normalised, for one action that of the first "
+        "action; a generator is further from any one demonstration by design. Middle and right: "
+        "modes reached, and chunks that reach one and pass all six layers. A point right of zero "
+        "in blue or orange is an encoder's or a trunk's merit, not a head's. All variants had the "
+        "same short training, one seed.",
         EFFECTS,
         _factors,
     ),

@@ -5,13 +5,14 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from gates.evidence import Evidence, MissingEvidenceError, count, flags, numbers
+from gates.evidence import Evidence, MissingEvidenceError, flags, numbers
 from gates.need.settings import AUDIT, MEASURED
 from gates.pages import plots_factors, plots_scene
 from gates.pages.figures import Photo, Plot, in_order
 from gates.pages.limits import draw_limit, limit_of
-from gates.pages.plots_scene import SUMMARY, obstacles
+from gates.pages.plots_scene import SUMMARY_FILE
 from gates.report import GateReport
+from genpolicy.audit.documents import SUMMARY
 from genpolicy.audit.rows import ModeOutcome, ReplayRow, SituationRow, Stratum
 from genpolicy.audit.shown_rows import Alignment, ExampleChunk
 from genpolicy.evidence.rows.need import ModeRow
@@ -25,11 +26,11 @@ REPLAY = f"{AUDIT}/replay.parquet"
 
 def _plane(evidence: Evidence) -> dict[str, Any]:
     """Names and unit of the position, and the obstacles, as the audit wrote them."""
-    summary = evidence.document(SUMMARY)
+    summary = evidence.document(AUDIT, SUMMARY)
     return {
-        "names": summary.get("position_names", ["x", "y", "z"]),
-        "unit": summary.get("position_unit", "m"),
-        "obstacles": obstacles(evidence),
+        "names": summary.position_names,
+        "unit": summary.position_unit,
+        "obstacles": summary.obstacles,
     }
 
 
@@ -47,7 +48,7 @@ def _overlay(evidence: Evidence, report: GateReport) -> Figure:
 
 
 def _realignment(evidence: Evidence, report: GateReport) -> Figure:
-    summary = evidence.document(SUMMARY)
+    summary = evidence.document(AUDIT, SUMMARY)
     frame = evidence.rows(ALIGNMENT, Alignment)
     limit_s = limit_of(report, "clock_residual_s")
     if limit_s is None:
@@ -55,8 +56,8 @@ def _realignment(evidence: Evidence, report: GateReport) -> Figure:
     return checks.realignment(
         frame,
         limit_s=limit_s,
-        modes_before=int(count(summary, "modes_before_realignment")),
-        modes_after=int(count(summary, "modes_after_realignment")),
+        modes_before=summary.modes_before_realignment,
+        modes_after=summary.modes_after_realignment,
     )
 
 
@@ -123,7 +124,7 @@ PLOTS: tuple[Plot | Photo, ...] = (
         *captions.CLUSTERS,
         EXAMPLES,
         _clusters,
-        also=(SUMMARY,),
+        also=(SUMMARY_FILE,),
     ),
     Plot(
         "Modes and their mean, in the scene plane",
@@ -133,13 +134,13 @@ PLOTS: tuple[Plot | Photo, ...] = (
         "held object are wider, so a mean beside the obstacle may still hit it.",
         f"{AUDIT}/neighbourhoods.parquet",
         _overlay,
-        also=(SUMMARY,),
+        also=(SUMMARY_FILE,),
     ),
     Plot(
         *captions.REALIGNMENT,
         ALIGNMENT,
         _realignment,
-        also=(SUMMARY,),
+        also=(SUMMARY_FILE,),
     ),
     Plot(
         *captions.STRATA,

@@ -13,6 +13,7 @@ from gates.evidence import Array, Evidence, MissingEvidenceError
 from gates.need.settings import AUDIT
 from gates.pages.figures import Photo, Plot
 from gates.report import GateReport
+from genpolicy.audit.documents import SUMMARY
 from genpolicy.data.rows import EpisodeRow, FrameRow
 from genpolicy.pages.figures.drawing import BLUE, GREY, ORANGE, RED, new_figure
 from genpolicy.pages.figures.situations import STONE, draw_obstacles
@@ -20,7 +21,7 @@ from genpolicy.pages.figures.situations import STONE, draw_obstacles
 SCENE = f"{AUDIT}/scene.png"
 FRAMES = "artifacts/ingest/frames.parquet"
 EPISODES = "artifacts/ingest/episodes.parquet"
-SUMMARY = f"{AUDIT}/summary.json"
+SUMMARY_FILE = f"{AUDIT}/{SUMMARY.file}"
 POINTS = 32
 """Points kept of each path; the recorded ones lie a few millimetres apart."""
 LEFT, RIGHT, BETWEEN = "left", "right", "does not pass"
@@ -38,15 +39,6 @@ class Path:
 
     points_m: Array
     success: bool
-
-
-def obstacles(evidence: Evidence) -> list[dict[str, float]]:
-    """Round obstacles of the scene plane as the audit wrote them; none where it wrote none."""
-    try:
-        found = evidence.document(SUMMARY).get("obstacles", [])
-    except MissingEvidenceError:
-        return []
-    return [item for item in found if isinstance(item, dict)]
 
 
 def side(points_m: Array, x_m: float, y_m: float) -> str:
@@ -87,11 +79,12 @@ def _demonstrations(evidence: Evidence, report: GateReport) -> Figure:
     every = paths(evidence)
     if not every:
         raise MissingEvidenceError(f"{FRAMES} has no rows of an accepted episode")
-    first = next(iter(obstacles(evidence)), None)
+    obstacles = evidence.document(AUDIT, SUMMARY).obstacles
+    first = next(iter(obstacles), None)
     if first is None:
         sides = [BETWEEN] * len(every)
     else:
-        sides = [side(path.points_m, first["x_m"], first["y_m"]) for path in every]
+        sides = [side(path.points_m, first.x_m, first.y_m) for path in every]
     figure, (above, aside) = new_figure(height=3.5, columns=2)
     for name, colour in SIDES.items():
         of_side = [path for path, one in zip(every, sides, strict=True) if one == name]
@@ -107,14 +100,12 @@ def _demonstrations(evidence: Evidence, report: GateReport) -> Figure:
         axes.scatter(failed[:, 0], failed[:, second], marker="x", s=22, color=RED, lw=1.2, zorder=6)
         axes.set_xlabel("x, m (base frame)")
     above.scatter([], [], marker="x", s=22, color=RED, label=f"end of a failure ({len(failed)})")
-    draw_obstacles(above, obstacles(evidence))
-    for item in obstacles(evidence):
+    draw_obstacles(above, obstacles)
+    for item in obstacles:
         low, high = aside.get_ylim()
-        corner = (item["x_m"] - item["radius_m"], low)
+        corner = (item.x_m - item.radius_m, low)
         aside.add_patch(
-            Rectangle(
-                corner, 2 * item["radius_m"], high - low, color=STONE, alpha=0.6, lw=0, zorder=1
-            )
+            Rectangle(corner, 2 * item.radius_m, high - low, color=STONE, alpha=0.6, lw=0, zorder=1)
         )
     above.set_title("from above")
     aside.set_title("from the side")
@@ -150,6 +141,6 @@ PLOTS: tuple[Plot | Photo, ...] = (
         "both succeed are what a generator is for; one bundle, or one that fails, is not.",
         FRAMES,
         _demonstrations,
-        also=(EPISODES, SUMMARY),
+        also=(EPISODES, SUMMARY_FILE),
     ),
 )

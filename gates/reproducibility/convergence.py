@@ -16,7 +16,7 @@ import pandas as pd
 
 from gates.bounds import counted_interval
 from gates.criterion import Measured, criterion
-from gates.evidence import Evidence, MissingEvidenceError, number, numbers
+from gates.evidence import Evidence, MissingEvidenceError, numbers
 from gates.need.settings import TRAINED as BASELINES
 from gates.reproducibility.modes import situations_of
 from gates.reproducibility.settings import (
@@ -25,6 +25,7 @@ from gates.reproducibility.settings import (
     MODES_EARLIER,
     ReproducibilitySettings,
 )
+from genpolicy.evidence.documents.given import MATCHED
 from genpolicy.policies.validation_row import VALIDATION_FILE, ValidationRow, three_quarters
 from genpolicy.statistics.ratios import ratio_of_sums
 
@@ -158,13 +159,10 @@ def updates_of(evidence: Evidence, root: str, method: str) -> int:
     Raises:
         MissingEvidenceError: The evidence does not say.
     """
-    methods = evidence.document(f"{root}/matched.json").get("methods")
-    entry = methods.get(method) if isinstance(methods, dict) else None
-    config = entry.get("config") if isinstance(entry, dict) else None
-    training = config.get("training") if isinstance(config, dict) else None
-    if not isinstance(training, dict):
-        raise MissingEvidenceError(f"{root}/matched.json does not say how {method} was trained")
-    return int(number(training, "steps"))
+    entry = evidence.document(root, MATCHED).methods.get(method)
+    if entry is None:
+        raise MissingEvidenceError(f"{root}/{MATCHED.file} does not say how {method} was trained")
+    return entry.config.training.steps
 
 
 def _has_weights(evidence: Evidence, method: str) -> bool:

@@ -1,13 +1,11 @@
 """Gate B, reproducibility: is a candidate pinned, and does it come back the same?"""
 
-from typing import Any
-
 import numpy as np
 
 from gates.claim import CHECKPOINT_ONLY
 from gates.criterion import Measured, criteria_of, criterion
 from gates.engine import GateSpec
-from gates.evidence import Array, Evidence, MissingEvidenceError, count, number, numbers
+from gates.evidence import Array, Evidence, MissingEvidenceError, numbers
 from gates.need.settings import TRAINED as BASELINES
 from gates.need.simpler import unmatched
 from gates.reproducibility import convergence, modes, timing
@@ -16,12 +14,12 @@ from gates.reproducibility.settings import (
     GENERATORS,
     RELOAD,
     ReproducibilitySettings,
-    chosen_nfe,
 )
+from genpolicy.evidence.documents.given import MATCHED
+from genpolicy.evidence.documents.reproducibility import CANDIDATES, CandidateIdentity
 from genpolicy.evidence.rows.reproducibility import NfeRow, SampleRow
 
 MANIFEST = "artifacts/ingest/manifest.json"
-PINNED = ("checkpoint", "config", "dataset", "normalisation", "seed", "sampler")
 
 
 @criterion(
@@ -34,7 +32,7 @@ def unmatched_keys(
     evidence: Evidence, settings: ReproducibilitySettings, candidate: str
 ) -> Measured:
     """Settings in which the candidate differs although no whitelist allows it."""
-    return unmatched(evidence, f"{GENERATORS}/matched.json", (candidate,))
+    return unmatched(evidence, GENERATORS, (candidate,))
 
 
 @criterion(
@@ -48,8 +46,8 @@ def parameter_budget_deviation(
 ) -> Measured:
     """Parameters against those of the reference, as a share off."""
     reference = settings.budget_reference
-    budget = _parameters(evidence, f"{BASELINES}/matched.json", reference, settings)
-    own = _parameters(evidence, f"{GENERATORS}/matched.json", candidate, settings)
+    budget = _parameters(evidence, BASELINES, reference, settings)
+    own = _parameters(evidence, GENERATORS, candidate, settings)
     if budget <= 0:
         raise MissingEvidenceError(f"{reference} has no parameters")
     text = f"{own:g} parameters, budget {budget:g} ({reference})"
@@ -57,14 +55,14 @@ def parameter_budget_deviation(
 
 
 def _parameters(
-    evidence: Evidence, path: str, method: str, settings: ReproducibilitySettings
+    evidence: Evidence, folder: str, method: str, settings: ReproducibilitySettings
 ) -> float:
-    methods = evidence.document(path).get("methods")
-    entry = methods.get(method) if isinstance(methods, dict) else None
-    parts = entry.get("parameters") if isinstance(entry, dict) else None
-    if not isinstance(parts, dict):
-        raise MissingEvidenceError(f"{path} counts no parameters of {method}")
-    return sum(number(parts, part) for part in settings.budget_parts)
+    entry = evidence.document(folder, MATCHED).methods.get(method)
+    absent = [part for part in settings.budget_parts if entry and part not in entry.parameters]
+    if entry is None or absent:
+        what = ", ".join([method, *absent])
+        raise MissingEvidenceError(f"{folder}/{MATCHED.file} counts no parameters of {what}")
+    return float(sum(entry.parameters[part] for part in settings.budget_parts))
 
 
 @criterion(
@@ -79,22 +77,30 @@ def unpinned_items(
 ) -> Measured:
     """Items that are not pinned by hash."""
     entry = _identity(evidence, candidate)
-    missing = [name for name in PINNED if entry.get(name) in (None, "", [], {})]
+    pins = {
+        "checkpoint": entry.checkpoint,
+        "config": entry.config,
+        "dataset": entry.dataset,
+        "normalisation": entry.normalisation,
+        "seed": entry.seed,
+        "sampler": entry.sampler,
+    }
+    missing = [name for name, pin in pins.items() if not pin]
     files = evidence.bind(
         f"{GENERATORS}/{candidate}/seed_*/model.safetensors",
         f"{GENERATORS}/{candidate}/seed_*/config.json",
     )
     if not any(file.endswith("model.safetensors") for file in files):
         missing.append("checkpoint file")
-    if entry.get("dataset") != evidence.digest(MANIFEST):
+    if entry.dataset != evidence.digest(MANIFEST):
         missing.append("dataset: trained on another one than the audited")
     return Measured(float(len(missing)), caveat=", ".join(missing) or "all pinned by hash")
 
 
-def _identity(evidence: Evidence, candidate: str) -> dict[str, Any]:
-    entry = evidence.document(f"{RELOAD}/identity.json").get(candidate)
-    if not isinstance(entry, dict):
-        raise MissingEvidenceError(f"identity.json has no entry of {candidate}")
+def _identity(evidence: Evidence, candidate: str) -> CandidateIdentity:
+    entry = evidence.document(RELOAD, CANDIDATES).get(candidate)
+    if entry is None:
+        raise MissingEvidenceError(f"{RELOAD}/{CANDIDATES.file} has no entry of {candidate}")
     return entry
 
 
@@ -109,7 +115,7 @@ def nonfinite_weights(
     evidence: Evidence, settings: ReproducibilitySettings, candidate: str
 ) -> Measured:
     """Weights that are NaN or infinite."""
-    return Measured(count(_identity(evidence, candidate), "nonfinite_weights"))
+    return Measured(float(_identity(evidence, candidate).nonfinite_weights))
 
 
 @criterion(
@@ -123,7 +129,7 @@ def metadata_mismatches(
     evidence: Evidence, settings: ReproducibilitySettings, candidate: str
 ) -> Measured:
     """Metadata that a fresh process reads otherwise than they were written."""
-    return Measured(count(_identity(evidence, candidate), "metadata_mismatches"))
+    return Measured(float(_identity(evidence, candidate).metadata_mismatches))
 
 
 @criterion(
@@ -157,13 +163,15 @@ def samples_difference(
 def nfe_mismatch(evidence: Evidence, settings: ReproducibilitySettings, candidate: str) -> Measured:
     """Largest difference of counted network evaluations from recorded or expected ones."""
     rows = evidence.of(f"{RELOAD}/nfe.parquet", NfeRow, candidate)
-    recorded, counted, expected = (
-        numbers(rows, name) for name in ("recorded", "counted", "expected")
+    recorded, counted, expected, least, most = (
+        numbers(rows, name) for name in ("recorded", "counted", "expected", "least", "most")
     )
+    if not np.all((least <= expected) & (expected <= most)):
+        raise MissingEvidenceError("an expected count that its definition does not allow")
     difference = np.maximum(np.abs(recorded - counted), np.abs(expected - counted))
     text = (
-        f"recorded {chosen_nfe(evidence, candidate):g}, counted {_range(counted)} at the network, "
-        f"{_range(expected)} by the definition of the sampler"
+        f"recorded {_range(recorded)}, counted {_range(counted)} at the network, "
+        f"{_range(np.append(least, most))} by the definition of the sampler"
     )
     return Measured(float(difference.max()), caveat=text)
 

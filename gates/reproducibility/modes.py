@@ -77,6 +77,8 @@ def situations_of(evidence: Evidence, candidate: str, *, table: str = MODES) -> 
     rows = evidence.of(table, ModeRow, candidate)
     if not np.all(numbers(rows, "samples") > 0):
         raise MissingEvidenceError("a situation without samples")
-    if not np.all(numbers(rows, "nfe") == chosen_nfe(evidence, candidate)):
+    least, most = chosen_nfe(evidence, candidate)
+    nfe = numbers(rows, "nfe")
+    if not np.all((nfe >= least) & (nfe <= most)):
         raise MissingEvidenceError("modes were not counted at the chosen NFE")
     return rows

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import ClassVar
 
+import numpy as np
 from pydantic import Field
 
 from gates.evidence import Evidence, MissingEvidenceError, numbers
@@ -38,14 +39,20 @@ class ReproducibilitySettings(CandidateSettings):
     mode_minimum_share: float = Field(gt=0.0, le=0.5)
 
 
-def chosen_nfe(evidence: Evidence, candidate: str) -> float:
-    """Network evaluations that the candidate records.
+def chosen_nfe(evidence: Evidence, candidate: str) -> tuple[float, float]:
+    """Fewest and most network evaluations that a sample of the candidate may take.
+
+    Both are what it records, unless its sampler chooses its steps by itself: then what it takes
+    differs with the observation, and the definition says from where to where.
 
     Raises:
-        MissingEvidenceError: None, or several.
+        MissingEvidenceError: None, or several of a sampler that always takes the same.
     """
     rows = evidence.of(f"{RELOAD}/nfe.parquet", NfeRow, candidate)
-    found = sorted(set(numbers(rows, "recorded").tolist()))
+    recorded, least, most = (numbers(rows, name) for name in ("recorded", "least", "most"))
+    if np.all(least < most):
+        return float(least.min()), float(most.max())
+    found = sorted(set(recorded.tolist()))
     if len(found) != 1:
         raise MissingEvidenceError(f"{candidate} records several NFE: {found}")
-    return float(found[0])
+    return float(found[0]), float(found[0])

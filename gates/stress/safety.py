@@ -104,4 +104,4 @@ def conservation_error(evidence: Evidence, settings: StressSettings, candidate: 
 )
 def checker_violations(evidence: Evidence, settings: StressSettings) -> Measured:
     """Violations that the independent checker found in the journals."""
-    return checked_violations(evidence, f"{STRESS}/checker.json")
+    return checked_violations(evidence, STRESS)

@@ -1,11 +1,11 @@
 """The trial itself: are starts matched, can the test come out either way, does it succeed?"""
 
 import math
-from typing import Any
 
 from gates.criterion import Measured, criterion
-from gates.evidence import Evidence, MissingEvidenceError, number
+from gates.evidence import Evidence, MissingEvidenceError
 from gates.stress.rollouts import NOMINAL, STRESS, StressSettings, rollouts, success_lower
+from genpolicy.evidence.documents.stress import POWER
 
 
 @criterion(
@@ -46,22 +46,22 @@ def verdict_reachable(evidence: Evidence, settings: StressSettings) -> Measured:
     The lower of two: promotion in the world of the planned effect, and return in the worlds in
     which the gain is at most the margin.
     """
-    document = evidence.document(f"{STRESS}/power.json")
-    stated = {"margin": settings.margin, "alpha": settings.alpha, "pairs": settings.planned_starts}
-    for key, value in stated.items():
-        if not math.isclose(number(document, key), value, rel_tol=1e-9):
+    power = evidence.document(STRESS, POWER)
+    for key, stated, planned in (
+        ("margin", power.margin, settings.margin),
+        ("alpha", power.alpha, settings.alpha),
+        ("pairs", power.pairs, settings.planned_starts),
+    ):
+        if not math.isclose(stated, planned, rel_tol=1e-9):
             raise MissingEvidenceError(f"the power table is for another {key}")
-    rows: Any = document.get("rows")
-    if not isinstance(rows, list) or not rows:
+    if not power.rows:
         raise MissingEvidenceError("the power table has no rows")
-    worlds = {
-        (number(row, "baseline_success"), number(row, "candidate_success")): row for row in rows
-    }
+    worlds = {(row.baseline_success, row.candidate_success): row for row in power.rows}
     without = {w: row for w, row in worlds.items() if not w[1] - w[0] > settings.margin + 1e-9}
     if settings.planned_effect not in worlds or not without:
         raise MissingEvidenceError("the power table lacks the planned effect or a world without")
-    promote = number(worlds[settings.planned_effect], "promote_share")
-    back = min(number(row, "return_share") for row in without.values())
+    promote = worlds[settings.planned_effect].promote_share
+    back = min(row.return_share for row in without.values())
     baseline, candidate = settings.planned_effect
     text = (
         f"success {baseline:g} against {candidate:g} is promoted in {promote:.3g} of simulated "

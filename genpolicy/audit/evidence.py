@@ -1,7 +1,7 @@
 """The audit's evidence as files: the tables that the gate reads, and nothing that decides."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +9,7 @@ import numpy as np
 
 from genpolicy.audit.component_rows import ComponentModes
 from genpolicy.audit.data import AuditInput, Integers, commanded_path
+from genpolicy.audit.documents import PERSISTENCE, SUMMARY, Obstacle, Summary
 from genpolicy.audit.examples import (
     alignment,
     example_chunks,
@@ -16,7 +17,6 @@ from genpolicy.audit.examples import (
     position_unit,
     support_points,
 )
-from genpolicy.audit.labels import disagreement
 from genpolicy.audit.persistence import persistent
 from genpolicy.audit.reach_rows import FURTHER_TABLES
 from genpolicy.audit.rows import TABLES, Demonstration, ReplayRow, SituationRow
@@ -33,7 +33,7 @@ def write_evidence(
     folder: Path,
     *,
     settings: AuditSettings,
-    obstacles: Sequence[Mapping[str, float]] = (),
+    obstacles: Sequence[Obstacle] = (),
 ) -> None:
     """Write every table and document of the audit into an existing folder.
 
@@ -41,7 +41,7 @@ def write_evidence(
         result: The audit.
         folder: Existing folder.
         settings: What the audit was made with; its floors stand beside the numbers.
-        obstacles: Round obstacles in the base frame, for plots: `x_m`, `y_m`, `radius_m`.
+        obstacles: Round obstacles in the base frame, for plots.
 
     Raises:
         BadInputError: The place cannot be written.
@@ -71,50 +71,39 @@ def write_evidence(
     }
     for name, row in (TABLES | FURTHER_TABLES).items():
         write_rows(folder / f"{name}.parquet", row, [_known(item) for item in rows[name]])
-    write_bytes(folder / "persistence.json", canonical_json(asdict(result.persistence)))
+    PERSISTENCE.write(folder, result.persistence)
     write_bytes(folder / "settings.json", canonical_json(settings.model_dump(mode="json")))
-    write_bytes(
-        folder / "summary.json",
-        canonical_json(summary(result, settings) | {"obstacles": [dict(o) for o in obstacles]}),
-    )
+    SUMMARY.write(folder, summary(result, settings, obstacles))
 
 
-def summary(result: AuditResult, settings: AuditSettings) -> dict[str, Any]:
-    """Counts and floors, as written to `summary.json`."""
-    wrong, replays = disagreement(result.replayed)
+def summary(
+    result: AuditResult, settings: AuditSettings, obstacles: Sequence[Obstacle] = ()
+) -> Summary:
+    """Counts, floors and names; content of `summary.json`."""
     several = [item for item in result.situations if item.two_mode]
     checked = [item for item in several if item.chunks.mean_admissible is not None]
-    return {
-        "modes_before_realignment": result.counts.two_mode_episodes,
-        "modes_after_realignment": result.modes_after_realignment,
-        "episodes": len(result.data.episodes),
-        "floors": settings.floors,
-        "ceilings": settings.ceilings,
-        "metre": settings.metre,
-        "primary_phase": result.primary_phase,
-        "rows": len(result.data.observation),
-        "counts": asdict(result.counts),
-        **_by_phase(result),
-        "position_names": position_names(result.data),
-        "position_unit": position_unit(result.data),
-        "support": [
-            {"phase": item.phase, "queries": item.queries, "analysed": item.analysed}
-            for item in result.support
-        ],
-        "two_mode_by_phase": {
-            phase: sum(item.phase == phase for item in several)
-            for phase in sorted({item.phase for item in several})
-        },
-        "mean_checked": len(checked),
-        "mean_defeated": sum(_defeated(item) for item in checked),
-        "median_defeated": sum(not item.chunks.median_admissible for item in checked),
-        "label_disagreements": wrong,
-        "label_replays": replays,
-        "gaps": result.semantics.gaps,
-        "negative_delays": result.semantics.negative_delays,
-        "start_drift": result.semantics.start_drift,
-        "notes": list(result.semantics.notes),
-    }
+    inside, across = _by_phase(result)
+    return Summary(
+        episodes=len(result.data.episodes),
+        rows=len(result.data.observation),
+        floors=settings.floors,
+        ceilings=settings.ceilings,
+        metre=settings.metre,
+        primary_phase=result.primary_phase,
+        counts=result.counts,
+        modes_before_realignment=result.counts.two_mode_episodes,
+        modes_after_realignment=result.modes_after_realignment,
+        modes_with_phase=inside,
+        modes_without_phase=across,
+        position_names=position_names(result.data),
+        position_unit=position_unit(result.data),
+        mean_checked=len(checked),
+        mean_defeated=sum(_defeated(item) for item in checked),
+        gaps=result.semantics.gaps,
+        start_drift=result.semantics.start_drift,
+        notes=list(result.semantics.notes),
+        obstacles=list(obstacles),
+    )
 
 
 def _components(result: AuditResult) -> list[ComponentModes]:
@@ -123,18 +112,14 @@ def _components(result: AuditResult) -> list[ComponentModes]:
     return [replace(item, unit=item.unit or unit) for item in result.components]
 
 
-def _by_phase(result: AuditResult) -> dict[str, int | None]:
+def _by_phase(result: AuditResult) -> tuple[int, int]:
     """Held-out episodes with several modes, with the phase looked at and without.
 
     With one phase only both are the same number, because there is nothing to look at.
     """
     here, other = result.counts.two_mode_episodes, result.modes_other_phases
     other = here if other is None else other
-    seen = result.data.phase_observed
-    return {
-        "modes_with_phase": here if seen else other,
-        "modes_without_phase": other if seen else here,
-    }
+    return (here, other) if result.data.phase_observed else (other, here)
 
 
 def _defeated(item: Situation) -> bool:

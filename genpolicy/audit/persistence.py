@@ -8,35 +8,17 @@ A grip or a start is one event, gone a chunk later. So clusters of other compone
 are made of every other action, and looked up in those between, none of which they have seen.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from genpolicy.audit.components import Component, joined, series
 from genpolicy.audit.data import Array, AuditInput, Integers, relative_paths
+from genpolicy.audit.documents import Persistence
 from genpolicy.audit.modes import ROUTE_CHUNKS, Clustering, cluster, features
 from genpolicy.audit.neighbourhoods import Neighbourhood
 from genpolicy.audit.settings import AuditSettings
 
 NULL_QUANTILE = 0.95
 MINIMUM_PER_MODE = 2
-
-
-@dataclass(frozen=True)
-class Persistence:
-    """Identity kept over time.
-
-    Attributes:
-        observed: Mean share of episodes that keep their cluster, over the situations.
-        null_q95: 95 % quantile of the same under the null.
-        null_mean: Its mean.
-        n: Situations in which it could be measured.
-    """
-
-    observed: float
-    null_q95: float
-    null_mean: float
-    n: int
 
 
 def kept_identity(

@@ -33,7 +33,6 @@ from genpolicy.audit.situations import Several
 from genpolicy.audit.variable import EPISODE_VARIABLES
 from genpolicy.seeds import stream
 
-CONFIDENCE = 0.9  # each end of the interval is a bound of 95 %
 REPEATS = 5
 LEAST_EPISODES = 20
 NOTHING_BEFORE = "the choice is at the start: nothing was seen before it"
@@ -62,7 +61,7 @@ def predictions(
 
     Args:
         data: Canonical audit input.
-        settings: Horizons.
+        settings: Horizons and confidence.
         situations: Situations with several modes, per phase.
         links: Mode of each episode, -1 for none, per phase. Shape (E,).
         root_seed: Seed of the folds.
@@ -96,12 +95,13 @@ def predictions(
             once = name in (TOGETHER, COLUMNS)
             rng = stream(root_seed, "audit", "predictability", phase, keys.get(name, name))
             hits = _hits(chosen, guess, rng, repeats=1 if once else REPEATS)
-            row = _row(name, phase, chosen, hits, of=len(more) if name in keys else 1)
+            of = len(more) if name in keys else 1
+            row = _row(name, phase, chosen, hits, settings.confidence, of=of)
             rows.append(replace(row, detail=_best(times)) if name == COLUMNS else row)
         seen = seen_before(data, settings, items, chosen)
         if len(seen.choices.mode) >= LEAST_EPISODES:
             rng = stream(root_seed, "audit", "predictability", phase, HISTORY)
-            rows.append(_past(phase, seen, rng))
+            rows.append(_past(phase, seen, rng, settings.confidence))
         elif seen.reached == 0 and len(chosen.mode) >= LEAST_EPISODES:
             by_luck, n = chosen.chance, len(chosen.mode)
             none = 0.0, 0.0, 0.0, by_luck, by_luck
@@ -171,11 +171,11 @@ def _before(links: Integers, order: Array, group: Integers) -> Integers:
     return result
 
 
-def _past(phase: str, seen: Before, rng: np.random.Generator) -> Prediction:
+def _past(phase: str, seen: Before, rng: np.random.Generator, confidence: float) -> Prediction:
     """What was seen earlier in the episode tells, beyond what is seen now."""
     guesses = by_best_column(seen.present), by_one_more(seen.present, seen.past)
     now, both = (
-        _row(HISTORY, phase, seen.choices, _hits(seen.choices, guess, rng, repeats=1))
+        _row(HISTORY, phase, seen.choices, _hits(seen.choices, guess, rng, repeats=1), confidence)
         for guess in guesses
     )
     known = min(now.told, MOST_SEEN)
@@ -195,9 +195,12 @@ def _best(times: Counter[str]) -> str:
     return min(times, key=lambda name: (-times[name], name)) if times else ""
 
 
-def _row(variable: str, phase: str, chosen: Choices, hits: Array, *, of: int = 1) -> Prediction:
+def _row(
+    variable: str, phase: str, chosen: Choices, hits: Array, confidence: float, *, of: int = 1
+) -> Prediction:
     """Share of right guesses with an interval for weighted shares. Source: Korn, Graubard 1998.
 
+    Each end is a bound at the confidence: a verdict rests on one of them, never on both.
     Whoever is misled by a variable would not use it: no share is less than that of a guess. Of
     several variables of one kind (`of`) all intervals hold at once (Bonferroni).
     """
@@ -208,7 +211,7 @@ def _row(variable: str, phase: str, chosen: Choices, hits: Array, *, of: int = 1
         return Prediction(variable, phase, 0.0, low, 1.0, chance, chance, n, "too few episodes")
     share = max(float(weight @ hits / weight.sum()), chance)
     effective = float(weight.sum() ** 2 / np.sum(weight**2))
-    k, tail = share * effective, (1.0 - CONFIDENCE) / 2.0 / of
+    k, tail = share * effective, (1.0 - confidence) / of
     low = float(stats.beta.ppf(tail, k, effective - k + 1.0)) if k > 0.0 else 0.0
     high = float(stats.beta.isf(tail, k + 1.0, effective - k)) if k < effective else 1.0
     told, lower, upper = ((x - chance) / (1.0 - chance) for x in (share, low, high))

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import norm
 
-from genpolicy.audit.counts import Counts
 from genpolicy.audit.data import Array, Integers
+from genpolicy.audit.documents import Counts, Persistence
 from genpolicy.audit.labels import Replayed, disagreement
-from genpolicy.audit.persistence import NULL_QUANTILE, Persistence, persistent
+from genpolicy.audit.persistence import NULL_QUANTILE, persistent
 from genpolicy.audit.reach_rows import StructureDraw
 from genpolicy.audit.rows import ModeOutcome, Prediction, Resample, Stratum
 from genpolicy.audit.settings import AuditSettings

@@ -8,10 +8,11 @@ Most are what the audit itself computes with. None is "not measured", never zero
 from dataclasses import dataclass
 
 from genpolicy.audit.component_rows import ComponentModes
+from genpolicy.audit.followed_rows import Demonstration
 from genpolicy.audit.hidden_rows import Asked, Prediction, Stratum
 from genpolicy.audit.shown_rows import Alignment, ExampleChunk, SupportPoint
 
-__all__ = ["Asked", "Prediction", "Stratum"]  # and what is defined here
+__all__ = ["Asked", "Demonstration", "Prediction", "Stratum"]  # and what is defined here
 
 
 @dataclass(frozen=True)
@@ -169,21 +170,6 @@ class ReplayRow:
     label: str
     replayed: str
     mode: str | None
-
-
-@dataclass(frozen=True)
-class Demonstration:
-    """`demonstrated.parquet`: the mode that one episode followed; unknown ones are left out.
-
-    Attributes:
-        episode_uuid: The episode.
-        phase: The phase with most situations.
-        mode: The mode that it followed there, as clustered or by its nearest chunks.
-    """
-
-    episode_uuid: str
-    phase: str
-    mode: str
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ import numpy as np
 from genpolicy.audit.asked import Given, questions
 from genpolicy.audit.component_rows import ComponentModes
 from genpolicy.audit.components import Component
-from genpolicy.audit.counts import Counts
 from genpolicy.audit.data import AuditInput, Integers, canonical
+from genpolicy.audit.documents import Counts, Persistence
 from genpolicy.audit.labels import Replay, Replayed, mode_outcomes, replay_sample
 from genpolicy.audit.linking import Memberships, alternatives, link
 from genpolicy.audit.looks import (
@@ -21,7 +21,7 @@ from genpolicy.audit.looks import (
 from genpolicy.audit.mean_versus_modes import Admissible
 from genpolicy.audit.modes import Clustering
 from genpolicy.audit.neighbourhoods import Neighbourhood, Support
-from genpolicy.audit.persistence import Persistence, summarise
+from genpolicy.audit.persistence import summarise
 from genpolicy.audit.predictability import predictions
 from genpolicy.audit.progress import Progress, silent
 from genpolicy.audit.reach_rows import Alternative, FindingDraw, Reach, Side, StructureDraw

@@ -17,6 +17,7 @@ class AuditSettings(BaseModel):
     Attributes:
         observation_horizon: Observations that condition an invocation.
         chunk_steps: Actions per chunk, K.
+        confidence: Of each end of the interval of what a variable tells.
         position_channel: Observed TCP position (or joint angles); its components pair with the
             first of the action. None: nothing in the observation pairs with the action.
         position_components: Names `channel.component` that pair with the action, where they are
@@ -104,6 +105,7 @@ class AuditSettings(BaseModel):
 
     observation_horizon: int = Field(default=2, ge=1)
     chunk_steps: int = Field(default=16, ge=2)
+    confidence: float = Field(default=0.95, gt=0.5, lt=1)
     position_channel: str | None = "tcp_position_m"
     position_components: list[str] | None = None
     action_components: list[str] | None = None

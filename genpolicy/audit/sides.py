@@ -8,8 +8,9 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 
 from genpolicy.audit.component_rows import POSITION
-from genpolicy.audit.counts import Counts, count
+from genpolicy.audit.counts import count
 from genpolicy.audit.data import AuditInput
+from genpolicy.audit.documents import Counts
 from genpolicy.audit.learned import find_learned
 from genpolicy.audit.looks import Look, foremost, look_at_route
 from genpolicy.audit.mean_versus_modes import Admissible, compare

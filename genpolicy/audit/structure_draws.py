@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from genpolicy.audit.counts import Counts
 from genpolicy.audit.data import Array, AuditInput, Episodes, Integers, canonical
+from genpolicy.audit.documents import Counts
 from genpolicy.audit.neighbourhoods import Support
 from genpolicy.audit.reach import FIFTHS, fifth_of
 from genpolicy.audit.reach_rows import FindingDraw, StructureDraw

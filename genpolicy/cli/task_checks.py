@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from genpolicy.audit.documents import Obstacle
 from genpolicy.audit.labels import Replay
 from genpolicy.audit.mean_versus_modes import Admissible
 from genpolicy.data.dataset import Dataset
@@ -30,7 +31,7 @@ class TaskChecks:
 
     admissible: Admissible | None = None
     replay: Replay | None = None
-    obstacles: list[dict[str, float]] = field(default_factory=list)
+    obstacles: list[Obstacle] = field(default_factory=list)
 
 
 def task_checks(dataset: Dataset, *, task: str | None, chunk_steps: int) -> TaskChecks:

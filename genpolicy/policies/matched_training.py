@@ -34,8 +34,8 @@ from genpolicy.policies.windows import Windows
 from genpolicy.seeds import integer_seed
 
 ALLOWED_DIFFERENCES = (
-    "method", "sampler.name", "sampler.steps", "sampler.clip", "sampler.population",
-    "training_seed",
+    "method", "sampler.name", "sampler.steps", "sampler.clip", "sampler.eta",
+    "sampler.population", "sampler.tolerance", "sampler.nfe_cap", "training_seed",
 )  # fmt: skip
 DERIVED = ("weights_sha256", "parameters", "training_only_parameters", "flops")
 

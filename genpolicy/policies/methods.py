@@ -10,30 +10,34 @@ from torch import Tensor
 
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.errors import ConfigError
+from genpolicy.policies.consistency import SegmentConsistency
 from genpolicy.policies.derivative_free import noise_length, search_codes
+from genpolicy.policies.diffusion_samplers import DIFFUSION_SAMPLERS, sample_diffusion
 from genpolicy.policies.energy import CODE_BOUND, EnergyContrast, EnergyNetwork
+from genpolicy.policies.evaluations import allowed_evaluations
 from genpolicy.policies.networks import Dimensions, HeadInput, PolicyNetwork
 from genpolicy.policies.objectives import (
     ConditionalVae,
-    NoisePrediction,
+    Denoising,
     ObjectiveFactory,
     absolute_error,
     flow_matching,
     squared_error,
 )
-from genpolicy.policies.offset import OffsetError, OffsetNetwork
-from genpolicy.policies.samplers import (
-    DIFFUSION_SAMPLERS,
+from genpolicy.policies.ode_samplers import (
+    ADAPTIVE_TABLEAUS,
+    CONSISTENCY,
+    EQUAL_STEPS,
     ODE_SAMPLERS,
-    CountedNetwork,
-    NoiseFunction,
-    sample_diffusion,
+    sample_adaptive,
     sample_ode,
 )
+from genpolicy.policies.offset import OffsetError, OffsetNetwork
+from genpolicy.policies.predictions import PREDICTIONS
+from genpolicy.policies.samplers import CountedNetwork, NoiseFunction
 from genpolicy.policies.schedules import (
     Gains,
     flow_gains,
-    noise_gains,
     squared_cosine,
     trailing_levels,
 )
@@ -41,7 +45,9 @@ from genpolicy.policies.settings import HeadConfig, NetworkConfig, SamplerConfig
 
 SINGLE_EVALUATION = ("direct", "z_zero", "z_prior", "offset")
 ENERGY_SAMPLER = "derivative_free"
-STOCHASTIC_SAMPLERS = ("z_prior", "offset", ENERGY_SAMPLER, *DIFFUSION_SAMPLERS, *ODE_SAMPLERS)
+STOCHASTIC_SAMPLERS = (
+    "z_prior", "offset", ENERGY_SAMPLER, CONSISTENCY, *DIFFUSION_SAMPLERS, *ODE_SAMPLERS,
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -95,8 +101,9 @@ class Method:
         return PolicyNetwork(dimensions, network, head_input=head_input)
 
 
-def _noise_gains(head: HeadConfig, time: Tensor) -> Gains:
-    return noise_gains(squared_cosine(head.diffusion_levels), time, data_std=head.conditional_std)
+def _diffusion_gains(head: HeadConfig, time: Tensor) -> Gains:
+    gains = PREDICTIONS[head.prediction].gains
+    return gains(squared_cosine(head.diffusion_levels), time, data_std=head.conditional_std)
 
 
 def _flow_gains(head: HeadConfig, time: Tensor) -> Gains:
@@ -118,10 +125,10 @@ METHODS = {
         # stands for promotion like the others.
         Method("cvae", True, "latent", ConditionalVae, ("z_prior",)),
         Method("ibc", True, "codes", EnergyContrast, (ENERGY_SAMPLER,)),
-        Method(
-            "diffusion", True, "chunk", NoisePrediction, ("ddim", "ddpm", "dpm_2m"), _noise_gains
-        ),
-        Method("flow", True, "chunk", flow_matching, ("euler", "heun", "rk4"), _flow_gains),
+        Method("diffusion", True, "chunk", Denoising, DIFFUSION_SAMPLERS, _diffusion_gains),
+        Method("flow", True, "chunk", flow_matching, ODE_SAMPLERS, _flow_gains),
+        # The network of `flow`, trained to say where the flow leads, for one or few evaluations.
+        Method("flow_policy", True, "chunk", SegmentConsistency, (CONSISTENCY,), _flow_gains),
     )
 }
 
@@ -147,8 +154,9 @@ def check_sampler(method: Method, sampler: SamplerConfig, head: HeadConfig) -> N
 
     Raises:
         ConfigError: Wrong kind, fewer than one step, more steps than training levels,
-            several steps of a method that evaluates its network once, or a population of a
-            sampler that has none.
+            several steps of a method that evaluates its network once, a population of a
+            sampler that has none, fresh noise of another than DDIM, or a cap that is missing or
+            too low to ever finish; jumps that do not fit the segments of the training.
     """
     if sampler.name not in method.samplers:
         raise ConfigError(
@@ -175,6 +183,33 @@ def check_sampler(method: Method, sampler: SamplerConfig, head: HeadConfig) -> N
             expected="at least 2" if searches else "exactly 1",
             action="Set a population for the energy's search, and for no other sampler.",
         )
+    if sampler.eta != 0.0 and sampler.name != "ddim":
+        raise ConfigError(
+            where=f"sampler.eta of {method.name}",
+            found=str(sampler.eta),
+            expected=f"0 for {sampler.name}",
+            action="Only `ddim` chooses its share of fresh noise.",
+        )
+    if sampler.name == CONSISTENCY and sampler.steps % head.flow_segments != 0:
+        raise ConfigError(
+            where=f"sampler_steps of {method.name}",
+            found=str(sampler.steps),
+            expected=f"a multiple of the {head.flow_segments} segments of the training",
+            action="A jump must not cross the end of a segment; train with other segments.",
+        )
+    _check_cap(method, sampler)
+
+
+def _check_cap(method: Method, sampler: SamplerConfig) -> None:
+    """An adaptive solver must have a cap, and no sampler one that it cannot keep."""
+    least = allowed_evaluations(sampler).least
+    if sampler.nfe_cap is not None and sampler.nfe_cap < least:
+        raise ConfigError(
+            where=f"sampler.nfe_cap of {method.name}",
+            found=str(sampler.nfe_cap),
+            expected=f"at least {least}",
+            action="Allow as many network evaluations as the deadline has time for.",
+        )
 
 
 def generate(
@@ -195,7 +230,11 @@ def generate(
         head: Head settings of the training.
 
     Returns:
-        Chunks (B, K, D_a) and the counted NFE.
+        Chunks (B, K, D_a) and the counted NFE: calls of the network, as many as its slowest row
+        needed.
+
+    Raises:
+        EvaluationCapError: The sampler's cap was reached.
     """
 
     def evaluate(values: Tensor, time: Tensor) -> Tensor:
@@ -205,21 +244,24 @@ def generate(
             return network.evaluate(condition, values)
         return network.evaluate(condition, values, time)
 
-    counted = CountedNetwork(evaluate)
+    counted = CountedNetwork(evaluate, cap=sampler.nfe_cap)
     if sampler.name in DIFFUSION_SAMPLERS:
         chunks = sample_diffusion(
             counted,
             noise,
             schedule=squared_cosine(head.diffusion_levels),
-            name=sampler.name,
-            steps=sampler.steps,
-            clip=sampler.clip,
+            sampler=sampler,
+            prediction=head.prediction,
         )
     elif sampler.name == ENERGY_SAMPLER:
         assert isinstance(network, EnergyNetwork)
         codes = search_codes(counted, noise, iterations=sampler.steps, bound=CODE_BOUND)
         chunks = network.code.decode(codes)
-    elif sampler.name in ODE_SAMPLERS:
+    elif sampler.name in ADAPTIVE_TABLEAUS:
+        chunks = sample_adaptive(
+            counted, noise, name=sampler.name, steps=sampler.steps, tolerance=sampler.tolerance
+        )
+    elif sampler.name in EQUAL_STEPS:
         chunks = sample_ode(counted, noise, name=sampler.name, steps=sampler.steps)
     else:
         latent = torch.zeros(len(condition), head.latent_dim, device=condition.device)

@@ -10,6 +10,7 @@ import torch
 from torch import Tensor, nn
 
 from genpolicy.policies.networks import Dimensions, PolicyNetwork
+from genpolicy.policies.predictions import PREDICTIONS
 from genpolicy.policies.schedules import squared_cosine, straight_path
 from genpolicy.policies.settings import HeadConfig, NetworkConfig
 
@@ -84,7 +85,7 @@ class ConditionalVae(Objective):
         condition = network.encode(batch.observations)
         seen = (batch.actions * batch.weight).flatten(1)
         mean, log_variance = self.posterior(torch.cat([seen, condition], dim=-1)).chunk(2, dim=-1)
-        latent = mean + (0.5 * log_variance).exp() * _normal_like(mean, generator)
+        latent = mean + (0.5 * log_variance).exp() * normal_like(mean, generator)
         error = masked_mean(
             (network.evaluate(condition, latent) - batch.actions).abs(), batch.weight
         )
@@ -93,24 +94,27 @@ class ConditionalVae(Objective):
         return total
 
 
-class NoisePrediction(Objective):
-    """Noise prediction at a random level of the squared-cosine schedule (DDPM training)."""
+class Denoising(Objective):
+    """What `head.prediction` says, at a random level of the squared-cosine schedule."""
 
     def __init__(self, dimensions: Dimensions, network: NetworkConfig, head: HeadConfig) -> None:
         super().__init__()
         self._schedule = squared_cosine(head.diffusion_levels)
+        self._prediction = PREDICTIONS[head.prediction]
 
     def loss(self, network: PolicyNetwork, batch: Batch, generator: torch.Generator) -> Tensor:
-        """Masked mean squared error of the noise."""
+        """Masked mean squared error of the prediction."""
         device = batch.actions.device
         level = torch.randint(
             self._schedule.levels, (len(batch.actions),), generator=generator, device=device
         )
-        noise = _normal_like(batch.actions, generator)
+        noise = normal_like(batch.actions, generator)
         noisy = self._schedule.add_noise(batch.actions, noise, level)
         time = self._schedule.level_time(level.to(noisy.dtype))
         predicted = network.evaluate(network.encode(batch.observations), noisy, time)
-        return masked_mean((predicted - noise).square(), batch.weight)
+        kept = self._schedule.kept(time)[:, None, None]
+        target = self._prediction.target(batch.actions, noise, kept)
+        return masked_mean((predicted - target).square(), batch.weight)
 
 
 class FlowMatching(Objective):
@@ -122,7 +126,7 @@ class FlowMatching(Objective):
 
     def loss(self, network: PolicyNetwork, batch: Batch, generator: torch.Generator) -> Tensor:
         """Masked mean squared error of the velocity."""
-        noise = _normal_like(batch.actions, generator)
+        noise = normal_like(batch.actions, generator)
         time = torch.rand(len(noise), generator=generator, dtype=noise.dtype, device=noise.device)
         point, velocity = straight_path(noise, batch.actions, time)
         predicted = network.evaluate(network.encode(batch.observations), point, time)
@@ -152,5 +156,6 @@ def masked_mean(values: Tensor, weight: Tensor) -> Tensor:
     return (values * weight).sum() / (weight.sum() * values.shape[-1]).clamp(min=1.0)
 
 
-def _normal_like(values: Tensor, generator: torch.Generator) -> Tensor:
+def normal_like(values: Tensor, generator: torch.Generator) -> Tensor:
+    """Standard normal numbers of the shape, type and device of `values`."""
     return torch.randn(values.shape, generator=generator, dtype=values.dtype, device=values.device)

@@ -38,7 +38,9 @@ class Samples:
 
     Attributes:
         actions: Candidate chunks, physical units. Shape (B, N, K, D_a).
-        nfe: Network evaluations per sample, counted at the network.
+        nfe: Network evaluations per sample, counted at the network. Where a sampler chooses its
+            steps by itself, those of the sample that took most: the calls that its batch waited
+            for, which is what the deadline sees.
     """
 
     actions: Array
@@ -134,11 +136,12 @@ class NetworkPolicy:
             candidates: N >= 1, candidates per row.
 
         Returns:
-            Actions (B, N, K, D_a) in physical units, and the NFE of one sample.
+            Actions (B, N, K, D_a) in physical units, and the NFE of one sample (the most of any).
 
         Raises:
             ContractError: Wrong shape, wrong number of names, no candidate.
             NonFiniteError: An observation or a sampled action is NaN or infinite.
+            EvaluationCapError: A sample took more network evaluations than its sampler may.
         """
         if len(noise_names) != len(observations) or not candidates >= 1:
             raise ContractError(
@@ -192,7 +195,7 @@ class NetworkPolicy:
         ]
         repeated = condition.repeat_interleave(candidates, dim=0)
         size = self.sampler.batch_rows
-        chunks, evaluations = [], set()
+        chunks, evaluations = [], []
         with deterministic(self.device), torch.inference_mode():
             for first in range(0, len(names), size):
                 rows = repeated[first : first + size]
@@ -204,12 +207,12 @@ class NetworkPolicy:
                     head=self.checkpoint.config.head,
                 )
                 chunks.append(result[: len(rows)].cpu())
-                evaluations.add(nfe)
-        (nfe,) = evaluations
+                evaluations.append(nfe)
         normalised = torch.cat(chunks).numpy().astype(np.float64)
         actions = self._normalisation.action.denormalise(normalised)
         _check_finite(actions, f"chunks sampled by {self.method}", "Reject all of them and hold.")
-        return Samples(actions.reshape(len(noise_names), candidates, *actions.shape[1:]), nfe)
+        shape = (len(noise_names), candidates, *actions.shape[1:])
+        return Samples(actions.reshape(shape), max(evaluations))
 
     def synchronise(self) -> None:
         """Wait until the device has finished what was asked of it."""
@@ -217,7 +220,11 @@ class NetworkPolicy:
             torch.cuda.synchronize(self.device)
 
     def _noise(self, names: Sequence[NoiseName], rows: int) -> Callable[[int], Tensor]:
-        """Noise function of one padded batch; padding rows get zeros."""
+        """Noise function of one padded batch.
+
+        Padding rows repeat the last row, noise as well as condition: an adaptive solver would
+        otherwise take the steps, and reach the cap, of samples that nobody asked for.
+        """
         shape = noise_shape(
             self.checkpoint.config.dimensions, self.sampler, self.checkpoint.config.head
         )
@@ -226,6 +233,7 @@ class NetworkPolicy:
             values = np.zeros((rows, *shape), dtype=np.float32)
             for row, name in enumerate(names):
                 values[row] = counter_noise((*name, step), shape=shape)
+            values[len(names) :] = values[len(names) - 1]
             return torch.from_numpy(values).to(self.device)
 
         return draw

@@ -40,6 +40,11 @@ class DiffusionSchedule:
         """The network's time input of levels: level / T, in [0, 1)."""
         return level / self.levels
 
+    def kept(self, time: Tensor) -> Tensor:
+        """Share of the clean variance left at times level / T. Shapes (B,)."""
+        table = torch.tensor(self.alpha_bar, dtype=time.dtype, device=time.device)
+        return table[(time * self.levels).round().long()]
+
     def add_noise(self, clean: Tensor, noise: Tensor, level: Tensor) -> Tensor:
         """Chunks at a noise level: sqrt(abar) clean + sqrt(1 - abar) noise.
 
@@ -88,8 +93,7 @@ class Gains:
 
 def noise_gains(schedule: DiffusionSchedule, time: Tensor, *, data_std: float) -> Gains:
     """Gains of a noise estimate at times level / T. Shape of `time`: (B,)."""
-    table = torch.tensor(schedule.alpha_bar, dtype=time.dtype, device=time.device)
-    kept = table[(time * schedule.levels).round().long()]
+    kept = schedule.kept(time)
     variance = kept * data_std**2 + 1.0 - kept
     return Gains(
         inner=variance.rsqrt(),

@@ -44,8 +44,12 @@ class HeadConfig(Settings):
 
     Attributes:
         diffusion_levels: Noise levels T of DDPM training.
+        prediction: What the diffusion's network is trained to say of a noisy chunk: its `noise`,
+            the clean chunk `x0`, or `v`, which is between the two (`predictions`).
         conditional_std: Assumed spread of normalised actions at one observation; sets the fixed
             gains around the networks of diffusion and flow (`schedules.Gains`).
+        flow_segments: Segments of the flow in which `flow_policy` is consistent: its fewest
+            network evaluations.
         latent_dim: Length of ACT's latent z. Small, because z = 0 is one of the two conventions:
             training draws z near a sphere of radius sqrt(latent_dim), and the more dimensions,
             the further from anything seen is its centre.
@@ -58,7 +62,9 @@ class HeadConfig(Settings):
     """
 
     diffusion_levels: int = Field(default=100, ge=1, le=10_000)
+    prediction: Literal["noise", "v", "x0"] = "noise"
     conditional_std: float = Field(default=0.2, gt=0.0, le=10.0)
+    flow_segments: int = Field(default=2, ge=1, le=64)
     latent_dim: int = Field(default=2, ge=1, le=1024)
     posterior_width: int = Field(default=256, ge=4, le=4096)
     kl_weight: float = Field(default=0.01, ge=0.0)
@@ -103,22 +109,31 @@ class SamplerConfig(Settings):
 
     Attributes:
         name: The sampler.
-        steps: Sampler steps (not NFE: Heun evaluates the network twice a step).
+        steps: Sampler steps (not NFE: Heun evaluates the network twice a step); of an adaptive
+            solver, one over the first step that it tries.
         clip: Bound of the predicted clean chunk, normalised units; diffusion samplers only.
+        eta: Share of the ancestral step's noise that `ddim` adds: 0 none, 1 makes it `ddpm`.
         population: Candidates that every pass of the energy's search scores; other samplers draw
             none and leave it at 1.
         batch_rows: Rows of every network call; shorter batches are padded, so that one row's
             sample does not depend on how many others there are.
+        tolerance: Error of one step that an adaptive solver accepts, normalised units; of the
+            defaults' kind a thousandth of the action's range, far below what a controller sees.
+        nfe_cap: Network evaluations after which a sample is given up, with an error; an adaptive
+            solver must have one. Set it by what the deadline has time for.
     """
 
     name: Literal[
-        "direct", "z_zero", "z_prior", "ddpm", "ddim", "dpm_2m", "euler", "heun", "rk4",
-        "derivative_free", "offset",
+        "direct", "z_zero", "z_prior", "ddpm", "ddim", "dpm_1", "dpm_2m", "dpm_sde", "euler",
+        "midpoint", "heun", "rk4", "bosh3", "consistency", "derivative_free", "offset",
     ]  # fmt: skip
     steps: int = Field(default=1, le=10_000)
     clip: float | None = Field(default=1.0, gt=0.0)
+    eta: float = Field(default=0.0, ge=0.0, le=1.0)
     population: int = Field(default=1, ge=1, le=65_536)
     batch_rows: int = Field(default=16, ge=1, le=65_536)
+    tolerance: float = Field(default=1e-3, gt=0.0, le=1.0)
+    nfe_cap: int | None = Field(default=None, ge=1, le=1_000_000)
 
     def hash(self) -> str:
         """SHA-256 of the settings."""

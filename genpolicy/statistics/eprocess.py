@@ -52,7 +52,7 @@ class PowerRow:
         pairs: Maximum number of pairs.
         promote_share: Share of simulated trials that end in `promote`.
         return_share: Share that end without promotion.
-        median_pairs: Median pairs at promotion; NaN if no trial promoted.
+        median_pairs: Median pairs at promotion; None if no trial promoted.
     """
 
     baseline_success: float
@@ -62,7 +62,7 @@ class PowerRow:
     pairs: int
     promote_share: float
     return_share: float
-    median_pairs: float
+    median_pairs: float | None
 
 
 def paired_e_value(differences: Array, *, margin: float, alpha: float) -> EProcess:
@@ -136,7 +136,7 @@ def power_table(
                 pairs=pairs,
                 promote_share=float(promoted.mean()),
                 return_share=float(1.0 - promoted.mean()),
-                median_pairs=float(np.median(first)) if len(first) else float("nan"),
+                median_pairs=float(np.median(first)) if len(first) else None,
             )
         )
     return rows

@@ -13,14 +13,12 @@ from typing import Any
 import numpy as np
 
 from genpolicy.contract.action import action_contract_hash
+from genpolicy.documents.task import IDENTITY, TaskIdentity
 from genpolicy.errors import ConfigError
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_bytes, sha256_file
 from genpolicy.robot.limits import RobotLimits
 from genpolicy.tasks.api import Task, find_task, load_task
-
-IDENTITY_FILE = "identity.json"
-"""Name of the file that the stage `task` writes."""
 
 COMPILED = (".pyc", ".pyo")
 
@@ -29,9 +27,7 @@ def task_identity(name: str) -> dict[str, Any]:
     """The identity of a registered task.
 
     Returns:
-        A document fit for canonical JSON: `name`, `entry_point`, `distribution`, SHA-256 of each
-        file of the task's package and of the scene's folder, of contract and robot table, the
-        phases by their meaning, and `sha256` over all of that.
+        A `TaskIdentity` fit for canonical JSON; `sha256` is over all the rest.
 
     Raises:
         ConfigError: No task of that name, or its phases or joints contradict each other.
@@ -41,26 +37,29 @@ def task_identity(name: str) -> dict[str, Any]:
     task = load_task(name)
     _check(task)
     scene = task.scene_path.resolve()
-    body: dict[str, Any] = {
-        "name": name,
-        "entry_point": point.value,
-        "distribution": _distribution(point),
-        "package": {key: sha256_file(path) for key, path in files.items()},
-        "scene": _scene_files(scene, inside=set(files.values())),
-        "scene_sha256": sha256_file(scene),
-        "observation_sha256": task.observation.hash(),
-        "action_sha256": action_contract_hash(),
-        "phases": {
+    identity = TaskIdentity(
+        name=name,
+        entry_point=point.value,
+        distribution=_distribution(point),
+        package={key: sha256_file(path) for key, path in files.items()},
+        scene=_scene_files(scene, inside=set(files.values())),
+        scene_sha256=sha256_file(scene),
+        observation_sha256=task.observation.hash(),
+        action_sha256=action_contract_hash(),
+        phases={
             "all": list(task.phases),
             "contact": sorted(task.contact_phases),
             "opening": sorted(task.opening_phases),
             "free": sorted(task.free_phases),
         },
-        "obstacles": list(task.obstacles),
-        "workspace_m": [list(task.workspace.lower_m), list(task.workspace.upper_m)],
-        "robot": task.limits.robot,
-        "robot_sha256": limits_sha256(task.limits),
-    }
+        obstacles=list(task.obstacles),
+        workspace_m=(task.workspace.lower_m, task.workspace.upper_m),
+        robot=task.limits.robot,
+        robot_sha256=limits_sha256(task.limits),
+        sha256="",
+    )
+    body = IDENTITY.plain(identity)
+    del body["sha256"]
     return {**body, "sha256": sha256_bytes(canonical_json(body))}
 
 

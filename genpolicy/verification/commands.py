@@ -7,9 +7,9 @@ import math
 import struct
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from genpolicy.verification.journal_source import read_messages
+from genpolicy.verification.report import Point, Reached
 
 COMMANDS = ("accept", "fallback")
 POSITION = struct.Struct("<3d")
@@ -29,18 +29,18 @@ class Reach:
 
     commands: int
     fastest_m_s: float
-    lowest_m: tuple[float, float, float]
-    highest_m: tuple[float, float, float]
+    lowest_m: Point
+    highest_m: Point
 
-    def as_document(self) -> dict[str, Any]:
+    def as_document(self) -> Reached:
         """For JSON; without commands there are no corners."""
         some = self.commands > 0
-        return {
-            "commands": self.commands,
-            "fastest_m_s": self.fastest_m_s if some else None,
-            "lowest_m": list(self.lowest_m) if some else None,
-            "highest_m": list(self.highest_m) if some else None,
-        }
+        return Reached(
+            commands=self.commands,
+            fastest_m_s=self.fastest_m_s if some else None,
+            lowest_m=self.lowest_m if some else None,
+            highest_m=self.highest_m if some else None,
+        )
 
 
 def reach_of(path: Path) -> Reach:

@@ -2,7 +2,8 @@
 
 from collections import Counter
 from dataclasses import dataclass, field
-from typing import Any
+
+Point = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -11,15 +12,48 @@ class Violation:
 
     Attributes:
         session: Rollout.
-        event_index: Number of the event in its session.
+        event: Number of the event in its session.
         rule: Invariant, as in `P1.age`.
-        sentence: What is wrong there.
+        text: What is wrong there, a sentence.
     """
 
     session: str
-    event_index: int
+    event: int
     rule: str
-    sentence: str
+    text: str
+
+
+@dataclass(frozen=True)
+class JournalReport:
+    """What `checker.json` says of a journal; meanings as in `CheckReport`."""
+
+    violations: list[Violation]
+    sessions: int
+    events: int
+    checked_actions: int
+    checked_fallback_actions: int
+    reproved_actions: int
+    chunks: int
+    discarded: dict[str, int]
+    oldest_action_s: float
+    longest_silence_s: float
+
+
+@dataclass(frozen=True)
+class Reached:
+    """What `envelope.json` says of the commands of a method; None without commands.
+
+    Attributes:
+        commands: How many were accepted.
+        fastest_m_s: Longest way from a command to the next one, over one period, m/s.
+        lowest_m: Lowest x, y, z commanded, m.
+        highest_m: Highest.
+    """
+
+    commands: int
+    fastest_m_s: float | None
+    lowest_m: Point | None
+    highest_m: Point | None
 
 
 @dataclass
@@ -52,20 +86,17 @@ class CheckReport:
     longest_silence_ns: int = 0
     checks_missing: set[str] = field(default_factory=set)
 
-    def as_document(self) -> dict[str, Any]:
+    def as_document(self) -> JournalReport:
         """For `checker.json`."""
-        return {
-            "violations": [
-                {"session": v.session, "event": v.event_index, "rule": v.rule, "text": v.sentence}
-                for v in self.violations
-            ],
-            "sessions": self.sessions,
-            "events": self.events,
-            "checked_actions": self.checked_actions,
-            "checked_fallback_actions": self.checked_fallback_actions,
-            "reproved_actions": self.reproved_actions,
-            "chunks": self.chunks,
-            "discarded": dict(sorted(self.discarded.items())),
-            "oldest_action_s": self.oldest_action_ns / 1e9,
-            "longest_silence_s": self.longest_silence_ns / 1e9,
-        }
+        return JournalReport(
+            violations=list(self.violations),
+            sessions=self.sessions,
+            events=self.events,
+            checked_actions=self.checked_actions,
+            checked_fallback_actions=self.checked_fallback_actions,
+            reproved_actions=self.reproved_actions,
+            chunks=self.chunks,
+            discarded=dict(sorted(self.discarded.items())),
+            oldest_action_s=self.oldest_action_ns / 1e9,
+            longest_silence_s=self.longest_silence_ns / 1e9,
+        )

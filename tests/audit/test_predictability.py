@@ -31,10 +31,10 @@ EVEN = (0.5, 0.5)
 N = 160
 
 
-def told(plan, seed=0, stride=20):
+def told(plan, seed=0, stride=20, **changes):
     """What everything tells of the modes of a plan, by variable."""
     data = canonical(record("planar", plan).data)
-    settings = SETTINGS.model_copy(update={"query_stride": stride})
+    settings = SETTINGS.model_copy(update={"query_stride": stride, **changes})
     several = [(i, c) for _, i, c in find_situations(data, settings, seed)[0] if c.count > 1]
     members = [(data.episode[item.members], split.labels) for item, split in several]
     links = {"approach": link(members, len(data.episodes), 6)}
@@ -59,6 +59,13 @@ def test_a_planted_teller_tells_as_much_as_it_was_made_to(decided_by, fidelity, 
     assert row.told_lower - 0.1 <= ideal <= row.told_upper + 0.1
     assert row.told_lower > 0.1
     assert row.told >= max(r.told for r in found.values()) - 0.15
+
+
+def test_each_end_of_the_interval_is_a_bound_at_the_confidence_of_the_settings():
+    plan = planned(decided_by="operator", fidelity=0.6)
+    usual, loose = (told(plan, confidence=share)["operator"] for share in (0.95, 0.7))
+    assert usual.told == loose.told
+    assert usual.told_lower < loose.told_lower < loose.told < loose.told_upper < usual.told_upper
 
 
 def test_where_an_episode_came_from_tells_where_it_goes():

@@ -7,10 +7,10 @@ import pytest
 from planar import SETTINGS
 
 from genpolicy.audit.counts import count
+from genpolicy.audit.documents import Persistence
 from genpolicy.audit.labels import Replayed
 from genpolicy.audit.modes import Clustering
 from genpolicy.audit.neighbourhoods import Neighbourhood, Support
-from genpolicy.audit.persistence import Persistence
 from genpolicy.audit.resamples import Measures, resamples
 from genpolicy.audit.rows import ModeOutcome, Prediction, Stratum
 from genpolicy.audit.situations import Situation

@@ -22,13 +22,10 @@ ROWS = (
 # What is indexed by name and is no frame, and what it is instead.
 NO_FRAMES = {
     "document": "a JSON document",
-    "documents": "JSON documents by name",
     "summary": "the document of the audit's counts",
     "settings": "settings as a document",
     "report.settings": "the same, of a report",
     "evidence": "tables by name",
-    "evidence.summary": "a JSON document",
-    "self.summary": "the same",
     "limits": "limits by question",
     "found": "entries of a document, or settings by owner",
     "first": "an error of pydantic, or an obstacle of a document",
@@ -36,7 +33,6 @@ NO_FRAMES = {
     "item": "the same",
     "row": "a limit or an epoch of a page, or one row of a frame that is checked where it is read",
     "record": "a record of times",
-    "identity": "the task's identity, a document",
     "names": "a namespace",
     "reports": "reports by gate",
     "chain.reports": "the same",

@@ -8,6 +8,8 @@ import pytest
 from genpolicy.data.ingest import ingest_recordings
 from genpolicy.data.recording.writer import write_episode
 from genpolicy.errors import ContractError
+from genpolicy.evidence.documents.given import REFUSALS
+from genpolicy.integrity.documents import canonical_json
 
 
 def test_refusals_are_listed_and_nothing_is_dropped_silently(factory, tmp_path):
@@ -27,6 +29,9 @@ def test_refusals_are_listed_and_nothing_is_dropped_silently(factory, tmp_path):
     assert "shares its episode_uuid with copy.mcap" in reasons["e004.mcap"]
     assert "shares its samples with e001.mcap" in reasons["renamed.mcap"]
     assert all(item["where"].startswith(item["file"]) for item in listed["refused"])
+    read = REFUSALS.read(tmp_path / "out")  # as gates read it, to the byte
+    assert canonical_json(REFUSALS.plain(read)) == (tmp_path / "out/refusals.json").read_bytes()
+    assert len(read.refused) == 4
 
 
 def test_what_names_another_task_is_refused_where_a_task_is_asked_for(factory, tmp_path):

@@ -56,6 +56,7 @@ from genpolicy.feasibility.checks import CHECKS as FEASIBILITY_CHECKS
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.rows import write_rows
 from genpolicy.integrity.tables import read_table, write_table
+from genpolicy.policies.settings import HeadConfig, NetworkConfig, SamplerConfig, TrainingConfig
 from genpolicy.policies.validation_row import ValidationRow
 
 CODE = "genpolicy/robot/impedance.py"
@@ -91,6 +92,19 @@ ENVELOPE = {
         }
         for method in CANDIDATES
     },
+}
+TASK = {
+    "name": "tabletop_insertion",
+    "entry_point": "",
+    "distribution": {"name": "", "version": ""},
+    "package": {},
+    "scene": {},
+    **dict.fromkeys(("scene_sha256", "observation_sha256", "action_sha256"), "0" * 64),
+    "phases": {"all": ["approach"]},
+    "obstacles": ["post"],
+    "workspace_m": [[0.3, -0.22, 0.02], [0.72, 0.22, 0.28]],
+    "robot": "panda",
+    **dict.fromkeys(("robot_sha256", "sha256"), "0" * 64),
 }
 SPEED = {"diffusion": 0.02, "flow": 0.01}
 
@@ -329,15 +343,7 @@ def build(root: Path) -> None:
     """All evidence and settings, without any report."""
     write_params(root)
     (root / PREREGISTRATION).write_bytes(plan_bytes(PARAMS, {}))
-    document(
-        root,
-        "task/identity.json",
-        {
-            "name": "tabletop_insertion",
-            "robot": "panda",
-            "workspace_m": [[0.3, -0.22, 0.02], [0.72, 0.22, 0.28]],
-        },
-    )
+    document(root, "task/identity.json", TASK)
     _dataset(root)
     _audit(root)
     _baselines(root)
@@ -377,9 +383,8 @@ def record(root: Path) -> None:
 
 
 def _dataset(root: Path) -> None:
-    document(
-        root, "ingest/refusals.json", {"found": 50, "accepted": 49, "refused": [{"file": "x"}]}
-    )
+    refused = [{"file": "x", "where": "x", "reason": "too short"}]
+    document(root, "ingest/refusals.json", {"found": 50, "accepted": 49, "refused": refused})
     document(root, "ingest/manifest.json", {"schema_version": 1})
     rows = range(9)
     table(
@@ -591,8 +596,13 @@ def _audit(root: Path) -> None:
             "ceilings": {},
             "metre": 1.0,
             "primary_phase": "approach",
-            "label_replays": 40,
-            "label_disagreements": 0,
+            "episodes": 100,
+            "rows": 9000,
+            "gaps": 0,
+            "start_drift": 0.0,
+            "notes": [],
+            "mean_checked": 40,
+            "mean_defeated": 38,
             "counts": {
                 "queries": 100,
                 "analysed": 90,
@@ -768,17 +778,38 @@ def _offline(method: str) -> dict[str, Any]:
 
 
 def _matched(methods: tuple[str, ...]) -> dict[str, Any]:
-    return {
-        "methods": {
-            m: {
-                "parameters": {"encoder": 10, "trunk": 80, "head": 10, "total": 100},
-                "flops": 1,
-                "config": {"training": {"steps": UPDATES}},
-            }
-            for m in methods
+    sizes = {
+        "parameters": {"encoder": 10, "trunk": 80, "head": 10, "total": 100},
+        "training_only_parameters": 0,
+        "flops": {"encoder": 1, "trunk": 1, "head": 1, "total": 3},
+    }
+    extent = {"minimum": [0.0], "maximum": [1.0]}
+    config = {
+        "format_version": 1,
+        "horizons": {
+            "observation_horizon": 2,
+            "prediction_horizon": 16,
+            "execution_horizon": 8,
+            "action_period_s": 0.05,
         },
+        "dimensions": {"observation_dim": 1, "action_dim": 9},
+        "normalisation": {"observation": extent, "action": extent},
+        "network": NetworkConfig().model_dump(mode="json"),
+        "head": HeadConfig().model_dump(mode="json"),
+        "training": TrainingConfig(steps=UPDATES).model_dump(mode="json"),
+        "training_seed": 0,
+        "sampler": SamplerConfig(name="direct").model_dump(mode="json"),
+        "provenance": {"dataset_manifest_sha256": "0" * 64, "episodes_sha256": None},
+        "weights_sha256": "0" * 64,
+        **sizes,
+    }
+    return {
+        "reference": methods[0],
+        "methods": {m: {**sizes, "config": {**config, "method": m}} for m in methods},
         "differing_keys": {m: ["head"] for m in methods},
         "whitelist": ["head"],
+        "single_action_keys": [],
+        "one_mode_keys": [],
     }
 
 
@@ -911,7 +942,16 @@ def _reload(root: Path) -> None:
         root,
         "reload/nfe.parquet",
         NfeRow,
-        [{"method": m, "seed": 0, "recorded": 8, "counted": 8, "expected": 8} for m in CANDIDATES],
+        [
+            {
+                "method": m,
+                "seed": 0,
+                **dict.fromkeys(("recorded", "counted", "expected"), 8),
+                "least": 8,
+                "most": 8,
+            }
+            for m in CANDIDATES
+        ],
     )
     table(
         root,
@@ -940,10 +980,11 @@ def _reload(root: Path) -> None:
         {
             m: {
                 "checkpoint": hashlib.sha256(m.encode()).hexdigest(),
-                "config": "c",
+                "checkpoints": [hashlib.sha256(m.encode()).hexdigest()],
+                "config": ["c"],
                 "dataset": hashlib.sha256(canonical_json({"schema_version": 1})).hexdigest(),
                 "normalisation": "n",
-                "seed": 0,
+                "seed": [0],
                 "sampler": "s",
                 "metadata_mismatches": 0,
                 "nonfinite_weights": 0,
@@ -1045,17 +1086,30 @@ def _shadow(root: Path) -> None:
             for reason, n in (("expired", 10), ("phase", 5))
         ],
     )
-    proved = {"violations": [], "checked_actions": 1000, "reproved_actions": 1000}
-    document(root, "shadow/checker.json", proved)
-    document(
-        root,
-        "shadow/mutants.json",
-        [
-            {"check": name, "layer": layer, "detected": True, "tried": 3, "violations": 3}
-            for layer, name in CHECKS
-        ],
-    )
+    document(root, "shadow/checker.json", checked("journal.mcap", 1000))
+    document(root, "shadow/mutants.json", [mutant(layer, name) for layer, name in CHECKS])
     (root / "artifacts/shadow/journal.mcap").write_bytes(b"journal")
+
+
+def checked(journal: str, actions: int) -> dict[str, Any]:
+    """What the checker says of one journal with nothing wrong in it."""
+    found = {"violations": [], "checked_actions": actions, "reproved_actions": actions}
+    more = {
+        "sessions": 1, "events": 9, "checked_fallback_actions": 0, "chunks": 9, "discarded": {},
+        "oldest_action_s": 0.1, "longest_silence_s": 0.05,
+    }  # fmt: skip
+    return {**found, "journals": {journal: found | more}}
+
+
+def mutant(layer: str, name: str) -> dict[str, Any]:
+    """A check whose absence was noticed."""
+    row = {"check": name, "layer": layer, "detected": True, "violations": 3}
+    if layer == "execution":
+        return row | {"rules": ["P1.age"], "violations_unchanged": 0}
+    return row | {"fixture": name, "behind": [], "tried": 3, "not_applicable": ""}
+
+
+VIOLATION = {"journal": "a.mcap", "session": "s", "event": 7, "rule": "P1.age", "text": "Too old."}
 
 
 def _succeeds(method: str, start: int) -> bool:
@@ -1158,19 +1212,11 @@ def _stress(root: Path) -> None:
             for m, c in cells
         ],
     )
-    document(
-        root,
-        "stress/checker.json",
-        {
-            "violations": [],
-            "checked_actions": 5000,
-            "reproved_actions": 5000,
-            "journals": ["a.mcap"],
-        },
-    )
+    document(root, "stress/checker.json", checked("a.mcap", 5000))
     document(root, "stress/envelope.json", ENVELOPE)
     power = {"margin": 0.1, "alpha": 0.05, "pairs": STARTS}
-    row = {"baseline_success": 0.5, "correlation": 0.6, "margin": 0.1, "pairs": STARTS}
+    row = {"baseline_success": 0.5, "correlation": 0.6, "margin": 0.1, "pairs": STARTS,
+           "median_pairs": 30.0}  # fmt: skip
     document(
         root,
         "stress/power.json",

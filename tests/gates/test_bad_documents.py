@@ -11,7 +11,7 @@ import yaml
 from gates import rederive
 from gates.card.card import DRAFT_PATH, read_card
 from gates.card.drafting import draft
-from gates.card.envelope import ENVELOPE, simulated_envelope
+from gates.card.envelope import ENVELOPE_FILE, simulated_envelope
 from gates.card.history import _evidence_digests
 from gates.card.people import load_allow_list
 from gates.cause.reading import folder_numbers
@@ -140,7 +140,7 @@ def test_report(fallen_over, edited, whole, gate):
     assert faults == {} and refused > 20
 
 
-@pytest.mark.parametrize("name", [TASK_IDENTITY, ENVELOPE, "artifacts/reload/identity.json"])
+@pytest.mark.parametrize("name", [TASK_IDENTITY, ENVELOPE_FILE, "artifacts/reload/identity.json"])
 def test_what_the_card_is_drafted_from(fallen_over, edited, whole, name):
     admitted = admit("card", whole)
 

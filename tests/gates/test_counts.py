@@ -22,9 +22,9 @@ COUNTED = [
     ("B", "outside_modes_upper", "reload/modes.parquet", "far_from_modes"),
 ]
 DOCUMENTED = [
-    ("C", "checker_violations", "shadow/checker.json", "violations"),
-    ("D", "checker_violations", "stress/checker.json", "violations"),
-    ("A", "refused_recordings_accounted", "ingest/refusals.json", "refused"),
+    ("C", "checker_violations", "shadow/checker.json", "reproved_actions"),
+    ("D", "checker_violations", "stress/checker.json", "checked_actions"),
+    ("A", "refused_recordings_accounted", "ingest/refusals.json", "accepted"),
 ]
 
 
@@ -56,7 +56,7 @@ def test_a_column_that_counts_below_zero_is_not_measured(repo, gate, name, table
 def test_a_number_that_counts_below_zero_is_not_measured(repo, gate, name, path, key):
     _measure(repo, gate, name)
     evidence.edit_document(repo, path, lambda document: {**document, key: -1})
-    with pytest.raises(MissingEvidenceError, match=f"{key} counts -1"):
+    with pytest.raises(MissingEvidenceError, match=rf"{key} = -1 \(.*greater than or equal to 0"):
         _measure(repo, gate, name)
 
 

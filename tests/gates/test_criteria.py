@@ -43,6 +43,10 @@ def _document(path, make):
     return lambda root, s: evidence.edit_document(root, path, make(s))
 
 
+def _violations(s):
+    return _set("violations", [evidence.VIOLATION] * (1 + int(3 * s)))
+
+
 def _identity(key):
     return lambda s: lambda d: [e.__setitem__(key, int(3 * s) + 1) for e in d.values()] and None
 
@@ -188,7 +192,7 @@ WORSE = {
             lambda s: (
                 lambda d: (
                     [
-                        v["parameters"].__setitem__("total", 100 + 50 * s)
+                        v["parameters"].__setitem__("total", 100 + int(50 * s))
                         for v in d["methods"].values()
                     ]
                     and None
@@ -266,7 +270,8 @@ WORSE = {
             SHADOW + "counts.parquet", lambda s: cells("executed", 81 + int(9 * s))
         ),
         "checker_violations": _document(
-            SHADOW + "checker.json", lambda s: _set("violations", ["v"] * (1 + int(3 * s)))
+            SHADOW + "checker.json",
+            _violations,
         ),
         "mutants_undetected": _document(
             SHADOW + "mutants.json",
@@ -318,7 +323,8 @@ WORSE = {
             STRESS + "conservation.parquet", lambda s: cells("executed", 89 + int(9 * s))
         ),
         "checker_violations": _document(
-            STRESS + "checker.json", lambda s: _set("violations", ["v"] * (1 + int(3 * s)))
+            STRESS + "checker.json",
+            _violations,
         ),
         "promotion_e_value": _table(
             ROLL,

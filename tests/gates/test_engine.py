@@ -16,10 +16,15 @@ from gates.report import report_bytes, report_path
 from gates.settings import GateSettings, Limit, Limits, Waiver
 
 
+def _write(tmp_path, name, document):
+    (tmp_path / "in").mkdir(exist_ok=True)
+    (tmp_path / "in" / name).write_text(json.dumps(document))
+
+
 def _judge(tmp_path, a, b, **limits):
-    (tmp_path / "a.json").write_text(json.dumps({"n": a}))
-    (tmp_path / "b.json").write_text(json.dumps({"n": b}))
-    (tmp_path / "c.json").write_text("{}")
+    _write(tmp_path, "a.json", {"n": a})
+    _write(tmp_path, "b.json", {"n": b})
+    _write(tmp_path, "c.json", {})
     (tmp_path / TASK_IDENTITY).parent.mkdir(parents=True, exist_ok=True)
     (tmp_path / TASK_IDENTITY).write_text("{}")
     return judge(SPEC, Evidence(tmp_path), Limits(**limits), GateSettings())
@@ -27,13 +32,16 @@ def _judge(tmp_path, a, b, **limits):
 
 def test_evidence_is_what_was_read_and_materials_are_all(tmp_path):
     report = _judge(tmp_path, 1, 1)
-    assert [answer.evidence for answer in report.criteria] == [("a.json",), ("a.json", "b.json")]
-    assert set(report.materials) == {"a.json", "b.json", "c.json", TASK_IDENTITY}
+    assert [answer.evidence for answer in report.criteria] == [
+        ("in/a.json",),
+        ("in/a.json", "in/b.json"),
+    ]
+    assert set(report.materials) == {"in/a.json", "in/b.json", "in/c.json", TASK_IDENTITY}
 
 
 def test_evidence_that_is_missing_is_named(tmp_path):
     report = judge(SPEC, Evidence(tmp_path), Limits(), GateSettings())
-    assert report.criteria[0].evidence == ("a.json",)
+    assert report.criteria[0].evidence == ("in/a.json",)
     assert "a.json is missing" in report.criteria[0].caveat
 
 
@@ -70,13 +78,14 @@ def test_what_does_not_apply_is_a_caveat_and_decides_nothing(tmp_path):
 
 def test_a_document_of_another_form_is_not_measured_and_no_fault(tmp_path, monkeypatch):
     def measure(evidence, settings):
-        return evidence.document("a.json")["no such key"]
+        return {}["no such key"]
 
     first, *others = SPEC.criteria
     spec = replace(SPEC, criteria=(replace(first, measure=measure), *others))
-    (tmp_path / "a.json").write_text("{}")
+    _write(tmp_path, "a.json", {})
     report = judge(spec, Evidence(tmp_path), Limits(), GateSettings())
     assert "not measured: the evidence has no 'no such key'" in report.criteria[0].caveat
+    assert "a.json is a document with the missing key n" in report.criteria[1].caveat
     assert report.verdict == "INCONCLUSIVE"
 
 
@@ -93,7 +102,7 @@ def test_what_no_run_stands_for_does_not_pass(tmp_path):
 def _asked(tmp_path, measured, **limits):
     """The engine's answer to a criterion that measures just this."""
     first = replace(SPEC.criteria[0], measure=lambda evidence, settings: measured)
-    (tmp_path / "a.json").write_text("{}")
+    _write(tmp_path, "a.json", {})
     spec = replace(SPEC, criteria=(first,))
     of = {"<lambda>": Limit(1.0, "r", "model")} if not limits else limits["of"]
     return judge(spec, Evidence(tmp_path), Limits(of=of), GateSettings()).criteria[0]

@@ -123,7 +123,7 @@ def test_a_task_whose_package_has_changed_refuses(ladder):
     (package / "scene.xml").write_text("<mujoco/>")
     files = {name: sha256_file(package / name) for name in ("scene.xml", "task.py")}
     identity = {"name": "t", "entry_point": "some_task.task:TASK", "package": files}
-    evidence.edit_document(ladder, "task/identity.json", lambda _: identity)
+    evidence.edit_document(ladder, "task/identity.json", lambda d: d.update(identity))
     assert judge(ladder, "A").verdict == "PASS"
     (package / "scene.xml").write_text("<mujoco></mujoco>")
     with pytest.raises(IntegrityError, match=r"the task t: scene\.xml is other than"):

@@ -12,6 +12,7 @@ from gates.proof import Rung
 from gates.rederive import STRESS, rederive, rederived
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.errors import BadInputError, ConfigError, RefusedError
+from genpolicy.evidence.documents import shadow, stress
 from genpolicy.evidence.rows.stress import (
     AgeRow,
     ConservationRow,
@@ -20,6 +21,7 @@ from genpolicy.evidence.rows.stress import (
     StressCountRow,
     StressStubRow,
 )
+from genpolicy.evidence.shadow.tables import checked
 from genpolicy.evidence.stress.settings import StressSettings
 from genpolicy.evidence.stress.tables import power_document
 from genpolicy.execution.cell import Cell, ExecutionSettings
@@ -38,12 +40,12 @@ from genpolicy.verification.tables import derived_tables
 PARAMS = yaml.safe_load((Path(__file__).parents[2] / "params.yaml").read_text())
 NAMES = ("flow__nominal", "bc__nominal", "flow__envelope")
 POWER = canonical_json(
-    power_document(
+    stress.POWER.plain(power_document(
         StressSettings(**PARAMS["stress"]),
         candidates=len(PARAMS["train_generators"]["samplers"]),
         root_seed=PARAMS["seed"],
-    )
-)
+    ))
+)  # fmt: skip
 TABLES = {
     "invocations": InvocationRow, "counts": StressCountRow, "conservation": ConservationRow,
     "stub": StressStubRow, "ages": AgeRow,
@@ -97,7 +99,7 @@ def root(tmp_path):
         seed = {"seed": 0} if name == "invocations" else {}
         made = [TABLES[name](**row, **seed) for row in listed]
         write_rows(folder / f"{name}.parquet", TABLES[name], made)
-    _write_checker(folder, documents)
+    shadow.CHECKER.write(folder, checked(documents))
     (folder / "envelope.json").write_text(json.dumps(_envelope(folder)))
     (folder / "power.json").write_bytes(POWER)
     return tmp_path
@@ -106,22 +108,8 @@ def root(tmp_path):
 def _envelope(folder):
     planned = {k: v for k, v in PARAMS["stress"]["perturbations"]["envelope"].items()
                if k != "kind"}  # fmt: skip
-    reach = reach_of(folder / "journals" / "flow__envelope.mcap").as_document()
+    reach = asdict(reach_of(folder / "journals" / "flow__envelope.mcap").as_document())
     return {"condition": "envelope", **planned, "reached": {"flow": reach}}
-
-
-def _write_checker(folder, documents):
-    violations = [
-        {"journal": name, **violation}
-        for name, document in documents.items()
-        for violation in document["violations"]
-    ]
-    totals = {
-        name: sum(item[name] for item in documents.values())
-        for name in ("checked_actions", "reproved_actions")
-    }
-    document = {"violations": violations, **totals, "journals": documents}
-    (folder / "checker.json").write_text(json.dumps(document))
 
 
 def test_true_evidence_stands(root):
@@ -180,7 +168,9 @@ def test_a_finding_of_the_checker_that_was_removed_is_found_again(root):
 def test_a_violation_left_out_of_the_list_is_found(root):
     path = root / STRESS / "checker.json"
     document = json.loads(path.read_text())
-    document["violations"] = [{"rule": "P1"}]
+    document["violations"] = [
+        {"journal": "a", "session": "s", "event": 1, "rule": "P1", "text": "."}
+    ]
     path.write_text(json.dumps(document))
     with pytest.raises(RefusedError, match=r"checker\.json: violations"):
         rederive(root, "D")

@@ -11,7 +11,8 @@ import yaml
 from gates import rederive_shadow as module
 from gates.rederive import rederive
 from gates.rederive_shadow import SHADOW, rederive_shadow
-from genpolicy.errors import BadInputError, ConfigError, RefusedError
+from genpolicy.errors import BadInputError, ConfigError, IntegrityError, RefusedError
+from genpolicy.evidence.documents.shadow import EXECUTION, ExecutionMutant, LayerMutant
 from genpolicy.evidence.rows.shadow import CandidateRow, ShadowCountRow, ShadowStubRow
 from genpolicy.evidence.shadow.observations import held_out_observations
 from genpolicy.evidence.shadow.settings import ShadowSection
@@ -25,8 +26,16 @@ from genpolicy.seeds import stream
 from genpolicy.verification.shadow import KEYS
 
 ROWS = {"candidates": CandidateRow, "stub": ShadowStubRow, "counts": ShadowCountRow}
-LAYERS_TRIED = [{"check": "shape", "layer": "representation", "detected": True, "violations": 3}]
-EXECUTION_TRIED = {"check": "expired", "detected": True, "violations": 2, "rules": ["P1"]}
+LAYERS_TRIED = [
+    LayerMutant(
+        check="shape", layer="representation", fixture="shape", behind=[], detected=True, tried=3,
+        violations=3, not_applicable="",
+    )
+]  # fmt: skip
+EXECUTION_TRIED = ExecutionMutant(
+    check="expired", layer=EXECUTION, detected=True, violations=2, rules=["P1"],
+    violations_unchanged=0,
+)  # fmt: skip
 
 
 class Demonstrator:
@@ -67,9 +76,7 @@ def written(params, task, checker, data, kit, tmp_path_factory):
     found = shadow_policy(shadow, Demonstrator(seen), first, seed=seed, two_mode=more)
     (root / SHADOW).mkdir(parents=True)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(
-            "genpolicy.evidence.shadow.tables.run_mutants", lambda: [dict(EXECUTION_TRIED)]
-        )
+        patch.setattr("genpolicy.evidence.shadow.tables.run_mutants", lambda: [EXECUTION_TRIED])
         write_shadow(root / SHADOW, [found], LAYERS_TRIED, cell=shadow.cell, robot=checker.cell)
     (root / "params.yaml").write_text(yaml.safe_dump(params))
     return root
@@ -79,9 +86,7 @@ def written(params, task, checker, data, kit, tmp_path_factory):
 def root(written, tmp_path, monkeypatch):
     """A copy to forge; mutants are tried in a test of their own, since they take a while."""
     monkeypatch.setattr(module, "_layer_mutants", lambda root, params: list(LAYERS_TRIED))
-    monkeypatch.setattr(
-        "genpolicy.evidence.shadow.tables.run_mutants", lambda: [dict(EXECUTION_TRIED)]
-    )
+    monkeypatch.setattr("genpolicy.evidence.shadow.tables.run_mutants", lambda: [EXECUTION_TRIED])
     return shutil.copytree(written, tmp_path / "repo")
 
 
@@ -159,12 +164,21 @@ def test_rows_that_are_left_out_or_stated_twice_are_found(root, name):
     lambda rows: rows[:-1], lambda rows: rows[1:], lambda rows: [*rows, rows[0]],
     lambda rows: [{**rows[0], "detected": False}, *rows[1:]],
     lambda rows: [*rows[:-1], {**rows[-1], "violations": 5}],
-    lambda rows: {"check": "shape"}, lambda rows: [*rows, "shape"],
 ])  # fmt: skip
 def test_mutants_that_are_not_those_found_again_are_refused(root, forge):
     path = root / SHADOW / "mutants.json"
     path.write_text(json.dumps(forge(json.loads(path.read_text()))))
     with pytest.raises(RefusedError, match=r"mutants\.json: .*as tried again"):
+        rederive(root, "C")
+
+
+@pytest.mark.parametrize("forge", [
+    lambda rows: {"check": "shape"}, lambda rows: [*rows, "shape"],
+])  # fmt: skip
+def test_mutants_of_another_form_are_bad_input(root, forge):
+    path = root / SHADOW / "mutants.json"
+    path.write_text(json.dumps(forge(json.loads(path.read_text()))))
+    with pytest.raises(IntegrityError, match=r"mutants\.json is a document with"):
         rederive(root, "C")
 
 
@@ -178,9 +192,7 @@ def test_the_checks_are_left_out_again_on_the_moments_of_the_dataset(
         module, "missing_checks_evidence",
         lambda shadow, observations: seen.append((shadow, observations)) or LAYERS_TRIED,
     )  # fmt: skip
-    monkeypatch.setattr(
-        "genpolicy.evidence.shadow.tables.run_mutants", lambda: [dict(EXECUTION_TRIED)]
-    )
+    monkeypatch.setattr("genpolicy.evidence.shadow.tables.run_mutants", lambda: [EXECUTION_TRIED])
     rederive_shadow(root, params)
     ((shadow, observations),) = seen
     assert len(observations) >= params["shadow"]["mutant_observations"]

@@ -28,14 +28,47 @@ def test_a_candidate_of_another_dataset_is_not_pinned(ladder):
 
 def test_a_solver_that_agrees_with_itself_but_not_with_its_definition_is_red(ladder):
     """One evaluation too often, at training and after reload: recorded and counted agree."""
-    evidence.edit_table(
-        ladder, "reload/nfe.parquet", lambda f: f.assign(recorded=9, counted=9, expected=8)
-    )
+    evidence.edit_table(ladder, "reload/nfe.parquet", lambda f: f.assign(recorded=9, counted=9))
     evidence.edit_table(ladder, MODES, cells("nfe", 9))
     report = judge(ladder, "B")
     assert _red(report) == {"nfe_mismatch"}
     found = _found(report, "nfe_mismatch")[0]
     assert found.measured == 1 and "8 by the definition" in found.caveat
+
+
+@pytest.mark.parametrize(
+    ("counted", "nearest", "red"),
+    [(22, 22, False), (23, 22, True), (4, 4, False), (61, 61, False), (64, 61, True)],
+)
+def test_an_adaptive_solver_is_held_against_the_counts_that_it_may_take(
+    ladder, counted, nearest, red
+):
+    """1 + 3 n up to a cap of 63; its count differs with the observation, and no other is right."""
+    evidence.edit_table(
+        ladder, "reload/nfe.parquet",
+        lambda f: f.assign(recorded=counted, counted=counted, expected=nearest, least=4, most=61),
+    )  # fmt: skip
+    for table in (MODES, EARLIER):
+        evidence.edit_table(ladder, table, lambda f: f.assign(nfe=4 + 3 * (f["index"] % 20)))
+    report = judge(ladder, "B")
+    assert _red(report) == ({"nfe_mismatch"} if red else set())
+    assert "4 to 61 by the definition" in _found(report, "nfe_mismatch")[0].caveat
+    evidence.edit_table(ladder, "reload/nfe.parquet", cells("recorded", counted + 3))
+    assert "nfe_mismatch" in _red(judge(ladder, "B"))
+
+
+def test_modes_beyond_what_an_adaptive_solver_may_take_say_nothing(ladder):
+    evidence.edit_table(ladder, "reload/nfe.parquet", lambda f: f.assign(least=4, most=61))
+    evidence.edit_table(ladder, MODES, cells("nfe", 64))
+    report = judge(ladder, "B")
+    assert "chosen NFE" in _found(report, "mode_coverage_lower")[0].caveat
+
+
+@pytest.mark.parametrize("change", [{"least": 9}, {"most": 7}])
+def test_an_expected_count_outside_its_definition_is_no_evidence(ladder, change):
+    evidence.edit_table(ladder, "reload/nfe.parquet", lambda f: f.assign(**change))
+    found = _found(judge(ladder, "B"), "nfe_mismatch")[0]
+    assert found.verdict != "PASS" and "does not allow" in found.caveat
 
 
 def test_a_noisy_point_policy_that_samples_between_the_modes_is_red(ladder):

@@ -23,6 +23,7 @@ SAMPLERS = {
     "ibc": ("derivative_free", 8),
     "diffusion": ("ddim", 10),
     "flow": ("euler", 8),
+    "flow_policy": ("consistency", 2),
 }
 POPULATION = {"derivative_free": 32}
 NETWORK = NetworkConfig(

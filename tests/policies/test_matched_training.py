@@ -4,6 +4,7 @@ import shutil
 
 import pytest
 
+from genpolicy.evidence.documents.given import MATCHED
 from genpolicy.integrity.atomic import write_bytes
 from genpolicy.integrity.documents import canonical_json, read_json
 from genpolicy.policies.checkpoint import CONFIG_FILE
@@ -46,6 +47,14 @@ def test_matched_methods_differ_in_whitelisted_keys_only(folders):
     assert set(found["differing_keys"]["flow"]) <= set(ALLOWED_DIFFERENCES)
     assert found["whitelist"] == list(ALLOWED_DIFFERENCES)
     assert set(found["single_action_keys"]) == SINGLE
+
+
+def test_gates_read_it_to_the_byte(folders):
+    found = matched_configuration(folders, reference="chunked_bc")
+    read = MATCHED.parse(found, where=MATCHED.file)
+    assert canonical_json(MATCHED.plain(read)) == canonical_json(found)
+    assert read.methods["flow"].config.training.steps == found["methods"]["flow"]["config"][
+        "training"]["steps"]  # fmt: skip
 
 
 def test_a_single_action_method_differs_in_its_horizon_by_definition(folders):

@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 import torch
 
-from genpolicy.errors import ConfigError, ContractError, IntegrityError, NonFiniteError
+from genpolicy.errors import (
+    ConfigError,
+    ContractError,
+    EvaluationCapError,
+    IntegrityError,
+    NonFiniteError,
+)
 from genpolicy.policies.methods import METHODS
 from genpolicy.policies.policy import load_policy
 from genpolicy.policies.settings import SamplerConfig
@@ -12,17 +18,21 @@ from genpolicy.policies.training import train
 
 STEPS = {
     "bc": 1, "chunked_bc": 1, "chunked_l1": 1, "bc_noise": 1, "one_mode_bc": 1, "act": 1,
-    "cvae": 1, "ibc": 8, "diffusion": 10, "flow": 8,
+    "cvae": 1, "ibc": 8, "diffusion": 10, "flow": 8, "flow_policy": 4,
 }  # fmt: skip
 STOCHASTIC = {
     "act": ("z_prior", 1), "bc_noise": ("offset", 1), "ibc": ("derivative_free", 8),
     "diffusion": ("ddim", 10), "flow": ("euler", 8),
+    "flow_policy": ("consistency", 2),
 }  # fmt: skip
 POPULATION = {"derivative_free": 32}
 
 
 def sampler_of(name, steps):
-    return SamplerConfig(name=name, steps=steps, population=POPULATION.get(name, 1))
+    return SamplerConfig(
+        name=name, steps=steps, population=POPULATION.get(name, 1),
+        nfe_cap=200 if name == "bosh3" else None,
+    )  # fmt: skip
 
 
 def names(count):
@@ -78,8 +88,11 @@ def test_two_loads_give_equal_bytes(folders, method, two_mode_windows):
     [
         ("bc", "direct", 1, 1), ("chunked_bc", "direct", 1, 1), ("act", "z_zero", 1, 1),
         ("act", "z_prior", 1, 1), ("diffusion", "ddim", 7, 7), ("diffusion", "ddpm", 100, 100),
-        ("diffusion", "dpm_2m", 6, 6), ("flow", "euler", 5, 5), ("flow", "heun", 5, 10),
-        ("flow", "rk4", 3, 12), ("chunked_l1", "direct", 1, 1), ("ibc", "derivative_free", 6, 7),
+        ("diffusion", "dpm_2m", 6, 6), ("diffusion", "dpm_1", 6, 6), ("diffusion", "dpm_sde", 6, 6),
+        ("flow", "euler", 5, 5), ("flow", "heun", 5, 10),
+        ("flow", "rk4", 3, 12), ("flow", "midpoint", 3, 6),
+        ("flow_policy", "consistency", 2, 2), ("flow_policy", "consistency", 4, 4),
+        ("chunked_l1", "direct", 1, 1), ("ibc", "derivative_free", 6, 7),
         ("bc_noise", "offset", 1, 1),
     ],
 )  # fmt: skip
@@ -107,7 +120,9 @@ def test_deterministic_conventions_give_equal_candidates(folders, two_mode_windo
     [("diffusion", "ddim", 101), ("diffusion", "ddim", 0), ("diffusion", "euler", 4),
      ("flow", "euler", 0), ("flow", "ddim", 4), ("bc", "direct", 2), ("ibc", "euler", 4),
      ("bc_noise", "offset", 2), ("bc_noise", "direct", 1), ("chunked_bc", "offset", 1),
-     ("flow", "derivative_free", 4), ("ibc", "derivative_free", 0)],
+     ("flow", "derivative_free", 4), ("ibc", "derivative_free", 0),
+     ("flow_policy", "consistency", 1), ("flow_policy", "consistency", 3),
+     ("flow_policy", "euler", 2), ("flow", "consistency", 2)],
 )  # fmt: skip
 def test_samplers_that_do_not_fit_are_refused(folders, method, name, steps):
     with pytest.raises(ConfigError, match="sampler"):
@@ -120,6 +135,45 @@ def test_samplers_that_do_not_fit_are_refused(folders, method, name, steps):
 def test_a_population_belongs_to_the_search_only(folders, method, name, population):
     with pytest.raises(ConfigError, match="population"):
         load_policy(folders[method], sampler=SamplerConfig(name=name, population=population))
+
+
+def test_an_adaptive_row_takes_its_own_steps_whatever_the_others_take(folders, two_mode_windows):
+    """Together they wait for the slowest; padding, of a batch of one, waits for nobody else."""
+    sampler = SamplerConfig(name="bosh3", steps=4, tolerance=1e-4, nfe_cap=400)
+    policy = load_policy(folders["flow"], sampler=sampler)
+    observations = two_mode_windows(3, seed=9).observations
+    together = policy.sample(observations, noise_names=names(3), candidates=1)
+    alone = [
+        policy.sample(observations[row : row + 1], noise_names=[("row", row)], candidates=1)
+        for row in range(3)
+    ]
+    assert all(
+        np.array_equal(one.actions[0], together.actions[row]) for row, one in enumerate(alone)
+    )
+    counts = [one.nfe for one in alone]
+    assert len(set(counts)) > 1, "the rows must differ, or nothing is shown"
+    assert together.nfe == max(counts)
+    slow = SamplerConfig(**{**sampler.model_dump(), "nfe_cap": max(counts) - 1})
+    policy = load_policy(folders["flow"], sampler=slow)
+    with pytest.raises(EvaluationCapError, match=f"at most sampler.nfe_cap, {slow.nfe_cap}"):
+        policy.sample(observations, noise_names=names(3), candidates=1)
+    fast = counts.index(min(counts))
+    again = policy.sample(observations[fast : fast + 1], noise_names=[("row", fast)], candidates=1)
+    assert np.array_equal(again.actions, alone[fast].actions)
+
+
+def test_fresh_noise_is_a_choice_of_ddim_only(folders):
+    load_policy(folders["diffusion"], sampler=SamplerConfig(name="ddim", steps=4, eta=1.0))
+    with pytest.raises(ConfigError, match=r"sampler\.eta of diffusion is 0.5"):
+        load_policy(folders["diffusion"], sampler=SamplerConfig(name="ddpm", steps=4, eta=0.5))
+
+
+@pytest.mark.parametrize(
+    ("name", "steps", "cap"), [("bosh3", 1, None), ("bosh3", 6, 6), ("rk4", 2, 7)]
+)
+def test_a_cap_that_is_missing_or_too_low_is_refused(folders, name, steps, cap):
+    with pytest.raises(ConfigError, match="nfe_cap"):
+        load_policy(folders["flow"], sampler=SamplerConfig(name=name, steps=steps, nfe_cap=cap))
 
 
 def test_wrong_observations_are_refused(folders, two_mode_windows):

@@ -8,9 +8,7 @@ import torch
 from diffusers import DDPMScheduler
 
 from genpolicy.errors import ConfigError
-from genpolicy.policies.samplers import (
-    sample_ode,
-)
+from genpolicy.policies.ode_samplers import sample_ode
 from genpolicy.policies.schedules import (
     flow_gains,
     noise_gains,

@@ -11,7 +11,7 @@ from genpolicy.data.contract import TCP_ACTION, IngestContract, plausible_ranges
 from genpolicy.data.dataset import load_dataset
 from genpolicy.data.ingest import ingest_recordings
 from genpolicy.evidence.admission_context import make_checker
-from genpolicy.evidence.need.audit_task import audit_task, round_obstacles
+from genpolicy.evidence.need.audit_task import audit_task, round_obstacles, settings_of
 from genpolicy.evidence.need.pictures import scene_png
 from genpolicy.evidence.shadow.corruption import CORRUPTIONS
 from genpolicy.evidence.shadow.layer_mutants import missing_checks_evidence
@@ -134,14 +134,15 @@ def test_the_robot_is_read_from_the_scene(cell):
 
 
 def test_the_audit_reads_the_tasks_own_channels(cell, kit):
+    few = AuditSettings(neighbours=4, minimum_neighbours=4, query_stride=8)
     result = audit_task(
         cell.root / "dataset", task_name=cell.task.name,
-        settings=AuditSettings(neighbours=4, minimum_neighbours=4, query_stride=8),
+        settings=settings_of(few, cell.task, cell.horizons, confidence=0.95),
         feasibility=cell.feasibility, action_period_s=cell.horizons.action_period_s, root_seed=SEED,
     )  # fmt: skip
     assert result is not None
     (pillar,) = round_obstacles(cell.task)
-    assert pillar == pytest.approx({"x_m": 0.44, "y_m": 0.0, "radius_m": 0.02})
+    assert vars(pillar) == pytest.approx({"x_m": 0.44, "y_m": 0.0, "radius_m": 0.02})
 
 
 def test_its_picture_is_its_own_and_the_same_every_time(cell):
@@ -169,14 +170,14 @@ def test_every_check_left_out_is_noticed(shadow, cell):
         cell.data, horizons=cell.horizons, count=6, generator=stream(2, "foreign")
     )
     rows = missing_checks_evidence(shadow, items)
-    assert [row["check"] for row in rows if not row["detected"]] == list(NOTHING_HELD)
-    excused = {row["check"]: row["not_applicable"] for row in rows if row["not_applicable"]}
+    assert [row.check for row in rows if not row.detected] == list(NOTHING_HELD)
+    excused = {row.check: row.not_applicable for row in rows if row.not_applicable}
     assert set(excused) == set(NOTHING_HELD)
     assert set(excused.values()) == {"the task's hand holds nothing"}
 
 
 def test_every_mutant_is_found():
-    assert all(row["detected"] for row in run_mutants())
+    assert all(row.detected for row in run_mutants())
 
 
 def test_ten_rollouts_of_the_scripted_operator(cell, tmp_path):

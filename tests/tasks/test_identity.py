@@ -7,6 +7,7 @@ from importlib.metadata import EntryPoint
 import numpy as np
 import pytest
 
+from genpolicy.documents.task import IDENTITY
 from genpolicy.errors import ConfigError
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_bytes
@@ -24,6 +25,7 @@ def test_the_default_task_is_itself_every_time():
     assert first["distribution"]["name"] == "genpolicy"
     body = {key: value for key, value in first.items() if key != "sha256"}
     assert sha256_bytes(canonical_json(body)) == first["sha256"]
+    assert IDENTITY.plain(IDENTITY.parse(first, where=IDENTITY.file)) == first
 
 
 @pytest.mark.parametrize("file", ["task.py", "arm.xml", "notes.txt"])

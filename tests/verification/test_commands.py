@@ -34,9 +34,9 @@ def test_speed_counts_from_command_to_command_and_a_hold_slows_nothing(tmp_path)
     assert reach.commands == 4
     assert reach.fastest_m_s == pytest.approx(np.hypot(0.02, 0.05) / 0.05)
     assert reach.lowest_m == (0.4, -0.1, 0.1) and reach.highest_m == (0.6, 0.02, 0.2)
-    assert reach.as_document()["commands"] == 4
+    assert reach.as_document().commands == 4
 
 
 def test_a_journal_without_commands_reached_nothing(tmp_path):
     write_journal(tmp_path / "j.mcap", [_session("a", [])])
-    assert reach_of(tmp_path / "j.mcap").as_document()["fastest_m_s"] is None
+    assert reach_of(tmp_path / "j.mcap").as_document().fastest_m_s is None

@@ -13,13 +13,12 @@ def test_a_document_says_everything_once_in_seconds():
         longest_silence_ns=150_000_000,
     )  # fmt: skip
     document = report.as_document()
-    assert document["violations"] == [
-        {"session": "a", "event": 7, "rule": "P1.age", "text": "Too old."}
-    ]
-    assert (document["oldest_action_s"], document["longest_silence_s"]) == (0.6, 0.15)
-    assert list(document["discarded"]) == ["expired", "late"]
-    assert (document["sessions"], document["events"], document["chunks"]) == (2, 30, 3)
-    assert (document["checked_actions"], document["checked_fallback_actions"]) == (5, 1)
+    (violation,) = document.violations
+    assert vars(violation) == {"session": "a", "event": 7, "rule": "P1.age", "text": "Too old."}
+    assert (document.oldest_action_s, document.longest_silence_s) == (0.6, 0.15)
+    assert list(document.discarded) == ["expired", "late"]
+    assert (document.sessions, document.events, document.chunks) == (2, 30, 3)
+    assert (document.checked_actions, document.checked_fallback_actions) == (5, 1)
 
 
 def test_reports_share_no_list():

@@ -22,7 +22,7 @@ from benchmarks.ladder_truth.planting import (
 FLOW = "artifacts/train_generators/flow/seed_0"
 DIFFUSION = "artifacts/train_generators/diffusion/seed_0"
 STAGE = "stages/train_generators.py"
-SAMPLERS = "genpolicy/policies/samplers.py"
+SAMPLERS = "genpolicy/policies/ode_samplers.py"
 B = "B"
 REFUSED = r"sha256|identity|checkpoint|config\.json|fixtures|configuration"
 
@@ -131,7 +131,8 @@ WRONGS = (
     Wrong("weights_missing", "checkpoint", "The weights of the flow are gone.",
           "small", _no_weights, Expected(B, ("unpinned_items",), refusal=r"model\.safetensors")),
     Wrong("euler_runs_backwards", "sampler", "The sign of the Euler step is wrong.",
-          "small", patched(SAMPLERS, ("x = x + h * k1\n", "x = x - h * k1\n")),
+          "small", patched(SAMPLERS, ("x = x + h / tableau.result.divisor",
+                                      "x = x - h / tableau.result.divisor")),
           Expected(B, ("outside_modes_upper", "mode_coverage_lower"), candidate="flow")),
     Wrong("noise_without_a_key", "sampler",
           "The sampler's noise is drawn fresh each time, not from its key.",
@@ -143,14 +144,15 @@ WRONGS = (
     Wrong("second_evaluation_not_counted", "sampler",
           "The network runs twice per Euler step and is counted by the definition of one.",
           "small",
-          patched(SAMPLERS, ("        k1 = slope(x, start)\n",
-                             "        slope(x, start)\n        k1 = slope(x, start)\n")),
+          patched(SAMPLERS, ("            slopes.append(velocity(point, time))\n",
+                             "            velocity(point, time)\n"
+                             "            slopes.append(velocity(point, time))\n")),
           Expected(B, ("nfe_mismatch",), candidate="flow")),
     Wrong("definition_of_nfe_is_wrong", "sampler",
           "What a sampler's definition says of its evaluations is one too many.",
           "small",
           patched("genpolicy/evidence/reproducibility/reload.py",
-                  ("expected = expected_evaluations(candidate.load().sampler)",
-                   "expected = expected_evaluations(candidate.load().sampler) + 1")),
+                  ("expected=allowed.nearest(counted)", "expected=allowed.nearest(counted) + 1"),
+                  ("most=allowed.most", "most=allowed.most + 1")),
           Expected(B, ("nfe_mismatch",))),
 )  # fmt: skip

@@ -89,7 +89,6 @@ def measure(data: AuditInput, settings: AuditSettings) -> Semantics:
         clocks=(*clocks, *others),
         calibrations=releases,
         gaps=continuity.gap_count(data),
-        negative_delays=negative,
         start_drift=calibration.start_drift(data),
         findings=in_order(findings),
         notes=(*notes, *remarks, *([wander] if wander else [])),

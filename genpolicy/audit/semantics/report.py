@@ -24,7 +24,6 @@ class Semantics:
         clocks: One per stream and epoch.
         calibrations: One per epoch.
         gaps: Rows that follow a gap in time.
-        negative_delays: Samples received before they happened, beyond the tolerance.
         start_drift: Largest difference of the median start position between training and held-out
             episodes, unit of the position.
         findings: Deviations beyond the noise, in the order of diagnosis.
@@ -39,7 +38,6 @@ class Semantics:
     clocks: tuple[Clock, ...]
     calibrations: tuple[Calibration, ...]
     gaps: int
-    negative_delays: int
     start_drift: float
     findings: tuple[Finding, ...] = ()
     notes: tuple[str, ...] = ()

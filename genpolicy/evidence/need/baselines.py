@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from genpolicy.candidates.judged import JudgedPolicy
 from genpolicy.compute import map_shards
@@ -11,19 +10,18 @@ from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.contract.settings import Settings
 from genpolicy.data.dataset import load_dataset
 from genpolicy.evidence.admission_context import make_checker
+from genpolicy.evidence.documents.need import LATENT, LatentDependence
 from genpolicy.evidence.need.held_out import HeldOut, held_out_situations, modes_of_policy
-from genpolicy.evidence.need.latent import as_row, latent_dependence
+from genpolicy.evidence.need.latent import latent_dependence
 from genpolicy.evidence.need.offline import offline_rows
 from genpolicy.evidence.rows.need import ModeRow, OfflineRow
 from genpolicy.feasibility.settings import FeasibilitySettings
-from genpolicy.integrity.atomic import write_bytes
-from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.rows import write_rows
 from genpolicy.policies.policy import NetworkPolicy
 from genpolicy.policies.settings import SamplerConfig
 from genpolicy.tasks.api import load_task
 
-Measured = tuple[list[OfflineRow], list[ModeRow], list[dict[str, Any]]]
+Measured = tuple[list[OfflineRow], list[ModeRow], list[LatentDependence]]
 
 
 class LatentTest(Settings):
@@ -83,7 +81,7 @@ def write_baselines(
     latent = [row for part in parts for row in part[2]]
     write_rows(folder / "offline.parquet", OfflineRow, offline)
     write_rows(folder / "modes.parquet", ModeRow, modes)
-    write_bytes(folder / "latent.json", canonical_json(latent))
+    LATENT.write(folder, latent)
 
 
 def measure_baseline(job: tuple[BaselinePlan, JudgedPolicy]) -> Measured:
@@ -122,7 +120,7 @@ def mode_rows(
 
 def latent_rows(
     plan: BaselinePlan, policy: NetworkPolicy, held_out: HeldOut, *, seed: int
-) -> list[dict[str, Any]]:
+) -> list[LatentDependence]:
     """Whether the tested method's latent depends on the observation; nothing for the others."""
     test = plan.latent
     if test is None or test.method != policy.method or len(held_out.situations) < 2:
@@ -134,4 +132,6 @@ def latent_rows(
         permutations=test.permutations,
         root_seed=plan.root_seed,
     )
-    return [as_row(found, method=policy.method, convention=test.convention, seed=seed)]
+    return [
+        LatentDependence(**vars(found), method=policy.method, convention=test.convention, seed=seed)
+    ]

@@ -7,12 +7,11 @@ without regard to the observation, it encodes style or noise. Held apart by a pe
 the distance covariance of observations and deviations (Szekely, Rizzo and Bakirov 2007).
 """
 
-from dataclasses import asdict, dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.contract.action import POSITION
+from genpolicy.evidence.documents.need import Dependence
 from genpolicy.evidence.need.held_out import HeldOut
 from genpolicy.policies.policy import NetworkPolicy, NoiseName
 from genpolicy.seeds import stream
@@ -24,27 +23,6 @@ ROUNDING = 1e-4
 # A latent that moves no chunk by a micrometre changes nothing.
 SMALLEST_SPREAD_M = 1e-6
 SHARED_NOISE: NoiseName = ("latent",)
-
-
-@dataclass(frozen=True)
-class Dependence:
-    """How far deviations depend on observations.
-
-    Attributes:
-        situations: Situations compared.
-        spread_m: Root mean square deviation of a sample's path from the situation's mean path.
-        condition_share: Share of that spread (its square) that differs between situations.
-        distance_correlation: Of observations and deviations, 0 to 1, not corrected for chance.
-        exceeding: Permutations with at least the measured statistic.
-        permutations: Permutations drawn.
-    """
-
-    situations: int
-    spread_m: float
-    condition_share: float
-    distance_correlation: float
-    exceeding: int
-    permutations: int
 
 
 def latent_dependence(
@@ -119,11 +97,6 @@ def dependence(
         exceeding=exceeding,
         permutations=permutations,
     )
-
-
-def as_row(found: Dependence, *, method: str, convention: str, seed: int) -> dict[str, object]:
-    """One entry of `latent.json`."""
-    return {"method": method, "convention": convention, "seed": seed, **asdict(found)}
 
 
 def _distances(rows: Array) -> Array:

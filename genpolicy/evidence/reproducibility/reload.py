@@ -1,9 +1,8 @@
 """Gate B's evidence: does a checkpoint come back the same, and what does fewer NFE cost?"""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.data.dataset import load_dataset
 from genpolicy.errors import ContractError
 from genpolicy.evidence.admission_context import make_checker
+from genpolicy.evidence.documents.reproducibility import CANDIDATES, CandidateIdentity
 from genpolicy.evidence.need.held_out import HeldOut, held_out_situations, modes_of_policy
 from genpolicy.evidence.need.offline import offline_rows
 from genpolicy.evidence.reproducibility.measure import in_fresh_process
@@ -19,12 +19,11 @@ from genpolicy.evidence.rows.need import ModeRow, OfflineRow
 from genpolicy.evidence.rows.reproducibility import CoverageRow, NfeRow, SampleRow
 from genpolicy.feasibility.admission import FeasibilityChecker
 from genpolicy.feasibility.settings import FeasibilitySettings
-from genpolicy.integrity.atomic import write_bytes
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_bytes, sha256_file
 from genpolicy.integrity.rows import read_rows, write_rows
 from genpolicy.policies.checkpoint import CONFIG_FILE
-from genpolicy.policies.evaluations import expected_evaluations
+from genpolicy.policies.evaluations import allowed_evaluations
 from genpolicy.policies.fixtures import FixtureRow, compare_fixtures, reload_fixture
 from genpolicy.policies.policy import NetworkPolicy, load_policy
 from genpolicy.policies.validation_row import EARLIER_FOLDER
@@ -102,8 +101,12 @@ def write_reload(
         before = [r for r in written if (r.method, r.seed) == (candidate.name, candidate.seed)]
         policy = candidate.load()
         entry = identity[candidate.name]
-        entry["metadata_mismatches"] += _reloaded(plan, candidate, before, rows)
-        entry["nonfinite_weights"] += nonfinite_weights(policy)
+        identity[candidate.name] = replace(
+            entry,
+            metadata_mismatches=entry.metadata_mismatches
+            + _reloaded(plan, candidate, before, rows),
+            nonfinite_weights=entry.nonfinite_weights + nonfinite_weights(policy),
+        )
         rows.offline += offline_rows(policy, data, seed=candidate.seed, horizons=plan.horizons)
         own, swept = _sweep(plan, policy, held_out, candidate.seed, task=task, checker=checker)
         rows.modes += own
@@ -118,7 +121,7 @@ def write_reload(
         )
         rows.coverage += swept
     rows.write(folder)
-    write_bytes(folder / "identity.json", canonical_json(identity))
+    CANDIDATES.write(folder, identity)
 
 
 def nonfinite_weights(policy: NetworkPolicy) -> int:
@@ -151,9 +154,18 @@ def _reloaded(
     rows.samples += [
         SampleRow(candidate.name, candidate.seed, **asdict(fixture)) for fixture in compared
     ]
-    expected = expected_evaluations(candidate.load().sampler)
-    nfe = (before[0].nfe, after[0].nfe, expected)
-    rows.nfe.append(NfeRow(candidate.name, candidate.seed, *nfe))
+    allowed, counted = allowed_evaluations(candidate.load().sampler), after[0].nfe
+    rows.nfe.append(
+        NfeRow(
+            method=candidate.name,
+            seed=candidate.seed,
+            recorded=before[0].nfe,
+            counted=counted,
+            expected=allowed.nearest(counted),
+            least=allowed.least,
+            most=allowed.most,
+        )
+    )
     return differing
 
 
@@ -196,7 +208,7 @@ def coverage_row(found: Sequence[ModeRow], *, steps: int) -> CoverageRow:
         method=found[0].method,
         seed=found[0].seed,
         steps=steps,
-        nfe=found[0].nfe,
+        nfe=max(row.nfe for row in found),
         situations=len(found),
         modes_covered_share=whole / len(found),
         coverage_lower=clopper_pearson(whole, len(found))[0],
@@ -206,22 +218,22 @@ def coverage_row(found: Sequence[ModeRow], *, steps: int) -> CoverageRow:
     )
 
 
-def _identities(candidates: Sequence[JudgedPolicy]) -> dict[str, dict[str, Any]]:
-    """Everything that pins a candidate, by hash; the first seed is the one that is promoted."""
+def _identities(candidates: Sequence[JudgedPolicy]) -> dict[str, CandidateIdentity]:
+    """What pins each candidate; nothing is counted yet."""
     result = {}
     for name in dict.fromkeys(candidate.name for candidate in candidates):
         own = [candidate for candidate in candidates if candidate.name == name]
         policies = [candidate.load() for candidate in own]
         first = policies[0].checkpoint.config
-        result[name] = {
-            "checkpoint": own[0].sha256,
-            "checkpoints": [candidate.sha256 for candidate in own],
-            "config": [sha256_file(candidate.folder / CONFIG_FILE) for candidate in own],
-            "dataset": first.provenance.dataset_manifest_sha256,
-            "normalisation": sha256_bytes(canonical_json(first.normalisation.model_dump())),
-            "seed": [policy.checkpoint.config.training_seed for policy in policies],
-            "sampler": policies[0].sampler_config_hash,
-            "metadata_mismatches": 0,
-            "nonfinite_weights": 0,
-        }
+        result[name] = CandidateIdentity(
+            checkpoint=own[0].sha256,
+            checkpoints=[candidate.sha256 for candidate in own],
+            config=[sha256_file(candidate.folder / CONFIG_FILE) for candidate in own],
+            dataset=first.provenance.dataset_manifest_sha256,
+            normalisation=sha256_bytes(canonical_json(first.normalisation.model_dump())),
+            seed=[policy.checkpoint.config.training_seed for policy in policies],
+            sampler=policies[0].sampler_config_hash,
+            metadata_mismatches=0,
+            nonfinite_weights=0,
+        )
     return result

@@ -33,7 +33,10 @@ class NfeRow:
         seed: Number of its training seed.
         recorded: As written at training.
         counted: As counted at the network after reload.
-        expected: By the definition of its sampler, for its steps.
+        expected: By the definition of its sampler, for its steps; where that allows several
+            counts, the one nearest to the counted.
+        least: The smallest count that the definition allows.
+        most: The largest; above the smallest only where a solver chooses its steps by itself.
     """
 
     method: str
@@ -41,6 +44,8 @@ class NfeRow:
     recorded: int
     counted: int
     expected: int
+    least: int
+    most: int
 
 
 @dataclass(frozen=True)
@@ -51,7 +56,7 @@ class CoverageRow:
         method: The candidate.
         seed: Number of its training seed.
         steps: Sampler steps.
-        nfe: Network evaluations of one invocation, counted.
+        nfe: Network evaluations of one invocation, counted; the most of any situation.
         situations: Held-out situations.
         modes_covered_share: Share of them of which every mode is reached.
         coverage_lower: Lower end of its interval (Clopper-Pearson).

@@ -1,8 +1,8 @@
 """Checks of the six layers, each left out once: does its corruption show that?"""
 
 from collections.abc import Sequence
-from typing import Any
 
+from genpolicy.evidence.documents.shadow import LayerMutant
 from genpolicy.evidence.shadow.case import Case, decide
 from genpolicy.evidence.shadow.corruption import CORRUPTIONS, Corruption
 from genpolicy.evidence.shadow.observations import Observation
@@ -14,7 +14,7 @@ from genpolicy.feasibility.checks import CHECKS, Check
 
 def missing_checks_evidence(
     shadow: Shadow, observations: Sequence[Observation], *, checks: tuple[Check, ...] = CHECKS
-) -> list[dict[str, Any]]:
+) -> list[LayerMutant]:
     """For each check: is its fixture refused with it, for its reason, and admitted without it?
 
     Args:
@@ -23,10 +23,7 @@ def missing_checks_evidence(
         checks: The table that a mutant is made of; another one is for the tests.
 
     Returns:
-        Rows of `mutants.json`, one per fixture of a check: `check`, `layer`, `fixture`, `behind`
-        (checks that are left out on both sides), `detected`, `tried` and `violations` (how many
-        cases were broken, and how many showed it), and `not_applicable`, which says why a task
-        has no such fixture and is empty otherwise.
+        Rows of `mutants.json`, one per fixture of a check.
     """
     good = [
         case
@@ -41,7 +38,7 @@ def missing_checks_evidence(
 
 def _row(
     shadow: Shadow, corruption: Corruption, good: Sequence[Case], checks: tuple[Check, ...]
-) -> dict[str, Any]:
+) -> LayerMutant:
     reason = corruption.applicable(shadow.checker.cell, shadow.task.obstacles)
     tried = noticed = 0
     if not reason:
@@ -49,16 +46,16 @@ def _row(
         cases = [case for case in broken if case is not None]
         tried = len(cases)
         noticed = _noticed(shadow, corruption, cases, checks)
-    return {
-        "check": corruption.check,
-        "layer": corruption.layer,
-        "fixture": corruption.name,
-        "behind": list(corruption.behind),
-        "detected": noticed > 0,
-        "tried": tried,
-        "violations": noticed,
-        "not_applicable": reason,
-    }
+    return LayerMutant(
+        check=corruption.check,
+        layer=corruption.layer,
+        fixture=corruption.name,
+        behind=list(corruption.behind),
+        detected=noticed > 0,
+        tried=tried,
+        violations=noticed,
+        not_applicable=reason,
+    )
 
 
 def _noticed(

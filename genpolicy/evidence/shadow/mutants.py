@@ -11,6 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, cast
 
+from genpolicy.evidence.documents.shadow import EXECUTION, ExecutionMutant
 from genpolicy.evidence.shadow.rig import IMITATED, Rig, passing_verdict
 from genpolicy.execution.checks import CHECKS, Checks, without
 from genpolicy.execution.journal import write_journal
@@ -22,26 +23,26 @@ Scenario = Callable[[Rig], None]
 DECLARATION = "settings.checks"
 
 
-def run_mutants() -> list[dict[str, Any]]:
+def run_mutants() -> list[ExecutionMutant]:
     """Play every scenario with and without its check.
 
     Returns:
-        One entry per row of `CHECKS`: `check`, `detected` (the mutant was found and the unchanged
-        executor was clean), `violations` (count of the mutant's), `rules` (which broke), and
-        `violations_unchanged` (of the unchanged executor).
+        One per row of `CHECKS`.
     """
     results = []
     for check in CHECKS:
         table = IMITATED if check in IMITATED else CHECKS
         unchanged = play(check.name, table)
         mutant = play(check.name, without(table, check.name))
-        results.append({
-            "check": check.name,
-            "detected": bool(mutant) and not unchanged,
-            "violations": len(mutant),
-            "rules": sorted({violation.rule for violation in mutant}),
-            "violations_unchanged": len(unchanged),
-        })  # fmt: skip
+        found = ExecutionMutant(
+            check=check.name,
+            layer=EXECUTION,
+            detected=bool(mutant) and not unchanged,
+            violations=len(mutant),
+            rules=sorted({violation.rule for violation in mutant}),
+            violations_unchanged=len(unchanged),
+        )
+        results.append(found)
     return results
 
 

@@ -4,6 +4,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from genpolicy.evidence.documents.shadow import (
+    CHECKER,
+    MUTANTS,
+    Checked,
+    JournalViolation,
+    LayerMutant,
+    Mutant,
+)
 from genpolicy.evidence.rows.shadow import CandidateRow, ShadowCountRow, ShadowStubRow
 from genpolicy.evidence.shadow.mutants import run_mutants
 from genpolicy.evidence.shadow.shadow import ShadowEvidence
@@ -12,16 +20,15 @@ from genpolicy.execution.journal import write_journal
 from genpolicy.execution.ledger import Account
 from genpolicy.feasibility.cell import Cell as FeasibilityCell
 from genpolicy.feasibility.figures import expected_motion
-from genpolicy.integrity.atomic import write_bytes
-from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.rows import write_rows
 from genpolicy.verification.checker import ExpectedSettings, check_journal
+from genpolicy.verification.report import JournalReport
 
 
 def write_shadow(
     folder: Path,
     found: Sequence[ShadowEvidence],
-    mutants: list[dict[str, Any]],
+    mutants: list[LayerMutant],
     *,
     cell: Cell,
     robot: FeasibilityCell,
@@ -48,17 +55,16 @@ def write_shadow(
     write_rows(folder / "counts.parquet", ShadowCountRow, counts)
     journal = folder / "journal.mcap"
     write_journal(journal, [session for item in found for session in item.sessions])
-    checked = checker_document([journal], cell=cell, robot=robot)
-    write_bytes(folder / "checker.json", canonical_json(checked))
-    write_bytes(folder / "mutants.json", canonical_json(all_mutants(mutants)))
+    CHECKER.write(folder, checker_document([journal], cell=cell, robot=robot))
+    MUTANTS.write(folder, all_mutants(mutants))
 
 
-def all_mutants(layers: list[dict[str, Any]]) -> list[dict[str, Any]]:
+def all_mutants(layers: list[LayerMutant]) -> list[Mutant]:
     """Content of `mutants.json`: checks of the six layers, then those of the execution.
 
     The executor's checks are owned by freshness and hand-over, layer six and beyond.
     """
-    return [*layers, *({**row, "layer": "execution"} for row in run_mutants())]
+    return [*layers, *run_mutants()]
 
 
 def account_rows(accounts: Sequence[Account]) -> list[dict[str, Any]]:
@@ -76,9 +82,7 @@ def account_rows(accounts: Sequence[Account]) -> list[dict[str, Any]]:
     return [{**totals, "reason": reason, "count": count} for reason, count in reasons]
 
 
-def checker_document(
-    journals: Sequence[Path], *, cell: Cell, robot: FeasibilityCell
-) -> dict[str, Any]:
+def checker_document(journals: Sequence[Path], *, cell: Cell, robot: FeasibilityCell) -> Checked:
     """What the independent checker says of journal files; content of `checker.json`.
 
     The settings that every session must have run under come from `params.yaml`, not from the
@@ -94,19 +98,27 @@ def checker_document(
         controller_mode=cell.controller_mode,
     )
     motion = expected_motion(robot)
-    documents = {
-        path.name: check_journal(path, expected, motion).as_document() for path in journals
-    }
-    return {
-        "violations": [
-            {"journal": name, **violation}
-            for name, document in documents.items()
-            for violation in document["violations"]
+    return checked(
+        {path.name: check_journal(path, expected, motion).as_document() for path in journals}
+    )
+
+
+def checked(journals: dict[str, JournalReport]) -> Checked:
+    """What was found in each journal, added up.
+
+    Args:
+        journals: By name of the file.
+    """
+    return Checked(
+        violations=[
+            JournalViolation(**vars(violation), journal=name)
+            for name, report in journals.items()
+            for violation in report.violations
         ],
-        "checked_actions": sum(item["checked_actions"] for item in documents.values()),
-        "reproved_actions": sum(item["reproved_actions"] for item in documents.values()),
-        "journals": documents,
-    }
+        checked_actions=sum(report.checked_actions for report in journals.values()),
+        reproved_actions=sum(report.reproved_actions for report in journals.values()),
+        journals=journals,
+    )
 
 
 def _stub_rows(evidence: ShadowEvidence) -> list[ShadowStubRow]:

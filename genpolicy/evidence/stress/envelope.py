@@ -7,18 +7,15 @@ the card's numbers as limits of feasibility. They may only be tighter than those
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 from genpolicy.errors import ConfigError
 from genpolicy.evidence.admission_context import make_checker
+from genpolicy.evidence.documents.stress import Envelope
 from genpolicy.evidence.stress.perturbations import Perturbation, ReducedEnvelope
 from genpolicy.feasibility.admission import FeasibilityChecker
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.tasks.api import Task
 from genpolicy.verification.commands import Reach
-
-ENVELOPE_FILE = "envelope.json"
-"""Beside the tables of the comparison; missing where no condition is of this kind."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +82,7 @@ def require_tighter(envelope: ReducedEnvelope, task: Task, settings: Feasibility
 
 def envelope_document(
     name: str, envelope: ReducedEnvelope, reached: Mapping[str, Reach]
-) -> dict[str, Any]:
+) -> Envelope:
     """Content of `envelope.json`: the limits, and how far the commands of each method went.
 
     Args:
@@ -93,13 +90,13 @@ def envelope_document(
         envelope: Its limits.
         reached: By method, from its journal.
     """
-    return {
-        "condition": name,
-        "workspace_lower_m": list(envelope.workspace_lower_m),
-        "workspace_upper_m": list(envelope.workspace_upper_m),
-        "speed_limit_m_s": envelope.speed_limit_m_s,
-        "reached": {method: reach.as_document() for method, reach in sorted(reached.items())},
-    }
+    return Envelope(
+        condition=name,
+        workspace_lower_m=envelope.workspace_lower_m,
+        workspace_upper_m=envelope.workspace_upper_m,
+        speed_limit_m_s=envelope.speed_limit_m_s,
+        reached={method: reach.as_document() for method, reach in sorted(reached.items())},
+    )
 
 
 def _refuse(name: str, found: object, expected: str) -> None:

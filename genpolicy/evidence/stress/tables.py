@@ -1,16 +1,16 @@
 """Gate D's evidence: the matched comparison as tables, journals, checker and power."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from itertools import product
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from genpolicy.candidates.judged import JudgedPolicy
 from genpolicy.compute import map_shards
 from genpolicy.errors import ConfigError
+from genpolicy.evidence.documents.shadow import CHECKER
+from genpolicy.evidence.documents.stress import ENVELOPE, Power
 from genpolicy.evidence.rows.stress import (
     AgeRow,
     ConservationRow,
@@ -20,14 +20,12 @@ from genpolicy.evidence.rows.stress import (
     StressStubRow,
 )
 from genpolicy.evidence.shadow.tables import account_rows, checker_document
-from genpolicy.evidence.stress.envelope import ENVELOPE_FILE, envelope_document, require_tighter
+from genpolicy.evidence.stress.envelope import envelope_document, require_tighter
 from genpolicy.evidence.stress.latency import LatencyModel
 from genpolicy.evidence.stress.matched import Comparison, Shard, ShardResult, run_shard
 from genpolicy.evidence.stress.perturbations import Perturbation, ReducedEnvelope
 from genpolicy.evidence.stress.settings import StressSettings
 from genpolicy.feasibility.cell import cell_of
-from genpolicy.integrity.atomic import write_bytes
-from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.rows import write_rows
 from genpolicy.seeds import stream
 from genpolicy.statistics.eprocess import power_table
@@ -35,7 +33,6 @@ from genpolicy.tasks.api import load_task
 from genpolicy.verification.commands import reach_of
 
 AGE_LEVELS = (0.0, 0.05, 0.25, 0.5, 0.75, 0.9, 0.95, 0.99, 1.0)
-POWER_FILE = "power.json"
 POWER_CORRELATION = 0.3
 POWER_TRIALS = 4000
 
@@ -86,8 +83,7 @@ def write_stress(folder: Path, shards: Sequence[Shard], *, workers: int, schedul
         comparison.feasibility,
         action_period_s=comparison.cell.horizons.action_period_s,
     )
-    checked = checker_document(journals, cell=comparison.cell, robot=robot)
-    write_bytes(folder / "checker.json", canonical_json(checked))
+    CHECKER.write(folder, checker_document(journals, cell=comparison.cell, robot=robot))
     _write_envelope(folder, shards)
 
 
@@ -99,8 +95,7 @@ def _write_envelope(folder: Path, shards: Sequence[Shard]) -> None:
     reached = {shard.judged.name: reach_of(shard.journal) for shard in inside}
     first = inside[0]
     assert isinstance(first.schedule, ReducedEnvelope)
-    document = envelope_document(first.perturbation, first.schedule, reached)
-    write_bytes(folder / ENVELOPE_FILE, canonical_json(document))
+    ENVELOPE.write(folder, envelope_document(first.perturbation, first.schedule, reached))
 
 
 def plan_shards(
@@ -148,7 +143,7 @@ def plan_shards(
     ]
 
 
-def power_document(settings: StressSettings, *, candidates: int, root_seed: int) -> dict[str, Any]:
+def power_document(settings: StressSettings, *, candidates: int, root_seed: int) -> Power:
     """Which verdicts the pre-registered test can reach; content of `power.json`.
 
     Args:
@@ -166,12 +161,7 @@ def power_document(settings: StressSettings, *, candidates: int, root_seed: int)
         trials=POWER_TRIALS,
         rng=stream(root_seed, "stress", "power"),
     )
-    return {
-        "margin": settings.margin,
-        "alpha": alpha,
-        "pairs": settings.starts,
-        "rows": [{key: _finite(value) for key, value in asdict(row).items()} for row in rows],
-    }
+    return Power(margin=settings.margin, alpha=alpha, pairs=settings.starts, rows=rows)
 
 
 def power_worlds(settings: StressSettings) -> list[tuple[float, float]]:
@@ -202,7 +192,3 @@ def _age_rows(shard: Shard, result: ShardResult) -> list[AgeRow]:
         )
         for level in AGE_LEVELS
     ]
-
-
-def _finite(value: Any) -> Any:
-    return None if isinstance(value, float) and not np.isfinite(value) else value

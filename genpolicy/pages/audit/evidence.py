@@ -8,6 +8,7 @@ from typing import Any
 
 import pandas as pd
 
+from genpolicy.audit.documents import PERSISTENCE, SUMMARY, Persistence, Summary
 from genpolicy.audit.reach_rows import FURTHER_TABLES
 from genpolicy.audit.rows import TABLES
 from genpolicy.integrity.documents import read_json
@@ -30,9 +31,9 @@ class AuditEvidence:
     """
 
     tables: Mapping[str, pd.DataFrame]
-    summary: Mapping[str, Any]
+    summary: Summary
     settings: Mapping[str, Any]
-    persistence: Mapping[str, Any]
+    persistence: Persistence
     digests: Mapping[str, str]
     origins: Mapping[str, str] = field(default_factory=dict)
     coverage: float = math.nan
@@ -40,32 +41,23 @@ class AuditEvidence:
     def __getitem__(self, name: str) -> pd.DataFrame:
         return self.tables[name]
 
-    @property
-    def primary_phase(self) -> str:
-        """The phase with most situations of several modes; empty where there is none."""
-        counts: Mapping[str, int] = self.summary["two_mode_by_phase"]
-        return max(sorted(counts), key=lambda phase: counts[phase], default="")
-
 
 def read_evidence(folder: Path) -> AuditEvidence:
     """Read what `genpolicy.audit.evidence.write_evidence` wrote.
 
     Raises:
         BadInputError: A file is missing or damaged.
-        IntegrityError: A table with unknown or missing columns.
+        IntegrityError: A table with unknown or missing columns, or a document with other keys.
     """
     tables = {
         name: read_columns(folder / f"{name}.parquet", row).to_pandas()
         for name, row in (TABLES | FURTHER_TABLES).items()
     }
-    documents = {
-        name: read_json(folder / f"{name}.json") for name in ("summary", "settings", "persistence")
-    }
     files = sorted(path for path in folder.iterdir() if path.is_file())
     return AuditEvidence(
         tables=tables,
-        summary=documents["summary"],
-        settings=documents["settings"],
-        persistence=documents["persistence"],
+        summary=SUMMARY.read(folder),
+        settings=read_json(folder / "settings.json"),
+        persistence=PERSISTENCE.read(folder),
         digests={path.name: sha256_file(path) for path in files},
     )

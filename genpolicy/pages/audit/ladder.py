@@ -95,7 +95,7 @@ def _judged(item: Mapping[str, Any]) -> Check:
 
 def _data(evidence: AuditEvidence) -> list[Check]:
     summary = evidence.summary
-    unit = str(summary["position_unit"])
+    unit = summary.position_unit
     checks = [Check("deviations beyond the noise", float(len(evidence["findings"])))]
     offset = _largest(evidence["clocks"], "offset_before_s")
     if offset is None:
@@ -113,10 +113,10 @@ def _data(evidence: AuditEvidence) -> list[Check]:
         checks.append(Check(what, value, unit=unit, note=place))
     return [
         *checks,
-        Check("rows that follow a gap in time", float(summary["gaps"])),
+        Check("rows that follow a gap in time", float(summary.gaps)),
         Check(
             "median start position, training against held-out",
-            float(summary["start_drift"]),
+            summary.start_drift,
             unit=unit,
         ),
     ]
@@ -145,7 +145,7 @@ def _support(evidence: AuditEvidence) -> list[Check]:
 
 
 def _structure(evidence: AuditEvidence) -> list[Check]:
-    ratio = float(evidence.summary["counts"]["noise_ratio"])
+    ratio = evidence.summary.counts.noise_ratio
     note = "1 white noise, 0 smooth"
     return [Check("spread that is noise from action to action", ratio, note=note)]
 
@@ -161,9 +161,9 @@ def _hidden(evidence: AuditEvidence) -> list[Check]:
 
 def _validity(evidence: AuditEvidence) -> list[Check]:
     summary = evidence.summary
-    total = int(summary["mean_checked"])
-    share = int(summary["mean_defeated"]) / total if total else None
-    why = f"{summary['mean_defeated']} of {total} situations" if total else "no feasibility check"
+    total = summary.mean_checked
+    share = summary.mean_defeated / total if total else None
+    why = f"{summary.mean_defeated} of {total} situations" if total else "no feasibility check"
     return [Check("situations whose mean is refused where all modes pass", share, note=why)]
 
 

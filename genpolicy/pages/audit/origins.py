@@ -36,7 +36,7 @@ def origins_shown(
         origins: Of all episodes.
     """
     replay = evidence["replay"]
-    shown = _identifiers(document) | _identifiers(evidence.summary)
+    shown = _identifiers(document) | _identifiers(evidence.summary.notes)
     shown |= set(evidence["examples"]["query_uuid"])
     shown |= set(replay.loc[replay["label"] != replay["replayed"], "episode_uuid"])
     return {uuid: origins[uuid] for uuid in sorted(shown & set(origins))}

@@ -13,6 +13,7 @@ import pandas as pd
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
+from genpolicy.audit.documents import Summary
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_bytes
 from genpolicy.pages.audit.evidence import AuditEvidence
@@ -46,7 +47,8 @@ def audit_page(document: Mapping[str, Any], evidence: AuditEvidence, *, name: st
     own, _, _ = PackageLoader("genpolicy.pages.audit").get_source(environment, "audit.css")
     cause, limits = str(document["verdict"]), _limits(document["limits"])
     origins = document.get("episodes", {})
-    said, summary = named(document, origins), named(evidence.summary, origins)
+    said = named(document, origins)
+    summary = replace(evidence.summary, notes=named(evidence.summary.notes, origins))
     evidence = replace(
         evidence, summary=summary, origins=origins, coverage=float(document["coverage"])
     )
@@ -151,9 +153,9 @@ def _named(document: Mapping[str, Any]) -> str:
     return ", ".join(dict.fromkeys(part for part in parts if part))
 
 
-def _phases(summary: Mapping[str, Any]) -> str:
+def _phases(summary: Summary) -> str:
     """What looking at the phase does to the modes, a sentence; empty where nothing is to say."""
-    inside, across = summary["modes_with_phase"], summary["modes_without_phase"]
+    inside, across = summary.modes_with_phase, summary.modes_without_phase
     if inside == across:
         return ""
     return (

@@ -48,9 +48,9 @@ def _clusters(evidence: AuditEvidence, limits: Limits) -> Figure:
     summary, examples = evidence.summary, evidence["examples"]
     figure = situations.clusters(
         examples,
-        names=summary["position_names"],
-        unit=summary["position_unit"],
-        obstacles=summary["obstacles"],
+        names=summary.position_names,
+        unit=summary.position_unit,
+        obstacles=summary.obstacles,
     )
     for axes in figure.axes:
         title = axes.get_title("left")  # the place of titles in the figures' style
@@ -73,9 +73,9 @@ def _overlay(evidence: AuditEvidence, limits: Limits) -> Figure:
     frame, summary = evidence["neighbourhoods"], evidence.summary
     return situations.mean_versus_modes(
         frame[frame["two_mode"].astype(bool)],
-        names=summary["position_names"],
-        unit=summary["position_unit"],
-        obstacles=summary["obstacles"],
+        names=summary.position_names,
+        unit=summary.position_unit,
+        obstacles=summary.obstacles,
     )
 
 
@@ -95,8 +95,8 @@ def _realignment(evidence: AuditEvidence, limits: Limits) -> Figure:
     return checks.realignment(
         evidence["alignment"],
         limit_s=limits["clock_residual_s"],
-        modes_before=summary["modes_before_realignment"],
-        modes_after=summary["modes_after_realignment"],
+        modes_before=summary.modes_before_realignment,
+        modes_after=summary.modes_after_realignment,
     )
 
 
@@ -108,8 +108,8 @@ def _support(evidence: AuditEvidence, limits: Limits) -> Figure:
     summary = evidence.summary
     return checks.support_map(
         evidence["support"],
-        names=summary["position_names"],
-        unit=summary["position_unit"],
+        names=summary.position_names,
+        unit=summary.position_unit,
         limit=limits["supported_share"],
     )
 

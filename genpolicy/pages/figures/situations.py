@@ -1,6 +1,6 @@
 """Figures of single situations: nearest observations and their actions, the mean and the modes."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import chain
 
 import numpy as np
@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
+from genpolicy.audit.documents import Obstacle
 from genpolicy.pages.figures.drawing import BLUE, GREEN, INK, ORANGE, PURPLE, RED, SKY, new_figure
 from genpolicy.pages.figures.plane import Array, Plane, plane_of
 
@@ -18,7 +19,7 @@ MARKS = ("o", "s", "^", "D")
 STONE = "#C3C8D0"
 REFUSED, PASSED, UNCHECKED = "refused", "admissible", "not checked"
 MEANS = {REFUSED: RED, PASSED: GREEN, UNCHECKED: INK}
-Obstacles = Sequence[Mapping[str, float]]
+Obstacles = Sequence[Obstacle]
 
 
 class NothingToDrawError(ValueError):
@@ -30,8 +31,8 @@ def draw_obstacles(axes: Axes, obstacles: Obstacles) -> None:
     for index, item in enumerate(obstacles):
         axes.add_patch(
             Circle(
-                (float(item["x_m"]), float(item["y_m"])),
-                float(item["radius_m"]),
+                (item.x_m, item.y_m),
+                item.radius_m,
                 facecolor=STONE,
                 edgecolor=INK,
                 zorder=1,

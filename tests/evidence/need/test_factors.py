@@ -6,8 +6,9 @@ import pytest
 
 from genpolicy.candidates.judged import trained
 from genpolicy.errors import ConfigError
+from genpolicy.evidence.documents.given import VARIANTS as VARIANTS_READ
 from genpolicy.evidence.need.factors import FactorPlan, write_factors
-from genpolicy.integrity.documents import read_json
+from genpolicy.integrity.documents import canonical_json, read_json
 from genpolicy.policies.matched_training import TrainingPlan
 from genpolicy.policies.settings import SamplerConfig
 from genpolicy.policies.variants import Variant, train_variants
@@ -67,7 +68,9 @@ def frame(folder, name):
 
 def test_each_variant_changes_only_its_factor(measured):
     found = read_json(measured / "variants.json")
-    assert found["reference"] == "reference"
+    read = VARIANTS_READ.read(measured)  # as gates read it, to the byte
+    assert canonical_json(VARIANTS_READ.plain(read)) == canonical_json(found)
+    assert found["reference"] == read.reference == "reference"
     for name, item in found["variants"].items():
         assert set(item["changed"]) <= set(item["allowed"]), name
         assert bool(item["changed"]) == (name != "reference")

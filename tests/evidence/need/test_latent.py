@@ -3,8 +3,11 @@
 import numpy as np
 import pytest
 
+from genpolicy.evidence.documents.need import LATENT
+from genpolicy.evidence.need.baselines import BaselinePlan, LatentTest, latent_rows
 from genpolicy.evidence.need.held_out import held_out_situations
 from genpolicy.evidence.need.latent import dependence, latent_dependence
+from genpolicy.integrity.documents import canonical_json
 
 LATENTS, STEPS = 8, 4
 
@@ -86,3 +89,23 @@ def test_a_trained_policy_is_asked_with_shared_latents(data, kit, tmp_path, poli
     )
     assert one == two
     assert one.situations == 6 and one.spread_m > 0.0
+
+
+def test_a_tested_latent_is_a_row_of_its_document(dataset, data, kit, tmp_path, policy):
+    names = kit.uuids(data)
+    audit = kit.write_situations(tmp_path / "audit", [(names[i], 4, {}) for i in range(6)])
+    test = LatentTest(method="flow", convention="drawn", permutations=19)
+    plan = BaselinePlan(
+        task="tabletop_insertion", dataset=dataset, audit=audit, horizons=kit.HORIZONS,
+        feasibility=kit.FEASIBILITY, conventions={"flow": {"drawn": policy.sampler}}, samples=4,
+        latent=test, root_seed=5,
+    )  # fmt: skip
+    held = held_out_situations(audit, data, horizons=kit.HORIZONS)
+    rows = latent_rows(plan, policy, held, seed=3)
+    LATENT.write(tmp_path, rows)
+    assert LATENT.read(tmp_path) == rows
+    (row,) = rows
+    assert (row.method, row.convention, row.seed, row.permutations) == ("flow", "drawn", 3, 19)
+    assert (tmp_path / "latent.json").read_bytes() == canonical_json([vars(row)])
+    other = plan.__class__(**{**vars(plan), "latent": None})
+    assert latent_rows(other, policy, held, seed=3) == []

@@ -4,11 +4,11 @@ import pytest
 
 from genpolicy.candidates.judged import trained
 from genpolicy.errors import ContractError
+from genpolicy.evidence.documents.reproducibility import CANDIDATES
 from genpolicy.evidence.reproducibility import reload
 from genpolicy.evidence.reproducibility.reload import ReloadPlan, coverage_row, write_reload
 from genpolicy.evidence.rows.need import ModeRow, OfflineRow
 from genpolicy.evidence.rows.reproducibility import CoverageRow, NfeRow, SampleRow
-from genpolicy.integrity.documents import read_json
 from genpolicy.integrity.rows import read_rows, write_rows
 from genpolicy.policies import methods
 from genpolicy.policies.fixtures import FixtureRow, fixture_observations, fixture_rows
@@ -36,10 +36,10 @@ def test_what_comes_back_is_equal_and_pinned(reloaded):
     _, (flow,), folder = reloaded
     samples = read_rows(folder / "samples.parquet", SampleRow)
     assert len(samples) == 3 and {row.max_abs_difference for row in samples} == {0.0}
-    assert read_rows(folder / "nfe.parquet", NfeRow) == [NfeRow("flow", 0, 2, 2, 2)]
-    identity = read_json(folder / "identity.json")["flow"]
-    assert identity["checkpoint"] == flow.sha256
-    assert identity["metadata_mismatches"] == identity["nonfinite_weights"] == 0
+    assert read_rows(folder / "nfe.parquet", NfeRow) == [NfeRow("flow", 0, 2, 2, 2, 2, 2)]
+    identity = CANDIDATES.read(folder)["flow"]
+    assert identity.checkpoint == flow.sha256 and identity.checkpoints == [flow.sha256]
+    assert identity.metadata_mismatches == identity.nonfinite_weights == 0
 
 
 def test_modes_of_the_chosen_steps_are_those_of_the_sweep(reloaded):
@@ -76,7 +76,7 @@ def test_a_solver_that_evaluates_once_too_often_is_not_what_it_says(
     write_rows(tmp_path / "fixtures.parquet", FixtureRow, rows)
     plan, candidates, _ = reloaded
     write_reload(plan, candidates, tmp_path / "fixtures.parquet", tmp_path)
-    assert read_rows(tmp_path / "nfe.parquet", NfeRow) == [NfeRow("flow", 0, 3, 3, 2)]
+    assert read_rows(tmp_path / "nfe.parquet", NfeRow) == [NfeRow("flow", 0, 3, 3, 2, 2, 2)]
 
 
 def test_a_candidate_without_fixtures_is_refused(reloaded, tmp_path):

@@ -36,10 +36,10 @@ def blinded(name):
 
 
 def test_every_row_of_the_table_has_a_row_and_is_noticed(rows):
-    assert [(row["layer"], row["check"]) for row in rows] == [(c.layer, c.name) for c in CHECKS]
-    assert [row["check"] for row in rows if not row["detected"]] == []
-    assert all(0 < row["violations"] == row["tried"] for row in rows)
-    assert not any(row["not_applicable"] for row in rows)
+    assert [(row.layer, row.check) for row in rows] == [(c.layer, c.name) for c in CHECKS]
+    assert [row.check for row in rows if not row.detected] == []
+    assert all(0 < row.violations == row.tried for row in rows)
+    assert not any(row.not_applicable for row in rows)
 
 
 def test_the_gate_asks_for_every_row_of_both_tables():
@@ -54,7 +54,7 @@ def test_a_row_that_is_gone_or_blind_is_not_claimed_to_be_noticed(name, shadow, 
     monkeypatch.setattr(layer_mutants, "CORRUPTIONS", own)
     for table in (without(CHECKS, name), blinded(name)):
         (row,) = missing_checks_evidence(shadow, few[-2:], checks=table)
-        assert row["check"] == name and not row["detected"]
+        assert row.check == name and not row.detected
 
 
 def test_what_is_not_asked_of_a_task_is_declared_and_not_tried(shadow, few, monkeypatch):
@@ -67,6 +67,6 @@ def test_what_is_not_asked_of_a_task_is_declared_and_not_tried(shadow, few, monk
     own = tuple(item for item in CORRUPTIONS if item.layer == "geometric")
     monkeypatch.setattr(layer_mutants, "CORRUPTIONS", own)
     rows = missing_checks_evidence(replace(shadow, task=Bare()), few[:1])
-    excused = {row["check"]: row for row in rows if row["not_applicable"]}
+    excused = {row.check: row for row in rows if row.not_applicable}
     assert set(excused) == {"scene_collision", "swept_collision"}
-    assert not any(row["detected"] or row["tried"] for row in excused.values())
+    assert not any(row.detected or row.tried for row in excused.values())

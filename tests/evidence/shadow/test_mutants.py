@@ -10,14 +10,14 @@ from genpolicy.verification.report import CheckReport
 def test_every_check_has_a_scenario_and_every_mutant_is_detected():
     results = run_mutants()
     names = [check.name for check in CHECKS]
-    assert [result["check"] for result in results] == names and set(SCENARIOS) == set(names)
+    assert [result.check for result in results] == names and set(SCENARIOS) == set(names)
     assert len(set(names)) == len(names)
-    assert [result["check"] for result in results if not result["detected"]] == []
-    assert all(result["violations_unchanged"] == 0 for result in results)
+    assert [result.check for result in results if not result.detected] == []
+    assert all(result.violations_unchanged == 0 for result in results)
 
 
 def test_the_rule_that_breaks_is_the_one_that_the_check_guards():
-    rules = {result["check"]: set(result["rules"]) for result in run_mutants()}
+    rules = {result.check: set(result.rules) for result in run_mutants()}
     assert "P1.age" in rules["stale_observation"]
     assert "P1.valid_until" in rules["expired"]
     assert "P1.window" in rules["window"]
@@ -61,4 +61,4 @@ def test_a_blind_checker_turns_the_evidence_red(monkeypatch):
     monkeypatch.setattr(
         "genpolicy.evidence.shadow.mutants.check_journal", lambda path: CheckReport()
     )
-    assert not any(result["detected"] for result in run_mutants())
+    assert not any(result.detected for result in run_mutants())

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from genpolicy.contract.chunk import DiscardReason
+from genpolicy.evidence.documents.shadow import CHECKER, MUTANTS, LayerMutant
 from genpolicy.evidence.shadow.observations import held_out_observations
 from genpolicy.evidence.shadow.shadow import HELD_OUT, Shadow, shadow_policy
 from genpolicy.evidence.shadow.tables import (
@@ -15,7 +16,6 @@ from genpolicy.evidence.shadow.tables import (
 )
 from genpolicy.execution.cell import Cell
 from genpolicy.execution.ledger import Account
-from genpolicy.integrity.documents import read_json
 from genpolicy.integrity.tables import read_table
 from genpolicy.seeds import stream
 
@@ -38,7 +38,12 @@ def written(task, checker, data, policy, kit, tmp_path_factory):
         method="operator", checkpoint_hash="w", sampler_config_hash="s", sample=demonstrated
     )
     found = [shadow_policy(shadow, item, seen, seed=0) for item in (operator, policy)]
-    mutants = [{"check": "expired", "layer": "fresh", "detected": True, "violations": 1}]
+    mutants = [
+        LayerMutant(
+            check="expired", layer="fresh", fixture="expired", behind=[], detected=True, tried=1,
+            violations=1, not_applicable="",
+        )
+    ]  # fmt: skip
     write_shadow(folder, found, mutants, cell=shadow.cell, robot=shadow.checker.cell)
     return folder
 
@@ -52,14 +57,14 @@ def test_all_files_are_there_and_agree(written):
         totals = part.iloc[0]
         ended = totals["executed"] + totals["queued"] + part["count"].sum()
         assert totals["generated"] == ended
-    checked = read_json(written / "checker.json")
-    assert checked["violations"] == []
-    assert checked["checked_actions"] == stub["arrivals"].sum() > 0
+    checked = CHECKER.read(written)
+    assert checked.violations == []
+    assert checked.checked_actions == stub["arrivals"].sum() > 0
     candidates = read_table(written / "candidates.parquet").to_pandas()
     assert (candidates["fixture"] == HELD_OUT).sum() == 2 * 5 * 2
-    mutants = read_json(written / "mutants.json")
-    assert mutants[0]["check"] == "expired"
-    assert all(row["layer"] == "execution" and row["detected"] for row in mutants[1:])
+    mutants = MUTANTS.read(written)
+    assert mutants[0].check == "expired"
+    assert all(row.layer == "execution" and row.detected for row in mutants[1:])
     assert len(mutants) > 10
 
 
@@ -73,9 +78,9 @@ def test_sessions_under_other_settings_are_flagged(written, kit, checker, name, 
     found = checker_document(
         [written / "journal.mcap"], cell=Cell(kit.HORIZONS, execution), robot=checker.cell
     )
-    rules = {violation["rule"] for violation in found["violations"]}
+    rules = {violation.rule for violation in found.violations}
     assert rules == {"settings.limits"}
-    assert all(violation["journal"] == "journal.mcap" for violation in found["violations"])
+    assert all(violation.journal == "journal.mcap" for violation in found.violations)
 
 
 def test_another_execution_horizon_is_flagged(written, kit, checker):
@@ -83,7 +88,7 @@ def test_another_execution_horizon_is_flagged(written, kit, checker):
     found = checker_document(
         [written / "journal.mcap"], cell=Cell(horizons, kit.EXECUTION), robot=checker.cell
     )
-    assert found["violations"]
+    assert found.violations
 
 
 def test_accounts_add_up_over_sessions():

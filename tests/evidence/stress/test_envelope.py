@@ -6,6 +6,7 @@ from genpolicy.errors import ConfigError
 from genpolicy.evidence.stress.envelope import checker_under, envelope_document, require_tighter
 from genpolicy.evidence.stress.perturbations import Nominal, ReducedEnvelope
 from genpolicy.verification.commands import Reach
+from genpolicy.verification.report import Reached
 
 INSIDE = ReducedEnvelope(
     workspace_lower_m=(0.33, -0.2, 0.03), workspace_upper_m=(0.7, 0.2, 0.22), speed_limit_m_s=0.25
@@ -49,7 +50,7 @@ def test_an_envelope_looser_than_the_cell_is_a_bad_setting(task, kit, change, te
 def test_the_document_names_limits_and_what_was_reached():
     reach = Reach(2, 0.2, (0.4, 0.0, 0.1), (0.5, 0.1, 0.2))
     document = envelope_document("envelope", INSIDE, {"flow": reach})
-    assert document["speed_limit_m_s"] == 0.25 and document["condition"] == "envelope"
-    assert document["reached"]["flow"]["fastest_m_s"] == 0.2
+    assert document.speed_limit_m_s == 0.25 and document.condition == "envelope"
+    assert document.reached["flow"].fastest_m_s == 0.2
     nothing = Reach(0, 0.0, (float("inf"),) * 3, (float("-inf"),) * 3).as_document()
-    assert nothing == {"commands": 0, "fastest_m_s": None, "lowest_m": None, "highest_m": None}
+    assert nothing == Reached(commands=0, fastest_m_s=None, lowest_m=None, highest_m=None)

@@ -5,6 +5,7 @@ import pytest
 
 from genpolicy.candidates.judged import JudgedPolicy
 from genpolicy.errors import ConfigError
+from genpolicy.evidence.documents.shadow import CHECKER
 from genpolicy.evidence.stress.latency import (
     DECLARED_TERMS,
     MEASURED_TERMS,
@@ -21,7 +22,6 @@ from genpolicy.evidence.stress.tables import (
     write_stress,
 )
 from genpolicy.execution.cell import Cell
-from genpolicy.integrity.documents import canonical_json, read_json
 from genpolicy.integrity.tables import read_table
 from genpolicy.verification import tables
 from genpolicy.verification.rollouts import differences
@@ -131,12 +131,12 @@ def test_every_table_follows_from_the_journals(written):
 
 
 def test_the_checker_has_read_every_journal(written):
-    checked = read_json(written / "checker.json")
+    checked = CHECKER.read(written)
     rows = read_table(written / "rollouts.parquet").to_pandas()
-    assert checked["violations"] == []
-    assert checked["checked_actions"] == rows["action_ticks"].sum()
-    assert sorted(checked["journals"]) == sorted(p.name for p in (written / "journals").iterdir())
-    assert sum(item["sessions"] for item in checked["journals"].values()) == len(rows)
+    assert checked.violations == []
+    assert checked.checked_actions == rows["action_ticks"].sum()
+    assert sorted(checked.journals) == sorted(p.name for p in (written / "journals").iterdir())
+    assert sum(item.sessions for item in checked.journals.values()) == len(rows)
 
 
 def test_ages_are_quantiles_of_all_rollouts(written):
@@ -155,15 +155,13 @@ def test_power_is_reproducible_and_grows_with_the_starts():
         power_document(settings(starts=10), candidates=1, root_seed=1),
         power_document(settings(starts=100), candidates=1, root_seed=1),
     )
-    assert canonical_json(few) == canonical_json(
-        power_document(settings(starts=10), candidates=1, root_seed=1)
-    )
-    assert (few["pairs"], many["pairs"], few["margin"]) == (10, 100, 0.05)
+    assert few == power_document(settings(starts=10), candidates=1, root_seed=1)
+    assert (few.pairs, many.pairs, few.margin) == (10, 100, 0.05)
 
     def promoted(document):
         return {
-            (row["baseline_success"], row["candidate_success"]): row["promote_share"]
-            for row in document["rows"]
+            (row.baseline_success, row.candidate_success): row.promote_share
+            for row in document.rows
         }
 
     assert promoted(many)[0.3, 0.9] > 0.95
@@ -180,8 +178,7 @@ def test_the_ladder_s_own_plan_finds_its_planned_effect(kit):
     candidates = len(kit.PARAMS["train_generators"]["samplers"])
     document = power_document(plan, candidates=candidates, root_seed=kit.PARAMS["seed"])
     found = {
-        (row["baseline_success"], row["candidate_success"]): row["promote_share"]
-        for row in document["rows"]
+        (row.baseline_success, row.candidate_success): row.promote_share for row in document.rows
     }
     assert found[plan.planned_effect] >= 0.8
     at_margin = plan.planned_effect[0] + plan.margin
@@ -192,12 +189,12 @@ def test_too_few_starts_can_never_promote():
     # An e-value can at most grow by a factor of (1 + wager * (1 - margin)) < 2 per pair:
     # two pairs give less than 4, and alpha = 0.05 asks for 20.
     document = power_document(settings(starts=2), candidates=1, root_seed=1)
-    assert [row["promote_share"] for row in document["rows"]] == [0.0] * 6
-    assert [row["median_pairs"] for row in document["rows"]] == [None] * 6
+    assert [row.promote_share for row in document.rows] == [0.0] * 6
+    assert [row.median_pairs for row in document.rows] == [None] * 6
 
 
 def test_alpha_is_shared_between_the_registered_candidates():
     document = power_document(settings(starts=10, alpha=0.06), candidates=3, root_seed=1)
-    assert document["alpha"] == pytest.approx(0.02)
+    assert document.alpha == pytest.approx(0.02)
     alone = power_document(settings(starts=10, alpha=0.02), candidates=1, root_seed=1)
-    assert document["rows"] == alone["rows"]
+    assert document.rows == alone.rows

@@ -1,6 +1,7 @@
 """The card: limits checked on every side, and days at their borders."""
 
 import datetime
+from dataclasses import replace
 
 import pytest
 from evidence import edit_document
@@ -158,10 +159,10 @@ def test_the_whole_workspace_of_the_task_is_inside_it_and_a_flat_one_is_none(sim
         "task_lower_m": simulated.workspace_lower_m,
         "task_upper_m": simulated.workspace_upper_m,
     }
-    assert beyond_simulation(simulated.model_copy(update=whole), "flow") == []
+    assert beyond_simulation(replace(simulated, **whole), "flow") == []
     x, y, _ = simulated.workspace_upper_m
     flat = {"workspace_upper_m": (x, y, simulated.workspace_lower_m[2])}
-    found = beyond_simulation(simulated.model_copy(update=flat), "flow")
+    found = beyond_simulation(replace(simulated, **flat), "flow")
     assert "workspace z not inside the task's" in found
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 from gates.cause import Cause, CauseLimits, default_limits, name_cause
 from gates.cause.numbers import Counts, Kept, Labels, Numbers
 from genpolicy.audit.component_rows import ComponentModes
-from genpolicy.audit.reach_rows import LOCAL, Alternative, Reach
+from genpolicy.audit.reach_rows import LEARNED, LOCAL, Alternative, Reach, Side
 from genpolicy.audit.rows import Finding, ModeOutcome, Prediction, Stratum
 from genpolicy.audit.settings import AuditSettings
 
@@ -82,3 +82,16 @@ BROKEN = {
         "unimodal", "one_valid_mode",
     ),
 }  # fmt: skip
+
+
+def learned(*, modes=0, spoke=0.9, confirmed=0, contradicted=0):
+    """What the learned evidence found, and how far it reaches."""
+    side = Side(
+        LEARNED, followed=False, queries=600, analysed=round(600 * spoke), analysed_episodes=50,
+        two_mode=3 * modes, two_mode_episodes=modes, primary_episodes=50 if modes else 0,
+        resolved=0, incoherent=0, persistent=3 * modes, noise_ratio=0.1, noise_spread=0.01,
+        white_share=0.02, kept=0.9, kept_null_q95=0.6, kept_n=3 * modes, confirmed=confirmed,
+        contradicted=contradicted,
+    )  # fmt: skip
+    reach = tuple(Reach(LEARNED, k, 120, round(120 * spoke)) for k in range(1, 6))
+    return {"other": side, "other_reach": reach}

@@ -2,11 +2,12 @@
 
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 import yaml
-from planted import BROKEN, LIMITS, VALID, counts, limit, named
+from planted import BROKEN, LIMITS, VALID, counts, learned, limit, named
 
 from gates.cause import CauseLimits, limits_of
 from gates.cause.limits import OWN, SHARED
@@ -62,6 +63,7 @@ def test_every_limit_is_asked_for_and_every_finding_has_one():
     others = (
         counts(two_mode_episodes=0),
         counts(two_mode_episodes=0, noise_ratio=0.9, white_share=0.3),
+        replace(VALID, **learned(contradicted=60)),
     )
     for numbers in (VALID, *others, *(item[0] for item in BROKEN.values())):
         named(numbers, watched, draws=[VALID] * 20)

@@ -79,8 +79,8 @@ def test_what_most_resampled_audits_contradict_is_not_said(said):
     assert f"9 say {named(said).name}, 11 another cause" in most.next_action
     assert f"8 of them data_defect({named(fault).variable}, clock). If" in most.next_action
     assert named(fault).next_action in most.next_action
-    # Leaving it open contradicts nothing, and a few draws overturn nothing.
-    for draws in ([said] * 2 + [thin] * 18, [thin] * 20, [fault] * 19):
+    # Leaving it open contradicts nothing.
+    for draws in ([said] * 2 + [thin] * 18, [thin] * 20):
         assert named(said, draws=draws).name is named(said).name
     # What stands in the rows stands, and so does what is missing.
     for layer in ("data", "labels", "support"):

@@ -3,10 +3,9 @@
 from dataclasses import replace
 
 import pytest
-from planted import HIDDEN, TOLD, VALID, counts, named
+from planted import HIDDEN, TOLD, VALID, counts, learned, limit, named
 
 from gates.cause import CauseName
-from genpolicy.audit.reach_rows import LEARNED, Reach, Side
 from genpolicy.audit.variable import INSIDE
 
 ABSENT = counts(two_mode_episodes=0, two_mode=0, persistent=0)
@@ -57,19 +56,6 @@ def test_white_noise_must_be_a_share_of_what_chunks_differ_by():
     assert named(counts(**trembling, white_share=0.05)).name is CauseName.UNIMODAL
 
 
-def learned(*, modes=0, spoke=0.9, confirmed=0, contradicted=0):
-    """What the learned evidence found, and how far it reaches."""
-    side = Side(
-        LEARNED, followed=False, queries=600, analysed=round(600 * spoke), analysed_episodes=50,
-        two_mode=3 * modes, two_mode_episodes=modes, primary_episodes=50 if modes else 0,
-        resolved=0, incoherent=0, persistent=3 * modes, noise_ratio=0.1, noise_spread=0.01,
-        white_share=0.02, kept=0.9, kept_null_q95=0.6, kept_n=3 * modes, confirmed=confirmed,
-        contradicted=contradicted,
-    )  # fmt: skip
-    reach = tuple(Reach(LEARNED, k, 120, round(120 * spoke)) for k in range(1, 6))
-    return {"other": side, "other_reach": reach}
-
-
 THIN = counts(two_mode_episodes=0, two_mode=0, persistent=0, analysed=0, analysed_episodes=0)
 
 
@@ -94,6 +80,19 @@ THIN = counts(two_mode_episodes=0, two_mode=0, persistent=0, analysed=0, analyse
 def test_two_kinds_of_evidence_speak_for_each_other_and_must_agree(numbers, name, kind):
     cause = named(numbers)
     assert (cause.name.value, cause.kind) == (name, kind)
+
+
+@pytest.mark.parametrize(
+    ("limits", "name"),
+    [
+        ({}, "valid_modes"),
+        ({"contradicted_situations": 20}, "insufficient_support"),
+        ({"contradicted_situations": 20, "confirmed_share": 0.05}, "valid_modes"),
+    ],
+)
+def test_how_many_must_contradict_and_confirm_is_a_limit(limits, name):
+    numbers = replace(VALID, **learned(confirmed=2, contradicted=25))
+    assert named(numbers, limit(**limits)).name.value == name
 
 
 FEW = replace(VALID, kept=replace(VALID.kept, n=29))

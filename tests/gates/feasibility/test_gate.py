@@ -22,10 +22,7 @@ def _found(report, name):
     return [c for c in report.criteria if c.id == name]
 
 
-ROWS = [
-    {"check": name, "layer": layer, "detected": True, "tried": 3, "violations": 3}
-    for layer, name in evidence.CHECKS
-]
+ROWS = [evidence.mutant(layer, name) for layer, name in evidence.CHECKS]
 
 
 def _undetected(root, rows):
@@ -85,16 +82,16 @@ def test_a_check_that_one_of_its_rows_missed_is_missed(tmp_path):
     assert found.value == 1
 
 
-@pytest.mark.parametrize("path", ["shadow/checker.json", "stress/checker.json"])
+@pytest.mark.parametrize("folder", ["shadow", "stress"])
 @pytest.mark.parametrize(("proved", "counts"), [(7, True), (6, False), (0, False), (None, False)])
-def test_an_action_whose_motion_was_not_proved_is_not_proved(path, proved, counts, tmp_path):
-    document = {"violations": [], "checked_actions": 7, "reproved_actions": proved}
-    evidence.document(tmp_path, path, document)
+def test_an_action_whose_motion_was_not_proved_is_not_proved(folder, proved, counts, tmp_path):
+    document = {**evidence.checked("a.mcap", 7), "reproved_actions": proved}
+    evidence.document(tmp_path, f"{folder}/checker.json", document)
     if counts:
-        assert checked_violations(Evidence(tmp_path), f"artifacts/{path}").value == 0
+        assert checked_violations(Evidence(tmp_path), f"artifacts/{folder}").value == 0
     else:
         with pytest.raises(MissingEvidenceError):
-            checked_violations(Evidence(tmp_path), f"artifacts/{path}")
+            checked_violations(Evidence(tmp_path), f"artifacts/{folder}")
 
 
 STUB, SAMPLED = "shadow/stub.parquet", "shadow/candidates.parquet"

@@ -34,12 +34,8 @@ def _declare(ladder):
     evidence.edit_document(
         ladder, "task/identity.json", lambda d: d | {"phases": {"all": ["approach", "insert"]}}
     )
-    channels = [{"name": "pose", "stream": "camera"}, {"name": "joints", "stream": "robot"}]
-    evidence.edit_document(
-        ladder,
-        "ingest/manifest.json",
-        lambda d: d | {"observation_contract": {"channels": channels}},
-    )
+    times = {"event_time_s.camera": 0.0, "event_time_s.robot": 0.0}
+    evidence.edit_table(ladder, "ingest/frames.parquet", lambda f: f.assign(**times))
 
 
 def test_what_was_not_asked_is_inconclusive_until_somebody_answers_for_it(ladder):
@@ -96,15 +92,17 @@ def test_a_waiver_that_is_needed_is_no_remark(ladder):
 
 
 @pytest.mark.parametrize(
-    ("name", "file"), [("past.approach", "task/identity"), ("clock.camera", "ingest/manifest")]
+    ("name", "file"),
+    [("past.approach", "task/identity.json"), ("clock.camera", "ingest/frames.parquet")],
 )
-def test_what_can_be_asked_is_not_known_without_task_or_contract(ladder, name, file):
-    """The evidence of the tests declares neither."""
+def test_what_can_be_asked_is_not_known_without_task_or_frames(ladder, name, file):
+    _declare(ladder)
+    (ladder / "artifacts" / file).unlink()
     evidence.write_params(ladder, _waive(name, "x"))
     report = judge(ladder, "A")
     found = _found(report, "unasked_checks")[0]
     assert (report.verdict, found.measured) == ("INCONCLUSIVE", None)
-    assert f"{file}.json holds no list" in found.caveat
+    assert file in found.caveat
 
 
 @pytest.mark.parametrize(

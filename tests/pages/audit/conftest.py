@@ -15,12 +15,13 @@ def audits(tmp_path_factory):
     from audited_cases import CASES
     from planar import SETTINGS, audited
 
+    from genpolicy.audit.documents import Obstacle
     from genpolicy.audit.evidence import write_evidence
 
     made = {}
     for name, options in CASES.items():
         made[name] = tmp_path_factory.mktemp(name)
-        obstacles = [{"x_m": 0.15, "y_m": 0.0, "radius_m": 0.04}]
+        obstacles = [Obstacle(x_m=0.15, y_m=0.0, radius_m=0.04)]
         result = audited(seed_of_audit=1, **options)
         write_evidence(result, made[name], settings=SETTINGS, obstacles=obstacles)
     return made

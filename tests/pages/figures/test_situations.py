@@ -6,6 +6,7 @@ import warnings
 import pytest
 from figure_frames import examples, neighbourhoods
 
+from genpolicy.audit.documents import Obstacle
 from genpolicy.pages.figures import situations
 from genpolicy.pages.figures.drawing import drawn
 
@@ -22,7 +23,7 @@ def quiet(draw):
 
 @pytest.mark.parametrize(("width", "drawn_there"), [(2, True), (26, False)])
 def test_obstacles_stand_only_in_a_scene(width, drawn_there):
-    names, stone = [f"c{i}" for i in range(width)], [{"x_m": 0.0, "y_m": 0.0, "radius_m": 0.04}]
+    names, stone = [f"c{i}" for i in range(width)], [Obstacle(x_m=0.0, y_m=0.0, radius_m=0.04)]
     for draw in (
         lambda: situations.clusters(examples(width), names=names, unit="m", obstacles=stone),
         lambda: situations.mean_versus_modes(

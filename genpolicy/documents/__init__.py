@@ -1,0 +1,1 @@
+"""JSON documents as dataclasses, and those that stages below the audit write."""

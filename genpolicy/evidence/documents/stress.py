@@ -1,0 +1,48 @@
+"""`power.json` and `envelope.json` of the matched comparison."""
+
+from dataclasses import dataclass
+
+from genpolicy.documents.document import Count, Document
+from genpolicy.statistics.eprocess import PowerRow
+from genpolicy.verification.report import Point, Reached
+
+
+@dataclass(frozen=True)
+class Power:
+    """Which verdicts the pre-registered test can reach.
+
+    Attributes:
+        margin: Margin of the test.
+        alpha: Level of each candidate.
+        pairs: Planned starts.
+        rows: One per assumed world.
+    """
+
+    margin: float
+    alpha: float
+    pairs: Count
+    rows: list[PowerRow]
+
+
+@dataclass(frozen=True)
+class Envelope:
+    """What the rollouts inside the card's envelope were held to, and what they did.
+
+    Attributes:
+        condition: Name of the planned condition.
+        workspace_lower_m: Lower corner, base frame, m.
+        workspace_upper_m: Upper corner, m.
+        speed_limit_m_s: Most for the speed of the TCP, m/s.
+        reached: How far the commands of each method went.
+    """
+
+    condition: str
+    workspace_lower_m: Point
+    workspace_upper_m: Point
+    speed_limit_m_s: float
+    reached: dict[str, Reached]
+
+
+POWER = Document("power.json", Power)
+ENVELOPE = Document("envelope.json", Envelope)
+"""Missing where no condition ran inside an envelope."""

@@ -1,0 +1,73 @@
+"""What a diffusion network predicts: noise, v or the clean chunk, behind one conversion.
+
+At a level with a share `kept` of the clean variance, x = sqrt(kept) clean + sqrt(1 - kept) noise.
+The three predictions say the same; they differ in what the training weighs.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from torch import Tensor
+
+from genpolicy.policies.schedules import DiffusionSchedule, Gains, noise_gains
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """One kind of prediction.
+
+    Attributes:
+        target: What is trained: of clean chunks, noise, and the shares kept of each, (B, 1, 1).
+        clean: The clean estimate: of noisy chunks, a prediction, and the share kept.
+        gains: Fixed gains around the network at times level / T.
+    """
+
+    target: Callable[[Tensor, Tensor, Tensor], Tensor]
+    clean: Callable[[Tensor, Tensor, float], Tensor]
+    gains: Callable[..., Gains]
+
+
+def _variance(schedule: DiffusionSchedule, time: Tensor, data_std: float) -> tuple[Tensor, Tensor]:
+    kept = schedule.kept(time)
+    return kept, kept * data_std**2 + 1.0 - kept
+
+
+def v_gains(schedule: DiffusionSchedule, time: Tensor, *, data_std: float) -> Gains:
+    """Gains of v = sqrt(kept) noise - sqrt(1 - kept) clean. Shape of `time`: (B,)."""
+    kept, variance = _variance(schedule, time, data_std)
+    return Gains(
+        inner=variance.rsqrt(),
+        skip=(kept * (1.0 - kept)).sqrt() * (1.0 - data_std**2) / variance,
+        outer=variance.rsqrt() * data_std,
+    )
+
+
+def clean_gains(schedule: DiffusionSchedule, time: Tensor, *, data_std: float) -> Gains:
+    """Gains of the clean chunk itself. Shape of `time`: (B,)."""
+    kept, variance = _variance(schedule, time, data_std)
+    return Gains(
+        inner=variance.rsqrt(),
+        skip=kept.sqrt() * data_std**2 / variance,
+        outer=((1.0 - kept) / variance).sqrt() * data_std,
+    )
+
+
+# v: Salimans and Ho, arXiv 2202.00512.
+PREDICTIONS = {
+    "noise": Prediction(
+        target=lambda clean, noise, kept: noise,
+        clean=lambda x, noise, kept: (x - math.sqrt(1.0 - kept) * noise) / math.sqrt(kept),
+        gains=noise_gains,
+    ),
+    "v": Prediction(
+        target=lambda clean, noise, kept: kept.sqrt() * noise - (1.0 - kept).sqrt() * clean,
+        clean=lambda x, v, kept: math.sqrt(kept) * x - math.sqrt(1.0 - kept) * v,
+        gains=v_gains,
+    ),
+    "x0": Prediction(
+        target=lambda clean, noise, kept: clean,
+        clean=lambda x, clean, kept: clean,
+        gains=clean_gains,
+    ),
+}

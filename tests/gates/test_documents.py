@@ -1,0 +1,138 @@
+"""Every JSON document that a gate reads: another key or type in it is refused by name.
+
+Taken from the modules of the gates, so that a document is tried as soon as one of them names it.
+"""
+
+import importlib
+import json
+import pkgutil
+import shutil
+from dataclasses import fields, is_dataclass
+
+import evidence
+import pytest
+
+import gates
+from gates.evidence import Evidence, MissingEvidenceError
+from gates.proof import judge
+from genpolicy.documents.document import Document
+from genpolicy.errors import BadInputError
+from genpolicy.integrity.documents import canonical_json
+
+
+def documents():
+    """By file and class: every document that some module of the gates names."""
+    found = {}
+    for module in pkgutil.walk_packages(gates.__path__, "gates."):
+        if module.name != "gates.__main__":
+            for value in vars(importlib.import_module(module.name)).values():
+                if isinstance(value, Document):
+                    found[f"{value.file}-{id(value)}"] = value
+    return sorted(found.values(), key=lambda of: (of.file, str(of.kind)))
+
+
+DOCUMENTS = documents()
+
+
+@pytest.fixture(scope="module")
+def root(tmp_path_factory, _ladder):
+    return shutil.copytree(_ladder, tmp_path_factory.mktemp("documents") / "repo")
+
+
+def folders(root, of):
+    """Folders of the evidence that hold a file of this name and form."""
+    found = []
+    for path in sorted((root / "artifacts").glob(f"*/{of.file}")):
+        try:
+            of.read(path.parent)
+        except BadInputError:
+            continue
+        found.append(path.parent.relative_to(root).as_posix())
+    return found
+
+
+def objects(content, at=()):
+    """Place and keys of every object of fixed keys; of a list or mapping one of each class."""
+    if is_dataclass(content):
+        names = [field.name for field in fields(content)]
+        yield at, names
+        for name in names:
+            yield from objects(getattr(content, name), (*at, name))
+    elif isinstance(content, dict | list | tuple):
+        items = content.items() if isinstance(content, dict) else enumerate(content)
+        for key, value in {type(value): (key, value) for key, value in items}.values():
+            yield from objects(value, (*at, key))
+
+
+def changes(content):
+    """What is changed, where, the name that must be said, and the change of the object there."""
+    for at, names in objects(content):
+        yield "extra", at, "odd", lambda inner: inner.update(odd=1)
+        for name in names:
+            yield "missing", at, name, lambda inner, name=name: inner.pop(name)
+            yield (
+                "misspelt",
+                at,
+                f"{name}x",
+                lambda inner, name=name: inner.update({f"{name}x": inner.pop(name)}),
+            )
+            yield "another type", at, name, lambda inner, name=name: inner.update({name: [[True]]})
+
+
+def test_the_documents_are_those_that_gates_judge_by():
+    assert {of.file for of in DOCUMENTS} >= {
+        "checker.json", "envelope.json", "identity.json", "latent.json", "matched.json",
+        "mutants.json", "persistence.json", "power.json", "refusals.json", "summary.json",
+        "variants.json",
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("of", DOCUMENTS, ids=[of.file for of in DOCUMENTS])
+def test_another_key_or_type_is_refused_by_name(root, of):
+    found = folders(root, of)
+    assert found, f"the evidence of the tests holds no {of.file}"
+    path = root / found[0] / of.file
+    kept = path.read_bytes()
+    tried = 0
+    try:
+        for what, at, name, change in changes(of.read(path.parent)):
+            document = json.loads(kept)
+            inner = document
+            for part in at:
+                inner = inner[part]
+            change(inner)
+            path.write_bytes(canonical_json(document))
+            with pytest.raises(MissingEvidenceError) as caught:
+                Evidence(root).document(found[0], of)
+            said = str(caught.value)
+            assert said.startswith(f"{found[0]}/{of.file} is a document with"), (what, at, said)
+            assert name in said and ", expected " in said and "dvc repro" in said, (what, at, said)
+            tried += 1
+    finally:
+        path.write_bytes(kept)
+    assert tried > 3
+
+
+@pytest.mark.parametrize("of", DOCUMENTS, ids=[of.file for of in DOCUMENTS])
+def test_what_is_read_is_what_would_be_written(root, tmp_path, of):
+    for folder in folders(root, of):
+        of.write(tmp_path, of.read(root / folder))
+        assert (tmp_path / of.file).read_bytes() == (root / folder / of.file).read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("gate", "path", "criterion"),
+    [("A", "train_factors/variants.json", "factors_isolated"),
+     ("B", "reload/identity.json", "unpinned_items"),
+     ("C", "shadow/mutants.json", "mutants_undetected"),
+     ("D", "stress/power.json", "verdict_reachable")],
+)  # fmt: skip
+def test_a_gate_says_so_and_decides_nothing(ladder, gate, path, criterion):
+    def odd(document):
+        first = document[0] if isinstance(document, list) else document
+        (next(iter(first.values())) if path.startswith("reload") else first)["odd"] = 1
+
+    evidence.edit_document(ladder, path, odd)
+    answers = [c for c in judge(ladder, gate).criteria if c.id == criterion]
+    assert {answer.verdict for answer in answers} == {"INCONCLUSIVE"}
+    assert all("unknown key" in answer.caveat and "odd" in answer.caveat for answer in answers)
