@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from gates.proof import Rung
     from gates.report import Gate
 
-INDEX = "reports/index.html"
 Root = Annotated[Path, typer.Option(help="Repository root.")]
 Letter = Annotated[str, typer.Argument(help="Gate: A, B, C, D or E.")]
 
@@ -90,7 +89,7 @@ def check(
     codes = {rung.exit_code for rung in rungs if rung.verdict != "PASS"}
     if last == "E" and not codes:
         require_history(root)
-    return 2 if 2 in codes else max(codes, default=0)
+    return _worst(codes | _front_page(root))
 
 
 @gates.command("verify", epilog=examples("genpolicy gates verify --json"))
@@ -99,7 +98,8 @@ def verify_reports(root: Root = Path(), as_json: AsJson = False) -> int:
     """Hash all evidence, derive all verdicts again.
 
     The independent checker reads every journal again, and each rollout must be
-    what its journal says. Exit 3 if a report is untrue, 2 if one cannot be read.
+    what its journal says; the front page must be the one that the reports give.
+    Exit 3 if a report is untrue, 2 if one cannot be read.
     """
     from gates.proof import prove_all
     from gates.rederive import rederived
@@ -111,7 +111,7 @@ def verify_reports(root: Root = Path(), as_json: AsJson = False) -> int:
     rungs = rederived(root, rungs)
     _print_rungs(rungs, as_json)
     codes = {rung.exit_code for rung in rungs if rung.verdict == "REFUSED"}
-    return 2 if 2 in codes else max(codes, default=0)
+    return _worst(codes | _front_page(root))
 
 
 @gates.command(epilog=examples("genpolicy gates show C"))
@@ -219,6 +219,7 @@ def summary(root: Root = Path(), as_json: AsJson = False) -> int:
     """The ladder in one table, each report proved; always exits 0."""
     from gates.overview import as_text, overview
     from gates.proof import prove_all
+    from gates.writing import INDEX
 
     lines = overview(root, prove_all(root))
     if as_json:
@@ -239,6 +240,24 @@ def _require_beneath(root: Path) -> None:
     require_history(root)
     for gate in GATES[:-1]:
         rederive(root, gate)
+
+
+def _front_page(root: Path) -> set[int]:
+    """Exit code of a front page that says other than the reports; none where it says the same."""
+    from gates.writing import INDEX, changed_index
+
+    if not changed_index(root):
+        return set()
+    print(
+        f"{INDEX} is another page, expected the one that the reports give. Run "
+        "`dvc repro -f gate_a`, which prints it again; never edit a page.",
+        file=sys.stderr,
+    )
+    return {3}
+
+
+def _worst(codes: set[int]) -> int:
+    return 2 if 2 in codes else max(codes, default=0)
 
 
 def _gate(letter: str) -> "Gate":

@@ -14,6 +14,9 @@ from gates.report import Gate, GateReport, report_bytes, report_path
 from genpolicy.errors import BadInputError
 from genpolicy.integrity.atomic import write_bytes
 
+INDEX = "reports/index.html"
+"""The ladder's front page, which a reader opens first."""
+
 
 def write_gate(root: Path, gate: Gate) -> GateReport:
     """Judge a gate and write its report: HTML, Markdown, then JSON.
@@ -26,6 +29,7 @@ def write_gate(root: Path, gate: Gate) -> GateReport:
     """
     base = root / report_path(gate)
     _remove(base)
+    write_index(root)
     report = judge(root, gate)
     write_bytes(base.with_suffix(".html"), gate_page(root, report).encode())
     write_bytes(base.with_suffix(".md"), markdown(report).encode())
@@ -36,9 +40,19 @@ def write_gate(root: Path, gate: Gate) -> GateReport:
 
 def write_index(root: Path) -> Path:
     """Write the ladder's front page from the reports that lie there."""
-    path = root / "reports" / "index.html"
+    path = root / INDEX
     write_bytes(path, index_page(root).encode())
     return path
+
+
+def changed_index(root: Path) -> bool:
+    """Whether the front page is another one than the reports that lie there give.
+
+    No stage has it as an output, since every gate prints it again: so it is printed once more and
+    compared, where a gate's own pages are held against the recorded run.
+    """
+    path = root / INDEX
+    return path.is_file() and path.read_bytes() != index_page(root).encode()
 
 
 def _remove(path: Path) -> None:

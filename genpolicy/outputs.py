@@ -66,7 +66,9 @@ def _written(root: Path, run: Any) -> set[str]:
     """Files that the recorded run wrote; of a folder the cache knows which, else their number."""
     found: set[str] = set()
     outs: Any = run.get("outs") if isinstance(run, dict) else None
-    for entry in [out for out in outs or () if isinstance(out, dict)]:
+    for entry in outs if isinstance(outs, list) else ():
+        if not isinstance(entry, dict):
+            continue
         path, md5 = str(entry.get("path")), str(entry.get("md5"))
         found.add(path)
         listing = _cached(root, md5)

@@ -90,6 +90,36 @@ def test_verify_finds_a_changed_byte(ladder, _run):
     assert "identity.json" in result.output
 
 
+@pytest.mark.parametrize("command", [("verify",), ("check", "--through", "A")])
+def test_a_front_page_that_says_other_than_the_reports_refuses(ladder, _run, command):
+    assert _run(ladder, "judge", "A").exit_code == 0
+    assert _run(ladder, *command).exit_code == 0
+    page = ladder / "reports" / "index.html"
+    page.write_text(page.read_text().replace("PASS", "FAIL", 1))
+    result = _run(ladder, *command)
+    _clean(result)
+    assert result.exit_code == 3
+    assert "reports/index.html is another page, expected the one that the reports give" in (
+        result.output
+    )
+    assert json.loads(_run(ladder, *command, "--json").output.partition("\n]")[0] + "]")
+    assert _run(ladder, "judge", "A").exit_code == 0
+    assert _run(ladder, *command).exit_code == 0
+
+
+def test_a_front_page_of_reports_that_are_gone_refuses(ladder, _run):
+    assert _run(ladder, "judge", "A").exit_code == 0
+    (ladder / "reports" / "gate_d.json").unlink()
+    result = _run(ladder, "check", "--through", "A")
+    assert result.exit_code == 3 and "index.html is another page" in result.output
+
+
+def test_what_cannot_be_read_is_said_before_the_front_page(ladder, _run):
+    assert _run(ladder, "judge", "A").exit_code == 0
+    (ladder / "reports" / "gate_a.json").write_text("{")
+    assert _run(ladder, "verify").exit_code == 2
+
+
 def test_show_and_judge(ladder, _run):
     assert "Gate C: PASS" in _run(ladder, "show", "C").output
     result = _run(ladder, "judge", "A")

@@ -72,3 +72,15 @@ def test_a_judge_that_cannot_finish_leaves_no_old_verdict(ladder):
     with pytest.raises(GenpolicyError):
         write_gate(ladder, "A")
     assert not (ladder / report_path("A")).exists()
+
+
+def test_a_gate_that_is_being_judged_has_no_verdict_on_the_front_page(ladder):
+    """Nor afterwards, where the judge stopped: a verdict from before would be nobody's."""
+    write_gate(ladder, "C")
+    page = ladder / "reports/index.html"
+    before = page.read_text().count("NOT JUDGED")
+    (ladder / "params.yaml").write_text("gate_c: 1")
+    with pytest.raises(GenpolicyError):
+        write_gate(ladder, "C")
+    assert page.read_text().count("NOT JUDGED") > before
+    assert page.read_text() == index_page(ladder)
