@@ -11,6 +11,7 @@ from genpolicy.evidence.reproducibility.reload import ReloadPlan, write_reload
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import output_folder
 from genpolicy.policies.matched_training import PolicySettings
+from genpolicy.policies.settings import SamplerConfig
 from stages._contracts import require_one_contract
 from stages._stage import ARTIFACTS, Params, main
 from stages._training import MethodsSection
@@ -20,11 +21,12 @@ class ReloadSection(Settings):
     """Section `reload`.
 
     Attributes:
-        sweep: Sampler steps to try besides the chosen ones, by method.
+        sweep: Samplers to try besides the chosen one, by method; a number is that many steps of
+            the chosen one.
         samples: Candidates per situation.
     """
 
-    sweep: dict[str, list[int]]
+    sweep: dict[str, list[int | SamplerConfig]]
     samples: int = Field(ge=2)
 
 

@@ -966,6 +966,7 @@ def _reload(root: Path) -> None:
             {
                 "method": m,
                 "seed": 0,
+                "sampler": "euler",
                 "steps": nfe,
                 "nfe": nfe,
                 "situations": 30,

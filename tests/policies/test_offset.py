@@ -102,7 +102,7 @@ def test_an_offset_is_one_draw_per_component_kept_over_the_chunk(noisy, phased):
     base, moved = (load_policy(noisy / name / "seed_0") for name in ("chunked_bc", "bc_noise"))
     seen = phased.observations[:1]
     plain = base.sample(seen, noise_names=[("x",)], candidates=1).actions[0, 0]
-    drawn = moved.sample(seen, noise_names=[("x",)], candidates=400).actions[0]
+    drawn = moved.sample(seen, noise_names=[("x",)], candidates=1600).actions[0]
     action = checkpoint.normalisation.action
     shift = action.normalise(drawn) - action.normalise(plain)
     z = shift / checkpoint.network.scale.numpy()[0]

@@ -20,7 +20,10 @@ def test_a_width_is_a_multiple_of_a_vector_register(field):
         (TrainingConfig, {"beta_1": 1.0}), (TrainingConfig, {"learning_rate": 0.0}),
         (TrainingConfig, {"ema_cap": 1.0}), (TrainingConfig, {"steps": "10"}),
         (SamplerConfig, {"name": "telepathy"}), (SamplerConfig, {"name": "ddim", "clip": 0.0}),
-        (SamplerConfig, {"name": "ddim", "eta": 0.0}),
+        (SamplerConfig, {"name": "ddim", "eta": 1.1}),
+        (SamplerConfig, {"name": "bosh3", "nfe_cap": 0}),
+        (SamplerConfig, {"name": "bosh3", "tolerance": 0.0}),
+        (SamplerConfig, {"name": "ddim", "surprise": 0.0}),
     ],
 )  # fmt: skip
 def test_what_is_out_of_range_or_unknown_is_refused(section, values):
@@ -35,7 +38,10 @@ def test_the_hash_of_a_sampler_covers_every_setting():
         SamplerConfig(name="ddim", steps=4, clip=None),
         SamplerConfig(name="ddim", steps=4, population=2),
         SamplerConfig(name="ddim", steps=4, batch_rows=8),
+        SamplerConfig(name="ddim", steps=4, eta=0.5),
+        SamplerConfig(name="ddim", steps=4, tolerance=0.1),
+        SamplerConfig(name="ddim", steps=4, nfe_cap=9),
     ]  # fmt: skip
     assert base.hash() == SamplerConfig(name="ddim", steps=4).hash()
-    assert len({base.hash(), *(other.hash() for other in others)}) == 6
+    assert len({base.hash(), *(other.hash() for other in others)}) == 9
     assert len(others) == len(SamplerConfig.model_fields)

@@ -26,6 +26,7 @@ from genpolicy.policies.checkpoint import CONFIG_FILE
 from genpolicy.policies.evaluations import allowed_evaluations
 from genpolicy.policies.fixtures import FixtureRow, compare_fixtures, reload_fixture
 from genpolicy.policies.policy import NetworkPolicy, load_policy
+from genpolicy.policies.settings import SamplerConfig
 from genpolicy.policies.validation_row import EARLIER_FOLDER
 from genpolicy.statistics.intervals import clopper_pearson
 from genpolicy.tasks.api import Task, load_task
@@ -40,7 +41,8 @@ class ReloadPlan:
         feasibility: Thresholds of the six layers.
         dataset: Folder of the dataset.
         audit: Folder of the audit.
-        sweep: Sampler steps to try besides the chosen ones, by method.
+        sweep: Samplers to try besides the chosen one, by method; a number is that many steps of
+            the chosen one.
         samples: Candidates per situation.
         horizons: Common horizons.
     """
@@ -49,7 +51,7 @@ class ReloadPlan:
     feasibility: FeasibilitySettings
     dataset: Path
     audit: Path
-    sweep: Mapping[str, Sequence[int]]
+    sweep: Mapping[str, Sequence[int | SamplerConfig]]
     samples: int
     horizons: HorizonConfig
 
@@ -178,12 +180,10 @@ def _sweep(
     task: Task,
     checker: FeasibilityChecker,
 ) -> tuple[list[ModeRow], list[CoverageRow]]:
-    """Modes at the candidate's own sampler steps, and coverage at these and the swept ones."""
-    own_steps = policy.sampler.steps
+    """Modes with the candidate's own sampler, and coverage with this one and the swept ones."""
     own: list[ModeRow] = []
     rows = []
-    for steps in sorted({own_steps, *plan.sweep.get(policy.method, ())}):
-        sampler = policy.sampler.model_copy(update={"steps": steps})
+    for sampler in swept_samplers(policy.sampler, plan.sweep.get(policy.method, ())):
         found = modes_of_policy(
             NetworkPolicy(policy.checkpoint, sampler=sampler),
             held_out,
@@ -193,11 +193,21 @@ def _sweep(
             task=task,
             checker=checker,
         )
-        if steps == own_steps:
+        if sampler == policy.sampler:
             own = found
         if found:
-            rows.append(coverage_row(found, steps=steps))
+            rows.append(coverage_row(found, steps=sampler.steps))
     return own, rows
+
+
+def swept_samplers(own: SamplerConfig, sweep: Sequence[int | SamplerConfig]) -> list[SamplerConfig]:
+    """The candidate's own sampler and those to try, each once, by name and steps."""
+    tried = [
+        own.model_copy(update={"steps": entry}) if isinstance(entry, int) else entry
+        for entry in sweep
+    ]
+    different = {sampler.hash(): sampler for sampler in (own, *tried)}
+    return sorted(different.values(), key=lambda sampler: (sampler.name, sampler.steps))
 
 
 def coverage_row(found: Sequence[ModeRow], *, steps: int) -> CoverageRow:
@@ -207,6 +217,7 @@ def coverage_row(found: Sequence[ModeRow], *, steps: int) -> CoverageRow:
     return CoverageRow(
         method=found[0].method,
         seed=found[0].seed,
+        sampler=found[0].convention,
         steps=steps,
         nfe=max(row.nfe for row in found),
         situations=len(found),

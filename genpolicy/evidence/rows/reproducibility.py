@@ -50,11 +50,12 @@ class NfeRow:
 
 @dataclass(frozen=True)
 class CoverageRow:
-    """`coverage.parquet` of reload: modes against sampler steps.
+    """`coverage.parquet` of reload: modes against samplers and their steps.
 
     Attributes:
         method: The candidate.
         seed: Number of its training seed.
+        sampler: Name of the sampler.
         steps: Sampler steps.
         nfe: Network evaluations of one invocation, counted; the most of any situation.
         situations: Held-out situations.
@@ -67,6 +68,7 @@ class CoverageRow:
 
     method: str
     seed: int
+    sampler: str
     steps: int
     nfe: int
     situations: int

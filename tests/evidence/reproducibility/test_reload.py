@@ -12,6 +12,7 @@ from genpolicy.evidence.rows.reproducibility import CoverageRow, NfeRow, SampleR
 from genpolicy.integrity.rows import read_rows, write_rows
 from genpolicy.policies import methods
 from genpolicy.policies.fixtures import FixtureRow, fixture_observations, fixture_rows
+from genpolicy.policies.settings import SamplerConfig
 
 
 @pytest.fixture(scope="module")
@@ -20,8 +21,8 @@ def reloaded(fleet, dataset, data, policy, kit, tmp_path_factory):
     situations = [(name, 4, {}) for name in kit.uuids(data)[8:]]
     plan = ReloadPlan(
         task="tabletop_insertion", feasibility=kit.FEASIBILITY, dataset=dataset,
-        audit=kit.write_situations(root / "audit", situations), sweep={"flow": [1, 2]}, samples=3,
-        horizons=kit.HORIZONS,
+        audit=kit.write_situations(root / "audit", situations), samples=3, horizons=kit.HORIZONS,
+        sweep={"flow": [1, 2, SamplerConfig(name="midpoint"), SamplerConfig(name="euler")]},
     )  # fmt: skip
     seen = fixture_observations(data, horizons=kit.HORIZONS, count=3)
     rows = fixture_rows(policy, seen, method="flow", seed=0)
@@ -46,7 +47,8 @@ def test_modes_of_the_chosen_steps_are_those_of_the_sweep(reloaded):
     _, _, folder = reloaded
     modes = read_rows(folder / "modes.parquet", ModeRow)
     coverage = read_rows(folder / "coverage.parquet", CoverageRow)
-    assert [row.steps for row in coverage] == [1, 2]
+    swept = [(row.sampler, row.steps, row.nfe) for row in coverage]
+    assert swept == [("euler", 1, 1), ("euler", 2, 2), ("midpoint", 1, 2)]
     assert {row.convention for row in modes} == {"euler"} and len(modes) == 2
     assert coverage_row(modes, steps=2) == coverage[1]
     earlier = read_rows(folder / "modes_earlier.parquet", ModeRow)
