@@ -4,7 +4,7 @@ import evidence
 import pandas as pd
 import pytest
 
-from gates.evidence import Evidence, MissingEvidenceError, count, counts
+from gates.evidence import Evidence, MissingEvidenceError, counts
 from genpolicy.audit.rows import TABLES, ModeOutcome, SituationRow
 from genpolicy.data.rows import FrameRow
 from genpolicy.errors import IntegrityError
@@ -92,6 +92,3 @@ def test_a_count_below_zero_is_no_count():
     assert counts(frame, "bad").tolist() == [0.0, 1.0]
     with pytest.raises(MissingEvidenceError, match="column stale counts -3"):
         counts(frame, "stale")
-    assert count({"n": 0}, "n") == 0.0 and count({"n": [1, 2]}, "n") == 2.0
-    with pytest.raises(MissingEvidenceError, match="n counts -1"):
-        count({"n": -1}, "n")
