@@ -73,8 +73,12 @@ class Document(Generic[Content]):
         return self.parse(read_json(path), where=str(path))
 
     def plain(self, content: Content) -> Any:
-        """The content as JSON knows it: mappings, lists, text and numbers."""
-        return self._form.dump_python((content,), mode="json")[0]
+        """The content as JSON knows it: mappings, lists, text and numbers.
+
+        A value of another type than its field says is a mistake of ours and raises pydantic's
+        `PydanticSerializationError`: nobody could read it back.
+        """
+        return self._form.dump_python((content,), mode="json", warnings="error")[0]
 
     def write(self, folder: Path, content: Content) -> None:
         """Write the file into a folder, whole or not at all; the same content, the same bytes.

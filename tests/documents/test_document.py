@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import pytest
+from pydantic_core import PydanticSerializationError
 
 from genpolicy.documents.document import SAID, Count, Document
 from genpolicy.errors import BadInputError, ContractError, IntegrityError
@@ -70,6 +71,12 @@ def test_a_misspelt_key_is_said_before_others_and_many_misfits_are_counted():
 def test_a_document_of_another_form_is_refused(value):
     with pytest.raises(IntegrityError, match="with"):
         OF.parse(value, where="w")
+
+
+def test_a_value_that_could_not_be_read_back_is_not_written(tmp_path):
+    with pytest.raises(PydanticSerializationError, match="Expected `int`"):
+        OF.write(tmp_path, Whole([], {}, (0.0, 0.0), 0.5, False))
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_no_number_that_is_none_is_written_and_no_file_is_bad_input(tmp_path):

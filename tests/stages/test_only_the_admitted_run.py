@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from genpolicy.candidates import judged
+from genpolicy.evidence.documents.stress import Power
 from stages import shadow, stress
 from stages._stage import load_params
 
@@ -87,7 +88,9 @@ def test_stress_rolls_out_what_passed_gate_c(
         "write_stress",
     )  # fmt: skip
     monkeypatch.setattr(stress, "matched_starts", lambda *_, **__: ())
-    monkeypatch.setattr(stress, "power_document", lambda *_, **__: {})
+    monkeypatch.setattr(
+        stress, "power_document", lambda *_, **__: Power(margin=0.1, alpha=0.1, pairs=1, rows=[])
+    )
     monkeypatch.setattr(stress, "plan_shards", lambda _, judged, *__, **___: ran.extend(judged))
     stress.work(params)
     baselines = params.raw["stress"]["baselines"]

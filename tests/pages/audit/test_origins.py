@@ -39,7 +39,7 @@ def told(audits):
     """A document whose defect names an episode, and evidence that asks with another."""
     said, evidence = document(audits["labels"]), read_evidence(audits["labels"])
     said["questions"][0]["note"] = f"jumps in {NAMES[0]}"
-    summary = {**evidence.summary, "notes": [f"{NAMES[1]} waits at first."]}
+    summary = replace(evidence.summary, notes=[f"{NAMES[1]} waits at first."])
     examples = evidence["examples"].assign(query_uuid=NAMES[2])
     replayed = evidence["replay"].assign(episode_uuid=NAMES[1])
     tables = {**evidence.tables, "examples": examples, "replay": replayed}
