@@ -15,7 +15,7 @@ from genpolicy.errors import BadInputError
 from genpolicy.integrity.atomic import write_bytes
 
 INDEX = "reports/index.html"
-"""The ladder's front page, which a reader opens first."""
+"""The ladder's first page, which a reader opens first."""
 
 
 def write_gate(root: Path, gate: Gate) -> GateReport:
@@ -39,14 +39,14 @@ def write_gate(root: Path, gate: Gate) -> GateReport:
 
 
 def write_index(root: Path) -> Path:
-    """Write the ladder's front page from the reports that lie there."""
+    """Write the ladder's first page from the reports that lie there."""
     path = root / INDEX
     write_bytes(path, index_page(root).encode())
     return path
 
 
 def changed_index(root: Path) -> bool:
-    """Whether the front page is another one than the reports that lie there give.
+    """Whether the first page is another one than the reports that lie there give.
 
     No stage has it as an output, since every gate prints it again: so it is printed once more and
     compared, where a gate's own pages are held against the recorded run.

@@ -51,10 +51,10 @@ def _like(name: str, evidence: Evidence) -> tuple[str, ...]:
 
 
 def _phases(evidence: Evidence) -> list[str]:
-    phases = evidence.document(TASK, IDENTITY).phases
-    if "all" not in phases:
+    phases = evidence.document(TASK, IDENTITY).every_phase
+    if not phases:
         raise MissingEvidenceError(f"{TASK}/{IDENTITY.file} does not say which phases there are")
-    return phases["all"]
+    return phases
 
 
 def _streams(evidence: Evidence) -> list[str]:

@@ -118,7 +118,8 @@ PLOTS = (
         "Modes and spread against NFE",
         "Left: share of held-out situations of which every mode is reached by one sample. Right: "
         "how far samples of one situation lie apart. One mark per sampler. The gate asks more, at "
-        "the chosen NFE: every mode needs its share of admissible samples, and few may lie between.",
+        "the chosen NFE: every mode needs its share of admissible samples, and few may lie "
+        "between.",
         COVERAGE,
         _coverage,
     ),

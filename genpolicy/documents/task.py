@@ -43,5 +43,10 @@ class TaskIdentity:
     robot_sha256: str
     sha256: str
 
+    @property
+    def every_phase(self) -> list[str]:
+        """All phases of the task; none where the task does not say."""
+        return self.phases.get("all", [])
+
 
 IDENTITY = Document("identity.json", TaskIdentity)

@@ -55,7 +55,7 @@ def test_tests_stand_beside_the_source() -> None:
     assert now.mirrored_share >= LEAST_MIRRORED
     # What only declares is left out of the count: it must stay the exception.
     inner = [name for name in now.declaring if not name.endswith("__init__.py")]
-    assert len(inner) <= 0.08 * (len(now.mirrored) + len(now.bare)), inner
+    assert len(inner) <= 0.09 * (len(now.mirrored) + len(now.bare)), inner
 
 
 def test_files_and_functions_stay_small_and_few_functions_take_many_parameters() -> None:
