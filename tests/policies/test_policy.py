@@ -11,6 +11,7 @@ from genpolicy.errors import (
     IntegrityError,
     NonFiniteError,
 )
+from genpolicy.policies import policy as policy_module
 from genpolicy.policies.methods import METHODS
 from genpolicy.policies.policy import load_policy
 from genpolicy.policies.settings import SamplerConfig
@@ -160,6 +161,23 @@ def test_an_adaptive_row_takes_its_own_steps_whatever_the_others_take(folders, t
     fast = counts.index(min(counts))
     again = policy.sample(observations[fast : fast + 1], noise_names=[("row", fast)], candidates=1)
     assert np.array_equal(again.actions, alone[fast].actions)
+
+
+def test_padding_is_the_last_row_again(folders, two_mode_windows, monkeypatch):
+    """Other noise could need more steps than any row that was asked for, or reach the cap."""
+    seen, honest = [], policy_module.generate
+
+    def spy(network, condition, noise, **settings):
+        seen.append((condition, noise(0)))
+        return honest(network, condition, noise, **settings)
+
+    monkeypatch.setattr(policy_module, "generate", spy)
+    observations = two_mode_windows(3, seed=9).observations
+    load_policy(folders["flow"]).sample(observations, noise_names=names(3), candidates=1)
+    ((condition, noise),) = seen
+    assert len(noise) == 16 and not torch.equal(noise[1], noise[2])
+    assert torch.equal(noise[3:], noise[2:3].expand_as(noise[3:]))
+    assert torch.equal(condition[3:], condition[2:3].expand_as(condition[3:]))
 
 
 def test_fresh_noise_is_a_choice_of_ddim_only(folders):
