@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from gates.proof import Rung
+from gates.rederive_dataset import rederive_dataset
 from gates.rederive_shadow import SHADOW, TaskSection, rederive_shadow
 from gates.report import Gate
 from gates.settings import PARAMS_FILE, read_params, section_of
@@ -75,14 +76,16 @@ def _rederived(root: Path, rung: Rung) -> Rung:
 
 
 def rederive(root: Path, gate: Gate) -> None:
-    """Hold the evidence of a gate against its journals; gates without journals have none.
+    """Hold the evidence of a gate against what lies under it: its journals, the rows of a dataset.
 
     Raises:
         RefusedError: A row, the envelope or a finding of the checker is not what the journals say,
-            or a power or a mutant is not what is computed again.
+            or a power, a mutant, a statistic or a split is not what is computed again.
         IntegrityError: A journal or a table is missing or no regular file.
         BadInputError: A journal or a table cannot be read.
     """
+    if gate == "A":
+        rederive_dataset(root)
     if gate not in FOLDERS:
         return
     folder, pattern = FOLDERS[gate]

@@ -386,25 +386,24 @@ def record(root: Path) -> None:
 def _dataset(root: Path) -> None:
     refused = [{"file": "x", "where": "x", "reason": "too short"}]
     document(root, "ingest/refusals.json", {"found": 50, "accepted": 49, "refused": refused})
-    document(root, "ingest/manifest.json", {"schema_version": 1})
-    rows = range(9)
-    table(
-        root,
-        "ingest/frames.parquet",
-        FrameRow,
-        [
-            {
-                "episode_uuid": f"e{e}",
-                "index": i,
-                "event_time_s": 0.1 * i,
-                "observation": [0.0],
-                "action": [0.38 + 0.03 * i, _bow(e, i), 0.15] * 3,
-                "phase": "approach",
-            }
-            for e in range(4)
-            for i in rows
-        ],
-    )
+    frames: list[dict[str, Any]] = [
+        {
+            "episode_uuid": f"e{e}",
+            "index": i,
+            "event_time_s": 0.1 * i,
+            "observation": [0.1 * e],
+            "action": [0.38 + 0.03 * i, _bow(e, i), 0.15] * 3,
+            "phase": "approach",
+        }
+        for e in range(4)
+        for i in range(9)
+    ]
+    table(root, "ingest/frames.parquet", FrameRow, frames)
+    training = [row for row in frames if row["episode_uuid"] in ("e0", "e1")]
+    statistics = {name: _extremes([row[name] for row in training]) for name in
+                  ("observation", "action")}  # fmt: skip
+    manifest = {"schema_version": 1, "normalisation": statistics}
+    document(root, "ingest/manifest.json", manifest)
     table(
         root,
         "ingest/episodes.parquet",
@@ -412,7 +411,7 @@ def _dataset(root: Path) -> None:
         [
             {
                 "episode_uuid": f"e{e}",
-                "split": "train",
+                "split": ("train", "train", "validation", "test")[e],
                 "task": "t",
                 "object": "o",
                 "operator": "p",
@@ -432,6 +431,11 @@ def _dataset(root: Path) -> None:
             for e in range(4)
         ],
     )
+
+
+def _extremes(rows: list[list[float]]) -> dict[str, list[float]]:
+    columns = list(zip(*rows, strict=True))
+    return {"minimum": [min(c) for c in columns], "maximum": [max(c) for c in columns]}
 
 
 def _bow(episode: int, index: int) -> float:

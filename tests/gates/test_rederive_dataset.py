@@ -1,0 +1,89 @@
+"""A fault that writer and reader of a dataset share is seen by a third who counts for himself."""
+
+import evidence
+import numpy as np
+import pandas as pd
+import pytest
+
+from gates.proof import Rung
+from gates.rederive import rederived
+from gates.rederive_dataset import rederive_dataset
+from genpolicy.errors import BadInputError, RefusedError
+
+FRAMES = "artifacts/ingest/frames.parquet"
+
+
+@pytest.fixture
+def dataset(repo):
+    """Four episodes in time, with the statistics of the first two."""
+    return repo
+
+
+def _state(root, frames, rows):
+    def of(column):
+        values = np.stack(frames[column][rows].tolist())
+        return {"minimum": values.min(axis=0).tolist(), "maximum": values.max(axis=0).tolist()}
+
+    found = {name: of(name) for name in ("observation", "action")}
+    evidence.edit_document(root, "ingest/manifest.json", lambda d: d | {"normalisation": found})
+
+
+def test_statistics_of_the_training_split_in_time_are_those_that_are_stated(dataset):
+    rederive_dataset(dataset)
+
+
+def test_statistics_of_all_splits_are_refused_by_name(dataset):
+    frames = pd.read_parquet(dataset / FRAMES)
+    _state(dataset, frames, np.ones(len(frames), dtype=bool))
+    with pytest.raises(RefusedError, match=r"normalisation\.\w+: m\w+imum.*training split"):
+        rederive_dataset(dataset)
+
+
+@pytest.mark.parametrize("change", [{}, {"normalisation": 3}, {"normalisation": {}}])
+def test_no_statistics_are_refused(dataset, change):
+    evidence.edit_document(
+        dataset, "ingest/manifest.json", lambda d: {"schema_version": 1} | change
+    )
+    with pytest.raises(RefusedError, match="normalisation"):
+        rederive_dataset(dataset)
+
+
+@pytest.mark.parametrize(
+    "splits",
+    [("train", "validation", "train", "test"), ("validation", "train", "train", "test"),
+     ("train", "train", "test", "validation"), ("test", "train", "train", "validation"),
+     ("train", "train", "validation", "validation"), ("train", "train", "test", "test")],
+)  # fmt: skip
+def test_splits_that_are_not_in_time_are_refused(dataset, splits):
+    evidence.edit_table(dataset, "ingest/episodes.parquet", lambda f: f.assign(split=splits))
+    with pytest.raises(RefusedError, match="split"):
+        rederive_dataset(dataset)
+
+
+def test_a_time_that_is_not_known_orders_nothing(dataset):
+    evidence.edit_table(
+        dataset, "ingest/episodes.parquet", lambda f: f.assign(recorded_at_s=np.nan)
+    )
+    with pytest.raises(RefusedError, match="split"):
+        rederive_dataset(dataset)
+
+
+def test_recordings_of_one_time_may_lie_on_either_side(dataset):
+    evidence.edit_table(dataset, "ingest/episodes.parquet", lambda f: f.assign(recorded_at_s=1.7e9))
+    rederive_dataset(dataset)
+
+
+def test_rows_of_unequal_length_are_refused(dataset):
+    def cut(frame):
+        return frame.assign(observation=[[1.0, 2.0][: 1 + (i > 0)] for i in range(len(frame))])
+
+    evidence.edit_table(dataset, "ingest/frames.parquet", cut)
+    with pytest.raises((RefusedError, BadInputError)):
+        rederive_dataset(dataset)
+
+
+def test_gate_a_is_refused_where_its_dataset_is(dataset):
+    rung = Rung("A", "need", "PASS", "", "", "reports/gate_a.json", 0)
+    assert rederived(dataset, [rung])[0].verdict == "PASS"
+    evidence.edit_document(dataset, "ingest/manifest.json", lambda d: {"schema_version": 1})
+    assert rederived(dataset, [rung])[0].verdict == "REFUSED"
