@@ -929,6 +929,7 @@ def _generators(root: Path) -> None:
 
 
 def _reload(root: Path) -> None:
+    manifest = (root / "artifacts/ingest/manifest.json").read_bytes()
     digest = hashlib.sha256(b"sample").hexdigest()
     table(
         root,
@@ -992,7 +993,7 @@ def _reload(root: Path) -> None:
                 "checkpoint": hashlib.sha256(m.encode()).hexdigest(),
                 "checkpoints": [hashlib.sha256(m.encode()).hexdigest()],
                 "config": ["c"],
-                "dataset": hashlib.sha256(canonical_json({"schema_version": 1})).hexdigest(),
+                "dataset": hashlib.sha256(manifest).hexdigest(),
                 "normalisation": "n",
                 "seed": [0],
                 "sampler": "s",
