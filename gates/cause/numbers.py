@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from genpolicy.audit.component_rows import ComponentModes
+from genpolicy.audit.documents import Counts
 from genpolicy.audit.reach_rows import LOCAL, Alternative, Reach, Side
 from genpolicy.audit.rows import Finding, ModeOutcome, Prediction, Stratum
 
@@ -14,29 +15,6 @@ class Labels:
 
     replays: int
     disagreements: int
-
-
-@dataclass(frozen=True)
-class Counts:
-    """Situations and distinct held-out episodes; meanings as in `genpolicy.audit.counts`."""
-
-    queries: int
-    analysed: int
-    analysed_episodes: int
-    two_mode: int
-    two_mode_episodes: int
-    primary_episodes: int
-    resolved: int
-    incoherent: int
-    persistent: int
-    noise_ratio: float
-    noise_spread: float
-    white_share: float
-
-    @property
-    def share(self) -> float:
-        """Share of the situations with enough neighbours."""
-        return self.analysed / self.queries if self.queries else 0.0
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
-from gates.cause.numbers import Counts, Kept, Labels, Numbers, Residual
+from gates.cause.numbers import Kept, Labels, Numbers, Residual
 from gates.evidence import MissingEvidenceError
 from genpolicy.audit.component_rows import ComponentModes
+from genpolicy.audit.documents import Counts
 from genpolicy.audit.reach_rows import Alternative, FindingDraw, Reach, Side, StructureDraw
 from genpolicy.audit.rows import (
     Calibration,

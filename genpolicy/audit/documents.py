@@ -40,6 +40,11 @@ class Counts:
     noise_spread: float
     white_share: float
 
+    @property
+    def share(self) -> float:
+        """Share of the situations with enough neighbours."""
+        return self.analysed / self.queries if self.queries else 0.0
+
 
 @dataclass(frozen=True)
 class Persistence:

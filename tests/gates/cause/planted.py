@@ -3,8 +3,9 @@
 from dataclasses import replace
 
 from gates.cause import Cause, CauseLimits, default_limits, name_cause
-from gates.cause.numbers import Counts, Kept, Labels, Numbers
+from gates.cause.numbers import Kept, Labels, Numbers
 from genpolicy.audit.component_rows import ComponentModes
+from genpolicy.audit.documents import Counts
 from genpolicy.audit.reach_rows import LEARNED, LOCAL, Alternative, Reach, Side
 from genpolicy.audit.rows import Finding, ModeOutcome, Prediction, Stratum
 from genpolicy.audit.settings import AuditSettings
