@@ -1,7 +1,7 @@
 """Reading the audit's numbers, and those of its resamples, from its evidence."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +10,7 @@ from typing import Any, Protocol, TypeVar
 from gates.cause.numbers import Kept, Labels, Numbers, Residual
 from gates.evidence import MissingEvidenceError
 from genpolicy.audit.component_rows import ComponentModes
-from genpolicy.audit.documents import Counts
+from genpolicy.audit.documents import PERSISTENCE, SUMMARY, Summary
 from genpolicy.audit.reach_rows import Alternative, FindingDraw, Reach, Side, StructureDraw
 from genpolicy.audit.rows import (
     Calibration,
@@ -22,17 +22,23 @@ from genpolicy.audit.rows import (
     Resample,
     Stratum,
 )
+from genpolicy.documents.document import Content, Document
 from genpolicy.errors import BadInputError
-from genpolicy.integrity.documents import read_json
 from genpolicy.integrity.rows import Row, read_rows
 
-Document = Callable[[str], Mapping[str, Any]]
 RESIDUALS: tuple[tuple[str, str, type[Any], str], ...] = (
     ("clock_residual_s", "clocks.parquet", Clock, "offset_after_s"),
     ("calibration_residual_m", "calibration.parquet", Calibration, "residual_m"),
 )
 """Question, table, its rows and the column that answers where no finding does."""
 _OfPhase = TypeVar("_OfPhase", ModeOutcome, Alternative)
+
+
+class Documents(Protocol):
+    """A JSON document of the evidence by its kind, as its class."""
+
+    def __call__(self, kind: Document[Content], /) -> Content:
+        """The content."""
 
 
 class Rows(Protocol):
@@ -42,17 +48,17 @@ class Rows(Protocol):
         """The rows, possibly none."""
 
 
-def read_numbers(document: Document, rows: Rows) -> tuple[Numbers, tuple[Numbers, ...]]:
+def read_numbers(documents: Documents, rows: Rows) -> tuple[Numbers, tuple[Numbers, ...]]:
     """The numbers of an audit, and those of its resamples.
 
     Args:
-        document: A JSON document of the evidence by name.
+        documents: A JSON document of the evidence by its kind.
         rows: A table of the evidence by name and class of its rows.
 
     Raises:
         BadInputError: A document or table lacks something.
     """
-    numbers = read_measured(document, rows)
+    numbers = read_measured(documents, rows)
     with _written_by_this_version():
         drawn = _draws(
             numbers,
@@ -63,22 +69,22 @@ def read_numbers(document: Document, rows: Rows) -> tuple[Numbers, tuple[Numbers
         return numbers, tuple(drawn)
 
 
-def read_measured(document: Document, rows: Rows) -> Numbers:
+def read_measured(documents: Documents, rows: Rows) -> Numbers:
     """The numbers of an audit without its resamples; arguments and errors as `read_numbers`."""
-    summary, kept = document("summary.json"), document("persistence.json")
+    summary, kept = documents(SUMMARY), documents(PERSISTENCE)
     with _written_by_this_version():
         sides, reach = rows("sides.parquet", Side), rows("reach.parquet", Reach)
         kind = next(side.kind for side in sides if side.followed)
         replayed = rows("replay.parquet", ReplayRow)
         numbers = Numbers(
             findings=tuple(rows("findings.parquet", Finding)),
-            floors={str(key): float(value) for key, value in summary["floors"].items()},
-            ceilings={str(key): float(value) for key, value in summary["ceilings"].items()},
-            metre=float(summary["metre"]),
-            unit=str(summary["position_unit"]),
+            floors=summary.floors,
+            ceilings=summary.ceilings,
+            metre=summary.metre,
+            unit=summary.position_unit,
             labels=_labels(len(replayed), sum(row.label != row.replayed for row in replayed)),
-            counts=_of(Counts, summary["counts"]),
-            kept=_of(Kept, kept),
+            counts=summary.counts,
+            kept=Kept(kept.observed, kept.null_q95, kept.n),
             strata=tuple(rows("strata.parquet", Stratum)),
             told=tuple(rows("predictions.parquet", Prediction)),
             modes=tuple(
@@ -88,7 +94,7 @@ def read_measured(document: Document, rows: Rows) -> Numbers:
             elsewhere=tuple(
                 mode
                 for mode in rows("modes.parquet", ModeOutcome)
-                if mode.phase != summary["primary_phase"]
+                if mode.phase != summary.primary_phase
             ),
             components=tuple(rows("components.parquet", ComponentModes)),
             alternatives=_of_phase(rows("alternatives.parquet", Alternative), summary),
@@ -99,7 +105,7 @@ def read_measured(document: Document, rows: Rows) -> Numbers:
             residuals=_residuals(rows),
         )
         _check_alternatives(numbers)
-        _check_known((*numbers.told, *reach, *sides, numbers.counts, numbers.kept))
+        _check_known((*numbers.told, *reach, *sides))
         _check_tests(numbers.strata)
         return numbers
 
@@ -152,9 +158,9 @@ def _written_by_this_version() -> Iterator[None]:
         ) from error
 
 
-def _of_phase(rows: Sequence[_OfPhase], summary: Mapping[str, Any]) -> tuple[_OfPhase, ...]:
+def _of_phase(rows: Sequence[_OfPhase], summary: Summary) -> tuple[_OfPhase, ...]:
     """Those of the phase with most situations."""
-    return tuple(row for row in rows if row.phase == summary["primary_phase"])
+    return tuple(row for row in rows if row.phase == summary.primary_phase)
 
 
 def _check_known(rows: Iterable[object]) -> None:
@@ -188,7 +194,7 @@ def folder_numbers(folder: Path) -> tuple[Numbers, tuple[Numbers, ...]]:
         BadInputError: A file is missing or damaged.
     """
     return read_numbers(
-        lambda name: read_json(folder / name),
+        lambda kind: kind.read(folder),
         lambda name, row: read_rows(folder / name, row),
     )
 
@@ -257,8 +263,3 @@ def _moved(row: Prediction, told: float) -> Prediction:
     return replace(
         row, told=told, told_lower=row.told_lower + away, told_upper=row.told_upper + away
     )
-
-
-def _of(kind: Any, row: Mapping[str, Any]) -> Any:
-    """A result class from the values of its fields; others are left out."""
-    return kind(**{name: row[name] for name in kind.__dataclass_fields__})

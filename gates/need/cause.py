@@ -1,7 +1,5 @@
 """The cause behind the modes: named from the audit's numbers, under the limits of this gate."""
 
-from typing import Any
-
 from gates.cause import (
     Cause,
     CauseLimits,
@@ -14,14 +12,12 @@ from gates.cause import (
 )
 from gates.cause.limits import SHARED
 from gates.cause.naming import IN_METRES
-from gates.cause.reading import Document as ReadDocument
-from gates.cause.reading import Rows
+from gates.cause.reading import Documents, Rows
 from gates.criterion import Measured
 from gates.evidence import Evidence, MissingEvidenceError
 from gates.need.settings import AUDIT, NeedSettings
 from gates.settings import PARAMS_FILE, Limit, Limits, Waiver
-from genpolicy.audit.documents import PERSISTENCE, SUMMARY
-from genpolicy.documents.document import Document
+from genpolicy.documents.document import Content, Document
 from genpolicy.errors import BadInputError
 
 PLACE = f"{PARAMS_FILE}: gate_a.cause"
@@ -82,11 +78,9 @@ def _limits(settings: NeedSettings) -> CauseLimits:
     return limits_of(settings.cause, shared, confidence=settings.confidence, where=PLACE)
 
 
-def _readers(evidence: Evidence) -> tuple[ReadDocument, Rows]:
-    def document(name: str) -> dict[str, Any]:
-        kind: Document[Any] = {kind.file: kind for kind in (SUMMARY, PERSISTENCE)}[name]
-        plain: dict[str, Any] = kind.plain(evidence.document(AUDIT, kind))
-        return plain
+def _readers(evidence: Evidence) -> tuple[Documents, Rows]:
+    def document(kind: Document[Content]) -> Content:
+        return evidence.document(AUDIT, kind)
 
     return document, lambda name, row: evidence.records(f"{AUDIT}/{name}", row)
 

@@ -2,15 +2,18 @@
 
 import math
 from dataclasses import replace
+from functools import reduce
+from operator import getitem
 
 import pytest
 from planted import VALID
 
 from gates.cause.reading import read_measured, read_numbers
 from gates.evidence import MissingEvidenceError
+from genpolicy.audit.documents import PERSISTENCE, SUMMARY, Persistence, Summary
 from genpolicy.audit.reach_rows import LOCAL, Side, StructureDraw
 from genpolicy.audit.rows import Calibration, Clock, ReplayRow, Resample
-from genpolicy.errors import BadInputError
+from genpolicy.errors import BadInputError, IntegrityError
 
 SIDE = Side(
     **{name: 0 for name in Side.__dataclass_fields__} | {"kind": LOCAL, "followed": True}
@@ -28,14 +31,15 @@ TABLES = {
     "clocks.parquet": [CLOCK, replace(CLOCK, offset_after_s=0.001)],
     "calibration.parquet": [Calibration("e1", 20, None)],
 }
-DOCUMENTS = {
-    "summary.json": {
+SUMMED = Summary(
+    **{name: 0 for name in Summary.__dataclass_fields__} | {
         "floors": {}, "ceilings": {}, "metre": 1.0, "position_unit": "m",
-        "primary_phase": "approach",
-        "counts": vars(VALID.counts),
-    },
-    "persistence.json": vars(VALID.kept),
-}  # fmt: skip
+        "primary_phase": "approach", "counts": VALID.counts, "position_names": [], "notes": [],
+        "obstacles": [],
+    }
+)  # fmt: skip
+KEPT = Persistence(VALID.kept.observed, VALID.kept.null_q95, 0.5, VALID.kept.n)
+DOCUMENTS = {SUMMARY: SUMMED, PERSISTENCE: KEPT}
 
 
 DRAW = Resample(
@@ -134,14 +138,13 @@ def test_a_test_of_a_resample_is_known_as_well(place):
 
 
 @pytest.mark.parametrize(
-    ("document", "place"),
-    [("counts", "noise_ratio"), ("counts", "incoherent"), ("kept", "null_q95"), ("kept", "n")],
-)
-def test_a_count_that_is_not_there_is_no_number(document, place, monkeypatch):
-    if document == "kept":
-        monkeypatch.setitem(DOCUMENTS, "persistence.json", vars(VALID.kept) | {place: None})
-    else:
-        changed = {"counts": vars(VALID.counts) | {place: None}}
-        monkeypatch.setitem(DOCUMENTS, "summary.json", DOCUMENTS["summary.json"] | changed)
-    with pytest.raises(BadInputError, match=f"{place} is not known"):
-        read()
+    ("kind", "place"),
+    [(SUMMARY, "counts.noise_ratio"), (SUMMARY, "counts.incoherent"), (PERSISTENCE, "null_q95"),
+     (PERSISTENCE, "n")],
+)  # fmt: skip
+def test_a_count_that_is_not_there_is_no_number(kind, place):
+    plain = kind.plain(DOCUMENTS[kind])
+    *above, name = place.split(".")
+    reduce(getitem, above, plain)[name] = None
+    with pytest.raises(IntegrityError, match=f"{place} = None"):
+        kind.parse(plain, where="the audit")
