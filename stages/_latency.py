@@ -12,16 +12,14 @@ class LatencySection(Settings):
     """Section `latency`.
 
     Attributes:
-        warm: Warm invocations per run.
-        cold: Cold invocations per run.
+        warm: Warm invocations of each process.
+        cold: Cold invocations of each process.
         declared: Least and most of each term that this machine cannot measure, s.
-        declared_draws: Values drawn from each of them for the report.
     """
 
     warm: int = Field(ge=20)
     cold: int = Field(ge=2)
     declared: dict[str, Annotated[list[float], Field(min_length=2, max_length=2)]]
-    declared_draws: int = Field(ge=20)
 
     @property
     def declared_terms(self) -> dict[str, DeclaredTerm]:

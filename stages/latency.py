@@ -7,8 +7,14 @@ from pathlib import Path
 
 from gates.proof import admit
 from genpolicy.candidates.judged import compared
-from genpolicy.evidence.reproducibility.latency import LatencyPlan, declared_rows, measured_rows
-from genpolicy.evidence.rows.reproducibility import LatencyRow
+from genpolicy.evidence.reproducibility.latency import (
+    PROCESSES,
+    LatencyPlan,
+    declared_rows,
+    measured_rows,
+    model_rows,
+)
+from genpolicy.evidence.rows.reproducibility import LatencyModelRow, LatencyRow
 from genpolicy.evidence.stress.settings import StressSettings
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import output_folder
@@ -22,7 +28,7 @@ from stages._training import MethodsSection
 
 
 def work(params: Params) -> None:
-    """Measure every method twice, each time in a fresh process."""
+    """Measure every method twice, each time in several fresh processes."""
     admit("latency", Path.cwd())
     require_one_contract("train_baselines", "train_generators")
     section = params.section("latency", LatencySection)
@@ -44,11 +50,13 @@ def work(params: Params) -> None:
         declared = declared_rows(
             [policy.name for policy in policies],
             section.declared_terms,
-            draws=section.declared_draws,
+            draws=section.warm * len(PROCESSES),
             generator=stream(params.seed, "latency", "declared"),
         )
-        rows = measured_rows(plan, policies) + declared
-        write_rows(folder / "latency.parquet", LatencyRow, rows)
+        rows = measured_rows(plan, policies)
+        model = model_rows(rows, section.declared_terms, root_seed=params.seed)
+        write_rows(folder / "latency.parquet", LatencyRow, rows + declared)
+        write_rows(folder / "model.parquet", LatencyModelRow, model)
 
 
 if __name__ == "__main__":

@@ -20,6 +20,7 @@ from genpolicy.evidence.documents.reproducibility import CANDIDATES, CandidateId
 from genpolicy.evidence.rows.reproducibility import NfeRow, SampleRow
 
 MANIFEST = "artifacts/ingest/manifest.json"
+TOTAL = "total"
 
 
 @criterion(
@@ -46,23 +47,19 @@ def parameter_budget_deviation(
 ) -> Measured:
     """Parameters against those of the reference, as a share off."""
     reference = settings.budget_reference
-    budget = _parameters(evidence, BASELINES, reference, settings)
-    own = _parameters(evidence, GENERATORS, candidate, settings)
+    budget = _parameters(evidence, BASELINES, reference)
+    own = _parameters(evidence, GENERATORS, candidate)
     if budget <= 0:
         raise MissingEvidenceError(f"{reference} has no parameters")
     text = f"{own:g} parameters, budget {budget:g} ({reference})"
     return Measured(abs(own / budget - 1.0), caveat=text)
 
 
-def _parameters(
-    evidence: Evidence, folder: str, method: str, settings: ReproducibilitySettings
-) -> float:
+def _parameters(evidence: Evidence, folder: str, method: str) -> float:
     entry = evidence.document(folder, MATCHED).methods.get(method)
-    absent = [part for part in settings.budget_parts if entry and part not in entry.parameters]
-    if entry is None or absent:
-        what = ", ".join([method, *absent])
-        raise MissingEvidenceError(f"{folder}/{MATCHED.file} counts no parameters of {what}")
-    return float(sum(entry.parameters[part] for part in settings.budget_parts))
+    if entry is None or TOTAL not in entry.parameters:
+        raise MissingEvidenceError(f"{folder}/{MATCHED.file} counts no parameters of {method}")
+    return float(entry.parameters[TOTAL])
 
 
 @criterion(

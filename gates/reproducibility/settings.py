@@ -23,7 +23,6 @@ class ReproducibilitySettings(CandidateSettings):
     Attributes:
         baselines: Simpler methods that candidates will be compared with.
         budget_reference: Method whose parameter count is the budget.
-        budget_parts: Parts of the model whose parameters are compared, summed.
         mode_minimum_share: Share of the samples of a situation that must be admissible and reach
             a mode, for that mode to be covered.
     """
@@ -35,7 +34,6 @@ class ReproducibilitySettings(CandidateSettings):
 
     baselines: tuple[str, ...] = Field(min_length=1)
     budget_reference: str
-    budget_parts: tuple[str, ...]
     mode_minimum_share: float = Field(gt=0.0, le=0.5)
 
 

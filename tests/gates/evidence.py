@@ -43,7 +43,13 @@ from genpolicy.evidence.rows.need import (
     ModeRow,
     OfflineRow,
 )
-from genpolicy.evidence.rows.reproducibility import CoverageRow, LatencyRow, NfeRow, SampleRow
+from genpolicy.evidence.rows.reproducibility import (
+    CoverageRow,
+    LatencyModelRow,
+    LatencyRow,
+    NfeRow,
+    SampleRow,
+)
 from genpolicy.evidence.rows.shadow import CandidateRow, ShadowCountRow, ShadowStubRow
 from genpolicy.evidence.rows.stress import (
     ConservationRow,
@@ -192,7 +198,6 @@ PARAMS: dict[str, Any] = {
     },
     "gate_b": {
         "budget_reference": "chunked_bc",
-        "budget_parts": ["total"],
         "mode_minimum_share": 0.125,
         "limits": by_owner(
             unmatched_keys=(0, "model"),
@@ -207,7 +212,9 @@ PARAMS: dict[str, Any] = {
             late_change_upper=(0.15, "model"),
             baseline_fall_upper=(0.1, "model"),
             latency_terms_missing=(0, "perception"),
-            latency_median_ratio=(1.5, "controller"),
+            warm_latency_ratio_upper=(1.5, "controller"),
+            cold_latency_ratio_upper=(2.0, "controller"),
+            latency_model_ratio_upper=(1.25, "controller"),
         ),
     },
     "gate_c": {
@@ -1014,18 +1021,41 @@ def _latency(root: Path) -> None:
             {
                 "method": m,
                 "run": run,
+                "process": process,
                 "component": term,
                 "owner": "model",
                 "temperature": temperature,
                 "repeat": i,
-                "seconds": (SPEED[m] if term == "sample" else 0.001) * (1 + 0.01 * i + 0.02 * run),
+                "seconds": (SPEED[m] if term == "sample" else 0.001)
+                * (1 + 0.01 * i + 0.02 * run + 0.01 * process),
                 "source": "measured" if term in MEASURED_HERE else "declared",
             }
             for m in CANDIDATES
             for run in (1, 2)
+            for process in (1, 2, 3)
             for term in TERMS
             for temperature in ("cold", "warm")
             for i in range(8)
+        ],
+    )
+    table(
+        root,
+        "latency/model.parquet",
+        LatencyModelRow,
+        [
+            {
+                "method": m,
+                "fitted_run": 3 - run,
+                "run": run,
+                "process": process,
+                "level": level,
+                "measured_s": SPEED[m] * (1 + level / 10 + 0.01 * process),
+                "drawn_s": SPEED[m] * (1.02 + level / 10),
+            }
+            for m in CANDIDATES
+            for run in (1, 2)
+            for process in (1, 2, 3)
+            for level in (0.5, 0.95)
         ],
     )
 

@@ -1,6 +1,11 @@
-"""Measured latency of every method, twice in fresh processes; and the virtual clock's models."""
+"""Measured latency of every method, twice in fresh processes; and the virtual clock's models.
 
-from collections.abc import Mapping, Sequence
+The unit is the process: invocations of one share its memory layout, its caches and the mood of the
+machine. So each of the two measurements takes several processes, in turns, and what a model says is
+held against the processes that it was not made from.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,14 +21,20 @@ from genpolicy.errors import ContractError
 from genpolicy.evidence.admission_context import context_at_rest, make_checker, recorded_proposal
 from genpolicy.evidence.reproducibility.benchmark import Measurement, measure_policy
 from genpolicy.evidence.reproducibility.measure import in_fresh_process
-from genpolicy.evidence.rows.reproducibility import LatencyRow
-from genpolicy.evidence.stress.latency import DeclaredTerm, LatencyModel
+from genpolicy.evidence.rows.reproducibility import LatencyModelRow, LatencyRow
+from genpolicy.evidence.stress.latency import DeclaredTerm, LatencyModel, draw_latency
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.policies.fixtures import fixture_observations
 from genpolicy.tasks.api import load_task
 
 RUNS = (1, 2)
+PROCESSES = (1, 2, 3)
+"""Of each run. Three: processes whose medians differ by a tenth are found alike up to a factor of
+1.5 in four of five comparisons (`genpolicy.statistics.equivalence`); two would need .06."""
 OBSERVATIONS = 32
+DRAWN = 1000
+LEVELS = (0.5, 0.95)
+INVOCATION = ["run", "process", "repeat"]
 
 
 @dataclass(frozen=True)
@@ -35,8 +46,8 @@ class LatencyPlan:
         task: Registered name of the task.
         feasibility: Thresholds of the six layers; their run time is the term `project`.
         horizons: Common horizons.
-        warm: Warm invocations.
-        cold: Cold invocations.
+        warm: Warm invocations of a process.
+        cold: Cold invocations of a process.
     """
 
     dataset: Path
@@ -48,11 +59,15 @@ class LatencyPlan:
 
 
 def measured_rows(plan: LatencyPlan, policies: Sequence[JudgedPolicy]) -> list[LatencyRow]:
-    """Terms measured on this machine: two independent runs per method."""
+    """Terms measured on this machine: two runs of several processes per method, in turns.
+
+    Methods and runs take turns, so that a machine which grows slower slows all of them.
+    """
     return [
         LatencyRow(
             method=judged.name,
             run=run,
+            process=process,
             component=item.component,
             owner=str(OWNERS[Term(item.component)]),
             temperature=item.temperature,
@@ -60,8 +75,9 @@ def measured_rows(plan: LatencyPlan, policies: Sequence[JudgedPolicy]) -> list[L
             seconds=item.seconds,
             source="measured",
         )
-        for judged in policies
+        for process in PROCESSES
         for run in RUNS
+        for judged in policies
         for item in in_fresh_process(measure_terms, plan, judged)
     ]
 
@@ -99,6 +115,7 @@ def declared_rows(
             LatencyRow(
                 method=name,
                 run=RUNS[0],
+                process=PROCESSES[0],
                 component=str(term),
                 owner=str(OWNERS[term]),
                 temperature="warm",
@@ -168,7 +185,57 @@ def latency_models(
                 expected="every measured term, cold and warm",
                 action="Run the latency stage again (`dvc repro latency`).",
             )
-        first = float(cold.groupby(["run", "repeat"])["seconds"].sum().max())
-        typical = float(warm.groupby(["run", "repeat"])["seconds"].sum().median())
+        first = float(cold.groupby(INVOCATION)["seconds"].sum().max())
+        typical = float(warm.groupby(INVOCATION)["seconds"].sum().median())
         models[str(method)] = LatencyModel(declared, terms, max(0.0, first - typical))
     return models
+
+
+def model_rows(
+    rows: Sequence[LatencyRow], declared: Mapping[str, DeclaredTerm], *, root_seed: int
+) -> list[LatencyModelRow]:
+    """What models made from one run say of the processes of the other.
+
+    Only measured terms are summed: nothing here can contradict a declared one.
+
+    Args:
+        rows: Measured rows of both runs.
+        declared: Bounds of the terms that this machine cannot measure.
+        root_seed: Root seed of the ladder.
+    """
+    table = pd.DataFrame([vars(row) for row in rows])
+    warm = table[table["temperature"] == "warm"]
+    spans = warm.groupby(["method", *INVOCATION])["seconds"].sum()
+    found = []
+    for fitted, other in (RUNS, RUNS[::-1]):
+        for method, model in latency_models(table[table["run"] == fitted], declared).items():
+            drawn = np.fromiter(_drawn_spans(model, root_seed), dtype=np.float64)
+            for process, part in spans.loc[method, other].groupby("process"):
+                found += [
+                    LatencyModelRow(
+                        method=method,
+                        fitted_run=fitted,
+                        run=other,
+                        process=int(process),
+                        level=level,
+                        measured_s=float(np.quantile(part, level, method="higher")),
+                        drawn_s=float(np.quantile(drawn, level, method="higher")),
+                    )
+                    for level in LEVELS
+                ]
+    return found
+
+
+def _drawn_spans(model: LatencyModel, root_seed: int) -> Iterator[float]:
+    """Measured terms of drawn invocations, summed, s; none of them is the first of a session."""
+    for invocation in range(1, DRAWN + 1):
+        draw = draw_latency(
+            model,
+            root_seed=root_seed,
+            perturbation="latency/model",
+            start=0,
+            invocation=invocation,
+            extra_s={},
+            compute_factor=1.0,
+        )
+        yield sum(draw.terms[str(name)] for name in MEASURED_TERMS)

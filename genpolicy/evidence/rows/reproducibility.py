@@ -85,7 +85,8 @@ class LatencyRow:
 
     Attributes:
         method: The method.
-        run: Which fresh process, from 1; a declared term belongs to the first.
+        run: Which of the two measurements, from 1; a declared term belongs to the first.
+        process: Which fresh process of its run, from 1.
         component: Term of the latency (`genpolicy.contract.latency.Term`).
         owner: Who answers for the term.
         temperature: `cold` or `warm`.
@@ -96,9 +97,33 @@ class LatencyRow:
 
     method: str
     run: int
+    process: int
     component: str
     owner: str
     temperature: str
     repeat: int
     seconds: float
     source: str
+
+
+@dataclass(frozen=True)
+class LatencyModelRow:
+    """`model.parquet`: the model that gate D draws from, against a process that it has not seen.
+
+    Attributes:
+        method: The method.
+        fitted_run: Measurement that the model was made from.
+        run: The other one.
+        process: Process of the other one.
+        level: Which quantile of an invocation's measured terms, summed.
+        measured_s: That quantile in the process, s.
+        drawn_s: The same of invocations drawn from the model, s.
+    """
+
+    method: str
+    fitted_run: int
+    run: int
+    process: int
+    level: float
+    measured_s: float
+    drawn_s: float

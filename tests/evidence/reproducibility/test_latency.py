@@ -6,7 +6,14 @@ import pytest
 
 from genpolicy.contract.latency import DECLARED_TERMS, MEASURED_TERMS, OWNERS
 from genpolicy.errors import ConfigError, ContractError
-from genpolicy.evidence.reproducibility.latency import declared_rows, latency_models
+from genpolicy.evidence.reproducibility.latency import (
+    DRAWN,
+    LEVELS,
+    declared_rows,
+    latency_models,
+    model_rows,
+)
+from genpolicy.evidence.rows.reproducibility import LatencyRow
 from genpolicy.evidence.stress.latency import DeclaredTerm
 from genpolicy.seeds import stream
 
@@ -20,7 +27,7 @@ def table(methods=("a", "b"), *, warm=20, cold=2):
             for temperature, repeats, scale in (("warm", warm, 1.0), ("cold", cold, 50.0)):
                 rows += [
                     {
-                        "method": method, "run": run, "component": name,
+                        "method": method, "run": run, "process": 1, "component": name,
                         "temperature": temperature, "repeat": repeat,
                         "seconds": scale * 1e-3 * (1 + (7 * repeat) % 5), "source": "measured",
                     }
@@ -29,8 +36,8 @@ def table(methods=("a", "b"), *, warm=20, cold=2):
                 ]  # fmt: skip
         rows.append(
             {
-                "method": method, "run": 1, "component": "network", "temperature": "warm",
-                "repeat": 0, "seconds": 9.0, "source": "declared",
+                "method": method, "run": 1, "process": 1, "component": "network",
+                "temperature": "warm", "repeat": 0, "seconds": 9.0, "source": "declared",
             }
         )  # fmt: skip
     return pd.DataFrame(rows)
@@ -95,3 +102,56 @@ def test_a_term_without_bounds_or_bounds_of_no_term_are_refused():
 def test_bounds_that_are_no_times_are_refused(bounds):
     with pytest.raises(ConfigError, match=r"latency\.declared"):
         DeclaredTerm(*bounds)
+
+
+def measured(spans, *, processes=3):
+    """Rows of method `a`: `spans(run, process, repeat, term)` seconds; cold as warm."""
+    return [
+        LatencyRow(
+            method="a", run=run, process=process, component=str(name), owner=str(OWNERS[name]),
+            temperature=temperature, repeat=repeat, seconds=spans(run, process, repeat, str(name)),
+            source="measured",
+        )
+        for run in (1, 2)
+        for process in range(1, processes + 1)
+        for temperature in ("cold", "warm")
+        for repeat in range(40)
+        for name in MEASURED_TERMS
+    ]  # fmt: skip
+
+
+def test_a_model_of_independent_terms_says_what_the_other_run_takes():
+    times = stream(3, "latency").uniform(1e-3, 2e-3, size=(3, 4, 40, 5))
+    order = {str(name): index for index, name in enumerate(MEASURED_TERMS)}
+    rows = model_rows(
+        measured(lambda run, process, repeat, name: times[run, process, repeat, order[name]]),
+        DECLARED, root_seed=1,
+    )  # fmt: skip
+    assert [(r.fitted_run, r.run, r.process, r.level) for r in rows] == [
+        (3 - run, run, process, level) for run in (2, 1) for process in (1, 2, 3)
+        for level in LEVELS
+    ]  # fmt: skip
+    assert all(row.measured_s == pytest.approx(row.drawn_s, rel=0.1) for row in rows)
+
+
+def test_slow_terms_that_coincide_are_more_than_the_model_draws():
+    """The model draws terms apart: a machine that stalls as a whole is beyond it."""
+    rows = model_rows(
+        measured(lambda run, process, repeat, name: 0.02 if repeat % 10 == 0 else 0.001),
+        DECLARED, root_seed=1,
+    )  # fmt: skip
+    high = [row for row in rows if row.level == 0.95]
+    assert all(row.measured_s == pytest.approx(0.1) for row in high)
+    # Two of five slow at once are drawn in one of ten, all five in one of a hundred thousand.
+    assert all(row.drawn_s == pytest.approx(0.043) for row in high)
+    assert DRAWN >= 1000
+
+
+def test_a_model_of_one_run_is_held_against_the_other():
+    rows = model_rows(
+        measured(lambda run, process, repeat, name: 0.001 * run * (1 + process / 10)),
+        DECLARED, root_seed=1,
+    )  # fmt: skip
+    for row in rows:
+        assert row.measured_s == pytest.approx(0.005 * row.run * (1 + row.process / 10))
+        assert row.drawn_s / row.fitted_run == pytest.approx(0.006, rel=0.11)

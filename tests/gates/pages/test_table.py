@@ -29,7 +29,7 @@ def test_a_candidate_that_stops_names_its_criterion(ladder):
     report = write_gate(ladder, "B")
     assert report.verdict == "PASS" and report.candidates["diffusion"] == "FAIL"
     why = stops(report)
-    assert why["flow"] == "" and why["diffusion"].startswith("latency_median_ratio: ")
+    assert why["flow"] == "" and why["diffusion"].startswith("warm_latency_ratio_upper: ")
     failed = next(c for c in report.criteria if c.verdict == "FAIL")
     assert waived(failed, report) == "stops diffusion only"
     assert passed_by(report) == "every required criterion holds; flow passes whole"

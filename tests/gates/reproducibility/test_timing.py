@@ -1,37 +1,111 @@
-"""Latency: two runs are held against each other, and every term is known."""
+"""Latency: two measurements and a model are held against processes, and every term is known."""
 
 import evidence
+import numpy as np
 import pytest
 from asked import asked, found_in
 from editing import cells
 
 from gates.proof import judge
-from gates.reproducibility.timing import MEASURED_HERE, TERMS, latency_terms_missing
+from gates.reproducibility.latency_budget import MEASURED_HERE, TERMS
+from gates.reproducibility.timing import latency_model_ratio_upper, latency_terms_missing
 
 LATENCY = "latency/latency.parquet"
+MODEL = "latency/model.parquet"
+RATIOS = {"warm": "warm_latency_ratio_upper", "cold": "cold_latency_ratio_upper"}
 
 
-@pytest.mark.parametrize(("run", "seconds"), [(1, 0.004), (2, 0.004)])
-def test_the_slower_of_two_runs_is_held_against_the_faster_whichever_it_is(ladder, run, seconds):
-    """Of what was measured warm: cold calls and declared terms are no part of the question."""
+@pytest.mark.parametrize("temperature", RATIOS)
+@pytest.mark.parametrize("run", [1, 2])
+def test_the_slower_measurement_is_held_against_the_faster_whichever_it_is(
+    ladder, temperature, run
+):
+    """Of one temperature: the other one and declared terms are no part of the question."""
 
     def change(frame):
-        warm = (frame["source"] == "measured") & (frame["temperature"] == "warm")
-        frame.loc[warm, "seconds"] = 0.001
-        frame.loc[warm & (frame["run"] == run), "seconds"] = seconds
-        frame.loc[~warm & (frame["run"] == 3 - run), "seconds"] = 9.0
+        own = (frame["source"] == "measured") & (frame["temperature"] == temperature)
+        frame.loc[own, "seconds"] = 0.001
+        frame.loc[own & (frame["run"] == run), "seconds"] = 0.004
+        frame.loc[~own & (frame["run"] == 3 - run), "seconds"] = 9.0
         return frame
 
     evidence.edit_table(ladder, LATENCY, change)
-    for found in found_in(judge(ladder, "B"), "latency_median_ratio"):
+    for found in found_in(judge(ladder, "B"), RATIOS[temperature]):
         assert found.measured == pytest.approx(4.0)
-        assert found.caveat.endswith("at 4") and found.verdict == "FAIL"
+        assert "at 4" in found.caveat and found.verdict == "FAIL"
+
+
+@pytest.mark.parametrize("temperature", RATIOS)
+def test_processes_that_scatter_show_nothing_though_their_means_agree(ladder, temperature):
+    """The unit is the process: many invocations of three processes are three."""
+
+    def scattered(frame):
+        factor = np.choose(frame["process"] - 1, [0.5, 1.0, 2.0])
+        return frame.assign(seconds=0.001 * factor)
+
+    evidence.edit_table(ladder, LATENCY, scattered)
+    for found in found_in(judge(ladder, "B"), RATIOS[temperature]):
+        assert found.verdict == "FAIL" and found.measured > 2.0
+        low, high = found.interval
+        assert low < 1.0 < high
+        assert "pass in four of five if processes differ by" in found.caveat
+
+
+@pytest.mark.parametrize(
+    ("keep", "why"),
+    [(lambda f: f["run"] == 1, "two runs"),
+     (lambda f: (f["run"] == 1) | (f["process"] == 1), "two runs"),
+     (lambda f: f["process"] == 1, "1 process of each run tells nothing of another")],
+)  # fmt: skip
+def test_too_few_processes_are_no_answer(ladder, keep, why):
+    declared = "declared"
+    evidence.edit_table(
+        ladder, LATENCY, lambda f: f[keep(f) | (f["source"] == declared)].reset_index(drop=True)
+    )
+    for name in RATIOS.values():
+        found = found_in(judge(ladder, "B"), name)[0]
+        assert found.measured is None and why in found.caveat
 
 
 def test_a_run_that_took_no_time_was_not_measured(ladder):
     evidence.edit_table(ladder, LATENCY, cells("seconds", 0.0))
-    found = found_in(judge(ladder, "B"), "latency_median_ratio")[0]
-    assert found.measured is None and "took no time" in found.caveat
+    for name in RATIOS.values():
+        found = found_in(judge(ladder, "B"), name)[0]
+        assert found.measured is None and "took no time" in found.caveat
+
+
+def test_a_model_that_draws_too_short_is_seen_and_one_that_draws_too_long_is_not_held_against_it(
+    ladder,
+):
+    def ratio(factor):
+        evidence.edit_table(ladder, MODEL, lambda f: f.assign(measured_s=f["drawn_s"] * factor))
+        return asked(ladder, latency_model_ratio_upper, "flow", gate="B").value
+
+    assert ratio(1.3) == pytest.approx(1.3) and ratio(0.5) == pytest.approx(0.5)
+
+
+def test_processes_that_scatter_leave_the_model_unproven(ladder):
+    def scattered(frame):
+        return frame.assign(
+            measured_s=frame["drawn_s"] * np.choose(frame["process"] - 1, [0.5, 1.0, 2.0])
+        )
+
+    evidence.edit_table(ladder, MODEL, scattered)
+    for found in found_in(judge(ladder, "B"), "latency_model_ratio_upper"):
+        assert found.verdict == "FAIL" and found.interval[0] < 1.0 < found.interval[1]
+
+
+@pytest.mark.parametrize(
+    ("change", "why"),
+    [(cells("fitted_run", 1), "the run that it was made from"),
+     (lambda f: f[f["run"] == 1], "several processes of both runs"),
+     (lambda f: f[f["level"] == 0.5], "several processes of both runs"),
+     (cells("drawn_s", 0.0), "no time")],
+)  # fmt: skip
+def test_a_model_that_was_not_tried_is_no_answer(ladder, change, why):
+    evidence.edit_table(ladder, MODEL, change)
+    found = found_in(judge(ladder, "B"), "latency_model_ratio_upper")[0]
+    assert found.measured is None and why in found.caveat
 
 
 @pytest.mark.parametrize("term", TERMS)
