@@ -32,9 +32,10 @@ def work(params: Params) -> None:
     admit("latency", Path.cwd())
     require_one_contract("train_baselines", "train_generators")
     section = params.section("latency", LatencySection)
+    stress = params.section("stress", StressSettings)
     policies = compared(
         ARTIFACTS,
-        baselines=params.section("stress", StressSettings).baselines,
+        baselines=stress.baselines,
         generators=params.section("train_generators", MethodsSection).samplers,
         seed=params.section("policy", PolicySettings).seeds[0],
     )
@@ -43,6 +44,7 @@ def work(params: Params) -> None:
         task=params.task.name,
         feasibility=params.section("feasibility", FeasibilitySettings),
         horizons=params.horizons,
+        samples=stress.samples,
         warm=section.warm,
         cold=section.cold,
     )

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from genpolicy.policies.policy import NetworkPolicy, load_policy
+from genpolicy.policies.policy import NetworkPolicy, Policy, load_policy
 
 BASELINES = "train_baselines"
 GENERATORS = "train_generators"
@@ -37,6 +37,11 @@ class JudgedPolicy:
             BadInputError: The files are missing or malformed.
         """
         return load_policy(self.folder, expected_sha256=self.sha256)
+
+
+def candidates_of(policy: Policy, samples: int) -> int:
+    """Candidates that an invocation draws: one of a policy that always draws the same."""
+    return samples if policy.stochastic else 1
 
 
 def trained(root: Path, names: Iterable[str], *, seeds: Iterable[int]) -> list[JudgedPolicy]:

@@ -51,7 +51,7 @@ class _Session:
     rejected_by: Counter[str] = field(default_factory=Counter)
     open_rejections: set[str] = field(default_factory=set)
     ages_ns: list[int] = field(default_factory=list)
-    latencies_s: list[float] = field(default_factory=list)
+    latencies_s: dict[str, float] = field(default_factory=dict)
 
     def read(self, kind: str, m: Message) -> None:
         """Take an event in."""
@@ -81,7 +81,9 @@ class _Session:
     def _invocation(self, m: Message) -> None:
         if m["stage"] == "begin":
             self.counts["invocations"] += 1
-            self.latencies_s.append(float(m["detail"]))
+            self.latencies_s[m["id"]] = float(m["detail"])
+        elif m["stage"] == "check":
+            self.latencies_s[m["id"]] += float(m["detail"])
         self.counts["misses"] += m["stage"] == "end" and m["detail"] == "deadline"
 
     def _candidate(self, m: Message) -> None:
@@ -122,7 +124,7 @@ class _Session:
             "action_age_p50_s": order_statistic(ages, 0.5),
             "action_age_p95_s": order_statistic(ages, 0.95),
             "action_age_max_s": order_statistic(ages, 1.0),
-            "latency_p95_s": order_statistic(self.latencies_s, 0.95),
+            "latency_p95_s": order_statistic(list(self.latencies_s.values()), 0.95),
             "force_peak_n": self.peak_n,
             "mode": self.mode,
         }

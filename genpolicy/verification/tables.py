@@ -30,7 +30,7 @@ KEYS: dict[str, tuple[str, ...]] = {
 class Condition:
     """Counts of one method under one perturbation or fixture while events go by."""
 
-    latencies_s: dict[int, list[float]] = field(default_factory=dict)
+    latencies_s: dict[int, dict[str, float]] = field(default_factory=dict)
     generated: int = 0
     enqueued: int = 0
     executed: int = 0
@@ -41,8 +41,9 @@ class Condition:
 
     def read(self, kind: str, m: Message, start: int) -> None:
         """Take an event of the rollout from this start in."""
-        if kind == "invocation" and m["stage"] == "begin":
-            self.latencies_s.setdefault(start, []).append(float(m["detail"]))
+        if kind == "invocation" and m["stage"] in ("begin", "check"):
+            own = self.latencies_s.setdefault(start, {})
+            own[m["id"]] = own.get(m["id"], 0.0) + float(m["detail"])
         elif kind == "enqueue":
             self.generated += 1
             self.enqueued += 1
@@ -66,7 +67,7 @@ class Condition:
             "invocations": [
                 {"start": start, "invocation": number, "latency_s": latency_s}
                 for start, latencies in sorted(self.latencies_s.items())
-                for number, latency_s in enumerate(latencies)
+                for number, latency_s in enumerate(latencies.values())
             ],
             "counts": [
                 {"reason": reason, "count": count}

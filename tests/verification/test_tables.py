@@ -6,6 +6,7 @@ import pytest
 from genpolicy.contract.chunk import DiscardReason
 from genpolicy.evidence.shadow.rig import Rig
 from genpolicy.execution.journal import write_journal
+from genpolicy.verification.rollouts import derived_rollouts
 from genpolicy.verification.tables import AGE_LEVELS, KEYS, derived_tables
 
 
@@ -17,6 +18,10 @@ def played(start):
     )
     for number in range(2 + start):
         rig.executor.begin_invocation(rig.now_s, f"i{number}", repr(0.01 * (number + 1)))
+        for _ in range(number):  # a candidate was refused, and the next one checked
+            rig.journal.invocation(
+                rig.now_s, invocation_id=f"i{number}", stage="check", detail="0.5"
+            )
         rig.executor.end_invocation(rig.now_s, f"i{number}", "answered")
     rig.run()
     rig.observe()
@@ -82,7 +87,13 @@ def test_the_stub_s_arrivals_and_refusals(tables, sessions):
 
 def test_invocations_are_numbered_in_the_order_in_which_they_began(tables):
     found = [(row["start"], row["invocation"], row["latency_s"]) for row in tables["invocations"]]
-    assert found == [(0, 0, 0.01), (0, 1, 0.02), (1, 0, 0.01), (1, 1, 0.02), (1, 2, 0.03)]
+    assert found == [(0, 0, 0.01), (0, 1, 0.52), (1, 0, 0.01), (1, 1, 0.52), (1, 2, 1.03)]
+
+
+def test_a_rollout_s_latency_counts_every_check(sessions, tmp_path):
+    write_journal(tmp_path / "journal.mcap", [rig.journal for rig in sessions])
+    found = [row["latency_p95_s"] for row in derived_rollouts(tmp_path / "journal.mcap").values()]
+    assert found == [0.52, 1.03]
 
 
 def test_without_a_journal_nothing_follows():

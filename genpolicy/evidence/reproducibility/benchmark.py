@@ -55,6 +55,7 @@ def measure_policy(
     cold_repeats: int = 5,
     warm_repeats: int = 200,
     discarded_repeats: int = 10,
+    candidates: int = 1,
     project: Projection | None = None,
 ) -> list[Measurement]:
     """Time one candidate per invocation, component by component.
@@ -68,6 +69,7 @@ def measure_policy(
         cold_repeats: Cold invocations.
         warm_repeats: Warm invocations.
         discarded_repeats: Invocations between them that are not recorded.
+        candidates: Candidates drawn by an invocation, as where it is deployed.
         project: Projection of a proposal; without it the term `project` stays unknown.
 
     Returns:
@@ -82,12 +84,12 @@ def measure_policy(
         policy = load()
         _evict_caches(repeat)
         row = observations[repeat % len(observations)][None]
-        spans = _invoke(policy, row, repeat=repeat, project=project)
+        spans = _invoke(policy, row, repeat=repeat, candidates=candidates, project=project)
         results += [Measurement(name, "cold", repeat, value) for name, value in spans.items()]
     policy = load()
     for index in range(discarded_repeats + warm_repeats):
         row = observations[index % len(observations)][None]
-        spans = _invoke(policy, row, repeat=index, project=project)
+        spans = _invoke(policy, row, repeat=index, candidates=candidates, project=project)
         repeat = index - discarded_repeats
         if repeat >= 0:
             results += [Measurement(name, "warm", repeat, value) for name, value in spans.items()]
@@ -95,7 +97,12 @@ def measure_policy(
 
 
 def _invoke(
-    policy: NetworkPolicy, row: Array, *, repeat: int, project: Projection | None
+    policy: NetworkPolicy,
+    row: Array,
+    *,
+    repeat: int,
+    candidates: int,
+    project: Projection | None,
 ) -> dict[str, float]:
     """Spans of one invocation, s."""
     spans: dict[str, float] = {}
@@ -105,7 +112,9 @@ def _invoke(
         condition = policy.encode(normalised)
         policy.synchronise()
     with _timed(spans, Term.SAMPLE):
-        samples = policy.sample_encoded(condition, noise_names=[("latency", repeat)], candidates=1)
+        samples = policy.sample_encoded(
+            condition, noise_names=[("latency", repeat)], candidates=candidates
+        )
     with _timed(spans, Term.SELECT):
         metadata = _metadata(policy, repeat)
         proposal = select([Candidate(metadata, actions) for actions in samples.actions[0]])

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from genpolicy.candidates.judged import JudgedPolicy
+from genpolicy.candidates.judged import JudgedPolicy, candidates_of
 from genpolicy.contract.chunk import Proposal
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.contract.latency import DECLARED_TERMS, MEASURED_TERMS, OWNERS, Term
@@ -46,6 +46,7 @@ class LatencyPlan:
         task: Registered name of the task.
         feasibility: Thresholds of the six layers; their run time is the term `project`.
         horizons: Common horizons.
+        samples: Candidates that an invocation of a stochastic method draws where it is deployed.
         warm: Warm invocations of a process.
         cold: Cold invocations of a process.
     """
@@ -54,6 +55,7 @@ class LatencyPlan:
     task: str
     feasibility: FeasibilitySettings
     horizons: HorizonConfig
+    samples: int
     warm: int
     cold: int
 
@@ -135,7 +137,8 @@ def measure_terms(plan: LatencyPlan, judged: JudgedPolicy) -> list[Measurement]:
     observations = fixture_observations(data, horizons=plan.horizons, count=OBSERVATIONS)
     checker = make_checker(task, plan.feasibility, action_period_s=plan.horizons.action_period_s)
     contexts = [context_at_rest(task, checker, row[-1]) for row in observations]
-    period_s = judged.load().horizons.action_period_s
+    policy = judged.load()
+    period_s = policy.horizons.action_period_s
     calls = 0
 
     def project(proposal: Proposal) -> object:
@@ -157,6 +160,7 @@ def measure_terms(plan: LatencyPlan, judged: JudgedPolicy) -> list[Measurement]:
         expected_sha256=judged.sha256,
         cold_repeats=plan.cold,
         warm_repeats=plan.warm,
+        candidates=candidates_of(policy, plan.samples),
         project=project,
     )
 

@@ -4,6 +4,8 @@ Compute terms come from the measured distribution of each method; sensor, networ
 terms from the declared schedule. The random number behind a draw is keyed by perturbation,
 start, invocation and term, and not by the method: where a term is the same for two methods,
 so is the draw, and where it is not, both get the same quantile of their own distribution.
+The term `project` is the check of one candidate. A selector that must try another one takes as
+long again, so that a policy whose candidates are refused answers later.
 """
 
 import math
@@ -13,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from genpolicy.contract.latency import DECLARED_TERMS, MEASURED_TERMS
+from genpolicy.contract.latency import DECLARED_TERMS, MEASURED_TERMS, Term
 from genpolicy.errors import ConfigError, ContractError
 from genpolicy.seeds import stream
 
@@ -121,6 +123,26 @@ def draw_latency(
     if invocation == 0:
         terms["sample"] += model.cold_extra_s
     return LatencyDraw(terms)
+
+
+def draw_check(
+    model: LatencyModel,
+    *,
+    root_seed: int,
+    perturbation: str,
+    start: int,
+    invocation: int,
+    candidate: int,
+    compute_factor: float,
+) -> float:
+    """What it takes to check one candidate more, after another one was refused, s.
+
+    Arguments as in `draw_latency`; `candidate` from 1, the first is in its `project`.
+    """
+    name = str(Term.PROJECT)
+    key = ("latency", perturbation, start, invocation, name, candidate)
+    uniform = float(stream(root_seed, *key).random())
+    return compute_factor * empirical_quantile(model.measured[name], uniform)
 
 
 def empirical_quantile(sorted_values: Array, level: float) -> float:

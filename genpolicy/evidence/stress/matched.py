@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from genpolicy.candidates.judged import JudgedPolicy
+from genpolicy.candidates.judged import JudgedPolicy, candidates_of
 from genpolicy.evidence.rows.stress import InvocationRow, RolloutRow, StressStubRow
 from genpolicy.evidence.stress.envelope import checker_under
 from genpolicy.evidence.stress.latency import LatencyModel
@@ -174,7 +174,7 @@ def step(active: Sequence[Rollout], policy: Policy, *, samples: int) -> None:
                 ("stress", rollout.setup.perturbation, rollout.start_index, rollout.invocations)
                 for rollout in asking
             ],
-            candidates=samples if policy.stochastic else 1,
+            candidates=candidates_of(policy, samples),
         )
         for rollout, chunks in zip(asking, drawn.actions, strict=True):
             assert rollout.wanted is not None

@@ -1,8 +1,10 @@
 """One closed-loop rollout on the virtual clock: world, executor, stub, supervisor, recovery.
 
 The world goes on while the policy thinks: an invocation that begins at a tick is delivered at the
-first tick after its latency has passed. A rollout is advanced tick by tick from outside, so that
-many of them run in lockstep and share the network's batches; it never sees the others.
+first tick after its latency has passed. Its candidates are checked one after the other, and each
+check takes its time: an answer whose first candidate is refused comes later. A rollout is advanced
+tick by tick from outside, so that many of them run in lockstep and share the network's batches; it
+never sees the others.
 """
 
 from collections import deque
@@ -21,7 +23,14 @@ from genpolicy.evidence.admission_context import (
 )
 from genpolicy.evidence.stress.disturbance import Disturbance
 from genpolicy.evidence.stress.fallback import Fallback
-from genpolicy.evidence.stress.state import InFlight, Outcome, Setup, Tally, in_flight
+from genpolicy.evidence.stress.state import (
+    InFlight,
+    Outcome,
+    Setup,
+    Tally,
+    in_flight,
+    next_candidate,
+)
 from genpolicy.execution.cell import FALLBACK_HASH, Cell, RecoveryState
 from genpolicy.execution.command import Command
 from genpolicy.execution.executor import Executor
@@ -74,8 +83,6 @@ class Rollout:
         self.wanted: InFlight | None = None
         self._flying: list[InFlight] = []
         self._arrived: deque[tuple[InFlight, int]] = deque()
-        self._candidate = 0
-        self._not_fresh: DiscardReason | None = None
         self._fallback = Fallback(setup, self.world, self.executor, self.recovery)
         self._newest_accepted_s: float | None = None
         self._last_command_s: float | None = None
@@ -129,40 +136,60 @@ class Rollout:
                 expected="the batch to fill in its candidates",
                 action="Sample every wanted invocation before `act`.",
             )
-        metadata = replace(flying.metadata, candidate_index=self._candidate)
-        candidate = Candidate(metadata, flying.chunks[self._candidate])
+        metadata = replace(flying.metadata, candidate_index=flying.candidate)
+        candidate = Candidate(metadata, flying.chunks[flying.candidate])
         proposal = Proposal(candidate.metadata, candidate.actions, selected_by=SELECTOR)
         return proposal, self._delivery_context(late)
 
     def settle(self, result: Admitted | Rejected) -> None:
         """Take the verdict on `pending`: the selector takes the first that passes all layers."""
-        flying, _ = self._arrived[0]
+        flying, _ = self._arrived.popleft()
         verdict, now_s = result.verdict, self.now_s
         self.journal.candidate(
             now_s,
             chunk_id=flying.metadata.chunk_id,
             method=self.setup.method,
-            index=self._candidate,
+            index=flying.candidate,
             layers={layer.name: layer.passed for layer in verdict.layers},
             first_reason=verdict.first_reason or None,
         )
-        assert flying.chunks is not None
         if isinstance(result, Admitted):
-            self._next_arrival()
+            self._answered(flying)
             if self.executor.deliver(result, now_s) is None:
                 self._newest_accepted_s = flying.metadata.condition_observation_event_time_s
             return
         counts = self.tally.rejected_by
         counts[verdict.first_reason] = counts.get(verdict.first_reason, 0) + 1
+        assert flying.chunks is not None
         # What made one candidate late or void holds for all of its invocation.
-        if verdict.first_layer == FRESH:
-            self._not_fresh = REASONS[verdict.first_reason]
-        self._candidate += 1
-        if self._candidate == len(flying.chunks):
-            reason = self._not_fresh or DiscardReason.INFEASIBLE
-            self._next_arrival()
+        stale = verdict.first_layer == FRESH
+        if stale or flying.candidate + 1 == len(flying.chunks):
+            self._answered(flying)
             self.tally.rejections += 1
+            reason = REASONS[verdict.first_reason] if stale else DiscardReason.INFEASIBLE
             self._write_off(flying, reason)
+        else:
+            self._try_another(flying)
+
+    def _try_another(self, flying: InFlight) -> None:
+        """The next candidate: at this tick if its check is done by now, else at a later one."""
+        check_s = next_candidate(self.setup, flying, start=self.start_index)
+        chunk_id = flying.metadata.chunk_id
+        self.journal.invocation(
+            self.now_s, invocation_id=chunk_id, stage="check", detail=repr(check_s)
+        )
+        self.tally.latencies_s[flying.number] += check_s
+        if flying.arrival_s <= self.now_s:
+            self._arrived.appendleft((flying, self._late_rows(flying)))
+            return
+        self._flying.append(flying)
+        if self._overdue(flying):
+            self._miss(flying, self.now_s)
+
+    def _answered(self, flying: InFlight) -> None:
+        """The next invocation may begin, unless the deadline let it begin before."""
+        if not flying.given_up:
+            self.executor.end_invocation(self.now_s, flying.metadata.chunk_id, "answered")
 
     def decide(self) -> None:
         """Recover where needed; sets `wanted` if the policy must sample."""
@@ -241,9 +268,12 @@ class Rollout:
         for flying in sorted(self._flying, key=lambda item: (item.arrival_s, item.number)):
             if flying.arrival_s <= now_s and not flying.dropped:
                 self._flying.remove(flying)
-                self._arrive(flying, now_s)
-            elif now_s - flying.begun_s >= self.setup.execution.deadline_s - 1e-9:
+                self._arrive(flying)
+            elif self._overdue(flying):
                 self._miss(flying, now_s)
+
+    def _overdue(self, flying: InFlight) -> bool:
+        return self.now_s - flying.begun_s >= self.setup.execution.deadline_s - 1e-9
 
     def _miss(self, flying: InFlight, now_s: float) -> None:
         """The deadline has passed: the next invocation may begin; the chunk may still come."""
@@ -255,20 +285,17 @@ class Rollout:
             self._flying.remove(flying)
             self._write_off(flying, DiscardReason.EXPIRED)
 
-    def _arrive(self, flying: InFlight, now_s: float) -> None:
-        if not flying.given_up:
-            self.executor.end_invocation(now_s, flying.metadata.chunk_id, "answered")
-        horizons = self.setup.horizons
-        late = round((now_s - flying.metadata.action_start_time_s) / horizons.action_period_s)
-        if late >= horizons.execution_horizon:
+    def _arrive(self, flying: InFlight) -> None:
+        late = self._late_rows(flying)
+        if late >= self.setup.horizons.execution_horizon:
+            self._answered(flying)
             self._write_off(flying, DiscardReason.EXPIRED)
         else:
             self._arrived.append((flying, late))
 
-    def _next_arrival(self) -> None:
-        self._arrived.popleft()
-        self._candidate = 0
-        self._not_fresh = None
+    def _late_rows(self, flying: InFlight) -> int:
+        late_s = self.now_s - flying.metadata.action_start_time_s
+        return round(late_s / self.setup.horizons.action_period_s)
 
     def _write_off(self, flying: InFlight, reason: DiscardReason) -> None:
         chunks = flying.chunks

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from genpolicy.contract.chunk import ChunkMetadata
 from genpolicy.contract.horizons import HorizonConfig
-from genpolicy.evidence.stress.latency import LatencyModel, draw_latency
+from genpolicy.evidence.stress.latency import LatencyModel, draw_check, draw_latency
 from genpolicy.evidence.stress.perturbations import Perturbation, injection
 from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.execution.journal import Journal
@@ -79,10 +79,11 @@ class InFlight:
         metadata: Of the chunk to come; candidate 0.
         observation: What it is conditioned on; the newest of the history. Shape (D_o,).
         begun_s: Tick at which it began.
-        arrival_s: When it is delivered.
-        total_s: Its end-to-end latency, the sum of the eleven terms, s.
+        arrival_s: When its candidate is judged; later with each one that is refused.
+        compute_factor: What compute contention multiplies its measured terms by.
         dropped: Lost on the way.
         chunks: Sampled candidates, filled in by the batch. Shape (N, K, D_a).
+        candidate: The candidate that is judged next.
         given_up: Its deadline has passed.
     """
 
@@ -91,10 +92,16 @@ class InFlight:
     observation: Array
     begun_s: float
     arrival_s: float
-    total_s: float
+    compute_factor: float
     dropped: bool
     chunks: Array | None = None
+    candidate: int = 0
     given_up: bool = False
+
+    @property
+    def total_s(self) -> float:
+        """Its end-to-end latency: the eleven terms, and every check after the first, s."""
+        return self.arrival_s - self.begun_s
 
 
 @dataclass
@@ -161,6 +168,22 @@ def in_flight(
         observation=observation,
         begun_s=begun_s,
         arrival_s=begun_s + draw.total_s,
-        total_s=draw.total_s,
+        compute_factor=hit.compute_factor,
         dropped=hit.dropped,
     )
+
+
+def next_candidate(setup: Setup, flying: InFlight, *, start: int) -> float:
+    """Go on to the next candidate of an invocation; returns what its check takes, s."""
+    flying.candidate += 1
+    check_s = draw_check(
+        setup.latency,
+        root_seed=setup.root_seed,
+        perturbation=setup.perturbation,
+        start=start,
+        invocation=flying.number,
+        candidate=flying.candidate,
+        compute_factor=flying.compute_factor,
+    )
+    flying.arrival_s += check_s
+    return check_s

@@ -80,6 +80,69 @@ def test_no_action_leaves_before_its_latency_has_passed(run, kit, plans):
     assert max(rollout.tally.latencies_s) < 0.05
 
 
+def refused_at_first(plan, count):
+    """`count` copies of a chunk that leaves the workspace, then what `plan` answers."""
+
+    def answer(rollout):
+        good = plan(rollout)
+        bad = np.repeat(good, count, axis=0)
+        bad[:, :, 2] += 5.0
+        return np.concatenate([bad, good])
+
+    return answer
+
+
+def test_each_candidate_that_is_refused_costs_another_check(run, kit, plans, tmp_path):
+    """The selector's second try is time that the answer takes: three checks of 4 ms, not one."""
+    plain, twice = (
+        run(plan, latency=kit.latency(0.02), ticks=3)[0]
+        for plan in (kit.Replay(plans.actions), refused_at_first(kit.Replay(plans.actions), 2))
+    )
+    assert twice.tally.latencies_s[0] == pytest.approx(plain.tally.latencies_s[0] + 0.008)
+    checks = [e for e in of_kind(twice, "invocation") if e.payload["stage"] == "check"]
+    assert [float(e.payload["detail"]) for e in checks] == pytest.approx([0.004, 0.004])
+    assert of_kind(twice, "enqueue")[0].t == of_kind(plain, "enqueue")[0].t  # both within a tick
+    prove([twice], kit, tmp_path)
+
+
+def test_an_answer_whose_checks_outlast_a_tick_comes_a_tick_later(run, kit, plans, tmp_path):
+    (rollout,) = run(
+        refused_at_first(kit.Replay(plans.actions), 2), latency=kit.latency(0.08), ticks=6
+    )
+    first = of_kind(rollout, "enqueue")[0]
+    # 86 to 92 ms, and two checks of 16 ms more: the tick of 100 ms judges two, the next the third.
+    assert rollout.tally.latencies_s[0] > 0.11 and first.t == 150_000_000
+    assert first.payload["checked_rows"][0] == 3
+    judged = [(e.t, e.payload["index"]) for e in of_kind(rollout, "candidate")][:3]
+    assert judged == [(100_000_000, 0), (150_000_000, 1), (150_000_000, 2)] or judged == [
+        (100_000_000, 0), (100_000_000, 1), (150_000_000, 2),
+    ]  # fmt: skip
+    prove([rollout], kit, tmp_path)
+
+
+def test_an_invocation_is_in_flight_until_its_last_candidate_was_judged(run, kit, plans):
+    """Between two checks no other invocation begins, and the deadline still runs."""
+    (rollout,) = run(
+        refused_at_first(kit.Replay(plans.actions), 5), latency=kit.latency(0.1), ticks=5
+    )
+    begun = [e.t for e in of_kind(rollout, "invocation") if e.payload["stage"] == "begin"]
+    ended = [e for e in of_kind(rollout, "invocation") if e.payload["stage"] == "end"]
+    assert ended[0].payload["detail"] == "deadline" and rollout.tally.deadline_misses == 1
+    assert begun[0] == 0 and begun[1] == ended[0].t == 150_000_000
+
+
+def test_what_is_stale_is_not_tried_again(run, kit, plans):
+    """Age is the invocation's: its other candidates are as old, and no check is spent on them."""
+    tight = kit.EXECUTION.model_copy(
+        update={"maximum_age_s": dict.fromkeys(kit.EXECUTION.maximum_age_s, 0.0)}
+    )
+    several = kit.Replay(plans.actions)
+    (rollout,) = run(lambda r: np.repeat(several(r), 4, axis=0), execution=tight, ticks=5)
+    assert rollout.tally.rejections >= 1
+    checks = [e for e in of_kind(rollout, "invocation") if e.payload["stage"] == "check"]
+    assert checks == [] and {e.payload["index"] for e in of_kind(rollout, "candidate")} == {0}
+
+
 def test_same_seed_same_bytes_whatever_the_global_generator(run, kit, plans, tmp_path):
     schedule = NetworkJitter(probability=0.5, magnitude_s=0.12)
     texts = []
