@@ -2,12 +2,14 @@
 
 from pathlib import Path
 
-from pydantic import Field
+from pydantic import ConfigDict, Field
 
 from gates.proof import admit
 from genpolicy.candidates.judged import trained
 from genpolicy.contract.settings import Settings
+from genpolicy.evidence.reproducibility.identity import Deployment
 from genpolicy.evidence.reproducibility.reload import ReloadPlan, write_reload
+from genpolicy.evidence.stress.settings import StressSettings
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import output_folder
 from genpolicy.policies.matched_training import PolicySettings
@@ -30,6 +32,14 @@ class ReloadSection(Settings):
     samples: int = Field(ge=2)
 
 
+class DeadlineSection(Settings):
+    """Of section `execution` only what names a candidate: the rest would reload it again."""
+
+    model_config = ConfigDict(extra="ignore")
+
+    deadline_s: float = Field(gt=0.0)
+
+
 def work(params: Params) -> None:
     """Admit through gate A, then reload, compare, sweep."""
     admit("reload", Path.cwd())
@@ -44,7 +54,11 @@ def work(params: Params) -> None:
         audit=ARTIFACTS / "audit",
         sweep=section.sweep,
         samples=section.samples,
-        horizons=params.horizons,
+        deployment=Deployment(
+            horizons=params.horizons,
+            deadline_s=params.section("execution", DeadlineSection).deadline_s,
+            samples=params.section("stress", StressSettings).samples,
+        ),
     )
     root = ARTIFACTS / "train_generators"
     candidates = trained(root, names, seeds=seeds)

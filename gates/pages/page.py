@@ -5,7 +5,9 @@ drawn here. Numbers stand as `<data value="...">` with the JSON number, so that 
 them back.
 """
 
+import dataclasses
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +15,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from gates.card.card import DRAFT_PATH, TrialCard
 from gates.card.judge import examine
-from gates.evidence import Evidence
+from gates.evidence import Evidence, MissingEvidenceError
 from gates.pages import (
     plots_convergence,
     plots_feasibility,
@@ -21,14 +23,17 @@ from gates.pages import (
     plots_stress,
     plots_time,
 )
-from gates.pages.figures import Photo, Plot, draw_all
+from gates.pages.figures import Photo, Plot, Table, draw_all
 from gates.pages.guide import BACK_TO, QUESTIONS, READING, label, words
 from gates.pages.table import deciding, groups, passed_by, stops, tally
 from gates.report import GATES, NAMES, Gate, GateReport, read_report, report_bytes
+from gates.reproducibility.settings import RELOAD
 from genpolicy.errors import IntegrityError
+from genpolicy.evidence.documents.reproducibility import CANDIDATES, IdentityCard
 from genpolicy.integrity.hashing import sha256_bytes
 from genpolicy.pages.style import page_style
 
+HASH = re.compile(r"[0-9a-f]{64}")
 MARKS = {
     "PASS": "✓",
     "FAIL": "✕",
@@ -72,10 +77,37 @@ def gate_page(root: Path, report: GateReport) -> str:
         reading=READING[report.gate],
         words=words(report.gate),
         pictures=draw_all(PLOTS[report.gate], Evidence(root), report),
+        identities=identity_table(Evidence(root), report),
         card=card,
         card_state=state,
         digest=sha256_bytes(report_bytes(report)),
     )
+
+
+def identity_table(evidence: Evidence, report: GateReport) -> Table:
+    """The identity cards of Gate B's candidates side by side; empty for the other gates."""
+    if report.gate != "B":
+        return ()
+    try:
+        known = evidence.document(RELOAD, CANDIDATES)
+    except MissingEvidenceError:
+        return ()
+    names = [name for name in report.candidates if name in known]
+    heads = ("", *names)
+    return heads, *(
+        (label(item.name), *(_said(getattr(known[name].card, item.name)) for name in names))
+        for item in dataclasses.fields(IdentityCard)
+    )
+
+
+def _said(value: Any) -> str:
+    """An item as a reader takes it in: a hash by its beginning, a list by its members."""
+    if value is None:
+        return "none: the sampler has none"
+    if isinstance(value, list):
+        return ", ".join(map(_said, value))
+    text = f"{value:.6g}" if isinstance(value, float) else str(value)
+    return f"{text[:12]}…" if HASH.fullmatch(text) else text
 
 
 def index_page(root: Path) -> str:

@@ -9,13 +9,14 @@ from gates.evidence import Array, Evidence, MissingEvidenceError, numbers
 from gates.need.settings import TRAINED as BASELINES
 from gates.need.simpler import unmatched
 from gates.reproducibility import convergence, modes, timing
+from gates.reproducibility.identity import contradicted, unrecorded
 from gates.reproducibility.settings import (
     COVERAGE,
     GENERATORS,
     RELOAD,
     ReproducibilitySettings,
 )
-from genpolicy.evidence.documents.given import MATCHED
+from genpolicy.evidence.documents.given import MATCHED, TrainedConfig
 from genpolicy.evidence.documents.reproducibility import CANDIDATES, CandidateIdentity
 from genpolicy.evidence.rows.reproducibility import NfeRow, SampleRow
 
@@ -64,7 +65,7 @@ def _parameters(evidence: Evidence, folder: str, method: str) -> float:
 
 @criterion(
     "<=",
-    question="Are checkpoint, configuration, data, seed and sampler pinned?",
+    question="Are checkpoint, data, seed and sampler pinned, and all of the identity card known?",
     look_at="Generator training: something is not pinned by hash; train again from a clean state.",
     per_candidate=True,
     always=True,
@@ -72,7 +73,7 @@ def _parameters(evidence: Evidence, folder: str, method: str) -> float:
 def unpinned_items(
     evidence: Evidence, settings: ReproducibilitySettings, candidate: str
 ) -> Measured:
-    """Items that are not pinned by hash."""
+    """Items that are not pinned by hash, not recorded, or not what the checkpoint says."""
     entry = _identity(evidence, candidate)
     pins = {
         "checkpoint": entry.checkpoint,
@@ -91,7 +92,15 @@ def unpinned_items(
         missing.append("checkpoint file")
     if entry.dataset != evidence.digest(MANIFEST):
         missing.append("dataset: trained on another one than the audited")
+    missing += unrecorded(entry.card) + contradicted(entry.card, _config(evidence, candidate))
     return Measured(float(len(missing)), caveat=", ".join(missing) or "all pinned by hash")
+
+
+def _config(evidence: Evidence, candidate: str) -> TrainedConfig:
+    entry = evidence.document(GENERATORS, MATCHED).methods.get(candidate)
+    if entry is None:
+        raise MissingEvidenceError(f"{GENERATORS}/{MATCHED.file} has no entry of {candidate}")
+    return entry.config
 
 
 def _identity(evidence: Evidence, candidate: str) -> CandidateIdentity:

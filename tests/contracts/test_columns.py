@@ -22,7 +22,6 @@ ROWS = (
 # What is indexed by name and is no frame, and what it is instead.
 NO_FRAMES = {
     "document": "a JSON document",
-    "summary": "the document of the audit's counts",
     "settings": "settings as a document",
     "report.settings": "the same, of a report",
     "evidence": "tables by name",
@@ -34,6 +33,9 @@ NO_FRAMES = {
     "row": "a limit or an epoch of a page, or one row of a frame that is checked where it is read",
     "record": "a record of times",
     "names": "a namespace",
+    "runs": "the regime of the arithmetic, by name",
+    "config.parameters": "counts of parameters by part",
+    "manifest": "a JSON document",
     "reports": "reports by gate",
     "chain.reports": "the same",
     "dataset.manifest": "a JSON document",

@@ -793,7 +793,7 @@ def _offline(method: str) -> dict[str, Any]:
     }
 
 
-def _matched(methods: tuple[str, ...]) -> dict[str, Any]:
+def _matched(methods: tuple[str, ...], *, dataset: str = "0" * 64) -> dict[str, Any]:
     sizes = {
         "parameters": {"encoder": 10, "trunk": 80, "head": 10, "total": 100},
         "training_only_parameters": 0,
@@ -815,7 +815,12 @@ def _matched(methods: tuple[str, ...]) -> dict[str, Any]:
         "training": TrainingConfig(steps=UPDATES).model_dump(mode="json"),
         "training_seed": 0,
         "sampler": SamplerConfig(name="direct").model_dump(mode="json"),
-        "provenance": {"dataset_manifest_sha256": "0" * 64, "episodes_sha256": None},
+        "provenance": {
+            "dataset_manifest_sha256": dataset,
+            "action_contract_sha256": "a" * 64,
+            "observation_contract_sha256": "b" * 64,
+            "episodes_sha256": None,
+        },
         "weights_sha256": "0" * 64,
         **sizes,
     }
@@ -930,7 +935,9 @@ def _factors(root: Path) -> None:
 def _generators(root: Path) -> None:
     for name in ("modes", "modes_earlier"):
         table(root, f"reload/{name}.parquet", ModeRow, _modes(CANDIDATES, 2, nfe=8))
-    document(root, "train_generators/matched.json", _matched(CANDIDATES))
+    manifest = (root / "artifacts/ingest/manifest.json").read_bytes()
+    dataset = hashlib.sha256(manifest).hexdigest()
+    document(root, "train_generators/matched.json", _matched(CANDIDATES, dataset=dataset))
     table(root, "reload/offline.parquet", OfflineRow, [_offline("flow")])
     _checkpoints(root, "train_generators", CANDIDATES)
 
@@ -1006,10 +1013,26 @@ def _reload(root: Path) -> None:
                 "sampler": "s",
                 "metadata_mismatches": 0,
                 "nonfinite_weights": 0,
+                "card": _identity_card(hashlib.sha256(manifest).hexdigest()),
             }
             for m in CANDIDATES
         },
     )
+
+
+def _identity_card(dataset: str) -> dict[str, Any]:
+    """Of the configuration that `_matched` writes."""
+    return {
+        "architecture": "mlp encoder", "parameters": 100, "training_seeds": ["0"],
+        "dataset": dataset, "split": "c" * 64, "action_semantics": "a" * 64,
+        "observation_semantics": "b" * 64, "observation_horizon": 2, "prediction_horizon": 16,
+        "execution_horizon": 8, "control_rate_hz": 20.0, "invocation_rate_hz": 2.5,
+        "deadline_s": 0.15, "path": "straight", "sampler": "direct", "sampler_steps": 1,
+        "eta": None, "tolerance": None, "evaluations": "1", "precision": "float32",
+        "device": "cpu", "threads": 1, "cpu_capability": "AVX2", "warm_up": 10, "batch_rows": 16,
+        "candidates": 4, "selector": "first_admissible", "selector_owner": "model",
+        "selector_sha256": "d" * 64,
+    }  # fmt: skip
 
 
 def _latency(root: Path) -> None:

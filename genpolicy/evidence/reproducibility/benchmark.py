@@ -15,10 +15,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from genpolicy.candidates.selector import propose
 from genpolicy.contract.chunk import Candidate, ChunkMetadata, Proposal
 from genpolicy.contract.latency import Term
 from genpolicy.policies.policy import NetworkPolicy, load_policy
-from genpolicy.policies.selection import select
 from genpolicy.policies.settings import SamplerConfig
 
 Array = NDArray[np.float64]
@@ -26,6 +26,8 @@ Projection = Callable[[Proposal], object]
 Temperature = Literal["cold", "warm"]
 
 CACHE_BYTES = 64 << 20
+DISCARDED = 10
+"""Invocations of a process before the first that is timed as warm."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,7 @@ def measure_policy(
     device: str = "cpu",
     cold_repeats: int = 5,
     warm_repeats: int = 200,
-    discarded_repeats: int = 10,
+    discarded_repeats: int = DISCARDED,
     candidates: int = 1,
     project: Projection | None = None,
 ) -> list[Measurement]:
@@ -117,7 +119,7 @@ def _invoke(
         )
     with _timed(spans, Term.SELECT):
         metadata = _metadata(policy, repeat)
-        proposal = select([Candidate(metadata, actions) for actions in samples.actions[0]])
+        proposal = propose([Candidate(metadata, actions) for actions in samples.actions[0]])
     if project is not None:
         with _timed(spans, Term.PROJECT):
             project(proposal)

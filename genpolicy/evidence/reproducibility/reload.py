@@ -11,18 +11,16 @@ from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.data.dataset import load_dataset
 from genpolicy.errors import ContractError
 from genpolicy.evidence.admission_context import make_checker
-from genpolicy.evidence.documents.reproducibility import CANDIDATES, CandidateIdentity
+from genpolicy.evidence.documents.reproducibility import CANDIDATES
 from genpolicy.evidence.need.held_out import HeldOut, held_out_situations, modes_of_policy
 from genpolicy.evidence.need.offline import offline_rows
+from genpolicy.evidence.reproducibility.identity import Deployment, identities
 from genpolicy.evidence.reproducibility.measure import in_fresh_process
 from genpolicy.evidence.rows.need import ModeRow, OfflineRow
 from genpolicy.evidence.rows.reproducibility import CoverageRow, NfeRow, SampleRow
 from genpolicy.feasibility.admission import FeasibilityChecker
 from genpolicy.feasibility.settings import FeasibilitySettings
-from genpolicy.integrity.documents import canonical_json
-from genpolicy.integrity.hashing import sha256_bytes, sha256_file
 from genpolicy.integrity.rows import read_rows, write_rows
-from genpolicy.policies.checkpoint import CONFIG_FILE
 from genpolicy.policies.evaluations import allowed_evaluations
 from genpolicy.policies.fixtures import FixtureRow, compare_fixtures, reload_fixture
 from genpolicy.policies.policy import NetworkPolicy, load_policy
@@ -44,7 +42,7 @@ class ReloadPlan:
         sweep: Samplers to try besides the chosen one, by method; a number is that many steps of
             the chosen one.
         samples: Candidates per situation.
-        horizons: Common horizons.
+        deployment: Horizons, deadline and candidates of an invocation.
     """
 
     task: str
@@ -53,7 +51,12 @@ class ReloadPlan:
     audit: Path
     sweep: Mapping[str, Sequence[int | SamplerConfig]]
     samples: int
-    horizons: HorizonConfig
+    deployment: Deployment
+
+    @property
+    def horizons(self) -> HorizonConfig:
+        """Common horizons."""
+        return self.deployment.horizons
 
 
 @dataclass
@@ -98,7 +101,7 @@ def write_reload(
     checker = make_checker(task, plan.feasibility, action_period_s=plan.horizons.action_period_s)
     held_out = held_out_situations(plan.audit, data, horizons=plan.horizons)
     written = read_rows(fixtures, FixtureRow)
-    rows, identity = ReloadRows(), _identities(candidates)
+    rows, identity = ReloadRows(), identities(candidates, data, plan.deployment)
     for candidate in candidates:
         before = [r for r in written if (r.method, r.seed) == (candidate.name, candidate.seed)]
         policy = candidate.load()
@@ -227,24 +230,3 @@ def coverage_row(found: Sequence[ModeRow], *, steps: int) -> CoverageRow:
         admissible_share=sum(row.admissible for row in found) / drawn,
         between_share=sum(row.between_modes for row in found) / drawn,
     )
-
-
-def _identities(candidates: Sequence[JudgedPolicy]) -> dict[str, CandidateIdentity]:
-    """What pins each candidate; nothing is counted yet."""
-    result = {}
-    for name in dict.fromkeys(candidate.name for candidate in candidates):
-        own = [candidate for candidate in candidates if candidate.name == name]
-        policies = [candidate.load() for candidate in own]
-        first = policies[0].checkpoint.config
-        result[name] = CandidateIdentity(
-            checkpoint=own[0].sha256,
-            checkpoints=[candidate.sha256 for candidate in own],
-            config=[sha256_file(candidate.folder / CONFIG_FILE) for candidate in own],
-            dataset=first.provenance.dataset_manifest_sha256,
-            normalisation=sha256_bytes(canonical_json(first.normalisation.model_dump())),
-            seed=[policy.checkpoint.config.training_seed for policy in policies],
-            sampler=policies[0].sampler_config_hash,
-            metadata_mismatches=0,
-            nonfinite_weights=0,
-        )
-    return result

@@ -74,8 +74,8 @@ class InvocationRow:
         perturbation: What was injected.
         start: Number of the initial state.
         invocation: Count in this rollout; 0 is cold.
-        latency_s: From sensor event to delivery: the sum of all terms, and of the checks of candidates
-            after the first, s.
+        latency_s: From sensor event to delivery: the sum of all terms, and of the checks of
+            candidates after the first, s.
     """
 
     method: str

@@ -12,8 +12,9 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from genpolicy.candidates.selector import propose
 from genpolicy.contract.action import POSITION
-from genpolicy.contract.chunk import ChunkMetadata, Proposal
+from genpolicy.contract.chunk import Candidate, ChunkMetadata
 from genpolicy.evidence.admission_context import Moment, Session, context_of
 from genpolicy.evidence.rows.shadow import CandidateRow
 from genpolicy.evidence.shadow.case import Case, decide
@@ -34,7 +35,6 @@ Array = NDArray[np.float64]
 
 HELD_OUT = "held_out"
 TWO_MODES = "two_modes"
-SELECTOR = "first_admissible"
 DEMONSTRATION = "demonstration"
 BUILT_EVERY = 6  # observations of a phase; fixtures without anything of the candidate's chunk
 
@@ -313,7 +313,7 @@ def case_of(
         q_before=_joints_before(shadow, item, q[0]), measured_at_s=0.0,
     )  # fmt: skip
     context = context_of(task, shadow.checker, moment, session=session, late_rows=shadow.late_steps)
-    proposal = Proposal(metadata, actions, selected_by=SELECTOR)
+    proposal = propose([Candidate(metadata, actions)])
     return Case(proposal, context, task.scene_poses(observation), task.obstacles, task.free_phases)
 
 

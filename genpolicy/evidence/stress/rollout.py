@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from genpolicy.candidates.selector import propose, tries_another
 from genpolicy.contract.chunk import Candidate, ChunkMetadata, DiscardReason, Proposal
 from genpolicy.errors import ContractError
 from genpolicy.evidence.admission_context import (
@@ -21,6 +22,7 @@ from genpolicy.evidence.admission_context import (
     Session,
     context_of,
 )
+from genpolicy.evidence.stress.deliveries import Deliveries
 from genpolicy.evidence.stress.disturbance import Disturbance
 from genpolicy.evidence.stress.fallback import Fallback
 from genpolicy.evidence.stress.state import (
@@ -29,7 +31,6 @@ from genpolicy.evidence.stress.state import (
     Setup,
     Tally,
     in_flight,
-    next_candidate,
 )
 from genpolicy.execution.cell import FALLBACK_HASH, Cell, RecoveryState
 from genpolicy.execution.command import Command
@@ -45,7 +46,6 @@ from genpolicy.tasks.api import Start, World, WorldSettings
 
 Array = NDArray[np.float64]
 
-SELECTOR = "first_admissible"
 FRESH = LAYERS[-1]
 
 
@@ -81,8 +81,9 @@ class Rollout:
         self.tally = Tally()
         self.tick = self.invocations = 0
         self.wanted: InFlight | None = None
-        self._flying: list[InFlight] = []
-        self._arrived: deque[tuple[InFlight, int]] = deque()
+        self._deliveries = Deliveries(
+            setup, self.executor, self.journal, self.tally, start=start_index
+        )
         self._fallback = Fallback(setup, self.world, self.executor, self.recovery)
         self._newest_accepted_s: float | None = None
         self._last_command_s: float | None = None
@@ -122,13 +123,13 @@ class Rollout:
         self.executor.observe(now_s, now_s, world.phase, world.calibration_epoch, divergence_m)
         self._supervise(now_s)
         if not self.done:
-            self._collect_deliveries(now_s)
+            self._deliveries.collect(now_s)
 
     def pending(self) -> tuple[Proposal, Context] | None:
         """The next delivered candidate to be judged, or None if there is none (left)."""
-        if self.done or not self._arrived:
+        flying = None if self.done else self._deliveries.first()
+        if flying is None:
             return None
-        flying, late = self._arrived[0]
         if flying.chunks is None:
             raise ContractError(
                 where=f"chunk {flying.metadata.chunk_id}",
@@ -136,14 +137,16 @@ class Rollout:
                 expected="the batch to fill in its candidates",
                 action="Sample every wanted invocation before `act`.",
             )
-        metadata = replace(flying.metadata, candidate_index=flying.candidate)
-        candidate = Candidate(metadata, flying.chunks[flying.candidate])
-        proposal = Proposal(candidate.metadata, candidate.actions, selected_by=SELECTOR)
-        return proposal, self._delivery_context(late)
+        drawn = [
+            Candidate(replace(flying.metadata, candidate_index=index), actions)
+            for index, actions in enumerate(flying.chunks)
+        ]
+        late = self._deliveries.late_rows(flying, self.now_s)
+        return propose(drawn, flying.candidate), self._delivery_context(late)
 
     def settle(self, result: Admitted | Rejected) -> None:
         """Take the verdict on `pending`: the selector takes the first that passes all layers."""
-        flying, _ = self._arrived.popleft()
+        flying = self._deliveries.take()
         verdict, now_s = result.verdict, self.now_s
         self.journal.candidate(
             now_s,
@@ -154,7 +157,7 @@ class Rollout:
             first_reason=verdict.first_reason or None,
         )
         if isinstance(result, Admitted):
-            self._answered(flying)
+            self._deliveries.answered(flying, now_s)
             if self.executor.deliver(result, now_s) is None:
                 self._newest_accepted_s = flying.metadata.condition_observation_event_time_s
             return
@@ -163,33 +166,13 @@ class Rollout:
         assert flying.chunks is not None
         # What made one candidate late or void holds for all of its invocation.
         stale = verdict.first_layer == FRESH
-        if stale or flying.candidate + 1 == len(flying.chunks):
-            self._answered(flying)
-            self.tally.rejections += 1
-            reason = REASONS[verdict.first_reason] if stale else DiscardReason.INFEASIBLE
-            self._write_off(flying, reason)
-        else:
-            self._try_another(flying)
-
-    def _try_another(self, flying: InFlight) -> None:
-        """The next candidate: at this tick if its check is done by now, else at a later one."""
-        check_s = next_candidate(self.setup, flying, start=self.start_index)
-        chunk_id = flying.metadata.chunk_id
-        self.journal.invocation(
-            self.now_s, invocation_id=chunk_id, stage="check", detail=repr(check_s)
-        )
-        self.tally.latencies_s[flying.number] += check_s
-        if flying.arrival_s <= self.now_s:
-            self._arrived.appendleft((flying, self._late_rows(flying)))
+        if tries_another(flying.candidate, len(flying.chunks), stale=stale):
+            self._deliveries.try_another(flying, now_s)
             return
-        self._flying.append(flying)
-        if self._overdue(flying):
-            self._miss(flying, self.now_s)
-
-    def _answered(self, flying: InFlight) -> None:
-        """The next invocation may begin, unless the deadline let it begin before."""
-        if not flying.given_up:
-            self.executor.end_invocation(self.now_s, flying.metadata.chunk_id, "answered")
+        self._deliveries.answered(flying, now_s)
+        self.tally.rejections += 1
+        reason = REASONS[verdict.first_reason] if stale else DiscardReason.INFEASIBLE
+        self._deliveries.write_off(flying, reason, now_s)
 
     def decide(self) -> None:
         """Recover where needed; sets `wanted` if the policy must sample."""
@@ -203,7 +186,7 @@ class Rollout:
         """One tick of the executor, one action period of the world."""
         now_s = self.now_s
         if self.wanted is not None:
-            self._flying.append(self.wanted)
+            self._deliveries.add(self.wanted)
             self.wanted = None
         command = self.executor.tick(now_s)
         self._apply(command, now_s)
@@ -221,10 +204,7 @@ class Rollout:
 
     def _end(self, outcome: Outcome) -> None:
         self.outcome = outcome
-        for flying in [*self._flying, *(item for item, _ in self._arrived)]:
-            self._write_off(flying, DiscardReason.END_OF_EPISODE)
-        self._flying.clear()
-        self._arrived.clear()
+        self._deliveries.end(self.now_s)
         self.tally.conclude(self.journal, self.setup.task, outcome, self.history[-1])
         self.executor.end_episode(self.now_s)
 
@@ -263,44 +243,6 @@ class Rollout:
         self.executor.begin_invocation(now_s, metadata.chunk_id, repr(flying.total_s))
         self.tally.latencies_s.append(flying.total_s)
         return flying
-
-    def _collect_deliveries(self, now_s: float) -> None:
-        for flying in sorted(self._flying, key=lambda item: (item.arrival_s, item.number)):
-            if flying.arrival_s <= now_s and not flying.dropped:
-                self._flying.remove(flying)
-                self._arrive(flying)
-            elif self._overdue(flying):
-                self._miss(flying, now_s)
-
-    def _overdue(self, flying: InFlight) -> bool:
-        return self.now_s - flying.begun_s >= self.setup.execution.deadline_s - 1e-9
-
-    def _miss(self, flying: InFlight, now_s: float) -> None:
-        """The deadline has passed: the next invocation may begin; the chunk may still come."""
-        if not flying.given_up:
-            flying.given_up = True
-            self.tally.deadline_misses += 1
-            self.executor.end_invocation(now_s, flying.metadata.chunk_id, "deadline")
-        if flying.dropped:
-            self._flying.remove(flying)
-            self._write_off(flying, DiscardReason.EXPIRED)
-
-    def _arrive(self, flying: InFlight) -> None:
-        late = self._late_rows(flying)
-        if late >= self.setup.horizons.execution_horizon:
-            self._answered(flying)
-            self._write_off(flying, DiscardReason.EXPIRED)
-        else:
-            self._arrived.append((flying, late))
-
-    def _late_rows(self, flying: InFlight) -> int:
-        late_s = self.now_s - flying.metadata.action_start_time_s
-        return round(late_s / self.setup.horizons.action_period_s)
-
-    def _write_off(self, flying: InFlight, reason: DiscardReason) -> None:
-        chunks = flying.chunks
-        rows = self.setup.horizons.prediction_horizon if chunks is None else int(chunks.shape[1])
-        self.executor.write_off(flying.metadata, rows, reason, self.now_s)
 
     def _delivery_context(self, late: int) -> Context:
         return context_of(

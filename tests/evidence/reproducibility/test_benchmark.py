@@ -32,7 +32,7 @@ def test_components_and_temperatures(fleet, method, observations):
     }
     assert all(row.seconds > 0 for row in rows)
     assert len(projected) == 6
-    assert projected[0].selected_by == "first"
+    assert projected[0].selected_by == "first_admissible"
 
 
 def test_without_a_projection_the_term_stays_unknown(fleet, observations):

@@ -2,10 +2,12 @@
 
 import pytest
 
+from gates.reproducibility.identity import unrecorded
 from genpolicy.candidates.judged import trained
 from genpolicy.errors import ContractError
 from genpolicy.evidence.documents.reproducibility import CANDIDATES
 from genpolicy.evidence.reproducibility import reload
+from genpolicy.evidence.reproducibility.identity import Deployment
 from genpolicy.evidence.reproducibility.reload import ReloadPlan, coverage_row, write_reload
 from genpolicy.evidence.rows.need import ModeRow, OfflineRow
 from genpolicy.evidence.rows.reproducibility import CoverageRow, NfeRow, SampleRow
@@ -21,7 +23,8 @@ def reloaded(fleet, dataset, data, policy, kit, tmp_path_factory):
     situations = [(name, 4, {}) for name in kit.uuids(data)[8:]]
     plan = ReloadPlan(
         task="tabletop_insertion", feasibility=kit.FEASIBILITY, dataset=dataset,
-        audit=kit.write_situations(root / "audit", situations), samples=3, horizons=kit.HORIZONS,
+        audit=kit.write_situations(root / "audit", situations), samples=3,
+        deployment=Deployment(kit.HORIZONS, deadline_s=0.15, samples=4),
         sweep={"flow": [1, 2, SamplerConfig(name="midpoint"), SamplerConfig(name="euler")]},
     )  # fmt: skip
     seen = fixture_observations(data, horizons=kit.HORIZONS, count=3)
@@ -79,6 +82,18 @@ def test_a_solver_that_evaluates_once_too_often_is_not_what_it_says(
     plan, candidates, _ = reloaded
     write_reload(plan, candidates, tmp_path / "fixtures.parquet", tmp_path)
     assert read_rows(tmp_path / "nfe.parquet", NfeRow) == [NfeRow("flow", 0, 3, 3, 2, 2, 2)]
+
+
+def test_the_card_says_what_runs(reloaded, data):
+    _, (flow,), folder = reloaded
+    card, config = CANDIDATES.read(folder)["flow"].card, flow.load().checkpoint.config
+    assert (card.sampler, card.sampler_steps, card.evaluations) == ("euler", 2, "2")
+    assert (card.eta, card.tolerance) == (None, None) and card.path.startswith("straight path")
+    assert (card.control_rate_hz, card.invocation_rate_hz) == pytest.approx((20.0, 2.5))
+    assert (card.candidates, card.selector, card.deadline_s) == (4, "first_admissible", 0.15)
+    assert card.dataset == data.manifest_sha256 and card.precision == "float32"
+    assert card.parameters == config.parameters["total"] > 0 and card.threads == 1
+    assert unrecorded(card) == []
 
 
 def test_a_candidate_without_fixtures_is_refused(reloaded, tmp_path):

@@ -1,0 +1,81 @@
+"""The identity card: what nobody recorded, and what the checkpoint says otherwise, is named."""
+
+import dataclasses
+import json
+
+import evidence
+import pytest
+from asked import asked
+
+from gates.pages.page import gate_page
+from gates.proof import judge
+from gates.reproducibility.gate import unpinned_items
+from gates.reproducibility.identity import MAY_BE_NONE
+from genpolicy.evidence.documents.reproducibility import IdentityCard
+
+IDENTITY = "reload/identity.json"
+ITEMS = {item.name: item for item in dataclasses.fields(IdentityCard)}
+
+
+def say(root, name, value):
+    evidence.edit_document(root, IDENTITY, lambda d: d["flow"]["card"].__setitem__(name, value))
+
+
+def unpinned(root):
+    return asked(root, unpinned_items, "flow", gate="B")
+
+
+def nothing(value):
+    return [] if isinstance(value, list) else type(value)()
+
+
+def test_what_nobody_recorded_fails_by_name(ladder):
+    assert unpinned(ladder).value == 0
+    card = json.loads((ladder / "artifacts" / IDENTITY).read_text())["flow"]["card"]
+    for name in sorted(set(ITEMS) - set(MAY_BE_NONE)):
+        say(ladder, name, nothing(card[name]))
+        found = unpinned(ladder)
+        assert found.value >= 1 and name in found.caveat, name
+        say(ladder, name, card[name])
+    assert unpinned(ladder).value == 0
+
+
+@pytest.mark.parametrize(("sampler", "item"), [("ddim", "eta"), ("bosh3", "tolerance")])
+def test_a_sampler_that_is_another_one_without_it_needs_it(ladder, sampler, item):
+    evidence.edit_document(
+        ladder, "train_generators/matched.json",
+        lambda d: d["methods"]["flow"]["config"]["sampler"].__setitem__("name", sampler),
+    )  # fmt: skip
+    say(ladder, "sampler", sampler)
+    found = unpinned(ladder)
+    assert found.value == 1 and found.caveat == item
+    say(ladder, item, 0.0)
+    assert unpinned(ladder).value == 0
+
+
+@pytest.mark.parametrize(
+    ("item", "value"),
+    [("parameters", 99), ("training_seeds", ["1"]), ("dataset", "e" * 64),
+     ("action_semantics", "e" * 64), ("observation_semantics", "e" * 64),
+     ("observation_horizon", 3), ("prediction_horizon", 17), ("execution_horizon", 9),
+     ("sampler", "euler"), ("sampler_steps", 2), ("batch_rows", 8)],
+)  # fmt: skip
+def test_what_the_checkpoint_says_otherwise_is_named_with_both(ladder, item, value):
+    say(ladder, item, value)
+    found = unpinned(ladder)
+    assert found.value == 1 and found.caveat.startswith(f"{item}: {value}, trained as ")
+
+
+def test_a_card_without_an_item_is_missing_evidence(ladder):
+    evidence.edit_document(ladder, IDENTITY, lambda d: d["flow"]["card"].pop("selector") and None)
+    report = judge(ladder, "B")
+    assert report.verdict == "INCONCLUSIVE"
+    found = [c.caveat for c in report.criteria if c.id == "unpinned_items"]
+    assert found and all("selector" in caveat for caveat in found), found
+
+
+def test_the_page_sets_candidates_side_by_side(ladder):
+    say(ladder, "path", "a path of its own")
+    page = gate_page(ladder, judge(ladder, "B"))
+    assert "Who is judged" in page and "a path of its own" in page and "first_admissible" in page
+    assert "none: the sampler has none" in page
