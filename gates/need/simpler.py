@@ -154,7 +154,7 @@ def valid_share(rows: pd.DataFrame, *, confidence: float) -> tuple[float, float,
 @criterion(
     "<=",
     question="Do ACT's samples depend on the observation beyond chance?",
-    look_at="Baselines: the latent encodes style or noise; clean the demonstrations first.",
+    look_at="Baselines: not shown: the latent encodes style or noise, or situations are too few.",
 )
 def latent_dependence_p(evidence: Evidence, settings: NeedSettings) -> Measured:
     """Upper end of the p-value that a latent's effect is unrelated to the observation."""
