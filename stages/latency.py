@@ -14,7 +14,8 @@ from genpolicy.evidence.reproducibility.latency import (
     measured_rows,
     model_rows,
 )
-from genpolicy.evidence.rows.reproducibility import LatencyModelRow, LatencyRow
+from genpolicy.evidence.reproducibility.load import candidates_rows
+from genpolicy.evidence.rows.reproducibility import CandidatesRow, LatencyModelRow, LatencyRow
 from genpolicy.evidence.stress.settings import StressSettings
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import output_folder
@@ -59,6 +60,7 @@ def work(params: Params) -> None:
         model = model_rows(rows, section.declared_terms, root_seed=params.seed)
         write_rows(folder / "latency.parquet", LatencyRow, rows + declared)
         write_rows(folder / "model.parquet", LatencyModelRow, model)
+        write_rows(folder / "candidates.parquet", CandidatesRow, candidates_rows(plan, policies))
 
 
 if __name__ == "__main__":

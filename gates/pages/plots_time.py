@@ -17,11 +17,14 @@ from gates.reproducibility.latency_budget import (
     budget_of,
     medians_of_processes,
 )
-from gates.reproducibility.settings import COVERAGE
-from genpolicy.evidence.rows.reproducibility import CoverageRow, LatencyRow
-from genpolicy.pages.figures.drawing import new_figure, plain_ticks
+from gates.reproducibility.settings import COVERAGE, RELOAD
+from genpolicy.evidence.documents.reproducibility import CANDIDATES
+from genpolicy.evidence.rows.reproducibility import CandidatesRow, CoverageRow, LatencyRow
+from genpolicy.pages.figures.drawing import GREY, new_figure, plain_ticks
 
 TEMPERATURES = ("warm", "cold")
+CANDIDATES_DRAWN = "artifacts/latency/candidates.parquet"
+QUIET = "none"
 
 
 def _latency(evidence: Evidence, report: GateReport) -> Figure:
@@ -117,6 +120,46 @@ def _coverage(evidence: Evidence, report: GateReport) -> Figure:
     return figure
 
 
+def _by_candidates(evidence: Evidence, report: GateReport) -> Figure:
+    frame = evidence.rows(CANDIDATES_DRAWN, CandidatesRow)
+    methods = in_order(frame["method"])
+    colour = colours(methods)
+    counts = sorted(set(frame["candidates"].tolist()))
+    figure, (axes,) = new_figure(height=2.8)
+    for place, method in enumerate(methods):
+        for load, own in frame[frame["method"] == method].groupby("load"):
+            quiet = load == QUIET
+            for rank, count in enumerate(counts):
+                times = numbers(own[own["candidates"] == count], "seconds") * MILLI
+                p50, p95 = np.quantile(times, [0.5, 0.95], method="higher")
+                at = rank + (place - (len(methods) - 1) / 2) * 0.2 + (0.0 if quiet else 0.08)
+                axes.vlines(at, p50, p95, color=colour[method], lw=1.2)
+                face = colour[method] if quiet else "white"
+                axes.plot([at], [p50], "o", ms=4, color=colour[method], markerfacecolor=face)
+        axes.plot([], [], "o", color=colour[method], label=method)
+    deadline = _deadline_s(evidence)
+    if deadline is not None:
+        axes.axhline(deadline * MILLI, color=GREY, lw=0.8)
+        axes.text(0.01, deadline * MILLI, "deadline of the whole answer", fontsize=8, va="bottom",
+                  transform=axes.get_yaxis_transform())  # fmt: skip
+    axes.set_xticks(np.arange(len(counts)), [f"{count:g}" for count in counts])
+    axes.set_yscale("log")
+    plain_ticks(axes.yaxis)
+    axes.set_xlabel("candidates of an invocation")
+    axes.set_ylabel("observation to proposal, ms")
+    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    return figure
+
+
+def _deadline_s(evidence: Evidence) -> float | None:
+    """Of the identity cards; they have the same."""
+    try:
+        cards = evidence.document(RELOAD, CANDIDATES)
+    except MissingEvidenceError:
+        return None
+    return next((entry.card.deadline_s for entry in cards.values()), None)
+
+
 def _processes(evidence: Evidence, report: GateReport) -> Figure:
     frame = evidence.rows(LATENCY, LatencyRow)
     methods = in_order(frame["method"])
@@ -158,6 +201,15 @@ PLOTS = (
         "between.",
         COVERAGE,
         _coverage,
+    ),
+    Plot(
+        "What do more candidates cost, and what a busy machine?",
+        "Dot: median of warm invocations; line: up to their p95. Full: alone on the machine; "
+        "hollow: beside a process on every core. Not among them: sensors, network, and the check "
+        "of each candidate that is tried.",
+        CANDIDATES_DRAWN,
+        _by_candidates,
+        also=(f"{RELOAD}/{CANDIDATES.file}",),
     ),
     Plot(
         "Measured twice, the same latency?",

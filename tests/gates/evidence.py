@@ -44,6 +44,7 @@ from genpolicy.evidence.rows.need import (
     OfflineRow,
 )
 from genpolicy.evidence.rows.reproducibility import (
+    CandidatesRow,
     CoverageRow,
     LatencyModelRow,
     LatencyRow,
@@ -359,6 +360,7 @@ def build(root: Path) -> None:
     _generators(root)
     _reload(root)
     _latency(root)
+    _candidates_drawn(root)
     _shadow(root)
     _stress(root)
     (root / CODE).parent.mkdir(parents=True)
@@ -1079,6 +1081,27 @@ def _latency(root: Path) -> None:
             for run in (1, 2)
             for process in (1, 2, 3)
             for level in (0.5, 0.95)
+        ],
+    )
+
+
+def _candidates_drawn(root: Path) -> None:
+    table(
+        root,
+        "latency/candidates.parquet",
+        CandidatesRow,
+        [
+            {
+                "method": m,
+                "candidates": count,
+                "load": load,
+                "repeat": repeat,
+                "seconds": SPEED[m] * (1 + count / 32 + 0.01 * repeat) * factor,
+            }
+            for m in CANDIDATES
+            for count in (1, 4, 8, 32)
+            for load, factor in (("none", 1), ("every core", 2))
+            for repeat in range(5)
         ],
     )
 

@@ -86,19 +86,19 @@ def measure_policy(
         policy = load()
         _evict_caches(repeat)
         row = observations[repeat % len(observations)][None]
-        spans = _invoke(policy, row, repeat=repeat, candidates=candidates, project=project)
+        spans = invoke(policy, row, repeat=repeat, candidates=candidates, project=project)
         results += [Measurement(name, "cold", repeat, value) for name, value in spans.items()]
     policy = load()
     for index in range(discarded_repeats + warm_repeats):
         row = observations[index % len(observations)][None]
-        spans = _invoke(policy, row, repeat=index, candidates=candidates, project=project)
+        spans = invoke(policy, row, repeat=index, candidates=candidates, project=project)
         repeat = index - discarded_repeats
         if repeat >= 0:
             results += [Measurement(name, "warm", repeat, value) for name, value in spans.items()]
     return results
 
 
-def _invoke(
+def invoke(
     policy: NetworkPolicy,
     row: Array,
     *,

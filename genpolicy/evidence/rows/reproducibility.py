@@ -127,3 +127,22 @@ class LatencyModelRow:
     level: float
     measured_s: float
     drawn_s: float
+
+
+@dataclass(frozen=True)
+class CandidatesRow:
+    """`candidates.parquet` of latency: one warm invocation that draws several candidates.
+
+    Attributes:
+        method: The method.
+        candidates: How many it draws.
+        load: What else runs: `none`, or a process on `every core`.
+        repeat: Which invocation.
+        seconds: From observation to proposal, without the check of it, s.
+    """
+
+    method: str
+    candidates: int
+    load: str
+    repeat: int
+    seconds: float

@@ -1,0 +1,90 @@
+"""Latency against the number of candidates, on a quiet machine and beside a competing load."""
+
+import multiprocessing
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from multiprocessing.synchronize import Event, Semaphore
+
+import numpy as np
+
+from genpolicy.candidates.judged import JudgedPolicy
+from genpolicy.data.dataset import load_dataset
+from genpolicy.evidence.reproducibility.benchmark import invoke
+from genpolicy.evidence.reproducibility.latency import OBSERVATIONS, LatencyPlan
+from genpolicy.evidence.reproducibility.measure import in_fresh_process
+from genpolicy.evidence.rows.reproducibility import CandidatesRow
+from genpolicy.policies.fixtures import fixture_observations
+
+COUNTS = (1, 4, 8, 32)
+REPEATS = 20
+DISCARDED = 3
+QUIET, BUSY = "none", "every core"
+SIDE = 256
+START_S = 60.0
+
+
+def candidates_rows(plan: LatencyPlan, policies: Sequence[JudgedPolicy]) -> list[CandidatesRow]:
+    """What an invocation costs that draws several candidates, without the checks of them.
+
+    Args:
+        plan: How methods are timed.
+        policies: Those of them that draw; the others always draw the same.
+    """
+    return [
+        row
+        for judged in policies
+        if judged.load().stochastic
+        for row in in_fresh_process(measure_counts, plan, judged)
+    ]
+
+
+def measure_counts(plan: LatencyPlan, judged: JudgedPolicy) -> list[CandidatesRow]:
+    """Rows of one method, measured in this process."""
+    rows = _measured(plan, judged, QUIET)
+    with competing():
+        return rows + _measured(plan, judged, BUSY)
+
+
+@contextmanager
+def competing() -> Iterator[int]:
+    """A process on every core that multiplies matrices inside the block; yields how many."""
+    context = multiprocessing.get_context("spawn")
+    stop, ready = context.Event(), context.Semaphore(0)
+    count = len(os.sched_getaffinity(0))
+    burners = [context.Process(target=_burn, args=(stop, ready)) for _ in range(count)]
+    try:
+        for burner in burners:
+            burner.start()
+        for _ in burners:
+            ready.acquire(timeout=START_S)
+        yield count
+    finally:
+        stop.set()
+        for burner in burners:
+            burner.join()
+
+
+def _burn(stop: Event, ready: Semaphore) -> None:
+    matrix = np.full((SIDE, SIDE), 1.0 / SIDE)
+    ready.release()
+    while not stop.is_set():
+        matrix = matrix @ matrix
+
+
+def _measured(plan: LatencyPlan, judged: JudgedPolicy, load: str) -> list[CandidatesRow]:
+    seen = fixture_observations(load_dataset(plan.dataset), horizons=plan.horizons,
+                                count=OBSERVATIONS)  # fmt: skip
+    policy, rows = judged.load(), []
+    for count in COUNTS:
+        for repeat in range(-DISCARDED, REPEATS):
+            row = seen[repeat % len(seen)][None]
+            spans = invoke(policy, row, repeat=repeat, candidates=count, project=None)
+            if repeat >= 0:
+                rows.append(
+                    CandidatesRow(
+                        method=judged.name, candidates=count, load=load, repeat=repeat,
+                        seconds=sum(spans.values()),
+                    )
+                )  # fmt: skip
+    return rows
