@@ -15,7 +15,7 @@ from gates.reproducibility.latency_budget import (
     TERMS,
     Spans,
     budget_of,
-    medians_of_processes,
+    spans_of_processes,
 )
 from gates.reproducibility.settings import COVERAGE, RELOAD
 from genpolicy.evidence.documents.reproducibility import CANDIDATES
@@ -168,7 +168,7 @@ def _processes(evidence: Evidence, report: GateReport) -> Figure:
     for axes, temperature in zip(places, TEMPERATURES, strict=True):
         for place, method in enumerate(methods):
             own = frame[frame["method"] == method]
-            for run, medians in medians_of_processes(own, temperature).items():
+            for run, medians in spans_of_processes(own, temperature).items():
                 face = colour[method] if run == 1 else "white"
                 heights = np.full(len(medians), place + 0.16 * (-1 if run == 1 else 1))
                 axes.plot(
@@ -178,7 +178,7 @@ def _processes(evidence: Evidence, report: GateReport) -> Figure:
         axes.set_ylim(len(methods) - 0.5, -0.5)
         axes.set_xscale("log")
         plain_ticks(axes.xaxis)
-        axes.set_xlabel(f"{temperature}: median of a process, ms")
+        axes.set_xlabel(f"{temperature}, each process, ms")
     return figure
 
 
@@ -187,8 +187,8 @@ PLOTS = (
         "Where the time goes",
         "The eleven terms from exposure to queue, logarithmic. Declared terms are drawn from "
         "settings, the others were measured here, one thread. Adding up the p95 of the terms is "
-        "the budget on paper; an invocation seldom is slow in all of them, so that its own p95 is "
-        "less. Both stand below the figure, with intervals between order statistics.",
+        "the budget on paper; invocations may take less, where slow terms do not coincide, or "
+        "more. Both stand below the figure, with intervals for these processes and no others.",
         LATENCY,
         _latency,
         read=_budgets,
@@ -213,8 +213,9 @@ PLOTS = (
     ),
     Plot(
         "Measured twice, the same latency?",
-        "A mark is one fresh process: the median of its invocations, measured terms summed. Full: "
-        "first measurement; hollow: second. The gate asks whether the two sets differ by less than "
+        "A mark is one fresh process, measured terms summed: warm the median of its invocations, "
+        "cold its first call. Full: first measurement; hollow: second. The gate asks whether the "
+        "two sets differ by less than "
         "its limit, at the worse end of an interval over processes.",
         LATENCY,
         _processes,

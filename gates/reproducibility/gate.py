@@ -92,7 +92,7 @@ def unpinned_items(
         missing.append("checkpoint file")
     if entry.dataset != evidence.digest(MANIFEST):
         missing.append("dataset: trained on another one than the audited")
-    missing += unrecorded(entry.card) + contradicted(entry.card, _config(evidence, candidate))
+    missing += unrecorded(entry.card) + contradicted(entry, _config(evidence, candidate))
     return Measured(float(len(missing)), caveat=", ".join(missing) or "all pinned by hash")
 
 

@@ -1,11 +1,12 @@
 """The identity card of a candidate: is each item recorded, and is it what the checkpoint says?"""
 
 import dataclasses
+import math
 from collections.abc import Mapping
 from typing import Any
 
 from genpolicy.evidence.documents.given import TrainedConfig
-from genpolicy.evidence.documents.reproducibility import IdentityCard
+from genpolicy.evidence.documents.reproducibility import CandidateIdentity, IdentityCard
 
 MAY_BE_NONE = ("eta", "tolerance")
 """Of samplers that have none."""
@@ -22,26 +23,38 @@ def unrecorded(card: IdentityCard) -> list[str]:
     ]
 
 
-def contradicted(card: IdentityCard, config: TrainedConfig) -> list[str]:
-    """Items in which the card and the checkpoint's own configuration differ, with both values."""
-    own = _as_trained(config)
+def contradicted(entry: CandidateIdentity, config: TrainedConfig) -> list[str]:
+    """Items in which the card and the checkpoint's own configuration differ, with both values.
+
+    Args:
+        entry: The candidate, with its card.
+        config: Configuration of the first training seed, which is the one that is promoted.
+    """
+    card, own = entry.card, dict(_as_trained(config))
+    for name in MAY_BE_NONE:
+        if getattr(card, name) is not None:
+            own[name] = config.sampler.get(name)
+    own["training_seeds"] = [str(seed) for seed in entry.seed]
     said = {name: getattr(card, name) for name in own}
-    return [
+    found = [
         f"{name}: {said[name]}, trained as {own[name]}" for name in own if said[name] != own[name]
     ]
+    if entry.seed[:1] != [config.training_seed] or len(entry.seed) != len(entry.checkpoints):
+        found.append(f"seed: {entry.seed}, trained as {config.training_seed} first")
+    return found
 
 
 def _as_trained(config: TrainedConfig) -> Mapping[str, Any]:
     horizons, sampler, rests_on = config.horizons, config.sampler, config.provenance
     return {
         "parameters": config.parameters.get("total"),
-        "training_seeds": [str(config.training_seed)],
         "dataset": rests_on.get("dataset_manifest_sha256"),
         "action_semantics": rests_on.get("action_contract_sha256"),
         "observation_semantics": rests_on.get("observation_contract_sha256"),
         "observation_horizon": horizons.get("observation_horizon"),
         "prediction_horizon": horizons.get("prediction_horizon"),
         "execution_horizon": horizons.get("execution_horizon"),
+        "control_rate_hz": 1.0 / float(horizons.get("action_period_s", math.inf)),
         "sampler": sampler.get("name"),
         "sampler_steps": sampler.get("steps"),
         "batch_rows": sampler.get("batch_rows"),

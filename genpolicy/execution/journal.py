@@ -130,7 +130,7 @@ class Journal:
         self.add("scene", self.clock(now_s), {"bodies": encode_poses(poses)})
 
     def invocation(self, now_s: float, *, invocation_id: str, stage: str, detail: str = "") -> None:
-        """Record the begin or the end of an invocation."""
+        """Record the begin of an invocation, the check of another candidate, or the end."""
         payload = {"id": invocation_id, "stage": stage, "detail": detail}
         self.add("invocation", self.clock(now_s), payload)
 

@@ -1070,7 +1070,6 @@ def _latency(root: Path) -> None:
         [
             {
                 "method": m,
-                "fitted_run": 3 - run,
                 "run": run,
                 "process": process,
                 "level": level,

@@ -35,7 +35,7 @@ class IdentityCard:
         device: Where it ran.
         threads: Threads of the arithmetic.
         cpu_capability: Instruction set of the kernels.
-        warm_up: Invocations before the first that is timed.
+        warm_up: Invocations before the first that is timed as warm.
         batch_rows: Rows of a network call, padded.
         candidates: Drawn by one invocation.
         selector: Rule by which one of them is proposed.

@@ -60,7 +60,7 @@ def measure_policy(
     candidates: int = 1,
     project: Projection | None = None,
 ) -> list[Measurement]:
-    """Time one candidate per invocation, component by component.
+    """Time invocations component by component.
 
     Args:
         folder: Checkpoint folder.

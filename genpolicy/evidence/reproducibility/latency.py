@@ -2,7 +2,7 @@
 
 The unit is the process: invocations of one share its memory layout, its caches and the mood of the
 machine. So each of the two measurements takes several processes, in turns, and what a model says is
-held against the processes that it was not made from.
+held against a process that it was not made from.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -198,7 +198,7 @@ def latency_models(
 def model_rows(
     rows: Sequence[LatencyRow], declared: Mapping[str, DeclaredTerm], *, root_seed: int
 ) -> list[LatencyModelRow]:
-    """What models made from one run say of the processes of the other.
+    """What the model made from all other processes says of each process.
 
     Only measured terms are summed: nothing here can contradict a declared one.
 
@@ -209,24 +209,25 @@ def model_rows(
     """
     table = pd.DataFrame([vars(row) for row in rows])
     warm = table[table["temperature"] == "warm"]
-    spans = warm.groupby(["method", *INVOCATION])["seconds"].sum()
     found = []
-    for fitted, other in (RUNS, RUNS[::-1]):
-        for method, model in latency_models(table[table["run"] == fitted], declared).items():
+    for run, process in warm[["run", "process"]].drop_duplicates().itertuples(index=False):
+        part = warm[(warm["run"] == run) & (warm["process"] == process)]
+        others = table[(table["run"] != run) | (table["process"] != process)]
+        spans = part.groupby(["method", "repeat"])["seconds"].sum()
+        for method, model in latency_models(others, declared).items():
             drawn = np.fromiter(_drawn_spans(model, root_seed), dtype=np.float64)
-            for process, part in spans.loc[method, other].groupby("process"):
-                found += [
-                    LatencyModelRow(
-                        method=method,
-                        fitted_run=fitted,
-                        run=other,
-                        process=int(process),
-                        level=level,
-                        measured_s=float(np.quantile(part, level, method="higher")),
-                        drawn_s=float(np.quantile(drawn, level, method="higher")),
-                    )
-                    for level in LEVELS
-                ]
+            measured = spans.loc[method].to_numpy()
+            found += [
+                LatencyModelRow(
+                    method=method,
+                    run=int(run),
+                    process=int(process),
+                    level=level,
+                    measured_s=float(np.quantile(measured, level, method="higher")),
+                    drawn_s=float(np.quantile(drawn, level, method="higher")),
+                )
+                for level in LEVELS
+            ]
     return found
 
 

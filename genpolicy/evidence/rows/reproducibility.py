@@ -112,16 +112,14 @@ class LatencyModelRow:
 
     Attributes:
         method: The method.
-        fitted_run: Measurement that the model was made from.
-        run: The other one.
-        process: Process of the other one.
+        run: Measurement of the process.
+        process: The process; the model was made from all the others.
         level: Which quantile of an invocation's measured terms, summed.
         measured_s: That quantile in the process, s.
         drawn_s: The same of invocations drawn from the model, s.
     """
 
     method: str
-    fitted_run: int
     run: int
     process: int
     level: float

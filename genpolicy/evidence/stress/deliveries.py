@@ -35,7 +35,7 @@ class Deliveries:
 
     def collect(self, now_s: float) -> None:
         """What is delivered by now arrives, in order; what is overdue is given up."""
-        for flying in sorted(self._flying, key=lambda item: (item.arrival_s, item.number)):
+        for flying in sorted(self._flying, key=_order):
             if flying.arrival_s <= now_s and not flying.dropped:
                 self._flying.remove(flying)
                 self._arrive(flying, now_s)
@@ -63,7 +63,8 @@ class Deliveries:
         )
         self._tally.latencies_s[flying.number] += check_s
         if flying.arrival_s <= now_s:
-            self._arrived.appendleft(flying)
+            waiting = [*self._arrived, flying]
+            self._arrived = deque(sorted(waiting, key=_order))
             return
         self._flying.append(flying)
         if self._overdue(flying, now_s):
@@ -106,3 +107,8 @@ class Deliveries:
         if flying.dropped:
             self._flying.remove(flying)
             self.write_off(flying, DiscardReason.EXPIRED, now_s)
+
+
+def _order(flying: InFlight) -> tuple[float, int]:
+    """Answers are judged in the order in which they come."""
+    return flying.arrival_s, flying.number

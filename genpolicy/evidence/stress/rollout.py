@@ -157,20 +157,22 @@ class Rollout:
             first_reason=verdict.first_reason or None,
         )
         if isinstance(result, Admitted):
+            self.tally.refused.discard(flying.metadata.chunk_id)
             self._deliveries.answered(flying, now_s)
             if self.executor.deliver(result, now_s) is None:
                 self._newest_accepted_s = flying.metadata.condition_observation_event_time_s
             return
+        self.tally.refused.add(flying.metadata.chunk_id)
         counts = self.tally.rejected_by
         counts[verdict.first_reason] = counts.get(verdict.first_reason, 0) + 1
         assert flying.chunks is not None
-        # What made one candidate late or void holds for all of its invocation.
+        # What made one candidate late or void holds for all of its invocation. It is known where
+        # the other layers passed: freshness is asked last.
         stale = verdict.first_layer == FRESH
         if tries_another(flying.candidate, len(flying.chunks), stale=stale):
             self._deliveries.try_another(flying, now_s)
             return
         self._deliveries.answered(flying, now_s)
-        self.tally.rejections += 1
         reason = REASONS[verdict.first_reason] if stale else DiscardReason.INFEASIBLE
         self._deliveries.write_off(flying, reason, now_s)
 

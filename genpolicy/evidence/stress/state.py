@@ -100,7 +100,7 @@ class InFlight:
 
     @property
     def total_s(self) -> float:
-        """Its end-to-end latency: the eleven terms, and every check after the first, s."""
+        """Its end-to-end latency so far: the eleven terms, and every check after the first, s."""
         return self.arrival_s - self.begun_s
 
 
@@ -113,12 +113,17 @@ class Tally:
     hold_ticks: int = 0
     fallback_ticks: int = 0
     deadline_misses: int = 0
-    rejections: int = 0
     interventions: int = 0
     force_peak_n: float = 0.0
     rejected_by: dict[str, int] = field(default_factory=dict)
+    refused: set[str] = field(default_factory=set)
     latencies_s: list[float] = field(default_factory=list)
     path_m: list[Array] = field(default_factory=list)
+
+    @property
+    def rejections(self) -> int:
+        """Invocations of which a candidate was refused and none passed."""
+        return len(self.refused)
 
     def feel(self, journal: Journal, now_s: float, force_n: float) -> None:
         """Note a contact force; a new peak goes on record."""

@@ -4,6 +4,7 @@ import pytest
 
 from genpolicy.evidence.reproducibility.benchmark import measure_policy
 from genpolicy.policies.fixtures import fixture_observations
+from genpolicy.policies.policy import NetworkPolicy
 
 
 @pytest.fixture(scope="module")
@@ -41,3 +42,19 @@ def test_without_a_projection_the_term_stays_unknown(fleet, observations):
         cold_repeats=1, warm_repeats=1,
     )  # fmt: skip
     assert "project" not in {row.component for row in rows}
+
+
+def test_as_many_candidates_are_drawn_as_are_deployed(fleet, observations, monkeypatch):
+    asked = []
+    plain = NetworkPolicy.sample_encoded
+
+    def spied(self, condition, *, noise_names, candidates):
+        asked.append(candidates)
+        return plain(self, condition, noise_names=noise_names, candidates=candidates)
+
+    monkeypatch.setattr(NetworkPolicy, "sample_encoded", spied)
+    measure_policy(
+        fleet[0] / "flow" / "seed_0", observations, expected_sha256=None, cold_repeats=1,
+        warm_repeats=2, discarded_repeats=1, candidates=4,
+    )  # fmt: skip
+    assert asked == [4] * 4

@@ -9,6 +9,7 @@ from genpolicy.evidence.stress.latency import (
     MEASURED_TERMS,
     DeclaredTerm,
     LatencyModel,
+    draw_check,
     draw_latency,
     empirical_quantile,
 )
@@ -103,3 +104,36 @@ def test_quantiles_are_order_statistics_and_never_interpolated():
         assert empirical_quantile(values, level) == value
     seen = {draw(model(), invocation=n).terms["encode"] for n in range(1, 40)}
     assert seen <= set(model().measured["encode"])
+
+
+def check(of, *, candidate=1, **changes):
+    keys = {
+        "root_seed": 5, "perturbation": "nominal", "start": 2, "invocation": 1,
+        "compute_factor": 1.0,
+    }  # fmt: skip
+    return draw_check(of, candidate=candidate, **(keys | changes))
+
+
+def test_another_check_is_a_draw_of_its_own_from_the_term_project():
+    drawn = [check(model(), candidate=number) for number in range(1, 60)]
+    assert set(drawn) <= set(model().measured["project"]) and len(set(drawn)) > 20
+    first = draw(model()).terms["project"]
+    assert [check(model(), candidate=c) for c in (1, 2)] != [first, first]
+    # The same for every method whose checks take as long, whatever its network takes.
+    assert check(model(sample_s=0.001)) == check(model(sample_s=0.1))
+
+
+def test_contention_slows_every_check():
+    for candidate in (1, 2, 3):
+        slow = check(model(), candidate=candidate, compute_factor=2.5)
+        assert slow == pytest.approx(2.5 * check(model(), candidate=candidate))
+
+
+@pytest.mark.parametrize(
+    "change", [{"start": 3}, {"invocation": 2}, {"root_seed": 6}, {"perturbation": "push"}]
+)
+def test_every_part_of_a_check_s_key_counts(change):
+    def several(**changes):
+        return [check(model(), candidate=number, **changes) for number in range(1, 6)]
+
+    assert several() == several() != several(**change)

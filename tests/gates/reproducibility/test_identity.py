@@ -49,8 +49,12 @@ def test_a_sampler_that_is_another_one_without_it_needs_it(ladder, sampler, item
     say(ladder, "sampler", sampler)
     found = unpinned(ladder)
     assert found.value == 1 and found.caveat == item
-    say(ladder, item, 0.0)
+    config = json.loads((ladder / "artifacts/train_generators/matched.json").read_text())
+    trained = config["methods"]["flow"]["config"]["sampler"][item]
+    say(ladder, item, trained)
     assert unpinned(ladder).value == 0
+    say(ladder, item, trained + 0.5)
+    assert unpinned(ladder).caveat == f"{item}: {trained + 0.5}, trained as {trained}"
 
 
 @pytest.mark.parametrize(
@@ -58,12 +62,27 @@ def test_a_sampler_that_is_another_one_without_it_needs_it(ladder, sampler, item
     [("parameters", 99), ("training_seeds", ["1"]), ("dataset", "e" * 64),
      ("action_semantics", "e" * 64), ("observation_semantics", "e" * 64),
      ("observation_horizon", 3), ("prediction_horizon", 17), ("execution_horizon", 9),
-     ("sampler", "euler"), ("sampler_steps", 2), ("batch_rows", 8)],
+     ("control_rate_hz", 10.0), ("sampler", "euler"), ("sampler_steps", 2), ("batch_rows", 8)],
 )  # fmt: skip
 def test_what_the_checkpoint_says_otherwise_is_named_with_both(ladder, item, value):
     say(ladder, item, value)
     found = unpinned(ladder)
     assert found.value == 1 and found.caveat.startswith(f"{item}: {value}, trained as ")
+
+
+def test_several_training_seeds_are_all_on_the_card(ladder):
+    """`matched.json` holds the configuration of the first, which is the one that is promoted."""
+
+    def two(document, seeds=(0, 7), said=("0", "7")):
+        document["flow"] |= {"seed": list(seeds), "checkpoints": ["x", "y"], "config": ["c", "d"]}
+        document["flow"]["card"]["training_seeds"] = list(said)
+
+    evidence.edit_document(ladder, IDENTITY, two)
+    assert unpinned(ladder).value == 0
+    evidence.edit_document(ladder, IDENTITY, lambda d: two(d, said=("0",)))
+    assert "training_seeds" in unpinned(ladder).caveat
+    evidence.edit_document(ladder, IDENTITY, lambda d: two(d, seeds=(7, 0), said=("7", "0")))
+    assert unpinned(ladder).caveat == "seed: [7, 0], trained as 0 first"
 
 
 def test_a_card_without_an_item_is_missing_evidence(ladder):
