@@ -8,6 +8,7 @@ them back.
 import dataclasses
 import json
 import re
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -77,27 +78,50 @@ def gate_page(root: Path, report: GateReport) -> str:
         reading=READING[report.gate],
         words=words(report.gate),
         pictures=draw_all(PLOTS[report.gate], Evidence(root), report),
-        identities=identity_table(Evidence(root), report),
+        identities=identities(Evidence(root), report),
         card=card,
         card_state=state,
         digest=sha256_bytes(report_bytes(report)),
     )
 
 
-def identity_table(evidence: Evidence, report: GateReport) -> Table:
-    """The identity cards of Gate B's candidates side by side; empty for the other gates."""
+@dataclass(frozen=True)
+class Identities:
+    """The identity cards of Gate B's candidates.
+
+    Attributes:
+        differ: Heads, then the items in which they differ, a column each.
+        shared: The items that are the same for all.
+    """
+
+    differ: Table
+    shared: Table
+
+
+def identities(evidence: Evidence, report: GateReport) -> Identities | None:
+    """The cards side by side; None for the other gates, and where none can be read."""
     if report.gate != "B":
-        return ()
+        return None
     try:
         known = evidence.document(RELOAD, CANDIDATES)
     except MissingEvidenceError:
-        return ()
+        return None
     names = [name for name in report.candidates if name in known]
-    heads = ("", *names)
-    return heads, *(
-        (label(item.name), *(_said(getattr(known[name].card, item.name)) for name in names))
+    rows = {
+        _item(item.name): tuple(_said(getattr(known[name].card, item.name)) for name in names)
         for item in dataclasses.fields(IdentityCard)
-    )
+    }
+    differ = tuple((key, *said) for key, said in rows.items() if len(set(said)) > 1)
+    shared = tuple((key, said[0]) for key, said in rows.items() if len(set(said)) == 1)
+    return Identities((("", *names), *differ), shared)
+
+
+def _item(name: str) -> str:
+    """An item of the card as a reader writes it, its unit behind a comma."""
+    for suffix, unit in (("_hz", "Hz"), ("_s", "s")):
+        if name.endswith(suffix):
+            return f"{name.removesuffix(suffix).replace('_', ' ')}, {unit}"
+    return name.replace("_sha256", " by hash").replace("_", " ")
 
 
 def _said(value: Any) -> str:

@@ -7,7 +7,8 @@ import evidence
 import pytest
 from asked import asked
 
-from gates.pages.page import gate_page
+from gates.evidence import Evidence
+from gates.pages.page import gate_page, identities
 from gates.proof import judge
 from gates.reproducibility.gate import unpinned_items
 from gates.reproducibility.identity import MAY_BE_NONE
@@ -93,8 +94,23 @@ def test_a_card_without_an_item_is_missing_evidence(ladder):
     assert found and all("selector" in caveat for caveat in found), found
 
 
-def test_the_page_sets_candidates_side_by_side(ladder):
+def test_the_page_sets_side_by_side_what_differs_and_says_once_what_does_not(ladder):
     say(ladder, "path", "a path of its own")
+    report = judge(ladder, "B")
+    found = identities(Evidence(ladder), report)
+    heads, *rows = found.differ
+    assert set(heads) == {"", *evidence.CANDIDATES}
+    (row,) = rows
+    assert row[0] == "path" and row[heads.index("flow")] == "a path of its own"
+    shared = dict(found.shared)
+    assert shared["control rate, Hz"] == "20" and shared["deadline, s"] == "0.15"
+    assert shared["eta"] == "none: the sampler has none" and len(shared) == len(ITEMS) - 1
+    page = gate_page(ladder, report)
+    assert "Who is judged" in page and f"The same for all: {len(shared)} items" in page
+    assert identities(Evidence(ladder), judge(ladder, "A")) is None
+
+
+def test_without_a_document_the_page_stands_without_cards(ladder):
+    evidence.replace(ladder, IDENTITY, None)
     page = gate_page(ladder, judge(ladder, "B"))
-    assert "Who is judged" in page and "a path of its own" in page and "first_admissible" in page
-    assert "none: the sampler has none" in page
+    assert "Who is judged" not in page
