@@ -133,7 +133,8 @@ def _whole(path: Path) -> str:
         return DATASET
     if (path / "meta" / "info.json").is_file():
         return "lerobot"
-    if (path / ".zgroup").is_file() or (path / "meta" / "episode_ends").is_dir():
+    described = any((path / name).is_file() for name in (".zgroup", "zarr.json"))
+    if described or (path / "meta" / "episode_ends").is_dir():
         return "zarr"
     return ""
 
@@ -211,12 +212,14 @@ def _file(path: Path) -> str:
 
 def _refuse_unknown(path: Path, what: str) -> NoReturn:
     csv = ".csv" in what or ".tsv" in what
+    packed = " .zip" in what or " .gz" in what or " .tar" in what
+    action = "Unpack it first." if packed else CHECK
     _refuse(
         path,
         f"of no known layout ({what})",
         "a dataset folder, MCAP files, a Zarr replay buffer, a LeRobot dataset, a robomimic "
         "HDF5 file or Parquet files",
-        "Convert the text to Parquet first; docs/import.md says which columns." if csv else CHECK,
+        "Convert the text to Parquet first; docs/import.md says which columns." if csv else action,
     )
 
 
