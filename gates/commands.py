@@ -55,15 +55,23 @@ def audit(
     correct it and give it back), evidence/ and dataset/. The exit code is 0
     whatever the verdict: it was measured.
     """
-    from genpolicy.cli.beforehand import check_folder, check_given, check_import
+    from genpolicy.cli.beforehand import check_folder, check_import, check_settings
 
-    check_given(limits, "--limits")
+    check_settings(limits, "--limits", "gate_a")
     check_import(path, out, format=layout, contract=contract)
     check_folder(out, "audit.json", "audit")
-    from gates.audit.command import AuditOptions, run_audit
+    from gates.audit.importing import AuditOptions, import_recordings
 
     options = AuditOptions(path, layout, contract, task, out=out, limits=limits, seed=seed)
-    return run_audit(options)
+    if limits is not None:  # a wrong limit is told before anything is read
+        from gates.need.gate import read_cause_limits
+
+        read_cause_limits(limits)
+    opened = import_recordings(options)
+    # What audits loads all of science; recordings that cannot be read are told before.
+    from gates.audit.command import run_audit
+
+    return run_audit(options, opened)
 
 
 @gates.command(epilog=examples("genpolicy gates check --through C"))

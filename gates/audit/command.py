@@ -6,14 +6,13 @@ limits of a `params.yaml` or the packaged ones.
 
 import os
 import shutil
-import sys
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from gates.audit.importing import AuditOptions, say
 from gates.cause import Answer, Cause, CauseLimits, Topic, cause_of, default_limits
 from gates.need.gate import read_cause_limits
 from genpolicy.audit.documents import Obstacle
@@ -21,14 +20,12 @@ from genpolicy.audit.evidence import write_evidence
 from genpolicy.audit.propose import propose_settings
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.audit.standalone import AuditReport, audit
-from genpolicy.cli.beforehand import check_apart, check_folder
-from genpolicy.cli.ingest import Recordings, given_contract
 from genpolicy.cli.progress import ProgressLine
 from genpolicy.cli.remember import Answers, remembered_admissible, remembered_replay
-from genpolicy.cli.resume import DATASET, fingerprint, kept_or_new, work_folder
+from genpolicy.cli.resume import DATASET, work_folder
 from genpolicy.cli.task_checks import TaskChecks, task_checks
 from genpolicy.data.dataset import Dataset, load_dataset
-from genpolicy.data.formats import Opened, open_dataset
+from genpolicy.data.formats import Opened
 from genpolicy.data.formats.contract import write_contract
 from genpolicy.integrity.atomic import output_folder, write_bytes
 from genpolicy.integrity.documents import canonical_json
@@ -42,31 +39,19 @@ DOCUMENT, PAGE, CONTRACT, EVIDENCE = "audit.json", "audit.html", "contract.yaml"
 SHOWN_REFUSALS = 5
 
 
-@dataclass(frozen=True)
-class AuditOptions(Recordings):
-    """What the command takes: recordings, where to write, limits, and the root of all draws."""
-
-    out: Path = Path("audit")
-    limits: Path | None = None
-    seed: int = 0
-
-
-def run_audit(options: AuditOptions) -> int:
-    """Import, audit, write everything or nothing, and print the verdict."""
+def run_audit(options: AuditOptions, opened: Opened) -> int:
+    """Audit what was imported, write everything or nothing, and print the verdict."""
     began_s = time.monotonic()
     out = options.out
-    check_apart(options.path, out)
-    check_folder(out, DOCUMENT, "audit")
     limits = given_limits(options.limits)
     work = work_folder(out)
-    opened = _opened(options, work)
-    _say(f"{opened.accepted} episodes accepted, {len(opened.refused)} refused; auditing")
+    say(f"{opened.accepted} episodes accepted, {len(opened.refused)} refused; auditing")
     dataset = load_dataset(opened.folder)
     origins = origins_of(dataset)
     settings = propose_settings(dataset, source=opened.contract.model_dump(mode="json"))
     checks = task_checks(dataset, task=options.task, chunk_steps=settings.chunk_steps)
     report = _audited(options, dataset, settings, checks, work)
-    _say("writing the evidence and the page")
+    say("writing the evidence and the page")
     with output_folder(out) as folder:
         write_contract(folder / CONTRACT, opened.contract)
         name = name_of(dataset, options.path)
@@ -83,7 +68,7 @@ def run_audit(options: AuditOptions) -> int:
     shutil.rmtree(work, ignore_errors=True)
     print(named(as_text(report, cause, opened, out), origins))
     print(limits_text(limits, options.limits))
-    _say(f"{time.monotonic() - began_s:.1f} s")
+    say(f"audited in {time.monotonic() - began_s:.1f} s")
     return 0
 
 
@@ -229,31 +214,3 @@ def _audited(
     finally:
         for line in lines.values():
             line.close()
-
-
-def _opened(options: AuditOptions, work: Path) -> Opened:
-    """The recordings as a dataset: kept from an interrupted audit, or imported now."""
-    contract = given_contract(options)
-    progress = ProgressLine("episodes")
-
-    def make(folder: Path) -> Opened:
-        return open_dataset(
-            options.path,
-            out=folder,
-            format=options.format,
-            contract=contract,
-            task=options.task,
-            progress=progress,
-        )
-
-    if not options.path.exists():
-        return make(work / DATASET)  # which says what is missing
-    key = fingerprint(options.path, format=options.format, contract=contract, task=options.task)
-    try:
-        return kept_or_new(work, key, make)
-    finally:
-        progress.close()
-
-
-def _say(text: str) -> None:
-    print(f"genpolicy audit: {text}", file=sys.stderr, flush=True)

@@ -27,6 +27,7 @@ from genpolicy.audit.modes import (
 )
 from genpolicy.audit.neighbourhoods import Neighbourhood, Support
 from genpolicy.audit.progress import Progress, silent
+from genpolicy.audit.rests import leaving, rank_of
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.seeds import stream
 
@@ -280,14 +281,21 @@ def planted_is_found(
 def _rows(
     data: AuditInput, settings: AuditSettings, phase: str, root_seed: int, groups: int
 ) -> tuple[Integers, Integers]:
-    """Rows of training episodes to learn from, and held-out rows to ask, of one phase."""
+    """Rows of training episodes to learn from, and held-out rows to ask, of one phase.
+
+    Of a rest only the row from which the arm leaves: else its many equal rows, of which any may
+    be taken for the neighbour, show how long it took and not where it goes.
+    """
     rows = np.arange(len(data.episode))
     clean = ~data.episodes.is_recovery[data.episode] & (data.grouping == phase)
     clean &= data.last_row - rows >= settings.chunk_steps // 2
+    leaves = leaving(data)
+    clean &= leaves
     training = (data.episodes.split == "train")[data.episode]
     rng = stream(root_seed, "audit", "learned", phase)
     apart = max(1, settings.chunk_steps // QUARTERS)
-    pool = _some(rows[clean & training & (data.index % apart == 0)], POOL // groups, rng)
+    thinned = rank_of(data, leaves) % apart == 0
+    pool = _some(rows[clean & training & thinned], POOL // groups, rng)
     return pool, _some(rows[clean & ~training], max(QUERIES // groups, 100), rng)
 
 

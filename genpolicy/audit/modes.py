@@ -27,6 +27,8 @@ ROUTE_CHUNKS = 2
 # Share of a chunk over which its length is smoothed; order and noise gain of third differences.
 SMOOTHING_SHARE = 4
 THIRD, THIRD_POWER = 3, 20.0
+# A step below this share of the usual one is none: the arm stands.
+STANDS = 0.1
 
 
 @dataclass(frozen=True)
@@ -244,14 +246,16 @@ def _by_arc_length(paths: Array, steps: int) -> Array:
     """Paths resampled at equal arc lengths up to one that most of them reach within `steps`.
 
     Whoever still rests when the chunk begins goes the same way a little later: what follows the
-    chunk counts until the common length is reached, so that to wait is no route of its own. The
-    length begins where the path does, at the origin, not at the first command: what lies between
-    them is lag times speed, and a faster one would seem to go another way.
+    chunk counts until the common length is reached, so that to wait is no route of its own. Nor
+    does it make the length shorter, on which two ways could not part: the steps are counted from
+    where the arm leaves. The length begins where the path does, at the origin, not at the first
+    command: what lies between them is lag times speed, and a faster one would seem to go another
+    way.
     """
     n = len(paths)
     paths = np.concatenate([np.zeros_like(paths[:, :1]), paths], axis=1)
     along = progress(paths, max(1, steps // SMOOTHING_SHARE))
-    lengths = along[:, steps]
+    lengths = along[np.arange(n), np.minimum(_leaves(along) + steps, along.shape[1] - 1)]
     common = max(float(np.quantile(lengths, 0.25)), 0.5 * float(np.median(lengths)))
     at = np.broadcast_to(np.linspace(0.0, common, steps), (n, steps))
     left = np.sum(along[:, None, 1:-1] <= at[:, :, None], axis=2)
@@ -259,6 +263,16 @@ def _by_arc_length(paths: Array, steps: int) -> Array:
     gap = along[rows, left + 1] - along[rows, left]
     share = np.clip((at - along[rows, left]) / np.where(gap > 0.0, gap, 1.0), 0.0, 1.0)[..., None]
     return np.asarray((1.0 - share) * paths[rows, left] + share * paths[rows, left + 1])
+
+
+def _leaves(along: Array) -> Integers:
+    """Step after which each path leaves where it stands; 0 where it goes at once. Shape (n,)."""
+    step = np.diff(along, axis=1)
+    moving = step[step > 0.0]
+    if not len(moving):
+        return np.zeros(len(along), dtype=np.int64)
+    goes = step >= STANDS * float(np.median(moving))
+    return np.where(goes.any(axis=1), np.argmax(goes, axis=1), 0)
 
 
 def progress(paths: Array, width: int) -> Array:

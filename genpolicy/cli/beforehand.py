@@ -8,7 +8,7 @@ import shutil
 from pathlib import Path
 from typing import NoReturn
 
-from genpolicy.data.formats.detect import DATASET, LAYOUT_OF, detect, refuse_unreadable
+from genpolicy.data.formats.detect import DATASET, LAYOUT_OF, check_named, detect, refuse_unreadable
 from genpolicy.data.formats.ends import check_ends
 from genpolicy.errors import BadInputError, ConfigError
 
@@ -24,7 +24,7 @@ def check_import(path: Path, out: Path, *, format: str, contract: Path | None) -
     Raises:
         BadInputError: One of them is wrong.
     """
-    check_given(contract, "--contract")
+    check_settings(contract, "--contract", "")
     layout = check_recordings(path, format)
     check_apart(path, out)
     check_writable(path, out, layout)
@@ -48,6 +48,8 @@ def check_recordings(path: Path, format: str) -> str:
     except OSError as error:
         refuse_unreadable(path, error)
     layout = detect(path) if format == "auto" or not there else format
+    if layout == format:
+        check_named(path, layout)
     check_ends(path, layout)
     return layout
 
@@ -73,6 +75,35 @@ def check_given(path: Path | None, option: str) -> None:
         expected="a file that you may read",
         action="Check the path.",
     )
+
+
+def check_settings(path: Path | None, option: str, section: str) -> None:
+    """Refuse a file of settings that is missing, or no mapping, or without a section.
+
+    Args:
+        path: The file; None where the option was not given.
+        option: What the user typed.
+        section: Key that it must have; empty: none.
+
+    Raises:
+        ConfigError: It is.
+    """
+    check_given(path, option)
+    if path is None:
+        return
+    from genpolicy.integrity.documents import read_yaml  # noqa: PLC0415 - only where it is given
+
+    document = read_yaml(path)
+    found = "" if isinstance(document, dict) else "no mapping"
+    if not found and section and section not in document:
+        found = f"without the section {section}"
+    if found:
+        raise ConfigError(
+            where=f"{option} {path}",
+            found=found,
+            expected=f"a mapping with the section {section}" if section else "a mapping",
+            action="Check the path.",
+        )
 
 
 def check_apart(path: Path, out: Path) -> None:
@@ -158,9 +189,13 @@ def check_writable(path: Path, out: Path, layout: str) -> None:
         BadInputError: No permission, or too little free space.
     """
     try:
-        place = next(p for p in out.resolve().parents if p.is_dir())
-        if not os.access(place, os.W_OK | os.X_OK):
-            _refuse(f"{out}, where you may not write", "a writable place", "Name another place.")
+        place = next(p for p in out.resolve().parents if p.exists())
+        if not place.is_dir():
+            _refuse(f"{out}, below the file {place.name}", "a place in folders", "Check the path.")
+        # What lies there is replaced, so it must be writable itself.
+        for folder in (place, out) if out.is_dir() else (place,):
+            if not os.access(folder, os.W_OK | os.X_OK):
+                _refuse(f"{out}, where you may not write", "a writable place", "Name another one.")
         needed = 0 if layout == DATASET else _size(path, MOST_ROOM_BYTES)
         free = shutil.disk_usage(place).free
     except OSError as error:

@@ -118,3 +118,17 @@ def test_to_rest_first_is_no_route_of_its_own(tremor_m):
         paths = paths + tremor_m * rng.normal(size=paths.shape)
         found.append(cluster_chunks(paths - paths[:, :1], SETTINGS).count > 1)
     assert np.mean(found) <= 0.05
+
+
+@pytest.mark.parametrize("rests", [0, 6, 10])
+def test_two_ways_part_as_far_after_a_rest(rests):
+    """To wait makes the common length no shorter: else nobody gets far enough to part."""
+    rng = stream(24, "late")
+    steps = SETTINGS.chunk_steps
+    ahead = np.maximum(np.arange(1, 2 * steps + 1)[None] - rests * np.ones((24, 1)), 0.0) / steps
+    side = np.where(np.arange(24) % 2, 1.0, -1.0)[:, None]
+    # Ways that part little by little: halfway along they are not yet apart.
+    across = 1.3 * SETTINGS.minimum_separation_m * side * ahead**2
+    paths = np.stack([0.3 * ahead, across, np.zeros_like(ahead)], axis=2)
+    paths += 0.0005 * rng.normal(size=(24, 1, 3)) * ahead[:, :, None]
+    assert cluster_chunks(paths, SETTINGS).count == 2

@@ -17,7 +17,12 @@ from genpolicy.data.formats import detect
 from genpolicy.data.formats.ends import check_ends
 from genpolicy.errors import IntegrityError
 
-READERS = ("gates.audit.command", "genpolicy.cli.ingest", "genpolicy.data.formats.opening")
+READERS = (
+    "gates.audit.command",
+    "gates.audit.importing",
+    "genpolicy.cli.ingest",
+    "genpolicy.data.formats.opening",
+)
 HEAVY = ("torch", "pandas", "mujoco", "matplotlib", "numpy", "scipy", "sklearn", "pyarrow", "h5py")
 PARQUET = b"PAR1" + bytes(40) + (20).to_bytes(4, "little") + b"PAR1"
 # Version 0: three addresses of eight bytes from byte 24 on, the third that of the end.
@@ -167,6 +172,56 @@ def test_files_that_options_name(option, place, capsys):
     assert "not a file" in refused("audit", "a.parquet", "out", capsys, option, str(place))
 
 
+def test_files_that_options_name_and_that_hold_no_settings(place, capsys):
+    lay(place, "a.parquet", "words.yaml")
+    lay(place, "other.yaml", data=b"a: 1")
+    lay(place, "broken.yaml", data=b"a: [1")
+    for option in ("--contract", "--limits"):
+        said = refused("audit", "a.parquet", "out", capsys, option, "words.yaml")
+        assert f"{option} words.yaml is no mapping" in said
+        assert "broken.yaml" in refused("audit", "a.parquet", "out", capsys, option, "broken.yaml")
+    said = refused("audit", "a.parquet", "out", capsys, "--limits", "other.yaml")
+    assert "--limits other.yaml is without the section gate_a" in said
+
+
+NAMED_WRONGLY = {
+    "robomimic": (lambda r: lay(r, "a.hdf5"), "a folder, expected one HDF5 file"),
+    "lerobot": (lambda r: lay(r, "a.parquet"), "without meta/info.json"),
+    "parquet": (lambda r: lay(r, ".zgroup", "data/a/.zarray"), "without a .parquet file"),
+    "mcap": (lambda r: lay(r, "a.parquet"), "without a .mcap file"),
+    "zarr": (lambda r: lay(r.parent, r.name), "a file, expected a folder of Zarr arrays"),
+}
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("layout", NAMED_WRONGLY)
+def test_a_layout_that_is_named_and_is_not_there(layout, command, place, capsys):
+    make, said = NAMED_WRONGLY[layout]
+    make(place / "recordings")
+    assert said in refused(command, "recordings", "out", capsys, "--format", layout)
+
+
+def test_a_layout_that_is_named_is_looked_for_in_data_sets_below(place):
+    lay(place / "all", "push/meta/info.json", "push/data/a.parquet")
+    detect.check_named(place / "all", "parquet")
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_output_below_a_file(command, place, capsys):
+    lay(place, "a.parquet", "thesis.tex")
+    assert "below the file thesis.tex" in refused(command, "a.parquet", "thesis.tex/out", capsys)
+
+
+@pytest.mark.parametrize(
+    ("command", "mark"), [("audit", "audit.json"), ("ingest", "manifest.json")]
+)
+def test_an_old_output_that_may_not_be_replaced(command, mark, place, capsys, monkeypatch):
+    lay(place, "a.parquet", f"old/{mark}")
+    locked = place / "old"
+    monkeypatch.setattr(os, "access", lambda path, mode, **__: Path(path).resolve() != locked)
+    assert "old, where you may not write" in refused(command, "a.parquet", "old", capsys)
+
+
 @pytest.mark.parametrize("command", COMMANDS)
 def test_no_room(command, place, capsys, monkeypatch):
     lay(place / "recordings", "a.parquet")
@@ -208,6 +263,23 @@ def test_no_permission_to_read(locked, command, place, capsys, monkeypatch):
     assert code == 2 and "not readable (Permission denied)" in printed.err
     assert "fault of genpolicy" not in printed.err and len(printed.err.splitlines()) == 1
     assert not (place / "out").exists()
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_an_array_that_may_not_be_listed(command, place, capsys, monkeypatch):
+    """Left out in silence, the rest of the buffer would be audited as the whole."""
+    lay(place / "b.zarr", ".zgroup", "meta/episode_ends/.zarray", "data/a/.zarray")
+    scan = os.scandir
+
+    def guarded(path="."):
+        if not isinstance(path, int) and os.fsdecode(path).endswith("data/a"):
+            raise PermissionError(13, "Permission denied", str(path))
+        return scan(path)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(os, "scandir", guarded)
+        code = main([command, "b.zarr", "--out", "out"])
+    assert code == 2 and "not readable (Permission denied)" in capsys.readouterr().err
 
 
 def test_whole_files_and_a_stated_layout_pass(place):

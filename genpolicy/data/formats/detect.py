@@ -56,8 +56,36 @@ def detect(path: Path) -> str:
         refuse_unreadable(path, error)
 
 
-def contents(path: Path) -> Contents:
+def check_named(path: Path, layout: str) -> None:
+    """Refuse a layout that a user named for what cannot be one, by what is there.
+
+    Raises:
+        BadInputError: It cannot.
+    """
+    try:
+        suffix = {"mcap": ".mcap", "parquet": ".parquet"}.get(layout)
+        if layout == "robomimic" and path.is_dir():
+            _refuse(path, "a folder", "one HDF5 file, as --format robomimic says")
+        if layout == "lerobot" and not (path / "meta" / "info.json").is_file():
+            _refuse(path, "without meta/info.json", "a LeRobot dataset, as --format says")
+        if layout == "zarr" and not path.is_dir():
+            _refuse(path, "a file", "a folder of Zarr arrays, as --format zarr says")
+        if suffix and path.is_dir() and not contents(path, into_whole=True).files.get(layout):
+            _refuse(
+                path,
+                f"without a {suffix} file",
+                f"a file, or a folder of them, as --format {layout} says",
+            )
+    except OSError as error:
+        refuse_unreadable(path, error)
+
+
+def contents(path: Path, *, into_whole: bool = False) -> Contents:
     """What lies in a folder and below it; no file is opened, no link is followed.
+
+    Args:
+        path: The folder.
+        into_whole: Whether to look into data sets below it as well.
 
     Raises:
         OSError: A folder cannot be listed: what lies in it would be left out in silence.
@@ -66,7 +94,7 @@ def contents(path: Path) -> Contents:
     for here, folders, files in os.walk(path, onerror=_raise):
         folders.sort()
         place = Path(here)
-        if place != path and _whole(place):
+        if place != path and not into_whole and _whole(place):
             found.datasets.append(place.relative_to(path).as_posix())
             folders.clear()
             if len(found.datasets) == MOST_DATASETS:
@@ -105,7 +133,8 @@ def _whole(path: Path) -> str:
         return DATASET
     if (path / "meta" / "info.json").is_file():
         return "lerobot"
-    if (path / ".zgroup").is_file() or (path / "meta" / "episode_ends").is_dir():
+    described = any((path / name).is_file() for name in (".zgroup", "zarr.json"))
+    if described or (path / "meta" / "episode_ends").is_dir():
         return "zarr"
     return ""
 
@@ -114,6 +143,8 @@ def _folder(path: Path) -> str:
     whole = _whole(path)
     if whole == "lerobot":
         _check_alone(path, contents(path))
+    if whole == "zarr":
+        contents(path, into_whole=True)  # an array that may not be listed would be left out
     if whole:
         return whole
     found = contents(path)
@@ -181,12 +212,14 @@ def _file(path: Path) -> str:
 
 def _refuse_unknown(path: Path, what: str) -> NoReturn:
     csv = ".csv" in what or ".tsv" in what
+    packed = " .zip" in what or " .gz" in what or " .tar" in what
+    action = "Unpack it first." if packed else CHECK
     _refuse(
         path,
         f"of no known layout ({what})",
         "a dataset folder, MCAP files, a Zarr replay buffer, a LeRobot dataset, a robomimic "
         "HDF5 file or Parquet files",
-        "Convert the text to Parquet first; docs/import.md says which columns." if csv else CHECK,
+        "Convert the text to Parquet first; docs/import.md says which columns." if csv else action,
     )
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from itertools import islice
-from pathlib import PurePath
+from pathlib import PurePath, PurePosixPath
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,7 +93,9 @@ def _roles(source: Source, labels: Labels) -> tuple[tuple[Column, ...], tuple[Co
     for words in ACTION_WORDS:
         actions = actions or [c for c in numeric if _is_action(c.name, words)]
     exact = [c for c in actions if tokens(c.name)[-1:] in (["action"], ["actions"])]
-    actions = exact[:1] or actions
+    # One that is called so and no more is the whole of it; `arm_action`, `hand_action` are parts.
+    whole = [c for c in exact if PurePosixPath(c.name).name in ("action", "actions")]
+    actions = whole[:1] or exact or actions
     observed = [
         c
         for c in numeric

@@ -1,17 +1,15 @@
-"""A zarr v2 replay buffer (the layout published with Diffusion Policy) to a dataset.
+"""A zarr replay buffer (the layout published with Diffusion Policy) to a dataset.
 
-The buffer knows rows and episode ends and nothing else: no clock, no outcome, no operator, no
-epoch. They are declared `not_recorded` and never guessed. zarr fills missing chunks with zeros
-and can name codecs that unpickle; both are refused before anything is decoded.
+Arrays hold all episodes one after the other, and one array says where each ends, or how long it is.
+The buffer knows rows and episode ends: clock, outcome, operator and epoch are `not_recorded` unless
+an array has such a name, and never guessed.
 """
 
-import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
-import zarr
 from numpy.typing import NDArray
 
 from genpolicy.data.assemble import Refusal
@@ -22,16 +20,24 @@ from genpolicy.data.formats.contract import (
     ImportContract,
     Labels,
 )
+from genpolicy.data.formats.columns import labels_of
 from genpolicy.data.formats.source import Also, Column, RawEpisode, nothing
-from genpolicy.errors import BadInputError, ContractError, IntegrityError
-from genpolicy.integrity.documents import canonical_json, read_json
+from genpolicy.data.formats.zarr_arrays import (
+    arrays_below,
+    check_head,
+    column_of,
+    head_of,
+    read_array,
+    refuse,
+)
+from genpolicy.data.formats.zarr_groups import EpisodeGroups, groups_of
+from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_bytes, sha256_tree
 
-MAXIMUM_ARRAY_BYTES = 1 << 30
-NUMERIC_TYPES = ("<f4", "<f8", "<i4", "<i8", "<i2", "<u2", "<u4", "|i1", "|u1", "|b1")
-TEXT = "<U"
-COMPRESSORS = ("blosc", "zstd", "zlib", "lz4")
-ACTION = "Fetch the buffer again, or leave this episode out."
+# Arrays that say where episodes end, or how long each is, by the names that people give them.
+ENDS = ("episode_ends", "episode_end", "traj_ends", "trajectory_ends")
+LENGTHS = ("episode_lengths", "episode_length", "traj_lengths", "traj_length", "seq_lengths")
+PLACES = ("meta", "", "data", "info")
 BOARD_PX = [-64.0, 576.0]
 PUSHT_ARRAYS = {"state": 5, "action": 2, "n_contacts": 1}
 
@@ -74,7 +80,6 @@ class ReplayBuffer:
     """The arrays of a buffer as a source; see `genpolicy.data.formats.source.Source`."""
 
     rate_hz: float | None = None
-    labels = Labels()
 
     def __init__(self, path: Path) -> None:
         """Describe the arrays; decodes nothing but the episode ends.
@@ -84,29 +89,47 @@ class ReplayBuffer:
         """
         self.path = path
         self.name = path.name
-        ends = path / "meta" / "episode_ends"
-        _check_head(_head(ends), str(ends))
-        columns: list[Column] = []
-        skipped: list[str] = []
-        for folder in sorted((path / "data").glob("*/.zarray")):
-            column = _column(folder.parent)
-            if column is None:
-                skipped.append(folder.parent.name)
-            else:
-                columns.append(column)
-        self._described = [
-            folder.parent.name
-            for folder in sorted((path / "meta").glob("*/.zarray"))
-            if folder.parent != ends and _is_single(folder.parent)
-        ]
+        found = ends_of(path)
+        if found is None:
+            refuse(
+                str(path),
+                "a Zarr group without meta/episode_ends or another array of where episodes end",
+                "a replay buffer, or a group per episode",
+                "Give the folder that holds data and meta.",
+            )
+        ends, lengths = found
+        check_head(head_of(ends), str(ends))
+        inside = arrays_below(path / "data" if (path / "data").is_dir() else path)
+        self._places = {name: folder for name, folder in inside.items() if folder != ends}
+        described = {name: column_of(name, folder) for name, folder in self._places.items()}
+        columns = [column for column in described.values() if column is not None]
+        skipped = [name for name, column in described.items() if column is None]
+        beside = arrays_below(path / "meta") if (path / "meta").is_dir() else {}
+        self._described = {
+            name: folder
+            for name, folder in beside.items()
+            if folder != ends and name not in self._places and _is_single(folder)
+        }
         # Described before it is hashed, hashed before it is decoded.
         self.digest = sha256_bytes(canonical_json(sha256_tree(path)))
-        self._ends = _array(ends)
+        values = read_array(ends)
+        self._ends = np.cumsum(values, axis=0) if lengths else values
         steps = np.diff(self._ends, prepend=0)
         if self._ends.ndim != 1 or not (steps > 0).all():
-            _refuse(f"{path}/meta/episode_ends", "not rising", "the last row of each episode")
-        self.columns = tuple(columns)
-        self.notes = (f"Not read: {', '.join(skipped)} (no plain columns).",) if skipped else ()
+            refuse(str(ends), "not rising", "the last row of each episode")
+        rows = int(self._ends[-1])
+        fitting = [c for c in columns if _rows_of(self._places[c.name]) == rows]
+        self.columns = tuple(fitting or columns)  # where none fits, that is the error
+        others = [c.name for c in columns if c not in self.columns]
+        self._single_places = {
+            c.name: self._places[c.name] for c in columns if c.width is None
+        } | self._described
+        self.labels = labels_of(self.columns, episode=None, frame=None)
+        notes = [f"Not read: {', '.join(skipped)} (no plain columns)."] if skipped else []
+        strange = [name for name in others if _rows_of(self._places[name]) != len(self._ends)]
+        if strange:
+            notes.append(f"Not read: {', '.join(strange)} (of another length than the episodes).")
+        self.notes = tuple(notes)
         self.count = len(self._ends)
 
     @property
@@ -124,11 +147,11 @@ class ReplayBuffer:
             BadInputError: An array is missing, incomplete, or of another length than the ends.
         """
         rows = int(self._ends[-1])
-        arrays = {name: _array(self.path / "data" / name) for name in wanted}
+        arrays = {name: read_array(self._place(name)) for name in wanted}
         for name, values in arrays.items():
             if len(values) != rows:
                 place = f"{self.path}/meta/episode_ends"
-                _refuse(place, f"{rows} at its end", f"{len(values)}, the rows of {name}")
+                refuse(place, f"{rows} at its end", f"{len(values)}, the rows of {name}")
         single = self._single(wanted, also)
         arrays |= {name: values for name, values in single.items() if len(values) == rows}
         by_episode = {n: v for n, v in single.items() if len(v) == len(self._ends) != rows}
@@ -142,88 +165,43 @@ class ReplayBuffer:
                 first_row=start,
             )
 
+    def _place(self, name: str) -> Path:
+        return self._places.get(name, self.path / "data" / name)
+
     def _single(self, wanted: Sequence[str], also: Also) -> dict[str, NDArray[Any]]:
         """Arrays of one axis beside those wanted, of the rows or of the episodes."""
-        places = {c.name: self.path / "data" / c.name for c in self.columns if c.width is None}
-        places |= {name: self.path / "meta" / name for name in self._described}
         return {
-            name: _array(place)
-            for name, place in sorted(places.items())
+            name: read_array(place)
+            for name, place in sorted(self._single_places.items())
             if name not in wanted and also(Column(name, None))
         }
 
 
-def open_source(path: Path) -> ReplayBuffer:
-    """A replay buffer, described; see `ReplayBuffer`."""
-    return ReplayBuffer(path)
+def ends_of(path: Path) -> tuple[Path, bool] | None:
+    """The array of where episodes end, and whether it gives lengths; None where there is none."""
+    for names, lengths in ((ENDS, False), (LENGTHS, True)):
+        for place in PLACES:
+            for name in names:
+                folder = path / place / name
+                if (folder / ".zarray").is_file() or (folder / "zarr.json").is_file():
+                    return folder, lengths
+    return None
 
 
-def _column(folder: Path) -> Column | None:
-    """An array as a column; None for pictures and other arrays of more than two axes."""
-    head = _head(folder)
-    if not (isinstance(head["shape"], list) and len(head["shape"]) <= 2):
-        return None
-    _check_head(head, str(folder))
-    width = int(head["shape"][1]) if len(head["shape"]) == 2 else None
-    if str(head["dtype"]).startswith(TEXT):
-        return Column(folder.name, width, "text")
-    return Column(folder.name, width)
+def open_source(path: Path) -> ReplayBuffer | EpisodeGroups:
+    """A replay buffer, or a group per episode, described.
+
+    Raises:
+        BadInputError: Neither.
+    """
+    groups = None if ends_of(path) else groups_of(path)
+    return ReplayBuffer(path) if groups is None else EpisodeGroups(path, groups)
 
 
 def _is_single(folder: Path) -> bool:
-    column = _column(folder)
+    column = column_of(folder.name, folder)
     return column is not None and column.width is None
 
 
-def _head(folder: Path) -> dict[str, Any]:
-    head = read_json(folder / ".zarray")
-    keys = ("dtype", "shape", "compressor", "filters", "zarr_format")
-    if not isinstance(head, dict) or any(key not in head for key in keys):
-        _refuse(f"{folder}/.zarray", "not an array description", f"the keys {keys}")
-    return head
-
-
-def _check_head(head: dict[str, Any], place: str) -> None:
-    """Plain numbers of a bounded size, in a codec that runs no foreign code."""
-    try:
-        kind, shape, compressor = head["dtype"], list(head["shape"]), head["compressor"]
-        size = math.prod(int(n) for n in shape) * int(str(kind)[2:])
-        text = str(kind).startswith(TEXT) and len(shape) == 1
-        codec = None if compressor is None else compressor["id"]
-        known = kind in NUMERIC_TYPES or text
-        plain = known and not head["filters"] and head["zarr_format"] == 2
-    except (KeyError, TypeError, ValueError) as error:
-        raise ContractError(
-            where=f"{place}/.zarray",
-            found=f"not an array description ({error!r:.80})",
-            expected="zarr version 2",
-            action=ACTION,
-        ) from error
-    if not plain or codec not in (None, *COMPRESSORS):
-        _refuse(f"{place}/.zarray", f"of type {kind!r:.20}, codec {codec!r:.20}", "plain numbers")
-    if not (0 < size <= MAXIMUM_ARRAY_BYTES and all(int(n) > 0 for n in shape)):
-        _refuse(place, f"{size} bytes", f"1 to {MAXIMUM_ARRAY_BYTES}")
-
-
-def _array(folder: Path) -> NDArray[Any]:
-    """A whole numeric zarr v2 array, its description checked before it is decoded."""
-    place = str(folder)
-    _check_head(_head(folder), place)
-    try:
-        array = zarr.open_array(str(folder), mode="r", zarr_format=2)
-        if array.nchunks_initialized != array.nchunks:
-            _refuse(place, f"{array.nchunks_initialized} chunks", f"all {array.nchunks} of them")
-        return np.asarray(array[:])
-    except BadInputError:
-        raise
-    except Exception as error:  # decoders raise whatever they like on changed bytes
-        raise IntegrityError(
-            where=place,
-            found=f"not decodable ({' '.join(str(error).split())[:120]})",
-            expected="whole chunks",
-            action=ACTION,
-        ) from error
-
-
-def _refuse(where: str, found: str, expected: str) -> NoReturn:
-    raise ContractError(where=where, found=found, expected=expected, action=ACTION)
+def _rows_of(folder: Path) -> int:
+    return int(head_of(folder)["shape"][0])
