@@ -32,7 +32,7 @@ def leaving(data: AuditInput) -> Flags:
 
 def rank_of(data: AuditInput, chosen: Flags) -> Integers:
     """How many chosen rows of its episode lie before each row. Shape (N,)."""
-    before = np.cumsum(chosen) - chosen
+    before: Integers = np.cumsum(chosen) - chosen
     return np.asarray(before - before[data.first_row], dtype=np.int64)
 
 
