@@ -28,7 +28,7 @@ TEXT = "<U"
 COMPRESSORS = ("blosc", "zstd", "zlib", "lz4")
 PLAIN_CODECS = {"bytes", "blosc", "zstd", "gzip", "crc32c"}
 ACTION = "Fetch the buffer again, or leave this episode out."
-ARRAY_FILES, GROUP_FILES = (".zarray", "zarr.json"), (".zgroup", "zarr.json")
+ARRAY_FILES = (".zarray", "zarr.json")
 
 
 def is_array(folder: Path) -> bool:

@@ -13,14 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.data.assemble import Refusal
+from genpolicy.data.formats.columns import labels_of
 from genpolicy.data.formats.contract import (
     ActionSource,
     ChannelSource,
     Frozen,
     ImportContract,
-    Labels,
 )
-from genpolicy.data.formats.columns import labels_of
 from genpolicy.data.formats.source import Also, Column, RawEpisode, nothing
 from genpolicy.data.formats.zarr_arrays import (
     arrays_below,

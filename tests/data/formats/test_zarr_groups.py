@@ -39,7 +39,8 @@ def group_each(place):
 def layouts():
     seen, told, hand, ends = joined()
     return {
-        "other names": {"data/robot0_eef_pos": seen, "data/action": told, "meta/episode_ends": ends},
+        "other names": {"data/robot0_eef_pos": seen, "data/action": told,
+                        "meta/episode_ends": ends},
         "parts of an action": {"data/obs/eef_pos": seen, "data/arm_action": told,
                                "data/hand_action": hand, "meta/episode_ends": ends},
         "without folders": {"state": seen, "actions": told, "episode_ends": ends},
