@@ -113,8 +113,9 @@ def _said(row: Stratum) -> Diagnosis:
         text = f"{share}: correct the epochs."
         return Diagnosis(CauseName.DATA_DEFECT, row.variable, row.variable, text)
     if row.variable == SEQUENCE:
+        how = "stored" if row.detail else "recorded"
         text = (
-            f"The mode of {row.phase} follows from those of the episodes recorded just before and "
+            f"The mode of {row.phase} follows from those of the episodes {how} just before and "
             f"after ({effect:.0%}): find out what was decided per session or in turns, record it, "
             "or draw it anew for every episode, then repeat the audit."
         )

@@ -84,6 +84,8 @@ class AuditInput:
         variables: Other recorded columns that may be why demonstrations differ.
         left_out: Recorded columns that cannot be, with the reason.
         phase_name: What the recordings call the phase.
+        stored: Place of each episode in the files, where no clock gives an order; else None. Shape
+            (E,).
     """
 
     observation: Array
@@ -112,6 +114,7 @@ class AuditInput:
     variables: tuple[Variable, ...] = ()
     left_out: tuple[tuple[str, str], ...] = ()
     phase_name: str = "phase"
+    stored: Array | None = None
 
     def __post_init__(self) -> None:
         n = len(self.observation)
@@ -192,6 +195,7 @@ def canonical(data: AuditInput) -> AuditInput:
         delay_s={name: values[rows] for name, values in sorted(data.delay_s.items())},
         stream_time_s={name: item[rows] for name, item in sorted(data.stream_time_s.items())},
         variables=tuple(item.reordered(rows, order) for item in data.variables),
+        stored=None if data.stored is None else data.stored[order],
         episodes=Episodes(
             **{name: getattr(table, name)[order] for name in Episodes.__dataclass_fields__}
         ),

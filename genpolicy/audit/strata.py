@@ -18,6 +18,7 @@ from genpolicy.audit.neighbourhoods import Neighbourhood
 from genpolicy.audit.resolution import observed_gap
 from genpolicy.audit.rows import Stratum
 from genpolicy.audit.settings import AuditSettings
+from genpolicy.audit.stored import STORED, sequence_test
 from genpolicy.audit.variable import EPISODE_VARIABLES, INSIDE
 from genpolicy.seeds import stream
 from genpolicy.statistics.conditional import conditional_test
@@ -77,7 +78,10 @@ def examine_strata(
             seeds = (root_seed, phase, variable)
             row = _tested(settings, seeds, values, place, observed=observed)
             inside = variable in (data.phase_name, "time_in_episode") and row.recorded
-            rows.append(replace(row, detail=INSIDE if inside else ""))
+            row = replace(row, detail=INSIDE if inside else "")
+            if variable == SEQUENCE and values is None:
+                row = _stored(data, row, hidden, links[phase], root_seed)
+            rows.append(row)
         rows += column_strata(data, settings, hidden, Asking(phase, root_seed))
         rows.append(_history(data, settings, phase, past, root_seed))
     return _adjusted(rows)
@@ -132,6 +136,31 @@ def _tested(
         n=test.n,
         recorded=True,
         observed=observed,
+    )
+
+
+def _stored(
+    data: AuditInput, unknown: Stratum, drawn: Drawn, links: Integers, root_seed: int
+) -> Stratum:
+    """The sequence by the places in the files if there is a pattern; else it is not known."""
+    if data.stored is None:
+        return unknown
+    nearby = _nearby_mode(data.stored, links)
+    test = sequence_test(data, nearby, drawn, seeds=(root_seed, unknown.phase))
+    if test is None:
+        return unknown
+    return Stratum(
+        variable=SEQUENCE,
+        phase=unknown.phase,
+        p_value=test.p_value,
+        p_adjusted=None,
+        effect=test.effect,
+        effect_lower=test.effect_lower,
+        effect_upper=test.effect_upper,
+        n=test.n,
+        recorded=True,
+        observed=False,
+        detail=STORED,
     )
 
 

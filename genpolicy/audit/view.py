@@ -17,6 +17,7 @@ from genpolicy.audit.data import (
 )
 from genpolicy.audit.forms import Forms, forms_of
 from genpolicy.audit.settings import AuditSettings
+from genpolicy.audit.stored import places
 from genpolicy.contract.action import ACTION_COMPONENTS, POSITION, ROTATION
 from genpolicy.contract.observation import Channel, ObservationContract
 from genpolicy.data.dataset import Dataset
@@ -45,7 +46,7 @@ def from_dataset(
         if name is not None and name not in slices:
             _refuse(f"naming the channel {name}", f"one of {', '.join(slices)}")
     observed, commanded, stream = _pairing(dataset, contract, settings)
-    width = len(np.arange(contract.dim)[observed])
+    episodes = _episodes(table, frames.event_time_s, frames.episode)
     data = canonical(
         AuditInput(
             observation=frames.observation,
@@ -54,7 +55,7 @@ def from_dataset(
             episode=frames.episode,
             index=frames.index,
             event_time_s=frames.event_time_s,
-            episodes=_episodes(table, frames.event_time_s, frames.episode),
+            episodes=episodes,
             observation_scale=scales(contract, settings),
             observation_names=contract.component_names,
             observation_position=observed,
@@ -76,9 +77,10 @@ def from_dataset(
             reference=slices.get(settings.reference_channel or ""),
             context={name: slices[name] for name in settings.context_channels},
             streams=_streams(contract),
-            paired=width > 0,
+            paired=len(np.arange(contract.dim)[observed]) > 0,
             phase_observed=settings.phase_observed,
             forms=_forms(dataset, settings, observed, commanded),
+            stored=_stored(table, episodes),
         )
     )
     return with_candidates(data, table, dataset.manifest)
@@ -206,6 +208,13 @@ def _episodes(table: Any, event_time_s: Array, episode: Integers) -> Episodes:
         is_recovery=np.asarray([flag is not None and flag == 1 for flag in flags], dtype=bool),
         order=order,
     )
+
+
+def _stored(table: Any, episodes: Episodes) -> Array | None:
+    """Places in the files, where nothing says when each episode was recorded."""
+    if "source_file" not in table or bool(np.all(np.isfinite(episodes.order))):
+        return None
+    return places(str(text) for text in table["source_file"])
 
 
 def _missing(value: object) -> bool:

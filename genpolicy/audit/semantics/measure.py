@@ -85,17 +85,36 @@ def measure(data: AuditInput, settings: AuditSettings) -> Semantics:
     if not any(finding.kind in ("unit", "frame", "swapped_columns") for finding in findings):
         findings += calibration.offset_findings(data, recorded, settings)
     wander = calibration.start_note(data)
+    shared = _shared_offset(data, settings)
     return Semantics(
         clocks=(*clocks, *others),
         calibrations=releases,
         gaps=continuity.gap_count(data),
         start_drift=calibration.start_drift(data),
         findings=in_order(findings),
-        notes=(*notes, *remarks, *([wander] if wander else [])),
+        notes=(*notes, *remarks, *(note for note in (wander, shared) if note)),
         shift_steps=shift,
         stream_shift_steps=stream_shift,
         unclocked=unclocked,
         untold_freezes=untold,
+    )
+
+
+def _shared_offset(data: AuditInput, settings: AuditSettings) -> str:
+    """What no comparison of epochs and episodes can show; empty where nothing is compared.
+
+    Every delay and lag is held against the usual one of its own stream. A receive time bounds an
+    offset on one side only: what is received before it happened is counted (`negative_delays`).
+    """
+    streams = {*data.delay_s, *(set(data.streams) - {data.position_stream})}
+    if settings.declared_lag_steps is not None:
+        streams -= {data.position_stream}
+    if not streams:
+        return ""
+    return (
+        f"Not looked at: an offset of the clock of {', '.join(sorted(streams))} that is the same "
+        "in all episodes and epochs. It looks like a slower link or a slower robot; only a lag "
+        "that was declared, or an event that two streams see, shows it."
     )
 
 

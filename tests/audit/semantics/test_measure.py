@@ -88,3 +88,19 @@ def test_another_rate_and_another_magnitude_are_reported_from_their_floors_on():
         found = {f.question: f for f in measure(spoilt, SETTINGS).findings}
         assert found[question].floor == SETTINGS.floors[question] < found[question].measured
         assert question not in {f.question for f in measure(spoilt, raised).findings}
+
+
+def test_a_clock_that_all_epochs_share_is_said_not_to_be_looked_at():
+    """Shifted by the same in every episode it is the same data as a slower link: no clean bill."""
+    data, _ = planar(episodes=60)
+    streams = (data.position_stream, "camera")
+    delays = {name: np.full(len(data.episode), 0.02) for name in streams}
+    late_everywhere = replace(data, delay_s={name: part + 0.05 for name, part in delays.items()})
+    for given in (replace(data, delay_s=delays), late_everywhere):
+        found = measure(given, SETTINGS)
+        assert not any(finding.kind == "clock" for finding in found.findings)
+        (said,) = [note for note in found.notes if note.startswith("Not looked at")]
+        assert all(name in said for name in streams) and "all episodes and epochs" in said
+    declared = SETTINGS.model_copy(update={"declared_lag_steps": 1.0})
+    (said,) = [n for n in measure(given, declared).notes if n.startswith("Not looked at")]
+    assert "camera" in said and f"{data.position_stream}," not in said
