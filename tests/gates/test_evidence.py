@@ -141,3 +141,22 @@ def test_what_may_be_unknown_may_be_empty(repo):
     evidence.edit_table(repo, path, lambda f: f.assign(effect=[[None] * 3] * len(f)))
     assert len(Evidence(repo).rows("artifacts/audit/clocks.parquet", TABLES["clocks"]))
     assert len(Evidence(repo).records(f"artifacts/{path}", TABLES["resamples"]))
+
+
+def test_a_link_to_nothing_is_no_missing_file(repo):
+    file = repo / NFE
+    file.unlink()
+    file.symlink_to(repo / "nowhere")
+    with pytest.raises(IntegrityError):
+        Evidence(repo).rows(NFE, NfeRow)
+
+
+def test_what_is_read_inside_is_told_there_and_stays_told_outside(repo):
+    found = Evidence(repo)
+    with found.recorded() as outer:
+        found.digest("artifacts/first")
+        with found.recorded() as inner:
+            found.digest("artifacts/second")
+        found.digest("artifacts/third")
+    assert inner == ["artifacts/second"]
+    assert outer == [f"artifacts/{name}" for name in ("first", "second", "third")]
