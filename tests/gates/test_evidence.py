@@ -4,7 +4,7 @@ import evidence
 import pandas as pd
 import pytest
 
-from gates.evidence import Evidence, MissingEvidenceError, counts
+from gates.evidence import Evidence, MissingEvidenceError, counts, flags, numbers
 from genpolicy.audit.rows import TABLES, ModeOutcome, SituationRow
 from genpolicy.data.rows import FrameRow
 from genpolicy.errors import IntegrityError
@@ -160,3 +160,16 @@ def test_what_is_read_inside_is_told_there_and_stays_told_outside(repo):
         found.digest("artifacts/third")
     assert inner == ["artifacts/second"]
     assert outer == [f"artifacts/{name}" for name in ("first", "second", "third")]
+
+
+def test_what_was_not_reached_is_false_and_what_is_no_answer_is_refused():
+    frame = pd.DataFrame({"good": [True, None, False], "bad": [True, 1, None]}, dtype=object)
+    assert flags(frame, "good").tolist() == [True, False, False]
+    with pytest.raises(MissingEvidenceError, match="column bad holds other values"):
+        flags(frame, "bad")
+
+
+@pytest.mark.parametrize("value", [None, float("nan"), float("inf"), "x"])
+def test_what_is_no_number_is_not_measured(value):
+    with pytest.raises(MissingEvidenceError, match="column loss"):
+        numbers(pd.DataFrame({"loss": [0.5, value]}, dtype=object), "loss")

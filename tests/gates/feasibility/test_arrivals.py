@@ -108,6 +108,10 @@ def test_a_candidate_that_generated_nothing_shows_nothing(ladder):
     )
     with pytest.raises(MissingEvidenceError, match="nothing was generated"):
         asked(ladder, conservation_error, "flow", gate="C")
+    one = {"generated": 1, "executed": 1}
+    evidence.edit_table(ladder, "shadow/counts.parquet", lambda f: f[of(f)].head(1).assign(**one))
+    # One action of one fixture is something, and accounted for.
+    assert asked(ladder, conservation_error, "flow", gate="C").value == 0.0
 
 
 @pytest.mark.parametrize("name", ["generated", "executed", "queued", "count"])

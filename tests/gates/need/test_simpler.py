@@ -242,3 +242,19 @@ def test_of_several_tests_of_a_latent_the_one_with_the_highest_upper_end_decides
         assert found(ladder, "latent_dependence_p").measured == pytest.approx(
             clopper_pearson(0, 10)[1], abs=1e-6
         )
+
+
+def test_a_situation_with_one_mode_asks_no_simple_policy(ladder):
+    """Ten of thirty have one mode, and there every sample is valid and every mode is covered."""
+
+    def change(frame):
+        easy = {"modes_present": 1, "modes_covered": 1, "modes_valid": 1, "samples": 16,
+                "admissible": 16, "valid": 16}  # fmt: skip
+        of = frame["index"] < 10
+        return frame.assign(**{name: np.where(of, v, frame[name]) for name, v in easy.items()})
+
+    evidence.edit_table(ladder, "measure_baselines/modes.parquet", change)
+    for name in ("remedy_valid_share", "chunking_valid_share"):
+        criterion = found(ladder, name)
+        assert "of 20 situations" in criterion.caveat and criterion.interval[0] == 0.0
+    assert found(ladder, "baseline_mode_coverage").measured == 0.0

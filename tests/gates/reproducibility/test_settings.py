@@ -39,6 +39,8 @@ def test_a_mode_may_need_a_few_samples_or_as_many_as_half(ladder, share):
 
 
 def test_candidates_are_compared_with_somebody(ladder):
+    evidence.write_params(ladder, lambda p: p["stress"].update(baselines=["bc"]))
+    assert settings_of(ladder, "B").baselines == ("bc",)
     evidence.write_params(ladder, lambda p: p["stress"].update(baselines=[]))
     with pytest.raises(ConfigError, match="baselines"):
         settings_of(ladder, "B")
