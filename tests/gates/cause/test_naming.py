@@ -118,6 +118,8 @@ def test_labels_are_contaminated_from_one_disagreement_on(labels, name, kind):
     assert (cause.name.value, cause.kind) == (name, kind)
     (answer,) = [a for a in cause.answers if a.question == "label_disagreement"]
     assert (answer.limit is None) == (answer.measured is None) == (labels.replays == 0)
+    assert answer.interval is None or answer.interval[1] == answer.measured
+    assert (answer.interval is None) == (labels.replays == 0)
 
 
 def _offset(measured, **changes):
@@ -172,3 +174,8 @@ def test_an_unstable_cause_asks_those_that_name_one_alone():
     assert named(VALID, draws=[VALID] + [hidden] + [thin] * 8).name is CauseName.VALID_MODES
     assert named(VALID, draws=[VALID] + [hidden] * 2 + [thin] * 8).kind == "unstable"
     assert named(VALID, draws=[hidden]).kind == "unstable"
+    # Ten of eighteen are most of them, and less than three quarters.
+    most = [VALID] * 10 + [hidden] * 8 + [thin] * 2
+    (answer,) = [a for a in named(VALID, draws=most).answers if a.question == "cause_agreement"]
+    assert answer.measured == pytest.approx(10 / 18) and answer.holds
+    assert named(VALID, limit(cause_agreement=0.75), draws=most).kind == "unstable"

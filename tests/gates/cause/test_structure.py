@@ -71,6 +71,7 @@ def _short_lived(modes):
     [
         # Where neighbours are missing the other evidence speaks, as far as it reaches.
         (replace(THIN, **learned()), "unimodal", ""),
+        (replace(THIN, **learned(modes=40)), "valid_modes", ""),
         (replace(THIN, **learned(spoke=0.1)), "insufficient_support", "neighbourhoods"),
         (replace(THIN, **learned(spoke=0.4)), "insufficient_support", "neighbourhoods"),
         (replace(THIN, reach=reach(0, 0, 0, 0, 0)), "insufficient_support", "neighbourhoods"),
