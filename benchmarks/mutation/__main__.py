@@ -65,6 +65,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--near", action="store_true")
+    parser.add_argument("--green", action="store_true")
     parser.add_argument("--out", type=Path, default=ROOT / "build/mutation.jsonl")
     asked = parser.parse_args()
     os.chdir(ROOT)
@@ -78,14 +79,14 @@ def main() -> None:
     elif asked.what == "run":
         done = {key(row) for row in rows_of(asked.out)}
         chosen = [m for m in drawn(places, asked.sample, asked.seed) if key(asdict(m)) not in done]
-        run(chosen, asked.out, asked.jobs, near=asked.near)
+        run(chosen, asked.out, asked.jobs, near=asked.near, green=asked.green)
         print(f"{time.monotonic() - started:.0f} s")
     elif asked.what == "again":
         left = [row for row in rows_of(asked.out) if row["outcome"] == "survived"]
         fields = Mutant.__dataclass_fields__
         again = [Mutant(**{name: row[name] for name in fields}) for row in left]
         chosen = [mutant for mutant in again if inside(mutant.path, places)]
-        run(chosen, asked.out, asked.jobs, near=asked.near)
+        run(chosen, asked.out, asked.jobs, near=asked.near, green=asked.green)
     else:
         show(asked.out)
 

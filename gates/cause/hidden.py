@@ -139,9 +139,9 @@ def _foremost(found: list[Stratum], limits: CauseLimits) -> Stratum:
     best = max(_number(row.effect) - handicap * (row.variable in EVERYTHING) for row in found)
     near = [row for row in found if _number(row.effect) >= best - limits["nearly_equal_effect"]]
 
-    def rank(row: Stratum) -> tuple[int, float, str]:
+    def rank(row: Stratum) -> tuple[float, float, str]:
         name = row.variable
-        place = CONCRETE.index(name) if name in CONCRETE else len(CONCRETE) - LEAST_CONCRETE
+        place = CONCRETE.index(name) if name in CONCRETE else len(CONCRETE) - LEAST_CONCRETE - 0.5
         # What was recorded of an episode is as concrete as who demonstrated it.
         column = name not in CONCRETE and not row.observed and not name.startswith(START)
         place = CONCRETE.index("operator") if column else place

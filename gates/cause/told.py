@@ -117,9 +117,9 @@ def _end(row: Prediction, limit: float) -> str:
 def _foremost(rows: Sequence[Prediction], close: float) -> Prediction:
     best = max(row.told for row in rows)
 
-    def rank(row: Prediction) -> tuple[int, float, str]:
+    def rank(row: Prediction) -> tuple[float, float, str]:
         known = row.variable in CONCRETE
-        place = CONCRETE.index(row.variable) if known else len(CONCRETE) - EVERYTHING
+        place = CONCRETE.index(row.variable) if known else len(CONCRETE) - EVERYTHING - 0.5
         place = CONCRETE.index("operator") if is_column(row.variable) else place
         return place, -row.told, row.variable
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from asked import settings_of
 
 from gates.bounds import (
     counted_interval,
@@ -10,7 +11,13 @@ from gates.bounds import (
     upper_quantile,
     widest_gap,
 )
-from gates.evidence import MissingEvidenceError
+from gates.evidence import Evidence, MissingEvidenceError
+from gates.feasibility import candidates
+from gates.need import modes as modes_needed
+from gates.need import simpler
+from gates.proof import SPECS
+from gates.reproducibility import modes as modes_drawn
+from gates.stress import cost, rollouts, safety
 from genpolicy.seeds import stream
 from genpolicy.statistics.intervals import clopper_pearson, order_statistic_interval
 
@@ -116,3 +123,29 @@ def test_the_gap_covers_the_true_difference():
         (lower, upper), _, _ = widest_gap(shares, confidence=0.95)
         covered += lower <= 0.15 <= upper
     assert covered / 400 >= 0.95
+
+
+ASKING = (modes_needed, simpler, modes_drawn, candidates, rollouts, cost, safety)
+BOTH_SIDES = {"recovery_success_lower"}  # a condition that is shown to fail counts by its best end
+
+
+@pytest.mark.parametrize("gate", "ABCD")
+def test_every_criterion_rounds_its_counts_against_whom_it_judges(gate, repo, monkeypatch):
+    """And takes an interval of the confidence of the settings, or a wider one."""
+    settings, asked = settings_of(repo, gate), []
+
+    def noted(hits, clusters, *, confidence, favourable):
+        asked.append((confidence, favourable))
+        return share_interval(hits, clusters, confidence=confidence, favourable=favourable)
+
+    for module in ASKING:
+        monkeypatch.setattr(module, "share_interval", noted)
+    met = set()
+    for item in SPECS[gate].criteria:
+        asked.clear()
+        item.measure(Evidence(repo), settings, *(["flow"] if item.per_candidate else []))
+        assert all(confidence >= settings.confidence for confidence, _ in asked), item.id
+        sides = {favourable for _, favourable in asked}
+        met |= {item.id} if asked else set()
+        assert sides <= ({True, False} if item.id in BOTH_SIDES else {item.comparison == ">="})
+    assert len(met) == {"A": 4, "B": 2, "C": 1, "D": 5}[gate], met

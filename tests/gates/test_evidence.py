@@ -4,7 +4,7 @@ import evidence
 import pandas as pd
 import pytest
 
-from gates.evidence import Evidence, MissingEvidenceError, counts
+from gates.evidence import Evidence, MissingEvidenceError, counts, flags, numbers
 from genpolicy.audit.rows import TABLES, ModeOutcome, SituationRow
 from genpolicy.data.rows import FrameRow
 from genpolicy.errors import IntegrityError
@@ -141,3 +141,35 @@ def test_what_may_be_unknown_may_be_empty(repo):
     evidence.edit_table(repo, path, lambda f: f.assign(effect=[[None] * 3] * len(f)))
     assert len(Evidence(repo).rows("artifacts/audit/clocks.parquet", TABLES["clocks"]))
     assert len(Evidence(repo).records(f"artifacts/{path}", TABLES["resamples"]))
+
+
+def test_a_link_to_nothing_is_no_missing_file(repo):
+    file = repo / NFE
+    file.unlink()
+    file.symlink_to(repo / "nowhere")
+    with pytest.raises(IntegrityError):
+        Evidence(repo).rows(NFE, NfeRow)
+
+
+def test_what_is_read_inside_is_told_there_and_stays_told_outside(repo):
+    found = Evidence(repo)
+    with found.recorded() as outer:
+        found.digest("artifacts/first")
+        with found.recorded() as inner:
+            found.digest("artifacts/second")
+        found.digest("artifacts/third")
+    assert inner == ["artifacts/second"]
+    assert outer == [f"artifacts/{name}" for name in ("first", "second", "third")]
+
+
+def test_what_was_not_reached_is_false_and_what_is_no_answer_is_refused():
+    frame = pd.DataFrame({"good": [True, None, False], "bad": [True, 1, None]}, dtype=object)
+    assert flags(frame, "good").tolist() == [True, False, False]
+    with pytest.raises(MissingEvidenceError, match="column bad holds other values"):
+        flags(frame, "bad")
+
+
+@pytest.mark.parametrize("value", [None, float("nan"), float("inf"), "x"])
+def test_what_is_no_number_is_not_measured(value):
+    with pytest.raises(MissingEvidenceError, match="column loss"):
+        numbers(pd.DataFrame({"loss": [0.5, value]}, dtype=object), "loss")

@@ -21,6 +21,30 @@ from gates.report import GATES, stage_of
 from genpolicy.errors import ConfigError
 from genpolicy.integrity.documents import read_yaml
 
+# Where each bound lies, as it was decided. Moving one is a decision of its own: the reason for it
+# stands beside it in the code, that of the numbers from elsewhere here (ISO 10218-1: 0.25 m/s).
+GOLDEN = {
+    "B": {"unpinned_items": 0, "metadata_mismatches": 0, "nfe_mismatch": 0,
+          "nonfinite_weights": 0, "samples_difference": 1e-5},
+    "C": {"execution.watchdog_s": 0.1, "execution.force_limit_n": 80, "gate_c.mode_observations":
+          30, "stub_stale": 0, "stub_invalid": 0, "checker_violations": 0, "mutants_undetected": 0,
+          "conservation_error": 0, "corrupted_refused_share": 1, "stub_violation_upper": 0.01},
+    "D": {"stub_violations": 0, "checker_violations": 0, "conservation_error": 0,
+          "unmatched_starts": 0, "execution.watchdog_s": 0.1, "execution.force_limit_n": 80,
+          "force_peak_p95_n": 80, "intervention_upper": 0.2, "reset_upper": 0.1,
+          "verdict_reachable": 0.8, "stress.starts": 59, "confidence": 0.9, "stress.alpha": 0.1,
+          "stress.margin": 0, "stress.perturbations.envelope.speed_limit_m_s": 0.25},
+    "E": {"gate_e.maximum_days": 30, "upstream_passed": 1, "draft_complete": 0,
+          "signature_valid": 1, "reviewer_independent": 1, "owners_signed": 4,
+          "envelope_within_limits": 0, "not_expired": 1},
+}  # fmt: skip
+
+
+def test_golden_where_each_bound_lies():
+    assert {gate: {b.place: b.bound for b in BOUNDS if b.gate == gate} for gate in "BCDE"} == GOLDEN
+    assert len(BOUNDS) == sum(map(len, GOLDEN.values()))
+    assert [bound.place for bound in BOUNDS if bound.waivable] == ["force_peak_p95_n"]
+
 
 def _put(params, bound, value):
     """Set the value at the place of a bound; criteria where their limit stands."""

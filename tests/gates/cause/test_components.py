@@ -27,6 +27,10 @@ def test_one_action_says_where_it_was_looked_for_and_where_not():
 def test_one_action_is_not_said_of_what_could_not_be_read():
     cause = named(with_component(ONE_ACTION, "rotation", state="unreadable", situations=0))
     assert (cause.text, cause.kind) == ("insufficient_support(rotation)", "component")
+    both = with_component(ONE_ACTION, "rotation", state="unreadable", situations=0)
+    both = with_component(both, "timing", state="unreadable", situations=0)
+    cause = named(both)
+    assert cause.text == "insufficient_support(rotation)" and "timing" in cause.next_action
     # Modes that were found stay found.
     assert named(with_component(VALID, "rotation", state="unreadable")).name == "valid_modes"
 

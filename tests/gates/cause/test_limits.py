@@ -33,6 +33,19 @@ def test_a_limit_above_where_the_audit_takes_modes_back_is_refused(question):
         named(VALID, limit(**{question: 1.1 * ceiling}))
 
 
+BORDERS = [(name, "floors", 1.0) for name in sorted(AuditSettings().floors)]
+BORDERS += [(name, "ceilings", -1.0) for name in sorted(AuditSettings().ceilings)]
+
+
+@pytest.mark.parametrize(("question", "kind", "inwards"), BORDERS)
+def test_a_limit_may_be_where_the_audit_begins_but_for_rounding(question, kind, inwards):
+    border = getattr(AuditSettings(), kind)[question]
+    for away in (0.0, 1e-10, -1e-10):
+        named(VALID, limit(**{question: border * (1.0 - inwards * away)}))
+    with pytest.raises(ConfigError, match=f"limit of {question}"):
+        named(VALID, limit(**{question: border * (1.0 - inwards * 1e-8)}))
+
+
 def test_every_deviation_above_zero_that_is_looked_for_has_a_floor():
     # A finding is made beyond its floor only: without one a lower limit would be without effect.
     zero = {"clock_disorder", "swapped_columns"}
@@ -89,6 +102,10 @@ def _numbers(limits):
     [({"model": {"noise": [1, "x"]}}, "a limit of no question"),
      ({"nobody": {}}, "no owner"), ({"model": {"noise_ratio": [1, ""]}}, "a number and a sentence"),
      ({"model": {"noise_ratio": [math.nan, "x"]}}, "a number and a sentence"),
+     ({"model": {"noise_ratio": [True, "x"]}}, "a number and a sentence"),
+     ({"model": {"noise_ratio": [math.inf, "x"]}}, "a number and a sentence"),
+     ({"model": {"noise_ratio": [1, "x"]}, "safety": {"noise_ratio": [2, "y"]}}, "a second limit"),
+     ({"model": [1]}, "no owner with questions"),
      ({}, "missing"), (None, "NoneType")],
 )  # fmt: skip
 def test_a_limit_without_reason_or_question_is_refused(cause, match):

@@ -4,13 +4,14 @@ import json
 from dataclasses import replace
 
 import pytest
-from planted import BROKEN, OFFSET, VALID, counts, limit, named
+from planted import BROKEN, LIMITS, OFFSET, VALID, counts, limit, named
 
 from gates.cause import (
     CauseName,
     Topic,
+    deciding_answer,
 )
-from gates.cause.numbers import Kept, Labels
+from gates.cause.numbers import Kept, Labels, Residual
 from genpolicy.audit.rows import Finding
 from genpolicy.errors import ConfigError
 
@@ -102,3 +103,79 @@ def test_confidence_is_the_share_of_draws_that_name_the_same():
     assert named(VALID).confidence is None
     # Of no number of draws is one sure.
     assert named(VALID, draws=[VALID] * 200).confidence == 200 / 201
+
+
+@pytest.mark.parametrize(
+    ("labels", "name", "kind"),
+    [
+        (Labels(0, 0), "valid_modes", ""), (Labels(1, 0), "insufficient_support", "replay"),
+        (Labels(10, 0), "insufficient_support", "replay"),
+        (Labels(10, 1), "label_contamination", "replay"), (Labels(60, 1), "valid_modes", ""),
+    ],
+)  # fmt: skip
+def test_labels_are_contaminated_from_one_disagreement_on(labels, name, kind):
+    cause = named(replace(VALID, labels=labels))
+    assert (cause.name.value, cause.kind) == (name, kind)
+    (answer,) = [a for a in cause.answers if a.question == "label_disagreement"]
+    assert (answer.limit is None) == (answer.measured is None) == (labels.replays == 0)
+    assert answer.interval is None or answer.interval[1] == answer.measured
+    assert (answer.interval is None) == (labels.replays == 0)
+
+
+def _offset(measured, **changes):
+    return replace(OFFSET, measured=measured, **changes)
+
+
+def test_the_answer_on_which_a_question_rests_is_the_one_furthest_beyond_its_limit():
+    def asked(*found, residual=None):
+        residuals = {"clock_residual_s": Residual(residual, "not measured")}
+        numbers = replace(VALID, findings=found, residuals=residuals)
+        answer = deciding_answer("clock_residual_s", numbers, limit(clock_residual_s=0.02))
+        return answer.measured
+
+    small, large = _offset(0.05), _offset(0.07)
+    assert asked(small, large) == asked(large, small) == 0.07
+    # One that is not known comes before those that keep the limit, and after those that do not.
+    assert asked(_offset(0.01)) is None and asked(_offset(0.01), residual=0.015) == 0.015
+    assert asked(_offset(0.015), residual=0.01) == 0.015
+    assert asked(small) == 0.05
+    assert asked(residual=0.02) == 0.02 and asked(residual=0.0201) is None
+    assert deciding_answer("clock_residual_s", VALID, limit()) is None
+
+
+def test_of_two_defects_the_first_is_named_and_both_are_shown():
+    other = _offset(0.09, variable="camera")
+    cause = named(replace(VALID, findings=(OFFSET, other)))
+    assert cause.variable == OFFSET.variable
+    assert sum(answer.red for answer in cause.answers) == 2
+    harmless = _offset(0.01, variable="camera")
+    assert named(replace(VALID, findings=(harmless, OFFSET))).variable == OFFSET.variable
+
+
+@pytest.mark.parametrize("metre", [1.0, 1000.0])
+def test_a_length_is_held_to_its_limit_in_the_unit_of_the_data(metre):
+    at = LIMITS["calibration_residual_m"] * metre
+    frame = _offset(at, question="calibration_residual_m", kind="calibration", floor=0.0, unit="m")
+    for measured, red in ((at, False), (1.01 * at, True)):
+        moved = replace(frame, measured=measured)
+        cause = named(replace(VALID, findings=(moved,), metre=metre))
+        assert (cause.name is CauseName.DATA_DEFECT) == red
+        residuals = {"calibration_residual_m": Residual(measured)}
+        answer = deciding_answer(
+            "calibration_residual_m", replace(VALID, residuals=residuals, metre=metre), limit()
+        )
+        assert answer.measured == (None if red else at)
+    clock = replace(VALID, findings=(_offset(0.011),), metre=metre)
+    assert named(clock).name is CauseName.DATA_DEFECT
+
+
+def test_an_unstable_cause_asks_those_that_name_one_alone():
+    hidden, thin = BROKEN["hidden"][0], BROKEN["support"][0]
+    assert named(VALID, draws=[VALID] + [hidden] + [thin] * 8).name is CauseName.VALID_MODES
+    assert named(VALID, draws=[VALID] + [hidden] * 2 + [thin] * 8).kind == "unstable"
+    assert named(VALID, draws=[hidden]).kind == "unstable"
+    # Ten of eighteen are most of them, and less than three quarters.
+    most = [VALID] * 10 + [hidden] * 8 + [thin] * 2
+    (answer,) = [a for a in named(VALID, draws=most).answers if a.question == "cause_agreement"]
+    assert answer.measured == pytest.approx(10 / 18) and answer.holds
+    assert named(VALID, limit(cause_agreement=0.75), draws=most).kind == "unstable"

@@ -6,12 +6,12 @@ from functools import reduce
 from operator import getitem
 
 import pytest
-from planted import VALID
+from planted import OFFSET, VALID
 
 from gates.cause.reading import read_measured, read_numbers
 from gates.evidence import MissingEvidenceError
 from genpolicy.audit.documents import PERSISTENCE, SUMMARY, Persistence, Summary
-from genpolicy.audit.reach_rows import LOCAL, Side, StructureDraw
+from genpolicy.audit.reach_rows import LEARNED, LOCAL, FindingDraw, Reach, Side, StructureDraw
 from genpolicy.audit.rows import Calibration, Clock, ReplayRow, Resample
 from genpolicy.errors import BadInputError, IntegrityError
 
@@ -148,3 +148,65 @@ def test_a_count_that_is_not_there_is_no_number(kind, place):
     reduce(getitem, above, plain)[name] = None
     with pytest.raises(IntegrityError, match=f"{place} = None"):
         kind.parse(plain, where="the audit")
+
+
+@pytest.mark.parametrize(
+    ("row", "changes"),
+    [
+        (DRAW, {"p_adjusted": ()}), (DRAW, {"effect": ()}), (DRAW, {"effect_lower": ()}),
+        (DRAW, {"told": ()}), (DRAW, {"told": (0.1, 0.2)}), (DRAW, {"admissible": (50,)}),
+        (DRAW, {"admissible": (50, 48, 40)}), (DRAW, {"p_adjusted": (0.9, 0.9)}),
+        (STRUCTURE, {"successes": (40,)}), (STRUCTURE, {"reach_queries": (40,) * 4}),
+        (STRUCTURE, {"reach_spoke": (36,) * 6}),
+    ],
+)  # fmt: skip
+def test_a_resample_speaks_of_all_that_was_measured_and_of_no_more(row, changes):
+    damaged = replace(row, **changes)
+    name = "resamples" if row is DRAW else "structure_draws"
+    with pytest.raises(BadInputError, match="ValueError"):
+        draws(**{name: [damaged]})
+
+
+def test_every_resample_has_both_of_its_rows():
+    for tables in ({"resamples": [DRAW, DRAW]}, {"structure_draws": [STRUCTURE] * 2}):
+        with pytest.raises(BadInputError, match="ValueError"):
+            draws(**tables)
+
+
+def test_what_cannot_be_of_a_resample_is_refused():
+    with pytest.raises(BadInputError, match="41 of 40 replayed labels"):
+        draws(resamples=[replace(DRAW, disagreements=41)])
+    with pytest.raises(BadInputError, match="-1 of 40 replayed labels"):
+        draws(resamples=[replace(DRAW, disagreements=-1)])
+    assert draws(resamples=[replace(DRAW, disagreements=40)])[0].labels.disagreements == 40
+
+
+def test_a_resample_has_the_findings_of_its_own_half_or_those_of_all():
+    """Draw -1 found what all did; any other has its own, and none where none is written."""
+    other = replace(OFFSET, measured=0.2)
+    rows = {"findings": [OFFSET], "finding_draws": [FindingDraw(0, **vars(other))]}
+    for half, found in ((-1, (OFFSET,)), (0, (other,)), (1, ())):
+        (drawn,) = draws(structure_draws=[replace(STRUCTURE, findings=half)], **rows)
+        assert drawn.findings == found
+
+
+def test_what_a_resample_tells_moves_its_interval_along():
+    (drawn,) = draws(resamples=[replace(DRAW, told=(0.25,))])
+    row, was = drawn.told[0], VALID.told[0]
+    assert row.told == 0.25
+    assert row.told_lower - was.told_lower == pytest.approx(0.25 - was.told)
+    assert row.told_upper - was.told_upper == pytest.approx(0.25 - was.told)
+
+
+def test_each_kind_of_evidence_and_each_phase_is_read_into_its_place():
+    other = replace(SIDE, kind=LEARNED, followed=False, analysed=7)
+    far = Reach(LEARNED, 1, 10, 3)
+    mode = replace(VALID.modes[0], phase="retreat")
+    numbers = read(
+        sides=[other, SIDE], reach=[far, *VALID.reach], modes=[*VALID.modes, mode],
+        replay=[ReplayRow("e0", "success", "failure", None), *TABLES["replay.parquet"]],
+    )  # fmt: skip
+    assert (numbers.kind, numbers.other) == (LOCAL, other)
+    assert (numbers.reach, numbers.other_reach) == (VALID.reach, (far,))
+    assert (numbers.modes, numbers.elsewhere) == (VALID.modes, (mode,))
+    assert (numbers.labels.replays, numbers.labels.disagreements) == (41, 1)

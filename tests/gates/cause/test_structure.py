@@ -1,9 +1,10 @@
 """Absence takes support along the whole way, and noise takes a share of what was looked at."""
 
+import math
 from dataclasses import replace
 
 import pytest
-from planted import HIDDEN, TOLD, VALID, counts, learned, limit, named
+from planted import HIDDEN, LIMITS, TOLD, VALID, counts, learned, limit, named
 
 from gates.cause import CauseName
 from genpolicy.audit.variable import INSIDE
@@ -59,11 +60,18 @@ def test_white_noise_must_be_a_share_of_what_chunks_differ_by():
 THIN = counts(two_mode_episodes=0, two_mode=0, persistent=0, analysed=0, analysed_episodes=0)
 
 
+def _short_lived(modes):
+    """The other evidence with modes in situations that end too soon to see them persist."""
+    found = learned(modes=modes)
+    return found | {"other": replace(found["other"], kept_n=20)}
+
+
 @pytest.mark.parametrize(
     ("numbers", "name", "kind"),
     [
         # Where neighbours are missing the other evidence speaks, as far as it reaches.
         (replace(THIN, **learned()), "unimodal", ""),
+        (replace(THIN, **learned(modes=40)), "valid_modes", ""),
         (replace(THIN, **learned(spoke=0.1)), "insufficient_support", "neighbourhoods"),
         (replace(THIN, **learned(spoke=0.4)), "insufficient_support", "neighbourhoods"),
         (replace(THIN, reach=reach(0, 0, 0, 0, 0)), "insufficient_support", "neighbourhoods"),
@@ -75,6 +83,14 @@ THIN = counts(two_mode_episodes=0, two_mode=0, persistent=0, analysed=0, analyse
          "evidence_disagrees"),
         (replace(VALID, **learned(confirmed=20, contradicted=38)), "valid_modes", ""),
         (replace(VALID, **learned(confirmed=0, contradicted=5)), "valid_modes", ""),
+        # What is too thin to deny here is denied by the other, and by nothing that is thin as well.
+        (replace(ABSENT, reach=reach(0.3, 0.4, 0.6, 0.9, 1.0), **learned()), "unimodal", ""),
+        (replace(ABSENT, reach=reach(0.3, 0.4, 0.6, 0.9, 1.0), **learned(spoke=0.4)),
+         "insufficient_support", "neighbourhoods"),
+        # Modes of the other count where it speaks, also where they go on too short to persist.
+        (replace(ABSENT, **learned(modes=40, spoke=0.1)), "unimodal", ""),
+        (replace(ABSENT, **_short_lived(modes=20)), "insufficient_support", "evidence_disagrees"),
+        (replace(ABSENT, **_short_lived(modes=0)), "unimodal", ""),
     ],
 )  # fmt: skip
 def test_two_kinds_of_evidence_speak_for_each_other_and_must_agree(numbers, name, kind):
@@ -137,3 +153,94 @@ def test_what_is_only_told_and_not_tested_does_not_show_that_modes_last():
 def test_a_disagreement_says_the_numbers_of_both():
     text = named(replace(VALID, **learned(confirmed=2, contradicted=60))).next_action
     assert "45 held-out episodes" in text and "2 show them" in text and "60 do not" in text
+
+
+@pytest.mark.parametrize(
+    ("confirmed", "contradicted", "name"),
+    [(10, 30, "valid_modes"), (9, 30, "insufficient_support"), (9, 29, "valid_modes")],
+)
+def test_a_contradiction_begins_at_its_limits(confirmed, contradicted, name):
+    """A quarter is enough to confirm, and thirty to contradict; the limits themselves included."""
+    numbers = replace(VALID, **learned(confirmed=confirmed, contradicted=contradicted))
+    limits = limit(confirmed_share=0.25, contradicted_situations=30)
+    assert named(numbers, limits).name.value == name
+
+
+def test_what_the_policy_sees_and_takes_for_near_is_no_contradiction():
+    against = replace(VALID, **learned(confirmed=2, contradicted=60))
+    seen = replace(against, strata=(replace(HIDDEN, observed=True),))
+    assert (named(seen).name, named(seen).kind) == (CauseName.UNIMODAL, "observed_variable")
+    unseen = replace(against, strata=(HIDDEN,))
+    assert named(unseen).kind == "evidence_disagrees"
+
+
+@pytest.mark.parametrize("name", ["noise_ratio", "noise_spread", "white_share"])
+def test_spread_is_white_from_its_limits_on_and_by_all_three(name):
+    at = {
+        "noise_ratio": LIMITS["noise_ratio"], "noise_spread": LIMITS["noise_spread_m"],
+        "white_share": LIMITS["white_share"],
+    }  # fmt: skip
+    none = {"two_mode_episodes": 0, "two_mode": 0, "persistent": 0}
+    assert named(counts(**none, **at)).name is CauseName.POINTWISE_NOISE
+    less = at | {name: math.nextafter(at[name], 0.0)}
+    assert named(counts(**none, **less)).name is CauseName.UNIMODAL
+
+
+WHITE = {"noise_ratio": 0.9, "noise_spread": 0.01, "white_share": 0.3}
+
+
+@pytest.mark.parametrize(
+    ("kept", "persistent", "changes", "name", "kind"),
+    [
+        # White spread makes noise of modes that are too short to see, and of no others.
+        ({"n": 118}, 110, WHITE, "valid_modes", ""),
+        ({"n": 29}, 110, WHITE, "pointwise_noise", ""),
+        ({"n": 30}, 110, {}, "valid_modes", ""),
+        ({"n": 118}, 30, {}, "valid_modes", ""),
+        # Clusters that fall apart are noise where it could be seen, and else too little.
+        ({"n": 118, "observed": 0.6}, 29, {}, "pointwise_noise", ""),
+        ({"n": 118, "observed": 0.6}, 110, {}, "pointwise_noise", ""),
+        ({"n": 29, "observed": 0.6}, 110, {}, "insufficient_support", "persistence"),
+        ({"n": 29, "observed": 0.6}, 29, {}, "insufficient_support", "persistence"),
+        ({"n": 0}, 110, {}, "insufficient_support", "persistence"),
+    ],
+)
+def test_modes_persist_or_are_noise_or_too_short_to_tell(kept, persistent, changes, name, kind):
+    numbers = counts(persistent=persistent, **changes)
+    cause = named(replace(numbers, kept=replace(VALID.kept, **kept)))
+    assert (cause.name.value, cause.kind) == (name, kind)
+
+
+@pytest.mark.parametrize(("resolved", "kind"), [(0, ""), (3, ""), (4, "observation_decides")])
+def test_clusters_that_the_observation_tells_apart_are_said_to_be(resolved, kind):
+    cause = named(counts(two_mode_episodes=1, two_mode=3, persistent=0, resolved=resolved))
+    assert (cause.name, cause.kind) == (CauseName.UNIMODAL, kind)
+
+
+@pytest.mark.parametrize(("episodes", "primary", "name"), [
+    (10, 50, "valid_modes"), (9, 50, "unimodal"), (5, 20, "valid_modes"),
+    (4, 20, "unimodal"),
+])  # fmt: skip
+def test_modes_are_shown_by_a_share_of_the_episodes_and_no_fewer_than_a_handful(
+    episodes, primary, name
+):
+    found = named(counts(two_mode_episodes=episodes, primary_episodes=primary))
+    assert found.name.value == name
+
+
+def test_where_the_other_evidence_supports_its_numbers_are_held_and_the_thin_ones_shown():
+    thin = replace(counts(analysed=99, analysed_episodes=19), **learned(modes=40))
+    cause = named(thin)
+    assert cause.name is CauseName.VALID_MODES
+    held = [a for a in cause.answers if a.question == "supported_episodes" and a.limit is not None]
+    assert [answer.measured for answer in held] == [50]
+    assert named(replace(thin, **learned(modes=40, spoke=0.1))).kind == "neighbourhoods"
+
+
+@pytest.mark.parametrize(("least", "name"), [(0, "first"), (2, "third"), (4, "last")])
+def test_the_fifth_of_the_way_that_is_seen_least_is_named(least, name):
+    shares = [0.9] * 5
+    shares[least] = 0.6
+    answers = named(replace(ABSENT, reach=reach(*shares))).answers
+    (found,) = [a for a in answers if "fifth of the way" in a.what]
+    assert found.measured == 0.6 and f"in the {name} fifth" in found.what

@@ -24,6 +24,7 @@ def of(*rows):
 @pytest.mark.parametrize(
     ("value", "half", "expected"),
     [(0.2, 0.1, False), (0.3, 0.1, False), (0.31, 0.1, None), (0.49, 0.1, None), (0.6, 0.1, True),
+     (0.5, 0.1, None), (0.4, 0.0, False),
      (math.nan, 0.1, None), (0.2, math.nan, None), (0.9, math.nan, None)],
 )  # fmt: skip
 def test_the_interval_decides_on_which_side_of_the_limit_it_is(value, half, expected):
@@ -91,6 +92,31 @@ def test_the_best_of_several_must_beat_a_guess_where_there_are_episodes_enough()
     # With few episodes nothing of the kind can be said.
     assert named(columns(0.35, luck, half=0.25)).kind == UNDECIDED
     assert named(columns(0.35, told("nan", math.nan, 0.1))).kind == UNDECIDED
+    # A column that tells exactly a guess beats none; an interval as wide as half the limit is wide.
+    assert named(columns(0.35, told("even", 0.25, 0.25))).name == "valid_modes"
+    assert named(columns(0.25, luck, half=0.25), limit(told_share=0.5)).name == "valid_modes"
+    assert named(columns(0.375, luck, half=0.25), limit(told_share=0.5)).kind == UNDECIDED
+
+
+def test_the_best_of_several_is_asked_for_in_its_own_phase():
+    luck = told("luck", 0.2, 0.3)
+    best = told("recorded_columns", 0.05, 0.1, detail="luck")
+    assert named(of(best, luck)).name == "valid_modes"
+    assert named(of(best, replace(luck, phase="retreat"))).kind == UNDECIDED
+    # What is shown for the best elsewhere says nothing of it here.
+    open_ = told("recorded_columns", 0.35, 0.1, detail="scenario")
+    guess = replace(told("scenario", -0.2, 0.1), phase="retreat")
+    assert named(of(open_, guess)).kind == UNDECIDED
+    assert named(of(open_, replace(guess, phase=open_.phase))).name == "valid_modes"
+
+
+def test_eight_are_shown_and_none_that_is_held_to_the_limit_is_left_out():
+    many = [told(f"n{k}", 0.2, 0.3) for k in range(9)]
+    held = told("operator", 0.05, 0.1)
+    best = told("recorded_columns", 0.05, 0.1, detail="n0")
+    cause = named(of(*many, held, best))
+    shown = [a for a in cause.answers if a.question == "told_share"]
+    assert len(shown) == 8 and [a.limit is not None for a in shown] == [True] * 2 + [False] * 6
 
 
 def test_a_recorded_column_is_as_concrete_as_who_demonstrated():
@@ -98,6 +124,18 @@ def test_a_recorded_column_is_as_concrete_as_who_demonstrated():
     assert named(of(order, column)).variable == "scenario"
     assert named(of(told("operator", 0.7), told("scenario", 0.75))).variable == "scenario"
     assert named(of(told("object", 0.7), told("scenario", 0.75))).variable == "object"
+
+
+def test_nearly_as_much_ends_at_its_limit_and_what_all_shines_through_comes_last():
+    close = limit(nearly_equal_effect=0.125)
+    order, habit = told("episode_order", 0.875), told("previous_episodes", 0.75)
+    assert named(of(order, habit), close).variable == "previous_episodes"
+    assert named(of(order, replace(habit, told=0.7499)), close).variable == "episode_order"
+    # The mode of another phase is no column: less concrete than the order, more than the past.
+    other = told("mode_of_reach", 0.875)
+    assert named(of(other, told("recording_sequence", 0.875))).variable == "recording_sequence"
+    for last in ("everything_together", "history"):
+        assert named(of(told(last, 0.875), other)).variable == "mode_of_reach"
 
 
 def test_what_is_not_held_to_the_limit_is_shown_without_one():

@@ -121,3 +121,78 @@ def test_a_mode_elsewhere_of_which_nothing_was_checked_is_not_known():
     assert asked_of_every_mode(VALID, "mode_feasible_share").measured == 0.96
     found = asked_of_every_mode(replace(VALID, elsewhere=(blank,)), "mode_feasible_share")
     assert found.measured is None and "lost" in found.what
+
+
+def _held(numbers, limits=None):
+    """Modes whose success is held to the limit where the cause is named."""
+    answers = named(numbers, limits or limit()).answers
+    found = [a for a in answers if a.question == "mode_success_lower" and a.limit is not None]
+    return [answer.what.split()[2].strip(",") for answer in found]
+
+
+def test_of_several_choices_the_one_whose_weaker_mode_succeeds_most_is_held():
+    worse, better = (GOOD, (38, 40)), ((39, 40), (39, 40))
+    assert _held(starts(worse, better)) == ["m2", "m3"]
+    assert _held(starts(better, worse)) == ["m0", "m1"]
+    assert _held(starts((GOOD, POOR), worse)) == ["m2", "m3"]
+
+
+def test_starts_together_count_from_two_on_and_no_mode_below_the_limit():
+    """Seven of ten is the limit itself; six of ten is below it, and surely nothing."""
+    seven = [(FEW, FEW)] * 7
+    assert named(starts(*seven, (FEW, (7, 10)))).name is CauseName.VALID_MODES
+    assert named(starts(*seven, (FEW, (6, 10)))).kind == "success_undecided"
+    assert named(starts(*seven, ((6, 10), FEW))).kind == "success_undecided"
+    assert named(starts(*[(FEW, FEW)] * 2)).name is CauseName.VALID_MODES
+    both = starts(*seven, (FEW, (7, 10)))
+    blocked = replace(both.modes[-1], checked=40, admissible=4)
+    assert named(replace(both, modes=(*both.modes[:-1], blocked))).name is not CauseName.VALID_MODES
+
+
+def test_the_modes_of_all_starts_are_taken_together_by_how_frequent_they_are():
+    frequent, rare = (12, 12), (9, 10)
+    answers = named(starts(*[(rare, frequent), (frequent, rare)] * 4)).answers
+    notes = {a.what: a.note for a in answers if "starts together" in a.what}
+    assert list(notes.values()) == ["96 of 96 succeed", "72 of 80 succeed"]
+
+
+def test_what_of_one_mode_alone_is_not_recorded_leaves_the_choice_open():
+    known, blank = VALID.modes[0], replace(VALID.modes[1], episodes=0, successes=0)
+    cause = named(replace(VALID, modes=(known, blank)))
+    assert (cause.name, cause.kind) == (CauseName.INSUFFICIENT_SUPPORT, "success_undecided")
+    one = replace(VALID.modes[1], episodes=1, successes=1)
+    assert named(replace(VALID, modes=(known, one))).kind == "success_undecided"
+
+
+def test_a_pair_without_a_checked_chunk_is_a_choice_and_is_not_known_to_be_feasible():
+    blank = tuple(replace(m, checked=0, admissible=0) for m in VALID.modes)
+    numbers = replace(VALID, modes=blank)
+    assert named(numbers).name is CauseName.VALID_MODES
+    assert asked_of_every_mode(numbers, "mode_feasible_share").measured is None
+    one = tuple(replace(m, checked=1, admissible=1) for m in VALID.modes)
+    assert asked_of_every_mode(replace(VALID, modes=one), "mode_feasible_share").measured == 1.0
+
+
+def test_a_mode_beside_the_choice_is_no_target_where_it_surely_fails_or_breaks_limits():
+    upper = clopper_pearson(5, 10, 0.95)[1]
+    few = ModeOutcome("few", "approach", 10, 5, 0.2, upper, 40, 40)
+
+    def asked(mode, question="mode_success_lower", **limits):
+        numbers = replace(VALID, modes=(*VALID.modes, mode))
+        return deciding_answer(question, numbers, limit(**limits))
+
+    # Up to the upper end itself nothing is claimed of it.
+    assert not asked(few, mode_success_lower=upper).red
+    assert asked(few, mode_success_lower=upper + 1e-9).red
+    assert "few" in asked(few, mode_success_lower=upper + 1e-9).what
+    blank = replace(few, episodes=0, successes=0)
+    assert asked(blank).measured is None and "few" in asked(blank).what
+    assert asked(replace(few, admissible=35), "mode_feasible_share").red
+    assert not asked(replace(few, admissible=36), "mode_feasible_share").red
+
+
+def test_a_success_that_is_known_has_its_interval():
+    answer = asked_of_every_mode(VALID)
+    assert answer.interval == clopper_pearson(39, 40) and answer.measured == answer.interval[0]
+    blank = asked_of_every_mode(BLANK)
+    assert (blank.measured, blank.interval) == (None, None)

@@ -7,7 +7,12 @@ from asked import asked, found_in
 from editing import cells
 
 from gates.evidence import MissingEvidenceError
-from gates.feasibility.arrivals import at_the_stub, stub_violation_upper, unaccounted
+from gates.feasibility.arrivals import (
+    at_the_stub,
+    conservation_error,
+    stub_violation_upper,
+    unaccounted,
+)
 from gates.proof import judge
 from genpolicy.statistics.intervals import clopper_pearson
 
@@ -77,3 +82,39 @@ def test_what_is_lost_in_one_run_is_not_made_good_by_what_appears_in_another():
 def test_totals_that_differ_or_count_below_zero_are_missing_evidence(changes, why):
     with pytest.raises(MissingEvidenceError, match=why):
         unaccounted(_runs(**changes), ["fixture"])
+
+
+def test_none_bad_is_shown_up_to_the_limit_itself(ladder):
+    upper = clopper_pearson(0, 400, 0.95)[1]
+    for limit, shown in ((upper, True), (0.999 * upper, False)):
+        evidence.write_params(ladder, evidence.set_limit("gate_c", "stub_violation_upper", limit))
+        if shown:
+            assert bound(ladder).value == upper
+        else:
+            with pytest.raises(MissingEvidenceError, match="none bad of 400"):
+                bound(ladder)
+
+
+def test_one_observation_is_some_and_no_more_are_bad_than_there_are(ladder):
+    evidence.edit_table(ladder, STUB, cells("delivered", 1, where=of))
+    evidence.edit_table(ladder, STUB, cells("stale", 9, where=of))
+    assert bound(ladder).value == 1.0
+
+
+def test_a_candidate_that_generated_nothing_shows_nothing(ladder):
+    names = ("generated", "executed", "queued", "count")
+    evidence.edit_table(
+        ladder, "shadow/counts.parquet", lambda f: f.assign(**dict.fromkeys(names, 0))
+    )
+    with pytest.raises(MissingEvidenceError, match="nothing was generated"):
+        asked(ladder, conservation_error, "flow", gate="C")
+    one = {"generated": 1, "executed": 1}
+    evidence.edit_table(ladder, "shadow/counts.parquet", lambda f: f[of(f)].head(1).assign(**one))
+    # One action of one fixture is something, and accounted for.
+    assert asked(ladder, conservation_error, "flow", gate="C").value == 0.0
+
+
+@pytest.mark.parametrize("name", ["generated", "executed", "queued", "count"])
+def test_each_part_of_the_balance_counts(name):
+    one_more = [n + (place == 2) for place, n in enumerate(_runs()[name])]
+    assert unaccounted(_runs(**{name: one_more}), ["fixture"]) == 1

@@ -90,3 +90,15 @@ def test_of_several_recorded_columns_only_the_best_is_held_to_the_limit(ladder):
     answers = {answer.id: answer for answer in judge(ladder, "A").criteria}
     assert (answers["told_share"].measured, answers["told_share"].verdict) == (0.2, "PASS")
     assert answers["cause_accepted"].verdict == "PASS"
+
+
+@pytest.mark.parametrize(
+    ("lower", "upper", "measured"),
+    [(0.1, 0.4, 0.4), (0.1, 0.4001, None), (0.4, 0.6, None), (0.4001, 0.6, 0.4001)],
+)
+def test_an_interval_that_ends_at_the_limit_is_decided_below_it_and_open_above(
+    ladder, lower, upper, measured
+):
+    worse = {"told": 0.3, "told_lower": lower, "told_upper": upper}
+    evidence.edit_table(ladder, "audit/predictions.parquet", lambda f: f.assign(**worse))
+    assert asked(ladder, conditioning.told_share, gate="A").value == measured

@@ -2,7 +2,10 @@
 
 import evidence
 import pytest
+from asked import asked
 
+from gates.evidence import MissingEvidenceError
+from gates.need import semantics
 from gates.proof import judge
 from genpolicy.errors import ConfigError
 
@@ -119,3 +122,34 @@ def test_a_waiver_without_name_or_reason_is_refused(ladder, change, match):
     evidence.write_params(ladder, change)
     with pytest.raises(ConfigError, match=match):
         judge(ladder, "A")
+
+
+@pytest.mark.parametrize(("found", "measured"), [(50, 0.0), (49, 1.0), (52, 2.0)])
+def test_a_recording_that_vanished_counts_as_one_that_appeared(ladder, found, measured):
+    """49 accepted and 1 refused."""
+    evidence.edit_document(ladder, "ingest/refusals.json", lambda d: d | {"found": found})
+    assert asked(ladder, semantics.refused_recordings_accounted, gate="A").value == measured
+
+
+def test_one_recording_is_some_and_none_is_no_evidence(ladder):
+    path = "ingest/refusals.json"
+    one = {"found": 1, "accepted": 1, "refused": []}
+    evidence.edit_document(ladder, path, lambda _: one)
+    assert asked(ladder, semantics.refused_recordings_accounted, gate="A").value == 0.0
+    evidence.edit_document(ladder, path, lambda _: one | {"found": 0, "accepted": 0})
+    with pytest.raises(MissingEvidenceError, match="no recordings were found"):
+        asked(ladder, semantics.refused_recordings_accounted, gate="A")
+
+
+def test_a_lag_is_held_against_the_other_epochs_of_its_stream_alone(ladder):
+    """Streams may lag differently; of one the epochs may not."""
+
+    def lags(frame, **of):
+        return frame.assign(lag_steps=[of[s] for s in frame["stream"] + frame["epoch"]])
+
+    path = "audit/clocks.parquet"
+    apart = {"robote1": 2.0, "robote2": 2.0, "camerae1": 6.0, "camerae2": 6.0}
+    evidence.edit_table(ladder, path, lambda f: lags(f, **apart))
+    assert asked(ladder, semantics.lag_spread_steps, gate="A").value == 0.0
+    evidence.edit_table(ladder, path, lambda f: lags(f, **apart | {"camerae2": 4.0}))
+    assert asked(ladder, semantics.lag_spread_steps, gate="A").value == 2.0

@@ -44,6 +44,22 @@ def test_the_ladder_s_baselines_and_latent_are_read_from_their_homes(ladder):
     assert settings.latent_baseline == "act" and settings.confidence == 0.95
 
 
+@pytest.mark.parametrize(
+    ("change", "match"),
+    [(lambda p: p.update(confidence=0.5), "confidence"),
+     (lambda p: p.update(confidence=1.0), "confidence"),
+     (lambda p: p["stress"].update(samples=0), "redraws")],
+)  # fmt: skip
+def test_a_setting_on_its_border_is_refused_and_one_inside_is_taken(ladder, change, match):
+    evidence.write_params(
+        ladder, lambda p: p.update(confidence=0.501) or p["stress"].update(samples=1)
+    )
+    assert settings_of(ladder, "A").redraws == 1
+    evidence.write_params(ladder, change)
+    with pytest.raises(ConfigError, match=match):
+        settings_of(ladder, "A")
+
+
 @pytest.mark.parametrize("splits", [["train", "test"], ["train"], ["everything"], []])
 def test_what_trained_is_never_held_out(ladder, splits):
     evidence.write_params(ladder, lambda params: params["gate_a"].update(held_out_splits=splits))

@@ -223,3 +223,38 @@ def test_noise_counts_as_a_simple_policy_and_only_by_what_may_be_executed(ladder
     evidence.edit_table(ladder, path, lambda f: scatter(f, modes_valid=2))
     criterion = found(ladder, "baseline_mode_coverage")
     assert criterion.verdict == "FAIL" and "by bc_noise, offset" in criterion.caveat
+
+
+def test_the_level_is_divided_among_as_many_as_could_look_valid(ladder):
+    """Two remedies and two conditioning variants, none valid in 30 situations of 30 episodes."""
+    for name in ("remedy_valid_share", "factor_valid_share"):
+        criterion = found(ladder, name)
+        assert criterion.interval == pytest.approx(clopper_pearson(0, 30, 0.975)), name
+        assert criterion.measured == criterion.interval[1]
+
+
+def test_of_several_tests_of_a_latent_the_one_with_the_highest_upper_end_decides(ladder):
+    """Of ten permutations none proves less than 30 of 999, whose lower end is the higher one."""
+    path = "measure_baselines/latent.json"
+    few, many = {"exceeding": 0, "permutations": 10}, {"exceeding": 30, "permutations": 999}
+    for order in ((few, many), (many, few)):
+        evidence.edit_document(ladder, path, lambda d, o=order: [{**d[0], **row} for row in o])
+        assert found(ladder, "latent_dependence_p").measured == pytest.approx(
+            clopper_pearson(0, 10)[1], abs=1e-6
+        )
+
+
+def test_a_situation_with_one_mode_asks_no_simple_policy(ladder):
+    """Ten of thirty have one mode, and there every sample is valid and every mode is covered."""
+
+    def change(frame):
+        easy = {"modes_present": 1, "modes_covered": 1, "modes_valid": 1, "samples": 16,
+                "admissible": 16, "valid": 16}  # fmt: skip
+        of = frame["index"] < 10
+        return frame.assign(**{name: np.where(of, v, frame[name]) for name, v in easy.items()})
+
+    evidence.edit_table(ladder, "measure_baselines/modes.parquet", change)
+    for name in ("remedy_valid_share", "chunking_valid_share"):
+        criterion = found(ladder, name)
+        assert "of 20 situations" in criterion.caveat and criterion.interval[0] == 0.0
+    assert found(ladder, "baseline_mode_coverage").measured == 0.0

@@ -142,3 +142,32 @@ def test_a_trained_baseline_without_its_loss_is_inconclusive_one_without_trainin
     report = judge(ladder, "B")
     assert report.verdict == "PASS"
     assert "no training of its own: act" in found_in(report, "baseline_fall_upper")[0].caveat
+
+
+def _of_act(ladder, seeds):
+    """Losses of the baseline, by training seed: how far they fall, and of how many episodes."""
+    folder = ladder / "artifacts/train_baselines/act"
+    for seed, (fall, episodes) in enumerate(seeds):
+        (folder / f"seed_{seed}").mkdir(exist_ok=True)
+        (folder / f"seed_{seed}/model.safetensors").write_bytes(b"x")
+        rows = [r for r in evidence.validation(fall) if int(r["episode_uuid"][1:]) < episodes]
+        path = f"train_baselines/act/seed_{seed}/validation.parquet"
+        evidence.table(ladder, path, evidence.ValidationRow, rows)
+    evidence.record(ladder)
+    return found_in(judge(ladder, "B"), "baseline_fall_upper")[0]
+
+
+@pytest.mark.parametrize("falls", [(0.02, 0.2), (0.2, 0.02)])
+def test_the_training_seed_whose_loss_falls_most_decides(ladder, falls):
+    found = _of_act(ladder, [(fall, 20) for fall in falls])
+    assert found.verdict == "FAIL" and found.measured >= 0.2
+
+
+def test_two_episodes_are_enough_to_measure_and_one_is_not(ladder):
+    assert _of_act(ladder, [(0.04, 2)]).verdict != "INCONCLUSIVE"
+    assert _of_act(ladder, [(0.04, 1)]).verdict == "INCONCLUSIVE"
+
+
+def test_a_loss_that_rises_is_no_fall(ladder):
+    found = _of_act(ladder, [(-0.2, 20)])
+    assert "act -0.2" in found.caveat and found.verdict == "PASS"

@@ -8,6 +8,7 @@ from editing import cells
 from gates.evidence import MissingEvidenceError
 from gates.proof import judge
 from gates.reproducibility.gate import (
+    nfe_mismatch,
     parameter_budget_deviation,
     samples_difference,
     unpinned_items,
@@ -89,3 +90,37 @@ def test_hashes_that_differ_without_a_difference_are_no_measurement(ladder):
     evidence.edit_table(ladder, "reload/samples.parquet", cells("sha256_reloaded", "0" * 64))
     with pytest.raises(MissingEvidenceError, match="hashes differ although no sample is said to"):
         asked(ladder, samples_difference, "flow", gate="B")
+
+
+def test_all_that_is_not_pinned_is_counted(ladder):
+    def unpin(document):
+        for item in ("checkpoint", "normalisation", "sampler"):
+            document["flow"][item] = type(document["flow"][item])()
+
+    evidence.edit_document(ladder, "reload/identity.json", unpin)
+    assert asked(ladder, unpinned_items, "flow", gate="B").value == 3
+    for file in (ladder / "artifacts/train_generators/flow").rglob("model.safetensors"):
+        file.unlink()
+    found = asked(ladder, unpinned_items, "flow", gate="B")
+    assert found.value == 4 and "checkpoint file" in found.caveat
+
+
+def test_the_largest_difference_counts_whichever_sample_has_it(ladder):
+    def differ(frame):
+        rows = frame.index[frame["method"] == "flow"]
+        frame.loc[rows[0], ["max_abs_difference", "sha256_reloaded"]] = [0.25, "0" * 64]
+        return frame
+
+    evidence.edit_table(ladder, "reload/samples.parquet", differ)
+    found = asked(ladder, samples_difference, "flow", gate="B")
+    assert found.value == 0.25 and "1 not bit-equal" in found.caveat
+
+
+@pytest.mark.parametrize("column", ["recorded", "counted"])
+def test_one_evaluation_too_many_or_too_few_is_a_mismatch(ladder, column):
+    for number in (7, 9):
+        evidence.edit_table(
+            ladder, "reload/nfe.parquet",
+            lambda f, n=number: f.assign(**{"recorded": 8, "counted": 8, column: n}),
+        )  # fmt: skip
+        assert asked(ladder, nfe_mismatch, "flow", gate="B").value == 1

@@ -2,6 +2,7 @@
 
 import evidence
 import pytest
+from asked import settings_of
 
 from gates.evidence import Evidence, MissingEvidenceError
 from gates.proof import judge
@@ -29,6 +30,20 @@ def test_a_candidate_that_records_several_nfe_has_chosen_none(ladder):
     evidence.edit_table(ladder, NFE, second)
     with pytest.raises(MissingEvidenceError, match=r"flow records several NFE: \[8.0, 16.0\]"):
         chosen_nfe(Evidence(ladder), "flow")
+
+
+@pytest.mark.parametrize("share", [0.001, 0.5])
+def test_a_mode_may_need_a_few_samples_or_as_many_as_half(ladder, share):
+    evidence.write_params(ladder, lambda p: p["gate_b"].update(mode_minimum_share=share))
+    assert settings_of(ladder, "B").mode_minimum_share == share
+
+
+def test_candidates_are_compared_with_somebody(ladder):
+    evidence.write_params(ladder, lambda p: p["stress"].update(baselines=["bc"]))
+    assert settings_of(ladder, "B").baselines == ("bc",)
+    evidence.write_params(ladder, lambda p: p["stress"].update(baselines=[]))
+    with pytest.raises(ConfigError, match="baselines"):
+        settings_of(ladder, "B")
 
 
 @pytest.mark.parametrize("share", [0.0, 0.6])

@@ -139,3 +139,19 @@ def test_a_term_that_is_measured_here_may_not_be_declared(ladder):
     evidence.edit_table(ladder, LATENCY, cells("source", "declared"))
     found = asked(ladder, latency_terms_missing, "flow", gate="B")
     assert found.caveat == f"missing: {', '.join(MEASURED_HERE)}"
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda f: f[(f["component"] != "sample") | (f["run"] == 1)],
+        lambda f: f[f["run"] == 1],
+        lambda f: f.assign(run=f["run"] + 1),
+        lambda f: evidence.pd.concat([f, f[f["run"] == 2].assign(run=3)]),
+    ],
+    ids=["a component once", "one run", "others", "three"],
+)
+def test_what_was_not_measured_in_two_runs_is_not_compared(ladder, change):
+    evidence.edit_table(ladder, LATENCY, change)
+    found = found_in(judge(ladder, "B"), "latency_median_ratio")[0]
+    assert found.measured is None and "two runs of every measured component" in found.caveat

@@ -6,9 +6,11 @@ from asked import settings_of
 from editing import cells
 
 from gates.claim import IN_SHORT
+from gates.engine import Judged
 from gates.evidence import Evidence
 from gates.proof import judge
-from gates.stress.choice import comparisons, pair_alpha, sooner
+from gates.stress import choice
+from gates.stress.choice import Comparison, choose, comparisons, pair_alpha, sooner
 from gates.stress.pairs import paired_differences
 from genpolicy.statistics.eprocess import paired_e_value
 
@@ -87,3 +89,25 @@ def test_every_ordered_pair_is_tested_at_its_share_of_the_family(ladder):
 def test_equal_latency_is_decided_by_the_order_of_registration():
     assert sooner(["b", "a"], {"a": 0.1, "b": 0.1}) == "b"
     assert sooner(["b", "a"], {"a": 0.1}) == "a"
+
+
+@pytest.mark.parametrize(
+    ("share", "decision", "promoted"),
+    [(1.0, f"promote diffusion, {IN_SHORT}; shown to be worse: flow", "diffusion"),
+     (0.999, "promote either of flow, diffusion", "flow")],
+)  # fmt: skip
+def test_a_pair_is_told_apart_from_the_evidence_that_is_needed_on(
+    ladder, monkeypatch, share, decision, promoted
+):
+    """Of neither is a latency known, so of both the first that is registered goes on the card."""
+    settings = settings_of(ladder, "D").model_copy(update={"candidates": ("flow", "diffusion")})
+    values = {"diffusion": share / pair_alpha(settings), "flow": 0.1}
+    monkeypatch.setattr(
+        choice, "comparisons",
+        lambda *_: [Comparison(one, other, values[one], 0.1)
+                    for one, other in (("flow", "diffusion"), ("diffusion", "flow"))],
+    )  # fmt: skip
+    verdicts = {"flow": "PASS", "diffusion": "PASS"}
+    found = choose(Judged(Evidence(ladder), settings, (), "PASS", verdicts))
+    assert found.promoted == promoted
+    assert found.text.startswith(decision)

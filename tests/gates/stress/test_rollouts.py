@@ -85,3 +85,29 @@ def test_the_undisturbed_condition_alone_is_no_comparison(ladder):
     for names in (("nominal",), ("camera_delay", "network_jitter"), ()):
         with pytest.raises(ValidationError, match="at least one more condition"):
             StressSettings.model_validate(known | {"perturbations": names})
+
+
+@pytest.mark.parametrize(
+    ("name", "outside", "inside"),
+    [("margin", (-1.0, 1.0), (-0.99, 0.99)), ("family_alpha", (0.0, 1.0), (0.01, 0.99)),
+     ("planned_starts", (0,), (1,)), ("execution_horizon", (0,), (1,)),
+     ("action_period_s", (0.0,), (0.001,)), ("candidates", ((),), (("flow",),))],
+)  # fmt: skip
+def test_a_setting_on_its_border_is_refused_and_one_inside_is_taken(ladder, name, outside, inside):
+    known = settings_of(ladder, "D").model_dump()
+    for value in inside:
+        assert getattr(StressSettings.model_validate(known | {name: value}), name) == value
+    for value in outside:
+        with pytest.raises(ValidationError, match=name):
+            StressSettings.model_validate(known | {name: value})
+
+
+def test_a_chunk_is_of_use_as_long_as_it_has_an_action(ladder):
+    settings = settings_of(ladder, "D")
+    assert settings.usable_s == pytest.approx(8 * 0.05)
+    assert settings.alpha == pytest.approx(settings.family_alpha / 2)
+
+
+def test_more_starts_than_planned_are_as_good(ladder):
+    evidence.write_params(ladder, lambda params: params["stress"].update(starts=79))
+    assert of(ladder)["start"].nunique() == 80
