@@ -218,10 +218,11 @@ def test_output_below_a_file(command, place, capsys):
 def test_an_old_output_that_may_not_be_replaced(command, mark, place, capsys, monkeypatch):
     lay(place, "a.parquet", f"old/{mark}")
     locked = place / "old"
-    monkeypatch.setattr(
-        os, "access",
-        lambda path, mode, **__: not (mode & os.W_OK and Path(path).resolve() == locked),
-    )  # fmt: skip
+
+    def may(path, mode, **_):
+        return Path(path).resolve() != locked or not mode & os.W_OK
+
+    monkeypatch.setattr(os, "access", may)
     assert "old, where you may not write" in refused(command, "a.parquet", "old", capsys)
 
 

@@ -10,7 +10,7 @@ import pytest
 import yaml
 from planar import planar
 
-from gates.audit import command
+from gates.audit import command, importing
 from gates.cause import cause_of, default_limits
 from genpolicy.cli.main import main
 from genpolicy.cli.resume import work_folder
@@ -167,7 +167,7 @@ def test_an_interrupted_audit_goes_on_without_importing_again(
         assert run(recordings, out) == 130
     assert not out.exists() and (work_folder(out) / "dataset").is_dir()
     with monkeypatch.context() as patched:
-        patched.setattr(command, "open_dataset", lambda *_, **__: pytest.fail("imported again"))
+        patched.setattr(importing, "open_dataset", lambda *_, **__: pytest.fail("imported again"))
         assert run(recordings, out) == 0
     assert {path.name for path in out.iterdir()} == OUTPUTS
     assert not work_folder(out).exists()
