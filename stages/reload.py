@@ -32,7 +32,7 @@ class ReloadSection(Settings):
     samples: int = Field(ge=2)
 
 
-class DeadlineSection(Settings):
+class AnswerDeadline(Settings):
     """Of section `execution` only what names a candidate: the rest would reload it again."""
 
     model_config = ConfigDict(extra="ignore")
@@ -56,7 +56,7 @@ def work(params: Params) -> None:
         samples=section.samples,
         deployment=Deployment(
             horizons=params.horizons,
-            deadline_s=params.section("execution", DeadlineSection).deadline_s,
+            deadline_s=params.section("execution", AnswerDeadline).deadline_s,
             samples=params.section("stress", StressSettings).samples,
         ),
     )
