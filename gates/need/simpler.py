@@ -154,19 +154,26 @@ def valid_share(rows: pd.DataFrame, *, confidence: float) -> tuple[float, float,
 @criterion(
     "<=",
     question="Do ACT's samples depend on the observation beyond chance?",
-    look_at="Baselines: not shown: the latent encodes style or noise, or situations are too few.",
+    look_at="Baselines: train or tune the latent baseline anew, or record more episodes to tell.",
 )
 def latent_dependence_p(evidence: Evidence, settings: NeedSettings) -> Measured:
-    """Upper end of the p-value that a latent's effect is unrelated to the observation."""
+    """Upper end of the p-value that a latent's effect is unrelated to the observation.
+
+    A test that does not reject shows nothing: it is held against the latent only where what the
+    latent changes is the same in every situation. Otherwise nothing can be said.
+    """
     method = settings.latent_baseline
+    limit = settings.limits.of.get("latent_dependence_p")
+    level = 0.0 if limit is None or limit.limit is None else limit.limit
     entries = [entry for entry in evidence.document(MEASURED, LATENT) if entry.method == method]
     if not entries:
         raise MissingEvidenceError(f"{MEASURED}/{LATENT.file} has no test of {method}")
     found = []
     for entry in entries:
         ends = counted_interval(entry.exceeding, entry.permutations, confidence=settings.confidence)
-        found.append((ends, entry))
-    interval, worst = max(found, key=lambda item: item[0][1])
+        same = entry.distance_correlation <= 0.0
+        found.append((same, ends[1], ends, entry))
+    same, upper, interval, worst = max(found, key=lambda item: item[:2])
     text = (
         f"{method} drawn by {worst.convention}: its latent moves chunks by "
         f"{1000.0 * worst.spread_m:.3g} mm, "
@@ -175,7 +182,9 @@ def latent_dependence_p(evidence: Evidence, settings: NeedSettings) -> Measured:
         f"{worst.distance_correlation:.3g}; p-value with the interval of "
         f"{worst.permutations} permutations"
     )
-    return Measured(interval[1], interval, text)
+    if upper > level and not same:
+        return Measured(None, interval, f"not decided, neither a strategy nor a style: {text}")
+    return Measured(upper, interval, text)
 
 
 @criterion(

@@ -151,7 +151,8 @@ def test_a_latent_that_answers_nothing_sends_nobody_to_train_what_was_trained(la
     }
     assert "Train the simple baselines" not in report.diagnosis
     assert "run the simpler policy" not in report.diagnosis
-    assert "the latent encodes style or noise, or situations are too few" in report.diagnosis
+    assert "neither a strategy nor a style" in report.diagnosis
+    assert "record more episodes to tell" in report.diagnosis
     evidence.edit_table(
         ladder,
         "measure_baselines/modes.parquet",

@@ -83,7 +83,7 @@ def test_a_latent_is_judged_by_its_worst_seed(ladder):
         lambda d: [*d, {**d[0], "seed": 1, "exceeding": 300}],
     )
     criterion = found(ladder, "latent_dependence_p")
-    assert criterion.verdict == "FAIL" and criterion.measured > 0.3
+    assert criterion.verdict == "INCONCLUSIVE" and criterion.interval[1] > 0.3
     evidence.edit_document(
         ladder, "measure_baselines/latent.json", lambda d: [{**d[0], "method": "other"}]
     )
@@ -233,13 +233,27 @@ def test_the_level_is_divided_among_as_many_as_could_look_valid(ladder):
         assert criterion.measured == criterion.interval[1]
 
 
+def test_a_test_that_does_not_reject_shows_no_style(ladder):
+    """Not rejecting is no proof: only a change that is the same everywhere is held against it."""
+    path = "measure_baselines/latent.json"
+    for exceeding, verdict in ((0, "PASS"), (30, "PASS"), (60, "INCONCLUSIVE"),
+                               (998, "INCONCLUSIVE")):  # fmt: skip
+        evidence.edit_document(ladder, path, lambda d, n=exceeding: [{**d[0], "exceeding": n}])
+        assert found(ladder, "latent_dependence_p").verdict == verdict, exceeding
+    assert "neither a strategy nor a style" in found(ladder, "latent_dependence_p").caveat
+    style = {"distance_correlation": 0.0, "exceeding": 999}
+    evidence.edit_document(ladder, path, lambda d: [{**d[0], "exceeding": 300}, {**d[0], **style}])
+    criterion = found(ladder, "latent_dependence_p")
+    assert criterion.verdict == "FAIL" and criterion.measured == 1.0
+
+
 def test_of_several_tests_of_a_latent_the_one_with_the_highest_upper_end_decides(ladder):
     """Of ten permutations none proves less than 30 of 999, whose lower end is the higher one."""
     path = "measure_baselines/latent.json"
     few, many = {"exceeding": 0, "permutations": 10}, {"exceeding": 30, "permutations": 999}
     for order in ((few, many), (many, few)):
         evidence.edit_document(ladder, path, lambda d, o=order: [{**d[0], **row} for row in o])
-        assert found(ladder, "latent_dependence_p").measured == pytest.approx(
+        assert found(ladder, "latent_dependence_p").interval[1] == pytest.approx(
             clopper_pearson(0, 10)[1], abs=1e-6
         )
 
