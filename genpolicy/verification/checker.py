@@ -5,7 +5,8 @@ about freshness: phase, calibration, newest observation, voiding events and stop
 again from the raw events, and every accepted action is compared bit for bit with the chunk that
 was admitted. Where the caller says what the robot is, executed rows are proved feasible again, by
 MuJoCo (`motion`). Rules: P1 gate to stub, P2 watchdog, P3 monotone, P4 chain, P5 newest first,
-P6 feasible, P7 stop is sticky, `conservation`, `journal` (form), `settings` (declared limits).
+P6 feasible, P7 stop is sticky, `clock` (no answer before its time), `conservation`, `journal`
+(form), `settings` (declared limits).
 """
 
 import hashlib
@@ -16,6 +17,7 @@ from typing import Any
 
 from genpolicy.contract.action import ACTION_DIM
 from genpolicy.verification.balance import Balance
+from genpolicy.verification.invocations import Invocations
 from genpolicy.verification.journal_source import Message, read_messages
 from genpolicy.verification.motion import ExpectedMotion, MotionProof
 from genpolicy.verification.report import CheckReport, Violation
@@ -100,6 +102,7 @@ class _Session:
         self.settings: Message = {}
         self.world = WorldView()
         self.balance = Balance()
+        self.invocations = Invocations()
         self.chunks: dict[str, Message] = {}
         self.open: dict[int, Message] = {}
         self.closed: set[int] = set()
@@ -143,6 +146,8 @@ class _Session:
         self._answered(self.t, final=True)
 
     def _follow(self, kind: str, m: Message) -> None:
+        for rule, sentence in self.invocations.follow(kind, m):
+            self.flag(rule, sentence)
         if kind in ("accept", "fallback"):
             self._answered(self.t)
             self._check_accept(kind, m)

@@ -19,6 +19,7 @@ from genpolicy.execution.checks import CHECKS, without
 from genpolicy.execution.journal import write_journal
 from genpolicy.feasibility.checks import CHECKS as LAYER_CHECKS
 from genpolicy.seeds import stream
+from genpolicy.verification.checker import check_messages
 from genpolicy.verification.rollouts import derived_rollouts
 
 
@@ -117,6 +118,29 @@ def test_an_answer_whose_checks_outlast_a_tick_comes_a_tick_later(run, kit, plan
     judged = [(e.t, e.payload["index"]) for e in of_kind(rollout, "candidate")][:3]
     assert judged == [(100_000_000, 0), (150_000_000, 1), (150_000_000, 2)]
     prove([rollout], kit, tmp_path)
+
+
+def test_a_journal_whose_second_candidate_was_free_is_found(run, kit, plans):
+    """The wrong that the virtual clock once made: four candidates judged for the time of one."""
+    (rollout,) = run(
+        refused_at_first(kit.Replay(plans.actions), 2), latency=kit.latency(0.02), ticks=3
+    )
+    rollout.executor.end_episode(rollout.now_s)
+
+    def found(events):
+        made = [(e.kind, {"session": "s", "t": e.t, **e.payload}) for e in events]
+        numbered = [(kind, {**m, "n": n}) for n, (kind, m) in enumerate(made)]
+        rules = {violation.rule for violation in check_messages(numbered).violations}
+        return {rule for rule in rules if rule.startswith("clock.")}
+
+    events = rollout.journal.events()
+    assert found(events) == set()
+    assert found([e for e in events if e.payload.get("stage") != "check"]) == {"clock.check"}
+    begins = [e for e in events if e.payload.get("stage") == "begin"]
+    assert begins
+    for event in begins:
+        event.payload["detail"] = repr(10.0)
+    assert "clock.early" in found(events)
 
 
 def test_an_invocation_is_in_flight_until_its_last_candidate_was_judged(run, kit, plans):
