@@ -135,6 +135,8 @@ class _Session:
         if (self.n == 0) != (kind == "session"):
             self.flag("journal.settings", f"Event {self.n} is {kind}; settings stand first, once.")
         try:
+            for rule, sentence in self.invocations.follow(kind, m):
+                self.flag(rule, sentence)
             self._follow(kind, m)
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             self.flag("journal.malformed", f"A {kind} event cannot be read ({error!r}).")
@@ -146,8 +148,6 @@ class _Session:
         self._answered(self.t, final=True)
 
     def _follow(self, kind: str, m: Message) -> None:
-        for rule, sentence in self.invocations.follow(kind, m):
-            self.flag(rule, sentence)
         if kind in ("accept", "fallback"):
             self._answered(self.t)
             self._check_accept(kind, m)

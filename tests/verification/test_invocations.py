@@ -1,4 +1,4 @@
-"""The virtual clock's debts: nothing is judged before its time, and each further candidate costs."""
+"""The virtual clock's debts: nothing is judged before its time; each further candidate costs."""
 
 import pytest
 
