@@ -62,6 +62,24 @@ WRONGS = (
                       ('admit("stress", Path.cwd()).candidates', '("diffusion", "flow")')),
           ),
           Expected(C, ("admissible_share",))),
+    Wrong("further_candidates_are_free", "code",
+          "The clock judges a second candidate at once, and no check of it is on record.",
+          "small",
+          patched("genpolicy/evidence/stress/deliveries.py",
+                  ("        check_s = next_candidate(self._setup, flying, start=self._start)\n",
+                   "        flying.candidate += 1\n"
+                   "        self._arrived.appendleft(flying)\n"
+                   "        return\n"
+                   "        check_s = 0.0\n")),
+          Expected("D", ("checker_violations", "refusal"))),
+    Wrong("answers_come_a_tick_early", "code",
+          "The clock delivers an answer one tick before its latency has passed.",
+          "small",
+          patched("genpolicy/evidence/stress/deliveries.py",
+                  ("            if flying.arrival_s <= now_s and not flying.dropped:",
+                   "            early_s = self._setup.horizons.action_period_s\n"
+                   "            if flying.arrival_s <= now_s + early_s and not flying.dropped:")),
+          Expected("D", ("checker_violations", "refusal"))),
     Wrong("starts_differ_between_methods", "code",
           "The candidates begin from other states than the baselines.",
           "small",
