@@ -43,16 +43,18 @@ def deterministic(device: str) -> Iterator[None]:
     """
     require_device(device)
     threads = torch.get_num_threads()
-    strict = torch.are_deterministic_algorithms_enabled()
+    # Sets the same flag as `use_deterministic_algorithms`, which imports torch's compiler to tell
+    # it too: a second or more in the first call of every process, and nothing here is compiled.
+    mode = torch.get_deterministic_debug_mode()
     if device != "cpu":
         os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")
     try:
-        torch.use_deterministic_algorithms(True)
+        torch.set_deterministic_debug_mode("error")
         if threads != 1:
             torch.set_num_threads(1)
         yield
     finally:
-        torch.use_deterministic_algorithms(strict)
+        torch.set_deterministic_debug_mode(mode)
         if threads != 1:
             torch.set_num_threads(threads)
 

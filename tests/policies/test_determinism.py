@@ -1,5 +1,8 @@
 """Deterministic computing: a row keeps its bits whatever its company."""
 
+import subprocess
+import sys
+
 import pytest
 import torch
 
@@ -63,3 +66,28 @@ def test_without_a_gpu_cuda_is_a_bad_setting(monkeypatch: pytest.MonkeyPatch) ->
     determinism.require_device("cuda:0")
     with pytest.raises(ConfigError):
         determinism.require_device("cuda:1")
+
+
+def test_the_regime_is_left_as_it_was_found() -> None:
+    before = torch.get_deterministic_debug_mode()
+    try:
+        torch.set_deterministic_debug_mode("warn")
+        with deterministic("cpu"):
+            assert torch.get_deterministic_debug_mode() == 2
+            assert torch.are_deterministic_algorithms_enabled()
+            assert not torch.is_deterministic_algorithms_warn_only_enabled()
+        assert torch.get_deterministic_debug_mode() == 1
+    finally:
+        torch.set_deterministic_debug_mode(before)
+
+
+def test_a_process_that_samples_imports_no_compiler() -> None:
+    """It would take a second of the first call, for a flag of a compiler that nothing uses."""
+    program = (
+        "import sys, torch\n"
+        "from genpolicy.policies.determinism import deterministic\n"
+        "with deterministic('cpu'):\n"
+        "    assert torch.are_deterministic_algorithms_enabled()\n"
+        "sys.exit('torch._inductor' in sys.modules)\n"
+    )
+    assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0
