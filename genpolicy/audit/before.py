@@ -26,7 +26,7 @@ class Before:
     """Episodes with a choice, and a past to look at where they had it.
 
     Attributes:
-        choices: Their choices. Length n.
+        choices: Their choices, with the share of each mode in the situation that is asked.
         past: Features of the past, as centred ranks between -0.5 and 0.5. Shape (n, P).
         present: The same of the present. Shape (n, F).
         reached: Episodes with a choice anywhere that long after their start, whether or not the
@@ -49,7 +49,9 @@ def seen_before(
 
     Of its situations long enough after the start it is the one whose clusters differ least in what
     is observed now. Episodes that have none had nothing to see before, or moved apart at once;
-    they are left out.
+    they are left out. How frequent a mode is, is read off that situation too: in an earlier one a
+    cue may still be seen, its neighbours are those who saw the same cue, and what it tells would
+    pass for what everybody can see.
 
     Args:
         data: Canonical audit input.
@@ -61,6 +63,7 @@ def seen_before(
     gaps = np.array([observed_gap(data, settings, *item) for item in items])
     n = len(choices.episode)
     past, present = np.zeros((n, 0)), np.zeros((n, 0))
+    share = np.zeros_like(choices.share)
     place = {int(episode): number for number, episode in enumerate(choices.episode)}
     missing, reached = np.ones(n, dtype=bool), np.zeros(n, dtype=bool)
     for number in np.argsort(np.round(gaps, 6), kind="stable"):
@@ -80,7 +83,8 @@ def seen_before(
             present = np.full((n, now.shape[1]), np.nan)
         past[at[new]] = centred_ranks(earlier, one)[new] / len(rows)
         present[at[new]] = centred_ranks(now, one)[new] / len(rows)
+        share[at[new]] = np.bincount(choices.mode[at], minlength=share.shape[1]) / len(at)
         missing[at] = False
     known = ~missing
-    part = Choices(choices.episode[known], choices.mode[known], choices.share[known])
+    part = Choices(choices.episode[known], choices.mode[known], share[known])
     return Before(part, past[known], present[known], int(np.count_nonzero(reached)))

@@ -172,16 +172,25 @@ def _before(links: Integers, order: Array, group: Integers) -> Integers:
 
 
 def _past(phase: str, seen: Before, rng: np.random.Generator, confidence: float) -> Prediction:
-    """What was seen earlier in the episode tells, beyond what is seen now."""
-    guesses = by_best_column(seen.present), by_one_more(seen.present, seen.past)
-    now, both = (
+    """What was seen earlier in the episode tells, beyond what is seen now.
+
+    Where the ways have begun to part, the present tells of the choice by its consequence, and hides
+    what a cue told before. So the past is asked by itself as well: a little beyond the present
+    proves nothing against a past that by itself may tell too much.
+    """
+    guesses = (
+        by_best_column(seen.present),
+        by_one_more(seen.present, seen.past),
+        by_best_column(seen.past),
+    )
+    now, both, alone = (
         _row(HISTORY, phase, seen.choices, _hits(seen.choices, guess, rng, repeats=1), confidence)
         for guess in guesses
     )
     known = min(now.told, MOST_SEEN)
     ends = (both.told, both.told_lower, both.told_upper)
     middle, lower, upper = ((end - known) / (1.0 - known) for end in ends)
-    return replace(both, told=middle, told_lower=lower, told_upper=upper)
+    return replace(both, told=middle, told_lower=lower, told_upper=max(upper, alone.told_upper))
 
 
 def _rows_of(items: Items) -> Integers:

@@ -58,3 +58,27 @@ def test_at_the_start_of_an_episode_nothing_was_seen_before():
     gap = shortest_gap(settings)
     first = [(i, c) for i, c in items if np.all(i.members - data.first_row[i.members] < gap)]
     assert first and seen_before(data, settings, first, who).reached == 0
+
+
+def test_how_frequent_a_mode_is_is_read_where_the_past_is_asked():
+    """While the lamp is seen, neighbours saw the same lamp: its word is no frequency of the mode.
+
+    Taken from all situations, a mode that went against the lamp would be the rarer one and count
+    more, so that a lamp that tells seven of ten would seem to tell nothing.
+    """
+    data, settings, items, who = chosen(stride=4, plan=replace(PLAN, fidelity=0.5))
+    seen = seen_before(data, settings, items, who)
+    part = seen.choices
+    shown = np.array([data.observation[data.first_row[data.episode == e][0], 4]
+                      for e in part.episode])  # fmt: skip
+    own = {int(e): share for e, share in zip(who.episode, who.share, strict=True)}
+    everywhere = np.array([own[int(e)] for e in part.episode])
+    assert np.allclose(part.share.sum(axis=1), 1.0)
+    assert np.all(part.share[np.arange(len(part.mode)), part.mode] > 0.0)
+
+    def shift(share):
+        """By how much mode 0 is the more frequent one where the lamp shines than where not."""
+        return abs(share[shown > 0.0, 0].mean() - share[shown < 0.0, 0].mean())
+
+    assert shift(everywhere) > 0.15
+    assert shift(part.share) < 0.5 * shift(everywhere)

@@ -11,8 +11,8 @@ from benchmarks.audit.planar import admissible
 from benchmarks.audit.recorder import record
 from gates.cause import CauseName
 from genpolicy.audit import predictability
-from genpolicy.audit.before import STILL_TOGETHER, seen_before
-from genpolicy.audit.choices import choices
+from genpolicy.audit.before import STILL_TOGETHER, Before, seen_before
+from genpolicy.audit.choices import Choices, choices
 from genpolicy.audit.data import canonical
 from genpolicy.audit.history import shortest_gap
 from genpolicy.audit.linking import link
@@ -181,3 +181,23 @@ def test_a_few_episodes_with_a_past_are_no_proof_that_there_was_none(monkeypatch
         monkeypatch.setattr(predictability, "seen_before", lambda *_, seen=seen: seen)
         found = predictions(data, settings, {"approach": several}, links, root_seed=0)
         assert len([row for row in found if row.variable == HISTORY]) == rows
+
+
+def test_a_past_that_by_itself_may_tell_too_much_is_not_denied_for_what_is_seen_now():
+    """Where the ways have begun to part, the present knows the choice by its consequence."""
+    n, rng = 120, np.random.default_rng(3)
+    mode = np.arange(n) % 2
+    even = Choices(np.arange(n), mode, np.full((n, 2), 0.5))
+    parted = np.where(rng.random(n) < 0.75, mode, 1 - mode) - 0.5
+    cue = np.where(rng.random(n) < 0.7, mode, 1 - mode) - 0.5
+
+    def told(past, present):
+        seen = Before(even, past[:, None], present[:, None], n)
+        return predictability._past("approach", seen, np.random.default_rng(0), 0.95)
+
+    nothing = rng.random(n) - 0.5
+    alone, both = told(cue, nothing), told(cue, parted)
+    assert alone.told_lower < 0.4 < alone.told_upper  # seven of ten, astride the limit
+    assert both.told_lower < 0.0 < both.told_upper  # beyond the present nothing is proved, and
+    assert both.told_upper > 0.4  # nothing is denied
+    assert told(nothing, nothing).told_upper < 0.4 and told(nothing, parted).told_upper < 0.4

@@ -133,9 +133,15 @@ def test_nearly_as_much_ends_at_its_limit_and_what_all_shines_through_comes_last
     assert named(of(order, replace(habit, told=0.7499)), close).variable == "episode_order"
     # The mode of another phase is no column: less concrete than the order, more than the past.
     other = told("mode_of_reach", 0.875)
-    assert named(of(other, told("recording_sequence", 0.875))).variable == "recording_sequence"
+    assert named(of(other, told("recording_sequence", 0.875))).kind == "recording_sequence"
     for last in ("everything_together", "history"):
         assert named(of(told(last, 0.875), other)).variable == "mode_of_reach"
+
+
+@pytest.mark.parametrize("past", ["history", "recording_sequence"])
+def test_what_nobody_recorded_has_the_name_that_the_strata_give_it(past):
+    cause = named(of(told(past, 0.875)))
+    assert (cause.variable, cause.kind) == ("unrecorded", past)
 
 
 def test_what_is_not_held_to_the_limit_is_shown_without_one():
