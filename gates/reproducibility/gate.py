@@ -16,7 +16,7 @@ from gates.reproducibility.settings import (
     RELOAD,
     ReproducibilitySettings,
 )
-from genpolicy.evidence.documents.given import MATCHED, TrainedConfig
+from genpolicy.evidence.documents.given import MATCHED, DistilledConfig, TrainedConfig
 from genpolicy.evidence.documents.reproducibility import CANDIDATES, CandidateIdentity
 from genpolicy.evidence.rows.reproducibility import NfeRow, SampleRow
 
@@ -53,7 +53,20 @@ def parameter_budget_deviation(
     if budget <= 0:
         raise MissingEvidenceError(f"{reference} has no parameters")
     text = f"{own:g} parameters, budget {budget:g} ({reference})"
-    return Measured(abs(own / budget - 1.0), caveat=text)
+    return Measured(abs(own / budget - 1.0), caveat=text + _spent(_config(evidence, candidate)))
+
+
+def _spent(config: TrainedConfig) -> str:
+    """What a distilled candidate's training took beyond one of its own; nothing of another one."""
+    if not isinstance(config, DistilledConfig):
+        return ""
+    said, once = config.distilled, config.training.steps * config.training.batch_size
+    # The way back through a network costs about as much as two ways through it.
+    ratio = (said.evaluations + 2 * said.gradients) / (3 * once)
+    return (
+        f"; distilled from {said.teacher} {said.teacher_sha256[:16]}…: {said.updates} updates and "
+        f"about {ratio:.3g} times the operations of one training, its teacher's included"
+    )
 
 
 def _parameters(evidence: Evidence, folder: str, method: str) -> float:

@@ -249,9 +249,13 @@ def _build(config: CheckpointConfig, *, where: Path) -> PolicyNetwork:
         check_sampler(method, config.sampler, config.head)
         Normalisation.from_json(config.normalisation.model_dump())
         with torch.device("meta"):
-            return method.build(sizes, config.network, config.head)
+            network = method.build(sizes, config.network, config.head)
     except (ConfigError, BadInputError) as error:
         _refuse(where, f"inconsistent ({error.where}: {error.found})", error.expected)
+    teacher = config.distilled.teacher if config.distilled else None
+    if teacher != method.teacher:
+        _refuse(where, f"{method.name} with the teacher {teacher}", f"the teacher {method.teacher}")
+    return network
 
 
 def _load_weights(network: PolicyNetwork, weights: bytes, *, where: Path) -> None:

@@ -2,13 +2,16 @@
 
 import dataclasses
 import json
+import shutil
 
 import numpy as np
 import pytest
 import torch
 
 from genpolicy.errors import ConfigError, ContractError, IntegrityError
-from genpolicy.integrity.documents import read_json
+from genpolicy.evidence.documents.given import MATCHED, DistilledConfig
+from genpolicy.integrity.atomic import write_bytes
+from genpolicy.integrity.documents import canonical_json, read_json
 from genpolicy.policies.checkpoint import CONFIG_FILE, load_checkpoint
 from genpolicy.policies.matched_training import (
     TrainingPlan,
@@ -106,6 +109,18 @@ def test_the_checkpoint_names_its_teacher_and_what_both_trainings_took(toy):
     assert "distilled" not in json.loads((toy / "diffusion" / CONFIG_FILE).read_text())
 
 
+@pytest.mark.parametrize(("method", "teacher"), [("manicm", None), ("diffusion", "diffusion")])
+def test_a_checkpoint_that_hides_or_invents_a_teacher_is_refused(toy, tmp_path, method, teacher):
+    shutil.copytree(toy / method, tmp_path / "copy")
+    config = read_json(toy / method / CONFIG_FILE)
+    said = read_json(toy / "manicm" / CONFIG_FILE)["distilled"]
+    config.pop("distilled", None)
+    config |= {"distilled": said} if teacher else {}
+    write_bytes(tmp_path / "copy" / CONFIG_FILE, canonical_json(config))
+    with pytest.raises(IntegrityError, match=f"{method} with the teacher {teacher}"):
+        load_checkpoint(tmp_path / "copy")
+
+
 def test_the_same_seed_gives_the_same_bytes_and_another_teacher_others(
     tmp_path, two_mode_windows, request_for
 ):
@@ -173,3 +188,9 @@ def test_a_student_is_trained_behind_its_teacher_and_differs_as_methods_may(plan
     found = matched_configuration(folders, reference="diffusion")
     assert found["differing_keys"]["manicm"] == ["method", "sampler.name", "sampler.steps"]
     assert set(found["differing_keys"]["manicm"]) <= set(found["whitelist"])
+    # And gates read it, to the byte.
+    read = MATCHED.parse(found, where=MATCHED.file)
+    assert canonical_json(MATCHED.plain(read)) == canonical_json(found)
+    config = read.methods["manicm"].config
+    assert isinstance(config, DistilledConfig) and config.distilled.teacher == "diffusion"
+    assert not isinstance(read.methods["diffusion"].config, DistilledConfig)
