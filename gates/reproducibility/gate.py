@@ -4,6 +4,7 @@ import numpy as np
 
 from gates.claim import CHECKPOINT_ONLY
 from gates.criterion import Measured, criteria_of, criterion
+from gates.distilled import spent
 from gates.engine import GateSpec
 from gates.evidence import Array, Evidence, MissingEvidenceError, numbers
 from gates.need.settings import TRAINED as BASELINES
@@ -53,20 +54,10 @@ def parameter_budget_deviation(
     if budget <= 0:
         raise MissingEvidenceError(f"{reference} has no parameters")
     text = f"{own:g} parameters, budget {budget:g} ({reference})"
-    return Measured(abs(own / budget - 1.0), caveat=text + _spent(_config(evidence, candidate)))
-
-
-def _spent(config: TrainedConfig) -> str:
-    """What a distilled candidate's training took beyond one of its own; nothing of another one."""
-    if not isinstance(config, DistilledConfig):
-        return ""
-    said, once = config.distilled, config.training.steps * config.training.batch_size
-    # The way back through a network costs about as much as two ways through it.
-    ratio = (said.evaluations + 2 * said.gradients) / (3 * once)
-    return (
-        f"; distilled from {said.teacher} {said.teacher_sha256[:16]}…: {said.updates} updates and "
-        f"about {ratio:.3g} times the operations of one training, its teacher's included"
-    )
+    config = _config(evidence, candidate)
+    if isinstance(config, DistilledConfig):
+        text = f"{text}; {spent(config.distilled)}"
+    return Measured(abs(own / budget - 1.0), caveat=text)
 
 
 def _parameters(evidence: Evidence, folder: str, method: str) -> float:
