@@ -271,16 +271,9 @@ def generate(
         return network.evaluate(condition, values, time)
 
     counted = CountedNetwork(evaluate, cap=sampler.nfe_cap)
-    if sampler.name in DIFFUSION_SAMPLERS:
-        chunks = sample_diffusion(
-            counted,
-            noise,
-            schedule=squared_cosine(head.diffusion_levels),
-            sampler=sampler,
-            prediction=head.prediction,
-        )
-    elif sampler.name == MULTISTEP:
-        chunks = sample_multistep(
+    if sampler.name in DIFFUSION_SAMPLERS or sampler.name == MULTISTEP:
+        walk = sample_multistep if sampler.name == MULTISTEP else sample_diffusion
+        chunks = walk(
             counted,
             noise,
             schedule=squared_cosine(head.diffusion_levels),

@@ -107,8 +107,10 @@ def teacher_of(method: Method, folder: Path | None, request: TrainingRequest) ->
     return checkpoint
 
 
-def distilled(teacher: Checkpoint, request: TrainingRequest) -> Distilled:
-    """The teacher of a checkpoint, and what both trainings took; validation is not counted."""
+def distilled(teacher: Checkpoint | None, request: TrainingRequest) -> Distilled | None:
+    """The teacher of a checkpoint, if any, and what both trainings took without validation."""
+    if teacher is None:
+        return None
     own, before = request.training, teacher.config.training
     windows, windows_before = own.steps * own.batch_size, before.steps * before.batch_size
     return Distilled(

@@ -23,6 +23,7 @@ from genpolicy.integrity.rows import rows_of_table
 from genpolicy.integrity.tables import read_table
 from genpolicy.policies.checkpoint import (
     FORMAT_VERSION,
+    Checkpoint,
     CheckpointConfig,
     Distilled,
     NormalisationRecord,
@@ -69,8 +70,7 @@ def train(
         windows: Training split.
         validation: Validation split, for the record only; it stops and selects nothing.
         device: `cpu` or a CUDA device.
-        weights_of: Checkpoint that the method rests on: its weights are taken over in place of an
-            optimisation, or it is the teacher of a distillation.
+        weights_of: Checkpoint with weights to take over untrained, or of the teacher to distil.
 
     Returns:
         SHA-256 of the checkpoint.
@@ -84,25 +84,22 @@ def train(
     method = method_named(request.method)
     check_sampler(method, request.sampler, request.head)
     horizons = method.horizons(request.horizons)
+    teacher = teacher_of(method, weights_of, request)
+    taken = weights_of if teacher is None else None
     with deterministic(device):
         data = _batch_of(windows, horizons, request, device)
         followed = _follow(validation, horizons, request, device) if validation else None
-        network, objective = _build(method, _dimensions(horizons, request), request, device)
-        teacher = teacher_of(method, weights_of, request)
-        if teacher is not None:
-            objective.learn_from(teacher.network.to(device), network)
-        taken = weights_of if teacher is None else None
+        network, objective = _build(method, request, device, teacher=teacher)
         objective.prepare(network, data)
         averaged = copy.deepcopy(network)
         if taken is not None:
             records = [take_over(averaged, taken, request)]
         else:
-            records = list(
-                _optimise(
-                    network, averaged, objective,
-                    data=data, followed=followed, request=request, device=device,
-                )
+            course = _optimise(
+                network, averaged, objective,
+                data=data, followed=followed, request=request, device=device,
             )  # fmt: skip
+            records = list(course)
         trained = _finished(averaged, followed, objective, data)
     summary = {
         "stopping_rule": _stopping_rule(taken),
@@ -114,8 +111,7 @@ def train(
         "regime": regime(device),
     }
     files = TrainingFiles(records, summary, _validation_rows(followed, taken))
-    behind = distilled(teacher, request) if teacher is not None else None
-    _add_checkpoints(files, trained, request, objective, behind=behind)
+    _add_checkpoints(files, trained, request, objective, behind=distilled(teacher, request))
     return files.write(folder)
 
 
@@ -233,12 +229,16 @@ def _checkpoint_config(
 
 
 def _build(
-    method: Method, dimensions: Dimensions, request: TrainingRequest, device: str
+    method: Method, request: TrainingRequest, device: str, *, teacher: Checkpoint | None
 ) -> tuple[PolicyNetwork, Objective]:
+    dimensions = _dimensions(method.horizons(request.horizons), request)
     with initial_weights(integer_seed(request.seed, "weights")):
         network = method.build(dimensions, request.network, request.head)
         objective = method.objective(dimensions, request.network, request.head)
-    return network.to(device), objective.to(device)
+    network = network.to(device)
+    if teacher is not None:
+        objective.learn_from(teacher.network.to(device), network)
+    return network, objective.to(device)
 
 
 def _optimise(
