@@ -45,7 +45,8 @@ from genpolicy.policies.checkpoint import Provenance
 from genpolicy.policies.matched_training import PolicySettings
 from genpolicy.policies.policy import NetworkPolicy, Samples, load_policy
 from genpolicy.policies.settings import SamplerConfig
-from genpolicy.policies.training import TrainingRequest, train
+from genpolicy.policies.training import train
+from genpolicy.policies.training_request import TrainingRequest
 from genpolicy.policies.windows import Windows
 from genpolicy.robot.collision import CollisionModel
 from genpolicy.robot.kinematics import ArmKinematics

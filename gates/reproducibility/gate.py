@@ -4,6 +4,7 @@ import numpy as np
 
 from gates.claim import CHECKPOINT_ONLY
 from gates.criterion import Measured, criteria_of, criterion
+from gates.distilled import spent
 from gates.engine import GateSpec
 from gates.evidence import Array, Evidence, MissingEvidenceError, numbers
 from gates.need.settings import TRAINED as BASELINES
@@ -16,7 +17,7 @@ from gates.reproducibility.settings import (
     RELOAD,
     ReproducibilitySettings,
 )
-from genpolicy.evidence.documents.given import MATCHED, TrainedConfig
+from genpolicy.evidence.documents.given import MATCHED, DistilledConfig, TrainedConfig
 from genpolicy.evidence.documents.reproducibility import CANDIDATES, CandidateIdentity
 from genpolicy.evidence.rows.reproducibility import NfeRow, SampleRow
 
@@ -53,6 +54,9 @@ def parameter_budget_deviation(
     if budget <= 0:
         raise MissingEvidenceError(f"{reference} has no parameters")
     text = f"{own:g} parameters, budget {budget:g} ({reference})"
+    config = _config(evidence, candidate)
+    if isinstance(config, DistilledConfig):
+        text = f"{text}; {spent(config.distilled)}"
     return Measured(abs(own / budget - 1.0), caveat=text)
 
 

@@ -9,17 +9,20 @@ import pandas as pd
 
 from gates.bounds import draws_for_quantile, share_interval, upper_quantile
 from gates.criterion import Measured, criterion
+from gates.distilled import spent
 from gates.evidence import Evidence, MissingEvidenceError, counts, numbers
 from gates.stress.rollouts import (
     DRILL,
     INVOCATIONS,
     NOMINAL,
+    STRESS,
     Interval,
     StressSettings,
     in_every_condition,
     rollouts,
     success_lower,
 )
+from genpolicy.evidence.documents.stress import DISTILLED
 from genpolicy.evidence.rows.stress import InvocationRow
 from genpolicy.statistics.clustered import ratio_interval
 
@@ -48,7 +51,8 @@ def deadline_miss_upper(evidence: Evidence, settings: StressSettings, candidate:
 def latency_p95_s(evidence: Evidence, settings: StressSettings, candidate: str) -> Measured:
     """Upper bound of the end-to-end latency that 95 % of the warm invocations keep, s.
 
-    The first invocation of a session is cold and before any motion; it is said apart.
+    The first invocation of a session is cold and before any motion; it is said apart, and so is
+    what a distilled candidate's training took, which bought the answer's speed.
     """
     rows = evidence.of(INVOCATIONS, InvocationRow, candidate)
     latency = numbers(rows, "latency_s")
@@ -78,6 +82,10 @@ def latency_p95_s(evidence: Evidence, settings: StressSettings, candidate: str) 
 
     found = in_every_condition(rows[~cold], settings.perturbations, measure)
     text = f"{found.caveat}; cold at most {latency[cold].max(initial=0.0):.4g} s"
+    # Missing where nothing that was compared has a teacher.
+    if evidence.bind(f"{STRESS}/{DISTILLED.file}"):
+        said = evidence.document(STRESS, DISTILLED).get(candidate)
+        text = f"{text}; {spent(said)}" if said else text
     return Measured(found.value, found.interval, text)
 
 

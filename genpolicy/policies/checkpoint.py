@@ -68,6 +68,24 @@ class Provenance(Settings):
     episodes_sha256: str | None = Field(default=None, pattern=DIGEST)
 
 
+class Distilled(Settings):
+    """What stands behind a distilled checkpoint, and what both trainings took.
+
+    Attributes:
+        teacher: Registered method of the teacher.
+        teacher_sha256: The teacher's checkpoint.
+        updates: Optimiser updates of teacher and student.
+        evaluations: Network evaluations of single windows in these updates.
+        gradients: Those among them that were differentiated; the others were of a frozen network.
+    """
+
+    teacher: str
+    teacher_sha256: str = Field(pattern=DIGEST)
+    updates: int = Field(ge=1)
+    evaluations: int = Field(ge=1)
+    gradients: int = Field(ge=1)
+
+
 class CheckpointConfig(Settings):
     """Everything about a checkpoint except its weights; the content of `config.json`.
 
@@ -87,6 +105,7 @@ class CheckpointConfig(Settings):
         training_only_parameters: Parameters that exist during training only.
         flops: Matrix-product operations for one row, per part.
         weights_sha256: Digest of `model.safetensors`.
+        distilled: Its teacher and the cost of both; None, and not in the file, without a teacher.
     """
 
     format_version: Literal[1]
@@ -104,6 +123,7 @@ class CheckpointConfig(Settings):
     training_only_parameters: int
     flops: dict[str, int]
     weights_sha256: str = Field(pattern=DIGEST)
+    distilled: Distilled | None = None
 
 
 @dataclass(frozen=True)
@@ -142,7 +162,9 @@ def save_checkpoint(folder: Path, *, weights: bytes, config: CheckpointConfig) -
     Raises:
         BadInputError: The place cannot be written.
     """
-    text = canonical_json(config.model_dump(mode="json"))
+    # Left out where there is none: a checkpoint's name must not change with what it is not.
+    without = {"distilled"} if config.distilled is None else None
+    text = canonical_json(config.model_dump(mode="json", exclude=without))
     write_bytes(folder / WEIGHTS_FILE, weights)
     write_bytes(folder / CONFIG_FILE, text)
     return _identity(weights, text)
@@ -227,9 +249,13 @@ def _build(config: CheckpointConfig, *, where: Path) -> PolicyNetwork:
         check_sampler(method, config.sampler, config.head)
         Normalisation.from_json(config.normalisation.model_dump())
         with torch.device("meta"):
-            return method.build(sizes, config.network, config.head)
+            network = method.build(sizes, config.network, config.head)
     except (ConfigError, BadInputError) as error:
         _refuse(where, f"inconsistent ({error.where}: {error.found})", error.expected)
+    teacher = config.distilled.teacher if config.distilled else None
+    if teacher != method.teacher:
+        _refuse(where, f"{method.name} with the teacher {teacher}", f"the teacher {method.teacher}")
+    return network
 
 
 def _load_weights(network: PolicyNetwork, weights: bytes, *, where: Path) -> None:

@@ -68,6 +68,8 @@ EVALUATIONS = {
     "rk4": Evaluations(4),
     # One jump from its place in a segment.
     "consistency": Evaluations(1),
+    # One jump from a noise level to the clean end; between jumps only noise is added.
+    "multistep_consistency": Evaluations(1),
     # Three slopes a tried step, accepted or not: the first one is the last of the step before,
     # or, after a rejected step, the same again. A step is at most five times the one before.
     "bosh3": Evaluations(3, once=1, growth=5),

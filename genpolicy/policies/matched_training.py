@@ -6,7 +6,7 @@ that is defined by its demonstrations (those of one mode) gets fewer windows and
 Each checkpoint leaves fixtures: samples that it must give again after reload.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -29,7 +29,9 @@ from genpolicy.policies.fixtures import FixtureRow, fixture_observations, fixtur
 from genpolicy.policies.methods import method_named
 from genpolicy.policies.policy import load_policy
 from genpolicy.policies.settings import HeadConfig, NetworkConfig, SamplerConfig, TrainingConfig
-from genpolicy.policies.training import TrainingRequest, train
+from genpolicy.policies.sources import source_folder
+from genpolicy.policies.training import train
+from genpolicy.policies.training_request import TrainingRequest
 from genpolicy.policies.windows import Windows
 from genpolicy.seeds import integer_seed
 
@@ -37,7 +39,7 @@ ALLOWED_DIFFERENCES = (
     "method", "sampler.name", "sampler.steps", "sampler.clip", "sampler.eta",
     "sampler.population", "sampler.tolerance", "sampler.nfe_cap", "training_seed",
 )  # fmt: skip
-DERIVED = ("weights_sha256", "parameters", "training_only_parameters", "flops")
+DERIVED = ("weights_sha256", "parameters", "training_only_parameters", "flops", "distilled")
 
 
 class PolicySettings(Settings):
@@ -146,7 +148,7 @@ class TrainingJob:
         seed: Number of the training seed.
         fixtures: Observations to draw fixtures at; 0 draws none.
         episodes: Episodes to train on; None: all of the training split.
-        weights_of: Checkpoint whose weights are taken over; None trains.
+        weights_of: Checkpoint that the method rests on; None where it rests on none.
     """
 
     dataset: Path
@@ -205,12 +207,12 @@ def train_methods(
             seed=seed,
             fixtures=plan.settings.fixtures,
             episodes=_tuple(plan.episodes(data, method)),
-            weights_of=_source(folder, method, samplers, seed),
+            weights_of=source_folder(folder, method, samplers, seed),
         )
         for method, seed in keys
     }
     trained: dict[tuple[str, int], tuple[str, list[FixtureRow]]] = {}
-    # What takes over weights comes behind what trains them.
+    # What rests on another method's weights comes behind it.
     for own in (True, False):
         due = [key for key in keys if (jobs[key].weights_of is None) == own]
         done = map_shards(
@@ -225,19 +227,6 @@ def train_methods(
 
 def _tuple(names: list[str] | None) -> tuple[str, ...] | None:
     return None if names is None else tuple(names)
-
-
-def _source(folder: Path, method: str, samplers: Iterable[str], seed: int) -> Path | None:
-    """Checkpoint folder whose weights a method takes over; None where it trains its own."""
-    source = method_named(method).weights_of
-    if source is not None and source not in samplers:
-        raise ConfigError(
-            where=f"samplers of the stage that trains {method}",
-            found=f"without {source}",
-            expected=f"{source}, whose weights {method} takes over",
-            action=f"Train {source} in the same stage, or leave {method} out.",
-        )
-    return None if source is None else folder / source / f"seed_{seed}"
 
 
 def train_job(job: TrainingJob) -> tuple[str, list[FixtureRow]]:

@@ -13,6 +13,12 @@ from genpolicy.errors import ConfigError
 from genpolicy.policies.consistency import SegmentConsistency
 from genpolicy.policies.derivative_free import noise_length, search_codes
 from genpolicy.policies.diffusion_samplers import DIFFUSION_SAMPLERS, sample_diffusion
+from genpolicy.policies.distillation import (
+    MULTISTEP,
+    Distillation,
+    sample_multistep,
+    visited_levels,
+)
 from genpolicy.policies.energy import CODE_BOUND, EnergyContrast, EnergyNetwork
 from genpolicy.policies.evaluations import allowed_evaluations
 from genpolicy.policies.networks import Dimensions, HeadInput, PolicyNetwork
@@ -46,7 +52,7 @@ from genpolicy.policies.settings import HeadConfig, NetworkConfig, SamplerConfig
 SINGLE_EVALUATION = ("direct", "z_zero", "z_prior", "offset")
 ENERGY_SAMPLER = "derivative_free"
 STOCHASTIC_SAMPLERS = (
-    "z_prior", "offset", ENERGY_SAMPLER, CONSISTENCY, *DIFFUSION_SAMPLERS, *ODE_SAMPLERS,
+    "z_prior", "offset", ENERGY_SAMPLER, CONSISTENCY, MULTISTEP, *DIFFUSION_SAMPLERS, *ODE_SAMPLERS,
 )  # fmt: skip
 
 
@@ -63,6 +69,7 @@ class Method:
         samplers: Samplers that fit; the first is the default.
         gains: Fixed gains around the network at a sampler time, for methods that read a chunk.
         weights_of: Method whose trained weights it takes over; None trains its own.
+        teacher: Method whose trained policy it distils; None learns from demonstrations alone.
         one_mode: Whether it is trained on the demonstrations of one mode only.
     """
 
@@ -73,7 +80,13 @@ class Method:
     samplers: tuple[str, ...]
     gains: Callable[[HeadConfig, Tensor], Gains] | None = None
     weights_of: str | None = None
+    teacher: str | None = None
     one_mode: bool = False
+
+    @property
+    def rests_on(self) -> str | None:
+        """Method that must be trained before it; None where there is none."""
+        return self.weights_of or self.teacher
 
     def horizons(self, horizons: HorizonConfig) -> HorizonConfig:
         """The horizons of this method: those given, or K = H_e = 1."""
@@ -129,6 +142,16 @@ METHODS = {
         Method("flow", True, "chunk", flow_matching, ODE_SAMPLERS, _flow_gains),
         # The network of `flow`, trained to say where the flow leads, for one or few evaluations.
         Method("flow_policy", True, "chunk", SegmentConsistency, (CONSISTENCY,), _flow_gains),
+        # The network of `diffusion`, trained to say where that one leads.
+        Method(
+            name="manicm",
+            chunked=True,
+            reads="chunk",
+            objective=Distillation,
+            samplers=(MULTISTEP,),
+            gains=_diffusion_gains,
+            teacher="diffusion",
+        ),
     )
 }
 
@@ -153,10 +176,11 @@ def check_sampler(method: Method, sampler: SamplerConfig, head: HeadConfig) -> N
     """Refuse a sampler that does not fit the method or its training.
 
     Raises:
-        ConfigError: Wrong kind, fewer than one step, more steps than training levels,
-            several steps of a method that evaluates its network once, a population of a
-            sampler that has none, fresh noise of another than DDIM, or a cap that is missing or
-            too low to ever finish; jumps that do not fit the segments of the training.
+        ConfigError: Wrong kind, fewer than one step, more steps than levels of the training (or of
+            the distillation's grid), several steps of a method that evaluates its network once, a
+            population of a sampler that has none, fresh noise of another than DDIM, a cap that is
+            missing or too low to ever finish, or jumps that do not fit the segments of the
+            training.
     """
     if sampler.name not in method.samplers:
         raise ConfigError(
@@ -167,6 +191,8 @@ def check_sampler(method: Method, sampler: SamplerConfig, head: HeadConfig) -> N
         )
     if sampler.name in DIFFUSION_SAMPLERS:
         trailing_levels(head.diffusion_levels, sampler.steps)
+    if sampler.name == MULTISTEP:
+        visited_levels(head.diffusion_levels, sampler.steps)
     single = sampler.name in SINGLE_EVALUATION
     if not sampler.steps >= 1 or (single and sampler.steps != 1):
         raise ConfigError(
@@ -245,8 +271,9 @@ def generate(
         return network.evaluate(condition, values, time)
 
     counted = CountedNetwork(evaluate, cap=sampler.nfe_cap)
-    if sampler.name in DIFFUSION_SAMPLERS:
-        chunks = sample_diffusion(
+    if sampler.name in DIFFUSION_SAMPLERS or sampler.name == MULTISTEP:
+        walk = sample_multistep if sampler.name == MULTISTEP else sample_diffusion
+        chunks = walk(
             counted,
             noise,
             schedule=squared_cosine(head.diffusion_levels),

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor, nn
 
+from genpolicy.errors import ContractError
 from genpolicy.policies.networks import Dimensions, PolicyNetwork
 from genpolicy.policies.predictions import PREDICTIONS
 from genpolicy.policies.schedules import squared_cosine, straight_path
@@ -33,8 +34,24 @@ class Batch:
 class Objective(nn.Module):
     """Loss of one method; parameters of its own, if any, are used in training only."""
 
+    def learn_from(self, teacher: PolicyNetwork, network: PolicyNetwork) -> None:
+        """Take a frozen teacher, before the first update.
+
+        Raises:
+            ContractError: The method has no teacher.
+        """
+        raise ContractError(
+            where=f"the objective {type(self).__name__}",
+            found="a teacher",
+            expected="none",
+            action="Only a distillation has a teacher.",
+        )
+
     def prepare(self, network: PolicyNetwork, data: Batch) -> None:
         """Fix what the network takes from the training split; by default nothing."""
+
+    def updated(self, network: PolicyNetwork) -> None:
+        """Follow the network after each update; likewise."""
 
     def finish(self, network: PolicyNetwork, data: Batch) -> None:
         """Fix what the averaged network takes from it after the last update; likewise."""

@@ -12,6 +12,8 @@ from torch import Tensor
 
 from genpolicy.policies.schedules import DiffusionSchedule, Gains, noise_gains
 
+Share = float | Tensor
+
 
 @dataclass(frozen=True)
 class Prediction:
@@ -19,13 +21,19 @@ class Prediction:
 
     Attributes:
         target: What is trained: of clean chunks, noise, and the shares kept of each, (B, 1, 1).
-        clean: The clean estimate: of noisy chunks, a prediction, and the share kept.
+        clean: The clean estimate: of noisy chunks, a prediction, and the share kept, one number
+            or one of each chunk, (B, 1, 1).
         gains: Fixed gains around the network at times level / T.
     """
 
     target: Callable[[Tensor, Tensor, Tensor], Tensor]
-    clean: Callable[[Tensor, Tensor, float], Tensor]
+    clean: Callable[[Tensor, Tensor, Share], Tensor]
     gains: Callable[..., Gains]
+
+
+def root(share: Share) -> Share:
+    """Square root of a share, of one number or of one for each chunk."""
+    return share.sqrt() if isinstance(share, Tensor) else math.sqrt(share)
 
 
 def _variance(schedule: DiffusionSchedule, time: Tensor, data_std: float) -> tuple[Tensor, Tensor]:
@@ -57,12 +65,12 @@ def clean_gains(schedule: DiffusionSchedule, time: Tensor, *, data_std: float) -
 PREDICTIONS = {
     "noise": Prediction(
         target=lambda clean, noise, kept: noise,
-        clean=lambda x, noise, kept: (x - math.sqrt(1.0 - kept) * noise) / math.sqrt(kept),
+        clean=lambda x, noise, kept: (x - root(1.0 - kept) * noise) / root(kept),
         gains=noise_gains,
     ),
     "v": Prediction(
         target=lambda clean, noise, kept: kept.sqrt() * noise - (1.0 - kept).sqrt() * clean,
-        clean=lambda x, v, kept: math.sqrt(kept) * x - math.sqrt(1.0 - kept) * v,
+        clean=lambda x, v, kept: root(kept) * x - root(1.0 - kept) * v,
         gains=v_gains,
     ),
     "x0": Prediction(

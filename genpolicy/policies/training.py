@@ -9,7 +9,6 @@ import copy
 import json
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -18,16 +17,16 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from genpolicy.contract.horizons import HorizonConfig
-from genpolicy.errors import IntegrityError, NonFiniteError
+from genpolicy.errors import NonFiniteError
 from genpolicy.integrity.hashing import sha256_bytes
 from genpolicy.integrity.rows import rows_of_table
 from genpolicy.integrity.tables import read_table
 from genpolicy.policies.checkpoint import (
     FORMAT_VERSION,
+    Checkpoint,
     CheckpointConfig,
+    Distilled,
     NormalisationRecord,
-    Provenance,
-    load_checkpoint,
     serialise_weights,
 )
 from genpolicy.policies.determinism import deterministic, initial_weights, regime
@@ -38,10 +37,11 @@ from genpolicy.policies.networks import (
     flops_per_evaluation,
     parameter_counts,
 )
-from genpolicy.policies.normalisation import Normalisation
 from genpolicy.policies.objectives import Batch, Objective
-from genpolicy.policies.settings import HeadConfig, NetworkConfig, SamplerConfig, TrainingConfig
+from genpolicy.policies.settings import TrainingConfig
+from genpolicy.policies.sources import distilled, take_over, teacher_of
 from genpolicy.policies.training_files import TrainingFiles
+from genpolicy.policies.training_request import TrainingRequest
 from genpolicy.policies.validation import Validation, moments
 from genpolicy.policies.validation_row import (
     EARLIER_FOLDER,
@@ -51,37 +51,6 @@ from genpolicy.policies.validation_row import (
 )
 from genpolicy.policies.windows import Windows, as_batch
 from genpolicy.seeds import integer_seed, stream
-
-
-@dataclass(frozen=True)
-class TrainingRequest:
-    """Everything that decides the bytes of a checkpoint.
-
-    Attributes:
-        method: Registered name.
-        horizons: Common horizons; `bc` shortens them to one action itself.
-        normalisation: Statistics of the training split.
-        network: Sizes, equal for all methods.
-        head: Head settings.
-        training: Optimisation, equal for all methods.
-        sampler: Sampler that the checkpoint will name as its own.
-        provenance: Dataset and contracts.
-        seed: Root seed of this training.
-        phase_columns: Numbers of an observation that name the phase.
-        keep_earlier: Whether the averaged weights at three quarters of the training are kept.
-    """
-
-    method: str
-    horizons: HorizonConfig
-    normalisation: Normalisation
-    network: NetworkConfig
-    head: HeadConfig
-    training: TrainingConfig
-    sampler: SamplerConfig
-    provenance: Provenance
-    seed: int
-    phase_columns: tuple[int, ...] = ()
-    keep_earlier: bool = False
 
 
 def train(
@@ -101,38 +70,39 @@ def train(
         windows: Training split.
         validation: Validation split, for the record only; it stops and selects nothing.
         device: `cpu` or a CUDA device.
-        weights_of: Checkpoint whose weights are taken over in place of an optimisation.
+        weights_of: Checkpoint with weights to take over untrained, or of the teacher to distil.
 
     Returns:
         SHA-256 of the checkpoint.
 
     Raises:
-        ConfigError: Unknown method, or a sampler that does not fit it.
-        IntegrityError: The checkpoint to take over is damaged, or was trained differently.
+        ConfigError: Unknown method, a sampler that does not fit it, or no teacher to distil.
+        IntegrityError: The checkpoint that it rests on is damaged, or was trained differently.
         ContractError: Windows that do not fit the horizons or the normalisation.
         NonFiniteError: The loss became NaN or infinite.
     """
     method = method_named(request.method)
     check_sampler(method, request.sampler, request.head)
     horizons = method.horizons(request.horizons)
+    teacher = teacher_of(method, weights_of, request)
+    taken = weights_of if teacher is None else None
     with deterministic(device):
         data = _batch_of(windows, horizons, request, device)
         followed = _follow(validation, horizons, request, device) if validation else None
-        network, objective = _build(method, _dimensions(horizons, request), request, device)
+        network, objective = _build(method, request, device, teacher=teacher)
         objective.prepare(network, data)
         averaged = copy.deepcopy(network)
-        if weights_of is not None:
-            records = [take_over(averaged, weights_of, request)]
+        if taken is not None:
+            records = [take_over(averaged, taken, request)]
         else:
-            records = list(
-                _optimise(
-                    network, averaged, objective,
-                    data=data, followed=followed, request=request, device=device,
-                )
+            course = _optimise(
+                network, averaged, objective,
+                data=data, followed=followed, request=request, device=device,
             )  # fmt: skip
+            records = list(course)
         trained = _finished(averaged, followed, objective, data)
     summary = {
-        "stopping_rule": _stopping_rule(weights_of),
+        "stopping_rule": _stopping_rule(taken),
         "steps": request.training.steps,
         "evaluated_weights": "exponential moving average",
         "windows": len(windows.observations),
@@ -140,8 +110,8 @@ def train(
         "final": records[-1],
         "regime": regime(device),
     }
-    files = TrainingFiles(records, summary, _validation_rows(followed, weights_of))
-    _add_checkpoints(files, trained, request, objective)
+    files = TrainingFiles(records, summary, _validation_rows(followed, taken))
+    _add_checkpoints(files, trained, request, objective, behind=distilled(teacher, request))
     return files.write(folder)
 
 
@@ -161,10 +131,13 @@ def _add_checkpoints(
     trained: Mapping[str, PolicyNetwork],
     request: TrainingRequest,
     objective: Objective,
+    *,
+    behind: Distilled | None,
 ) -> None:
     for part, network in trained.items():
         weights = serialise_weights(network, method=request.method)
-        files.add(part, weights, _checkpoint_config(request, network, objective, weights=weights))
+        config = _checkpoint_config(request, network, objective, weights=weights, behind=behind)
+        files.add(part, weights, config)
 
 
 def _validation_rows(followed: Validation | None, weights_of: Path | None) -> list[ValidationRow]:
@@ -181,28 +154,6 @@ def _validation_rows(followed: Validation | None, weights_of: Path | None) -> li
 
 def _stopping_rule(weights_of: Path | None) -> str:
     return f"weights of {weights_of.parent.name}" if weights_of else "fixed number of steps"
-
-
-def take_over(
-    network: PolicyNetwork, folder: Path, request: TrainingRequest
-) -> dict[str, float | int | None]:
-    """Put the weights of a trained checkpoint into a network; returns its last record.
-
-    Raises:
-        IntegrityError: The checkpoint is damaged, or was trained with other settings.
-    """
-    checkpoint = load_checkpoint(folder)
-    config = checkpoint.config
-    asked = (request.network, request.training, request.provenance, request.seed)
-    if (config.network, config.training, config.provenance, config.training_seed) != asked:
-        raise IntegrityError(
-            where=str(folder),
-            found="a checkpoint that was trained with other settings",
-            expected="network, training, data and seed of the method that takes over its weights",
-            action="Train both in one run (`dvc repro train_baselines`).",
-        )
-    network.load_state_dict({**network.state_dict(), **checkpoint.network.state_dict()})
-    return {"step": config.training.steps, "training_loss": None, "validation_loss": None}
 
 
 def learning_rate(step: int, config: TrainingConfig) -> float:
@@ -248,7 +199,12 @@ def _dimensions(horizons: HorizonConfig, request: TrainingRequest) -> Dimensions
 
 
 def _checkpoint_config(
-    request: TrainingRequest, network: PolicyNetwork, objective: Objective, *, weights: bytes
+    request: TrainingRequest,
+    network: PolicyNetwork,
+    objective: Objective,
+    *,
+    weights: bytes,
+    behind: Distilled | None,
 ) -> CheckpointConfig:
     """The config file of a trained network."""
     statistics = json.dumps(request.normalisation.as_json())
@@ -268,16 +224,21 @@ def _checkpoint_config(
         training_only_parameters=sum(part.numel() for part in objective.parameters()),
         flops=flops_per_evaluation(network),
         weights_sha256=sha256_bytes(weights),
+        distilled=behind,
     )
 
 
 def _build(
-    method: Method, dimensions: Dimensions, request: TrainingRequest, device: str
+    method: Method, request: TrainingRequest, device: str, *, teacher: Checkpoint | None
 ) -> tuple[PolicyNetwork, Objective]:
+    dimensions = _dimensions(method.horizons(request.horizons), request)
     with initial_weights(integer_seed(request.seed, "weights")):
         network = method.build(dimensions, request.network, request.head)
         objective = method.objective(dimensions, request.network, request.head)
-    return network.to(device), objective.to(device)
+    network = network.to(device)
+    if teacher is not None:
+        objective.learn_from(teacher.network.to(device), network)
+    return network, objective.to(device)
 
 
 def _optimise(
@@ -318,6 +279,7 @@ def _optimise(
         optimiser.step()
         with torch.no_grad():
             torch._foreach_lerp_(average, current, 1.0 - averaging_decay(step, config))
+            objective.updated(network)
         total, counted = total + loss.detach(), counted + 1
         if followed and step + 1 in measured_after:
             followed.follow(step + 1, averaged, objective)

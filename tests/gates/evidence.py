@@ -1300,6 +1300,20 @@ def _stress(root: Path) -> None:
     )
     document(root, "stress/checker.json", checked("a.mcap", 5000))
     document(root, "stress/envelope.json", ENVELOPE)
+    # Of nobody who is judged here: a distilled candidate's is written by the test that asks.
+    document(
+        root,
+        "stress/distilled.json",
+        {
+            "manicm": {
+                "teacher": "diffusion",
+                "teacher_sha256": "c" * 64,
+                "updates": 2 * UPDATES,
+                "evaluations": 4 * UPDATES,
+                "gradients": 2 * UPDATES,
+            }
+        },
+    )
     power = {"margin": 0.1, "alpha": 0.05, "pairs": STARTS}
     row = {"baseline_success": 0.5, "correlation": 0.6, "margin": 0.1, "pairs": STARTS,
            "median_pairs": 30.0}  # fmt: skip

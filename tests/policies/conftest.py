@@ -1,5 +1,6 @@
 """Small policies, trained in a second, shared by the tests of this folder."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -7,9 +8,11 @@ import pytest
 
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.policies.checkpoint import Provenance
+from genpolicy.policies.methods import METHODS
 from genpolicy.policies.normalisation import MinMax, Normalisation
 from genpolicy.policies.settings import HeadConfig, NetworkConfig, SamplerConfig, TrainingConfig
-from genpolicy.policies.training import TrainingRequest, train
+from genpolicy.policies.training import train
+from genpolicy.policies.training_request import TrainingRequest
 from genpolicy.policies.windows import Windows
 
 SAMPLERS = {
@@ -24,6 +27,7 @@ SAMPLERS = {
     "diffusion": ("ddim", 10),
     "flow": ("euler", 8),
     "flow_policy": ("consistency", 2),
+    "manicm": ("multistep_consistency", 1),
 }
 POPULATION = {"derivative_free": 32}
 NETWORK = NetworkConfig(
@@ -80,6 +84,23 @@ def request_for(
     return TrainingRequest(**{**fields, **changes})
 
 
+def train_with_teacher(
+    folder: Path, request: TrainingRequest, *, windows: Windows, validation: Windows | None = None
+) -> str:
+    """Train a method alike; where it has a teacher, that one first, next to it."""
+    teacher, beside = METHODS[request.method].teacher, None
+    if teacher is not None:
+        beside = folder.with_name(f"{folder.name}_teacher")
+        sampler = request_for(teacher).sampler
+        train(beside, replace(request, method=teacher, sampler=sampler), windows=windows)
+    return train(folder, request, windows=windows, validation=validation, weights_of=beside)
+
+
+@pytest.fixture(scope="session", name="train_with_teacher")
+def _train_with_teacher():
+    return train_with_teacher
+
+
 @pytest.fixture(scope="session", name="two_mode_windows")
 def _two_mode_windows():
     return two_mode_windows
@@ -96,5 +117,5 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     root = tmp_path_factory.mktemp("checkpoints")
     windows = two_mode_windows()
     for method in SAMPLERS:
-        train(root / method, request_for(method), windows=windows, validation=windows)
+        train_with_teacher(root / method, request_for(method), windows=windows, validation=windows)
     return {method: root / method for method in SAMPLERS}

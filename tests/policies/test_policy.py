@@ -20,11 +20,12 @@ from genpolicy.policies.training import train
 STEPS = {
     "bc": 1, "chunked_bc": 1, "chunked_l1": 1, "bc_noise": 1, "one_mode_bc": 1, "act": 1,
     "cvae": 1, "ibc": 8, "diffusion": 10, "flow": 8, "flow_policy": 4,
+    "manicm": 2,
 }  # fmt: skip
 STOCHASTIC = {
     "act": ("z_prior", 1), "bc_noise": ("offset", 1), "ibc": ("derivative_free", 8),
     "diffusion": ("ddim", 10), "flow": ("euler", 8),
-    "flow_policy": ("consistency", 2),
+    "flow_policy": ("consistency", 2), "manicm": ("multistep_consistency", 2),
 }  # fmt: skip
 POPULATION = {"derivative_free": 32}
 
@@ -93,6 +94,7 @@ def test_two_loads_give_equal_bytes(folders, method, two_mode_windows):
         ("flow", "euler", 5, 5), ("flow", "heun", 5, 10),
         ("flow", "rk4", 3, 12), ("flow", "midpoint", 3, 6),
         ("flow_policy", "consistency", 2, 2), ("flow_policy", "consistency", 4, 4),
+        ("manicm", "multistep_consistency", 1, 1), ("manicm", "multistep_consistency", 10, 10),
         ("chunked_l1", "direct", 1, 1), ("ibc", "derivative_free", 6, 7),
         ("bc_noise", "offset", 1, 1),
     ],
@@ -123,7 +125,10 @@ def test_deterministic_conventions_give_equal_candidates(folders, two_mode_windo
      ("bc_noise", "offset", 2), ("bc_noise", "direct", 1), ("chunked_bc", "offset", 1),
      ("flow", "derivative_free", 4), ("ibc", "derivative_free", 0),
      ("flow_policy", "consistency", 1), ("flow_policy", "consistency", 3),
-     ("flow_policy", "euler", 2), ("flow", "consistency", 2)],
+     ("flow_policy", "euler", 2), ("flow", "consistency", 2),
+     ("manicm", "multistep_consistency", 0), ("manicm", "multistep_consistency", 11),
+     ("manicm", "ddim", 4), ("manicm", "consistency", 1),
+     ("diffusion", "multistep_consistency", 1)],
 )  # fmt: skip
 def test_samplers_that_do_not_fit_are_refused(folders, method, name, steps):
     with pytest.raises(ConfigError, match="sampler"):

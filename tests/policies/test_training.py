@@ -20,13 +20,13 @@ from genpolicy.policies.windows import Windows
 
 @pytest.mark.parametrize("method", list(METHODS))
 def test_same_seed_same_bytes_other_seed_other_bytes(
-    tmp_path, folders, method, request_for, two_mode_windows
+    tmp_path, folders, method, request_for, two_mode_windows, train_with_teacher
 ):
     windows = two_mode_windows()
     torch.manual_seed(99)
     np.random.seed(99)
-    train(tmp_path / "again", request_for(method), windows=windows, validation=windows)
-    train(tmp_path / "other", request_for(method, seed=4), windows=windows, validation=windows)
+    for name, request in (("again", request_for(method)), ("other", request_for(method, seed=4))):
+        train_with_teacher(tmp_path / name, request, windows=windows, validation=windows)
     for name in ("model.safetensors", "config.json", "training.json", "metrics.jsonl"):
         first = (folders[method] / name).read_bytes()
         assert (tmp_path / "again" / name).read_bytes() == first
@@ -50,9 +50,9 @@ def test_padded_actions_do_not_move_the_loss(tmp_path, request_for, two_mode_win
 
 
 @pytest.mark.parametrize("method", list(METHODS))
-def test_every_loss_learns(tmp_path, method, request_for, two_mode_windows):
-    windows = two_mode_windows()
-    train(tmp_path / "run", request_for(method, steps=60), windows=windows, validation=windows)
+def test_every_loss_learns(tmp_path, method, request_for, two_mode_windows, train_with_teacher):
+    windows, request = two_mode_windows(), request_for(method, steps=60)
+    train_with_teacher(tmp_path / "run", request, windows=windows, validation=windows)
     lines = [
         json.loads(line) for line in (tmp_path / "run" / "metrics.jsonl").read_text().splitlines()
     ]

@@ -74,6 +74,32 @@ class TrainedConfig:
 
 
 @dataclass(frozen=True)
+class Distilled:
+    """What stands behind a distilled checkpoint, and what both trainings took.
+
+    Attributes:
+        teacher: Registered method of the teacher.
+        teacher_sha256: The teacher's checkpoint.
+        updates: Optimiser updates of teacher and student.
+        evaluations: Network evaluations of single windows in these updates.
+        gradients: Those among them that were differentiated.
+    """
+
+    teacher: str
+    teacher_sha256: str
+    updates: Count
+    evaluations: Count
+    gradients: Count
+
+
+@dataclass(frozen=True)
+class DistilledConfig(TrainedConfig):
+    """`config.json` of a checkpoint that has a teacher."""
+
+    distilled: Distilled
+
+
+@dataclass(frozen=True)
 class MatchedMethod:
     """One method of `matched.json`.
 
@@ -87,7 +113,7 @@ class MatchedMethod:
     parameters: dict[str, Count]
     training_only_parameters: Count
     flops: dict[str, Count]
-    config: TrainedConfig
+    config: TrainedConfig | DistilledConfig
 
 
 @dataclass(frozen=True)

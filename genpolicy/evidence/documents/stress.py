@@ -1,8 +1,9 @@
-"""`power.json` and `envelope.json` of the matched comparison."""
+"""`power.json`, `envelope.json` and `distilled.json` of the matched comparison."""
 
 from dataclasses import dataclass
 
 from genpolicy.documents.document import Count, Document
+from genpolicy.evidence.documents.given import Distilled
 from genpolicy.statistics.eprocess import PowerRow
 from genpolicy.verification.report import Point, Reached
 
@@ -46,3 +47,5 @@ class Envelope:
 POWER = Document("power.json", Power)
 ENVELOPE = Document("envelope.json", Envelope)
 """Missing where no condition ran inside an envelope."""
+DISTILLED = Document("distilled.json", dict[str, Distilled])
+"""By method, of those that have a teacher; missing where none has."""

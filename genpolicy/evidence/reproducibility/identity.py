@@ -15,6 +15,7 @@ from genpolicy.integrity.hashing import sha256_bytes, sha256_file
 from genpolicy.policies.checkpoint import CONFIG_FILE, CheckpointConfig
 from genpolicy.policies.determinism import regime
 from genpolicy.policies.diffusion_samplers import DIFFUSION_SAMPLERS
+from genpolicy.policies.distillation import GRID_STEPS, MULTISTEP
 from genpolicy.policies.evaluations import allowed_evaluations
 from genpolicy.policies.ode_samplers import ADAPTIVE_TABLEAUS, ODE_SAMPLERS
 from genpolicy.policies.policy import NetworkPolicy
@@ -119,6 +120,12 @@ def _path(config: CheckpointConfig, sampler: SamplerConfig) -> str:
     if sampler.name in DIFFUSION_SAMPLERS:
         levels, said = config.head.diffusion_levels, config.head.prediction
         return f"squared-cosine schedule of {levels} levels, network predicts {said}"
+    if sampler.name == MULTISTEP:
+        levels, said = config.head.diffusion_levels, config.head.prediction
+        return (
+            f"squared-cosine schedule of {levels} levels, consistent at {GRID_STEPS} of them, "
+            f"network predicts {said}"
+        )
     if sampler.name in ODE_SAMPLERS:
         return "straight path from Gaussian noise, network predicts velocity"
     if sampler.name == "consistency":

@@ -1,6 +1,6 @@
 """Gate D's evidence: the matched comparison as tables, journals, checker and power."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import product
 from pathlib import Path
 
@@ -9,8 +9,9 @@ import numpy as np
 from genpolicy.candidates.judged import JudgedPolicy
 from genpolicy.compute import map_shards
 from genpolicy.errors import ConfigError
+from genpolicy.evidence.documents.given import Distilled
 from genpolicy.evidence.documents.shadow import CHECKER
-from genpolicy.evidence.documents.stress import ENVELOPE, Power
+from genpolicy.evidence.documents.stress import DISTILLED, ENVELOPE, Power
 from genpolicy.evidence.rows.stress import (
     AgeRow,
     ConservationRow,
@@ -85,6 +86,7 @@ def write_stress(folder: Path, shards: Sequence[Shard], *, workers: int, schedul
     )
     CHECKER.write(folder, checker_document(journals, cell=comparison.cell, robot=robot))
     _write_envelope(folder, shards)
+    write_distilled(folder, [shard.judged for shard in shards])
 
 
 def _write_envelope(folder: Path, shards: Sequence[Shard]) -> None:
@@ -96,6 +98,22 @@ def _write_envelope(folder: Path, shards: Sequence[Shard]) -> None:
     first = inside[0]
     assert isinstance(first.schedule, ReducedEnvelope)
     ENVELOPE.write(folder, envelope_document(first.perturbation, first.schedule, reached))
+
+
+def write_distilled(folder: Path, judged: Iterable[JudgedPolicy]) -> None:
+    """`distilled.json`, where a compared policy has a teacher: which, and what it took.
+
+    Raises:
+        IntegrityError: The files of a policy are not those of its identity.
+        BadInputError: They are missing, or the place cannot be written.
+    """
+    found = {}
+    for policy in {one.name: one for one in judged}.values():
+        said = policy.load().checkpoint.config.distilled
+        if said is not None:
+            found[policy.name] = Distilled(**said.model_dump())
+    if found:
+        DISTILLED.write(folder, found)
 
 
 def plan_shards(

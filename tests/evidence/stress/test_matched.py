@@ -15,7 +15,8 @@ from genpolicy.execution.journal import read_journal
 from genpolicy.policies.checkpoint import Provenance
 from genpolicy.policies.policy import NetworkPolicy
 from genpolicy.policies.settings import HeadConfig, NetworkConfig, SamplerConfig, TrainingConfig
-from genpolicy.policies.training import TrainingRequest, train
+from genpolicy.policies.training import train
+from genpolicy.policies.training_request import TrainingRequest
 from genpolicy.policies.windows import Windows
 from genpolicy.seeds import stream
 from genpolicy.tasks.api import WorldSettings

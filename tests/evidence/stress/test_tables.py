@@ -6,6 +6,7 @@ import pytest
 from genpolicy.candidates.judged import JudgedPolicy
 from genpolicy.errors import ConfigError
 from genpolicy.evidence.documents.shadow import CHECKER
+from genpolicy.evidence.documents.stress import DISTILLED
 from genpolicy.evidence.stress.latency import (
     DECLARED_TERMS,
     MEASURED_TERMS,
@@ -19,10 +20,13 @@ from genpolicy.evidence.stress.tables import (
     AGE_LEVELS,
     plan_shards,
     power_document,
+    write_distilled,
     write_stress,
 )
 from genpolicy.execution.cell import Cell
 from genpolicy.integrity.tables import read_table
+from genpolicy.policies.matched_training import PolicySettings, TrainingPlan, train_methods
+from genpolicy.policies.settings import NetworkConfig, SamplerConfig, TrainingConfig
 from genpolicy.verification import tables
 from genpolicy.verification.rollouts import differences
 from genpolicy.verification.tables import KEYS, derived_tables
@@ -198,3 +202,36 @@ def test_alpha_is_shared_between_the_registered_candidates():
     assert document.alpha == pytest.approx(0.02)
     alone = power_document(settings(starts=10, alpha=0.02), candidates=1, root_seed=1)
     assert document.rows == alone.rows
+
+
+def test_a_distilled_policy_s_teacher_and_what_it_took_stand_beside_the_comparison(
+    dataset, kit, tmp_path
+):
+    """From its checkpoint; where nothing has a teacher, there is no such file."""
+    network = NetworkConfig(
+        encoder_width=16, condition_dim=16, trunk_width=16, trunk_blocks=1, time_features=16,
+        head_parameters=12_000,
+    )  # fmt: skip
+    short = TrainingConfig(steps=4, batch_size=8, validation_every=4)
+    policies = PolicySettings(network=network, training=short, seeds=[0], fixtures=1)
+    plan = TrainingPlan(
+        dataset=dataset, settings=policies, horizons=kit.HORIZONS, root_seed=1, device="cpu",
+        workers=1, scheduler="local",
+    )  # fmt: skip
+    samplers = {
+        "diffusion": SamplerConfig(name="ddim", steps=2),
+        "manicm": SamplerConfig(name="multistep_consistency"),
+    }
+    hashes, _ = train_methods(plan, samplers, folder=tmp_path / "trained")
+    judged = [
+        JudgedPolicy(name, 0, tmp_path / "trained" / name / "seed_0", hashes[name][0])
+        for name in samplers
+    ]
+    (tmp_path / "stress").mkdir()
+    write_distilled(tmp_path / "stress", judged[:1])
+    assert not list((tmp_path / "stress").iterdir())
+    write_distilled(tmp_path / "stress", judged)
+    found = DISTILLED.read(tmp_path / "stress")
+    assert set(found) == {"manicm"}
+    assert found["manicm"].teacher_sha256 == hashes["diffusion"][0]
+    assert found["manicm"].updates == 2 * short.steps

@@ -74,6 +74,25 @@ def test_the_budget_is_missed_by_a_share_either_way(ladder, factor):
     assert found.value == pytest.approx(abs(factor - 1.0))
 
 
+def test_the_budget_says_what_a_distilled_candidate_s_training_took(ladder):
+    """By hand: four evaluations of a window and two ways back, against one of each: 8 over 3."""
+    plain = asked(ladder, parameter_budget_deviation, "flow", gate="B").caveat
+
+    def taught(document):
+        config = document["methods"]["flow"]["config"]
+        windows = config["training"]["steps"] * config["training"]["batch_size"]
+        config["distilled"] = {
+            "teacher": "diffusion", "teacher_sha256": "c" * 64, "updates": 8000,
+            "evaluations": 4 * windows, "gradients": 2 * windows,
+        }  # fmt: skip
+
+    evidence.edit_document(ladder, "train_generators/matched.json", taught)
+    said = asked(ladder, parameter_budget_deviation, "flow", gate="B").caveat
+    assert said.startswith(plain) and "distilled" not in plain
+    assert "distilled from diffusion cccc" in said
+    assert "8000 updates and about 2.67 times" in said
+
+
 @pytest.mark.parametrize(
     "item", ["checkpoint", "config", "dataset", "normalisation", "seed", "sampler"]
 )

@@ -149,6 +149,16 @@ def test_the_upper_end_is_judged_and_not_the_point(ladder):
     assert found.interval[0] < 0.4 < found.value == 0.5
 
 
+def test_what_a_distilled_candidate_took_is_said_beside_its_latency(ladder):
+    plain = flow(ladder, cost.latency_p95_s)
+    evidence.edit_document(ladder, "stress/distilled.json", lambda d: {"flow": d["manicm"]})
+    said = flow(ladder, cost.latency_p95_s)
+    assert said.value == plain.value and "distilled" not in plain.caveat
+    assert "distilled from diffusion cccc" in said.caveat and "2.67 times" in said.caveat
+    evidence.replace(ladder, "stress/distilled.json", None)
+    assert flow(ladder, cost.latency_p95_s).caveat == plain.caveat
+
+
 def test_a_rollout_that_states_one_answer_has_one_recorded(ladder):
     """The answers of one rollout are gone, and it states that there was one, not none."""
     one = lambda f: in_("nominal")(f) & (f["start"] == 3)  # noqa: E731
