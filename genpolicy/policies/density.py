@@ -233,9 +233,7 @@ def _levels(count: int, steps: int) -> list[tuple[int, int, int]]:
     pairs = (count - 1) // 2
     ends = (2 * np.linspace(0, pairs, min(steps, pairs) + 1).round()).astype(np.int64).tolist()
     ends[-1] = count - 1
-    return [
-        (first, (first + last) // 2, last) for first, last in itertools.pairwise(ends)
-    ]
+    return [(first, (first + last) // 2, last) for first, last in itertools.pairwise(ends)]
 
 
 def _leg(levels: tuple[int, int, int], angles: Array) -> Leg:
