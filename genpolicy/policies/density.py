@@ -23,7 +23,7 @@ from torch import Tensor
 
 from genpolicy.errors import ConfigError, ContractError, NonFiniteError
 from genpolicy.policies.determinism import deterministic
-from genpolicy.policies.networks import PolicyNetwork
+from genpolicy.policies.networks import Dimensions, PolicyNetwork
 from genpolicy.policies.ode_samplers import sample_ode
 from genpolicy.policies.policy import NetworkPolicy
 from genpolicy.policies.predictions import PREDICTIONS
@@ -73,6 +73,10 @@ def log_density(
     estimate, at the least noise level of the training: chunks blurred by that noise (0.025 in
     normalised units at 100 levels), since nothing was trained below it.
 
+    The error falls with the fourth power of the step on a mixture's own field. Of trained heads
+    with fast time features less is left to say: on demonstrated chunks of about 100 nats (small
+    ladder) 12 and 24 steps differ by at most 0.35 nats, 24 and 48 by 0.6 (flow) and 0.1.
+
     Every chunk is computed alone, in float64 and on one CPU thread: its bits depend on neither
     batch nor order.
 
@@ -99,15 +103,7 @@ def log_density(
             expected=f"one of {', '.join(DENSITIES)}",
             action="Compare the other methods by their samples; no surrogate is merged with this.",
         )
-    expected = (len(observations), config.dimensions.prediction_horizon)
-    if chunks.shape != (*expected, config.dimensions.action_dim):
-        raise ContractError(
-            where="chunks of a log-density",
-            found=f"of shape {chunks.shape}",
-            expected=f"{(*expected, config.dimensions.action_dim)}, one chunk per observation",
-            action="Deliver whole chunks in the units of the action contract.",
-        )
-    _require_finite(chunks, "chunks of a log-density")
+    _check_chunks(chunks, len(observations), config.dimensions)
     seen = policy.preprocess(observations).cpu().double()
     clean = torch.from_numpy(policy.checkpoint.normalisation.action.normalise(chunks))
     network = copy.deepcopy(policy.checkpoint.network).to("cpu", torch.float64)
@@ -197,7 +193,8 @@ def divergence(velocity: Velocity, x: Tensor, place: float) -> tuple[Tensor, flo
         found = velocity(values, place)
         return found, found
 
-    jacobian, value = torch.func.jacfwd(twice, has_aux=True)(x)
+    # All of it by reverse mode: two thirds of the time of forward mode for these networks.
+    jacobian, value = torch.func.jacrev(twice, has_aux=True)(x)
     return value, float(jacobian.reshape(x.numel(), x.numel()).trace())
 
 
@@ -272,6 +269,18 @@ DENSITIES: dict[str, Callable[[NetworkFunction, Tensor, HeadConfig, int], float]
     "diffusion": _of_diffusion,
 }
 """Methods whose draws have a density that their head states, and how it is computed."""
+
+
+def _check_chunks(chunks: Array, count: int, sizes: Dimensions) -> None:
+    expected = (count, sizes.prediction_horizon, sizes.action_dim)
+    if chunks.shape != expected:
+        raise ContractError(
+            where="chunks of a log-density",
+            found=f"of shape {chunks.shape}",
+            expected=f"{expected}, one chunk per observation",
+            action="Deliver whole chunks in the units of the action contract.",
+        )
+    _require_finite(chunks, "chunks of a log-density")
 
 
 def _check_steps(steps: int) -> None:
