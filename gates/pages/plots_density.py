@@ -23,7 +23,7 @@ def _densities(evidence: Evidence, report: GateReport) -> Figure:
         axes.axhline(0.0, color=GREY, lw=0.8)
         axes.set_xlim(-0.03, 1.03)
         axes.set_xlabel(f"{method}: share of samples in the mode")
-    places[0].set_ylabel("log-density, over the situation's mean, nats")
+    places[0].set_ylabel("log-density over the mean, nats")
     return figure
 
 
