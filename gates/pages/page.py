@@ -19,6 +19,7 @@ from gates.card.judge import examine
 from gates.evidence import Evidence, MissingEvidenceError
 from gates.pages import (
     plots_convergence,
+    plots_density,
     plots_feasibility,
     plots_need,
     plots_stress,
@@ -45,7 +46,7 @@ MARKS = {
 }
 PLOTS: dict[str, tuple[Plot | Photo, ...]] = {
     "A": plots_need.PLOTS,
-    "B": (*plots_convergence.PLOTS, *plots_time.PLOTS),
+    "B": (*plots_convergence.PLOTS, *plots_time.PLOTS, *plots_density.PLOTS),
     "C": plots_feasibility.PLOTS,
     "D": plots_stress.PLOTS,
     "E": (),

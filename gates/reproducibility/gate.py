@@ -13,6 +13,7 @@ from gates.reproducibility import convergence, modes, timing
 from gates.reproducibility.identity import contradicted, unrecorded
 from gates.reproducibility.settings import (
     COVERAGE,
+    DENSITY,
     GENERATORS,
     RELOAD,
     ReproducibilitySettings,
@@ -195,14 +196,15 @@ GATE = GateSpec(
     gate="B",
     settings=ReproducibilitySettings,
     criteria=criteria_of(globals(), vars(convergence), vars(modes), vars(timing)),
-    bind=(f"{RELOAD}/offline.parquet", COVERAGE, "artifacts/latency/candidates.parquet"),
+    bind=(f"{RELOAD}/offline.parquet", COVERAGE, DENSITY, "artifacts/latency/candidates.parquet"),
     back_to="training",
     go_on="Sample every passing candidate in shadow, on held-out and corrupted observations.",
     caveats=(
         CHECKPOINT_ONLY,
         "Bit equality holds for the same wheels, CPU capability, thread count and batch shape.",
         "Latency was measured on one machine; sensor and network terms are declared, not measured.",
-        "Mode coverage is counted on recorded two-mode situations, not on a likelihood.",
+        "Mode coverage is counted on recorded two-mode situations, not on a likelihood; where a "
+        "head states one, it stands beside the shares and judges nothing.",
         "Updates are equal for all methods; how far each training has come is told beside them.",
     ),
     below="A",

@@ -14,6 +14,7 @@ RELOAD = "artifacts/reload"
 COVERAGE = f"{RELOAD}/coverage.parquet"
 MODES = f"{RELOAD}/modes.parquet"
 MODES_EARLIER = f"{RELOAD}/modes_earlier.parquet"
+DENSITY = f"{RELOAD}/density.parquet"
 GENERATORS = "artifacts/train_generators"
 
 

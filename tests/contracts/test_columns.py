@@ -50,6 +50,8 @@ MADE = {
     ("gates/pages/plots_need.py", "mean"): "the same",
     ("gates/pages/plots_need.py", "size"): "the same",
     ("gates/pages/plots_convergence.py", "total"): "made in `gates.reproducibility.convergence`",
+    ("gates/pages/plots_density.py", "gain"): "made in `gates.reproducibility.densities`",
+    ("gates/pages/plots_density.py", "share"): "the same",
 }
 # Methods of a frame that take names of columns, and functions that take one after the frame.
 METHODS = {"groupby", "sort_values", "drop_duplicates", "set_index", "pivot", "dropna"}

@@ -46,6 +46,7 @@ from genpolicy.evidence.rows.need import (
 from genpolicy.evidence.rows.reproducibility import (
     CandidatesRow,
     CoverageRow,
+    DensityRow,
     LatencyModelRow,
     LatencyRow,
     NfeRow,
@@ -941,7 +942,29 @@ def _generators(root: Path) -> None:
     dataset = hashlib.sha256(manifest).hexdigest()
     document(root, "train_generators/matched.json", _matched(CANDIDATES, dataset=dataset))
     table(root, "reload/offline.parquet", OfflineRow, [_offline("flow")])
+    table(root, "reload/density.parquet", DensityRow, _densities())
     _checkpoints(root, "train_generators", CANDIDATES)
+
+
+def _densities() -> list[dict[str, Any]]:
+    """Sixteen situations with two modes; in every fourth the denser one is drawn less often."""
+    return [
+        {
+            "method": method,
+            "seed": 0,
+            "episode_uuid": f"e{place}",
+            "index": place,
+            "mode": mode,
+            "log_density": 100.0 - 4.0 * mode,
+            "shape_distance_m": 0.0,
+            "moved_m": 0.01,
+            "samples": 16,
+            "reached": (5 if mode else 9) if place % 4 else (9 if mode else 5),
+        }
+        for method in CANDIDATES
+        for place in range(16)
+        for mode in (0, 1)
+    ]
 
 
 def _reload(root: Path) -> None:

@@ -15,9 +15,10 @@ from genpolicy.evidence.documents.reproducibility import CANDIDATES
 from genpolicy.evidence.need.held_out import HeldOut, held_out_situations, modes_of_policy
 from genpolicy.evidence.need.offline import offline_rows
 from genpolicy.evidence.reproducibility.identity import Deployment, identities
+from genpolicy.evidence.reproducibility.likelihood import density_rows, drawn_situations
 from genpolicy.evidence.reproducibility.measure import in_fresh_process
 from genpolicy.evidence.rows.need import ModeRow, OfflineRow
-from genpolicy.evidence.rows.reproducibility import CoverageRow, NfeRow, SampleRow
+from genpolicy.evidence.rows.reproducibility import CoverageRow, DensityRow, NfeRow, SampleRow
 from genpolicy.feasibility.admission import FeasibilityChecker
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.rows import read_rows, write_rows
@@ -69,6 +70,7 @@ class ReloadRows:
     offline: list[OfflineRow] = field(default_factory=list)
     modes: list[ModeRow] = field(default_factory=list)
     earlier: list[ModeRow] = field(default_factory=list)
+    density: list[DensityRow] = field(default_factory=list)
 
     def write(self, folder: Path) -> None:
         """Write every table."""
@@ -78,6 +80,7 @@ class ReloadRows:
         write_rows(folder / "offline.parquet", OfflineRow, self.offline)
         write_rows(folder / "modes.parquet", ModeRow, self.modes)
         write_rows(folder / "modes_earlier.parquet", ModeRow, self.earlier)
+        write_rows(folder / "density.parquet", DensityRow, self.density)
 
 
 def write_reload(
@@ -125,6 +128,9 @@ def write_reload(
             checker=checker,
         )
         rows.coverage += swept
+        rows.density += density_rows(
+            policy, drawn_situations(held_out), data, seed=candidate.seed, samples=plan.samples
+        )
     rows.write(folder)
     CANDIDATES.write(folder, identity)
 

@@ -1,4 +1,4 @@
-"""Rows of reload and latency: samples, evaluations, coverage and times."""
+"""Rows of reload and latency: samples, evaluations, coverage, densities and times."""
 
 from dataclasses import dataclass
 
@@ -77,6 +77,37 @@ class CoverageRow:
     spread_m: float
     admissible_share: float
     between_share: float
+
+
+@dataclass(frozen=True)
+class DensityRow:
+    """`density.parquet` of reload: one mode of one held-out situation, its density and its share.
+
+    Only of methods that state a density, and of as many situations as the stage has time for.
+
+    Attributes:
+        method: The candidate.
+        seed: Number of its training seed.
+        episode_uuid: The held-out episode.
+        index: The row of the situation in it.
+        mode: Which mode, in the order of the audit.
+        log_density: Of the demonstrated chunk of that mode, nats over normalised actions.
+        shape_distance_m: RMS distance of its path from the audit's, once moved onto it, m.
+        moved_m: How far it was moved, m.
+        samples: Candidates drawn.
+        reached: Of them in this mode.
+    """
+
+    method: str
+    seed: int
+    episode_uuid: str
+    index: int
+    mode: int
+    log_density: float
+    shape_distance_m: float
+    moved_m: float
+    samples: int
+    reached: int
 
 
 @dataclass(frozen=True)

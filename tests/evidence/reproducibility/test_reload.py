@@ -10,7 +10,7 @@ from genpolicy.evidence.reproducibility import reload
 from genpolicy.evidence.reproducibility.identity import Deployment
 from genpolicy.evidence.reproducibility.reload import ReloadPlan, coverage_row, write_reload
 from genpolicy.evidence.rows.need import ModeRow, OfflineRow
-from genpolicy.evidence.rows.reproducibility import CoverageRow, NfeRow, SampleRow
+from genpolicy.evidence.rows.reproducibility import CoverageRow, DensityRow, NfeRow, SampleRow
 from genpolicy.integrity.rows import read_rows, write_rows
 from genpolicy.policies import methods
 from genpolicy.policies.fixtures import FixtureRow, fixture_observations, fixture_rows
@@ -62,6 +62,18 @@ def test_modes_of_the_chosen_steps_are_those_of_the_sweep(reloaded):
     assert {row.split for row in read_rows(folder / "offline.parquet", OfflineRow)} == {
         "validation", "test",
     }  # fmt: skip
+
+
+def test_every_mode_of_a_situation_has_a_density_and_its_share(reloaded):
+    _, _, folder = reloaded
+    rows = read_rows(folder / "density.parquet", DensityRow)
+    modes = read_rows(folder / "modes.parquet", ModeRow)
+    asked = [(row.episode_uuid, row.index, row.mode) for row in rows]
+    assert asked == [(m.episode_uuid, m.index, n) for m in modes for n in range(m.modes_present)]
+    assert {(row.method, row.seed, row.samples) for row in rows} == {("flow", 0, 3)}
+    for drawn in modes:
+        own = [r.reached for r in rows if r.episode_uuid == drawn.episode_uuid]
+        assert sum(own) == drawn.samples - drawn.between_modes - drawn.far_from_modes
 
 
 def test_a_solver_that_evaluates_once_too_often_is_not_what_it_says(

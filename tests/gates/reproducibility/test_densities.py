@@ -1,0 +1,57 @@
+"""How often the denser mode is the one drawn more often, over which situations and episodes."""
+
+import evidence
+import pytest
+from editing import cells
+
+from gates.evidence import Evidence, MissingEvidenceError
+from gates.reproducibility.densities import agreement, densities
+from genpolicy.statistics.intervals import clopper_pearson
+
+DENSITY = "reload/density.parquet"
+
+
+def told(ladder, method="flow"):
+    return agreement(densities(Evidence(ladder)), method, confidence=0.95)
+
+
+def test_the_interval_is_over_episodes(ladder):
+    evidence.edit_table(
+        ladder, DENSITY, lambda f: f.assign(episode_uuid=[f"e{i // 2}" for i in f["index"]])
+    )
+    found = told(ladder)
+    assert (found.share, found.situations, found.episodes, found.tied) == (0.75, 16, 8, 0)
+    assert found.interval == pytest.approx(clopper_pearson(6, 8))
+
+
+def test_a_tie_says_nothing_and_is_counted(ladder):
+    """Situation 0 disagreed; now its modes are drawn equally often."""
+    evidence.edit_table(
+        ladder, DENSITY, lambda f: f.assign(reached=f["reached"].where(f["index"] != 0, 7))
+    )
+    found = told(ladder)
+    assert (found.situations, found.tied) == (15, 1) and found.share == 12 / 15
+
+
+def test_gains_are_over_the_mean_of_the_situation(ladder):
+    rows = densities(Evidence(ladder))
+    assert set(zip(rows["mode"], rows["gain"], strict=True)) == {(0, 2.0), (1, -2.0)}
+    assert set(rows["share"]) == {5 / 16, 9 / 16}
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        (cells("reached", 17), "more samples than were drawn"),
+        (cells("samples", 0), "more samples than were drawn"),
+        (cells("reached", -1), "corrupt"),
+        (cells("log_density", float("nan")), "non-finite"),
+        (lambda f: f[f["mode"] == 0], "each once"),
+        (lambda f: f.assign(mode=0), "each once"),
+        (lambda f: f.head(0), "no rows"),
+    ],
+)
+def test_what_cannot_be_is_no_evidence(ladder, change, text):
+    evidence.edit_table(ladder, DENSITY, change)
+    with pytest.raises(MissingEvidenceError, match=text):
+        told(ladder)
