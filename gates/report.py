@@ -3,6 +3,7 @@
 Reports are canonical JSON without a timestamp, so that equal evidence gives equal bytes.
 """
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, ClassVar, Literal, TypeVar
 
@@ -194,8 +195,20 @@ def parse_report(data: bytes, *, gate: str) -> GateReport:
     return report
 
 
-def parse_section(model: type[Model], section: object, *, where: str) -> Model:
+def parse_section(
+    model: type[Model],
+    section: object,
+    *,
+    where: str,
+    homes: Mapping[str, str] | None = None,
+) -> Model:
     """A settings section as its model; lists may stand for tuples, nothing else is coerced.
+
+    Args:
+        model: The model.
+        section: The section.
+        where: Its place, for the error.
+        homes: Places of keys that stand elsewhere, by key.
 
     Raises:
         ConfigError: The section breaks the model.
@@ -203,8 +216,10 @@ def parse_section(model: type[Model], section: object, *, where: str) -> Model:
     try:
         return model.model_validate_json(canonical_json(section))
     except ValidationError as error:
+        key, *deeper = place(error).split(".")
+        home = (homes or {}).get(key)
         raise ConfigError(
-            where=f"{where}.{place(error)}",
+            where=".".join([home or f"{where}.{key}", *deeper]),
             found=message(error),
             expected="the keys and types of its model",
             action="Correct the section; no unknown keys, no text for numbers.",

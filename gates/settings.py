@@ -201,7 +201,8 @@ def read_settings(params: Mapping[str, Any], name: str, model: type[Settings]) -
         if key in values:
             _refuse(f"{name}.{key}", "a second home", home, f"Remove it; `{home}` says it.")
         values[key] = _at(params, home)
-    return parse_section(model, values, where=f"{PARAMS_FILE}: {name}")
+    places = {key: f"{PARAMS_FILE}: {home}" for key, home in homes.items()}
+    return parse_section(model, values, where=f"{PARAMS_FILE}: {name}", homes=places)
 
 
 def _at(params: Mapping[str, Any], path: str) -> Any:

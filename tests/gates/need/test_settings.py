@@ -48,7 +48,7 @@ def test_the_ladder_s_baselines_and_latent_are_read_from_their_homes(ladder):
     ("change", "match"),
     [(lambda p: p.update(confidence=0.5), "confidence"),
      (lambda p: p.update(confidence=1.0), "confidence"),
-     (lambda p: p["stress"].update(samples=0), "redraws")],
+     (lambda p: p["stress"].update(samples=0), "params.yaml: stress.samples ")],
 )  # fmt: skip
 def test_a_setting_on_its_border_is_refused_and_one_inside_is_taken(ladder, change, match):
     evidence.write_params(
