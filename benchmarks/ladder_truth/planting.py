@@ -56,28 +56,53 @@ class Wrong:
     note: str = ""
 
 
-def all_of(*plants: Plant) -> Plant:
+@dataclass(frozen=True)
+class Several:
     """Several edits, in this order."""
 
-    def plant(workspace: Path) -> None:
-        for part in plants:
+    plants: tuple[Plant, ...]
+
+    def __call__(self, workspace: Path) -> None:
+        """Make them."""
+        for part in self.plants:
             part(workspace)
 
-    return plant
+
+@dataclass(frozen=True)
+class Patch:
+    """Replaces text that must be there exactly once in a file of the workspace's own code."""
+
+    file: str
+    changes: tuple[tuple[str, str], ...]
+
+    def text(self, root: Path) -> str:
+        """The file below `root`, patched; an assertion fails where a text is not there once."""
+        text = (root / self.file).read_text()
+        for old, new in self.changes:
+            assert text.count(old) == 1, f"{self.file}: {old!r} is there {text.count(old)} times"
+            text = text.replace(old, new)
+        return text
+
+    def __call__(self, workspace: Path) -> None:
+        """Patch it."""
+        (workspace / self.file).write_text(self.text(workspace))
+
+
+def all_of(*plants: Plant) -> Plant:
+    """Several edits, in this order."""
+    return Several(plants)
 
 
 def patched(file: str, *changes: tuple[str, str]) -> Plant:
     """Replace text that must be there exactly once in a file of the workspace's own code."""
+    return Patch(file, changes)
 
-    def plant(workspace: Path) -> None:
-        path = workspace / file
-        text = path.read_text()
-        for old, new in changes:
-            assert text.count(old) == 1, f"{file}: {old!r} is there {text.count(old)} times"
-            text = text.replace(old, new)
-        path.write_text(text)
 
-    return plant
+def patches_of(plant: Plant) -> list[Patch]:
+    """The patches of code in a plant."""
+    if isinstance(plant, Several):
+        return [patch for part in plant.plants for patch in patches_of(part)]
+    return [plant] if isinstance(plant, Patch) else []
 
 
 def document(file: str, change: Callable[[Any], Any]) -> Plant:

@@ -5,12 +5,11 @@ import math
 from gates.cause.answers import Answer, CauseName, Diagnosis, Named, Topic
 from gates.cause.limits import CauseLimits
 from gates.cause.numbers import Numbers
-from gates.cause.told import teller, told
+from gates.cause.told import HISTORY, SEQUENCE, UNRECORDED, teller, told
 from genpolicy.audit.rows import Stratum
 from genpolicy.audit.variable import EPISODE_VARIABLES, INSIDE
 
 DATA_VARIABLES = ("calibration_epoch",)
-HISTORY, SEQUENCE = "history", "recording_sequence"
 # Which variable to name when several explain the modes equally well, most concrete first; all
 # others (observed ones) come before the last three, which anything else may shine through.
 CONCRETE = (
@@ -119,13 +118,13 @@ def _said(row: Stratum) -> Diagnosis:
             f"after ({effect:.0%}): find out what was decided per session or in turns, record it, "
             "or draw it anew for every episode, then repeat the audit."
         )
-        return Diagnosis(CauseName.HIDDEN_STATE, "unrecorded", SEQUENCE, text)
+        return Diagnosis(CauseName.HIDDEN_STATE, UNRECORDED, SEQUENCE, text)
     if row.variable == HISTORY:
         text = (
             f"The past explains {effect:.0%} of the modes in {row.phase} ({row.detail}): record "
             "what was decided there, or lengthen the observation history, then repeat the audit."
         )
-        return Diagnosis(CauseName.HIDDEN_STATE, "unrecorded", HISTORY, text)
+        return Diagnosis(CauseName.HIDDEN_STATE, UNRECORDED, HISTORY, text)
     if row.observed:
         text = f"{share}, and the policy sees it: use the simple baselines."
         return Diagnosis(CauseName.UNIMODAL, row.variable, OBSERVED, text)

@@ -13,8 +13,8 @@ from genpolicy.audit.rows import Prediction
 
 QUESTION = "told_share"
 PREDICTED, UNDECIDED = "prediction", "undecided"
-# What no column says: the strata give it the same name and kind.
-UNRECORDED, PAST = "unrecorded", ("recording_sequence", "history")
+# What no column says; the strata give it the same name and kind.
+UNRECORDED, SEQUENCE, HISTORY = "unrecorded", "recording_sequence", "history"
 EPOCH = "calibration_epoch"
 # Which to name of several that tell nearly as much, most concrete first; others come before the
 # last two, which anything else shines through.
@@ -134,7 +134,7 @@ def _hidden(row: Prediction) -> Diagnosis:
         f"takes away {row.told:.0%} of the wrong guesses (at least {row.told_lower:.0%}). Observe "
         "it, standardise it, or draw it anew for every episode; then repeat the audit."
     )
-    if row.variable in PAST:
+    if row.variable in (SEQUENCE, HISTORY):
         return Diagnosis(CauseName.HIDDEN_STATE, UNRECORDED, row.variable, text)
     name = CauseName.DATA_DEFECT if row.variable == EPOCH else CauseName.HIDDEN_STATE
     return Diagnosis(name, row.variable, PREDICTED, text)

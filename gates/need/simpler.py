@@ -171,9 +171,10 @@ def latent_dependence_p(evidence: Evidence, settings: NeedSettings) -> Measured:
     found = []
     for entry in entries:
         ends = counted_interval(entry.exceeding, entry.permutations, confidence=settings.confidence)
-        same = entry.distance_correlation <= 0.0
-        found.append((same, ends[1], ends, entry))
-    same, upper, interval, worst = max(found, key=lambda item: item[:2])
+        shown = entry.same_everywhere and ends[1] > level
+        found.append((shown, ends[1], ends, entry))
+    # A style that is shown decides; then the test that is furthest from rejecting.
+    shown, upper, interval, worst = max(found, key=lambda item: item[:2])
     text = (
         f"{method} drawn by {worst.convention}: its latent moves chunks by "
         f"{1000.0 * worst.spread_m:.3g} mm, "
@@ -182,7 +183,7 @@ def latent_dependence_p(evidence: Evidence, settings: NeedSettings) -> Measured:
         f"{worst.distance_correlation:.3g}; p-value with the interval of "
         f"{worst.permutations} permutations"
     )
-    if upper > level and not same:
+    if upper > level and not shown:
         return Measured(None, interval, f"not decided, neither a strategy nor a style: {text}")
     return Measured(upper, interval, text)
 

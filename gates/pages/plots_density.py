@@ -54,9 +54,10 @@ PLOTS = (
         "Does the density know the modes that are drawn?",
         "A mark is one mode of a held-out situation: how many of the samples reach it, and how "
         "much denser its demonstrated chunk is than the mean of the situation's modes. Not "
-        "judged. Only heads that state a density have one: exact for the flow, of the "
-        "probability flow for the diffusion, blurred by its least noise, so that the two are not "
-        "compared by height. A density is no share: a narrow mode is dense and may be rare. "
+        "judged. Only heads that state a density have one, of the exact equation, where "
+        "the samples are those of the few steps that are deployed; the diffusion's is blurred by "
+        "its least noise, so that the two are not compared by height. A density is no share: a "
+        "narrow mode is dense and may be rare. "
         "With two modes, a density that knows nothing agrees in half of the situations.",
         DENSITY,
         _densities,

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from genpolicy.audit.choices import Choices
+from genpolicy.audit.choices import LEAST_SHARE, Choices
 from genpolicy.audit.data import Array, AuditInput
 from genpolicy.audit.history import centred_ranks, past_features, present_features, shortest_gap
 from genpolicy.audit.modes import Clustering
@@ -85,6 +85,11 @@ def seen_before(
         present[at[new]] = centred_ranks(now, one)[new] / len(rows)
         share[at[new]] = np.bincount(choices.mode[at], minlength=share.shape[1]) / len(at)
         missing[at] = False
+    # As in `choices`: so rare a mode is a slip of the linking, and would weigh as much as twenty.
+    share[share < LEAST_SHARE] = 0.0
+    chose = share[np.arange(n), choices.mode] > 0.0
+    missing |= ~chose | (np.count_nonzero(share, axis=1) < 2)
     known = ~missing
-    part = Choices(choices.episode[known], choices.mode[known], share[known])
+    share = share[known] / share[known].sum(axis=1, keepdims=True)
+    part = Choices(choices.episode[known], choices.mode[known], share)
     return Before(part, past[known], present[known], int(np.count_nonzero(reached)))

@@ -195,8 +195,12 @@ def _stratum(
 
 
 def _told(row: Prediction, rng: np.random.Generator) -> float:
-    """What a variable tells, drawn from the normal distribution of its interval."""
-    wide = (row.told_upper - row.told_lower) / (2 * TWO_SIDED_90)
+    """What a variable tells, drawn from the normal distribution of its interval.
+
+    Of the past the upper end may be that of another estimate, so the nearer end is taken twice.
+    """
+    wide = min(row.told_upper - row.told, row.told - row.told_lower) / TWO_SIDED_90
+    wide = max(0.0, wide)
     return row.told + wide * float(rng.normal())
 
 

@@ -1,8 +1,10 @@
 """What the virtual clock owes: no candidate is judged before its time, and each further one costs.
 
 An invocation states how long it takes, and each check of another candidate what that takes. An
-answer that is judged sooner, or after fewer checks than candidates, would be faster on paper than
-any policy is. Invocations that state no time (the shadow evaluation has no clock) are not asked.
+answer that is judged sooner than stated, or after fewer checks than candidates, would be faster on
+paper than any policy is. That the stated times are those of the latency model is not asked here.
+A session of a rollout (its labels name the start) has a clock, and states every time; one of the
+shadow evaluation has none, and there nothing is asked.
 """
 
 from collections.abc import Iterator
@@ -13,6 +15,8 @@ from genpolicy.verification.journal_source import Message
 Finding = tuple[str, str]
 ROUNDING_NS = 1_000
 """Sums of seconds are rounded to nanoseconds of a tick."""
+TIMED = "start_sha256"
+"""The label of a session that runs on the virtual clock."""
 
 
 @dataclass
@@ -23,6 +27,7 @@ class _Invocation:
     cost_s: float
     checks: int = 0
     judged: int = 0
+    answered: bool = False
 
     def due_ns(self) -> float:
         return self.begun_ns + self.cost_s * 1e9 - ROUNDING_NS
@@ -33,33 +38,57 @@ class Invocations:
 
     def __init__(self) -> None:
         self._of: dict[str, _Invocation] = {}
+        self._timed = False
 
     def follow(self, kind: str, m: Message) -> Iterator[Finding]:
         """Take an event in; yields what it could not have cost so little."""
-        if kind == "invocation" and m["stage"] == "begin" and m["detail"] != "":
+        if kind == "session":
+            self._timed = TIMED in m["labels"]
+        elif not self._timed:
+            return
+        elif kind == "invocation":
+            yield from self._invocation(m)
+        elif kind == "candidate":
+            yield from self._candidate(m)
+        elif kind == "enqueue" and m["source"] == "policy":
+            own = self._of.get(m["chunk_id"])
+            if own is None or own.judged == 0:
+                yield "clock.unknown", f"{m['chunk_id']!r} comes, and nothing of it was judged."
+            else:
+                yield from self._early(repr(m["chunk_id"]), own, m)
+
+    def _invocation(self, m: Message) -> Iterator[Finding]:
+        own = self._of.get(m["id"])
+        if m["stage"] == "begin":
+            if own is not None:
+                yield "clock.begin", f"Invocation {m['id']!r} begins again."
+                return
             own = self._of[m["id"]] = _Invocation(m["t"], float(m["detail"]))
             if not own.cost_s > 0.0:
                 yield "clock.latency", f"Invocation {m['id']!r} takes {own.cost_s} s."
-        elif kind == "invocation" and m["stage"] == "check":
-            if m["id"] not in self._of:
-                yield "clock.check", f"A candidate of {m['id']!r} is checked before it began."
-                return
-            own = self._of[m["id"]]
+        elif own is None:
+            yield "clock.unknown", f"Invocation {m['id']!r} has a {m['stage']} and no begin."
+        elif m["stage"] == "check":
             cost_s = float(m["detail"])
             if not cost_s > 0.0:
                 yield "clock.check", f"The check of a candidate of {m['id']!r} takes {cost_s} s."
             own.checks, own.cost_s = own.checks + 1, own.cost_s + cost_s
-        elif kind == "candidate" and m["chunk_id"] in self._of:
-            own = self._of[m["chunk_id"]]
-            which = f"Candidate {m['index']} of {m['chunk_id']!r}"
-            if m["index"] != own.judged:
-                yield "clock.order", f"{which} is judged, {own.judged} were judged before it."
-            if m["index"] != own.checks:
-                yield "clock.check", f"{which} is judged after {own.checks} further checks."
-            own.judged += 1
-            yield from self._early(which, own, m)
-        elif kind == "enqueue" and m["chunk_id"] in self._of:
-            yield from self._early(repr(m["chunk_id"]), self._of[m["chunk_id"]], m)
+        else:
+            own.answered |= m["detail"] == "answered"
+
+    def _candidate(self, m: Message) -> Iterator[Finding]:
+        which, own = f"Candidate {m['index']} of {m['chunk_id']!r}", self._of.get(m["chunk_id"])
+        if own is None:
+            yield "clock.unknown", f"{which} is judged, and its invocation never began."
+            return
+        if own.answered:
+            yield "clock.order", f"{which} is judged after the answer."
+        if m["index"] != own.judged:
+            yield "clock.order", f"{which} is judged, {own.judged} were judged before it."
+        if m["index"] != own.checks:
+            yield "clock.check", f"{which} is judged after {own.checks} further checks."
+        own.judged += 1
+        yield from self._early(which, own, m)
 
     @staticmethod
     def _early(which: str, own: _Invocation, m: Message) -> Iterator[Finding]:

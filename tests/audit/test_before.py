@@ -7,6 +7,7 @@ from planar import SETTINGS
 
 from benchmarks.audit.plan import Plan
 from benchmarks.audit.recorder import record
+from genpolicy.audit import before
 from genpolicy.audit.before import STILL_TOGETHER, seen_before
 from genpolicy.audit.choices import choices
 from genpolicy.audit.data import canonical
@@ -82,3 +83,21 @@ def test_how_frequent_a_mode_is_is_read_where_the_past_is_asked():
 
     assert shift(everywhere) > 0.15
     assert shift(part.share) < 0.5 * shift(everywhere)
+
+
+def test_a_slip_of_the_linking_does_not_weigh_as_much_as_twenty(monkeypatch):
+    """One of a crowd that is of another mode where it is asked had no choice: it is left out."""
+    data, settings, items, who = chosen(stride=4)
+    late = [item for item in items if observed_gap(data, settings, *item) < STILL_TOGETHER]
+    gap = shortest_gap(settings)
+    crowd = max(
+        late, key=lambda item: np.sum(item[0].members - data.first_row[item[0].members] >= gap)
+    )
+    members = np.unique(data.episode[crowd[0].members])
+    one = int(seen_before(data, settings, [crowd], who).choices.episode[0])
+    mode = np.where(who.episode == one, 1, np.where(np.isin(who.episode, members), 0, who.mode))
+    lonely = replace(who, mode=mode)
+    asked = seen_before(data, settings, [crowd], lonely).choices
+    assert one in asked.episode and asked.weight.max() > 10.0
+    monkeypatch.setattr(before, "LEAST_SHARE", 0.1)
+    assert len(seen_before(data, settings, [crowd], lonely).choices.episode) == 0

@@ -1214,7 +1214,7 @@ def mutant(layer: str, name: str) -> dict[str, Any]:
     """A check whose absence was noticed."""
     row = {"check": name, "layer": layer, "detected": True, "violations": 3}
     if layer == "execution":
-        return row | {"rules": ["P1.age"], "violations_unchanged": 0}
+        return row | {"rules": ["P1.age"], "violations_unchanged": 0, "slipped": 0}
     return row | {"fixture": name, "behind": [], "tried": 3, "not_applicable": ""}
 
 

@@ -175,7 +175,7 @@ WORSE = {
         ),
         "latent_dependence_p": _document(
             BASE + "latent.json",
-            lambda s: lambda d: d[0].update(distance_correlation=0.0, exceeding=int(999 * s)),
+            lambda s: lambda d: d[0].update(condition_share=0.0, exceeding=int(999 * s)),
         ),
         "factors_isolated": _document(
             "train_factors/variants.json",

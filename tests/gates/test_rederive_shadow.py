@@ -35,6 +35,7 @@ LAYERS_TRIED = [
 EXECUTION_TRIED = ExecutionMutant(
     check="expired", layer=EXECUTION, detected=True, violations=2, rules=["P1"],
     violations_unchanged=0,
+    slipped=0,
 )  # fmt: skip
 
 

@@ -8,7 +8,8 @@ from benchmarks.ladder_truth.__main__ import chosen, try_one
 from benchmarks.ladder_truth.catalogue import WRONGS
 from benchmarks.ladder_truth.honest import HONEST
 from benchmarks.ladder_truth.outcome import Expected, Seen, Stop, count, look
-from benchmarks.ladder_truth.planting import Wrong, silently
+from benchmarks.ladder_truth.planting import Wrong, patches_of, silently
+from benchmarks.ladder_truth.workspace import ROOT
 
 BIT = silently("artifacts/ingest/frames.parquet")
 AT_A = Expected("A", refusal=r"sha256 of artifacts/ingest/frames\.parquet")
@@ -33,6 +34,14 @@ def test_a_plant_that_cannot_be_made_is_broken_and_counts_as_nothing(tmp_path: P
     result = try_one(wrong, tmp_path / "no such base", tmp_path / "copy")
     assert result["count"] == "broken"
     assert "no such base" in str(result["fault"])
+
+
+@pytest.mark.parametrize("wrong", WRONGS, ids=lambda wrong: wrong.name)
+def test_every_patch_of_the_catalogue_still_fits_the_code_and_leaves_python(wrong: Wrong) -> None:
+    for patch in patches_of(wrong.plant):
+        text = patch.text(ROOT)
+        if patch.file.endswith(".py"):
+            compile(text, patch.file, "exec")
 
 
 STOPS = {

@@ -5,16 +5,19 @@ import pytest
 from genpolicy.verification.invocations import Invocations
 
 MS = 1_000_000
+SESSION = ("session", {"t": 0, "labels": {"start_sha256": "ab"}})
 BEGIN = ("invocation", {"t": 100 * MS, "id": "a", "stage": "begin", "detail": "0.06"})
 CHECK = ("invocation", {"t": 200 * MS, "id": "a", "stage": "check", "detail": "0.03"})
 FIRST = ("candidate", {"t": 200 * MS, "chunk_id": "a", "index": 0})
 SECOND = ("candidate", {"t": 200 * MS, "chunk_id": "a", "index": 1})
-QUEUED = ("enqueue", {"t": 200 * MS, "chunk_id": "a"})
+QUEUED = ("enqueue", {"t": 200 * MS, "chunk_id": "a", "source": "policy"})
+ANSWERED = ("invocation", {"t": 200 * MS, "id": "a", "stage": "end", "detail": "answered"})
 
 
-def rules(*events):
+def rules(*events, session=SESSION):
     seen = Invocations()
-    return [rule for kind, message in events for rule, _ in seen.follow(kind, message)]
+    told = (session, *events)
+    return [rule for kind, message in told for rule, _ in seen.follow(kind, message)]
 
 
 def changed(event, **to):
@@ -31,11 +34,16 @@ def test_an_answer_in_its_time_is_right():
     ("events", "rule"),
     [
         ((BEGIN, changed(FIRST, t=159 * MS)), "clock.early"),
-        ((BEGIN, changed(QUEUED, t=159 * MS)), "clock.early"),
+        ((BEGIN, FIRST, changed(QUEUED, t=159 * MS)), "clock.early"),
         ((BEGIN, FIRST, CHECK, changed(SECOND, t=189 * MS)), "clock.early"),
         ((BEGIN, FIRST, SECOND), "clock.check"),
         ((BEGIN, CHECK, FIRST), "clock.check"),
-        ((CHECK,), "clock.check"),
+        ((CHECK,), "clock.unknown"),
+        ((FIRST,), "clock.unknown"),
+        ((QUEUED,), "clock.unknown"),
+        ((BEGIN, QUEUED), "clock.unknown"),
+        ((BEGIN, changed(BEGIN, detail="1e-12"), FIRST), "clock.begin"),
+        ((BEGIN, FIRST, ANSWERED, CHECK, SECOND), "clock.order"),
         ((BEGIN, FIRST, changed(CHECK, detail="0.0"), SECOND), "clock.check"),
         ((BEGIN, FIRST, changed(CHECK, detail="nan"), SECOND), "clock.check"),
         ((changed(BEGIN, detail="0.0"),), "clock.latency"),
@@ -53,10 +61,18 @@ def test_a_sum_of_seconds_may_round_by_less_than_a_microsecond():
     assert rules(BEGIN, changed(FIRST, t=160 * MS - 1_100)) == ["clock.early"]
 
 
-def test_without_a_stated_time_nothing_is_owed():
+def test_a_session_without_a_clock_owes_nothing_and_one_with_a_clock_states_every_time():
+    shadow = ("session", {"t": 0, "labels": {"fixture": "held_out"}})
     silent = changed(BEGIN, detail="")
-    assert rules(silent, changed(FIRST, t=0), changed(QUEUED, t=0)) == []
-    assert rules(changed(FIRST, t=0), changed(QUEUED, t=0)) == []
+    assert rules(silent, changed(FIRST, t=0), changed(QUEUED, t=0), session=shadow) == []
+    with pytest.raises(ValueError, match="could not convert"):
+        rules(silent)
+
+
+def test_an_answer_that_comes_behind_the_deadline_is_right_and_a_fallback_owes_nothing():
+    late = changed(ANSWERED, detail="deadline")
+    assert rules(BEGIN, late, FIRST, ANSWERED, QUEUED) == []
+    assert rules(changed(QUEUED, source="fallback", t=0)) == []
 
 
 def test_what_is_unreadable_is_no_number_of_seconds():

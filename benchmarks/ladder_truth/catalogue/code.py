@@ -84,8 +84,8 @@ WRONGS = (
           "The candidates begin from other states than the baselines.",
           "small",
           patched("genpolicy/evidence/stress/matched.py",
-                  ("Rollout(fixture, task.start_from_json(text), index,",
-                   "Rollout(fixture, task.sample_start(stream(len(shard.judged.name), index)),"
+                  ("Rollout(setup, task.start_from_json(text), index,",
+                   "Rollout(setup, task.sample_start(stream(len(shard.judged.name), index)),"
                    " index,")),
           Expected(D, ("unmatched_starts",))),
     Wrong("rollouts_are_called_success", "code",

@@ -5,7 +5,9 @@ what the writers leave against these classes, to the byte.
 """
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import Field
 
 from genpolicy.documents.document import Count, Document
 
@@ -73,6 +75,9 @@ class TrainedConfig:
     weights_sha256: str
 
 
+Positive = Annotated[int, Field(ge=1)]
+
+
 @dataclass(frozen=True)
 class Distilled:
     """What stands behind a distilled checkpoint, and what both trainings took.
@@ -87,9 +92,9 @@ class Distilled:
 
     teacher: str
     teacher_sha256: str
-    updates: Count
-    evaluations: Count
-    gradients: Count
+    updates: Positive
+    evaluations: Positive
+    gradients: Positive
 
 
 @dataclass(frozen=True)

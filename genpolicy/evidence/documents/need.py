@@ -4,6 +4,11 @@ from dataclasses import dataclass
 
 from genpolicy.documents.document import Count, Document
 
+ROUNDING = 1e-4
+"""Deviations that differ by less than this share of their size differ by rounding."""
+SMALLEST_SPREAD_M = 1e-6
+"""A latent that moves no chunk by a micrometre changes nothing."""
+
 
 @dataclass(frozen=True)
 class Dependence:
@@ -24,6 +29,12 @@ class Dependence:
     distance_correlation: float
     exceeding: Count
     permutations: Count
+
+    @property
+    def same_everywhere(self) -> bool:
+        """Whether what the latent changes is the same in every situation, or is nothing."""
+        differs = self.condition_share >= ROUNDING**2 and self.spread_m >= SMALLEST_SPREAD_M
+        return not differs
 
 
 @dataclass(frozen=True)

@@ -68,10 +68,13 @@ class ExecutionMutant:
     Attributes:
         check: The check.
         layer: `EXECUTION`.
-        detected: Whether the mutant was found and the unchanged executor was clean.
+        detected: Whether the mutant was found, the unchanged executor was clean, and nothing
+            slipped.
         violations: Of the mutant.
         rules: Rules that it broke.
         violations_unchanged: Of the unchanged executor.
+        slipped: Actions that were accepted where executor or stub alone was blind to the check,
+            beyond those that pass both; 0 where only one of them asks it.
     """
 
     check: str
@@ -80,6 +83,7 @@ class ExecutionMutant:
     violations: Count
     rules: list[str]
     violations_unchanged: Count
+    slipped: Count
 
 
 def _kind(row: Any) -> str:

@@ -11,17 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.contract.action import POSITION
-from genpolicy.evidence.documents.need import Dependence
+from genpolicy.evidence.documents.need import ROUNDING, SMALLEST_SPREAD_M, Dependence
 from genpolicy.evidence.need.held_out import HeldOut
 from genpolicy.policies.policy import NetworkPolicy, NoiseName
 from genpolicy.seeds import stream
 
 Array = NDArray[np.float64]
 
-# Deviations that differ by less than this share of their size differ by rounding.
-ROUNDING = 1e-4
-# A latent that moves no chunk by a micrometre changes nothing.
-SMALLEST_SPREAD_M = 1e-6
 SHARED_NOISE: NoiseName = ("latent",)
 
 

@@ -2,8 +2,10 @@
 
 Each scenario is played twice: with the whole table, and then the checker must find nothing; with
 the tuple minus one row in executor, stub and supervisor alike, and then it must find something.
-That is the evidence that the checker is awake, and that each check is needed. The chunks are
-imitations, so both tables are without `issued`, but where that row itself is taken away.
+That is the evidence that the checker is awake, and that each check is needed. What executor and
+stub both ask is played twice more, with one of them blind: the other alone must let no more
+actions through, or the second look is none. The chunks are imitations, so both tables are without
+`issued`, but where that row itself is taken away.
 """
 
 import tempfile
@@ -13,7 +15,7 @@ from typing import Any, cast
 
 from genpolicy.evidence.documents.shadow import EXECUTION, ExecutionMutant
 from genpolicy.evidence.shadow.rig import IMITATED, Rig, passing_verdict
-from genpolicy.execution.checks import CHECKS, Checks, without
+from genpolicy.execution.checks import CHECKS, Check, Checks, Place, without
 from genpolicy.execution.journal import write_journal
 from genpolicy.execution.moment import POLICY
 from genpolicy.verification.checker import check_journal
@@ -34,24 +36,47 @@ def run_mutants() -> list[ExecutionMutant]:
         table = IMITATED if check in IMITATED else CHECKS
         unchanged = play(check.name, table)
         mutant = play(check.name, without(table, check.name))
+        slipped = slipped_by(check, table)
         found = ExecutionMutant(
             check=check.name,
             layer=EXECUTION,
-            detected=bool(mutant) and not unchanged,
+            detected=bool(mutant) and not unchanged and not slipped,
             violations=len(mutant),
             rules=sorted({violation.rule for violation in mutant}),
             violations_unchanged=len(unchanged),
+            slipped=slipped,
         )
         results.append(found)
     return results
 
 
-def play(check: str, checks: Checks) -> list[Violation]:
-    """Violations that the checker finds in the scenario of `check`, declarations aside."""
-    rig = Rig(checks=checks, session=check)
+def slipped_by(check: Check, table: Checks) -> int:
+    """Actions that one of the two lets through where the other is blind to a check of both.
+
+    Beyond those that pass both; 0 for a check that one of them asks alone.
+    """
+    if Place.STUB not in check.places or not check.places - {Place.STUB, Place.LAYER}:
+        return 0
+    blind = without(table, check.name)
+    by_both = _played(check.name, table).stub.accepted
+    alone = (
+        _played(check.name, blind, stub_checks=table),
+        _played(check.name, table, stub_checks=blind),
+    )
+    return sum(max(0, rig.stub.accepted - by_both) for rig in alone)
+
+
+def _played(check: str, checks: Checks, *, stub_checks: Checks | None = None) -> Rig:
+    rig = Rig(checks=checks, stub_checks=stub_checks, session=check)
     SCENARIOS[check](rig)
     if check != "end_of_episode":
         rig.executor.end_episode(rig.now_s)
+    return rig
+
+
+def play(check: str, checks: Checks) -> list[Violation]:
+    """Violations that the checker finds in the scenario of `check`, declarations aside."""
+    rig = _played(check, checks)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "journal.mcap"
         write_journal(path, [rig.journal])

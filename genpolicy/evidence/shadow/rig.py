@@ -119,6 +119,7 @@ class Rig:
 
     Args:
         checks: The table of executor, stub and supervisor; the whole one takes no imitation.
+        stub_checks: That of the stub, where it is another.
         execution_horizon: Actions of a chunk that may be executed.
         session: Name of the session.
         changes: Of the settings of execution.
@@ -128,6 +129,7 @@ class Rig:
         self,
         *,
         checks: Checks = IMITATED,
+        stub_checks: Checks | None = None,
         session: str = "rig",
         execution_horizon: int = HORIZONS.execution_horizon,
         **changes: Any,
@@ -135,7 +137,8 @@ class Rig:
         self.journal = Journal(session)
         self.cell = rig_cell(execution_horizon=execution_horizon, **changes)
         self.supervisor = Supervisor(self.cell.execution, self.journal, checks=checks)
-        self.stub = ControllerStub(self.cell, self.journal, self.supervisor, checks=checks)
+        own = checks if stub_checks is None else stub_checks
+        self.stub = ControllerStub(self.cell, self.journal, self.supervisor, checks=own)
         self.executor = Executor(self.cell, self.journal, self.stub, checks=checks)
         self.now_ns = 0
         self.phase, self.epoch = "approach", "epoch-1"

@@ -1,8 +1,14 @@
 """Each row of the table, taken away, must turn the independent checker red; else it is silent."""
 
-from genpolicy.evidence.shadow.mutants import SCENARIOS, play, run_mutants
+from dataclasses import replace
+
+import pytest
+
+from genpolicy.evidence.shadow.mutants import SCENARIOS, play, run_mutants, slipped_by
 from genpolicy.evidence.shadow.rig import IMITATED, Rig
-from genpolicy.execution.checks import CHECKS, missing, without
+from genpolicy.execution.checks import CHECKS, Place, missing, without
+from genpolicy.execution.executor import Executor
+from genpolicy.execution.stub import ControllerStub
 from genpolicy.verification.checker import check_messages
 from genpolicy.verification.report import CheckReport
 
@@ -14,6 +20,28 @@ def test_every_check_has_a_scenario_and_every_mutant_is_detected():
     assert len(set(names)) == len(names)
     assert [result.check for result in results if not result.detected] == []
     assert all(result.violations_unchanged == 0 for result in results)
+    assert all(result.slipped == 0 for result in results)
+
+
+def test_executor_and_stub_each_keep_out_alone_what_both_ask():
+    """What one of the two does not see, the other alone must refuse, exactly once."""
+    twice = [c for c in CHECKS if c.places >= {Place.STUB} and c.places - {Place.STUB, Place.LAYER}]
+    assert len(twice) > 20
+    assert [check.name for check in twice if slipped_by(check, IMITATED)] == []
+
+
+@pytest.mark.parametrize("blind", [ControllerStub, Executor])
+@pytest.mark.parametrize(("fact", "check"), [("stopped", "stopped"), ("phase", "phase_transition")])
+def test_a_look_that_is_none_is_found(monkeypatch, blind, fact, check):
+    """With the stop taken from the stub's view, the executor still holds, and nothing else saw it:
+    all gates passed."""
+    honest, seen = blind._present, {"stopped": False, "phase": "insert"}
+    monkeypatch.setattr(blind, "_present", lambda self: replace(honest(self), **{fact: seen[fact]}))
+    (row,) = (check_ for check_ in CHECKS if check_.name == check)
+    table = IMITATED
+    assert slipped_by(row, table) > 0
+    found = {result.check: result for result in run_mutants()}[check]
+    assert found.slipped > 0 and not found.detected
 
 
 def test_the_rule_that_breaks_is_the_one_that_the_check_guards():

@@ -241,10 +241,18 @@ def test_a_test_that_does_not_reject_shows_no_style(ladder):
         evidence.edit_document(ladder, path, lambda d, n=exceeding: [{**d[0], "exceeding": n}])
         assert found(ladder, "latent_dependence_p").verdict == verdict, exceeding
     assert "neither a strategy nor a style" in found(ladder, "latent_dependence_p").caveat
-    style = {"distance_correlation": 0.0, "exceeding": 999}
+    style = {"condition_share": 0.9e-8, "distance_correlation": 0.0, "exceeding": 999}
     evidence.edit_document(ladder, path, lambda d: [{**d[0], "exceeding": 300}, {**d[0], **style}])
     criterion = found(ladder, "latent_dependence_p")
     assert criterion.verdict == "FAIL" and criterion.measured == 1.0
+    still = {**style, "condition_share": 0.4, "spread_m": 0.9e-6}
+    evidence.edit_document(ladder, path, lambda d: [{**d[0], **still}])
+    assert found(ladder, "latent_dependence_p").verdict == "FAIL"
+    # A p that rejects does not cover one that does not, in whichever row it stands.
+    rejects = {"condition_share": 0.0, "exceeding": 0}
+    open_ = {"condition_share": 0.4, "spread_m": 0.03, "exceeding": 300}
+    evidence.edit_document(ladder, path, lambda d: [{**d[0], **rejects}, {**d[0], **open_}])
+    assert found(ladder, "latent_dependence_p").verdict == "INCONCLUSIVE"
 
 
 def test_of_several_tests_of_a_latent_the_one_with_the_highest_upper_end_decides(ladder):
