@@ -12,6 +12,7 @@ from typing import Any
 
 from gates.proof import Rung
 from gates.rederive_dataset import rederive_dataset
+from gates.rederive_latency import rederive_latency
 from gates.rederive_shadow import SHADOW, TaskSection, rederive_shadow
 from gates.report import Gate
 from gates.settings import PARAMS_FILE, read_params, section_of
@@ -80,7 +81,8 @@ def rederive(root: Path, gate: Gate) -> None:
 
     Raises:
         RefusedError: A row, the envelope or a finding of the checker is not what the journals say,
-            or a power, a mutant, a statistic or a split is not what is computed again.
+            a stated latency is not what the measured times give, or a power, a mutant, a
+            statistic or a split is not what is computed again.
         IntegrityError: A journal or a table is missing or no regular file.
         BadInputError: A journal or a table cannot be read.
     """
@@ -95,6 +97,7 @@ def rederive(root: Path, gate: Gate) -> None:
         rederive_shadow(root, params)
     else:
         _tables(root, params, journals)
+        rederive_latency(root, params, journals)
         _envelope(root, params)
         _power(root, params)
 

@@ -16,6 +16,7 @@ from genpolicy.evidence.reproducibility.latency import (
 )
 from genpolicy.evidence.reproducibility.load import candidates_rows
 from genpolicy.evidence.rows.reproducibility import CandidatesRow, LatencyModelRow, LatencyRow
+from genpolicy.evidence.stress.latency import LatencySection
 from genpolicy.evidence.stress.settings import StressSettings
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import output_folder
@@ -23,7 +24,6 @@ from genpolicy.integrity.rows import write_rows
 from genpolicy.policies.matched_training import PolicySettings
 from genpolicy.seeds import stream
 from stages._contracts import require_one_contract
-from stages._latency import LatencySection
 from stages._stage import ARTIFACTS, Params, main
 from stages._training import MethodsSection
 

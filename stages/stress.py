@@ -7,6 +7,7 @@ from genpolicy.candidates.judged import compared
 from genpolicy.evidence.documents.stress import POWER
 from genpolicy.evidence.reproducibility.latency import latency_models
 from genpolicy.evidence.rows.reproducibility import LatencyRow
+from genpolicy.evidence.stress.latency import LatencySection
 from genpolicy.evidence.stress.matched import Comparison, matched_starts
 from genpolicy.evidence.stress.settings import StressSettings
 from genpolicy.evidence.stress.tables import (
@@ -21,7 +22,6 @@ from genpolicy.integrity.rows import read_columns
 from genpolicy.policies.matched_training import PolicySettings
 from genpolicy.tasks.api import load_task
 from stages._contracts import require_one_contract
-from stages._latency import LatencySection
 from stages._stage import ARTIFACTS, Params, main
 from stages._training import MethodsSection
 

@@ -1,7 +1,7 @@
 """Journals are a second witness: what they do not say is refused, whoever recorded it."""
 
 import json
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import pytest
@@ -11,8 +11,10 @@ from gates import rederive as module
 from gates.proof import Rung
 from gates.rederive import STRESS, rederive, rederived
 from genpolicy.contract.horizons import HorizonConfig
-from genpolicy.errors import BadInputError, ConfigError, RefusedError
+from genpolicy.contract.latency import MEASURED_TERMS
+from genpolicy.errors import BadInputError, ConfigError, IntegrityError, RefusedError
 from genpolicy.evidence.documents import shadow, stress
+from genpolicy.evidence.rows.reproducibility import LatencyRow
 from genpolicy.evidence.rows.stress import (
     AgeRow,
     ConservationRow,
@@ -38,6 +40,16 @@ from genpolicy.verification.rollouts import derived_rollouts
 from genpolicy.verification.tables import derived_tables
 
 PARAMS = yaml.safe_load((Path(__file__).parents[2] / "params.yaml").read_text())
+DECLARED = PARAMS["latency"]["declared"]
+DECLARED |= {term: [0.001, 0.001] for term in DECLARED}
+LATENCY = [
+    LatencyRow(method, 1, 1, str(term), "model", how, 1, seconds, "measured")
+    for method in ("flow", "bc")
+    for how, seconds in (("cold", 0.005), ("warm", 0.002))
+    for term in MEASURED_TERMS
+]
+FIRST_S = 0.031
+"""Six declared terms, five measured ones, and the five of a cold call 3 ms longer each."""
 NAMES = ("flow__nominal", "bc__nominal", "flow__envelope")
 POWER = canonical_json(
     stress.POWER.plain(power_document(
@@ -70,7 +82,7 @@ def _session(name: str, start: int) -> Journal:
         now_s = tick * horizons.action_period_s
         executor.observe(now_s, now_s, "approach", "epoch_1", 0.0)
         executor.tick(now_s)
-    executor.begin_invocation(0.2, "one", repr(0.031))
+    executor.begin_invocation(0.2, "one", repr(FIRST_S))
     executor.end_invocation(0.2, "one", "deadline")
     for force_n in (3.0, 7.5, 2.0):
         journal.add("force", journal.clock(0.2), {"force_n": force_n})
@@ -84,6 +96,8 @@ def _session(name: str, start: int) -> Journal:
 def root(tmp_path):
     """Stress evidence of two methods on two starts, as its journals tell it."""
     (tmp_path / "params.yaml").write_text(yaml.safe_dump(PARAMS))
+    (tmp_path / "artifacts" / "latency").mkdir(parents=True)
+    write_rows(tmp_path / "artifacts" / "latency" / "latency.parquet", LatencyRow, LATENCY)
     folder = tmp_path / STRESS
     (folder / "journals").mkdir(parents=True)
     expected, _ = module._held_to(PARAMS)
@@ -119,7 +133,7 @@ def test_true_evidence_stands(root):
     (row, *_) = read_table(root / STRESS / "rollouts.parquet").to_pylist()
     assert (row["force_peak_n"], row["outcome"], row["ticks"]) == (7.5, "collision", 4)
     assert (row["invocations"], row["deadline_misses"]) == (1, 1)
-    assert row["latency_p95_s"] == 0.031
+    assert row["latency_p95_s"] == FIRST_S
 
 
 FORGED = {
@@ -301,3 +315,31 @@ def test_power_is_that_of_the_registered_candidates_and_seed(root):
     (root / "params.yaml").write_text(yaml.safe_dump(params))
     with pytest.raises(ConfigError, match=r"samplers is a list, expected a mapping"):
         rederive(root, "D")
+
+
+def test_a_clock_that_was_faster_on_paper_is_refused(root):
+    """The journals and every table agree: only the measured times speak against them."""
+    path = root / "artifacts" / "latency" / "latency.parquet"
+    slower = [replace(row, seconds=1.01 * row.seconds) for row in LATENCY]
+    write_rows(path, LatencyRow, slower)
+    said = r"bc__nominal\.mcap is invocation 'one' states 0\.031 s, 0\.03125 s by the measured"
+    with pytest.raises(RefusedError, match=said):
+        rederive(root, "D")
+    write_rows(path, LatencyRow, [row for row in LATENCY if row.method == "flow"])
+    with pytest.raises(RefusedError, match="nan s by the measured times"):
+        rederive(root, "D")
+    path.unlink()
+    with pytest.raises(IntegrityError, match="latency"):
+        rederive(root, "D")
+
+
+def test_declared_times_and_planned_perturbations_are_held_too(root):
+    for section, key, value in (
+        ("latency", "declared", DECLARED | {"network": [0.002, 0.002]}),
+        ("stress", "perturbations", PARAMS["stress"]["perturbations"]
+         | {"nominal": {"kind": "camera_delay", "probability": 1.0, "magnitude_s": 0.08}}),
+    ):  # fmt: skip
+        params = PARAMS | {section: PARAMS[section] | {key: value}}
+        (root / "params.yaml").write_text(yaml.safe_dump(params))
+        with pytest.raises(RefusedError, match=r"states 0\.031 s"):
+            rederive(root, "D")

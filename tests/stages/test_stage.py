@@ -8,7 +8,7 @@ import pytest
 import yaml
 
 from genpolicy.errors import ContractError, RefusedError
-from stages._latency import LatencySection
+from genpolicy.evidence.stress.latency import LatencySection
 from stages._stage import SHARED, STAGES, load_params, main
 
 BAD_SETTINGS = {

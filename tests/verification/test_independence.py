@@ -11,6 +11,7 @@ ROOT = Path(genpolicy.__file__).parent
 CHECKER = sorted(path.stem for path in (ROOT / "verification").glob("*.py"))
 ALLOWED = (
     "genpolicy.contract", "genpolicy.errors", "genpolicy.integrity", "genpolicy.verification",
+    "genpolicy.seeds",
 )  # fmt: skip
 FORBIDDEN = (
     "torch", "genpolicy.policies", "socket", "serial", "asyncio", "http", "urllib", "rclpy",

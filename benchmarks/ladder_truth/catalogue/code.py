@@ -80,6 +80,13 @@ WRONGS = (
                    "            early_s = self._setup.horizons.action_period_s\n"
                    "            if flying.arrival_s <= now_s + early_s and not flying.dropped:")),
           Expected("D", ("checker_violations", "refusal"))),
+    Wrong("latencies_a_tenth_shorter", "code",
+          "The virtual clock draws every measured time a tenth shorter than it was.",
+          "small",
+          patched("genpolicy/evidence/stress/latency.py",
+                  ("            value = compute_factor * empirical_quantile(",
+                   "            value = 0.9 * compute_factor * empirical_quantile(")),
+          Expected(D, refusal=r"by the measured times")),
     Wrong("starts_differ_between_methods", "code",
           "The candidates begin from other states than the baselines.",
           "small",

@@ -11,11 +11,14 @@ long again, so that a policy whose candidates are refused answers later.
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from genpolicy.contract.latency import DECLARED_TERMS, MEASURED_TERMS, Term
+from genpolicy.contract.settings import Settings
 from genpolicy.errors import ConfigError, ContractError
 from genpolicy.seeds import stream
 
@@ -45,6 +48,25 @@ class DeclaredTerm:
                 expected="least and most of a duration, s: 0 <= least <= most, finite",
                 action="Correct the bounds; an unknown term is not zero.",
             )
+
+
+class LatencySection(Settings):
+    """Section `latency`.
+
+    Attributes:
+        warm: Warm invocations of each process.
+        cold: Cold invocations of each process.
+        declared: Least and most of each term that this machine cannot measure, s.
+    """
+
+    warm: int = Field(ge=20)
+    cold: int = Field(ge=2)
+    declared: dict[str, Annotated[list[float], Field(min_length=2, max_length=2)]]
+
+    @property
+    def declared_terms(self) -> dict[str, DeclaredTerm]:
+        """Bounds of the terms that this machine cannot measure."""
+        return {name: DeclaredTerm(bounds[0], bounds[1]) for name, bounds in self.declared.items()}
 
 
 @dataclass(frozen=True)

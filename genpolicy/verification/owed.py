@@ -1,0 +1,187 @@
+"""How long each invocation of a rollout had to take, drawn again from what was measured.
+
+Journals state a time for every invocation and for every further check of a candidate. Here the
+same times are drawn again, in other words than the virtual clock's: from the rows of the latency
+evidence, the declared bounds and the planned perturbations, by the named streams of the root seed.
+A clock that is faster on paper than the policy was on the machine states other times.
+"""
+
+import math
+import statistics
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from genpolicy.seeds import stream
+from genpolicy.verification.journal_source import Message, read_messages
+
+ROUNDING_S = 1e-9
+CHECK = "project"
+"""The term that every further candidate costs once more."""
+FIRST = "sample"
+"""The term that pays for a cold start."""
+DELAYS = {"camera_delay": "capture", "queue_reorder": "queue", "network_jitter": "network"}
+"""Which term a perturbation of this kind adds its `magnitude_s` to; of the last a share of it."""
+
+Row = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Hit:
+    """What a perturbation does to one invocation.
+
+    Attributes:
+        term: The term that takes longer; empty for none.
+        more_s: By how much, s.
+        factor: How many times as long every measured term takes.
+        lost: Its answer never comes.
+    """
+
+    term: str = ""
+    more_s: float = 0.0
+    factor: float = 1.0
+    lost: bool = False
+
+
+class Times:
+    """What latencies are drawn from.
+
+    Args:
+        rows: Rows of `latency.parquet`.
+        declared: Least and most of each declared term, s.
+        perturbations: The planned ones, by name: `kind` and its fields.
+        root_seed: Root seed of the ladder.
+    """
+
+    def __init__(
+        self,
+        rows: Iterable[Row],
+        *,
+        declared: Mapping[str, tuple[float, float]],
+        perturbations: Mapping[str, Row],
+        root_seed: int,
+    ) -> None:
+        self._declared, self._planned, self._seed = declared, perturbations, root_seed
+        warm: dict[str, dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
+        whole: dict[tuple[str, str], dict[tuple[int, ...], float]] = defaultdict(dict)
+        for row in rows:
+            if row["source"] != "measured":
+                continue
+            method, how, seconds = row["method"], row["temperature"], row["seconds"]
+            if how == "warm":
+                warm[method][row["component"]].append(seconds)
+            which = (row["run"], row["process"], row["repeat"])
+            sums = whole[method, how]
+            sums[which] = sums.get(which, 0.0) + seconds
+        self._warm = {m: {t: sorted(v) for t, v in terms.items()} for m, terms in warm.items()}
+        self._start_s = {
+            method: _cold_start_s(whole[method, "cold"].values(), whole[method, "warm"].values())
+            for method in warm
+        }
+
+    def begins_with_s(self, method: str, condition: str, start: int, number: int) -> float:
+        """What invocation `number` takes to its first candidate, s; NaN of an unknown method."""
+        hit, terms = self.hit(condition, start, number), self._warm.get(method, {})
+        drawn_s = self._start_s.get(method, math.nan) if number == 0 else 0.0
+        for term, (least_s, most_s) in self._declared.items():
+            drawn_s += least_s + (most_s - least_s) * self._lot(condition, start, number, term)
+        for term, seconds in terms.items():
+            lot = self._lot(condition, start, number, term)
+            drawn_s += hit.factor * _at(seconds, lot)
+        return drawn_s + hit.more_s if terms else math.nan
+
+    def check_s(
+        self, method: str, condition: str, start: int, number: int, candidate: int
+    ) -> float:
+        """What the check of a further candidate takes, s; the first further one is 1."""
+        factor = self.hit(condition, start, number).factor
+        seconds = self._warm.get(method, {}).get(CHECK, [])
+        return factor * _at(seconds, self._lot(condition, start, number, CHECK, candidate))
+
+    def hit(self, condition: str, start: int, number: int) -> Hit:
+        """What the planned perturbation does to an invocation."""
+        planned = self._planned[condition]
+        kind = planned["kind"]
+        if kind not in (*DELAYS, "compute_contention", "chunk_drop"):
+            return Hit()
+        lots = stream(self._seed, "perturbation", condition, start, number).random(2)
+        if not lots[0] < planned["probability"]:
+            return Hit()
+        if kind == "compute_contention":
+            return Hit(factor=planned["factor"])
+        if kind == "chunk_drop":
+            return Hit(lost=True)
+        share = float(lots[1]) if kind == "network_jitter" else 1.0
+        return Hit(DELAYS[kind], share * planned["magnitude_s"])
+
+    def _lot(self, condition: str, start: int, number: int, *names: str | int) -> float:
+        return float(stream(self._seed, "latency", condition, start, number, *names).random())
+
+
+def _cold_start_s(cold_s: Iterable[float], warm_s: Iterable[float]) -> float:
+    """What the first call costs on top of a typical one; NaN where no first call was measured."""
+    worst_s = max(cold_s, default=math.nan)
+    more_s = worst_s - statistics.median(warm_s)
+    return 0.0 if more_s < 0.0 else more_s
+
+
+def _at(seconds: Sequence[float], lot: float) -> float:
+    """The measured time at a share of all, which is one of them; NaN where none was measured."""
+    return seconds[min(len(seconds) - 1, math.floor(lot * len(seconds)))] if seconds else math.nan
+
+
+@dataclass
+class _Session:
+    """One rollout while its events go by."""
+
+    method: str
+    condition: str
+    start: int
+    numbers: dict[str, int]
+    checks: dict[str, int]
+
+
+def stated_otherwise(path: Path, times: Times) -> Iterator[str]:
+    """What a journal of rollouts states that is not what was drawn again, in words.
+
+    Raises:
+        IntegrityError: No regular file.
+        BadInputError: Not a whole journal.
+        KeyError, TypeError, ValueError: An event that cannot be read.
+    """
+    sessions: dict[str, _Session] = {}
+    for kind, m in read_messages(path):
+        name = str(m.get("session"))
+        if kind == "session":
+            labels = m["labels"]
+            own = (str(labels["method"]), str(labels["perturbation"]), int(labels["start"]))
+            sessions[name] = _Session(*own, {}, {})
+        elif kind == "invocation":
+            yield from _stated(m, sessions[name], times)
+        elif kind == "candidate":
+            yield from _arrived(m, sessions[name], times)
+
+
+def _stated(m: Message, session: _Session, times: Times) -> Iterator[str]:
+    own = (session.method, session.condition, session.start)
+    which = f"invocation {m['id']!r}"
+    if m["stage"] == "begin":
+        number = session.numbers.setdefault(m["id"], len(session.numbers))
+        owed_s = times.begins_with_s(*own, number)
+    elif m["stage"] == "check":
+        number = session.numbers[m["id"]]
+        candidate = session.checks[m["id"]] = session.checks.get(m["id"], 0) + 1
+        which += f", candidate {candidate}"
+        owed_s = times.check_s(*own, number, candidate)
+    else:
+        return
+    if not abs(float(m["detail"]) - owed_s) <= ROUNDING_S:
+        yield f"{which} states {float(m['detail']):.9g} s, {owed_s:.9g} s by the measured times"
+
+
+def _arrived(m: Message, session: _Session, times: Times) -> Iterator[str]:
+    number = session.numbers[m["chunk_id"]]
+    if times.hit(session.condition, session.start, number).lost:
+        yield f"invocation {m['chunk_id']!r} is judged, and it was to be lost"
