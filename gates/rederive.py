@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from gates.proof import Rung
-from gates.rederive_dataset import rederive_dataset
+from gates.rederive_dataset import TRAININGS, rederive_dataset, rederive_trainings
 from gates.rederive_latency import rederive_latency
 from gates.rederive_shadow import SHADOW, TaskSection, rederive_shadow
 from gates.report import Gate
@@ -88,6 +88,8 @@ def rederive(root: Path, gate: Gate) -> None:
     """
     if gate == "A":
         rederive_dataset(root)
+    if gate in TRAININGS:
+        rederive_trainings(root, gate)
     if gate not in FOLDERS:
         return
     folder, pattern = FOLDERS[gate]

@@ -1,7 +1,8 @@
-"""The dataset derived again: its statistics and its splits, in words of this file alone.
+"""The dataset derived again: its statistics, its splits, and which of them was trained on.
 
-Ingest writes both and whoever reads a dataset checks both, by the same functions. A fault in those
-agrees with itself; here the tables are read as numbers, and nothing of `genpolicy.data` is asked.
+Ingest writes the first two and whoever reads a dataset checks them, by the same functions. A fault
+in those agrees with itself; here the tables are read as numbers, and nothing of `genpolicy.data` is
+asked. What a training was given, its windows say themselves.
 """
 
 from itertools import pairwise
@@ -12,6 +13,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
+from gates.report import Gate
 from gates.stated import compare_keys, mapping, refuse
 from genpolicy.integrity.documents import read_json
 from genpolicy.integrity.tables import read_table
@@ -19,6 +21,12 @@ from genpolicy.integrity.tables import read_table
 INGEST = "artifacts/ingest"
 MANIFEST = f"{INGEST}/manifest.json"
 IN_TIME = ("train", "validation", "test")
+TRAININGS: dict[Gate, tuple[str, ...]] = {
+    "A": ("artifacts/train_baselines", "artifacts/train_factors"),
+    "B": ("artifacts/train_generators",),
+}
+GIVEN = {"episodes": "train", "validation_episodes": "validation"}
+"""Which split the episodes of a key of `training.json` are of."""
 TIES_S = 1e-3
 """Recordings that began within it are of one time: the rule has nanoseconds, tables seconds."""
 
@@ -45,6 +53,30 @@ def rederive_dataset(root: Path) -> None:
         if not rows.any():
             refuse("A", place, "numbers", "none: no row is of the training split")
         compare_keys("A", place, mapping(stated.get(part)), _extremes(frames[part], rows), how)
+
+
+def rederive_trainings(root: Path, gate: Gate) -> None:
+    """Hold the episodes that every training of a gate was given against the splits.
+
+    Raises:
+        RefusedError: A training saw an episode of another split, or does not say what it saw.
+        IntegrityError: A table is missing or damaged.
+        BadInputError: A document cannot be read.
+    """
+    episodes = read_table(root / INGEST / "episodes.parquet")
+    pairs = zip(episodes["episode_uuid"].to_pylist(), episodes["split"].to_pylist(), strict=True)
+    split_of = dict(pairs)
+    folders = [root / folder for folder in TRAININGS[gate]]
+    for path in sorted(found for folder in folders for found in folder.rglob("training.json")):
+        document, place = mapping(read_json(path)), path.relative_to(root).as_posix()
+        for key, split in GIVEN.items():
+            given = document.get(key)
+            if not isinstance(given, list) or not given:
+                refuse(gate, f"{place}: {key}", "nothing", f"episodes of the {split} split")
+            other = [name for name in given if split_of.get(str(name)) != split]
+            if other:
+                found = f"{len(other)} episodes of no {split} split, among them {other[0]}"
+                refuse(gate, f"{place}: {key}", found, f"episodes of the {split} split alone")
 
 
 def _extremes(column: pa.ChunkedArray, rows: NDArray[np.bool_]) -> dict[str, list[float]]:

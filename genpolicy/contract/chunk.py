@@ -76,6 +76,13 @@ class ChunkMetadata:
     candidate_index: int
 
     def __post_init__(self) -> None:
+        if not self.well_typed:
+            raise ContractError(
+                where=f"metadata of chunk {self.chunk_id!r:.80}",
+                found=", ".join(f"{k} a {type(v).__name__}" for k, v in vars(self).items()),
+                expected="text for names, whole numbers for counts, s for times",
+                action="Reject the chunk and hold.",
+            )
         for name in (
             "condition_observation_event_time_s",
             "action_start_time_s",
@@ -97,6 +104,17 @@ class ChunkMetadata:
                 action="Reject the chunk and hold.",
             )
 
+    @property
+    def well_typed(self) -> bool:
+        """Every field is of its own plain type, so that it can be compared and written down."""
+        numbers = ("session_epoch", "candidate_index")
+        times = [name for name in self.__dataclass_fields__ if name.endswith("_s")]
+        kinds = dict.fromkeys(numbers, (int,)) | dict.fromkeys(times, (int, float))
+        return all(
+            isinstance(value, kinds.get(name, (str,))) and not isinstance(value, bool)
+            for name, value in vars(self).items()
+        )
+
 
 @dataclass(frozen=True)
 class Candidate:
@@ -111,7 +129,7 @@ class Candidate:
     actions: Array
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "actions", frozen_array(self.actions))
+        object.__setattr__(self, "actions", raw_actions(self.actions))
 
 
 @dataclass(frozen=True)
@@ -129,7 +147,7 @@ class Proposal:
     selected_by: str
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "actions", frozen_array(self.actions))
+        object.__setattr__(self, "actions", raw_actions(self.actions))
 
 
 @dataclass(frozen=True)
@@ -162,6 +180,20 @@ def frozen_array(values: Array) -> Array:
     copy = np.array(values, dtype=np.float64)
     copy.flags.writeable = False
     return copy
+
+
+def raw_actions(values: object) -> Array:
+    """A read-only float64 copy of what a policy answered, whatever it is.
+
+    What is no array of real numbers (text, bytes, objects, complex numbers, one number, rows of
+    unequal length) is an array without a row: the first layer rejects it, and nothing is raised.
+    """
+    try:
+        found = np.asarray(values)
+    except (TypeError, ValueError):
+        found = np.zeros((0, 0))
+    real = found.dtype.kind in "fiu" and found.ndim > 0
+    return frozen_array(found if real else np.zeros((0, 0)))
 
 
 def actions_sha256(actions: Array) -> str:

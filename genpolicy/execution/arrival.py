@@ -1,48 +1,47 @@
 """What claims to be an admitted chunk is read here; nothing is asked of what cannot be read."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from genpolicy.contract.action import ACTION_DIM
 from genpolicy.contract.chunk import ChunkMetadata, DiscardReason, actions_sha256
-from genpolicy.errors import GenpolicyError, IntegrityError
 from genpolicy.execution.checks import Checks, Place, refusal
 from genpolicy.execution.chunk_queue import ChunkQueue
-from genpolicy.execution.moment import Chunk, Moment, View
+from genpolicy.execution.issued import issued_by_feasibility
+from genpolicy.execution.moment import MODE_OF_SOURCE, Chunk, Moment, View
 from genpolicy.execution.nanoseconds import ChunkTimes
-from genpolicy.feasibility.admission import Admitted
+
+if TYPE_CHECKING:
+    from genpolicy.feasibility.admission import Admitted
 
 LAYER_COUNT = 6
 MALFORMED = "<malformed>"
 
 
-def issued_by_feasibility(chunk: object) -> bool:
-    """Whether the feasibility module made this very object, and its actions are unchanged."""
-    if type(chunk) is not Admitted:
-        return False
-    try:
-        chunk.verify()
-    except IntegrityError:
-        return False
-    return True
-
-
-def shape_of(admitted: Admitted) -> tuple[int, str]:
+def shape_of(admitted: "Admitted") -> tuple[int, str]:
     """Number of rows and name of whatever was delivered, malformed things included."""
-    actions = getattr(admitted, "actions", None)
-    metadata = getattr(admitted, "metadata", None)
-    rows = len(actions) if isinstance(actions, np.ndarray) and actions.ndim == 2 else 0
-    return rows, metadata.chunk_id if isinstance(metadata, ChunkMetadata) else MALFORMED
+    try:
+        actions, metadata = admitted.actions, admitted.metadata
+    except Exception:  # of whatever it is, reading it may raise anything
+        return 0, MALFORMED
+    rows = len(actions) if type(actions) is np.ndarray and actions.ndim == 2 else 0
+    named = type(metadata) is ChunkMetadata and type(metadata.chunk_id) is str
+    return rows, metadata.chunk_id if named else MALFORMED
 
 
-def read_chunk(admitted: Admitted, *, arrival: int, source: str) -> Chunk | None:
-    """What the table of checks asks about; None where shape, times or rows cannot be read."""
+def read_chunk(admitted: "Admitted", *, arrival: int, source: str) -> Chunk | None:
+    """What the table of checks asks about; None where shape, times, names or rows are not."""
+    if shape_of(admitted)[1] == MALFORMED or source not in MODE_OF_SOURCE:
+        return None
     try:
         times = ChunkTimes.of(admitted.metadata)
         actions, layers = admitted.actions, admitted.verdict.layers
         passed = len(layers) == LAYER_COUNT and all(layer.passed is True for layer in layers)
         first, last = admitted.verdict.rows
         shaped = actions.ndim == 2 and actions.shape[1] == ACTION_DIM and len(actions) > 0
-        if not (shaped and times.period_ns > 0 and 0 <= first < last <= len(actions)):
+        checked = 0 <= first < last <= len(actions)
+        if not (shaped and checked and times.period_ns > 0 and admitted.metadata.well_typed):
             return None
         return Chunk(
             metadata=admitted.metadata,
@@ -54,7 +53,7 @@ def read_chunk(admitted: Admitted, *, arrival: int, source: str) -> Chunk | None
             passed=passed and bool(np.isfinite(actions).all()),
             hashed=actions_sha256(actions) == admitted.actions_sha256,
         )
-    except (AttributeError, TypeError, ValueError, GenpolicyError):
+    except Exception:  # of whatever it is, reading it may raise anything
         return None
 
 
@@ -72,7 +71,7 @@ class Arrivals:
         self._names: set[str] = set()
 
     def arrive(
-        self, admitted: Admitted, now_ns: int, view: View, source: str
+        self, admitted: "Admitted", now_ns: int, view: View, source: str
     ) -> DiscardReason | None:
         """Enqueue a chunk of this source, or discard it and say why."""
         rows, name = shape_of(admitted)

@@ -33,6 +33,8 @@ class Place(StrEnum):
     """Of the next row, before each command: has its time gone by?"""
     DUE = "due"
     """Of the next row: is it the command of this moment?"""
+    NEXT = "next"
+    """Of the row that is: does it continue what was commanded?"""
     STUB = "stub"
     LAYER = "layer"
     """In the freshness layer of feasibility."""
@@ -58,6 +60,10 @@ class Check(NamedTuple):
 
 
 Checks = tuple[Check, ...]
+
+MOST_OF_A_PERIOD, LEAST_OF_A_PERIOD = 9, 10
+"""Two commands are nine tenths of a period apart or more: they were checked at a whole one, and
+what comes faster moves faster than anything that was checked. A tenth is left to a clock."""
 
 
 class Named(Protocol):
@@ -164,6 +170,12 @@ def _awake(m: Moment) -> bool:
     return m.last_accept_ns is None or m.watchdog_ns - (m.now_ns - m.last_accept_ns) >= 0
 
 
+def _not_at_once(m: Moment) -> bool:
+    if m.last_accept_ns is None:
+        return True
+    return LEAST_OF_A_PERIOD * (m.now_ns - m.last_accept_ns) >= m.view.period_ns * MOST_OF_A_PERIOD
+
+
 def _after(reason: DiscardReason) -> Callable[[Moment], bool]:
     def holds(m: Moment) -> bool:
         event = m.view.voidings.get(reason)
@@ -197,11 +209,11 @@ _LIVE = (Place.ARRIVAL, Place.QUEUE, Place.STUB)
 CHECKS: Checks = (
     _row("end_of_episode", lambda m: m.view.mode != ExecutorMode.ENDED,
          _R.END_OF_EPISODE, _P.DOOR, _P.QUEUE, _P.STUB),
-    _row("issued", lambda m: m.issued is True, _R.INFEASIBLE, _P.DOOR),
+    _row("issued", lambda m: m.issued is True, _R.INFEASIBLE, _P.DOOR, _P.STUB),
     _row("duplicate", lambda m: m.known is False, _R.DUPLICATE, _P.DOOR),
-    _row("infeasible", lambda m: m.chunk.passed, _R.INFEASIBLE, _P.ARRIVAL),
+    _row("infeasible", lambda m: m.chunk.passed, _R.INFEASIBLE, _P.ARRIVAL, _P.STUB),
     _row("period", lambda m: m.chunk.times.period_ns == m.view.period_ns,
-         _R.INFEASIBLE, _P.ARRIVAL),
+         _R.INFEASIBLE, _P.ARRIVAL, _P.STUB),
     _row("action_hash", lambda m: m.chunk.hashed, _R.INFEASIBLE, _P.ARRIVAL, _P.STUB),
     _row("same_action", lambda m: m.same_action is True, _R.INFEASIBLE, _P.STUB),
     _row("execution_horizon", _within_horizon, _R.INFEASIBLE, _P.ROWS, _P.STUB),
@@ -249,6 +261,8 @@ CHECKS: Checks = (
          _R.OUT_OF_ORDER, _P.DUE, _P.STUB),
     _row("sequence", lambda m: m.sequence is not None and m.sequence > m.last_sequence,
          _R.OUT_OF_ORDER, _P.STUB),
+    _row("seam", lambda m: m.follows is True, _R.BROKEN_PREDECESSOR, _P.NEXT, _P.STUB),
+    _row("pace", _not_at_once, _R.OUT_OF_ORDER, _P.DUE, _P.STUB),
     _row("watchdog", _awake, None, _P.SUPERVISOR),
 )  # fmt: skip
 """In the order in which they decide: the first row that does not hold names the reason."""

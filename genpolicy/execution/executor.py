@@ -5,8 +5,8 @@ window has passed are skipped, never caught up. The newest valid chunk replaces 
 ones from its start on. Whatever is doubtful is discarded with one reason, and the answer is hold.
 """
 
-import math
 from dataclasses import replace
+from numbers import Real
 
 from genpolicy.contract.chunk import ChunkMetadata, DiscardReason
 from genpolicy.execution.arrival import Arrivals
@@ -17,7 +17,7 @@ from genpolicy.execution.command import Command
 from genpolicy.execution.journal import Journal, session_payload
 from genpolicy.execution.ledger import Conservation
 from genpolicy.execution.moment import FALLBACK, POLICY, ExecutorMode, View
-from genpolicy.execution.nanoseconds import NEVER_NS, NS_PER_S, to_ns
+from genpolicy.execution.nanoseconds import NEVER_NS, ns_or_none
 from genpolicy.execution.stub import ControllerStub
 from genpolicy.feasibility.admission import Admitted
 
@@ -34,8 +34,6 @@ class Executor:
     Attributes:
         observations_ignored: Observations dropped as older than one already used, or from the
             future.
-        clock_faults: Calls with a time before an earlier one; they are treated as that earlier
-            time, and a tick among them holds.
         mode: Who commands.
     """
 
@@ -49,7 +47,7 @@ class Executor:
     ) -> None:
         self.cell = cell
         self.stub = stub
-        self.observations_ignored = self.clock_faults = 0
+        self.observations_ignored = 0
         self.mode = ExecutorMode.RUN
         self._journal = journal
         self._checks = checks
@@ -60,6 +58,11 @@ class Executor:
         self._sequence = 0
         self._stops_seen = 0
         self._begun = False
+
+    @property
+    def clock_faults(self) -> int:
+        """Times that were not believed, of all components; a tick with one of them holds."""
+        return self._journal.doubts
 
     # -- what the world says ------------------------------------------------------------------
 
@@ -81,7 +84,9 @@ class Executor:
             divergence_m: Distance of measured from commanded TCP, if known, m.
         """
         now_ns = self._begin(now_s)
-        event_ns = to_ns(event_time_s) if math.isfinite(event_time_s * NS_PER_S) else now_ns + 1
+        told_ns = ns_or_none(event_time_s)
+        event_ns = now_ns + 1 if told_ns is None else told_ns
+        phase, calibration_epoch = _word(phase), _word(calibration_epoch)
         ignored = self._view.ignores(event_ns, now_ns)
         payload = {
             "event_time_ns": event_ns, "phase": phase, "calibration_epoch": calibration_epoch,
@@ -91,6 +96,7 @@ class Executor:
         self.stub.note_observation(now_ns, event_ns, phase, calibration_epoch)
         if ignored:
             self.observations_ignored += 1
+            self._heed_divergence(now_ns, now_ns, divergence_m)
             return False
         before = self._view
         self._view = replace(
@@ -107,10 +113,20 @@ class Executor:
                 self._journal.add(kind, now_ns, {"event_time_ns": event_ns, "old": old, "new": new})
                 if before.newest_observation_ns is not None:
                     self._void(now_ns, reason, event_ns)
-        limit_m = self.cell.execution.maximum_divergence_m
-        if divergence_m is not None and not limit_m - divergence_m >= 0:
-            self._invalidate(now_ns, event_ns, DiscardReason.OBSERVATION_DIVERGENCE)
+        self._heed_divergence(now_ns, event_ns, divergence_m)
         return True
+
+    def _heed_divergence(self, now_ns: int, before_ns: int, divergence_m: float | None) -> None:
+        """Void what was conditioned before, where the arm is not where it was sent.
+
+        Asked of an observation that is not used as well: whatever is wrong with its time, the
+        distance was measured. What is no distance is too far.
+        """
+        limit_m = self.cell.execution.maximum_divergence_m
+        if divergence_m is None:
+            return
+        if not (isinstance(divergence_m, Real) and 0.0 <= divergence_m <= limit_m):
+            self._invalidate(now_ns, before_ns, DiscardReason.OBSERVATION_DIVERGENCE)
 
     def force_event(self, now_s: float) -> None:
         """A force event: everything conditioned before now is void."""
@@ -147,7 +163,7 @@ class Executor:
     def reset(self, now_s: float) -> None:
         """A new session begins: chunks, observations and invocations of the old one are void.
 
-        It clears no stop of the supervisor; a person does.
+        It clears no stop of the supervisor and takes no command from a person; a person does.
         """
         now_ns = self._begin(now_s)
         epoch = self._view.session_epoch + 1
@@ -157,14 +173,16 @@ class Executor:
         self._in_flight.clear()
         self._queue.forget()
         self.stub.note_reset(now_ns, epoch)
-        if self.mode is not ExecutorMode.ENDED:
+        if self.mode is ExecutorMode.FALLBACK:
             self._enter(now_ns, ExecutorMode.RUN)
 
     def intervene(self, now_s: float) -> None:
         """A person takes over: policy and fallback are discarded until `hand_back`."""
         now_ns = self._begin(now_s)
-        self._enter(now_ns, ExecutorMode.INTERVENTION)
-        self._drop(now_ns, DiscardReason.INTERVENTION)
+        if self.mode is not ExecutorMode.ENDED:
+            self._enter(now_ns, ExecutorMode.INTERVENTION)
+            self._queue.seam.forget()
+            self._drop(now_ns, DiscardReason.INTERVENTION)
 
     def hand_back(self, now_s: float) -> None:
         """The person hands back; chunks conditioned before now stay void."""
@@ -190,6 +208,8 @@ class Executor:
     def end_episode(self, now_s: float) -> Conservation:
         """Discard what is left, write the balances down and accept nothing more."""
         now_ns = self._begin(now_s)
+        if self.mode is ExecutorMode.ENDED:
+            return self.conservation()
         self._queue.drop(
             now_ns, replace(self._view, mode=ExecutorMode.ENDED), DiscardReason.END_OF_EPISODE
         )
@@ -254,10 +274,11 @@ class Executor:
 
     def tick(self, now_s: float) -> Command:
         """The command of this moment; also sweeps out what has become stale, before anything."""
-        faults = self.clock_faults
         now_ns = self._begin(now_s)
-        if self.clock_faults != faults:
-            return self._hold(now_ns, "clock_backwards")
+        if self._journal.doubt:
+            doubt = self._journal.doubt
+            stopped = self.stub.supervisor.stopped
+            return self._nothing(now_ns) if stopped else self._hold(now_ns, doubt)
         self.stub.poll(now_s)
         self._heed_supervisor(now_ns)
         view = self._present()
@@ -265,6 +286,10 @@ class Executor:
         chunk = self._queue.due(now_ns, view)
         if chunk is None:
             return self._nothing(now_ns)
+        broken = self._queue.continues(now_ns, chunk, view)
+        if broken is not None:
+            self._queue.close(now_ns, chunk, broken)
+            return self._hold(now_ns, str(broken))
         row, action = chunk.next_row, chunk.admitted.actions[chunk.next_row]
         self._sequence += 1
         reason = self.stub.offer(
@@ -281,9 +306,7 @@ class Executor:
     # -- inside -------------------------------------------------------------------------------
 
     def _begin(self, now_s: float) -> int:
-        """Now in ns, never before an earlier now; the first call opens the journal."""
-        if to_ns(now_s) < self._journal.latest_ns:
-            self.clock_faults += 1
+        """Now in ns, the newest time that is believed; the first call opens the journal."""
         now_ns = self._journal.clock(now_s)
         if not self._begun:
             self._begun = True
@@ -344,3 +367,8 @@ class Executor:
     def _hold(self, now_ns: int, reason: str) -> Command:
         self.stub.hold(now_ns, reason)
         return Command("hold", reason)
+
+
+def _word(value: object) -> str:
+    """A name of a phase or a calibration; what is none names nothing, and nothing is allowed."""
+    return value if isinstance(value, str) else ""

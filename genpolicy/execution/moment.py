@@ -144,6 +144,7 @@ class Moment:
         sequence: Number of the offer.
         last_sequence: Number of the offer accepted last.
         last_accept_ns: When an action was accepted last; None before the first.
+        follows: The way from the last command to this row is one that feasibility checked.
         watchdog_ns: Longest silence.
     """
 
@@ -165,6 +166,7 @@ class Moment:
     sequence: int | None = None
     last_sequence: int = -1
     last_accept_ns: int | None = None
+    follows: bool | None = None
     watchdog_ns: int = 0
 
     @property

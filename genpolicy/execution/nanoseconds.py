@@ -1,7 +1,7 @@
 """Time in whole nanoseconds: `n * 0.05` is no multiple of 0.05 in floating point, in ns it is."""
 
-import math
 from dataclasses import dataclass
+from numbers import Real
 
 from genpolicy.contract.chunk import ChunkMetadata
 from genpolicy.errors import NonFiniteError
@@ -10,18 +10,32 @@ NS_PER_S = 1_000_000_000
 NEVER_NS = -(1 << 62)
 
 
+def ns_or_none(time_s: object) -> int | None:
+    """Whole nanoseconds of a time in s; None of what is no time, whatever it is."""
+    if isinstance(time_s, bool) or not isinstance(time_s, Real):
+        return None
+    try:
+        scaled = float(time_s) * NS_PER_S
+    except OverflowError:
+        return None
+    return round(scaled) if abs(scaled) < -NEVER_NS else None
+
+
 def to_ns(time_s: float) -> int:
     """Whole nanoseconds of a time in s.
 
     Raises:
-        NonFiniteError: NaN, infinite, or too large to convert.
+        NonFiniteError: No number, NaN, infinite, or more than a century from the clock's zero.
     """
-    scaled = time_s * NS_PER_S
-    if not math.isfinite(scaled):
+    time_ns = ns_or_none(time_s)
+    if time_ns is None:
         raise NonFiniteError(
-            where="a time", found=repr(time_s), expected="finite, s", action="Hold; fix the clock."
+            where="a time",
+            found=f"{time_s!r:.40}",
+            expected="finite, s",
+            action="Hold; fix the clock.",
         )
-    return round(scaled)
+    return time_ns
 
 
 @dataclass(frozen=True, slots=True)

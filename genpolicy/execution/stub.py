@@ -8,7 +8,6 @@ independent checker (`genpolicy.verification`) imports nothing of this. A refusa
 is no controller behind it.
 """
 
-import hashlib
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -16,11 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.contract.chunk import DiscardReason
+from genpolicy.execution.arrival import read_chunk, shape_of
 from genpolicy.execution.cell import Cell
 from genpolicy.execution.checks import CHECKS, Checks, Place, refusal
+from genpolicy.execution.issued import issued_by_feasibility
 from genpolicy.execution.journal import Journal, encode_actions
-from genpolicy.execution.moment import Chunk, Moment, View
-from genpolicy.execution.nanoseconds import ChunkTimes
+from genpolicy.execution.moment import ExecutorMode, Moment, View
+from genpolicy.execution.seam import Seam, bytes_of
 from genpolicy.execution.supervisor import Supervisor
 
 if TYPE_CHECKING:
@@ -61,6 +62,7 @@ class ControllerStub:
         self._view = cell.first_view()
         self._last_due_ns: int | None = None
         self._last_sequence = -1
+        self._seam = Seam()
 
     def note_observation(
         self, now_ns: int, event_ns: int, phase: str, calibration_epoch: str
@@ -91,12 +93,15 @@ class ControllerStub:
 
     def note_mode(self, mode: str) -> None:
         """Who may command: run (the policy), fallback, intervention or ended (nobody)."""
+        if mode == ExecutorMode.INTERVENTION:
+            self._seam.forget()
         self._view = replace(self._view, mode=mode)
 
     def note_reset(self, now_ns: int, session_epoch: int) -> None:
         """A new session: nothing from before is accepted."""
         self._view = replace(self._view, session_epoch=session_epoch, newest_observation_ns=None)
         self._last_due_ns = None
+        self._seam.forget()
         self.void(DiscardReason.RESET, now_ns)
 
     def void(self, reason: DiscardReason, before_ns: int) -> None:
@@ -139,27 +144,31 @@ class ControllerStub:
             None when accepted.
         """
         self.arrivals += 1
-        about = self._read(admitted, source=source, arrival=arrival)
+        about = read_chunk(admitted, source=source, arrival=arrival)
+        place = {"arrival": arrival, "chunk_id": shape_of(admitted)[1], "row": row}
+        if about is None or type(row) is not int:
+            return self._refuse(now_ns, {**place, "row": -1}, DiscardReason.INFEASIBLE)
         moment = Moment(
             now_ns=now_ns,
             view=self._present(),
             about=about,
             row=row,
+            issued=issued_by_feasibility(admitted),
             same_action=_is_row(admitted, action, row),
+            follows=self._seam.follows(admitted, about.checked_rows[0], row),
             last_due_ns=self._last_due_ns,
+            last_accept_ns=self._seam.given_ns,
             sequence=sequence,
             last_sequence=self._last_sequence,
         )
         check = refusal(self.checks, Place.STUB, moment)
-        place = {"arrival": arrival, "chunk_id": about.metadata.chunk_id, "row": row}
         if check is not None:
-            self.invalid += check.reason is DiscardReason.INFEASIBLE
-            self.stale += check.reason is not DiscardReason.INFEASIBLE
-            self._journal.add("refuse", now_ns, {**place, "reason": str(check.reason)})
-            return check.reason
+            assert check.reason is not None, "a row that is asked here has a reason"
+            return self._refuse(now_ns, place, check.reason)
         self.accepted += 1
         self._last_sequence = sequence
         self._last_due_ns = moment.due_ns
+        self._seam.note(now_ns, admitted, row, action)
         self.supervisor.note_accepted(now_ns)
         payload = {**place, "sequence": sequence, "age_ns": now_ns - about.times.condition_ns}
         payload["action"] = encode_actions(action)
@@ -171,25 +180,17 @@ class ControllerStub:
         view = self._view.voided(DiscardReason.STOPPED, self.supervisor.resumed_ns)
         return replace(view, stopped=self.supervisor.stopped)
 
-    @staticmethod
-    def _read(admitted: "Admitted", *, source: str, arrival: int) -> Chunk:
-        """The offered chunk; whether it passed the layers was asked where it arrived."""
-        whole = np.ascontiguousarray(admitted.actions, dtype="<f8")
-        first, last = admitted.verdict.rows
-        return Chunk(
-            metadata=admitted.metadata,
-            times=ChunkTimes.of(admitted.metadata),
-            source=source,
-            arrival=arrival,
-            rows=len(whole),
-            checked_rows=(first, last),
-            hashed=hashlib.sha256(whole.tobytes()).hexdigest() == admitted.actions_sha256,
-        )
+    def _refuse(
+        self, now_ns: int, place: dict[str, object], reason: DiscardReason
+    ) -> DiscardReason:
+        self.invalid += reason is DiscardReason.INFEASIBLE
+        self.stale += reason is not DiscardReason.INFEASIBLE
+        self._journal.add("refuse", now_ns, {**place, "reason": str(reason)})
+        return reason
 
 
 def _is_row(admitted: "Admitted", action: Array, row: int) -> bool:
     """The action is that row of the chunk, bit for bit."""
     if not 0 <= row < len(admitted.actions):
         return False
-    own = np.ascontiguousarray(admitted.actions[row], dtype="<f8")
-    return np.asarray(action, dtype="<f8").tobytes() == own.tobytes()
+    return bytes_of(action) == bytes_of(admitted.actions[row])

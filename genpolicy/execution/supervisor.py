@@ -6,6 +6,9 @@ monitor carries the assurance, the learned function does not).
 """
 
 from enum import StrEnum
+from numbers import Real
+
+import numpy as np
 
 from genpolicy.errors import ContractError
 from genpolicy.execution.cell import ExecutionSettings
@@ -25,6 +28,8 @@ class SupervisorState(StrEnum):
 
 
 STOPPED = frozenset({SupervisorState.PROTECTIVE_STOP, SupervisorState.EMERGENCY_STOP})
+FLAGS = (bool, np.bool_)
+LONGEST_TEXT = 120
 
 
 class Supervisor:
@@ -56,7 +61,7 @@ class Supervisor:
         return self.state in STOPPED
 
     def observe_force(self, now_s: float, force_n: float, phase: str) -> bool:
-        """Force gate; trips a protective stop above the phase's limit, and on NaN.
+        """Force gate; trips a protective stop above the phase's limit, and on what is no force.
 
         Args:
             now_s: Time, s.
@@ -66,43 +71,47 @@ class Supervisor:
         Returns:
             Whether it tripped.
         """
-        margin_n = self.settings.force_limit_n.get(phase, 0.0) - force_n
-        if margin_n >= 0:
+        limits = self.settings.force_limit_n
+        limit_n = limits.get(phase, 0.0) if isinstance(phase, str) else 0.0
+        # A force is a size: one that is negative, unknown or no number was not measured.
+        if isinstance(force_n, Real) and 0.0 <= force_n <= limit_n:
             return False
-        self._stop(
-            self._journal.clock(now_s),
-            SupervisorState.PROTECTIVE_STOP,
-            "force",
-            f"{force_n!r} N {phase}",
-        )
+        detail = f"{_text(force_n)} N {_text(phase)}"
+        self._stop(self._journal.clock(now_s), SupervisorState.PROTECTIVE_STOP, "force", detail)
         return True
 
     def observe_collision(self, now_s: float, collision: bool) -> bool:
-        """Collision gate; trips a protective stop. Returns whether it tripped."""
-        if collision:
-            self._stop(self._journal.clock(now_s), SupervisorState.PROTECTIVE_STOP, "collision", "")
-        return collision
+        """Collision gate; trips a protective stop, unless told that there is none.
+
+        Returns:
+            Whether it tripped.
+        """
+        if type(collision) in FLAGS and not collision:
+            return False
+        self._stop(self._journal.clock(now_s), SupervisorState.PROTECTIVE_STOP, "collision", "")
+        return True
 
     def emergency_stop(self, now_s: float, detail: str = "") -> None:
         """E-stop, by a person or for any cause named in `detail`; from every state."""
-        self._stop(
-            self._journal.clock(now_s), SupervisorState.EMERGENCY_STOP, "emergency_stop", detail
-        )
+        now_ns = self._journal.clock(now_s)
+        self._stop(now_ns, SupervisorState.EMERGENCY_STOP, "emergency_stop", _text(detail))
 
     def human_reset(self, now_s: float, person: str) -> None:
         """Clear a stop; the only way back to RUN, and it needs a name.
 
+        A clock that is far ahead is believed from here on: a person has looked.
+
         Raises:
             ContractError: No person is named.
         """
-        if not person.strip():
+        if not isinstance(person, str) or not person.strip():
             raise ContractError(
                 where="supervisor reset",
                 found="a reset without a person",
                 expected="the name of the person who looked",
                 action="Nothing but a person may clear a stop.",
             )
-        now_ns = self._journal.clock(now_s)
+        now_ns = self._journal.believe(now_s)
         if self.stopped:
             self._last_accept_ns = None  # it stands still until the next accepted command
         self.state = SupervisorState.RUN
@@ -143,3 +152,11 @@ class Supervisor:
     def _record(self, now_ns: int, event: str, detail: str) -> None:
         payload = {"event": event, "state": str(self.state), "detail": detail}
         self._journal.add("supervisor", now_ns, payload)
+
+
+def _text(value: object) -> str:
+    """Whatever it is as a short text; what goes on record must not stand in the way of a stop."""
+    try:
+        return str(value)[:LONGEST_TEXT]
+    except Exception:
+        return "unreadable"

@@ -1,13 +1,15 @@
 """Admission: the only place where an `Admitted` chunk can come into being.
 
 `Admitted` is sealed. It has no public constructor, cannot be copied, pickled, subclassed or
-changed, and `verify` recognises one that was made behind the seal's back or whose actions differ
-from the hash that was taken when the six layers passed.
+changed, and `verify` recognises one that was made behind the seal's back or of which anything (its
+actions, what they rest on, the verdict, what they were checked against) differs from the hash that
+was taken when the six layers passed.
 """
 
+import hashlib
 import weakref
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, is_dataclass
 from typing import Any, NoReturn
 
 import numpy as np
@@ -22,6 +24,7 @@ from genpolicy.feasibility.verdict import Verdict
 Array = NDArray[np.float64]
 
 _SEAL = object()
+PLAIN = frozenset({float, int, str, bool, type(None)})
 
 
 @dataclass(frozen=True)
@@ -57,14 +60,16 @@ class Admitted:
         actions_sha256: Hash of the projected actions when they passed.
         verdict: The six layers.
         context: What it was checked against.
+        sealed: Hash of all of it when it passed.
     """
 
-    __slots__ = ("__weakref__", "actions_sha256", "context", "projected", "verdict")
+    __slots__ = ("__weakref__", "actions_sha256", "context", "projected", "sealed", "verdict")
 
     projected: Projected
     actions_sha256: str
     verdict: Verdict
     context: Context
+    sealed: bytes
 
     def __init__(
         self, *, projected: Projected, verdict: Verdict, context: Context, seal: object = None
@@ -78,6 +83,7 @@ class Admitted:
         put(self, "actions_sha256", actions_sha256(projected.actions))
         put(self, "verdict", verdict)
         put(self, "context", context)
+        put(self, "sealed", _seal_of(projected, verdict, context))
         _ISSUED.add(self)
 
     def __init_subclass__(cls, **kwargs: Any) -> NoReturn:
@@ -103,7 +109,7 @@ class Admitted:
         return self.projected.metadata
 
     def verify(self) -> None:
-        """Check that this object was issued here and that its actions are those that passed.
+        """Check that this object was issued here and that all of it is what passed.
 
         Raises:
             IntegrityError: It was not, or they are not.
@@ -122,6 +128,38 @@ class Admitted:
                 expected=f"sha256 {self.actions_sha256}",
                 action="Discard it and hold.",
             )
+        if _seal_of(self.projected, self.verdict, self.context) != self.sealed:
+            raise IntegrityError(
+                where=f"the admitted chunk {self.metadata.chunk_id}",
+                found="with other metadata, another verdict or another context than it passed with",
+                expected="the ones that were sealed with its actions",
+                action="Discard it and hold.",
+            )
+
+
+def _seal_of(*parts: object) -> bytes:
+    """Hash of everything below some dataclasses, numbers bit for bit; asked for every action."""
+    found: list[bytes] = []
+    open_parts: list[Any] = list(parts)
+    while open_parts:
+        part = open_parts.pop()
+        kind = type(part)
+        if kind in PLAIN:
+            found.append(repr(part).encode())
+        elif kind is np.ndarray:
+            found.append(f"{part.dtype.str}{part.shape}".encode() + part.tobytes())
+        elif kind is tuple or kind is list:
+            found.append(f"{len(part)} of".encode())
+            open_parts += part
+        elif isinstance(part, Mapping):
+            found.append(f"{len(part)} by".encode())
+            open_parts += [entry for key in sorted(part) for entry in (key, part[key])]
+        elif is_dataclass(part):
+            found.append(kind.__name__.encode())
+            open_parts += vars(part).values()
+        else:
+            found.append(repr(part).encode())
+    return hashlib.sha256(b"|".join(found)).digest()
 
 
 _ISSUED: "weakref.WeakSet[Admitted]" = weakref.WeakSet()

@@ -83,7 +83,7 @@ def fixture_rows(
 ) -> list[FixtureRow]:
     """Rows of `fixtures.parquet` for one checkpoint."""
     names = [("fixture", row) for row in range(len(observations))]
-    drawn = policy.sample(observations, noise_names=names, candidates=CANDIDATES)
+    drawn = policy.sample(observations, noise_names=names, candidates=CANDIDATES).finite()
     return [
         FixtureRow(
             method=method,

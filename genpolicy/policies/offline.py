@@ -65,7 +65,7 @@ def masked_errors(
             action="Pass the columns of the same windows.",
         )
     horizon = policy.prediction_horizon
-    sampled = policy.sample(windows.observations, noise_names=noise_names, candidates=1)
+    sampled = policy.sample(windows.observations, noise_names=noise_names, candidates=1).finite()
     predicted, target = sampled.actions[:, 0], windows.actions[:, :horizon]
     counts = ~windows.is_pad[:, :horizon]
     scale = normalisation.action

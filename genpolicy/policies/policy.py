@@ -46,6 +46,15 @@ class Samples:
     actions: Array
     nfe: int
 
+    def finite(self) -> "Samples":
+        """The same, for whoever computes with all of them: shares and distances know no NaN.
+
+        Raises:
+            NonFiniteError: A number of a chunk is NaN or infinite.
+        """
+        _check_finite(self.actions, "sampled chunks", "Look at the weights; the training diverged.")
+        return self
+
 
 class Policy(Protocol):
     """What every policy offers, learned or scripted."""
@@ -73,7 +82,11 @@ class Policy(Protocol):
     def sample(
         self, observations: Array, *, noise_names: Sequence[NoiseName], candidates: int
     ) -> Samples:
-        """Candidate chunks of physical observations (B, H_o, D_o), one noise name per row."""
+        """Candidate chunks of physical observations (B, H_o, D_o), one noise name per row.
+
+        A chunk that is not finite comes back as it is: the first layer of feasibility rejects it
+        alone, and the others are candidates as before.
+        """
 
 
 class NetworkPolicy:
@@ -140,7 +153,7 @@ class NetworkPolicy:
 
         Raises:
             ContractError: Wrong shape, wrong number of names, no candidate.
-            NonFiniteError: An observation or a sampled action is NaN or infinite.
+            NonFiniteError: An observation is NaN or infinite; a chunk may be, see `Policy.sample`.
             EvaluationCapError: A sample took more network evaluations than its sampler may.
         """
         if len(noise_names) != len(observations) or not candidates >= 1:
@@ -210,7 +223,6 @@ class NetworkPolicy:
                 evaluations.append(nfe)
         normalised = torch.cat(chunks).numpy().astype(np.float64)
         actions = self._normalisation.action.denormalise(normalised)
-        _check_finite(actions, f"chunks sampled by {self.method}", "Reject all of them and hold.")
         shape = (len(noise_names), candidates, *actions.shape[1:])
         return Samples(actions.reshape(shape), max(evaluations))
 

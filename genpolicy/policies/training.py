@@ -107,12 +107,20 @@ def train(
         "evaluated_weights": "exponential moving average",
         "windows": len(windows.observations),
         "validation_windows": len(validation.observations) if validation else 0,
+        "episodes": _episodes(windows),
+        "validation_episodes": _episodes(validation),
         "final": records[-1],
         "regime": regime(device),
     }
     files = TrainingFiles(records, summary, _validation_rows(followed, taken))
     _add_checkpoints(files, trained, request, objective, behind=distilled(teacher, request))
     return files.write(folder)
+
+
+def _episodes(windows: Windows | None) -> list[str]:
+    """Names of the episodes that windows were cut from, as the windows themselves say."""
+    names = None if windows is None else windows.episodes
+    return [] if names is None else sorted(set(names.tolist()))
 
 
 def _finished(

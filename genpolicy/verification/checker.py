@@ -114,6 +114,8 @@ class _Session:
         self.last_start_ns: int | None = None
         self.last_due_ns: int | None = None
         self.last_row: dict[int, int] = {}
+        self.last_command: tuple[int, int, str] | None = None
+        self.last_accept_ns: int | None = None
         self.unanswered_ns: int | None = None
 
     def flag(self, rule: str, sentence: str) -> None:
@@ -130,7 +132,8 @@ class _Session:
             self.flag("journal.time", f"Time goes back from {self.t} ns to {m['t']} ns.")
         self.t = m["t"]
         late_arrival = kind == "discard" and m.get("reason") == "end_of_episode"
-        if self.ended and not late_arrival:
+        # A stop is heard at any time.
+        if self.ended and not late_arrival and kind != "supervisor":
             self.flag("journal.after_end", f"A {kind} event follows the end of the session.")
         if (self.n == 0) != (kind == "session"):
             self.flag("journal.settings", f"Event {self.n} is {kind}; settings stand first, once.")
@@ -171,10 +174,17 @@ class _Session:
             if kind == "supervisor" and self.world.stopped:
                 self._answered(self.t)
                 self.unanswered_ns = None
-            if kind in ("reset", "mode") and self.proof is not None:
-                self.proof.forget(self.name)
-            if kind == "reset":
-                self.head = self.last_due_ns = self.last_start_ns = None
+            if kind in ("reset", "mode"):
+                self._interrupted(kind, m)
+
+    def _interrupted(self, kind: str, m: Message) -> None:
+        """Somebody else commands, or has: what was commanded last may not be where the arm is."""
+        if self.proof is not None:
+            self.proof.forget(self.name)
+        if kind == "reset" or "intervention" in (m["old"], m["new"]):
+            self.last_command = None
+        if kind == "reset":
+            self.head = self.last_due_ns = self.last_start_ns = None
 
     # P2: silence ------------------------------------------------------------------------------
 
@@ -212,6 +222,7 @@ class _Session:
         if m["age_ns"] != age_ns:
             self.flag("P1.age", f"The age is noted as {m['age_ns']} ns and is {age_ns} ns.")
         self._check_order(chunk, row, m)
+        self._check_seam(chunk, row, m)
         self._check_motion(chunk, row)
 
     def _check_motion(self, chunk: Message, row: int) -> None:
@@ -261,6 +272,21 @@ class _Session:
             self.flag("P5.newest", f"A newer chunk than {chunk['chunk_id']!r} has started.")
         self.last_row[arrival], self.last_sequence = row, m["sequence"]
         self.last_start_ns, self.last_due_ns = start_ns, due_ns
+
+    def _check_seam(self, chunk: Message, row: int, m: Message) -> None:
+        """From the last command on, every step is one that was checked, at the pace it was."""
+        last, motion = self.last_command, chunk["motion"]
+        if last is not None and last[0] == m["arrival"]:
+            if row != last[1] + 1:
+                self.flag("P5.seam", f"Row {row} follows row {last[1]}: nobody checked that step.")
+        elif row != chunk["checked_rows"][0]:
+            self.flag("P5.seam", f"Row {row} is not the first that was checked, and comes first.")
+        elif last is not None and motion is not None and motion["last_action"] != last[2]:
+            self.flag("P5.seam", f"{chunk['chunk_id']!r} was checked from another command.")
+        since_ns, period_ns = self.last_accept_ns, self.settings["period_ns"]
+        if since_ns is not None and 10 * (self.t - since_ns) < 9 * period_ns:
+            self.flag("P5.pace", f"Two actions are {self.t - since_ns} ns apart.")
+        self.last_command, self.last_accept_ns = (m["arrival"], row, m["action"]), self.t
 
     # P4 and the queue --------------------------------------------------------------------------
 

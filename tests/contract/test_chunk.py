@@ -12,6 +12,7 @@ from genpolicy.contract.chunk import (
     Proposal,
     actions_sha256,
     frozen_array,
+    raw_actions,
 )
 from genpolicy.errors import ContractError, NonFiniteError
 
@@ -76,3 +77,33 @@ def test_the_hash_of_actions_is_that_of_their_bytes():
     assert actions_sha256(np.array([1.0, 9.0, 2.0])[::2]) == expected
     assert actions_sha256(np.array([2.0, 1.0])) != expected
     assert frozen_array(np.array([1, 2])).dtype == np.float64
+
+
+@pytest.mark.parametrize(
+    "answer",
+    ["text", b"\x00" * 80, None, [[1.0], [1.0, 2.0]], 3.0, np.ones((4, 10), dtype=complex),
+     np.array([[None] * 10]), np.ones((4, 10), dtype=bool), object()],
+)  # fmt: skip
+def test_what_is_no_array_of_numbers_has_no_row_and_raises_nothing(answer):
+    assert Proposal(METADATA, answer, "first").actions.shape == (0, 0)
+
+
+@pytest.mark.parametrize("kind", [np.float32, np.int64, np.uint8])
+def test_real_numbers_are_kept_whatever_their_width_and_shape(kind):
+    for shape in ((4, 10), (10,), (1, 4, 10), (0, 10)):
+        kept = raw_actions(np.ones(shape, dtype=kind))
+        assert kept.dtype == np.float64 and kept.shape == shape and not kept.flags.writeable
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("chunk_id", 3), ("task_phase", None), ("method", b"flow"), ("session_epoch", 1.0),
+     ("session_epoch", True), ("session_epoch", np.zeros(2)), ("candidate_index", "0"),
+     ("valid_until_s", "2.0"), ("action_start_time_s", None)],
+)  # fmt: skip
+def test_metadata_of_another_kind_are_refused(name, value):
+    with pytest.raises(ContractError, match=r"metadata of chunk .*text for names.*hold"):
+        replace(METADATA, **{name: value})
+    made = replace(METADATA)
+    object.__setattr__(made, name, value)
+    assert METADATA.well_typed and not made.well_typed

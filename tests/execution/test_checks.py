@@ -28,7 +28,7 @@ VIEW = View(
 GOOD = Moment(
     now_ns=310 * MS, view=VIEW, about=CHUNK, row=2, known=False, issued=True, same_action=True,
     sequence=5, last_sequence=4, last_due_ns=250 * MS, watchdog_ns=100 * MS,
-    last_accept_ns=260 * MS,
+    last_accept_ns=260 * MS, follows=True,
     accepted_condition_ns=100 * MS, accepted_start_ns=200 * MS, queued_condition_ns=100 * MS,
     queued_start_ns=200 * MS, newer_start_ns=350 * MS,
 )  # fmt: skip
@@ -89,6 +89,8 @@ BAD = {
     "superseded": replace(GOOD, newer_start_ns=300 * MS),
     "out_of_order": replace(GOOD, last_due_ns=300 * MS),
     "sequence": replace(GOOD, last_sequence=5),
+    "seam": replace(GOOD, follows=False),
+    "pace": replace(GOOD, last_accept_ns=265 * MS + 1),
     "watchdog": replace(GOOD, last_accept_ns=210 * MS - 1),
 }
 
@@ -121,13 +123,14 @@ def test_at_the_limit_it_holds():
     assert failing(view(newest_observation_ns=100 * MS)) == set()
     assert failing(replace(GOOD, now_ns=350 * MS - 1, newer_start_ns=None)) == set()
     assert failing(replace(GOOD, last_accept_ns=210 * MS)) == set()
+    assert failing(replace(GOOD, last_accept_ns=265 * MS)) == set()  # nine tenths of a period
 
 
 def test_what_is_unknown_does_not_hold():
     unknown = Moment(now_ns=310 * MS, about=Chunk(METADATA, CHUNK.times), row=2)
     assert failing(unknown) >= {
         "issued", "duplicate", "infeasible", "action_hash", "same_action", "execution_horizon",
-        "checked_rows", "future_observation", "stale_observation", "sequence", "period",
+        "checked_rows", "future_observation", "stale_observation", "sequence", "period", "seam",
     }  # fmt: skip
 
 

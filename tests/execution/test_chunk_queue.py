@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from playing import begin, judged
 
 from genpolicy.contract.chunk import DiscardReason
-from genpolicy.evidence.shadow.rig import Rig, passing_verdict
+from genpolicy.evidence.shadow.rig import Rig, StandInContext, passing_verdict
 
 R = DiscardReason
 
@@ -26,7 +26,8 @@ def test_rows_are_due_in_their_half_open_window():
     for time_s, row in due.items():
         rig = Rig()
         rig.observe()
-        assert rig.deliver(rig.chunk(action_start_time_s=0.10)) is None
+        checked = passing_verdict(rows=(row or 0, 16))  # from the row that is due then
+        assert rig.deliver(rig.chunk(action_start_time_s=0.10, verdict=checked)) is None
         command = rig.executor.tick(time_s)
         assert command.action_index == (-1 if row is None else row), time_s
         if row is not None:
@@ -36,11 +37,33 @@ def test_rows_are_due_in_their_half_open_window():
 def test_a_late_chunk_skips_the_rows_whose_time_has_passed():
     rig = Rig()
     rig.observe()
-    chunk = rig.chunk()
+    chunk = rig.chunk(verdict=passing_verdict(rows=(3, 16)))
     rig.advance(0.15)
     assert rig.deliver(chunk) is None
     assert [c.action_index for c in rig.tick(6)] == [3, 4, 5, 6, 7, -1]
     assert rig.executor.conservation().actions.discarded["late"] == 3
+    judged(rig)
+
+
+def test_a_late_chunk_that_was_checked_from_its_first_row_moves_nothing():
+    """Its row of now was checked behind rows that nobody executed: the way there is a jump."""
+    rig = Rig()
+    rig.observe()
+    chunk = rig.chunk()
+    rig.advance(0.15)
+    assert rig.deliver(chunk) is None
+    assert {c.kind for c in rig.tick(6)} == {"hold"}
+    assert rig.executor.conservation().chunks.discarded == {"broken_predecessor": 1}
+    assert rig.stub.arrivals == 0
+    judged(rig)
+
+
+def test_after_a_pause_no_row_of_the_chunk_follows():
+    rig = Rig()
+    begin(rig)
+    rig.advance(0.05)
+    assert [c.reason for c in rig.tick(2)] == ["broken_predecessor", "empty"]
+    assert [c.kind for c in rig.run(3)] == ["action"] * 3  # a new one, checked from where it stands
     judged(rig)
 
 
@@ -58,7 +81,9 @@ def test_a_prefetched_chunk_takes_over_at_its_start():
     rig.deliver(rig.chunk())
     first = rig.tick(1)
     rig.observe()
-    assert rig.deliver(rig.chunk(action_start_time_s=0.15)) is None
+    # The command that will be the last one is known: row 2 of what is queued.
+    context = StandInContext(last_action=rig.actions(1)[2])
+    assert rig.deliver(rig.chunk(action_start_time_s=0.15, context=context)) is None
     rest = rig.tick(4)
     assert [c.chunk_id for c in first + rest] == ["chunk-1"] * 3 + ["chunk-2"] * 2
     assert [c.action_index for c in first + rest] == [0, 1, 2, 0, 1]
@@ -122,7 +147,26 @@ def test_an_action_due_no_later_than_the_last_one_waits():
     rig.observe()
     assert rig.deliver(rig.chunk(action_start_time_s=0.1)) is None
     assert rig.executor.tick(0.12).kind == "hold"
-    assert rig.executor.tick(0.15).action_index == 1
+    # Its row 1 would be next, and nobody checked the way there from row 2 of the first chunk.
+    assert rig.executor.tick(0.15).reason == "broken_predecessor"
+    judged(rig)
+
+
+def test_a_prefetched_chunk_that_was_checked_from_another_command_moves_nothing():
+    rig = Rig()
+    begin(rig, ticks=1)
+    rig.observe()
+    assert rig.deliver(rig.chunk(action_start_time_s=0.15)) is None  # from row 0, not row 2
+    assert [c.kind for c in rig.tick(4)] == ["action"] * 2 + ["hold"] * 2
+    judged(rig)
+
+
+def test_what_is_due_too_soon_waits_for_its_pace():
+    rig = Rig()
+    rig.observe()
+    rig.deliver(rig.chunk())
+    kinds = [rig.executor.tick(t).kind for t in (0.04, 0.05, 0.08499, 0.085, 0.12999, 0.13)]
+    assert kinds == ["action", "hold", "hold", "action", "hold", "action"]
     judged(rig)
 
 

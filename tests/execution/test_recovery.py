@@ -89,7 +89,7 @@ REACH = {
     S.RETREAT: lambda r: (r.trigger(0.0, "insert", "x"), r.advance(1.0)),
     S.CLASSICAL_RETURN: lambda r: (r.trigger(0.0, "approach", "x"), r.advance(1.0)),
     S.ASK_HUMAN: lambda r: (r.trigger(0.0, "release", "x"), r.advance(1.0)),
-    S.ABORT: lambda r: (r.trigger(0.0, "release", "x"), r.advance(1.0), r.advance(99.0)),
+    S.ABORT: lambda r: (r.trigger(0.0, "release", "x"), r.advance(1.0), r.advance(50.0)),
 }
 
 
@@ -99,7 +99,7 @@ def test_a_stop_is_reachable_from_every_state_and_sticky(recovery, state):
     assert recovery.state is state
     recovery.stop(100.0, "E-stop")
     recovery.trigger(101.0, "insert", "x")
-    recovery.advance(1000.0)
+    recovery.advance(150.0)
     assert recovery.state is S.STOPPED
     with pytest.raises(ContractError, match="without a person"):
         recovery.human_reset(1001.0, "")

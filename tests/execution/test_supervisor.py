@@ -4,6 +4,7 @@ import ast
 import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -14,6 +15,7 @@ from genpolicy.execution import supervisor as module
 from genpolicy.execution.journal import Journal
 from genpolicy.execution.nanoseconds import to_ns
 from genpolicy.execution.supervisor import Supervisor, SupervisorState
+from genpolicy.verification.checker import check_messages
 
 
 @pytest.fixture
@@ -24,7 +26,10 @@ def supervisor():
 @pytest.mark.parametrize("force_n, phase, trips", [
     (20.0, "approach", False), (math.nextafter(20.0, 30.0), "approach", True),
     (40.0, "insert", False), (41.0, "insert", True), (0.1, "unknown phase", True),
-    (math.nan, "insert", True), (math.inf, "insert", True),
+    (math.nan, "insert", True), (math.inf, "insert", True), (-1e-9, "insert", True),
+    (-math.inf, "insert", True), (None, "insert", True), ("5", "insert", True),
+    (1j, "insert", True), (0.0, "insert", False), (0, "insert", False),
+    (np.float32(1.0), "insert", False), (1.0, ["insert"], True), (1.0, None, True),
 ])  # fmt: skip
 def test_force_gate(supervisor, force_n, phase, trips):
     assert supervisor.observe_force(1.0, force_n, phase) is trips
@@ -133,3 +138,70 @@ def test_it_has_no_way_to_hear_a_score():
     assert not {name for name in names if "score" in name or "ood" in name or "clear" in name}
     words = {node.arg for node in ast.walk(tree) if isinstance(node, ast.arg)}
     assert not words & {"score", "confidence", "probability", "uncertainty"}
+
+
+class Unprintable:
+    def __str__(self):
+        raise ValueError("no text")
+
+
+NO_TIMES = (math.nan, math.inf, -math.inf, 1e300, None, 10**400, "now", 0.5, 99999.0)
+
+
+@pytest.mark.parametrize("now_s", NO_TIMES, ids=lambda t: repr(t)[:8])
+@pytest.mark.parametrize("stop", [
+    lambda s, now_s: s.emergency_stop(now_s),
+    lambda s, now_s: s.emergency_stop(now_s, Unprintable()),
+    lambda s, now_s: s.observe_force(now_s, 1e6, "approach"),
+    lambda s, now_s: s.observe_force(now_s, Unprintable(), Unprintable()),
+    lambda s, now_s: s.observe_collision(now_s, True),
+])  # fmt: skip
+def test_a_stop_needs_no_valid_argument(stop, now_s):
+    """With a time that is none each of them raised, and the next tick commanded an action."""
+    rig = Rig()
+    rig.now_ns = 1_000_000_000
+    rig.observe()
+    rig.deliver(rig.chunk())
+    assert rig.tick()[0].kind == "action"
+    stop(rig.supervisor, now_s)
+    assert rig.supervisor.stopped and rig.tick()[0].kind == "stop"
+    rig.end()
+
+
+@pytest.mark.parametrize("told", [None, math.nan, 0, "", [], np.True_, 1])
+def test_a_collision_that_is_not_surely_none_stops(supervisor, told):
+    assert supervisor.observe_collision(0.0, told) is True and supervisor.stopped
+
+
+def test_the_absence_of_a_collision_may_be_said_by_numpy(supervisor):
+    assert supervisor.observe_collision(0.0, np.False_) is False and not supervisor.stopped
+
+
+@pytest.mark.parametrize("person", ["", " ", None, 3])
+def test_nobody_clears_no_stop(supervisor, person):
+    supervisor.emergency_stop(0.0)
+    with pytest.raises(ContractError, match="without a person"):
+        supervisor.human_reset(0.1, person)
+    assert supervisor.stopped
+
+
+def test_a_person_who_looked_says_what_time_it_is():
+    rig = Rig()
+    rig.executor.tick(0.0)
+    for _ in range(3):  # the clock has jumped by an hour, and stays there
+        assert rig.executor.tick(3600.0).reason == "clock_ahead"
+    rig.supervisor.human_reset(3600.0, "spotter")
+    rig.now_ns = 3600 * 10**9
+    assert [c.kind for c in rig.run(3)] == ["action"] * 3
+
+
+def test_a_stop_after_the_end_is_heard_and_is_no_fault_of_the_journal():
+    rig = Rig()
+    rig.executor.end_episode(0.0)
+    rig.supervisor.emergency_stop(0.1)
+    assert rig.supervisor.stopped
+    report = check_messages(
+        (e.kind, {"session": e.session, "n": e.n, "t": e.t, **e.payload})
+        for e in rig.journal.events()
+    )
+    assert {violation.rule for violation in report.violations} == {"settings.checks"}

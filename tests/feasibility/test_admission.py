@@ -109,3 +109,34 @@ def test_every_candidate_has_one_verdict_and_one_reason(checker, kit):
         passed = [layer.passed for layer in result.verdict.layers]
         failed = passed.index(False) if False in passed else 6
         assert passed == [True] * failed + [False] * (failed < 6) + [None] * (5 - failed)
+
+
+def relabelled(admitted, **changes):
+    """The genuine object, with other metadata put below its actions."""
+    proposal = dataclasses.replace(
+        admitted.projected.proposal, metadata=dataclasses.replace(admitted.metadata, **changes)
+    )
+    return {"projected": dataclasses.replace(admitted.projected, proposal=proposal)}
+
+
+@pytest.mark.parametrize("bent", [
+    lambda a: relabelled(a, valid_until_s=99.0),
+    lambda a: relabelled(a, chunk_id="other"),
+    lambda a: relabelled(a, session_epoch=7),
+    lambda a: {"verdict": dataclasses.replace(a.verdict, rows=(0, 99))},
+    lambda a: {"verdict": dataclasses.replace(a.verdict, margins={})},
+    lambda a: {"context": dataclasses.replace(a.context, q_meas=a.context.q_meas + 1e-9)},
+    lambda a: {"context": dataclasses.replace(a.context, last_action=a.context.last_action + 1)},
+    lambda a: {"context": dataclasses.replace(a.context, now_s=11.0)},
+])  # fmt: skip
+def test_a_genuine_chunk_with_other_papers_is_recognised(admitted, bent):
+    for name, value in bent(admitted).items():
+        object.__setattr__(admitted, name, value)
+    with pytest.raises(IntegrityError, match="with other metadata, another verdict or another"):
+        admitted.verify()
+
+
+def test_papers_that_say_the_same_are_the_same(admitted):
+    for name, value in relabelled(admitted).items():
+        object.__setattr__(admitted, name, value)
+    admitted.verify()

@@ -1,5 +1,7 @@
 """A fault that writer and reader of a dataset share is seen by a third who counts for himself."""
 
+import json
+
 import evidence
 import numpy as np
 import pandas as pd
@@ -7,7 +9,7 @@ import pytest
 
 from gates.proof import Rung
 from gates.rederive import rederived
-from gates.rederive_dataset import rederive_dataset
+from gates.rederive_dataset import rederive_dataset, rederive_trainings
 from genpolicy.errors import BadInputError, RefusedError
 
 FRAMES = "artifacts/ingest/frames.parquet"
@@ -87,3 +89,44 @@ def test_gate_a_is_refused_where_its_dataset_is(dataset):
     assert rederived(dataset, [rung])[0].verdict == "PASS"
     evidence.edit_document(dataset, "ingest/manifest.json", lambda d: {"schema_version": 1})
     assert rederived(dataset, [rung])[0].verdict == "REFUSED"
+
+
+def _training(root, folder, **changes):
+    """What a training says that it was given, true but for the changes."""
+    table = pd.read_parquet(root / "artifacts/ingest/episodes.parquet")
+    own = {split: table["episode_uuid"][table["split"] == split].tolist()
+           for split in ("train", "validation", "test")}  # fmt: skip
+    given = {"episodes": own["train"], "validation_episodes": own["validation"]}
+    path = root / "artifacts" / folder / "a" / "seed_0" / "training.json"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    wrong = {key: own[value] if str(value) in own else value for key, value in changes.items()}
+    path.write_text(json.dumps(given | wrong))
+    return own
+
+
+@pytest.mark.parametrize(
+    ("gate", "folder"),
+    [("A", "train_baselines"), ("A", "train_factors"), ("B", "train_generators")],
+)
+def test_a_training_that_saw_another_split_is_refused(dataset, gate, folder):
+    _training(dataset, folder)
+    rederive_trainings(dataset, gate)
+    own = _training(dataset, folder, episodes="validation")
+    first = own["validation"][0]
+    said = rf"training\.json: episodes is \d+ episodes of no train split, among them {first}"
+    with pytest.raises(RefusedError, match=said):
+        rederive_trainings(dataset, gate)
+    _training(dataset, folder, validation_episodes="test")
+    with pytest.raises(RefusedError, match=r"validation_episodes is .* of no validation split"):
+        rederive_trainings(dataset, gate)
+    for nothing in ([], None, "some"):
+        _training(dataset, folder, episodes=nothing)
+        with pytest.raises(RefusedError, match="episodes is nothing"):
+            rederive_trainings(dataset, gate)
+    note = rederived(dataset, [Rung(gate, "n", "PASS", "", "", "r", 0)])[0].note
+    assert "training.json" in note
+
+
+def test_the_trainings_of_one_gate_are_not_those_of_another(dataset):
+    _training(dataset, "train_generators", episodes="validation")
+    rederive_trainings(dataset, "A")

@@ -10,6 +10,12 @@ SMALLEST_SPREAD_M = 1e-6
 """A latent that moves no chunk by a micrometre changes nothing."""
 
 
+def is_the_same(share: float, spread_m: float) -> bool:
+    """Whether deviations of this size, of which so much differs between situations, are alike."""
+    differs = share >= ROUNDING**2 and spread_m >= SMALLEST_SPREAD_M
+    return not differs
+
+
 @dataclass(frozen=True)
 class Dependence:
     """How far deviations depend on observations.
@@ -33,8 +39,7 @@ class Dependence:
     @property
     def same_everywhere(self) -> bool:
         """Whether what the latent changes is the same in every situation, or is nothing."""
-        differs = self.condition_share >= ROUNDING**2 and self.spread_m >= SMALLEST_SPREAD_M
-        return not differs
+        return is_the_same(self.condition_share, self.spread_m)
 
 
 @dataclass(frozen=True)

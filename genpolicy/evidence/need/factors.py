@@ -189,7 +189,7 @@ def episode_errors(
                 for e, i in zip(cut.episode[some], cut.index[some], strict=True)
             ],
             candidates=1,
-        ).actions[:, 0]
+        ).finite().actions[:, 0]  # fmt: skip
         target = scale.normalise(windows.actions[some, :steps])
         error = np.abs(scale.normalise(drawn) - target).mean(axis=2)
         counts = ~windows.is_pad[some, :steps]

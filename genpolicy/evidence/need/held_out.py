@@ -67,7 +67,8 @@ def modes_of_policy(
     if not held_out.situations:
         return []
     names = [("modes", s.episode_uuid, s.index) for s in held_out.situations]
-    drawn = policy.sample(held_out.observations, noise_names=names, candidates=samples)
+    asked = policy.sample(held_out.observations, noise_names=names, candidates=samples)
+    drawn = asked.finite()
     rows = []
     for situation, observation, chunks in zip(
         held_out.situations, held_out.observations[:, -1], drawn.actions, strict=True

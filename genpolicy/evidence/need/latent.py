@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.contract.action import POSITION
-from genpolicy.evidence.documents.need import ROUNDING, SMALLEST_SPREAD_M, Dependence
+from genpolicy.evidence.documents.need import Dependence, is_the_same
 from genpolicy.evidence.need.held_out import HeldOut
 from genpolicy.policies.policy import NetworkPolicy, NoiseName
 from genpolicy.seeds import stream
@@ -42,7 +42,7 @@ def latent_dependence(
         held_out.observations,
         noise_names=[SHARED_NOISE] * len(held_out.situations),
         candidates=samples,
-    )
+    ).finite()
     normalised = policy.checkpoint.normalisation.observation.normalise(held_out.observations)
     return dependence(
         normalised.reshape(len(normalised), -1),
@@ -74,7 +74,7 @@ def dependence(
         _centred(_distances(values.reshape(count, -1))) for values in (observations, deviations)
     )
     spread_m = float(np.sqrt(square.mean()))
-    if not (share >= ROUNDING**2 and spread_m >= SMALLEST_SPREAD_M):
+    if is_the_same(share, spread_m):
         changed = np.zeros_like(changed)
     scale = float(np.sqrt(np.square(seen).mean() * np.square(changed).mean()))
     measured = float((seen * changed).mean())

@@ -71,7 +71,8 @@ def density_rows(
     if policy.method not in DENSITIES or not held_out.situations:
         return []
     names = [("modes", s.episode_uuid, s.index) for s in held_out.situations]
-    drawn = policy.sample(held_out.observations, noise_names=names, candidates=samples).actions
+    asked = policy.sample(held_out.observations, noise_names=names, candidates=samples)
+    drawn = asked.finite().actions
     demonstrated = _demonstrated(data, held_out, policy.prediction_horizon)
     rows = []
     for situation, observation, chunks in zip(

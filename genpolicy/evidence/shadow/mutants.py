@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from genpolicy.evidence.documents.shadow import EXECUTION, ExecutionMutant
-from genpolicy.evidence.shadow.rig import IMITATED, Rig, passing_verdict
+from genpolicy.evidence.shadow.rig import IMITATED, ROWS, Rig, passing_verdict
 from genpolicy.execution.checks import CHECKS, Check, Checks, Place, without
 from genpolicy.execution.journal import write_journal
 from genpolicy.execution.moment import POLICY
@@ -139,6 +139,12 @@ def _new_chunk_while_stopped(rig: Rig) -> None:
     rig.run(2, predecessor_chunk_id="")
 
 
+def _new_chunk_under_a_person(rig: Rig) -> None:
+    _begin(rig)
+    rig.executor.intervene(rig.now_s)
+    rig.run(2, predecessor_chunk_id="")
+
+
 def _new_chunk_in_another_mode(rig: Rig) -> None:
     _begin(rig)
     rig.executor.controller(rig.now_s, "joint_position")
@@ -182,7 +188,8 @@ def _older_behind_accepted(rig: Rig) -> None:
     rig.deliver(rig.chunk(verdict=passing_verdict(rows=(0, 1))))
     rig.tick(1)
     old = {"condition_observation_event_time_s": 0.0, "action_start_time_s": 0.0}
-    rig.deliver(rig.chunk(**old, predecessor_chunk_id=""))
+    verdict = passing_verdict(rows=(3, ROWS))  # the row that is due now
+    rig.deliver(rig.chunk(**old, verdict=verdict, predecessor_chunk_id=""))
     rig.tick(1)
 
 
@@ -198,7 +205,7 @@ def _older_behind_queued(rig: Rig) -> None:
 
 def _one_window_twice(rig: Rig) -> None:
     _begin(rig)
-    rig.now_ns -= 20_000_000  # still in the window of the action accepted last
+    rig.now_ns -= 2_000_000  # still in the window of the action accepted last
     rig.observe()
     rig.deliver(rig.chunk(action_start_time_s=0.05))
     rig.tick(1)
@@ -220,6 +227,22 @@ def _newer_chunk(rig: Rig) -> None:
 
 def _paused(rig: Rig) -> None:
     rig.advance(0.3)
+
+
+def _a_row_left_out(rig: Rig) -> None:
+    _begin(rig)
+    rig.advance(0.05)
+    rig.tick(1)
+
+
+def _two_at_once(rig: Rig) -> None:
+    """The end of one window, and the begin of the next."""
+    rig.observe()
+    rig.deliver(rig.chunk())
+    rig.advance(0.04)
+    rig.tick(1)
+    rig.now_ns -= 40_000_000
+    rig.tick(1)
 
 
 def _diverged(rig: Rig) -> None:
@@ -267,14 +290,16 @@ SCENARIOS: dict[str, Scenario] = {
     "expired": _short_validity,
     "future_observation": _bad(condition_observation_event_time_s=0.04),
     "infeasible": _bad(verdict=passing_verdict(failed=2)),
-    "intervention": _then(lambda rig: rig.executor.intervene(rig.now_s)),
+    "intervention": _new_chunk_under_a_person,
     "out_of_order": _one_window_twice,
+    "pace": _two_at_once,
     "period": _bad(action_period_s=0.1),
     "issued": _bad(context=None),
     "phase_transition": _bad(task_phase="insert"),
     "predecessor": _bad(predecessor_chunk_id="never seen"),
     "same_action": _offered(sequence=2, altered=True),
     "sampler_mismatch": _bad(sampler_config_hash="0" * 64),
+    "seam": _a_row_left_out,
     "sequence": _offered(sequence=1, altered=False),
     "session_epoch": _bad(session_epoch=7),
     "stale_observation": _frozen_camera,

@@ -19,7 +19,7 @@ from genpolicy.execution.cell import PRIMITIVES, Cell, ExecutionSettings
 from genpolicy.execution.checks import CHECKS, Checks, without
 from genpolicy.execution.command import Command
 from genpolicy.execution.executor import Executor
-from genpolicy.execution.journal import Event, Journal
+from genpolicy.execution.journal import Event, Journal, decode_actions
 from genpolicy.execution.stub import ControllerStub
 from genpolicy.execution.supervisor import Supervisor
 
@@ -166,7 +166,7 @@ class Rig:
         actions = changes.pop("actions", self.actions(self.made))
         sha256 = changes.pop("actions_sha256", None)
         verdict = changes.pop("verdict", passing_verdict())
-        context = changes.pop("context", StandInContext())
+        context = changes.pop("context", self.context())
         metadata = ChunkMetadata(
             chunk_id=f"chunk-{self.made}",
             condition_observation_event_time_s=self.now_s,
@@ -186,6 +186,13 @@ class Rig:
         return StandIn(
             replace(metadata, **changes), values, sha256 or actions_sha256(values), verdict, context
         )
+
+    def context(self) -> StandInContext:
+        """What an honest chunk would have been checked against now: the last command."""
+        commanded = self.journal.last("accept", "fallback")
+        if commanded is None:
+            return StandInContext()
+        return StandInContext(last_action=decode_actions(commanded["action"])[0])
 
     @staticmethod
     def actions(seed: int, rows: int = ROWS) -> Array:

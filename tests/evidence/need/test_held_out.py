@@ -1,7 +1,5 @@
 """Held-out situations: the right rows, and errors for rows that are not there."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
@@ -13,6 +11,7 @@ from genpolicy.evidence.need.held_out import (
     held_out_situations,
     modes_of_policy,
 )
+from genpolicy.policies.policy import Samples
 
 
 def rows_of(data, number):
@@ -96,7 +95,7 @@ def test_a_mode_counts_the_samples_that_reach_it_and_may_be_executed(
     verdicts = [True, True, False, True, True, True, True]
 
     def drawn(observations, *, noise_names, candidates):
-        return SimpleNamespace(actions=chunks[None], nfe=2)
+        return Samples(chunks[None], nfe=2)
 
     monkeypatch.setattr(policy, "sample", drawn)
     monkeypatch.setattr(held_out, "admissible_chunks", lambda *_, **__: np.array(verdicts))

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from genpolicy.evidence.shadow.corruption import CORRUPTIONS
+from genpolicy.evidence.shadow.layer_mutants import RULES
 from genpolicy.evidence.shadow.observations import spread
 from genpolicy.evidence.shadow.session import play
 from genpolicy.evidence.shadow.shadow import admit, case_of
@@ -20,29 +21,6 @@ from genpolicy.verification.checker import check_messages
 from genpolicy.verification.motion import MotionProof
 
 BY_CHECK = {item.check: item for item in CORRUPTIONS if item.check}
-RULES = {
-    "workspace": "P6.workspace",
-    "unreachable": "P6.pose",
-    "scene_collision": "P6.collision",
-    "self_collision": "P6.collision",
-    "joint_velocity": "P6.joint_speed",
-    "joint_acceleration": "P6.joint_acceleration",
-    "joint_jerk": "P6.joint_jerk",
-    "joint_torque": "P6.torque",
-    "payload_torque": "P6.payload",
-    "contact_surface": "P6.surface",
-    "contact_force": "P6.force",
-    "measured_velocity": "P6.measured_speed",
-    "measured_acceleration": "P6.measured_acceleration",
-    "state_age": "P6.state_age",
-    "tcp_speed": "P6.tcp_speed",
-    "tcp_turn": "P6.tcp_turn",
-    "approach_direction": "P6.approach",
-    "contact_speed": "P6.contact_speed",
-    "gripper_opening": "P6.release",
-    "singular": "P6.singular",
-    "swept_collision": "P6.sweep",
-}
 
 
 def journal(shadow, item, case, name):
