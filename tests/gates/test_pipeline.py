@@ -134,6 +134,15 @@ def test_a_task_whose_package_has_changed_refuses(ladder):
         judge(ladder, "A")
 
 
+def test_an_identity_without_an_entry_point_names_no_file(ladder, monkeypatch):
+    """In the folder itself, as `dvc repro` runs it, the empty name was a fault of genpolicy."""
+    monkeypatch.chdir(ladder)
+    assert judge(Path(), "A").verdict == "PASS"
+    evidence.edit_document(Path(), "task/identity.json", lambda d: d | {"package": {"a.py": "0"}})
+    with pytest.raises(IntegrityError, match=r"the task .*: a\.py is other than"):
+        judge(Path(), "A")
+
+
 def test_a_report_about_another_task_refuses(ladder):
     identity = {"name": "t", "entry_point": "no_task:TASK", "package": {"task.py": "0" * 64}}
     _judge_again(ladder, "A")
