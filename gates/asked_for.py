@@ -82,7 +82,7 @@ CHECKS_ASKED_FOR = (
     "execution.superseded",
     "execution.out_of_order",
     "execution.sequence",
-    "execution.seam",
+    "execution.continuity",
     "execution.pace",
     "execution.watchdog",
 )

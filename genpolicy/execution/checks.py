@@ -261,7 +261,7 @@ CHECKS: Checks = (
          _R.OUT_OF_ORDER, _P.DUE, _P.STUB),
     _row("sequence", lambda m: m.sequence is not None and m.sequence > m.last_sequence,
          _R.OUT_OF_ORDER, _P.STUB),
-    _row("seam", lambda m: m.follows is True, _R.BROKEN_PREDECESSOR, _P.NEXT, _P.STUB),
+    _row("continuity", lambda m: m.follows is True, _R.BROKEN_PREDECESSOR, _P.NEXT, _P.STUB),
     _row("pace", _not_at_once, _R.OUT_OF_ORDER, _P.DUE, _P.STUB),
     _row("watchdog", _awake, None, _P.SUPERVISOR),
 )  # fmt: skip

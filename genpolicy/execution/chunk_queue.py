@@ -4,11 +4,11 @@ from typing import TYPE_CHECKING
 
 from genpolicy.contract.chunk import DiscardReason
 from genpolicy.execution.checks import Checks, Place, refusal
+from genpolicy.execution.continuity import Continuity
 from genpolicy.execution.journal import Journal, encode_actions, encode_poses
 from genpolicy.execution.ledger import BEYOND_HORIZON, Conservation, Ledger, QueuedChunk
 from genpolicy.execution.moment import Chunk, Moment, View
 from genpolicy.execution.nanoseconds import to_ns
-from genpolicy.execution.seam import Seam
 
 if TYPE_CHECKING:
     from genpolicy.feasibility.admission import Admitted
@@ -31,14 +31,14 @@ class ChunkQueue:
         head: Chunk that the next one must name as predecessor; None after a break of the chain.
         last_accepted: Chunk of the last action that the controller accepted, in this session.
         last_due_ns: Begin of that action's window.
-        seam: What was commanded last.
+        continuity: What was commanded last.
     """
 
     def __init__(self, capacity: int, journal: Journal, checks: Checks) -> None:
         self.head: str | None = None
         self.last_accepted: QueuedChunk | None = None
         self.last_due_ns: int | None = None
-        self.seam = Seam()
+        self.continuity = Continuity()
         self._capacity = capacity
         self._journal = journal
         self._checks = checks
@@ -134,7 +134,7 @@ class ChunkQueue:
     def accepted(self, now_ns: int, chunk: QueuedChunk) -> None:
         """The controller accepted the chunk's next row."""
         row, admitted = chunk.next_row, chunk.admitted
-        self.seam.note(now_ns, admitted, row, admitted.actions[row])
+        self.continuity.note(now_ns, admitted, row, admitted.actions[row])
         self.last_accepted = chunk
         self.last_due_ns = chunk.about.times.due_ns(chunk.next_row)
         chunk.take()
@@ -160,8 +160,8 @@ class ChunkQueue:
         moment = Moment(
             now_ns=now_ns, view=view, about=chunk.about, row=chunk.next_row,
             newer_start_ns=newer_start_ns, last_due_ns=self.last_due_ns,
-            last_accept_ns=self.seam.given_ns,
-            follows=self.seam.follows(
+            last_accept_ns=self.continuity.given_ns,
+            follows=self.continuity.follows(
                 chunk.admitted, chunk.about.checked_rows[0], chunk.next_row
             ),
         )  # fmt: skip
@@ -211,7 +211,7 @@ class ChunkQueue:
     def forget(self) -> None:
         """A new session: no chain, no last action."""
         self.head = self.last_accepted = self.last_due_ns = None
-        self.seam.forget()
+        self.continuity.forget()
 
     def conservation(self) -> Conservation:
         """The balances now."""

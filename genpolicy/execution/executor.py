@@ -181,7 +181,7 @@ class Executor:
         now_ns = self._begin(now_s)
         if self.mode is not ExecutorMode.ENDED:
             self._enter(now_ns, ExecutorMode.INTERVENTION)
-            self._queue.seam.forget()
+            self._queue.continuity.forget()
             self._drop(now_ns, DiscardReason.INTERVENTION)
 
     def hand_back(self, now_s: float) -> None:

@@ -18,10 +18,10 @@ from genpolicy.contract.chunk import DiscardReason
 from genpolicy.execution.arrival import read_chunk, shape_of
 from genpolicy.execution.cell import Cell
 from genpolicy.execution.checks import CHECKS, Checks, Place, refusal
+from genpolicy.execution.continuity import Continuity, bytes_of
 from genpolicy.execution.issued import issued_by_feasibility
 from genpolicy.execution.journal import Journal, encode_actions
 from genpolicy.execution.moment import ExecutorMode, Moment, View
-from genpolicy.execution.seam import Seam, bytes_of
 from genpolicy.execution.supervisor import Supervisor
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ class ControllerStub:
         self._view = cell.first_view()
         self._last_due_ns: int | None = None
         self._last_sequence = -1
-        self._seam = Seam()
+        self._continuity = Continuity()
 
     def note_observation(
         self, now_ns: int, event_ns: int, phase: str, calibration_epoch: str
@@ -94,14 +94,14 @@ class ControllerStub:
     def note_mode(self, mode: str) -> None:
         """Who may command: run (the policy), fallback, intervention or ended (nobody)."""
         if mode == ExecutorMode.INTERVENTION:
-            self._seam.forget()
+            self._continuity.forget()
         self._view = replace(self._view, mode=mode)
 
     def note_reset(self, now_ns: int, session_epoch: int) -> None:
         """A new session: nothing from before is accepted."""
         self._view = replace(self._view, session_epoch=session_epoch, newest_observation_ns=None)
         self._last_due_ns = None
-        self._seam.forget()
+        self._continuity.forget()
         self.void(DiscardReason.RESET, now_ns)
 
     def void(self, reason: DiscardReason, before_ns: int) -> None:
@@ -155,9 +155,9 @@ class ControllerStub:
             row=row,
             issued=issued_by_feasibility(admitted),
             same_action=_is_row(admitted, action, row),
-            follows=self._seam.follows(admitted, about.checked_rows[0], row),
+            follows=self._continuity.follows(admitted, about.checked_rows[0], row),
             last_due_ns=self._last_due_ns,
-            last_accept_ns=self._seam.given_ns,
+            last_accept_ns=self._continuity.given_ns,
             sequence=sequence,
             last_sequence=self._last_sequence,
         )
@@ -168,7 +168,7 @@ class ControllerStub:
         self.accepted += 1
         self._last_sequence = sequence
         self._last_due_ns = moment.due_ns
-        self._seam.note(now_ns, admitted, row, action)
+        self._continuity.note(now_ns, admitted, row, action)
         self.supervisor.note_accepted(now_ns)
         payload = {**place, "sequence": sequence, "age_ns": now_ns - about.times.condition_ns}
         payload["action"] = encode_actions(action)

@@ -222,7 +222,7 @@ class _Session:
         if m["age_ns"] != age_ns:
             self.flag("P1.age", f"The age is noted as {m['age_ns']} ns and is {age_ns} ns.")
         self._check_order(chunk, row, m)
-        self._check_seam(chunk, row, m)
+        self._check_continuity(chunk, row, m)
         self._check_motion(chunk, row)
 
     def _check_motion(self, chunk: Message, row: int) -> None:
@@ -273,16 +273,20 @@ class _Session:
         self.last_row[arrival], self.last_sequence = row, m["sequence"]
         self.last_start_ns, self.last_due_ns = start_ns, due_ns
 
-    def _check_seam(self, chunk: Message, row: int, m: Message) -> None:
+    def _check_continuity(self, chunk: Message, row: int, m: Message) -> None:
         """From the last command on, every step is one that was checked, at the pace it was."""
         last, motion = self.last_command, chunk["motion"]
         if last is not None and last[0] == m["arrival"]:
             if row != last[1] + 1:
-                self.flag("P5.seam", f"Row {row} follows row {last[1]}: nobody checked that step.")
+                self.flag(
+                    "P5.continuity", f"Row {row} follows row {last[1]}: nobody checked that step."
+                )
         elif row != chunk["checked_rows"][0]:
-            self.flag("P5.seam", f"Row {row} is not the first that was checked, and comes first.")
+            self.flag(
+                "P5.continuity", f"Row {row} is not the first that was checked, and comes first."
+            )
         elif last is not None and motion is not None and motion["last_action"] != last[2]:
-            self.flag("P5.seam", f"{chunk['chunk_id']!r} was checked from another command.")
+            self.flag("P5.continuity", f"{chunk['chunk_id']!r} was checked from another command.")
         since_ns, period_ns = self.last_accept_ns, self.settings["period_ns"]
         if since_ns is not None and 10 * (self.t - since_ns) < 9 * period_ns:
             self.flag("P5.pace", f"Two actions are {self.t - since_ns} ns apart.")

@@ -89,7 +89,7 @@ BAD = {
     "superseded": replace(GOOD, newer_start_ns=300 * MS),
     "out_of_order": replace(GOOD, last_due_ns=300 * MS),
     "sequence": replace(GOOD, last_sequence=5),
-    "seam": replace(GOOD, follows=False),
+    "continuity": replace(GOOD, follows=False),
     "pace": replace(GOOD, last_accept_ns=265 * MS + 1),
     "watchdog": replace(GOOD, last_accept_ns=210 * MS - 1),
 }
@@ -130,7 +130,7 @@ def test_what_is_unknown_does_not_hold():
     unknown = Moment(now_ns=310 * MS, about=Chunk(METADATA, CHUNK.times), row=2)
     assert failing(unknown) >= {
         "issued", "duplicate", "infeasible", "action_hash", "same_action", "execution_horizon",
-        "checked_rows", "future_observation", "stale_observation", "sequence", "period", "seam",
+        "checked_rows", "future_observation", "stale_observation", "sequence", "period", "continuity",
     }  # fmt: skip
 
 

@@ -81,7 +81,7 @@ WRONGS = (
     Wrong("any_row_follows_any_other", "queue",
           "Nobody asks whether the way from the last command to the next row was checked.",
           "small",
-          patched("genpolicy/execution/seam.py",
+          patched("genpolicy/execution/continuity.py",
                   ("            return row == last.row + 1\n        if row != first:\n"
                    "            return False\n",
                    "            return True\n")),

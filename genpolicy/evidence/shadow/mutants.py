@@ -299,7 +299,7 @@ SCENARIOS: dict[str, Scenario] = {
     "predecessor": _bad(predecessor_chunk_id="never seen"),
     "same_action": _offered(sequence=2, altered=True),
     "sampler_mismatch": _bad(sampler_config_hash="0" * 64),
-    "seam": _a_row_left_out,
+    "continuity": _a_row_left_out,
     "sequence": _offered(sequence=1, altered=False),
     "session_epoch": _bad(session_epoch=7),
     "stale_observation": _frozen_camera,

@@ -61,7 +61,7 @@ def test_the_rule_that_breaks_is_the_one_that_the_check_guards():
     assert "P5.order" in rules["behind_queued"]
     assert "P3.start" in rules["behind_accepted"]
     assert "P3.due" in rules["out_of_order"]
-    assert rules["seam"] == {"P5.seam"} and rules["pace"] == {"P5.pace"}
+    assert rules["continuity"] == {"P5.continuity"} and rules["pace"] == {"P5.pace"}
     assert "P3.sequence" in rules["sequence"]
     assert "P1.bits" in rules["same_action"]
     assert "P1.state" in rules["commander"] & rules["intervention"]

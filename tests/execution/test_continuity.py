@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from genpolicy.execution.seam import Seam, bytes_of
+from genpolicy.execution.continuity import Continuity, bytes_of
 
 ACTION = np.arange(10.0)
 
@@ -15,31 +15,31 @@ def chunk(last_action=ACTION):
 
 
 def after(own, row=3, action=ACTION):
-    seam = Seam()
-    seam.note(7, own, row, action)
-    return seam
+    continuity = Continuity()
+    continuity.note(7, own, row, action)
+    return continuity
 
 
 def test_at_first_only_the_first_checked_row_follows():
-    seam = Seam()
-    assert seam.follows(chunk(None), 2, 2) and seam.given_ns is None
-    assert not seam.follows(chunk(), 2, 3) and not seam.follows(chunk(), 2, 1)
+    continuity = Continuity()
+    assert continuity.follows(chunk(None), 2, 2) and continuity.given_ns is None
+    assert not continuity.follows(chunk(), 2, 3) and not continuity.follows(chunk(), 2, 1)
 
 
 def test_of_the_same_chunk_the_next_row_alone_follows():
     own = chunk()
-    seam = after(own)
-    assert [row for row in range(8) if seam.follows(own, 0, row)] == [4]
-    assert seam.given_ns == 7
+    continuity = after(own)
+    assert [row for row in range(8) if continuity.follows(own, 0, row)] == [4]
+    assert continuity.given_ns == 7
 
 
 def test_another_chunk_follows_from_the_command_that_it_was_checked_from():
-    seam = after(chunk())
-    assert seam.follows(chunk(ACTION.copy()), 1, 1)
-    assert not seam.follows(chunk(ACTION.copy()), 1, 2)
+    continuity = after(chunk())
+    assert continuity.follows(chunk(ACTION.copy()), 1, 1)
+    assert not continuity.follows(chunk(ACTION.copy()), 1, 2)
     other = ACTION.copy()
     other[0] = np.nextafter(other[0], 1.0)
-    assert not seam.follows(chunk(other), 1, 1)
+    assert not continuity.follows(chunk(other), 1, 1)
 
 
 def test_an_equal_chunk_is_not_the_same_one():
@@ -50,17 +50,17 @@ def test_an_equal_chunk_is_not_the_same_one():
 
 @pytest.mark.parametrize("told", [None, "text", object(), [[1.0], [1.0, 2.0]]])
 def test_what_does_not_say_its_command_follows_nothing(told):
-    seam = after(chunk())
-    assert not seam.follows(chunk(told), 0, 0)
-    assert not seam.follows(SimpleNamespace(), 0, 0)
+    continuity = after(chunk())
+    assert not continuity.follows(chunk(told), 0, 0)
+    assert not continuity.follows(SimpleNamespace(), 0, 0)
 
 
 def test_what_is_forgotten_binds_nobody_and_the_pace_stays():
     own = chunk()
-    seam = after(own)
-    seam.forget()
-    assert not seam.follows(own, 0, 4) and seam.follows(chunk(None), 0, 0)
-    assert seam.given_ns == 7
+    continuity = after(own)
+    continuity.forget()
+    assert not continuity.follows(own, 0, 4) and continuity.follows(chunk(None), 0, 0)
+    assert continuity.given_ns == 7
 
 
 def test_bytes_are_of_numbers_only():

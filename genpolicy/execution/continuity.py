@@ -1,9 +1,9 @@
-"""The seam: is the way from the last command to the next row one that feasibility checked?
+"""Continuity: is the way from the last command to the next row one that feasibility checked?
 
 It checked the ways between the rows of a chunk, and the one from the last command of its own
 moment to the first row that it was asked about. After a row that was left out, or another command
 in between, nobody has checked anything, and the chunk needs a new admission. Executor and
-controller stub each keep a seam of their own.
+controller stub each keep their own.
 """
 
 from typing import TYPE_CHECKING, NamedTuple
@@ -31,7 +31,7 @@ class Given(NamedTuple):
     action: bytes
 
 
-class Seam:
+class Continuity:
     """What was commanded last, as the asking place knows it.
 
     Attributes:
