@@ -23,6 +23,7 @@ from genpolicy.verification.motion import ExpectedMotion, MotionProof
 from genpolicy.verification.report import CheckReport, Violation
 from genpolicy.verification.world_view import WorldView
 
+CONTINUITY = "P5.continuity"
 LAYERS = 6
 FLOAT_HEX_DIGITS = 16
 ROW_HEX_DIGITS = ACTION_DIM * FLOAT_HEX_DIGITS
