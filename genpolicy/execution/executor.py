@@ -6,7 +6,6 @@ ones from its start on. Whatever is doubtful is discarded with one reason, and t
 """
 
 from dataclasses import replace
-from numbers import Real
 
 from genpolicy.contract.chunk import ChunkMetadata, DiscardReason
 from genpolicy.execution.arrival import Arrivals
@@ -17,7 +16,8 @@ from genpolicy.execution.command import Command
 from genpolicy.execution.journal import Journal, session_payload
 from genpolicy.execution.ledger import Conservation
 from genpolicy.execution.moment import FALLBACK, POLICY, ExecutorMode, View
-from genpolicy.execution.nanoseconds import NEVER_NS, ns_or_none
+from genpolicy.execution.nanoseconds import NEVER_NS
+from genpolicy.execution.observed import Observed, too_far
 from genpolicy.execution.stub import ControllerStub
 from genpolicy.feasibility.admission import Admitted
 
@@ -59,11 +59,6 @@ class Executor:
         self._stops_seen = 0
         self._begun = False
 
-    @property
-    def clock_faults(self) -> int:
-        """Times that were not believed, of all components; a tick with one of them holds."""
-        return self._journal.doubts
-
     # -- what the world says ------------------------------------------------------------------
 
     def observe(
@@ -84,49 +79,36 @@ class Executor:
             divergence_m: Distance of measured from commanded TCP, if known, m.
         """
         now_ns = self._begin(now_s)
-        told_ns = ns_or_none(event_time_s)
-        event_ns = now_ns + 1 if told_ns is None else told_ns
-        phase, calibration_epoch = _word(phase), _word(calibration_epoch)
-        ignored = self._view.ignores(event_ns, now_ns)
-        payload = {
-            "event_time_ns": event_ns, "phase": phase, "calibration_epoch": calibration_epoch,
-            "used": not ignored, "ignored_because": ignored,
-        }  # fmt: skip
-        self._journal.add("observation", now_ns, payload)
-        self.stub.note_observation(now_ns, event_ns, phase, calibration_epoch)
-        if ignored:
+        told = Observed.of(self._view, now_ns, event_time_s, phase, calibration_epoch)
+        self._journal.add("observation", now_ns, told.payload())
+        self.stub.note_observation(now_ns, told.event_ns, told.phase, told.calibration_epoch)
+        if told.ignored:
             self.observations_ignored += 1
-            self._heed_divergence(now_ns, now_ns, divergence_m)
-            return False
-        before = self._view
+        else:
+            self._look(now_ns, told)
+        # Whatever is wrong with the time of an observation, the distance was measured.
+        if too_far(divergence_m, self.cell.execution.maximum_divergence_m):
+            before_ns = now_ns if told.ignored else told.event_ns
+            self._invalidate(now_ns, before_ns, DiscardReason.OBSERVATION_DIVERGENCE)
+        return not told.ignored
+
+    def _look(self, now_ns: int, told: Observed) -> None:
+        """The view after an observation; another phase or calibration voids what is here."""
+        before, event_ns = self._view, told.event_ns
         self._view = replace(
-            before, newest_observation_ns=event_ns, phase=phase,
-            calibration_epoch=calibration_epoch,
-            maximum_age_ns=self.cell.maximum_age_ns.get(phase),
+            before, newest_observation_ns=event_ns, phase=told.phase,
+            calibration_epoch=told.calibration_epoch,
+            maximum_age_ns=self.cell.maximum_age_ns.get(told.phase),
         )  # fmt: skip
         for kind, old, new, reason in (
-            ("phase", before.phase, phase, DiscardReason.PHASE_TRANSITION),
-            ("epoch", before.calibration_epoch, calibration_epoch,
+            ("phase", before.phase, told.phase, DiscardReason.PHASE_TRANSITION),
+            ("epoch", before.calibration_epoch, told.calibration_epoch,
              DiscardReason.CALIBRATION_MISMATCH),
         ):  # fmt: skip
             if old != new:
                 self._journal.add(kind, now_ns, {"event_time_ns": event_ns, "old": old, "new": new})
                 if before.newest_observation_ns is not None:
                     self._void(now_ns, reason, event_ns)
-        self._heed_divergence(now_ns, event_ns, divergence_m)
-        return True
-
-    def _heed_divergence(self, now_ns: int, before_ns: int, divergence_m: float | None) -> None:
-        """Void what was conditioned before, where the arm is not where it was sent.
-
-        Asked of an observation that is not used as well: whatever is wrong with its time, the
-        distance was measured. What is no distance is too far.
-        """
-        limit_m = self.cell.execution.maximum_divergence_m
-        if divergence_m is None:
-            return
-        if not (isinstance(divergence_m, Real) and 0.0 <= divergence_m <= limit_m):
-            self._invalidate(now_ns, before_ns, DiscardReason.OBSERVATION_DIVERGENCE)
 
     def force_event(self, now_s: float) -> None:
         """A force event: everything conditioned before now is void."""
@@ -275,10 +257,8 @@ class Executor:
     def tick(self, now_s: float) -> Command:
         """The command of this moment; also sweeps out what has become stale, before anything."""
         now_ns = self._begin(now_s)
-        if self._journal.doubt:
-            doubt = self._journal.doubt
-            stopped = self.stub.supervisor.stopped
-            return self._nothing(now_ns) if stopped else self._hold(now_ns, doubt)
+        if self._journal.doubt and not self.stub.supervisor.stopped:
+            return self._hold(now_ns, self._journal.doubt)
         self.stub.poll(now_s)
         self._heed_supervisor(now_ns)
         view = self._present()
@@ -367,8 +347,3 @@ class Executor:
     def _hold(self, now_ns: int, reason: str) -> Command:
         self.stub.hold(now_ns, reason)
         return Command("hold", reason)
-
-
-def _word(value: object) -> str:
-    """A name of a phase or a calibration; what is none names nothing, and nothing is allowed."""
-    return value if isinstance(value, str) else ""

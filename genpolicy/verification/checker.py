@@ -17,13 +17,13 @@ from typing import Any
 
 from genpolicy.contract.action import ACTION_DIM
 from genpolicy.verification.balance import Balance
+from genpolicy.verification.continuity import Continuity
 from genpolicy.verification.invocations import Invocations
 from genpolicy.verification.journal_source import Message, read_messages
 from genpolicy.verification.motion import ExpectedMotion, MotionProof
 from genpolicy.verification.report import CheckReport, Violation
 from genpolicy.verification.world_view import WorldView
 
-CONTINUITY = "P5.continuity"
 LAYERS = 6
 FLOAT_HEX_DIGITS = 16
 ROW_HEX_DIGITS = ACTION_DIM * FLOAT_HEX_DIGITS
@@ -104,6 +104,7 @@ class _Session:
         self.world = WorldView()
         self.balance = Balance()
         self.invocations = Invocations()
+        self.continuity = Continuity()
         self.chunks: dict[str, Message] = {}
         self.open: dict[int, Message] = {}
         self.closed: set[int] = set()
@@ -115,8 +116,6 @@ class _Session:
         self.last_start_ns: int | None = None
         self.last_due_ns: int | None = None
         self.last_row: dict[int, int] = {}
-        self.last_command: tuple[int, int, str] | None = None
-        self.last_accept_ns: int | None = None
         self.unanswered_ns: int | None = None
 
     def flag(self, rule: str, sentence: str) -> None:
@@ -183,7 +182,7 @@ class _Session:
         if self.proof is not None:
             self.proof.forget(self.name)
         if kind == "reset" or "intervention" in (m["old"], m["new"]):
-            self.last_command = None
+            self.continuity.forget()
         if kind == "reset":
             self.head = self.last_due_ns = self.last_start_ns = None
 
@@ -223,7 +222,8 @@ class _Session:
         if m["age_ns"] != age_ns:
             self.flag("P1.age", f"The age is noted as {m['age_ns']} ns and is {age_ns} ns.")
         self._check_order(chunk, row, m)
-        self._check_continuity(chunk, row, m)
+        for rule, sentence in self.continuity.follow(chunk, m, self.settings["period_ns"]):
+            self.flag(rule, sentence)
         self._check_motion(chunk, row)
 
     def _check_motion(self, chunk: Message, row: int) -> None:
@@ -273,25 +273,6 @@ class _Session:
             self.flag("P5.newest", f"A newer chunk than {chunk['chunk_id']!r} has started.")
         self.last_row[arrival], self.last_sequence = row, m["sequence"]
         self.last_start_ns, self.last_due_ns = start_ns, due_ns
-
-    def _check_continuity(self, chunk: Message, row: int, m: Message) -> None:
-        """From the last command on, every step is one that was checked, at the pace it was."""
-        last, motion = self.last_command, chunk["motion"]
-        if last is not None and last[0] == m["arrival"]:
-            if row != last[1] + 1:
-                self.flag(
-                    "P5.continuity", f"Row {row} follows row {last[1]}: nobody checked that step."
-                )
-        elif row != chunk["checked_rows"][0]:
-            self.flag(
-                "P5.continuity", f"Row {row} is not the first that was checked, and comes first."
-            )
-        elif last is not None and motion is not None and motion["last_action"] != last[2]:
-            self.flag("P5.continuity", f"{chunk['chunk_id']!r} was checked from another command.")
-        since_ns, period_ns = self.last_accept_ns, self.settings["period_ns"]
-        if since_ns is not None and 10 * (self.t - since_ns) < 9 * period_ns:
-            self.flag("P5.pace", f"Two actions are {self.t - since_ns} ns apart.")
-        self.last_command, self.last_accept_ns = (m["arrival"], row, m["action"]), self.t
 
     # P4 and the queue --------------------------------------------------------------------------
 

@@ -130,7 +130,8 @@ def test_what_is_unknown_does_not_hold():
     unknown = Moment(now_ns=310 * MS, about=Chunk(METADATA, CHUNK.times), row=2)
     assert failing(unknown) >= {
         "issued", "duplicate", "infeasible", "action_hash", "same_action", "execution_horizon",
-        "checked_rows", "future_observation", "stale_observation", "sequence", "period", "continuity",
+        "checked_rows", "future_observation", "stale_observation", "sequence", "period",
+        "continuity",
     }  # fmt: skip
 
 
