@@ -11,7 +11,10 @@ from genpolicy.execution.observed import Observed, too_far
 NOW_NS = 10**9
 
 
-def read(event_time_s, phase="approach", epoch="e", view=View()):
+EMPTY = View()
+
+
+def read(event_time_s, phase="approach", epoch="e", view=EMPTY):
     return Observed.of(view, NOW_NS, event_time_s, phase, epoch)
 
 
