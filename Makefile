@@ -3,7 +3,8 @@
 #   make ladder   build the environment once, run the pipeline, print the table of the gates
 #   make smoke    the same ladder, reduced (params.smoke.yaml), in its own workspace build/smoke
 #   make test     format, lint, types, import contracts, tests
-#   make lint     the same without the tests
+#   make soak     twenty million random events against executor, stub and supervisor (an hour)
+#   make lint     make test without the tests
 #   make doctor   versions against the pins, disk, memory, telemetry, DVC
 #   make clean    remove what was generated and is not versioned; the DVC cache stays
 #
@@ -43,10 +44,10 @@ export PATH := $(BIN):$(PATH)
 SHA256 := $(shell command -v sha256sum >/dev/null && echo sha256sum || echo 'shasum -a 256')
 WANTED := $(shell cat constraints.txt pyproject.toml | $(SHA256) | cut -d' ' -f1)
 
-.PHONY: help env ladder smoke test lint doctor clean
+.PHONY: help env ladder smoke test soak lint doctor clean
 
 help:
-	@sed -n '1,17p' Makefile | sed 's/^# \{0,1\}//'
+	@sed -n '1,18p' Makefile | sed 's/^# \{0,1\}//'
 
 env:
 	@if [ "$$(cat $(VENV)/.ok 2>/dev/null)" = "$(WANTED)" ]; then exit 0; fi; \
@@ -73,6 +74,9 @@ smoke: env
 test: env
 	@code=0; $(MAKE) --no-print-directory lint || code=1; \
 	python -m pytest -q -n $(JOBS) --dist loadfile || code=1; exit $$code
+
+soak: env
+	@python tests/execution/soak.py
 
 lint: env
 	@code=0; ruff check . || code=1; ruff format --check . || code=1; \
