@@ -60,6 +60,11 @@ class Limits:
     of: Mapping[str, Limit] = field(default_factory=dict)
     waived: Mapping[str, Waiver] = field(default_factory=dict)
 
+    def number(self, criterion: str, *, otherwise: float) -> float:
+        """The limit of a criterion; another number where it has none, or none of its own."""
+        entry = self.of.get(criterion)
+        return otherwise if entry is None or entry.limit is None else entry.limit
+
 
 class GateSettings(StrictModel):
     """Base of a gate's settings other than limits.

@@ -36,8 +36,7 @@ def told_share(evidence: Evidence, settings: NeedSettings) -> Measured:
     lower one above it. Where an interval lies astride, nothing can be said.
     """
     frame = evidence.rows(f"{AUDIT}/predictions.parquet", Prediction)
-    limit = settings.limits.of.get("told_share")
-    least = math.inf if limit is None or limit.limit is None else limit.limit
+    least = settings.limits.number("told_share", otherwise=math.inf)
     names = list(Prediction.__dataclass_fields__)
     records = frame[names].to_dict("records")
     rows = [Prediction(**{str(name): value for name, value in row.items()}) for row in records]

@@ -163,8 +163,7 @@ def latent_dependence_p(evidence: Evidence, settings: NeedSettings) -> Measured:
     latent changes is the same in every situation. Otherwise nothing can be said.
     """
     method = settings.latent_baseline
-    limit = settings.limits.of.get("latent_dependence_p")
-    level = 0.0 if limit is None or limit.limit is None else limit.limit
+    level = settings.limits.number("latent_dependence_p", otherwise=0.0)
     entries = [entry for entry in evidence.document(MEASURED, LATENT) if entry.method == method]
     if not entries:
         raise MissingEvidenceError(f"{MEASURED}/{LATENT.file} has no test of {method}")

@@ -146,9 +146,9 @@ PLOTS = (
         "Left: loss of the averaged weights on held-out episodes, each method its own loss, over "
         "that after its first measured updates; interval over episodes at three quarters and "
         "at the end. Right: by how much it falls in between. The limit is that of "
-        f"`{LIMIT}` and judges what candidates are compared with (filled). A candidate (hollow) "
-        "is asked by its samples, `late_change_upper`: the loss of a density goes on falling when "
-        "its samples have long ceased to change. Drawn from `validation.parquet` beside each "
+        f"{LIMIT} and judges what candidates are compared with (filled). A candidate (hollow) "
+        "is asked by its samples, late_change_upper: the loss of a density goes on falling when "
+        "its samples have long ceased to change. Drawn from validation.parquet beside each "
         "checkpoint.",
         f"{GENERATORS}/{MATCHED}",
         _convergence,

@@ -71,7 +71,11 @@ def tally(report: GateReport) -> str:
         who = "" if spared == failing else f"{spared} of them "
         aside = f" ({who}without weight for the verdict)" if spared else ""
         texts.append(f"{failing} {'fails' if failing == 1 else 'fail'}{aside}")
-    if absent := _count(report, "INCONCLUSIVE"):
+    # What was measured and is not decided has an interval; what was not measured has nothing.
+    unsure = [c for c in report.criteria if c.verdict == "INCONCLUSIVE"]
+    if undecided := sum(c.interval is not None for c in unsure):
+        texts.append(f"{undecided} not decided")
+    if absent := len(unsure) - undecided:
         texts.append(f"{absent} not measured")
     if waiting := _count(report, "PENDING_REVIEW"):
         texts.append(f"{waiting} {'waits' if waiting == 1 else 'wait'} for a person")

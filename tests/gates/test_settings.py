@@ -9,7 +9,7 @@ import pytest
 from flows.workspace import merged
 from gates.card.card import CardSettings
 from gates.proof import SPECS, judge
-from gates.settings import read_limits, read_params, read_settings, section_of
+from gates.settings import Limit, Limits, read_limits, read_params, read_settings, section_of
 from genpolicy.errors import ConfigError
 from genpolicy.integrity.documents import read_yaml
 
@@ -201,3 +201,9 @@ def test_what_json_cannot_say_is_bad_configuration(tmp_path, text, said):
     (tmp_path / "params.yaml").write_text(text)
     with pytest.raises(ConfigError, match=said):
         read_params(tmp_path)
+
+
+def test_the_number_of_a_limit_or_another_one():
+    limits = Limits({"a": Limit(0.5, "why", "safety"), "b": Limit(None, "why", "safety")})
+    assert limits.number("a", otherwise=9.0) == 0.5
+    assert limits.number("b", otherwise=9.0) == limits.number("c", otherwise=9.0) == 9.0

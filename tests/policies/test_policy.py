@@ -247,3 +247,26 @@ def test_generative_heads_keep_both_modes_and_the_mean_lies_between(
             lowest = 0.15 if method == "ibc" else 0.3
             assert lowest < (first > 0).mean() < 1.0 - lowest
             assert (np.abs(np.abs(first) - 1.0) < 0.3).mean() > 0.9
+
+
+def test_one_chunk_that_is_not_finite_is_a_candidate_like_the_others(
+    folders, two_mode_windows, monkeypatch
+):
+    """It ended the whole batch, and with it the stage; the first layer rejects it alone."""
+    policy, seen = load_policy(folders["flow"]), two_mode_windows(4).observations[:3]
+    whole = policy.sample(seen, noise_names=names(3), candidates=2)
+    assert whole.finite() is whole
+    honest = policy_module.generate
+
+    def spoiled(network, condition, noise, **rest):
+        chunks, nfe = honest(network, condition, noise, **rest)
+        chunks[3, 0, 0] = np.nan
+        return chunks, nfe
+
+    monkeypatch.setattr(policy_module, "generate", spoiled)
+    drawn = policy.sample(seen, noise_names=names(3), candidates=2)
+    assert np.argwhere(~np.isfinite(drawn.actions)).tolist() == [[1, 1, 0, 0]]
+    kept = np.isfinite(drawn.actions)
+    assert np.array_equal(drawn.actions[kept], whole.actions[kept])
+    with pytest.raises(NonFiniteError, match=r"sampled chunks, \[1, 1, 0, 0\] is nan"):
+        drawn.finite()

@@ -8,12 +8,14 @@ import pytest
 from gates.asked_for import CHECKS_ASKED_FOR
 from genpolicy.evidence.shadow import layer_mutants
 from genpolicy.evidence.shadow.corruption import CORRUPTIONS
-from genpolicy.evidence.shadow.layer_mutants import missing_checks_evidence
+from genpolicy.evidence.shadow.layer_mutants import RULES, missing_checks_evidence
 from genpolicy.evidence.shadow.observations import spread
 from genpolicy.execution.checks import CHECKS as EXECUTION_CHECKS
 from genpolicy.execution.checks import without
 from genpolicy.feasibility.batch import Margins
 from genpolicy.feasibility.checks import CHECKS
+from genpolicy.verification.motion import MotionProof
+from genpolicy.verification.report import CheckReport
 
 
 @pytest.fixture(scope="module")
@@ -70,3 +72,23 @@ def test_what_is_not_asked_of_a_task_is_declared_and_not_tried(shadow, few, monk
     excused = {row.check: row for row in rows if row.not_applicable}
     assert set(excused) == {"scene_collision", "swept_collision"}
     assert not any(row.detected or row.tried for row in excused.values())
+
+
+def test_a_proof_that_proves_nothing_is_seen(shadow, few, monkeypatch):
+    """Without the collisions of the independent proof every gate passed."""
+    monkeypatch.setattr(layer_mutants, "check_messages", lambda *_: CheckReport())
+    rows = missing_checks_evidence(shadow, few[-2:])
+    assert {row.check for row in rows if not row.detected} == set(RULES)
+
+
+@pytest.mark.parametrize(
+    ("part", "checks"),
+    [("_touching", {"contact_force", "contact_surface", "scene_collision", "self_collision"}),
+     ("_swept", {"swept_collision"}), ("_turning_freely", {"singular"}),
+     ("_reached", {"unreachable"})],
+)  # fmt: skip
+def test_a_part_of_the_proof_that_is_left_out_is_seen(part, checks, shadow, few, monkeypatch):
+    own = tuple(item for item in CORRUPTIONS if item.check in checks)
+    monkeypatch.setattr(layer_mutants, "CORRUPTIONS", own)
+    monkeypatch.setattr(MotionProof, part, lambda self, *_: iter(()))
+    assert not any(row.detected for row in missing_checks_evidence(shadow, few[-2:]))

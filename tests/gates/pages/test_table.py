@@ -1,5 +1,7 @@
 """What the page and the summary say about what decided: waived, counted, with units."""
 
+from types import SimpleNamespace
+
 import evidence
 import pytest
 
@@ -47,3 +49,12 @@ def test_groups_hold_every_criterion_once_in_order(ladder, gate):
     lines = [line.criterion for group in groups(report) for line in group.lines]
     assert lines == list(report.criteria)
     assert len({group.id for group in groups(report)}) == len(groups(report))
+
+
+def test_what_is_not_decided_is_told_from_what_was_not_measured():
+    def of(verdict, interval=None):
+        return SimpleNamespace(verdict=verdict, interval=interval, candidate=None)
+
+    criteria = [of("PASS"), of("INCONCLUSIVE", (0.1, 0.2)), of("INCONCLUSIVE"), of("INCONCLUSIVE")]
+    report = SimpleNamespace(criteria=criteria, verdict="INCONCLUSIVE")
+    assert tally(report) == "1 of 4 hold; 1 not decided; 2 not measured"
