@@ -285,13 +285,11 @@ def changed_task(root: Path) -> str:
 def _package(root: Path, entry_point: str) -> dict[str, str]:
     """SHA-256 of the files around an entry point's module, by path inside its package."""
     module = entry_point.partition(":")[0]
-    if not module:
-        return {}
-    own = root.joinpath(*module.split(".")).with_suffix(".py")
+    own = root / f"{module.replace('.', '/')}.py"
     if own.is_file():
         origin = own
     else:
-        spec = importlib.util.find_spec(module)
+        spec = importlib.util.find_spec(module) if module else None
         if spec is None or spec.origin is None:
             return {}
         origin = Path(spec.origin).resolve()

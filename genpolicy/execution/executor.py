@@ -1,8 +1,9 @@
 """The receding-horizon executor: decides which admitted action goes to the stub, at this moment.
 
-Row j of a chunk is due in `[start + j * period, start + (j + 1) * period)`, j < H_e. Rows whose
-window has passed are skipped, never caught up. The newest valid chunk replaces the rest of older
-ones from its start on. Whatever is doubtful is discarded with one reason, and the answer is hold.
+Row j of a chunk is due in `[start + j * period, start + (j + 1) * period)`, j < H_e. A row whose
+window has passed is never caught up, and what would follow behind it is discarded: nobody checked
+the way there. The newest valid chunk replaces the rest of older ones from its start on. Whatever is
+doubtful is discarded with one reason, and the answer is hold.
 """
 
 from dataclasses import replace

@@ -20,8 +20,6 @@ from genpolicy.verification.journal_source import Message, read_messages
 ROUNDING_S = 1e-9
 CHECK = "project"
 """The term that every further candidate costs once more."""
-FIRST = "sample"
-"""The term that pays for a cold start."""
 DELAYS = {"camera_delay": "capture", "queue_reorder": "queue", "network_jitter": "network"}
 """Which term a perturbation of this kind adds its `magnitude_s` to; of the last a share of it."""
 

@@ -93,6 +93,8 @@ WORDS = {
     ("gates/asked_for.py", "approach"): "the same",
     ("genpolicy/verification/contact.py", "approach"): "name of the proof's rule of the same",
     ("genpolicy/verification/contact.py", "release"): "the same, of letting go",
+    ("genpolicy/evidence/shadow/layer_mutants.py", "approach"): "which rule stands behind a check",
+    ("genpolicy/evidence/shadow/layer_mutants.py", "release"): "the same",
 }
 
 
