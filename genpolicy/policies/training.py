@@ -105,10 +105,8 @@ def train(
         "stopping_rule": _stopping_rule(taken),
         "steps": request.training.steps,
         "evaluated_weights": "exponential moving average",
-        "windows": len(windows.observations),
-        "validation_windows": len(validation.observations) if validation else 0,
-        "episodes": _episodes(windows),
-        "validation_episodes": _episodes(validation),
+        **_given("", windows),
+        **_given("validation_", validation),
         "final": records[-1],
         "regime": regime(device),
     }
@@ -117,10 +115,13 @@ def train(
     return files.write(folder)
 
 
-def _episodes(windows: Windows | None) -> list[str]:
-    """Names of the episodes that windows were cut from, as the windows themselves say."""
+def _given(prefix: str, windows: Windows | None) -> dict[str, int | list[str]]:
+    """How many windows there were, and of which episodes, as the windows themselves say."""
     names = None if windows is None else windows.episodes
-    return [] if names is None else sorted(set(names.tolist()))
+    return {
+        f"{prefix}windows": 0 if windows is None else len(windows.observations),
+        f"{prefix}episodes": [] if names is None else sorted(set(names.tolist())),
+    }
 
 
 def _finished(
