@@ -67,8 +67,12 @@ def rederive_trainings(root: Path, gate: Gate) -> None:
     pairs = zip(episodes["episode_uuid"].to_pylist(), episodes["split"].to_pylist(), strict=True)
     split_of = dict(pairs)
     folders = [root / folder for folder in TRAININGS[gate]]
-    for path in sorted(found for folder in folders for found in folder.rglob("training.json")):
-        document, place = mapping(read_json(path)), path.relative_to(root).as_posix()
+    for seed in sorted(found for folder in folders for found in folder.rglob("seed_*")):
+        path = seed / "training.json"
+        place = path.relative_to(root).as_posix()
+        if not path.is_file():
+            refuse(gate, place, "missing", "what the training was given")
+        document = mapping(read_json(path))
         for key, split in GIVEN.items():
             given = document.get(key)
             if not isinstance(given, list) or not given:

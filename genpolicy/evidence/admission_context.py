@@ -146,7 +146,13 @@ def context_of(
         maximum_age_s=session.maximum_age_s[moment.phase],
         active_checkpoint_hash=session.checkpoint,
         active_sampler_hash=session.sampler,
-        scene=SceneState(task.scene_poses(moment.observation)),
+        # A task may hand out views of what it goes on writing to; the seal is on these numbers.
+        scene=SceneState(
+            {
+                name: (np.array(position), np.array(quaternion))
+                for name, (position, quaternion) in task.scene_poses(moment.observation).items()
+            }
+        ),
         q_cmd_history=history,
         newest_accepted_observation_s=newest_accepted_observation_s,
         first_index=late_rows,

@@ -162,7 +162,7 @@ class ChunkQueue:
             newer_start_ns=newer_start_ns, last_due_ns=self.last_due_ns,
             last_accept_ns=self.continuity.given_ns,
             follows=self.continuity.follows(
-                chunk.admitted, chunk.about.checked_rows[0], chunk.next_row
+                chunk.admitted, chunk.about, chunk.next_row, now_ns
             ),
         )  # fmt: skip
         check = refusal(self._checks, place, moment)

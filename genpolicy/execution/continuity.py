@@ -11,9 +11,14 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from genpolicy.execution.moment import Chunk
+from genpolicy.execution.nanoseconds import NEVER_NS
+
 if TYPE_CHECKING:
     from genpolicy.feasibility.admission import Admitted
 
+STILL_RAD = 1e-6
+"""Joints of one pose, from solutions that began elsewhere."""
 Array = NDArray[np.float64]
 
 
@@ -41,6 +46,7 @@ class Continuity:
     def __init__(self) -> None:
         self.given_ns: int | None = None
         self._last: Given | None = None
+        self._resumed_ns = NEVER_NS
 
     def note(self, now_ns: int, chunk: "Admitted", row: int, action: Array) -> None:
         """The controller was given a row."""
@@ -50,20 +56,48 @@ class Continuity:
         """A person moves the arm, or has: no command says where it is."""
         self._last = None
 
-    def follows(self, chunk: "Admitted", first: int, row: int) -> bool:
+    def after(self, resumed_ns: int) -> None:
+        """A stop was cleared at this time: the arm stands where the brakes or a person left it."""
+        if resumed_ns != self._resumed_ns:
+            self._resumed_ns = resumed_ns
+            self.forget()
+
+    def follows(self, chunk: "Admitted", about: Chunk, row: int, now_ns: int) -> bool:
         """Whether feasibility checked the way from the last command to a row.
 
         Args:
             chunk: Whose row it is.
-            first: The first row that was checked.
+            about: What is known of the chunk.
             row: The row.
+            now_ns: Time.
         """
-        last = self._last
+        last, given_ns = self._last, self.given_ns
         if last is not None and last.chunk is chunk:
             return row == last.row + 1
-        if row != first:
+        if row != about.checked_rows[0]:
             return False
-        return last is None or bytes_of(_told(chunk)) == last.action
+        if last is None or given_ns is None:
+            return True
+        holds = round((now_ns - given_ns) / about.times.period_ns) - 1
+        context = getattr(chunk, "context", None)
+        told = bytes_of(getattr(context, "last_action", None))
+        return told == last.action and rests(context, holds)
+
+
+def rests(context: object, holds: int) -> bool:
+    """Whether a chunk was checked from an arm that has stood still for so many periods.
+
+    Its joints were commanded to one place for as long, as far as it says; without a hold it may
+    come from any motion, and where it says nothing it rests on nothing.
+    """
+    if holds <= 0:
+        return True
+    try:
+        command = np.asarray(getattr(context, "q_cmd", None), dtype=float)
+        before = np.asarray(getattr(context, "q_cmd_history", None), dtype=float)[-holds:]
+        return bool(np.all(np.abs(before - command) <= STILL_RAD))
+    except (TypeError, ValueError, IndexError):
+        return False
 
 
 def bytes_of(values: object) -> bytes:
@@ -72,8 +106,3 @@ def bytes_of(values: object) -> bytes:
         return np.ascontiguousarray(values, dtype="<f8").tobytes()
     except (TypeError, ValueError):
         return b""
-
-
-def _told(chunk: "Admitted") -> object:
-    """The last command that the chunk was checked from; None where it says none."""
-    return getattr(getattr(chunk, "context", None), "last_action", None)

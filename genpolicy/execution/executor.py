@@ -18,7 +18,7 @@ from genpolicy.execution.journal import Journal, session_payload
 from genpolicy.execution.ledger import Conservation
 from genpolicy.execution.moment import FALLBACK, POLICY, ExecutorMode, View
 from genpolicy.execution.nanoseconds import NEVER_NS
-from genpolicy.execution.observed import Observed, too_far
+from genpolicy.execution.observed import Observed, name_of, too_far
 from genpolicy.execution.stub import ControllerStub
 from genpolicy.feasibility.admission import Admitted
 
@@ -133,7 +133,7 @@ class Executor:
 
     def controller(self, now_s: float, mode: str) -> None:
         """The mode that the controller is in; another one than before voids what is here."""
-        now_ns, before = self._begin(now_s), self._view.controller
+        now_ns, before, mode = self._begin(now_s), self._view.controller, name_of(mode)
         self._journal.add("controller", now_ns, {"mode": mode})
         self.stub.note_controller(mode)
         self._view = replace(self._view, controller=mode)
@@ -258,15 +258,19 @@ class Executor:
     def tick(self, now_s: float) -> Command:
         """The command of this moment; also sweeps out what has become stale, before anything."""
         now_ns = self._begin(now_s)
-        if self._journal.doubt and not self.stub.supervisor.stopped:
-            return self._hold(now_ns, self._journal.doubt)
+        if self.mode is ExecutorMode.ENDED:
+            return Command("stop" if self.stub.supervisor.stopped else "hold", "ended")
+        if doubt := self._journal.doubt:
+            self.stub.supervisor.doubt(now_ns, doubt)
+            return self._hold(now_ns, doubt)
         self.stub.poll(now_s)
         self._heed_supervisor(now_ns)
         view = self._present()
         self._queue.sweep(now_ns, view)
         chunk = self._queue.due(now_ns, view)
         if chunk is None:
-            return self._nothing(now_ns)
+            person = self.mode is ExecutorMode.INTERVENTION
+            return self._hold(now_ns, "intervention" if person else "empty")
         broken = self._queue.continues(now_ns, chunk, view)
         if broken is not None:
             self._queue.close(now_ns, chunk, broken)
@@ -313,6 +317,7 @@ class Executor:
             self._stops_seen = supervisor.stops
             self._void(now_ns, DiscardReason.STOPPED, NEVER_NS)
         self._view = self._view.voided(DiscardReason.STOPPED, supervisor.resumed_ns)
+        self._queue.continuity.after(supervisor.resumed_ns)
 
     def _void(self, now_ns: int, reason: DiscardReason, before_ns: int) -> None:
         """Nothing conditioned before this time, and nothing that is here, is used any more."""
@@ -334,17 +339,10 @@ class Executor:
             self.mode = mode
             self.stub.note_mode(str(mode))
 
-    def _nothing(self, now_ns: int) -> Command:
-        """No chunk is due: stop, hold, or nothing more after the end."""
-        if self.stub.supervisor.stopped:
-            self._hold(now_ns, "stopped")
-            return Command("stop", str(self.stub.supervisor.state))
-        if self.mode is ExecutorMode.ENDED:
-            return Command("hold", "ended")
-        return self._hold(
-            now_ns, "intervention" if self.mode is ExecutorMode.INTERVENTION else "empty"
-        )
-
     def _hold(self, now_ns: int, reason: str) -> Command:
-        self.stub.hold(now_ns, reason)
+        """Hold for a reason; a stop where one stands."""
+        supervisor = self.stub.supervisor
+        self.stub.hold(now_ns, "stopped" if supervisor.stopped else reason)
+        if supervisor.stopped:
+            return Command("stop", str(supervisor.state))
         return Command("hold", reason)

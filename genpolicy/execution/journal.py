@@ -29,6 +29,7 @@ from genpolicy.integrity.hashing import sha256_bytes_of
 Array = NDArray[np.float64]
 
 JOURNAL_VERSION = 5
+CLOCK_AHEAD = "clock_ahead"
 LONGEST_JUMP_NS = 60 * NS_PER_S
 """No component of a session is silent for longer; a clock that is further ahead is doubted."""
 MAXIMUM_UNCOMPRESSED_BYTES = 8 << 30
@@ -132,7 +133,7 @@ class Journal:
         if now_ns < self.latest_ns:
             return "clock_backwards"
         begun = self.latest_ns != NEVER_NS
-        return "clock_ahead" if begun and now_ns - self.latest_ns > LONGEST_JUMP_NS else ""
+        return CLOCK_AHEAD if begun and now_ns - self.latest_ns > LONGEST_JUMP_NS else ""
 
     def add(self, kind: str, time_ns: int, payload: dict[str, Any]) -> None:
         """Append an event; the payload is kept, not copied, and must not change afterwards."""

@@ -30,7 +30,7 @@ class Observed:
         """What is told now, seen from a view of the present."""
         told_ns = ns_or_none(event_time_s)
         event_ns = now_ns + 1 if told_ns is None else told_ns
-        return cls(event_ns, _name(phase), _name(epoch), view.ignores(event_ns, now_ns))
+        return cls(event_ns, name_of(phase), name_of(epoch), view.ignores(event_ns, now_ns))
 
     def payload(self) -> dict[str, object]:
         """For the journal."""
@@ -41,12 +41,13 @@ class Observed:
         }  # fmt: skip
 
 
-def too_far(divergence_m: object, limit_m: float) -> bool:
+def too_far(divergence_m: float | None, limit_m: float) -> bool:
     """Whether the arm is not where it was sent; what is no distance is too far, None is unknown."""
     if divergence_m is None:
         return False
-    return not (isinstance(divergence_m, Real) and 0.0 <= float(divergence_m) <= limit_m)
+    return not (isinstance(divergence_m, Real) and 0.0 <= divergence_m <= limit_m)
 
 
-def _name(value: object) -> str:
+def name_of(value: object) -> str:
+    """A name, as it is; what is none names nothing."""
     return value if isinstance(value, str) else ""

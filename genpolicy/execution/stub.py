@@ -1,7 +1,7 @@
 """The controller stub: the last check before a controller, and the end of the road.
 
 It is a second look: it follows phase, calibration, weights, resets and voiding events by itself,
-reads the offered chunk by itself, and believes nothing of what the executor concluded. The
+reads the offered chunk anew, and believes nothing of what the executor concluded. The
 questions are the executor's, from one table (`checks`): two wordings of "stale" would be two
 definitions, and the laxer one would hold. That the one wording is right is proved by another: the
 independent checker (`genpolicy.verification`) imports nothing of this. A refusal means hold; there
@@ -111,7 +111,12 @@ class ControllerStub:
     def poll(self, now_s: float) -> None:
         """The consumer's own clock: runs the watchdog also while the executor is paused."""
         now_ns = self._journal.clock(now_s)
-        if self.supervisor.poll(now_ns):
+        if self._view.mode == ExecutorMode.ENDED:
+            return
+        if self._journal.doubt:
+            self.supervisor.doubt(now_ns, self._journal.doubt)
+            self.hold(now_ns, self._journal.doubt)
+        elif self.supervisor.poll(now_ns):
             self.hold(now_ns, "watchdog")
 
     def hold(self, now_ns: int, reason: str) -> None:
@@ -144,10 +149,12 @@ class ControllerStub:
             None when accepted.
         """
         self.arrivals += 1
-        about = read_chunk(admitted, source=source, arrival=arrival)
+        known = isinstance(source, str) and type(row) is type(sequence) is int
+        about = read_chunk(admitted, source=source, arrival=arrival) if known else None
         place = {"arrival": arrival, "chunk_id": shape_of(admitted)[1], "row": row}
-        if about is None or type(row) is not int:
+        if about is None:
             return self._refuse(now_ns, {**place, "row": -1}, DiscardReason.INFEASIBLE)
+        self._continuity.after(self.supervisor.resumed_ns)
         moment = Moment(
             now_ns=now_ns,
             view=self._present(),
@@ -155,7 +162,7 @@ class ControllerStub:
             row=row,
             issued=issued_by_feasibility(admitted),
             same_action=_is_row(admitted, action, row),
-            follows=self._continuity.follows(admitted, about.checked_rows[0], row),
+            follows=self._continuity.follows(admitted, about, row, now_ns),
             last_due_ns=self._last_due_ns,
             last_accept_ns=self._continuity.given_ns,
             sequence=sequence,

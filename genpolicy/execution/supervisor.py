@@ -13,7 +13,7 @@ import numpy as np
 from genpolicy.errors import ContractError
 from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.execution.checks import CHECKS, Checks, Place, refusal
-from genpolicy.execution.journal import Journal
+from genpolicy.execution.journal import CLOCK_AHEAD, Journal
 from genpolicy.execution.moment import Moment
 from genpolicy.execution.nanoseconds import to_ns
 
@@ -124,6 +124,19 @@ class Supervisor:
         if self.state is SupervisorState.WATCHDOG_HOLD:
             self.state = SupervisorState.RUN
             self._record(now_ns, "watchdog_recovered", "")
+
+    def doubt(self, now_ns: int, why: str) -> None:
+        """A clock that is not believed measures no silence: what was commanded is held.
+
+        Where silence stops, a clock that is far ahead stops too: that long nobody commanded.
+        """
+        if self._last_accept_ns is None or self.stopped:
+            return
+        if self._silence_ns is not None and why == CLOCK_AHEAD:
+            self._stop(now_ns, SupervisorState.PROTECTIVE_STOP, "silence", why)
+        elif self.state is SupervisorState.RUN:
+            self.state = SupervisorState.WATCHDOG_HOLD
+            self._record(now_ns, "watchdog", why)
 
     def poll(self, now_ns: int) -> bool:
         """Watchdog, on the consumer's clock. Returns whether it has just begun to hold."""

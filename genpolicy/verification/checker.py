@@ -176,6 +176,8 @@ class _Session:
                 self.unanswered_ns = None
             if kind in ("reset", "mode"):
                 self._interrupted(kind, m)
+            if kind == "supervisor" and m["event"] == "human_reset":
+                self.continuity.forget()
 
     def _interrupted(self, kind: str, m: Message) -> None:
         """Somebody else commands, or has: what was commanded last may not be where the arm is."""

@@ -27,7 +27,7 @@ class WorldView:
         self.session_epoch = 0
         self.mode = "run"
         self.controller = ""
-        self.stopped = False
+        self.stopped = self.looked = False
         self.scene: dict[str, str] = {}
         self.void_before: dict[str, int] = {}
         self._followed: dict[str, Callable[[Message], Iterator[Finding]]] = {
@@ -47,7 +47,9 @@ class WorldView:
             self.active = (m["checkpoint"], m["sampler"])
         elif kind == "invalidate":
             if m["reason"] == "observation_divergence":
-                self._void("an observation divergence", self.newest_ns or m["t"])
+                # Of an observation that was not used nothing is known but that it is here now.
+                newest_ns = self.newest_ns if self.looked else None
+                self._void("an observation divergence", m["t"] if newest_ns is None else newest_ns)
             else:
                 self._void(f"a {m['reason']}", m["t"])
         elif kind == "phase" and m["new"] != self.phase:
@@ -114,6 +116,7 @@ class WorldView:
         used = event_ns <= t and not late
         if used != m["used"]:
             yield "journal.observation", f"An observation of {event_ns} ns, used: {m['used']}."
+        self.looked = used
         if not used:
             return
         if self.newest_ns is not None:

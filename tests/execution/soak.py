@@ -261,7 +261,7 @@ class Walk:
 
     def _human_reset(self) -> None:
         self.rig.supervisor.human_reset(self.rig.now_s, "spotter")
-        self.model.stopped = False
+        self.model.stopped, self.model.last_s = False, None
         self.model.void(self.rig.now_s)
 
     def _intervene(self) -> None:

@@ -5,13 +5,19 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from genpolicy.execution.continuity import Continuity, bytes_of
+from genpolicy.execution.continuity import Continuity, bytes_of, rests
 
 ACTION = np.arange(10.0)
 
 
-def chunk(last_action=ACTION):
-    return SimpleNamespace(context=SimpleNamespace(last_action=last_action))
+def chunk(last_action=ACTION, before=((0.0, 0.0), (0.0, 0.0))):
+    context = SimpleNamespace(last_action=last_action, q_cmd=(0.0, 0.0), q_cmd_history=before)
+    return SimpleNamespace(context=context)
+
+
+def follows(own, of, first, row, now_ns=57):
+    times = SimpleNamespace(period_ns=50)
+    return own.follows(of, SimpleNamespace(checked_rows=(first, 16), times=times), row, now_ns)
 
 
 def after(own, row=3, action=ACTION):
@@ -22,47 +28,77 @@ def after(own, row=3, action=ACTION):
 
 def test_at_first_only_the_first_checked_row_follows():
     continuity = Continuity()
-    assert continuity.follows(chunk(None), 2, 2) and continuity.given_ns is None
-    assert not continuity.follows(chunk(), 2, 3) and not continuity.follows(chunk(), 2, 1)
+    assert follows(continuity, chunk(None), 2, 2) and continuity.given_ns is None
+    assert not follows(continuity, chunk(), 2, 3) and not follows(continuity, chunk(), 2, 1)
 
 
 def test_of_the_same_chunk_the_next_row_alone_follows():
     own = chunk()
     continuity = after(own)
-    assert [row for row in range(8) if continuity.follows(own, 0, row)] == [4]
+    assert [row for row in range(8) if follows(continuity, own, 0, row)] == [4]
     assert continuity.given_ns == 7
 
 
 def test_another_chunk_follows_from_the_command_that_it_was_checked_from():
     continuity = after(chunk())
-    assert continuity.follows(chunk(ACTION.copy()), 1, 1)
-    assert not continuity.follows(chunk(ACTION.copy()), 1, 2)
+    assert follows(continuity, chunk(ACTION.copy()), 1, 1)
+    assert not follows(continuity, chunk(ACTION.copy()), 1, 2)
     other = ACTION.copy()
     other[0] = np.nextafter(other[0], 1.0)
-    assert not continuity.follows(chunk(other), 1, 1)
+    assert not follows(continuity, chunk(other), 1, 1)
 
 
 def test_an_equal_chunk_is_not_the_same_one():
     told = ACTION + 1.0
     own, twin = chunk(told), chunk(told)
-    assert own == twin and own is not twin and not after(own).follows(twin, 0, 4)
+    assert own == twin and own is not twin and not follows(after(own), twin, 0, 4)
 
 
 @pytest.mark.parametrize("told", [None, "text", object(), [[1.0], [1.0, 2.0]]])
 def test_what_does_not_say_its_command_follows_nothing(told):
     continuity = after(chunk())
-    assert not continuity.follows(chunk(told), 0, 0)
-    assert not continuity.follows(SimpleNamespace(), 0, 0)
+    assert not follows(continuity, chunk(told), 0, 0)
+    assert not follows(continuity, SimpleNamespace(), 0, 0)
 
 
 def test_what_is_forgotten_binds_nobody_and_the_pace_stays():
     own = chunk()
     continuity = after(own)
     continuity.forget()
-    assert not continuity.follows(own, 0, 4) and continuity.follows(chunk(None), 0, 0)
+    assert not follows(continuity, own, 0, 4) and follows(continuity, chunk(None), 0, 0)
     assert continuity.given_ns == 7
 
 
 def test_bytes_are_of_numbers_only():
     assert bytes_of([1, 2]) == np.array([1.0, 2.0]).tobytes()
     assert bytes_of("a") == bytes_of(object()) == b""
+
+
+MOVING = ((0.0, 0.1), (0.0, 0.05))
+
+
+@pytest.mark.parametrize(
+    ("now_ns", "before", "holds"),
+    [(57, MOVING, True), (81, MOVING, True), (82, MOVING, False), (107, MOVING, False),
+     (107, ((0.0, 0.1), (0.0, 0.0)), True), (157, ((0.0, 0.1), (0.0, 0.0)), False),
+     (157, ((0.0, 0.0), (0.0, 0.0)), True), (5007, ((0.0, 0.0), (0.0, 0.0)), True),
+     (107, ((0.0, 0.0), (0.0, 1e-7)), True), (107, np.zeros((0, 2)), True), (107, None, False),
+     (107, "moving", False)],
+)  # fmt: skip
+def test_after_holds_only_an_arm_that_stood_still_goes_on(now_ns, before, holds):
+    """The same last command, reached in motion: from rest it was twice the acceleration."""
+    continuity = after(chunk())
+    assert follows(continuity, chunk(ACTION.copy(), before), 0, 0, now_ns) is holds
+
+
+def test_a_stop_that_was_cleared_is_forgotten_once():
+    continuity = after(chunk())
+    continuity.after(10)
+    assert follows(continuity, chunk(None), 0, 0)
+    continuity.note(20, chunk(), 0, ACTION)
+    continuity.after(10)
+    assert not follows(continuity, chunk(None), 0, 0, 70)
+
+
+def test_what_cannot_be_read_rests_on_nothing():
+    assert rests(None, 0) and not rests(None, 1) and not rests(object(), 2)

@@ -10,10 +10,12 @@ from hypothesis import strategies as st
 from playing import begin, judged
 
 from genpolicy.contract.chunk import DiscardReason
-from genpolicy.evidence.shadow.rig import CHECKPOINT, SAMPLER, Rig
+from genpolicy.evidence.shadow.rig import CHECKPOINT, IMITATED, SAMPLER, Rig
 from genpolicy.execution.cell import FALLBACK_HASH
+from genpolicy.execution.checks import without
 from genpolicy.execution.journal import write_journal
 from genpolicy.execution.nanoseconds import to_ns
+from genpolicy.verification.checker import check_messages
 
 R = DiscardReason
 
@@ -343,7 +345,7 @@ def test_no_time_raises_out_of_a_control_path(call, now_s, tmp_path):
     write_journal(tmp_path / "j.mcap", [rig.journal])
 
 
-@pytest.mark.parametrize("distance_m", [10.0, -1e-9, -math.inf, math.nan, "far", 1j])
+@pytest.mark.parametrize("distance_m", [10.0, 10**400, -1e-9, -math.inf, math.nan, "far", 1j])
 @pytest.mark.parametrize("age_s", [0.0, 0.04, -0.001, math.nan])
 def test_a_divergence_is_heeded_whatever_is_wrong_with_the_time_of_it(distance_m, age_s):
     rig = Rig()
@@ -390,5 +392,28 @@ def test_metadata_that_were_bent_afterwards_are_garbage(name, value, tmp_path):
     chunk = rig.chunk()
     object.__setattr__(chunk.metadata, name, value)
     assert rig.deliver(chunk) is R.INFEASIBLE
+    judged(rig)
+    write_journal(tmp_path / "j.mcap", [rig.journal])
+
+
+@pytest.mark.parametrize("age_s", [-0.01, 0.04])
+def test_the_checker_voids_what_is_older_than_a_divergence_it_cannot_date(age_s):
+    rig = Rig(checks=without(IMITATED, "after_observation_divergence"))
+    begin(rig)
+    rig.executor.observe(rig.now_s, rig.now_s - age_s, "approach", "epoch-1", 0.5)
+    rig.tick(2)
+    report = check_messages(
+        (e.kind, {"session": e.session, "n": e.n, "t": e.t, **e.payload}) for e in rig.end()
+    )
+    assert "P1.void" in {violation.rule for violation in report.violations}
+
+
+@pytest.mark.parametrize("mode", [np.zeros(2), None, 3, ["a"]])
+def test_a_mode_of_the_controller_that_is_no_name_allows_nothing(mode, tmp_path):
+    rig = Rig()
+    begin(rig)
+    for _ in range(2):
+        rig.executor.controller(rig.now_s, mode)
+    assert rig.tick()[0].kind == "hold"
     judged(rig)
     write_journal(tmp_path / "j.mcap", [rig.journal])

@@ -21,6 +21,14 @@ def test_what_feasibility_did_not_make_is_not_issued(chunk):
     assert issued_by_feasibility(chunk) is False
 
 
+def test_a_genuine_chunk_that_was_bent_is_not_issued_and_raises_nothing():
+    for bent in (None, 3, object()):
+        chunk = object.__new__(sys.modules[MAKER].Admitted)
+        sys.modules[MAKER]._ISSUED.add(chunk)
+        object.__setattr__(chunk, "projected", bent)
+        assert issued_by_feasibility(chunk) is False
+
+
 def test_without_the_maker_nothing_was_made():
     code = (
         "import sys; from genpolicy.execution.issued import issued_by_feasibility as ask; "

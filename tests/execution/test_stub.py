@@ -10,7 +10,7 @@ from genpolicy.execution.checks import CHECKS, Place, without
 from genpolicy.execution.executor import Executor
 from genpolicy.verification.checker import check_messages
 
-PAST_THE_EXECUTOR = {"same_action", "sequence"}
+PAST_THE_EXECUTOR = {"same_action", "sequence", "end_of_episode"}
 SEEN_BY_THE_STUB = [
     check.name for check in CHECKS
     if Place.STUB in check.places and check.name not in PAST_THE_EXECUTOR
@@ -128,3 +128,18 @@ def test_the_stub_takes_nothing_from_before_a_reset():
     chunk = rig.chunk(condition_observation_event_time_s=0.05)
     offer = {"row": 0, "source": "policy", "arrival": 0, "sequence": 1, "now_ns": rig.now_ns}
     assert rig.stub.offer(chunk, chunk.actions[0], **offer) == "reset"
+
+
+@pytest.mark.parametrize(
+    "bad", [{"row": None}, {"row": "0"}, {"row": True}, {"sequence": "x"}, {"sequence": 1.0},
+            {"source": []}, {"source": "nobody"}, {"source": None}],
+)  # fmt: skip
+def test_an_offer_of_other_kinds_is_refused_and_never_raises(bad):
+    rig = Rig()
+    rig.observe()
+    chunk = rig.chunk()
+    offer = {"row": 0, "source": "policy", "arrival": 0, "sequence": 1, "now_ns": 0}
+    assert rig.stub.offer(chunk, chunk.actions[0], **offer | bad) == "infeasible"
+    for nothing in (None, 3, object()):
+        assert rig.stub.offer(nothing, chunk.actions[0], **offer) == "infeasible"
+    assert rig.stub.accepted == 0 and rig.stub.invalid == 4

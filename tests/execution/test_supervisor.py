@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from playing import begin, judged
 
 from genpolicy.errors import ContractError
-from genpolicy.evidence.shadow.rig import EXECUTION, Rig, rig_cell
+from genpolicy.evidence.shadow.rig import EXECUTION, Rig, StandInContext, rig_cell
 from genpolicy.execution import supervisor as module
 from genpolicy.execution.journal import Journal
 from genpolicy.execution.nanoseconds import to_ns
@@ -205,3 +206,52 @@ def test_a_stop_after_the_end_is_heard_and_is_no_fault_of_the_journal():
         for e in rig.journal.events()
     )
     assert {violation.rule for violation in report.violations} == {"settings.checks"}
+
+
+@pytest.mark.parametrize("now_s", [math.nan, None, 999.0, -1.0])
+def test_a_poll_with_a_clock_that_is_not_believed_is_silence(now_s):
+    """It measured none, so that nobody noticed that the executor was dead."""
+    rig = Rig()
+    begin(rig)
+    rig.stub.poll(now_s)
+    assert rig.supervisor.state is SupervisorState.WATCHDOG_HOLD
+    assert rig.executor.tick(now_s).kind == "hold"
+    assert rig.tick()[0].kind == "action" and rig.supervisor.state is SupervisorState.RUN
+
+
+def test_a_clock_far_ahead_stops_where_silence_stops():
+    rig = Rig(silence_stop_s=1.0)
+    rig.stub.poll(500.0)
+    assert not rig.supervisor.stopped  # nothing was commanded yet
+    begin(rig)
+    rig.stub.poll(math.nan)
+    assert not rig.supervisor.stopped
+    rig.stub.poll(500.0)
+    assert rig.supervisor.stopped and rig.tick()[0].kind == "stop"
+
+
+def test_after_the_end_nothing_is_noted_but_a_stop():
+    rig = Rig()
+    begin(rig)
+    rig.executor.end_episode(rig.now_s)
+    events = len(rig.journal.events())
+    for now_s in (rig.now_s, math.nan, rig.now_s + 30.0):
+        assert rig.executor.tick(now_s).reason == "ended"
+        rig.stub.poll(now_s)
+    assert len(rig.journal.events()) == events
+    rig.supervisor.emergency_stop(math.nan)
+    assert rig.executor.tick(rig.now_s + 31.0).kind == "stop"
+    assert [e.kind for e in rig.journal.events()[events:]] == ["supervisor"]
+
+
+def test_after_a_cleared_stop_a_chunk_from_where_the_arm_stands_goes_on():
+    rig = Rig()
+    begin(rig)
+    rig.supervisor.emergency_stop(rig.now_s)
+    rig.tick(2)
+    rig.supervisor.human_reset(rig.now_s, "spotter")
+    elsewhere = StandInContext(last_action=np.full(10, 0.7))
+    assert [c.kind for c in rig.run(2, context=elsewhere, predecessor_chunk_id="")] == [
+        "action"
+    ] * 2
+    judged(rig)

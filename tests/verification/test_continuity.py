@@ -1,5 +1,7 @@
 """The checker's own words for what may follow the last command."""
 
+import struct
+
 import pytest
 
 from genpolicy.verification.continuity import PACE, RULE, Continuity
@@ -7,10 +9,18 @@ from genpolicy.verification.continuity import PACE, RULE, Continuity
 PERIOD = 50
 
 
-def chunk(first=0, last_action="aa", motion=True):
+def told(*numbers):
+    return struct.pack(f"<{len(numbers)}d", *numbers).hex()
+
+
+def chunk(first=0, last_action="aa", motion=True, before=(0.0, 0.0)):
+    ground = {
+        "last_action": last_action,
+        "q_cmd_rad": told(0.0, 0.0),
+        "q_before_rad": told(*before),
+    }
     return {
-        "chunk_id": "c", "checked_rows": [first, 16],
-        "motion": {"last_action": last_action} if motion else None,
+        "chunk_id": "c", "checked_rows": [first, 16], "motion": ground if motion else None,
     }  # fmt: skip
 
 
@@ -62,3 +72,14 @@ def test_after_somebody_else_moved_the_arm_no_command_binds():
 def test_the_pace_is_nine_tenths_of_a_period(t, found):
     own = chunk()
     assert rules((own, accept(0, 0)), (own, accept(t, 1)))[1] == found
+
+
+@pytest.mark.parametrize(
+    ("t", "before", "found"),
+    [(50, (0.0, 0.1), []), (74, (0.0, 0.1), []), (76, (0.0, 0.1), [RULE]), (100, (0.0, 0.1), [RULE]),
+     (100, (0.1, 0.0, 0.0, 0.0), []), (150, (0.1, 0.0, 0.0, 0.0), [RULE]), (400, (), []),
+     (400, (0.0, 1e-7), [])],
+)  # fmt: skip
+def test_after_holds_a_chunk_was_checked_from_an_arm_that_stood_still(t, before, found):
+    start = (chunk(), accept(0, 0))
+    assert rules(start, (chunk(before=before), accept(t, 0, arrival=1)))[1] == found
