@@ -63,11 +63,14 @@ def rederive_trainings(root: Path, gate: Gate) -> None:
         IntegrityError: A table is missing or damaged.
         BadInputError: A document cannot be read.
     """
+    folders = [root / folder for folder in TRAININGS[gate]]
+    seeds = sorted(found for folder in folders for found in folder.rglob("seed_*"))
+    if not seeds:
+        return
     episodes = read_table(root / INGEST / "episodes.parquet")
     pairs = zip(episodes["episode_uuid"].to_pylist(), episodes["split"].to_pylist(), strict=True)
     split_of = dict(pairs)
-    folders = [root / folder for folder in TRAININGS[gate]]
-    for seed in sorted(found for folder in folders for found in folder.rglob("seed_*")):
+    for seed in seeds:
         path = seed / "training.json"
         place = path.relative_to(root).as_posix()
         if not path.is_file():

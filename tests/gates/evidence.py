@@ -843,6 +843,8 @@ def _checkpoints(root: Path, stage: str, methods: tuple[str, ...]) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         (folder / "model.safetensors").write_bytes(method.encode())
         (folder / "config.json").write_bytes(b"{}\n")
+        given = {"episodes": ["e0", "e1"], "validation_episodes": ["e2"]}
+        document(root, f"{stage}/{method}/seed_0/training.json", given)
         table(root, f"{stage}/{method}/seed_0/validation.parquet", ValidationRow, validation())
 
 
