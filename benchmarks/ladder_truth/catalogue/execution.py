@@ -82,7 +82,8 @@ WRONGS = (
           "Nobody asks whether the way from the last command to the next row was checked.",
           "small",
           patched("genpolicy/execution/continuity.py",
-                  ("            return row == last.row + 1\n        if row != first:\n"
+                  ("            return row == last.row + 1\n"
+                   "        if row != about.checked_rows[0]:\n"
                    "            return False\n",
                    "            return True\n")),
           Expected(C, SEEN)),
@@ -106,7 +107,7 @@ WRONGS = (
     Wrong("nobody_polls_the_watchdog", "supervisor",
           "The stub's clock does not ask the supervisor any more.",
           "small",
-          patched(STUB, ("        if self.supervisor.poll(now_ns):\n", "        if False:\n")),
+          patched(STUB, ("elif self.supervisor.poll(now_ns):\n", "elif False:\n")),
           Expected(C, SEEN)),
     Wrong("a_stop_is_not_heeded", "supervisor",
           "Executor and stub go on after the supervisor has stopped.",
