@@ -3,7 +3,8 @@
 #   make ladder   build the environment once, run the pipeline, print the table of the gates
 #   make smoke    the same ladder, reduced (params.smoke.yaml), in its own workspace build/smoke
 #   make test     format, lint, types, import contracts, tests
-#   make soak     twenty million random events against executor, stub and supervisor (an hour)
+#   make soak     twenty million random events against executor, stub and supervisor, ten thousand
+#                 random chunks at every millisecond (an hour and a half)
 #   make lint     make test without the tests
 #   make doctor   versions against the pins, disk, memory, telemetry, DVC
 #   make clean    remove what was generated and is not versioned; the DVC cache stays
@@ -47,7 +48,7 @@ WANTED := $(shell cat constraints.txt pyproject.toml | $(SHA256) | cut -d' ' -f1
 .PHONY: help env ladder smoke test soak lint doctor clean
 
 help:
-	@sed -n '1,18p' Makefile | sed 's/^# \{0,1\}//'
+	@sed -n '1,19p' Makefile | sed 's/^# \{0,1\}//'
 
 env:
 	@if [ "$$(cat $(VENV)/.ok 2>/dev/null)" = "$(WANTED)" ]; then exit 0; fi; \
@@ -76,6 +77,7 @@ test: env
 	python -m pytest -q -n $(JOBS) --dist loadfile || code=1; exit $$code
 
 soak: env
+	@python tests/feasibility/dense.py
 	@python tests/execution/soak.py
 
 lint: env

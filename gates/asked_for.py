@@ -19,6 +19,7 @@ CHECKS_ASKED_FOR = (
     "geometric.scene_collision",
     "geometric.self_collision",
     "geometric.swept_collision",
+    "geometric.measured_collision",
     "dynamic.action_period",
     "dynamic.joint_velocity",
     "dynamic.joint_acceleration",

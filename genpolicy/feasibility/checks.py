@@ -71,6 +71,7 @@ CHECKS: tuple[Check, ...] = (
     Check("scene_collision", "geometric", geometric.margins, _close),
     Check("self_collision", "geometric", geometric.margins, _close),
     Check("swept_collision", "geometric", geometric.swept_margins, _close),
+    Check("measured_collision", "geometric", geometric.measured_margins, _close),
     Check("action_period", "dynamic", dynamic.margins),
     Check("joint_velocity", "dynamic", dynamic.margins,
           lambda cell: float(cell.limits.velocity_rad_s.min())),

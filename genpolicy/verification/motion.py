@@ -147,7 +147,12 @@ class MotionProof:
             yield from contact.coming(action[POSITION] - before[POSITION], period_s)
         if loaded and not held:
             yield from contact.letting_go(phase, self._depth_m())
-        yield from self._swept(ends, openings[-2:], held, phase, motion["scene"])
+        scene = motion["scene"]
+        yield from self._swept(ends, openings[-2:], held, phase, scene)
+        if row == first:
+            came = np.stack([_floats(motion["q_meas_rad"]), ends[1]])
+            for _, sentence in self._swept(came, openings[-2:], held, phase, scene):
+                yield "P6.measured_sweep", f"From where the arm was measured: {sentence}"
 
     def _pose(self, q_rad: Array, opening_m: float, held: bool, scene: dict[str, str]) -> None:
         model, data = self._model, self._data

@@ -1,6 +1,8 @@
 """A tool that points down, straight chunks, and the context in which they are feasible."""
 
+import sys
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -19,6 +21,8 @@ from genpolicy.feasibility.settings import LAYERS, FeasibilitySettings
 from genpolicy.robot.controller import CONTROLLER_MODE
 from genpolicy.robot.scene_state import SceneState
 from genpolicy.tasks.api import load_task
+
+sys.path.insert(0, str(Path(__file__).parent))  # for what tests of this folder share
 
 WORKSPACE = SimpleNamespace(lower_m=(0.30, -0.22, 0.02), upper_m=(0.72, 0.22, 0.28))
 DOWN = np.diag([1.0, -1.0, -1.0])

@@ -15,7 +15,7 @@ from genpolicy.feasibility.settings import LAYERS
 
 def test_names_are_unique_and_layers_in_order():
     names = [check.name for check in CHECKS]
-    assert len(set(names)) == len(names) == 39
+    assert len(set(names)) == len(names) == 40
     assert list(dict.fromkeys(check.layer for check in CHECKS)) == list(LAYERS)
     assert sorted(CHECKS, key=lambda check: LAYERS.index(check.layer)) == list(CHECKS)
 

@@ -5,15 +5,23 @@ its commands came there, where it was measured, how fast, or when.
 """
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import bisect
 
-from genpolicy.evidence.shadow.at_the_margin import BEYOND
+from genpolicy.contract.action import GRIPPER
+from genpolicy.evidence.shadow.at_the_margin import BEYOND, WITHIN
 from genpolicy.evidence.shadow.case import Case, alone, still
 from genpolicy.feasibility.admission import FeasibilityChecker
+from genpolicy.feasibility.context import Context
+from genpolicy.robot.collision import CollisionModel, Paths
 from genpolicy.robot.dynamics import ArmDynamics
+from genpolicy.seeds import stream
+
+Array = NDArray[np.float64]
 
 UNSTOPPABLE = 4.0  # times the robot's acceleration: no projection can go on from it
 HARDEST = 100.0  # times the robot's acceleration: beyond the torque of any joint
+WAYS, LOOKS = 200, 5  # places to be cut off at, and where the way back from one is looked at
 JOLTS = (4.0, 8.0, 16.0, -4.0, -8.0, -16.0)  # likewise; with gravity, and against it
 
 
@@ -96,6 +104,39 @@ def pushed_aside(case: Case, checker: FeasibilityChecker) -> Case | None:
     speeds = BEYOND * checker.cell.limits.acceleration_rad_s2 * _time_left_s(here, checker)
     cases = [here.with_context(dq_meas=row) for row in np.diag(speeds)]
     return alone(checker, cases, "measured_acceleration")
+
+
+def cut_off(case: Case, checker: FeasibilityChecker) -> Case | None:
+    """The arm was seen a while ago on the other side of something: the way back leads through it.
+
+    In time it could come; its commands are where they should be.
+    """
+    cell, context = checker.cell, case.context
+    here = still(case, checker, context.q_cmd).with_context(
+        state_time_s=context.now_s - WITHIN * context.maximum_age_s
+    )
+    most_rad = WITHIN * cell.limits.velocity_rad_s * _time_left_s(here, checker)
+    ways = stream(0, "corruption", "cut_off").uniform(-1.0, 1.0, (WAYS, len(most_rad)))
+    places = context.q_cmd + ways * most_rad
+    places = places[cell.kinematics.within_limits(places)]
+    depths_m = _depths_m(cell.collision, here.context, places)
+    deepest = np.argsort(-depths_m, kind="stable")[: np.count_nonzero(depths_m)]
+    return alone(
+        checker, [here.with_context(q_meas=places[i]) for i in deepest], "measured_collision"
+    )
+
+
+def _depths_m(model: CollisionModel, context: Context, places: Array) -> Array:
+    """How deep something is hit on the way from each of some places (n, J), m. Shape (n,)."""
+    shares = np.linspace(0.0, 1.0, LOOKS)[:, None]
+    closed = np.full((len(places), LOOKS), context.last_action[GRIPPER])
+    report = model.check_samples(Paths(
+        q_rad=places[:, None] + shares * (context.q_cmd - places)[:, None],
+        opening_m=closed, held=np.zeros(closed.shape, dtype=bool),
+        scenes=(context.scene,) * len(places),
+        contact_allowed=np.zeros(len(places), dtype=bool), clearance_m=np.zeros(len(places)),
+    ))  # fmt: skip
+    return np.array([0.0 if hit is None else hit.depth_m for hit in report.hits])
 
 
 def old_state(case: Case, checker: FeasibilityChecker) -> Case | None:

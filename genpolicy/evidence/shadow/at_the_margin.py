@@ -21,7 +21,10 @@ Array = NDArray[np.float64]
 Place = Callable[[Case], Case | None]
 
 RATES = ("joint_velocity", "joint_acceleration", "joint_jerk", "tcp_speed", "tcp_turn")
-LEAPING = (*RATES, "measured_velocity")  # a leap is too fast, and so is the way to it
+# A leap is too fast, and so is the way to it, which leads through the same.
+LEAPING = (*RATES, "measured_velocity", "measured_collision")
+
+OWN_WAY = ("workspace", "swept_collision", "measured_collision")
 
 BEYOND = 1.02  # of a limit
 WITHIN = 0.98
@@ -118,7 +121,7 @@ def singular_posture(case: Case, checker: FeasibilityChecker) -> Case | None:
 def folded_posture(case: Case, checker: FeasibilityChecker) -> Case | None:
     """The arm stands still, folded into itself; also its way there is in collision."""
     cases = [still(case, checker, q).as_it_is() for q in postures_of(checker.cell).folded]
-    return alone(checker, cases, "self_collision", ("workspace", "swept_collision"))
+    return alone(checker, cases, "self_collision", OWN_WAY)
 
 
 def leapt_obstacle(case: Case, checker: FeasibilityChecker, place: Place) -> Case | None:

@@ -267,13 +267,14 @@ CORRUPTIONS = (
     Corruption("singular_posture", margin.singular_posture, "kinematic", "singular"),
     Corruption(
         "collision", collision, "geometric", "scene_collision",
-        ("swept_collision", "contact_surface"), with_obstacle,
+        ("swept_collision", "measured_collision", "contact_surface"), with_obstacle,
     ),
     Corruption(
         "folded_posture", margin.folded_posture, "geometric", "self_collision",
-        ("workspace", "swept_collision"),
+        margin.OWN_WAY,
     ),
     Corruption("leap", leap, "geometric", "swept_collision", margin.LEAPING, with_obstacle),
+    Corruption("cut_off", boundary.cut_off, "geometric", "measured_collision"),
     Corruption("other_period", other_period, "dynamic", "action_period"),
     Corruption("fast_joint", margin.fast_joint, "dynamic", "joint_velocity"),
     Corruption("broken_boundary", boundary.broken_boundary, "dynamic", "joint_acceleration"),

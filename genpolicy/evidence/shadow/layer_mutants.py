@@ -41,6 +41,7 @@ RULES = {
     "gripper_opening": "P6.release",
     "singular": "P6.singular",
     "swept_collision": "P6.sweep",
+    "measured_collision": "P6.measured_sweep",
 }
 """Which rule of the independent checker stands behind a check of a layer, where one does."""
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from genpolicy.contract.action import GRIPPER, POSITION
 from genpolicy.feasibility.batch import Batch, Margins
 from genpolicy.feasibility.cell import Cell
-from genpolicy.feasibility.layers.geometric import depth_m, detail_of, paths_of
+from genpolicy.feasibility.layers.geometric import depth_m, detail_of, from_measured, paths_of
 from genpolicy.robot.impedance import STIFFNESS_N_M
 from genpolicy.robot.pressing import pressed_depth_m
 
@@ -52,7 +52,7 @@ def margins(batch: Batch, cell: Cell) -> Margins:
 
 
 def surface_margins(batch: Batch, cell: Cell) -> Margins:
-    """What is held touches nothing but the target, at the rows and between them.
+    """What is held touches nothing but the target, at the rows, on the way there and between them.
 
     ====================  =====================================================================
     contact_surface       in a contact phase: lower bound on distance - clearance to all of the
@@ -64,11 +64,13 @@ def surface_margins(batch: Batch, cell: Cell) -> Margins:
     found, details = np.zeros(len(batch)), [""] * len(batch)
     inside = np.flatnonzero(batch.in_phases(cell.contact_phases))
     if len(inside):
-        paths = paths_of(batch.take(inside), cell, "held")
-        reports = cell.collision.check_samples(paths), cell.collision.check_swept(paths)
+        some = batch.take(inside)
+        paths, came = paths_of(some, cell, "held"), from_measured(some, cell, "held")
+        sweep = cell.collision.check_swept
+        reports = cell.collision.check_samples(paths), sweep(paths), sweep(came)
         for place, i in enumerate(inside):
             found[i] = min(float(report.clearance_m[place]) for report in reports)
-            hit = reports[0].hits[place] or reports[1].hits[place]
+            hit = next((r.hits[place] for r in reports if r.hits[place] is not None), None)
             if hit is not None:
                 found[i], details[i] = -depth_m(hit), detail_of(hit)
     return Margins({"contact_surface": found}, tuple(details))

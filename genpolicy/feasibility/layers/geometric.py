@@ -1,12 +1,16 @@
 """The geometric layer: does arm, hand or held object touch anything, at or between the rows?"""
 
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from genpolicy.feasibility.batch import Batch, Margins
 from genpolicy.feasibility.cell import Cell
-from genpolicy.robot.collision import Hit, Paths
+from genpolicy.robot.collision import CollisionReport, Hit, Paths
+
+Array = NDArray[np.float64]
 
 TOUCH_M = 1e-9  # a touch without depth is still a collision
 
@@ -35,7 +39,7 @@ def margins(batch: Batch, cell: Cell) -> Margins:
             name = "self_collision" if hit.second in own_names else "scene_collision"
             values["scene_collision"][i] = values["self_collision"][i] = 0.0
             values[name][i] = -depth_m(hit)
-    return Margins(values, tuple(detail_of(hit) for hit in report.hits))
+    return Margins(values, _details(report))
 
 
 def swept_margins(batch: Batch, cell: Cell) -> Margins:
@@ -49,11 +53,44 @@ def swept_margins(batch: Batch, cell: Cell) -> Margins:
     passed.
     """
     report = cell.collision.check_swept(paths_of(batch, cell, "free"))
-    pairs = zip(report.hits, report.clearance_m, strict=True)
-    left = [clearance if hit is None else -depth_m(hit) for hit, clearance in pairs]
-    return Margins(
-        {"swept_collision": np.array(left)}, tuple(detail_of(hit) for hit in report.hits)
+    return Margins({"swept_collision": _left_m(report)}, _details(report))
+
+
+def measured_margins(batch: Batch, cell: Cell) -> Margins:
+    """Collisions of the way from where the arm was measured to the first row.
+
+    ==================  =======================================================================
+    measured_collision  lower bound on distance, m; - depth (at least 1 nm) of a hit
+    ==================  =======================================================================
+
+    An arm that lags, was pushed or was seen a while ago comes to the first row another way than its
+    commands do. No clearance is asked: that belongs to what is commanded.
+    """
+    report = cell.collision.check_swept(from_measured(batch, cell, "free"))
+    return Margins({"measured_collision": _left_m(report)}, _details(report))
+
+
+def from_measured(batch: Batch, cell: Cell, asked: Literal["held", "free"]) -> Paths:
+    """The way from where the arm was measured to the first row, without clearance."""
+    paths = paths_of(batch, cell, asked)
+    measured = np.stack([context.q_meas for context in batch.contexts])
+    return replace(
+        paths,
+        q_rad=np.stack([measured, paths.q_rad[:, 1]], axis=1),
+        opening_m=paths.opening_m[:, :2],
+        held=paths.held[:, :2],
+        clearance_m=np.zeros(len(batch)),
     )
+
+
+def _left_m(report: CollisionReport) -> Array:
+    """Clearance that is left of each path, m; - depth of a hit. Shape (B,)."""
+    pairs = zip(report.hits, report.clearance_m, strict=True)
+    return np.array([clearance if hit is None else -depth_m(hit) for hit, clearance in pairs])
+
+
+def _details(report: CollisionReport) -> tuple[str, ...]:
+    return tuple(detail_of(hit) for hit in report.hits)
 
 
 def paths_of(batch: Batch, cell: Cell, asked: Literal["held", "free"]) -> Paths:

@@ -84,7 +84,7 @@ def test_a_proof_that_proves_nothing_is_seen(shadow, few, monkeypatch):
 @pytest.mark.parametrize(
     ("part", "checks"),
     [("_touching", {"contact_force", "contact_surface", "scene_collision", "self_collision"}),
-     ("_swept", {"swept_collision"}), ("_turning_freely", {"singular"}),
+     ("_swept", {"swept_collision", "measured_collision"}), ("_turning_freely", {"singular"}),
      ("_reached", {"unreachable"})],
 )  # fmt: skip
 def test_a_part_of_the_proof_that_is_left_out_is_seen(part, checks, shadow, few, monkeypatch):

@@ -54,6 +54,18 @@ def test_outside_is_refused_by_exactly_this_check(name, cases, build, kit):
     kit.turns_red(build, name, cases[name])
 
 
+def test_on_the_way_from_where_the_arm_was_measured_it_touches_nothing_else(checker, cell, kit):
+    """What is held stood in the post's top when it was seen; its commands are free of it."""
+    aside = (HOVER[0], HOVER[1] + 0.04, HOVER[2])
+    ctx = kit.context(checker, HOVER, phase="insert")
+    ctx = replace(ctx, scene=standing(checker, kit, aside))
+    seen = replace(ctx, q_meas=kit.context(checker, aside).q_cmd)
+    phase = {"task_phase": "insert"}
+    assert kit.judge(checker, kit.line(HOVER, HOVER), ctx, **phase).passed
+    verdict = kit.judge(checker, kit.line(HOVER, HOVER), seen, **phase)
+    assert verdict.first_reason == "contact_surface" and "post" in verdict.detail
+
+
 def test_margins_by_hand(checker, cell, kit):
     """One step of 1 mm sideways and 4 mm down in 50 ms, held in a contact phase."""
     ctx = kit.context(checker, HOVER, phase="insert")

@@ -9,13 +9,14 @@ from genpolicy.contract.action import join_action
 from genpolicy.execution.checks import without
 from genpolicy.feasibility.admission import FeasibilityChecker
 from genpolicy.feasibility.checks import CHECKS
-from genpolicy.feasibility.layers.geometric import margins, swept_margins
+from genpolicy.feasibility.layers.geometric import margins, measured_margins, swept_margins
 
 BESIDE, BEYOND = (0.5, -0.15, 0.15), (0.5, 0.15, 0.15)
 RATES = (
     "joint_velocity", "joint_acceleration", "joint_jerk", "joint_torque", "payload_torque",
-    "tcp_speed", "tcp_turn", "measured_velocity",
+    "tcp_speed", "tcp_turn", "measured_velocity", "measured_collision",
 )  # fmt: skip
+SAMPLED, ON_THE_WAY = ("scene_collision",), ("swept_collision", "measured_collision")
 KINEMATIC = ("workspace", "joint_position", "singular", "unreachable")
 
 
@@ -24,13 +25,24 @@ def cases(checker, kit):
     start = kit.context(checker, kit.START)
     return {
         "scene_collision": kit.Outside(
-            kit.line(kit.START, (0.45, 0, 0.15)), start, others=("swept_collision",)
+            kit.line(kit.START, (0.45, 0, 0.15)),
+            start,
+            others=ON_THE_WAY,
         ),
         "self_collision": folded(checker, kit),
         "swept_collision": kit.Outside(
             kit.line(BESIDE, BEYOND, n=1), kit.context(checker, BESIDE), others=RATES
         ),
+        "measured_collision": cut_off(checker, kit),
     }
+
+
+def cut_off(checker, kit):
+    """Commands rest on one side of the post; on the other the arm was seen, a while ago."""
+    ctx = kit.context(checker, BESIDE)
+    beyond = kit.context(checker, BEYOND).q_cmd
+    seen = replace(ctx, q_meas=beyond, state_time_s=ctx.now_s - 0.28)
+    return kit.Outside(kit.line(BESIDE, BESIDE), seen)
 
 
 def folded(checker, kit):
@@ -44,10 +56,12 @@ def folded(checker, kit):
             break
     action = join_action(*arm.forward(q), 0.0)[None]
     there = replace(ctx, q_cmd=q, q_meas=q, last_action=action[0], q_cmd_history=np.tile(q, (2, 1)))
-    return kit.Outside(action, there, others=(*KINEMATIC, "swept_collision", "scene_collision"))
+    return kit.Outside(action, there, others=(*KINEMATIC, *SAMPLED, *ON_THE_WAY))
 
 
-@pytest.mark.parametrize("name", ["scene_collision", "self_collision", "swept_collision"])
+@pytest.mark.parametrize(
+    "name", ["scene_collision", "self_collision", "swept_collision", "measured_collision"]
+)
 def test_outside_is_refused_by_exactly_this_check(name, cases, build, kit):
     assert list(cases) == kit.names_of("geometric")
     kit.turns_red(build, name, cases[name])
@@ -85,14 +99,27 @@ def test_what_no_check_asks_is_not_computed(cell, kit, checker, monkeypatch):
         raise AssertionError("a test that no check asked for")
 
     monkeypatch.setattr(cell.collision, "check_swept", never)
-    blind = FeasibilityChecker(cell, checks=without(CHECKS, "swept_collision"))
+    blind = FeasibilityChecker(cell, checks=without(CHECKS, *ON_THE_WAY, "contact_surface"))
     assert kit.judge(blind, good, ctx).passed
     with pytest.raises(AssertionError, match="no check asked for"):
         kit.judge(checker, good, ctx)
     monkeypatch.setattr(cell.collision, "check_samples", never)
-    names = ("scene_collision", "self_collision", "swept_collision")
+    names = (*SAMPLED, "self_collision", *ON_THE_WAY, "contact_surface")
     blind = FeasibilityChecker(cell, checks=without(CHECKS, *names))
     assert kit.judge(blind, good, ctx).passed
+
+
+def test_the_way_back_is_asked_without_clearance(cell, kit, checker):
+    """Where the arm stands already, 1 mm more is not asked of it; what it is told to do must."""
+    near = (0.50, -0.0865, 0.15)
+    ctx = kit.context(checker, near)
+    batch = kit.solved(kit.batch_of((kit.line(near, near), ctx)), cell)
+    room = [m(batch, cell).values for m in (margins, measured_margins)]
+    wide = replace(cell, settings=cell.settings.model_copy(update={"clearance_m": 0.05}))
+    assert margins(batch, wide).values["scene_collision"][0] < 0 <= room[0]["scene_collision"][0]
+    assert measured_margins(batch, wide).values["measured_collision"][0] == pytest.approx(
+        room[1]["measured_collision"][0]
+    )
 
 
 def test_the_swept_test_is_made_where_the_rows_are_free(checker, cases, kit):

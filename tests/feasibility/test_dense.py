@@ -1,0 +1,40 @@
+"""Admitted chunks, looked at every millisecond by something else; and that it is awake."""
+
+import pytest
+from dense import KINDS, look
+
+from genpolicy.execution.checks import without
+from genpolicy.feasibility.checks import CHECKS
+
+ADMITTED = 200
+
+
+def test_nothing_admitted_is_wrong_at_any_millisecond():
+    found = look(1, ADMITTED)
+    assert found.wrongs == []
+    assert found.admitted.total() == ADMITTED and set(found.admitted) == set(KINDS)
+    # Looked at is what is next to being refused, by many checks, at speed and close by.
+    assert len(found.refused) > 12
+    assert found.worst["of a joint's speed"] > 0.95
+    assert found.worst["lacking of the clearance, m"] > -0.001
+
+
+@pytest.mark.parametrize(
+    ("gone", "kinds", "said"),
+    [
+        (("scene_collision", "swept_collision", "measured_collision"), ("beside",), "post"),
+        (("swept_collision",), KINDS, "ms: "),
+        (("measured_collision",), KINDS, "from where it was"),
+        (("joint_velocity", "measured_velocity"), ("free", "edge"), "of a joint's speed"),
+        (("contact_force",), ("down",), " N"),
+        (("approach_direction",), ("down",), "P6.approach"),
+        (("gripper_opening",), ("down", "onto"), "P6.release"),
+    ],
+)
+def test_without_a_check_it_objects(gone, kinds, said):
+    found = look(0, 3 * ADMITTED, without(CHECKS, *gone), kinds=kinds, until=said)
+    assert any(said in wrong for wrong in found.wrongs), found.wrongs[:5]
+
+
+def test_the_same_seed_is_the_same_look():
+    assert look(3, 10) == look(3, 10)
