@@ -82,6 +82,7 @@ def test_everything_is_written_and_again_the_same(recordings, tmp_path, capsys):
     assert document["next_action"] in printed.out and str(out / "audit.html") in printed.out
     assert all(line in printed.out for line in document["rests_on"])
     assert "60 episodes accepted, 0 refused" in printed.err
+    assert "packaged; --limits gives others" in printed.out
     limits = default_limits()
     assert document["limits"] == limits.as_json()
     assert all(f"{name} {item.limit:g}" in printed.out for name, item in limits.by_question.items())
@@ -109,6 +110,12 @@ def test_everything_is_written_and_again_the_same(recordings, tmp_path, capsys):
     assert run(tmp_path / "dataset", again) == 0
     assert {path.name for path in again.iterdir()} == OUTPUTS - {"dataset"}
     assert read_json(again / "audit.json")["verdict"] == document["verdict"]
+
+
+def test_limits_say_where_they_are_from(tmp_path):
+    limits, own = default_limits(), tmp_path / "params.yaml"
+    assert "packaged" in command.limits_text(limits, None)
+    assert str(own) in command.limits_text(limits, own)
 
 
 @pytest.mark.usefixtures("unaudited")

@@ -120,6 +120,8 @@ def test_labels_are_contaminated_from_one_disagreement_on(labels, name, kind):
     assert (answer.limit is None) == (answer.measured is None) == (labels.replays == 0)
     assert answer.interval is None or answer.interval[1] == answer.measured
     assert (answer.interval is None) == (labels.replays == 0)
+    told = f"{labels.disagreements} of {labels.replays} replayed"
+    assert answer.note == (told if labels.replays else "no replay: labels are taken as they are")
 
 
 def _offset(measured, **changes):

@@ -212,6 +212,18 @@ def test_a_remedy_that_was_not_tried_leaves_no_verdict(ladder, name):
     assert criterion.verdict == "INCONCLUSIVE" and f"not trained: {name}" in criterion.caveat
 
 
+def test_in_doubt_a_remedy_is_taken_to_be_valid_more_often(ladder):
+    """A chance of 0.364 in 30 episodes is 10.9 of them: 11, for what is judged is how high."""
+
+    def sampled(frame):
+        rows = frame["method"] == "bc_noise"
+        return frame.assign(**{k: np.where(rows, v, frame[k]) for k, v in SAMPLED.items()})
+
+    evidence.edit_table(ladder, "measure_baselines/modes.parquet", sampled)
+    criterion = found(ladder, "remedy_valid_share")
+    assert criterion.interval == pytest.approx(clopper_pearson(11, 30, 0.975))
+
+
 def test_noise_counts_as_a_simple_policy_and_only_by_what_may_be_executed(ladder):
     def scatter(frame, **changes):
         rows = frame["method"] == "bc_noise"

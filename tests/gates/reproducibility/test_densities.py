@@ -44,6 +44,7 @@ def test_gains_are_over_the_mean_of_the_situation(ladder):
     [
         (cells("reached", 17), "more samples than were drawn"),
         (cells("samples", 0), "more samples than were drawn"),
+        (lambda f: f.assign(samples=0, reached=0), "more samples than were drawn"),
         (cells("reached", -1), "corrupt"),
         (cells("log_density", float("nan")), "non-finite"),
         (lambda f: f[f["mode"] == 0], "each once"),

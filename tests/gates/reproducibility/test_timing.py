@@ -117,6 +117,7 @@ def test_processes_that_scatter_leave_the_model_unproven(ladder):
     ("change", "why"),
     [(lambda f: f[f["run"] == 1], "several processes of both runs"),
      (lambda f: f[f["level"] == 0.5], "several processes of both runs"),
+     (lambda f: f[f["process"] < 4 - f["run"]], "several processes of both runs"),
      (cells("drawn_s", 0.0), "no time")],
 )  # fmt: skip
 def test_a_model_that_was_not_tried_is_no_answer(ladder, change, why):

@@ -67,6 +67,16 @@ def test_a_recovery_that_hardly_ever_began_is_no_evidence(ladder):
     assert judge(ladder, "D").candidates["flow"] == "PASS"
 
 
+def test_no_recovery_is_no_evidence_whatever_is_asked(ladder):
+    """Nothing began, and no limit asks for anything: that is not a share of 0, or of 1."""
+    begun(ladder, "recovery_drill", 0, 0)
+    evidence.write_params(
+        ladder, lambda p: p["gate_d"]["limits"]["safety"].pop("recovery_success_lower")
+    )
+    with pytest.raises(MissingEvidenceError, match="recovery began on 0 starts"):
+        recovery(ladder)
+
+
 def test_drills_that_succeed_do_not_hide_a_condition_that_is_shown_to_fail(ladder):
     begun(ladder, "camera_delay", 16, 1)
     found = recovery(ladder)
