@@ -1,8 +1,9 @@
-"""Checks that Gate C asks for: every row of both tables, by name. No setting leaves one out.
+"""What Gate C asks for by name: every row of both tables of checks, every incident on the way.
 
-Written out, not imported: every stage reads the gates, and training may know neither feasibility
-nor execution. A test holds the list to the tables (`genpolicy/feasibility/checks.py`,
-`genpolicy/execution/checks.py`).
+No setting leaves one out. Written out, not imported: every stage reads the gates, and training may
+know neither feasibility nor execution. Tests hold the lists to the tables
+(`genpolicy/feasibility/checks.py`, `genpolicy/execution/checks.py`,
+`genpolicy/evidence/shadow/on_the_way.py`).
 """
 
 CHECKS_ASKED_FOR = (
@@ -87,3 +88,27 @@ CHECKS_ASKED_FOR = (
     "execution.pace",
     "execution.watchdog",
 )
+INCIDENTS_ASKED_FOR = {
+    "phase_change_on_the_way": "phase_transition",
+    "calibration_change_on_the_way": "calibration_mismatch",
+    "divergence_on_the_way": "observation_divergence",
+    "force_event_on_the_way": "force_event",
+    "collision_event_on_the_way": "collision_event",
+    "force_stop_on_the_way": "stopped",
+    "collision_stop_on_the_way": "stopped",
+    "emergency_stop_on_the_way": "stopped",
+    "cleared_stop_on_the_way": "stopped",
+    "intervention_on_the_way": "intervention",
+    "handed_back_on_the_way": "intervention",
+    "reset_on_the_way": "reset",
+    "other_weights_on_the_way": "checkpoint_mismatch",
+    "other_sampler_on_the_way": "sampler_mismatch",
+    "other_controller_on_the_way": "stopped",
+    "fallback_on_the_way": "stopped",
+    "delay_on_the_way": "stale_observation",
+    "loss_on_the_way": "expired",
+    "copy_on_the_way": "duplicate",
+}
+"""What happens to an admitted chunk before it arrives, and by which reason it must be counted."""
+COPIES = ("copy_on_the_way",)
+"""Of these each chunk arrives twice, and is executed once."""

@@ -62,6 +62,7 @@ BOUNDS: tuple[Bound, ...] = (
     *_counts("C", "the independent proof agrees or there is none", "checker_violations"),
     *_counts("C", "a check whose absence goes unseen protects nobody", "mutants_undetected"),
     *_counts("C", "an action that vanished may still be executed", "conservation_error"),
+    *_counts("C", "what is void already may hurt somebody", "incidents_miscounted"),
     Bound("C", "corrupted_refused_share", ">=", 1.0, "corrupted input is never executed"),
     Bound("C", "stub_violation_upper", "<=", 0.01, "more says nothing although none was seen"),
     *_counts("D", "one bad action is enough to hurt somebody", "stub_violations"),

@@ -11,6 +11,7 @@ from gates.feasibility.settings import (
     HELD_OUT,
     INTACT,
     LAYERS,
+    NO_MODE,
     TWO_MODES,
     FeasibilitySettings,
 )
@@ -55,7 +56,7 @@ def mode_admissible_gap(
         admissible=admissible(rows),
         episode=rows["situation"].astype(str).str.rpartition(":")[0],
     )
-    rows = rows[~rows["mode"].isin(settings.unassigned_modes)]
+    rows = rows[~rows["mode"].isin(NO_MODE)]
     rows = rows[rows.groupby("observation")["mode"].transform("nunique") >= 2]
     by_mode = {str(mode): part for mode, part in rows.groupby("mode")}
     seen = {mode: part["episode"].nunique() for mode, part in by_mode.items()}

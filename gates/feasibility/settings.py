@@ -10,6 +10,8 @@ LAYERS = ("representation", "kinematic", "geometric", "dynamic", "contact", "fre
 HELD_OUT = "held_out"
 TWO_MODES = "two_modes"
 INTACT = (HELD_OUT, TWO_MODES)
+NO_MODE = ("", "none", "unassigned")
+"""What a candidate is labelled that belongs to no mode: unknown, no path, between the modes."""
 
 
 class FeasibilitySettings(CandidateSettings):
@@ -17,11 +19,9 @@ class FeasibilitySettings(CandidateSettings):
 
     Attributes:
         required_fixtures: Corrupted fixtures that must have been tried.
-        unassigned_modes: Labels of candidates that belong to no mode.
         mode_observations: Independent observations of every mode without which the modes are not
             compared.
     """
 
     required_fixtures: tuple[str, ...]
-    unassigned_modes: tuple[str, ...]
     mode_observations: int = Field(ge=2)

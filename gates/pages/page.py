@@ -21,6 +21,7 @@ from gates.pages import (
     plots_convergence,
     plots_density,
     plots_feasibility,
+    plots_incidents,
     plots_need,
     plots_stress,
     plots_time,
@@ -47,7 +48,7 @@ MARKS = {
 PLOTS: dict[str, tuple[Plot | Photo, ...]] = {
     "A": plots_need.PLOTS,
     "B": (*plots_convergence.PLOTS, *plots_time.PLOTS, *plots_density.PLOTS),
-    "C": plots_feasibility.PLOTS,
+    "C": (*plots_feasibility.PLOTS, *plots_incidents.PLOTS),
     "D": plots_stress.PLOTS,
     "E": (),
 }

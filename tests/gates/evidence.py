@@ -60,6 +60,7 @@ from genpolicy.evidence.rows.stress import (
     StressCountRow,
     StressStubRow,
 )
+from genpolicy.evidence.shadow.on_the_way import INCIDENTS as ON_THE_WAY
 from genpolicy.execution.checks import CHECKS as EXECUTION_CHECKS
 from genpolicy.feasibility.checks import CHECKS as FEASIBILITY_CHECKS
 from genpolicy.integrity.documents import canonical_json
@@ -130,6 +131,8 @@ FIXTURES = (
 
 
 PLAYED = tuple(name for name in FIXTURES if name != "two_modes")
+INCIDENTS = [(item.name, str(item.reason), item.arrives > 1) for item in ON_THE_WAY]
+"""What befalls twelve chunks of each candidate, its reason, and whether one copy is executed."""
 
 
 def by_owner(**limits: tuple[Any, str]) -> dict[str, dict[str, list[Any]]]:
@@ -221,7 +224,6 @@ PARAMS: dict[str, Any] = {
     },
     "gate_c": {
         "required_fixtures": list(FIXTURES[2:]),
-        "unassigned_modes": ["", "none"],
         "mode_observations": 30,
         "limits": by_owner(
             mode_admissible_gap=(0.3, "controller"),
@@ -233,6 +235,7 @@ PARAMS: dict[str, Any] = {
             stub_invalid=(0, "safety"),
             stub_violation_upper=(0.01, "safety"),
             conservation_error=(0, "controller"),
+            incidents_miscounted=(0, "safety"),
             checker_violations=(0, "safety"),
             mutants_undetected=(0, "safety"),
         ),
@@ -1176,6 +1179,18 @@ def _shadow(root: Path) -> None:
             {"method": m, "fixture": f, "delivered": 400, "arrivals": 900, "stale": 0, "invalid": 0}
             for m in CANDIDATES
             for f in PLAYED
+        ]
+        + [
+            {
+                "method": m,
+                "fixture": f,
+                "delivered": 12 * moved,
+                "arrivals": 24 * moved,
+                "stale": 0,
+                "invalid": 0,
+            }
+            for m in CANDIDATES
+            for f, _, moved in INCIDENTS
         ],
     )
     table(
@@ -1195,6 +1210,19 @@ def _shadow(root: Path) -> None:
             for m in CANDIDATES
             for f in PLAYED
             for reason, n in (("expired", 10), ("phase", 5))
+        ]
+        + [
+            {
+                "method": m,
+                "fixture": f,
+                "generated": 12 * (1 + moved),
+                "executed": 12 * moved,
+                "queued": 0,
+                "reason": reason,
+                "count": 12,
+            }
+            for m in CANDIDATES
+            for f, reason, moved in INCIDENTS
         ],
     )
     document(root, "shadow/checker.json", checked("journal.mcap", 1000))

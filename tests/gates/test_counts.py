@@ -13,6 +13,7 @@ COUNTED = [
     ("C", "stub_invalid", "shadow/stub.parquet", "invalid"),
     ("C", "stub_violation_upper", "shadow/stub.parquet", "delivered"),
     ("C", "conservation_error", "shadow/counts.parquet", "count"),
+    ("C", "incidents_miscounted", "shadow/counts.parquet", "executed"),
     ("D", "stub_violations", "stress/stub.parquet", "stale"),
     ("D", "stub_violations", "stress/stub.parquet", "arrivals"),
     ("D", "conservation_error", "stress/conservation.parquet", "discarded"),

@@ -280,6 +280,12 @@ WORSE = {
         "conservation_error": _table(
             SHADOW + "counts.parquet", lambda s: cells("executed", 81 + int(9 * s))
         ),
+        "incidents_miscounted": _table(
+            SHADOW + "counts.parquet",
+            lambda s: cells(
+                "executed", 1 + int(9 * s), where=lambda f: f["fixture"] == "reset_on_the_way"
+            ),
+        ),
         "checker_violations": _document(
             SHADOW + "checker.json",
             _violations,

@@ -5,7 +5,7 @@ import pytest
 import yaml
 
 from flows.workspace import merged
-from gates.asked_for import CHECKS_ASKED_FOR
+from gates.asked_for import CHECKS_ASKED_FOR, COPIES, INCIDENTS_ASKED_FOR
 from gates.criterion import Criterion
 from gates.proof import SPECS, judge
 from gates.protection import (
@@ -28,7 +28,8 @@ GOLDEN = {
           "nonfinite_weights": 0, "samples_difference": 1e-5},
     "C": {"execution.watchdog_s": 0.1, "execution.force_limit_n": 80, "gate_c.mode_observations":
           30, "stub_stale": 0, "stub_invalid": 0, "checker_violations": 0, "mutants_undetected": 0,
-          "conservation_error": 0, "corrupted_refused_share": 1, "stub_violation_upper": 0.01},
+          "conservation_error": 0, "incidents_miscounted": 0,
+          "corrupted_refused_share": 1, "stub_violation_upper": 0.01},
     "D": {"stub_violations": 0, "checker_violations": 0, "conservation_error": 0,
           "unmatched_starts": 0, "execution.watchdog_s": 0.1, "execution.force_limit_n": 80,
           "force_peak_p95_n": 80, "intervention_upper": 0.2, "reset_upper": 0.1,
@@ -114,6 +115,8 @@ def test_a_list_that_leaves_out_a_check_is_bad_configuration_but_in_a_rehearsal(
 
 def test_what_must_be_asked_for_is_every_row_of_both_tables():
     assert list(CHECKS_ASKED_FOR) == [f"{layer}.{name}" for layer, name in evidence.CHECKS]
+    assert list(INCIDENTS_ASKED_FOR.items()) == [pair[:2] for pair in evidence.INCIDENTS]
+    assert tuple(name for name, _, moved in evidence.INCIDENTS if moved) == COPIES
 
 
 def test_the_shipped_lists_name_what_they_must(request):

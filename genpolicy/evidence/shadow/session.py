@@ -7,10 +7,11 @@ from typing import Any
 from genpolicy.contract.chunk import DiscardReason
 from genpolicy.evidence.shadow.case import Case
 from genpolicy.evidence.shadow.observations import Observation
+from genpolicy.evidence.shadow.on_the_way import Incident, Way
 from genpolicy.execution.cell import Cell
 from genpolicy.execution.executor import Executor
 from genpolicy.execution.journal import Journal
-from genpolicy.execution.ledger import Account
+from genpolicy.execution.ledger import Account, Conservation
 from genpolicy.execution.stub import ControllerStub
 from genpolicy.execution.supervisor import Supervisor
 from genpolicy.feasibility.admission import Admitted, Rejected
@@ -64,24 +65,77 @@ def play(
         number: Number of the observation.
         measures: What a table states of each candidate, if anything.
     """
-    horizons = cell.horizons
-    metadata = judged[0][0].proposal.metadata
+    metadata, now_s = judged[0][0].proposal.metadata, judged[0][0].context.now_s
     executor, stub, journal = _begin(cell, item, judged[0][0], fixture, number)
-    executor.begin_invocation(0.0, metadata.chunk_id)
-    period_s, now_s = horizons.action_period_s, judged[0][0].context.now_s
-    executor.observe(now_s, now_s, item.phase, item.calibration_epoch)
-    executor.end_invocation(now_s, metadata.chunk_id, "answered")
+    _answer(executor, item, metadata.chunk_id, now_s)
     _note(journal, judged, measures, now_s=now_s)
     delivered = _deliver(executor, judged, now_s=now_s)
+    leaves = item.phase if fixture != IN_FLIGHT_PHASE_CHANGE else f"after {item.phase}"
+    balance = _tick(cell, executor, item, now_s, after=leaves)
+    return _played(journal, stub, balance, delivered)
+
+
+def play_incident(
+    cell: Cell,
+    item: Observation,
+    case: Case,
+    admitted: Admitted,
+    incident: Incident,
+    *,
+    number: int,
+) -> Played:
+    """One session in which something happens while an admitted chunk is on its way.
+
+    Args:
+        cell: Executor, supervisor and stub.
+        item: The observation.
+        case: The chunk, and what it was made from.
+        admitted: The chunk, admitted.
+        incident: What happens.
+        number: Number of the observation.
+    """
+    metadata, context = case.proposal.metadata, case.context
+    executor, stub, journal = _begin(cell, item, case, incident.name, number)
+    ended_s = max(metadata.valid_until_s, context.maximum_age_s)
+    late_s = ended_s + cell.horizons.action_period_s
+    now_s = late_s if incident.late else context.now_s
+    _answer(executor, item, metadata.chunk_id, now_s)
+    incident.happen(Way(
+        executor, stub.supervisor, item, context.active_checkpoint_hash,
+        context.active_sampler_hash, now_s,
+    ))  # fmt: skip
+    arrivals = [executor.deliver(admitted, now_s) for _ in range(incident.arrives)]
+    if not arrivals:
+        rows = len(admitted.projected.actions)
+        executor.write_off(metadata, rows, incident.reason, now_s)
+    balance = _tick(cell, executor, item, now_s, after=item.phase)
+    return _played(journal, stub, balance, arrivals.count(None))
+
+
+def _answer(executor: Executor, item: Observation, invocation: str, now_s: float) -> None:
+    """An invocation on the observation at time 0, which answers now, while another one comes."""
+    executor.begin_invocation(0.0, invocation)
+    executor.observe(now_s, now_s, item.phase, item.calibration_epoch)
+    executor.end_invocation(now_s, invocation, "answered")
+
+
+def _tick(
+    cell: Cell, executor: Executor, item: Observation, now_s: float, *, after: str
+) -> Conservation:
+    """Tick until the horizon has passed; from the third tick on the phase is `after`."""
+    period_s, horizon = cell.horizons.action_period_s, cell.horizons.execution_horizon
     first = round(now_s / period_s)
-    for tick in range(first, first + horizons.execution_horizon + 1):
-        phase = item.phase
-        if fixture == IN_FLIGHT_PHASE_CHANGE and tick >= first + 2:
-            phase = f"after {item.phase}"
+    for tick in range(first, first + horizon + 1):
         if tick > first:
+            phase = item.phase if tick < first + 2 else after
             executor.observe(tick * period_s, tick * period_s, phase, item.calibration_epoch)
         executor.tick(tick * period_s)
-    balance = executor.end_episode((first + horizons.execution_horizon + 1) * period_s)
+    return executor.end_episode((first + horizon + 1) * period_s)
+
+
+def _played(
+    journal: Journal, stub: ControllerStub, balance: Conservation, delivered: int
+) -> Played:
     return Played(
         journal=journal,
         account=balance.chunks,

@@ -6,7 +6,7 @@ clock of its observation, and the journal of that is what the independent checke
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
@@ -19,11 +19,17 @@ from genpolicy.evidence.admission_context import Moment, Session, context_of
 from genpolicy.evidence.rows.shadow import CandidateRow
 from genpolicy.evidence.shadow.case import Case, decide
 from genpolicy.evidence.shadow.corruption import CORRUPTIONS
+from genpolicy.evidence.shadow.found import ShadowEvidence
 from genpolicy.evidence.shadow.observations import Observation
-from genpolicy.evidence.shadow.session import IN_FLIGHT_PHASE_CHANGE, Judged, note_only, play
+from genpolicy.evidence.shadow.on_the_way import INCIDENTS, Incident
+from genpolicy.evidence.shadow.session import (
+    IN_FLIGHT_PHASE_CHANGE,
+    Judged,
+    note_only,
+    play,
+    play_incident,
+)
 from genpolicy.execution.cell import Cell
-from genpolicy.execution.journal import Journal
-from genpolicy.execution.ledger import Account
 from genpolicy.feasibility.admission import Admitted, FeasibilityChecker, Rejected
 from genpolicy.feasibility.settings import LAYERS
 from genpolicy.feasibility.verdict import Verdict
@@ -36,7 +42,8 @@ Array = NDArray[np.float64]
 HELD_OUT = "held_out"
 TWO_MODES = "two_modes"
 DEMONSTRATION = "demonstration"
-BUILT_EVERY = 6  # observations of a phase; fixtures without anything of the candidate's chunk
+# Observations of a phase: of fixtures without anything of the candidate's chunk, of incidents.
+BUILT_EVERY = 6
 
 
 class Identity(Protocol):
@@ -65,16 +72,6 @@ class Demonstrated:
     method: str = DEMONSTRATION
     checkpoint_hash: str = DEMONSTRATION
     sampler_config_hash: str = DEMONSTRATION
-
-
-@dataclass
-class ShadowEvidence:
-    """Rows of the tables, sessions of the journal."""
-
-    candidates: list[CandidateRow] = field(default_factory=list)
-    stub: Counter[tuple[str, str, str]] = field(default_factory=Counter)
-    accounts: dict[tuple[str, str], list[Account]] = field(default_factory=dict)
-    sessions: list[Journal] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -120,6 +117,7 @@ def shadow_policy(
     """
     evidence = ShadowEvidence()
     of_phase: Counter[str] = Counter()
+    good_of_phase: Counter[str] = Counter()
     for number, (item, cases) in enumerate(_answers(shadow, policy, [*observations, *two_mode])):
         seen = _Seen(shadow, evidence, item, number, seed)
         if number >= len(observations):
@@ -129,6 +127,9 @@ def shadow_policy(
         seen.play(judged, fixture=HELD_OUT)
         if any(isinstance(result, Admitted) for _, result in judged.pairs):
             seen.play(judged, fixture=IN_FLIGHT_PHASE_CHANGE)
+            for incident in INCIDENTS if good_of_phase[item.phase] % BUILT_EVERY == 0 else ():
+                seen.play_incident(judged, incident)
+            good_of_phase[item.phase] += 1
         skip_built = of_phase[item.phase] % BUILT_EVERY > 0
         of_phase[item.phase] += 1
         for corruption in CORRUPTIONS:
@@ -198,16 +199,21 @@ class _Seen:
 
     def play(self, judged: _Judgement, *, fixture: str) -> None:
         """Run a session with them."""
-        evidence = self.evidence
         played = play(
             self.shadow.cell, self.item, judged.pairs, fixture=fixture, number=self.number,
             measures=judged.measures,
         )  # fmt: skip
-        key = (judged.pairs[0][0].proposal.metadata.method, fixture)
-        for name in ("arrivals", "stale", "invalid", "delivered"):
-            evidence.stub[(*key, name)] += getattr(played, name)
-        evidence.accounts.setdefault(key, []).append(played.account)
-        evidence.sessions.append(played.journal)
+        self.evidence.keep(played, judged.pairs[0][0].proposal.metadata.method, fixture)
+
+    def play_incident(self, judged: _Judgement, incident: Incident) -> None:
+        """Run a session in which something happens to the first admitted candidate, if any."""
+        for case, result in judged.pairs:
+            if isinstance(result, Admitted):
+                played = play_incident(
+                    self.shadow.cell, self.item, case, result, incident, number=self.number
+                )
+                self.evidence.keep(played, case.proposal.metadata.method, incident.name)
+                return
 
     def _row(
         self, case: Case, result: Admitted | Rejected, fixture: str, candidate: int

@@ -13,8 +13,8 @@ from genpolicy.evidence.documents.shadow import (
     Mutant,
 )
 from genpolicy.evidence.rows.shadow import CandidateRow, ShadowCountRow, ShadowStubRow
+from genpolicy.evidence.shadow.found import ShadowEvidence
 from genpolicy.evidence.shadow.mutants import run_mutants
-from genpolicy.evidence.shadow.shadow import ShadowEvidence
 from genpolicy.execution.cell import Cell
 from genpolicy.execution.journal import write_journal
 from genpolicy.execution.ledger import Account

@@ -1,0 +1,96 @@
+"""What happened to good chunks on their way: each is counted by its reason, and does not move."""
+
+from dataclasses import dataclass
+
+import pandas as pd
+
+from gates.asked_for import COPIES, INCIDENTS_ASKED_FOR
+from gates.criterion import Measured, criterion
+from gates.evidence import Evidence, MissingEvidenceError, counts
+from gates.feasibility.settings import SHADOW, FeasibilitySettings
+from genpolicy.evidence.rows.shadow import ShadowCountRow, ShadowStubRow
+
+COUNTS = f"{SHADOW}/counts.parquet"
+STUB = f"{SHADOW}/stub.parquet"
+
+
+@dataclass(frozen=True)
+class Counted:
+    """One incident of a method, over its sessions.
+
+    Attributes:
+        name: The incident.
+        reason: By which the chunks must be counted.
+        injected: Chunks that it befell.
+        counted: Of these, those that were discarded for the reason.
+        moved: Of these, those of which actions were executed, where none may be; of a chunk that
+            came twice, how many less or more than the one.
+        arrivals: Actions of theirs at the controller stub, where none may be.
+    """
+
+    name: str
+    reason: str
+    injected: float
+    counted: float
+    moved: float
+    arrivals: float
+
+    @property
+    def wrong(self) -> float:
+        """Chunks that were counted otherwise or moved, and actions that arrived."""
+        return abs(self.injected - self.counted) + self.moved + self.arrivals
+
+
+def counted(evidence: Evidence, method: str) -> list[Counted]:
+    """Every incident that is asked for, of one method.
+
+    Raises:
+        MissingEvidenceError: One was never tried, or states several totals.
+    """
+    rows = evidence.of(COUNTS, ShadowCountRow, method)
+    stub = evidence.of(STUB, ShadowStubRow, method)
+    absent = sorted(set(INCIDENTS_ASKED_FOR) - set(rows["fixture"]))
+    if absent:
+        raise MissingEvidenceError(f"not tried: {', '.join(absent)}")
+    rows = rows.assign(**{name: counts(rows, name) for name in ("generated", "executed", "count")})
+    return [
+        _counted(name, reason, rows[rows["fixture"] == name], stub[stub["fixture"] == name])
+        for name, reason in INCIDENTS_ASKED_FOR.items()
+    ]
+
+
+def _counted(name: str, reason: str, rows: pd.DataFrame, stub: pd.DataFrame) -> Counted:
+    totals = rows[["generated", "executed"]].drop_duplicates()
+    if len(totals) != 1:
+        raise MissingEvidenceError(f"{name} states several totals")
+    generated, executed = (float(value) for value in totals.iloc[0])
+    if not generated > 0:
+        raise MissingEvidenceError(f"not tried: {name}")
+    found = float(rows["count"][rows["reason"] == reason].sum())
+    if name in COPIES:
+        half = generated / 2
+        return Counted(name, reason, half, found, abs(executed - half), 0.0)
+    return Counted(name, reason, generated, found, executed, float(counts(stub, "arrivals").sum()))
+
+
+@criterion(
+    "<=",
+    question="Is what happens to a good chunk on its way counted by its reason, and never moved?",
+    look_at="Timing: a chunk that is void already was executed, or counted as something else.",
+    per_candidate=True,
+    always=True,
+)
+def incidents_miscounted(
+    evidence: Evidence, settings: FeasibilitySettings, candidate: str
+) -> Measured:
+    """Chunks that were counted by another reason or moved, and actions that arrived of them."""
+    found = counted(evidence, candidate)
+    wrong = [
+        f"{item.name}: {item.counted:g} of {item.injected:g} as {item.reason}, "
+        f"{item.moved + item.arrivals:g} moved"
+        for item in found
+        if item.wrong
+    ]
+    least = min(item.injected for item in found)
+    text = f"{len(found)} incidents, each to {least:g} chunks or more"
+    return Measured(sum(item.wrong for item in found), caveat="; ".join([text, *wrong]))
