@@ -36,9 +36,14 @@ class Counted:
     arrivals: float
 
     @property
+    def through(self) -> float:
+        """What got as far as the stub, executed or refused there, or moved although a copy."""
+        return self.moved + self.arrivals
+
+    @property
     def wrong(self) -> float:
         """Chunks that were counted otherwise or moved, and actions that arrived."""
-        return abs(self.injected - self.counted) + self.moved + self.arrivals
+        return abs(self.injected - self.counted) + self.through
 
 
 def counted(evidence: Evidence, method: str) -> list[Counted]:
@@ -87,7 +92,7 @@ def incidents_miscounted(
     found = counted(evidence, candidate)
     wrong = [
         f"{item.name}: {item.counted:g} of {item.injected:g} as {item.reason}, "
-        f"{item.moved + item.arrivals:g} moved"
+        f"{item.through:g} got to the stub"
         for item in found
         if item.wrong
     ]

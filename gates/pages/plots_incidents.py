@@ -19,8 +19,8 @@ def _by_method(evidence: Evidence) -> dict[str, list[Counted]]:
 
 
 def _cell(item: Counted) -> str:
-    moved = item.moved + item.arrivals
-    return f"{item.counted:g} of {item.injected:g}" + (f", {moved:g} moved" if moved else "")
+    through = f", {item.through:g} at the stub" if item.through else ""
+    return f"{item.counted:g} of {item.injected:g}{through}"
 
 
 def _incidents(evidence: Evidence, report: GateReport) -> Figure:
@@ -54,11 +54,11 @@ def _name(item: Counted) -> str:
 def _table(evidence: Evidence, report: GateReport) -> Table:
     rows = [
         (method, _name(item), item.reason, f"{item.injected:g}", f"{item.counted:g}",
-         f"{item.moved + item.arrivals:g}")
+         f"{item.through:g}")
         for method, items in _by_method(evidence).items()
         for item in items
     ]  # fmt: skip
-    heads = ("method", "what happened", "must be counted as", "chunks", "counted so", "moved")
+    heads = ("method", "what happened", "must be counted as", "chunks", "counted so", "at the stub")
     return (heads, *rows)
 
 

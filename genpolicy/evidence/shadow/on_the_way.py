@@ -14,7 +14,7 @@ from genpolicy.execution.executor import Executor
 from genpolicy.execution.supervisor import Supervisor
 
 SUFFIX = "_on_the_way"
-"""How the fixtures are recognised; their candidates were judged in `held_out`."""
+"""Ends the names of the fixtures; their chunks are those of `held_out`."""
 OTHER = "0" * 64  # a hash of nothing
 
 

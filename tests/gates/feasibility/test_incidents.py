@@ -48,7 +48,7 @@ def test_what_is_counted_otherwise_is_wrong_whichever_it_is(
 def test_nothing_of_it_moves(ladder, name, table, column):
     evidence.edit_table(ladder, table, cells(column, 2, where=of(name)))
     found = told(ladder)
-    assert found.value == 2.0 and "2 moved" in found.caveat
+    assert found.value == 2.0 and "2 got to the stub" in found.caveat
     report = judge(ladder, "C")
     assert report.candidates["flow"] == "FAIL" and report.candidates["diffusion"] == "PASS"
 
