@@ -106,24 +106,39 @@ def cold_latency_ratio_upper(
 
 @criterion(
     "<=",
-    question="Do invocations take no longer than the model says that gate D draws from?",
+    question="Does gate D draw candidates no shorter, and what they are held against no longer?",
     look_at="Timing: slow terms coincide, or the machine was busier in one run; measure again.",
     per_candidate=True,
 )
 def latency_model_ratio_upper(
     evidence: Evidence, settings: ReproducibilitySettings, candidate: str
 ) -> Measured:
-    """p95 of each process over that of a model made without it, at the upper end."""
-    rows = evidence.of(MODEL, LatencyModelRow, candidate)
+    """p95 of each process against that of a model made without it, at the upper end.
+
+    Either way a candidate would win by a clock that is not the cell's: where its own invocations
+    take longer than drawn, or those of a baseline shorter. The furthest of them is measured.
+    """
+    found = [_held(evidence, settings, candidate, longer=True)]
+    found += [_held(evidence, settings, name, longer=False) for name in settings.baselines]
+    return max(found, key=lambda item: item.value)
+
+
+def _held(
+    evidence: Evidence, settings: ReproducibilitySettings, method: str, *, longer: bool
+) -> Measured:
+    """How much longer (or shorter) a method's processes took than was drawn of the others."""
+    rows = evidence.of(MODEL, LatencyModelRow, method)
     high = rows[rows["level"] == P95]
     if set(high["run"]) != {1, 2} or len(high) < 2 * FEWEST:
-        raise MissingEvidenceError("the p95 of several processes of both runs is needed")
+        raise MissingEvidenceError(f"{method}: the p95 of several processes of both runs is needed")
     measured, drawn = numbers(high, "measured_s"), numbers(high, "drawn_s")
     if not np.all((measured > 0) & (drawn > 0)):
-        raise MissingEvidenceError("a quantile of no time")
-    ratio, lower, upper = ratio_to(measured, drawn, confidence=settings.confidence)
+        raise MissingEvidenceError(f"{method}: a quantile of no time")
+    pair = (measured, drawn) if longer else (drawn, measured)
+    ratio, lower, upper = ratio_to(*pair, confidence=settings.confidence)
     text = (
-        f"p95 of {len(high)} processes {np.median(measured) * MILLI:.4g} ms, drawn "
-        f"{np.median(drawn) * MILLI:.4g} ms from the others: {ratio:.3g} of it"
+        f"{method}: p95 of {len(high)} processes {np.median(measured) * MILLI:.4g} ms, drawn "
+        f"{np.median(drawn) * MILLI:.4g} ms from the others: "
+        f"{'took' if longer else 'drawn'} {ratio:.3g} of it"
     )
     return Measured(upper, interval=(lower, upper), caveat=text)

@@ -116,7 +116,7 @@ TASK = {
     "robot": "panda",
     **dict.fromkeys(("robot_sha256", "sha256"), "0" * 64),
 }
-SPEED = {"diffusion": 0.02, "flow": 0.01}
+SPEED = {"diffusion": 0.02, "flow": 0.01, "bc": 0.004, "chunked_bc": 0.005, "act": 0.006}
 
 
 FIXTURES = (
@@ -1104,7 +1104,7 @@ def _latency(root: Path) -> None:
                 "measured_s": SPEED[m] * (1 + level / 10 + 0.01 * process),
                 "drawn_s": SPEED[m] * (1.02 + level / 10),
             }
-            for m in CANDIDATES
+            for m in (*CANDIDATES, *BASELINES)
             for run in (1, 2)
             for process in (1, 2, 3)
             for level in (0.5, 0.95)

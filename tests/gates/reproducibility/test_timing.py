@@ -92,14 +92,49 @@ def test_a_run_that_took_no_time_was_not_measured(ladder):
         assert found.measured is None and "took no time" in found.caveat
 
 
+def _as_drawn(rows, factor):
+    """All processes as drawn, but those of some rows so many times as long."""
+
+    def change(frame):
+        return frame.assign(measured_s=frame["drawn_s"] * np.where(rows(frame), factor, 1.0))
+
+    return change
+
+
 def test_a_model_that_draws_too_short_is_seen_and_one_that_draws_too_long_is_not_held_against_it(
     ladder,
 ):
     def ratio(factor):
-        evidence.edit_table(ladder, MODEL, lambda f: f.assign(measured_s=f["drawn_s"] * factor))
-        return asked(ladder, latency_model_ratio_upper, "flow", gate="B").value
+        change = _as_drawn(lambda f: f["method"] == "flow", factor)
+        evidence.edit_table(ladder, MODEL, change)
+        return asked(ladder, latency_model_ratio_upper, "flow", gate="B")
 
-    assert ratio(1.3) == pytest.approx(1.3) and ratio(0.5) == pytest.approx(0.5)
+    assert ratio(1.3).value == pytest.approx(1.3) and ratio(1.3).caveat.startswith("flow: ")
+    # Then the baselines are what is left to ask, and they are as they were drawn.
+    assert ratio(0.5).value == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("name", evidence.BASELINES)
+def test_a_baseline_that_is_drawn_too_long_is_seen_and_one_that_is_drawn_too_short_is_not(
+    ladder, name
+):
+    """It would miss deadlines that it keeps, and a candidate would win by that."""
+
+    def ratio(factor):
+        change = _as_drawn(lambda f: f["method"] == name, factor)
+        evidence.edit_table(ladder, MODEL, change)
+        return asked(ladder, latency_model_ratio_upper, "flow", gate="B")
+
+    assert ratio(0.5).value == pytest.approx(2.0)
+    assert ratio(0.5).caveat.startswith(f"{name}: ") and "drawn 2 of it" in ratio(0.5).caveat
+    assert ratio(2.0).value == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("name", evidence.BASELINES)
+def test_a_baseline_without_a_model_leaves_no_verdict(ladder, name):
+    evidence.edit_table(ladder, MODEL, lambda f: f[f["method"] != name])
+    for found in found_in(judge(ladder, "B"), "latency_model_ratio_upper"):
+        assert found.measured is None and name in found.caveat
 
 
 def test_processes_that_scatter_leave_the_model_unproven(ladder):
