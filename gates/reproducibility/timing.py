@@ -118,15 +118,20 @@ def latency_model_ratio_upper(
     Either way a candidate would win by a clock that is not the cell's: where its own invocations
     take longer than drawn, or those of a baseline shorter. The furthest of them is measured.
     """
-    found = [_held(evidence, settings, candidate, longer=True)]
-    found += [_held(evidence, settings, name, longer=False) for name in settings.baselines]
-    return max(found, key=lambda item: item.value)
+    asked = [(candidate, True), *((name, False) for name in settings.baselines)]
+    found = [_held(evidence, settings, name, longer=longer) for name, longer in asked]
+    upper, interval, text = max(found)
+    return Measured(upper, interval=interval, caveat=text)
 
 
 def _held(
     evidence: Evidence, settings: ReproducibilitySettings, method: str, *, longer: bool
-) -> Measured:
-    """How much longer (or shorter) a method's processes took than was drawn of the others."""
+) -> tuple[float, tuple[float, float], str]:
+    """How much longer (or shorter) a method's processes took than was drawn of the others.
+
+    Returns:
+        Upper end, interval, and both in words.
+    """
     rows = evidence.of(MODEL, LatencyModelRow, method)
     high = rows[rows["level"] == P95]
     if set(high["run"]) != {1, 2} or len(high) < 2 * FEWEST:
@@ -141,4 +146,4 @@ def _held(
         f"{np.median(drawn) * MILLI:.4g} ms from the others: "
         f"{'took' if longer else 'drawn'} {ratio:.3g} of it"
     )
-    return Measured(upper, interval=(lower, upper), caveat=text)
+    return upper, (lower, upper), text
