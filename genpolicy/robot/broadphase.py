@@ -16,10 +16,9 @@ from genpolicy.robot.shapes import BASE_FRAME, HELD, SceneShapes, Shape, boundin
 Array = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
-# A shape of the tool is held against the links at least this many joints up the chain. Links
-# nearer to it touch it by design (housings of neighbouring joints overlap in a file of
-# primitives) or are kept off it by the joint ranges.
-SELF_CHAIN_JOINTS = 4
+# Shapes at least this many joints apart along the chain are held against each other. Nearer ones
+# touch by design: housings of neighbouring joints overlap in a file of primitives.
+SELF_CHAIN_JOINTS = 3
 
 
 @dataclass(frozen=True)
@@ -201,7 +200,7 @@ class BroadPhase:
             raise ConfigError(
                 where="the collision model",
                 found="no pair of robot shapes that could meet",
-                expected=f"shapes on the tool and on a link {SELF_CHAIN_JOINTS} joints before it",
+                expected=f"shapes on links {SELF_CHAIN_JOINTS} joints apart along the chain",
                 action="Give hand and links colliding geoms of the robot's group in the MJCF.",
             )
         pairs += [(i, -1, j) for i, j in own]
@@ -214,20 +213,17 @@ class BroadPhase:
 
 
 def self_pairs(robot: tuple[Shape, ...]) -> list[tuple[int, int]]:
-    """Pairs of robot shapes that are held against each other: tool against links far up the chain.
+    """Pairs of robot shapes that are held against each other: all that lie far enough apart.
 
-    The tool is what hangs behind the last link, or the last link itself where nothing does. Which
-    pairs follows from the kinematic tree alone, never from names.
+    Links against links, and the tool with what it holds against links. Which pairs follows from
+    the kinematic tree alone, never from names.
 
     Returns:
-        Indices of the tool's shape and of the link's shape.
+        Indices of the shape further down the chain and of the one further up.
     """
-    last = max((shape.frame for shape in robot), default=BASE_FRAME)
-    behind = any(shape.tool and shape.name != HELD for shape in robot)
     return [
         (i, j)
         for i, first in enumerate(robot)
-        if first.tool or (not behind and first.frame == last != BASE_FRAME)
         for j, second in enumerate(robot)
         if first.frame - second.frame >= SELF_CHAIN_JOINTS
     ]
