@@ -106,7 +106,6 @@ INCIDENTS_ASKED_FOR = {
     "other_controller_on_the_way": "stopped",
     "fallback_on_the_way": "stopped",
     "delay_on_the_way": "stale_observation",
-    "loss_on_the_way": "expired",
     "copy_on_the_way": "duplicate",
 }
 """What happens to an admitted chunk before it arrives, and by which reason it must be counted."""

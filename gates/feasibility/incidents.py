@@ -25,7 +25,8 @@ class Counted:
         counted: Of these, those that were discarded for the reason.
         moved: Of these, those of which actions were executed, where none may be; of a chunk that
             came twice, how many less or more than the one.
-        arrivals: Actions of theirs at the controller stub, where none may be.
+        arrivals: Actions of theirs at the controller stub, where none may be; of a chunk that came
+            twice those that were refused there.
     """
 
     name: str
@@ -74,7 +75,8 @@ def _counted(name: str, reason: str, rows: pd.DataFrame, stub: pd.DataFrame) -> 
     found = float(rows["count"][rows["reason"] == reason].sum())
     if name in COPIES:
         half = generated / 2
-        return Counted(name, reason, half, found, abs(executed - half), 0.0)
+        refused = counts(stub, "stale").sum() + counts(stub, "invalid").sum()
+        return Counted(name, reason, half, found, abs(executed - half), float(refused))
     return Counted(name, reason, generated, found, executed, float(counts(stub, "arrivals").sum()))
 
 

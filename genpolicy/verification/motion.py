@@ -10,6 +10,7 @@ What may be done with a held object is `contact`'s.
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import chain, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -150,8 +151,7 @@ class MotionProof:
         scene = motion["scene"]
         yield from self._swept(ends, openings[-2:], held, phase, scene)
         if row == first:
-            came = np.stack([_floats(motion["q_meas_rad"]), ends[1]])
-            for _, sentence in self._swept(came, openings[-2:], held, phase, scene):
+            for sentence in self._on_the_way_here(chunk, before_rad, float(told[GRIPPER]), phase):
                 yield "P6.measured_sweep", f"From where the arm was measured: {sentence}"
 
     def _pose(self, q_rad: Array, opening_m: float, held: bool, scene: dict[str, str]) -> None:
@@ -246,6 +246,24 @@ class MotionProof:
             step = (ends[1] - ends[0]) / period_s - _floats(motion["dq_meas_rad_s"])
             if not np.all(np.abs(step) / time_s <= acceleration_limit * (1 + ROUNDING)):
                 yield "P6.measured_acceleration", f"The arm must change by {step.tolist()} rad/s."
+
+    def _on_the_way_here(
+        self, chunk: Message, before_rad: Array, opening_m: float, phase: str
+    ) -> Iterator[str]:
+        """What is hit where the arm was measured, or by the commands since then; the first hit."""
+        motion = chunk["motion"]
+        begins_ns = chunk["start_ns"] + chunk["checked_rows"][0] * chunk["period_ns"]
+        since = max(int((begins_ns - motion["measured_ns"]) // chunk["period_ns"]), 0)
+        commands = [*before_rad[max(len(before_rad) - since, 0) :], _floats(motion["q_cmd_rad"])]
+        way, scene = [_floats(motion["q_meas_rad"]), *commands], motion["scene"]
+        held = opening_m <= self.expected.held_opening_m
+        self._pose(way[0], opening_m, held, scene)
+        ways = (np.stack(ends) for ends in pairwise(way))
+        swept = (self._swept(ends, np.full(2, opening_m), held, phase, scene) for ends in ways)
+        for rule, sentence in chain(self._touching(held, phase), chain.from_iterable(swept)):
+            if rule != "P6.force":
+                yield sentence
+                return
 
     def _touching(self, held: bool, phase: str) -> Iterator[Finding]:
         """What touches what may not, and how hard the held object is pressed where it may."""

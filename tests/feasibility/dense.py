@@ -13,6 +13,7 @@ import math
 import sys
 from collections import Counter
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import mujoco
 import numpy as np
@@ -285,11 +286,15 @@ class Eye:
                 told = ms == MILLISECONDS
                 wrong = self.touching(context.phase, clearance_m, commanded=told) if ms else ""
                 found += [f"row {row}, {ms} ms: {wrong}"] * bool(wrong)
-        for share in np.linspace(0, 1, MILLISECONDS):
-            q = context.q_meas + share * (path[1] - context.q_meas)
-            self.place(q, openings[0], held[0] and held[1], context.scene)
-            wrong = self.touching(context.phase, 0.0, commanded=False)
-            found += [f"{share:.0%} of the way from where it was: {wrong}"] * bool(wrong)
+        since = round((context.now_s - context.measured_at_s) / PERIOD_S)
+        known = context.q_cmd_history[max(len(context.q_cmd_history) - since, 0) :]
+        way = [context.q_meas, *known, context.q_cmd]
+        for before, after in pairwise(way):
+            for share in np.linspace(0, 1, MILLISECONDS):
+                q = before + share * (after - before)
+                self.place(q, openings[0], held[0], context.scene)
+                wrong = self.touching(context.phase, 0.0, commanded=False)
+                found += [f"{share:.0%} of the way from where it was: {wrong}"] * bool(wrong)
         return found + self._figures(path, np.array(places), np.array(turns), actions)
 
     def _figures(self, path, places, turns, actions):

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 UNSTOPPABLE = 4.0  # times the robot's acceleration: no projection can go on from it
 HARDEST = 100.0  # times the robot's acceleration: beyond the torque of any joint
-WAYS, LOOKS = 200, 5  # places to be cut off at, and where the way back from one is looked at
+WAYS, LOOKS = 400, 7  # places to be cut off at, and where the way back from one is looked at
 JOLTS = (4.0, 8.0, 16.0, -4.0, -8.0, -16.0)  # likewise; with gravity, and against it
 
 
@@ -107,9 +107,10 @@ def pushed_aside(case: Case, checker: FeasibilityChecker) -> Case | None:
 
 
 def cut_off(case: Case, checker: FeasibilityChecker) -> Case | None:
-    """The arm was seen a while ago on the other side of something: the way back leads through it.
+    """The arm was seen on the other side of something: the way back leads through it.
 
-    In time it could come; its commands are where they should be.
+    In time it could come; its commands are where they should be. Where nothing stands between two
+    free places, it was seen inside of something.
     """
     cell, context = checker.cell, case.context
     here = still(case, checker, context.q_cmd).with_context(
@@ -119,17 +120,21 @@ def cut_off(case: Case, checker: FeasibilityChecker) -> Case | None:
     ways = stream(0, "corruption", "cut_off").uniform(-1.0, 1.0, (WAYS, len(most_rad)))
     places = context.q_cmd + ways * most_rad
     places = places[cell.kinematics.within_limits(places)]
-    depths_m = _depths_m(cell.collision, here.context, places)
-    deepest = np.argsort(-depths_m, kind="stable")[: np.count_nonzero(depths_m)]
-    return alone(
-        checker, [here.with_context(q_meas=places[i]) for i in deepest], "measured_collision"
-    )
+    there = _depths_m(cell.collision, here.context, places, np.zeros(2))
+    between = _depths_m(cell.collision, here.context, places, np.linspace(0.0, 1.0, LOOKS))
+    hit = np.flatnonzero(np.maximum(there, between))
+    best = hit[np.lexsort((-between[hit], there[hit] > 0))]
+    return alone(checker, [here.with_context(q_meas=places[i]) for i in best], "measured_collision")
 
 
-def _depths_m(model: CollisionModel, context: Context, places: Array) -> Array:
-    """How deep something is hit on the way from each of some places (n, J), m. Shape (n,)."""
-    shares = np.linspace(0.0, 1.0, LOOKS)[:, None]
-    closed = np.full((len(places), LOOKS), context.last_action[GRIPPER])
+def _depths_m(model: CollisionModel, context: Context, places: Array, shares: Array) -> Array:
+    """How deep something is hit from each of some places (n, J) on, at the shares but the first.
+
+    Returns:
+        m. Shape (n,).
+    """
+    shares = shares[:, None]
+    closed = np.full((len(places), len(shares)), context.last_action[GRIPPER])
     report = model.check_samples(Paths(
         q_rad=places[:, None] + shares * (context.q_cmd - places)[:, None],
         opening_m=closed, held=np.zeros(closed.shape, dtype=bool),

@@ -126,7 +126,6 @@ HAPPENED: tuple[tuple[str, DiscardReason, Callable[[Way], object]], ...] = (
 INCIDENTS: tuple[Incident, ...] = (
     *(Incident(f"{name}{SUFFIX}", reason, happen) for name, reason, happen in HAPPENED),
     Incident(f"delay{SUFFIX}", DiscardReason.STALE_OBSERVATION, _nothing, late=True),
-    Incident(f"loss{SUFFIX}", DiscardReason.EXPIRED, _nothing, arrives=0),
     Incident(f"copy{SUFFIX}", DiscardReason.DUPLICATE, _nothing, arrives=2),
 )
 """Every incident, once."""

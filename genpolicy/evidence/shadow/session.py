@@ -105,9 +105,6 @@ def play_incident(
         context.active_sampler_hash, now_s,
     ))  # fmt: skip
     arrivals = [executor.deliver(admitted, now_s) for _ in range(incident.arrives)]
-    if not arrivals:
-        rows = len(admitted.projected.actions)
-        executor.write_off(metadata, rows, incident.reason, now_s)
     balance = _tick(cell, executor, item, now_s, after=item.phase)
     return _played(journal, stub, balance, arrivals.count(None))
 

@@ -6,13 +6,16 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from genpolicy.contract.chunk import Projected
 from genpolicy.feasibility.batch import Batch, Margins
 from genpolicy.feasibility.cell import Cell
+from genpolicy.feasibility.context import Context
 from genpolicy.robot.collision import CollisionReport, Hit, Paths
 
 Array = NDArray[np.float64]
 
 TOUCH_M = 1e-9  # a touch without depth is still a collision
+PERIOD_ROUNDING = 1e-6  # of a period: times are sums of periods
 
 
 def margins(batch: Batch, cell: Cell) -> Margins:
@@ -57,30 +60,43 @@ def swept_margins(batch: Batch, cell: Cell) -> Margins:
 
 
 def measured_margins(batch: Batch, cell: Cell) -> Margins:
-    """Collisions of the way from where the arm was measured to the first row.
+    """Collisions of the way from where the arm was measured to its last command.
 
     ==================  =======================================================================
     measured_collision  lower bound on distance, m; - depth (at least 1 nm) of a hit
     ==================  =======================================================================
 
-    An arm that lags, was pushed or was seen a while ago comes to the first row another way than its
-    commands do. No clearance is asked: that belongs to what is commanded.
+    An arm that was pushed, or that stands, comes to the first row another way than its commands
+    do. No clearance is asked: that belongs to what is commanded.
     """
     report = cell.collision.check_swept(from_measured(batch, cell, "free"))
     return Margins({"measured_collision": _left_m(report)}, _details(report))
 
 
 def from_measured(batch: Batch, cell: Cell, asked: Literal["held", "free"]) -> Paths:
-    """The way from where the arm was measured to the first row, without clearance."""
-    paths = paths_of(batch, cell, asked)
-    measured = np.stack([context.q_meas for context in batch.contexts])
+    """The way from where the arm was measured to its last command, without clearance.
+
+    It leads by the commands that are known since the measurement: an arm that was seen a while
+    ago has followed them, and the straight way to here would cut its corners.
+    """
+    pairs = zip(batch.projected, batch.contexts, strict=True)
+    ways = [_known_way(chunk, context, cell.action_period_s) for chunk, context in pairs]
+    points, paths = max(map(len, ways)), paths_of(batch, cell, asked)
     return replace(
         paths,
-        q_rad=np.stack([measured, paths.q_rad[:, 1]], axis=1),
-        opening_m=paths.opening_m[:, :2],
-        held=paths.held[:, :2],
+        q_rad=np.stack([np.pad(w, ((0, points - len(w)), (0, 0)), mode="edge") for w in ways]),
+        opening_m=np.repeat(paths.opening_m[:, :1], points, axis=1),
+        held=np.repeat(paths.held[:, :1], points, axis=1),
         clearance_m=np.zeros(len(batch)),
     )
+
+
+def _known_way(chunk: Projected, context: Context, period_s: float) -> Array:
+    """Measured state, commands of whole periods since, last command. Shape (n, J), n >= 2."""
+    begins_s = chunk.metadata.action_start_time_s + context.first_index * period_s
+    since = int((begins_s - context.measured_at_s) / period_s + PERIOD_ROUNDING)
+    known = context.q_cmd_history[max(len(context.q_cmd_history) - max(since, 0), 0) :]
+    return np.concatenate([context.q_meas[None], known, context.q_cmd[None]])
 
 
 def _left_m(report: CollisionReport) -> Array:

@@ -190,3 +190,19 @@ def test_a_corruption_leaves_the_good_case_alone(good, checker):
         for corruption in CORRUPTIONS:
             corruption.apply(case, checker)
         np.testing.assert_array_equal(case.proposal.actions, before)
+
+
+def test_an_arm_that_is_cut_off_stands_in_the_open(shadow, observations):
+    """Else a check that looks at where it stands, and not at the way, would do."""
+    model, found = shadow.checker.collision, 0
+    for number, item in enumerate(observations[::4]):
+        case = case_of(shadow, item, item.demonstrated, number=number)
+        broken = BY_NAME["cut_off"].apply(case, shadow.checker)
+        context = broken.context
+        opening_m = float(context.last_action[-1])
+        assert (
+            model.in_collision(context.q_meas, context.scene, held=False, opening_m=opening_m)
+            is None
+        )
+        found += 1
+    assert found >= 5

@@ -109,6 +109,25 @@ def test_what_no_check_asks_is_not_computed(cell, kit, checker, monkeypatch):
     assert kit.judge(blind, good, ctx).passed
 
 
+@pytest.mark.parametrize("periods", range(7))
+def test_an_arm_that_follows_its_commands_round_the_post_cuts_no_corner(checker, kit, periods):
+    """Seen up to 0.3 s ago: the straight way from there would lead through the post."""
+    angle = np.pi - 0.15 * np.arange(17)
+    ring = [0.5 + 0.102 * np.cos(angle), 0.102 * np.sin(angle), np.full(17, 0.15)]
+    rotation = np.broadcast_to(kit.DOWN, (17, 3, 3))
+    actions = join_action(np.stack(ring, axis=1), rotation, np.zeros(17))
+    start = kit.context(checker, actions[0, :3])
+    q, reached = checker.ik_chunk(actions, start.q_cmd)
+    assert reached.all()
+    now = 8
+    ctx = replace(
+        start, q_cmd=q[now], last_action=actions[now], q_cmd_history=q[now - 2 : now],
+        q_meas=q[now - periods], state_time_s=start.now_s - periods * kit.PERIOD_S,
+    )  # fmt: skip
+    verdict = kit.judge(checker, actions[now + 1 :], ctx)
+    assert verdict.passed, (verdict.first_reason, verdict.detail, verdict.margins)
+
+
 def test_the_way_back_is_asked_without_clearance(cell, kit, checker):
     """Where the arm stands already, 1 mm more is not asked of it; what it is told to do must."""
     near = (0.50, -0.0865, 0.15)

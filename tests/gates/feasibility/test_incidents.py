@@ -12,7 +12,7 @@ from gates.feasibility.incidents import incidents_miscounted
 from gates.proof import judge
 from gates.writing import write_gate
 
-FEW = ("phase_change_on_the_way", "loss_on_the_way", *COPIES)
+FEW = ("phase_change_on_the_way", "delay_on_the_way", *COPIES)
 COUNTS, STUB = "shadow/counts.parquet", "shadow/stub.parquet"
 
 
@@ -59,6 +59,12 @@ def test_of_copies_exactly_one_is_executed(ladder, executed, wrong):
     assert told(ladder).value == wrong
 
 
+@pytest.mark.parametrize("column", ["stale", "invalid"])
+def test_nothing_of_a_copy_is_refused_at_the_stub(ladder, column):
+    evidence.edit_table(ladder, STUB, cells(column, 3, where=of(COPIES[0])))
+    assert told(ladder).value == 3.0
+
+
 @pytest.mark.parametrize("name", FEW)
 def test_one_that_was_not_tried_leaves_no_verdict(ladder, name):
     evidence.edit_table(ladder, COUNTS, lambda f: f[~of(name)(f)])
@@ -80,16 +86,16 @@ def test_none_of_none_is_no_evidence(ladder):
 
 def test_several_totals_of_one_incident_are_no_evidence(ladder):
     def twice(frame):
-        again = frame[of("loss_on_the_way")(frame)].assign(reason="reset", generated=13)
+        again = frame[of("delay_on_the_way")(frame)].assign(reason="reset", generated=13)
         return pd.concat([frame, again])
 
     evidence.edit_table(ladder, COUNTS, twice)
-    with pytest.raises(MissingEvidenceError, match="loss_on_the_way states several totals"):
+    with pytest.raises(MissingEvidenceError, match="delay_on_the_way states several totals"):
         told(ladder)
 
 
 def test_the_page_shows_what_was_expected_and_seen(ladder):
-    evidence.edit_table(ladder, COUNTS, cells("count", 11, where=of("loss_on_the_way")))
+    evidence.edit_table(ladder, COUNTS, cells("count", 11, where=of("delay_on_the_way")))
     write_gate(ladder, "C")
     page = (ladder / "reports/gate_c.html").read_text()
     assert "What happens on the way" in page
