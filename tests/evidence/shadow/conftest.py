@@ -3,8 +3,9 @@
 import pytest
 
 from genpolicy.evidence.shadow.observations import held_out_observations
-from genpolicy.evidence.shadow.shadow import Shadow
+from genpolicy.evidence.shadow.shadow import Shadow, admit, case_of
 from genpolicy.execution.cell import Cell
+from genpolicy.feasibility.admission import Admitted
 from genpolicy.seeds import stream
 
 
@@ -21,3 +22,14 @@ def observations(data, kit):
     return held_out_observations(
         data, horizons=kit.HORIZONS, count=20, generator=stream(1, "shadow")
     )
+
+
+@pytest.fixture(scope="session")
+def demonstrated(shadow, observations):
+    """A moment, what the operator did there as a case, and its admitted chunk."""
+    for number, item in enumerate(observations):
+        case = case_of(shadow, item, item.demonstrated, number=number)
+        result = admit(shadow, case)
+        if isinstance(result, Admitted):
+            return item, case, result
+    raise AssertionError("no demonstration was admitted")

@@ -8,27 +8,14 @@ from genpolicy.contract.chunk import DiscardReason
 from genpolicy.evidence.shadow import session
 from genpolicy.evidence.shadow.on_the_way import INCIDENTS, SUFFIX
 from genpolicy.evidence.shadow.session import play, play_incident
-from genpolicy.evidence.shadow.shadow import admit, case_of
 from genpolicy.execution.checks import CHECKS, without
-from genpolicy.feasibility.admission import Admitted
 from genpolicy.feasibility.figures import expected_motion
 from genpolicy.verification.checker import check_messages
 
 
-@pytest.fixture(scope="module")
-def good(shadow, observations):
-    """A demonstrated chunk that is admitted, and its observation."""
-    for number, item in enumerate(observations):
-        case = case_of(shadow, item, item.demonstrated, number=number)
-        result = admit(shadow, case)
-        if isinstance(result, Admitted):
-            return item, case, result
-    raise AssertionError("no demonstration was admitted")
-
-
 @pytest.mark.parametrize("incident", INCIDENTS, ids=lambda incident: incident.name)
-def test_each_is_counted_by_its_reason_and_nothing_moves(shadow, good, incident):
-    found = play_incident(shadow.cell, *good, incident, number=0)
+def test_each_is_counted_by_its_reason_and_nothing_moves(shadow, demonstrated, incident):
+    found = play_incident(shadow.cell, *demonstrated, incident, number=0)
     copies = incident.arrives
     moved = incident.arrives > 1
     assert found.account.generated == copies and found.account.error == 0
@@ -43,9 +30,9 @@ def test_each_is_counted_by_its_reason_and_nothing_moves(shadow, good, incident)
     assert report.violations == []
 
 
-def test_without_an_incident_the_same_chunk_is_executed(shadow, good):
+def test_without_an_incident_the_same_chunk_is_executed(shadow, demonstrated):
     """Else the incidents would show nothing."""
-    item, case, result = good
+    item, case, result = demonstrated
     found = play(shadow.cell, item, [(case, result)], fixture="held_out", number=0)
     assert found.account.executed == 1 and found.arrivals > 0 and found.account.discarded == {}
 
@@ -76,12 +63,12 @@ BLIND = {
 
 
 @pytest.mark.parametrize("name", BLIND)
-def test_an_executor_that_does_not_look_is_seen(shadow, good, name, monkeypatch):
+def test_an_executor_that_does_not_look_is_seen(shadow, demonstrated, name, monkeypatch):
     """The stub, which looks for itself, refuses what arrives there; but it arrives."""
     (incident,) = (item for item in INCIDENTS if item.name == name)
     blind = partial(session.Executor, checks=without(CHECKS, *BLIND[name]))
     monkeypatch.setattr(session, "Executor", blind)
-    found = play_incident(shadow.cell, *good, incident, number=0)
+    found = play_incident(shadow.cell, *demonstrated, incident, number=0)
     once = incident.arrives > 1
     assert found.account.discarded != {incident.reason: 1} or (found.arrivals and not once)
     assert found.account.executed == once

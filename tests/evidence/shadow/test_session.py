@@ -6,20 +6,16 @@ import numpy as np
 import pytest
 
 from genpolicy.evidence.shadow.session import IN_FLIGHT_PHASE_CHANGE, play
-from genpolicy.evidence.shadow.shadow import HELD_OUT, admit, case_of
-from genpolicy.feasibility.admission import Admitted, Rejected
+from genpolicy.evidence.shadow.shadow import HELD_OUT, admit
+from genpolicy.feasibility.admission import Rejected
 
 
 @pytest.fixture(scope="module")
-def judged(shadow, observations):
+def judged(shadow, demonstrated):
     """A demonstrated chunk that is admitted, and what the layers say to a NaN in its place."""
-    for number, item in enumerate(observations):
-        good = case_of(shadow, item, item.demonstrated, number=number)
-        result = admit(shadow, good)
-        if isinstance(result, Admitted):
-            bad = good.with_actions(np.full_like(good.proposal.actions, np.nan))
-            return item, (good, result), (bad, admit(shadow, bad))
-    raise AssertionError("no demonstration was admitted")
+    item, case, result = demonstrated
+    bad = case.with_actions(np.full_like(case.proposal.actions, np.nan))
+    return item, (case, result), (bad, admit(shadow, bad))
 
 
 def played(shadow, judged, *pairs, fixture=HELD_OUT):
