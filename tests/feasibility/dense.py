@@ -20,7 +20,8 @@ import numpy as np
 
 from genpolicy.contract.action import GRIPPER, POSITION, join_action
 from genpolicy.contract.chunk import ChunkMetadata, Proposal
-from genpolicy.execution.journal import encode_actions, encode_poses
+from genpolicy.execution.chunk_queue import _motion
+from genpolicy.execution.journal import encode_actions
 from genpolicy.feasibility.admission import Admitted, FeasibilityChecker
 from genpolicy.feasibility.cell import cell_of
 from genpolicy.feasibility.checks import CHECKS
@@ -330,21 +331,11 @@ def proved(proof, admitted, session):
     """What the checker of journals says of all rows of it."""
     context, metadata = admitted.context, admitted.metadata
     first, last = admitted.verdict.rows
-    speed = context.dq_meas
     message = {
         "chunk_id": metadata.chunk_id, "actions": encode_actions(admitted.actions),
         "rows": len(admitted.actions), "checked_rows": [first, last],
         "start_ns": round(metadata.action_start_time_s * 1e9), "period_ns": round(PERIOD_S * 1e9),
-        "motion": {
-            "joints": len(context.q_cmd), "q_rad": encode_actions(admitted.verdict.q_rad),
-            "q_cmd_rad": encode_actions(context.q_cmd),
-            "q_before_rad": encode_actions(context.q_cmd_history),
-            "q_meas_rad": encode_actions(context.q_meas),
-            "dq_meas_rad_s": None if speed is None else encode_actions(speed),
-            "measured_ns": round(context.measured_at_s * 1e9),
-            "last_action": encode_actions(context.last_action),
-            "scene": encode_poses(context.scene.bodies),
-        },
+        "motion": _motion(admitted),
     }  # fmt: skip
     said = (
         proof.objections(session, message, row, phase=context.phase, period_s=PERIOD_S)
