@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from gates.proof import Rung
-from gates.rederive_dataset import TRAININGS, rederive_dataset, rederive_trainings
+from gates.rederive_dataset import TRAININGS, rederive_dataset, rederive_trainings, trainings
+from gates.rederive_distilled import rederive_costs, rederive_distilled
 from gates.rederive_latency import rederive_latency
 from gates.rederive_shadow import SHADOW, TaskSection, rederive_shadow
 from gates.report import Gate
@@ -82,24 +83,28 @@ def rederive(root: Path, gate: Gate) -> None:
     Raises:
         RefusedError: A row, the envelope or a finding of the checker is not what the journals say,
             a stated latency is not what the measured times give, or a power, a mutant, a
-            statistic or a split is not what is computed again.
+            statistic, a split or the cost of a distillation is not what is computed again.
         IntegrityError: A journal or a table is missing or no regular file.
         BadInputError: A journal or a table cannot be read.
     """
     if gate == "A":
         rederive_dataset(root)
+    params = read_params(root)
     if gate in TRAININGS:
-        rederive_trainings(root, gate)
+        rederive_trainings(root, gate, params)
+    if gate == "B":
+        rederive_costs(root, trainings(root, gate, params))
     if gate not in FOLDERS:
         return
     folder, pattern = FOLDERS[gate]
-    journals, params = sorted((root / folder).glob(pattern)), read_params(root)
+    journals = sorted((root / folder).glob(pattern))
     _check(root, gate, params, journals)
     if gate == "C":
         rederive_shadow(root, params)
     else:
         _tables(root, params, journals)
         rederive_latency(root, params, journals)
+        rederive_distilled(root, training_seed(params))
         _envelope(root, params)
         _power(root, params)
 

@@ -5,8 +5,10 @@ in those agrees with itself; here the tables are read as numbers, and nothing of
 asked. What a training was given, its windows say themselves.
 """
 
+from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -14,6 +16,7 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from gates.report import Gate
+from gates.settings import PARAMS_FILE, section_of
 from gates.stated import compare_keys, mapping, refuse
 from genpolicy.integrity.documents import read_json
 from genpolicy.integrity.tables import read_table
@@ -21,12 +24,15 @@ from genpolicy.integrity.tables import read_table
 INGEST = "artifacts/ingest"
 MANIFEST = f"{INGEST}/manifest.json"
 IN_TIME = ("train", "validation", "test")
-TRAININGS: dict[Gate, tuple[str, ...]] = {
-    "A": ("artifacts/train_baselines", "artifacts/train_factors"),
-    "B": ("artifacts/train_generators",),
+TRAININGS: dict[Gate, tuple[tuple[str, str], ...]] = {
+    "A": (("train_baselines", "samplers"), ("train_factors", "variants")),
+    "B": (("train_generators", "samplers"),),
 }
+"""Stages that train for a gate, each with the key of its section that names what is trained."""
 GIVEN = {"episodes": "train", "validation_episodes": "validation"}
 """Which split the episodes of a key of `training.json` are of."""
+NAMED = {"train": "training", "validation": "validation"}
+"""Splits as the field and every other message call them."""
 TIES_S = 1e-3
 """Recordings that began within it are of one time: the rule has nanoseconds, tables seconds."""
 
@@ -55,22 +61,37 @@ def rederive_dataset(root: Path) -> None:
         compare_keys("A", place, mapping(stated.get(part)), _extremes(frames[part], rows), how)
 
 
-def rederive_trainings(root: Path, gate: Gate) -> None:
+def trainings(root: Path, gate: Gate, params: Mapping[str, Any]) -> list[Path]:
+    """The folder of every training that a gate rests on, by method or variant and by seed.
+
+    Raises:
+        RefusedError: What `params.yaml` names was not trained.
+        ConfigError: A section is missing.
+    """
+    found: list[Path] = []
+    for stage, key in TRAININGS[gate]:
+        place = f"artifacts/{stage}"
+        found += sorted((root / place).rglob("seed_*"))
+        for name in mapping(section_of(params, stage).get(key)):
+            if root / place / name not in {seed.parent for seed in found}:
+                required = f"a training, since {PARAMS_FILE} names it"
+                refuse(gate, f"{place}/{name}", "not trained", required)
+    return found
+
+
+def rederive_trainings(root: Path, gate: Gate, params: Mapping[str, Any]) -> None:
     """Hold the episodes that every training of a gate was given against the splits.
 
     Raises:
-        RefusedError: A training saw an episode of another split, or does not say what it saw.
+        RefusedError: A training saw an episode of another split, does not say what it saw, or is
+            not there.
         IntegrityError: A table is missing or damaged.
         BadInputError: A document cannot be read.
     """
-    folders = [root / folder for folder in TRAININGS[gate]]
-    seeds = sorted(found for folder in folders for found in folder.rglob("seed_*"))
-    if not seeds:
-        return
     episodes = read_table(root / INGEST / "episodes.parquet")
     pairs = zip(episodes["episode_uuid"].to_pylist(), episodes["split"].to_pylist(), strict=True)
     split_of = dict(pairs)
-    for seed in seeds:
+    for seed in trainings(root, gate, params):
         path = seed / "training.json"
         place = path.relative_to(root).as_posix()
         if not path.is_file():
@@ -79,11 +100,12 @@ def rederive_trainings(root: Path, gate: Gate) -> None:
         for key, split in GIVEN.items():
             given = document.get(key)
             if not isinstance(given, list) or not given:
-                refuse(gate, f"{place}: {key}", "nothing", f"episodes of the {split} split")
+                refuse(gate, f"{place}: {key}", "nothing", f"episodes of the {NAMED[split]} split")
             other = [name for name in given if split_of.get(str(name)) != split]
             if other:
-                found = f"{len(other)} episodes of no {split} split, among them {other[0]}"
-                refuse(gate, f"{place}: {key}", found, f"episodes of the {split} split alone")
+                named = NAMED[split]
+                found = f"{len(other)} episodes outside the {named} split, among them {other[0]}"
+                refuse(gate, f"{place}: {key}", found, f"episodes of the {named} split alone")
 
 
 def _extremes(column: pa.ChunkedArray, rows: NDArray[np.bool_]) -> dict[str, list[float]]:

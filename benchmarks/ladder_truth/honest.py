@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from benchmarks.ladder_truth.planting import Plant, recordings, with_metadata
+from benchmarks.ladder_truth.planting import Plant, all_of, recordings, with_metadata
 from benchmarks.ladder_truth.workspace import BROUGHT, edit_params, set_limit
 
 
@@ -73,6 +73,11 @@ HONEST = (
     Variant("stricter_limit_a", "A stricter limit of gate A that still holds.", "small",
             _limit("gate_a", "clock_residual_s", 0.005),
             note="The base holds it, and it lies below the audit's floor of 0.01 s."),
+    Variant("stricter_limit_a_and_floor", "The same, with the audit's floor lowered to it, as "
+            "its refusal asks.", "small",
+            all_of(_limit("gate_a", "clock_residual_s", 0.005),
+                   _params(lambda p: p["audit"].update(clock_floor_s=0.005))),
+            note="Added after the one above was stopped; it does what the refusal says."),
     Variant("stricter_limit_b", "A stricter limit of gate B that still holds.", "small",
             _limit("gate_b", "parameter_budget_deviation", 0.04),
             note="Was `validation_fall_upper`; that criterion is no more."),

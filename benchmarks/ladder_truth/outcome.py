@@ -31,6 +31,8 @@ PROOF = ("verify", "report")
 _PROOF = {"signed": ("gates", "check", "--through", "E")}
 """Synthetic evidence has no journals from which it could be derived again."""
 REFUSES = re.compile(r"Gate (?P<gate>[A-E]) refuses: (?P<what>.*)")
+OUTPUT = re.compile(r"^artifacts/(?P<stage>\w+)/")
+"""Begins the refusal of a file in a stage's folder, which comes before any stage."""
 REFUSED_CRITERION = re.compile(r"^[a-z_0-9]+(\([a-z_0-9]+\))? is ")
 WAITING = "PENDING_REVIEW"
 
@@ -141,7 +143,7 @@ def run(workspace: Path, base: str) -> Seen:
         raise RuntimeError(f"the machine failed, not the ladder: {end.sentence}")
     stops: list[Stop] = []
     if end.code != 0 and not end.verdict:  # the report of a gate that judged says it better
-        refused = _refusal(end.stage, _said(end.sentence, runs.lines))
+        refused = refused_by(end.stage, _said(end.sentence, runs.lines))
         stops = [refused] if refused else []
     seen = look(workspace, base)
     found = {(s.gate, s.reason, s.candidate): s for s in (*stops, *seen.stops)}
@@ -223,10 +225,12 @@ def _said(sentence: str, lines: list[str]) -> str:
     return " ".join(before[-2:]) or sentence
 
 
-def _refusal(stage: str, sentence: str) -> Stop | None:
+def refused_by(stage: str, sentence: str) -> Stop | None:
     """The stop that a stage announces; None where a report says it better."""
     refused = REFUSES.search(sentence)
     if refused is None:
+        output = OUTPUT.match(sentence)
+        stage = output["stage"] if output and not stage else stage
         return Stop(GATE_OF_STAGE.get(stage, "A"), "refusal", sentence or "dvc itself")
     if REFUSED_CRITERION.match(refused["what"]) and not refused["what"].startswith("report"):
         return None

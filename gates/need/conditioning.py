@@ -5,7 +5,8 @@ import math
 import numpy as np
 
 from gates.bounds import counted_interval
-from gates.cause.told import UNDECIDED, counts
+from gates.cause import CauseName
+from gates.cause.told import counts
 from gates.criterion import Measured, criterion
 from gates.evidence import Evidence, numbers
 from gates.need.cause import as_the_cause, found_cause
@@ -63,9 +64,12 @@ def told_share(evidence: Evidence, settings: NeedSettings) -> Measured:
     always=True,
 )
 def cause_accepted(evidence: Evidence, settings: NeedSettings) -> Measured:
-    """1 if the audit attributes the modes to the task itself, else 0."""
+    """1 if the audit attributes the modes to the task itself, 0 if to something else.
+
+    Too little to say is neither: whoever records more may still be right.
+    """
     cause = found_cause(evidence, settings)
-    if cause.kind == UNDECIDED:
+    if cause.name is CauseName.INSUFFICIENT_SUPPORT:
         return Measured(None, caveat=f"not decided: {cause.next_action}")
     return Measured(float(cause.name == VALID_CAUSE), caveat=f"cause: {cause.text}")
 

@@ -4,9 +4,10 @@ import numpy as np
 import pandas as pd
 
 from gates.bounds import share_interval
+from gates.cause import CauseName
 from gates.criterion import Measured, criterion
 from gates.evidence import Evidence, MissingEvidenceError, flags, numbers
-from gates.need.cause import as_the_cause
+from gates.need.cause import as_the_cause, asked, found_cause
 from gates.need.settings import AUDIT, NeedSettings
 from genpolicy.audit.rows import RecoveryOutcome, SituationRow
 
@@ -23,7 +24,7 @@ def _held_out(evidence: Evidence, settings: NeedSettings) -> pd.DataFrame:
 )
 def held_out_situations(evidence: Evidence, settings: NeedSettings) -> Measured:
     """Held-out situations that were examined."""
-    return as_the_cause("held_out_situations", evidence, settings)
+    return _support("held_out_situations", evidence, settings)
 
 
 @criterion(
@@ -33,7 +34,23 @@ def held_out_situations(evidence: Evidence, settings: NeedSettings) -> Measured:
 )
 def multimodal_situations(evidence: Evidence, settings: NeedSettings) -> Measured:
     """Held-out situations with two clusters that persist."""
-    return as_the_cause("multimodal_situations", evidence, settings)
+    return _support("multimodal_situations", evidence, settings)
+
+
+def _support(question: str, evidence: Evidence, settings: NeedSettings) -> Measured:
+    """A count; below its limit it denies modes only where the cause says that there are none.
+
+    Where there was too little to say, fewer situations than are needed are no refutation.
+    """
+    found = as_the_cause(question, evidence, settings)
+    needed = asked(settings.limits)[question].limit
+    if found.value is None or needed is None or found.value - needed >= 0:
+        return found
+    cause = found_cause(evidence, settings)
+    if cause.name is not CauseName.INSUFFICIENT_SUPPORT:
+        return found
+    text = f"not decided: {found.value:g} of {needed:g} needed; {cause.next_action}"
+    return Measured(None, caveat=text)
 
 
 @criterion(

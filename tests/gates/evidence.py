@@ -151,6 +151,13 @@ def _cause() -> dict[str, Any]:
     }
 
 
+VARIANTS = {
+    "reference": ("reference", "direct", 16, []),
+    "linear_encoder": ("representation", "direct", 16, ["network.encoder"]),
+    "transformer": ("trunk", "direct", 16, ["network.trunk"]),
+    "energy_head": ("head", "derivative_free", 16, ["method", "sampler.name"]),
+    "single_action": ("temporal", "direct", 1, ["method"]),
+}
 PARAMS: dict[str, Any] = {
     "seed": 1,
     "confidence": 0.95,
@@ -158,6 +165,7 @@ PARAMS: dict[str, Any] = {
     "task": {"name": "tabletop_insertion"},
     "train_baselines": {"samplers": {name: {} for name in (*BASELINES, *REMEDIES, DRAWN)}},
     "measure_baselines": {"latent": {"method": "act"}},
+    "train_factors": {"variants": {name: {} for name in VARIANTS}},
     "train_generators": {"samplers": {name: {} for name in CANDIDATES}},
     "stress": {
         "starts": STARTS,
@@ -883,15 +891,6 @@ def _baselines(root: Path) -> None:
     }  # fmt: skip
     document(root, "measure_baselines/latent.json", [latent])
     _checkpoints(root, "train_baselines", (*BASELINES, *REMEDIES, DRAWN))
-
-
-VARIANTS = {
-    "reference": ("reference", "direct", 16, []),
-    "linear_encoder": ("representation", "direct", 16, ["network.encoder"]),
-    "transformer": ("trunk", "direct", 16, ["network.trunk"]),
-    "energy_head": ("head", "derivative_free", 16, ["method", "sampler.name"]),
-    "single_action": ("temporal", "direct", 1, ["method"]),
-}
 
 
 def _factors(root: Path) -> None:

@@ -128,8 +128,7 @@ def _envelope(folder):
 
 def test_true_evidence_stands(root):
     rederive(root, "D")
-    for gate in "BE":
-        rederive(root, gate)
+    rederive(root, "E")
     (row, *_) = read_table(root / STRESS / "rollouts.parquet").to_pylist()
     assert (row["force_peak_n"], row["outcome"], row["ticks"]) == (7.5, "collision", 4)
     assert (row["invocations"], row["deadline_misses"]) == (1, 1)
@@ -245,6 +244,13 @@ def test_an_envelope_that_was_not_planned_or_not_run_is_refused(root, key, value
         rederive(root, "D")
 
 
+def test_a_distillation_that_no_candidate_has_is_refused(root):
+    said = {"teacher": "diffusion", "teacher_sha256": "0", "updates": 1}
+    (root / STRESS / stress.DISTILLED.file).write_text(json.dumps({"flow": said}))
+    with pytest.raises(RefusedError, match=r"distilled\.json: flow"):
+        rederive(root, "D")
+
+
 def test_a_journal_that_nobody_checked_is_found(root):
     path = root / STRESS / "checker.json"
     document = json.loads(path.read_text())
@@ -262,7 +268,7 @@ def test_a_damaged_journal_is_bad_input(root):
 
 def test_a_refused_rung_says_why_and_the_others_stand(root):
     (root / STRESS / "journals" / "bc__nominal.mcap").unlink()
-    rungs = [Rung(gate, "n", "PASS", "", "", "r", 0) for gate in "BD"]
+    rungs = [Rung(gate, "n", "PASS", "", "", "r", 0) for gate in "ED"]
     first, second = rederived(root, rungs)
     assert first == rungs[0]
     assert (second.verdict, second.exit_code) == ("REFUSED", 3)

@@ -1,6 +1,7 @@
 """A fault that writer and reader of a dataset share is seen by a third who counts for himself."""
 
 import json
+import shutil
 
 import evidence
 import numpy as np
@@ -110,23 +111,39 @@ def _training(root, folder, **changes):
 )
 def test_a_training_that_saw_another_split_is_refused(dataset, gate, folder):
     _training(dataset, folder)
-    rederive_trainings(dataset, gate)
+    rederive_trainings(dataset, gate, evidence.PARAMS)
     own = _training(dataset, folder, episodes="validation")
     first = own["validation"][0]
-    said = rf"training\.json: episodes is \d+ episodes of no train split, among them {first}"
+    said = (
+        rf"training\.json: episodes is \d+ episodes outside the training split, among them {first}"
+    )
     with pytest.raises(RefusedError, match=said):
-        rederive_trainings(dataset, gate)
+        rederive_trainings(dataset, gate, evidence.PARAMS)
     _training(dataset, folder, validation_episodes="test")
-    with pytest.raises(RefusedError, match=r"validation_episodes is .* of no validation split"):
-        rederive_trainings(dataset, gate)
+    with pytest.raises(
+        RefusedError, match=r"validation_episodes is .* outside the validation split"
+    ):
+        rederive_trainings(dataset, gate, evidence.PARAMS)
     for nothing in ([], None, "some"):
         _training(dataset, folder, episodes=nothing)
         with pytest.raises(RefusedError, match="episodes is nothing"):
-            rederive_trainings(dataset, gate)
+            rederive_trainings(dataset, gate, evidence.PARAMS)
     note = rederived(dataset, [Rung(gate, "n", "PASS", "", "", "r", 0)])[0].note
     assert "training.json" in note
 
 
 def test_the_trainings_of_one_gate_are_not_those_of_another(dataset):
     _training(dataset, "train_generators", episodes="validation")
-    rederive_trainings(dataset, "A")
+    rederive_trainings(dataset, "A", evidence.PARAMS)
+
+
+@pytest.mark.parametrize(
+    ("gate", "folder", "name"),
+    [("A", "train_baselines", "chunked_bc"), ("A", "train_factors", "reference"),
+     ("B", "train_generators", "flow")],
+)  # fmt: skip
+def test_a_training_that_is_named_and_not_there_is_refused(dataset, gate, folder, name):
+    rederive_trainings(dataset, gate, evidence.PARAMS)
+    shutil.rmtree(dataset / "artifacts" / folder / name)
+    with pytest.raises(RefusedError, match=f"artifacts/{folder}/{name} is not trained"):
+        rederive_trainings(dataset, gate, evidence.PARAMS)

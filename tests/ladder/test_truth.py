@@ -7,7 +7,7 @@ import pytest
 from benchmarks.ladder_truth.__main__ import chosen, try_one
 from benchmarks.ladder_truth.catalogue import WRONGS
 from benchmarks.ladder_truth.honest import HONEST
-from benchmarks.ladder_truth.outcome import Expected, Seen, Stop, count, look
+from benchmarks.ladder_truth.outcome import Expected, Seen, Stop, count, look, refused_by
 from benchmarks.ladder_truth.planting import Wrong, patches_of, silently
 from benchmarks.ladder_truth.workspace import ROOT
 
@@ -64,6 +64,15 @@ def test_gate_and_reason_are_both_asked_for(name: str) -> None:
 def test_a_stop_below_the_named_gate_is_elsewhere() -> None:
     stops = (Stop("A", "data_defects", ""), Stop("B", "nfe_mismatch", ""))
     assert count(Expected("B", ("nfe_mismatch",)), Seen(stops)) == "elsewhere"
+
+
+def test_a_refusal_before_any_stage_counts_for_the_gate_of_the_folder_that_it_names() -> None:
+    said = "is a file that the stage stress did not write, expected nothing else"
+    for place, gate in (("artifacts/stress/journals/extra.mcap", "D"), ("reports/x", "A")):
+        stop = refused_by("", f"{place} {said}")
+        assert stop and (stop.gate, stop.reason) == (gate, "refusal")
+    stop = refused_by("shadow", f"artifacts/stress/journals/extra.mcap {said}")
+    assert stop and stop.gate == "C"
 
 
 def test_a_finished_ladder_shows_no_stop_and_a_fail_is_one(finished: Path, tmp_path: Path) -> None:

@@ -56,7 +56,11 @@ def test_what_tells_the_mode_is_judged_by_the_end_that_speaks_against(
     answers = {answer.id: answer for answer in report.criteria}
     told = answers["told_share"]
     assert (told.measured, told.verdict, told.interval) == (found, verdict, (lower, upper))
-    assert answers["cause_accepted"].verdict == report.verdict == verdict
+    assert report.verdict == verdict
+    # The fixture's resampled audits still say valid modes, so that beyond the limit the cause is
+    # left open; what tells the mode is not.
+    cause = "INCONCLUSIVE" if verdict == "FAIL" else verdict
+    assert answers["cause_accepted"].verdict == cause
     assert verdict == "PASS" or "told_share" in report.diagnosis
 
 

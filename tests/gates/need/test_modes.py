@@ -46,6 +46,38 @@ def test_a_situation_needs_two_modes_that_persist_and_long_enough_to_see_it(ladd
     assert value(ladder, modes.held_out_situations) == 90
 
 
+@pytest.mark.parametrize(
+    ("path", "key"), [("audit/summary.json", "persistent"), ("audit/persistence.json", "n")]
+)
+def test_too_few_situations_are_no_refutation(ladder, path, key):
+    def fewer(document):
+        (document if key in document else document["counts"])[key] = 9
+
+    evidence.edit_document(ladder, path, fewer)
+    report = judge(ladder, "A")
+    answers = {answer.id: answer for answer in report.criteria}
+    said = answers["multimodal_situations"]
+    assert (said.verdict, said.measured) == ("INCONCLUSIVE", None)
+    assert "9 of 10 needed" in said.caveat and "record more" in said.caveat
+    assert answers["cause_accepted"].verdict == report.verdict == "INCONCLUSIVE"
+
+
+def test_no_modes_where_there_was_enough_to_see_them_are_one(ladder):
+    def none(document):
+        document["counts"] |= {"two_mode": 0, "two_mode_episodes": 0, "persistent": 0}
+
+    evidence.edit_document(ladder, "audit/summary.json", none)
+    for name in ("sides", "resamples"):
+        evidence.edit_table(
+            ladder, f"audit/{name}.parquet", lambda f: f.assign(two_mode=0, two_mode_episodes=0)
+        )
+    report = judge(ladder, "A")
+    answers = {answer.id: answer for answer in report.criteria}
+    assert "unimodal" in answers["cause_accepted"].caveat
+    assert answers["multimodal_situations"].verdict == report.verdict == "FAIL"
+    assert answers["multimodal_situations"].measured == 0
+
+
 def test_counts_that_cannot_be_are_missing_evidence(ladder):
     evidence.edit_table(ladder, "audit/modes.parquet", cells("successes", 26, share=0.01))
     with pytest.raises(MissingEvidenceError, match="26 of 25 episodes of left, which cannot be"):
