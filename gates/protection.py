@@ -51,6 +51,8 @@ def _executed(gate: Gate) -> list[Bound]:
     ]
 
 
+SHARED = ("confidence",)
+"""Places that are settings of their own in `params.yaml`, and no criteria."""
 PINNED = "what comes back otherwise than it was judged is another policy"
 BOUNDS: tuple[Bound, ...] = (
     *_counts("B", PINNED, "unpinned_items", "metadata_mismatches", "nfe_mismatch"),
@@ -104,16 +106,24 @@ class Named:
         gate: Who judges by it.
         place: Setting in the gate's section.
         names: The names.
-        reason: Why no team may leave one out.
+        reason: Why no team may leave one out, or name another.
+        at_most: They are what it may name, in place of what it must.
     """
 
     gate: Gate
     place: str
     names: tuple[str, ...]
     reason: str
+    at_most: bool = False
 
 
+SIMPLER = "a simpler policy that is not asked is never found to be enough"
 NAMED: tuple[Named, ...] = (
+    Named("A", "remedies", ("chunked_l1", "bc_noise"), SIMPLER),
+    Named("A", "conditioning_factors", ("representation", "trunk"), SIMPLER),
+    Named("A", "deployed_conventions", ("direct", "z_zero", "offset"), SIMPLER),
+    Named("A", "chunked_baseline", ("chunked_bc",), SIMPLER, at_most=True),
+    Named("A", "generative_baselines", ("ibc",), SIMPLER, at_most=True),
     Named(
         "C",
         "required_fixtures",
@@ -159,9 +169,9 @@ def loosened(params: Mapping[str, Any], gate: Gate) -> list[tuple[Bound, Any]]:
 
 
 def lacking(params: Mapping[str, Any], gate: Gate) -> list[tuple[Named, list[str]]]:
-    """Lists of a gate that leave out what they must name, with what is left out.
+    """Lists of a gate that leave out what they must name, or name what they may not, with that.
 
-    A list that is missing leaves out nothing: the gate's model asks for it.
+    A list that is missing does neither: the gate's model asks for it, or its default names all.
     """
     found = []
     for named in NAMED:
@@ -169,10 +179,11 @@ def lacking(params: Mapping[str, Any], gate: Gate) -> list[tuple[Named, list[str
         if not isinstance(section, Mapping) or named.place not in section:
             continue
         stated = section[named.place]
-        stated = stated if isinstance(stated, list) else []
-        absent = [name for name in named.names if name not in stated]
-        if absent:
-            found.append((named, absent))
+        stated = list(stated) if isinstance(stated, list | tuple) else [stated]
+        inner, outer = (stated, named.names) if named.at_most else (named.names, stated)
+        wrong = [str(name) for name in inner if name not in outer]
+        if wrong:
+            found.append((named, wrong))
     return found
 
 
@@ -204,19 +215,22 @@ def require_protection(params: Mapping[str, Any], gate: Gate) -> tuple[str, ...]
             expected=f"{bound.comparison} {bound.bound:g}, because {bound.reason}",
             action="Tighten it. This bound stands in the code; a rehearsal may go beyond it.",
         )
-    for named, left_out in absent:
+    for named, wrong in absent:
+        found = f"{'with' if named.at_most else 'without'} {', '.join(wrong)}"
+        what = f"{'nothing but' if named.at_most else 'all that the code names:'}"
         raise ConfigError(
             where=f"params.yaml: {stage_of(gate)}: {named.place}",
-            found=f"without {', '.join(left_out)}"[:200],
-            expected=f"all that the code names, because {named.reason}",
-            action="Name it. What it must name stands in the code; a rehearsal may leave it out.",
+            found=found[:200],
+            expected=f"{what} {', '.join(named.names)}, because {named.reason}",
+            action="Restore it. What it names stands in the code; a rehearsal may differ.",
         )
     return ()
 
 
 def _values(params: Mapping[str, Any], bound: Bound) -> list[Any]:
     """What `params.yaml` says at a place: nothing, one value, or those of several owners."""
-    if "." in bound.place or bound.place in params:
+    # Criteria are looked for among the limits alone: a section of that name would hide them.
+    if "." in bound.place or bound.place in SHARED:
         value: Any = params
         for part in bound.place.split("."):
             if not isinstance(value, Mapping) or part not in value:

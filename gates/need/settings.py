@@ -55,7 +55,7 @@ class NeedSettings(GateSettings):
     deployed_conventions: tuple[str, ...]
     generative_baselines: tuple[str, ...]
     chunked_baseline: str
-    remedies: tuple[str, ...] = ("chunked_l1", "bc_noise")
+    remedies: tuple[str, ...] = Field(default=("chunked_l1", "bc_noise"), min_length=1)
     one_mode: str = "one_mode_bc"
     redraws: int = Field(ge=1)
     latent_baseline: str

@@ -7,11 +7,13 @@ import yaml
 from flows.workspace import merged
 from gates.asked_for import CHECKS_ASKED_FOR, COPIES, INCIDENTS_ASKED_FOR
 from gates.criterion import Criterion
+from gates.need.settings import NeedSettings
 from gates.proof import SPECS, judge
 from gates.protection import (
     BOUNDS,
     NAMED,
     REHEARSED,
+    SHARED,
     is_rehearsal,
     lacking,
     loosened,
@@ -21,6 +23,8 @@ from gates.report import GATES, stage_of
 from genpolicy.errors import ConfigError
 from genpolicy.integrity.documents import read_yaml
 
+DEFAULTED = ("remedies", "conditioning_factors")
+"""Settings of Gate A with a default in code."""
 # Where each bound lies, as it was decided. Moving one is a decision of its own: the reason for it
 # stands beside it in the code, that of the numbers from elsewhere here (ISO 10218-1: 0.25 m/s).
 GOLDEN = {
@@ -49,7 +53,7 @@ def test_golden_where_each_bound_lies():
 
 def _put(params, bound, value):
     """Set the value at the place of a bound; criteria where their limit stands."""
-    if "." in bound.place or bound.place in params:
+    if "." in bound.place or bound.place in SHARED:
         *path, last = bound.place.split(".")
         section = params
         for part in path:
@@ -87,7 +91,7 @@ def test_a_looser_limit_is_bad_configuration_but_in_a_rehearsal(bound, rehearsal
 def test_every_bound_is_of_a_criterion_or_a_setting(request):
     params = read_yaml(request.config.rootpath / "params.yaml")
     for bound in BOUNDS:
-        if "." in bound.place or bound.place in params:
+        if "." in bound.place or bound.place in SHARED:
             value = params
             for part in bound.place.split("."):
                 value = value[part]
@@ -99,18 +103,51 @@ def test_every_bound_is_of_a_criterion_or_a_setting(request):
 @pytest.mark.parametrize("named", NAMED, ids=lambda named: named.place)
 @pytest.mark.parametrize("rehearsal", [False, True])
 def test_a_list_that_leaves_out_a_check_is_bad_configuration_but_in_a_rehearsal(named, rehearsal):
-    section = {named.place: [*named.names, "one_more"]}
-    params = {"gate_c": section, "rehearsal": rehearsal}
-    assert lacking(params, "C") == [] == lacking(params, "D")
-    assert bool(require_protection(params, "C")) == rehearsal
-    for broken in (list(named.names[1:]), [], "all", None):
-        params["gate_c"] = {named.place: broken}
+    names, gate = list(named.names), named.gate
+    params = {"rehearsal": rehearsal}
+    more = [*names, "one_more"]
+    good, bad = (
+        ([names, [], names[0] if len(names) == 1 else names], [more, "all", ["one_more"], None])
+        if named.at_most
+        else ([names, more], [names[1:], [], "all", None])
+    )
+    for kept in good:
+        params[stage_of(gate)] = {named.place: kept}
+        assert lacking(params, gate) == [] == lacking(params, "D")
+        assert bool(require_protection(params, gate)) == rehearsal
+    for broken in bad:
+        params[stage_of(gate)] = {named.place: broken}
         if rehearsal:
-            assert named.place in require_protection(params, "C")[0]
+            assert named.place in require_protection(params, gate)[0]
             continue
         with pytest.raises(ConfigError, match=named.place) as refused:
-            require_protection(params, "C")
+            require_protection(params, gate)
         assert named.names[0] in str(refused.value) and named.reason in str(refused.value)
+
+
+def test_golden_what_each_list_must_or_may_name():
+    assert {(n.gate, n.place, n.names, n.at_most) for n in NAMED} == {
+        ("A", "remedies", ("chunked_l1", "bc_noise"), False),
+        ("A", "conditioning_factors", ("representation", "trunk"), False),
+        ("A", "deployed_conventions", ("direct", "z_zero", "offset"), False),
+        ("A", "chunked_baseline", ("chunked_bc",), True),
+        ("A", "generative_baselines", ("ibc",), True),
+        ("C", "required_fixtures",
+         ("stale_observation", "infeasible_rotation", "phase_change", "reordered_chunk"), False),
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "bound", [b for b in BOUNDS if "." not in b.place and b.place not in SHARED],
+    ids=lambda bound: f"{bound.gate}-{bound.place}",
+)  # fmt: skip
+def test_a_section_of_the_name_of_a_criterion_does_not_hide_its_limit(bound, tmp_path):
+    """`stub_violations: 0` at the top of the file took the place of the gate's limit of 5."""
+    sign = 1 if bound.comparison == "<=" else -1
+    evidence.write_params(tmp_path, lambda p: _put(p, bound, bound.bound + sign))
+    params = yaml.safe_load((tmp_path / "params.yaml").read_text()) | {bound.place: bound.bound}
+    with pytest.raises(ConfigError, match=bound.place):
+        require_protection(params, bound.gate)
 
 
 def test_what_must_be_asked_for_is_every_row_of_both_tables():
@@ -121,8 +158,16 @@ def test_what_must_be_asked_for_is_every_row_of_both_tables():
 
 def test_the_shipped_lists_name_what_they_must(request):
     params = read_yaml(request.config.rootpath / "params.yaml")
-    assert {named.place for named in NAMED} <= set(params["gate_c"])
-    assert lacking(params, "C") == []
+    assert [lacking(params, gate) for gate in GATES] == [[]] * len(GATES)
+    for named in NAMED:
+        assert named.place in params[stage_of(named.gate)] or named.place in DEFAULTED
+
+
+def test_what_a_list_that_is_not_written_stands_for_names_all_that_it_must():
+    fields = NeedSettings.model_fields
+    for named in NAMED:
+        if named.place in DEFAULTED:
+            assert set(named.names) <= set(fields[named.place].default)
 
 
 OF_CRITERIA = [
