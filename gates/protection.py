@@ -37,6 +37,10 @@ class Bound:
     waivable: bool = False
 
 
+HARDEST_CONTACT_N = 80.0
+"""Force of the hardest contact that is simulated, N: nobody has seen a stop beyond it."""
+
+
 def _counts(gate: Gate, reason: str, *criteria: str) -> list[Bound]:
     return [Bound(gate, name, "<=", 0.0, reason) for name in criteria]
 
@@ -47,7 +51,7 @@ def _executed(gate: Gate) -> list[Bound]:
     force = "the hardest contact that is simulated; beyond it no stop would ever be seen"
     return [
         Bound(gate, "execution.watchdog_s", "<=", 0.1, silence),
-        Bound(gate, "execution.force_limit_n", "<=", 80.0, force),
+        Bound(gate, "execution.force_limit_n", "<=", HARDEST_CONTACT_N, force),
     ]
 
 
@@ -72,7 +76,14 @@ BOUNDS: tuple[Bound, ...] = (
     *_counts("D", "an action that vanished may still be executed", "conservation_error"),
     *_counts("D", "methods on other starts are not compared", "unmatched_starts"),
     *_executed("D"),
-    Bound("D", "force_peak_p95_n", "<=", 80.0, "the hardest contact that is simulated", True),
+    Bound(
+        "D",
+        "force_peak_p95_n",
+        "<=",
+        HARDEST_CONTACT_N,
+        "the hardest contact that is simulated",
+        True,
+    ),
     Bound("D", "intervention_upper", "<=", 0.2, "more often a person drives, not the policy"),
     Bound("D", "reset_upper", "<=", 0.1, "each protective stop sends a person to the arm"),
     Bound("D", "verdict_reachable", ">=", 0.8, "a trial that seldom ends right proves nothing"),

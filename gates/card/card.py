@@ -6,6 +6,7 @@ measured for this cell would look like a safe one. An empty field keeps the card
 
 import datetime
 import re
+import unicodedata
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
@@ -15,6 +16,7 @@ from pydantic import Field
 from gates.card.envelope import Simulated, beyond_simulation
 from gates.card.people import PersonId
 from gates.claim import CHECKPOINT_ONLY
+from gates.protection import HARDEST_CONTACT_N
 from gates.report import Gate, GateReport, Point, StrictModel, parse_section
 from gates.settings import GateSettings
 from genpolicy.errors import RefusedError
@@ -88,7 +90,7 @@ class TrialCard(StrictModel):
         caveats: What the reports do not show, or what moved since the plan; people may add some.
         not_before: First day of validity, YYYY-MM-DD.
         expires: Last day of validity, YYYY-MM-DD.
-        nonce: Makes this card unlike any other; at least 16 characters.
+        nonce: Makes this card unlike any other; at least 16 printable ASCII characters.
     """
 
     schema_version: int
@@ -201,13 +203,29 @@ def card_bytes(card: TrialCard) -> bytes:
 
 
 def missing_fields(card: TrialCard) -> list[str]:
-    """Fields that are still empty; a force limit is never implied."""
+    """Fields that are still empty or say nothing a reader can see; a force limit is never implied.
+
+    A text of spaces, dashes or characters without a shape is an empty one, and one that hides such
+    characters among others is not what its reader reads.
+    """
     dump: dict[str, Any] = card.model_dump()
     empty = [name for name, value in dump.items() if value in (None, "", {}, ())]
-    blank = [name for name, value in dump.items() if isinstance(value, str) and not value.strip()]
-    short = ["nonce"] if 0 < len(card.nonce.strip()) < 16 else []
+    texts = {name: value for name, value in dump.items() if isinstance(value, str) and value}
+    silent = [name for name, value in texts.items() if not _says(value)]
+    short = [] if re.fullmatch(r"[!-~]{16,}", card.nonce) else ["nonce"]
     reports = ["reports"] if set(card.reports) != {"A", "B", "C", "D"} else []
-    return sorted({*empty, *blank, *short, *reports} - {"caveats"})
+    return sorted({*empty, *silent, *short, *reports} - {"caveats"})
+
+
+BLANK = "\u115f\u1160\u3164\uffa0"
+"""Letters by their category, and fillers without a shape."""
+
+
+def _says(text: str) -> bool:
+    """Whether a text holds a letter or a digit, and nothing that is not seen."""
+    seen = [character for character in text if character not in "\n\t"]
+    kinds = {"Cf" if c in BLANK else unicodedata.category(c) for c in seen}
+    return any(kind[0] in "LN" for kind in kinds) and not kinds & {"Cf", "Cc", "Co", "Cn", "Cs"}
 
 
 def envelope_violations(card: TrialCard, draft: TrialCard, simulated: Simulated) -> list[str]:
@@ -223,7 +241,7 @@ def envelope_violations(card: TrialCard, draft: TrialCard, simulated: Simulated)
             bad.append(f"{name} other than simulated")
     if card.robot_model != simulated.robot:
         bad.append("robot_model other than simulated")
-    if card.force_limit_n is None or not card.force_limit_n > 0:
+    if card.force_limit_n is None or not 0 < card.force_limit_n <= HARDEST_CONTACT_N:
         bad.append("force_limit_n")
     for name in sorted({*ABORT_FROM, *draft.abort_thresholds}):
         value, limit = card.abort_thresholds.get(name), draft.abort_thresholds.get(name)

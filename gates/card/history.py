@@ -7,6 +7,8 @@ Git shows the order of commits, not when a run took place or whose hands typed. 
 and left out of the history until the plan was committed looks like evidence that came after it.
 """
 
+import os
+import re
 import subprocess
 from collections.abc import Sequence
 from pathlib import Path
@@ -29,6 +31,10 @@ MEASURED: dict[str, Gate] = {
 """Stages whose evidence a plan has to precede, and the gate that judges it."""
 CANDIDATE = ("genpolicy", "gates", "stages", "params.yaml", "dvc.yaml")
 """Whoever committed to these made the candidate, or the yardstick that it is held against."""
+MAKERS = "a <%ae>%nc <%ce>%n%(trailers:key=Co-authored-by,valueonly,unfold,separator=%x0A)"
+"""Per commit: who wrote it, who committed it, and who is named as having helped."""
+FORGE = "noreply@github.com"
+"""Commits what is merged by a button; nobody's own address."""
 PLAN_FIRST = "Plan, commit, run, commit, and have it reviewed by somebody else; then sign."
 NAME_ALL = (
     f"Name all who made it in `card.authors`, by their addresses on {ALLOW_LIST}; let others sign."
@@ -99,18 +105,29 @@ def require_makers_known(root: Path, authors: Sequence[str], allowed: AllowList)
             found = "without addresses"
             _refuse(f"{ALLOW_LIST}: {person.id}", found, "those of their commits", NAME_ALL)
     changed = _git(root, "status", "--porcelain", "--untracked-files=all", "--", *CANDIDATE)
-    committed = _git(root, "log", "--format=<%ae>", "--", *CANDIDATE)
+    committed = _git(root, "log", f"--format={MAKERS}", "--", *CANDIDATE)
     if changed or not committed:
         name = str(changed).splitlines()[0].split(maxsplit=1)[-1] if changed else "the candidate"
         _refuse(name, "not committed as it lies here", "a commit that says who made it")
     owner = {mail.casefold(): person.id for person in allowed.people for mail in person.emails}
-    # In brackets, or a commit without an address would be none.
-    for mail in sorted({line[1:-1].casefold() for line in str(committed).splitlines()}):
+    for mail in _addresses(str(committed)):
         if owner.get(mail) not in authors:
             who = owner.get(mail, f"somebody not on {ALLOW_LIST}")
             found = f"by {who}, who committed as {mail or 'nobody: the address is empty'}"
             expected = f"commits of its authors alone ({', '.join(authors) or 'none is named'})"
             _refuse("the candidate", found, expected, NAME_ALL)
+
+
+def _addresses(makers: str) -> list[str]:
+    """Addresses of authors, committers and co-authors, a line each; empty where one has none."""
+    found = set()
+    for line in filter(str.strip, makers.splitlines()):
+        # In brackets, or a commit without an address would be none.
+        match = re.search(r"<([^<>]*)>\s*$", line)
+        role, mail = line[0], (match[1] if match else "").casefold()
+        if (role, mail) != ("c", FORGE):
+            found.add(mail)
+    return sorted(found)
 
 
 def _versions(root: Path) -> list[tuple[str, dict[str, object]]]:
@@ -169,9 +186,10 @@ def _require_whole(root: Path) -> None:
 def _git(root: Path, *args: str) -> str | None:
     """Output of a git command; None if it fails or there is no git."""
     command = ["git", "--no-replace-objects", "-C", str(root), *args]
+    whole = {**os.environ, "GIT_GRAFT_FILE": os.devnull}  # or a file of ours could hide commits
     try:
         done = subprocess.run(
-            command, capture_output=True, text=True, check=False, errors="replace"
+            command, capture_output=True, text=True, check=False, errors="replace", env=whole
         )
     except OSError:
         return None

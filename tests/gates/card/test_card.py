@@ -49,6 +49,8 @@ def test_a_card_allows_exactly_what_was_simulated(draft, simulated, card):
         {"robot_model": "fr3"},
         {"force_limit_n": None},
         {"force_limit_n": float("nan")},
+        {"force_limit_n": 80.1},
+        {"force_limit_n": 5000.0},
         {"candidate": "another"},
         {"abort_thresholds": {}},
         {"abort_thresholds": {**draft.abort_thresholds, "latency_s": -1.0}},
@@ -127,6 +129,20 @@ def test_every_field_but_the_caveats_is_required(card, name):
         assert missing_fields(card.model_copy(update={name: None})) == [name]
 
 
+@pytest.mark.parametrize("name", ["spotter", "stop_path", "force_limit_reason", "nonce"])
+@pytest.mark.parametrize(
+    "text", ["\u200b" * 16, "\u00ad", "\u2060\u2060", "-" * 15, "...", "\u3164", "mo\u200b",
+             "a\u202eb", "\x00" * 16],
+)  # fmt: skip
+def test_a_text_that_shows_nothing_or_hides_something_is_empty(card, name, text):
+    assert missing_fields(card.model_copy(update={name: text})) == [name]
+
+
+def test_other_scripts_and_several_lines_say_something(card):
+    for text in ("Ümit Özdağ", "佐藤", "left of the cell\nat the door", "2nd button, red"):
+        assert missing_fields(card.model_copy(update={"spotter": text})) == []
+
+
 def test_both_days_count(card):
     def on(day, first="2026-11-01", last="2026-11-30", days=30):
         dated = card.model_copy(update={"not_before": first, "expires": last})
@@ -172,7 +188,7 @@ def test_borders_of_what_people_fill_in(draft, simulated, card):
         return missing_fields(changed) + envelope_violations(changed, draft, simulated)
 
     assert with_(nonce="0123456789abcdef") == [] and with_(nonce="0123456789abcde") == ["nonce"]
-    assert with_(force_limit_n=0.5) == []
+    assert with_(force_limit_n=0.5) == [] == with_(force_limit_n=80.0)
     assert with_(abort_thresholds=dict.fromkeys(draft.abort_thresholds, 0.0)) == []
     three = {key: value for key, value in card.reports.items() if key != "D"}
     assert with_(reports=three) == ["reports"]

@@ -279,6 +279,64 @@ def test_authors_alone_made_the_candidate(history, people):
             require_makers_known(root, authors, people)
 
 
+def test_who_commits_for_another_or_helps_has_made_it_too(history, people):
+    root, commit = history
+    commit("ada", params="a: 1")
+    before = commit.git("rev-parse", "HEAD")
+    by = {name: ("-c", f"user.name={name}", "-c", f"user.email={name}@example.org")
+          for name in ("ada", "rita")}  # fmt: skip
+    helped = "x\n\nCo-authored-by: Rita <Rita@Example.org>"
+    for committer, words in (
+        ("rita", ("-m", "x", "--author=ada <ada@example.org>")),
+        ("ada", ("-m", helped)),
+        ("ada", ("-m", f"{helped}\nCo-authored-by: ada <ada@example.org>")),
+    ):
+        (root / FILES["code"]).parent.mkdir(exist_ok=True)
+        (root / FILES["code"]).write_text("x = 1\n")
+        commit.git("add", "-A")
+        commit.git(*by[committer], "commit", "-q", *words)
+        with pytest.raises(IntegrityError, match=r"rita, who committed as rita@example\.org"):
+            require_makers_known(root, ["ada"], people)
+        require_makers_known(root, ["ada", "rita"], people)
+        commit.git("reset", "-q", "--hard", before)
+    commit.git(*by["ada"], "commit", "-q", "--allow-empty", "-m", "x\n\nCo-authored-by: Rita")
+    require_makers_known(root, ["ada"], people)  # no file of the candidate is in it
+    (root / FILES["code"]).parent.mkdir(exist_ok=True)
+    (root / FILES["code"]).write_text("x = 1\n")
+    commit.git("add", "-A")
+    commit.git(*by["ada"], "commit", "-q", "-m", "x\n\nCo-authored-by: Rita")
+    with pytest.raises(IntegrityError, match="the address is empty"):
+        require_makers_known(root, ["ada"], people)
+
+
+def test_what_a_forge_merges_by_a_button_is_made_by_its_author(history, people):
+    root, commit = history
+    commit("ada", params="a: 1")
+    forge = ("-c", "user.name=GitHub", "-c", "user.email=noreply@github.com")
+    for author, known in (("ada", True), ("noreply", False)):
+        mail = "noreply@github.com" if author == "noreply" else f"{author}@example.org"
+        (root / FILES["code"]).parent.mkdir(exist_ok=True)
+        (root / FILES["code"]).write_text(f"by {author}\n")
+        commit.git("add", "-A")
+        commit.git(*forge, "commit", "-q", "-m", "x", f"--author={author} <{mail}>")
+        if known:
+            require_makers_known(root, ["ada"], people)
+        else:
+            with pytest.raises(IntegrityError, match=r"noreply@github\.com"):
+                require_makers_known(root, ["ada"], people)
+
+
+def test_a_commit_that_a_graft_hides_is_read(history, people):
+    root, commit = history
+    first = commit("ada", params="a: 1")
+    commit("mo", code="by mo")
+    last = commit("ada", code="by ada")
+    (root / ".git" / "info").mkdir(exist_ok=True)
+    (root / ".git" / "info" / "grafts").write_text(f"{last} {first}\n")
+    with pytest.raises(IntegrityError, match="mo, who committed"):
+        require_makers_known(root, ["ada"], people)
+
+
 def test_a_committer_whom_nobody_lists_is_not_known(history, people):
     root, commit = history
     commit("ada", params="a: 1")
