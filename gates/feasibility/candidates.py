@@ -30,6 +30,12 @@ def _held_out(evidence: Evidence, candidate: str) -> pd.DataFrame:
     return rows
 
 
+def _episodes(rows: pd.DataFrame) -> pd.Series:
+    """Episode of each row: a situation is named by its episode and a step of it."""
+    found: pd.Series = rows["situation"].astype(str).str.rpartition(":")[0]
+    return found
+
+
 def admissible(rows: pd.DataFrame) -> Array:
     """1.0 where a candidate passed all six layers; a layer not reached is not passed."""
     passed = np.ones(len(rows), dtype=np.bool_)
@@ -52,10 +58,7 @@ def mode_admissible_gap(
     rows = rows[rows["fixture"] == TWO_MODES]
     if len(rows) == 0:
         raise MissingEvidenceError("no situation with several modes was sampled")
-    rows = rows.assign(
-        admissible=admissible(rows),
-        episode=rows["situation"].astype(str).str.rpartition(":")[0],
-    )
+    rows = rows.assign(admissible=admissible(rows), episode=_episodes(rows))
     rows = rows[~rows["mode"].isin(NO_MODE)]
     rows = rows[rows.groupby("observation")["mode"].transform("nunique") >= 2]
     by_mode = {str(mode): part for mode, part in rows.groupby("mode")}
@@ -84,15 +87,14 @@ def mode_admissible_gap(
 def admissible_share(evidence: Evidence, settings: FeasibilitySettings, candidate: str) -> Measured:
     """Lower bound of the share of held-out candidates that pass all six layers."""
     rows = _held_out(evidence, candidate)
+    episodes = _episodes(rows)
     share, lower, upper = share_interval(
-        admissible(rows),
-        rows["observation"].to_numpy(),
-        confidence=settings.confidence,
-        favourable=True,
+        admissible(rows), episodes.to_numpy(), confidence=settings.confidence, favourable=True
     )
     text = (
-        f"share {share:.4g} of {len(rows)} candidates; lower bound over "
-        f"{rows['observation'].nunique()} observations"
+        f"share {share:.4g} of {len(rows)} candidates at {rows['observation'].nunique()} "
+        f"observations; lower bound over {episodes.nunique()} episodes, whose observations are "
+        "not independent"
     )
     return Measured(lower, (lower, upper), text)
 

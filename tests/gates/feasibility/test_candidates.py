@@ -9,11 +9,13 @@ from asked import asked, found_in
 from gates.evidence import MissingEvidenceError
 from gates.feasibility.candidates import (
     admissible,
+    admissible_share,
     boundary_jerk_p95_m_s3,
     projection_p95_m,
 )
 from gates.feasibility.settings import LAYERS
 from gates.proof import judge
+from genpolicy.statistics.intervals import clopper_pearson
 
 CANDIDATES = "shadow/candidates.parquet"
 
@@ -40,6 +42,43 @@ def test_a_p95_is_judged_at_the_upper_end_over_observations(ladder, criterion, c
     assert found.interval == (0.001, 900.0) and found.value == 900.0
     assert "p95 0.001, largest 900" in found.caveat or "p95 900" in found.caveat
     assert judge(ladder, "C").candidates["flow"] == "FAIL"
+
+
+@pytest.mark.parametrize("criterion", [projection_p95_m, boundary_jerk_p95_m_s3])
+def test_a_p95_below_its_limit_whose_upper_end_is_not_fails(ladder, criterion):
+    column = {"projection_p95_m": "position_change_m"}.get(criterion.id, "boundary_jerk_m_s3")
+
+    def change(frame):
+        held = of(frame) & (frame["fixture"] == "held_out")
+        first = held & (frame["observation"] == 3) & (frame["candidate"] < 3)
+        values = np.where(first, 900.0, np.where(held, 0.001, frame[column].astype(float)))
+        return frame.assign(**{column: values})
+
+    evidence.edit_table(ladder, CANDIDATES, change)
+    found = asked(ladder, criterion, "flow", gate="C")
+    assert "p95 0.001," in found.caveat and found.value == 900.0
+
+
+@pytest.mark.parametrize("far", [0, 1])
+def test_observations_of_one_episode_are_one_for_the_share(ladder, far):
+    """Two steps of each episode: as many rows, half of the independent units."""
+
+    def paired(frame):
+        held = frame["fixture"] == "held_out"
+        own = frame.loc[held, "observation"]
+        frame.loc[held, "situation"] = [f"e{n // 2}:{n % 2}" for n in own]
+        frame.loc[held & (frame["observation"] < 2 * far), "geometric"] = False
+        return frame
+
+    before = asked(ladder, admissible_share, "flow", gate="C")
+    evidence.edit_table(ladder, CANDIDATES, paired)
+    after = asked(ladder, admissible_share, "flow", gate="C")
+    assert after.interval[0] < before.interval[0]
+    frame = pd.read_parquet(ladder / "artifacts" / CANDIDATES)
+    held = frame[of(frame) & (frame["fixture"] == "held_out")]
+    n = held["situation"].str.split(":").str[0].nunique()
+    assert f"over {n} episodes" in after.caveat
+    assert after.interval == pytest.approx(clopper_pearson(n - far, n, 0.95))
 
 
 def test_a_p95_of_a_few_observations_is_not_measured(ladder):

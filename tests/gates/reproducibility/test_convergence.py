@@ -139,9 +139,16 @@ def test_a_trained_baseline_without_its_loss_is_inconclusive_one_without_trainin
     assert report.verdict == "INCONCLUSIVE"
     assert "while act was trained" in found_in(report, "baseline_fall_upper")[0].caveat
     (folder / "model.safetensors").unlink()
+    evidence.record(ladder)
     report = judge(ladder, "B")
-    assert report.verdict == "PASS"
-    assert "no training of its own: act" in found_in(report, "baseline_fall_upper")[0].caveat
+    # Weights that are gone are no sign that nothing was trained: the account of it says so.
+    assert report.verdict == "INCONCLUSIVE"
+    assert "while act was trained" in found_in(report, "baseline_fall_upper")[0].caveat
+    evidence.edit_document(
+        ladder, "train_baselines/matched.json", lambda d: d["methods"].pop("act") and d
+    )
+    found = found_in(judge(ladder, "B"), "baseline_fall_upper")[0]
+    assert (found.verdict, "no training of its own: act" in found.caveat) == ("PASS", True)
 
 
 def _of_act(ladder, seeds):
