@@ -78,6 +78,7 @@ CHECKS_ASKED_FOR = (
     "execution.expired",
     "execution.early",
     "execution.window",
+    "execution.late_chunk",
     "execution.behind_accepted",
     "execution.behind_queued",
     "execution.predecessor",

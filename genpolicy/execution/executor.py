@@ -96,11 +96,9 @@ class Executor:
     def _look(self, now_ns: int, told: Observed) -> None:
         """The view after an observation; another phase or calibration voids what is here."""
         before, event_ns = self._view, told.event_ns
-        self._view = replace(
-            before, newest_observation_ns=event_ns, phase=told.phase,
-            calibration_epoch=told.calibration_epoch,
-            maximum_age_ns=self.cell.maximum_age_ns.get(told.phase),
-        )  # fmt: skip
+        self._view = self.cell.view_after(
+            before, event_ns=event_ns, phase=told.phase, epoch=told.calibration_epoch
+        )
         for kind, old, new, reason in (
             ("phase", before.phase, told.phase, DiscardReason.PHASE_TRANSITION),
             ("epoch", before.calibration_epoch, told.calibration_epoch,
