@@ -57,7 +57,7 @@ class Executor:
         self._arrivals = Arrivals(self._queue, checks)
         self._in_flight: set[str] = set()
         self._sequence = 0
-        self._stops_seen = 0
+        self._stops_seen = (stub.supervisor, 0)
         self._begun = False
 
     # -- what the world says ------------------------------------------------------------------
@@ -311,8 +311,8 @@ class Executor:
 
     def _heed_supervisor(self, now_ns: int) -> None:
         supervisor = self.stub.supervisor
-        if supervisor.stops != self._stops_seen:
-            self._stops_seen = supervisor.stops
+        if (supervisor, supervisor.stops) != self._stops_seen:
+            self._stops_seen = (supervisor, supervisor.stops)
             self._void(now_ns, DiscardReason.STOPPED, NEVER_NS)
         self._view = self._view.voided(DiscardReason.STOPPED, supervisor.resumed_ns)
         self._queue.continuity.after(supervisor.resumed_ns)

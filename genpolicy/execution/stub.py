@@ -36,7 +36,8 @@ class ControllerStub:
     Args:
         cell: The same limits that the executor is held to.
         journal: Where arrivals go.
-        supervisor: The independent gate; while it stops, nothing is accepted.
+        supervisor: The independent gate; while it stops, nothing is accepted. Another may take its
+            place, and begins stopped.
         checks: The table; its rows of the place `STUB` are asked.
 
     Attributes:

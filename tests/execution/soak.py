@@ -21,6 +21,7 @@ from genpolicy.contract.chunk import DiscardReason
 from genpolicy.evidence.shadow.rig import CHECKPOINT, IMITATED, ROWS, SAMPLER, Rig, passing_verdict
 from genpolicy.execution.cell import FALLBACK_HASH
 from genpolicy.execution.checks import Checks
+from genpolicy.execution.supervisor import Supervisor
 from genpolicy.statistics.intervals import clopper_pearson
 from genpolicy.verification.checker import check_messages
 
@@ -36,7 +37,7 @@ OPERATIONS = {
     "force": 1, "no_force": 1, "collision": 1, "stop": 1, "human_reset": 2, "intervene": 1,
     "hand_back": 2, "reset": 1, "phase": 1, "epoch": 1, "end": 1, "fallback": 1, "end_fallback": 1,
     "deliver_fallback": 2, "weights": 1, "controller": 1, "void": 1, "diverge": 1, "garbage": 1,
-    "write_off": 1, "poll": 1,
+    "write_off": 1, "poll": 1, "restart": 1,
 }  # fmt: skip
 LATEST = 3  # row with which a chunk may begin where a late one is not continued
 LASTS = 0.15  # chance that `end` ends
@@ -267,6 +268,12 @@ class Walk:
 
     def _stop(self) -> None:
         self.rig.supervisor.emergency_stop(self._now(), self.rng.choice(("", None, object())))
+        self._stopped()
+
+    def _restart(self) -> None:
+        rig = self.rig
+        rig.supervisor = Supervisor(rig.cell.execution, rig.journal, checks=rig.stub.checks)
+        rig.stub.supervisor = rig.supervisor
         self._stopped()
 
     def _human_reset(self) -> None:

@@ -122,6 +122,39 @@ def test_a_stop_that_clears_itself_is_found():
     assert "P7.sticky" in rules(check_messages(messages(rig.end())))
 
 
+@pytest.mark.parametrize(("state", "found"), [
+    ("protective_stop", {"P7.stop"}), ("emergency_stop", {"P7.stop"}),
+    ("run", {"P7.stop", "P7.restart"}), ("watchdog_hold", {"P7.stop", "P7.restart"}),
+])  # fmt: skip
+def test_an_action_between_a_new_start_of_the_supervisor_and_a_person_is_found(
+    honest, state, found
+):
+    """Whatever the new one says of itself, and whatever it says next."""
+    first = next(i for i, (kind, _) in enumerate(honest) if kind == "accept")
+    place = next(i for i in range(first + 1, len(honest)) if honest[i][0] == "accept")
+
+    def told(event, state, person=""):
+        base = {key: honest[place][1][key] for key in ("session", "t")}
+        return ("supervisor", {**base, "n": 0, "event": event, "state": state, "detail": person})
+
+    def judged(*events):
+        journal = copy.deepcopy(honest[:place] + list(events) + honest[place:])
+        for n, (_, message) in enumerate(journal):
+            message["n"] = n
+        journal[-1][1]["events"] += len(events)
+        report = check_messages(journal)
+        return rules(report), sum(v.rule == "P7.stop" for v in report.violations)
+
+    after = sum(kind == "accept" for kind, _ in honest[place:])
+    names, stopped = judged(told("restarted", state))
+    assert names == found | {"P1.void"} and stopped == after
+    names, stopped = judged(told("restarted", state), told("watchdog_recovered", "run"))
+    assert names == found | {"P1.void", "P7.sticky"} and stopped == after
+    names, stopped = judged(told("restarted", state), told("human_reset", "run", "spotter"))
+    # The person clears it; what was made before, and where the arm stands since, is another rule.
+    assert names == found - {"P7.stop"} | {"P1.void", "P5.continuity"} and stopped == 0
+
+
 def test_declared_limits_are_compared_with_the_expected_ones(honest):
     report = check_messages(honest, EXPECTED)
     assert rules(report) == set()
