@@ -5,7 +5,7 @@ import pytest
 import yaml
 
 from flows.workspace import merged
-from gates.asked_for import CHECKS_ASKED_FOR, COPIES, INCIDENTS_ASKED_FOR
+from gates.asked_for import CHECKS_ASKED_FOR, INCIDENTS_ASKED_FOR, OF_TWO
 from gates.criterion import Criterion
 from gates.proof import SPECS, judge
 from gates.protection import (
@@ -116,7 +116,7 @@ def test_a_list_that_leaves_out_a_check_is_bad_configuration_but_in_a_rehearsal(
 def test_what_must_be_asked_for_is_every_row_of_both_tables():
     assert list(CHECKS_ASKED_FOR) == [f"{layer}.{name}" for layer, name in evidence.CHECKS]
     assert list(INCIDENTS_ASKED_FOR.items()) == [pair[:2] for pair in evidence.INCIDENTS]
-    assert tuple(name for name, _, moved in evidence.INCIDENTS if moved) == COPIES
+    assert tuple(name for name, _, moved in evidence.INCIDENTS if moved) == OF_TWO
 
 
 def test_the_shipped_lists_name_what_they_must(request):
