@@ -1,5 +1,6 @@
 """One shadow session: a judged chunk through executor and stub, on the clock of its observation."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -172,10 +173,15 @@ def _tick(
     clock_s: float = 0.0,
     hanging: _Hanging | None = None,
 ) -> Conservation:
-    """Tick until the horizon has passed; from the third tick on the phase is `after`."""
-    period_s, horizon = cell.horizons.action_period_s, cell.horizons.execution_horizon
+    """Tick until the horizon has passed; from the third tick on the phase is `after`.
+
+    Where a policy hangs, until the deadline of an invocation at the end of the horizon has, too.
+    """
+    period_s, ticks = cell.horizons.action_period_s, cell.horizons.execution_horizon + 1
+    if hanging is not None:
+        ticks += math.ceil(cell.execution.deadline_s / period_s) + 1
     first = round(now_s / period_s)
-    for tick in range(first, first + horizon + 1):
+    for tick in range(first, first + ticks):
         told_s = tick * period_s + clock_s
         if tick > first:
             phase = item.phase if tick < first + 2 else after
@@ -183,7 +189,7 @@ def _tick(
         if hanging is not None:
             hanging.look(told_s)
         executor.tick(told_s)
-    return executor.end_episode((first + horizon + 1) * period_s + clock_s)
+    return executor.end_episode((first + ticks) * period_s + clock_s)
 
 
 def _played(

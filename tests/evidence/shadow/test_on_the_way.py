@@ -1,5 +1,6 @@
 """What happens while a chunk is on its way: counted by one reason, and nothing of it moves."""
 
+from dataclasses import replace
 from functools import partial
 
 import pandas as pd
@@ -12,6 +13,7 @@ from genpolicy.evidence.shadow import session
 from genpolicy.evidence.shadow.case import newer_than
 from genpolicy.evidence.shadow.on_the_way import INCIDENTS, SUFFIX
 from genpolicy.evidence.shadow.session import play, play_incident
+from genpolicy.execution.cell import Cell
 from genpolicy.execution.checks import CHECKS, without
 from genpolicy.execution.executor import Executor
 from genpolicy.execution.journal import Journal
@@ -120,8 +122,18 @@ def test_a_policy_that_hangs_is_given_up_and_the_arm_holds(shadow, demonstrated)
     accepted = of_kind(found, "accept")
     # Every tick of the session is an action or a hold: nothing is made up, and nothing waits.
     holds = [p["reason"] for p in of_kind(found, "hold")]
-    assert len(accepted) + holds.count("empty") == shadow.cell.horizons.execution_horizon + 1
+    cell = shadow.cell
+    waited = round(cell.execution.deadline_s / cell.horizons.action_period_s) + 1
+    ticks = cell.horizons.execution_horizon + 1 + waited
+    assert len(accepted) + holds.count("empty") == ticks
     assert {p["chunk_id"] for p in accepted} == {demonstrated[1].proposal.metadata.chunk_id}
+
+
+@pytest.mark.parametrize("deadline_s", [0.01, 0.5, 2.0])
+def test_a_policy_that_hangs_is_given_up_however_long_that_takes(shadow, demonstrated, deadline_s):
+    execution = shadow.cell.execution.model_copy(update={"deadline_s": deadline_s})
+    patient = replace(shadow, cell=Cell(shadow.cell.horizons, execution))
+    assert wrongs(injected(patient, demonstrated, named("policy_hang")), named("policy_hang")) == 0
 
 
 def test_of_two_in_the_wrong_order_the_newer_one_moves(shadow, demonstrated):
