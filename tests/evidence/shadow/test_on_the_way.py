@@ -13,10 +13,12 @@ from genpolicy.evidence.shadow import session
 from genpolicy.evidence.shadow.case import newer_than
 from genpolicy.evidence.shadow.on_the_way import INCIDENTS, SUFFIX
 from genpolicy.evidence.shadow.session import play, play_incident
+from genpolicy.evidence.shadow.shadow import admit, case_of
 from genpolicy.execution.cell import Cell
 from genpolicy.execution.checks import CHECKS, without
 from genpolicy.execution.executor import Executor
 from genpolicy.execution.journal import Journal
+from genpolicy.feasibility.admission import Admitted
 from genpolicy.feasibility.figures import expected_motion
 from genpolicy.verification.checker import check_messages
 
@@ -146,6 +148,19 @@ def test_a_supervisor_that_starts_again_is_on_record(shadow, demonstrated):
     found = injected(shadow, demonstrated, named("supervisor_restart"))
     assert [p["event"] for p in of_kind(found, "supervisor")] == ["restarted"]
     assert {p["reason"] for p in of_kind(found, "hold")} == {"stopped"}
+
+
+def test_in_every_phase_each_new_one_is_counted(shadow, observations):
+    tried = set()
+    for number, item in enumerate(observations):
+        case = case_of(shadow, item, item.demonstrated, number=number)
+        result = admit(shadow, case)
+        if not isinstance(result, Admitted) or item.phase in tried:
+            continue
+        tried.add(item.phase)
+        for incident in INCIDENTS[-5:]:
+            assert wrongs(injected(shadow, (item, case, result), incident), incident) == 0
+    assert tried & shadow.task.contact_phases and tried & shadow.task.free_phases
 
 
 def no_doubt(patch):
