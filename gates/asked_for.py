@@ -78,6 +78,7 @@ CHECKS_ASKED_FOR = (
     "execution.expired",
     "execution.early",
     "execution.window",
+    "execution.late_chunk",
     "execution.behind_accepted",
     "execution.behind_queued",
     "execution.predecessor",
@@ -98,6 +99,7 @@ INCIDENTS_ASKED_FOR = {
     "collision_stop_on_the_way": "stopped",
     "emergency_stop_on_the_way": "stopped",
     "cleared_stop_on_the_way": "stopped",
+    "supervisor_restart_on_the_way": "stopped",
     "intervention_on_the_way": "intervention",
     "handed_back_on_the_way": "intervention",
     "reset_on_the_way": "reset",
@@ -106,8 +108,13 @@ INCIDENTS_ASKED_FOR = {
     "other_controller_on_the_way": "stopped",
     "fallback_on_the_way": "stopped",
     "delay_on_the_way": "stale_observation",
+    "clock_forward_on_the_way": "end_of_episode",
+    "clock_backward_on_the_way": "end_of_episode",
     "copy_on_the_way": "duplicate",
+    "overtaken_on_the_way": "out_of_order",
+    "policy_hang_on_the_way": "expired",
 }
 """What happens to an admitted chunk before it arrives, and by which reason it must be counted."""
-COPIES = ("copy_on_the_way",)
-"""Of these each chunk arrives twice, and is executed once."""
+OF_TWO = ("copy_on_the_way", "overtaken_on_the_way", "policy_hang_on_the_way")
+"""In these two chunks are counted, of which one is executed: the first of two copies, the newer of
+two that come in the wrong order, the one before the one that never comes."""

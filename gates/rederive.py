@@ -44,8 +44,9 @@ from genpolicy.integrity.documents import read_json
 from genpolicy.integrity.tables import read_table
 from genpolicy.robot.controller import CONTROLLER_MODE
 from genpolicy.tasks.api import load_task
-from genpolicy.verification.checker import ExpectedSettings, check_journal
+from genpolicy.verification.checker import check_journal
 from genpolicy.verification.commands import reach_of
+from genpolicy.verification.expected import ExpectedSettings
 from genpolicy.verification.journal_source import readable
 from genpolicy.verification.motion import ExpectedMotion
 from genpolicy.verification.report import JournalReport
@@ -120,6 +121,8 @@ def _held_to(params: Mapping[str, Any]) -> tuple[ExpectedSettings, ExpectedMotio
         watchdog_s=execution.watchdog_s,
         queue_capacity=execution.queue_capacity,
         controller_mode=CONTROLLER_MODE,
+        replan_lead_steps=execution.replan_lead_steps,
+        late_chunk=execution.late_by_phase,
     )
     feasibility = section(params, "feasibility", FeasibilitySettings)
     task = load_task(section(params, "task", TaskSection).name)

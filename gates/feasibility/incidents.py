@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from gates.asked_for import COPIES, INCIDENTS_ASKED_FOR
+from gates.asked_for import INCIDENTS_ASKED_FOR, OF_TWO
 from gates.criterion import Measured, criterion
 from gates.evidence import Evidence, MissingEvidenceError, counts
 from gates.feasibility.settings import SHADOW, FeasibilitySettings
@@ -23,10 +23,10 @@ class Counted:
         reason: By which the chunks must be counted.
         injected: Chunks that it befell.
         counted: Of these, those that were discarded for the reason.
-        moved: Of these, those of which actions were executed, where none may be; of a chunk that
-            came twice, how many less or more than the one.
-        arrivals: Actions of theirs at the controller stub, where none may be; of a chunk that came
-            twice those that were refused there.
+        moved: Of these, those of which actions were executed, where none may be; where one of two
+            is, how many less or more than the one.
+        arrivals: Actions of theirs at the controller stub, where none may be; where one of two is
+            executed, those that were refused there.
     """
 
     name: str
@@ -38,7 +38,7 @@ class Counted:
 
     @property
     def through(self) -> float:
-        """What got as far as the stub, executed or refused there, or moved although a copy."""
+        """What got as far as the stub, executed or refused there, or moved beside another."""
         return self.moved + self.arrivals
 
     @property
@@ -73,7 +73,7 @@ def _counted(name: str, reason: str, rows: pd.DataFrame, stub: pd.DataFrame) -> 
     if not generated > 0:
         raise MissingEvidenceError(f"not tried: {name}")
     found = float(rows["count"][rows["reason"] == reason].sum())
-    if name in COPIES:
+    if name in OF_TWO:
         half = generated / 2
         refused = counts(stub, "stale").sum() + counts(stub, "invalid").sum()
         return Counted(name, reason, half, found, abs(executed - half), float(refused))

@@ -67,7 +67,9 @@ PLOTS = (
         "What happens on the way",
         "Good chunks that were admitted, and something happened between their observation and "
         "their arrival. Each must be discarded and counted by its one reason, and nothing of it "
-        "may reach the controller stub; of a chunk that comes twice the second is discarded. "
+        "may reach the controller stub. Of a chunk that comes twice the second is discarded, of "
+        "two in the wrong order the older, and the answer of a policy that hangs is given up; "
+        "there the other one of the two is executed. "
         "Derived again from the journal by genpolicy verify report.",
         COUNTS,
         _incidents,

@@ -5,7 +5,7 @@ out of it. Times are in s; whole ns, for those who compare, are derived here.
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property
 from typing import Annotated, Any
@@ -43,15 +43,29 @@ class RecoveryState(StrEnum):
 PRIMITIVES = (RecoveryState.RETREAT, RecoveryState.CLASSICAL_RETURN)
 
 
+class LateChunk(StrEnum):
+    """What a phase declares for a chunk that comes too late to begin where it was meant to."""
+
+    CONTINUE = "continue"
+    """It begins at a later row, as long as it is valid and young enough."""
+    HOLD = "hold"
+    """It is discarded, and the controller holds until the next one."""
+    FALLBACK = "fallback"
+    """It is discarded, and recovery begins."""
+
+
 class ExecutionSettings(Settings):
     """Section `execution`: fixtures of executor, supervisor and recovery, equal for all methods.
 
     The phases are those of `force_limit_n`, which has no default: each names its own limit.
+    Neither has `late_chunk`: it names every phase once.
     `maximum_age_s` and `recovery_plans` may name a `default` and the phases that differ from it,
     and an age may be one number; what is read back is complete, one entry per phase.
 
     Attributes:
-        replan_lead_steps: Executable actions left at which the next invocation begins.
+        replan_lead_steps: Executable actions left at which the next invocation begins, so that its
+            chunk is meant to take over with this row; one that begins behind it is late.
+        late_chunk: Phases by what becomes of a late chunk.
         deadline_s: An invocation that takes longer has missed its deadline and is given up.
         watchdog_s: Silence after which the stub holds; at least one period. Polled every period,
             the hold comes within `period + watchdog` (P2).
@@ -74,6 +88,7 @@ class ExecutionSettings(Settings):
     """
 
     replan_lead_steps: int = Field(ge=0)
+    late_chunk: dict[LateChunk, tuple[str, ...]]
     deadline_s: float = Field(gt=0)
     watchdog_s: float = Field(gt=0)
     queue_capacity: int = Field(ge=1)
@@ -101,10 +116,18 @@ class ExecutionSettings(Settings):
                 table = {DEFAULT: table}
             if isinstance(table, dict):
                 complete[name] = _complete(name, table, phases)
+        late = complete.get("late_chunk")
+        if isinstance(late, dict):
+            complete["late_chunk"] = _each_once(late, phases)
         plans = complete.get("recovery_plans")
         if isinstance(plans, dict):
             complete["recovery_plans"] = {phase: _plan(phase, plans[phase]) for phase in plans}
         return complete
+
+    @property
+    def late_by_phase(self) -> dict[str, str]:
+        """What becomes of a late chunk, by phase."""
+        return {phase: str(what) for what, phases in self.late_chunk.items() for phase in phases}
 
 
 @dataclass(frozen=True)
@@ -147,6 +170,26 @@ class Cell:
     def maximum_age_ns(self) -> dict[str, int]:
         """Largest action age per phase, ns."""
         return {phase: to_ns(age) for phase, age in self.execution.maximum_age_s.items()}
+
+    @cached_property
+    def latest_first_row(self) -> dict[str, int]:
+        """By phase, the row with which a chunk may begin at the latest."""
+        last, lead = self.horizons.prediction_horizon - 1, self.execution.replan_lead_steps
+        return {
+            phase: last if what == LateChunk.CONTINUE else lead
+            for phase, what in self.execution.late_by_phase.items()
+        }
+
+    def view_after(self, view: View, *, event_ns: int, phase: str, epoch: str) -> View:
+        """A view of the present after an observation; a phase without limits allows nothing."""
+        return replace(
+            view,
+            newest_observation_ns=event_ns,
+            phase=phase,
+            calibration_epoch=epoch,
+            maximum_age_ns=self.maximum_age_ns.get(phase),
+            latest_first_row=self.latest_first_row.get(phase),
+        )
 
     def require_task(self, phases: Iterable[str]) -> None:
         """Refuse a cell that is not for this task, or whose age limits refuse nothing.
@@ -199,6 +242,24 @@ def _complete(name: str, table: dict[str, Any], phases: list[str]) -> dict[str, 
         for phase in phases
         if phase in table or DEFAULT in table
     }
+
+
+def _each_once(late: dict[Any, Any], phases: list[str]) -> dict[LateChunk, tuple[str, ...]]:
+    """Every phase in one of the lists, and in one only."""
+    lists = {name: late[name] for name in late if isinstance(late[name], list | tuple)}
+    named = [phase for listed in lists.values() for phase in listed]
+    wrong = [f"{name!r}" for name in late if name not in [*LateChunk] or name not in lists]
+    wrong += [f"no {phase}" for phase in phases if phase not in named]
+    wrong += [f"{phase} twice" for phase in phases if named.count(phase) > 1]
+    wrong += [f"the phase {phase!r}" for phase in named if phase not in phases]
+    if wrong:
+        raise ConfigError(
+            where="execution.late_chunk",
+            found=", ".join(wrong),
+            expected=f"{', '.join(LateChunk)}: a list each, and each of {phases} in one of them",
+            action="Say of every phase what becomes of a late chunk; nothing is assumed.",
+        )
+    return {LateChunk(name): tuple(listed) for name, listed in lists.items()}
 
 
 def _plan(phase: str, names: Any) -> tuple[RecoveryState, ...]:

@@ -152,6 +152,13 @@ def _not_superseded(m: Moment) -> bool:
     return newer_ns is None or (m.now_ns < newer_ns and m.due_ns < newer_ns)
 
 
+def _begins_in_time(m: Moment) -> bool:
+    times, first, latest = m.chunk.times, m.chunk.checked_rows[0], m.view.latest_first_row
+    if m.first_use_ns is not None:
+        first = max(first, (m.first_use_ns - times.start_ns) // times.period_ns)
+    return latest is not None and first <= latest
+
+
 def _in_checked_rows(m: Moment) -> bool:
     first, last = m.chunk.checked_rows
     return m.row is not None and first <= m.row < last
@@ -251,6 +258,7 @@ CHECKS: Checks = (
     _row("early", lambda m: m.due_ns <= m.now_ns, _R.EXPIRED, _P.DUE, _P.STUB),
     _row("window", lambda m: m.now_ns < m.due_ns + m.view.period_ns,
          _R.EXPIRED, _P.ARRIVAL, _P.PAST, _P.STUB),
+    _row("late_chunk", _begins_in_time, _R.EXPIRED, _P.ARRIVAL, _P.STUB),
     _timed("behind_accepted", _behind_margin_ns, _R.SUPERSEDED, _P.ARRIVAL, _P.LAYER),
     _timed("behind_queued", _behind_queued_margin_ns, _R.OUT_OF_ORDER, _P.ARRIVAL),
     _row("predecessor",

@@ -57,7 +57,7 @@ class Executor:
         self._arrivals = Arrivals(self._queue, checks)
         self._in_flight: set[str] = set()
         self._sequence = 0
-        self._stops_seen = 0
+        self._stops_seen = (stub.supervisor, 0)
         self._begun = False
 
     # -- what the world says ------------------------------------------------------------------
@@ -96,11 +96,9 @@ class Executor:
     def _look(self, now_ns: int, told: Observed) -> None:
         """The view after an observation; another phase or calibration voids what is here."""
         before, event_ns = self._view, told.event_ns
-        self._view = replace(
-            before, newest_observation_ns=event_ns, phase=told.phase,
-            calibration_epoch=told.calibration_epoch,
-            maximum_age_ns=self.cell.maximum_age_ns.get(told.phase),
-        )  # fmt: skip
+        self._view = self.cell.view_after(
+            before, event_ns=event_ns, phase=told.phase, epoch=told.calibration_epoch
+        )
         for kind, old, new, reason in (
             ("phase", before.phase, told.phase, DiscardReason.PHASE_TRANSITION),
             ("epoch", before.calibration_epoch, told.calibration_epoch,
@@ -313,8 +311,8 @@ class Executor:
 
     def _heed_supervisor(self, now_ns: int) -> None:
         supervisor = self.stub.supervisor
-        if supervisor.stops != self._stops_seen:
-            self._stops_seen = supervisor.stops
+        if (supervisor, supervisor.stops) != self._stops_seen:
+            self._stops_seen = (supervisor, supervisor.stops)
             self._void(now_ns, DiscardReason.STOPPED, NEVER_NS)
         self._view = self._view.voided(DiscardReason.STOPPED, supervisor.resumed_ns)
         self._queue.continuity.after(supervisor.resumed_ns)

@@ -49,6 +49,8 @@ class View:
         calibration_epoch: Calibration of the newest observation.
         newest_observation_ns: Event time of the newest observation; None before the first.
         maximum_age_ns: Largest action age in this phase; None where no age is allowed.
+        latest_first_row: Row with which a chunk may begin at the latest in this phase; None where
+            none may.
         checkpoint: Active weights of the policy.
         sampler: Active sampler settings.
         fallback: Identity of the task's fallback planner, in place of both.
@@ -66,6 +68,7 @@ class View:
     calibration_epoch: str = ""
     newest_observation_ns: int | None = None
     maximum_age_ns: int | None = None
+    latest_first_row: int | None = None
     checkpoint: str = ""
     sampler: str = ""
     fallback: str = ""

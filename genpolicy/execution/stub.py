@@ -36,7 +36,8 @@ class ControllerStub:
     Args:
         cell: The same limits that the executor is held to.
         journal: Where arrivals go.
-        supervisor: The independent gate; while it stops, nothing is accepted.
+        supervisor: The independent gate; while it stops, nothing is accepted. Another may take its
+            place, and begins stopped.
         checks: The table; its rows of the place `STUB` are asked.
 
     Attributes:
@@ -58,7 +59,7 @@ class ControllerStub:
         self.arrivals = self.accepted = self.stale = self.invalid = 0
         self.checks = checks
         self._journal = journal
-        self._maximum_age_ns = cell.maximum_age_ns
+        self._cell = cell
         self._view = cell.first_view()
         self._last_due_ns: int | None = None
         self._last_sequence = -1
@@ -75,12 +76,8 @@ class ControllerStub:
             self.void(DiscardReason.PHASE_TRANSITION, event_ns)
         if old.calibration_epoch != calibration_epoch and seen_ns is not None:
             self.void(DiscardReason.CALIBRATION_MISMATCH, event_ns)
-        self._view = replace(
-            self._view,
-            newest_observation_ns=event_ns,
-            phase=phase,
-            calibration_epoch=calibration_epoch,
-            maximum_age_ns=self._maximum_age_ns.get(phase),
+        self._view = self._cell.view_after(
+            self._view, event_ns=event_ns, phase=phase, epoch=calibration_epoch
         )
 
     def note_active(self, checkpoint: str, sampler: str) -> None:

@@ -2,7 +2,8 @@
 
 It knows no policy, no chunk and no score; it hears forces, collisions, accepted commands and
 people. A stop is sticky: only a named person resets it (Simplex architecture, ASTM F3269: the
-monitor carries the assurance, the learned function does not).
+monitor carries the assurance, the learned function does not). One that takes over in a running
+session cannot know whether a stop stood: it begins stopped.
 """
 
 from enum import StrEnum
@@ -37,7 +38,8 @@ class Supervisor:
 
     Args:
         settings: Its limits; none has a default that could be taken for a safe value.
-        journal: Where its events go.
+        journal: Where its events go; one that has events is of a session that runs, and of a
+            supervisor before this one.
         checks: The table; its rows of the place `SUPERVISOR` are asked.
     """
 
@@ -54,6 +56,8 @@ class Supervisor:
         silence_s = settings.silence_stop_s
         self._silence_ns = None if silence_s is None else to_ns(silence_s)
         self._last_accept_ns: int | None = None
+        if len(journal):
+            self._stop(journal.latest_ns, SupervisorState.PROTECTIVE_STOP, "restarted", "")
 
     @property
     def stopped(self) -> bool:

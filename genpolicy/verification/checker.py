@@ -11,13 +11,12 @@ P6 feasible, P7 stop is sticky, `clock` (no answer before its time), `conservati
 
 import hashlib
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from genpolicy.contract.action import ACTION_DIM
 from genpolicy.verification.balance import Balance
 from genpolicy.verification.continuity import Continuity
+from genpolicy.verification.expected import ExpectedSettings
 from genpolicy.verification.invocations import Invocations
 from genpolicy.verification.journal_source import Message, read_messages
 from genpolicy.verification.motion import ExpectedMotion, MotionProof
@@ -27,29 +26,6 @@ from genpolicy.verification.world_view import WorldView
 LAYERS = 6
 FLOAT_HEX_DIGITS = 16
 ROW_HEX_DIGITS = ACTION_DIM * FLOAT_HEX_DIGITS
-
-
-@dataclass(frozen=True)
-class ExpectedSettings:
-    """What the caller knows that the sessions must have been held to; times in s."""
-
-    execution_horizon: int
-    action_period_s: float
-    maximum_age_s: dict[str, float]
-    watchdog_s: float
-    queue_capacity: int
-    controller_mode: str
-
-    def declared(self) -> dict[str, Any]:
-        """The same in the journal's words."""
-        return {
-            "execution_horizon": self.execution_horizon,
-            "period_ns": round(self.action_period_s * 1e9),
-            "maximum_age_ns": {k: round(v * 1e9) for k, v in self.maximum_age_s.items()},
-            "watchdog_ns": round(self.watchdog_s * 1e9),
-            "queue_capacity": self.queue_capacity,
-            "controller_mode": self.controller_mode,
-        }
 
 
 def check_journal(
@@ -223,6 +199,7 @@ class _Session:
         self.report.oldest_action_ns = max(self.report.oldest_action_ns, age_ns)
         if m["age_ns"] != age_ns:
             self.flag("P1.age", f"The age is noted as {m['age_ns']} ns and is {age_ns} ns.")
+        self._check_begin(row, m)
         self._check_order(chunk, row, m)
         for rule, sentence in self.continuity.follow(chunk, m, self.settings["period_ns"]):
             self.flag(rule, sentence)
@@ -259,6 +236,14 @@ class _Session:
             self.flag("P1.checked_rows", f"Row {row} was not among those that were checked.")
         if not chunk["valid_until_ns"] - self.t >= 0:
             self.flag("P1.valid_until", f"The chunk was valid until {chunk['valid_until_ns']} ns.")
+
+    def _check_begin(self, row: int, m: Message) -> None:
+        """A chunk begins by the row at which it was meant to take over, or may begin late."""
+        lead, phase = self.settings["replan_lead_steps"], self.world.phase
+        late = m["arrival"] not in self.last_row and row > lead
+        declared = self.settings["late_chunk"].get(phase)
+        if late and declared != "continue":
+            self.flag("P1.late", f"A chunk begins at row {row}; {phase!r} says {declared!r}.")
 
     def _check_order(self, chunk: Message, row: int, m: Message) -> None:
         arrival, start_ns = m["arrival"], chunk["start_ns"]
@@ -339,11 +324,12 @@ class _Session:
             self.head = None
 
     def _check_settings(self, m: Message) -> None:
-        self.settings = m
+        expected = self.expected.declared() if self.expected else {}
+        self.settings = {**m, **expected}
         self.world.fallback_hash = m["fallback_hash"]
         if m["checks_missing"]:
             self.report.checks_missing.update(m["checks_missing"])
             self.flag("settings.checks", f"Checks are missing: {m['checks_missing']}.")
-        for key, value in (self.expected.declared() if self.expected else {}).items():
+        for key, value in expected.items():
             if m[key] != value:
                 self.flag("settings.limits", f"{key} is {m[key]!r}, expected {value!r}.")

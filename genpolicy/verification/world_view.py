@@ -131,12 +131,15 @@ class WorldView:
         reset = m["event"] == "human_reset"
         if reset and not str(m["detail"]).strip():
             yield "P7.reset", "A stop is cleared without a person."
-        now_stopped = m["state"] in STOP_STATES
+        restarted, now_stopped = m["event"] == "restarted", m["state"] in STOP_STATES
+        if restarted and not now_stopped:
+            yield "P7.restart", f"A supervisor starts again in {m['state']!r}, not stopped."
         if self.stopped and not now_stopped and not reset:
             yield "P7.sticky", f"A {m['event']} event clears a stop."
-        if now_stopped or reset:
+        if now_stopped or reset or restarted:
             self._void("a stop", m["t"])
-        self.stopped = now_stopped
+        # Whatever it says of itself: only a person clears a stop, and a new start is one.
+        self.stopped = now_stopped or ((self.stopped or restarted) and not reset)
 
     def _void(self, cause: str, before_ns: int) -> None:
         self.void_before[cause] = max(before_ns, self.void_before.get(cause, before_ns))

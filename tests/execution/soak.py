@@ -21,6 +21,7 @@ from genpolicy.contract.chunk import DiscardReason
 from genpolicy.evidence.shadow.rig import CHECKPOINT, IMITATED, ROWS, SAMPLER, Rig, passing_verdict
 from genpolicy.execution.cell import FALLBACK_HASH
 from genpolicy.execution.checks import Checks
+from genpolicy.execution.supervisor import Supervisor
 from genpolicy.statistics.intervals import clopper_pearson
 from genpolicy.verification.checker import check_messages
 
@@ -36,8 +37,9 @@ OPERATIONS = {
     "force": 1, "no_force": 1, "collision": 1, "stop": 1, "human_reset": 2, "intervene": 1,
     "hand_back": 2, "reset": 1, "phase": 1, "epoch": 1, "end": 1, "fallback": 1, "end_fallback": 1,
     "deliver_fallback": 2, "weights": 1, "controller": 1, "void": 1, "diverge": 1, "garbage": 1,
-    "write_off": 1, "poll": 1,
+    "write_off": 1, "poll": 1, "restart": 1,
 }  # fmt: skip
+LATEST = 3  # row with which a chunk may begin where a late one is not continued
 LASTS = 0.15  # chance that `end` ends
 
 
@@ -52,6 +54,7 @@ class Model:
     seen: tuple[str, str] | None = None
     position_m: np.ndarray = field(default_factory=lambda: np.zeros(3))
     last_s: float | None = None
+    chunk_id: str = ""
 
     def saw(self, now_s: float, phase: str, epoch: str) -> None:
         """An observation was used: another phase or calibration voids what is older."""
@@ -63,8 +66,9 @@ class Model:
         """Nothing conditioned before counts any more."""
         self.void_s = max(self.void_s, now_s)
 
-    def objections(self, rig: Rig, metadata, action, now_s: float) -> list[str]:
+    def objections(self, rig: Rig, metadata, command, now_s: float) -> list[str]:
         """What is wrong with a command that was accepted now."""
+        action, begins = command.action, command.chunk_id != self.chunk_id
         age_s = now_s - metadata.condition_observation_event_time_s
         limit_s = rig.cell.execution.maximum_age_s.get(self.seen[0] if self.seen else "", -1.0)
         far_m = float(np.linalg.norm(action[:3] - self.position_m))
@@ -79,12 +83,16 @@ class Model:
             != self.seen,
             "conditioned before a voiding event": metadata.condition_observation_event_time_s
             < self.void_s - 1e-9,
+            "begins late in contact": begins
+            and command.action_index > LATEST
+            and metadata.task_phase != "approach",
             "no number": not np.isfinite(action).all(),
             f"{far_m:.3f} m from the last command": self.last_s is not None
             and not far_m <= 1.01 * STEP_M,
             "too soon after the last command": early,
         }
         self.position_m, self.last_s = action[:3].copy(), now_s
+        self.chunk_id = command.chunk_id
         return [name for name, holds in wrongs.items() if holds]
 
 
@@ -164,6 +172,9 @@ class Walk:
         if self.rng.random() < 0.05:
             rows = self.rng.choice(((0, 99), (3, 16), (0, 2)))
             changes |= {"first": rows[0], "verdict": passing_verdict(rows=rows)}
+        if self.rng.random() < 0.1:  # it begins at once, with row 4
+            changes["action_start_time_s"] = now_s - 0.2
+            changes |= {"first": 4, "verdict": passing_verdict(rows=(4, ROWS))}
         return self._made(**changes)
 
     def _give(self, chunk, now_s, *, fallback: bool = False) -> None:
@@ -180,7 +191,7 @@ class Walk:
             self.wrongs.append("a command that the controller did not accept")
         if command.action is not None:
             metadata = self._metadata[command.chunk_id]
-            self.wrongs += self.model.objections(self.rig, metadata, command.action, now_s)
+            self.wrongs += self.model.objections(self.rig, metadata, command, now_s)
         whole = self.rng.random() < 0.9
         self.rig.now_ns += PERIOD_NS if whole else self.rng.choice((1, 17, 33)) * 1_000_000
 
@@ -257,6 +268,12 @@ class Walk:
 
     def _stop(self) -> None:
         self.rig.supervisor.emergency_stop(self._now(), self.rng.choice(("", None, object())))
+        self._stopped()
+
+    def _restart(self) -> None:
+        rig = self.rig
+        rig.supervisor = Supervisor(rig.cell.execution, rig.journal, checks=rig.stub.checks)
+        rig.stub.supervisor = rig.supervisor
         self._stopped()
 
     def _human_reset(self) -> None:

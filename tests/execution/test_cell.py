@@ -74,7 +74,7 @@ def test_what_is_unknown_untyped_or_out_of_range_is_refused_by_name(change):
     (name,) = change
     values = {**EXECUTION.model_dump(), "recovery_plans": {}, **change}
     if name == "force_limit_n":
-        values["maximum_age_s"] = 0.3
+        values |= {"maximum_age_s": 0.3, "late_chunk": {"hold": ["approach"]}}
     with pytest.raises(ValidationError):
         ExecutionSettings(**values)
     with pytest.raises(ConfigError, match=rf"params\.yaml: execution\.{name}"):
@@ -87,6 +87,48 @@ def test_what_is_unknown_untyped_or_out_of_range_is_refused_by_name(change):
 def test_a_plan_of_other_primitives_is_refused(kit, names):
     with pytest.raises(ConfigError, match="recovery_plans of phase approach"):
         section(kit, recovery_plans={"approach": names})
+
+
+LATE = {"continue": ["approach", "align"], "hold": ["insert", "release"],
+        "fallback": ["retreat", "recover"]}  # fmt: skip
+
+
+def test_every_phase_says_what_becomes_of_a_late_chunk(kit, task):
+    settings = section(kit, late_chunk=LATE)
+    assert settings.late_by_phase == {phase: what for what in LATE for phase in LATE[what]}
+    assert ExecutionSettings(**settings.model_dump()) == settings
+    cell = Cell(kit.HORIZONS, settings)
+    lead, last = settings.replan_lead_steps, kit.HORIZONS.prediction_horizon - 1
+    assert cell.latest_first_row == dict.fromkeys(LATE["continue"], last) | dict.fromkeys(
+        [*LATE["hold"], *LATE["fallback"]], lead
+    )
+    assert set(kit.EXECUTION.late_by_phase) == set(task.phases)
+    in_contact = {kit.EXECUTION.late_by_phase[phase] for phase in task.contact_phases}
+    assert in_contact == {"hold"}
+    assert cell.first_view().latest_first_row is None  # before it is known where we are: none
+
+
+@pytest.mark.parametrize(("change", "found"), [
+    ({"continue": ["approach"]}, "no align"), ({"hold": []}, "no insert, no release"),
+    ({"hold": ["insert", "release", "approach"]}, "approach twice"),
+    ({"hold": ["insert", "release", "release"]}, "release twice"),
+    ({"fallback": ["retreat", "recover", "levitate"]}, "the phase 'levitate'"),
+    ({"default": ["approach"]}, "'default'"), ({"hold": "insert"}, "'hold'"),
+    ({"wait": []}, "'wait'"), ({"hold": None}, "'hold'"), ({"hold": [["insert"]]}, "no insert"),
+])  # fmt: skip
+def test_a_phase_in_no_list_or_in_two_is_refused(kit, change, found):
+    with pytest.raises(ConfigError, match=rf"execution\.late_chunk is .*{found}"):
+        section(kit, late_chunk=LATE | change)
+
+
+@pytest.mark.parametrize("late", [None, "hold", ["approach"]])
+def test_there_is_no_default_for_a_late_chunk(kit, late):
+    values = {**kit.PARAMS["execution"], "late_chunk": late}
+    with pytest.raises(ConfigError, match=r"params\.yaml: execution\.late_chunk"):
+        parse_settings(ExecutionSettings, values, where="params.yaml: execution")
+    del values["late_chunk"]
+    with pytest.raises(ConfigError, match=r"params\.yaml: execution\.late_chunk"):
+        parse_settings(ExecutionSettings, values, where="params.yaml: execution")
 
 
 @pytest.mark.parametrize("age_s", [0.35, 0.4, 0.45, {"default": 0.3, "insert": 0.35}])

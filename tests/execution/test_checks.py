@@ -22,7 +22,8 @@ CHUNK = Chunk(
 )  # fmt: skip
 VIEW = View(
     phase="approach", calibration_epoch="e", newest_observation_ns=150 * MS,
-    maximum_age_ns=300 * MS, checkpoint="w", sampler="s", fallback="f", session_epoch=1,
+    maximum_age_ns=300 * MS, latest_first_row=15, checkpoint="w", sampler="s", fallback="f",
+    session_epoch=1,
     execution_horizon=8, period_ns=50 * MS, controller="m", controller_mode="m",
 )  # fmt: skip
 GOOD = Moment(
@@ -83,6 +84,7 @@ BAD = {
     "expired": metadata(valid_until_s=0.309),
     "early": replace(GOOD, now_ns=300 * MS - 1),
     "window": replace(GOOD, now_ns=350 * MS),
+    "late_chunk": view(latest_first_row=None),
     "behind_accepted": replace(GOOD, accepted_condition_ns=100 * MS + 1),
     "behind_queued": replace(GOOD, queued_start_ns=200 * MS + 1),
     "predecessor": metadata(predecessor_chunk_id="ghost"),
@@ -131,7 +133,7 @@ def test_what_is_unknown_does_not_hold():
     assert failing(unknown) >= {
         "issued", "duplicate", "infeasible", "action_hash", "same_action", "execution_horizon",
         "checked_rows", "future_observation", "stale_observation", "sequence", "period",
-        "continuity",
+        "continuity", "late_chunk",
     }  # fmt: skip
 
 
@@ -139,6 +141,20 @@ def test_age_and_validity_are_asked_for_the_first_use():
     late = replace(GOOD, first_use_ns=401 * MS)
     assert failing(late) == {"stale_observation"}
     assert failing(replace(GOOD, first_use_ns=601 * MS)) == {"stale_observation", "expired"}
+
+
+@pytest.mark.parametrize(("checked", "first_use_ms", "row"), [
+    (0, None, 0), (4, None, 4), (0, 200, 0), (0, 399, 3), (0, 400, 4), (5, 400, 5), (4, 150, 4),
+])  # fmt: skip
+def test_a_chunk_begins_with_its_first_checked_row_or_the_one_that_is_due(
+    checked, first_use_ms, row
+):
+    late = next(check for check in CHECKS if check.name == "late_chunk")
+    first_use_ns = None if first_use_ms is None else first_use_ms * MS
+    moment = replace(chunk(checked_rows=(checked, 16)), first_use_ns=first_use_ns)
+    for latest in range(16):
+        allowed = replace(moment, view=replace(VIEW, latest_first_row=latest))
+        assert late.holds(allowed) == (row <= latest)
 
 
 def test_the_fallback_has_an_identity_of_its_own():

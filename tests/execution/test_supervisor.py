@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 from playing import begin, judged
 
 from genpolicy.errors import ContractError
-from genpolicy.evidence.shadow.rig import EXECUTION, Rig, StandInContext, rig_cell
+from genpolicy.evidence.shadow.rig import EXECUTION, IMITATED, Rig, StandInContext, rig_cell
 from genpolicy.execution import supervisor as module
+from genpolicy.execution.checks import without
 from genpolicy.execution.journal import Journal
 from genpolicy.execution.nanoseconds import to_ns
 from genpolicy.execution.supervisor import Supervisor, SupervisorState
@@ -255,3 +256,75 @@ def test_after_a_cleared_stop_a_chunk_from_where_the_arm_stands_goes_on():
         "action"
     ] * 2
     judged(rig)
+
+
+def replaced(rig):
+    """The supervisor died, and another one takes over in the same session."""
+    rig.stub.supervisor = Supervisor(rig.cell.execution, rig.journal, checks=rig.stub.checks)
+    return rig.stub.supervisor
+
+
+BEFORE = {
+    "run": lambda rig: None,
+    "watchdog_hold": lambda rig: rig.advance(0.2),
+    "protective_stop": lambda rig: rig.supervisor.observe_collision(rig.now_s, True),
+    "emergency_stop": lambda rig: rig.supervisor.emergency_stop(rig.now_s),
+}
+
+
+@pytest.mark.parametrize("state", BEFORE)
+def test_one_that_starts_again_begins_stopped_until_a_named_person_looked(state):
+    rig = Rig()
+    begin(rig)
+    BEFORE[state](rig)
+    assert rig.supervisor.state == state
+    new, accepted = replaced(rig), rig.stub.accepted
+    assert new.state is SupervisorState.PROTECTIVE_STOP and new.stops == 1
+    assert rig.journal.last("supervisor") == {
+        "event": "restarted", "state": "protective_stop", "detail": "",
+    }  # fmt: skip
+    assert [command.kind for command in rig.tick(2)] == ["stop"] * 2
+    assert {command.kind for command in rig.run(3, predecessor_chunk_id="")} == {"stop"}
+    with pytest.raises(ContractError, match="without a person"):
+        new.human_reset(rig.now_s, "")
+    assert rig.stub.accepted == accepted
+    new.human_reset(rig.now_s, "spotter")
+    assert [c.kind for c in rig.run(2, predecessor_chunk_id="")] == ["action"] * 2
+    judged(rig)
+
+
+def test_the_first_of_a_session_runs_and_each_further_one_stops():
+    journal = Journal("s")
+    assert Supervisor(EXECUTION, journal).state is SupervisorState.RUN
+    assert Supervisor(EXECUTION, journal).state is SupervisorState.RUN  # nothing happened yet
+    journal.add("scene", journal.clock(0.0), {"bodies": {}})
+    for _ in range(2):
+        assert Supervisor(EXECUTION, journal).stopped
+    assert [event.payload["event"] for event in journal.events()[1:]] == ["restarted"] * 2
+
+
+def test_a_chunk_from_before_stays_void_although_the_old_one_had_stopped_as_often():
+    """Both have stopped once: whoever counts stops alone sees no second one."""
+    rig = Rig()
+    begin(rig)
+    rig.supervisor.emergency_stop(rig.now_s)
+    rig.tick()
+    rig.supervisor.human_reset(rig.now_s, "spotter")
+    rig.run(2, predecessor_chunk_id="")
+    rig.observe()
+    rig.deliver(rig.chunk())
+    replaced(rig).human_reset(rig.now_s, "spotter")  # at once, and the chunk is as new as that
+    assert rig.tick()[0].kind == "hold" and rig.executor.conservation().chunks.queued == 0
+    judged(rig)
+
+
+@pytest.mark.parametrize("blind", ["executor", "stub"])
+def test_executor_and_stub_each_heed_a_new_one(blind):
+    blinded = without(IMITATED, "stopped")
+    tables = {"checks": blinded} if blind == "executor" else {"stub_checks": blinded}
+    rig = Rig(**({"stub_checks": IMITATED} | tables))
+    begin(rig)
+    accepted = rig.stub.accepted
+    replaced(rig)
+    rig.run(3, predecessor_chunk_id="")
+    assert rig.stub.accepted == accepted

@@ -131,8 +131,11 @@ FIXTURES = (
 
 
 PLAYED = tuple(name for name in FIXTURES if name != "two_modes")
-INCIDENTS = [(item.name, str(item.reason), item.arrives > 1) for item in ON_THE_WAY]
-"""What befalls twelve chunks of each candidate, its reason, and whether one copy is executed."""
+INCIDENTS = [
+    (item.name, str(item.reason), item.arrives > 1 or item.overtaken or item.hangs)
+    for item in ON_THE_WAY
+]
+"""What befalls twelve chunks of each candidate, its reason, and whether another one is executed."""
 
 
 def by_owner(**limits: tuple[Any, str]) -> dict[str, dict[str, list[Any]]]:

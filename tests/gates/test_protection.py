@@ -5,7 +5,7 @@ import pytest
 import yaml
 
 from flows.workspace import merged
-from gates.asked_for import CHECKS_ASKED_FOR, COPIES, INCIDENTS_ASKED_FOR
+from gates.asked_for import CHECKS_ASKED_FOR, INCIDENTS_ASKED_FOR, OF_TWO
 from gates.criterion import Criterion
 from gates.need.settings import NeedSettings
 from gates.proof import SPECS, judge
@@ -153,7 +153,7 @@ def test_a_section_of_the_name_of_a_criterion_does_not_hide_its_limit(bound, tmp
 def test_what_must_be_asked_for_is_every_row_of_both_tables():
     assert list(CHECKS_ASKED_FOR) == [f"{layer}.{name}" for layer, name in evidence.CHECKS]
     assert list(INCIDENTS_ASKED_FOR.items()) == [pair[:2] for pair in evidence.INCIDENTS]
-    assert tuple(name for name, _, moved in evidence.INCIDENTS if moved) == COPIES
+    assert tuple(name for name, _, moved in evidence.INCIDENTS if moved) == OF_TWO
 
 
 def test_the_shipped_lists_name_what_they_must(request):

@@ -41,7 +41,8 @@ from genpolicy.robot.controller import CONTROLLER_MODE
 from genpolicy.seeds import stream
 from genpolicy.tasks.api import load_task
 from genpolicy.tasks.demonstrations import record_session
-from genpolicy.verification.checker import ExpectedSettings, check_journal
+from genpolicy.verification.checker import check_journal
+from genpolicy.verification.expected import ExpectedSettings
 
 EPISODES, ROLLOUTS, SEED = 12, 10, 3
 NOTHING_HELD = ("payload_torque", "contact_surface", "contact_force")
@@ -80,6 +81,7 @@ def cell(foreign_task, kit, tmp_path_factory):
         **kit.PARAMS["execution"]
         | {
             "force_limit_n": dict.fromkeys(task.phases, 40.0),
+            "late_chunk": {"hold": list(task.phases)},
             "recovery_plans": {"default": ["retreat"]},
         }
     )
@@ -232,6 +234,8 @@ def test_ten_rollouts_of_the_scripted_operator(cell, tmp_path):
         watchdog_s=cell.execution.watchdog_s,
         queue_capacity=cell.execution.queue_capacity,
         controller_mode=CONTROLLER_MODE,
+        replan_lead_steps=cell.execution.replan_lead_steps,
+        late_chunk=cell.execution.late_by_phase,
     )
     motion = expected_motion(cell.checker.cell)
     report = check_journal(journal, expected, motion)

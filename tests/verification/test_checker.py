@@ -1,12 +1,14 @@
 """The checker against journals that were tampered with after an honest run."""
 
 import copy
+from dataclasses import replace
 
 import pytest
 
-from genpolicy.evidence.shadow.rig import EXECUTION, HORIZONS, Rig
+from genpolicy.evidence.shadow.rig import EXECUTION, HORIZONS, ROWS, Rig, passing_verdict
 from genpolicy.robot.controller import CONTROLLER_MODE
-from genpolicy.verification.checker import ExpectedSettings, check_messages
+from genpolicy.verification.checker import check_messages
+from genpolicy.verification.expected import ExpectedSettings
 
 EXPECTED = ExpectedSettings(
     execution_horizon=HORIZONS.execution_horizon,
@@ -15,6 +17,8 @@ EXPECTED = ExpectedSettings(
     watchdog_s=EXECUTION.watchdog_s,
     queue_capacity=EXECUTION.queue_capacity,
     controller_mode=CONTROLLER_MODE,
+    replan_lead_steps=EXECUTION.replan_lead_steps,
+    late_chunk=EXECUTION.late_by_phase,
 )
 
 
@@ -118,11 +122,73 @@ def test_a_stop_that_clears_itself_is_found():
     assert "P7.sticky" in rules(check_messages(messages(rig.end())))
 
 
+@pytest.mark.parametrize(("state", "found"), [
+    ("protective_stop", {"P7.stop"}), ("emergency_stop", {"P7.stop"}),
+    ("run", {"P7.stop", "P7.restart"}), ("watchdog_hold", {"P7.stop", "P7.restart"}),
+])  # fmt: skip
+def test_an_action_between_a_new_start_of_the_supervisor_and_a_person_is_found(
+    honest, state, found
+):
+    """Whatever the new one says of itself, and whatever it says next."""
+    first = next(i for i, (kind, _) in enumerate(honest) if kind == "accept")
+    place = next(i for i in range(first + 1, len(honest)) if honest[i][0] == "accept")
+
+    def told(event, state, person=""):
+        base = {key: honest[place][1][key] for key in ("session", "t")}
+        return ("supervisor", {**base, "n": 0, "event": event, "state": state, "detail": person})
+
+    def judged(*events):
+        journal = copy.deepcopy(honest[:place] + list(events) + honest[place:])
+        for n, (_, message) in enumerate(journal):
+            message["n"] = n
+        journal[-1][1]["events"] += len(events)
+        report = check_messages(journal)
+        return rules(report), sum(v.rule == "P7.stop" for v in report.violations)
+
+    after = sum(kind == "accept" for kind, _ in honest[place:])
+    names, stopped = judged(told("restarted", state))
+    assert names == found | {"P1.void"} and stopped == after
+    names, stopped = judged(told("restarted", state), told("watchdog_recovered", "run"))
+    assert names == found | {"P1.void", "P7.sticky"} and stopped == after
+    names, stopped = judged(told("restarted", state), told("human_reset", "run", "spotter"))
+    # The person clears it; what was made before, and where the arm stands since, is another rule.
+    assert names == found - {"P7.stop"} | {"P1.void", "P5.continuity"} and stopped == 0
+
+
 def test_declared_limits_are_compared_with_the_expected_ones(honest):
     report = check_messages(honest, EXPECTED)
     assert rules(report) == set()
-    looser = ExpectedSettings(8, 0.05, {"approach": 0.3}, 0.1, 2, CONTROLLER_MODE)
+    looser = replace(EXPECTED, maximum_age_s={"approach": 0.3})
     assert "settings.limits" in rules(check_messages(honest, looser))
+
+
+def late_run(**changes):
+    """A chunk that comes a row too late in the phase `insert`, and the next one, in time."""
+    rig = Rig(**changes)
+    rig.phase = "insert"
+    rig.observe()
+    rig.advance(0.2)
+    first = {"condition_observation_event_time_s": 0.0, "action_start_time_s": 0.0}
+    rig.deliver(rig.chunk(**first, verdict=passing_verdict(rows=(4, ROWS))))
+    rig.tick(2)
+    rig.run(2, predecessor_chunk_id="")
+    return messages(rig.end())
+
+
+def test_a_late_chunk_is_executed_only_where_the_phase_says_so():
+    kept, laxer = late_run(), late_run(late_chunk={"continue": ("approach", "insert")})
+    assert rules(check_messages(kept, EXPECTED)) == set()
+    assert rules(check_messages(laxer)) == set()
+    assert sum(kind == "accept" for kind, _ in laxer) > sum(kind == "accept" for kind, _ in kept)
+    # What the phase says is known from elsewhere; a journal that claims another thing is none.
+    assert rules(check_messages(laxer, EXPECTED)) == {"P1.late", "settings.limits"}
+    for claimed in ("hold", "fallback", None):
+        laxer[0][1]["late_chunk"]["insert"] = claimed
+        assert rules(check_messages(laxer)) == {"P1.late"}
+    laxer[0][1]["late_chunk"]["insert"] = "hold"
+    laxer[0][1]["replan_lead_steps"] = 4
+    assert rules(check_messages(laxer)) == set()
+    assert rules(check_messages(laxer, EXPECTED)) == {"P1.late", "settings.limits"}
 
 
 def test_a_session_without_end_is_no_proof():

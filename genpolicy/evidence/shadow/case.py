@@ -56,6 +56,20 @@ class Case:
         """The case in another context."""
         return replace(self, context=replace(self.context, **changes))  # type: ignore[arg-type]
 
+    def later(self, by_s: float) -> "Case":
+        """The same from an observation that was made so much later; nothing has moved since."""
+        was, context = self.proposal.metadata, self.context
+        return self.with_metadata(
+            chunk_id=f"{was.chunk_id}/later",
+            condition_observation_event_time_s=was.condition_observation_event_time_s + by_s,
+            action_start_time_s=was.action_start_time_s + by_s,
+            valid_until_s=was.valid_until_s + by_s,
+        ).with_context(
+            now_s=context.now_s + by_s,
+            latest_observation_event_time_s=context.latest_observation_event_time_s + by_s,
+            state_time_s=context.measured_at_s + by_s,
+        )
+
     def as_it_is(self) -> "Case":
         """The case judged without projection."""
         return replace(self, unprojected=True)
@@ -66,6 +80,13 @@ def decide(checker: FeasibilityChecker, case: Case) -> Admitted | Rejected:
     if case.unprojected:
         return checker.admit_as_it_is(case.proposal, context=case.context)
     return checker.admit(case.proposal, context=case.context)
+
+
+def newer_than(checker: FeasibilityChecker, case: Case) -> Admitted:
+    """The same chunk from an observation one period later, admitted as the one of the case was."""
+    result = decide(checker, case.later(checker.cell.action_period_s))
+    assert isinstance(result, Admitted), "nothing that a layer asks has changed"
+    return result
 
 
 def refusals(checker: FeasibilityChecker, cases: Sequence[Case]) -> list[frozenset[str]]:

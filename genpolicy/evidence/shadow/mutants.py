@@ -203,6 +203,16 @@ def _older_behind_queued(rig: Rig) -> None:
     rig.tick(2)
 
 
+def _late_in_contact(rig: Rig) -> None:
+    """It was checked for the row that is due now, one behind the last at which it may begin."""
+    rig.phase = "insert"
+    rig.observe()
+    rig.advance(0.2)
+    first = {"condition_observation_event_time_s": 0.0, "action_start_time_s": 0.0}
+    rig.deliver(rig.chunk(**first, verdict=passing_verdict(rows=(4, ROWS))))
+    rig.tick(2)
+
+
 def _one_window_twice(rig: Rig) -> None:
     _begin(rig)
     rig.now_ns -= 2_000_000  # still in the window of the action accepted last
@@ -291,6 +301,7 @@ SCENARIOS: dict[str, Scenario] = {
     "future_observation": _bad(condition_observation_event_time_s=0.04),
     "infeasible": _bad(verdict=passing_verdict(failed=2)),
     "intervention": _new_chunk_under_a_person,
+    "late_chunk": _late_in_contact,
     "out_of_order": _one_window_twice,
     "pace": _two_at_once,
     "period": _bad(action_period_s=0.1),

@@ -1,8 +1,9 @@
 """What can happen while a chunk is on its way from its observation to the executor.
 
 The chunk itself is good, and was admitted. Each incident has one reason by which the executor must
-count it, and none of its actions may reach the controller stub; a chunk that comes twice is
-executed once.
+count it, and none of its actions may reach the controller stub. Where two chunks are counted (a
+copy, an older one behind a newer one, one that never comes behind one that came) one of them is
+executed.
 """
 
 from collections.abc import Callable
@@ -11,11 +12,13 @@ from dataclasses import dataclass
 from genpolicy.contract.chunk import DiscardReason
 from genpolicy.evidence.shadow.observations import Observation
 from genpolicy.execution.executor import Executor
+from genpolicy.execution.journal import Journal
 from genpolicy.execution.supervisor import Supervisor
 
 SUFFIX = "_on_the_way"
 """Ends the names of the fixtures; their chunks are those of `held_out`."""
 OTHER = "0" * 64  # a hash of nothing
+CLOCK_STEP_S = 3600.0  # a daylight saving hour; far beyond what a clock may leap
 
 
 @dataclass(frozen=True)
@@ -25,6 +28,7 @@ class Way:
     Attributes:
         executor: Its executor.
         supervisor: Its supervisor.
+        journal: Its journal.
         item: The observation that the chunk was made from.
         checkpoint: Weights in force.
         sampler: Sampler settings in force.
@@ -33,6 +37,7 @@ class Way:
 
     executor: Executor
     supervisor: Supervisor
+    journal: Journal
     item: Observation
     checkpoint: str
     sampler: str
@@ -54,6 +59,9 @@ class Incident:
         happen: What happens before it arrives.
         late: It arrives when its validity has ended and its observation is too old.
         arrives: How often it does.
+        clock_s: What the clock of everybody is wrong by from its arrival on.
+        overtaken: A chunk of a newer observation arrives before it, and is executed.
+        hangs: It is executed, and when the next one is asked for, no answer comes. That one counts.
     """
 
     name: str
@@ -61,6 +69,9 @@ class Incident:
     happen: Callable[[Way], object]
     late: bool = False
     arrives: int = 1
+    clock_s: float = 0.0
+    overtaken: bool = False
+    hangs: bool = False
 
 
 def _another_phase(way: Way) -> None:
@@ -96,8 +107,13 @@ def _reset(way: Way) -> None:
     way.look()
 
 
+def _another_supervisor(way: Way) -> None:
+    """The one before died; whether it had stopped, nobody knows."""
+    way.executor.stub.supervisor = Supervisor(way.executor.cell.execution, way.journal)
+
+
 def _nothing(way: Way) -> None:
-    """Only the way itself was too long, or the chunk takes it twice."""
+    """Only the way itself was too long, the chunk takes it twice, or another arrives before it."""
 
 
 HAPPENED: tuple[tuple[str, DiscardReason, Callable[[Way], object]], ...] = (
@@ -112,6 +128,7 @@ HAPPENED: tuple[tuple[str, DiscardReason, Callable[[Way], object]], ...] = (
      lambda w: w.supervisor.observe_collision(w.now_s, True)),
     ("emergency_stop", DiscardReason.STOPPED, lambda w: w.supervisor.emergency_stop(w.now_s)),
     ("cleared_stop", DiscardReason.STOPPED, _stopped_and_reset),
+    ("supervisor_restart", DiscardReason.STOPPED, _another_supervisor),
     ("intervention", DiscardReason.INTERVENTION, lambda w: w.executor.intervene(w.now_s)),
     ("handed_back", DiscardReason.INTERVENTION, _driven_by_hand),
     ("reset", DiscardReason.RESET, _reset),
@@ -126,6 +143,13 @@ HAPPENED: tuple[tuple[str, DiscardReason, Callable[[Way], object]], ...] = (
 INCIDENTS: tuple[Incident, ...] = (
     *(Incident(f"{name}{SUFFIX}", reason, happen) for name, reason, happen in HAPPENED),
     Incident(f"delay{SUFFIX}", DiscardReason.STALE_OBSERVATION, _nothing, late=True),
+    Incident(f"clock_forward{SUFFIX}", DiscardReason.END_OF_EPISODE, _nothing,
+             clock_s=CLOCK_STEP_S),
+    Incident(f"clock_backward{SUFFIX}", DiscardReason.END_OF_EPISODE, _nothing,
+             clock_s=-CLOCK_STEP_S),
     Incident(f"copy{SUFFIX}", DiscardReason.DUPLICATE, _nothing, arrives=2),
-)
-"""Every incident, once."""
+    Incident(f"overtaken{SUFFIX}", DiscardReason.OUT_OF_ORDER, _nothing, overtaken=True),
+    Incident(f"policy_hang{SUFFIX}", DiscardReason.EXPIRED, _nothing, hangs=True),
+)  # fmt: skip
+"""Every incident, once. On a clock that is not believed nothing is commanded, and what waits
+is there at the end."""

@@ -15,7 +15,7 @@ from genpolicy.contract.action import ACTION_DIM
 from genpolicy.contract.chunk import ChunkMetadata, DiscardReason, actions_sha256, frozen_array
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.execution.arrival import LAYER_COUNT
-from genpolicy.execution.cell import PRIMITIVES, Cell, ExecutionSettings
+from genpolicy.execution.cell import PRIMITIVES, Cell, ExecutionSettings, LateChunk
 from genpolicy.execution.checks import CHECKS, Checks, without
 from genpolicy.execution.command import Command
 from genpolicy.execution.executor import Executor
@@ -33,6 +33,7 @@ HORIZONS = HorizonConfig(
 )
 EXECUTION = ExecutionSettings(
     replan_lead_steps=3,
+    late_chunk={LateChunk.CONTINUE: ("approach",), LateChunk.HOLD: ("insert",)},
     deadline_s=0.15,
     watchdog_s=0.1,
     queue_capacity=2,

@@ -1,10 +1,11 @@
 """One shadow session: a judged chunk through executor and stub, on the clock of its observation."""
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
-from genpolicy.contract.chunk import DiscardReason
+from genpolicy.contract.chunk import ChunkMetadata, DiscardReason
 from genpolicy.evidence.shadow.case import Case
 from genpolicy.evidence.shadow.observations import Observation
 from genpolicy.evidence.shadow.on_the_way import Incident, Way
@@ -18,6 +19,7 @@ from genpolicy.feasibility.admission import Admitted, Rejected
 from genpolicy.feasibility.freshness import REASONS
 from genpolicy.feasibility.settings import LAYERS
 
+ROUNDING_S = 1e-9
 IN_FLIGHT_PHASE_CHANGE = "phase_change_in_flight"
 
 Judged = tuple[Case, Admitted | Rejected]
@@ -83,6 +85,7 @@ def play_incident(
     incident: Incident,
     *,
     number: int,
+    newer: Admitted | None = None,
 ) -> Played:
     """One session in which something happens while an admitted chunk is on its way.
 
@@ -93,19 +96,31 @@ def play_incident(
         admitted: The chunk, admitted.
         incident: What happens.
         number: Number of the observation.
+        newer: A chunk from an observation one period later, which arrives first; for an incident
+            in which one is overtaken.
     """
+    assert incident.overtaken == (newer is not None), "a newer chunk, exactly where one is named"
     metadata, context = case.proposal.metadata, case.context
     executor, stub, journal = _begin(cell, item, case, incident.name, number)
     ended_s = max(metadata.valid_until_s, context.maximum_age_s)
     late_s = ended_s + cell.horizons.action_period_s
     now_s = late_s if incident.late else context.now_s
+    if newer is not None:
+        now_s += cell.horizons.action_period_s
     _answer(executor, item, metadata.chunk_id, now_s)
     incident.happen(Way(
-        executor, stub.supervisor, item, context.active_checkpoint_hash,
+        executor, stub.supervisor, journal, item, context.active_checkpoint_hash,
         context.active_sampler_hash, now_s,
     ))  # fmt: skip
-    arrivals = [executor.deliver(admitted, now_s) for _ in range(incident.arrives)]
-    balance = _tick(cell, executor, item, now_s, after=item.phase)
+    first = [] if newer is None else [newer]
+    arrivals = [
+        executor.deliver(chunk, now_s + incident.clock_s)
+        for chunk in [*first, *[admitted] * incident.arrives]
+    ]
+    hanging = _Hanging(executor, metadata, len(case.proposal.actions)) if incident.hangs else None
+    balance = _tick(
+        cell, executor, item, now_s, after=item.phase, clock_s=incident.clock_s, hanging=hanging
+    )
     return _played(journal, stub, balance, arrivals.count(None))
 
 
@@ -116,18 +131,65 @@ def _answer(executor: Executor, item: Observation, invocation: str, now_s: float
     executor.end_invocation(now_s, invocation, "answered")
 
 
+class _Hanging:
+    """A policy that is asked for the next chunk, and never answers.
+
+    When its deadline has passed it is given up, and what never came is accounted for as soon as
+    the executor asks for another one.
+
+    Args:
+        executor: Asks.
+        before: Metadata of the chunk before.
+        rows: Actions of a chunk.
+    """
+
+    def __init__(self, executor: Executor, before: ChunkMetadata, rows: int) -> None:
+        self._executor, self._rows = executor, rows
+        self._asked_for = replace(before, chunk_id=f"{before.chunk_id}/next")
+        self._given_up_s: float | None = None
+        self._over = False
+
+    def look(self, now_s: float) -> None:
+        """Time goes by."""
+        executor, name = self._executor, self._asked_for.chunk_id
+        if self._given_up_s is None:
+            if executor.needs_invocation(now_s):
+                executor.begin_invocation(now_s, name)
+                self._given_up_s = now_s + executor.cell.execution.deadline_s
+        elif now_s >= self._given_up_s - ROUNDING_S and not self._over:
+            executor.end_invocation(now_s, name, "deadline")
+            self._over = executor.needs_invocation(now_s)
+            if self._over:
+                executor.write_off(self._asked_for, self._rows, DiscardReason.EXPIRED, now_s)
+
+
 def _tick(
-    cell: Cell, executor: Executor, item: Observation, now_s: float, *, after: str
+    cell: Cell,
+    executor: Executor,
+    item: Observation,
+    now_s: float,
+    *,
+    after: str,
+    clock_s: float = 0.0,
+    hanging: _Hanging | None = None,
 ) -> Conservation:
-    """Tick until the horizon has passed; from the third tick on the phase is `after`."""
-    period_s, horizon = cell.horizons.action_period_s, cell.horizons.execution_horizon
+    """Tick until the horizon has passed; from the third tick on the phase is `after`.
+
+    Where a policy hangs, until the deadline of an invocation at the end of the horizon has, too.
+    """
+    period_s, ticks = cell.horizons.action_period_s, cell.horizons.execution_horizon + 1
+    if hanging is not None:
+        ticks += math.ceil(cell.execution.deadline_s / period_s) + 1
     first = round(now_s / period_s)
-    for tick in range(first, first + horizon + 1):
+    for tick in range(first, first + ticks):
+        told_s = tick * period_s + clock_s
         if tick > first:
             phase = item.phase if tick < first + 2 else after
-            executor.observe(tick * period_s, tick * period_s, phase, item.calibration_epoch)
-        executor.tick(tick * period_s)
-    return executor.end_episode((first + horizon + 1) * period_s)
+            executor.observe(told_s, told_s, phase, item.calibration_epoch)
+        if hanging is not None:
+            hanging.look(told_s)
+        executor.tick(told_s)
+    return executor.end_episode((first + ticks) * period_s + clock_s)
 
 
 def _played(

@@ -17,7 +17,7 @@ from genpolicy.contract.action import POSITION
 from genpolicy.contract.chunk import Candidate, ChunkMetadata
 from genpolicy.evidence.admission_context import Moment, Session, context_of
 from genpolicy.evidence.rows.shadow import CandidateRow
-from genpolicy.evidence.shadow.case import Case, decide
+from genpolicy.evidence.shadow.case import Case, decide, newer_than
 from genpolicy.evidence.shadow.corruption import CORRUPTIONS
 from genpolicy.evidence.shadow.found import ShadowEvidence
 from genpolicy.evidence.shadow.observations import Observation
@@ -209,9 +209,11 @@ class _Seen:
         """Run a session in which something happens to the first admitted candidate, if any."""
         for case, result in judged.pairs:
             if isinstance(result, Admitted):
+                newer = newer_than(self.shadow.checker, case) if incident.overtaken else None
                 played = play_incident(
-                    self.shadow.cell, self.item, case, result, incident, number=self.number
-                )
+                    self.shadow.cell, self.item, case, result, incident, number=self.number,
+                    newer=newer,
+                )  # fmt: skip
                 self.evidence.keep(played, case.proposal.metadata.method, incident.name)
                 return
 

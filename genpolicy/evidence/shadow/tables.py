@@ -21,7 +21,8 @@ from genpolicy.execution.ledger import Account
 from genpolicy.feasibility.cell import Cell as FeasibilityCell
 from genpolicy.feasibility.figures import expected_motion
 from genpolicy.integrity.rows import write_rows
-from genpolicy.verification.checker import ExpectedSettings, check_journal
+from genpolicy.verification.checker import check_journal
+from genpolicy.verification.expected import ExpectedSettings
 from genpolicy.verification.report import JournalReport
 
 
@@ -96,6 +97,8 @@ def checker_document(journals: Sequence[Path], *, cell: Cell, robot: Feasibility
         watchdog_s=execution.watchdog_s,
         queue_capacity=execution.queue_capacity,
         controller_mode=cell.controller_mode,
+        replan_lead_steps=execution.replan_lead_steps,
+        late_chunk=execution.late_by_phase,
     )
     motion = expected_motion(robot)
     return checked(

@@ -4,6 +4,7 @@ from collections import deque
 
 from genpolicy.contract.chunk import DiscardReason
 from genpolicy.evidence.stress.state import InFlight, Setup, Tally, next_candidate
+from genpolicy.execution.cell import LateChunk
 from genpolicy.execution.executor import Executor
 from genpolicy.execution.journal import Journal
 
@@ -19,11 +20,16 @@ class Deliveries:
         journal: Of the rollout.
         tally: Its counts.
         start: Index of the initial state; key of the draws.
+
+    Attributes:
+        late_in: Phase of an answer that came late at the last tick, if that phase declares the
+            classical fallback for it; else empty.
     """
 
     def __init__(
         self, setup: Setup, executor: Executor, journal: Journal, tally: Tally, *, start: int
     ) -> None:
+        self.late_in = ""
         self._setup, self._executor = setup, executor
         self._journal, self._tally, self._start = journal, tally, start
         self._flying: list[InFlight] = []
@@ -35,6 +41,7 @@ class Deliveries:
 
     def collect(self, now_s: float) -> None:
         """What is delivered by now arrives, in order; what is overdue is given up."""
+        self.late_in = ""
         for flying in sorted(self._flying, key=_order):
             if flying.arrival_s <= now_s and not flying.dropped:
                 self._flying.remove(flying)
@@ -89,7 +96,12 @@ class Deliveries:
         self._arrived.clear()
 
     def _arrive(self, flying: InFlight, now_s: float) -> None:
-        if self.late_rows(flying, now_s) >= self._setup.horizons.execution_horizon:
+        late, execution = self.late_rows(flying, now_s), self._setup.execution
+        phase = flying.metadata.task_phase
+        falls_back = execution.late_by_phase.get(phase) == LateChunk.FALLBACK
+        if late > execution.replan_lead_steps and falls_back:
+            self.late_in = phase
+        if late >= self._setup.horizons.execution_horizon:
             self.answered(flying, now_s)
             self.write_off(flying, DiscardReason.EXPIRED, now_s)
         else:

@@ -259,8 +259,10 @@ class Rollout:
     def _recover(self, now_s: float) -> None:
         last_s = self._last_command_s if self._last_command_s is not None else 0.0
         silent = now_s - last_s >= self.setup.execution.hold_before_recovery_s - 1e-9
-        if not self.recovery.active and (silent or self._disturbance.drill(now_s)):
-            self.recovery.trigger(now_s, self.world.phase, "silence" if silent else "drill")
+        late = self._deliveries.late_in == self.world.phase
+        if not self.recovery.active and (silent or late or self._disturbance.drill(now_s)):
+            cause = "silence" if silent else "late chunk" if late else "drill"
+            self.recovery.trigger(now_s, self.world.phase, cause)
         if not self.recovery.active:
             return
         state = step(

@@ -1,6 +1,6 @@
 """Section `stress`: the matched comparison, registered before it runs."""
 
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import Field, field_validator, model_validator
 
@@ -20,7 +20,8 @@ class StressSettings(Settings):
         episode_limit_s: Longest rollout.
         samples: Candidates per invocation of a stochastic method.
         baselines: Simpler methods in the comparison, timed and run beside the candidates.
-        perturbations: What is injected, by name; `nominal` is one of them.
+        perturbations: What is injected, by name; `nominal` is one of them. One that names no kind
+            is of the kind of its name.
         margin: Pre-registered gain in success.
         alpha: Pre-registered family-wise error; each candidate gets its equal share.
         planned_effect: Success of a baseline and of a candidate that is worth promoting; a gain
@@ -40,6 +41,16 @@ class StressSettings(Settings):
     @classmethod
     def _pair(cls, value: object) -> object:
         return tuple(value) if isinstance(value, list) else value
+
+    @field_validator("perturbations", mode="before")
+    @classmethod
+    def _kind_by_name(cls, value: Any) -> Any:
+        if not isinstance(value, dict):
+            return value
+        return {
+            name: {"kind": name, **entry} if isinstance(entry, dict) else entry
+            for name, entry in value.items()
+        }
 
     @model_validator(mode="after")
     def _one_envelope(self) -> "StressSettings":

@@ -30,6 +30,14 @@ def test_executor_and_stub_each_keep_out_alone_what_both_ask():
     assert [check.name for check in twice if slipped_by(check, _table(check))] == []
 
 
+@pytest.mark.parametrize("blind", ["checks", "stub_checks"])
+def test_a_late_chunk_is_refused_by_the_executor_and_by_the_stub(blind):
+    rig = Rig(**({"stub_checks": IMITATED} | {blind: without(IMITATED, "late_chunk")}))
+    SCENARIOS["late_chunk"](rig)
+    assert rig.stub.accepted == 0 and rig.stub.stale == (blind == "checks")
+    assert rig.executor.conservation().chunks.discarded == {"expired": 1}
+
+
 def _table(check):
     return IMITATED if check in IMITATED else CHECKS
 

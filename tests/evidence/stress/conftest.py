@@ -27,7 +27,8 @@ from genpolicy.integrity.documents import read_yaml
 from genpolicy.robot.controller import CONTROLLER_MODE
 from genpolicy.tasks.api import load_task
 from genpolicy.tasks.tabletop_insertion.episodes import demonstrate
-from genpolicy.verification.checker import ExpectedSettings, check_journal
+from genpolicy.verification.checker import check_journal
+from genpolicy.verification.expected import ExpectedSettings
 
 PARAMS = read_yaml(Path(__file__).parents[3] / "params.yaml")
 HORIZONS = HorizonConfig(**PARAMS["horizons"])
@@ -71,6 +72,11 @@ def drive(rollouts, plan, *, ticks=300):
     for rollout in rollouts:
         rollout.end(Outcome.TIMEOUT)
     return rollouts
+
+
+def drive_one(rollout, plan):
+    """One tick of one rollout under a scripted policy."""
+    step([rollout], Scripted(plan, {rollout.start_index: rollout}), samples=1)
 
 
 class Replay:
@@ -122,6 +128,8 @@ def check(rollouts, folder, *, execution=EXECUTION):
         watchdog_s=execution.watchdog_s,
         queue_capacity=execution.queue_capacity,
         controller_mode=CONTROLLER_MODE,
+        replan_lead_steps=execution.replan_lead_steps,
+        late_chunk=execution.late_by_phase,
     )
     robot = rollouts[0].setup.checker.cell if rollouts else None
     return check_journal(path, expected, robot and expected_motion(robot))
@@ -186,6 +194,7 @@ def kit():
     """The helpers of this file, by name."""
     return SimpleNamespace(
         HORIZONS=HORIZONS, EXECUTION=EXECUTION, FEASIBILITY=FEASIBILITY, ROOT_SEED=ROOT_SEED,
-        EPOCH=EPOCH, PARAMS=PARAMS, latency=latency, drive=drive, Replay=Replay,
+        EPOCH=EPOCH, PARAMS=PARAMS, latency=latency, drive=drive, drive_one=drive_one,
+        Replay=Replay,
         straight=straight, check=check,
     )  # fmt: skip

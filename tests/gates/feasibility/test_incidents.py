@@ -6,13 +6,13 @@ import pytest
 from asked import asked
 from editing import cells
 
-from gates.asked_for import COPIES, INCIDENTS_ASKED_FOR
+from gates.asked_for import INCIDENTS_ASKED_FOR, OF_TWO
 from gates.evidence import MissingEvidenceError
 from gates.feasibility.incidents import incidents_miscounted
 from gates.proof import judge
 from gates.writing import write_gate
 
-FEW = ("phase_change_on_the_way", "delay_on_the_way", *COPIES)
+FEW = ("phase_change_on_the_way", "delay_on_the_way", *OF_TWO)
 COUNTS, STUB = "shadow/counts.parquet", "shadow/stub.parquet"
 
 
@@ -55,13 +55,13 @@ def test_nothing_of_it_moves(ladder, name, table, column):
 
 @pytest.mark.parametrize(("executed", "wrong"), [(11, 1), (13, 1), (24, 12)])
 def test_of_copies_exactly_one_is_executed(ladder, executed, wrong):
-    evidence.edit_table(ladder, COUNTS, cells("executed", executed, where=of(COPIES[0])))
+    evidence.edit_table(ladder, COUNTS, cells("executed", executed, where=of(OF_TWO[0])))
     assert told(ladder).value == wrong
 
 
 @pytest.mark.parametrize("column", ["stale", "invalid"])
 def test_nothing_of_a_copy_is_refused_at_the_stub(ladder, column):
-    evidence.edit_table(ladder, STUB, cells(column, 3, where=of(COPIES[0])))
+    evidence.edit_table(ladder, STUB, cells(column, 3, where=of(OF_TWO[0])))
     assert told(ladder).value == 3.0
 
 

@@ -1,0 +1,43 @@
+"""What a journal is held to: settings as the caller knows them, whatever it declares."""
+
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class ExpectedSettings:
+    """What the caller knows that the sessions must have been held to; times in s.
+
+    Attributes:
+        execution_horizon: Actions of a chunk that may be executed.
+        action_period_s: Time between actions.
+        maximum_age_s: Largest action age, by phase.
+        watchdog_s: Silence after which there must be a hold.
+        queue_capacity: Chunks that may wait.
+        controller_mode: The one mode in which an action may be accepted.
+        replan_lead_steps: A chunk that begins behind this row is late.
+        late_chunk: `continue`, `hold` or `fallback`, by phase; only where a phase says `continue`
+            may a late chunk be executed.
+    """
+
+    execution_horizon: int
+    action_period_s: float
+    maximum_age_s: dict[str, float]
+    watchdog_s: float
+    queue_capacity: int
+    controller_mode: str
+    replan_lead_steps: int
+    late_chunk: dict[str, str]
+
+    def declared(self) -> dict[str, Any]:
+        """The same in the journal's words."""
+        return {
+            "execution_horizon": self.execution_horizon,
+            "period_ns": round(self.action_period_s * 1e9),
+            "maximum_age_ns": {k: round(v * 1e9) for k, v in self.maximum_age_s.items()},
+            "watchdog_ns": round(self.watchdog_s * 1e9),
+            "queue_capacity": self.queue_capacity,
+            "controller_mode": self.controller_mode,
+            "replan_lead_steps": self.replan_lead_steps,
+            "late_chunk": self.late_chunk,
+        }
