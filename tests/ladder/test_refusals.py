@@ -43,7 +43,7 @@ def flip(pattern: str) -> Tamper:
 
 def forge_a_pass(workspace: Path) -> None:
     """Gate A fails honestly, then somebody writes PASS into its report."""
-    set_limit(workspace, "gate_a", "held_out_situations", 1e9)
+    set_limit(workspace, "gate_a", "persistence_margin", 1e9)
     assert run_stage(workspace, "gate_a")[0] == 0
     report, _ = read_report(workspace, "A")
     assert report.verdict == "FAIL"
@@ -177,7 +177,7 @@ def test_a_flipped_bit_stops_repro_where_direct_calls_stop(copy: Path) -> None:
 
 
 def test_a_failed_gate_stops_repro_and_the_report_says_why(copy: Path) -> None:
-    set_limit(copy, "gate_a", "held_out_situations", 1e9)
+    set_limit(copy, "gate_a", "persistence_margin", 1e9)
     evidence = hashes(
         copy,
         "artifacts/ingest",
@@ -189,7 +189,7 @@ def test_a_failed_gate_stops_repro_and_the_report_says_why(copy: Path) -> None:
     assert (outcome.code, outcome.stage) == (3, "train_generators")
     assert ran == ["gate_a", "train_generators"]
     assert re.search(
-        r"Gate A refuses: held_out_situations is \d+, required >= 1e\+09; see reports/gate_a\.json",
+        r"Gate A refuses: persistence_margin is [\d.]+, required >= 1e\+09; see reports/gate_a\.json",
         outcome.sentence,
     ), outcome.sentence
     assert not (copy / "artifacts" / "train_generators").exists()
@@ -205,7 +205,7 @@ def test_a_failed_gate_stops_repro_and_the_report_says_why(copy: Path) -> None:
     )
     report = json.loads((copy / "reports" / "gate_a.json").read_text())
     assert report["verdict"] == "FAIL"
-    assert report["diagnosis"].startswith("First unmet: held_out_situations")
+    assert report["diagnosis"].startswith("First unmet: persistence_margin")
 
 
 @pytest.mark.parametrize(

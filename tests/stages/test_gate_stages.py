@@ -72,11 +72,11 @@ def test_the_verdict_file_moves_with_verdict_or_evidence_and_not_with_a_limit(
     judge(stage, "gate_a")
     assert read(evidence, "gate_a", "verdict.json") == before
     assert (evidence / "reports" / "gate_a.json").read_bytes() != report
-    edit(evidence, limit(1e9, "model", "held_out_situations"))
+    edit(evidence, limit(1e9, "model", "persistence_margin"))
     judge(stage, "gate_a")
     failed = json.loads(read(evidence, "gate_a", "verdict.json"))
     assert failed["verdict"] == "FAIL"
-    edit(evidence, limit(20, "model", "held_out_situations"))
+    edit(evidence, limit(0.05, "model", "persistence_margin"))
     gate_evidence.edit_document(
         evidence, "audit/persistence.json", lambda d: {**d, "null_mean": d["null_mean"] * 0.99}
     )
@@ -89,17 +89,17 @@ def test_the_verdict_file_moves_with_verdict_or_evidence_and_not_with_a_limit(
 def test_a_failed_gate_ends_with_0_and_its_report_says_fail(evidence, stage, edit) -> None:
     edit(
         evidence,
-        lambda p: p["gate_a"]["limits"]["model"].update(held_out_situations=[1e9, "test"]),
+        lambda p: p["gate_a"]["limits"]["model"].update(persistence_margin=[1e9, "test"]),
     )
     judge(stage, "gate_a")
     report = json.loads((evidence / "reports" / "gate_a.json").read_text())
     assert report["verdict"] == "FAIL"
     metrics = json.loads((evidence / "reports" / "gate_a.metrics.json").read_text())
     assert (metrics["verdict"], metrics["passes"]) == ("FAIL", 0)
-    assert metrics["criteria"]["held_out_situations"]["verdict"] == "FAIL"
+    assert metrics["criteria"]["persistence_margin"]["verdict"] == "FAIL"
     code, said = stage("train_generators")
     assert code == 3
-    assert "Gate A refuses: held_out_situations is" in said
+    assert "Gate A refuses: persistence_margin is" in said
 
 
 def test_missing_evidence_is_inconclusive_never_a_pass(workspace, stage) -> None:
