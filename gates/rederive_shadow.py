@@ -10,10 +10,11 @@ from genpolicy.contract.settings import Settings
 from genpolicy.data.dataset import load_dataset
 from genpolicy.evidence.admission_context import make_checker
 from genpolicy.evidence.documents.shadow import MUTANTS, LayerMutant, Mutant
+from genpolicy.evidence.shadow.candidate_rows import numbers_sha256
 from genpolicy.evidence.shadow.layer_mutants import missing_checks_evidence
 from genpolicy.evidence.shadow.observations import held_out_observations, spread
 from genpolicy.evidence.shadow.settings import ShadowSection
-from genpolicy.evidence.shadow.shadow import Shadow, numbers_sha256
+from genpolicy.evidence.shadow.shadow import Shadow
 from genpolicy.evidence.shadow.tables import all_mutants
 from genpolicy.execution.cell import Cell, ExecutionSettings
 from genpolicy.feasibility.settings import FeasibilitySettings

@@ -88,7 +88,7 @@ WORDS = {
     ("genpolicy/evidence/shadow/corruption.py", "release"): "a gripper that opens early",
     ("genpolicy/evidence/shadow/corruption.py", "approach"): "name of a check of contact",
     ("genpolicy/evidence/shadow/at_the_margin.py", "approach"): "the same",
-    ("genpolicy/feasibility/checks.py", "approach"): "the same",
+    ("genpolicy/feasibility/reasons.py", "approach"): "the same",
     ("genpolicy/feasibility/layers/contact.py", "approach"): "the same",
     ("gates/asked_for.py", "approach"): "the same",
     ("genpolicy/verification/contact.py", "approach"): "name of the proof's rule of the same",

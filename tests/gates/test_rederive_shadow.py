@@ -107,7 +107,8 @@ def test_true_evidence_stands(root):
 
 
 FORGED = {
-    "dynamic": False, "first_reason": "expired", "mode": "left", "layer_margin": 9.0,
+    "dynamic": False, "outcome": "unknown", "first_reason": "expired", "first_row": 15,
+    "mode": "left", "layer_margin": 9.0, "margin_unit": "s",
     "position_change_m": 0.0001, "rotation_change_rad": 0.5, "boundary_jerk_m_s3": 1.0,
     "phase": "release", "situation": "elsewhere:1", "seed": 77,
 }  # fmt: skip
