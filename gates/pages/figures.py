@@ -53,9 +53,13 @@ class Shown(Picture):
 
     Attributes:
         in_words: The same in words: heads, then rows of cells; empty without.
+        listed: A table that stands in the place of a drawing; empty for a drawing.
+        folded: Further tables, each with what it is called; folded until somebody asks.
     """
 
     in_words: Table = ()
+    listed: Table = ()
+    folded: tuple[tuple[str, Table], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -78,6 +82,40 @@ class Plot:
         """What this adds to a `Shown`."""
         svg = drawn(lambda: self.draw(evidence, report), self.title, salt=salt)
         return {"svg": svg, "in_words": self.read(evidence, report) if self.read else ()}
+
+
+@dataclass(frozen=True)
+class Folded:
+    """A table that is shown to those who ask.
+
+    Attributes:
+        summary: What it is called.
+        read: Gives it: heads, then rows of cells.
+    """
+
+    summary: str
+    read: Callable[[Evidence, GateReport], Table]
+
+
+@dataclass(frozen=True)
+class Listing:
+    """A table in the place of a figure, with further ones folded behind it.
+
+    Attributes:
+        also: Further files that it is read from.
+    """
+
+    title: str
+    caption: str
+    source: str
+    read: Callable[[Evidence, GateReport], Table]
+    folded: tuple[Folded, ...] = ()
+    also: tuple[str, ...] = ()
+
+    def picture(self, evidence: Evidence, report: GateReport, salt: str) -> dict[str, Any]:
+        """What this adds to a `Shown`; a table has no inner names and needs no salt."""
+        behind = tuple((item.summary, item.read(evidence, report)) for item in self.folded)
+        return {"listed": self.read(evidence, report), "folded": behind}
 
 
 @dataclass(frozen=True)
@@ -109,7 +147,11 @@ class Photo:
         return {"photo": f"data:image/png;base64,{base64.b64encode(data).decode()}"}
 
 
-def draw_all(plots: Sequence[Plot | Photo], evidence: Evidence, report: GateReport) -> list[Shown]:
+Picturable = Plot | Photo | Listing
+"""What a page can be given to show."""
+
+
+def draw_all(plots: Sequence[Picturable], evidence: Evidence, report: GateReport) -> list[Shown]:
     """Draw what the evidence allows; what is missing is said, never left out in silence."""
     pictures = []
     for index, plot in enumerate(plots):

@@ -91,6 +91,7 @@ WORDS = {
     ("genpolicy/feasibility/reasons.py", "approach"): "the same",
     ("genpolicy/feasibility/layers/contact.py", "approach"): "the same",
     ("gates/asked_for.py", "approach"): "the same",
+    ("gates/pages/reasons.py", "approach"): "the same",
     ("genpolicy/verification/contact.py", "approach"): "name of the proof's rule of the same",
     ("genpolicy/verification/contact.py", "release"): "the same, of letting go",
     ("genpolicy/evidence/shadow/layer_mutants.py", "approach"): "which rule stands behind a check",
