@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from gates.evidence import Evidence, MissingEvidenceError
@@ -48,6 +49,15 @@ Table = tuple[tuple[str, ...], ...]
 
 
 @dataclass(frozen=True)
+class Small:
+    """One drawing of a series as the page shows it: its title, what is said of it, the drawing."""
+
+    title: str
+    lines: tuple[str, ...]
+    svg: Markup
+
+
+@dataclass(frozen=True)
 class Shown(Picture):
     """A figure of a gate's page.
 
@@ -55,11 +65,13 @@ class Shown(Picture):
         in_words: The same in words: heads, then rows of cells; empty without.
         listed: A table that stands in the place of a drawing; empty for a drawing.
         folded: Further tables, each with what it is called; folded until somebody asks.
+        series: Small drawings, each with its text.
     """
 
     in_words: Table = ()
     listed: Table = ()
     folded: tuple[tuple[str, Table], ...] = ()
+    series: tuple[Small, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -119,6 +131,40 @@ class Listing:
 
 
 @dataclass(frozen=True)
+class Drawing:
+    """One drawing of a series: its title, what is said of it, and what draws it."""
+
+    title: str
+    lines: tuple[str, ...]
+    draw: Callable[[], Figure]
+
+
+@dataclass(frozen=True)
+class Series:
+    """Small drawings of one kind, each with its text: `draw(evidence, report)` lists them.
+
+    Attributes:
+        also: Further files that they are drawn from.
+    """
+
+    title: str
+    caption: str
+    source: str
+    draw: Callable[[Evidence, GateReport], Sequence[Drawing]]
+    also: tuple[str, ...] = ()
+
+    def picture(self, evidence: Evidence, report: GateReport, salt: str) -> dict[str, Any]:
+        """What this adds to a `Shown`."""
+        found = self.draw(evidence, report)
+        return {
+            "series": tuple(
+                Small(item.title, item.lines, drawn(item.draw, item.title, salt=f"{salt}n{number}"))
+                for number, item in enumerate(found)
+            )
+        }
+
+
+@dataclass(frozen=True)
 class Photo:
     """A PNG among the evidence; shown only if the report names these very bytes."""
 
@@ -147,7 +193,7 @@ class Photo:
         return {"photo": f"data:image/png;base64,{base64.b64encode(data).decode()}"}
 
 
-Picturable = Plot | Photo | Listing
+Picturable = Plot | Photo | Listing | Series
 """What a page can be given to show."""
 
 

@@ -23,6 +23,7 @@ from gates.pages import (
     plots_feasibility,
     plots_incidents,
     plots_need,
+    plots_rejected,
     plots_stress,
     plots_time,
     tables_feasibility,
@@ -49,7 +50,12 @@ MARKS = {
 PLOTS: dict[str, tuple[Picturable, ...]] = {
     "A": plots_need.PLOTS,
     "B": (*plots_convergence.PLOTS, *plots_time.PLOTS, *plots_density.PLOTS),
-    "C": (*plots_feasibility.PLOTS, *tables_feasibility.LISTINGS, *plots_incidents.PLOTS),
+    "C": (
+        *plots_feasibility.PLOTS,
+        *tables_feasibility.LISTINGS,
+        *plots_rejected.GALLERIES,
+        *plots_incidents.PLOTS,
+    ),
     "D": plots_stress.PLOTS,
     "E": (),
 }

@@ -26,17 +26,14 @@ NOTHING = "nothing"
 def _rejections(evidence: Evidence, report: GateReport) -> Table:
     """Reasons in the order of the checks, with a line for each method."""
     held = _held_out(evidence)
-    lines = [
-        (
-            f"{_layer(reason)}: {said(reason)}",
-            method,
-            _of(rows, own),
-            _where(rows, own, "phase"),
-            _where(rows, own, "mode"),
-            REASON_WORDS.get(reason, ""),
-        )
-        for reason, method, own, rows in _groups(held)
-    ]
+    lines, told = [], set[str]()
+    for reason, method, own, rows in _groups(held):
+        because = "as above" if reason in told else REASON_WORDS.get(reason, "")
+        told.add(reason)
+        lines.append(
+            (f"{_layer(reason)}: {said(reason)}", method, _of(rows, own),
+             _where(rows, own, "phase"), _where(rows, own, "mode"), because)
+        )  # fmt: skip
     heads = ("layer: reason", "method", "rejected", "by phase", "by mode", "because")
     return (heads, *(lines or [(NOTHING, "all", f"0 of {len(held)}", "", "", "")]))
 
