@@ -52,8 +52,8 @@ def _text(gallery: Gallery, example: RejectedExample) -> tuple[str, ...]:
     return (
         f"{what}.",
         f"{_where(gallery, example)} {_how_far(example)}",
-        f"{example.layer.capitalize()} layer; so are {example.rejected} of {example.held_out} "
-        f"held-out candidates of {example.method}. This one: candidate {example.candidate} of "
+        f"The {example.layer} layer rejects {example.rejected} of {example.held_out} held-out "
+        f"candidates of {example.method} for it. This one: candidate {example.candidate} of "
         f"observation {example.observation}, phase {example.phase}, mode {example.mode}.",
     )
 

@@ -160,8 +160,8 @@ def test_what_touches_and_who_it_is_are_said(copied):
     assert item.title == "flow: scene collision"
     assert item.lines[0].endswith("or touches it: finger left and post.")
     assert item.lines[2] == (
-        "Dynamic layer; so are 7 of 80 held-out candidates of flow. This one: candidate 1 of "
-        "observation 0, phase approach, mode left."
+        "The dynamic layer rejects 7 of 80 held-out candidates of flow for it. This one: "
+        "candidate 1 of observation 0, phase approach, mode left."
     )
 
 
