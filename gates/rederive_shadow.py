@@ -1,4 +1,4 @@
-"""Gate C's evidence derived again: tables from the journal, mutants by trying them again."""
+"""Gate C's evidence derived again: tables from the journal, mutants and gallery by the layers."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -9,14 +9,19 @@ from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.contract.settings import Settings
 from genpolicy.data.dataset import load_dataset
 from genpolicy.evidence.admission_context import make_checker
-from genpolicy.evidence.documents.shadow import MUTANTS, LayerMutant, Mutant
+from genpolicy.evidence.documents.gallery import GALLERY, Gallery
+from genpolicy.evidence.documents.shadow import MUTANTS, Mutant
+from genpolicy.evidence.rows.shadow import CandidateRow
+from genpolicy.evidence.shadow.candidate_rows import numbers_sha256
+from genpolicy.evidence.shadow.gallery import gallery_of
 from genpolicy.evidence.shadow.layer_mutants import missing_checks_evidence
-from genpolicy.evidence.shadow.observations import held_out_observations, spread
+from genpolicy.evidence.shadow.observations import Observation, held_out_observations, spread
 from genpolicy.evidence.shadow.settings import ShadowSection
-from genpolicy.evidence.shadow.shadow import Shadow, numbers_sha256
+from genpolicy.evidence.shadow.shadow import Shadow
 from genpolicy.evidence.shadow.tables import all_mutants
 from genpolicy.execution.cell import Cell, ExecutionSettings
 from genpolicy.feasibility.settings import FeasibilitySettings
+from genpolicy.integrity.rows import read_rows
 from genpolicy.integrity.tables import read_table
 from genpolicy.seeds import stream
 from genpolicy.tasks.api import load_task
@@ -25,6 +30,7 @@ from genpolicy.verification.shadow import KEYS, derived_shadow
 
 SHADOW = "artifacts/shadow"
 JOURNAL = "journal.mcap"
+CANDIDATES = "candidates"
 DATASET = "artifacts/ingest"
 HASHED = ("raw", "projected")
 """Columns that a journal states by their hash."""
@@ -37,11 +43,16 @@ class TaskSection(Settings):
 
 
 def rederive_shadow(root: Path, params: Mapping[str, Any]) -> None:
-    """Hold the tables of the shadow test against its journal, and try its mutants again.
+    """Hold the tables of the shadow test against its journal, and ask the layers again.
+
+    Its mutants are tried again, and the examples of its gallery chosen, judged and drawn up again
+    from the table and the dataset. That a policy drew those actions is not asked again.
 
     Raises:
-        RefusedError: A row is not what the journal says, or a mutant is not what is found again.
-        IntegrityError: A file is missing or no regular file.
+        RefusedError: A row is not what the journal says, or a mutant or an example is not what is
+            found again.
+        IntegrityError: A file is missing or no regular file, or the layers say something else of
+            an example than its row.
         BadInputError: A file cannot be read.
     """
     with readable(f"{SHADOW}/{JOURNAL}"):
@@ -50,10 +61,15 @@ def rederive_shadow(root: Path, params: Mapping[str, Any]) -> None:
         path = f"{SHADOW}/{name}.parquet"
         stated = [_hashed(row) for row in read_table(root / path).to_pylist()]
         compare_rows("C", path, keys, stated, derived[name], seed=training_seed(params))
+    tried, observations, mutant_observations = _moments(root, params)
     path = f"{SHADOW}/{MUTANTS.file}"
-    again = all_mutants(_layer_mutants(root, params))
+    again = all_mutants(missing_checks_evidence(tried, spread(observations, mutant_observations)))
     stated_mutants, found = (_by_check(rows) for rows in (MUTANTS.read(root / SHADOW), again))
     compare_keys("C", path, stated_mutants, found, "as tried again")
+    rows = read_rows(root / SHADOW / f"{CANDIDATES}.parquet", CandidateRow)
+    shown, drawn = GALLERY.read(root / SHADOW), gallery_of(tried, observations, rows)
+    path = f"{SHADOW}/{GALLERY.file}"
+    compare_keys("C", path, _by_example(shown), _by_example(drawn), "as judged again")
 
 
 def _hashed(row: dict[str, Any]) -> Row:
@@ -71,8 +87,17 @@ def _by_check(rows: Sequence[Mutant]) -> dict[str, Any]:
     return found
 
 
-def _layer_mutants(root: Path, params: Mapping[str, Any]) -> list[LayerMutant]:
-    """Each check of the six layers left out again, on the held-out moments of the dataset."""
+def _by_example(gallery: Gallery) -> dict[str, Any]:
+    """A gallery by its keys, its examples by method and reason, in their order."""
+    found = {key: value for key, value in vars(gallery).items() if key != "examples"}
+    for number, example in enumerate(gallery.examples):
+        name = f"example {number}, {example.method}/{example.reason}"
+        found |= {f"{name}: {key}": value for key, value in vars(example).items()}
+    return found
+
+
+def _moments(root: Path, params: Mapping[str, Any]) -> tuple[Shadow, list[Observation], int]:
+    """What the shadow test ran with, its held-out moments, and how many its mutants see."""
     shadow = section(params, "shadow", ShadowSection)
     horizons = section(params, "horizons", HorizonConfig)
     task = load_task(section(params, "task", TaskSection).name)
@@ -94,4 +119,4 @@ def _layer_mutants(root: Path, params: Mapping[str, Any]) -> list[LayerMutant]:
         late_steps=shadow.late_steps,
         samples=shadow.samples,
     )
-    return missing_checks_evidence(tried, spread(observations, shadow.mutant_observations))
+    return tried, observations, shadow.mutant_observations

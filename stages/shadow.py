@@ -6,6 +6,7 @@ from gates.proof import admit
 from genpolicy.candidates.judged import GENERATORS, trained
 from genpolicy.data.dataset import load_dataset
 from genpolicy.evidence.admission_context import make_checker
+from genpolicy.evidence.shadow.gallery import gallery_of
 from genpolicy.evidence.shadow.layer_mutants import missing_checks_evidence
 from genpolicy.evidence.shadow.observations import (
     held_out_observations,
@@ -55,7 +56,9 @@ def work(params: Params) -> None:
             for candidate in trained(ARTIFACTS / GENERATORS, admitted, seeds=[seed])
         ]
         mutants = missing_checks_evidence(shadow, spread(observations, section.mutant_observations))
-        write_shadow(folder, found, mutants, cell=shadow.cell, robot=shadow.checker.cell)
+        rows = [row for item in found for row in item.candidates]
+        gallery = gallery_of(shadow, observations, rows)
+        write_shadow(folder, found, mutants, gallery, cell=shadow.cell, robot=shadow.checker.cell)
 
 
 if __name__ == "__main__":

@@ -12,7 +12,10 @@ from gates.feasibility.settings import (
     INTACT,
     LAYERS,
     NO_MODE,
+    PASSED,
+    REASONS,
     TWO_MODES,
+    UNKNOWN,
     FeasibilitySettings,
 )
 from genpolicy.evidence.rows.shadow import CandidateRow
@@ -37,11 +40,17 @@ def _episodes(rows: pd.DataFrame) -> pd.Series:
 
 
 def admissible(rows: pd.DataFrame) -> Array:
-    """1.0 where a candidate passed all six layers; a layer not reached is not passed."""
-    passed = np.ones(len(rows), dtype=np.bool_)
+    """1.0 where a candidate passed all six layers; one not reached or unknown is not passed."""
+    passed = np.array(rows["outcome"] == PASSED, dtype=np.bool_)
     for layer in LAYERS:
         passed &= flags(rows, layer)
     return passed.astype(np.float64)
+
+
+def _unknown(rows: pd.DataFrame) -> str:
+    """How many of some candidates could not be judged, as the end of a caveat."""
+    count = int((rows["outcome"] == UNKNOWN).sum())
+    return f"; {count} unknown, which is not passed"
 
 
 @criterion(
@@ -94,7 +103,7 @@ def admissible_share(evidence: Evidence, settings: FeasibilitySettings, candidat
     text = (
         f"share {share:.4g} of {len(rows)} candidates at {rows['observation'].nunique()} "
         f"observations; lower bound over {episodes.nunique()} episodes, whose observations are "
-        "not independent"
+        f"not independent{_unknown(rows)}"
     )
     return Measured(lower, (lower, upper), text)
 
@@ -154,13 +163,13 @@ def _of_admissible(
 def corrupted_refused_share(
     evidence: Evidence, settings: FeasibilitySettings, candidate: str
 ) -> Measured:
-    """Share of corrupted candidates that are refused with a reason."""
+    """Share of corrupted candidates that are refused with one of the known reasons."""
     rows = _rows(evidence, candidate)
     rows = rows[~rows["fixture"].isin(INTACT)]
     absent = sorted(set(settings.required_fixtures) - set(rows["fixture"]))
     if absent:
         raise MissingEvidenceError(f"corrupted fixtures not tried: {', '.join(absent)}")
-    named = rows["first_reason"].ne("").to_numpy()
+    named = rows["first_reason"].isin(REASONS).to_numpy()
     refused = (admissible(rows) == 0.0) & named
     interval = counted_interval(
         float(refused.sum()), float(len(rows)), confidence=settings.confidence

@@ -2,11 +2,18 @@
 
 from pydantic import Field
 
+from gates.asked_for import CHECKS_ASKED_FOR
 from gates.settings import CandidateSettings
 
 SHADOW = "artifacts/shadow"
 CANDIDATES = f"{SHADOW}/candidates.parquet"
 LAYERS = ("representation", "kinematic", "geometric", "dynamic", "contact", "fresh")
+REASONS = tuple(
+    name for layer, _, name in (row.partition(".") for row in CHECKS_ASKED_FOR) if layer in LAYERS
+)
+"""Why a layer may reject: the checks of the six layers, and nothing else."""
+PASSED, UNKNOWN = "passed", "unknown"
+"""What came of a candidate: passed by all layers, or a check could not be evaluated."""
 HELD_OUT = "held_out"
 TWO_MODES = "two_modes"
 INTACT = (HELD_OUT, TWO_MODES)

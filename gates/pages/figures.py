@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from gates.evidence import Evidence, MissingEvidenceError
@@ -48,14 +49,29 @@ Table = tuple[tuple[str, ...], ...]
 
 
 @dataclass(frozen=True)
+class Small:
+    """One drawing of a series as the page shows it: its title, what is said of it, the drawing."""
+
+    title: str
+    lines: tuple[str, ...]
+    svg: Markup
+
+
+@dataclass(frozen=True)
 class Shown(Picture):
     """A figure of a gate's page.
 
     Attributes:
         in_words: The same in words: heads, then rows of cells; empty without.
+        listed: A table that stands in the place of a drawing; empty for a drawing.
+        folded: Further tables, each with what it is called; folded until somebody asks.
+        series: Small drawings, each with its text.
     """
 
     in_words: Table = ()
+    listed: Table = ()
+    folded: tuple[tuple[str, Table], ...] = ()
+    series: tuple[Small, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -78,6 +94,74 @@ class Plot:
         """What this adds to a `Shown`."""
         svg = drawn(lambda: self.draw(evidence, report), self.title, salt=salt)
         return {"svg": svg, "in_words": self.read(evidence, report) if self.read else ()}
+
+
+@dataclass(frozen=True)
+class Folded:
+    """A table that is shown to those who ask.
+
+    Attributes:
+        summary: What it is called.
+        read: Gives it: heads, then rows of cells.
+    """
+
+    summary: str
+    read: Callable[[Evidence, GateReport], Table]
+
+
+@dataclass(frozen=True)
+class Listing:
+    """A table in the place of a figure, with further ones folded behind it.
+
+    Attributes:
+        also: Further files that it is read from.
+    """
+
+    title: str
+    caption: str
+    source: str
+    read: Callable[[Evidence, GateReport], Table]
+    folded: tuple[Folded, ...] = ()
+    also: tuple[str, ...] = ()
+
+    def picture(self, evidence: Evidence, report: GateReport, salt: str) -> dict[str, Any]:
+        """What this adds to a `Shown`; a table has no inner names and needs no salt."""
+        behind = tuple((item.summary, item.read(evidence, report)) for item in self.folded)
+        return {"listed": self.read(evidence, report), "folded": behind}
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """One drawing of a series: its title, what is said of it, and what draws it."""
+
+    title: str
+    lines: tuple[str, ...]
+    draw: Callable[[], Figure]
+
+
+@dataclass(frozen=True)
+class Series:
+    """Small drawings of one kind, each with its text: `draw(evidence, report)` lists them.
+
+    Attributes:
+        also: Further files that they are drawn from.
+    """
+
+    title: str
+    caption: str
+    source: str
+    draw: Callable[[Evidence, GateReport], Sequence[Drawing]]
+    also: tuple[str, ...] = ()
+
+    def picture(self, evidence: Evidence, report: GateReport, salt: str) -> dict[str, Any]:
+        """What this adds to a `Shown`."""
+        found = self.draw(evidence, report)
+        return {
+            "series": tuple(
+                Small(item.title, item.lines, drawn(item.draw, item.title, salt=f"{salt}n{number}"))
+                for number, item in enumerate(found)
+            )
+        }
 
 
 @dataclass(frozen=True)
@@ -109,7 +193,11 @@ class Photo:
         return {"photo": f"data:image/png;base64,{base64.b64encode(data).decode()}"}
 
 
-def draw_all(plots: Sequence[Plot | Photo], evidence: Evidence, report: GateReport) -> list[Shown]:
+Picturable = Plot | Photo | Listing | Series
+"""What a page can be given to show."""
+
+
+def draw_all(plots: Sequence[Picturable], evidence: Evidence, report: GateReport) -> list[Shown]:
     """Draw what the evidence allows; what is missing is said, never left out in silence."""
     pictures = []
     for index, plot in enumerate(plots):

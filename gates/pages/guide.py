@@ -33,6 +33,8 @@ READING: dict[Gate, tuple[str, ...]] = {
     "C": (
         "The waterfall: do held-out candidates stand, and do all corrupted ones fall?",
         "Size of projection: does one mode's curve lie apart, so that projection removes it?",
+        "What was rejected, and why: does a reason take one phase or one mode, is any unknown?",
+        "Rejected proposals: would you have refused them, for that reason and at that action?",
         "Stub, checker and mutants in the criteria: all zero, and is zero of enough arrivals?",
         "What happens on the way: is each row green, and is one missing that your cell knows?",
         "Is a corruption missing that your cell knows? Then the caveats.",

@@ -23,10 +23,12 @@ from gates.pages import (
     plots_feasibility,
     plots_incidents,
     plots_need,
+    plots_rejected,
     plots_stress,
     plots_time,
+    tables_feasibility,
 )
-from gates.pages.figures import Photo, Plot, Table, draw_all
+from gates.pages.figures import Picturable, Table, draw_all
 from gates.pages.guide import BACK_TO, QUESTIONS, READING, label, words
 from gates.pages.table import deciding, groups, passed_by, stops, tally
 from gates.report import GATES, NAMES, Gate, GateReport, read_report, report_bytes
@@ -45,10 +47,15 @@ MARKS = {
     "NOT JUDGED": "·",
     "UNREADABLE": "✕",
 }
-PLOTS: dict[str, tuple[Plot | Photo, ...]] = {
+PLOTS: dict[str, tuple[Picturable, ...]] = {
     "A": plots_need.PLOTS,
     "B": (*plots_convergence.PLOTS, *plots_time.PLOTS, *plots_density.PLOTS),
-    "C": (*plots_feasibility.PLOTS, *plots_incidents.PLOTS),
+    "C": (
+        *plots_feasibility.PLOTS,
+        *tables_feasibility.LISTINGS,
+        *plots_rejected.GALLERIES,
+        *plots_incidents.PLOTS,
+    ),
     "D": plots_stress.PLOTS,
     "E": (),
 }

@@ -19,12 +19,14 @@ from genpolicy.contract.chunk import ChunkMetadata, Projected, Proposal, actions
 from genpolicy.errors import IntegrityError
 from genpolicy.feasibility.checker import LayerChecker
 from genpolicy.feasibility.context import Context
-from genpolicy.feasibility.verdict import Verdict
+from genpolicy.feasibility.reasons import Reason, Unit
+from genpolicy.feasibility.verdict import LayerOutcome, Verdict
 
 Array = NDArray[np.float64]
 
 _SEAL = object()
 PLAIN = frozenset({float, int, str, bool, type(None)})
+NAMES = frozenset({LayerOutcome, Reason, Unit})
 
 
 @dataclass(frozen=True)
@@ -42,9 +44,11 @@ class Rejected:
     rejected_at_s: float
 
     @property
-    def reason(self) -> str:
+    def reason(self) -> Reason:
         """First reason."""
-        return self.verdict.first_reason
+        found = self.verdict.first_reason
+        assert found is not None, "a verdict that passed is no rejection"
+        return found
 
     @property
     def metadata(self) -> ChunkMetadata:
@@ -146,6 +150,8 @@ def _seal_of(*parts: object) -> bytes:
         kind = type(part)
         if kind in PLAIN:
             found.append(repr(part).encode())
+        elif kind in NAMES:
+            found.append(b"=" + part.encode())
         elif kind is np.ndarray:
             found.append(f"{part.dtype.str}{part.shape}".encode() + part.tobytes())
         elif kind is tuple or kind is list:

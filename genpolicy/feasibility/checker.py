@@ -2,7 +2,7 @@
 
 from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +15,11 @@ from genpolicy.feasibility.checks import CHECKS, Check, Measure, require_table
 from genpolicy.feasibility.context import Context
 from genpolicy.feasibility.inverse import solve_chunks, solved
 from genpolicy.feasibility.layers.representation import is_shaped
+from genpolicy.feasibility.offence import offending_row
 from genpolicy.feasibility.projection import project_many
+from genpolicy.feasibility.reasons import Reason
 from genpolicy.feasibility.settings import LAYERS, FeasibilitySettings
-from genpolicy.feasibility.verdict import Verdict, judge_layer, not_reached
+from genpolicy.feasibility.verdict import Verdict, judge_layer, not_answerable, not_reached
 from genpolicy.robot.collision import CollisionModel
 from genpolicy.robot.kinematics import ArmKinematics
 
@@ -71,8 +73,8 @@ class LayerChecker:
         require_table(checks)
         self.cell = cell
         self.checks = checks
-        self._scales = {
-            layer: {check.name: check.scale(cell) for check in checks if check.layer == layer}
+        self._gauges = {
+            layer: {check.name: check.gauge(cell) for check in checks if check.layer == layer}
             for layer in LAYERS
         }
         self._measures: dict[str, dict[Measure, list[str]]] = {layer: {} for layer in LAYERS}
@@ -131,8 +133,9 @@ class LayerChecker:
         Args:
             projected: The chunks.
             contexts: One per chunk.
-            evaluate_all: Also evaluate layers behind the first that rejects (where the chunk is
-                finite), for evidence; the first reason stays the same.
+            evaluate_all: Also evaluate layers behind the first that rejects, for evidence; the
+                first reason stays the same. Those that a rejection leaves nothing to ask about
+                (numbers that are none, a pose that no joint positions reach) are unknown.
 
         Raises:
             ContractError: A context is of another task or robot.
@@ -150,6 +153,26 @@ class LayerChecker:
         asked = [state for state in states if state.alive or evaluate_all]
         self._measure(LAST, asked, _batch(asked))
         return [self._verdict(state, evaluate_all) for state in states]
+
+    def located(self, projected: Projected, verdict: Verdict, *, context: Context) -> Verdict:
+        """The verdict with the first offending row of every layer that did not pass.
+
+        Args:
+            projected: The chunk.
+            verdict: This checker's verdict on it.
+            context: What it was checked against.
+        """
+        checks = {check.name: check for check in self.checks}
+        layers = [
+            replace(
+                layer,
+                row=offending_row(checks[layer.check], projected, context=context, cell=self.cell),
+            )
+            if layer.passed is False and layer.check is not None
+            else layer
+            for layer in verdict.layers
+        ]
+        return replace(verdict, layers=tuple(layers))
 
     def boundary_jerk_m_s3(self, projected: Projected, *, context: Context) -> float:
         """Largest jerk of the TCP over the boundary, m/s^3; NaN where fewer than four points exist.
@@ -217,21 +240,26 @@ class LayerChecker:
             state.alive = state.alive and self._passes(state, layer)
 
     def _passes(self, state: _State, layer: str) -> bool:
-        return bool(judge_layer(layer, state.margins, self._scales[layer]).passed)
+        return bool(judge_layer(layer, state.margins, self._gauges[layer]).passed)
 
     def _verdict(self, state: _State, evaluate_all: bool) -> Verdict:
         found, rejected = [], False
-        for layer, scales in self._scales.items():
-            evaluated = any(check in state.margins for check in scales)
-            if rejected and not (evaluate_all and evaluated):
+        for layer, gauges in self._gauges.items():
+            if rejected and not evaluate_all:
                 found.append(not_reached(layer))
-                continue
-            verdict = judge_layer(layer, state.margins, scales)
-            rejected = rejected or verdict.passed is not True
-            found.append(verdict)
+            elif rejected and not self._answerable(state, layer):
+                found.append(not_answerable(layer, next(v.reason for v in found if v.reason)))
+            else:
+                found.append(judge_layer(layer, state.margins, gauges))
+                rejected = rejected or not found[-1].passed
         rows = state.context.rows(len(state.projected.actions)) if state.shaped else slice(0, 0)
         place = (rows.start, rows.stop)
         return Verdict(tuple(found), dict(state.margins), place, state.detail, state.q_rad)
+
+    def _answerable(self, state: _State, layer: str) -> bool:
+        """Whether a layer behind a rejection was asked about something that there is."""
+        reached = state.margins.get(Reason.UNREACHABLE, 0.0) >= 0 or layer not in MOTION[1:]
+        return reached and any(check in state.margins for check in self._gauges[layer])
 
 
 def _batch(states: Sequence[_State]) -> Batch:

@@ -13,7 +13,6 @@ from dead_code import PRODUCT, Tree, parse, tree
 # Definition: why nothing of ours reads it. An entry that is read, or gone, is an error too.
 READS_BACK = "reads what the product writes, for whoever audits a run"
 YAML = "PyYAML calls it of every loader or dumper"
-COMPARED = "where the shapes stand, for whoever asks another collision library of the same poses"
 ALLOWED: dict[str, str] = {
     "genpolicy.cli.shell:Registered.get_command": "typer asks its groups for it",
     "genpolicy.data.formats.contract:_Dumper.ignore_aliases": YAML,
@@ -28,8 +27,6 @@ ALLOWED: dict[str, str] = {
     "genpolicy.robot.collision:CollisionModel.in_collision": (
         "for the worlds of tasks outside the tree; the one of the tests asks it at every tick"
     ),
-    "genpolicy.robot.collision:CollisionModel.placements": COMPARED,
-    "genpolicy.robot.collision:CollisionModel.scene_placements": COMPARED,
 }
 
 

@@ -158,7 +158,7 @@ def test_a_chunk_that_feasibility_issued_is_taken_and_a_tampered_one_is_not():
     from genpolicy.contract.chunk import Projected, Proposal
     from genpolicy.feasibility import admission
     from genpolicy.feasibility.settings import LAYERS
-    from genpolicy.feasibility.verdict import LayerVerdict, Verdict
+    from genpolicy.feasibility.verdict import LayerOutcome, LayerVerdict, Verdict
 
     rig = Rig()
     strict = Executor(rig.cell, rig.journal, rig.stub)
@@ -168,7 +168,9 @@ def test_a_chunk_that_feasibility_issued_is_taken_and_a_tampered_one_is_not():
 
     def issued():
         made = rig.chunk()
-        layers = tuple(LayerVerdict(name, True, "", 1.0, "any") for name in LAYERS)
+        layers = tuple(
+            LayerVerdict(name, LayerOutcome.PASSED, None, 1.0, None, None) for name in LAYERS
+        )
         projected = Projected(Proposal(made.metadata, made.actions, "first"), made.actions, 0, 0)
         return admission.Admitted(
             projected=projected, verdict=Verdict(layers, {}, (0, 16)), context=None,

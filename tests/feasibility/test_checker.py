@@ -6,13 +6,18 @@ import numpy as np
 import pytest
 
 from genpolicy.contract.chunk import Projected
+from genpolicy.execution.checks import without
+from genpolicy.feasibility.admission import FeasibilityChecker, Rejected
 from genpolicy.feasibility.checks import CHECKS
+from genpolicy.feasibility.reasons import Reason, Unit
+from genpolicy.feasibility.settings import LAYERS
+from genpolicy.feasibility.verdict import LayerOutcome
 
 
 def test_inside_passes_every_layer(checker, kit):
     verdict = kit.judge(checker, kit.line(kit.START, kit.SIDE), kit.context(checker, kit.START))
     assert verdict.passed
-    assert verdict.first_reason == ""
+    assert verdict.first_reason is None
     assert [layer.passed for layer in verdict.layers] == [True] * 6
     assert all(margin >= 0 for margin in verdict.margins.values())
     assert set(verdict.margins) == {check.name for check in CHECKS}
@@ -79,6 +84,39 @@ def test_evaluate_all_adds_evidence_and_keeps_the_first_reason(checker, kit):
     assert short.layer("fresh").passed is None
     assert full.layer("fresh").passed is False
     assert full.layer("dynamic").passed is True
+    assert [layer.outcome for layer in short.layers].count(LayerOutcome.NOT_REACHED) == 3
+
+
+def test_what_a_rejection_leaves_nothing_to_ask_about_is_unknown(checker, kit):
+    ctx = kit.context(checker, kit.START)
+    far = kit.line(kit.START, kit.START)
+    far[5:, :3] = (0.7, 0.2, 0.9)
+    none = kit.line(kit.START, kit.SIDE)
+    none[3, 0] = np.nan
+    loose = FeasibilityChecker(checker.cell, checks=without(CHECKS, "workspace"))
+    for bad, reason, first in ((far, "unreachable", "kinematic"), (none, "finite", LAYERS[0])):
+        projected = Projected(kit.proposal(bad, session_epoch=0), bad, 0.0, 0.0)
+        short = loose.check(projected, context=ctx)
+        assert (short.first_layer, short.first_reason) == (first, reason)
+        assert short.layer(first).outcome is LayerOutcome.FAILED
+        behind = LAYERS[LAYERS.index(first) + 1 :]
+        assert {short.layer(name).outcome for name in behind} == {LayerOutcome.NOT_REACHED}
+        full = loose.check(projected, context=ctx, evaluate_all=True)
+        told = {name: full.layer(name) for name in behind}
+        assert told.pop("fresh").outcome is LayerOutcome.FAILED
+        assert {layer.outcome for layer in told.values()} == {LayerOutcome.UNKNOWN}
+        assert {layer.reason for layer in told.values()} == {Reason(reason)}
+        assert not any(layer.passed for layer in told.values())
+
+
+def test_a_check_that_cannot_be_evaluated_is_unknown_and_refuses(checker, kit):
+    """A measurement from behind the first row leaves no time to get there: no velocity at all."""
+    ctx = replace(kit.context(checker, kit.START), state_time_s=20.0)
+    result = checker.admit_as_it_is(kit.proposal(kit.line(kit.START, kit.SIDE)), context=ctx)
+    assert isinstance(result, Rejected) and result.reason is Reason.MEASURED_VELOCITY
+    layer = result.verdict.layer("dynamic")
+    assert (layer.outcome, layer.unit, layer.passed) == (LayerOutcome.UNKNOWN, Unit.RAD_S, False)
+    assert np.isnan(layer.margin) and result.verdict.first_layer == "dynamic"
 
 
 def test_late_rows_are_not_checked_and_all_behind_them_are(checker, kit):
@@ -87,7 +125,7 @@ def test_late_rows_are_not_checked_and_all_behind_them_are(checker, kit):
     late = good.copy()
     late[:2, :3] = (0.45, 0.0, 0.15)  # would collide, but those two are past
     on_time = np.concatenate([late[:2], kit.line(kit.START, kit.SIDE)[:14]])
-    assert kit.judge(checker, on_time, ctx).first_reason != ""
+    assert kit.judge(checker, on_time, ctx).first_reason is not None
     assert kit.judge(checker, on_time, replace(ctx, first_index=2)).passed
     tail = good.copy()
     tail[10:, :3] = (0.45, 0.0, 0.15)

@@ -1150,8 +1150,11 @@ def _candidate(method: str, fixture: str, observation: int, candidate: int) -> d
         "candidate": candidate,
         "mode": ("left", "right")[candidate % 2],
         **layers,
-        "first_reason": "" if held else "dynamic",
+        "outcome": "passed" if held else "failed",
+        "first_reason": "" if held else "joint_jerk",
+        "first_row": None if held else 2,
         "layer_margin": 0.1,
+        "margin_unit": "m" if held else "rad/s^3",
         "position_change_m": 0.001 * (1 + candidate) if held else None,
         "rotation_change_rad": 0.01,
         "boundary_jerk_m_s3": 50.0 + observation if held else None,
@@ -1230,6 +1233,32 @@ def _shadow(root: Path) -> None:
     document(root, "shadow/checker.json", checked("journal.mcap", 1000))
     document(root, "shadow/mutants.json", [mutant(layer, name) for layer, name in CHECKS])
     (root / "artifacts/shadow/journal.mcap").write_bytes(b"journal")
+    document(root, "shadow/gallery.json", gallery())
+
+
+def gallery() -> dict[str, Any]:
+    """One rejected candidate of each method: a leap in row 2, in a scene of one post."""
+    return {
+        "workspace_m": [[0.3, -0.2, 0.02], [0.7, 0.2, 0.25]],
+        "action_period_s": 0.05,
+        "examples": [rejected(method) for method in CANDIDATES],
+    }
+
+
+def rejected(method: str, **changes: Any) -> dict[str, Any]:
+    """An example of the gallery, with changes."""
+    path = [[0.40 + 0.01 * k, 0.0, 0.15] for k in range(4)]
+    box = [[0.49, 0.05], [0.51, 0.05], [0.51, 0.07], [0.49, 0.07]]
+    post = {"name": "post", "kind": "obstacle", "touches": False, "above_m": box, "aside_m": box}
+    example = {
+        "method": method, "layer": "dynamic", "reason": "joint_jerk", "outcome": "failed",
+        "rejected": 7, "held_out": 80, "situation": "e0:0", "phase": "approach", "mode": "left",
+        "observation": 0, "candidate": 1, "row": 2, "late_rows": 1, "margin": -10.0,
+        "unit": "rad/s^3", "limits": [100.0, 200.0], "touching": [],
+        "commanded_m": [0.39, 0.0, 0.15], "raw_m": [*path[:2], [0.42, 0.03, 0.15], path[3]],
+        "projected_m": path, "bodies": [post],
+    }  # fmt: skip
+    return {**example, **changes}
 
 
 def checked(journal: str, actions: int) -> dict[str, Any]:

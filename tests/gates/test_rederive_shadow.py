@@ -12,8 +12,10 @@ from gates import rederive_shadow as module
 from gates.rederive import rederive
 from gates.rederive_shadow import SHADOW, rederive_shadow
 from genpolicy.errors import BadInputError, ConfigError, IntegrityError, RefusedError
+from genpolicy.evidence.documents.gallery import GALLERY
 from genpolicy.evidence.documents.shadow import EXECUTION, ExecutionMutant, LayerMutant
 from genpolicy.evidence.rows.shadow import CandidateRow, ShadowCountRow, ShadowStubRow
+from genpolicy.evidence.shadow.gallery import gallery_of
 from genpolicy.evidence.shadow.observations import held_out_observations
 from genpolicy.evidence.shadow.settings import ShadowSection
 from genpolicy.evidence.shadow.shadow import Shadow, shadow_policy
@@ -39,8 +41,11 @@ EXECUTION_TRIED = ExecutionMutant(
 )  # fmt: skip
 
 
+MOMENTS = module._moments
+
+
 class Demonstrator:
-    """Answers with what the operator did, and with a NaN."""
+    """Answers with what the operator did, with a NaN, and with a gripper that opens too far."""
 
     method, checkpoint_hash, sampler_config_hash, stochastic = "operator", "w" * 64, "s" * 64, True
 
@@ -49,7 +54,9 @@ class Demonstrator:
 
     def sample(self, seen, *, noise_names, candidates):
         good = np.stack([self.chunks[name[1:]] for name in noise_names])
-        actions = np.stack([good, np.full_like(good, np.nan)], axis=1)
+        wide = good.copy()
+        wide[:, 5:, -1] = 0.2
+        actions = np.stack([good, np.full_like(good, np.nan), wide], axis=1)
         return SimpleNamespace(actions=actions, nfe=1)
 
 
@@ -78,15 +85,27 @@ def written(params, task, checker, data, kit, tmp_path_factory):
     (root / SHADOW).mkdir(parents=True)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("genpolicy.evidence.shadow.tables.run_mutants", lambda: [EXECUTION_TRIED])
-        write_shadow(root / SHADOW, [found], LAYERS_TRIED, cell=shadow.cell, robot=checker.cell)
+        gallery = gallery_of(shadow, seen, found.candidates)
+        write_shadow(
+            root / SHADOW, [found], LAYERS_TRIED, gallery, cell=shadow.cell, robot=checker.cell
+        )
     (root / "params.yaml").write_text(yaml.safe_dump(params))
     return root
 
 
+@pytest.fixture(scope="module")
+def moments(dataset, params, tmp_path_factory):
+    """What the shadow test ran with, read once."""
+    root = tmp_path_factory.mktemp("moments")
+    shutil.copytree(dataset, root / module.DATASET)
+    return MOMENTS(root, params)
+
+
 @pytest.fixture
-def root(written, tmp_path, monkeypatch):
+def root(written, moments, tmp_path, monkeypatch):
     """A copy to forge; mutants are tried in a test of their own, since they take a while."""
-    monkeypatch.setattr(module, "_layer_mutants", lambda root, params: list(LAYERS_TRIED))
+    monkeypatch.setattr(module, "_moments", lambda root, params: moments)
+    monkeypatch.setattr(module, "missing_checks_evidence", lambda *_: list(LAYERS_TRIED))
     monkeypatch.setattr("genpolicy.evidence.shadow.tables.run_mutants", lambda: [EXECUTION_TRIED])
     return shutil.copytree(written, tmp_path / "repo")
 
@@ -107,7 +126,8 @@ def test_true_evidence_stands(root):
 
 
 FORGED = {
-    "dynamic": False, "first_reason": "expired", "mode": "left", "layer_margin": 9.0,
+    "dynamic": False, "outcome": "unknown", "first_reason": "expired", "first_row": 15,
+    "mode": "left", "layer_margin": 9.0, "margin_unit": "s",
     "position_change_m": 0.0001, "rotation_change_rad": 0.5, "boundary_jerk_m_s3": 1.0,
     "phase": "release", "situation": "elsewhere:1", "seed": 77,
 }  # fmt: skip
@@ -200,6 +220,46 @@ def test_the_checks_are_left_out_again_on_the_moments_of_the_dataset(
     assert (shadow.samples, shadow.late_steps) == (2, 1)
     with pytest.raises(ConfigError, match=r"seed is True, expected a whole number"):
         rederive_shadow(root, {**params, "seed": True})
+
+
+def edited(root, change):
+    path = root / SHADOW / GALLERY.file
+    document = json.loads(path.read_text())
+    path.write_text(json.dumps(change(document) or document))
+
+
+@pytest.mark.parametrize("change", [
+    lambda d: d["examples"].pop(), lambda d: d["examples"].reverse(),
+    lambda d: d["examples"].append(d["examples"][0]), lambda d: d.update(examples=[]),
+    lambda d: d["workspace_m"][0].reverse(), lambda d: d.update(action_period_s=0.1),
+    lambda d: d["examples"][0].update(margin=-1e-6), lambda d: d["examples"][0].update(row=15),
+    lambda d: d["examples"][0].update(rejected=99), lambda d: d["examples"][0].update(limits=[9.0]),
+    lambda d: d["examples"][-1]["raw_m"].reverse(), lambda d: d["examples"][0]["raw_m"].pop(),
+    lambda d: d["examples"][0]["projected_m"].__setitem__(2, [0.5, 0.0, 0.1]),
+    lambda d: d["examples"][0]["bodies"].pop(), lambda d: d["examples"][0].update(touching=["a"]),
+])  # fmt: skip
+def test_a_gallery_that_is_not_what_the_layers_say_again_is_refused(root, change):
+    assert len(json.loads((root / SHADOW / GALLERY.file).read_text())["examples"]) >= 2
+    edited(root, lambda document: change(document) and None)
+    with pytest.raises(RefusedError, match=r"gallery\.json: .*as judged again"):
+        rederive(root, "C")
+
+
+def test_a_gallery_that_is_missing_is_bad_input(root):
+    (root / SHADOW / GALLERY.file).unlink()
+    with pytest.raises(BadInputError, match=r"gallery\.json"):
+        rederive(root, "C")
+
+
+def test_the_layers_are_asked_and_not_the_table_alone(root, dataset, monkeypatch):
+    """Table, journal and gallery that agree, and layers of today that admit the example."""
+    monkeypatch.setattr(module, "_moments", MOMENTS)
+    shutil.copytree(dataset, root / module.DATASET)
+    settings = yaml.safe_load((root / "params.yaml").read_text())
+    settings["feasibility"] = {**settings.get("feasibility", {}), "gripper_tolerance_m": 0.5}
+    (root / "params.yaml").write_text(yaml.safe_dump(settings))
+    with pytest.raises(IntegrityError, match="what the layers say"):
+        rederive(root, "C")
 
 
 def test_an_event_that_cannot_be_read_is_bad_input(root):

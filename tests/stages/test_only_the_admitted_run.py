@@ -64,9 +64,14 @@ def test_shadow_samples_what_passed_gate_b(
     without(
         monkeypatch, shadow, "require_one_contract", "load_task", "make_checker", "load_dataset",
         "two_mode_observations", "held_out_observations", "spread", "missing_checks_evidence",
-        "Shadow", "write_shadow",
+        "Shadow", "write_shadow", "gallery_of",
     )  # fmt: skip
-    monkeypatch.setattr(shadow, "shadow_policy", lambda _, policy, *__, **___: ran.append(policy))
+
+    def judged(_, policy, *__, **___):
+        ran.append(policy)
+        return SimpleNamespace(candidates=[])
+
+    monkeypatch.setattr(shadow, "shadow_policy", judged)
     shadow.work(params)
     assert [policy.method for policy in ran] == [name for name in ALL if name != failed]
 

@@ -38,7 +38,7 @@ def _admissible(frame: pd.DataFrame) -> pd.DataFrame:
     frame = frame.copy()
     for name in layers:
         frame[name] = frame[name].dtype.type(True) if frame[name].dtype == bool else True
-    return frame.assign(first_reason="")
+    return frame.assign(first_reason="", outcome="passed")
 
 
 def _fewer_rollouts(frame: pd.DataFrame) -> pd.DataFrame:

@@ -16,14 +16,20 @@ class CandidateRow:
         observation: Number of the observation.
         candidate: Number of the candidate.
         mode: Mode of the path, as the task names it.
-        representation: Whether the layer passed; None where it was not reached.
+        representation: Whether the layer passed; one that could not be evaluated did not. None
+            where it was not reached.
         kinematic: Likewise.
         geometric: Likewise.
         dynamic: Likewise.
         contact: Likewise.
         fresh: Likewise.
-        first_reason: Why the first failing layer failed; empty where all passed.
-        layer_margin: Margin of that layer, else the smallest one, in the layer's own unit.
+        outcome: `passed` by all of them, `failed` at one, or `unknown`: one could not be evaluated.
+        first_reason: Check that the first layer failed at, or that could not be evaluated there;
+            empty where all passed.
+        first_row: First row of the chunk that offends against it, counted from 0 and late ones
+            included; None where all passed, and where the array is no chunk.
+        layer_margin: Margin of that layer, else the smallest one.
+        margin_unit: Its unit.
         position_change_m: Largest move of a position by projection, m.
         rotation_change_rad: Largest turn by projection, rad.
         boundary_jerk_m_s3: Jerk at the boundary to the previous command, m/s^3.
@@ -45,8 +51,11 @@ class CandidateRow:
     dynamic: bool | None
     contact: bool | None
     fresh: bool | None
+    outcome: str
     first_reason: str
+    first_row: int | None
     layer_margin: float | None
+    margin_unit: str
     position_change_m: float | None
     rotation_change_rad: float | None
     boundary_jerk_m_s3: float | None

@@ -278,5 +278,5 @@ def _reason(result: Admitted | Rejected) -> DiscardReason:
     if isinstance(result, Admitted):
         return DiscardReason.SUPERSEDED
     if result.verdict.first_layer == LAYERS[-1]:
-        return REASONS[result.verdict.first_reason]
+        return REASONS[result.reason]
     return DiscardReason.INFEASIBLE

@@ -13,10 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.candidates.selector import propose
-from genpolicy.contract.action import POSITION
 from genpolicy.contract.chunk import Candidate, ChunkMetadata
 from genpolicy.evidence.admission_context import Moment, Session, context_of
-from genpolicy.evidence.rows.shadow import CandidateRow
+from genpolicy.evidence.shadow.candidate_rows import RowLabels, candidate_row, measures_of
 from genpolicy.evidence.shadow.case import Case, decide, newer_than
 from genpolicy.evidence.shadow.corruption import CORRUPTIONS
 from genpolicy.evidence.shadow.found import ShadowEvidence
@@ -31,9 +30,6 @@ from genpolicy.evidence.shadow.session import (
 )
 from genpolicy.execution.cell import Cell
 from genpolicy.feasibility.admission import Admitted, FeasibilityChecker, Rejected
-from genpolicy.feasibility.settings import LAYERS
-from genpolicy.feasibility.verdict import Verdict
-from genpolicy.integrity.hashing import sha256_bytes
 from genpolicy.policies.policy import Policy
 from genpolicy.tasks.api import Task
 
@@ -181,9 +177,12 @@ class _Seen:
     def judge(self, cases: list[Case], *, fixture: str) -> _Judgement:
         """Judge chunks; every verdict is a row."""
         judged = [(case, admit(self.shadow, case)) for case in cases]
+        labels = RowLabels(self.seed, fixture, self.item, self.number)
         rows = [
-            self._row(case, result, fixture, candidate)
-            for candidate, (case, result) in enumerate(judged)
+            candidate_row(
+                self.shadow.checker, self.shadow.task, labels, case, result, candidate=number
+            )
+            for number, (case, result) in enumerate(judged)
         ]
         self.evidence.candidates.extend(rows)
         return _Judgement(judged, [measures_of(row) for row in rows])
@@ -216,56 +215,6 @@ class _Seen:
                 )  # fmt: skip
                 self.evidence.keep(played, case.proposal.metadata.method, incident.name)
                 return
-
-    def _row(
-        self, case: Case, result: Admitted | Rejected, fixture: str, candidate: int
-    ) -> CandidateRow:
-        item, verdict, projected = self.item, result.verdict, result.projected
-        failed = [layer for layer in verdict.layers if layer.passed is False]
-        raw = case.proposal.actions
-        mode = "none"
-        if np.all(np.isfinite(raw)):
-            mode = self.shadow.task.mode_of(raw[:, POSITION], item.history[-1])
-        jerk = self.shadow.checker.boundary_jerk_m_s3(projected, context=case.context)
-        passed = {layer.name: layer.passed for layer in verdict.layers}
-        return CandidateRow(
-            method=case.proposal.metadata.method,
-            seed=self.seed,
-            fixture=fixture,
-            situation=f"{item.episode_uuid}:{item.index}",
-            phase=item.phase,
-            observation=self.number,
-            candidate=candidate,
-            mode=mode,
-            **{name: passed[name] for name in LAYERS},
-            first_reason=verdict.first_reason,
-            layer_margin=_finite(failed[0].margin) if failed else _smallest(verdict),
-            position_change_m=_finite(projected.position_change_m),
-            rotation_change_rad=_finite(projected.rotation_change_rad),
-            boundary_jerk_m_s3=_finite(jerk),
-            raw=tuple(raw.ravel().tolist()),
-            projected=tuple(projected.actions.ravel().tolist()),
-        )
-
-
-def measures_of(row: CandidateRow) -> dict[str, Any]:
-    """What a row states beside the verdict, for the journal; arrays by their hash."""
-    return {
-        "mode": row.mode,
-        "layer_margin": row.layer_margin,
-        "position_change_m": row.position_change_m,
-        "rotation_change_rad": row.rotation_change_rad,
-        "boundary_jerk_m_s3": row.boundary_jerk_m_s3,
-        "raw_sha256": numbers_sha256(row.raw),
-        "projected_sha256": numbers_sha256(row.projected),
-    }
-
-
-def numbers_sha256(values: Sequence[float]) -> str:
-    """SHA-256 of numbers as little-endian float64; every NaN is the same one."""
-    numbers = np.array(values, dtype="<f8")
-    numbers[np.isnan(numbers)] = np.nan
-    return sha256_bytes(numbers.tobytes())
 
 
 def case_of(
@@ -336,12 +285,3 @@ def _joints_before(shadow: Shadow, item: Observation, q_rad: Array) -> Array | N
 def admit(shadow: Shadow, case: Case) -> Admitted | Rejected:
     """The verdict of the six layers."""
     return decide(shadow.checker, case)
-
-
-def _smallest(verdict: Verdict) -> float | None:
-    margins = [layer.margin for layer in verdict.layers if np.isfinite(layer.margin)]
-    return float(min(margins)) if margins else None
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

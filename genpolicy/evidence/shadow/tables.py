@@ -1,9 +1,10 @@
-"""The shadow evidence as files: candidates, stub, balances, journal, checker and mutants."""
+"""The shadow evidence as files: candidates, stub, balances, journal, checker, mutants, gallery."""
 
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from genpolicy.evidence.documents.gallery import GALLERY, Gallery
 from genpolicy.evidence.documents.shadow import (
     CHECKER,
     MUTANTS,
@@ -30,6 +31,7 @@ def write_shadow(
     folder: Path,
     found: Sequence[ShadowEvidence],
     mutants: list[LayerMutant],
+    gallery: Gallery,
     *,
     cell: Cell,
     robot: FeasibilityCell,
@@ -40,6 +42,7 @@ def write_shadow(
         folder: Existing folder.
         found: Evidence of each method.
         mutants: Disabled checks of the six layers.
+        gallery: Examples of what was rejected.
         cell: What every session must have run under.
         robot: What every executed row must keep to.
     """
@@ -58,6 +61,7 @@ def write_shadow(
     write_journal(journal, [session for item in found for session in item.sessions])
     CHECKER.write(folder, checker_document([journal], cell=cell, robot=robot))
     MUTANTS.write(folder, all_mutants(mutants))
+    GALLERY.write(folder, gallery)
 
 
 def all_mutants(layers: list[LayerMutant]) -> list[Mutant]:

@@ -164,7 +164,7 @@ class Rollout:
             return
         self.tally.refused.add(flying.metadata.chunk_id)
         counts = self.tally.rejected_by
-        counts[verdict.first_reason] = counts.get(verdict.first_reason, 0) + 1
+        counts[result.reason] = counts.get(result.reason, 0) + 1
         assert flying.chunks is not None
         # What made one candidate late or void holds for all of its invocation. It is known where
         # the other layers passed: freshness is asked last.
@@ -173,7 +173,7 @@ class Rollout:
             self._deliveries.try_another(flying, now_s)
             return
         self._deliveries.answered(flying, now_s)
-        reason = REASONS[verdict.first_reason] if stale else DiscardReason.INFEASIBLE
+        reason = REASONS[result.reason] if stale else DiscardReason.INFEASIBLE
         self._deliveries.write_off(flying, reason, now_s)
 
     def decide(self) -> None:

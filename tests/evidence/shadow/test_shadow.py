@@ -10,6 +10,7 @@ from genpolicy.evidence.shadow.corruption import CORRUPTIONS
 from genpolicy.evidence.shadow.session import IN_FLIGHT_PHASE_CHANGE
 from genpolicy.evidence.shadow.shadow import HELD_OUT, TWO_MODES, case_of, shadow_policy
 from genpolicy.execution.journal import write_journal
+from genpolicy.feasibility.checks import CHECKS
 from genpolicy.feasibility.settings import LAYERS
 from genpolicy.verification.checker import check_journal
 
@@ -46,8 +47,12 @@ def test_every_candidate_has_its_row_and_its_verdict(evidence, observations):
         if row.candidate == 1:
             assert verdicts == [False, *[None] * 5] and row.first_reason == "finite"
             assert row.mode == "none" and row.position_change_m is None
+            assert (row.outcome, row.first_row, row.layer_margin) == ("failed", 0, None)
         elif not row.first_reason:
             assert verdicts == [True] * 6
+            assert row.outcome == "passed" and row.first_row is None and row.margin_unit
+        else:
+            assert row.outcome == "failed" and 0 <= row.first_row < 16 and row.margin_unit
     passed = [not row.first_reason for row in rows if row.candidate == 0]
     assert np.mean(passed) >= 0.8
 
@@ -61,6 +66,20 @@ def test_every_corruption_is_refused_and_its_session_executes_nothing(evidence):
     for corruption in CORRUPTIONS:
         key = ("operator", corruption.name)
         assert evidence.stub[(*key, "delivered")] == evidence.stub[(*key, "arrivals")] == 0
+
+
+def test_a_row_names_the_action_that_offends_and_the_unit_of_its_margin(evidence):
+    """The NaN is in the first row, a damaged pose where the corruption puts it, ages are in s."""
+    found = {(row.fixture, row.first_reason): row for row in evidence.candidates}
+    units = {check.name: check.unit for check in CHECKS}
+    for (_, reason), row in found.items():
+        assert not reason or row.margin_unit == units[reason]
+    assert found["stale_observation", "stale_observation"].margin_unit == "s"
+    assert found["stale_observation", "stale_observation"].first_row in (0, 1)  # the first not late
+    rejected = [row for row in evidence.candidates if row.first_reason]
+    assert len({row.first_row for row in rejected}) > 3
+    shapeless = {row.first_reason for row in rejected if row.first_row is None}
+    assert shapeless <= {"shape"}
 
 
 def test_the_stub_sees_good_actions_only(evidence, kit):

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from genpolicy.contract.chunk import DiscardReason
+from genpolicy.evidence.documents.gallery import GALLERY
 from genpolicy.evidence.documents.shadow import CHECKER, MUTANTS, LayerMutant
+from genpolicy.evidence.shadow.gallery import gallery_of
 from genpolicy.evidence.shadow.observations import held_out_observations
 from genpolicy.evidence.shadow.shadow import HELD_OUT, Shadow, shadow_policy
 from genpolicy.evidence.shadow.tables import (
@@ -44,7 +46,8 @@ def written(task, checker, data, policy, kit, tmp_path_factory):
             violations=1, not_applicable="",
         )
     ]  # fmt: skip
-    write_shadow(folder, found, mutants, cell=shadow.cell, robot=shadow.checker.cell)
+    gallery = gallery_of(shadow, seen, [row for item in found for row in item.candidates])
+    write_shadow(folder, found, mutants, gallery, cell=shadow.cell, robot=shadow.checker.cell)
     return folder
 
 
@@ -58,6 +61,8 @@ def test_all_files_are_there_and_agree(written):
         ended = totals["executed"] + totals["queued"] + part["count"].sum()
         assert totals["generated"] == ended
     checked = CHECKER.read(written)
+    shown = {example.method for example in GALLERY.read(written).examples}
+    assert shown == {"flow"}  # little trained; all that the operator did is admitted
     assert checked.violations == []
     assert checked.checked_actions == stub["arrivals"].sum() > 0
     candidates = read_table(written / "candidates.parquet").to_pandas()

@@ -13,7 +13,7 @@ from gates.feasibility.candidates import (
     boundary_jerk_p95_m_s3,
     projection_p95_m,
 )
-from gates.feasibility.settings import LAYERS
+from gates.feasibility.settings import LAYERS, REASONS
 from gates.proof import judge
 from genpolicy.statistics.intervals import clopper_pearson
 
@@ -166,6 +166,48 @@ def test_situations_with_two_modes_are_no_corruption(ladder):
 @pytest.mark.parametrize("answer", [False, None])
 def test_a_layer_that_refused_or_was_not_reached_is_not_passed(layer, answer):
     rows = pd.DataFrame({name: [True, True, True] for name in LAYERS}, dtype=object)
+    rows["outcome"] = "passed"
     assert admissible(rows).tolist() == [1.0, 1.0, 1.0]
     rows.loc[1, layer] = answer
     assert admissible(rows).tolist() == [1.0, 0.0, 1.0]
+
+
+@pytest.mark.parametrize("outcome", ["unknown", "failed", "not_reached", ""])
+def test_a_candidate_passes_by_its_outcome_too(outcome):
+    rows = pd.DataFrame({name: [True, True] for name in LAYERS})
+    rows["outcome"] = ["passed", outcome]
+    assert admissible(rows).tolist() == [1.0, 0.0]
+
+
+def test_unknown_candidates_are_not_passed_and_are_counted(ladder):
+    """5 of 80 held-out candidates of the flow could not be evaluated."""
+
+    def change(frame):
+        some = of(frame) & (frame["fixture"] == "held_out") & (frame["observation"] < 5)
+        some &= frame["candidate"] == 0
+        return frame.assign(
+            dynamic=frame["dynamic"].mask(some, False),
+            outcome=frame["outcome"].mask(some, "unknown"),
+            first_reason=frame["first_reason"].mask(some, "measured_velocity"),
+        )
+
+    before = found_in(judge(ladder, "C"), "admissible_share")
+    assert all("; 0 unknown, which is not passed" in found.caveat for found in before)
+    evidence.edit_table(ladder, CANDIDATES, change)
+    after = {found.candidate: found for found in found_in(judge(ladder, "C"), "admissible_share")}
+    assert "share 0.9375 of 80" in after["flow"].caveat
+    assert "; 5 unknown, which is not passed" in after["flow"].caveat
+    assert "; 0 unknown" in after["diffusion"].caveat
+
+
+def test_a_reason_that_no_layer_knows_is_none(ladder):
+    """Refused, but for a reason out of no table: nobody can say what it means."""
+    assert len(REASONS) == len(set(REASONS)) and "expired" in REASONS and "issued" not in REASONS
+    other = lambda f: f.assign(  # noqa: E731
+        first_reason=f["first_reason"].mask(of(f) & (f["fixture"] == "collision"), "because")
+    )
+    evidence.edit_table(ladder, CANDIDATES, other)
+    report = judge(ladder, "C")
+    assert report.candidates == {"diffusion": "PASS", "flow": "FAIL"}
+    found = {f.candidate: f for f in found_in(report, "corrupted_refused_share")}["flow"]
+    assert "refused without reason: collision" in found.caveat
