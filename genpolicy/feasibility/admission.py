@@ -152,14 +152,23 @@ def _seal_of(*parts: object) -> bytes:
             found.append(f"{len(part)} of".encode())
             open_parts += part
         elif isinstance(part, Mapping):
-            found.append(f"{len(part)} by".encode())
-            open_parts += [entry for key in sorted(part) for entry in (key, part[key])]
+            found.append(f"{len(part)} by {sorted(part)}".encode())
+            _put([part[key] for key in sorted(part)], found, open_parts)
         elif is_dataclass(part):
             found.append(kind.__name__.encode())
-            open_parts += vars(part).values()
+            _put(list(vars(part).values()), found, open_parts)
         else:
             found.append(repr(part).encode())
     return hashlib.sha256(b"|".join(found)).digest()
+
+
+def _put(values: list[Any], found: list[bytes], open_parts: list[Any]) -> None:
+    """Plain values at once, others one by one."""
+    if PLAIN.issuperset(map(type, values)):
+        found.append(repr(values).encode())
+    else:
+        found.append(f"{len(values)} in".encode())
+        open_parts += values
 
 
 _ISSUED: "weakref.WeakSet[Admitted]" = weakref.WeakSet()
