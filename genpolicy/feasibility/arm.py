@@ -71,9 +71,9 @@ class CompiledDynamics(ArmDynamics):
     def __init__(self, kinematics: CompiledArm, payload: Payload | None = None) -> None:
         super().__init__(kinematics, payload)
         joints = kinematics.joint_count
-        self._other = np.zeros((joints, 3))
-        self._other[:, 0], self._other[:, 1] = self._armature, self._damping
-        self._other[:3, 2] = self._gravity
+        self._other = np.zeros((joints + 1, 3))
+        self._other[:joints, 0], self._other[:joints, 1] = self._armature, self._damping
+        self._other[joints] = self._gravity
         self._bodies = owned(self._mass), owned(self._centre), owned(self._inertia)
 
     def torque(self, q_rad: Array, dq_rad_s: Array, ddq_rad_s2: Array) -> Array:

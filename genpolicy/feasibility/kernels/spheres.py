@@ -49,23 +49,29 @@ def centres(
                 result[n, s, i] = turned + position[n, f, i]
 
 
-@compiled("f8(f8[:,::1], i8, i8, f8[::1], f8[::1])")
-def to_box(spheres: Array, first: int, last: int, pose: Array, box: Array) -> float:
-    """Least signed distance of the centres from `first` to `last` to a box, m.
+@compiled("f8(f8[:,:,::1], i8, i8, i8, f8[:,:,::1], i8, f8[:,::1])")
+def to_box(
+    spheres: Array, n: int, first: int, last: int, poses: Array, body: int, boxes: Array
+) -> float:
+    """Least signed distance of the centres from `first` to `last` to a body's box, m.
 
     Args:
-        spheres: Centres, m. Shape (S, 3).
+        spheres: Centres, m. Shape (N, S, 3).
+        n: Configuration.
         first: First of them.
         last: Behind the last one.
-        pose: x, y, z (m), cosine and sine of the yaw of its body. Shape (5,).
-        box: Middle and half edges in the body, m. Shape (6,).
+        poses: x, y, z (m), cosine and sine of the yaw of each body. Shape (N, bodies, 5).
+        body: Which.
+        boxes: Middle and half edges in the body, m. Shape (bodies, 6).
     """
+    cosine, sine = poses[n, body, 3], poses[n, body, 4]
     least, deepest = np.inf, 0.0
     for s in range(first, last):
-        x, y = spheres[s, 0] - pose[0], spheres[s, 1] - pose[1]
-        a = abs(pose[3] * x + pose[4] * y - box[0]) - box[3]
-        b = abs(pose[3] * y - pose[4] * x - box[1]) - box[4]
-        c = abs(spheres[s, 2] - pose[2] - box[2]) - box[5]
+        x, y = spheres[n, s, 0] - poses[n, body, 0], spheres[n, s, 1] - poses[n, body, 1]
+        z = spheres[n, s, 2] - poses[n, body, 2]
+        a = abs(cosine * x + sine * y - boxes[body, 0]) - boxes[body, 3]
+        b = abs(cosine * y - sine * x - boxes[body, 1]) - boxes[body, 4]
+        c = abs(z - boxes[body, 2]) - boxes[body, 5]
         outermost = a if a > b else b
         outermost = outermost if outermost > c else c
         deepest = outermost if outermost < deepest else deepest
@@ -75,14 +81,14 @@ def to_box(spheres: Array, first: int, last: int, pose: Array, box: Array) -> fl
     return math.sqrt(least) + deepest
 
 
-@compiled("f8(f8[:,::1], i8, i8, i8, i8)")
-def between(spheres: Array, first: int, last: int, begin: int, end: int) -> float:
+@compiled("f8(f8[:,:,::1], i8, i8, i8, i8, i8)")
+def between(spheres: Array, n: int, first: int, last: int, begin: int, end: int) -> float:
     """Least distance of the centres from `first` to `last` to those from `begin` to `end`, m."""
     least = np.inf
     for s in range(first, last):
-        x, y, z = spheres[s, 0], spheres[s, 1], spheres[s, 2]
+        x, y, z = spheres[n, s, 0], spheres[n, s, 1], spheres[n, s, 2]
         for t in range(begin, end):
-            a, b, c = x - spheres[t, 0], y - spheres[t, 1], z - spheres[t, 2]
+            a, b, c = x - spheres[n, t, 0], y - spheres[n, t, 1], z - spheres[n, t, 2]
             away = a * a + b * b + c * c
             least = away if away < least else least
     return math.sqrt(least)
@@ -114,10 +120,10 @@ def lower_bounds(
             shape, body, other = pairs[0, column], pairs[1, column], pairs[2, column]
             first, last = starts[shape], starts[shape + 1]
             if body >= 0:
-                gap = to_box(spheres[n], first, last, poses[n, body], boxes[body])
+                gap = to_box(spheres, n, first, last, poses, body, boxes)
                 result[n, column] = gap - radius[shape]
             else:
-                gap = between(spheres[n], first, last, starts[other], starts[other + 1])
+                gap = between(spheres, n, first, last, starts[other], starts[other + 1])
                 result[n, column] = gap - radius[shape] - radius[other]
 
 

@@ -7,37 +7,50 @@ from genpolicy.feasibility.kernels.arm import place
 from genpolicy.feasibility.kernels.compiled import compiled
 
 Array = NDArray[np.float64]
+Vector = tuple[float, float, float]
+
+THREE = "UniTuple(f8, 3)"
 
 
-@compiled("void(f8[::1], f8[::1], f8[::1])")
-def cross_add(first: Array, second: Array, result: Array) -> None:
-    """Add a cross product to an array of shape (3,)."""
-    result[0] += first[1] * second[2] - first[2] * second[1]
-    result[1] += first[2] * second[0] - first[0] * second[2]
-    result[2] += first[0] * second[1] - first[1] * second[0]
+@compiled(f"{THREE}({THREE}, {THREE})")
+def cross(first: Vector, second: Vector) -> Vector:
+    """Cross product."""
+    a, b, c = first
+    x, y, z = second
+    return b * z - c * y, c * x - a * z, a * y - b * x
 
 
-@compiled("void(f8[::1], f8[::1], f8[::1], f8[::1], f8[::1])")
-def accelerate(turning: Array, bending: Array, lever: Array, room: Array, result: Array) -> None:
-    """Add the acceleration of a lever's end against its begin to an array of shape (3,)."""
-    cross_add(bending, lever, result)
-    room[:] = 0.0
-    cross_add(turning, lever, room)
-    cross_add(turning, room, result)
+@compiled(f"{THREE}({THREE}, {THREE})")
+def plus(first: Vector, second: Vector) -> Vector:
+    """Sum."""
+    return first[0] + second[0], first[1] + second[1], first[2] + second[2]
 
 
-@compiled("void(f8[:,::1], f8[:,::1], f8[::1], f8[::1])")
-def turned(rotation: Array, inertia: Array, vector: Array, result: Array) -> None:
-    """Rotation @ inertia @ rotation.T @ vector, into an array of shape (3,)."""
-    inner = np.zeros(3)
-    for i in range(3):
-        for k in range(3):
-            local = rotation[0, k] * vector[0] + rotation[1, k] * vector[1]
-            inner[i] += inertia[i, k] * (local + rotation[2, k] * vector[2])
-    for i in range(3):
-        result[i] = 0.0
-        for k in range(3):
-            result[i] += rotation[i, k] * inner[k]
+@compiled(f"{THREE}({THREE}, {THREE}, {THREE})")
+def accelerated(turning: Vector, bending: Vector, lever: Vector) -> Vector:
+    """Acceleration of a lever's end against its begin."""
+    return plus(cross(bending, lever), cross(turning, cross(turning, lever)))
+
+
+@compiled(f"{THREE}(f8[:,:,::1], i8, {THREE})")
+def outwards(rotations: Array, joint: int, vector: Vector) -> Vector:
+    """A vector of one frame in axes of the base."""
+    x, y, z = vector
+    return (
+        rotations[joint, 0, 0] * x + rotations[joint, 0, 1] * y + rotations[joint, 0, 2] * z,
+        rotations[joint, 1, 0] * x + rotations[joint, 1, 1] * y + rotations[joint, 1, 2] * z,
+        rotations[joint, 2, 0] * x + rotations[joint, 2, 1] * y + rotations[joint, 2, 2] * z,
+    )
+
+
+@compiled(f"{THREE}(f8[:,:,::1], f8[:,:,::1], i8, {THREE})")
+def weighed(rotations: Array, inertia: Array, joint: int, vector: Vector) -> Vector:
+    """Inertia of a link times a vector, both in axes of the base."""
+    x, y, z = vector
+    a = rotations[joint, 0, 0] * x + rotations[joint, 1, 0] * y + rotations[joint, 2, 0] * z
+    b = rotations[joint, 0, 1] * x + rotations[joint, 1, 1] * y + rotations[joint, 2, 1] * z
+    c = rotations[joint, 0, 2] * x + rotations[joint, 1, 2] * y + rotations[joint, 2, 2] * z
+    return outwards(rotations, joint, outwards(inertia, joint, (a, b, c)))
 
 
 @compiled(
@@ -63,8 +76,8 @@ def torques(
         mass: Of each link, kg. Shape (J,).
         lever: Centre of mass of each, m. Shape (J, 3).
         inertia: About that centre, kg m^2. Shape (J, 3, 3).
-        other: Armature, kg m^2, damping, N m s/rad, of each joint, in columns 0 and 1; gravity,
-            m/s^2, in column 2 of the first three. Shape (J, 3), J >= 3.
+        other: Armature, kg m^2, and damping, N m s/rad, of each joint, then gravity, m/s^2, in the
+            last row. Shape (J + 1, 3).
         result: Written. Shape (N, J).
 
     Source:
@@ -72,47 +85,37 @@ def torques(
     """
     joints = len(mass)
     rotation, position = np.empty((joints + 1, 3, 3)), np.empty((joints + 1, 3))
-    force, moment = np.empty((joints, 3)), np.empty((joints, 3))
-    turning, bending, carried = np.empty(3), np.empty(3), np.empty(3)
-    axis, spin, room = np.empty(3), np.empty(3), np.empty(3)
-    reach, way = np.empty(3), np.empty(3)
+    forces, moments = np.empty((joints, 3)), np.empty((joints, 3))
     for n in range(motion.shape[1]):
         place(turns, offsets, motion[0, n], rotation, position)
-        turning[:], bending[:] = 0.0, 0.0
-        for i in range(3):
-            carried[i] = -other[i, 2]
+        turning, bending = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        carried = (-other[joints, 0], -other[joints, 1], -other[joints, 2])
+        before = (position[0, 0], position[0, 1], position[0, 2])
         for joint in range(joints):
-            if joint:
-                for i in range(3):
-                    way[i] = position[joint, i] - position[joint - 1, i]
-                accelerate(turning, bending, way, room, carried)
-            for i in range(3):
-                axis[i] = rotation[joint, i, 2]
-                spin[i] = axis[i] * motion[1, n, joint]
-                bending[i] += axis[i] * motion[2, n, joint]
-            cross_add(turning, spin, bending)
-            for i in range(3):
-                turning[i] += spin[i]
-                reach[i] = 0.0
-                for k in range(3):
-                    reach[i] += rotation[joint, i, k] * lever[joint, k]
-                force[joint, i] = carried[i]
-            accelerate(turning, bending, reach, room, force[joint])
-            turned(rotation[joint], inertia[joint], bending, moment[joint])
-            turned(rotation[joint], inertia[joint], turning, room)
-            cross_add(turning, room, moment[joint])
-            for i in range(3):
-                force[joint, i] *= mass[joint]
-                way[i] = position[joint, i] + reach[i]
-            cross_add(way, force[joint], moment[joint])
+            at = (position[joint, 0], position[joint, 1], position[joint, 2])
+            way = (at[0] - before[0], at[1] - before[1], at[2] - before[2])
+            carried, before = plus(carried, accelerated(turning, bending, way)), at
+            speed, push = motion[1, n, joint], motion[2, n, joint]
+            spin = outwards(rotation, joint, (0.0, 0.0, speed))
+            bending = plus(bending, plus(cross(turning, spin),
+                                         outwards(rotation, joint, (0.0, 0.0, push))))  # fmt: skip
+            turning = plus(turning, spin)
+            centre = (lever[joint, 0], lever[joint, 1], lever[joint, 2])
+            reach = outwards(rotation, joint, centre)
+            x, y, z = plus(carried, accelerated(turning, bending, reach))
+            force = (x * mass[joint], y * mass[joint], z * mass[joint])
+            moment = plus(weighed(rotation, inertia, joint, bending),
+                          cross(turning, weighed(rotation, inertia, joint, turning)))  # fmt: skip
+            moment = plus(moment, cross(plus(at, reach), force))
+            forces[joint, 0], forces[joint, 1], forces[joint, 2] = force
+            moments[joint, 0], moments[joint, 1], moments[joint, 2] = moment
+        force, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
         for joint in range(joints - 1, -1, -1):
-            if joint < joints - 1:
-                for i in range(3):
-                    force[joint, i] += force[joint + 1, i]
-                    moment[joint, i] += moment[joint + 1, i]
-            room[:] = 0.0
-            cross_add(position[joint], force[joint], room)
-            total = other[joint, 0] * motion[2, n, joint] + other[joint, 1] * motion[1, n, joint]
-            for i in range(3):
-                total += rotation[joint, i, 2] * (moment[joint, i] - room[i])
+            force = plus(force, (forces[joint, 0], forces[joint, 1], forces[joint, 2]))
+            moment = plus(moment, (moments[joint, 0], moments[joint, 1], moments[joint, 2]))
+            at = (position[joint, 0], position[joint, 1], position[joint, 2])
+            a, b, c = cross(at, force)
+            total = rotation[joint, 0, 2] * (moment[0] - a) + rotation[joint, 1, 2] * (moment[1] - b)
+            total += rotation[joint, 2, 2] * (moment[2] - c)
+            total += other[joint, 0] * motion[2, n, joint] + other[joint, 1] * motion[1, n, joint]
             result[n, joint] = total
