@@ -4,6 +4,8 @@ Only what is asked for many configurations a chunk is overridden. Which pairs ex
 when a motion is split and what FCL decides is the robot's code, here as there.
 """
 
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,20 +14,24 @@ from numpy.typing import NDArray
 from genpolicy.feasibility.kernels.arm import place_all, solve_all
 from genpolicy.feasibility.kernels.compiled import owned
 from genpolicy.feasibility.kernels.spheres import centres, lower_bounds, travel
+from genpolicy.feasibility.kernels.sweep import clear
 from genpolicy.feasibility.kernels.torque import torques
 from genpolicy.robot import kinematics as robot
 from genpolicy.robot.broadphase import BroadPhase
-from genpolicy.robot.collision import CollisionModel
+from genpolicy.robot.collision import CollisionModel, CollisionReport, Hit, Paths
 from genpolicy.robot.collision import _Ends as Ends
 from genpolicy.robot.collision import _Pieces as Pieces
 from genpolicy.robot.dynamics import ArmDynamics
 from genpolicy.robot.frames import Frames
 from genpolicy.robot.kinematics import ArmKinematics, IkResult
+from genpolicy.robot.narrowphase import require_finite
 from genpolicy.robot.payload import Payload
+from genpolicy.robot.scene_state import SceneState
 from genpolicy.robot.shapes import SceneShapes
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
 
 FIGURES = np.array([
     robot.DAMPING, robot.STEP_LIMIT_RAD, robot.POSITION_TOLERANCE_M, robot.ROTATION_TOLERANCE_RAD,
@@ -96,6 +102,12 @@ class CompiledBroadPhase(BroadPhase):
         self._size = self._radius[self._starts].copy()
         self._box = np.array([np.concatenate(box) for box in self._boxes])
 
+    @property
+    def spheres(self) -> tuple[Array, ...]:
+        """Spheres, boxes and pairs, as `sweep.clear` takes them."""
+        held = self._frame, self._centre, self._slide
+        return *held, self._box, self._ends, self._size, self._pairs_of
+
     def centres(self, frames: Frames, opening_m: Array) -> Array:
         """Centres of all spheres; see `BroadPhase.centres`."""
         result = np.empty((len(opening_m), len(self._frame), 3))
@@ -128,34 +140,69 @@ class CompiledCollision(CollisionModel):
         super().__init__(scene_path, kinematics)
         self.broad = CompiledBroadPhase(self.shapes)
 
+    def check_samples(self, paths: Paths) -> CollisionReport:
+        """Collision at the waypoints 1 to P - 1; see `CollisionModel.check_samples`."""
+        return self._checked(paths, super().check_samples, swept=False)
+
+    def check_swept(self, paths: Paths) -> CollisionReport:
+        """Collision on the segments; see `CollisionModel.check_swept`."""
+        return self._checked(paths, super().check_swept, swept=True)
+
+    def poses(self, scenes: tuple[SceneState, ...]) -> Array:
+        """Where bodies stand, of each scene once; see `CollisionModel.poses`."""
+        first = {id(scene): scene for scene in scenes}
+        number = {name: i for i, name in enumerate(first)}
+        return super().poses(tuple(first.values()))[[number[id(scene)] for scene in scenes]]
+
+    def _checked(
+        self, paths: Paths, exactly: Callable[[Paths], CollisionReport], *, swept: bool
+    ) -> CollisionReport:
+        """What the spheres alone clear; every path that they do not is asked about exactly."""
+        require_finite(paths.q_rad, paths.opening_m, paths.clearance_m)
+        least = np.empty(len(paths.q_rad))
+        clear(
+            self.kinematics.turns, self.kinematics.offsets, owned(paths.q_rad),
+            self._opening(paths), np.ascontiguousarray(paths.held), self.poses(paths.scenes),
+            self._asked(paths), owned(paths.clearance_m), swept, self.kinematics.reach_m,
+            *self.broad.spheres, least,
+        )  # fmt: skip
+        hits: list[Hit | None] = [None] * len(least)
+        close = np.flatnonzero(~(least >= 0))
+        if len(close):
+            report = exactly(_taken(paths, close))
+            least[close] = report.clearance_m
+            for i, hit in zip(close.tolist(), report.hits, strict=True):
+                hits[i] = None if hit is None else replace(hit, row=i)
+        return CollisionReport(tuple(hits), np.maximum(least, 0.0))
+
+    def _asked(self, paths: Paths) -> BoolArray:
+        """Pairs that count at a point with an empty hand, and with the object. Shape (B, 2, C)."""
+        row = np.repeat(np.arange(len(paths.q_rad)), 2)
+        asked = self._enabled(paths, row, np.arange(len(row)) % 2 == 1)
+        return asked.reshape(len(paths.q_rad), 2, -1)
+
     def _evaluate(self, pieces: Pieces, poses: Array) -> Ends:
         """Pieces evaluated; see `CollisionModel._evaluate`."""
-        broad, (point, begin, end) = self.broad, _points(pieces)
-        q, opening = pieces.q.reshape(-1, pieces.q.shape[-1])[point], pieces.opening.ravel()[point]
-        frames = self.kinematics.frames(q)
-        spheres = broad.centres(frames, opening)
-        bounds = broad.lower_bounds(spheres, poses[pieces.row[point // 2]])
+        broad, standing = self.broad, poses[pieces.row]
+        first, second = (self.kinematics.frames(pieces.q[:, end]) for end in (0, 1))
+        begin = broad.centres(first, pieces.opening[:, 0])
+        end = broad.centres(second, pieces.opening[:, 1])
+        bounds = broad.lower_bounds(begin, standing), broad.lower_bounds(end, standing)
         turned = np.sum(np.abs(pieces.q[:, 1] - pieces.q[:, 0]), axis=1)
         opened = np.abs(pieces.opening[:, 1] - pieces.opening[:, 0])
         bend = (self.kinematics.reach_m * turned**2 + 2 * opened * turned) / 8
-        first, second = (
-            Frames(frames.rotation[at], frames.position_m[at]) for at in (begin, end)
-        )
-        moved = broad.between((first, second), (spheres[begin], spheres[end]), bend)
-        return Ends((first, second), np.minimum(bounds[begin], bounds[end]), moved)
+        moved = broad.between((first, second), (begin, end), bend)
+        return Ends((first, second), np.minimum(*bounds), moved)
 
 
-def _points(pieces: Pieces) -> tuple[Integers, Integers, Integers]:
-    """Ends that differ, by number (two a piece), and at which of them each piece begins and ends.
-
-    Where a piece goes on from the end of the one before it, that end is looked at once.
-    """
-    q, opening, row = pieces.q, pieces.opening, pieces.row
-    fresh = np.ones((len(row), 2), dtype=bool)
-    fresh[1:, 0] = (
-        (row[1:] != row[:-1])
-        | (q[1:, 0] != q[:-1, 1]).any(axis=1)
-        | (opening[1:, 0] != opening[:-1, 1])
+def _taken(paths: Paths, rows: Integers) -> Paths:
+    """Some of the paths."""
+    return Paths(
+        q_rad=paths.q_rad[rows],
+        opening_m=paths.opening_m[rows],
+        held=paths.held[rows],
+        scenes=tuple(paths.scenes[i] for i in rows),
+        contact_allowed=paths.contact_allowed[rows],
+        clearance_m=paths.clearance_m[rows],
+        asked=paths.asked,
     )
-    place = np.cumsum(fresh.ravel()).reshape(fresh.shape) - 1
-    return np.flatnonzero(fresh.ravel()), place[:, 0], place[:, 1]
