@@ -1,11 +1,13 @@
-"""Projection the straightforward way: numpy, chunk by chunk, with the kinematics of `robot`.
+"""The straightforward way: numpy and FCL of `genpolicy.robot`, projection chunk by chunk.
 
-What `feasibility.projection` answers with compiled kernels is held against this, by tests and by
+What is answered with compiled kernels is held against this, by tests and by
 `benchmarks.feasibility.equal`.
 """
 
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +17,7 @@ from genpolicy.contract.chunk import Projected, Proposal
 from genpolicy.contract.rotation import rotation_from_6d
 from genpolicy.feasibility.batch import Batch
 from genpolicy.feasibility.cell import Cell
+from genpolicy.feasibility.checker import LayerChecker
 from genpolicy.feasibility.context import Context
 from genpolicy.feasibility.projection import (
     _projected,
@@ -24,6 +27,9 @@ from genpolicy.feasibility.projection import (
     project,
 )
 from genpolicy.feasibility.smoothing import PENALTIES, TIGHTENED, ladder
+from genpolicy.robot.collision import CollisionModel
+from genpolicy.robot.dynamics import ArmDynamics
+from genpolicy.robot.kinematics import ArmKinematics
 from genpolicy.robot.limits import RobotLimits
 
 Array = NDArray[np.float64]
@@ -175,3 +181,26 @@ def _seeded(batch: Batch, cell: Cell) -> tuple[Array, NDArray[np.bool_]]:
 def _before(context: Context) -> Array:
     """The commands that the path goes on from, oldest first. Shape (s, J), 1 <= s <= 3."""
     return np.concatenate([context.q_cmd_history[-2:], context.q_cmd[None]])
+
+
+def plain_cell(cell: Cell) -> Cell:
+    """The same cell with nothing compiled in it."""
+    arm: Any = ArmKinematics(cell.kinematics.scene_path)
+    collision: Any = CollisionModel(arm.scene_path, arm)
+    plain = replace(cell, kinematics=arm, collision=collision)
+    vars(plain)["dynamics"] = ArmDynamics(arm)
+    vars(plain)["loaded_dynamics"] = ArmDynamics(arm, plain.payload)
+    return plain
+
+
+class PlainChecker(LayerChecker):
+    """Projection and six layers, the straightforward way."""
+
+    def __init__(self, cell: Cell) -> None:
+        super().__init__(plain_cell(cell))
+
+    def project_many(
+        self, proposals: Sequence[Proposal], contexts: Sequence[Context]
+    ) -> list[Projected]:
+        """As the compiled one."""
+        return project_many(proposals, contexts, self.cell)

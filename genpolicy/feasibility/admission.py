@@ -164,7 +164,7 @@ def _hash_of(whole: object) -> bytes:
             open_parts += part
         elif kind is dict or isinstance(part, Mapping):
             keys = sorted(part)
-            found.append(f"{len(keys)} by {keys}".encode())
+            found.append(repr(keys).encode())
             _put([part[key] for key in keys], found, open_parts)
         elif is_dataclass(part):
             found.append(kind.__name__.encode())
@@ -176,7 +176,10 @@ def _hash_of(whole: object) -> bytes:
 
 def _put(values: list[Any], found: list[bytes], open_parts: list[Any]) -> None:
     """Plain values at once, others one by one."""
-    if PLAIN.issuperset(map(type, values)):
+    kinds = set(map(type, values))
+    if kinds == {float}:
+        found.append(b"f8" + np.array(values).tobytes())
+    elif kinds <= PLAIN:
         found.append(repr(values).encode())
     else:
         found.append(f"{len(values)} in".encode())
@@ -216,5 +219,7 @@ def _decide(
     projected: Projected, verdict: Verdict, context: Context, told: bytes
 ) -> Admitted | Rejected:
     if verdict.passed:
-        return Admitted(projected=projected, verdict=verdict, context=context, seal=_SEAL, told=told)
+        return Admitted(
+            projected=projected, verdict=verdict, context=context, seal=_SEAL, told=told
+        )
     return Rejected(projected, verdict, context.now_s)

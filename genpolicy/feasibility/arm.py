@@ -103,10 +103,12 @@ class CompiledBroadPhase(BroadPhase):
         self._box = np.array([np.concatenate(box) for box in self._boxes])
 
     @property
-    def spheres(self) -> tuple[Array, ...]:
+    def spheres(self) -> tuple[Integers, Array, Array, Array, Integers, Array, Integers]:
         """Spheres, boxes and pairs, as `sweep.clear` takes them."""
-        held = self._frame, self._centre, self._slide
-        return *held, self._box, self._ends, self._size, self._pairs_of
+        return (
+            self._frame, self._centre, self._slide, self._box, self._ends, self._size,
+            self._pairs_of,
+        )  # fmt: skip
 
     def centres(self, frames: Frames, opening_m: Array) -> Array:
         """Centres of all spheres; see `BroadPhase.centres`."""
@@ -122,7 +124,9 @@ class CompiledBroadPhase(BroadPhase):
         lower_bounds(centres, owned(poses), *own, result)
         return result
 
-    def between(self, ends: tuple[Frames, Frames], spheres: tuple[Array, Array], bend: Array) -> Array:
+    def between(
+        self, ends: tuple[Frames, Frames], spheres: tuple[Array, Array], bend: Array
+    ) -> Array:
         """How far a pair is from the nearer end at most, m; see `BroadPhase.travel`."""
         result = np.empty((len(bend), self._pairs_of.shape[1]))
         turned = ends[0].rotation, ends[1].rotation
@@ -134,6 +138,7 @@ class CompiledBroadPhase(BroadPhase):
 class CompiledCollision(CollisionModel):
     """Collision queries of an arm that was compiled."""
 
+    kinematics: CompiledArm
     broad: CompiledBroadPhase
 
     def __init__(self, scene_path: Path, kinematics: CompiledArm) -> None:
@@ -183,11 +188,11 @@ class CompiledCollision(CollisionModel):
 
     def _evaluate(self, pieces: Pieces, poses: Array) -> Ends:
         """Pieces evaluated; see `CollisionModel._evaluate`."""
-        broad, standing = self.broad, poses[pieces.row]
+        broad, here = self.broad, poses[pieces.row]
         first, second = (self.kinematics.frames(pieces.q[:, end]) for end in (0, 1))
         begin = broad.centres(first, pieces.opening[:, 0])
         end = broad.centres(second, pieces.opening[:, 1])
-        bounds = broad.lower_bounds(begin, standing), broad.lower_bounds(end, standing)
+        bounds = broad.lower_bounds(begin, here), broad.lower_bounds(end, here)
         turned = np.sum(np.abs(pieces.q[:, 1] - pieces.q[:, 0]), axis=1)
         opened = np.abs(pieces.opening[:, 1] - pieces.opening[:, 0])
         bend = (self.kinematics.reach_m * turned**2 + 2 * opened * turned) / 8

@@ -135,9 +135,7 @@ def step_along(
             step[joint] *= largest_rad / largest
 
 
-@compiled(
-    "void(f8[:,:,::1], f8[:,::1], f8[:,::1], f8[:,:,::1], f8[:,::1], i8, f8[::1], f8[:,::1])"
-)
+@compiled("void(f8[:,:,::1], f8[:,::1], f8[:,::1], f8[:,:,::1], f8[:,::1], i8, f8[::1], f8[:,::1])")
 def solve_all(
     turns: Array,
     offsets: Array,

@@ -7,7 +7,7 @@ the folder is named after a hash of all kernels: an edited callee never leaves a
 import hashlib
 from collections.abc import Callable
 from pathlib import Path
-from typing import TypeVar, cast
+from typing import Any, TypeVar, cast
 
 import numba
 import numpy as np
@@ -35,12 +35,13 @@ def compiled(signature: str) -> Callable[[F], F]:
     """
 
     def compile_one(function: F) -> F:
-        elsewhere = numba.config.CACHE_DIR
-        numba.config.CACHE_DIR = elsewhere or _FOLDER
+        config: Any = numba.config
+        elsewhere = config.CACHE_DIR
+        config.CACHE_DIR = elsewhere or _FOLDER
         try:
             made = numba.njit(signature, cache=True, error_model="numpy")(function)
         finally:
-            numba.config.CACHE_DIR = elsewhere
+            config.CACHE_DIR = elsewhere
         return cast(F, made)
 
     return compile_one

@@ -16,7 +16,6 @@ from genpolicy.feasibility.kernels.compiled import compiled
 from genpolicy.feasibility.kernels.turn import angle, from_columns
 
 Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 LEFT_ALONE = -1
 

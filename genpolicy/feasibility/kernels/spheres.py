@@ -11,9 +11,7 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 
-@compiled(
-    "void(f8[:,:,:,::1], f8[:,:,::1], f8[::1], i8[::1], f8[:,::1], f8[:,::1], f8[:,:,::1])"
-)
+@compiled("void(f8[:,:,:,::1], f8[:,:,::1], f8[::1], i8[::1], f8[:,::1], f8[:,::1], f8[:,:,::1])")
 def centres(
     rotation: Array,
     position: Array,

@@ -139,13 +139,13 @@ def clear(
     """
     points, places, columns = q.shape[1], len(turns), pairs.shape[1]
     rotation, position = np.empty((points, places, 3, 3)), np.empty((points, places, 3))
-    spheres, standing = np.empty((points, len(frame), 3)), np.empty((points, *poses.shape[1:]))
+    spheres, here = np.empty((points, len(frame), 3)), np.empty((points, *poses.shape[1:]))
     bounds, ways = np.empty((points, columns)), np.zeros((points - 1, columns))
     for path in range(len(q)):
         place_all(turns, offsets, q[path], rotation, position)
         centres(rotation, position, opening[path], frame, local, slide, spheres)
-        standing[:] = poses[path]
-        lower_bounds(spheres, standing, boxes, starts, radius, pairs, bounds)
+        here[:] = poses[path]
+        lower_bounds(spheres, here, boxes, starts, radius, pairs, bounds)
         if swept:
             ways_of(q[path : path + 1], rotation, opening[path : path + 1], reach, spheres,
                     frame, starts, radius, pairs, ways)  # fmt: skip

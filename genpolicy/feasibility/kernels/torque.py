@@ -53,6 +53,29 @@ def weighed(rotations: Array, inertia: Array, joint: int, vector: Vector) -> Vec
     return outwards(rotations, joint, outwards(inertia, joint, (a, b, c)))
 
 
+@compiled("void(f8[:,:,::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[:,:], f8[::1])")
+def gather(
+    rotation: Array,
+    position: Array,
+    forces: Array,
+    moments: Array,
+    other: Array,
+    motion: Array,
+    result: Array,
+) -> None:
+    """Torques of the joints, N m, of the forces on each link and behind it, from the tip back."""
+    force, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    for joint in range(len(result) - 1, -1, -1):
+        force = plus(force, (forces[joint, 0], forces[joint, 1], forces[joint, 2]))
+        moment = plus(moment, (moments[joint, 0], moments[joint, 1], moments[joint, 2]))
+        at = (position[joint, 0], position[joint, 1], position[joint, 2])
+        a, b, c = cross(at, force)
+        total = rotation[joint, 0, 2] * (moment[0] - a) + rotation[joint, 1, 2] * (moment[1] - b)
+        total += rotation[joint, 2, 2] * (moment[2] - c)
+        total += other[joint, 0] * motion[2, joint] + other[joint, 1] * motion[1, joint]
+        result[joint] = total
+
+
 @compiled(
     "void(f8[:,:,::1], f8[:,::1], f8[:,:,::1], f8[::1], f8[:,::1], f8[:,:,::1], f8[:,::1],"
     " f8[:,::1])"
@@ -109,13 +132,4 @@ def torques(
             moment = plus(moment, cross(plus(at, reach), force))
             forces[joint, 0], forces[joint, 1], forces[joint, 2] = force
             moments[joint, 0], moments[joint, 1], moments[joint, 2] = moment
-        force, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-        for joint in range(joints - 1, -1, -1):
-            force = plus(force, (forces[joint, 0], forces[joint, 1], forces[joint, 2]))
-            moment = plus(moment, (moments[joint, 0], moments[joint, 1], moments[joint, 2]))
-            at = (position[joint, 0], position[joint, 1], position[joint, 2])
-            a, b, c = cross(at, force)
-            total = rotation[joint, 0, 2] * (moment[0] - a) + rotation[joint, 1, 2] * (moment[1] - b)
-            total += rotation[joint, 2, 2] * (moment[2] - c)
-            total += other[joint, 0] * motion[2, n, joint] + other[joint, 1] * motion[1, n, joint]
-            result[n, joint] = total
+        gather(rotation, position, forces, moments, other, motion[:, n], result[n])
