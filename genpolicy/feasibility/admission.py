@@ -76,7 +76,13 @@ class Admitted:
     sealed: bytes
 
     def __init__(
-        self, *, projected: Projected, verdict: Verdict, context: Context, seal: object = None
+        self,
+        *,
+        projected: Projected,
+        verdict: Verdict,
+        context: Context,
+        seal: object = None,
+        told: bytes = b"",
     ) -> None:
         if seal is not _SEAL:
             raise TypeError("Admitted is made by genpolicy.feasibility.admission only.")
@@ -87,7 +93,7 @@ class Admitted:
         put(self, "actions_sha256", actions_sha256(projected.actions))
         put(self, "verdict", verdict)
         put(self, "context", context)
-        put(self, "sealed", _seal_of(projected, verdict, context))
+        put(self, "sealed", _seal_of(projected, verdict, told or _hash_of(context)))
         _ISSUED.add(self)
 
     def __init_subclass__(cls, **kwargs: Any) -> NoReturn:
@@ -132,7 +138,7 @@ class Admitted:
                 expected=f"sha256 {self.actions_sha256}",
                 action="Discard it and hold.",
             )
-        if _seal_of(self.projected, self.verdict, self.context) != self.sealed:
+        if _seal_of(self.projected, self.verdict, _hash_of(self.context)) != self.sealed:
             raise IntegrityError(
                 where=f"the admitted chunk {self.metadata.chunk_id}",
                 found="with other metadata, another verdict or another context than it passed with",
@@ -141,10 +147,15 @@ class Admitted:
             )
 
 
-def _seal_of(*parts: object) -> bytes:
-    """Hash of everything below some dataclasses, numbers bit for bit; asked for every action."""
+def _seal_of(projected: Projected, verdict: Verdict, told: bytes) -> bytes:
+    """Hash of a chunk, its verdict, and the hash of what it was checked against."""
+    return hashlib.sha256(_hash_of(projected) + _hash_of(verdict) + told).digest()
+
+
+def _hash_of(whole: object) -> bytes:
+    """Hash of everything below a dataclass, numbers bit for bit; asked for every action."""
     found: list[bytes] = []
-    open_parts: list[Any] = list(parts)
+    open_parts: list[Any] = [whole]
     while open_parts:
         part = open_parts.pop()
         kind = type(part)
@@ -157,15 +168,28 @@ def _seal_of(*parts: object) -> bytes:
         elif kind is tuple or kind is list:
             found.append(f"{len(part)} of".encode())
             open_parts += part
-        elif isinstance(part, Mapping):
-            found.append(f"{len(part)} by".encode())
-            open_parts += [entry for key in sorted(part) for entry in (key, part[key])]
+        elif kind is dict or isinstance(part, Mapping):
+            keys = sorted(part)
+            found.append(repr(keys).encode())
+            _put([part[key] for key in keys], found, open_parts)
         elif is_dataclass(part):
             found.append(kind.__name__.encode())
-            open_parts += vars(part).values()
+            _put(list(vars(part).values()), found, open_parts)
         else:
             found.append(repr(part).encode())
     return hashlib.sha256(b"|".join(found)).digest()
+
+
+def _put(values: list[Any], found: list[bytes], open_parts: list[Any]) -> None:
+    """Plain values at once, others one by one."""
+    kinds = set(map(type, values))
+    if kinds == {float}:
+        found.append(b"f8" + np.array(values).tobytes())
+    elif kinds <= PLAIN:
+        found.append(repr(values).encode())
+    else:
+        found.append(f"{len(values)} in".encode())
+        open_parts += values
 
 
 _ISSUED: "weakref.WeakSet[Admitted]" = weakref.WeakSet()
@@ -184,18 +208,24 @@ class FeasibilityChecker(LayerChecker):
         """Project, check and decide on many proposals, each with its own context."""
         projected = self.project_many(proposals, contexts)
         verdicts = self.check_many(projected, contexts)
+        told = {i: _hash_of(c) for i, c in {id(c): c for c in contexts}.items()}
         return [
-            _decide(chunk, verdict, context)
+            _decide(chunk, verdict, context, told[id(context)])
             for chunk, verdict, context in zip(projected, verdicts, contexts, strict=True)
         ]
 
     def admit_as_it_is(self, proposal: Proposal, *, context: Context) -> Admitted | Rejected:
         """Check and decide on a proposal without repairing anything in it."""
         projected = Projected(proposal, proposal.actions, 0.0, 0.0)
-        return _decide(projected, self.check(projected, context=context), context)
+        verdict = self.check(projected, context=context)
+        return _decide(projected, verdict, context, _hash_of(context))
 
 
-def _decide(projected: Projected, verdict: Verdict, context: Context) -> Admitted | Rejected:
+def _decide(
+    projected: Projected, verdict: Verdict, context: Context, told: bytes
+) -> Admitted | Rejected:
     if verdict.passed:
-        return Admitted(projected=projected, verdict=verdict, context=context, seal=_SEAL)
+        return Admitted(
+            projected=projected, verdict=verdict, context=context, seal=_SEAL, told=told
+        )
     return Rejected(projected, verdict, context.now_s)

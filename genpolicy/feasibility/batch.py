@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from genpolicy.contract.action import GRIPPER, POSITION, ROTATION
 from genpolicy.contract.chunk import Projected
-from genpolicy.contract.rotation import rotation_from_6d
 from genpolicy.feasibility.context import Context
+from genpolicy.feasibility.kernels.turn import from_rows
 
 Array = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -73,7 +73,9 @@ class Batch:
     @cached_property
     def rotation(self) -> Array:
         """Rotation of each row. Shape (B, n, 3, 3)."""
-        return rotation_from_6d(self.actions[..., ROTATION])
+        result = np.empty((*self.actions.shape[:2], 3, 3))
+        from_rows(self.actions, ROTATION.start, result)
+        return result
 
     @cached_property
     def last_action(self) -> Array:

@@ -10,12 +10,10 @@ from typing import Protocol
 import numpy as np
 
 from genpolicy.errors import ConfigError, ContractError
+from genpolicy.feasibility.arm import CompiledArm, CompiledCollision, CompiledDynamics
 from genpolicy.feasibility.context import Context
 from genpolicy.feasibility.settings import FeasibilitySettings
-from genpolicy.robot.collision import CollisionModel
 from genpolicy.robot.controller import CONTROLLER_MODE
-from genpolicy.robot.dynamics import ArmDynamics
-from genpolicy.robot.kinematics import ArmKinematics
 from genpolicy.robot.limits import RobotLimits
 from genpolicy.robot.payload import Payload, payload_of
 
@@ -93,8 +91,8 @@ class Cell:
     action_period_s: float
     workspace: Workspace
     limits: RobotLimits
-    kinematics: ArmKinematics
-    collision: CollisionModel
+    kinematics: CompiledArm
+    collision: CompiledCollision
     phases: tuple[str, ...]
     contact_phases: frozenset[str]
     opening_phases: frozenset[str]
@@ -184,9 +182,9 @@ class Cell:
         )
 
     @cached_property
-    def dynamics(self) -> ArmDynamics:
+    def dynamics(self) -> CompiledDynamics:
         """What torques a motion of the arm needs."""
-        return ArmDynamics(self.kinematics)
+        return CompiledDynamics(self.kinematics)
 
     @cached_property
     def payload(self) -> Payload | None:
@@ -194,9 +192,9 @@ class Cell:
         return payload_of(self.kinematics.scene_path, joints=self.joint_count)
 
     @cached_property
-    def loaded_dynamics(self) -> ArmDynamics:
+    def loaded_dynamics(self) -> CompiledDynamics:
         """The same with the payload in the hand."""
-        return ArmDynamics(self.kinematics, self.payload)
+        return CompiledDynamics(self.kinematics, self.payload)
 
     @property
     def joint_count(self) -> int:
@@ -236,14 +234,14 @@ def cell_of(task: CellTask, settings: FeasibilitySettings, *, action_period_s: f
         settings: Thresholds.
         action_period_s: The controller's period, s.
     """
-    kinematics = ArmKinematics(task.scene_path)
+    kinematics = CompiledArm(task.scene_path)
     return Cell(
         settings=settings,
         action_period_s=action_period_s,
         workspace=task.workspace,
         limits=task.limits,
         kinematics=kinematics,
-        collision=CollisionModel(task.scene_path, kinematics),
+        collision=CompiledCollision(task.scene_path, kinematics),
         phases=tuple(task.phases),
         contact_phases=frozenset(task.contact_phases),
         opening_phases=frozenset(task.opening_phases),

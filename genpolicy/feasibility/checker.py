@@ -229,9 +229,10 @@ class LayerChecker:
             if not len(left):
                 break
             found = measure(batch.take(left), self.cell)
+            asked = [states[i] for i in left]
             for name in names:
-                for i, value in zip(left, found.values[name], strict=True):
-                    states[i].margins[name] = float(value)
+                for state, value in zip(asked, found.values[name].tolist(), strict=True):
+                    state.margins[name] = value
             for i, detail in zip(left, found.details, strict=bool(found.details)):
                 states[i].detail = states[i].detail or detail
             passed = np.all([found.values[name] >= 0 for name in names], axis=0)
@@ -240,7 +241,7 @@ class LayerChecker:
             state.alive = state.alive and self._passes(state, layer)
 
     def _passes(self, state: _State, layer: str) -> bool:
-        return bool(judge_layer(layer, state.margins, self._gauges[layer]).passed)
+        return all(state.margins.get(name, np.nan) >= 0 for name in self._gauges[layer])
 
     def _verdict(self, state: _State, evaluate_all: bool) -> Verdict:
         found, rejected = [], False

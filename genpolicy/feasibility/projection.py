@@ -5,7 +5,7 @@ changed stands beside the result, and too much is a reason for rejection.
 """
 
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,15 +13,17 @@ from numpy.typing import NDArray
 from genpolicy.contract.action import ACTION_DIM, GRIPPER, POSITION, ROTATION, join_action
 from genpolicy.contract.chunk import Projected, Proposal
 from genpolicy.contract.rotation import angle_between, rotation_from_6d, rotation_to_6d
-from genpolicy.feasibility.batch import Batch
+from genpolicy.feasibility.arm import FIGURES
 from genpolicy.feasibility.cell import Cell
 from genpolicy.feasibility.context import Context
-from genpolicy.feasibility.smoothing import rate_excess, smoothed
+from genpolicy.feasibility.kernels.chunk import NO_CHUNK, ROUNDING, TURNS, project_all
+from genpolicy.feasibility.kernels.smooth import LEFT_ALONE, changes_of, smooth
+from genpolicy.feasibility.smoothing import TIGHTENED, ladder
+from genpolicy.robot.kinematics import ITERATIONS
 
 Array = NDArray[np.float64]
 
-# Below this relative excess a step counts as within its limit: what was limited once stays.
-ROUNDING = 1e-9
+SOLVER = np.append(FIGURES, ITERATIONS)  # as the kernels take it
 
 
 def project(proposal: Proposal, *, context: Context, cell: Cell) -> Projected:
@@ -59,100 +61,69 @@ def project(proposal: Proposal, *, context: Context, cell: Cell) -> Projected:
     )
 
 
-def smooth_rates(
-    projected: Projected, q_rad: Array, *, context: Context, cell: Cell
-) -> Iterator[Projected]:
-    """The dynamic part: smoothing that keeps the joints within their rate limits, least first.
-
-    Args:
-        projected: Result of `project`.
-        q_rad: Its inverse kinematics, executable rows only. Shape (n, J).
-        context: State; its commands are the fixed beginning of the path.
-        cell: Robot, workspace, and limits of joint and TCP rates.
-
-    Yields:
-        Chunks to choose from; none where no smoothing is needed. The joint path of a chunk is
-        not quite the smoothed one (the elbow may differ), so whoever chooses solves it again.
-    """
-    rows = context.rows(len(projected.actions))
-    workspace, fixed = cell.workspace, _before(context)
-    step_m, turn_rad = _step_limits(cell)
-    last_rotation = rotation_from_6d(context.last_action[ROTATION])
-    before = rotation_from_6d(projected.proposal.actions[:, ROTATION])
-    for path in smoothed(q_rad, fixed, limits=cell.usable_limits, period_s=cell.action_period_s):
-        position, rotation = cell.kinematics.forward(path)
-        inside = np.all((position >= workspace.lower_m) & (position <= workspace.upper_m))
-        fast = _too_fast(position, context.last_action[POSITION], step_m)
-        if inside and not fast and not _turns_too_fast(rotation, last_rotation, turn_rad):
-            actions = projected.actions.copy()
-            actions[rows] = join_action(position, rotation, actions[rows, GRIPPER])
-            after = before.copy()
-            after[rows] = rotation
-            yield _projected(projected.proposal, actions, before=before, after=after)
-
-
 def project_many(
     proposals: Sequence[Proposal], contexts: Sequence[Context], cell: Cell
 ) -> list[Projected]:
-    """Both parts of the projection for many proposals, each with its own context."""
-    result = [project(p, context=c, cell=cell) for p, c in zip(proposals, contexts, strict=True)]
+    """Both parts of the projection for many proposals, each with its own context.
+
+    The dynamic part smooths least what keeps the joints within their rate limits; a chunk that
+    needs no smoothing, or that none helps, is left as it was.
+    """
+    result = [Projected(p, p.actions, float("inf"), float("inf")) for p in proposals]
     groups: dict[int, list[int]] = defaultdict(list)
-    for i, (chunk, context) in enumerate(zip(result, contexts, strict=True)):
-        rows = context.rows(len(chunk.actions))
-        if np.isfinite(chunk.position_change_m) and rows.stop > rows.start:
-            groups[rows.stop - rows.start].append(i)
+    for i, proposal in enumerate(proposals):
+        raw = proposal.actions
+        if raw.ndim == 2 and raw.shape[1] == ACTION_DIM and len(raw) > 0:
+            groups[len(raw)].append(i)
+    figures = _figures(cell)
     for members in groups.values():
-        batch = Batch(tuple(result[i] for i in members), tuple(contexts[i] for i in members))
-        for i, chunk in zip(members, _smooth(batch, cell), strict=True):
-            result[i] = chunk
+        raw = np.stack([proposals[i].actions for i in members])
+        last = np.stack([contexts[i].last_action for i in members])
+        begin = np.array([contexts[i].first_index for i in members])
+        actions, changes = np.empty_like(raw), np.empty((len(members), 2))
+        state = np.empty(len(members), dtype=np.int64)
+        project_all(raw, last, begin, figures, actions, changes, state)
+        for place, i in enumerate(members):
+            if state[place] == NO_CHUNK:
+                continue
+            if state[place] == TURNS:
+                limited = project(proposals[i], context=contexts[i], cell=cell)
+                actions[place] = limited.actions
+                changes[place] = limited.position_change_m, limited.rotation_change_rad
+            if _smooth(actions[place], contexts[i], cell, figures):
+                changes_of(raw[place], actions[place], changes[place])
+            result[i] = Projected(proposals[i], actions[place], *changes[place].tolist())
     return result
 
 
-def _smooth(batch: Batch, cell: Cell) -> list[Projected]:
-    """Least smoothed chunks whose joint path keeps the rate limits; else as they were."""
-    path, reached = _seeded(batch, cell)
-    options = {
-        i: smooth_rates(chunk, path[i], context=batch.contexts[i], cell=cell)
-        for i, chunk in enumerate(batch.projected)
-        if reached[i]
-    }
-    chosen = list(batch.projected)
-    while options:
-        trial = {i: chunk for i, it in options.items() if (chunk := next(it, None))}
-        if not trial:
-            break
-        tried = Batch(tuple(trial.values()), tuple(batch.contexts[i] for i in trial))
-        path, reached = _seeded(tried, cell)
-        for place, (i, chunk) in enumerate(trial.items()):
-            fixed = _before(batch.contexts[i])
-            excess = rate_excess(
-                np.concatenate([fixed, path[place]]),
-                fixed_points=len(fixed),
-                limits=cell.usable_limits,
-                period_s=cell.action_period_s,
-            )
-            if reached[place] and excess <= 1.0:
-                chosen[i] = chunk
-                del options[i]
-        options = {i: it for i, it in options.items() if i in trial}
-    return chosen
-
-
-def _seeded(batch: Batch, cell: Cell) -> tuple[Array, NDArray[np.bool_]]:
-    """Inverse kinematics from the last commands, without restarts: (B, n, J) and (B,)."""
-    size, rows = batch.actions.shape[:2]
-    found = cell.kinematics.solve(
-        batch.actions[..., POSITION].reshape(-1, 3),
-        batch.rotation.reshape(-1, 3, 3),
-        q_seed_rad=np.repeat(batch.q_cmd_rad, rows, axis=0),
+def _smooth(actions: Array, context: Context, cell: Cell, figures: Array) -> bool:
+    """Smooth the rows of a chunk where its joints need it; whether anything was changed."""
+    rows = actions[context.first_index :]
+    if not len(rows):
+        return False
+    fixed = np.concatenate([context.q_cmd_history[-2:], context.q_cmd[None]])
+    arm, limits = cell.kinematics, cell.usable_limits
+    bounds = np.stack([limits.velocity_rad_s, limits.acceleration_rad_s2, limits.jerk_rad_s3])
+    rung = smooth(
+        arm.turns,
+        arm.offsets,
+        rows,
+        fixed,
+        np.array(context.last_action),
+        *ladder(len(rows), len(fixed)),
+        bounds,
+        figures,
+        SOLVER,
+        np.array([cell.action_period_s, TIGHTENED]),
     )
-    reached = np.array([part.all() for part in found.converged.reshape(size, rows)])
-    return found.q_rad.reshape(size, rows, -1), reached
+    return rung != LEFT_ALONE
 
 
-def _before(context: Context) -> Array:
-    """The commands that the path goes on from, oldest first. Shape (s, J), 1 <= s <= 3."""
-    return np.concatenate([context.q_cmd_history[-2:], context.q_cmd[None]])
+def _figures(cell: Cell) -> Array:
+    """Limits as the kernels take them: workspace, opening, longest step (m), largest turn (rad)."""
+    settings, workspace = cell.settings, cell.workspace
+    opening = settings.gripper_lower_m, settings.gripper_upper_m
+    return np.array([*workspace.lower_m, *workspace.upper_m, *opening, *_step_limits(cell)])
 
 
 def _projected(proposal: Proposal, actions: Array, *, before: Array, after: Array) -> Projected:

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from benchmarks.feasibility.plain import PlainChecker
 from genpolicy.contract.action import POSITION, ROTATION
 from genpolicy.contract.chunk import Proposal
 from genpolicy.contract.rotation import angle_between, orthonormality_error, rotation_from_6d
@@ -119,3 +120,57 @@ def test_late_rows_do_not_slow_the_chunk(checker, kit):
     raw = np.concatenate([kit.line(kit.START, kit.SIDE)[-3:], kit.line(kit.START, kit.SIDE)[:13]])
     projected = checker.project(kit.proposal(raw), context=ctx)
     assert np.abs(projected.actions - raw).max() <= 1e-9
+
+
+def mixed(kit, count=40, seed=0):
+    """Chunks with jitter, turns, leaps, late rows and things that are none, in no order."""
+    rng = np.random.default_rng(seed)
+    found = []
+    for i in range(count):
+        rows = int(rng.choice([kit.K, kit.K, 5]))
+        raw = kit.line(kit.START, np.add(kit.START, rng.normal(0, 0.05, 3)), n=rows)
+        raw[:, :3] += rng.normal(0, rng.choice([0.0, 5e-4, 2e-3, 0.02]), (rows, 3))
+        raw[:, 3:9] += rng.normal(0, rng.choice([0.0, 1e-3, 0.1]), (rows, 6))
+        if i % 11 == 3:
+            raw[2, rng.integers(10)] = rng.choice([np.nan, np.inf])
+        if i % 11 == 7:
+            raw[1, 3:9] = 0.0
+        found.append((raw, int(rng.choice([0, 0, 2, kit.K]))))
+    return found
+
+
+def test_projection_is_that_of_the_straightforward_way(cell, checker, kit):
+    """Kernels against numpy, chunk by chunk; which chunks are smoothed, too."""
+    plain, ctx = PlainChecker(cell), kit.context(checker, kit.START)
+    cases = mixed(kit, 120)
+    proposals = [kit.proposal(raw) for raw, _ in cases]
+    contexts = [replace(ctx, first_index=late) for _, late in cases]
+    found, expected = (c.project_many(proposals, contexts) for c in (checker, plain))
+    smoothed = 0
+    for ours, theirs in zip(found, expected, strict=True):
+        assert np.allclose(ours.actions, theirs.actions, atol=1e-12, rtol=0, equal_nan=True)
+        assert ours.position_change_m == pytest.approx(theirs.position_change_m, abs=1e-12)
+        assert ours.rotation_change_rad == pytest.approx(theirs.rotation_change_rad, abs=1e-12)
+        smoothed += 0 < ours.position_change_m < 0.02
+    assert smoothed > 20
+    assert sum(np.isinf(ours.position_change_m) for ours in found) > 10
+
+
+def test_a_chunk_has_the_same_bytes_in_any_company(checker, kit):
+    """Projection and all margins: alone, with others, and in another order."""
+    ctx, other = (kit.context(checker, start) for start in (kit.START, (0.40, 0.05, 0.16)))
+    cases = mixed(kit, 33, seed=1)
+    proposals = [kit.proposal(raw) for raw, _ in cases]
+    contexts = [replace((ctx, other)[i % 2], first_index=late) for i, (_, late) in enumerate(cases)]
+    projected = checker.project_many(proposals, contexts)
+    verdicts = checker.check_many(projected, contexts, evaluate_all=True)
+    backwards = checker.project_many(proposals[::-1], contexts[::-1])[::-1]
+    for i in range(len(cases)):
+        alone = checker.project(proposals[i], context=contexts[i])
+        assert alone.actions.tobytes() == projected[i].actions.tobytes()
+        assert alone.actions.tobytes() == backwards[i].actions.tobytes()
+        verdict = checker.check(alone, context=contexts[i], evaluate_all=True)
+        assert repr(verdict) == repr(verdicts[i])
+        if verdict.q_rad is not None:
+            assert verdict.q_rad.tobytes() == verdicts[i].q_rad.tobytes()
+    assert len({verdict.first_reason for verdict in verdicts}) > 3

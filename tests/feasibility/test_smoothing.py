@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from genpolicy.feasibility.smoothing import rate_excess, smoothed
+from benchmarks.feasibility.plain import rate_excess, smoothed
 from genpolicy.robot.limits import PANDA
 
 

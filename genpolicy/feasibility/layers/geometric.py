@@ -82,9 +82,10 @@ def from_measured(batch: Batch, cell: Cell, asked: Literal["held", "free"]) -> P
     pairs = zip(batch.projected, batch.contexts, strict=True)
     ways = [_known_way(chunk, context, cell.action_period_s) for chunk, context in pairs]
     points, paths = max(map(len, ways)), paths_of(batch, cell, asked)
+    every = np.arange(points)  # a shorter way stands at its end
     return replace(
         paths,
-        q_rad=np.stack([np.pad(w, ((0, points - len(w)), (0, 0)), mode="edge") for w in ways]),
+        q_rad=np.stack([way[np.minimum(every, len(way) - 1)] for way in ways]),
         opening_m=np.repeat(paths.opening_m[:, :1], points, axis=1),
         held=np.repeat(paths.held[:, :1], points, axis=1),
         clearance_m=np.zeros(len(batch)),

@@ -1,14 +1,17 @@
 """The representation layer: is it a chunk at all, and did projection leave it nearly alone?"""
 
+from collections import defaultdict
+
 import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.contract.action import ACTION_DIM, GRIPPER, ROTATION
 from genpolicy.contract.chunk import Projected
-from genpolicy.contract.rotation import orthonormality_error, rotation_from_6d
+from genpolicy.contract.rotation import orthonormality_error
 from genpolicy.feasibility.batch import Batch, Margins
 from genpolicy.feasibility.cell import Cell
 from genpolicy.feasibility.context import Context
+from genpolicy.feasibility.kernels.turn import from_rows
 from genpolicy.feasibility.settings import FeasibilitySettings
 
 Array = NDArray[np.float64]
@@ -35,11 +38,18 @@ def margins(batch: Batch, cell: Cell) -> Margins:
 
     Each is asked by itself; NaN where a number that it needs is none.
     """
-    found = [
-        _margins_of(projected, context, cell.settings)
-        for projected, context in zip(batch.projected, batch.contexts, strict=True)
-    ]
-    return Margins({name: np.array([m.get(name, np.nan) for m in found]) for name in CHECKED})
+    values = {name: np.full(len(batch), np.nan) for name in CHECKED}
+    groups: dict[int, list[int]] = defaultdict(list)
+    for i, (projected, context) in enumerate(zip(batch.projected, batch.contexts, strict=True)):
+        values["shape"][i] = _shape_margin(projected.proposal.actions, context, cell.settings)
+        if is_shaped(projected, context):
+            groups[len(projected.proposal.actions)].append(i)
+            values["projection_too_large"][i] = _change_margin(projected, cell.settings)
+    for members in groups.values():
+        raw = np.stack([batch.projected[i].proposal.actions for i in members])
+        for name, margin in _margins_of(raw, cell.settings).items():
+            values[name][members] = margin
+    return Margins(values)
 
 
 def is_shaped(projected: Projected, context: Context) -> bool:
@@ -59,29 +69,26 @@ def _shape_margin(raw: Array, context: Context, settings: FeasibilitySettings) -
     return float(min(settings.maximum_actions - len(raw), rows - 1)) if rows else -1.0
 
 
-def _margins_of(
-    projected: Projected, context: Context, settings: FeasibilitySettings
-) -> dict[str, float]:
-    raw = projected.proposal.actions
-    result = {"shape": _shape_margin(raw, context, settings)}
-    if not is_shaped(projected, context):
-        return result
-    result["finite"] = 0.0 if np.all(np.isfinite(raw)) else float("nan")
-    columns = raw[:, ROTATION]
-    with np.errstate(invalid="ignore", over="ignore"):
-        degenerate = not np.all(np.isfinite(rotation_from_6d(columns)))
-        error = float(np.max(orthonormality_error(columns)))
-    result["rotation_degenerate"] = float("nan") if degenerate else 0.0
-    result["rotation_not_orthonormal"] = settings.orthonormality_tolerance - error
-    opening, slack = raw[:, GRIPPER], settings.gripper_tolerance_m
-    result["gripper_range"] = float(
-        min(
-            np.min(opening) - settings.gripper_lower_m + slack,
-            settings.gripper_upper_m + slack - np.max(opening),
-        )
-    )
+def _change_margin(projected: Projected, settings: FeasibilitySettings) -> float:
     moved = settings.position_change_limit_m - projected.position_change_m
     turned = settings.rotation_change_limit_rad - projected.rotation_change_rad
     relative = moved / settings.position_change_limit_m, turned / settings.rotation_change_limit_rad
-    result["projection_too_large"] = float(moved if relative[0] <= relative[1] else turned)
-    return result
+    return float(moved if relative[0] <= relative[1] else turned)
+
+
+def _margins_of(raw: Array, settings: FeasibilitySettings) -> dict[str, Array]:
+    """Margins of raw chunks of one shape (B, K, D_a). Shapes (B,)."""
+    columns, opening, slack = raw[..., ROTATION], raw[..., GRIPPER], settings.gripper_tolerance_m
+    rotation = np.empty((*raw.shape[:2], 3, 3))
+    from_rows(raw, ROTATION.start, rotation)
+    with np.errstate(invalid="ignore", over="ignore"):
+        error = np.max(orthonormality_error(columns), axis=1)
+    return {
+        "finite": np.where(np.isfinite(raw).all(axis=(1, 2)), 0.0, np.nan),
+        "rotation_degenerate": np.where(np.isfinite(rotation).all(axis=(1, 2, 3)), 0.0, np.nan),
+        "rotation_not_orthonormal": settings.orthonormality_tolerance - error,
+        "gripper_range": np.minimum(
+            np.min(opening, axis=1) - settings.gripper_lower_m + slack,
+            settings.gripper_upper_m + slack - np.max(opening, axis=1),
+        ),
+    }

@@ -1,0 +1,52 @@
+"""Compilation of the kernels: once per machine and version of the code, then read from a cache.
+
+numba keeps what it compiled beside the source, but looks at the age of the calling file alone. So
+the folder is named after a hash of all kernels: an edited callee never leaves a stale caller.
+"""
+
+import hashlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+F = TypeVar("F", bound=Callable[..., object])
+
+HERE = Path(__file__).parent
+ENOUGH = 16  # digits of the hash
+
+
+def cache_folder() -> Path:
+    """Where the compiled kernels of this very code lie."""
+    code = b"".join(path.read_bytes() for path in sorted(HERE.glob("*.py")))
+    return HERE / "__pycache__" / f"kernels-{hashlib.sha256(code).hexdigest()[:ENOUGH]}"
+
+
+_FOLDER = str(cache_folder())
+
+
+def compiled(signature: str) -> Callable[[F], F]:
+    """Compile a kernel for arguments of this one signature; any other is refused, not compiled.
+
+    IEEE arithmetic as written: nothing is contracted or reordered, and a division by zero is inf.
+    """
+
+    def compile_one(function: F) -> F:
+        config: Any = numba.config
+        elsewhere = config.CACHE_DIR
+        config.CACHE_DIR = elsewhere or _FOLDER
+        try:
+            made = numba.njit(signature, cache=True, error_model="numpy")(function)
+        finally:
+            config.CACHE_DIR = elsewhere
+        return cast(F, made)
+
+    return compile_one
+
+
+def owned(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The values as a kernel takes them: float64, writeable, row after row; a copy if need be."""
+    return np.require(values, np.float64, ["C", "W"])

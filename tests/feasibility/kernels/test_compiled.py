@@ -1,0 +1,42 @@
+"""Kernels are compiled for one signature, and kept under a name of all their code."""
+
+import numpy as np
+import pytest
+
+from genpolicy.feasibility.kernels import compiled as module
+from genpolicy.feasibility.kernels.arm import place_all
+
+
+def test_the_folder_of_the_cache_is_named_after_all_the_code(tmp_path, monkeypatch):
+    monkeypatch.setattr(module, "HERE", tmp_path)
+    (tmp_path / "a.py").write_text("one")
+    (tmp_path / "b.py").write_text("two")
+    first = module.cache_folder()
+    assert first.parent == tmp_path / "__pycache__"
+    assert module.cache_folder() == first
+    (tmp_path / "b.py").write_text("three")  # a callee, in another file than its caller
+    assert module.cache_folder() != first
+
+
+def test_what_is_compiled_lies_in_that_folder():
+    assert list(module.cache_folder().rglob("*.nbi"))
+
+
+def test_another_kind_of_array_is_refused_and_not_compiled(cell):
+    q = np.zeros((2, cell.joint_count), dtype=np.float32)
+    arm, places = cell.kinematics, cell.joint_count + 1
+    room = np.empty((2, places, 3, 3)), np.empty((2, places, 3))
+    with pytest.raises(TypeError, match="No matching definition"):
+        place_all(arm.turns, arm.offsets, q, *room)
+    assert module.owned(q).dtype == np.float64
+
+
+def test_owned_copies_only_what_a_kernel_could_not_take():
+    values = np.arange(6.0).reshape(2, 3)
+    assert module.owned(values) is values
+    frozen = values.copy()
+    frozen.flags.writeable = False
+    for other in (frozen, values.T):
+        taken = module.owned(other)
+        assert taken.flags.writeable and taken.flags.c_contiguous
+        assert np.array_equal(taken, other)
