@@ -189,7 +189,8 @@ def test_a_failed_gate_stops_repro_and_the_report_says_why(copy: Path) -> None:
     assert (outcome.code, outcome.stage) == (3, "train_generators")
     assert ran == ["gate_a", "train_generators"]
     assert re.search(
-        r"Gate A refuses: persistence_margin is [\d.]+, required >= 1e\+09; see reports/gate_a\.json",
+        r"Gate A refuses: persistence_margin is [\d.]+, required >= 1e\+09; "
+        r"see reports/gate_a\.json",
         outcome.sentence,
     ), outcome.sentence
     assert not (copy / "artifacts" / "train_generators").exists()
