@@ -31,6 +31,16 @@ def _starts(evidence: Evidence, settings: StressSettings, method: str) -> set[tu
         raise MissingEvidenceError(f"{method} has two rows of one seed, condition and start")
     if rows["start_sha256"].eq("").any():
         raise MissingEvidenceError(f"{method} has a start without hash")
+    planned = set(range(settings.planned_starts))
+    for (seed, condition), part in rows.groupby(["seed", "perturbation"]):
+        where = f"{method}, seed {seed}, {condition}"
+        if set(part["start"]) != planned:
+            raise MissingEvidenceError(
+                f"{where}: {len(set(part['start']) ^ planned)} starts lack or nobody planned them"
+            )
+        # A reset that ignores its start gives one state under many numbers: one start.
+        if (states := part["start_sha256"].nunique()) < len(planned):
+            raise MissingEvidenceError(f"{where}: {states} states for {len(planned)} starts")
     return set(zip(rows["perturbation"], rows["start"], rows["start_sha256"], strict=True))
 
 

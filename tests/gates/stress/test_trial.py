@@ -7,7 +7,7 @@ from editing import cells
 
 from gates.evidence import MissingEvidenceError
 from gates.proof import judge
-from gates.stress.trial import verdict_reachable
+from gates.stress.trial import unmatched_starts, verdict_reachable
 
 
 def _of(method):
@@ -29,6 +29,23 @@ def test_fewer_starts_than_planned_gives_no_verdict(ladder):
     report = judge(ladder, "D")
     assert report.verdict == "INCONCLUSIVE"
     assert report.decision.startswith("No decision")
+
+
+def test_a_reset_that_ignores_its_start_is_one_start(ladder):
+    """All methods share every state, and all states are one: nothing was repeated."""
+    evidence.edit_table(ladder, "stress/rollouts.parquet", cells("start_sha256", "ab" * 32))
+    with pytest.raises(MissingEvidenceError, match=f"1 states for {evidence.STARTS} starts"):
+        asked(ladder, unmatched_starts, "flow", gate="D")
+    assert judge(ladder, "D").verdict == "INCONCLUSIVE"
+
+
+def test_starts_that_nobody_planned_are_no_trial(ladder):
+    """As many as planned, but of other numbers: a choice after the fact."""
+    evidence.edit_table(
+        ladder, "stress/rollouts.parquet", lambda f: f.assign(start=f["start"] + 1)
+    )
+    with pytest.raises(MissingEvidenceError, match="2 starts lack or nobody planned them"):
+        asked(ladder, unmatched_starts, "flow", gate="D")
 
 
 POWER = "stress/power.json"
