@@ -41,9 +41,7 @@ def test_a_reset_that_ignores_its_start_is_one_start(ladder):
 
 def test_starts_that_nobody_planned_are_no_trial(ladder):
     """As many as planned, but of other numbers: a choice after the fact."""
-    evidence.edit_table(
-        ladder, "stress/rollouts.parquet", lambda f: f.assign(start=f["start"] + 1)
-    )
+    evidence.edit_table(ladder, "stress/rollouts.parquet", lambda f: f.assign(start=f["start"] + 1))
     with pytest.raises(MissingEvidenceError, match="2 starts lack or nobody planned them"):
         asked(ladder, unmatched_starts, "flow", gate="D")
 
