@@ -140,16 +140,17 @@ def _of_admissible(
     if len(rows) == 0:
         raise MissingEvidenceError("no candidate is admissible")
     values = np.abs(numbers(rows, column))
+    episodes = _episodes(rows)
     point, interval = upper_quantile(
         values,
-        rows["observation"].to_numpy(),
+        episodes.to_numpy(),
         0.95,
         confidence=settings.confidence,
         rng=settings.draws("C", column, candidate),
     )
     text = (
         f"p95 {point:.4g}, largest {values.max():.4g}; {len(rows)} admissible candidates of "
-        f"{rows['observation'].nunique()} held-out observations"
+        f"{rows['observation'].nunique()} held-out observations in {episodes.nunique()} episodes"
     )
     return Measured(interval[1], interval, text)
 

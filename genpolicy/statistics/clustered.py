@@ -3,13 +3,16 @@
 Whole clusters are drawn again with replacement, so that rows of one cluster count as the one draw
 that they are. Two ends of that method are closed: clusters that do not vary (no miss on any start)
 would give an interval of no width, and a quantile near the largest value has nothing above it to
-draw. Source: Efron and Tibshirani 1993, chapter 13; Field and Welsh 2007 for clusters.
+draw: there the exact interval of as many independent draws as the rows are worth decides. Sources:
+Efron and Tibshirani 1993, chapter 13; Field and Welsh 2007 for clusters; Korn and Graubard 1998
+for the number of draws that rows of a cluster are worth.
 """
 
 import math
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import stats
 
 from genpolicy.errors import ContractError, NonFiniteError
 from genpolicy.statistics.intervals import clopper_pearson, order_statistic_interval
@@ -66,7 +69,9 @@ def quantile_interval(
 ) -> tuple[float, float]:
     """Interval of a quantile of rows that come in clusters; its ends are values that occurred.
 
-    With one row per cluster it is the exact one between order statistics.
+    With one row per cluster it is the exact one between order statistics. Else it is the wider, at
+    either end, of the resampled one and the exact one of the draws that the rows are worth: where
+    a cluster's rows are one, resampling 20 of them finds an end that 20 draws do not have.
 
     Args:
         values: One per row. Shape (n,).
@@ -98,12 +103,37 @@ def quantile_interval(
     order = np.argsort(values, kind="stable")
     ranks = _drawn_ranks(member.reshape(-1)[order], n, quantile, rng)
     tail = (1.0 - confidence) / 2.0
-    low = int(np.quantile(ranks, tail, method="lower"))
-    high = int(np.quantile(ranks, 1.0 - tail, method="higher"))
-    last = len(values) - 1
-    lower = float(values[order[low]]) if low > 0 else -math.inf
-    upper = float(values[order[high]]) if high < last else math.inf
+    worth = _effective_draws(values, member.reshape(-1), quantile, tail)
+    exact = _exact_ranks(len(values), worth, quantile, tail)
+    low = min(int(np.quantile(ranks, tail, method="lower")), exact[0])
+    high = max(int(np.quantile(ranks, 1.0 - tail, method="higher")), exact[1])
+    lower = float(values[order[low]]) if low >= 0 else -math.inf
+    upper = float(values[order[high]]) if high < len(values) else math.inf
     return lower, upper
+
+
+def _effective_draws(values: Array, member: NDArray[np.int64], quantile: float, tail: float) -> int:
+    """Independent draws that know as much of the share below the quantile as these rows."""
+    rows = len(values)
+    below = (values <= np.quantile(values, quantile, method="higher")).astype(np.float64)
+    share = below.mean()
+    alone = share * (1.0 - share) * rows
+    if alone == 0.0:
+        # Every row is the quantile itself, or below: a cluster is worth one draw.
+        return int(member.max()) + 1
+    sums = np.bincount(member, weights=below - share)
+    n = len(sums)
+    together = float(sums @ sums) * n / (n - 1)
+    few = stats.t.isf(tail, rows - 1) / stats.t.isf(tail, n - 1)
+    return min(rows, math.floor(rows * alone / together * few**2)) if together > 0.0 else rows
+
+
+def _exact_ranks(rows: int, draws: int, quantile: float, tail: float) -> tuple[int, int]:
+    """Ranks, from 0, of the exact interval of so many draws; -1 or `rows` where there is none."""
+    low = int(stats.binom.ppf(tail, draws, quantile))
+    high = int(stats.binom.isf(tail, draws, quantile)) + 1
+    first = math.floor((low - 1) / draws * rows) if low >= 1 else -1
+    return first, math.ceil(high / draws * rows) - 1 if high <= draws else rows
 
 
 def _drawn_ranks(

@@ -1172,7 +1172,7 @@ def _shadow(root: Path) -> None:
             _candidate(m, fixture, o, c)
             for m in CANDIDATES
             for fixture in FIXTURES
-            for o in range({"held_out": 20, "two_modes": 60}.get(fixture, 4))
+            for o in range({"held_out": 80, "two_modes": 60}.get(fixture, 4))
             for c in range(4)
         ],
     )
@@ -1252,7 +1252,7 @@ def rejected(method: str, **changes: Any) -> dict[str, Any]:
     post = {"name": "post", "kind": "obstacle", "touches": False, "above_m": box, "aside_m": box}
     example = {
         "method": method, "layer": "dynamic", "reason": "joint_jerk", "outcome": "failed",
-        "rejected": 7, "held_out": 80, "situation": "e0:0", "phase": "approach", "mode": "left",
+        "rejected": 7, "held_out": 320, "situation": "e0:0", "phase": "approach", "mode": "left",
         "observation": 0, "candidate": 1, "row": 2, "late_rows": 1, "margin": -10.0,
         "unit": "rad/s^3", "limits": [100.0, 200.0], "touching": [],
         "commanded_m": [0.39, 0.0, 0.15], "raw_m": [*path[:2], [0.42, 0.03, 0.15], path[3]],

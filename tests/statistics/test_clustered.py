@@ -90,6 +90,32 @@ def test_one_slow_cluster_in_twenty_is_p95_by_luck():
     assert lower == 0.0 and upper >= 10.0
 
 
+def covers(n, per_cluster, seed):
+    """Share of trials in which the upper end covers .95, where a cluster's rows are one value."""
+    rng, right = np.random.default_rng(seed), 0
+    for trial in range(100):
+        own = rng.exponential(size=n)
+        upper = p95(np.repeat(own, per_cluster), np.repeat(np.arange(n), per_cluster), trial)[1]
+        right += upper >= -math.log(0.05)
+    return right / 100
+
+
+def test_few_clusters_of_one_value_bound_nothing():
+    """The largest of 20 is below the 95th percentile in .36 of all draws, whatever is resampled."""
+    assert covers(20, 10, seed=6) == 1.0 and covers(60, 10, seed=7) == 1.0
+    own = np.random.default_rng(8).normal(size=60)
+    assert p95(np.repeat(own, 10), np.repeat(np.arange(60), 10))[1] == math.inf
+    assert covers(100, 4, seed=9) >= 0.93
+
+
+def test_rows_that_do_not_resemble_their_cluster_are_worth_as_many_draws():
+    """Thirty clusters of forty independent rows: 1,200 draws, and a finite end close to theirs."""
+    values = np.random.default_rng(10).normal(size=1200)
+    exact = order_statistic_interval(values, 0.95, 0.95)
+    lower, upper = p95(values, np.repeat(np.arange(30), 40))
+    assert lower == pytest.approx(exact[0], abs=0.1) and upper == pytest.approx(exact[1], abs=0.15)
+
+
 def test_same_stream_same_interval_and_nan_is_refused():
     values, clusters = np.random.default_rng(5).normal(size=900), np.repeat(np.arange(90), 10)
     np.random.seed(3)

@@ -146,7 +146,7 @@ def test_without_situations_with_two_modes_nothing_is_compared(ladder):
 
 
 def test_situations_of_one_episode_are_one_observation(ladder):
-    three_each = [f"e{number // 3}:{number}" for number in range(60)]
+    three_each = [f"e{number // 3}:{number}" for number in range(80)]
     evidence.edit_table(
         ladder,
         CANDIDATES,
@@ -180,7 +180,7 @@ def test_a_candidate_passes_by_its_outcome_too(outcome):
 
 
 def test_unknown_candidates_are_not_passed_and_are_counted(ladder):
-    """5 of 80 held-out candidates of the flow could not be evaluated."""
+    """5 of 320 held-out candidates of the flow could not be evaluated."""
 
     def change(frame):
         some = of(frame) & (frame["fixture"] == "held_out") & (frame["observation"] < 5)
@@ -195,7 +195,7 @@ def test_unknown_candidates_are_not_passed_and_are_counted(ladder):
     assert all("; 0 unknown, which is not passed" in found.caveat for found in before)
     evidence.edit_table(ladder, CANDIDATES, change)
     after = {found.candidate: found for found in found_in(judge(ladder, "C"), "admissible_share")}
-    assert "share 0.9375 of 80" in after["flow"].caveat
+    assert "share 0.9844 of 320" in after["flow"].caveat
     assert "; 5 unknown, which is not passed" in after["flow"].caveat
     assert "; 0 unknown" in after["diffusion"].caveat
 
@@ -211,3 +211,21 @@ def test_a_reason_that_no_layer_knows_is_none(ladder):
     assert report.candidates == {"diffusion": "PASS", "flow": "FAIL"}
     found = {f.candidate: f for f in found_in(report, "corrupted_refused_share")}["flow"]
     assert "refused without reason: collision" in found.caveat
+
+
+@pytest.mark.parametrize("name", ["projection_p95_m", "boundary_jerk_p95_m_s3"])
+def test_rows_of_twenty_episodes_bound_no_p95_where_an_episode_is_one_draw(ladder, name):
+    """Four observations an episode, all as far as the episode: 20 draws, of which 72 are needed."""
+    column = {"projection_p95_m": "position_change_m"}.get(name, "boundary_jerk_m_s3")
+
+    def change(frame):
+        episode = frame["observation"] // 4
+        return frame.assign(
+            situation=[f"e{e}:{o}" for e, o in zip(episode, frame["observation"], strict=True)],
+            **{column: frame[column].where(frame[column].isna(), 1e-4 * episode)},
+        )
+
+    evidence.edit_table(ladder, CANDIDATES, change)
+    found = found_in(judge(ladder, "C"), name)[0]
+    assert found.verdict == "INCONCLUSIVE"
+    assert "320 values of 20 independent draws bound no 95% quantile" in found.caveat

@@ -160,7 +160,7 @@ def test_what_touches_and_who_it_is_are_said(copied):
     assert item.title == "flow: scene collision"
     assert item.lines[0].endswith("or touches it: finger left and post.")
     assert item.lines[2] == (
-        "The dynamic layer rejects 7 of 80 held-out candidates of flow for it. This one: "
+        "The dynamic layer rejects 7 of 320 held-out candidates of flow for it. This one: "
         "candidate 1 of observation 0, phase approach, mode left."
     )
 

@@ -41,9 +41,9 @@ def test_each_reason_stands_with_its_layer_method_phases_and_modes(shown):
     heads, *lines = shown.listed
     assert heads[:5] == ("layer: reason", "method", "rejected", "by phase", "by mode")
     assert [line[:5] for line in lines] == [
-        ("geometric: scene collision", "flow", "6 of 80 (7.5 %), 1 of them unknown",
-         "approach 4 of 78, insert 2 of 2", "left 3 of 40, right 3 of 40"),
-        ("dynamic: joint jerk", "flow", "4 of 80 (5 %)", "approach 4 of 78", "left 4 of 40"),
+        ("geometric: scene collision", "flow", "6 of 320 (1.9 %), 1 of them unknown",
+         "approach 4 of 318, insert 2 of 2", "left 3 of 160, right 3 of 160"),
+        ("dynamic: joint jerk", "flow", "4 of 320 (1.2 %)", "approach 4 of 318", "left 4 of 160"),
     ]  # fmt: skip
     assert all(len(line) == len(heads) and line[-1] for line in lines)
 
@@ -66,7 +66,7 @@ def test_each_phase_with_each_mode_counts_every_rejection_once(shown):
 
 def test_without_a_rejection_it_says_so(whole, judged):
     (found,) = draw_all(LISTINGS, Evidence(whole), judged("C"))
-    assert found.listed[1:] == (("nothing", "all", "0 of 160", "", "", ""),)
+    assert found.listed[1:] == (("nothing", "all", "0 of 640", "", "", ""),)
     assert len(found.folded[0][1]) == 1 and len(found.folded[1][1]) == len(REASONS) + 1
 
 
@@ -85,7 +85,7 @@ def test_a_reason_that_no_layer_knows_is_listed_last(copied, judged):
 def test_the_page_shows_the_table_and_folds_the_rest(copied, judged):
     evidence.edit_table(copied, TABLE, rejected)
     html = gate_page(copied, judged("C"))
-    assert "geometric: scene collision" in html and "left 3 of 40, right 3 of 40" in html
+    assert "geometric: scene collision" in html and "left 3 of 160, right 3 of 160" in html
     found = re.findall(r"<details><summary>([^<]*\(\d+\))</summary>", html)
     assert found == [
         "Every phase with every mode (5)", "Reasons that rejected nothing (38)",

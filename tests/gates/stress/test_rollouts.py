@@ -3,7 +3,7 @@
 import evidence
 import pandas as pd
 import pytest
-from asked import settings_of
+from asked import asked, settings_of
 from editing import cells
 from pydantic import ValidationError
 
@@ -14,6 +14,7 @@ from gates.stress.rollouts import (
     rollouts,
     success_lower,
 )
+from gates.stress.trial import unmatched_starts
 from genpolicy.statistics.intervals import clopper_pearson
 
 TABLE = "stress/rollouts.parquet"
@@ -108,6 +109,9 @@ def test_a_chunk_is_of_use_as_long_as_it_has_an_action(ladder):
     assert settings.alpha == pytest.approx(settings.family_alpha / 2)
 
 
-def test_more_starts_than_planned_are_as_good(ladder):
+def test_more_starts_than_planned_are_read_and_are_no_trial(ladder):
+    """As long a trial as is needed until it comes out right: the starts are those of the plan."""
     evidence.write_params(ladder, lambda params: params["stress"].update(starts=79))
     assert of(ladder)["start"].nunique() == 80
+    with pytest.raises(MissingEvidenceError, match="1 starts lack or nobody planned them"):
+        asked(ladder, unmatched_starts, "flow", gate="D")
