@@ -14,6 +14,7 @@ from gates.proof import Rung
 from gates.rederive_dataset import TRAININGS, rederive_dataset, rederive_trainings, trainings
 from gates.rederive_distilled import rederive_costs, rederive_distilled
 from gates.rederive_latency import rederive_latency
+from gates.rederive_sessions import rederive_sessions
 from gates.rederive_shadow import SHADOW, TaskSection, rederive_shadow
 from gates.report import Gate
 from gates.settings import PARAMS_FILE, read_params, section_of
@@ -100,6 +101,7 @@ def rederive(root: Path, gate: Gate) -> None:
     folder, pattern = FOLDERS[gate]
     journals = sorted((root / folder).glob(pattern))
     _check(root, gate, params, journals)
+    rederive_sessions(root, gate, params, journals)
     if gate == "C":
         rederive_shadow(root, params)
     else:

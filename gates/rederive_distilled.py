@@ -71,7 +71,7 @@ def _compare(root: Path, gate: Gate, seed: Path, stated: dict[str, Any]) -> None
     own, before = (_batches(folder) for folder in (seed, teacher))
     derived = {
         "teacher": stated.get("teacher"),
-        "teacher_sha256": _identity(teacher),
+        "teacher_sha256": identity(teacher),
         "updates": own[0] + before[0],
         "evaluations": EVALUATIONS * own[1] + before[1],
         "gradients": GRADIENTS * own[1] + before[1],
@@ -86,7 +86,7 @@ def _batches(folder: Path) -> tuple[int, int]:
     return steps, steps * batch
 
 
-def _identity(folder: Path) -> str:
+def identity(folder: Path) -> str:
     """Digest of weights and configuration, by which a checkpoint is known."""
     parts = (sha256_file(folder / name) for name in ("model.safetensors", "config.json"))
     return sha256_bytes("".join(f"{part}\n" for part in parts).encode())

@@ -1,8 +1,11 @@
 """Journals are a second witness: what they do not say is refused, whoever recorded it."""
 
+import hashlib
 import json
 from dataclasses import asdict, replace
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
@@ -34,6 +37,8 @@ from genpolicy.execution.supervisor import Supervisor
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.rows import write_rows
 from genpolicy.integrity.tables import read_table, write_table
+from genpolicy.seeds import stream
+from genpolicy.tasks.api import WorldSettings, load_task
 from genpolicy.verification.checker import check_journal
 from genpolicy.verification.commands import reach_of
 from genpolicy.verification.rollouts import derived_rollouts
@@ -64,6 +69,33 @@ TABLES = {
 }  # fmt: skip
 
 
+WEIGHTS = b"weights"
+SAMPLER = {"name": "euler", "steps": 4}
+CONFIGS = {name: json.dumps({"method": name, "sampler": SAMPLER}) for name in ("flow", "bc")}
+FOLDERS = {"flow": "train_generators/flow/seed_0", "bc": "train_baselines/bc/seed_0"}
+
+
+def _sha(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()
+
+
+MAKERS = {
+    name: (_sha(f"{_sha(WEIGHTS)}\n{_sha(config.encode())}\n".encode()),
+           _sha(canonical_json(SAMPLER)))
+    for name, config in CONFIGS.items()
+}  # fmt: skip
+"""By hand: the two hashes by which a journal names who made its chunks."""
+
+
+@cache
+def _scene(start: int) -> dict[str, Any]:
+    """What a rollout of the plan sees first."""
+    task = load_task("tabletop_insertion")
+    state = task.sample_start(stream(PARAMS["seed"], "starts", start))
+    world = task.make_world(state, settings=WorldSettings(task.calibration_epochs[-1]))
+    return task.scene_poses(world.observe())
+
+
 def _session(name: str, start: int) -> Journal:
     """A rollout in which nothing is delivered: it holds, touches something and ends."""
     method, _, perturbation = name.partition("__")
@@ -76,7 +108,8 @@ def _session(name: str, start: int) -> Journal:
     cell = Cell(horizons, execution)
     supervisor = Supervisor(execution, journal)
     executor = Executor(cell, journal, ControllerStub(cell, journal, supervisor))
-    executor.set_active(0.0, "weights", "sampler")
+    executor.set_active(0.0, *MAKERS[method])
+    journal.scene(0.0, _scene(start))
     executor.controller(0.0, cell.controller_mode)
     for tick in range(4):
         now_s = tick * horizons.action_period_s
@@ -98,6 +131,10 @@ def root(tmp_path):
     (tmp_path / "params.yaml").write_text(yaml.safe_dump(PARAMS))
     (tmp_path / "artifacts" / "latency").mkdir(parents=True)
     write_rows(tmp_path / "artifacts" / "latency" / "latency.parquet", LatencyRow, LATENCY)
+    for name, place in FOLDERS.items():
+        (tmp_path / "artifacts" / place).mkdir(parents=True)
+        (tmp_path / "artifacts" / place / "config.json").write_text(CONFIGS[name])
+        (tmp_path / "artifacts" / place / "model.safetensors").write_bytes(WEIGHTS)
     folder = tmp_path / STRESS
     (folder / "journals").mkdir(parents=True)
     expected, _ = module._held_to(PARAMS)

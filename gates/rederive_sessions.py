@@ -1,0 +1,102 @@
+"""Who made what a session executed, and from which start: held against checkpoints and the plan.
+
+A journal proves what was done with the chunks of some policy. That it was the policy of this
+report, and that it began where the plan begins, is asked here.
+"""
+
+from collections.abc import Mapping, Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gates.rederive_distilled import identity
+from gates.rederive_shadow import TaskSection
+from gates.report import Gate
+from gates.stated import mapping, refuse, root_seed, section, training_seed
+from genpolicy.candidates.judged import BASELINES, GENERATORS
+from genpolicy.evidence.stress.matched import matched_starts
+from genpolicy.evidence.stress.settings import StressSettings
+from genpolicy.integrity.documents import canonical_json, read_json
+from genpolicy.integrity.hashing import sha256_bytes
+from genpolicy.tasks.api import WorldSettings, load_task
+from genpolicy.verification.begun import Begun, Maker, begun_sessions
+from genpolicy.verification.journal_source import readable
+
+TOLERANCE = 1e-6
+"""Of a pose, m or without unit: another processor rounds, another start is centimetres away."""
+
+
+def rederive_sessions(
+    root: Path, gate: Gate, params: Mapping[str, Any], journals: Sequence[Path]
+) -> None:
+    """Hold the maker of every session against the trained policies, and its start against the plan.
+
+    Gate C changes the active maker within a session on purpose; there the first one counts.
+
+    Raises:
+        RefusedError: A session was made by another policy, or began elsewhere.
+        ConfigError: A section of `params.yaml` cannot be read.
+        IntegrityError: A file is missing or no regular file.
+        BadInputError: A file cannot be read.
+    """
+    seed = training_seed(params)
+
+    @cache
+    def maker(method: str) -> Maker | None:
+        return _maker(root, method, seed)
+
+    planned = _planned(params) if gate == "D" else []
+    for path in journals:
+        with readable(f"{path.parent.name}/{path.name}"):
+            sessions = begun_sessions(path)
+            for name, session in sessions.items():
+                place = f"{path.name}: {name}"
+                own = maker(session.labels["method"])
+                others = set(session.makers[: 1 if gate == "C" else None]) - {own}
+                if own is None or others or not session.makers:
+                    made = ", ".join(sorted(checkpoint for checkpoint, _ in others)) or "nobody"
+                    refuse(gate, f"{place}: made by", made, "the policy of that name, as trained")
+                if gate == "D":
+                    _began(gate, place, session, planned)
+
+
+def _maker(root: Path, method: str, seed: object) -> Maker | None:
+    """Weights and sampler of a trained policy; None where there is none of the name."""
+    for stage in (BASELINES, GENERATORS):
+        folder = root / "artifacts" / stage / method / f"seed_{seed}"
+        if (folder / "config.json").is_file():
+            sampler = mapping(mapping(read_json(folder / "config.json")).get("sampler"))
+            return identity(folder), sha256_bytes(canonical_json(sampler))
+    return None
+
+
+def _planned(params: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """The scene of every planned start, as it is first seen."""
+    task = load_task(section(params, "task", TaskSection).name)
+    count = section(params, "stress", StressSettings).starts
+    settings = WorldSettings(calibration_epoch=task.calibration_epochs[-1])
+    found = []
+    for start in matched_starts(task, root_seed=root_seed(params), count=count):
+        seen = task.scene_poses(task.make_world(start, settings=settings).observe())
+        found.append({body: np.concatenate(pose) for body, pose in seen.items()})
+    return found
+
+
+def _began(gate: Gate, place: str, session: Begun, planned: Sequence[Mapping[str, Any]]) -> None:
+    number = int(session.labels["start"])
+    seen = session.bodies or {}
+    if not 0 <= number < len(planned):
+        refuse(gate, f"{place}: start", str(number), f"one of the {len(planned)} that are planned")
+    expected = planned[number]
+    if set(seen) != set(expected) or not all(
+        np.allclose(seen[body], expected[body], rtol=0.0, atol=TOLERANCE) for body in expected
+    ):
+        refuse(gate, f"{place}: first seen", _said(seen), f"{_said(expected)}, as planned")
+
+
+def _said(bodies: Mapping[str, Any]) -> str:
+    """Where bodies are, m."""
+    places = (f"{body} {np.round(pose[:3], 4).tolist()}" for body, pose in sorted(bodies.items()))
+    return ", ".join(places) or "nothing"
