@@ -33,16 +33,19 @@ def begun_sessions(path: Path) -> dict[str, Begun]:
     Raises:
         IntegrityError: No regular file.
         BadInputError: Not a whole journal.
+        KeyError: An event of a session that never said what it is.
     """
     found: dict[str, Begun] = {}
     for kind, message in read_messages(path):
         name = str(message.get("session"))
         if kind == "session":
             found[name] = Begun(dict(message["labels"]))
-        elif kind == "active" and name in found:
-            found[name].makers.append((str(message["checkpoint"]), str(message["sampler"])))
-        elif kind == "scene" and name in found and found[name].bodies is None:
-            found[name].bodies = {
+            continue
+        session = found[name]
+        if kind == "active":
+            session.makers.append((str(message["checkpoint"]), str(message["sampler"])))
+        elif kind == "scene" and session.bodies is None:
+            session.bodies = {
                 body: np.frombuffer(bytes.fromhex(text), dtype="<f8")
                 for body, text in message["bodies"].items()
             }

@@ -1,6 +1,5 @@
 """Journals are a second witness: what they do not say is refused, whoever recorded it."""
 
-import hashlib
 import json
 from dataclasses import asdict, replace
 from functools import cache
@@ -9,6 +8,7 @@ from typing import Any
 
 import pytest
 import yaml
+from makers import maker, write_policy
 
 from gates import rederive as module
 from gates.proof import Rung
@@ -69,24 +69,6 @@ TABLES = {
 }  # fmt: skip
 
 
-WEIGHTS = b"weights"
-SAMPLER = {"name": "euler", "steps": 4}
-CONFIGS = {name: json.dumps({"method": name, "sampler": SAMPLER}) for name in ("flow", "bc")}
-FOLDERS = {"flow": "train_generators/flow/seed_0", "bc": "train_baselines/bc/seed_0"}
-
-
-def _sha(data: bytes) -> str:
-    return hashlib.sha256(data).hexdigest()
-
-
-MAKERS = {
-    name: (_sha(f"{_sha(WEIGHTS)}\n{_sha(config.encode())}\n".encode()),
-           _sha(canonical_json(SAMPLER)))
-    for name, config in CONFIGS.items()
-}  # fmt: skip
-"""By hand: the two hashes by which a journal names who made its chunks."""
-
-
 @cache
 def _scene(start: int) -> dict[str, Any]:
     """What a rollout of the plan sees first."""
@@ -108,7 +90,7 @@ def _session(name: str, start: int) -> Journal:
     cell = Cell(horizons, execution)
     supervisor = Supervisor(execution, journal)
     executor = Executor(cell, journal, ControllerStub(cell, journal, supervisor))
-    executor.set_active(0.0, *MAKERS[method])
+    executor.set_active(0.0, *maker(method))
     journal.scene(0.0, _scene(start))
     executor.controller(0.0, cell.controller_mode)
     for tick in range(4):
@@ -131,10 +113,8 @@ def root(tmp_path):
     (tmp_path / "params.yaml").write_text(yaml.safe_dump(PARAMS))
     (tmp_path / "artifacts" / "latency").mkdir(parents=True)
     write_rows(tmp_path / "artifacts" / "latency" / "latency.parquet", LatencyRow, LATENCY)
-    for name, place in FOLDERS.items():
-        (tmp_path / "artifacts" / place).mkdir(parents=True)
-        (tmp_path / "artifacts" / place / "config.json").write_text(CONFIGS[name])
-        (tmp_path / "artifacts" / place / "model.safetensors").write_bytes(WEIGHTS)
+    for method in ("flow", "bc"):
+        write_policy(tmp_path, method)
     folder = tmp_path / STRESS
     (folder / "journals").mkdir(parents=True)
     expected, _ = module._held_to(PARAMS)

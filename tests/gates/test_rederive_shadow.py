@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import yaml
+from makers import maker, write_policy
 
 from gates import rederive_shadow as module
 from gates.rederive import rederive
@@ -47,7 +48,8 @@ MOMENTS = module._moments
 class Demonstrator:
     """Answers with what the operator did, with a NaN, and with a gripper that opens too far."""
 
-    method, checkpoint_hash, sampler_config_hash, stochastic = "operator", "w" * 64, "s" * 64, True
+    method, stochastic = "operator", True
+    checkpoint_hash, sampler_config_hash = maker(method)
 
     def __init__(self, observations):
         self.chunks = {(o.episode_uuid, o.index): o.demonstrated for o in observations}
@@ -90,6 +92,7 @@ def written(params, task, checker, data, kit, tmp_path_factory):
             root / SHADOW, [found], LAYERS_TRIED, gallery, cell=shadow.cell, robot=checker.cell
         )
     (root / "params.yaml").write_text(yaml.safe_dump(params))
+    write_policy(root, "operator", seed=seed)
     return root
 
 
