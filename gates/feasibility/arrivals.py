@@ -1,11 +1,13 @@
 """What reaches the controller stub, and whether every generated action is accounted for."""
 
+from collections.abc import Iterable
+
 import pandas as pd
 
 from gates.bounds import counted_interval
 from gates.criterion import Measured, criterion
 from gates.evidence import Evidence, MissingEvidenceError, counts
-from gates.feasibility.settings import SHADOW, FeasibilitySettings
+from gates.feasibility.settings import HELD_OUT, SHADOW, FeasibilitySettings
 from genpolicy.evidence.rows.shadow import ShadowCountRow, ShadowStubRow
 
 
@@ -18,7 +20,7 @@ from genpolicy.evidence.rows.shadow import ShadowCountRow, ShadowStubRow
 )
 def stub_stale(evidence: Evidence, settings: FeasibilitySettings, candidate: str) -> Measured:
     """Stale actions that arrived at the stub."""
-    bad, arrivals = _stub(evidence, candidate, "stale")
+    bad, arrivals = _stub(evidence, settings, candidate, "stale")
     return Measured(bad, caveat=f"of {arrivals:g} arrivals")
 
 
@@ -34,8 +36,26 @@ def at_the_stub(rows: pd.DataFrame, *columns: str) -> tuple[float, float]:
     return sum(float(counts(rows, column).sum()) for column in columns), arrivals
 
 
-def _stub(evidence: Evidence, candidate: str, *columns: str) -> tuple[float, float]:
-    return at_the_stub(evidence.of(f"{SHADOW}/stub.parquet", ShadowStubRow, candidate), *columns)
+def require_played(rows: pd.DataFrame, column: str, planned: Iterable[str]) -> None:
+    """A count of some conditions says nothing of those that are not in it.
+
+    Raises:
+        MissingEvidenceError: A planned condition has no row.
+    """
+    if absent := sorted(set(planned) - set(rows[column])):
+        raise MissingEvidenceError(f"nothing is counted of {', '.join(absent)}")
+
+
+def _played(evidence: Evidence, settings: FeasibilitySettings, candidate: str) -> pd.DataFrame:
+    rows = evidence.of(f"{SHADOW}/stub.parquet", ShadowStubRow, candidate)
+    require_played(rows, "fixture", (HELD_OUT, *settings.required_fixtures))
+    return rows
+
+
+def _stub(
+    evidence: Evidence, settings: FeasibilitySettings, candidate: str, *columns: str
+) -> tuple[float, float]:
+    return at_the_stub(_played(evidence, settings, candidate), *columns)
 
 
 @criterion(
@@ -47,7 +67,7 @@ def _stub(evidence: Evidence, candidate: str, *columns: str) -> tuple[float, flo
 )
 def stub_invalid(evidence: Evidence, settings: FeasibilitySettings, candidate: str) -> Measured:
     """Actions of no admitted chunk that arrived at the stub."""
-    bad, arrivals = _stub(evidence, candidate, "invalid")
+    bad, arrivals = _stub(evidence, settings, candidate, "invalid")
     return Measured(bad, caveat=f"of {arrivals:g} arrivals")
 
 
@@ -65,8 +85,8 @@ def stub_violation_upper(
 
     Actions of one observation arrive or fail together, so the observations are the trials.
     """
-    bad, _ = _stub(evidence, candidate, "stale", "invalid")
-    rows = evidence.of(f"{SHADOW}/stub.parquet", ShadowStubRow, candidate)
+    rows = _played(evidence, settings, candidate)
+    bad, _ = at_the_stub(rows, "stale", "invalid")
     # The same observations are played in every fixture, and deliver at most one chunk in each.
     observations = float(counts(rows, "delivered").max())
     if observations <= 0:
@@ -95,6 +115,7 @@ def conservation_error(
 ) -> Measured:
     """Actions unaccounted for, over all fixtures."""
     rows = evidence.of(f"{SHADOW}/counts.parquet", ShadowCountRow, candidate)
+    require_played(rows, "fixture", (HELD_OUT, *settings.required_fixtures))
     error = unaccounted(rows, ["fixture"])
     if float(rows["generated"].sum()) <= 0:
         raise MissingEvidenceError("nothing was generated")

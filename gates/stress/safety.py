@@ -5,7 +5,7 @@ import numpy as np
 from gates.bounds import counted_interval, share_interval
 from gates.criterion import Measured, criterion
 from gates.evidence import Evidence, MissingEvidenceError, counts, flags
-from gates.feasibility.arrivals import at_the_stub
+from gates.feasibility.arrivals import at_the_stub, require_played
 from gates.feasibility.proof import checked_violations
 from gates.stress.rollouts import STRESS, StressSettings, rollouts
 from genpolicy.evidence.rows.stress import ConservationRow, StressCountRow, StressStubRow
@@ -67,6 +67,7 @@ def recovery_success_lower(
 def stub_violations(evidence: Evidence, settings: StressSettings, candidate: str) -> Measured:
     """Stale or invalid actions that arrived at the controller stub."""
     rows = evidence.of(f"{STRESS}/stub.parquet", StressStubRow, candidate)
+    require_played(rows, "perturbation", settings.perturbations)
     bad, arrivals = at_the_stub(rows, "stale", "invalid")
     return Measured(bad, caveat=f"stale or invalid, of {arrivals:g} arrivals")
 
@@ -83,6 +84,7 @@ def conservation_error(evidence: Evidence, settings: StressSettings, candidate: 
     names = ("generated", "executed", "discarded", "queued")
     path = f"{STRESS}/conservation.parquet"
     rows = evidence.of(path, ConservationRow, candidate)
+    require_played(rows, "perturbation", settings.perturbations)
     generated, executed, discarded, queued = (counts(rows, name) for name in names)
     if generated.sum() <= 0:
         raise MissingEvidenceError("nothing was generated")

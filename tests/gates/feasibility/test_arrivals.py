@@ -10,6 +10,8 @@ from gates.evidence import MissingEvidenceError
 from gates.feasibility.arrivals import (
     at_the_stub,
     conservation_error,
+    stub_invalid,
+    stub_stale,
     stub_violation_upper,
     unaccounted,
 )
@@ -108,9 +110,13 @@ def test_a_candidate_that_generated_nothing_shows_nothing(ladder):
     )
     with pytest.raises(MissingEvidenceError, match="nothing was generated"):
         asked(ladder, conservation_error, "flow", gate="C")
-    one = {"generated": 1, "executed": 1}
-    evidence.edit_table(ladder, "shadow/counts.parquet", lambda f: f[of(f)].head(1).assign(**one))
-    # One action of one fixture is something, and accounted for.
+
+    def one(frame):
+        """One action of one fixture, executed; all others have rows and generated nothing."""
+        only = of(frame) & (frame["fixture"] == "held_out")
+        return frame.assign(generated=only.astype(int), executed=only.astype(int))
+
+    evidence.edit_table(ladder, "shadow/counts.parquet", one)
     assert asked(ladder, conservation_error, "flow", gate="C").value == 0.0
 
 
@@ -118,3 +124,17 @@ def test_a_candidate_that_generated_nothing_shows_nothing(ladder):
 def test_each_part_of_the_balance_counts(name):
     one_more = [n + (place == 2) for place, n in enumerate(_runs()[name])]
     assert unaccounted(_runs(**{name: one_more}), ["fixture"]) == 1
+
+
+@pytest.mark.parametrize("fixture", ["held_out", "stale_observation"])
+@pytest.mark.parametrize(
+    ("criterion", "table"),
+    [(stub_stale, "stub"), (stub_invalid, "stub"), (stub_violation_upper, "stub"),
+     (conservation_error, "counts")],
+)  # fmt: skip
+def test_a_fixture_of_which_nothing_is_counted_gives_no_verdict(ladder, criterion, table, fixture):
+    """What arrived of the fixture that was to be refused is in the rows that are not there."""
+    path = f"shadow/{table}.parquet"
+    evidence.edit_table(ladder, path, lambda f: f[f["fixture"] != fixture])
+    with pytest.raises(MissingEvidenceError, match=f"nothing is counted of {fixture}"):
+        asked(ladder, criterion, "flow", gate="C")

@@ -116,3 +116,15 @@ def test_an_action_lost_and_a_reason_too_many_do_not_cancel(ladder):
     assert asked(ladder, safety.conservation_error, "flow", gate="D").value == 1.0
     evidence.edit_table(ladder, "stress/counts.parquet", cells("count", 11, where=of, share=0.01))
     assert asked(ladder, safety.conservation_error, "flow", gate="D").value == 2.0
+
+
+@pytest.mark.parametrize(
+    ("criterion", "path"),
+    [(safety.stub_violations, "stress/stub.parquet"),
+     (safety.conservation_error, "stress/conservation.parquet")],
+)  # fmt: skip
+def test_a_condition_of_which_nothing_is_counted_gives_no_verdict(ladder, criterion, path):
+    """All that went wrong went wrong under the perturbation whose rows are not there."""
+    evidence.edit_table(ladder, path, lambda f: f[f["perturbation"] != "camera_delay"])
+    with pytest.raises(MissingEvidenceError, match="nothing is counted of camera_delay"):
+        asked(ladder, criterion, "flow", gate="D")
