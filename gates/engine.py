@@ -37,13 +37,15 @@ from genpolicy.integrity.hashing import sha256_bytes_of
 UNRECORDED = "Judged outside the pipeline: dvc.lock holds no run of"
 LIBRARIES = (
     "numpy", "pandas", "pyarrow", "pydantic", "scipy",
-    "scikit-learn", "torch", "mujoco", "pin",
+    "scikit-learn", "torch", "mujoco", "pin", "numba",
 )  # fmt: skip
 """What judges, and what the evidence comes from: the audit, the networks, the arm, its motion."""
 REGIME = (
     "bit-equal for the same wheels, CPU capability, one thread and one batch shape; "
     "elsewhere samples within 1e-5 and the same verdict"
 )
+ASTRIDE = "the limit lies inside the interval: more of the same evidence decides"
+"""Said of what is neither shown to hold nor shown to be broken."""
 
 
 @dataclass(frozen=True)
@@ -208,7 +210,10 @@ def _answer(
     threshold = limit.limit if limit else None
     if limit and item.derived:
         threshold = rounded(item.derived(inputs))
-    verdict = judge_criterion(value, threshold, item.comparison)
+    verdict = judge_criterion(value, threshold, item.comparison, interval)
+    caveat = measured.caveat
+    if verdict == "INCONCLUSIVE" and value is not None and threshold is not None:
+        caveat = f"{caveat}; {ASTRIDE}" if caveat else ASTRIDE
     if measured.pending and verdict != "PASS" and limit is not None:
         verdict = "PENDING_REVIEW"
     return Answer(
@@ -223,7 +228,7 @@ def _answer(
         reason=limit.reason if limit else "no limit in params.yaml",
         verdict=verdict,
         evidence=tuple(touched),
-        caveat=measured.caveat,
+        caveat=caveat,
     )
 
 
@@ -252,7 +257,8 @@ def _diagnosis(spec: GateSpec, judged: Judged) -> str:
         lacking = "No criterion decided: criteria, limits, the task's identity or a record lack."
         return "" if judged.verdict == "PASS" else lacking
     of = f" of {decided.candidate}" if decided.candidate else ""
-    why = f" ({decided.caveat})" if decided.measured is None and decided.caveat else ""
+    said = ASTRIDE if decided.caveat.endswith(ASTRIDE) else decided.caveat
+    why = f" ({said})" if said and (decided.measured is None or said == ASTRIDE) else ""
     look_at = next(item.look_at for item in spec.criteria if item.id == decided.id)
     return f"First unmet: {decided.id}{of}{why}. {look_at}"
 

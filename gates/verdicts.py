@@ -23,13 +23,35 @@ def margin(measured: float, limit: float, comparison: Comparison) -> float:
     return limit - measured if comparison == "<=" else measured - limit
 
 
-def judge_criterion(measured: float | None, limit: float | None, comparison: Comparison) -> Verdict:
-    """Verdict of one criterion; INCONCLUSIVE without a finite number on both sides."""
+def judge_criterion(
+    measured: float | None,
+    limit: float | None,
+    comparison: Comparison,
+    interval: tuple[float, float] | None = None,
+) -> Verdict:
+    """Verdict of one criterion: shown to hold, shown to be broken, or neither.
+
+    Args:
+        measured: The number that must hold; the worse end of the interval, where there is one.
+        limit: What it is held against.
+        comparison: How it must stand to the limit.
+        interval: What else the number may be, lower end first. A limit inside it is not shown to
+            be broken: other episodes of the same truth would have met it.
+
+    Returns:
+        INCONCLUSIVE without a finite number on both sides, or where the limit is not met and the
+        better end of the interval meets it.
+    """
     if measured is None or limit is None:
         return "INCONCLUSIVE"
     if not (math.isfinite(measured) and math.isfinite(limit)):
         return "INCONCLUSIVE"
-    return "PASS" if margin(measured, limit, comparison) >= 0 else "FAIL"
+    if margin(measured, limit, comparison) >= 0:
+        return "PASS"
+    better = None if interval is None else interval[0 if comparison == "<=" else 1]
+    return (
+        "INCONCLUSIVE" if better is not None and margin(better, limit, comparison) >= 0 else "FAIL"
+    )
 
 
 def worst(verdicts: Iterable[Verdict]) -> Verdict:

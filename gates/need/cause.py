@@ -67,7 +67,8 @@ def as_the_cause(
         raise MissingEvidenceError(f"{answer.what}: {answer.note}")
     unit = numbers.metre if question in IN_METRES else 1.0
     text = "; ".join(filter(None, [answer.what, answer.note, also]))
-    return Measured(answer.measured / unit, answer.interval, text)
+    interval = answer.interval and (answer.interval[0] / unit, answer.interval[1] / unit)
+    return Measured(answer.measured / unit, interval, text)
 
 
 def _limits(settings: NeedSettings) -> CauseLimits:

@@ -58,7 +58,8 @@ def _ratio_of_runs(
     if len(first) < FEWEST:
         raise MissingEvidenceError(f"{len(first)} process of each run tells nothing of another")
     _, lower, upper = ratio_of_means(first, second, confidence=settings.confidence)
-    slower = max(upper, 1.0 / lower)
+    # Slower over faster: what stands on both sides of 1 may be none.
+    least, slower = max(1.0, lower, 1.0 / upper), max(upper, 1.0 / lower)
     text = (
         f"{np.median(first) * MILLI:.4g} ms and {np.median(second) * MILLI:.4g} ms, {temperature}, "
         f"over {len(first)} processes each; {_least_stable(rows, temperature)}"
@@ -67,7 +68,7 @@ def _ratio_of_runs(
     if limit is not None and limit.limit is not None and limit.limit > 1.0:
         spread = spread_found(limit.limit, len(first), confidence=settings.confidence)
         text += f"; equal runs pass in four of five if processes differ by {spread:.2g} at most"
-    return Measured(slower, interval=(lower, upper), caveat=text)
+    return Measured(slower, interval=(least, slower), caveat=text)
 
 
 def _least_stable(rows: pd.DataFrame, temperature: str) -> str:

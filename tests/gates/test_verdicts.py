@@ -72,6 +72,30 @@ def test_just_beyond_the_limit_fails_and_the_other_side_passes(measured, limit, 
     assert judge_criterion(measured, limit, other[comparison]) == "PASS"
 
 
+@pytest.mark.parametrize(
+    ("measured", "interval", "comparison", "verdict"),
+    [(0.6, (0.4, 0.6), "<=", "INCONCLUSIVE"), (0.6, (0.5, 0.6), "<=", "INCONCLUSIVE"),
+     (0.6, (0.5 + 1e-9, 0.6), "<=", "FAIL"), (0.5, (0.4, 0.5), "<=", "PASS"),
+     (0.4, (0.4, 0.6), ">=", "INCONCLUSIVE"), (0.4, (0.4, 0.5), ">=", "INCONCLUSIVE"),
+     (0.4, (0.4, 0.5 - 1e-9), ">=", "FAIL"), (0.5, (0.5, 0.6), ">=", "PASS"),
+     (0.6, (math.nan, math.nan), "<=", "FAIL"), (0.6, (-math.inf, 0.6), "<=", "INCONCLUSIVE")],
+)  # fmt: skip
+def test_a_limit_inside_the_interval_is_neither_kept_nor_broken(
+    measured, interval, comparison, verdict
+):
+    """By luck nothing passes, and by luck nothing fails."""
+    assert judge_criterion(measured, 0.5, comparison, interval) == verdict
+
+
+@given(NUMBERS, NUMBERS, NUMBERS, st.sampled_from(["<=", ">="]))
+def test_an_interval_never_makes_a_pass(one, other, limit, comparison):
+    low, high = sorted((one, other))
+    worse = high if comparison == "<=" else low
+    alone = judge_criterion(worse, limit, comparison)
+    found = judge_criterion(worse, limit, comparison, (low, high))
+    assert (found == "PASS") is (alone == "PASS")
+
+
 def test_a_number_is_known_to_twelve_digits():
     assert rounded(0.1 + 0.2) == 0.3 and rounded(1.0000000000004) == 1.0
     assert rounded(1.00000000001) == 1.00000000001  # the twelfth digit still counts

@@ -6,6 +6,7 @@ import pandas as pd
 import pytest
 from asked import asked, found_in
 
+from gates.engine import ASTRIDE
 from gates.evidence import MissingEvidenceError
 from gates.feasibility.candidates import (
     admissible,
@@ -41,7 +42,7 @@ def test_a_p95_is_judged_at_the_upper_end_over_observations(ladder, criterion, c
     found = asked(ladder, criterion, "flow", gate="C")
     assert found.interval == (0.001, 900.0) and found.value == 900.0
     assert "p95 0.001, largest 900" in found.caveat or "p95 900" in found.caveat
-    assert judge(ladder, "C").candidates["flow"] == "FAIL"
+    assert judge(ladder, "C").candidates["flow"] == "INCONCLUSIVE"
 
 
 @pytest.mark.parametrize("criterion", [projection_p95_m, boundary_jerk_p95_m_s3])
@@ -111,10 +112,15 @@ def test_the_worse_end_of_the_gap_decides(ladder):
     assert found.verdict == "PASS" and 8 / 60 < found.interval[1] == found.measured < 0.3
     evidence.edit_table(ladder, CANDIDATES, _reject("right", 16))
     report, found = _gap(ladder)
-    assert report.verdict == found.verdict == "FAIL"
+    assert report.verdict == found.verdict == "INCONCLUSIVE"
     assert found.interval[0] < 16 / 60 < 0.3 < found.measured
+    assert ASTRIDE in found.caveat and ASTRIDE in report.diagnosis
     assert "upper bound of left minus right" in found.caveat
     assert "left 1 of 60, right 0.7333 of 60 episodes" in found.caveat
+    evidence.edit_table(ladder, CANDIDATES, _reject("right", 32))
+    report, found = _gap(ladder)
+    assert report.verdict == found.verdict == "FAIL" and 0.3 < found.interval[0]
+    assert ASTRIDE not in found.caveat
 
 
 def test_the_gap_counts_whichever_mode_is_removed(ladder):

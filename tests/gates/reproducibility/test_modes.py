@@ -27,8 +27,11 @@ def test_a_noisy_point_policy_that_samples_between_the_modes_is_red(ladder):
 
 
 def test_samples_far_from_every_mode_lie_outside_as_well(ladder):
-    evidence.edit_table(ladder, MODES, cells("far_from_modes", 6))
+    evidence.edit_table(ladder, MODES, cells("far_from_modes", 14))
     assert red(judge(ladder, "B")) == {"outside_modes_upper"}
+    evidence.edit_table(ladder, MODES, cells("far_from_modes", 6))
+    report = judge(ladder, "B")
+    assert (report.verdict, red(report)) == ("INCONCLUSIVE", set())
 
 
 @pytest.mark.parametrize(("fewest", "passes"), [(0, False), (1, False), (2, True)])
