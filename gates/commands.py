@@ -16,7 +16,7 @@ import typer
 
 from genpolicy.cli.commands import Contract, Format, Recordings, TaskName
 from genpolicy.cli.shell import AsJson, examples, new_app, with_examples
-from genpolicy.errors import BadInputError
+from genpolicy.errors import BadInputError, GenpolicyError
 
 if TYPE_CHECKING:
     from gates.proof import Rung
@@ -97,7 +97,7 @@ def check(
     codes = {rung.exit_code for rung in rungs if rung.verdict != "PASS"}
     if last == "E" and not codes:
         require_history(root)
-    return _worst(codes | _front_page(root))
+    return _worst(codes | _pages(root))
 
 
 @gates.command("verify", epilog=examples("genpolicy gates verify --json"))
@@ -119,7 +119,7 @@ def verify_reports(root: Root = Path(), as_json: AsJson = False) -> int:
     rungs = rederived(root, rungs)
     _print_rungs(rungs, as_json)
     codes = {rung.exit_code for rung in rungs if rung.verdict == "REFUSED"}
-    return _worst(codes | _front_page(root))
+    return _worst(codes | _pages(root))
 
 
 @gates.command(epilog=examples("genpolicy gates show C"))
@@ -250,14 +250,19 @@ def _require_beneath(root: Path) -> None:
         rederive(root, gate)
 
 
-def _front_page(root: Path) -> set[int]:
-    """Exit code of a front page that says other than the reports; none where it says the same."""
-    from gates.writing import INDEX, changed_index
+def _pages(root: Path) -> set[int]:
+    """Exit code of a printed page that says other than the reports; none where all say the same."""
+    from gates.writing import changed_page
 
-    if not changed_index(root):
+    try:
+        page = changed_page(root)
+    except GenpolicyError as error:
+        print(error, file=sys.stderr)
+        return {error.exit_code}
+    if not page:
         return set()
     print(
-        f"{INDEX} is another page, expected the one that the reports give. Run "
+        f"{page} is another page, expected the one that the reports give. Run "
         "`dvc repro -f gate_a`, which prints it again; never edit a page.",
         file=sys.stderr,
     )

@@ -9,8 +9,9 @@ from pathlib import Path
 
 from gates.pages.page import gate_page, index_page
 from gates.pages.summary import markdown
+from gates.pipeline import recorded_pages
 from gates.proof import judge
-from gates.report import Gate, GateReport, report_bytes, report_path
+from gates.report import GATES, Gate, GateReport, read_report, report_bytes, report_path
 from genpolicy.errors import BadInputError
 from genpolicy.integrity.atomic import write_bytes
 
@@ -45,14 +46,34 @@ def write_index(root: Path) -> Path:
     return path
 
 
-def changed_index(root: Path) -> bool:
-    """Whether the first page is another one than the reports that lie there give.
+def changed_page(root: Path) -> str:
+    """The first printed page that is another one than the reports give; empty if none is.
 
-    No stage has it as an output, since every gate prints it again: so it is printed once more and
-    compared, where a gate's own pages are held against the recorded run.
+    The first page has no record, since every gate prints it again, and neither have those of a
+    gate whose entry was taken out of `dvc.lock`: these are printed once more and compared. All
+    others are held against the recorded run where the report is proved.
+
+    Raises:
+        GenpolicyError: A report or its evidence cannot be read.
     """
     path = root / INDEX
-    return path.is_file() and path.read_bytes() != index_page(root).encode()
+    if path.is_file() and path.read_bytes() != index_page(root).encode():
+        return INDEX
+    for gate in GATES:
+        base = root / report_path(gate)
+        if not base.is_file():
+            continue
+        recorded = recorded_pages(root, gate)
+        for suffix in (".md", ".html"):
+            page = base.with_suffix(suffix)
+            name = page.relative_to(root).as_posix()
+            if not page.is_file() or name in recorded:
+                continue
+            report, _ = read_report(root, gate)
+            again = markdown(report) if suffix == ".md" else gate_page(root, report)
+            if page.read_bytes() != again.encode():
+                return name
+    return ""
 
 
 def _remove(path: Path) -> None:

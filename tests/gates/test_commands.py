@@ -107,6 +107,19 @@ def test_a_front_page_that_says_other_than_the_reports_refuses(ladder, _run, com
     assert _run(ladder, *command).exit_code == 0
 
 
+@pytest.mark.parametrize("suffix", ["html", "md"])
+@pytest.mark.parametrize("command", [("verify",), ("check", "--through", "A")])
+def test_a_page_that_no_run_recorded_is_printed_again_and_compared(ladder, _run, command, suffix):
+    """A forged page, and its entry taken out of the lock: nothing held it to anything."""
+    assert _run(ladder, "judge", "A").exit_code == 0
+    page = ladder / "reports" / f"gate_a.{suffix}"
+    page.write_text(page.read_text().replace("PASS", "FAIL", 1))
+    result = _run(ladder, *command)
+    _clean(result)
+    assert result.exit_code == 3
+    assert f"reports/gate_a.{suffix} is another page" in result.output
+
+
 def test_a_front_page_of_reports_that_are_gone_refuses(ladder, _run):
     assert _run(ladder, "judge", "A").exit_code == 0
     (ladder / "reports" / "gate_d.json").unlink()

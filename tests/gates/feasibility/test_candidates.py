@@ -119,7 +119,7 @@ def test_the_worse_end_of_the_gap_decides(ladder):
     assert "left 1 of 60, right 0.7333 of 60 episodes" in found.caveat
     evidence.edit_table(ladder, CANDIDATES, _reject("right", 32))
     report, found = _gap(ladder)
-    assert report.verdict == found.verdict == "FAIL" and 0.3 < found.interval[0]
+    assert report.verdict == found.verdict == "FAIL" and found.interval[0] > 0.3
     assert ASTRIDE not in found.caveat
 
 
