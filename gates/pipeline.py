@@ -145,12 +145,6 @@ def changed_pages(root: Path, gate: Gate) -> str:
     return ""
 
 
-def recorded_pages(root: Path, gate: Gate) -> set[str]:
-    """Paths that the recorded run of a gate wrote below `reports/`."""
-    run = stages_of(root, LOCK).get(stage_of(gate)) or {}
-    return {str(entry.get("path")) for entry in run.get("outs") or ()}
-
-
 def outputs_of(root: Path, gate: Gate) -> tuple[str, ...]:
     """Every file below the folders of a gate's evidence stages, by path, sorted."""
     names: set[str] = set()

@@ -9,9 +9,9 @@ from pathlib import Path
 
 from gates.pages.page import gate_page, index_page
 from gates.pages.summary import markdown
-from gates.pipeline import recorded_pages
+from gates.pipeline import LOCK, stages_of
 from gates.proof import judge
-from gates.report import GATES, Gate, GateReport, read_report, report_bytes, report_path
+from gates.report import GATES, Gate, GateReport, read_report, report_bytes, report_path, stage_of
 from genpolicy.errors import BadInputError
 from genpolicy.integrity.atomic import write_bytes
 
@@ -63,7 +63,8 @@ def changed_page(root: Path) -> str:
         base = root / report_path(gate)
         if not base.is_file():
             continue
-        recorded = recorded_pages(root, gate)
+        run = stages_of(root, LOCK).get(stage_of(gate)) or {}
+        recorded = {str(entry.get("path")) for entry in run.get("outs") or ()}
         for suffix in (".md", ".html"):
             page = base.with_suffix(suffix)
             name = page.relative_to(root).as_posix()
