@@ -260,6 +260,7 @@ def _diagnosis(spec: GateSpec, judged: Judged) -> str:
     said = ASTRIDE if decided.caveat.endswith(ASTRIDE) else decided.caveat
     why = f" ({said})" if said and (decided.measured is None or said == ASTRIDE) else ""
     look_at = next(item.look_at for item in spec.criteria if item.id == decided.id)
+    look_at = f"Should it be broken: {look_at}" if said == ASTRIDE else look_at
     return f"First unmet: {decided.id}{of}{why}. {look_at}"
 
 

@@ -20,9 +20,10 @@ from gates.report import stage_of
 from gates.settings import read_limits, read_params, read_settings
 
 ONE_MODE = "Gate D asks that in motion, against `one_mode_bc`."
-SIMPLER = (
-    "Next: run the simpler policy that is named above; nothing in the data has to be mended. Where "
-    "its interval holds the limit, it may do or may not: record more episodes to know."
+SIMPLER = "Next: run the simpler policy that is named above; nothing in the data has to be mended."
+OPEN = (
+    "Next: record more episodes, to know whether the simpler policy that is named above is enough; "
+    "nothing in the data has to be mended."
 )
 SIMPLER_ASKED = frozenset(
     item.id
@@ -46,7 +47,10 @@ def _cause(judged: Judged) -> str:
     text = f"Cause found by the audit: {cause.text}."
     unmet = {answer.id for answer in judged.answers if answer.verdict != "PASS"}
     if cause.name is CauseName.VALID_MODES and unmet and unmet <= TRAINED_ASKED:
-        return f"{text} {SIMPLER}" if unmet & SIMPLER_ASKED else text
+        broken = {answer.id for answer in judged.answers if answer.verdict == "FAIL"}
+        if not unmet & SIMPLER_ASKED:
+            return text
+        return f"{text} {SIMPLER if broken & SIMPLER_ASKED else OPEN}"
     if judged.verdict != "PASS":
         return f"{text} Next: {cause.next_action}"
     return f"{text} One mode alone may still be enough: {ONE_MODE}"

@@ -1,10 +1,12 @@
 """Gate A as a whole: nothing waives the cause, and every red number of the data stops it."""
 
 import evidence
+import numpy as np
 import pytest
 from editing import cells
 
 from gates.cause import default_limits
+from gates.engine import ASTRIDE
 from gates.proof import judge
 from genpolicy.audit.rows import Finding
 from genpolicy.integrity.rows import write_rows
@@ -137,6 +139,25 @@ def test_where_a_simpler_policy_may_do_the_page_sends_nobody_to_the_data(ladder)
     assert "Train the simple baselines" not in report.diagnosis
     evidence.edit_table(ladder, "audit/clocks.parquet", evidence.lags_apart)
     assert "run the simpler policy" not in judge(ladder, "A").diagnosis
+
+
+def test_where_it_is_open_whether_a_simpler_policy_does_nobody_is_told_to_take_it(ladder):
+    """Valid in about half of the situations, where at most half may be: more of them decide."""
+    evidence.edit_table(
+        ladder,
+        "measure_baselines/modes.parquet",
+        lambda f: f.assign(
+            **{
+                key: np.where((f["method"] == "bc_noise") & (f["index"] % 2 == 0), 16, f[key])
+                for key in ("admissible", "valid")
+            }
+        ),
+    )
+    report = judge(ladder, "A")
+    assert verdicts(report)["remedy_valid_share"] == report.verdict == "INCONCLUSIVE"
+    assert "record more episodes, to know whether the simpler policy" in report.diagnosis
+    assert "run the simpler policy" not in report.diagnosis
+    assert f"({ASTRIDE}). Should it be broken: Baselines:" in report.diagnosis
 
 
 def _independent(entries):
