@@ -89,6 +89,17 @@ CHECKS_ASKED_FOR = (
     "execution.pace",
     "execution.watchdog",
 )
+NOT_ASKED_OF_EVERY_TASK = (
+    "geometric.scene_collision",
+    "geometric.swept_collision",
+    "dynamic.payload_torque",
+    "contact.approach_direction",
+    "contact.contact_speed",
+    "contact.contact_surface",
+    "contact.contact_force",
+)
+"""Checks that a task without obstacles, without a held part or without contact has no chunk for.
+No other check may be excused, whatever reason the evidence gives."""
 INCIDENTS_ASKED_FOR = {
     "phase_change_on_the_way": "phase_transition",
     "calibration_change_on_the_way": "calibration_mismatch",

@@ -160,7 +160,8 @@ class Evidence:
         for pattern in patterns:
             for file in sorted(self.root.glob(pattern)):
                 name = file.relative_to(self.root).as_posix()
-                self._materials.setdefault(name, sha256_file(file))
+                if name not in self._materials:
+                    self._materials[name] = sha256_file(file)
                 bound.append(name)
         return bound
 

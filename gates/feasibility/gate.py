@@ -3,13 +3,13 @@
 from gates.criterion import criteria_of
 from gates.engine import GateSpec
 from gates.feasibility import arrivals, candidates, incidents, proof
-from gates.feasibility.settings import SHADOW, FeasibilitySettings
+from gates.feasibility.settings import JOURNALS, SHADOW, FeasibilitySettings
 
 GATE = GateSpec(
     gate="C",
     settings=FeasibilitySettings,
     criteria=criteria_of(vars(candidates), vars(arrivals), vars(incidents), vars(proof)),
-    bind=(f"{SHADOW}/journal.mcap", f"{SHADOW}/gallery.json"),
+    bind=(JOURNALS, f"{SHADOW}/gallery.json"),
     back_to="the generator or the projection",
     go_on="Compare every passing candidate with the simpler policies on identical starts.",
     caveats=(

@@ -6,6 +6,7 @@ from gates.asked_for import CHECKS_ASKED_FOR
 from gates.settings import CandidateSettings
 
 SHADOW = "artifacts/shadow"
+JOURNALS = f"{SHADOW}/*.mcap"
 CANDIDATES = f"{SHADOW}/candidates.parquet"
 LAYERS = ("representation", "kinematic", "geometric", "dynamic", "contact", "fresh")
 REASONS = tuple(

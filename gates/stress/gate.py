@@ -15,7 +15,7 @@ from gates.preregistration import PREREGISTRATION
 from gates.stress import cost, safety, trial
 from gates.stress.choice import choose
 from gates.stress.pairs import paired_differences
-from gates.stress.rollouts import ROLLOUTS, STRESS, StressSettings
+from gates.stress.rollouts import JOURNALS, ROLLOUTS, StressSettings
 from genpolicy.evidence.rows.stress import RolloutRow
 from genpolicy.statistics.eprocess import paired_e_value
 
@@ -74,7 +74,7 @@ GATE = GateSpec(
     gate="D",
     settings=StressSettings,
     criteria=criteria_of(vars(trial), vars(cost), vars(safety), globals()),
-    bind=(f"{STRESS}/journals/*.mcap", PREREGISTRATION),
+    bind=(JOURNALS, PREREGISTRATION),
     back_to="the simpler policy",
     go_on="Draft the trial card.",
     caveats=(

@@ -14,7 +14,10 @@ from genpolicy.evidence.rows.stress import RolloutRow
 
 STRESS = "artifacts/stress"
 ROLLOUTS = f"{STRESS}/rollouts.parquet"
+JOURNALS = f"{STRESS}/journals/*.mcap"
 INVOCATIONS = f"{STRESS}/invocations.parquet"
+SUCCESS = "success"
+"""How a rollout ended that succeeded."""
 NOMINAL = "nominal"
 DRILL = "recovery_drill"
 """Condition in which recovery is called for on every start, so that it is exercised."""
@@ -81,7 +84,8 @@ def rollouts(evidence: Evidence, settings: StressSettings, method: str) -> pd.Da
     """Rollouts of a method under the planned conditions.
 
     Raises:
-        MissingEvidenceError: A condition is missing, or has fewer starts than planned.
+        MissingEvidenceError: A condition is missing, has fewer starts than planned, or a rollout
+            counts as another end than the one it came to.
     """
     rows = evidence.of(ROLLOUTS, RolloutRow, method)
     rows = rows[rows["perturbation"].isin(settings.perturbations)]
@@ -94,7 +98,23 @@ def rollouts(evidence: Evidence, settings: StressSettings, method: str) -> pd.Da
             f"{method} has {int(per_condition.min())} starts in {per_condition.idxmin()}, "
             f"planned {settings.planned_starts}"
         )
+    _require_as_it_ended(rows, method)
     return rows
+
+
+def _require_as_it_ended(rows: pd.DataFrame, method: str) -> None:
+    """Success is judged and the end is not: a rollout in which they differ was edited, or is wrong.
+
+    Raises:
+        MissingEvidenceError: They differ.
+    """
+    differ = rows[flags(rows, "success") != (rows["outcome"] == SUCCESS).to_numpy()]
+    if len(differ):
+        row = differ.iloc[0]
+        raise MissingEvidenceError(
+            f"rollout {method}, {row['perturbation']}, start {row['start']}: success is "
+            f"{row['success']}, and it ended in {row['outcome']}"
+        )
 
 
 def in_every_condition(

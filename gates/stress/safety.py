@@ -7,7 +7,7 @@ from gates.criterion import Measured, criterion
 from gates.evidence import Evidence, MissingEvidenceError, counts, flags
 from gates.feasibility.arrivals import at_the_stub, require_played
 from gates.feasibility.proof import checked_violations
-from gates.stress.rollouts import STRESS, StressSettings, rollouts
+from gates.stress.rollouts import JOURNALS, STRESS, StressSettings, rollouts
 from genpolicy.evidence.rows.stress import ConservationRow, StressCountRow, StressStubRow
 
 
@@ -106,4 +106,4 @@ def conservation_error(evidence: Evidence, settings: StressSettings, candidate: 
 )
 def checker_violations(evidence: Evidence, settings: StressSettings) -> Measured:
     """Violations that the independent checker found in the journals."""
-    return checked_violations(evidence, STRESS)
+    return checked_violations(evidence, STRESS, JOURNALS)

@@ -76,7 +76,7 @@ FILES = (
     "reload/identity.json",
     "shadow/journal.mcap",
     "stress/rollouts.parquet",
-    "stress/journals/flow__nominal.mcap",
+    "stress/journals/a.mcap",
 )
 
 

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gates.asked_for import CHECKS_ASKED_FOR
+from gates.asked_for import CHECKS_ASKED_FOR, NOT_ASKED_OF_EVERY_TASK
 from genpolicy.evidence.shadow import layer_mutants
-from genpolicy.evidence.shadow.corruption import CORRUPTIONS
+from genpolicy.evidence.shadow.corruption import CORRUPTIONS, always
 from genpolicy.evidence.shadow.layer_mutants import RULES, missing_checks_evidence
 from genpolicy.evidence.shadow.observations import spread
 from genpolicy.execution.checks import CHECKS as EXECUTION_CHECKS
@@ -48,6 +48,8 @@ def test_the_gate_asks_for_every_row_of_both_tables():
     expected = [f"{check.layer}.{check.name}" for check in CHECKS]
     expected += [f"execution.{check.name}" for check in EXECUTION_CHECKS]
     assert list(CHECKS_ASKED_FOR) == expected
+    some = [c for c in CORRUPTIONS if c.check and c.applicable is not always]
+    assert {f"{c.layer}.{c.check}" for c in some} == set(NOT_ASKED_OF_EVERY_TASK)
 
 
 @pytest.mark.parametrize("name", [check.name for check in CHECKS])

@@ -6,13 +6,17 @@ import evidence
 import pytest
 from asked import found_in
 
+from gates.asked_for import NOT_ASKED_OF_EVERY_TASK
 from gates.evidence import Evidence, MissingEvidenceError
 from gates.feasibility.proof import checked_violations, mutants_undetected
 from gates.feasibility.settings import SHADOW, FeasibilitySettings
 from gates.proof import judge
 
 ROWS = [evidence.mutant(layer, name) for layer, name in evidence.CHECKS]
-EXCUSED = {**ROWS[0], "detected": False, "tried": 0, "not_applicable": "no gripper"}
+LACKING = [f"{row['layer']}.{row['check']}" for row in ROWS].index("geometric.scene_collision")
+FIRST = ROWS[LACKING]
+REST = ROWS[:LACKING] + ROWS[LACKING + 1 :]
+EXCUSED = {**FIRST, "detected": False, "tried": 0, "not_applicable": "no gripper"}
 
 
 def _undetected(root, rows):
@@ -41,21 +45,21 @@ def test_all_of_them_are_enough(tmp_path):
 
 
 def test_a_check_that_a_task_has_no_chunk_for_is_named_with_its_reason(tmp_path):
-    found = _undetected(tmp_path, [EXCUSED, *ROWS[1:]])
-    assert found.value == 0 and "representation.shape (no gripper)" in found.caveat
+    found = _undetected(tmp_path, [EXCUSED, *REST])
+    assert found.value == 0 and "geometric.scene_collision (no gripper)" in found.caveat
 
 
 @pytest.mark.parametrize("changes", [{"not_applicable": ""}, {"tried": 3}])
 def test_no_reason_or_a_tried_fixture_excuses_nothing(changes, tmp_path):
-    assert _undetected(tmp_path, [EXCUSED | changes, *ROWS[1:]]).value == 1
+    assert _undetected(tmp_path, [EXCUSED | changes, *REST]).value == 1
 
 
 @pytest.mark.parametrize("place", [0, 1])
 def test_an_excuse_does_not_undo_a_failure_of_the_same_check(place, tmp_path):
-    missed = {**ROWS[0], "detected": False}
+    missed = {**FIRST, "detected": False}
     rows = [missed, EXCUSED] if place else [EXCUSED, missed]
-    found = _undetected(tmp_path, [*rows, *ROWS[1:]])
-    assert found.value == 1 and "not detected: representation.shape" in found.caveat
+    found = _undetected(tmp_path, [*rows, *REST])
+    assert found.value == 1 and "not detected: geometric.scene_collision" in found.caveat
 
 
 def test_a_check_that_one_of_its_rows_missed_is_missed(tmp_path):
@@ -63,13 +67,58 @@ def test_a_check_that_one_of_its_rows_missed_is_missed(tmp_path):
     assert found.value == 1
 
 
-@pytest.mark.parametrize("folder", ["shadow", "stress"])
-@pytest.mark.parametrize(("proved", "counts"), [(7, True), (6, False), (0, False), (None, False)])
-def test_an_action_whose_motion_was_not_proved_is_not_proved(folder, proved, counts, tmp_path):
-    document = {**evidence.checked("a.mcap", 7), "reproved_actions": proved}
-    evidence.document(tmp_path, f"{folder}/checker.json", document)
-    if counts:
-        assert checked_violations(Evidence(tmp_path), f"artifacts/{folder}").value == 0
-    else:
-        with pytest.raises(MissingEvidenceError):
-            checked_violations(Evidence(tmp_path), f"artifacts/{folder}")
+@pytest.mark.parametrize(
+    "name", [f"{layer}.{check}" for layer, check in evidence.CHECKS if layer != "execution"]
+)
+def test_only_what_a_task_may_lack_is_excused(name, tmp_path):
+    """With every check of the layers excused the mutants said nothing at all, and passed."""
+    excuse = {"detected": False, "tried": 0, "not_applicable": "no such thing"}
+    rows = [row | excuse if f"{row['layer']}.{row['check']}" == name else row for row in ROWS]
+    assert _undetected(tmp_path, rows).value == (name not in NOT_ASKED_OF_EVERY_TASK)
+
+
+FOLDERS = [("shadow", "a.mcap"), ("stress", "journals/a.mcap")]
+
+
+def _checked(root, folder, journal, **changes):
+    """The finding of one journal, and the journal; and what the gate makes of both."""
+    path = root / "artifacts" / folder / journal
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(b"journal")
+    evidence.document(root, f"{folder}/checker.json", {**evidence.checked("a.mcap", 7), **changes})
+    pattern = f"artifacts/{folder}/{journal.replace('a.mcap', '*.mcap')}"
+    return checked_violations(Evidence(root), f"artifacts/{folder}", pattern)
+
+
+@pytest.mark.parametrize("where", FOLDERS)
+@pytest.mark.parametrize(
+    ("proved", "told"),
+    [(6, "6 of 7 actions was proved"), (0, "0 of 7 actions was proved"),
+     (None, "reproved_actions = None"), (8, "8 proved actions in all, 7 in the journals")],
+)  # fmt: skip
+def test_an_action_whose_motion_was_not_proved_is_not_proved(where, proved, told, tmp_path):
+    assert _checked(tmp_path, *where).value == 0
+    with pytest.raises(MissingEvidenceError, match=told):
+        _checked(tmp_path, *where, reproved_actions=proved)
+
+
+@pytest.mark.parametrize("where", FOLDERS)
+def test_a_journal_that_nobody_checked_and_a_finding_of_none_are_named(where, tmp_path):
+    with pytest.raises(MissingEvidenceError, match=r"do not belong together: a\.mcap$"):
+        _checked(tmp_path, *where, journals={}, checked_actions=0, reproved_actions=0)
+    none = evidence.checked("a.mcap", 0)["journals"]
+    with pytest.raises(MissingEvidenceError, match="7 checked actions in all, 0 in the journals"):
+        _checked(tmp_path, *where, journals=none)
+    many = {f"{k}.mcap": evidence.checked("a", 0)["journals"]["a"] for k in range(4)}
+    with pytest.raises(MissingEvidenceError, match=r"0\.mcap, 1\.mcap, 2\.mcap and 1 more"):
+        found = evidence.checked("a.mcap", 7)["journals"]
+        _checked(tmp_path, *where, journals=found | many)
+
+
+@pytest.mark.parametrize("where", FOLDERS)
+def test_a_violation_counts_wherever_it_is_written(where, tmp_path):
+    found = evidence.checked("a.mcap", 7)["journals"]["a.mcap"]
+    own = {key: value for key, value in evidence.VIOLATION.items() if key != "journal"}
+    inside = {"a.mcap": found | {"violations": [own, own]}}
+    assert _checked(tmp_path, *where, journals=inside).value == 2
+    assert _checked(tmp_path, *where, violations=[evidence.VIOLATION]).value == 1

@@ -18,9 +18,10 @@ def edit(root, change):
 
 def test_conditions_and_seeds_of_a_start_are_one_number(ladder):
     def change(frame):
-        second = frame[frame["method"] == "flow"].assign(seed=1, success=False)
+        second = frame[frame["method"] == "flow"].assign(seed=1, success=False, outcome="timeout")
         own = (frame["method"] == "flow") & (frame["start"] == 4)
-        first = frame.assign(success=frame["success"] | own)
+        ended = frame["outcome"].mask(own, "success")
+        first = frame.assign(success=frame["success"] | own, outcome=ended)
         return type(frame)(np.vstack([first, second]), columns=frame.columns).astype(frame.dtypes)
 
     means = success_by_start(*edit(ladder, change), "flow")

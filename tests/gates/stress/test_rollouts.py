@@ -2,6 +2,7 @@
 
 import evidence
 import pandas as pd
+import pyarrow as pa
 import pytest
 from asked import asked, settings_of
 from editing import cells
@@ -9,15 +10,22 @@ from pydantic import ValidationError
 
 from gates.evidence import Evidence, MissingEvidenceError
 from gates.stress.rollouts import (
+    SUCCESS,
     StressSettings,
     in_every_condition,
     rollouts,
     success_lower,
 )
 from gates.stress.trial import unmatched_starts
+from genpolicy.evidence.stress.state import Outcome
+from genpolicy.integrity.tables import read_table, write_table
 from genpolicy.statistics.intervals import clopper_pearson
 
 TABLE = "stress/rollouts.parquet"
+
+
+def test_the_gate_knows_how_a_success_is_called():
+    assert str(Outcome.SUCCESS) == SUCCESS
 
 
 def of(root, method="flow"):
@@ -63,6 +71,29 @@ def test_the_lowest_bound_over_the_conditions_decides_and_the_starts_are_the_tri
     assert found.caveat.startswith("camera_delay: share 0.25")
     undisturbed = success_lower(Evidence(ladder), settings, "flow", ("nominal",))
     assert undisturbed.value > found.value
+
+
+@pytest.mark.parametrize(
+    ("success", "outcome"), [(True, "collision"), (True, ""), (False, "success")]
+)
+def test_a_rollout_counts_as_it_ended(ladder, success, outcome):
+    """Rollouts marked as successes, whose end was left as it was, passed until their journals
+    were read again."""
+
+    def change(frame):
+        hit = (frame["method"] == "flow") & (frame["start"] == 3)
+        hit &= frame["perturbation"] == "camera_delay"
+        frame = frame.assign(success=frame["success"].mask(hit, success))
+        return frame.assign(outcome=frame["outcome"].mask(hit, outcome))
+
+    assert len(of(ladder))
+    file = ladder / "artifacts" / TABLE
+    frame = change(read_table(file).to_pandas())
+    write_table(file, pa.Table.from_pandas(frame, preserve_index=False))
+    told = rf"rollout flow, camera_delay, start 3: success is {success}, and it ended in {outcome}"
+    with pytest.raises(MissingEvidenceError, match=told):
+        of(ladder)
+    assert len(of(ladder, "diffusion"))
 
 
 def test_a_rollout_without_outcome_is_missing_evidence(ladder):
