@@ -156,16 +156,10 @@ def judge(letter: Letter, root: Root = Path()) -> int:
 def preregister(root: Root = Path()) -> int:
     """Write preregistration.yaml from params.yaml. Commit it, then run the ladder."""
     from gates.preregistration import PREREGISTRATION, plan_bytes
-    from gates.proof import SPECS
-    from gates.report import stage_of
     from gates.settings import read_params
     from genpolicy.integrity.atomic import write_bytes
 
-    comparisons = {
-        stage_of(gate): {item.id: item.comparison for item in spec.criteria}
-        for gate, spec in SPECS.items()
-    }
-    write_bytes(root / PREREGISTRATION, plan_bytes(read_params(root), comparisons))
+    write_bytes(root / PREREGISTRATION, plan_bytes(read_params(root)))
     print(f"Wrote {PREREGISTRATION}. Commit it before the evidence exists.")
     return 0
 

@@ -90,6 +90,18 @@ CAUSE_STRICT: Mapping[str, str] = {
     **dict.fromkeys(("supported_episodes", "supported_share", "denial_share"), ">="),
 }  # fmt: skip
 """On which side a limit of the cause is strict; of those left out, each side accepts something."""
+AT_LEAST = frozenset(
+    (
+        "held_out_situations", "multimodal_situations", "persistence_margin", "mode_success_lower",
+        "mode_feasible_share", "mean_defeated_share", "cause_accepted", "mode_coverage_lower",
+        "admissible_share", "corrupted_refused_share", "verdict_reachable",
+        "nominal_success_lower", "stress_success_lower", "recovery_success_lower",
+        "promotion_e_value", "upstream_passed", "signature_valid", "reviewer_independent",
+        "owners_signed", "not_expired",
+    )
+)  # fmt: skip
+"""Criteria whose number may not be lower than their limit; of all others it may not be higher.
+Written out, not read from the plan: who edits the plan would edit what counts as looser."""
 HEAD = (
     "# Written by `genpolicy gates preregister`. Commit it before the evidence exists; what moves\n"
     "# afterwards shows in the report of every gate that judges by it and on the card.\n"
@@ -112,28 +124,14 @@ class Move:
         return f"{self.place} ({_short(self.before)} -> {_short(self.now)})"
 
 
-def plan_of(
-    params: Mapping[str, Any], comparisons: Mapping[str, Mapping[str, str]]
-) -> dict[str, list[Any]]:
-    """By place: on which side it is strict, and its value.
-
-    Args:
-        params: `params.yaml`.
-        comparisons: By section of a gate, and by criterion: `<=` or `>=`.
-    """
-    found = {place: [item.strict, _at(params, place)] for place, item in PLANNED.items()}
-    found |= {place: [_strict(place), value] for place, value in _all_settings(params).items()}
-    strict = {
-        f"{name}.{item}": side for name in comparisons for item, side in comparisons[name].items()
-    }
-    strict |= {f"{stage_of('A')}.{CAUSE}.{item}": side for item, side in CAUSE_STRICT.items()}
-    found |= {place: [strict.get(place, ""), value] for place, value in _all_limits(params).items()}
-    return found
+def plan_of(params: Mapping[str, Any]) -> dict[str, list[Any]]:
+    """By place: on which side it is strict (`<=`, `>=`, or '' for neither), and its value."""
+    return {place: [_side(place), value] for place, value in _now(params).items()}
 
 
-def plan_bytes(params: Mapping[str, Any], comparisons: Mapping[str, Mapping[str, str]]) -> bytes:
+def plan_bytes(params: Mapping[str, Any]) -> bytes:
     """The file that `preregister` writes."""
-    text = yaml.safe_dump(plan_of(params, comparisons), sort_keys=False, default_flow_style=None)
+    text = yaml.safe_dump(plan_of(params), sort_keys=False, default_flow_style=None)
     return (HEAD + text).encode()
 
 
@@ -154,18 +152,38 @@ def read_plan(root: Path) -> dict[str, list[Any]] | None:
 def moves(plan: Mapping[str, Sequence[Any]], params: Mapping[str, Any]) -> list[Move]:
     """What differs from the plan now, in the order of the plan.
 
-    A limit that was dropped is loosened, a new one tightened; a setting of a section changed.
+    A limit that was dropped is loosened. What the plan does not name was added since, or struck
+    out of the plan: it changed. So did what the plan calls strict on another side than the code.
     """
-    planned = {place: _at(params, place) for place in PLANNED}
-    now = {**planned, **_all_settings(params), **_all_limits(params)}
+    now = _now(params)
     found = []
-    for place, (comparison, before) in plan.items():
+    for place, (stated, before) in plan.items():
+        side = _side(place)
         if place not in now:
             found.append(Move(place, before, None, _of_section(place, "loosened")))
+        elif stated != side:
+            found.append(Move(place, f"{stated} {before}", f"{side} {now[place]}", "changed"))
         elif now[place] != before:
-            found.append(Move(place, before, now[place], _kind(comparison, before, now[place])))
-    new = [place for place in now if place not in plan]
-    return found + [Move(p, None, now[p], _of_section(p, "tightened")) for p in new]
+            found.append(Move(place, before, now[place], _kind(side, before, now[place])))
+    return found + [Move(p, None, now[p], "changed") for p in now if p not in plan]
+
+
+def _now(params: Mapping[str, Any]) -> dict[str, Any]:
+    """All that a plan names, by its place."""
+    planned = {place: _at(params, place) for place in PLANNED}
+    return {**planned, **_all_settings(params), **_all_limits(params)}
+
+
+def _side(place: str) -> str:
+    """On which side a setting is strict; '' where neither is."""
+    if place in PLANNED:
+        return PLANNED[place].strict
+    section, _, name = place.partition(".")
+    if section in SECTIONS:
+        return _strict(place)
+    if name.startswith(f"{CAUSE}."):
+        return CAUSE_STRICT.get(name.partition(".")[2], "")
+    return ">=" if name in AT_LEAST else "<="
 
 
 def asked_by(place: str) -> Gate:

@@ -155,7 +155,7 @@ def test_every_section_that_a_stage_parses_is_among_its_parameters(stage: str) -
 def _judged_by(gate: str) -> set[str]:
     """Places of `params.yaml` that a gate reads: its own section, homes, bounds, and the plan."""
     with (ROOT / "params.yaml").open() as stream:
-        plan = plan_of(yaml.safe_load(stream), {})
+        plan = plan_of(yaml.safe_load(stream))
     reached = GATES[: GATES.index(gate) + 1]
     homes = getattr(SPECS[gate].settings, "homes", {})
     bounds = {bound.place for bound in BOUNDS if bound.gate == gate and "." in bound.place}

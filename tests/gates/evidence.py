@@ -381,7 +381,7 @@ def replace(root: Path, path: str, data: bytes | None) -> None:
 def build(root: Path) -> None:
     """All evidence and settings, without any report."""
     write_params(root)
-    (root / PREREGISTRATION).write_bytes(plan_bytes(PARAMS, {}))
+    (root / PREREGISTRATION).write_bytes(plan_bytes(PARAMS))
     document(root, "task/identity.json", TASK)
     _dataset(root)
     _audit(root)

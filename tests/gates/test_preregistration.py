@@ -21,16 +21,11 @@ from gates.preregistration import (
 from gates.proof import SPECS, judge
 from gates.report import stage_of
 
-COMPARISONS = {
-    stage_of(gate): {item.id: item.comparison for item in spec.criteria}
-    for gate, spec in SPECS.items()
-}
-
 
 def _moved(change):
     params = copy.deepcopy(evidence.PARAMS)
     change(params)
-    return [(m.place, m.kind) for m in moves(plan_of(evidence.PARAMS, COMPARISONS), params)]
+    return [(m.place, m.kind) for m in moves(plan_of(evidence.PARAMS), params)]
 
 
 @pytest.mark.parametrize(
@@ -107,13 +102,13 @@ def test_every_setting_that_actions_are_executed_and_checked_by_is_planned(
     section, name, value, kind
 ):
     params = {**evidence.PARAMS, **SECTION}
-    plan = plan_of(params, COMPARISONS)
+    plan = plan_of(params)
     moved = {**params, section: {**SECTION[section], name: value}}
     assert [(m.place, m.kind) for m in moves(plan, moved)] == [(f"{section}.{name}", kind)]
 
 
 def test_the_force_of_each_phase_is_planned_and_a_setting_that_went_has_changed():
-    plan = plan_of({**evidence.PARAMS, **SECTION}, COMPARISONS)
+    plan = plan_of({**evidence.PARAMS, **SECTION})
     now = {"execution": {**EXECUTION, "force_limit_n": {"open": 50.0, "touch": 1.0}}}
     found = {m.place: m.kind for m in moves(plan, {**evidence.PARAMS, **now})}
     assert found == {
@@ -132,7 +127,7 @@ def test_the_force_of_each_phase_is_planned_and_a_setting_that_went_has_changed(
 )  # fmt: skip
 def test_how_much_is_looked_at_is_planned(section, name, value):
     shadow = {"shadow": {"observations": 400}}
-    plan = plan_of({**evidence.PARAMS, **shadow}, COMPARISONS)
+    plan = plan_of({**evidence.PARAMS, **shadow})
     params = copy.deepcopy({**evidence.PARAMS, **shadow})
     params[section][name] = value
     assert [(m.place, m.kind) for m in moves(plan, params)] == [(f"{section}.{name}", "loosened")]
@@ -159,7 +154,7 @@ def test_a_limit_that_was_dropped_is_loosened_and_a_reason_or_owner_is_free():
 
 
 def test_the_report_binds_the_plan_and_says_what_moved(ladder):
-    (ladder / PREREGISTRATION).write_bytes(plan_bytes(evidence.PARAMS, COMPARISONS))
+    (ladder / PREREGISTRATION).write_bytes(plan_bytes(evidence.PARAMS))
     report = judge(ladder, "D")
     assert PREREGISTRATION in report.materials
     assert not any(PREREGISTRATION in caveat for caveat in report.caveats)
@@ -184,7 +179,7 @@ OWN_LIMIT = {
 
 @pytest.mark.parametrize("gate", OWN_LIMIT)
 def test_what_moved_shows_in_the_report_of_the_gate_and_of_those_above(ladder, gate):
-    (ladder / PREREGISTRATION).write_bytes(plan_bytes(evidence.PARAMS, COMPARISONS))
+    (ladder / PREREGISTRATION).write_bytes(plan_bytes(evidence.PARAMS))
     assert not any(PREREGISTRATION in caveat for caveat in judge(ladder, gate).caveats)
 
     def change(params):
@@ -219,15 +214,13 @@ def _written(tmp_path, plan):
 
 @pytest.mark.parametrize("entry", [["<", 1], ["<="], ["<=", 1, 2], "<=", {"<=": 1}, [1, "<="]])
 def test_one_entry_of_another_form_voids_the_plan(tmp_path, entry):
-    plan = plan_of(evidence.PARAMS, COMPARISONS)
+    plan = plan_of(evidence.PARAMS)
     assert _written(tmp_path, plan) is not None
     assert _written(tmp_path, {**plan, "gate_d.reset_upper": entry}) is None
 
 
 def test_a_plan_names_every_setting_that_is_planned_and_may_name_no_limit(tmp_path):
-    bare = {
-        place: entry for place, entry in plan_of(evidence.PARAMS, {}).items() if place in PLANNED
-    }
+    bare = {place: entry for place, entry in plan_of(evidence.PARAMS).items() if place in PLANNED}
     assert _written(tmp_path, bare) is not None
     for place in bare:
         assert _written(tmp_path, {k: v for k, v in bare.items() if k != place}) is None
@@ -241,11 +234,41 @@ def test_a_limit_that_is_no_number_any_more_changed(before, now):
     evidence.set_limit("gate_d", "reset_upper", now)(changed)
     found = {move.place: move.kind for move in moves(plan, changed)}
     assert found["gate_d.reset_upper"] == "changed"
-    assert found["gate_d.force_peak_p95_n"] == "tightened"  # a limit that nobody planned
+    assert found["gate_d.force_peak_p95_n"] == "changed"  # a limit that nobody planned
+
+
+@pytest.mark.parametrize(
+    ("gate", "item"),
+    [pytest.param(g, c, id=f"{g}-{c.id}") for g, spec in SPECS.items() for c in spec.criteria],
+)
+def test_every_limit_is_strict_on_the_side_of_its_criterion(gate, item):
+    plan = plan_of({stage_of(gate): {"limits": {"model": {item.id: [0.5, "why"]}}}})
+    assert plan[f"{stage_of(gate)}.{item.id}"] == [item.comparison, 0.5]
+
+
+def test_what_counts_as_looser_is_not_read_from_the_plan():
+    """A plan whose side was turned said "Tightened" of a limit that was loosened."""
+    plan = plan_of(evidence.PARAMS)
+    place = "gate_d.fallback_share_upper"
+    side, before = plan[place]
+    plan[place] = [">=", before]
+    params = copy.deepcopy(evidence.PARAMS)
+    evidence.set_limit("gate_d", "fallback_share_upper", 0.9)(params)
+    (move,) = moves(plan, params)
+    assert (move.place, move.kind) == (place, "changed")
+    assert str(move) == f"{place} (>= {before} -> {side} 0.9)"
+    assert [m.kind for m in moves(plan, evidence.PARAMS)] == ["changed"]
+
+
+def test_a_line_struck_out_of_the_plan_is_not_told_as_tightened():
+    plan = {p: e for p, e in plan_of(evidence.PARAMS).items() if p != "gate_d.reset_upper"}
+    assert [(m.place, m.kind) for m in moves(plan, evidence.PARAMS)] == [
+        ("gate_d.reset_upper", "changed")
+    ]
 
 
 def test_the_shipped_plan_can_be_read(request):
     plan = read_plan(request.config.rootpath)
     assert plan is not None
-    text = plan_bytes(yaml.safe_load((request.config.rootpath / "params.yaml").read_text()), {})
+    text = plan_bytes(yaml.safe_load((request.config.rootpath / "params.yaml").read_text()))
     assert set(yaml.safe_load(text)) >= {"stress.margin", "gate_d.stub_violations"}
