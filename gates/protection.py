@@ -115,7 +115,8 @@ class Named:
 
     Attributes:
         gate: Who judges by it.
-        place: Setting in the gate's section.
+        place: Setting in the gate's section; with a dot, from the top of the file. Of a mapping its
+            keys are what it names, or the `kind` of an entry that says one.
         names: The names.
         reason: Why no team may leave one out, or name another.
         at_most: They are what it may name, in place of what it must.
@@ -140,6 +141,13 @@ NAMED: tuple[Named, ...] = (
         "required_fixtures",
         ("stale_observation", "infeasible_rotation", "phase_change", "reordered_chunk"),
         "what is never tried is never refused",
+    ),
+    Named("D", "stress.baselines", ("chunked_bc", "chunked_l1", "bc_noise", "act"), SIMPLER),
+    Named(
+        "D",
+        "stress.perturbations",
+        ("nominal", "camera_delay", "compute_contention", "network_jitter", "queue_reorder"),
+        "what was never injected was never withstood",
     ),
 )
 """`collision` is not among them: a task may have nothing to collide with."""
@@ -186,16 +194,27 @@ def lacking(params: Mapping[str, Any], gate: Gate) -> list[tuple[Named, list[str
     """
     found = []
     for named in NAMED:
-        section = params.get(stage_of(gate)) if named.gate == gate else None
-        if not isinstance(section, Mapping) or named.place not in section:
+        if named.gate != gate or (stated := _stated(params, named)) is None:
             continue
-        stated = section[named.place]
-        stated = list(stated) if isinstance(stated, list | tuple) else [stated]
         inner, outer = (stated, named.names) if named.at_most else (named.names, stated)
         wrong = [str(name) for name in inner if name not in outer]
         if wrong:
             found.append((named, wrong))
     return found
+
+
+def _stated(params: Mapping[str, Any], named: Named) -> list[Any] | None:
+    """What a list names; None where it is not written."""
+    value: Any = params
+    places = named.place.split(".") if "." in named.place else [stage_of(named.gate), named.place]
+    for part in places:
+        if not isinstance(value, Mapping) or part not in value:
+            return None
+        value = value[part]
+    if isinstance(value, Mapping):
+        entries = value.items()
+        return [e.get("kind", name) if isinstance(e, Mapping) else name for name, e in entries]
+    return list(value) if isinstance(value, list | tuple) else [value]
 
 
 def _keeps(value: object, bound: Bound) -> bool:
@@ -219,9 +238,8 @@ def require_protection(params: Mapping[str, Any], gate: Gate) -> tuple[str, ...]
         names = ", ".join([*(bound.place for bound, _ in beyond), *(n.place for n, _ in absent)])
         return (f"{REHEARSED} Looser: {names or 'none of this gate'}.",)
     for bound, value in beyond:
-        place = bound.place if "." in bound.place else f"{stage_of(gate)}: {bound.place}"
         raise ConfigError(
-            where=f"params.yaml: {place}",
+            where=f"params.yaml: {_place(gate, bound.place)}",
             found=repr(value)[:60],
             expected=f"{bound.comparison} {bound.bound:g}, because {bound.reason}",
             action="Tighten it. This bound stands in the code; a rehearsal may go beyond it.",
@@ -230,12 +248,16 @@ def require_protection(params: Mapping[str, Any], gate: Gate) -> tuple[str, ...]
         found = f"{'with' if named.at_most else 'without'} {', '.join(wrong)}"
         what = f"{'nothing but' if named.at_most else 'all that the code names:'}"
         raise ConfigError(
-            where=f"params.yaml: {stage_of(gate)}: {named.place}",
+            where=f"params.yaml: {_place(gate, named.place)}",
             found=found[:200],
             expected=f"{what} {', '.join(named.names)}, because {named.reason}",
             action="Restore it. What it names stands in the code; a rehearsal may differ.",
         )
     return ()
+
+
+def _place(gate: Gate, place: str) -> str:
+    return place if "." in place else f"{stage_of(gate)}: {place}"
 
 
 def _values(params: Mapping[str, Any], bound: Bound) -> list[Any]:

@@ -53,7 +53,7 @@ class StressSettings(CandidateSettings):
     }
 
     candidates: tuple[str, ...] = Field(min_length=1)
-    baselines: tuple[str, ...]
+    baselines: tuple[str, ...] = Field(min_length=1)
     perturbations: tuple[str, ...]
     margin: float = Field(gt=-1.0, lt=1.0)
     family_alpha: float = Field(gt=0.0, lt=1.0)

@@ -79,8 +79,13 @@ CHECKS = (
 BASELINES = ("bc", "chunked_bc", "act")
 REMEDIES = {"chunked_l1": "direct", "one_mode_bc": "direct", "bc_noise": "offset"}
 DRAWN = "ibc"
+COMPARED = (*BASELINES, *REMEDIES)
+"""Baselines that the candidates are compared with, and timed beside."""
 CANDIDATES = ("diffusion", "flow")
-CONDITIONS = ("nominal", "camera_delay", "recovery_drill", "envelope")
+CONDITIONS = (
+    "nominal", "camera_delay", "compute_contention", "network_jitter", "queue_reorder",
+    "recovery_drill", "envelope",
+)  # fmt: skip
 STARTS = 80
 INVOCATIONS = 20
 UPDATES = 4000
@@ -116,7 +121,10 @@ TASK = {
     "robot": "panda",
     **dict.fromkeys(("robot_sha256", "sha256"), "0" * 64),
 }
-SPEED = {"diffusion": 0.02, "flow": 0.01, "bc": 0.004, "chunked_bc": 0.005, "act": 0.006}
+SPEED = {
+    "diffusion": 0.02, "flow": 0.01, "bc": 0.004, "chunked_bc": 0.005, "act": 0.006,
+    "chunked_l1": 0.005, "one_mode_bc": 0.005, "bc_noise": 0.006,
+}  # fmt: skip
 
 
 FIXTURES = (
@@ -172,7 +180,7 @@ PARAMS: dict[str, Any] = {
     "train_generators": {"samplers": {name: {} for name in CANDIDATES}},
     "stress": {
         "starts": STARTS,
-        "baselines": list(BASELINES),
+        "baselines": list(COMPARED),
         "perturbations": {name: {} for name in CONDITIONS},
         "margin": 0.1,
         "alpha": 0.1,
@@ -1121,7 +1129,7 @@ def _latency(root: Path) -> None:
                 "measured_s": SPEED[m] * (1 + level / 10 + 0.01 * process),
                 "drawn_s": SPEED[m] * (1.02 + level / 10),
             }
-            for m in (*CANDIDATES, *BASELINES)
+            for m in (*CANDIDATES, *COMPARED)
             for run in (1, 2)
             for process in (1, 2, 3)
             for level in (0.5, 0.95)
@@ -1298,7 +1306,7 @@ VIOLATION = {"journal": "a.mcap", "session": "s", "event": 7, "rule": "P1.age", 
 
 
 def _succeeds(method: str, start: int) -> bool:
-    if method in BASELINES:
+    if method in COMPARED:
         return start % 2 == 0
     return not (method == "flow" and start == 7)
 
@@ -1309,7 +1317,7 @@ def _answer_s(method: str, lot: int) -> float:
 
 
 def _stress(root: Path) -> None:
-    methods = (*BASELINES, *CANDIDATES)
+    methods = (*COMPARED, *CANDIDATES)
     rows = []
     for method in methods:
         for condition in CONDITIONS:

@@ -111,12 +111,13 @@ def test_a_list_that_leaves_out_a_check_is_bad_configuration_but_in_a_rehearsal(
         if named.at_most
         else ([names, more], [names[1:], [], "all", None])
     )
+    section, _, place = named.place.rpartition(".")
     for kept in good:
-        params[stage_of(gate)] = {named.place: kept}
-        assert lacking(params, gate) == [] == lacking(params, "D")
+        params[section or stage_of(gate)] = {place: kept}
+        assert lacking(params, gate) == [] == lacking(params, "E")
         assert bool(require_protection(params, gate)) == rehearsal
     for broken in bad:
-        params[stage_of(gate)] = {named.place: broken}
+        params[section or stage_of(gate)] = {place: broken}
         if rehearsal:
             assert named.place in require_protection(params, gate)[0]
             continue
@@ -134,6 +135,10 @@ def test_golden_what_each_list_must_or_may_name():
         ("A", "generative_baselines", ("ibc",), True),
         ("C", "required_fixtures",
          ("stale_observation", "infeasible_rotation", "phase_change", "reordered_chunk"), False),
+        ("D", "stress.baselines", ("chunked_bc", "chunked_l1", "bc_noise", "act"), False),
+        ("D", "stress.perturbations",
+         ("nominal", "camera_delay", "compute_contention", "network_jitter", "queue_reorder"),
+         False),
     }  # fmt: skip
 
 
@@ -160,7 +165,18 @@ def test_the_shipped_lists_name_what_they_must(request):
     params = read_yaml(request.config.rootpath / "params.yaml")
     assert [lacking(params, gate) for gate in GATES] == [[]] * len(GATES)
     for named in NAMED:
-        assert named.place in params[stage_of(named.gate)] or named.place in DEFAULTED
+        section, _, place = named.place.rpartition(".")
+        assert place in params[section or stage_of(named.gate)] or place in DEFAULTED
+
+
+def test_a_condition_counts_by_its_kind_and_not_by_its_name():
+    """`camera_delay: {kind: nominal}` is no camera delay, by whatever name it goes."""
+    conditions = {"nominal": {}, "camera_delay": {}, "compute_contention": {}, "queue_reorder": {}}
+    jitter = {"slow_line": {"kind": "network_jitter"}}
+    assert lacking({"stress": {"perturbations": conditions | jitter}}, "D") == []
+    for bad in ({"network_jitter": {"kind": "nominal"}}, {"slow_line": {}}):
+        ((named, wrong),) = lacking({"stress": {"perturbations": conditions | bad}}, "D")
+        assert (named.place, wrong) == ("stress.perturbations", ["network_jitter"])
 
 
 def test_what_a_list_that_is_not_written_stands_for_names_all_that_it_must():

@@ -42,10 +42,11 @@ class InvocationPerturbation(Settings):
     """What hits some invocations.
 
     Attributes:
-        probability: Share of invocations that it hits.
+        probability: Share of invocations that it hits. None, and no size of nothing, is refused: a
+            condition in which nothing happens would pass as one that was met.
     """
 
-    probability: float = Field(default=1.0, ge=0.0, le=1.0)
+    probability: float = Field(default=1.0, gt=0.0, le=1.0)
 
     @abstractmethod
     def hit(self, lot: float) -> Injection:
@@ -60,7 +61,7 @@ class CameraDelay(InvocationPerturbation):
     """The picture comes later; `magnitude_s` is added to the capture, s."""
 
     kind: Literal["camera_delay"] = "camera_delay"
-    magnitude_s: float = Field(ge=0.0)
+    magnitude_s: float = Field(gt=0.0)
 
     def hit(self, lot: float) -> Injection:
         """Always the whole delay."""
@@ -71,7 +72,7 @@ class ComputeContention(InvocationPerturbation):
     """Another load on the machine; measured terms take `factor` times as long."""
 
     kind: Literal["compute_contention"] = "compute_contention"
-    factor: float = Field(ge=1.0)
+    factor: float = Field(gt=1.0)
 
     def hit(self, lot: float) -> Injection:
         """Always the whole factor."""
@@ -82,7 +83,7 @@ class NetworkJitter(InvocationPerturbation):
     """The network takes longer, by up to `magnitude_s`, s, uniformly."""
 
     kind: Literal["network_jitter"] = "network_jitter"
-    magnitude_s: float = Field(ge=0.0)
+    magnitude_s: float = Field(gt=0.0)
 
     def hit(self, lot: float) -> Injection:
         """A share of the magnitude."""
@@ -93,7 +94,7 @@ class QueueReorder(InvocationPerturbation):
     """A chunk waits `magnitude_s`, s, so that a later one may overtake it."""
 
     kind: Literal["queue_reorder"] = "queue_reorder"
-    magnitude_s: float = Field(ge=0.0)
+    magnitude_s: float = Field(gt=0.0)
 
     def hit(self, lot: float) -> Injection:
         """Always the whole wait."""

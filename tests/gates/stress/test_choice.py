@@ -51,7 +51,7 @@ def test_one_that_is_shown_to_be_better_is_promoted_alone(ladder):
         if name in entries
     ]  # fmt: skip
     bad = lambda f: (f["method"] == "flow") & (f["start"] % 3 == 0)  # noqa: E731
-    base = lambda f: f["method"].isin(evidence.BASELINES) & (f["start"] % 5 != 0)  # noqa: E731
+    base = lambda f: f["method"].isin(evidence.COMPARED) & (f["start"] % 5 != 0)  # noqa: E731
     for who in (bad, base):
         for column in ("success", "recovered"):
             evidence.edit_table(ladder, ROLLOUTS, cells(column, False, where=who))
