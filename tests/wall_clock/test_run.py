@@ -8,11 +8,12 @@ import json
 import os
 import signal
 import sys
+import time
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from arranged import HERE, begun, broken_clock, ended, events, violations, wait_for, workspace
+from arranged import HERE, SLOW, begun, broken_clock, ended, events, violations, wait_for, workspace
 
 from genpolicy.errors import ConfigError, GenpolicyError
 from genpolicy.wall_clock.messages import Order
@@ -149,6 +150,20 @@ def test_a_clock_that_is_not_believed_holds_then_stops(fault, pinned, standing, 
     assert seen.supervisor()[-1] == "emergency_stop"
     assert seen.accepted_after(seen.supervisor()[0]) == 0
     assert seen.violations == set()
+
+
+def test_a_supervisor_that_was_paused_stops_before_anything_moves(pinned, standing, tmp_path):
+    """What it slept through is late and silent; the checker sees that nobody was there to hold."""
+    root = linked(pinned, tmp_path)
+    running = begun(root, root / "run", longer(standing, 3), "good")
+    wait_for(lambda: has(events(running.folder), "accept"), "an accepted command")
+    running.supervisor.send_signal(signal.SIGSTOP)
+    time.sleep(1.5 * SLOW["silence_stop_s"])
+    running.supervisor.send_signal(signal.SIGCONT)
+    seen = ended(running)
+    assert seen.supervisor()[-1] == "silence" and seen.outcome["state"] == PROTECTIVE
+    assert seen.accepted_after("silence") == 0 and seen.outcome["missed"] > 0
+    assert seen.violations == {"P2.watchdog"}
 
 
 def test_a_supervisor_that_is_killed_leaves_a_journal_and_begins_stopped(
