@@ -114,6 +114,15 @@ def test_the_buffer_is_bounded_whatever_a_header_promises(pipe):
         assert len(pipe.inbox._buffer) <= HEADER.size + MAXIMUM_PAYLOAD_BYTES + READ_BYTES
 
 
+def test_the_buffer_is_bounded_where_more_comes_than_is_taken(pipe):
+    os.set_blocking(pipe.writer, False)
+    for _ in range(20):
+        with contextlib.suppress(BlockingIOError):
+            os.write(pipe.writer, frame(b"a") * 4000)
+        assert len(pipe.inbox.read()) == MOST_FRAMES
+        assert len(pipe.inbox._buffer) <= HEADER.size + MAXIMUM_PAYLOAD_BYTES + READ_BYTES
+
+
 def test_a_sender_that_dies_in_a_frame_is_counted_once(pipe):
     os.write(pipe.writer, frame(b"whole") + frame(b"half")[:-2])
     os.close(pipe.writer)

@@ -156,6 +156,21 @@ def test_a_clock_that_stands_tells_no_time_and_is_stopped_for(arranged):
     assert arranged.time.slept[0] == PERIOD_S  # it goes on by the system's timer
 
 
+def test_no_wait_is_longer_than_a_period_whatever_the_clock_says(arranged):
+    waits, select = [], arranged.select
+
+    def waited(readable, writable, failed, timeout_s):
+        waits.append(timeout_s)
+        found = select(readable, writable, failed, timeout_s)
+        if len(waits) == 3:
+            arranged.time.now_s -= 50.0
+        return found
+
+    loop_module.select.select = waited
+    arranged.run()
+    assert max(waits) <= PERIOD_S
+
+
 def test_silence_without_a_clock_is_an_emergency_stop_once(arranged):
     arranged.loop._clock = lambda: float("nan")
     arranged.run()

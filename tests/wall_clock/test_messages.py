@@ -51,7 +51,9 @@ def changed(**changes: object) -> bytes:
     [
         b"", b"{}", b"[]", b"null", b"3", b"\xff\xfe", b"[" * 10_000, b"NaN",
         changed(rows=3), changed(rows=0), changed(rows=-2), changed(rows=True),
-        changed(rows=MOST_ROWS + 1), changed(columns=0), changed(columns=1000),
+        changed(rows=MOST_ROWS + 1),
+        Answer("0", "c", "s", "m", np.zeros((MOST_ROWS + 1, 2))).encoded(),
+        changed(columns=0), changed(columns=1000),
         changed(rows="2"), changed(actions="zz"), changed(actions="00"), changed(actions=[1]),
         changed(invocation=3), changed(invocation=None), changed(method="x" * (LONGEST_NAME + 1)),
         changed(task_phase="insert"), changed(valid_until_s=1e9), changed(order="reset"),
