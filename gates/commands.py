@@ -74,6 +74,26 @@ def audit(
     return run_audit(options, opened)
 
 
+@with_examples("genpolicy shadow --method flow --out runs/flow")
+def shadow(
+    method: Annotated[str, typer.Option(help="A method that gate B admits.")],
+    out: Annotated[Path, typer.Option(help="Folder of the run.")],
+    episode: Annotated[str, typer.Option(help="UUID; the first held-out one if absent.")] = "",
+    root: Root = Path(),
+) -> int:
+    """Replay an episode by the wall clock, down to the stub.
+
+    The policy proposes in one process, supervisor and controller stub decide in
+    another, under the pinned limits.yaml; nothing moves. A folder in which a stop
+    stood, or a supervisor died, begins stopped. Exit 3 if gate B does not pass, 1
+    if the independent checker finds a broken rule.
+    """
+    from gates.proof import admit
+    from genpolicy.cli.shadow import ShadowOptions, run_shadow
+
+    return run_shadow(ShadowOptions(root, out, method, episode), admit("shadow", root).candidates)
+
+
 @gates.command(epilog=examples("genpolicy gates check --through C"))
 def check(
     through: Annotated[str, typer.Option(help="Last gate that must pass.")] = "D",

@@ -6,10 +6,11 @@ from genpolicy.errors import ConfigError
 from genpolicy.integrity.documents import read_yaml
 from genpolicy.tasks.fixtures import fixture_hashes, pin, require_pinned
 from genpolicy.tasks.identity import task_identity
+from genpolicy.wall_clock.limits import pin_limits, require_limits
 
 
 def run_fixtures(root: Path, *, task: str | None, write: bool) -> int:
-    """Print the hashes; pin them, or hold them against the pins.
+    """Print the hashes; pin them, or hold them against the pins; limits of a wall clock too.
 
     Args:
         root: Workspace.
@@ -21,10 +22,12 @@ def run_fixtures(root: Path, *, task: str | None, write: bool) -> int:
     """
     name = task or _task_of(root)
     found = pin(root, name) if write else fixture_hashes(task_identity(name))
-    for key, value in found.items():
+    limits = pin_limits(root) if write else {}
+    for key, value in {**found, **limits}.items():
         print(f"{key:<12}{value}")
     if not write:
         require_pinned(root, name, found)
+        require_limits(root)
     return 0
 
 

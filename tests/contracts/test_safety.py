@@ -159,3 +159,80 @@ def test_the_patterns_find_what_they_are_for() -> None:
     assert not MACHINE_PATH.search("artifacts/work/x")
     assert REGISTRY.search("pip install --index-url " + "https://x")
     assert OWN_PRIVATE_HOST.search("http://build." + "internal/x")
+
+
+# What clears a fault, or puts another state or supervisor in the place of one that stopped.
+CLEARS = {"human_reset", "human_resolved"}
+REPLACED = {"supervisor", "state", "_last_accept_ns", "resumed_ns"}
+MAY_CLEAR = {
+    "genpolicy/evidence/shadow/mutants.py": "a mutant without a check, on the test rig",
+    "genpolicy/evidence/shadow/on_the_way.py": "incidents of the shadow evidence",
+    "genpolicy/wall_clock/session.py": "what came by the operator's channel",
+}
+OF_THE_WALL_CLOCK = sorted((ROOT / "genpolicy" / "wall_clock").glob("*.py"))
+MAY_IMPORT = {
+    *("argparse", "collections", "dataclasses", "enum", "functools", "json", "math", "pathlib"),
+    *("os", "queue", "select", "signal", "struct", "subprocess", "sys", "threading", "time"),
+    *("typing", "zlib", "genpolicy", "mcap", "numpy", "pydantic", "yaml"),
+}
+
+
+def clearings(source: str) -> list[str]:
+    """Where a module clears a fault, or replaces what holds one, as `function: what`."""
+    found = []
+    for function in ast.walk(ast.parse(source)):
+        if not isinstance(function, ast.FunctionDef):
+            continue
+        for node in ast.walk(function):
+            if not isinstance(node, ast.Attribute):
+                continue
+            of_self = isinstance(node.value, ast.Name) and node.value.id == "self"
+            stored = isinstance(node.ctx, ast.Store) and not of_self
+            if node.attr in CLEARS or (stored and node.attr in REPLACED):
+                found.append(f"{function.name}: {node.attr}")
+    return found
+
+
+def test_nothing_clears_a_fault_but_the_words_of_a_person() -> None:
+    found = {m: clearings((ROOT / m).read_text()) for m in modules()}
+    assert {module for module, where in found.items() if where} <= set(MAY_CLEAR)
+    assert sorted(found["genpolicy/wall_clock/session.py"]) == [
+        "__init__: supervisor",  # one that takes over begins stopped
+        "obey: human_reset",
+    ]
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["session.stub.supervisor.human_reset(0, 'policy')", "recovery.human_resolved(0, 'policy')",
+     "stub.supervisor = other", "supervisor.state = 'run'", "s.supervisor._last_accept_ns = None"],
+)  # fmt: skip
+def test_each_way_to_clear_a_fault_is_found(line: str) -> None:
+    assert clearings(f"def f():\n    {line}\n")
+
+
+def test_a_person_is_heard_on_the_operators_channel_only() -> None:
+    """What is obeyed was read from it; what the policy says goes to the answers."""
+    tree = ast.parse((ROOT / "genpolicy" / "wall_clock" / "loop.py").read_text())
+    heard = [
+        (ast.unparse(loop.iter), node.func.attr)
+        for loop in ast.walk(tree)
+        if isinstance(loop, ast.For)
+        for node in ast.walk(loop)
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute)
+        and node.func.attr in ("obey", "answer")
+    ]  # fmt: skip
+    assert sorted(heard) == [("self._answers.read()", "answer"), ("self._operator.read()", "obey")]
+    callers = [m for m in modules() if re.search(r"\.obey\(", (ROOT / m).read_text())]
+    assert callers == ["genpolicy/wall_clock/loop.py"]
+
+
+@pytest.mark.parametrize("path", OF_THE_WALL_CLOCK, ids=lambda path: path.name)
+def test_the_processes_of_the_wall_clock_reach_pipes_and_files_only(path: Path) -> None:
+    """Nothing that could speak to a device; only the parent starts a process."""
+    tree = ast.parse(path.read_text())
+    nodes = [n for n in ast.walk(tree) if isinstance(n, ast.Import | ast.ImportFrom)]
+    names = {name.split(".")[0] for node in nodes for name in _imported(node)}
+    assert names <= MAY_IMPORT
+    assert ("subprocess" in names) <= (path.name == "run.py")
+    assert "/dev" not in path.read_text() and "ioctl" not in path.read_text()

@@ -1,0 +1,266 @@
+"""One replay under supervision: the objects of the virtual mode, told what the wall clock says.
+
+Nothing is decided here. Executor, controller stub and supervisor are those of every rollout and
+shadow session, with the whole table of checks; this passes on to them what was recorded, what a
+policy answered and what a person wants. Nothing moves: before each invocation the session is reset
+to where the recorded arm is, which clears no stop.
+"""
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+from genpolicy.candidates.selector import propose
+from genpolicy.contract.chunk import Candidate, ChunkMetadata, DiscardReason
+from genpolicy.errors import ContractError
+from genpolicy.evidence.admission_context import Session
+from genpolicy.execution.cell import Cell
+from genpolicy.execution.executor import Executor
+from genpolicy.execution.ledger import Conservation
+from genpolicy.execution.stub import ControllerStub
+from genpolicy.execution.supervisor import Supervisor
+from genpolicy.feasibility.admission import Admitted, Rejected
+from genpolicy.feasibility.freshness import REASONS
+from genpolicy.feasibility.settings import LAYERS
+from genpolicy.tasks.api import Task
+from genpolicy.wall_clock.admission import Job, Result
+from genpolicy.wall_clock.messages import Answer, Ask, Operator, Order
+from genpolicy.wall_clock.replay import Replay
+from genpolicy.wall_clock.request import WallClockRequest
+from genpolicy.wall_clock.streamed import StreamedJournal
+
+
+@dataclass
+class Asked:
+    """An invocation that has not been decided.
+
+    Attributes:
+        metadata: Of the chunk that is to come.
+        row: Row of the replay that it was asked at.
+        asked_s: When, s.
+        answered_s: When the answer came, s; None before.
+    """
+
+    metadata: ChunkMetadata
+    row: int
+    asked_s: float
+    answered_s: float | None = None
+
+
+@dataclass
+class Tally:
+    """What is counted beside the journal.
+
+    Attributes:
+        dropped: What was not used, by reason.
+        decided_s: From each answer to the decision on it, s.
+        late_s: How late each tick was, s.
+    """
+
+    dropped: Counter[str] = field(default_factory=Counter)
+    decided_s: list[float] = field(default_factory=list)
+    late_s: list[float] = field(default_factory=list)
+
+
+class SupervisedSession:
+    """Supervisor, controller stub and executor of one replay.
+
+    Args:
+        task: The task.
+        cell: What they are held to.
+        request: What is replayed, and who may command.
+        journal: Where every event goes.
+        stop_stands: A session before this one left a stop, or died: this one begins stopped.
+
+    Attributes:
+        ended: A person wants the end.
+        tally: What is counted.
+    """
+
+    def __init__(
+        self,
+        task: Task,
+        cell: Cell,
+        request: WallClockRequest,
+        journal: StreamedJournal,
+        *,
+        stop_stands: bool,
+    ) -> None:
+        self.journal, self.cell, self.tally, self.ended = journal, cell, Tally(), False
+        self._task, self._request = task, request
+        self._replay: Replay = request.replay
+        self.stub = ControllerStub(cell, journal, Supervisor(cell.execution, journal))
+        self.executor = Executor(cell, journal, self.stub)
+        self.executor.set_active(0.0, request.checkpoint, request.sampler)
+        self.executor.controller(0.0, cell.controller_mode)
+        if stop_stands:  # one that takes over in a session that runs begins stopped
+            self.stub.supervisor = Supervisor(cell.execution, journal)
+        self._asked: Asked | None = None
+        self._row = 0
+        self._asks = 0
+
+    def tick(self, now_s: float, row: int) -> Ask | None:
+        """One control period: what was recorded at a row is seen now, and a command is decided.
+
+        Args:
+            now_s: Time, s; NaN where the clock tells none.
+            row: Row of the replay.
+
+        Returns:
+            What the policy is asked next, if anything.
+        """
+        self._row, replay, executor = row, self._replay, self.executor
+        phase = replay.phases[row]
+        executor.observe(now_s, now_s, phase, replay.calibration_epoch)
+        if self.stub.supervisor.observe_force(now_s, replay.forces_n[row], phase):
+            executor.force_event(now_s)
+        executor.tick(now_s)
+        asked = self._asked
+        if asked is not None and not now_s - asked.asked_s <= self.cell.execution.deadline_s:
+            self._give_up(asked, now_s)
+        if self.journal.doubt or self._asked is not None or not executor.needs_invocation(now_s):
+            return None
+        return self._ask(now_s, row)
+
+    def _ask(self, now_s: float, row: int) -> Ask:
+        executor, replay, horizons = self.executor, self._replay, self.cell.horizons
+        phase, start_s = replay.phases[row], row * horizons.action_period_s
+        if self._asks:  # the arm is where the operator brought it, not where the last chunk ended
+            executor.reset(now_s)
+            executor.observe(now_s, now_s, phase, replay.calibration_epoch)
+        metadata = ChunkMetadata(
+            chunk_id=f"{self.journal.session}/{self._asks}",
+            condition_observation_event_time_s=now_s,
+            policy_checkpoint_hash=self._request.checkpoint,
+            sampler_config_hash=self._request.sampler,
+            action_start_time_s=start_s,
+            action_period_s=horizons.action_period_s,
+            valid_until_s=start_s + horizons.execution_horizon * horizons.action_period_s,
+            task_phase=phase,
+            calibration_epoch=replay.calibration_epoch,
+            predecessor_chunk_id=executor.chain_head,
+            session_epoch=executor.session_epoch,
+            method=self._request.method,
+            candidate_index=0,
+        )
+        self._asks += 1
+        self.journal.scene(now_s, self._task.scene_poses(replay.observation_rows[row]))
+        executor.begin_invocation(now_s, metadata.chunk_id)
+        self._asked = Asked(metadata, row, now_s)
+        return Ask(
+            metadata.chunk_id,
+            replay.history(row, horizons.observation_horizon),
+            (replay.episode_uuid, str(row)),
+        )
+
+    def answer(self, answer: Answer, now_s: float, submit: Callable[[Job], bool]) -> None:
+        """A policy answers; only the first answer to what was asked is taken."""
+        asked = self._asked
+        if asked is None or asked.answered_s is not None:
+            self.tally.dropped["unsolicited"] += 1
+            return
+        if answer.invocation != asked.metadata.chunk_id:
+            self.tally.dropped["unsolicited"] += 1
+            return
+        asked.answered_s = now_s
+        asked.metadata = replace(
+            asked.metadata, policy_checkpoint_hash=answer.checkpoint,
+            sampler_config_hash=answer.sampler, method=answer.method,
+        )  # fmt: skip
+        self.executor.end_invocation(now_s, asked.metadata.chunk_id, "answered")
+        replay, row = self._replay, asked.row
+        late_rows = self._row + 1 - row
+        if late_rows >= self.cell.horizons.execution_horizon:
+            self._write_off(asked, DiscardReason.EXPIRED, now_s, dropped="too_late")
+            return
+        taken = submit(
+            Job(
+                proposal=propose([Candidate(asked.metadata, answer.actions)]),
+                history=replay.history(row, min(row + 1, 2)),
+                commanded=replay.commanded(row),
+                session=self._in_force(),
+                event_s=asked.asked_s,
+                now_s=now_s,
+                phase=replay.phases[row],
+                late_rows=late_rows,
+            )
+        )
+        if not taken:
+            self._write_off(asked, DiscardReason.EXPIRED, now_s, dropped="admission_busy")
+
+    def decide(self, job: Job, result: Result, now_s: float) -> None:
+        """What became of an answer: it is enqueued, or counted under one reason."""
+        asked, metadata = self._asked, job.proposal.metadata
+        if asked is None or asked.metadata.chunk_id != metadata.chunk_id:
+            self.tally.dropped["late_verdict"] += 1  # it was given up, and is accounted for
+            return
+        if result is not None:
+            verdict = result.verdict
+            self.journal.candidate(
+                now_s,
+                chunk_id=metadata.chunk_id,
+                method=metadata.method,
+                index=metadata.candidate_index,
+                layers={layer.name: layer.passed for layer in verdict.layers},
+                first_reason=verdict.first_reason or None,
+            )
+        if isinstance(result, Admitted):
+            self._asked = None
+            self.executor.deliver(result, now_s)
+        else:
+            self._write_off(asked, _reason(result), now_s)
+        assert asked.answered_s is not None, "what is decided was answered"
+        self.tally.decided_s.append(now_s - asked.answered_s)
+
+    def obey(self, operator: Operator, now_s: float) -> None:
+        """What a person wants; the only way back from a stop, and it needs a name."""
+        if operator.order is Order.EMERGENCY_STOP:
+            self.stub.supervisor.emergency_stop(now_s, operator.person)
+        elif operator.order is Order.END:
+            self.ended = True
+        else:
+            try:
+                self.stub.supervisor.human_reset(now_s, operator.person)
+            except ContractError:
+                self.tally.dropped["reset_without_a_person"] += 1
+
+    def fail(self, now_s: float, cause: str) -> None:
+        """Something that supervision rests on is gone: E-stop."""
+        self.stub.supervisor.emergency_stop(now_s, cause)
+
+    def end(self, now_s: float) -> Conservation:
+        """What is open is given up, the balance is written down."""
+        if self._asked is not None:
+            self._give_up(self._asked, now_s)
+        return self.executor.end_episode(now_s)
+
+    def _give_up(self, asked: Asked, now_s: float) -> None:
+        if asked.answered_s is None:
+            self.executor.end_invocation(now_s, asked.metadata.chunk_id, "deadline")
+        self._write_off(asked, DiscardReason.EXPIRED, now_s, dropped="deadline")
+
+    def _write_off(
+        self, asked: Asked, reason: DiscardReason, now_s: float, *, dropped: str = ""
+    ) -> None:
+        self._asked = None
+        rows = self.cell.horizons.prediction_horizon
+        self.executor.write_off(asked.metadata, rows, reason, now_s)
+        if dropped:
+            self.tally.dropped[dropped] += 1
+
+    def _in_force(self) -> Session:
+        return Session(
+            calibration_epoch=self._replay.calibration_epoch,
+            session_epoch=self.executor.session_epoch,
+            checkpoint=self._request.checkpoint,
+            sampler=self._request.sampler,
+            maximum_age_s=self.cell.execution.maximum_age_s,
+            controller_mode=self.cell.controller_mode,
+        )
+
+
+def _reason(result: Rejected | None) -> DiscardReason:
+    """Why a chunk is not delivered: a layer rejected it, or it could not be judged."""
+    if result is not None and result.verdict.first_layer == LAYERS[-1]:
+        return REASONS[result.reason]
+    return DiscardReason.INFEASIBLE

@@ -1,0 +1,33 @@
+"""The policy's process answers what it is asked with what the policy samples."""
+
+import os
+import threading
+
+import numpy as np
+from arranged import GUARD_S, wait_for
+
+from genpolicy.wall_clock.channel import Inbox, Outbox
+from genpolicy.wall_clock.messages import Ask, read_answer
+from genpolicy.wall_clock.policy import main
+
+
+def test_an_answer_is_the_sample_of_that_observation(fleet, policy, data):
+    folder = fleet[0] / "flow" / "seed_0"
+    (asks_r, asks_w), (answers_r, answers_w) = os.pipe(), os.pipe()
+    words = [str(folder), policy.checkpoint_hash, "--asks", str(asks_r), "--answers",
+             str(answers_w)]  # fmt: skip
+    serving = threading.Thread(target=main, args=(words,), daemon=True)
+    serving.start()
+    seen = data.frames.observation[:2]
+    outbox, inbox = Outbox(asks_w), Inbox(answers_r)
+    outbox.send(Ask("0", seen, ("episode", "1")).encoded())
+    answer = read_answer(wait_for(inbox.read, "an answer")[0])
+    drawn = policy.sample(seen[None], noise_names=[("episode", "1")], candidates=1)
+    assert answer.actions.tobytes() == np.ascontiguousarray(drawn.actions[0, 0]).tobytes()
+    assert (answer.invocation, answer.method) == ("0", "flow")
+    assert (answer.checkpoint, answer.sampler) == (
+        policy.checkpoint_hash, policy.sampler_config_hash
+    )  # fmt: skip
+    outbox.close()
+    serving.join(GUARD_S)
+    assert not serving.is_alive()

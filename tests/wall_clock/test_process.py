@@ -1,0 +1,62 @@
+"""What the supervisor's process refuses before it begins; the rest is asked of real processes."""
+
+import sys
+
+import pytest
+from arranged import request_of, workspace
+
+from genpolicy.errors import ConfigError
+from genpolicy.wall_clock import process as process_module
+from genpolicy.wall_clock.limits import read_limits
+
+
+@pytest.fixture(autouse=True)
+def alone(monkeypatch):
+    """The tests have loaded policies; a supervisor's process has not."""
+    monkeypatch.setattr(process_module.signal, "signal", lambda *_: None)
+    monkeypatch.setattr(process_module, "LEARNED", ())
+
+
+def begun(folder):
+    return process_module.main([str(folder), "--answers", "0", "--asks", "1", "--operator", "2"])
+
+
+@pytest.mark.parametrize("module", process_module.LEARNED)
+def test_whatever_learned_is_loaded_is_refused(module, monkeypatch):
+    monkeypatch.setattr(process_module, "LEARNED", (module,))
+    monkeypatch.setitem(sys.modules, module, object())
+    with pytest.raises(ConfigError, match=f"with {module} loaded"):
+        process_module._refuse_learned()
+
+
+def test_a_folder_without_a_request_is_refused(tmp_path, capsys):
+    assert begun(tmp_path) == 2
+    assert "request.json is not readable" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"force_limit_n": {"approach": 40.0}, "late_chunk": {"hold": ["approach"]},
+          "recovery_plans": {}}, "expected the task's"),
+        ({"force_limit_n": dict.fromkeys(
+            ("approach", "align", "insert", "release", "retreat", "recover"), 1.0)},
+         "where the supervisor stops"),
+        ({"maximum_age_s": 0.7}, "age of a chunk's last valid action"),
+        ({"watchdog_s": 0.01}, "at least one period"),
+    ],
+)  # fmt: skip
+def test_limits_that_are_not_for_this_cell_are_refused(changes, said, tmp_path):
+    with pytest.raises(ConfigError, match=said):
+        process_module._cell(read_limits(workspace(tmp_path, **changes)))
+
+
+def test_nothing_is_written_before_it_is_allowed_to_begin(standing, tmp_path, capsys):
+    root = workspace(tmp_path)
+    (root / "limits.yaml").write_text("task: another\n")
+    folder = tmp_path / "run"
+    folder.mkdir()
+    request_of(root, standing).write(folder)
+    assert begun(folder) == 2
+    assert "as pinned" in capsys.readouterr().err
+    assert sorted(path.name for path in folder.iterdir()) == ["request.json"]

@@ -1,0 +1,226 @@
+"""One session without a process: ticks, answers and people, in the order that is told here."""
+
+import math
+
+import numpy as np
+import pytest
+from arranged import request_of
+
+from genpolicy.execution.cell import Cell
+from genpolicy.verification.checker import check_messages
+from genpolicy.wall_clock.admission import judge
+from genpolicy.wall_clock.messages import Answer, Operator, Order
+from genpolicy.wall_clock.session import SupervisedSession
+from genpolicy.wall_clock.streamed import StreamedJournal
+
+PERIOD_S = 0.05
+
+
+class Told:
+    """A session, and a judge that answers at once or when it is asked to."""
+
+    def __init__(self, session, task, checker):
+        self.session, self.task, self.checker, self.jobs = session, task, checker, []
+        self.row = -1
+
+    def tick(self, now_s=None):
+        self.row += 1
+        return self.session.tick(self.row * PERIOD_S if now_s is None else now_s, self.row)
+
+    def answer(self, ask, *, at=0.01, **changes):
+        actions = np.tile(self.task.action_at(ask.observations[-1]), (16, 1))
+        said = {"invocation": ask.invocation, "checkpoint": "c" * 64, "sampler": "5" * 64,
+                "method": "m", "actions": actions}  # fmt: skip
+        now_s = self.row * PERIOD_S + at
+        self.session.answer(Answer(**(said | changes)), now_s, self.take)
+
+    def take(self, job):
+        self.jobs.append(job)
+        return True
+
+    def decide(self, at=0.02):
+        job = self.jobs.pop(0)
+        result = judge(self.task, self.checker, job)
+        self.session.decide(job, result, self.row * PERIOD_S + at)
+        return result
+
+    def count(self, kind):
+        return sum(event.kind == kind for event in self.session.journal.events())
+
+    def end(self):
+        return self.session.end((self.row + 1) * PERIOD_S)
+
+    def checked(self):
+        events = self.session.journal.events()
+        report = check_messages(
+            (e.kind, {"session": e.session, "n": e.n, "t": e.t, **e.payload}) for e in events
+        )
+        return {violation.rule for violation in report.violations}
+
+
+@pytest.fixture
+def told(kit, task, checker, standing, tmp_path):
+    return begin(kit, task, checker, standing, tmp_path)
+
+
+def begin(kit, task, checker, standing, tmp_path, *, stop_stands=False, **changes):
+    execution = kit.EXECUTION.model_copy(update={"silence_stop_s": 0.6} | changes)
+    session = SupervisedSession(
+        task, Cell(kit.HORIZONS, execution), request_of(tmp_path, standing),
+        StreamedJournal("m/0", tmp_path / "session_0.mcap"), stop_stands=stop_stands,
+    )  # fmt: skip
+    return Told(session, task, checker)
+
+
+def test_an_answer_is_executed_from_the_next_tick_on(told):
+    ask = told.tick()
+    assert ask.noise == ("still", "0") and ask.observations.shape == (2, 24)
+    told.answer(ask)
+    told.decide()
+    assert told.session.stub.accepted == 0 and told.count("scene") == 1
+    told.tick()
+    assert told.session.stub.accepted == 1
+    told.end()
+    assert told.checked() == set()
+
+
+def test_the_next_ask_begins_where_the_recorded_arm_is(told):
+    told.answer(told.tick())
+    told.decide()
+    asks = []
+    while not asks:
+        asks += [ask for ask in [told.tick()] if ask]
+    assert told.count("reset") == 1 and told.session.executor.session_epoch == 1
+    told.answer(asks[0])
+    told.decide()
+    before = told.session.stub.accepted
+    told.tick()
+    assert told.session.stub.accepted == before + 1
+    told.end()
+    assert told.checked() == set()
+
+
+def test_only_the_first_answer_to_what_was_asked_is_taken(told):
+    ask = told.tick()
+    told.answer(ask, invocation="another")
+    told.answer(ask)
+    told.answer(ask)
+    told.decide()
+    told.answer(ask)
+    assert told.session.tally.dropped == {"unsolicited": 3} and told.jobs == []
+    assert told.count("enqueue") == 1
+
+
+def test_an_answer_after_the_deadline_is_not_taken(told):
+    ask = told.tick()
+    while told.count("discard") == 0:
+        told.tick()
+    told.answer(ask)
+    assert told.session.tally.dropped == {"deadline": 1, "unsolicited": 1}
+    last = told.session.journal.last("discard")
+    assert (last["reason"], last["chunk_id"]) == ("expired", ask.invocation)
+
+
+def test_a_verdict_after_the_deadline_moves_nothing(told):
+    told.answer(told.tick())
+    while told.count("discard") == 0:
+        told.tick()
+    told.decide()
+    told.tick()
+    assert told.session.tally.dropped["late_verdict"] == 1
+    assert told.count("enqueue") == told.session.stub.accepted == 0
+    told.end()
+    assert told.checked() == set()
+
+
+def test_what_nobody_can_judge_now_is_given_up(told):
+    told.take = lambda job: False
+    told.answer(told.tick())
+    assert told.session.tally.dropped == {"admission_busy": 1}
+    assert told.session.journal.last("discard")["reason"] == "expired"
+
+
+def test_an_answer_behind_the_horizon_is_not_judged(kit, task, checker, standing, tmp_path):
+    told = begin(kit, task, checker, standing, tmp_path, deadline_s=5.0)
+    ask = told.tick()
+    for _ in range(kit.HORIZONS.execution_horizon):
+        told.tick()
+    told.answer(ask)
+    assert told.jobs == [] and told.session.tally.dropped == {"too_late": 1}
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"checkpoint": "0" * 64}, "checkpoint_mismatch"),
+        ({"sampler": "0" * 64}, "sampler_mismatch"),
+        ({"actions": np.full((16, 10), np.nan)}, "infeasible"),
+    ],
+)
+def test_what_is_claimed_is_asked(changes, reason, told):
+    told.answer(told.tick(), **changes)
+    told.decide()
+    assert told.session.journal.last("discard")["reason"] == reason
+    assert told.session.stub.arrivals == 0
+
+
+def test_what_could_not_be_judged_is_infeasible(told):
+    told.answer(told.tick())
+    told.session.decide(told.jobs.pop(), None, 0.02)
+    assert told.session.journal.last("discard")["reason"] == "infeasible"
+    assert told.count("candidate") == 0
+
+
+def test_a_recorded_force_above_the_limit_stops(told, kit):
+    limit_n = kit.EXECUTION.force_limit_n[told.session._replay.phases[0]]
+    forces = [limit_n, limit_n + 1e-6] + [0.0] * (len(told.session._replay) - 2)
+    told.session._replay = told.session._replay.model_copy(update={"forces_n": tuple(forces)})
+    told.answer(told.tick())
+    told.decide()
+    assert not told.session.stub.supervisor.stopped
+    told.tick()
+    assert told.session.stub.supervisor.stopped and told.session.stub.accepted == 0
+    assert told.count("invalidate") == 1
+    told.end()
+    assert told.checked() == set()
+
+
+def test_a_clock_that_tells_no_time_asks_for_nothing(told):
+    assert told.tick(math.nan) is None
+    assert told.count("hold") == 1 and told.count("invocation") == 0
+
+
+def test_a_person_stops_and_only_a_named_one_resets(told):
+    told.answer(told.tick())
+    told.decide()
+    told.session.obey(Operator(Order.EMERGENCY_STOP, "spotter"), 0.03)
+    told.tick()
+    told.session.obey(Operator(Order.RESET, " "), 0.06)
+    assert told.session.stub.supervisor.stopped and told.session.stub.accepted == 0
+    told.session.obey(Operator(Order.RESET, "spotter"), 0.07)
+    assert not told.session.stub.supervisor.stopped and not told.session.ended
+    told.session.obey(Operator(Order.END), 0.08)
+    assert told.session.ended
+    told.end()
+    assert told.checked() == set()
+
+
+def test_one_that_follows_a_stop_begins_stopped(kit, task, checker, standing, tmp_path):
+    told = begin(kit, task, checker, standing, tmp_path, stop_stands=True)
+    assert told.tick() is None and told.session.stub.supervisor.stopped
+    assert told.session.journal.last("supervisor")["event"] == "restarted"
+    told.end()
+    assert told.checked() == set()
+
+
+def test_what_is_open_at_the_end_is_accounted_for(told):
+    told.tick()
+    assert told.session.end(0.01).error == 0
+    assert told.session.tally.dropped == {"deadline": 1}
+    assert told.checked() == set()
+
+
+def test_a_cause_without_a_person_is_an_emergency_stop(told):
+    told.tick()
+    told.session.fail(0.01, "no clock")
+    assert told.session.journal.last("supervisor")["detail"] == "no clock"
