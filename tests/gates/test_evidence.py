@@ -101,6 +101,8 @@ def test_a_count_below_zero_is_no_count():
     assert counts(frame, "bad").tolist() == [0.0, 1.0]
     with pytest.raises(MissingEvidenceError, match="column stale counts -3"):
         counts(frame, "stale")
+    with pytest.raises(MissingEvidenceError, match="counts -1"):
+        counts(pd.DataFrame({"stale": [-1]}), "stale")
 
 
 def _empty(column, row=0):

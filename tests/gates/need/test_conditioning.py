@@ -96,6 +96,20 @@ def test_of_several_recorded_columns_only_the_best_is_held_to_the_limit(ladder):
     assert answers["cause_accepted"].verdict == "PASS"
 
 
+def test_columns_that_beat_no_guess_take_no_wrong_guesses_away(ladder):
+    names = ["variable", "told", "told_lower", "told_upper", "detail"]
+
+    def change(frame):
+        frame = frame.head(2).copy()
+        frame.loc[0, names] = ["scenario", 0.1, -0.3, 0.6, ""]
+        frame.loc[1, names] = ["recorded_columns", 0.3, -0.1, 0.45, "scenario"]
+        return frame
+
+    evidence.edit_table(ladder, "audit/predictions.parquet", change)
+    found = asked(ladder, conditioning.told_share, gate="A")
+    assert (found.value, found.caveat) == (0.0, "by itself no recorded column beats a guess")
+
+
 @pytest.mark.parametrize(
     ("lower", "upper", "measured"),
     [(0.1, 0.4, 0.4), (0.1, 0.4001, None), (0.4, 0.6, None), (0.4001, 0.6, 0.4001)],

@@ -39,6 +39,14 @@ def test_the_worse_end_of_the_change_decides(ladder):
     assert found.interval[0] < 0.125 < 0.15 < found.interval[1] == found.measured
 
 
+def test_the_worse_end_of_a_loss_of_samples_decides(ladder):
+    """Half of the situations lose a quarter: the lower end lies further away than the change."""
+    evidence.edit_table(ladder, MODES, lambda f: f.assign(valid=16 - 4 * (f["index"] % 2)))
+    found = found_in(judge(ladder, "B"), "late_change_upper")[0]
+    assert found.verdict == "INCONCLUSIVE" and "valid samples -0.125" in found.caveat
+    assert found.interval[0] < 0.125 < 0.15 < found.interval[1] == found.measured
+
+
 def test_few_situations_cannot_show_that_nothing_changes(ladder):
     found = found_in(judge(ladder, "B"), "late_change_upper")[0]
     assert found.verdict == "PASS" and found.interval[0] == 0.0

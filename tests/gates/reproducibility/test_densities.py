@@ -24,6 +24,16 @@ def test_the_interval_is_over_episodes(ladder):
     assert found.interval == pytest.approx(clopper_pearson(6, 8))
 
 
+def test_situations_of_one_episode_that_differ_count_to_its_disadvantage(ladder):
+    """Twelve of sixteen situations in five episodes are three and three quarters: three count."""
+    evidence.edit_table(
+        ladder, DENSITY, lambda f: f.assign(episode_uuid=[f"e{i % 5}" for i in f["index"]])
+    )
+    found = told(ladder)
+    assert (found.share, found.episodes) == (0.75, 5)
+    assert found.interval == pytest.approx(clopper_pearson(3, 5))
+
+
 def test_a_tie_says_nothing_and_is_counted(ladder):
     """Situation 0 disagreed; now its modes are drawn equally often."""
     evidence.edit_table(

@@ -42,6 +42,16 @@ def test_the_rule_is_the_latency_and_not_the_point_of_success(ladder):
     assert report.promoted == "diffusion" and "either of diffusion, flow" in report.decision
 
 
+def test_no_other_number_stands_for_the_latency(ladder):
+    """A harder touch is no slower answer, though it is the last number that is measured."""
+    for name in evidence.CANDIDATES:
+        own = lambda f, name=name: f["method"] == name  # noqa: E731
+        evidence.edit_table(
+            ladder, ROLLOUTS, cells("force_peak_n", 1.0 if name == "diffusion" else 9.0, where=own)
+        )
+    assert judge(ladder, "D").promoted == "flow"
+
+
 def test_one_that_is_shown_to_be_better_is_promoted_alone(ladder):
     params = lambda p: [  # noqa: E731
         entries[name].__setitem__(0, limit)

@@ -84,6 +84,23 @@ def test_drills_that_succeed_do_not_hide_a_condition_that_is_shown_to_fail(ladde
     assert "worst in camera_delay" in found.caveat
 
 
+def test_starts_that_recover_under_one_seed_only_count_to_its_advantage(ladder):
+    """One of six starts recovers, under one of two seeds: at best that start is a good one."""
+    begun(ladder, "camera_delay", 6, 0)
+
+    def second(frame):
+        rows = frame[of(frame) & (frame["perturbation"] == "camera_delay") & (frame["start"] < 6)]
+        lucky = rows["start"] == 0
+        ended = rows["outcome"].mask(lucky, "success")
+        more = rows.assign(seed=1, recovered=lucky, success=lucky, outcome=ended)
+        return evidence.pd.concat([frame, more], ignore_index=True)
+
+    evidence.edit_table(ladder, ROLLOUTS, second)
+    found = recovery(ladder)
+    assert found.interval == clopper_pearson(1, 6, 0.95) and found.value == found.interval[1]
+    assert found.caveat.startswith("worst in camera_delay: 0.08333 of 12 recoveries")
+
+
 def test_one_failure_of_three_in_a_condition_shows_nothing_about_it(ladder):
     before = recovery(ladder)
     begun(ladder, "camera_delay", 3, 2)
