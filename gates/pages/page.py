@@ -27,6 +27,7 @@ from gates.pages import (
     plots_stress,
     plots_time,
     tables_feasibility,
+    tables_holds,
 )
 from gates.pages.figures import Picturable, Table, draw_all
 from gates.pages.guide import BACK_TO, QUESTIONS, READING, label, words
@@ -55,6 +56,7 @@ PLOTS: dict[str, tuple[Picturable, ...]] = {
         *tables_feasibility.LISTINGS,
         *plots_rejected.GALLERIES,
         *plots_incidents.PLOTS,
+        *tables_holds.LISTINGS,
     ),
     "D": plots_stress.PLOTS,
     "E": (),

@@ -218,7 +218,8 @@ GALLERIES = (
         "to it, the outlines the hand there with what it holds, red what touches. From the side, "
         "filled is what the plane through that action cuts, dotted what stands before or behind "
         "it. Green is the target, grey an obstacle, tinted what lies outside of the workspace. "
-        "Each was judged again when it was chosen.",
+        "Each was judged again when it was chosen. `genpolicy replay` shows the session "
+        "METHOD/held_out/OBSERVATION of the journal in three dimensions.",
         FILE,
         _drawings,
     ),

@@ -34,6 +34,10 @@ IMPORT_EXAMPLES = examples(
     "genpolicy ingest recordings/ --contract contract.yaml --out dataset/",
     "genpolicy ingest pusht_cchi_v7_replay.zarr --out dataset/",
 )
+REPLAY_EXAMPLES = examples(
+    "genpolicy replay artifacts/shadow/journal.mcap \\",
+    "    --session flow/held_out/11 --out rejected.mcap",
+)
 
 
 def program(arguments: Sequence[str]) -> int:
@@ -42,6 +46,7 @@ def program(arguments: Sequence[str]) -> int:
     app.command("propose", epilog=IMPORT_EXAMPLES)(propose)
     app.command("ingest", epilog=IMPORT_EXAMPLES)(ingest)
     app.command("fixtures", epilog=examples("genpolicy fixtures --pin"))(fixtures)
+    app.command("replay", epilog=REPLAY_EXAMPLES)(replay)
     app.command("doctor", epilog=examples("genpolicy doctor --json"))(doctor)
     return run_program(app, "genpolicy", arguments)
 
@@ -99,6 +104,26 @@ def fixtures(
     from genpolicy.cli.fixtures import run_fixtures
 
     return run_fixtures(root, task=task, write=pin)
+
+
+def replay(
+    journal: Annotated[Path, typer.Argument(help="Journal of shadow or stress.")],
+    out: Annotated[Path, typer.Option(help="MCAP file to write.")],
+    session: Annotated[
+        str | None, typer.Option(help="Which one; needed where the journal has several.")
+    ] = None,
+    task: TaskName = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace an old file.")] = False,
+) -> int:
+    """Write a session of a journal for Foxglove.
+
+    The messages of the session are copied, and beside them stands what they
+    say: scene, arm, the action commanded, the chunk proposed, proposals that
+    were rejected with the reason, and a log. The journal is only read.
+    """
+    from genpolicy.cli.replay import run_replay
+
+    return run_replay(journal, out, session=session, task=task, force=force)
 
 
 def doctor(

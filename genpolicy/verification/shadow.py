@@ -1,9 +1,12 @@
 """What a shadow journal says of Gate C's tables, derived again from raw events.
 
-Candidates with their verdicts, what reached the controller stub, and the balance of chunks. Shares
-no code with what wrote the tables, so that a row and its journal are two witnesses.
+Candidates with their verdicts, what reached the controller stub, the balance of chunks, and what
+stood still. Shares no code with what wrote the tables, so that a row and its journal are two
+witnesses.
 """
 
+from collections import Counter
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +19,45 @@ KEYS: dict[str, tuple[str, ...]] = {
     "candidates": ("method", "fixture", "observation", "candidate"),
     "stub": ("method", "fixture"),
     "counts": ("method", "fixture", "reason"),
+    "holds": ("method", "fixture", "phase", "event", "reason"),
 }
 """Tables that are derived here, and the columns by which a row is known."""
+DOUBTS = ("no_time", "clock_backwards", "clock_ahead")
+"""Reasons of a hold, and of the watchdog, that speak of the clock."""
+STOPS = ("protective_stop", "emergency_stop")
+
+
+@dataclass
+class Stillness:
+    """What stood still, while events go by."""
+
+    phases: dict[str, str] = field(default_factory=dict)
+    seen: Counter[tuple[str, ...]] = field(default_factory=Counter)
+
+    def read(self, kind: str, m: Message, key: tuple[str, str]) -> None:
+        """Take an event of a session of this method and fixture in."""
+        session = str(m["session"])
+        if kind == "phase":
+            self.phases[session] = m["new"]
+            return
+        if kind == "hold":
+            found = ("doubt" if m["reason"] in DOUBTS else "hold", m["reason"])
+        elif kind != "supervisor":
+            return
+        elif m["event"] == "watchdog":
+            found = ("watchdog", m["detail"] if m["detail"] in DOUBTS else "silence")
+        elif m["state"] in STOPS:
+            found = ("stop", m["event"])
+        else:
+            return
+        self.seen[(*key, self.phases.get(session, ""), *found)] += 1
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Rows of `holds`."""
+        return [
+            {**dict(zip(KEYS["holds"], key, strict=True)), "count": count}
+            for key, count in sorted(self.seen.items())
+        ]
 
 
 def derived_shadow(path: Path) -> dict[str, list[dict[str, Any]]]:
@@ -35,6 +75,7 @@ def derived_shadow(path: Path) -> dict[str, list[dict[str, Any]]]:
     sessions: dict[str, dict[str, Any]] = {}
     phases: dict[str, str] = {}
     asked: set[tuple[str, str]] = set()
+    still = Stillness()
     candidates = []
     for kind, message in read_messages(path):
         name = str(message.get("session"))
@@ -43,6 +84,7 @@ def derived_shadow(path: Path) -> dict[str, list[dict[str, Any]]]:
             continue
         labels = sessions.get(name, {})
         key = (str(labels.get("method")), str(labels.get("fixture")))
+        still.read(kind, message, key)
         if kind == "observation":
             phases.setdefault(name, str(message["phase"]))
         elif kind == "invocation":
@@ -59,6 +101,7 @@ def derived_shadow(path: Path) -> dict[str, list[dict[str, Any]]]:
             for key, found in played.items()
         ],
         "counts": [row for key, found in played.items() for row in _counts(key, found)],
+        "holds": still.rows(),
     }
 
 

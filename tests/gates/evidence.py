@@ -52,7 +52,12 @@ from genpolicy.evidence.rows.reproducibility import (
     NfeRow,
     SampleRow,
 )
-from genpolicy.evidence.rows.shadow import CandidateRow, ShadowCountRow, ShadowStubRow
+from genpolicy.evidence.rows.shadow import (
+    CandidateRow,
+    ShadowCountRow,
+    ShadowHoldRow,
+    ShadowStubRow,
+)
 from genpolicy.evidence.rows.stress import (
     ConservationRow,
     InvocationRow,
@@ -1186,6 +1191,16 @@ def _candidate(method: str, fixture: str, observation: int, candidate: int) -> d
     }
 
 
+STILL = [
+    *((f, phase, "hold", "empty", 40) for f in PLAYED for phase in ("approach", "insert")),
+    *((f, "approach", "watchdog", "silence", 7) for f in PLAYED),
+    ("clock_backwards_on_the_way", "insert", "doubt", "clock_backwards", 9),
+    ("clock_forward_on_the_way", "insert", "watchdog", "clock_ahead", 1),
+    ("stop_on_the_way", "approach", "hold", "stopped", 12),
+]
+"""Condition, phase, event, reason and how often; no stop, so that the page must say so."""
+
+
 def _shadow(root: Path) -> None:
     table(
         root,
@@ -1251,6 +1266,23 @@ def _shadow(root: Path) -> None:
             }
             for m in CANDIDATES
             for f, reason, moved in INCIDENTS
+        ],
+    )
+    table(
+        root,
+        "shadow/holds.parquet",
+        ShadowHoldRow,
+        [
+            {
+                "method": m,
+                "fixture": f,
+                "phase": phase,
+                "event": event,
+                "reason": reason,
+                "count": n * (1 + (m == "flow")),
+            }
+            for m in CANDIDATES
+            for f, phase, event, reason, n in STILL
         ],
     )
     document(root, "shadow/checker.json", checked("journal.mcap", 1000))

@@ -15,7 +15,12 @@ from gates.rederive_shadow import SHADOW, rederive_shadow
 from genpolicy.errors import BadInputError, ConfigError, IntegrityError, RefusedError
 from genpolicy.evidence.documents.gallery import GALLERY
 from genpolicy.evidence.documents.shadow import EXECUTION, ExecutionMutant, LayerMutant
-from genpolicy.evidence.rows.shadow import CandidateRow, ShadowCountRow, ShadowStubRow
+from genpolicy.evidence.rows.shadow import (
+    CandidateRow,
+    ShadowCountRow,
+    ShadowHoldRow,
+    ShadowStubRow,
+)
 from genpolicy.evidence.shadow.gallery import gallery_of
 from genpolicy.evidence.shadow.observations import held_out_observations
 from genpolicy.evidence.shadow.settings import ShadowSection
@@ -28,7 +33,12 @@ from genpolicy.integrity.tables import read_table
 from genpolicy.seeds import stream
 from genpolicy.verification.shadow import KEYS
 
-ROWS = {"candidates": CandidateRow, "stub": ShadowStubRow, "counts": ShadowCountRow}
+ROWS = {
+    "candidates": CandidateRow,
+    "stub": ShadowStubRow,
+    "counts": ShadowCountRow,
+    "holds": ShadowHoldRow,
+}
 LAYERS_TRIED = [
     LayerMutant(
         check="shape", layer="representation", fixture="shape", behind=[], detected=True, tried=3,
@@ -160,6 +170,7 @@ def test_forged_actions_of_a_candidate_are_refused(root, column):
 @pytest.mark.parametrize(("name", "column"), [
     ("stub", "delivered"), ("stub", "arrivals"), ("stub", "stale"), ("stub", "invalid"),
     ("counts", "generated"), ("counts", "executed"), ("counts", "queued"), ("counts", "count"),
+    ("holds", "count"),
 ])  # fmt: skip
 def test_a_forged_count_is_refused_by_name(root, name, column):
     rows = rows_of(root, name)

@@ -1,4 +1,4 @@
-"""Rows of shadow: candidates, the stub and the balance of actions."""
+"""Rows of shadow: candidates, the stub, the balance of actions, and what stood still."""
 
 from dataclasses import dataclass
 
@@ -103,5 +103,28 @@ class ShadowCountRow:
     generated: int
     executed: int
     queued: int
+    reason: str
+    count: int
+
+
+@dataclass(frozen=True)
+class ShadowHoldRow:
+    """`holds.parquet` of shadow: when the executor did not command, and what the supervisor said.
+
+    Attributes:
+        method: The method.
+        fixture: `held_out`, the corruption, or the incident.
+        phase: Task phase of the newest observation that was used.
+        event: `hold` is a tick that held; `doubt` one that held because its time was not believed;
+            `watchdog` a silence after which the supervisor began to hold; `stop` a protective or
+            emergency stop.
+        reason: Why: what was empty or discarded, what is wrong with the clock, what stopped.
+        count: How often.
+    """
+
+    method: str
+    fixture: str
+    phase: str
+    event: str
     reason: str
     count: int

@@ -1,4 +1,4 @@
-"""The shadow evidence as files: candidates, stub, balances, journal, checker, mutants, gallery."""
+"""The shadow evidence as files: candidates, stub, balances, holds, journal, checker and others."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,8 +13,14 @@ from genpolicy.evidence.documents.shadow import (
     LayerMutant,
     Mutant,
 )
-from genpolicy.evidence.rows.shadow import CandidateRow, ShadowCountRow, ShadowStubRow
+from genpolicy.evidence.rows.shadow import (
+    CandidateRow,
+    ShadowCountRow,
+    ShadowHoldRow,
+    ShadowStubRow,
+)
 from genpolicy.evidence.shadow.found import ShadowEvidence
+from genpolicy.evidence.shadow.holds import hold_rows
 from genpolicy.evidence.shadow.mutants import run_mutants
 from genpolicy.execution.cell import Cell
 from genpolicy.execution.journal import write_journal
@@ -57,8 +63,10 @@ def write_shadow(
         for row in account_rows(accounts)
     ]
     write_rows(folder / "counts.parquet", ShadowCountRow, counts)
+    sessions = [session for item in found for session in item.sessions]
+    write_rows(folder / "holds.parquet", ShadowHoldRow, hold_rows(sessions))
     journal = folder / "journal.mcap"
-    write_journal(journal, [session for item in found for session in item.sessions])
+    write_journal(journal, sessions)
     CHECKER.write(folder, checker_document([journal], cell=cell, robot=robot))
     MUTANTS.write(folder, all_mutants(mutants))
     GALLERY.write(folder, gallery)

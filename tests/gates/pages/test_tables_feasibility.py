@@ -90,4 +90,5 @@ def test_the_page_shows_the_table_and_folds_the_rest(copied, judged):
     assert found == [
         "Every phase with every mode (5)", "Reasons that rejected nothing (38)",
         "What corrupted fixtures were refused for (5)",
+        "Every condition (30)", "Every phase (12)",
     ]  # fmt: skip
