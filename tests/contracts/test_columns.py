@@ -33,6 +33,7 @@ NO_FRAMES = {
     "row": "a limit or an epoch of a page, or one row of a frame that is checked where it is read",
     "record": "a record of times",
     "names": "a namespace",
+    "payload": "an event of a journal",
     "runs": "the regime of the arithmetic, by name",
     "config.parameters": "counts of parameters by part",
     "manifest": "a JSON document",
