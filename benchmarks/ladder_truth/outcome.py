@@ -82,7 +82,8 @@ class Expected:
     Attributes:
         gate: Letter.
         criteria: Ids of criteria, any of which names the wrong.
-        refusal: Pattern of the refusal that names it; empty where a criterion must.
+        refusal: Pattern of the refusal that names it; empty where a criterion must. Evidence that a
+            criterion says it cannot be measured from is refused too, in the words of its gate.
         candidate: Method whose verdict it must be; empty for any.
     """
 
@@ -97,9 +98,13 @@ class Expected:
             return False
         if stop.reason in self.criteria:
             return True
-        return bool(
-            stop.reason == "refusal" and self.refusal and re.search(self.refusal, stop.detail)
-        )
+        said = stop.detail if stop.reason == "refusal" else _unmeasured(stop.detail)
+        return bool(self.refusal and said and re.search(self.refusal, said))
+
+
+def _unmeasured(detail: str) -> str:
+    """Why a criterion says that nothing can be measured; empty where it measured something."""
+    return detail.partition("(not measured: ")[2]
 
 
 @dataclass

@@ -51,6 +51,18 @@ STOPS = {
     "the same criterion of another gate": (Stop("C", "nfe_mismatch", ""), "elsewhere"),
     "a refusal in the named words": (Stop("B", "refusal", "sampler.steps is 3"), "right"),
     "a refusal in other words": (Stop("B", "refusal", "no space left"), "elsewhere"),
+    "not measured, in the named words": (
+        Stop("B", "x", "None, limit <= 1 (not measured: sampler.steps is 3)"),
+        "right",
+    ),
+    "not measured, in other words": (
+        Stop("B", "x", "None, limit <= 1 (not measured: no rows)"),
+        "elsewhere",
+    ),
+    "measured, and the words by chance": (
+        Stop("B", "x", "2, limit <= 1 (sampler.steps is 3)"),
+        "elsewhere",
+    ),
 }
 
 

@@ -23,8 +23,8 @@ ROOT = Path(__file__).parents[2]
 HERE = Path(__file__).parent
 GUARD_S = 120.0
 """No test waits longer for what must happen; nothing is judged by how long it took."""
-PERIOD_S = 0.1
-SLOW = {"deadline_s": 0.6, "watchdog_s": 1.0, "maximum_age_s": 0.65, "silence_stop_s": 2.0}
+PERIOD_S = 0.2
+SLOW = {"deadline_s": 1.2, "watchdog_s": 2.0, "maximum_age_s": 1.3, "silence_stop_s": 4.0}
 
 
 def workspace(root: Path, **changes: Any) -> Path:
@@ -114,6 +114,18 @@ class Ended:
 def ended(running, number: int = 0) -> Ended:
     outcome = running.wait(GUARD_S)
     return Ended(outcome, events(running.folder, number), violations(running.folder))
+
+
+def answered(root: Path, replay: Replay, behaviour: str) -> Ended:
+    """A run in which the first answer came in time, the third at the latest.
+
+    On a machine that is busy with something else it may not, and then there is nothing to stop.
+    """
+    for attempt in range(3):
+        seen = ended(begun(root, root / f"run_{attempt}", replay, behaviour))
+        if seen.outcome["accepted"]:
+            break
+    return seen
 
 
 def violations(folder: Path) -> set[str]:

@@ -57,7 +57,7 @@ def misbehave(behaviour: str, number: int, good: Answer, out: int) -> None:
     elif behaviour == "operator":  # words of a person, from the policy
         send(out, frame(Operator(Order.RESET, "spotter").encoded()) + plain)
     elif behaviour == "late":
-        time.sleep(1.0)
+        time.sleep(2.0)  # beyond the slow deadline of `arranged`
         send(out, plain)
     else:
         raise SystemExit(f"no behaviour {behaviour}")

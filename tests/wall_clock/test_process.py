@@ -42,7 +42,7 @@ def test_a_folder_without_a_request_is_refused(tmp_path, capsys):
         ({"force_limit_n": dict.fromkeys(
             ("approach", "align", "insert", "release", "retreat", "recover"), 1.0)},
          "where the supervisor stops"),
-        ({"maximum_age_s": 0.7}, "age of a chunk's last valid action"),
+        ({"maximum_age_s": 1.4}, "age of a chunk's last valid action"),
         ({"watchdog_s": 0.01}, "at least one period"),
     ],
 )  # fmt: skip

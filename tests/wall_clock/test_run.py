@@ -13,7 +13,18 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from arranged import HERE, SLOW, begun, broken_clock, ended, events, violations, wait_for, workspace
+from arranged import (
+    HERE,
+    SLOW,
+    answered,
+    begun,
+    broken_clock,
+    ended,
+    events,
+    violations,
+    wait_for,
+    workspace,
+)
 
 from genpolicy.errors import ConfigError, GenpolicyError
 from genpolicy.wall_clock.messages import Order
@@ -57,7 +68,7 @@ TABLE = (
 @pytest.mark.parametrize("incident", TABLE, ids=lambda row: row.injected)
 def test_a_policy_that_fails_is_held_then_stopped_for(incident, pinned, standing, tmp_path):
     root = linked(pinned, tmp_path)
-    seen = ended(begun(root, root / "run", standing, incident.injected))
+    seen = answered(root, standing, incident.injected)
     outcome = seen.outcome
     assert seen.violations == set()
     assert seen.kinds().count("accept") == outcome["accepted"] > 0
@@ -74,7 +85,7 @@ def test_a_policy_that_fails_is_held_then_stopped_for(incident, pinned, standing
 
 def test_a_policy_that_answers_is_executed(pinned, standing, tmp_path):
     root = linked(pinned, tmp_path)
-    seen = ended(begun(root, root / "run", standing, "good"))
+    seen = answered(root, standing, "good")
     assert seen.violations == set()
     assert (seen.outcome["state"], seen.outcome["dropped"]) == (RUN, {})
     assert seen.outcome["accepted"] > 0 and seen.outcome["chunks"]["executed"] > 1
