@@ -13,6 +13,8 @@ from typing import Any
 from gates.proof import Rung
 from gates.rederive_dataset import TRAININGS, rederive_dataset, rederive_trainings, trainings
 from gates.rederive_distilled import rederive_costs, rederive_distilled
+from gates.rederive_disturbance import rederive_disturbance
+from gates.rederive_draws import rederive_rollout_draws, rederive_shadow_draws
 from gates.rederive_latency import rederive_latency
 from gates.rederive_sessions import rederive_sessions
 from gates.rederive_shadow import SHADOW, TaskSection, rederive_shadow
@@ -84,7 +86,8 @@ def rederive(root: Path, gate: Gate) -> None:
 
     Raises:
         RefusedError: A row, the envelope or a finding of the checker is not what the journals say,
-            a stated latency is not what the measured times give, or a power, a mutant, a
+            a stated latency is not what the measured times give, a push or a drill not what was
+            planned, a chunk not what its checkpoint draws again, or a power, a mutant, a
             statistic, a split or the cost of a distillation is not what is computed again.
         IntegrityError: A journal or a table is missing or no regular file.
         BadInputError: A journal or a table cannot be read.
@@ -104,9 +107,12 @@ def rederive(root: Path, gate: Gate) -> None:
     rederive_sessions(root, gate, params, journals)
     if gate == "C":
         rederive_shadow(root, params)
+        rederive_shadow_draws(root, params)
     else:
         _tables(root, params, journals)
         rederive_latency(root, params, journals)
+        rederive_disturbance(params, journals)
+        rederive_rollout_draws(root, params, journals)
         rederive_distilled(root, training_seed(params))
         _envelope(root, params)
         _power(root, params)

@@ -64,11 +64,19 @@ def rederive_sessions(
 
 def _maker(root: Path, method: str, seed: object) -> Maker | None:
     """Weights and sampler of a trained policy; None where there is none of the name."""
+    folder = checkpoint_of(root, method, seed)
+    if folder is None:
+        return None
+    sampler = mapping(mapping(read_json(folder / "config.json")).get("sampler"))
+    return identity(folder), sha256_bytes(canonical_json(sampler))
+
+
+def checkpoint_of(root: Path, method: str, seed: object) -> Path | None:
+    """Folder of a trained policy; None where there is none of the name."""
     for stage in (BASELINES, GENERATORS):
         folder = root / "artifacts" / stage / method / f"seed_{seed}"
         if (folder / "config.json").is_file():
-            sampler = mapping(mapping(read_json(folder / "config.json")).get("sampler"))
-            return identity(folder), sha256_bytes(canonical_json(sampler))
+            return folder
     return None
 
 

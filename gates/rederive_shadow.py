@@ -46,7 +46,7 @@ def rederive_shadow(root: Path, params: Mapping[str, Any]) -> None:
     """Hold the tables of the shadow test against its journal, and ask the layers again.
 
     Its mutants are tried again, and the examples of its gallery chosen, judged and drawn up again
-    from the table and the dataset. That a policy drew those actions is not asked again.
+    from the table and the dataset. That a policy drew those actions is asked in `rederive_draws`.
 
     Raises:
         RefusedError: A row is not what the journal says, or a mutant or an example is not what is

@@ -229,7 +229,7 @@ def _enqueue_payload(chunk: QueuedChunk) -> Payload:
         "calibration_epoch": metadata.calibration_epoch,
         "checkpoint": metadata.policy_checkpoint_hash, "sampler": metadata.sampler_config_hash,
         "session_epoch": metadata.session_epoch, "predecessor": metadata.predecessor_chunk_id,
-        "rows": about.rows, "actions": encode_actions(admitted.actions),
+        "rows": about.rows, "raw": _raw(admitted), "actions": encode_actions(admitted.actions),
         "actions_sha256": admitted.actions_sha256,
         "checked_rows": list(admitted.verdict.rows),
         "layers": {layer.name: bool(layer.passed) for layer in admitted.verdict.layers},
@@ -254,3 +254,9 @@ def _motion(admitted: "Admitted") -> Payload | None:
         "last_action": encode_actions(context.last_action),
         "scene": encode_poses(context.scene.bodies),
     }
+
+
+def _raw(admitted: "Admitted") -> str:
+    """The actions as drawn, where projection changed a bit of them; else empty."""
+    raw = encode_actions(admitted.drawn)
+    return "" if raw == encode_actions(admitted.actions) else raw

@@ -28,7 +28,7 @@ from genpolicy.integrity.hashing import sha256_bytes_of
 
 Array = NDArray[np.float64]
 
-JOURNAL_VERSION = 6
+JOURNAL_VERSION = 7
 CLOCK_AHEAD = "clock_ahead"
 LONGEST_JUMP_NS = 60 * NS_PER_S
 """No component of a session is silent for longer; a clock that is further ahead is doubted."""
@@ -46,10 +46,11 @@ EVENT_FIELDS: dict[str, tuple[str, ...]] = {
     "active": ("checkpoint", "sampler"),
     "controller": ("mode",),
     "invocation": ("id", "stage", "detail"),
+    "conditioning": ("id", "key", "rows", "history"),
     "candidate": ("chunk_id", "method", "index", "layers", "first_reason", "measures"),
     "enqueue": ("arrival", "chunk_id", "source", "method", "condition_ns", "start_ns", "period_ns",
                 "valid_until_ns", "phase", "calibration_epoch", "checkpoint", "sampler",
-                "session_epoch", "predecessor", "rows", "actions", "actions_sha256",
+                "session_epoch", "predecessor", "rows", "raw", "actions", "actions_sha256",
                 "checked_rows", "layers", "motion"),
     "discard": ("arrival", "chunk_id", "at", "reason", "ended", "rows"),
     "finish": ("arrival", "chunk_id", "ended", "rows"),
@@ -63,6 +64,7 @@ EVENT_FIELDS: dict[str, tuple[str, ...]] = {
     "mode": ("old", "new"),
     "reset": ("session_epoch",),
     "force": ("force_n",),
+    "push": ("force_n", "duration_s", "in_contact"),
     "outcome": ("outcome", "mode"),
     "end": ("chunks", "actions", "events"),
 }  # fmt: skip
@@ -168,6 +170,23 @@ class Journal:
         """Record the begin of an invocation, the check of another candidate, or the end."""
         payload = {"id": invocation_id, "stage": stage, "detail": detail}
         self.add("invocation", self.clock(now_s), payload)
+
+    def conditioning(
+        self, now_s: float, *, invocation_id: str, key: Sequence[str | int], history: Array
+    ) -> None:
+        """Record what an invocation draws from, so that anybody can draw again.
+
+        Args:
+            now_s: Time, s.
+            invocation_id: The invocation.
+            key: Names of its noise; with the checkpoint they say which numbers are drawn.
+            history: The observations that it sees, oldest first. Shape (H_o, D_o).
+        """
+        payload = {
+            "id": invocation_id, "key": list(key), "rows": len(history),
+            "history": encode_actions(history),
+        }  # fmt: skip
+        self.add("conditioning", self.clock(now_s), payload)
 
     def last(self, *kinds: str) -> dict[str, Any] | None:
         """Payload of the newest event of one of these kinds; None without one."""

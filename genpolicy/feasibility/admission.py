@@ -114,6 +114,11 @@ class Admitted:
         return self.projected.actions
 
     @property
+    def drawn(self) -> Array:
+        """Actions before projection, read-only. Shape (K, D_a)."""
+        return self.projected.proposal.actions
+
+    @property
     def metadata(self) -> ChunkMetadata:
         """What the chunk rests on."""
         return self.projected.metadata

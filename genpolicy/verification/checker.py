@@ -277,6 +277,8 @@ class _Session:
         data = bytes.fromhex(m["actions"])
         if len(data) * 2 != m["rows"] * ROW_HEX_DIGITS:
             self.flag("P1.admitted", f"{chunk_id!r} has not {m['rows']} rows of {ACTION_DIM}.")
+        if m["raw"] and len(m["raw"]) != len(m["actions"]):
+            self.flag("P1.admitted", f"{chunk_id!r} was projected from another number of rows.")
         if hashlib.sha256(data).hexdigest() != m["actions_sha256"]:
             self.flag("P1.hash", f"The actions of {chunk_id!r} are not those that were admitted.")
         layers = m["layers"]

@@ -6,6 +6,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import yaml
 from makers import maker, write_policy
@@ -98,6 +99,8 @@ def _session(name: str, start: int) -> Journal:
         executor.observe(now_s, now_s, "approach", "epoch_1", 0.0)
         executor.tick(now_s)
     executor.begin_invocation(0.2, "one", repr(FIRST_S))
+    key = ["stress", perturbation, start, 1]
+    journal.conditioning(0.2, invocation_id="one", key=key, history=np.zeros((2, 24)))
     executor.end_invocation(0.2, "one", "deadline")
     for force_n in (3.0, 7.5, 2.0):
         journal.add("force", journal.clock(0.2), {"force_n": force_n})
@@ -353,6 +356,27 @@ def test_a_clock_that_was_faster_on_paper_is_refused(root):
         rederive(root, "D")
     path.unlink()
     with pytest.raises(IntegrityError, match="latency"):
+        rederive(root, "D")
+
+
+def test_a_rollout_that_was_not_pushed_as_planned_is_refused(root, monkeypatch):
+    said = iter(["'bc/nominal/0' was pushed never"])
+    monkeypatch.setattr("gates.rederive_disturbance.disturbed_otherwise", lambda path, plan: said)
+    with pytest.raises(RefusedError, match=r"bc__nominal\.mcap is 'bc/nominal/0' was pushed never"):
+        rederive(root, "D")
+
+
+def test_an_invocation_that_does_not_say_from_what_it_drew_is_refused(root, monkeypatch):
+    monkeypatch.setattr(Journal, "conditioning", lambda *_, **__: None)
+    path = root / STRESS / "journals" / "flow__nominal.mcap"
+    write_journal(path, [_session("flow__nominal", start) for start in (0, 1)])
+    document = json.loads((root / STRESS / "checker.json").read_text())
+    again = check_journal(path, module._held_to(PARAMS)[0]).as_document()
+    told = {
+        name: shadow.CHECKER.read(root / STRESS).journals[name] for name in document["journals"]
+    }
+    shadow.CHECKER.write(root / STRESS, checked(told | {path.name: again}))
+    with pytest.raises(RefusedError, match=r"nominal\.mcap is 'one' begins, and nobody says"):
         rederive(root, "D")
 
 

@@ -115,11 +115,14 @@ def moments(dataset, params, tmp_path_factory):
 
 
 @pytest.fixture
-def root(written, moments, tmp_path, monkeypatch):
+def root(written, moments, data, tmp_path, monkeypatch):
     """A copy to forge; mutants are tried in a test of their own, since they take a while."""
     monkeypatch.setattr(module, "_moments", lambda root, params: moments)
     monkeypatch.setattr(module, "missing_checks_evidence", lambda *_: list(LAYERS_TRIED))
     monkeypatch.setattr("genpolicy.evidence.shadow.tables.run_mutants", lambda: [EXECUTION_TRIED])
+    demonstrator = Demonstrator(moments[1])
+    monkeypatch.setattr("gates.rederive_draws.load_policy", lambda folder: demonstrator)
+    monkeypatch.setattr("gates.rederive_draws.load_dataset", lambda folder: data)
     return shutil.copytree(written, tmp_path / "repo")
 
 
@@ -129,6 +132,14 @@ def rows_of(root, name):
 
 def write(root, name, rows):
     write_rows(root / SHADOW / f"{name}.parquet", ROWS[name], [ROWS[name](**row) for row in rows])
+
+
+def test_candidates_that_the_named_checkpoint_does_not_draw_are_refused(root, moments, monkeypatch):
+    other = Demonstrator(moments[1])
+    other.chunks = {key: chunk + 2e-5 for key, chunk in other.chunks.items()}
+    monkeypatch.setattr("gates.rederive_draws.load_policy", lambda folder: other)
+    with pytest.raises(RefusedError, match=r"candidate operator/held_out/0/0 is up to 2e-05"):
+        rederive(root, "C")
 
 
 def test_true_evidence_stands(root):

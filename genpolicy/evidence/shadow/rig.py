@@ -100,6 +100,11 @@ class StandIn:
     verdict: StandInVerdict
     context: StandInContext | None = field(default_factory=StandInContext, repr=False)
 
+    @property
+    def drawn(self) -> Array:
+        """Actions before projection; an imitation was not projected."""
+        return self.actions
+
 
 def passing_verdict(
     *, failed: int | None = None, rows: tuple[int, int] = (0, ROWS)

@@ -4,6 +4,7 @@ import numpy as np
 
 from genpolicy.evidence.stress.perturbations import drill_s, pushes
 from genpolicy.evidence.stress.state import Setup
+from genpolicy.execution.journal import Journal
 from genpolicy.tasks.api import World
 
 
@@ -24,8 +25,8 @@ class Disturbance:
         self._pushes = list(pushes(schedule, root_seed=seed, name=name, start=start))
         self._drill_s = drill_s(schedule, root_seed=seed, name=name, start=start)
 
-    def push(self, now_s: float) -> None:
-        """Apply the pushes that are due; one in contact counts from where contact began."""
+    def push(self, journal: Journal, now_s: float) -> None:
+        """Apply the pushes that are due, on record; in contact from where contact began."""
         if self._contact_since_s is None and self._world.phase in self._contact_phases:
             self._contact_since_s = now_s
         for push in list(self._pushes):
@@ -34,6 +35,11 @@ class Disturbance:
                 force_n = np.array([0.0, push.force_n, 0.0])
                 self._world.apply_force(force_n, push.duration_s)
                 self._pushes.remove(push)
+                payload = {
+                    "force_n": push.force_n, "duration_s": push.duration_s,
+                    "in_contact": push.in_contact,
+                }  # fmt: skip
+                journal.add("push", journal.clock(now_s), payload)
 
     def drill(self, now_s: float) -> bool:
         """Whether recovery is called for now; true once."""

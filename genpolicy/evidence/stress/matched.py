@@ -170,10 +170,7 @@ def step(active: Sequence[Rollout], policy: Policy, *, samples: int) -> None:
     if asking:
         drawn = policy.sample(
             np.stack([rollout.conditioning() for rollout in asking]),
-            noise_names=[
-                ("stress", rollout.setup.perturbation, rollout.start_index, rollout.invocations)
-                for rollout in asking
-            ],
+            noise_names=[rollout.noise_name for rollout in asking],
             candidates=candidates_of(policy, samples),
         )
         for rollout, chunks in zip(asking, drawn.actions, strict=True):

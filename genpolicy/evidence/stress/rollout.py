@@ -14,7 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.candidates.selector import propose, tries_another
-from genpolicy.contract.chunk import Candidate, ChunkMetadata, DiscardReason, Proposal
+from genpolicy.contract.chunk import (
+    Candidate,
+    ChunkMetadata,
+    DiscardReason,
+    Proposal,
+    actions_sha256,
+    raw_actions,
+)
 from genpolicy.errors import ContractError
 from genpolicy.evidence.admission_context import (
     COMMANDS_AT_THE_BOUNDARY,
@@ -110,6 +117,11 @@ class Rollout:
         missing = self.setup.horizons.observation_horizon - len(self.history)
         return np.stack([self.history[0]] * missing + list(self.history))
 
+    @property
+    def noise_name(self) -> tuple[str, str, int, int]:
+        """Names of the noise of the invocation that began last."""
+        return "stress", self.setup.perturbation, self.start_index, self.invocations
+
     def sense(self) -> None:
         """Observe, supervise, and collect what has been delivered by now."""
         now_s, world = self.now_s, self.world
@@ -155,6 +167,7 @@ class Rollout:
             index=flying.candidate,
             layers={layer.name: layer.passed for layer in verdict.layers},
             first_reason=verdict.first_reason or None,
+            measures={"drawn_sha256": actions_sha256(raw_actions(flying.drawn))},
         )
         if isinstance(result, Admitted):
             self.tally.refused.discard(flying.metadata.chunk_id)
@@ -165,11 +178,10 @@ class Rollout:
         self.tally.refused.add(flying.metadata.chunk_id)
         counts = self.tally.rejected_by
         counts[result.reason] = counts.get(result.reason, 0) + 1
-        assert flying.chunks is not None
         # What made one candidate late or void holds for all of its invocation. It is known where
         # the other layers passed: freshness is asked last.
         stale = verdict.first_layer == FRESH
-        if tries_another(flying.candidate, len(flying.chunks), stale=stale):
+        if tries_another(flying.candidate, flying.candidates, stale=stale):
             self._deliveries.try_another(flying, now_s)
             return
         self._deliveries.answered(flying, now_s)
@@ -192,7 +204,7 @@ class Rollout:
             self.wanted = None
         command = self.executor.tick(now_s)
         self._apply(command, now_s)
-        self._disturbance.push(now_s)
+        self._disturbance.push(self.journal, now_s)
         self.world.advance()
         self.tick += 1
         self.tally.feel(self.journal, self.now_s, self.world.contact_force_n)
@@ -243,6 +255,9 @@ class Rollout:
             self.setup, metadata, self.history[-1], start=self.start_index, number=number
         )
         self.executor.begin_invocation(now_s, metadata.chunk_id, repr(flying.total_s))
+        self.journal.conditioning(
+            now_s, invocation_id=metadata.chunk_id, key=self.noise_name, history=self.conditioning()
+        )
         self.tally.latencies_s.append(flying.total_s)
         return flying
 

@@ -99,6 +99,16 @@ class InFlight:
     given_up: bool = False
 
     @property
+    def candidates(self) -> int:
+        """Candidates that were drawn; none before the batch filled them in."""
+        return 0 if self.chunks is None else len(self.chunks)
+
+    @property
+    def drawn(self) -> Array | None:
+        """The candidate that is judged next, as drawn. Shape (K, D_a)."""
+        return None if self.chunks is None else self.chunks[self.candidate]
+
+    @property
     def total_s(self) -> float:
         """Its end-to-end latency so far: the eleven terms, and every check after the first, s."""
         return self.arrival_s - self.begun_s

@@ -3,9 +3,12 @@
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 from genpolicy.evidence.stress.disturbance import Disturbance
 from genpolicy.evidence.stress.perturbations import RecoveryDrill, SidewaysPush
+from genpolicy.execution.journal import Journal, write_journal
+from genpolicy.verification.disturbed import Plan, disturbed_otherwise
 
 
 def causes(rollout):
@@ -37,6 +40,22 @@ def test_a_push_in_contact_makes_a_clean_insertion_touch(run, kit, plans, tmp_pa
     assert kit.check(hard, tmp_path).violations == []
 
 
+@pytest.mark.parametrize("schedule", [
+    RecoveryDrill(), SidewaysPush(force_n=15.0, contact_force_n=30.0),
+])  # fmt: skip
+def test_what_happens_to_the_cell_is_on_record_as_the_checker_draws_it(
+    run, kit, plans, task, tmp_path, schedule
+):
+    planned = {"nominal": schedule.model_dump()}
+    plan = Plan(planned, frozenset(task.contact_phases), kit.ROOT_SEED)
+    rollouts = run(kit.Replay(plans.actions), starts=(0, 1, 2), schedule=schedule)
+    write_journal(tmp_path / "journal.mcap", [rollout.journal for rollout in rollouts])
+    assert list(disturbed_otherwise(tmp_path / "journal.mcap", plan)) == []
+    plain = run(kit.Replay(plans.actions), starts=(0, 1, 2))
+    write_journal(tmp_path / "plain.mcap", [rollout.journal for rollout in plain])
+    assert len(list(disturbed_otherwise(tmp_path / "plain.mcap", plan))) == 3
+
+
 class Hand:
     """A world that remembers how it is pushed."""
 
@@ -48,19 +67,20 @@ class Hand:
 
 
 def test_a_push_in_contact_waits_for_contact_and_each_push_happens_once(make_fixture):
-    hand = Hand()
+    hand, journal = Hand(), Journal("one")
     fixture = make_fixture(
         schedule=SidewaysPush(force_n=15.0, contact_force_n=30.0),
         task=SimpleNamespace(contact_phases=frozenset({"insert"})),
     )
     disturbance = Disturbance(fixture, hand, start=0)
     for now_s in np.arange(0.0, 5.0, 0.05):
-        disturbance.push(float(now_s))
+        disturbance.push(journal, float(now_s))
     assert [abs(force) for force, _ in hand.forces] == [15.0]
     hand.phase = "insert"
-    disturbance.push(5.0)
+    disturbance.push(journal, 5.0)
     assert len(hand.forces) == 1, "it lowers first"
     for now_s in np.arange(5.0, 9.0, 0.05):
-        disturbance.push(float(now_s))
+        disturbance.push(journal, float(now_s))
     assert [abs(force) for force, _ in hand.forces] == [15.0, 30.0]
+    assert [event.payload["in_contact"] for event in journal.events()] == [False, True]
     assert not disturbance.drill(9.0)

@@ -1,0 +1,217 @@
+"""What the policies of gates C and D answered, drawn again: are these chunks theirs?
+
+Everything else about a journal holds for the chunks of any policy. Here a sample of invocations is
+given to the checkpoint of that name again: the same observations, the same names of the noise. The
+sample is drawn by the hash of the journal, so that nobody who writes one can choose what is asked.
+"""
+
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gates.rederive_sessions import checkpoint_of
+from gates.rederive_shadow import TaskSection
+from gates.report import Gate
+from gates.stated import refuse, section, training_seed
+from genpolicy.candidates.judged import candidates_of
+from genpolicy.contract.chunk import actions_sha256
+from genpolicy.contract.horizons import HorizonConfig
+from genpolicy.data.dataset import Dataset, load_dataset
+from genpolicy.evidence.rows.shadow import CandidateRow
+from genpolicy.evidence.shadow.settings import ShadowSection
+from genpolicy.evidence.shadow.shadow import HELD_OUT, TWO_MODES
+from genpolicy.evidence.stress.settings import StressSettings
+from genpolicy.execution.journal import encode_poses
+from genpolicy.integrity.hashing import sha256_file
+from genpolicy.integrity.rows import read_rows
+from genpolicy.policies.policy import NoiseName, Policy, load_policy
+from genpolicy.seeds import stream
+from genpolicy.tasks.api import Task, load_task
+from genpolicy.verification.drawn import Drawn, drawn_chunks
+from genpolicy.verification.journal_source import readable
+
+Array = NDArray[np.float64]
+
+TOLERANCE = 1e-5
+"""Of a number of a chunk, m or without unit: what another processor may make of the same sample."""
+OF_A_JOURNAL = 12
+"""Candidates of a journal of Gate D that are drawn again."""
+OF_A_METHOD = 48
+"""Observations of a method at Gate C whose candidates are drawn again."""
+SHADOW = "artifacts/shadow"
+DATASET = "artifacts/ingest"
+
+
+@dataclass(frozen=True)
+class Asked:
+    """One candidate that is drawn again.
+
+    Attributes:
+        place: Where it stands, in words.
+        key: Names of the noise.
+        history: What the policy saw. Shape (H_o, D_o).
+        index: Number of the candidate.
+        actions: What was drawn, where the numbers are there. Shape (K, 10).
+        sha256: Its hash, where only that is.
+    """
+
+    place: str
+    key: NoiseName
+    history: Array
+    index: int
+    actions: Array | None
+    sha256: str = ""
+
+
+def rederive_rollout_draws(root: Path, params: Mapping[str, Any], journals: Sequence[Path]) -> None:
+    """Draw a sample of what was judged in the rollouts again.
+
+    Raises:
+        RefusedError: A chunk is not what the checkpoint of its name draws from what it saw, an
+            invocation does not say from what it drew, or it saw another scene than was there.
+        ConfigError: A section of `params.yaml` cannot be read.
+        IntegrityError: A journal or a checkpoint is missing, or is not what it claims to be.
+        BadInputError: A journal cannot be read.
+    """
+    stress = section(params, "stress", StressSettings)
+    task = load_task(section(params, "task", TaskSection).name)
+    asked: dict[str, list[Asked]] = defaultdict(list)
+    for path in journals:
+        with readable(f"{path.parent.name}/{path.name}"):
+            drawn, wrong = drawn_chunks(path)
+        if wrong:
+            refuse("D", path.name, wrong, "every invocation with what it saw and its own noise")
+        for item in _some(drawn, OF_A_JOURNAL, path):
+            asked[item.method].append(_asked(task, path, item))
+    _draw_again("D", root, params, asked, samples=stress.samples)
+
+
+def rederive_shadow_draws(root: Path, params: Mapping[str, Any]) -> None:
+    """Draw a sample of the candidates of the shadow test again, from the dataset.
+
+    Raises:
+        RefusedError: A candidate is not what the checkpoint of its name draws there, or it is of a
+            moment that the dataset does not hold.
+        ConfigError: A section of `params.yaml` cannot be read.
+        IntegrityError: A file is missing, or is not what it claims to be.
+        BadInputError: A table cannot be read.
+    """
+    shadow = section(params, "shadow", ShadowSection)
+    horizons = section(params, "horizons", HorizonConfig)
+    data = load_dataset(root / DATASET)
+    moments: dict[str, dict[tuple[str, int], list[CandidateRow]]] = defaultdict(dict)
+    for row in read_rows(root / SHADOW / "candidates.parquet", CandidateRow):
+        if row.fixture in (HELD_OUT, TWO_MODES):
+            moments[row.method].setdefault((row.fixture, row.observation), []).append(row)
+    asked: dict[str, list[Asked]] = {}
+    for method, of_method in moments.items():
+        chosen = _some(sorted(of_method), OF_A_METHOD, root / SHADOW / "journal.mcap")
+        rows = [row for moment in chosen for row in of_method[moment]]
+        asked[method] = [_of_row(data, horizons, row) for row in rows]
+    _draw_again("C", root, params, asked, samples=shadow.samples, always=True)
+
+
+def _some(items: Sequence[Any], count: int, path: Path) -> Iterable[Any]:
+    """At most so many of the items, by the hash of a file, in their order."""
+    generator = stream(0, "drawn again", path.name, sha256_file(path))
+    chosen = generator.choice(len(items), size=min(count, len(items)), replace=False)
+    return [items[i] for i in sorted(chosen.tolist())]
+
+
+def _asked(task: Task, path: Path, item: Drawn) -> Asked:
+    """A judged candidate of a rollout; what its policy saw is the scene that was there."""
+    place = f"{path.name}: {item.chunk_id}, candidate {item.index}"
+    with readable(place):
+        seen = encode_poses(task.scene_poses(item.history[-1]))
+    if seen != item.seen:
+        refuse("D", f"{place}: saw", "another scene", "the scene of its session at that time")
+    return Asked(place, item.key, item.history, item.index, item.actions, item.sha256)
+
+
+def _of_row(data: Dataset, horizons: HorizonConfig, row: CandidateRow) -> Asked:
+    place = f"candidate {row.method}/{row.fixture}/{row.observation}/{row.candidate}"
+    name, _, index = row.situation.rpartition(":")
+    numbers = np.flatnonzero(data.episodes["episode_uuid"].to_numpy(dtype=str) == name)
+    own = np.flatnonzero(data.frames.episode == numbers[0]) if len(numbers) else numbers
+    if not index.isdecimal() or not int(index) < len(own):
+        refuse("C", f"{place}: situation", row.situation, "a row of an episode of the dataset")
+    at = int(index)
+    back = np.maximum(np.arange(at - horizons.observation_horizon + 1, at + 1), 0)
+    history = data.frames.observation[own[back]]
+    with readable(place):
+        actions = np.array(row.raw).reshape(horizons.prediction_horizon, -1)
+    return Asked(place, ("shadow", name, at), history, row.candidate, actions)
+
+
+def _draw_again(
+    gate: Gate,
+    root: Path,
+    params: Mapping[str, Any],
+    asked: Mapping[str, Sequence[Asked]],
+    *,
+    samples: int,
+    always: bool = False,
+) -> None:
+    """Hold what each method is said to have drawn against its checkpoint.
+
+    Args:
+        gate: Whose evidence it is.
+        root: The workspace.
+        params: Its parameters.
+        asked: By method.
+        samples: Candidates of an invocation.
+        always: A policy that always draws the same was asked for as many, too.
+    """
+    for method, items in sorted(asked.items()):
+        folder = checkpoint_of(root, method, training_seed(params))
+        if folder is None:
+            refuse(gate, items[0].place, f"drawn by {method}", "a policy that was trained")
+        policy = load_policy(folder)
+        count = samples if always else candidates_of(policy, samples)
+        _compare(gate, policy, items, count)
+
+
+def _compare(gate: Gate, policy: Policy, items: Sequence[Asked], count: int) -> None:
+    with readable(items[0].place):
+        drawn = policy.sample(
+            np.stack([item.history for item in items]),
+            noise_names=[item.key for item in items],
+            candidates=count,
+        ).actions
+    limit = f"what {policy.checkpoint_hash[:16]}… draws there, within {TOLERANCE:g}"
+    to_the_bit = True
+    for item, chunks in zip(items, drawn, strict=True):
+        if not 0 <= item.index < len(chunks):
+            refuse(gate, item.place, "drawn", f"one of {len(chunks)} candidates")
+        again = chunks[item.index]
+        if item.actions is None:
+            continue
+        if not _alike(again, item.actions):
+            refuse(gate, item.place, _apart(again, item.actions), limit)
+        to_the_bit = to_the_bit and np.array_equal(again, item.actions, equal_nan=True)
+    for item, chunks in zip(items, drawn, strict=True):
+        # Of what was refused only the hash is there. It says something where this machine rounds
+        # as that one did.
+        if (
+            to_the_bit
+            and item.actions is None
+            and actions_sha256(chunks[item.index]) != item.sha256
+        ):
+            refuse(gate, item.place, f"drawn as {item.sha256[:16]}…", limit)
+
+
+def _alike(one: Array, other: Array) -> bool:
+    return one.shape == other.shape and np.allclose(
+        one, other, rtol=0.0, atol=TOLERANCE, equal_nan=True
+    )
+
+
+def _apart(one: Array, other: Array) -> str:
+    if one.shape != other.shape:
+        return f"of shape {other.shape}"
+    return f"up to {np.nanmax(np.abs(one - other)):.3g} beside it"

@@ -1,0 +1,309 @@
+"""Chunks of another checkpoint, from other noise or of another moment are no proof of this one."""
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from gates import rederive_draws as module
+from gates.rederive_draws import SHADOW, rederive_rollout_draws, rederive_shadow_draws
+from genpolicy.candidates.judged import JudgedPolicy
+from genpolicy.contract.horizons import HorizonConfig
+from genpolicy.contract.normalisation import MinMax, Normalisation
+from genpolicy.data.dataset import load_dataset
+from genpolicy.errors import BadInputError, RefusedError
+from genpolicy.evidence.admission_context import make_checker
+from genpolicy.evidence.rows.shadow import CandidateRow
+from genpolicy.evidence.shadow.observations import held_out_observations
+from genpolicy.evidence.shadow.shadow import Shadow, shadow_policy
+from genpolicy.evidence.stress.latency import (
+    DECLARED_TERMS,
+    MEASURED_TERMS,
+    DeclaredTerm,
+    LatencyModel,
+)
+from genpolicy.evidence.stress.matched import Comparison, Shard, matched_starts, run_shard
+from genpolicy.evidence.stress.perturbations import ReducedEnvelope
+from genpolicy.execution.cell import Cell, ExecutionSettings
+from genpolicy.execution.journal import Journal, encode_actions, read_journal, write_journal
+from genpolicy.feasibility.settings import FeasibilitySettings
+from genpolicy.integrity.rows import read_rows, write_rows
+from genpolicy.policies.checkpoint import Provenance
+from genpolicy.policies.settings import HeadConfig, NetworkConfig, SamplerConfig, TrainingConfig
+from genpolicy.policies.training import train
+from genpolicy.policies.training_request import TrainingRequest
+from genpolicy.policies.windows import Windows
+from genpolicy.seeds import stream
+from genpolicy.tasks.api import WorldSettings, load_task
+
+PARAMS = yaml.safe_load((Path(__file__).parents[2] / "params.yaml").read_text())
+HORIZONS = HorizonConfig(**PARAMS["horizons"])
+TASK = load_task("tabletop_insertion")
+STARTS = matched_starts(TASK, root_seed=PARAMS["seed"], count=4)
+SAMPLES = 2
+
+
+def _train(folder, *, seed):
+    """A flow that barely moves from where it is, to either side."""
+    rng = stream(2, "windows")
+    worlds = [TASK.make_world(s, settings=WorldSettings(TASK.calibration_epochs[-1]))
+              for s in STARTS]  # fmt: skip
+    seen = np.repeat(np.stack([world.observe() for world in worlds]), 30, axis=0)
+    observations = np.repeat(seen[:, None], 2, axis=1) + rng.normal(0, 1e-3, (120, 2, 24))
+    actions = np.repeat(np.stack([world.last_action for world in worlds]), 30, axis=0)
+    actions = np.repeat(actions[:, None], 16, axis=1)
+    actions[:, :, 1] += np.linspace(0, 0.02, 16) * rng.choice([-1.0, 1.0], 120)[:, None]
+    ends = {
+        name: MinMax(rows.min(axis=(0, 1)), rows.max(axis=(0, 1)))
+        for name, rows in (("observation", observations), ("action", actions))
+    }
+    request = TrainingRequest(
+        method="flow", horizons=HORIZONS, normalisation=Normalisation(**ends),
+        network=NetworkConfig(
+            encoder_width=16, condition_dim=16, trunk_width=48, trunk_blocks=1, time_features=16,
+            head_parameters=40_000,
+        ),
+        head=HeadConfig(posterior_width=16),
+        training=TrainingConfig(steps=60, batch_size=64, learning_rate=3e-3, warmup_steps=5),
+        sampler=SamplerConfig(name="euler", steps=2),
+        provenance=Provenance(
+            dataset_manifest_sha256="a" * 64, action_contract_sha256="b" * 64,
+            observation_contract_sha256="c" * 64,
+        ),
+        seed=seed,
+    )  # fmt: skip
+    return train(folder, request, windows=Windows(observations, actions, np.zeros((120, 16), bool)))
+
+
+def _folder(root):
+    return root / "artifacts" / "train_generators" / "flow" / "seed_0"
+
+
+@pytest.fixture(scope="module")
+def checkpoints(tmp_path_factory):
+    """Two trainings of one method: folder and identity."""
+    root = tmp_path_factory.mktemp("trained")
+    return [(root / str(seed), _train(root / str(seed), seed=seed)) for seed in (3, 4)]
+
+
+@pytest.fixture(scope="module")
+def journals(checkpoints, tmp_path_factory):
+    """One shard of rollouts of either training, of a second, in which some chunks are refused."""
+    found = []
+    for folder, sha256 in checkpoints:
+        path = tmp_path_factory.mktemp("journals") / "flow__envelope.mcap"
+        comparison = Comparison(
+            task=TASK.name, starts=tuple(start.to_json() for start in STARTS),
+            episode_limit_s=1.0, samples=SAMPLES,
+            cell=Cell(HORIZONS, ExecutionSettings(**PARAMS["execution"])),
+            feasibility=FeasibilitySettings(
+                **(PARAMS["feasibility"] | {"position_change_limit_m": 0.006})
+            ),
+            root_seed=PARAMS["seed"],
+        )  # fmt: skip
+        slow = ReducedEnvelope(
+            **(PARAMS["stress"]["perturbations"]["envelope"] | {"speed_limit_m_s": 0.008})
+        )
+        times = LatencyModel(
+            {name: DeclaredTerm(0.001, 0.002) for name in DECLARED_TERMS},
+            {name: np.full(8, 0.004) for name in MEASURED_TERMS}, 0.0,
+        )  # fmt: skip
+        judged = JudgedPolicy("flow", 0, folder, sha256)
+        run_shard(Shard(comparison, judged, times, "envelope", slow, path))
+        found.append(path)
+    return found
+
+
+@pytest.fixture
+def root(checkpoints, tmp_path):
+    """A workspace in which the first training is the trained policy."""
+    shutil.copytree(checkpoints[0][0], _folder(tmp_path))
+    return tmp_path
+
+
+@pytest.fixture
+def params():
+    return PARAMS | {"stress": PARAMS["stress"] | {"samples": SAMPLES}}
+
+
+def test_what_the_checkpoint_drew_stands_and_both_kinds_of_verdict_are_among_it(
+    root, params, journals
+):
+    rederive_rollout_draws(root, params, journals[:1])
+    drawn, wrong = module.drawn_chunks(journals[0])
+    assert not wrong and len(drawn) > module.OF_A_JOURNAL
+    assert {item.actions is None for item in drawn} == {False, True}, "admitted and refused"
+    events = [event for each in read_journal(journals[0]).values() for event in each]
+    assert any(event.payload["raw"] for event in events if event.kind == "enqueue"), "projected"
+
+
+def test_rollouts_of_another_checkpoint_under_this_name_are_refused(root, params, journals):
+    with pytest.raises(RefusedError, match=r"flow/envelope/\d/\d, candidate \d is up to 0\.\d"):
+        rederive_rollout_draws(root, params, journals[1:])
+
+
+def test_a_policy_that_nobody_trained_drew_nothing(root, params, journals):
+    shutil.rmtree(_folder(root))
+    with pytest.raises(RefusedError, match="drawn by flow"):
+        rederive_rollout_draws(root, params, journals[:1])
+
+
+def _edited(path, target, change):
+    """The journal with some events changed; None leaves one out."""
+    sessions = []
+    for name, events in read_journal(path).items():
+        journal = Journal(name)
+        for event in events:
+            payload = change(event.kind, dict(event.payload))
+            if payload is not None:
+                journal.add(event.kind, event.t, payload)
+        sessions.append(journal)
+    target.parent.mkdir(exist_ok=True)
+    write_journal(target, sessions)
+    return target
+
+
+def _other_noise(kind, payload):
+    if kind == "conditioning":
+        payload["key"] = [*payload["key"][:-1], payload["key"][-1] + 1]
+    return payload
+
+
+def _seen_elsewhere(kind, payload):
+    """The post, as the policy saw it, a centimetre beside where it was."""
+    if kind == "conditioning":
+        seen = np.frombuffer(bytes.fromhex(payload["history"]), dtype="<f8").reshape(2, -1).copy()
+        seen[:, 17] += 0.01
+        payload["history"] = encode_actions(seen)
+    return payload
+
+
+@pytest.mark.parametrize(("change", "said"), [
+    (_other_noise, r"the noise of 'flow/envelope/0/0' is named .*, \['stress', 'envelope', 0, 1\]"),
+    (_seen_elsewhere, r"saw is another scene"),
+    (lambda kind, p: None if kind == "conditioning" else p, r"nobody says what it was drawn from"),
+    (lambda kind, p: p | {"id": "flow/envelope/0/9"} if kind == "conditioning" else p,
+     r"saw is stated, and it does not begin there"),
+    (lambda kind, p: p | {"raw": "00" + (p["raw"] or p["actions"])[2:]} if kind == "enqueue" else p,
+     r"is enqueued, and what was judged is not"),
+    (lambda kind, p: p | {"measures": {"drawn_sha256": "0" * 64}}
+     if kind == "candidate" and p["first_reason"] else p, r"is drawn as 0000000000000000…"),
+    (lambda kind, p: None if kind == "candidate" else p, r"no candidate of it passed"),
+])  # fmt: skip
+def test_what_was_not_drawn_so_is_refused_by_name(
+    root, params, journals, tmp_path, change, said, monkeypatch
+):
+    monkeypatch.setattr(module, "OF_A_JOURNAL", 1000)
+    path = _edited(journals[0], tmp_path / "edited" / "flow__envelope.mcap", change)
+    with pytest.raises(RefusedError, match=said):
+        rederive_rollout_draws(root, params, [path])
+
+
+def test_an_invocation_that_cannot_be_read_is_bad_input(root, params, journals, tmp_path):
+    def change(kind, payload):
+        return payload | {"rows": 7} if kind == "conditioning" else payload
+
+    path = _edited(journals[0], tmp_path / "edited" / "flow__envelope.mcap", change)
+    with pytest.raises(BadInputError, match="cannot be read"):
+        rederive_rollout_draws(root, params, [path])
+
+
+def test_another_processor_may_round_and_what_is_further_away_is_another_draw(
+    root, params, journals, monkeypatch
+):
+    load = module.load_policy
+
+    class Rounds:
+        """A policy on a processor that rounds by so much."""
+
+        def __init__(self, policy, by):
+            self.policy, self.by = policy, by
+            self.stochastic, self.checkpoint_hash = True, policy.checkpoint_hash
+
+        def sample(self, *words, **named):
+            drawn = self.policy.sample(*words, **named)
+            return replace(drawn, actions=drawn.actions + self.by)
+
+    monkeypatch.setattr(module, "OF_A_JOURNAL", 1000)
+    monkeypatch.setattr(module, "load_policy", lambda folder: Rounds(load(folder), 9e-6))
+    rederive_rollout_draws(root, params, journals[:1])
+    monkeypatch.setattr(module, "load_policy", lambda folder: Rounds(load(folder), 1.1e-5))
+    with pytest.raises(RefusedError, match=r"up to 1\.1e-05 beside it"):
+        rederive_rollout_draws(root, params, journals[:1])
+
+
+def test_which_are_drawn_again_follows_from_the_journal_and_is_bounded(journals, tmp_path):
+    def chosen(path):
+        return list(module._some(range(1000), 12, path))
+
+    assert chosen(journals[0]) == chosen(journals[0]) and len(chosen(journals[0])) == 12
+    assert chosen(journals[0]) != chosen(journals[1])
+    assert list(module._some(range(3), 12, journals[0])) == [0, 1, 2]
+    assert list(module._some([], 12, journals[0])) == []
+
+
+@pytest.fixture(scope="module")
+def shadows(checkpoints, dataset, tmp_path_factory):
+    """Candidates of the shadow test of either training, on the same moments."""
+    data = load_dataset(dataset)
+    checker = make_checker(
+        TASK, FeasibilitySettings(**PARAMS["feasibility"]),
+        action_period_s=HORIZONS.action_period_s,
+    )  # fmt: skip
+    tried = Shadow(
+        task=TASK, checker=checker, cell=Cell(HORIZONS, ExecutionSettings(**PARAMS["execution"])),
+        late_steps=1, samples=SAMPLES,
+    )  # fmt: skip
+    seen = held_out_observations(
+        data, horizons=HORIZONS, count=12, generator=stream(1, "shadow", "observations")
+    )
+    found = []
+    for folder, _ in checkpoints:
+        root = tmp_path_factory.mktemp("shadow")
+        (root / SHADOW).mkdir(parents=True)
+        policy = module.load_policy(folder)
+        rows = shadow_policy(tried, policy, seen[:4], seed=0, two_mode=seen[4:]).candidates
+        write_rows(root / SHADOW / "candidates.parquet", CandidateRow, rows)
+        (root / SHADOW / "journal.mcap").write_bytes(b"only its hash is asked for")
+        shutil.copytree(dataset, root / module.DATASET)
+        shutil.copytree(checkpoints[0][0], _folder(root))
+        found.append(root)
+    return found
+
+
+@pytest.fixture
+def shadow_params():
+    return PARAMS | {"shadow": PARAMS["shadow"] | {"samples": SAMPLES}}
+
+
+def test_shadow_candidates_of_this_checkpoint_stand_and_of_another_are_refused(
+    shadows, shadow_params
+):
+    rederive_shadow_draws(shadows[0], shadow_params)
+    with pytest.raises(RefusedError, match=r"candidate flow/\w+/\d+/0 is up to 0\.\d+ beside it"):
+        rederive_shadow_draws(shadows[1], shadow_params)
+
+
+@pytest.mark.parametrize(("changes", "said"), [
+    ({"situation": "elsewhere:1"}, "a row of an episode of the dataset"),
+    ({"situation": None}, "beside it"),
+    ({"candidate": SAMPLES}, rf"drawn, required one of {SAMPLES} candidates"),
+])  # fmt: skip
+@pytest.mark.parametrize("fixture", ["held_out", "two_modes"])
+def test_a_candidate_of_another_moment_is_refused(
+    shadows, shadow_params, tmp_path, changes, said, fixture
+):
+    root = shutil.copytree(shadows[0], tmp_path / "repo")
+    path = root / SHADOW / "candidates.parquet"
+    rows = read_rows(path, CandidateRow)
+    place = next(i for i, row in enumerate(rows) if row.fixture == fixture)
+    if changes.get("situation", "") is None:
+        name, _, index = rows[place].situation.rpartition(":")
+        changes = {"situation": f"{name}:{int(index) + 5}"}
+    rows[place] = replace(rows[place], **changes)
+    write_rows(path, CandidateRow, rows)
+    with pytest.raises(RefusedError, match=said):
+        rederive_shadow_draws(root, shadow_params)
