@@ -19,6 +19,10 @@ from gates.feasibility.settings import (
     FeasibilitySettings,
 )
 from genpolicy.evidence.rows.shadow import CandidateRow
+from genpolicy.statistics.intervals import clopper_pearson
+
+ODD_SHARE = 0.125
+"""One sample of eight, as at Gate B: what fewer episodes come by is a mode by luck."""
 
 
 def _rows(evidence: Evidence, candidate: str) -> pd.DataFrame:
@@ -62,13 +66,19 @@ def _unknown(rows: pd.DataFrame) -> str:
 def mode_admissible_gap(
     evidence: Evidence, settings: FeasibilitySettings, candidate: str
 ) -> Measured:
-    """Upper bound of the largest difference between modes in the share that is admissible."""
+    """Upper bound of the largest difference between modes in the share that is admissible.
+
+    Modes with too few episodes to be compared leave it open, unless surely hardly any episode is
+    answered in one of them: then they are odd chunks, and are named and left out.
+    """
     rows = _rows(evidence, candidate)
     rows = rows[rows["fixture"] == TWO_MODES]
     if len(rows) == 0:
         raise MissingEvidenceError("no situation with several modes was sampled")
     rows = rows.assign(admissible=admissible(rows), episode=_episodes(rows))
     rows = rows[~rows["mode"].isin(NO_MODE)]
+    odd, said = _odd(rows, settings)
+    rows = rows[~rows["mode"].isin(odd)]
     rows = rows[rows.groupby("observation")["mode"].transform("nunique") >= 2]
     by_mode = {str(mode): part for mode, part in rows.groupby("mode")}
     seen = {mode: part["episode"].nunique() for mode, part in by_mode.items()}
@@ -78,13 +88,29 @@ def mode_admissible_gap(
         rare = ", ".join(f"{mode} {count}" for mode, count in seen.items())
         raise MissingEvidenceError(
             f"observations answered in several modes: {rare}; "
-            f"at least {settings.mode_observations} of each are needed"
+            f"at least {settings.mode_observations} of each are needed{said}"
         )
     shares = {m: (p["admissible"].to_numpy(), p["episode"].tolist()) for m, p in by_mode.items()}
     interval, more, less = widest_gap(shares, confidence=settings.confidence)
     text = ", ".join(f"{m} {p['admissible'].mean():.4g} of {seen[m]}" for m, p in by_mode.items())
-    text += f" episodes answered in several modes; upper bound of {more} minus {less}"
+    text += f" episodes answered in several modes; upper bound of {more} minus {less}{said}"
     return Measured(interval[1], interval, text)
+
+
+def _odd(rows: pd.DataFrame, settings: FeasibilitySettings) -> tuple[list[str], str]:
+    """Modes of too few episodes that surely few episodes come by, all together; and their names.
+
+    Whether a mode of the task is sampled at all is asked at Gate B. What the checks do to one that
+    three chunks of a thousand take, nobody can tell and nothing rests on.
+    """
+    of_mode = rows.groupby("mode")["episode"].agg(lambda episodes: sorted(set(episodes)))
+    few = {str(m): own for m, own in of_mode.items() if len(own) < settings.mode_observations}
+    touched = len({episode for own in few.values() for episode in own})
+    most = clopper_pearson(touched, rows["episode"].nunique(), settings.confidence)[1]
+    if not few or not most <= ODD_SHARE:
+        return [], ""
+    named = ", ".join(f"{mode} in {len(own)}" for mode, own in few.items())
+    return list(few), f"; left out: {named} episodes, together at most {most:.3g} of all"
 
 
 @criterion(

@@ -179,8 +179,8 @@ def latent_dependence_p(evidence: Evidence, settings: NeedSettings) -> Measured:
         f"{1000.0 * worst.spread_m:.3g} mm, "
         f"of which {100 * worst.condition_share:.3g} % (squared) differs between "
         f"{worst.situations} situations; distance correlation with the observation "
-        f"{worst.distance_correlation:.3g}; p-value with the interval of "
-        f"{worst.permutations} permutations"
+        f"{worst.distance_correlation:.3g}; p-value of this training, with the interval that "
+        f"{worst.permutations} permutations leave"
     )
     if upper > level and not shown:
         return Measured(None, interval, f"not decided, neither a strategy nor a style: {text}")

@@ -5,7 +5,7 @@ import os
 import pytest
 
 from genpolicy.cli.main import main
-from genpolicy.execution.journal import Journal, write_journal
+from genpolicy.execution.journal import JOURNAL_VERSION, Journal, write_journal
 
 TASK = ("--task", "tabletop_insertion")
 
@@ -13,7 +13,7 @@ TASK = ("--task", "tabletop_insertion")
 @pytest.fixture
 def journal(tmp_path):
     found = Journal("only")
-    found.add("session", 0, {"version": 6, "labels": {"method": "flow"}})
+    found.add("session", 0, {"version": JOURNAL_VERSION, "labels": {"method": "flow"}})
     found.add("hold", 50_000_000, {"reason": "empty"})
     write_journal(tmp_path / "journal.mcap", [found])
     return tmp_path / "journal.mcap"

@@ -7,7 +7,7 @@ import pytest
 from replayed import SESSION, added, copied
 
 from genpolicy.errors import BadInputError, ConfigError, IntegrityError
-from genpolicy.execution.journal import Journal, write_journal
+from genpolicy.execution.journal import JOURNAL_VERSION, Journal, write_journal
 from genpolicy.integrity.hashing import sha256_file
 from genpolicy.replay.replay import task_of, write_replay
 
@@ -69,15 +69,15 @@ def test_nothing_is_left_behind_where_it_fails(journal, tmp_path):
     """Injected faults: cut off, of another task, with an event that nobody can read."""
     (tmp_path / "cut.mcap").write_bytes(journal.read_bytes()[:-30])
     bad = Journal("s")
-    bad.add("session", 0, {"version": 6, "labels": {}})
+    bad.add("session", 0, {"version": JOURNAL_VERSION, "labels": {}})
     bad.add("accept", 5, {"arrival": 0, "chunk_id": "c", "row": 0, "age_ns": 1, "action": "zz"})
     write_journal(tmp_path / "bad.mcap", [bad])
     strange = Journal("s")
-    strange.add("session", 0, {"version": 6, "labels": {}})
+    strange.add("session", 0, {"version": JOURNAL_VERSION, "labels": {}})
     strange.add("scene", 5, {"bodies": {"anvil": "00" * 24 + "000000000000f03f" + "00" * 24}})
     write_journal(tmp_path / "strange.mcap", [strange])
     none = Journal("s")
-    none.add("session", 0, {"version": 6})
+    none.add("session", 0, {"version": JOURNAL_VERSION})
     write_journal(tmp_path / "none.mcap", [none])
     before = sorted(tmp_path.iterdir())
     for name, session, said in (
@@ -98,7 +98,7 @@ def test_nothing_is_left_behind_where_it_fails(journal, tmp_path):
 @pytest.mark.filterwarnings("ignore:invalid value encountered in det")
 def test_a_number_that_is_none_is_not_written(tmp_path):
     bad = Journal("s")
-    bad.add("session", 0, {"version": 6, "labels": {}})
+    bad.add("session", 0, {"version": JOURNAL_VERSION, "labels": {}})
     action = "000000000000f87f" * 10
     bad.add("accept", 5, {"arrival": 0, "chunk_id": "c", "row": 0, "age_ns": 1, "action": action})
     write_journal(tmp_path / "bad.mcap", [bad])

@@ -36,6 +36,18 @@ def _plan(change: str) -> Plant:
     )
 
 
+def _unkeyed(*, of_generators: bool) -> Plant:
+    """Fresh noise for the candidates alone, or for all others."""
+    among = "in" if of_generators else "not in"
+    return patched(
+        "genpolicy/policies/policy.py",
+        ("values[row] = counter_noise((*name, step), shape=shape)",
+         "values[row] = counter_noise((*name, step), shape=shape)\n"
+         f"                if self.method {among} ('diffusion', 'flow'):\n"
+         "                    values[row] = np.random.default_rng().standard_normal(shape)"),
+    )  # fmt: skip
+
+
 def _settings(what: str) -> Plant:
     return _plan(
         f"plan = dataclasses.replace(plan, settings=plan.settings.model_copy(update={what}))"
@@ -140,7 +152,18 @@ WRONGS = (
           patched("genpolicy/policies/policy.py",
                   ("values[row] = counter_noise((*name, step), shape=shape)",
                    "values[row] = np.random.default_rng().standard_normal(shape)")),
-          Expected(B, ("samples_difference",))),
+          Expected(B, ("samples_difference",)),
+          note="Baselines draw by the same function, so that gate A is right to stop it; the two "
+          "below part it."),
+    Wrong("noise_of_the_baselines_without_a_key", "sampler",
+          "The noise of the baselines is drawn fresh each time, not from its key.",
+          "small", _unkeyed(of_generators=False),
+          Expected("A", refusal=r"drawn again under the same key"),
+          note="Added when the one above had been stopped at gate A in words about latents."),
+    Wrong("noise_of_the_candidates_without_a_key", "sampler",
+          "The noise of the candidates is drawn fresh each time, not from its key.",
+          "small", _unkeyed(of_generators=True),
+          Expected(B, ("samples_difference",)), note="Added with the one above."),
     Wrong("second_evaluation_not_counted", "sampler",
           "The network runs twice per Euler step and is counted by the definition of one.",
           "small",

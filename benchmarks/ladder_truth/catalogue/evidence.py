@@ -5,7 +5,15 @@ from pathlib import Path
 import pandas as pd
 
 from benchmarks.ladder_truth.outcome import Expected
-from benchmarks.ladder_truth.planting import Wrong, all_of, committed, document, silently, table
+from benchmarks.ladder_truth.planting import (
+    Wrong,
+    all_of,
+    committed,
+    document,
+    patched,
+    silently,
+    table,
+)
 from benchmarks.ladder_truth.workspace import set_limit
 
 RESTORED = (
@@ -43,6 +51,23 @@ def _admissible(frame: pd.DataFrame) -> pd.DataFrame:
 
 def _fewer_rollouts(frame: pd.DataFrame) -> pd.DataFrame:
     return frame[~((frame["method"] == "flow") & (frame["start"] == 1))]
+
+
+OF_ANOTHER = """
+
+def _instead_of(policy):
+    from pathlib import Path
+
+    from genpolicy.policies.policy import load_policy
+
+    others = {"flow": "diffusion"}
+    if policy.method not in others:
+        return policy
+    return load_policy(Path("artifacts/train_generators") / others[policy.method] / "seed_0")
+
+
+def step("""
+"""Whoever is called a flow is a diffusion; its hashes stay those of the flow."""
 
 
 def _unjudged(workspace: Path) -> None:
@@ -101,6 +126,34 @@ WRONGS = (
           "small", _unjudged,
           Expected("D", refusal=r"extra\.mcap"),
           note="Stopped before DVC, which would check the folder out anew and remove it."),
+    Wrong("rollouts_of_another_checkpoint", "evidence",
+          "The chunks of the flow's rollouts are drawn by the diffusion, under the flow's hashes.",
+          "small",
+          patched("genpolicy/evidence/stress/matched.py", ("\n\ndef step(", OF_ANOTHER),
+                  ("drawn = policy.sample(", "drawn = _instead_of(policy).sample(")),
+          Expected("D", refusal=r"flow__\w+\.mcap: flow/.* beside it"),
+          note="Added with the check that draws chunks again."),
+    Wrong("shadow_of_another_checkpoint", "evidence",
+          "The flow's shadow candidates are drawn by the diffusion, under the flow's hashes.",
+          "small",
+          patched("genpolicy/evidence/shadow/shadow.py",
+                  ("\n\ndef case_of(", OF_ANOTHER.replace("def step(", "def case_of(")),
+                  ("drawn = policy.sample(", "drawn = _instead_of(policy).sample(")),
+          Expected("C", refusal=r"candidate flow/.* beside it"), note="Added with the one above."),
+    Wrong("noise_chosen_for_the_rollouts", "evidence",
+          "Every rollout draws by noise of its own choice, and says so.",
+          "small",
+          patched("genpolicy/evidence/stress/rollout.py",
+                  ('return "stress", self.setup.perturbation, self.start_index, self.invocations',
+                   'return "stress", self.setup.perturbation, 7, self.invocations')),
+          Expected("D", refusal=r"the noise of .* by the plan"), note="Added with the one above."),
+    Wrong("pushes_that_never_come", "evidence",
+          "The condition that pushes the hand pushes nobody.",
+          "small",
+          patched("genpolicy/evidence/stress/disturbance.py",
+                  ("self._pushes = list(pushes(", "self._pushes = list([] and pushes(")),
+          Expected("D", refusal=r"was pushed never, .* by the plan"),
+          note="Added with the event that a push leaves."),
     Wrong("a_file_beside_signed_evidence", "evidence",
           "A journal lies beside those on which a signed card stands.",
           "signed", _unjudged, Expected("E", ("upstream_passed",), refusal=r"extra\.mcap")),

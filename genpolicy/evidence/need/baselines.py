@@ -1,14 +1,21 @@
-"""What the baselines reach on held-out data: errors, modes, and what a latent depends on."""
+"""What the baselines reach on held-out data: errors, modes, and what a latent depends on.
+
+Before anything is counted, each is drawn from twice under the same key: what comes out differently
+cannot be made again, and nothing that is measured with it proves anything.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+
+import numpy as np
 
 from genpolicy.candidates.judged import JudgedPolicy
 from genpolicy.compute import map_shards
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.contract.settings import Settings
 from genpolicy.data.dataset import load_dataset
+from genpolicy.errors import ContractError
 from genpolicy.evidence.admission_context import make_checker
 from genpolicy.evidence.documents.need import LATENT, LatentDependence
 from genpolicy.evidence.need.held_out import HeldOut, held_out_situations, modes_of_policy
@@ -17,10 +24,12 @@ from genpolicy.evidence.need.offline import offline_rows
 from genpolicy.evidence.rows.need import ModeRow, OfflineRow
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.rows import write_rows
-from genpolicy.policies.policy import NetworkPolicy
+from genpolicy.policies.policy import NetworkPolicy, Policy
 from genpolicy.policies.settings import SamplerConfig
 from genpolicy.tasks.api import load_task
 
+DRAWN_TWICE = 4
+"""Situations at which each policy is drawn from twice."""
 Measured = tuple[list[OfflineRow], list[ModeRow], list[LatentDependence]]
 
 
@@ -99,10 +108,16 @@ def measure_baseline(job: tuple[BaselinePlan, JudgedPolicy]) -> Measured:
 def mode_rows(
     plan: BaselinePlan, policy: NetworkPolicy, held_out: HeldOut, *, seed: int
 ) -> list[ModeRow]:
-    """Modes that one checkpoint reaches, under each sampling convention."""
+    """Modes that one checkpoint reaches, under each sampling convention.
+
+    Raises:
+        ContractError: A sample is another one when it is drawn again under the same key.
+    """
     task = load_task(plan.task)
     checker = make_checker(task, plan.feasibility, action_period_s=plan.horizons.action_period_s)
     conventions = {policy.sampler.name: policy.sampler, **plan.conventions.get(policy.method, {})}
+    for convention, sampler in conventions.items():
+        require_repeatable(NetworkPolicy(policy.checkpoint, sampler=sampler), held_out, convention)
     return [
         row
         for convention, sampler in conventions.items()
@@ -116,6 +131,29 @@ def mode_rows(
             checker=checker,
         )
     ]
+
+
+def require_repeatable(policy: Policy, held_out: HeldOut, convention: str) -> None:
+    """Refuse a policy whose noise is no function of its key.
+
+    Raises:
+        ContractError: A sample is another one when it is drawn again under the same key.
+    """
+    seen = held_out.observations[:DRAWN_TWICE]
+    if not len(seen):
+        return
+    names = [("drawn twice", row) for row in range(len(seen))]
+    first, again = (policy.sample(seen, noise_names=names, candidates=2).actions for _ in range(2))
+    if np.array_equal(first, again, equal_nan=True):
+        return
+    raise ContractError(
+        where=f"samples of {policy.method} drawn by {convention}",
+        found=f"others when drawn again under the same key, by up to "
+        f"{np.nanmax(np.abs(first - again)):.3g}",
+        expected="the same bits, since noise is a function of its key",
+        action="Draw noise with genpolicy.seeds.counter_noise; nothing measured without a key can "
+        "be made again.",
+    )
 
 
 def latent_rows(
