@@ -48,9 +48,9 @@ class Criterion:
     question: str
     look_at: str
     comparison: Comparison
-    per_candidate: bool = False
-    always: bool = False
-    derived: Callable[[Any], float] | None = None
+    per_candidate: bool
+    always: bool
+    derived: Callable[[Any], float] | None
 
     @property
     def id(self) -> str:

@@ -21,8 +21,7 @@ def _comparable(report: GateReport) -> Any:
 
 def _first_difference(old: Any, new: Any, place: str) -> tuple[str, Any, Any]:
     if isinstance(old, dict) and isinstance(new, dict):
-        order = sorted(set(old) | set(new), key=lambda key: (key == "verdict", key))
-        for key in order:
+        for key in sorted(set(old) | set(new)):  # by the alphabet what decided comes first
             if old.get(key) != new.get(key) or (key in old) != (key in new):
                 return _first_difference(old.get(key), new.get(key), f"{place}.{key}")
     if isinstance(old, list) and isinstance(new, list) and len(old) == len(new):

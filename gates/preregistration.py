@@ -215,7 +215,7 @@ def moved_caveats(root: Path, params: Mapping[str, Any], gate: Gate) -> tuple[st
     return tuple(texts)
 
 
-@functools.lru_cache(maxsize=4)
+@functools.lru_cache
 def _parsed(data: bytes) -> Any:
     return parse_yaml(data, where=PREREGISTRATION)
 

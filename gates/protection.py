@@ -163,7 +163,7 @@ def is_rehearsal(params: Mapping[str, Any]) -> bool:
     if not isinstance(value, bool):
         raise ConfigError(
             where=f"params.yaml: {REHEARSAL}",
-            found=repr(value)[:60],
+            found=f"{value!r:.60}",
             expected="true or false",
             action="Say which; only a ladder that is no rehearsal leads to a card.",
         )
@@ -240,16 +240,16 @@ def require_protection(params: Mapping[str, Any], gate: Gate) -> tuple[str, ...]
     for bound, value in beyond:
         raise ConfigError(
             where=f"params.yaml: {_place(gate, bound.place)}",
-            found=repr(value)[:60],
+            found=f"{value!r:.60}",
             expected=f"{bound.comparison} {bound.bound:g}, because {bound.reason}",
             action="Tighten it. This bound stands in the code; a rehearsal may go beyond it.",
         )
     for named, wrong in absent:
         found = f"{'with' if named.at_most else 'without'} {', '.join(wrong)}"
-        what = f"{'nothing but' if named.at_most else 'all that the code names:'}"
+        what = "nothing but" if named.at_most else "all that the code names:"
         raise ConfigError(
             where=f"params.yaml: {_place(gate, named.place)}",
-            found=found[:200],
+            found=f"{found:.200}",
             expected=f"{what} {', '.join(named.names)}, because {named.reason}",
             action="Restore it. What it names stands in the code; a rehearsal may differ.",
         )

@@ -141,7 +141,7 @@ def read_params(root: Path, *, name: str = PARAMS_FILE) -> dict[str, Any]:
     return document if isinstance(document, dict) else {}
 
 
-@functools.lru_cache(maxsize=4)
+@functools.lru_cache
 def _parsed(data: bytes) -> Any:
     document = parse_yaml(data, where=PARAMS_FILE)
     require_plain(document, where=PARAMS_FILE)
@@ -278,12 +278,12 @@ def _once(where: str, again: bool) -> None:
 
 def _limit(value: Any, owner: Owner, item: Criterion, where: str) -> Limit:
     if not isinstance(value, list) or len(value) != 2:
-        _refuse(where, repr(value)[:60], "[limit, reason]", "Give both.")
+        _refuse(where, f"{value!r:.60}", "[limit, reason]", "Give both.")
     found, reason = value
     derives = item.derived is not None
     if derives != (found == DERIVED):
         expected = f"`{DERIVED}`, because it follows from settings" if derives else "a number"
-        _refuse(where, repr(found)[:60], expected, "Correct the limit.")
+        _refuse(where, f"{found!r:.60}", expected, "Correct the limit.")
     number = None if derives else parse_section(_Number, {"limit": found}, where=_full(where)).limit
     return Limit(number, _reason(reason, where), owner)
 

@@ -31,6 +31,8 @@ KINDS = (
     "core/NumberReplacer",
     "core/ZeroIterationForLoop",
 )
+EVERY = ("tests/gates/test_forms.py",)
+"""Tests that ask every class and function of the gates; the last that a mutant meets."""
 JUDGED = ("tests/gates/test_criteria.py",)
 TESTS = {
     "gates/card/keys.py": (),
@@ -119,7 +121,7 @@ def tests_of(path: str) -> list[str]:
     mirror = ROOT / "tests/gates" / place.parent / f"test_{place.name}"
     first = [mirror.relative_to(ROOT).as_posix()] if mirror.is_file() else []
     found = next((tests for key, tests in TESTS.items() if path.startswith(key)), ())
-    return first + [name for name in found if name not in first]
+    return first + [name for name in (*found, *EVERY) if name not in first]
 
 
 def modules(places: Sequence[str]) -> Iterator[str]:

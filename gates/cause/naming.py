@@ -4,6 +4,7 @@ Order: clocks and frames, calibration, labels, support, modes at all, persistenc
 variables, validity of each mode. A later topic is not believed while an earlier one is red.
 """
 
+import math
 from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -114,11 +115,11 @@ def deciding_answer(question: str, numbers: Numbers, limits: CauseLimits) -> Ans
     found += beside_the_choice(numbers, limits)
     held = [item for item in found if item.question == question and item.limit is not None]
 
-    def margin(item: Answer) -> tuple[int, float]:
+    def margin(item: Answer) -> tuple[bool, float]:
         if item.measured is None or item.limit is None:
-            return 1, 0.0
+            return False, math.inf
         left = item.limit - item.measured
-        return (0 if item.red else 2), left if item.comparison == "<=" else -left
+        return not item.red, left if item.comparison == "<=" else -left
 
     return min(held, key=margin, default=None)
 

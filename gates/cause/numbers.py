@@ -84,10 +84,9 @@ class Numbers:
 
 
 def turned(numbers: Numbers) -> Numbers:
-    """The same with the other evidence in place of the one that is followed."""
+    """The same with the other evidence, which there must be, in place of the one followed."""
     side, fields = numbers.other, Counts.__dataclass_fields__
-    if side is None:
-        return numbers
+    assert side is not None, "no other evidence to turn to"
     own = {name: getattr(numbers.counts, name) for name in fields}
     kept = numbers.kept
     return replace(

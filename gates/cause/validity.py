@@ -195,7 +195,8 @@ def found_words(numbers: Numbers, limits: CauseLimits) -> tuple[str, ...]:
     counts, modes = numbers.counts, numbers.modes
     if counts.two_mode_episodes == 0:
         return ()
-    several = f"{len(modes)} modes of {followed(numbers) or 'the action'}" if modes else "Modes"
+    many = len(modes) > 1
+    several = f"{len(modes)} modes of {followed(numbers) or 'the action'}" if many else "Modes"
     lines = [
         f"{several} were found in {counts.two_mode_episodes} of {counts.primary_episodes} held-out "
         "episodes that could be looked at."

@@ -101,6 +101,28 @@ def test_the_widest_gap_by_hand():
     assert lower == pytest.approx(0.5 - np.hypot(1 - a[0], b[1] - 0.5))
 
 
+def test_both_ends_of_a_gap_are_rounded_against_it():
+    """Half of three clusters are one to two of them: one below, two above."""
+    halves = (np.array([True, True, False, False]), ["a", "a", "b", "c"])
+    none = (np.zeros(30), [str(i) for i in range(30)])
+    (lower, upper), more, less = widest_gap({"a": halves, "b": none}, confidence=0.95)
+    below, above = clopper_pearson(1, 3)[0], clopper_pearson(2, 3)[1]
+    assert (more, less) == ("a", "b")
+    assert upper == pytest.approx(0.5 + (above - 0.5))
+    end = clopper_pearson(0, 30)[1]
+    assert lower == pytest.approx(max(0.0, 0.5 - np.hypot(0.5 - below, end)))
+
+
+def test_the_interval_of_a_count_and_the_level_of_a_share_are_those_asked_for():
+    with pytest.raises(MissingEvidenceError, match=r"^3 of 2 is no share$"):
+        counted_interval(3, 2, confidence=0.9)
+    assert counted_interval(1.0, 3.0, confidence=0.5) == clopper_pearson(1, 3, 0.5)
+    for quantile, confidence, fewest in ((0.5, 0.5, 2), (0.9, 0.8, 22), (0.5, 0.75, 3)):
+        assert draws_for_quantile(quantile, confidence) == fewest
+        half = (1.0 - confidence) / 2.0
+        assert quantile**fewest <= half < quantile ** (fewest - 1)
+
+
 def test_equal_shares_may_still_differ_and_the_widest_of_three_is_told():
     clusters = [str(i) for i in range(40)]
     same = {name: (np.ones(40), clusters) for name in "ab"}

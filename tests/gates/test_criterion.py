@@ -4,7 +4,7 @@ import types
 
 from asking import SPEC, second_in_the_alphabet
 
-from gates.criterion import Criterion, criteria_of
+from gates.criterion import Criterion, Measured, criteria_of, criterion
 from gates.proof import SPECS
 
 
@@ -18,6 +18,27 @@ def test_what_a_module_only_imports_is_not_its_own():
     module = types.ModuleType("another")
     module.borrowed = second_in_the_alphabet
     assert criteria_of(vars(module)) == ()
+
+
+def test_a_number_is_pending_only_where_that_is_said():
+    found = Measured(1.0)
+    assert (found.interval, found.caveat, found.pending) == (None, "", False)
+
+
+def test_who_is_asked_of_each_candidate():
+    """Of all other criteria the answer is one for all methods."""
+    asked = {gate: {i.id for i in s.criteria if i.per_candidate} for gate, s in SPECS.items()}
+    assert asked["A"] == asked["E"] == set()
+    common = {gate: {i.id for i in s.criteria} - asked[gate] for gate, s in SPECS.items()}
+    assert common["B"] == {"baseline_fall_upper"}
+    assert common["C"] == {"mutants_undetected", "checker_violations"}
+    assert common["D"] == {"verdict_reachable", "checker_violations"}
+
+
+def test_what_is_said_of_a_criterion_is_what_it_is():
+    made = criterion(">=", question="?", look_at="There.")(lambda evidence, settings: None)
+    assert (made.comparison, made.question, made.look_at) == (">=", "?", "There.")
+    assert (made.per_candidate, made.always, made.derived) == (False, False, None)
 
 
 def test_every_gate_asks_each_question_once():

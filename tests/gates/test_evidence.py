@@ -5,9 +5,11 @@ import pandas as pd
 import pytest
 
 from gates.evidence import Evidence, MissingEvidenceError, counts, flags, numbers
+from gates.pipeline import Basis
 from genpolicy.audit.rows import TABLES, ModeOutcome, SituationRow
 from genpolicy.data.rows import FrameRow
 from genpolicy.errors import IntegrityError
+from genpolicy.evidence.documents.given import REFUSALS
 from genpolicy.evidence.rows.reproducibility import NfeRow
 from genpolicy.evidence.rows.shadow import CandidateRow
 from genpolicy.evidence.rows.stress import RolloutRow
@@ -128,6 +130,27 @@ def test_an_empty_cell_is_no_value_and_drops_no_row(repo, path, row, column):
     for read in (Evidence(repo).rows, Evidence(repo).records):
         with pytest.raises(MissingEvidenceError, match=rf"{path}\.parquet.* empty .*{column}"):
             read(f"artifacts/{path}.parquet", row)
+
+
+def test_files_are_bound_by_name_and_keep_the_hash_that_was_judged(tmp_path):
+    (tmp_path / "a").write_text("1")
+    found = Evidence(tmp_path, Basis(unrecorded=("stress",)))
+    assert found.basis.unrecorded == ("stress",) and Evidence(tmp_path).basis == Basis()
+    found.bind_files(["a"])
+    first = found.materials
+    assert set(first) == {"a"} and found.digest("a") == first["a"]
+    (tmp_path / "a").write_text("2")
+    found.bind_files(["a"])
+    assert found.bind("*") == ["a"] and found.materials == first
+
+
+def test_a_document_of_another_form_is_not_measured(tmp_path):
+    (tmp_path / "refusals.json").write_text('{"found": 1}')
+    for _ in range(2):
+        with pytest.raises(MissingEvidenceError, match=r"\./refusals\.json is a document with"):
+            Evidence(tmp_path).document(".", REFUSALS)
+    (tmp_path / "refusals.json").write_text('{"found": 1, "accepted": 1, "refused": []}')
+    assert Evidence(tmp_path).document(".", REFUSALS).accepted == 1
 
 
 def test_a_list_has_no_empty_places(repo):

@@ -12,6 +12,7 @@ from gates.preregistration import (
     NONE,
     PLANNED,
     PREREGISTRATION,
+    Move,
     moved_caveats,
     moves,
     plan_bytes,
@@ -265,6 +266,21 @@ def test_a_line_struck_out_of_the_plan_is_not_told_as_tightened():
     assert [(m.place, m.kind) for m in moves(plan, evidence.PARAMS)] == [
         ("gate_d.reset_upper", "changed")
     ]
+
+
+@pytest.mark.parametrize(("length", "shown"), [(59, 59), (60, 60), (61, 60), (500, 60)])
+def test_a_long_value_is_cut_where_it_is_longer_than_sixty(length, shown):
+    text = str(Move("a", "x" * length, None, "changed"))
+    before = text.removeprefix("a (").removesuffix(" -> None)")
+    assert len(before) == shown and before.endswith("…") == (length > 60)
+
+
+def test_a_plan_is_written_in_the_order_in_which_it_is_read():
+    """A person compares it line by line with what changed: not by the alphabet."""
+    plan = plan_of(evidence.PARAMS)
+    assert list(yaml.safe_load(plan_bytes(evidence.PARAMS))) == list(plan)
+    assert list(plan)[: len(PLANNED)] == list(PLANNED)
+    assert plan_bytes(evidence.PARAMS).startswith(b"# Written by `genpolicy gates preregister`.")
 
 
 def test_the_shipped_plan_can_be_read(request):

@@ -126,6 +126,21 @@ def test_a_list_that_leaves_out_a_check_is_bad_configuration_but_in_a_rehearsal(
         assert named.names[0] in str(refused.value) and named.reason in str(refused.value)
 
 
+@pytest.mark.parametrize("named", NAMED, ids=lambda named: named.place)
+def test_the_refusal_of_a_list_says_what_is_wrong_with_it(named):
+    section, _, place = named.place.rpartition(".")
+    broken = {section or stage_of(named.gate): {place: [*named.names[1:], "odd"]}}
+    with pytest.raises(ConfigError) as refused:
+        require_protection(broken, named.gate)
+    if named.at_most:
+        found, rule = "with odd", f"nothing but {named.names[0]}, because"
+    else:
+        found, rule = f"without {named.names[0]}", "all that the code names: "
+    where = named.place if section else f"{stage_of(named.gate)}: {named.place}"
+    assert refused.value.where == f"params.yaml: {where}"
+    assert refused.value.found == found and refused.value.expected.startswith(rule)
+
+
 def test_golden_what_each_list_must_or_may_name():
     assert {(n.gate, n.place, n.names, n.at_most) for n in NAMED} == {
         ("A", "remedies", ("chunked_l1", "bc_noise"), False),

@@ -18,5 +18,12 @@ def test_what_dvc_writes_has_the_form():
     ("dvc.lock", "params", {"params.yaml": 3}), ("dvc.yaml", "plots", True),
 ])  # fmt: skip
 def test_another_form_is_named(name, part, value):
+    stages = {"0": None, "b": {}, "a": {part: value}}
     with pytest.raises(ConfigError, match=rf"{name}: a\.{part} is .*expected what DVC writes"):
-        require_form(name, {"a": {part: value}})
+        require_form(name, stages)
+
+
+@pytest.mark.parametrize("name", ["dvc.yaml", "dvc.lock"])
+def test_of_several_parts_of_another_form_the_first_is_named(name):
+    with pytest.raises(ConfigError, match=rf"{name}: a\.deps is 'x', expected"):
+        require_form(name, {"a": {"params": 3, "plots": 2, "outs": 1, "deps": "x"}})

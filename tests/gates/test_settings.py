@@ -2,6 +2,7 @@
 
 import copy
 import re
+from typing import ClassVar
 
 import evidence
 import pytest
@@ -9,7 +10,16 @@ import pytest
 from flows.workspace import merged
 from gates.card.card import CardSettings
 from gates.proof import SPECS, judge
-from gates.settings import Limit, Limits, read_limits, read_params, read_settings, section_of
+from gates.settings import (
+    GateSettings,
+    Limit,
+    Limits,
+    read_limits,
+    read_params,
+    read_settings,
+    require_plain,
+    section_of,
+)
 from genpolicy.errors import ConfigError
 from genpolicy.integrity.documents import read_yaml
 
@@ -201,6 +211,52 @@ def test_what_json_cannot_say_is_bad_configuration(tmp_path, text, said):
     (tmp_path / "params.yaml").write_text(text)
     with pytest.raises(ConfigError, match=said):
         read_params(tmp_path)
+
+
+@pytest.mark.parametrize(("levels", "fits"), [(30, True), (31, False)])
+@pytest.mark.parametrize("kind", [dict, list])
+def test_settings_are_thirty_levels_deep_at_the_most(levels, fits, kind):
+    document = 1
+    for _ in range(levels):
+        document = {"a": document} if kind is dict else [document]
+    if fits:
+        return require_plain(document, where="params.yaml")
+    with pytest.raises(ConfigError, match="more than 30 levels deep"):
+        require_plain(document, where="params.yaml")
+
+
+def test_a_place_is_named_from_the_top_of_the_file(tmp_path):
+    (tmp_path / "other.yaml").write_text("a: {b: {c: [{d: .inf}]}}")
+    with pytest.raises(ConfigError, match=r"params\.yaml: a\.b\.c\.d is inf, expected plain"):
+        read_params(tmp_path, name="other.yaml")
+    for plain in (True, None, 1, 1.5, "x", [], {}):
+        require_plain({"a": [plain]}, where="params.yaml")
+
+
+def test_a_home_is_one_setting_or_the_names_of_a_table():
+    params = {"a": {"b": {"x": 1, "y": 2}, "c": 3}}
+    assert read_settings({"g": {}, **params}, "g", _Homes).model_dump() == {
+        "names": ["x", "y"], "number": 3,
+    }  # fmt: skip
+    for broken in ({}, {"a": 1}, {"a": {"b": {}}}):
+        with pytest.raises(ConfigError, match=r"params\.yaml: a\.[bc] is missing, expected a sett"):
+            read_settings({"g": {}, **broken}, "g", _Homes)
+
+
+class _Homes(GateSettings):
+    homes: ClassVar = {"names": "a.b", "number": "a.c"}
+
+    names: list[str]
+    number: int
+
+
+def test_no_limits_and_no_waivers_are_none():
+    assert read_limits({"gate_a": {"limits": None}}, "A", SPECS["A"].criteria) == Limits()
+    for part in ("limits", "not_applicable"):
+        for wrong in ([1], "x", {"model": [1]}):
+            with pytest.raises(ConfigError, match=rf"gate_a\.{part}.*owners, and under each"):
+                read_limits({"gate_a": {part: wrong}}, "A", SPECS["A"].criteria)
+    assert GateSettings().caveats == ()
 
 
 def test_the_number_of_a_limit_or_another_one():

@@ -11,8 +11,8 @@ from gates.pages.page import gate_page, index_page
 from gates.pages.summary import markdown
 from gates.proof import judge
 from gates.report import report_bytes, report_path
-from gates.writing import write_gate
-from genpolicy.errors import GenpolicyError
+from gates.writing import changed_page, write_gate
+from genpolicy.errors import BadInputError, GenpolicyError
 
 NUMBER = re.compile(r'<data value="([^"]*)" title="([^"]*)">([^<]*)</data>')
 
@@ -57,6 +57,44 @@ def test_same_evidence_same_bytes(pages, gate):
     assert report_bytes(report) == (pages / report_path(gate)).read_bytes()
     assert gate_page(pages, report) == _page(pages, gate)
     assert markdown(report) == (pages / f"reports/gate_{gate.lower()}.md").read_text()
+
+
+def test_the_first_page_that_is_another_one_is_named(pages, tmp_path):
+    root = tmp_path / "repo"
+    shutil.copytree(pages, root)
+    assert changed_page(root) == ""
+    spoilt = ("index.html", "gate_a.md", "gate_a.html", "gate_e.md", "gate_e.html")
+    for name in reversed(spoilt):
+        page = root / "reports" / name
+        page.write_bytes(page.read_bytes() + b"<!-- -->")
+        assert changed_page(root) == f"reports/{name}"
+    for name in spoilt:  # what was not printed is no other page
+        (root / "reports" / name).unlink()
+    assert changed_page(root) == ""
+
+
+def test_a_page_that_the_lock_file_records_is_left_to_it(pages, tmp_path):
+    root = tmp_path / "repo"
+    shutil.copytree(pages, root)
+    page = root / "reports/gate_b.md"
+    page.write_text("other")
+    lock = json.loads((root / "dvc.lock").read_text())
+    lock["stages"]["gate_b"] = {"cmd": "gate", "outs": [{"path": "reports/gate_b.md"}]}
+    (root / "dvc.lock").write_text(json.dumps(lock))
+    assert changed_page(root) == ""
+    (root / "reports/gate_b.html").write_text("other")
+    assert changed_page(root) == "reports/gate_b.html"
+    (root / report_path("B")).unlink()
+    (root / "reports/index.html").write_bytes(index_page(root).encode())
+    assert changed_page(root) == ""
+
+
+def test_a_report_that_cannot_be_removed_is_bad_input(ladder):
+    report = ladder / report_path("A")
+    report.unlink()
+    report.mkdir()
+    with pytest.raises(BadInputError, match=r"not removable .*writable reports folder"):
+        write_gate(ladder, "A")
 
 
 def test_a_fail_is_written_like_any_verdict(ladder):

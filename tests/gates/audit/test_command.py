@@ -2,7 +2,9 @@
 
 import shutil
 import sys
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -11,13 +13,14 @@ import yaml
 from planar import planar
 
 from gates.audit import command, importing
-from gates.cause import cause_of, default_limits
+from gates.cause import Answer, Cause, CauseName, Topic, cause_of, default_limits
 from genpolicy.cli.main import main
 from genpolicy.cli.resume import work_folder
 from genpolicy.cli.task_checks import task_checks
 from genpolicy.data.dataset import load_dataset
 from genpolicy.data.formats.contract import load_contract
 from genpolicy.integrity.documents import read_json
+from genpolicy.pages.audit.words import TITLES
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "audit"))
 
@@ -67,6 +70,69 @@ def files(folder):
 def unaudited(monkeypatch):
     """The audit is never reached: what is refused before it must not cost it."""
     monkeypatch.setattr(command, "audit", lambda *_, **__: pytest.fail("the audit began"))
+
+
+ROW = Answer("q", Topic.DATA, "an offset", 0.05, 0.0123456)
+OTHER = Answer("o", Topic.LABELS, "labels", None, None)
+CAUSE = Cause(
+    CauseName.DATA_DEFECT, "the_robot", "clock", Topic.DATA, "Correct it.", (ROW, OTHER), 0.5,
+    (3, 4), ("Modes.", "More."),
+)  # fmt: skip
+
+
+def told(cause=CAUSE, refused=0, out=Path("out")):
+    report = SimpleNamespace(evidence=("from e1", "from e2"), rests_on=("60 episodes",))
+    opened = SimpleNamespace(refused=[SimpleNamespace(reason=f"r{k}") for k in range(refused)])
+    return command.as_text(report, cause, opened, out).splitlines()
+
+
+def test_golden_what_a_person_reads_at_the_terminal():
+    title = TITLES[CauseName.DATA_DEFECT]
+    assert told() == [
+        "verdict     data_defect (the robot, clock)",
+        f"            {title}; 3 of 4 resampled audits say the same; first red topic: data",
+        "found       Modes.",
+        "            More.",
+        "judged      an offset: 0.05, <= 0.0123, red",
+        "evidence    from e1",
+        "            from e2",
+        "rests on    60 episodes",
+        "next        Correct it.",
+        "page        out/audit.html",
+    ]
+
+
+def test_what_is_said_where_nothing_is_red_or_sure():
+    alike = replace(CAUSE, variable="clock", agreeing=(0, 0), topic=Topic.NONE)
+    verdict, sure, *_ = told(alike)
+    assert verdict == "verdict     data_defect (clock)"
+    assert sure.endswith("; confidence unknown; no topic is red")
+    assert told(replace(CAUSE, variable="", kind=""))[0] == "verdict     data_defect"
+    against = told(replace(CAUSE, topic=Topic.AGREEMENT))[1]
+    assert against.endswith("3 of 4 resampled audits contradict what all of them say; first red "
+                            "topic: agreement")  # fmt: skip
+    labels = told(replace(CAUSE, topic=Topic.LABELS))
+    assert "judged      labels: unknown, no limit" in labels
+    held = replace(CAUSE, answers=(replace(ROW, measured=0.01),))
+    assert "judged      an offset: 0.01, <= 0.0123" in told(held)
+
+
+@pytest.mark.parametrize("refused", [0, 1, 5, 6, 9])
+def test_five_refusals_are_told_and_how_many_more_there_are(refused):
+    lines = told(refused=refused)[-1 - min(refused, 6) : -1]
+    shown = [f"r{k}" for k in range(min(refused, 5))]
+    more = [f"and {refused - 5} more"] if refused > 5 else []
+    assert [line[12:] for line in lines] == shown + more
+    assert [line[:12].strip() for line in lines] == ["refused", *[""] * 5][: len(lines)]
+
+
+@pytest.mark.parametrize(
+    ("tasks", "name"),
+    [(["insert"], "insert"), (["unnamed"], "data"), ([], "data"), (["a", "b"], "data")],
+)
+def test_a_dataset_is_called_by_its_one_task_or_by_its_file(tasks, name, tmp_path):
+    dataset = SimpleNamespace(manifest={"tasks": tasks})
+    assert command.name_of(dataset, tmp_path / "data") == name
 
 
 def test_everything_is_written_and_again_the_same(recordings, tmp_path, capsys):

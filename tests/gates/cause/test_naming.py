@@ -145,6 +145,22 @@ def test_the_answer_on_which_a_question_rests_is_the_one_furthest_beyond_its_lim
     assert deciding_answer("clock_residual_s", VALID, limit()) is None
 
 
+def test_of_what_is_beyond_what_is_open_and_what_holds_the_worst_decides():
+    """A mode far beyond, one just beyond, one not known and one that holds, in any order."""
+    good, blank = VALID.modes[0], replace(VALID.modes[0], mode="blank", episodes=0, successes=0)
+    bad = replace(VALID.modes[0], mode="bad", successes=30)
+    worse = replace(bad, mode="worse", successes=20)
+
+    def asked(*modes):
+        for order in (modes, modes[::-1]):
+            numbers = replace(VALID, modes=order, alternatives=())
+            yield deciding_answer("mode_success_lower", numbers, limit()).what.split()[2]
+
+    assert set(asked(good, blank, bad, worse)) == {"worse,"}
+    assert set(asked(good, blank, bad)) == {"bad,"}
+    assert set(asked(good, blank)) == {"blank,"}
+
+
 def test_of_two_defects_the_first_is_named_and_both_are_shown():
     other = _offset(0.09, variable="camera")
     cause = named(replace(VALID, findings=(OFFSET, other)))
