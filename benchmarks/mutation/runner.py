@@ -15,7 +15,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict
 from pathlib import Path
 
-from benchmarks.mutation.plan import ROOT, Mutant, change_of, tests_of, text_of
+from benchmarks.mutation.plan import ROOT, Mutant, cases_of, change_of, tests_of, text_of
 
 OURS = ("gates", "tests", "benchmarks")
 CPU_S = 150
@@ -101,6 +101,7 @@ def _run(path: str, text: str | None, tests: Sequence[str], log: Path, scratch: 
         import pytest
 
         options = ["-x", "-q", "--no-header", "--tb=no", "-p", "no:cacheprovider", "--timeout=0"]
+        options += ["-k", cases_of(path)] if cases_of(path) else []
         code = int(pytest.main([*options, f"--basetemp={scratch}/tests", *tests]))
     except BaseException:
         code = 3

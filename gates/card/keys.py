@@ -12,12 +12,12 @@ CURVE_D = -121665 * pow(121666, -1, PRIME) % PRIME
 ROOT_OF_MINUS_ONE = pow(2, (PRIME - 1) // 4, PRIME)
 
 Point = tuple[int, int, int, int]
-"""Extended coordinates: x = X/Z, y = Y/Z, x y = T/Z."""
+"""Extended coordinates, each below the prime: x = X/Z, y = Y/Z, x y = T/Z."""
 
 NEUTRAL: Point = (0, 1, 1, 0)
 
 
-@functools.lru_cache(maxsize=256)
+@functools.cache
 def key_weakness(public_key: bytes) -> str:
     """Why 32 bytes are no key of a person; empty if they may be one."""
     point = _decoded(public_key)
@@ -31,6 +31,7 @@ def key_weakness(public_key: bytes) -> str:
 
 
 def _decoded(data: bytes) -> Point | None:
+    """The point, or its opposite: both have one order, and nothing else is asked of it."""
     if len(data) != 32:
         return None
     number = int.from_bytes(data, "little")
@@ -43,7 +44,6 @@ def _decoded(data: bytes) -> Point | None:
         x = x * ROOT_OF_MINUS_ONE % PRIME
     if (x * x - square) % PRIME or (x == 0 and sign):
         return None
-    x = PRIME - x if x & 1 != sign else x
     return x, y, 1, x * y % PRIME
 
 
@@ -67,4 +67,4 @@ def _times(factor: int, point: Point) -> Point:
 
 
 def _is_neutral(point: Point) -> bool:
-    return point[0] % PRIME == 0 and (point[1] - point[2]) % PRIME == 0
+    return point[0] == 0 and point[1] == point[2]

@@ -15,8 +15,7 @@ from gates.preregistration import PREREGISTRATION
 from gates.stress import cost, safety, trial
 from gates.stress.choice import choose
 from gates.stress.pairs import paired_differences
-from gates.stress.rollouts import JOURNALS, ROLLOUTS, StressSettings
-from genpolicy.evidence.rows.stress import RolloutRow
+from gates.stress.rollouts import JOURNALS, StressSettings, rollouts
 from genpolicy.statistics.eprocess import paired_e_value
 
 
@@ -47,15 +46,13 @@ def best_baseline(evidence: Evidence, settings: StressSettings) -> str:
     """The simple method with the highest success over all planned conditions.
 
     Raises:
-        MissingEvidenceError: A baseline was not run.
+        MissingEvidenceError: A baseline was not run under every condition, as often as planned.
     """
-    means: dict[str, float] = {}
-    for method in settings.baselines:
-        rows = evidence.of(ROLLOUTS, RolloutRow, method)
-        rows = rows[rows["perturbation"].isin(settings.perturbations)]
-        means[method] = float(np.mean(flags(rows, "success"))) if len(rows) else 0.0
-    order = list(means)
-    return min(order, key=lambda name: (-means[name], order.index(name)))
+    means = {
+        method: float(np.mean(flags(rollouts(evidence, settings, method), "success")))
+        for method in settings.baselines
+    }
+    return max(means, key=lambda name: means[name])  # of equals the one that is named first
 
 
 def _decide(judged: Judged) -> Decision:

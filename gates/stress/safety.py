@@ -32,8 +32,10 @@ def recovery_success_lower(
     starts = begun["start"].nunique()
     limit = settings.limits.of.get("recovery_success_lower")
     least = limit.limit if limit and limit.limit is not None else 0.0
-    reach = counted_interval(starts, starts, confidence=settings.confidence)[0] if starts else 0.0
-    if starts == 0 or not reach >= least:
+    if starts == 0:
+        raise MissingEvidenceError("not exercised: recovery began on 0 starts, in any condition")
+    reach, _ = counted_interval(starts, starts, confidence=settings.confidence)
+    if not reach >= least:
         raise MissingEvidenceError(
             f"hardly exercised: recovery began on {starts} starts, in any condition; had each "
             f"succeeded, {reach:.4g} were shown"

@@ -7,7 +7,9 @@ import evidence
 import pytest
 
 from gates.commands import gates
+from gates.preregistration import PREREGISTRATION, plan_bytes
 from gates.proof import STAGE_REQUIRES
+from gates.settings import read_params
 from genpolicy.cli.shell import run_program
 from genpolicy.errors import RefusedError
 
@@ -150,7 +152,8 @@ def test_judge_exits_0_on_fail(ladder, _run):
 def test_verify_card_waits_for_people(ladder, _run):
     result = _run(ladder, "verify-card")
     assert result.exit_code == 3
-    assert "PENDING_REVIEW" in result.output
+    assert result.output.startswith("PENDING_REVIEW: Wait for")
+    assert "  PENDING_REVIEW signature_valid: waits for a person: sign the card\n" in result.output
     assert _run(ladder, "verify-card", "--today", "soon").exit_code == 2
 
 
@@ -178,3 +181,10 @@ def test_a_bad_settings_file_is_exit_2(repo, _run):
         _clean(result)
         assert result.exit_code == 2, text
         assert "params.yaml" in result.output
+
+
+def test_a_plan_is_written_from_the_settings_beside_it(repo, _run):
+    (repo / PREREGISTRATION).unlink()
+    result = _run(repo, "preregister")
+    assert result.exit_code == 0 and "Commit it before the evidence exists" in result.output
+    assert (repo / PREREGISTRATION).read_bytes() == plan_bytes(read_params(repo))

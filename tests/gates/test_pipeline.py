@@ -341,6 +341,10 @@ def test_every_printed_page_is_held_to_its_record_and_nothing_else_is(ladder):
         ({"a": 1, "b": 2}, {"b": 2, "a": 1}, True),
         ({"a": 1, "b": 2}, {"a": 1, "b": 3}, False),
         ([1], {"a": 1}, False),
+        ({}, [], False),
+        ([], {}, False),
+        ({"a": 1}, ["a"], False),
+        ([], "", False),
         (None, 0, False),
     ],
 )

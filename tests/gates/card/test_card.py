@@ -216,3 +216,19 @@ def test_a_card_is_of_a_task_that_has_a_name():
     assert parse_section(CardSettings, section, where="card").task == "t"
     with pytest.raises(ConfigError, match=r"card\.task"):
         parse_section(CardSettings, {**section, "task": ""}, where="card")
+
+
+@pytest.mark.parametrize(("beyond", "inside"), [(0.9e-6, True), (1.1e-6, False)])
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_rounding_of_a_command_is_a_millionth_and_no_more(simulated, axis, beyond, inside):
+    reached = simulated.reached["flow"]
+    lowest, highest = list(simulated.workspace_lower_m), list(simulated.workspace_upper_m)
+    lowest[axis] -= beyond
+    highest[axis] += beyond
+    for change in (
+        {"lowest_m": tuple(lowest)},
+        {"highest_m": tuple(highest)},
+        {"fastest_m_s": simulated.speed_limit_m_s * (1 + beyond)},
+    ):
+        other = replace(simulated, reached={"flow": replace(reached, **change)})
+        assert (beyond_simulation(other, "flow") == []) is inside, change

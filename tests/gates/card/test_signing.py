@@ -3,10 +3,12 @@
 import json
 
 import pytest
+from cryptography.exceptions import UnsupportedAlgorithm
 from cryptography.hazmat.primitives import serialization
 from cryptography.hazmat.primitives.asymmetric.x25519 import X25519PrivateKey
 from team import KEYS, PEOPLE
 
+from gates.card import signing
 from gates.card.signing import load_allow_list, sign_card
 from genpolicy.errors import BadInputError
 from genpolicy.integrity.documents import canonical_json
@@ -126,3 +128,14 @@ def test_a_private_key_that_cannot_sign_is_bad_input(team, kind):
     with pytest.raises(BadInputError, match="the private key"):
         sign_card(team.root, card_file=team.complete(), key_file=file, reviewer="rita")
     assert not team.envelope.exists()
+
+
+def test_a_key_that_the_library_does_not_know_is_bad_input(team, monkeypatch):
+    """As where it was built without a curve: the file names what this machine cannot read."""
+
+    def unsupported(data, password):
+        raise UnsupportedAlgorithm("a curve of its own")
+
+    monkeypatch.setattr(signing, "load_pem_private_key", unsupported)
+    with pytest.raises(BadInputError, match="the private key is not readable"):
+        team.sign(team.complete(), ["rita"])

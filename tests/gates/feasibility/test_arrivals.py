@@ -138,3 +138,8 @@ def test_a_fixture_of_which_nothing_is_counted_gives_no_verdict(ladder, criterio
     evidence.edit_table(ladder, path, lambda f: f[f["fixture"] != fixture])
     with pytest.raises(MissingEvidenceError, match=f"nothing is counted of {fixture}"):
         asked(ladder, criterion, "flow", gate="C")
+
+
+def test_one_arrival_is_some():
+    rows = pd.DataFrame({"arrivals": [1], "stale": [1], "invalid": [0]})
+    assert at_the_stub(rows, "stale", "invalid") == (1, 1)

@@ -280,3 +280,19 @@ def test_rows_of_twenty_episodes_bound_no_p95_where_an_episode_is_one_draw(ladde
     found = found_in(judge(ladder, "C"), name)[0]
     assert found.verdict == "INCONCLUSIVE"
     assert "320 values of 20 independent draws bound no 95% quantile" in found.caveat
+
+
+def test_one_mode_everywhere_compares_nothing(ladder):
+    evidence.edit_table(ladder, CANDIDATES, lambda f: f.assign(mode="left"))
+    report, found = _gap(ladder)
+    assert report.verdict == "INCONCLUSIVE"
+    assert "no observation was answered in two modes" in found.caveat
+
+
+def test_the_move_that_is_judged_has_no_sign(ladder):
+    """A projection to the other side moves a chunk as far."""
+    plain = asked(ladder, projection_p95_m, "flow", gate="C")
+    evidence.edit_table(
+        ladder, CANDIDATES, lambda f: f.assign(position_change_m=-f["position_change_m"])
+    )
+    assert asked(ladder, projection_p95_m, "flow", gate="C") == plain

@@ -122,3 +122,18 @@ def test_a_violation_counts_wherever_it_is_written(where, tmp_path):
     inside = {"a.mcap": found | {"violations": [own, own]}}
     assert _checked(tmp_path, *where, journals=inside).value == 2
     assert _checked(tmp_path, *where, violations=[evidence.VIOLATION]).value == 1
+
+
+@pytest.mark.parametrize("where", FOLDERS)
+def test_one_checked_action_is_some(where, tmp_path):
+    one = evidence.checked("a.mcap", 1)
+    assert _checked(tmp_path, *where, **one).value == 0
+
+
+@pytest.mark.parametrize(("count", "more"), [(3, ""), (5, " and 2 more")])
+def test_three_that_do_not_belong_together_are_named_and_of_more_the_number(count, more, tmp_path):
+    many = {f"{k}.mcap": evidence.checked("a", 0)["journals"]["a"] for k in range(count)}
+    own = evidence.checked("a.mcap", 7)["journals"]
+    with pytest.raises(MissingEvidenceError) as caught:
+        _checked(tmp_path, *FOLDERS[0], journals=own | many)
+    assert str(caught.value).endswith(f": 0.mcap, 1.mcap, 2.mcap{more}")

@@ -1,5 +1,7 @@
 """How often the denser mode is the one drawn more often, over which situations and episodes."""
 
+import math
+
 import evidence
 import pytest
 from editing import cells
@@ -66,3 +68,20 @@ def test_what_cannot_be_is_no_evidence(ladder, change, text):
     evidence.edit_table(ladder, DENSITY, change)
     with pytest.raises(MissingEvidenceError, match=text):
         told(ladder)
+
+
+def test_where_every_situation_is_a_tie_nothing_is_known(ladder):
+    """No share, an interval that holds all, and no episode."""
+    evidence.edit_table(ladder, DENSITY, cells("reached", 7))
+    found = told(ladder)
+    assert math.isnan(found.share) and found.interval == (0.0, 1.0)
+    assert (found.situations, found.tied, found.episodes) == (0, 16, 0)
+
+
+def test_a_mode_may_be_reached_by_every_sample_or_by_none(ladder):
+    """One of two modes is reached by all sixteen: a share of 1 and one of 0, and no tie."""
+    evidence.edit_table(ladder, DENSITY, lambda f: f.assign(reached=16 * (f["mode"] == 0)))
+    found = told(ladder)
+    assert (found.share, found.situations) == (1.0, 16)
+    evidence.edit_table(ladder, DENSITY, lambda f: f.assign(samples=1, reached=1 * (f["mode"] > 0)))
+    assert told(ladder).share == 0.0

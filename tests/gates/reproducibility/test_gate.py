@@ -9,6 +9,7 @@ from gates.evidence import MissingEvidenceError
 from gates.proof import judge
 from gates.reproducibility.gate import (
     nfe_mismatch,
+    nonfinite_weights,
     parameter_budget_deviation,
     samples_difference,
     unpinned_items,
@@ -143,3 +144,36 @@ def test_one_evaluation_too_many_or_too_few_is_a_mismatch(ladder, column):
             lambda f, n=number: f.assign(**{"recorded": 8, "counted": 8, column: n}),
         )  # fmt: skip
         assert asked(ladder, nfe_mismatch, "flow", gate="B").value == 1
+
+
+@pytest.mark.parametrize(
+    ("path", "criterion", "said"),
+    [("train_generators/matched.json", parameter_budget_deviation, "counts no parameters of flow"),
+     ("train_generators/matched.json", unpinned_items, "has no entry of flow"),
+     ("reload/identity.json", unpinned_items, "has no entry of flow"),
+     ("reload/identity.json", nonfinite_weights, "has no entry of flow")],
+)  # fmt: skip
+def test_a_candidate_of_which_nothing_is_written_is_not_measured(ladder, path, criterion, said):
+    evidence.edit_document(ladder, path, lambda d: d.get("methods", d).pop("flow") and None)
+    with pytest.raises(MissingEvidenceError, match=said):
+        asked(ladder, criterion, "flow", gate="B")
+
+
+def test_a_reference_without_parameters_is_no_budget_and_one_of_one_is(ladder):
+    def of(number):
+        def change(document):
+            document["methods"]["chunked_bc"]["parameters"]["total"] = number
+
+        return change
+
+    evidence.edit_document(ladder, "train_baselines/matched.json", of(1))
+    assert asked(ladder, parameter_budget_deviation, "flow", gate="B").value == 99.0
+    evidence.edit_document(ladder, "train_baselines/matched.json", of(0))
+    with pytest.raises(MissingEvidenceError, match="chunked_bc has no parameters"):
+        asked(ladder, parameter_budget_deviation, "flow", gate="B")
+    evidence.edit_document(
+        ladder, "train_baselines/matched.json",
+        lambda d: d["methods"]["chunked_bc"]["parameters"].pop("total") and None,
+    )  # fmt: skip
+    with pytest.raises(MissingEvidenceError, match="parameters"):
+        asked(ladder, parameter_budget_deviation, "flow", gate="B")

@@ -77,3 +77,19 @@ def test_modes_beyond_what_an_adaptive_solver_may_take_say_nothing(ladder):
     evidence.edit_table(ladder, MODES, cells("nfe", 64))
     report = judge(ladder, "B")
     assert "chosen NFE" in found_in(report, "mode_coverage_lower")[0].caveat
+
+
+def test_the_seed_of_the_lowest_bound_is_told_with_its_own_numbers(ladder):
+    """The second covers less, although its single samples reach more."""
+
+    def second(frame):
+        few = frame["index"] % 3 == 0
+        other = frame.assign(seed=1, fewest_admissible=frame["fewest_admissible"].mask(few, 1))
+        first = frame.assign(modes_covered=1)
+        return evidence.pd.concat([first, other], ignore_index=True)
+
+    evidence.edit_table(ladder, MODES, second)
+    found = found_in(judge(ladder, "B"), "mode_coverage_lower")[0]
+    assert found.interval == pytest.approx(clopper_pearson(20, 30, 0.95))
+    assert found.caveat.startswith("in 20 of 30 two-mode situations")
+    assert "reaches every mode in 1;" in found.caveat

@@ -6,6 +6,7 @@ import pytest
 from asked import asked, found_in
 from editing import cells
 
+from gates.evidence import MissingEvidenceError
 from gates.proof import judge
 from gates.reproducibility.latency_budget import MEASURED_HERE, TERMS
 from gates.reproducibility.timing import latency_model_ratio_upper, latency_terms_missing
@@ -191,3 +192,45 @@ def test_what_was_not_measured_in_two_runs_is_not_compared(ladder, change):
     for name in RATIOS.values():
         found = found_in(judge(ladder, "B"), name)[0]
         assert found.measured is None and ("two runs" in found.caveat or "lacks" in found.caveat)
+
+
+def test_two_processes_of_each_run_are_the_fewest_that_answer(ladder):
+    def two(frame):
+        return frame[(frame["process"] < 3) | (frame.get("source", "") == "declared")]
+
+    evidence.edit_table(ladder, MODEL, two)
+    evidence.edit_table(ladder, LATENCY, two)
+    assert asked(ladder, latency_model_ratio_upper, "flow", gate="B").value is not None
+    found = [found_in(judge(ladder, "B"), name)[0] for name in RATIOS.values()]
+    assert all("over 2 processes each" in one.caveat for one in found)
+
+
+@pytest.mark.parametrize("column", ["measured_s", "drawn_s"])
+def test_a_quantile_of_no_time_on_either_side_is_no_ratio(ladder, column):
+    evidence.edit_table(ladder, MODEL, cells(column, 0.0, where=lambda f: f["method"] == "flow"))
+    with pytest.raises(MissingEvidenceError, match="flow: a quantile of no time"):
+        asked(ladder, latency_model_ratio_upper, "flow", gate="B")
+
+
+@pytest.mark.parametrize(("limit", "told"), [(1.0, False), (1.0001, True), (2.0, True)])
+def test_what_spread_a_limit_allows_is_said_where_it_allows_some(ladder, limit, told):
+    """Equal runs differ a little: a limit of 1 allows none, and nothing has to be said of it."""
+    change = evidence.set_limit("gate_b", "warm_latency_ratio_upper", limit)
+    evidence.write_params(ladder, change)
+    found = found_in(judge(ladder, "B"), RATIOS["warm"])[0]
+    assert found.measured is not None
+    assert ("if processes differ by" in found.caveat) is told
+
+
+def test_the_least_stable_component_is_named_whichever_run_was_slower(ladder):
+    """In run 1 `encode` takes twice as long, in run 2 `sample` half as much again."""
+
+    def change(frame):
+        own = frame["source"] == "measured"
+        factor = np.where((frame["run"] == 1) & (frame["component"] == "encode"), 2.0, 1.0)
+        factor *= np.where((frame["run"] == 2) & (frame["component"] == "sample"), 1.5, 1.0)
+        return frame.assign(seconds=frame["seconds"].mask(own, 0.001 * factor))
+
+    evidence.edit_table(ladder, LATENCY, change)
+    for name in RATIOS.values():
+        assert "least stable component encode at 2" in found_in(judge(ladder, "B"), name)[0].caveat

@@ -121,3 +121,17 @@ def test_a_pair_is_told_apart_from_the_evidence_that_is_needed_on(
     found = choose(Judged(Evidence(ladder), settings, (), "PASS", verdicts))
     assert found.promoted == promoted
     assert found.text.startswith(decision)
+
+
+@pytest.mark.parametrize(("change", "promoted"), [({}, "flow"), ({"measured": None}, "diffusion")])
+def test_the_card_goes_to_the_sooner_whatever_else_was_measured(ladder, change, promoted):
+    """Another number of the same candidate, after its latency; and a latency that is not known."""
+    latency = [c for c in judge(ladder, "D").criteria if c.id == "latency_p95_s"]
+    own = [c.model_copy(update=change if c.candidate == "flow" else {}) for c in latency]
+    more = [c.model_copy(update={"id": "other", "measured": 99.0}) for c in own
+            if c.candidate == "flow"]  # fmt: skip
+    whole = [c.model_copy(update={"candidate": None, "measured": 0.0}) for c in own[:1]]
+    verdicts = dict.fromkeys(evidence.CANDIDATES, "PASS")
+    answers = (*own, *(more if not change else ()), *whole)
+    judged = Judged(Evidence(ladder), settings_of(ladder, "D"), answers, "PASS", verdicts)
+    assert choose(judged).promoted == promoted

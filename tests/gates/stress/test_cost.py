@@ -228,3 +228,24 @@ def test_a_force_is_never_negative(ladder):
     evidence.edit_table(ladder, ROLLOUTS, cells("force_peak_n", -1.0, where=of, share=0.01))
     with pytest.raises(MissingEvidenceError, match="negative"):
         flow(ladder, cost.force_peak_p95_n)
+
+
+def test_a_rollout_that_asked_nothing_has_nothing_recorded(ladder):
+    """It states no invocation, and none is recorded: that is the same number."""
+    none = lambda f: in_("nominal")(f) & (f["start"] == 3)  # noqa: E731
+    before = flow(ladder, cost.latency_p95_s).value
+    evidence.edit_table(ladder, INVOCATIONS, lambda f: f[~none(f)])
+    evidence.edit_table(ladder, ROLLOUTS, cells("invocations", 0, where=none))
+    assert flow(ladder, cost.latency_p95_s).value == before
+
+
+def test_without_a_cold_answer_none_is_said_to_be_slow(ladder):
+    evidence.edit_table(ladder, INVOCATIONS, lambda f: f.assign(invocation=f["invocation"] + 1))
+    assert "cold at most 0 s" in flow(ladder, cost.latency_p95_s).caveat
+
+
+def test_the_point_that_is_said_is_the_share_of_the_pool(ladder):
+    """Two misses of twenty on half of the starts: one of twenty in all."""
+    half = lambda f: of(f) & (f["start"] % 2 == 0)  # noqa: E731
+    evidence.edit_table(ladder, ROLLOUTS, cells("deadline_misses", 2, where=half))
+    assert ": 0.05, bounded by" in flow(ladder, cost.deadline_miss_upper).caveat

@@ -1,9 +1,11 @@
 """Gate D: the least evidence over the baselines, and the best of them."""
 
 import evidence
+import pytest
 from asked import asked, settings_of
 
-from gates.evidence import Evidence
+from gates.evidence import Evidence, MissingEvidenceError
+from gates.proof import judge
 from gates.stress.gate import best_baseline, promotion_e_value
 from gates.stress.pairs import paired_differences
 from genpolicy.statistics.eprocess import paired_e_value
@@ -40,3 +42,16 @@ def test_the_best_baseline_is_the_first_of_equals_and_never_a_candidate(ladder):
     last = settings.baselines[-1]
     only = lambda frame: frame.assign(success=~frame["method"].isin(settings.baselines[:-1]))  # noqa: E731
     assert best_baseline(*edit(ladder, only)) == last
+
+
+def test_a_baseline_that_did_not_meet_the_plan_is_not_called_the_best(ladder):
+    def elsewhere(frame):
+        own = (frame["method"] == "bc") & (frame["perturbation"] == "camera_delay")
+        return frame.assign(perturbation=frame["perturbation"].mask(own, "storm"))
+
+    with pytest.raises(MissingEvidenceError, match="bc did not meet camera_delay"):
+        best_baseline(*edit(ladder, elsewhere))
+    evidence.edit_table(ladder, "stress/stub.parquet", lambda f: f.assign(stale=1))
+    report = judge(ladder, "D")
+    assert report.verdict == "FAIL"
+    assert report.decision.startswith("return to the simpler policy (bc did not meet")

@@ -124,7 +124,8 @@ def test_the_undisturbed_condition_alone_is_no_comparison(ladder):
     [("margin", (-1.0, 1.0), (-0.99, 0.99)), ("family_alpha", (0.0, 1.0), (0.01, 0.99)),
      ("planned_starts", (0,), (1,)), ("execution_horizon", (0,), (1,)),
      ("action_period_s", (0.0,), (0.001,)), ("candidates", ((),), (("flow",),)),
-     ("baselines", ((),), (("bc",),))],
+     ("baselines", ((),), (("bc",),)),
+     ("perturbations", (("nominal",),), (("nominal", "camera_delay"),))],
 )  # fmt: skip
 def test_a_setting_on_its_border_is_refused_and_one_inside_is_taken(ladder, name, outside, inside):
     known = settings_of(ladder, "D").model_dump()

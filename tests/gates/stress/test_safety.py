@@ -57,7 +57,7 @@ def test_the_lower_bound_over_the_starts_is_judged(ladder):
 
 def test_a_recovery_that_hardly_ever_began_is_no_evidence(ladder):
     begun(ladder, "recovery_drill", 0, 0)
-    with pytest.raises(MissingEvidenceError, match="hardly exercised: recovery began on 0 starts"):
+    with pytest.raises(MissingEvidenceError, match="not exercised: recovery began on 0 starts"):
         recovery(ladder)
     assert judge(ladder, "D").candidates["flow"] == "INCONCLUSIVE"
     # Five of five could all be luck: even then no more than 0.478 is shown, and 0.5 is asked.
@@ -145,3 +145,55 @@ def test_a_condition_of_which_nothing_is_counted_gives_no_verdict(ladder, criter
     evidence.edit_table(ladder, path, lambda f: f[f["perturbation"] != "camera_delay"])
     with pytest.raises(MissingEvidenceError, match="nothing is counted of camera_delay"):
         asked(ladder, criterion, "flow", gate="D")
+
+
+def test_recoveries_that_just_reach_what_is_asked_are_judged(ladder):
+    """Six of six show 0.541 at most: where that is the limit they are asked, a hair above not."""
+    begun(ladder, "recovery_drill", 6, 6)
+    shown = clopper_pearson(6, 6, 0.95)[0]
+    for limit, judged in ((shown, True), (shown * 1.001, False)):
+        change = evidence.set_limit("gate_d", "recovery_success_lower", limit)
+        evidence.write_params(ladder, change)
+        if judged:
+            assert recovery(ladder).value == shown
+        else:
+            with pytest.raises(MissingEvidenceError, match=r"hardly exercised: .* on 6 starts"):
+                recovery(ladder)
+
+
+def test_without_a_limit_any_recovery_is_measured(ladder):
+    begun(ladder, "recovery_drill", 1, 1)
+    evidence.write_params(
+        ladder, lambda p: p["gate_d"]["limits"]["safety"].pop("recovery_success_lower")
+    )
+    assert recovery(ladder).value == clopper_pearson(1, 1, 0.95)[0]
+
+
+@pytest.mark.parametrize("made", [0, 1])
+def test_a_candidate_that_generated_nothing_balances_nothing(ladder, made):
+    """One action that was generated and executed is a balance; none is not."""
+    names = ("generated", "executed", "discarded", "queued")
+
+    def little(frame):
+        some = of(frame) & (frame["perturbation"] == "nominal")
+        values = {name: made * some.astype(int) for name in names[:2]}
+        return frame.assign(**values, **dict.fromkeys(names[2:], 0))
+
+    evidence.edit_table(ladder, "stress/conservation.parquet", little)
+    evidence.edit_table(ladder, "stress/counts.parquet", cells("count", 0))
+    if made:
+        assert asked(ladder, safety.conservation_error, "flow", gate="D").value == 0.0
+    else:
+        with pytest.raises(MissingEvidenceError, match="nothing was generated"):
+            asked(ladder, safety.conservation_error, "flow", gate="D")
+
+
+def test_what_was_discarded_without_a_reason_counts_and_a_reason_without_a_condition_too(ladder):
+    gone = lambda f: of(f) & (f["perturbation"] == "camera_delay")  # noqa: E731
+    evidence.edit_table(ladder, "stress/counts.parquet", lambda f: f[~gone(f)])
+    assert asked(ladder, safety.conservation_error, "flow", gate="D").value == 10.0
+    evidence.edit_table(
+        ladder, "stress/counts.parquet",
+        lambda f: f.assign(perturbation=f["perturbation"].mask(of(f), "storm")),
+    )  # fmt: skip
+    assert asked(ladder, safety.conservation_error, "flow", gate="D").value == 10.0 * (7 + 6)
