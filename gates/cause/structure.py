@@ -209,7 +209,9 @@ def _absent(
             "record the commands so that they can be read, and repeat the audit."
         )
         return answers, Diagnosis(CauseName.INSUFFICIENT_SUPPORT, unread[0], "component", text)
-    decided = counts.resolved > counts.two_mode
+    # A handful of situations with clusters is luck, and decides nothing.
+    many = counts.resolved - limits["two_mode_chance"] * max(counts.analysed, 1) >= 0
+    decided = many and counts.resolved > counts.two_mode
     text = (
         "Use the simple baselines: no two separate actions were found under one observation, in "
         f"{looked_in(numbers)}."

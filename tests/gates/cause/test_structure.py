@@ -211,7 +211,9 @@ def test_modes_persist_or_are_noise_or_too_short_to_tell(kept, persistent, chang
     assert (cause.name.value, cause.kind) == (name, kind)
 
 
-@pytest.mark.parametrize(("resolved", "kind"), [(0, ""), (3, ""), (4, "observation_decides")])
+@pytest.mark.parametrize(
+    ("resolved", "kind"), [(0, ""), (4, ""), (17, ""), (18, "observation_decides")]
+)
 def test_clusters_that_the_observation_tells_apart_are_said_to_be(resolved, kind):
     cause = named(counts(two_mode_episodes=1, two_mode=3, persistent=0, resolved=resolved))
     assert (cause.name, cause.kind) == (CauseName.UNIMODAL, kind)
