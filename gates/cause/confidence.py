@@ -2,8 +2,8 @@
 
 Resampled audits look where the whole one looked, so where it is blind all of them agree. On 300
 recordings that the detector was not made on, 8 of the 173 verdicts that nearly every resample
-shared were not right all the same; that share is taken off every confidence. And a verdict that denies
-modes is no surer than the part of the way on which modes would have been found.
+shared were not right all the same; that share is taken off every confidence. And a verdict that
+denies modes is no surer than the part of the way on which modes would have been found.
 """
 
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ from gates.cause.answers import CauseName, Topic
 from gates.cause.numbers import Numbers
 from genpolicy.audit.reach_rows import Reach
 
-# Jeffreys' estimate of 8 of 173 that were not right: docs/audit-real.md, report half of commit 096fb73.
+# Jeffreys' estimate of 8 of 173 that were not right: docs/audit-real.md, half of commit 096fb73.
 UNSEEN = (8 + 0.5) / (173 + 1)
 
 
