@@ -183,8 +183,9 @@ def _with_turns(
     """What the sequence tells by a pattern over all starts, in place of less that it tells by name.
 
     What decided shows in an episode and in its neighbour alike: a neighbour that tells a quarter
-    shows something that tells a half, at least. A pattern that is not believed accuses nobody: its
-    lower end is that of a guess.
+    shows something that tells a half, at least. How much it tells at most no neighbour says, so
+    nothing is denied beside a pattern; one that is not believed accuses nobody: its lower end is
+    that of a guess.
     """
     phase, chosen = of
     ordered = bool(np.all(np.isfinite(data.episodes.order)))
@@ -201,9 +202,10 @@ def _with_turns(
     # Where the order is known it is asked by itself, and a share that drifts is no session.
     if lower > row.told_lower and not ordered:
         row = replace(row, told=told, told_lower=lower, told_upper=upper)
-    row = row if believed else replace(row, told_lower=min(row.told_lower, 0.0))
+    least = row.told_lower if believed else min(row.told_lower, 0.0)
+    row = replace(row, told_lower=least, told_upper=1.0)
     same = [old for old in rows if (old.variable, old.phase) == (SEQUENCE, phase)]
-    if same and same[0].told >= row.told:
+    if same and same[0].told_lower >= row.told_lower:
         return rows
     return [*(old for old in rows if old not in same), row]
 

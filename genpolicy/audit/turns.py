@@ -158,11 +158,13 @@ def _guesses(
     result = np.full((2, len(modes)), -1, dtype=np.int64)
     for row, own in enumerate(scored):
         cross = np.outer(own, close[row])
-        axis = np.linalg.eigh(whole - cross - cross.T)[1][:, -1]
-        number = np.where(present[cell[row]], whitened @ axis, np.nan)
-        for which, votes in enumerate((close[row] @ axis, nearest[row] @ axis)):
-            if abs(votes) > FLAT:
-                result[which, row] = np.nanargmax(number * votes)
+        values, axes = np.linalg.eigh(whole - cross - cross.T)
+        # Of three modes two numbers are alike; each counts as much as neighbours agree in it.
+        numbers = whitened @ (axes * np.maximum(values, 0.0))
+        for which, near_by in enumerate((close[row], nearest[row])):
+            votes = np.where(present[cell[row]], numbers @ (axes.T @ near_by), np.nan)
+            if np.nanmax(np.abs(votes)) > FLAT:
+                result[which, row] = np.nanargmax(votes)
     return result
 
 

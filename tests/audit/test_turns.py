@@ -32,6 +32,18 @@ def test_a_side_per_session_is_seen_over_starts_whose_modes_share_no_name(turns)
         assert np.mean(found.by_nearest == modes) > 0.7
 
 
+def test_of_three_ways_in_turn_each_is_guessed():
+    """One number for each mode never speaks for the middle one."""
+    rng = stream(5, "three")
+    way = np.arange(EPISODES) // 8 % 3
+    start = rng.integers(0, 4, EPISODES)
+    modes = 3 * start + np.stack([rng.permutation(3) for _ in range(4)])[start, way]
+    found = pattern(np.arange(EPISODES), modes, start, rng=stream(5, "draws"), draws=1999)
+    assert found.p_value <= 0.001
+    for one in range(3):
+        assert np.mean((found.guessed == modes)[way == one]) > 0.6
+
+
 def test_modes_that_are_dealt_have_no_pattern_and_are_not_guessed():
     p_values, right = [], []
     for seed in range(60):
