@@ -84,7 +84,13 @@ def measured(todo: Sequence[Job], file: Path, *, workers: int) -> list[Result]:
             known[result.job] = result
         done = [known[job].as_row() for job in todo if job in known]
         file.write_text(json.dumps(done, indent=1) + "\n")
-        print(f"{len(done)} of {len(todo)} data sets", flush=True)
+        strong = [result for result in known.values() if result.strong and result.job in todo]
+        right = sum(result.right for result in strong)
+        print(
+            f"{len(done)} of {len(todo)} data sets, right in {right} of {len(strong)} from the "
+            "minimum strength on",
+            flush=True,
+        )
     return [known[job] for job in todo]
 
 

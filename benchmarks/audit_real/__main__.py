@@ -13,7 +13,7 @@ stopped. The report half is drawn from the hash of the commit, where all is as c
 import argparse
 import json
 import time
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -21,7 +21,7 @@ from benchmarks.audit.frozen import DETECTOR, frozen_commit, report_seed
 from benchmarks.audit_real.catalogue import AS_IS, Case, development, report
 from benchmarks.audit_real.runner import Result, run
 from benchmarks.audit_real.stated import RESULTS, TRUTH, into_page, truth_tables
-from benchmarks.audit_real.tables import markdown
+from benchmarks.audit_real.tables import SHARES, markdown
 from benchmarks.audit_real.truth import RIGHT
 from genpolicy.compute import LOCAL, map_shards
 from genpolicy.seeds import stream
@@ -60,7 +60,15 @@ def measured(todo: Sequence[Case], file: Path, *, jobs: int) -> list[Result]:
             print(f"{result.judged:18s} {result.case.title}: {result.said}{sure}{mark}", flush=True)
         rows = [result.as_row() for result in known.values()]
         file.write_text(json.dumps(rows, indent=1) + "\n")
+        print(so_far([known[case] for case in todo if case in known], len(todo)), flush=True)
     return [known[case] for case in todo]
+
+
+def so_far(results: Sequence[Result], of: int) -> str:
+    """What has been found up to here, a line: a run that is cut short has its figures."""
+    count = Counter(result.judged for result in results)
+    counted = ", ".join(f"{count[name]} {name}" for name in SHARES if count[name])
+    return f"{len(results)} of {of}: {counted}"
 
 
 def main() -> None:

@@ -108,8 +108,8 @@ class Cause:
         next_action: What to do.
         answers: Every question with its number and limit, in the order of diagnosis.
         confidence: Share of resampled audits with the same cause and variable, of one more than
-            there were, so that no number of draws makes certainty; None without any. Where more
-            of them contradict the cause it is not said, and this is the share of those.
+            there were, less what no resample shows (`gates.cause.confidence`); None without any.
+            Where more of them contradict the cause it is not said, and this is about those.
         agreeing: How many of how many resampled audits name the same; where it is not said, how
             many contradict it.
         found: What was found of modes and hidden variables, a sentence each, whatever the verdict.

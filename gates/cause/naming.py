@@ -20,6 +20,7 @@ from gates.cause.answers import (
     in_words,
 )
 from gates.cause.components import others
+from gates.cause.confidence import confidence_of
 from gates.cause.hidden import hidden
 from gates.cause.limits import CauseLimits
 from gates.cause.numbers import Numbers, Residual
@@ -61,7 +62,8 @@ def name_cause(numbers: Numbers, draws: Sequence[Numbers], limits: CauseLimits) 
 
     Args:
         numbers: What was measured.
-        draws: The same of resampled data; the confidence is the share that names the same cause.
+        draws: The same of resampled data; the confidence rests on the share that names the
+            same cause.
         limits: One for each question.
 
     Raises:
@@ -91,7 +93,7 @@ def name_cause(numbers: Numbers, draws: Sequence[Numbers], limits: CauseLimits) 
         topic=red,
         next_action=f"{verdict.next_action}{others(numbers, red)}",
         answers=tuple(answers),
-        confidence=sum(same) / (len(same) + 1) if same else None,
+        confidence=confidence_of(verdict.name, red, (sum(same), len(same)), numbers),
         agreeing=(sum(same), len(same)),
         found=found_words(numbers, limits),
     )

@@ -190,17 +190,25 @@ def _absent(
     denied, falling = _denied(numbers, limits), _falling_apart(numbers, limits, apart)
     few = _few(numbers, limits)
     answers = [*denied, falling, few]
+    beside = max(apart, _apart_of_other(numbers))
     if any(answer.red for answer in denied):
         return answers, thin(_where(numbers, limits, blank))
-    if white:
-        return answers, _noise("The spread is noise from action to action")
-    if falling.red:
-        return answers, _noise(f"The clusters of {apart:.0%} of the situations do not persist")
+    if white or falling.red:
+        what = f"The clusters of {apart:.0%} of the situations do not persist"
+        return answers, _noise("The spread is noise from action to action" if white else what)
     if few.red:
         text = (
             f"Clusters were found in {counts.two_mode_episodes} of {counts.primary_episodes} "
             f"held-out episodes: more than chance gives ({limits['two_mode_chance']:.0%}), fewer "
             f"than show modes ({limits['two_mode_share']:.0%}): record more, from fewer starts."
+        )
+        return answers, thin(text, kind="few_clusters")
+    # What falls apart more often than chance clusters is not denied, whoever saw it.
+    if beside - limits["two_mode_chance"] > 0:
+        text = (
+            f"The clusters of {beside:.0%} of the situations do not persist: more than chance "
+            f"gives ({limits['two_mode_chance']:.0%}), fewer than noise makes "
+            f"({limits['incoherent_share']:.0%}): record more, from fewer starts."
         )
         return answers, thin(text, kind="few_clusters")
     if unread:
@@ -209,13 +217,22 @@ def _absent(
             "record the commands so that they can be read, and repeat the audit."
         )
         return answers, Diagnosis(CauseName.INSUFFICIENT_SUPPORT, unread[0], "component", text)
-    decided = counts.resolved > counts.two_mode
+    # A handful of situations with clusters is luck, and decides nothing.
+    many = counts.resolved - limits["two_mode_chance"] * max(counts.analysed, 1) >= 0
+    decided = many and counts.resolved > counts.two_mode
     text = (
         "Use the simple baselines: no two separate actions were found under one observation, in "
         f"{looked_in(numbers)}."
     )
     kind = "observation_decides" if decided else ""
     return answers, Diagnosis(CauseName.UNIMODAL, "", kind, text)
+
+
+def _apart_of_other(numbers: Numbers) -> float:
+    """The share of situations whose clusters fall apart, of the other kind of evidence."""
+    if numbers.other is None or not numbers.other.analysed:
+        return 0.0
+    return numbers.other.incoherent / numbers.other.analysed
 
 
 def _denied(numbers: Numbers, limits: CauseLimits) -> list[Answer]:

@@ -30,6 +30,7 @@ from genpolicy.audit.neighbourhoods import Neighbourhood
 from genpolicy.audit.rows import Prediction
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.audit.situations import Several
+from genpolicy.audit.stored import sequence_hits
 from genpolicy.audit.variable import EPISODE_VARIABLES
 from genpolicy.seeds import stream
 
@@ -98,6 +99,7 @@ def predictions(
             of = len(more) if name in keys else 1
             row = _row(name, phase, chosen, hits, settings.confidence, of=of)
             rows.append(replace(row, detail=_best(times)) if name == COLUMNS else row)
+        rows = _with_turns(data, rows, (phase, chosen), root_seed, settings.confidence)
         seen = seen_before(data, settings, items, chosen)
         if len(seen.choices.mode) >= LEAST_EPISODES:
             rng = stream(root_seed, "audit", "predictability", phase, HISTORY)
@@ -169,6 +171,43 @@ def _before(links: Integers, order: Array, group: Integers) -> Integers:
             if links[episode] >= 0:
                 last = [int(links[episode]) + 1, *last[:-1]]
     return result
+
+
+def _with_turns(
+    data: AuditInput,
+    rows: list[Prediction],
+    of: tuple[str, Choices],
+    root_seed: int,
+    confidence: float,
+) -> list[Prediction]:
+    """What the sequence tells by a pattern over all starts, in place of less that it tells by name.
+
+    What decided shows in an episode and in its neighbour alike: a neighbour that tells a quarter
+    shows something that tells a half, at least. How much it tells at most no neighbour says, so
+    nothing is denied beside a pattern; one that is not believed accuses nobody: its lower end is
+    that of a guess.
+    """
+    phase, chosen = of
+    ordered = bool(np.all(np.isfinite(data.episodes.order)))
+    place = data.episodes.order if ordered else data.stored
+    if place is None or len(chosen.mode) < LEAST_EPISODES:
+        return rows
+    found = sequence_hits(data, place, chosen, seeds=(root_seed, phase))
+    if found is None:
+        return rows
+    *hits, believed = found
+    row, nearest = (_row(SEQUENCE, phase, chosen, part, confidence) for part in hits)
+    ends = [nearest.told, nearest.told_lower, nearest.told_upper]
+    told, lower, upper = (float(np.sqrt(max(end, 0.0))) for end in ends)
+    # Where the order is known it is asked by itself, and a share that drifts is no session.
+    if lower > row.told_lower and not ordered:
+        row = replace(row, told=told, told_lower=lower, told_upper=upper)
+    least = row.told_lower if believed else min(row.told_lower, 0.0)
+    row = replace(row, told_lower=least, told_upper=1.0)
+    same = [old for old in rows if (old.variable, old.phase) == (SEQUENCE, phase)]
+    if same and same[0].told_lower >= row.told_lower:
+        return rows
+    return [*(old for old in rows if old not in same), row]
 
 
 def _past(phase: str, seen: Before, rng: np.random.Generator, confidence: float) -> Prediction:

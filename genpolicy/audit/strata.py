@@ -79,8 +79,8 @@ def examine_strata(
             row = _tested(settings, seeds, values, place, observed=observed)
             inside = variable in (data.phase_name, "time_in_episode") and row.recorded
             row = replace(row, detail=INSIDE if inside else "")
-            if variable == SEQUENCE and values is None:
-                row = _stored(data, row, hidden, links[phase], root_seed)
+            if variable == SEQUENCE:
+                row = _in_turns(data, row, hidden, links[phase], root_seed)
             rows.append(row)
         rows += column_strata(data, settings, hidden, Asking(phase, root_seed))
         rows.append(_history(data, settings, phase, past, root_seed))
@@ -139,19 +139,22 @@ def _tested(
     )
 
 
-def _stored(
-    data: AuditInput, unknown: Stratum, drawn: Drawn, links: Integers, root_seed: int
+def _in_turns(
+    data: AuditInput, row: Stratum, drawn: Drawn, links: Integers, root_seed: int
 ) -> Stratum:
-    """The sequence by the places in the files if there is a pattern; else it is not known."""
-    if data.stored is None:
-        return unknown
-    nearby = _nearby_mode(data.stored, links)
-    test = sequence_test(data, nearby, drawn, seeds=(root_seed, unknown.phase))
-    if test is None:
-        return unknown
+    """The sequence by a pattern over all starts where there is one; else as it was tested.
+
+    Without an order of recording the places in the files are asked for a pattern, and only that.
+    """
+    place = data.episodes.order if row.recorded else data.stored
+    if place is None:
+        return row
+    test = sequence_test(data, place, links, drawn, seeds=(root_seed, row.phase))
+    if test is None or (row.recorded and test.effect <= (row.effect or 0.0)):
+        return row
     return Stratum(
         variable=SEQUENCE,
-        phase=unknown.phase,
+        phase=row.phase,
         p_value=test.p_value,
         p_adjusted=None,
         effect=test.effect,
@@ -160,7 +163,7 @@ def _stored(
         n=test.n,
         recorded=True,
         observed=False,
-        detail=STORED,
+        detail=row.detail if row.recorded else STORED,
     )
 
 

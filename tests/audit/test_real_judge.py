@@ -3,7 +3,7 @@
 import json
 from dataclasses import replace
 
-from benchmarks.audit_real.__main__ import measured, sampled
+from benchmarks.audit_real.__main__ import measured, sampled, so_far
 from benchmarks.audit_real.catalogue import (
     AS_IS,
     BASES,
@@ -86,6 +86,15 @@ def test_the_reliability_table_counts_by_confidence():
     rows = reliability([said(RIGHT, 1.0), said(WRONG, 0.995), said(RIGHT, 0.6), said(WRONG, None)])
     assert rows[2].startswith("| 0.50 to 0.70 | 1 | 1 | 1.00")
     assert rows[3].startswith("| 0.99 to 1.00 | 2 | 1 | 0.50")
+
+
+def test_a_run_that_is_cut_short_has_its_figures():
+    found = [
+        Result("pushing", ((AS_IS, 1.0),), seed, "valid_modes", "unimodal", "", "", 0.9, judged,
+               10, 1.0)
+        for seed, judged in enumerate((RIGHT, WRONG, RIGHT))
+    ]  # fmt: skip
+    assert so_far(found, 10) == "3 of 10: 2 right, 1 wrong"
 
 
 def test_a_run_goes_on_where_it_stopped_and_a_sample_begins_with_each_base_as_it_is(tmp_path):

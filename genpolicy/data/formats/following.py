@@ -19,7 +19,7 @@ LAGS = (-2, -1, 0, 1, 2, 3, 4, 6, 8, 12)
 SPANS = (4, 12)
 MINIMUM_SAMPLES = 20
 LEAST_ROWS = 6
-MOST_EPISODES = 40
+MOST_EPISODES = 80
 # An episode in which a number moves less than this share of its usual power has no vote on it.
 STILL = 0.05
 # What is left unexplained, against what the command of another episode leaves; and the share from

@@ -52,8 +52,8 @@ WORDS = {
     "held-out": "from episodes that stand apart from those searched for neighbours",
     "realigned": "with every measured clock offset taken out",
     "alike": "in what predicts the action, learned from other episodes, where none stands near",
-    "confidence": "share of audits of resampled data that name the same cause; it says nothing of "
-    "causes that the audit cannot see",
+    "confidence": "share of audits of resampled data that name the same cause, less what such "
+    "audits get wrong together and, where modes are denied, what could not be looked at",
     "adjusted p": "after Holm's correction over all variables and phases",
 }
 

@@ -11,6 +11,7 @@ from gates.cause import (
     Topic,
     deciding_answer,
 )
+from gates.cause.confidence import UNSEEN
 from gates.cause.numbers import Kept, Labels, Residual
 from genpolicy.audit.rows import Finding
 from genpolicy.errors import ConfigError
@@ -76,7 +77,8 @@ def test_what_most_resampled_audits_contradict_is_not_said(said):
     assert half.name is named(said).name and half.agreeing == (10, 20)
     most = named(said, draws=[said] * 9 + [fault] * 8 + [label] * 3 + [thin] * 4)
     assert (most.name, most.kind) == (CauseName.INSUFFICIENT_SUPPORT, "unstable")
-    assert (most.topic.value, most.agreeing, most.confidence) == ("agreement", (11, 24), 11 / 25)
+    assert (most.topic.value, most.agreeing) == ("agreement", (11, 24))
+    assert most.confidence == pytest.approx((1.0 - UNSEEN) * 11 / 25)
     assert f"9 say {named(said).name}, 11 another cause" in most.next_action
     assert f"8 of them data_defect({named(fault).variable}, clock). If" in most.next_action
     assert named(fault).next_action in most.next_action
@@ -96,13 +98,14 @@ def test_which_of_two_variables_is_named_is_no_other_cause():
     assert (cause.name, cause.agreeing) == (CauseName.HIDDEN_STATE, (9, 20))
 
 
-def test_confidence_is_the_share_of_draws_that_name_the_same():
+def test_confidence_rests_on_the_share_of_draws_that_name_the_same():
     draws = [VALID] * 3 + [BROKEN["hidden"][0]]
-    assert named(VALID, draws=draws).confidence == 3 / 5
+    assert named(VALID, draws=draws).confidence == pytest.approx((1.0 - UNSEEN) * 3 / 5)
     assert named(VALID, draws=draws).agreeing == (3, 4)
     assert named(VALID).confidence is None
-    # Of no number of draws is one sure.
-    assert named(VALID, draws=[VALID] * 200).confidence == 200 / 201
+    # Of no number of draws is one sure, since all of them look where the whole audit looked.
+    sure = named(VALID, draws=[VALID] * 200).confidence
+    assert sure == pytest.approx((1.0 - UNSEEN) * 200 / 201) and sure < 0.96
 
 
 @pytest.mark.parametrize(

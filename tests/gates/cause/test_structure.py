@@ -211,7 +211,9 @@ def test_modes_persist_or_are_noise_or_too_short_to_tell(kept, persistent, chang
     assert (cause.name.value, cause.kind) == (name, kind)
 
 
-@pytest.mark.parametrize(("resolved", "kind"), [(0, ""), (3, ""), (4, "observation_decides")])
+@pytest.mark.parametrize(
+    ("resolved", "kind"), [(0, ""), (4, ""), (17, ""), (18, "observation_decides")]
+)
 def test_clusters_that_the_observation_tells_apart_are_said_to_be(resolved, kind):
     cause = named(counts(two_mode_episodes=1, two_mode=3, persistent=0, resolved=resolved))
     assert (cause.name, cause.kind) == (CauseName.UNIMODAL, kind)
@@ -244,3 +246,18 @@ def test_the_fifth_of_the_way_that_is_seen_least_is_named(least, name):
     answers = named(replace(ABSENT, reach=reach(*shares))).answers
     (found,) = [a for a in answers if "fifth of the way" in a.what]
     assert found.measured == 0.6 and f"in the {name} fifth" in found.what
+
+
+@pytest.mark.parametrize(
+    ("here", "there", "name"),
+    [(18, 0, "unimodal"), (19, 0, "insufficient_support"), (0, 19, "insufficient_support"),
+     (0, 18, "unimodal"), (37, 0, "pointwise_noise")],
+)  # fmt: skip
+def test_clusters_that_fall_apart_more_often_than_chance_gives_are_not_denied(here, there, name):
+    """Two ways that join a chunk later fell apart in 12 %, and the learned evidence denied them."""
+    numbers = counts(two_mode_episodes=0, two_mode=0, incoherent=here)
+    seen = learned(spoke=0.3)
+    other = replace(seen["other"], incoherent=there)
+    cause = named(replace(numbers, **seen | {"other": other}))
+    assert cause.name.value == name
+    assert cause.kind == ("few_clusters" if name == "insufficient_support" else "")
