@@ -105,21 +105,37 @@ def stricter(settings: AuditSettings) -> AuditSettings:
 
 
 def vectors(
-    data: AuditInput, settings: AuditSettings, component: Component, rows: Integers
+    data: AuditInput,
+    settings: AuditSettings,
+    component: Component,
+    rows: Integers,
+    like: Integers | None = None,
 ) -> Array:
     """Vectors of the chunks at `rows` whose distance is the RMS distance in this component.
+
+    Args:
+        data: Canonical audit input.
+        settings: Chunk length and representation.
+        component: What is compared.
+        rows: Rows of the chunks. Shape (n,).
+        like: Rows of the situation against which they are held, whose common length and tremor are
+            taken; those of `rows` where None.
 
     Returns:
         Shape (n, d).
     """
     if component.name == POSITION:
-        paths = relative_paths(data, rows, ROUTE_CHUNKS * settings.chunk_steps)
-        return features(paths, settings)
-    return joined(component, series(data, settings, component, rows))
+        paths = _routes(data, settings, rows)
+        return features(paths, settings, None if like is None else _routes(data, settings, like))
+    return joined(component, series(data, settings, component, rows, like))
 
 
 def series(
-    data: AuditInput, settings: AuditSettings, component: Component, rows: Integers
+    data: AuditInput,
+    settings: AuditSettings,
+    component: Component,
+    rows: Integers,
+    like: Integers | None = None,
 ) -> Array:
     """Values of the component at each step of the chunks: of timing, how far each step goes.
 
@@ -130,13 +146,18 @@ def series(
     if component.name == POSITION:
         return relative_paths(data, rows, steps)
     if component.name == TIMING:
-        paths = relative_paths(data, rows, ROUTE_CHUNKS * steps)
-        along = progress(paths, max(1, steps // SMOOTHING_SHARE))[:, :steps]
+        paths = _routes(data, settings, rows)
+        others = None if like is None else _routes(data, settings, like)
+        along = progress(paths, max(1, steps // SMOOTHING_SHARE), others)[:, :steps]
         return np.asarray(np.diff(along, axis=1, prepend=0.0)[..., None] * steps)
     if component.signal is None:
         return np.zeros((len(rows), steps, 0))
     values = component.signal[chunk_rows(data, rows, steps)]
     return values if component.begin is None else values - component.begin[rows][:, None]
+
+
+def _routes(data: AuditInput, settings: AuditSettings, rows: Integers) -> Array:
+    return relative_paths(data, rows, ROUTE_CHUNKS * settings.chunk_steps)
 
 
 def joined(component: Component, values: Array) -> Array:

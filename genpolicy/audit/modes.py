@@ -13,9 +13,11 @@ from functools import lru_cache
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
+from sklearn import config_context
 from sklearn.cluster import HDBSCAN
 
 from genpolicy.audit.data import Array, Integers
+from genpolicy.audit.middle import middle
 from genpolicy.audit.settings import AuditSettings
 
 AXES = 3
@@ -56,13 +58,15 @@ class Clustering:
         return tuple(int(size) for size in np.bincount(self.labels, minlength=self.count))
 
 
-def features(paths: Array, settings: AuditSettings) -> Array:
+def features(paths: Array, settings: AuditSettings, like: Array | None = None) -> Array:
     """Vectors whose Euclidean distance is the RMS distance of two chunks.
 
     Args:
         paths: Positions of chunks from a common origin, and what follows them. Shape (n, S, P).
         settings: `representation`: `path` resamples at equal arc length, so that fast and slow
             along one route are one mode; `time` compares position by position.
+        like: Chunks whose common length and tremor are taken, to hold others against them; those
+            of `paths` where None. Shape (m, S, P).
 
     Returns:
         Shape (n, min(K, S) * P).
@@ -70,7 +74,7 @@ def features(paths: Array, settings: AuditSettings) -> Array:
     n, steps = len(paths), min(settings.chunk_steps, paths.shape[1])
     used = paths[:, :steps]
     if settings.representation == "path":
-        used = _by_arc_length(paths, steps)
+        used = _by_arc_length(paths, steps, like)
     return np.asarray(used.reshape(n, -1) / np.sqrt(steps), dtype=np.float64)
 
 
@@ -228,9 +232,10 @@ def _principal_splits(vectors: Array, least: int, minimum_gain: float) -> list[I
 
 def _confirmed(vectors: Array, sides: Integers, least: int) -> bool:
     """Whether HDBSCAN finds clusters in every group and none that mixes them."""
-    found = HDBSCAN(
-        min_cluster_size=least, min_samples=MINIMUM_SAMPLES, algorithm="brute", copy=True
-    ).fit_predict(vectors)
+    with config_context(assume_finite=True, skip_parameter_validation=True):
+        found = HDBSCAN(
+            min_cluster_size=least, min_samples=MINIMUM_SAMPLES, algorithm="brute", copy=True
+        ).fit_predict(vectors)
     clear = found >= 0
     if np.count_nonzero(clear) < len(vectors) / 2:
         return False
@@ -242,7 +247,7 @@ def _confirmed(vectors: Array, sides: Integers, least: int) -> bool:
     return majorities == set(sides.tolist()) and bool(pure >= AGREEMENT * np.count_nonzero(clear))
 
 
-def _by_arc_length(paths: Array, steps: int) -> Array:
+def _by_arc_length(paths: Array, steps: int, like: Array | None) -> Array:
     """Paths resampled at equal arc lengths up to one that most of them reach within `steps`.
 
     Whoever still rests when the chunk begins goes the same way a little later: what follows the
@@ -252,11 +257,15 @@ def _by_arc_length(paths: Array, steps: int) -> Array:
     command: what lies between them is lag times speed, and a faster one would seem to go another
     way.
     """
-    n = len(paths)
+    n, width = len(paths), max(1, steps // SMOOTHING_SHARE)
     paths = np.concatenate([np.zeros_like(paths[:, :1]), paths], axis=1)
-    along = progress(paths, max(1, steps // SMOOTHING_SHARE))
-    lengths = along[np.arange(n), np.minimum(_leaves(along) + steps, along.shape[1] - 1)]
-    common = max(float(np.quantile(lengths, 0.25)), 0.5 * float(np.median(lengths)))
+    if like is None:
+        along = progress(paths, width)
+        common = _common_length(along, steps)
+    else:
+        like = np.concatenate([np.zeros_like(like[:, :1]), like], axis=1)
+        common = _common_length(progress(like, width), steps)
+        along = progress(paths, width, like)
     at = np.broadcast_to(np.linspace(0.0, common, steps), (n, steps))
     left = np.sum(along[:, None, 1:-1] <= at[:, :, None], axis=2)
     rows = np.arange(n)[:, None]
@@ -265,28 +274,36 @@ def _by_arc_length(paths: Array, steps: int) -> Array:
     return np.asarray((1.0 - share) * paths[rows, left] + share * paths[rows, left + 1])
 
 
+def _common_length(along: Array, steps: int) -> float:
+    """Length that most paths reach within `steps` from where they leave."""
+    ends = np.minimum(_leaves(along) + steps, along.shape[1] - 1)
+    lengths = along[np.arange(len(along)), ends]
+    return max(float(np.quantile(lengths, 0.25)), 0.5 * float(middle(lengths)))
+
+
 def _leaves(along: Array) -> Integers:
     """Step after which each path leaves where it stands; 0 where it goes at once. Shape (n,)."""
     step = np.diff(along, axis=1)
     moving = step[step > 0.0]
     if not len(moving):
         return np.zeros(len(along), dtype=np.int64)
-    goes = step >= STANDS * float(np.median(moving))
+    goes = step >= STANDS * float(middle(moving))
     return np.where(goes.any(axis=1), np.argmax(goes, axis=1), 0)
 
 
-def progress(paths: Array, width: int) -> Array:
+def progress(paths: Array, width: int, like: Array | None = None) -> Array:
     """How far each path has come at each step, tremor left out. Shape (n, S).
 
     The length of a path that trembles grows while it stands. So it is taken from running means,
     less the square that white noise adds to a step; the noise is read off third differences, in
-    which a smooth motion is next to nothing.
+    which a smooth motion is next to nothing, of the paths in `like`, else of these.
     """
     smooth = uniform_filter1d(paths, width, axis=1, mode="nearest")
     squares = np.sum(np.diff(smooth, axis=1) ** 2, axis=2)
     if paths.shape[1] > THIRD:
-        third = np.sum(np.diff(paths, THIRD, axis=1) ** 2, axis=2) / THIRD_POWER
-        squares = np.maximum(squares - 2.0 * np.median(third) / width**2, 0.0)
+        rough = paths if like is None else like
+        third = np.sum(np.diff(rough, THIRD, axis=1) ** 2, axis=2) / THIRD_POWER
+        squares = np.maximum(squares - 2.0 * middle(third.reshape(-1)) / width**2, 0.0)
     along = np.zeros(paths.shape[:2])
     along[:, 1:] = np.cumsum(np.sqrt(squares), axis=1)
     return along

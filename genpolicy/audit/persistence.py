@@ -19,6 +19,7 @@ from genpolicy.audit.settings import AuditSettings
 
 NULL_QUANTILE = 0.95
 MINIMUM_PER_MODE = 2
+DRAWS = 99
 
 
 def kept_identity(
@@ -61,7 +62,7 @@ def kept_between(
     values = series(data, settings, component, situation.members)
     labels = cluster(joined(component, values[:, ::2]), settings, component.separation).labels
     if labels.max() == 0:
-        return 0.0, np.zeros(99)
+        return 0.0, np.zeros(DRAWS)
     return _against_null(joined(component, values[:, 1::2]), labels, rng)
 
 
@@ -69,9 +70,9 @@ def _against_null(
     vectors: Array, labels: Integers, rng: np.random.Generator
 ) -> tuple[float, Array]:
     gaps = np.linalg.norm(vectors[:, None] - vectors[None], axis=2)
-    observed = _share(gaps, labels)
-    null = np.array([_share(gaps, rng.permutation(labels)) for _ in range(99)])
-    return observed, null
+    dealt = [rng.permutation(labels) for _ in range(DRAWS)]
+    observed, *null = shares(gaps, np.stack([labels, *dealt]))
+    return float(observed), np.asarray(null)
 
 
 def summarise(measured: list[tuple[float, Array] | None]) -> Persistence:
@@ -93,14 +94,22 @@ def persistent(measured: tuple[float, Array] | None) -> bool:
     return measured is not None and measured[0] > float(np.quantile(measured[1], NULL_QUANTILE))
 
 
-def _share(gaps: Array, labels: Integers) -> float:
-    """Share of chunks nearer on average to their own cluster (itself left out) than to others."""
+def shares(gaps: Array, labels: Integers) -> Array:
+    """Share of chunks nearer on average to their own cluster (itself left out) than to others.
+
+    Args:
+        gaps: Distances of all pairs. Shape (n, n).
+        labels: Cluster of each chunk, the same sizes in every row. Shape (m, n).
+
+    Returns:
+        Shape (m,).
+    """
     kinds = np.unique(labels)
-    own = labels[:, None] == kinds[None]
-    counts = own.sum(axis=0)[None] - own
-    means = (gaps @ own) / np.maximum(counts, 1)
-    means[np.broadcast_to(counts == 0, means.shape)] = np.inf
-    return float(np.mean(kinds[np.argmin(means, axis=1)] == labels))
+    own = labels[:, :, None] == kinds
+    counts = own.sum(axis=1)[:, None] - own
+    means = np.matmul(gaps, own.astype(np.float64)) / np.maximum(counts, 1)
+    means[counts == 0] = np.inf
+    return np.asarray(np.mean(kinds[np.argmin(means, axis=2)] == labels, axis=1))
 
 
 def roughness(values: Array) -> float:

@@ -2,6 +2,7 @@
 
 import numpy as np
 from scipy.spatial import cKDTree
+from scipy.spatial.distance import cdist
 
 from genpolicy.audit.components import Component, vectors
 from genpolicy.audit.data import AuditInput, Integers, observation_history
@@ -12,6 +13,9 @@ from genpolicy.audit.rows import RecoveryOutcome
 from genpolicy.audit.settings import AuditSettings
 
 UNASSIGNED = "unassigned"
+# Situations that vote, evenly over all of them: an episode passes many of one held-out episode, and
+# they say the same. As many others are asked where none of these is near.
+VOTERS = 600
 
 
 def assign(
@@ -37,26 +41,53 @@ def assign(
         Mode of each, by majority over its situations; -1 where none is near. Shape (n,).
     """
     result = np.full(len(episodes), -1, dtype=np.int64)
-    if not situations:
+    if episode_modes.max(initial=-1) < 0:
         return result
+    step = max(1, -(-len(situations) // VOTERS))
+    for part in range(step):
+        open_ones = np.flatnonzero(result < 0)
+        some = situations[part::step]
+        votes = _votes(
+            data, settings, some, episode_modes, episodes[open_ones], component=component
+        )
+        voted = votes.any(axis=1)
+        result[open_ones[voted]] = np.argmax(votes[voted], axis=1)
+    return result
+
+
+def _votes(
+    data: AuditInput,
+    settings: AuditSettings,
+    situations: list[tuple[Neighbourhood, Clustering]],
+    episode_modes: Integers,
+    episodes: Integers,
+    *,
+    component: Component,
+) -> Integers:
+    """How many situations say that an episode goes as those of a mode. Shape (n, modes)."""
+    votes = np.zeros((len(episodes), int(episode_modes.max()) + 1), dtype=np.int64)
+    if not situations or not len(episodes):
+        return votes
     starts = np.searchsorted(data.episode, np.arange(len(data.episodes) + 1))
     queries = np.array([item[0].query for item in situations], dtype=np.int64)
     places = observation_history(data, queries, settings.observation_horizon)
+    near = np.full((len(episodes), len(queries)), -1, dtype=np.int64)
     for number, episode in enumerate(episodes):
         rows = np.arange(starts[episode], starts[episode + 1])
-        votes = np.zeros(int(episode_modes.max(initial=-1)) + 2, dtype=np.int64)
         history = observation_history(data, rows, settings.observation_horizon)
         found = cKDTree(history).query(places, distance_upper_bound=settings.radius)
-        gaps, near = np.asarray(found[0]), np.asarray(found[1])
-        for place in np.flatnonzero(np.isfinite(gaps)):
-            situation, _ = situations[int(place)]
-            chunks = np.append(situation.members, rows[near[place]])
-            near_by = vectors(data, settings, component, chunks)
-            nearest = int(np.argmin(np.linalg.norm(near_by[:-1] - near_by[-1], axis=1)))
-            votes[episode_modes[data.episode[situation.members[nearest]]]] += 1
-        if votes[:-1].any():
-            result[number] = int(np.argmax(votes[:-1]))
-    return result
+        inside = np.isfinite(found[0])
+        near[number, inside] = rows[np.asarray(found[1])[inside]]
+    for number, (situation, _) in enumerate(situations):
+        who = np.flatnonzero(near[:, number] >= 0)
+        if not len(who):
+            continue
+        members = situation.members
+        known = vectors(data, settings, component, members)
+        asked = vectors(data, settings, component, near[who, number], like=members)
+        modes = episode_modes[data.episode[members[np.argmin(cdist(asked, known), axis=1)]]]
+        votes[who[modes >= 0], modes[modes >= 0]] += 1
+    return votes
 
 
 def demonstrated(

@@ -8,7 +8,7 @@ cause each of them names, and so how often it is the same, is judged where the l
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtr, ndtri
 
 from genpolicy.audit.data import Array, Integers
 from genpolicy.audit.documents import Counts, Persistence
@@ -190,7 +190,7 @@ def _stratum(
     wide = (row.effect_upper or 0.0) - (row.effect_lower or 0.0)
     shock = float(rng.normal())
     effect = min(1.0, max(0.0, row.effect + shock * wide / (2 * TWO_SIDED_95)))
-    p_value = float(norm.sf(norm.isf(min(max(row.p_adjusted, 1e-12), 1.0 - 1e-12)) + shock))
+    p_value = float(ndtr(ndtri(min(max(row.p_adjusted, 1e-12), 1.0 - 1e-12)) - shock))
     return p_value, effect, max(0.0, effect - (row.effect - (row.effect_lower or 0.0)))
 
 

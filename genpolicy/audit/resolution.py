@@ -8,6 +8,7 @@ import numpy as np
 from scipy import stats
 
 from genpolicy.audit.data import Array, AuditInput, Flags, Integers
+from genpolicy.audit.middle import middle
 from genpolicy.audit.modes import Clustering
 from genpolicy.audit.neighbourhoods import Neighbourhood
 from genpolicy.audit.settings import AuditSettings
@@ -76,8 +77,9 @@ def resolved_by_observation(
     uuid = str(data.episodes.uuid[data.episode[situation.query]])
     rng = stream(0, "audit", "resolution", uuid, int(data.index[situation.query]))
     drawn = [rng.permutation(clustering.labels) for _ in range(DRAWS)]
+    table = _table(observed, steps, least)
     real, *chance = (
-        _columns(observed, steps, _masks(labels, clustering.count), least, auc)
+        _columns(table, _masks(labels, clustering.count), auc)
         for labels in (clustering.labels, *drawn)
     )
     return Told(together, real, tuple(chance))
@@ -118,27 +120,36 @@ def _episodes(told: Iterable[tuple[int, frozenset[int]]]) -> dict[int, set[int]]
     return found
 
 
+def _table(
+    observed: Sequence[Array], steps: tuple[Array, float], least: float
+) -> tuple[Array, Array, Integers]:
+    """All that is observed beside each other, by how much it must differ, and as which component.
+
+    Returns:
+        Values, shape (n, C); least differences, shape (C,); components, their last steps behind all
+        of them, shape (C,).
+    """
+    last, step = steps
+    count = last.shape[1]
+    onset = COURSE * step if step > 0.0 else np.inf
+    return (
+        np.concatenate([*observed, last], axis=1),
+        np.repeat([*[least] * len(observed), onset], count),
+        np.concatenate([np.tile(np.arange(count), len(observed)), count + np.arange(count)]),
+    )
+
+
 def _columns(
-    observed: Sequence[Array],
-    steps: tuple[Array, float],
-    masks: Sequence[Flags],
-    least: float,
-    auc: float,
+    table: tuple[Array, Array, Integers], masks: Sequence[Flags], auc: float
 ) -> frozenset[int]:
     """Observed components, and behind them their last steps, that tell a cluster from the rest."""
+    values, least, component = table
     found: set[int] = set()
-    last, step = steps
     for inside in masks:
-        for values in observed:
-            found |= _tell(values, inside, least, auc)
-        if step > 0.0:
-            found |= {last.shape[1] + j for j in _tell(last, inside, COURSE * step, auc)}
+        gap = np.abs(middle(values[inside]) - middle(values[~inside]))
+        told = (j for j in np.flatnonzero(gap >= least) if _auc(values[:, j], inside) >= auc)
+        found.update(int(component[j]) for j in told)
     return frozenset(found)
-
-
-def _tell(values: Array, inside: Flags, least: float, auc: float) -> set[int]:
-    gap = np.abs(np.median(values[inside], axis=0) - np.median(values[~inside], axis=0))
-    return {int(j) for j in np.flatnonzero(gap >= least) if _auc(values[:, j], inside) >= auc}
 
 
 def _masks(labels: Integers, count: int) -> list[Flags]:
@@ -194,13 +205,13 @@ def _across(values: Array, inside: Flags) -> Array:
 
     Left out of the middles, no member draws the line to itself.
     """
-    result = np.empty(len(values))
-    for number in range(len(values)):
-        rest = np.arange(len(values)) != number
-        line = values[rest & inside].mean(axis=0) - values[rest & ~inside].mean(axis=0)
-        length = float(np.linalg.norm(line))
-        result[number] = float(values[number] @ line) / (length if length > 0.0 else 1.0)
-    return result
+    own = np.stack([inside, ~inside], axis=1)
+    sums = own.T.astype(np.float64) @ values
+    left = own.sum(axis=0) - own
+    means = (sums - own[..., None] * values[:, None]) / left[..., None]
+    line = means[:, 0] - means[:, 1]
+    length = np.linalg.norm(line, axis=1)
+    return np.asarray(np.sum(values * line, axis=1) / np.where(length > 0.0, length, 1.0))
 
 
 def _place(data: AuditInput) -> Integers:
@@ -225,7 +236,7 @@ def _along(values: Array, inside: Flags) -> Array:
 
 def _parts(values: Array, inside: Flags, least: float, auc: float) -> bool:
     """Whether a coordinate differs by so much and orders a cluster and the rest."""
-    apart = abs(float(np.median(values[inside]) - np.median(values[~inside])))
+    apart = abs(float(middle(values[inside]) - middle(values[~inside])))
     return apart >= least and _auc(values, inside) >= auc
 
 
@@ -237,7 +248,7 @@ def observed_gap(
 ) -> float:
     """Largest difference of a component's median between a cluster and the rest, in scales."""
     return max(
-        float(np.max(np.abs(np.median(v[inside], axis=0) - np.median(v[~inside], axis=0))))
+        float(np.max(np.abs(middle(v[inside]) - middle(v[~inside]))))
         for v in _observed(data, settings, situation)
         for inside in _masks(clustering.labels, clustering.count)
     )

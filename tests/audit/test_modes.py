@@ -132,3 +132,15 @@ def test_two_ways_part_as_far_after_a_rest(rests):
     paths = np.stack([0.3 * ahead, across, np.zeros_like(ahead)], axis=2)
     paths += 0.0005 * rng.normal(size=(24, 1, 3)) * ahead[:, :, None]
     assert cluster_chunks(paths, SETTINGS).count == 2
+
+
+def test_chunks_are_measured_by_the_length_of_those_against_which_they_are_held():
+    rng = stream(25, "like")
+    paths = fan(rng.uniform(-0.1, 0.1, 9), rng)
+    assert np.array_equal(features(paths, SETTINGS, paths), features(paths, SETTINGS))
+    # One of them alone, and twice as fast: the same route, seen as far as the others go.
+    slow, fast = features(paths[:1], SETTINGS, paths), features(2.0 * paths[:1], SETTINGS, paths)
+    assert np.allclose(slow, features(paths, SETTINGS)[:1], atol=1e-12)
+    assert np.linalg.norm(fast - slow) < 0.1 * np.linalg.norm(
+        features(2.0 * paths[:1], SETTINGS) - slow
+    )

@@ -11,6 +11,7 @@ from genpolicy.audit.persistence import (
     Persistence,
     kept_identity,
     persistent,
+    shares,
     summarise,
     von_neumann,
 )
@@ -75,3 +76,27 @@ def test_the_ratio_of_von_neumann_is_two_for_an_alternation_and_one_for_white_no
     smooth = np.linspace(-1, 1, 64)[None, :, None] * np.array([1.0, -1.0])[:, None, None]
     assert von_neumann(smooth)[0] < 0.01
     assert von_neumann(np.ones((5, 16, 2))) == (0.0, 0.0)
+
+
+def test_shares_are_those_of_one_dealing_after_the_other():
+    """By hand: each chunk against the mean distance to every cluster, itself left out."""
+    rng = stream(4, "shares")
+    gaps = np.abs(rng.normal(size=(9, 9)))
+    gaps += gaps.T
+    np.fill_diagonal(gaps, 0.0)
+    labels = np.array([0, 0, 0, 0, 1, 1, 1, 2, 2])
+    deals = np.stack([labels, *(rng.permutation(labels) for _ in range(5))])
+    expected = []
+    for deal in deals:
+        right = 0
+        for chunk, own in enumerate(deal):
+            others = np.arange(9) != chunk
+            means = [gaps[chunk, others & (deal == kind)].mean() for kind in range(3)]
+            right += int(np.argmin(means)) == own
+        expected.append(right / 9)
+    assert shares(gaps, deals).tolist() == expected
+
+
+def test_a_cluster_of_one_is_nobodys_own():
+    gaps = np.array([[0.0, 1.0, 2.0], [1.0, 0.0, 2.0], [2.0, 2.0, 0.0]])
+    assert shares(gaps, np.array([[0, 0, 1]])).tolist() == [2 / 3]

@@ -82,6 +82,7 @@ FILES = {
     "b.hdf5": (lambda p: p.write_bytes(b"text"), "does not begin as HDF5"),
     "c.hdf5": (lambda p: sparse(p, detect.HDF5_MAGIC), "cut off"),
     "d.hdf5": (lambda p: sparse(p, b""), "does not begin as HDF5"),
+    "e.hdf5": (lambda p: sparse(p, HDF5), "300000000000 bytes long, expected 96 bytes"),
     "a.mcap": (lambda p: p.write_bytes(MCAP[:-1]), "cut off or still being written"),
 }
 COMMANDS = ("audit", "ingest", "propose")

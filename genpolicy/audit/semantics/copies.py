@@ -11,9 +11,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
+from scipy.spatial.distance import pdist
 
 from genpolicy.audit.data import Array, AuditInput, Flags, Integers, Text
+from genpolicy.audit.middle import middle
 from genpolicy.audit.rows import Finding
+from genpolicy.audit.semantics.meetings import may_cover
 from genpolicy.audit.semantics.motion import Motion
 from genpolicy.audit.semantics.report import listed
 from genpolicy.audit.semantics.robust import episode_centred, episode_sums, some
@@ -97,11 +100,15 @@ def find_copies(data: AuditInput, motion: Motion) -> Copies:
     nearest = tree.query(points[probes], k=NEIGHBOURS)
     distance, found = np.asarray(nearest[0]), np.asarray(nearest[1])
     moving = replace(moving, usual=_usual_distance(points, segment, probes))
-    for number, probe in enumerate(probes):
-        for near, other in zip(distance[number], found[number], strict=True):
-            if near > CLOSE * moving.usual or other == probe:
-                continue
-            _judge(result, moving, int(places[probe]), int(places[other]))
+    number, place = np.nonzero(distance <= CLOSE * moving.usual)
+    probe, other = probes[number], found[number, place]
+    rows = places[np.sort(np.stack([probe, other], axis=1)[probe != other], axis=1)]
+    near = CLOSE * moving.usual
+    hopeful = may_cover(
+        moving.signal, moving.starts, rows, near=near, least=LEAST_OVERLAP, own=SELF_COVER, of=COVER
+    )
+    for row, later in rows[hopeful].tolist():
+        _judge(result, moving, row, later)
     return result
 
 
@@ -263,10 +270,9 @@ def _usual_distance(points: Array, segment: Integers, probes: Integers) -> float
     """Median distance between windows of different episodes, at probes."""
     step = max(1, len(probes) // 500)
     chosen = probes[::step]
-    gaps = points[chosen][:, None, :] - points[chosen][None, :, :]
-    distance = np.linalg.norm(gaps, axis=2)
-    other = segment[chosen][:, None] != segment[chosen][None, :]
-    return float(np.median(distance[other])) if other.any() else 0.0
+    apart = pdist(points[chosen])
+    other = pdist(segment[chosen][:, None].astype(np.float64)) > 0.0
+    return float(np.median(apart[other])) if other.any() else 0.0
 
 
 def _judge(result: Copies, moving: Moving, row: int, other: int) -> None:
@@ -322,13 +328,16 @@ def _same(first: Array, second: Array, usual: float) -> bool:
         return False
     if float(np.abs(gap).max()) <= ROUNDING * usual:
         return True
-    rough = float((np.diff(gap, axis=0) ** 2).sum()) / max(float((gap**2).sum()), 1e-300)
+    steps = gap[1:] - gap[:-1]
+    rough = float((steps**2).sum()) / max(float((gap**2).sum()), 1e-300)
     if not rough - ROUGH >= 0:
         return False
-    small, left = np.diff(first, n=2, axis=0), np.diff(gap, n=2, axis=0)
+    left = steps[1:] - steps[:-1]
+    small = first[1:] - first[:-1]
+    small = small[1:] - small[:-1]
     power = (small**2).sum(axis=0)
     noisy = power > 0
     if not noisy.any():
         return True
     share = np.sqrt((left**2).sum(axis=0)[noisy] / power[noisy])
-    return bool(np.median(share) <= SMALL_MOVEMENT)
+    return bool(middle(share) <= SMALL_MOVEMENT)

@@ -15,6 +15,7 @@ from genpolicy.data.formats.detect import HDF5_MAGIC, MCAP_MAGIC, PARQUET_MAGIC,
 from genpolicy.errors import IntegrityError
 
 FIRST_USER_BLOCK = 512
+LARGEST_TAIL = 2**20  # bytes behind the stated end that a writer may have reserved
 # Where a superblock of each version keeps the size of addresses, and the first address; the third
 # is that of the end.
 ADDRESS_SIZE_AT = {0: 13, 1: 13, 2: 9, 3: 9}
@@ -76,6 +77,8 @@ def _hdf5(path: Path, stream: BinaryIO, size: int) -> None:
     end = int.from_bytes(block[place : place + width], "little")
     if not (0 < width <= 8 and 0 < end <= size):
         _refuse(path, f"cut off: {size} bytes", f"{end} bytes, as its superblock says")
+    if size - start - end > LARGEST_TAIL:  # it would be hashed, and none of it read
+        _refuse(path, f"{size} bytes long", f"{end} bytes, as its superblock says")
 
 
 CHECKS = {"parquet": _parquet, "mcap": _mcap, "robomimic": _hdf5}

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from arms import SETTINGS, arms, build, parts, rebuilt, some
 
-from genpolicy.audit.semantics import measure
+from genpolicy.audit.data import canonical
+from genpolicy.audit.semantics import copies, measure
 from genpolicy.seeds import stream
 
 
@@ -82,3 +83,20 @@ def test_a_way_gone_twice_is_not_glued():
 
 def test_slow_motion_without_noise_does_not_repeat_itself():
     assert kinds(arms(62, noise=0.0, rate_hz=40.0, rows=(300, 320), episodes=20)) == []
+
+
+def findings(data):
+    return [(found.kind, found.where, found.measured) for found in measure(data, SETTINGS).findings]
+
+
+@pytest.mark.parametrize("how", ["copied", "late and short", "glued", "as it is"])
+def test_what_is_left_out_changes_no_finding(how, monkeypatch):
+    data = arms(61)
+    if how == "glued":
+        data = joined(data, np.arange(len(data.episodes)) % 5 == 0, lambda k: k)
+    elif how != "as it is":
+        data = copied(data, 0.1, **({"late": 3, "keep": 0.8} if how != "copied" else {}))
+    said = findings(canonical(data))
+    monkeypatch.setattr(copies, "may_cover", lambda _, __, rows, **___: np.ones(len(rows), bool))
+    assert findings(canonical(data)) == said
+    assert (how == "as it is") == (said == [])
