@@ -15,7 +15,13 @@ from genpolicy.evidence.reproducibility.latency import (
     model_rows,
 )
 from genpolicy.evidence.reproducibility.load import candidates_rows
-from genpolicy.evidence.rows.reproducibility import CandidatesRow, LatencyModelRow, LatencyRow
+from genpolicy.evidence.reproducibility.sweep import SweepSection, sweep_latency_rows
+from genpolicy.evidence.rows.reproducibility import (
+    CandidatesRow,
+    LatencyModelRow,
+    LatencyRow,
+    SweepLatencyRow,
+)
 from genpolicy.evidence.stress.latency import LatencySection
 from genpolicy.evidence.stress.settings import StressSettings
 from genpolicy.feasibility.settings import FeasibilitySettings
@@ -34,10 +40,12 @@ def work(params: Params) -> None:
     require_one_contract("train_baselines", "train_generators")
     section = params.section("latency", LatencySection)
     stress = params.section("stress", StressSettings)
+    generators = params.section("train_generators", MethodsSection).samplers
+    sweep = params.section("reload", SweepSection).sweep
     policies = compared(
         ARTIFACTS,
         baselines=stress.baselines,
-        generators=params.section("train_generators", MethodsSection).samplers,
+        generators=generators,
         seed=params.section("policy", PolicySettings).seeds[0],
     )
     plan = LatencyPlan(
@@ -61,6 +69,11 @@ def work(params: Params) -> None:
         write_rows(folder / "latency.parquet", LatencyRow, rows + declared)
         write_rows(folder / "model.parquet", LatencyModelRow, model)
         write_rows(folder / "candidates.parquet", CandidatesRow, candidates_rows(plan, policies))
+        write_rows(
+            folder / "sweep.parquet",
+            SweepLatencyRow,
+            sweep_latency_rows(plan, [p for p in policies if p.name in generators], sweep),
+        )
 
 
 if __name__ == "__main__":

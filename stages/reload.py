@@ -9,27 +9,14 @@ from genpolicy.candidates.judged import trained
 from genpolicy.contract.settings import Settings
 from genpolicy.evidence.reproducibility.identity import Deployment
 from genpolicy.evidence.reproducibility.reload import ReloadPlan, write_reload
+from genpolicy.evidence.reproducibility.sweep import SweepSection
 from genpolicy.evidence.stress.settings import StressSettings
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import output_folder
 from genpolicy.policies.matched_training import PolicySettings
-from genpolicy.policies.settings import SamplerConfig
 from stages._contracts import require_one_contract
 from stages._stage import ARTIFACTS, Params, main
 from stages._training import MethodsSection
-
-
-class ReloadSection(Settings):
-    """Section `reload`.
-
-    Attributes:
-        sweep: Samplers to try besides the chosen one, by method; a number is that many steps of
-            the chosen one.
-        samples: Candidates per situation.
-    """
-
-    sweep: dict[str, list[int | SamplerConfig]]
-    samples: int = Field(ge=2)
 
 
 class AnswerDeadline(Settings):
@@ -44,7 +31,7 @@ def work(params: Params) -> None:
     """Admit through gate A, then reload, compare, sweep."""
     admit("reload", Path.cwd())
     require_one_contract("train_generators")
-    section = params.section("reload", ReloadSection)
+    section = params.section("reload", SweepSection)
     names = params.section("train_generators", MethodsSection).samplers
     seeds = params.section("policy", PolicySettings).seeds
     plan = ReloadPlan(

@@ -21,6 +21,7 @@ from gates.pages import (
     plots_convergence,
     plots_density,
     plots_feasibility,
+    plots_front,
     plots_incidents,
     plots_need,
     plots_rejected,
@@ -50,7 +51,12 @@ MARKS = {
 }
 PLOTS: dict[str, tuple[Picturable, ...]] = {
     "A": plots_need.PLOTS,
-    "B": (*plots_convergence.PLOTS, *plots_time.PLOTS, *plots_density.PLOTS),
+    "B": (
+        *plots_convergence.PLOTS,
+        *plots_time.PLOTS,
+        *plots_front.PLOTS,
+        *plots_density.PLOTS,
+    ),
     "C": (
         *plots_feasibility.PLOTS,
         *tables_feasibility.LISTINGS,

@@ -10,6 +10,7 @@ from gates.evidence import Array, Evidence, MissingEvidenceError, numbers
 from gates.need.settings import TRAINED as BASELINES
 from gates.need.simpler import unmatched
 from gates.reproducibility import convergence, modes, timing
+from gates.reproducibility.front import SWEEP
 from gates.reproducibility.identity import contradicted, unrecorded
 from gates.reproducibility.settings import (
     COVERAGE,
@@ -196,7 +197,13 @@ GATE = GateSpec(
     gate="B",
     settings=ReproducibilitySettings,
     criteria=criteria_of(globals(), vars(convergence), vars(modes), vars(timing)),
-    bind=(f"{RELOAD}/offline.parquet", COVERAGE, DENSITY, "artifacts/latency/candidates.parquet"),
+    bind=(
+        f"{RELOAD}/offline.parquet",
+        COVERAGE,
+        DENSITY,
+        "artifacts/latency/candidates.parquet",
+        SWEEP,
+    ),
     back_to="training",
     go_on="Sample every passing candidate in shadow, on held-out and corrupted observations.",
     caveats=(

@@ -10,7 +10,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from genpolicy.errors import ConfigError, ContractError
-from genpolicy.policies.networks import Dimensions, Head, HeadInput, PolicyNetwork
+from genpolicy.policies.networks import Dimensions, Head, HeadInput, PolicyNetwork, Prepared
 from genpolicy.policies.objectives import Batch, Objective
 from genpolicy.policies.settings import WIDTH_UNIT, HeadConfig, NetworkConfig
 
@@ -159,8 +159,17 @@ class EnergyNetwork(PolicyNetwork):
                 expected="candidate codes to score",
                 action="Draw candidates first.",
             )
-        features = self.trunk(self.head.enter(None, len(condition)), condition)
-        return self.head.score(features, values)
+        return self.finish(self.prepare(condition), values)
+
+    def prepare(self, condition: Tensor, time: Tensor | None = None) -> Prepared:
+        """The trunk's features of conditions (B, C): candidates enter behind it."""
+        context = self.trunk.prepare(condition)
+        return Prepared(self.trunk(self.head.enter(None, len(condition)), context), None)
+
+    def finish(self, prepared: Prepared, values: Tensor | None) -> Tensor:
+        """Scores (B, N) of candidate codes (B, N, Z)."""
+        assert values is not None
+        return self.head.score(prepared.context, values)
 
 
 class EnergyContrast(Objective):

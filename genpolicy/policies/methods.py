@@ -10,6 +10,7 @@ from torch import Tensor
 
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.errors import ConfigError
+from genpolicy.policies.ahead import AheadNetwork, Conditions
 from genpolicy.policies.consistency import SegmentConsistency
 from genpolicy.policies.derivative_free import noise_length, search_codes
 from genpolicy.policies.diffusion_samplers import DIFFUSION_SAMPLERS, sample_diffusion
@@ -35,6 +36,7 @@ from genpolicy.policies.ode_samplers import (
     CONSISTENCY,
     EQUAL_STEPS,
     ODE_SAMPLERS,
+    equal_step_times,
     sample_adaptive,
     sample_ode,
 )
@@ -238,22 +240,45 @@ def _check_cap(method: Method, sampler: SamplerConfig) -> None:
         )
 
 
+def announced_times(sampler: SamplerConfig, head: HeadConfig) -> list[float]:
+    """Times at which a sampler evaluates its network, as float32 holds them, where it knows them.
+
+    An energy has one score whatever the time; an adaptive solver finds its times on the way, and
+    one pass has none.
+    """
+    if sampler.name == ENERGY_SAMPLER:
+        return [0.0]
+    schedule, times = squared_cosine(head.diffusion_levels), torch.empty(0)
+    if sampler.name in DIFFUSION_SAMPLERS:
+        levels = trailing_levels(head.diffusion_levels, sampler.steps)
+        times = schedule.level_time(torch.tensor(levels, dtype=torch.float32))
+    elif sampler.name == MULTISTEP:
+        levels = visited_levels(head.diffusion_levels, sampler.steps)
+        times = schedule.level_time(torch.tensor(levels, dtype=torch.float32))
+    elif sampler.name in EQUAL_STEPS:
+        times = torch.tensor(equal_step_times(sampler.name, sampler.steps)).flatten()
+    found: list[float] = times.tolist()
+    return found
+
+
 def generate(
     network: PolicyNetwork,
-    condition: Tensor,
+    conditions: Conditions,
     noise: NoiseFunction,
     *,
     sampler: SamplerConfig,
     head: HeadConfig,
+    call_rows: Callable[[int], int],
 ) -> tuple[Tensor, int]:
     """Normalised chunks of conditions, and the network evaluations that they took.
 
     Args:
         network: Trained network of a method that fits the sampler.
-        condition: Encoded observations. Shape (B, C).
+        conditions: Encoded observations of B rows.
         noise: Noise of a sampler step, of `noise_shape` per row.
         sampler: Sampler settings.
         head: Head settings of the training.
+        call_rows: Rows that a network call for so many rows has, padded.
 
     Returns:
         Chunks (B, K, D_a) and the counted NFE: calls of the network, as many as its slowest row
@@ -262,15 +287,15 @@ def generate(
     Raises:
         EvaluationCapError: The sampler's cap was reached.
     """
+    times = announced_times(sampler, head)
+    ahead = AheadNetwork(network, conditions, times=times, call_rows=call_rows)
 
-    def evaluate(values: Tensor, time: Tensor) -> Tensor:
-        if sampler.name == "direct":
-            return network.evaluate(condition)
-        if sampler.name in SINGLE_EVALUATION or sampler.name == ENERGY_SAMPLER:
-            return network.evaluate(condition, values)
-        return network.evaluate(condition, values, time)
+    def once(values: Tensor, _: Tensor) -> Tensor:
+        read = () if sampler.name == "direct" else (values,)
+        return network.evaluate(conditions.rows, *read)
 
-    counted = CountedNetwork(evaluate, cap=sampler.nfe_cap)
+    single = sampler.name in SINGLE_EVALUATION
+    counted = CountedNetwork(once if single else ahead, cap=sampler.nfe_cap)
     if sampler.name in DIFFUSION_SAMPLERS or sampler.name == MULTISTEP:
         walk = sample_multistep if sampler.name == MULTISTEP else sample_diffusion
         chunks = walk(
@@ -291,7 +316,7 @@ def generate(
     elif sampler.name in EQUAL_STEPS:
         chunks = sample_ode(counted, noise, name=sampler.name, steps=sampler.steps)
     else:
-        latent = torch.zeros(len(condition), head.latent_dim, device=condition.device)
+        latent = conditions.stored.new_zeros(len(conditions.of_row), head.latent_dim)
         if sampler.name in ("z_prior", "offset"):
             latent = noise(0)
         chunks = counted(latent, latent.new_zeros(len(latent)))

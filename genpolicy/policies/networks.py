@@ -7,7 +7,7 @@ readout is solved from one parameter budget, so that no method is simply larger.
 
 import functools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -60,6 +60,42 @@ class HeadInput:
 
     numbers: int
     gains: Callable[[Tensor], Gains] | None
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """What a network evaluation needs besides its values.
+
+    Attributes:
+        context: What the trunk makes of condition and time. Shape (B, ...).
+        gains: Gains at the time; None for a head without one. Shapes (B,).
+    """
+
+    context: Tensor
+    gains: Gains | None
+
+    def rows(self, choose: Callable[[Tensor], Tensor]) -> "Prepared":
+        """The same of rows that `choose` takes from a tensor (B, ...)."""
+        gains = self.gains
+        if gains is not None:
+            gains = Gains(choose(gains.inner), choose(gains.skip), choose(gains.outer))
+        return Prepared(choose(self.context), gains)
+
+
+def joined(parts: Sequence[Prepared]) -> Prepared:
+    """The rows of all parts, one part after the other; at least one part."""
+    contexts = torch.cat([part.context for part in parts])
+    gains = [part.gains for part in parts if part.gains is not None]
+    if not gains:
+        return Prepared(contexts, None)
+    return Prepared(
+        contexts,
+        Gains(
+            torch.cat([own.inner for own in gains]),
+            torch.cat([own.skip for own in gains]),
+            torch.cat([own.outer for own in gains]),
+        ),
+    )
 
 
 class Encoder(nn.Module):
@@ -176,15 +212,30 @@ class PolicyNetwork(nn.Module):
         Returns:
             Shape (B, K, D_a).
         """
-        if time is None or self._gains is None or values is None:
-            return self._chunk(condition, values)
-        gains = self._gains(time)
-        condition = condition + self.head.embed_time(time)
-        residual = self._chunk(condition, gains.inner[:, None, None] * values)
+        return self.finish(self.prepare(condition, time), values)
+
+    def prepare(self, condition: Tensor, time: Tensor | None = None) -> Prepared:
+        """What an evaluation needs of conditions (B, C) and times (B,), whatever its values are."""
+        if time is None or self._gains is None:
+            return Prepared(self.trunk.prepare(condition), None)
+        context = self.trunk.prepare(condition + self.head.embed_time(time))
+        return Prepared(context, self._gains(time))
+
+    def finish(self, prepared: Prepared, values: Tensor | None) -> Tensor:
+        """The rest of an evaluation: chunks (B, K, D_a) of values, as of `evaluate`.
+
+        Args:
+            prepared: A row for each of the values, or one for all of them.
+            values: Latent (B, Z) or noisy chunk (B, K, D_a); None for a head without input.
+        """
+        gains = prepared.gains
+        if gains is None or values is None:
+            return self._chunk(prepared.context, values)
+        residual = self._chunk(prepared.context, gains.inner[:, None, None] * values)
         return gains.skip[:, None, None] * values + gains.outer[:, None, None] * residual
 
-    def _chunk(self, condition: Tensor, values: Tensor | None) -> Tensor:
-        features = self.trunk(self.head.enter(values, len(condition)), condition)
+    def _chunk(self, context: Tensor, values: Tensor | None) -> Tensor:
+        features = self.trunk(self.head.enter(values, len(context)), context)
         return self.head.read_out(features).reshape(
             -1, self.dimensions.prediction_horizon, self.dimensions.action_dim
         )

@@ -117,15 +117,19 @@ def sample_ode(velocity: NetworkFunction, noise: NoiseFunction, *, name: str, st
     tableau = EQUAL_STEPS[name]
     x = noise(0)
     h = 1.0 / steps
-    for step in range(steps):
-        start = step / steps
+    for times in equal_step_times(name, steps):
         slopes: list[Tensor] = []
-        for node, blend in zip(tableau.nodes, (None, *tableau.stages), strict=True):
+        for time, blend in zip(times, (None, *tableau.stages), strict=True):
             point = x if blend is None else x + h / blend.divisor * blend.sum(slopes)
-            time = torch.full(x.shape[:1], start + node * h, dtype=x.dtype, device=x.device)
-            slopes.append(velocity(point, time))
+            slopes.append(velocity(point, x.new_full(x.shape[:1], time)))
         x = x + h / tableau.result.divisor * tableau.result.sum(slopes)
     return x
+
+
+def equal_step_times(name: str, steps: int) -> list[list[float]]:
+    """Flow times at which a sampler with equal steps evaluates the velocity, step by step."""
+    h, nodes = 1.0 / steps, EQUAL_STEPS[name].nodes
+    return [[step / steps + node * h for node in nodes] for step in range(steps)]
 
 
 def sample_adaptive(

@@ -1,7 +1,8 @@
 """The policy: physical observations in, physical candidate chunks out, nothing in between stored.
 
-Noise is a pure function of checkpoint, observation, candidate and sampler step, and every
-network call has the same number of rows, so a row's sample does not depend on its company.
+Noise is a pure function of checkpoint, observation, candidate and sampler step, and a network call
+has one of few numbers of rows that were measured to give the same bits, so that a row's sample does
+not depend on its company.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,6 +17,8 @@ from torch import Tensor
 
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.errors import ContractError, IntegrityError, NonFiniteError
+from genpolicy.policies.ahead import Conditions, padded
+from genpolicy.policies.call_shapes import call_shapes
 from genpolicy.policies.checkpoint import Checkpoint, load_checkpoint
 from genpolicy.policies.determinism import deterministic
 from genpolicy.policies.methods import (
@@ -106,6 +109,7 @@ class NetworkPolicy:
         self.device = device
         self._normalisation = checkpoint.normalisation
         self._network = checkpoint.network.to(device).requires_grad_(False)
+        self._calls = call_shapes(self._network, config, self.sampler, device=device)
         self._sampler_hash = self.sampler.hash()
 
     @property
@@ -192,8 +196,8 @@ class NetworkPolicy:
         with deterministic(self.device), torch.inference_mode():
             return torch.cat(
                 [
-                    self._network.encode(_padded(rows, self.sampler.batch_rows))[: len(rows)]
-                    for rows in torch.split(observations, self.sampler.batch_rows)
+                    self._network.encode(padded(rows, self._calls.fit(len(rows))))[: len(rows)]
+                    for rows in torch.split(observations, self._calls.most)
                 ]
             )
 
@@ -206,20 +210,22 @@ class NetworkPolicy:
             for row in noise_names
             for candidate in range(candidates)
         ]
-        repeated = condition.repeat_interleave(candidates, dim=0)
-        size = self.sampler.batch_rows
         chunks, evaluations = [], []
         with deterministic(self.device), torch.inference_mode():
-            for first in range(0, len(names), size):
-                rows = repeated[first : first + size]
+            for first in range(0, len(names), self._calls.most):
+                own = names[first : first + self._calls.most]
+                size = self._calls.fit(len(own))
+                # A padding row is the last row again, with its condition.
+                rows = [first + min(row, len(own) - 1) for row in range(size)]
                 result, nfe = generate(
                     self._network,
-                    _padded(rows, size),
-                    self._noise(names[first : first + size], size),
+                    _conditions(condition, [row // candidates for row in rows]),
+                    self._noise(own, size),
                     sampler=self.sampler,
                     head=self.checkpoint.config.head,
+                    call_rows=self._calls.fit,
                 )
-                chunks.append(result[: len(rows)].cpu())
+                chunks.append(result[: len(own)].cpu())
                 evaluations.append(nfe)
         normalised = torch.cat(chunks).numpy().astype(np.float64)
         actions = self._normalisation.action.denormalise(normalised)
@@ -290,10 +296,11 @@ def load_policy(
     return NetworkPolicy(checkpoint, sampler=sampler, device=device)
 
 
-def _padded(rows: Tensor, size: int) -> Tensor:
-    """`rows` (n, C) followed by copies of its last row, up to `size` rows."""
-    missing = size - len(rows)
-    return torch.cat([rows, rows[-1:].expand(missing, *rows.shape[1:])]) if missing else rows
+def _conditions(condition: Tensor, observations: Sequence[int]) -> Conditions:
+    """The conditions of rows, given by the observation of each; ascending."""
+    first, last = observations[0], observations[-1]
+    of_row = torch.tensor(observations, device=condition.device) - first
+    return Conditions(condition[first : last + 1], of_row)
 
 
 def _check_finite(values: Array, where: str, action: str) -> None:

@@ -31,9 +31,14 @@ class Trunk(nn.Module):
         self.first = nn.ModuleList(nn.Linear(width, width) for _ in range(config.trunk_blocks))
         self.second = nn.ModuleList(nn.Linear(width, width) for _ in range(config.trunk_blocks))
 
-    def forward(self, hidden: Tensor, condition: Tensor) -> Tensor:
-        """Features (B, W) and conditions (B, C) to features (B, W)."""
-        modulation = self.modulation(functional.silu(condition)).chunk(2 * len(self.first), dim=-1)
+    def prepare(self, condition: Tensor) -> Tensor:
+        """Shifts and scales (B, 2 W blocks) of conditions (B, C): no feature is needed for them."""
+        modulation: Tensor = self.modulation(functional.silu(condition))
+        return modulation
+
+    def forward(self, hidden: Tensor, prepared: Tensor) -> Tensor:
+        """Features (B, W) to features (B, W), by what `prepare` made: a row for each or for all."""
+        modulation = prepared.chunk(2 * len(self.first), dim=-1)
         for index, (first, second) in enumerate(zip(self.first, self.second, strict=True)):
             shift, scale = modulation[2 * index], modulation[2 * index + 1]
             normed = functional.layer_norm(hidden, (self.width,))
@@ -94,10 +99,14 @@ class TransformerTrunk(nn.Module):
         self.blocks = nn.ModuleList(Block(width, hidden) for _ in range(config.trunk_blocks))
         self.leave = nn.Linear(width, config.trunk_width)
 
-    def forward(self, hidden: Tensor, condition: Tensor) -> Tensor:
-        """Features (B, W) and conditions (B, C) to features (B, W)."""
-        observed = self.observed(functional.silu(condition))
-        observed = observed.reshape(len(condition), OBSERVATION_TOKENS, self.token_width)
+    def prepare(self, condition: Tensor) -> Tensor:
+        """Observation tokens (B, T - 1, w) of conditions (B, C): no feature is needed for them."""
+        observed: Tensor = self.observed(functional.silu(condition))
+        return observed.reshape(len(condition), OBSERVATION_TOKENS, self.token_width)
+
+    def forward(self, hidden: Tensor, prepared: Tensor) -> Tensor:
+        """Features (B, W) to features (B, W), by what `prepare` made: a row for each or for all."""
+        observed = prepared.expand(len(hidden), -1, -1)
         tokens = torch.cat([observed, self.entry(hidden)[:, None]], dim=1) + self.place
         for block in self.blocks:
             tokens = block(tokens)

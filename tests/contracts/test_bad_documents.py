@@ -14,6 +14,7 @@ import pytest
 import yaml
 
 from genpolicy.data.dataset import load_dataset
+from genpolicy.evidence.reproducibility.sweep import SweepSection
 from genpolicy.evidence.shadow.settings import ShadowSection
 from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.feasibility.settings import FeasibilitySettings
@@ -52,7 +53,8 @@ def section_models() -> dict[str, type]:
 def test_params(monkeypatch, fallen_over):
     models = section_models() | {
         "execution": ExecutionSettings, "feasibility": FeasibilitySettings,
-        "policy": PolicySettings, "source": SourceSection, "shadow": ShadowSection,
+        "policy": PolicySettings, "reload": SweepSection, "source": SourceSection,
+        "shadow": ShadowSection,
     }  # fmt: skip
     assert len(models) > 8
 

@@ -51,6 +51,7 @@ from genpolicy.evidence.rows.reproducibility import (
     LatencyRow,
     NfeRow,
     SampleRow,
+    SweepLatencyRow,
 )
 from genpolicy.evidence.rows.shadow import (
     CandidateRow,
@@ -1047,13 +1048,17 @@ def _reload(root: Path) -> None:
                 "seed": 0,
                 "sampler": "euler",
                 "steps": nfe,
+                "sampler_sha256": f"{m}{nfe}",
+                "tolerance": None,
                 "nfe": nfe,
                 "situations": 30,
                 "modes_covered_share": min(1.0, 0.7 + nfe / 30),
-                "coverage_lower": 0.8,
+                "coverage_lower": min(1.0, 0.7 + nfe / 30) - 0.1,
                 "spread_m": 0.1,
                 "admissible_share": 0.9,
                 "between_share": 0.0,
+                "chunk_error": 0.1 + 0.1 / nfe,
+                "jerk_p95_m_s3": 1000.0 + 100.0 / nfe,
             }
             for m in CANDIDATES
             for nfe in (2, 4, 8, 16)
@@ -1143,6 +1148,23 @@ def _latency(root: Path) -> None:
 
 
 def _candidates_drawn(root: Path) -> None:
+    table(
+        root,
+        "latency/sweep.parquet",
+        SweepLatencyRow,
+        [
+            {
+                "method": m,
+                "sampler_sha256": f"{m}{nfe}",
+                "candidates": 4,
+                "repeat": repeat,
+                "seconds": 1e-3 * nfe + 1e-5 * repeat,
+            }
+            for m in CANDIDATES
+            for nfe in (2, 4, 8, 16)
+            for repeat in range(5)
+        ],
+    )
     table(
         root,
         "latency/candidates.parquet",

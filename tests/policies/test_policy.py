@@ -12,6 +12,7 @@ from genpolicy.errors import (
     NonFiniteError,
 )
 from genpolicy.policies import policy as policy_module
+from genpolicy.policies.call_shapes import CallShapes
 from genpolicy.policies.methods import METHODS
 from genpolicy.policies.policy import load_policy
 from genpolicy.policies.settings import SamplerConfig
@@ -172,13 +173,15 @@ def test_padding_is_the_last_row_again(folders, two_mode_windows, monkeypatch):
     """Other noise could need more steps than any row that was asked for, or reach the cap."""
     seen, honest = [], policy_module.generate
 
-    def spy(network, condition, noise, **settings):
-        seen.append((condition, noise(0)))
-        return honest(network, condition, noise, **settings)
+    def spy(network, conditions, noise, **settings):
+        seen.append((conditions.rows, noise(0)))
+        return honest(network, conditions, noise, **settings)
 
     monkeypatch.setattr(policy_module, "generate", spy)
     observations = two_mode_windows(3, seed=9).observations
-    load_policy(folders["flow"]).sample(observations, noise_names=names(3), candidates=1)
+    policy = load_policy(folders["flow"])
+    policy._calls = CallShapes((16,))
+    policy.sample(observations, noise_names=names(3), candidates=1)
     ((condition, noise),) = seen
     assert len(noise) == 16 and not torch.equal(noise[1], noise[2])
     assert torch.equal(noise[3:], noise[2:3].expand_as(noise[3:]))
@@ -258,8 +261,8 @@ def test_one_chunk_that_is_not_finite_is_a_candidate_like_the_others(
     assert whole.finite() is whole
     honest = policy_module.generate
 
-    def spoiled(network, condition, noise, **rest):
-        chunks, nfe = honest(network, condition, noise, **rest)
+    def spoiled(network, conditions, noise, **rest):
+        chunks, nfe = honest(network, conditions, noise, **rest)
         chunks[3, 0, 0] = np.nan
         return chunks, nfe
 

@@ -67,7 +67,17 @@ def test_every_parameter_of_a_transformer_learns():
 def test_the_action_token_reads_the_observation_tokens():
     trunk = TransformerTrunk(CONFIGS["small"])
     hidden, condition = torch.randn(1, 64), torch.randn(2, 1, 32)
-    assert not torch.allclose(trunk(hidden, condition[0]), trunk(hidden, condition[1]))
+    found = [trunk(hidden, trunk.prepare(one)) for one in condition]
+    assert not torch.allclose(*found)
+
+
+@pytest.mark.parametrize("kind", [Trunk, TransformerTrunk])
+def test_what_is_prepared_once_serves_all_rows(kind):
+    """To rounding: other products of as many rows."""
+    trunk = kind(CONFIGS["small"])
+    hidden, condition = torch.randn(5, 64), torch.randn(1, 32)
+    whole = trunk(hidden, trunk.prepare(condition.expand(5, -1)))
+    assert torch.allclose(trunk(hidden, trunk.prepare(condition)), whole, atol=1e-6)
 
 
 def test_attention_is_a_mean_of_values():

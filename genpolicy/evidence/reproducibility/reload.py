@@ -1,14 +1,12 @@
 """Gate B's evidence: does a checkpoint come back the same, and what does fewer NFE cost?"""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
-import numpy as np
-
 from genpolicy.candidates.judged import JudgedPolicy
 from genpolicy.contract.horizons import HorizonConfig
-from genpolicy.data.dataset import load_dataset
+from genpolicy.data.dataset import Dataset, load_dataset
 from genpolicy.errors import ContractError
 from genpolicy.evidence.admission_context import make_checker
 from genpolicy.evidence.documents.reproducibility import CANDIDATES
@@ -17,6 +15,13 @@ from genpolicy.evidence.need.offline import offline_rows
 from genpolicy.evidence.reproducibility.identity import Deployment, identities
 from genpolicy.evidence.reproducibility.likelihood import density_rows, drawn_situations
 from genpolicy.evidence.reproducibility.measure import in_fresh_process
+from genpolicy.evidence.reproducibility.sweep import (
+    Sweep,
+    coverage_row,
+    quality_of,
+    swept_samplers,
+    swept_windows,
+)
 from genpolicy.evidence.rows.need import ModeRow, OfflineRow
 from genpolicy.evidence.rows.reproducibility import CoverageRow, DensityRow, NfeRow, SampleRow
 from genpolicy.feasibility.admission import FeasibilityChecker
@@ -25,9 +30,7 @@ from genpolicy.integrity.rows import read_rows, write_rows
 from genpolicy.policies.evaluations import allowed_evaluations
 from genpolicy.policies.fixtures import FixtureRow, compare_fixtures, reload_fixture
 from genpolicy.policies.policy import NetworkPolicy, load_policy
-from genpolicy.policies.settings import SamplerConfig
 from genpolicy.policies.validation_row import EARLIER_FOLDER
-from genpolicy.statistics.intervals import clopper_pearson
 from genpolicy.tasks.api import Task, load_task
 
 
@@ -50,7 +53,7 @@ class ReloadPlan:
     feasibility: FeasibilitySettings
     dataset: Path
     audit: Path
-    sweep: Mapping[str, Sequence[int | SamplerConfig]]
+    sweep: Sweep
     samples: int
     deployment: Deployment
 
@@ -116,7 +119,9 @@ def write_reload(
             nonfinite_weights=entry.nonfinite_weights + nonfinite_weights(policy),
         )
         rows.offline += offline_rows(policy, data, seed=candidate.seed, horizons=plan.horizons)
-        own, swept = _sweep(plan, policy, held_out, candidate.seed, task=task, checker=checker)
+        own, swept = _sweep(
+            plan, policy, held_out, candidate.seed, task=task, checker=checker, data=data
+        )
         rows.modes += own
         rows.earlier += modes_of_policy(
             load_policy(candidate.folder / EARLIER_FOLDER),
@@ -188,13 +193,15 @@ def _sweep(
     *,
     task: Task,
     checker: FeasibilityChecker,
+    data: Dataset,
 ) -> tuple[list[ModeRow], list[CoverageRow]]:
     """Modes with the candidate's own sampler, and coverage with this one and the swept ones."""
     own: list[ModeRow] = []
-    rows = []
+    rows, windows = [], swept_windows(data, plan.horizons)
     for sampler in swept_samplers(policy.sampler, plan.sweep.get(policy.method, ())):
+        tried = NetworkPolicy(policy.checkpoint, sampler=sampler)
         found = modes_of_policy(
-            NetworkPolicy(policy.checkpoint, sampler=sampler),
+            tried,
             held_out,
             seed=seed,
             convention=sampler.name,
@@ -205,34 +212,6 @@ def _sweep(
         if sampler == policy.sampler:
             own = found
         if found:
-            rows.append(coverage_row(found, steps=sampler.steps))
+            quality = quality_of(tried, windows, data)
+            rows.append(coverage_row(found, sampler=sampler, quality=quality))
     return own, rows
-
-
-def swept_samplers(own: SamplerConfig, sweep: Sequence[int | SamplerConfig]) -> list[SamplerConfig]:
-    """The candidate's own sampler and those to try, each once, by name and steps."""
-    tried = [
-        own.model_copy(update={"steps": entry}) if isinstance(entry, int) else entry
-        for entry in sweep
-    ]
-    different = {sampler.hash(): sampler for sampler in (own, *tried)}
-    return sorted(different.values(), key=lambda sampler: (sampler.name, sampler.steps))
-
-
-def coverage_row(found: Sequence[ModeRow], *, steps: int) -> CoverageRow:
-    """One row of `coverage.parquet` from the modes of every situation, at least one."""
-    whole = sum(row.modes_covered == row.modes_present for row in found)
-    drawn = sum(row.samples for row in found)
-    return CoverageRow(
-        method=found[0].method,
-        seed=found[0].seed,
-        sampler=found[0].convention,
-        steps=steps,
-        nfe=max(row.nfe for row in found),
-        situations=len(found),
-        modes_covered_share=whole / len(found),
-        coverage_lower=clopper_pearson(whole, len(found))[0],
-        spread_m=float(np.mean([row.spread_m for row in found])),
-        admissible_share=sum(row.admissible for row in found) / drawn,
-        between_share=sum(row.between_modes for row in found) / drawn,
-    )

@@ -57,6 +57,8 @@ class CoverageRow:
         seed: Number of its training seed.
         sampler: Name of the sampler.
         steps: Sampler steps.
+        sampler_sha256: Settings of the sampler.
+        tolerance: Error of a step that it accepts; None of a sampler with equal steps.
         nfe: Network evaluations of one invocation, counted; the most of any situation.
         situations: Held-out situations.
         modes_covered_share: Share of them of which every mode is reached.
@@ -64,12 +66,16 @@ class CoverageRow:
         spread_m: Mean over situations of the samples' spread, m.
         admissible_share: Share of the samples that pass the six layers.
         between_share: Share of the samples in the middle between two modes.
+        chunk_error: Mean absolute error on held-out windows, normalised units.
+        jerk_p95_m_s3: p95 over the same chunks of the largest jerk inside one, m/s^3.
     """
 
     method: str
     seed: int
     sampler: str
     steps: int
+    sampler_sha256: str
+    tolerance: float | None
     nfe: int
     situations: int
     modes_covered_share: float
@@ -77,6 +83,8 @@ class CoverageRow:
     spread_m: float
     admissible_share: float
     between_share: float
+    chunk_error: float
+    jerk_p95_m_s3: float
 
 
 @dataclass(frozen=True)
@@ -173,5 +181,24 @@ class CandidatesRow:
     method: str
     candidates: int
     load: str
+    repeat: int
+    seconds: float
+
+
+@dataclass(frozen=True)
+class SweepLatencyRow:
+    """`sweep.parquet` of latency: one warm invocation with a sampler of the sweep.
+
+    Attributes:
+        method: The candidate.
+        sampler_sha256: Settings of the sampler.
+        candidates: How many it draws.
+        repeat: Which invocation.
+        seconds: From observation to proposal, without the check of it, s.
+    """
+
+    method: str
+    sampler_sha256: str
+    candidates: int
     repeat: int
     seconds: float

@@ -8,7 +8,8 @@ from genpolicy.errors import ContractError
 from genpolicy.evidence.documents.reproducibility import CANDIDATES
 from genpolicy.evidence.reproducibility import reload
 from genpolicy.evidence.reproducibility.identity import Deployment
-from genpolicy.evidence.reproducibility.reload import ReloadPlan, coverage_row, write_reload
+from genpolicy.evidence.reproducibility.reload import ReloadPlan, write_reload
+from genpolicy.evidence.reproducibility.sweep import Quality, coverage_row
 from genpolicy.evidence.rows.need import ModeRow, OfflineRow
 from genpolicy.evidence.rows.reproducibility import CoverageRow, DensityRow, NfeRow, SampleRow
 from genpolicy.integrity.rows import read_rows, write_rows
@@ -53,7 +54,11 @@ def test_modes_of_the_chosen_steps_are_those_of_the_sweep(reloaded):
     swept = [(row.sampler, row.steps, row.nfe) for row in coverage]
     assert swept == [("euler", 1, 1), ("euler", 2, 2), ("midpoint", 1, 2)]
     assert {row.convention for row in modes} == {"euler"} and len(modes) == 2
-    assert coverage_row(modes, steps=2) == coverage[1]
+    quality = Quality(coverage[1].chunk_error, coverage[1].jerk_p95_m_s3)
+    own = SamplerConfig(name="euler", steps=2)
+    assert coverage_row(modes, sampler=own, quality=quality) == coverage[1]
+    assert all(row.chunk_error > 0 and row.jerk_p95_m_s3 > 0 for row in coverage)
+    assert len({row.sampler_sha256 for row in coverage}) == 3
     earlier = read_rows(folder / "modes_earlier.parquet", ModeRow)
     drawn = [
         [(r.episode_uuid, r.index, r.samples, r.nfe) for r in rows] for rows in (modes, earlier)

@@ -1,0 +1,132 @@
+"""Figure of Gate B: samplers of the sweep against each other, with the deadline drawn in."""
+
+from matplotlib.figure import Figure
+
+from gates.evidence import Evidence
+from gates.pages.figures import Listing, Plot, Table, colours, in_order
+from gates.report import GateReport
+from gates.reproducibility.front import (
+    SWEEP,
+    Choice,
+    Setting,
+    advice,
+    choice,
+    deadline_of,
+    efficient,
+    settings_of,
+)
+from gates.reproducibility.latency_budget import LATENCY, MILLI
+from gates.reproducibility.settings import COVERAGE, RELOAD
+from genpolicy.evidence.documents.reproducibility import CANDIDATES
+from genpolicy.evidence.rows.reproducibility import CoverageRow
+from genpolicy.pages.figures.drawing import GREY, new_figure, plain_ticks
+
+Sweeps = dict[str, tuple[list[Setting], Choice, float]]
+
+
+def _sweeps(evidence: Evidence, report: GateReport) -> Sweeps:
+    """Of each method its settings, what the rule says, and the deadline, s."""
+    confidence, found = float(report.settings["confidence"]), {}
+    for method in in_order(evidence.rows(COVERAGE, CoverageRow)["method"]):
+        settings = settings_of(evidence, method, confidence=confidence)
+        deadline_s = deadline_of(evidence, method)
+        found[method] = settings, choice(settings, deadline_s=deadline_s), deadline_s
+    return found
+
+
+def _front(evidence: Evidence, report: GateReport) -> Figure:
+    sweeps = _sweeps(evidence, report)
+    colour = colours(list(sweeps))
+    figure, places = new_figure(columns=3)
+    for method, (settings, _, _) in sweeps.items():
+        kept = efficient(settings)
+        for axes, heights in zip(places, _heights(settings), strict=True):
+            times = [setting.answer_s * MILLI for setting in settings]
+            line = [at for at, on in zip(zip(times, heights, strict=True), kept, strict=True) if on]
+            axes.plot(*zip(*sorted(line), strict=True), color=colour[method], lw=0.9)
+            for at, height, on in zip(times, heights, kept, strict=True):
+                face = colour[method] if on else "white"
+                axes.plot([at], [height], "o", ms=4, color=colour[method], markerfacecolor=face)
+        places[0].plot([], [], "o", color=colour[method], label=method)
+    names = ("every mode reached, share", "chunk error, normalised", "jerk p95, m/s³")
+    for axes, name in zip(places, names, strict=True):
+        for deadline_s in sorted({found[2] for found in sweeps.values()}):
+            axes.axvline(deadline_s * MILLI, color=GREY, lw=0.8)
+        axes.set_xscale("log")
+        plain_ticks(axes.xaxis)
+        axes.set_ylabel(name)
+        axes.set_ylim(bottom=0)
+    places[1].set_xlabel("whole answer, p95 of all terms summed, ms; line: deadline")
+    figure.legend(loc="outside lower center", ncols=4)
+    return figure
+
+
+def _heights(settings: list[Setting]) -> tuple[list[float], list[float], list[float]]:
+    return (
+        [setting.coverage for setting in settings],
+        [setting.chunk_error for setting in settings],
+        [setting.jerk_p95_m_s3 for setting in settings],
+    )
+
+
+def _table(evidence: Evidence, report: GateReport) -> Table:
+    heads = (
+        "method", "setting", "NFE", "tolerance", "observation to proposal p50, ms",
+        "answer p95, ms", "coverage (lower end)", "chunk error", "jerk p95, m/s³", "efficient",
+    )  # fmt: skip
+    rows = []
+    for method, (settings, _, _) in _sweeps(evidence, report).items():
+        for setting, on in zip(settings, efficient(settings), strict=True):
+            tolerance = "" if setting.tolerance is None else f"{setting.tolerance:g}"
+            rows.append(
+                (
+                    method,
+                    setting.name,
+                    f"{setting.nfe}",
+                    tolerance,
+                    f"{setting.p50_s * MILLI:.3g}",
+                    f"{setting.answer_s * MILLI:.3g}",
+                    f"{setting.coverage:.3g} ({setting.coverage_lower:.3g})",
+                    f"{setting.chunk_error:.3g}",
+                    f"{setting.jerk_p95_m_s3:.4g}",
+                    "yes" if on else "no",
+                )
+            )
+    return (heads, *rows)
+
+
+def _advice(evidence: Evidence, report: GateReport) -> Table:
+    heads = ("method", "which setting would you deploy?", "what does the next cheaper one lose?")
+    sweeps = _sweeps(evidence, report)
+    rows = [
+        (method, *advice(found, deadline_s=deadline_s))
+        for method, (_, found, deadline_s) in sweeps.items()
+    ]
+    return (heads, *rows)
+
+
+READ = (LATENCY, SWEEP, f"{RELOAD}/{CANDIDATES.file}")
+
+PLOTS: tuple[Plot | Listing, ...] = (
+    Plot(
+        "What does each setting of the sampler buy?",
+        "A mark is one sampler with its steps or tolerance. Full and joined: efficient, that is, "
+        "no other setting of the method is as good in time, coverage, chunk error and jerk, and "
+        "better in one. Across: the p95 of the invocation and of every other term, added up "
+        "as on paper. Error and jerk are of one chunk for each of some held-out windows, as drawn, "
+        "before projection; with several good plans no error goes to zero. Not judged.",
+        COVERAGE,
+        _front,
+        also=READ,
+        read=_table,
+    ),
+    Listing(
+        "Which setting would you deploy?",
+        "By a rule, from the figure above: of the settings whose answer keeps the deadline, the "
+        "cheapest whose coverage is not below the interval of the best. Differences are those of "
+        "the next cheaper setting. What is deployed stands in `train_generators.samplers`.",
+        COVERAGE,
+        _advice,
+        also=READ,
+    ),
+)

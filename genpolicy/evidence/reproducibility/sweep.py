@@ -1,0 +1,178 @@
+"""The sweep: other samplers and steps of a candidate, what they draw and how long they take.
+
+What is drawn comes back byte for byte and is counted in `reload`; times are measured in `latency`.
+A row of either names the sampler's settings by hash, which joins them.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from genpolicy.candidates.judged import JudgedPolicy, candidates_of
+from genpolicy.contract.action import POSITION
+from genpolicy.contract.horizons import HorizonConfig
+from genpolicy.contract.settings import Settings
+from genpolicy.data.dataset import Dataset, load_dataset
+from genpolicy.evidence.reproducibility.benchmark import invoke
+from genpolicy.evidence.reproducibility.latency import OBSERVATIONS, LatencyPlan
+from genpolicy.evidence.reproducibility.measure import in_fresh_process
+from genpolicy.evidence.rows.need import ModeRow
+from genpolicy.evidence.rows.reproducibility import CoverageRow, SweepLatencyRow
+from genpolicy.policies.fixtures import fixture_observations
+from genpolicy.policies.matched_training import training_windows
+from genpolicy.policies.ode_samplers import ADAPTIVE_TABLEAUS
+from genpolicy.policies.policy import NetworkPolicy, NoiseName
+from genpolicy.policies.settings import SamplerConfig
+from genpolicy.policies.windows import Windows
+from genpolicy.statistics.intervals import clopper_pearson
+
+Sweep = Mapping[str, Sequence[int | SamplerConfig]]
+
+SPLIT, WINDOWS = "test", 256
+JERK_LEVEL = 0.95
+REPEATS, DISCARDED = 40, 3
+
+
+class SweepSection(Settings):
+    """Of section `reload` what the stages of the sweep share.
+
+    Attributes:
+        sweep: Samplers to try besides the chosen one, by method; a number is that many steps of
+            the chosen one.
+        samples: Candidates per situation.
+    """
+
+    sweep: dict[str, list[int | SamplerConfig]]
+    samples: int = Field(ge=2)
+
+
+@dataclass(frozen=True)
+class Quality:
+    """What one sampler draws on held-out windows.
+
+    Attributes:
+        chunk_error: Mean absolute error of the actions that are not padding, normalised units.
+        jerk_p95_m_s3: Over chunks, of the largest jerk of the positions inside one, m/s^3.
+    """
+
+    chunk_error: float
+    jerk_p95_m_s3: float
+
+
+def swept_samplers(own: SamplerConfig, sweep: Sequence[int | SamplerConfig]) -> list[SamplerConfig]:
+    """The candidate's own sampler and those to try, each once, by name and steps."""
+    tried = [
+        own.model_copy(update={"steps": entry}) if isinstance(entry, int) else entry
+        for entry in sweep
+    ]
+    different = {sampler.hash(): sampler for sampler in (own, *tried)}
+    return sorted(different.values(), key=lambda sampler: (sampler.name, sampler.steps))
+
+
+def swept_windows(data: Dataset, horizons: HorizonConfig) -> Windows:
+    """Evenly spaced held-out windows that every sampler of the sweep answers."""
+    whole = training_windows(data, SPLIT, horizons)
+    count = len(whole.observations)
+    rows = np.unique(np.linspace(0, count - 1, num=min(WINDOWS, count)).round().astype(np.int64))
+    return Windows(whole.observations[rows], whole.actions[rows], whole.is_pad[rows])
+
+
+def quality_of(policy: NetworkPolicy, windows: Windows, data: Dataset) -> Quality:
+    """One candidate per window, against the demonstrated chunk and in itself.
+
+    The jerk is that of the chunk as it is drawn, before projection and without the boundary to
+    the last command, which Gate C judges.
+    """
+    horizon = policy.prediction_horizon
+    names: list[NoiseName] = [("sweep", row) for row in range(len(windows.observations))]
+    asked = policy.sample(windows.observations, noise_names=names, candidates=1)
+    drawn = asked.finite().actions[:, 0]
+    scale, wanted = data.normalisation.action, windows.actions[:, :horizon]
+    error = np.abs(scale.normalise(drawn) - scale.normalise(wanted)).mean(axis=-1)
+    return Quality(
+        chunk_error=float(error[~windows.is_pad[:, :horizon]].mean()),
+        jerk_p95_m_s3=jerk_p95_m_s3(
+            drawn[:, :, POSITION], period_s=policy.horizons.action_period_s
+        ),
+    )
+
+
+def jerk_p95_m_s3(path_m: NDArray[np.float64], *, period_s: float) -> float:
+    """p95 over chunks of the largest third difference of positions (B, K, 3) over the period.
+
+    Zero where a chunk has fewer than four actions, which have none.
+    """
+    if path_m.shape[1] < 4:
+        return 0.0
+    jerk = np.linalg.norm(np.diff(path_m, n=3, axis=1), axis=-1).max(axis=1) / period_s**3
+    return float(np.quantile(jerk, JERK_LEVEL, method="higher"))
+
+
+def coverage_row(
+    found: Sequence[ModeRow], *, sampler: SamplerConfig, quality: Quality
+) -> CoverageRow:
+    """One row of `coverage.parquet` from the modes of every situation, at least one."""
+    whole = sum(row.modes_covered == row.modes_present for row in found)
+    drawn = sum(row.samples for row in found)
+    return CoverageRow(
+        method=found[0].method,
+        seed=found[0].seed,
+        sampler=found[0].convention,
+        steps=sampler.steps,
+        sampler_sha256=sampler.hash(),
+        tolerance=sampler.tolerance if sampler.name in ADAPTIVE_TABLEAUS else None,
+        nfe=max(row.nfe for row in found),
+        situations=len(found),
+        modes_covered_share=whole / len(found),
+        coverage_lower=clopper_pearson(whole, len(found))[0],
+        spread_m=float(np.mean([row.spread_m for row in found])),
+        admissible_share=sum(row.admissible for row in found) / drawn,
+        between_share=sum(row.between_modes for row in found) / drawn,
+        chunk_error=quality.chunk_error,
+        jerk_p95_m_s3=quality.jerk_p95_m_s3,
+    )
+
+
+def sweep_latency_rows(
+    plan: LatencyPlan, policies: Sequence[JudgedPolicy], sweep: Sweep
+) -> list[SweepLatencyRow]:
+    """What an invocation of each candidate takes with each sampler of its sweep."""
+    return [
+        row
+        for judged in policies
+        for row in in_fresh_process(measure_sweep, plan, judged, sweep.get(judged.name, ()))
+    ]
+
+
+def measure_sweep(
+    plan: LatencyPlan, judged: JudgedPolicy, sweep: Sequence[int | SamplerConfig]
+) -> list[SweepLatencyRow]:
+    """Rows of one method, measured in this process; samplers take turns, call by call."""
+    seen = fixture_observations(
+        load_dataset(plan.dataset), horizons=plan.horizons, count=OBSERVATIONS
+    )
+    loaded = judged.load()
+    policies = [
+        NetworkPolicy(loaded.checkpoint, sampler=sampler)
+        for sampler in swept_samplers(loaded.sampler, sweep)
+    ]
+    rows = []
+    for repeat in range(-DISCARDED, REPEATS):
+        row = seen[repeat % len(seen)][None]
+        for policy in policies:
+            count = candidates_of(policy, plan.samples)
+            spans = invoke(policy, row, repeat=repeat, candidates=count, project=None)
+            if repeat >= 0:
+                rows.append(
+                    SweepLatencyRow(
+                        method=judged.name,
+                        sampler_sha256=policy.sampler_config_hash,
+                        candidates=count,
+                        repeat=repeat,
+                        seconds=sum(spans.values()),
+                    )
+                )
+    return rows

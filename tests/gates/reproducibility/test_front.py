@@ -1,0 +1,120 @@
+"""The front of the sweep, and the rule that names a setting: golden by hand, and properties."""
+
+from dataclasses import replace
+
+import evidence
+import numpy as np
+import pytest
+from editing import cells
+
+from gates.evidence import Evidence, MissingEvidenceError
+from gates.reproducibility.front import (
+    SWEEP,
+    Setting,
+    advice,
+    choice,
+    deadline_of,
+    efficient,
+    settings_of,
+)
+from gates.reproducibility.latency_budget import LATENCY, budget_of
+from genpolicy.evidence.rows.reproducibility import LatencyRow
+
+CONFIDENCE = 0.95
+COVERAGE = "reload/coverage.parquet"
+
+
+def setting(name, p50_s, coverage, *, error=0.1, jerk=1000.0, answer_s=None, lower=None):
+    return Setting(
+        name=name, sha256=name, nfe=1, tolerance=None, p50_s=p50_s,
+        answer_s=p50_s + 0.05 if answer_s is None else answer_s, coverage=coverage,
+        coverage_lower=coverage - 0.1 if lower is None else lower, chunk_error=error,
+        jerk_p95_m_s3=jerk,
+    )  # fmt: skip
+
+
+FOUR = [
+    setting("two", 0.002, 0.60, error=0.2),
+    setting("four", 0.004, 0.86),
+    setting("eight", 0.008, 0.95),
+    setting("many", 0.200, 0.99),
+]
+
+
+def test_the_cheapest_within_the_interval_of_the_best_that_keeps_the_deadline():
+    """By hand: `many` answers too late; `eight` is best, from 0.85 on; `four` is not below."""
+    found = choice(FOUR, deadline_s=0.15)
+    assert [s.name for s in (found.deploy, found.best, found.cheaper)] == ["four", "eight", "two"]
+    deploy, loses = advice(found, deadline_s=0.15)
+    assert deploy == (
+        "four: the cheapest whose answer keeps 150 ms and whose coverage, 0.86, is not below "
+        "0.85, where the interval of the best begins (eight, 0.95)."
+    )
+    assert loses == "two saves 2 ms; coverage -0.26, chunk error +100.0%, jerk +0.0%."
+
+
+def test_the_deadline_decides_what_is_asked():
+    assert choice(FOUR, deadline_s=0.3).best.name == "many"
+    only = choice(FOUR, deadline_s=0.0525)
+    assert only.deploy.name == only.best.name == "two" and only.cheaper is None
+    assert advice(only, deadline_s=0.0525)[1] == "There is no cheaper one in the sweep."
+    none = choice(FOUR, deadline_s=0.01)
+    assert none.deploy is None and advice(none, deadline_s=0.01)[0].startswith("None: no answer")
+    unknown = [replace(FOUR[0], answer_s=float("nan"))]
+    assert choice(unknown, deadline_s=0.15).deploy is None, "a time that is no number keeps nothing"
+
+
+def test_a_setting_is_off_the_front_only_where_another_is_as_good_in_everything():
+    dear = setting("dear", 0.009, 0.95)
+    assert efficient([*FOUR, dear]) == [True, True, True, True, False]
+    assert efficient([*FOUR, replace(dear, jerk_p95_m_s3=999.0)]) == [True] * 5
+    assert efficient([FOUR[0], FOUR[0]]) == [True, True], "equal ones do not beat each other"
+
+
+def test_whoever_is_off_the_front_is_beaten_by_one_that_is_on_it():
+    rng = np.random.default_rng(0)
+    drawn = [
+        setting(f"s{n}", *rng.integers(1, 4, 2) / 10, error=rng.integers(1, 4) / 10, jerk=1.0)
+        for n in range(30)
+    ]
+    on = efficient(drawn)
+    assert 0 < sum(on) < 30
+    front = [one for one, kept in zip(drawn, on, strict=True) if kept]
+    for one, kept in zip(drawn, on, strict=True):
+        assert kept != any(other.dominates(one) for other in front)
+
+
+def test_the_answer_holds_every_term_that_the_sweep_did_not_time(repo):
+    held = Evidence(repo)
+    found = settings_of(held, "flow", confidence=CONFIDENCE)
+    assert [(s.name, s.nfe) for s in found] == [
+        (f"euler, {nfe} steps", nfe) for nfe in (2, 4, 8, 16)
+    ]
+    budget = budget_of(held.of(LATENCY, LatencyRow, "flow"), "warm", confidence=CONFIDENCE)
+    others = [t for t in budget.terms if t not in ("preprocess", "encode", "sample", "select")]
+    assert len(others) == 7
+    rest_s = sum(budget.terms[name].p95[0] for name in others)
+    assert found[0].answer_s == pytest.approx(2.04e-3 + rest_s)
+    assert found[0].p50_s == pytest.approx(2.02e-3)
+    assert deadline_of(held, "flow") > 0
+
+
+def test_a_setting_without_times_is_not_known(repo):
+    name = SWEEP.removeprefix("artifacts/")
+    evidence.edit_table(repo, name, lambda f: f[f["sampler_sha256"] != "flow4"])
+    with pytest.raises(MissingEvidenceError, match="no times of flow, euler, 4 steps"):
+        settings_of(Evidence(repo), "flow", confidence=CONFIDENCE)
+    settings_of(Evidence(repo), "diffusion", confidence=CONFIDENCE)
+
+
+def test_slower_times_move_the_choice(repo):
+    """The rule reads the evidence: all but the cheapest made too slow."""
+    evidence.edit_table(
+        repo, SWEEP.removeprefix("artifacts/"),
+        lambda f: f.assign(seconds=f["seconds"] + 9.0 * (f["sampler_sha256"] != "flow2")),
+    )  # fmt: skip
+    found = settings_of(Evidence(repo), "flow", confidence=CONFIDENCE)
+    assert choice(found, deadline_s=1.0).best.name == "euler, 2 steps"
+    evidence.edit_table(repo, COVERAGE, cells("modes_covered_share", 0.5))
+    with pytest.raises(MissingEvidenceError, match="euler, 2 steps below the lower end"):
+        settings_of(Evidence(repo), "flow", confidence=CONFIDENCE)
