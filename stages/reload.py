@@ -47,6 +47,7 @@ def work(params: Params) -> None:
     section = params.section("reload", ReloadSection)
     names = params.section("train_generators", MethodsSection).samplers
     seeds = params.section("policy", PolicySettings).seeds
+    stress = params.section("stress", StressSettings)
     plan = ReloadPlan(
         task=params.task.name,
         feasibility=params.section("feasibility", FeasibilitySettings),
@@ -57,7 +58,8 @@ def work(params: Params) -> None:
         deployment=Deployment(
             horizons=params.horizons,
             deadline_s=params.section("execution", AnswerDeadline).deadline_s,
-            samples=params.section("stress", StressSettings).samples,
+            samples=stress.samples,
+            joining=stress.joining,
         ),
     )
     root = ARTIFACTS / "train_generators"

@@ -21,6 +21,7 @@ from genpolicy.policies.distillation import (
 )
 from genpolicy.policies.energy import CODE_BOUND, EnergyContrast, EnergyNetwork
 from genpolicy.policies.evaluations import allowed_evaluations
+from genpolicy.policies.guidance import Guidance, guided
 from genpolicy.policies.networks import Dimensions, HeadInput, PolicyNetwork
 from genpolicy.policies.objectives import (
     ConditionalVae,
@@ -245,6 +246,7 @@ def generate(
     *,
     sampler: SamplerConfig,
     head: HeadConfig,
+    guidance: Guidance | None = None,
 ) -> tuple[Tensor, int]:
     """Normalised chunks of conditions, and the network evaluations that they took.
 
@@ -254,12 +256,14 @@ def generate(
         noise: Noise of a sampler step, of `noise_shape` per row.
         sampler: Sampler settings.
         head: Head settings of the training.
+        guidance: What the chunks go on from; None: nothing.
 
     Returns:
         Chunks (B, K, D_a) and the counted NFE: calls of the network, as many as its slowest row
-        needed.
+        needed, and its backward passes.
 
     Raises:
+        ConfigError: Guidance of a sampler that has no path to guide.
         EvaluationCapError: The sampler's cap was reached.
     """
 
@@ -271,10 +275,11 @@ def generate(
         return network.evaluate(condition, values, time)
 
     counted = CountedNetwork(evaluate, cap=sampler.nfe_cap)
+    walked = guided(counted, sampler, head, guidance)
     if sampler.name in DIFFUSION_SAMPLERS or sampler.name == MULTISTEP:
         walk = sample_multistep if sampler.name == MULTISTEP else sample_diffusion
         chunks = walk(
-            counted,
+            walked,
             noise,
             schedule=squared_cosine(head.diffusion_levels),
             sampler=sampler,
@@ -289,7 +294,7 @@ def generate(
             counted, noise, name=sampler.name, steps=sampler.steps, tolerance=sampler.tolerance
         )
     elif sampler.name in EQUAL_STEPS:
-        chunks = sample_ode(counted, noise, name=sampler.name, steps=sampler.steps)
+        chunks = sample_ode(walked, noise, name=sampler.name, steps=sampler.steps)
     else:
         latent = torch.zeros(len(condition), head.latent_dim, device=condition.device)
         if sampler.name in ("z_prior", "offset"):

@@ -18,6 +18,7 @@ from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.errors import ContractError, IntegrityError, NonFiniteError
 from genpolicy.policies.checkpoint import Checkpoint, load_checkpoint
 from genpolicy.policies.determinism import deterministic
+from genpolicy.policies.guidance import GUIDED, Guidance, Prefix
 from genpolicy.policies.methods import (
     STOCHASTIC_SAMPLERS,
     check_sampler,
@@ -80,9 +81,16 @@ class Policy(Protocol):
         """Whether candidates of one observation differ."""
 
     def sample(
-        self, observations: Array, *, noise_names: Sequence[NoiseName], candidates: int
+        self,
+        observations: Array,
+        *,
+        noise_names: Sequence[NoiseName],
+        candidates: int,
+        prefix: Prefix | None = None,
     ) -> Samples:
         """Candidate chunks of physical observations (B, H_o, D_o), one noise name per row.
+
+        `prefix` is what each row's chunks are drawn to go on from; None: nothing.
 
         A chunk that is not finite comes back as it is: the first layer of feasibility rejects it
         alone, and the others are candidates as before.
@@ -138,8 +146,18 @@ class NetworkPolicy:
         """Whether candidates of one observation differ."""
         return self.sampler.name in STOCHASTIC_SAMPLERS
 
+    @property
+    def guided(self) -> bool:
+        """Whether its chunks can be drawn to go on from given actions."""
+        return self.sampler.name in GUIDED
+
     def sample(
-        self, observations: Array, *, noise_names: Sequence[NoiseName], candidates: int
+        self,
+        observations: Array,
+        *,
+        noise_names: Sequence[NoiseName],
+        candidates: int,
+        prefix: Prefix | None = None,
     ) -> Samples:
         """Candidate chunks of a batch of observations.
 
@@ -147,11 +165,13 @@ class NetworkPolicy:
             observations: Physical units, newest last. Shape (B, H_o, D_o).
             noise_names: Names of each row's noise; equal names give equal noise. Length B.
             candidates: N >= 1, candidates per row.
+            prefix: What each row's chunks are drawn to go on from; None: nothing.
 
         Returns:
             Actions (B, N, K, D_a) in physical units, and the NFE of one sample (the most of any).
 
         Raises:
+            ConfigError: A prefix for a sampler that cannot be guided.
             ContractError: Wrong shape, wrong number of names, no candidate.
             NonFiniteError: An observation is NaN or infinite; a chunk may be, see `Policy.sample`.
             EvaluationCapError: A sample took more network evaluations than its sampler may.
@@ -165,7 +185,9 @@ class NetworkPolicy:
                 action="Name the noise of every row.",
             )
         condition = self.encode(self.preprocess(observations))
-        return self.sample_encoded(condition, noise_names=noise_names, candidates=candidates)
+        return self.sample_encoded(
+            condition, noise_names=noise_names, candidates=candidates, prefix=prefix
+        )
 
     def preprocess(self, observations: Array) -> Tensor:
         """Check and normalise observations (B, H_o, D_o); result on the device.
@@ -198,7 +220,12 @@ class NetworkPolicy:
             )
 
     def sample_encoded(
-        self, condition: Tensor, *, noise_names: Sequence[NoiseName], candidates: int
+        self,
+        condition: Tensor,
+        *,
+        noise_names: Sequence[NoiseName],
+        candidates: int,
+        prefix: Prefix | None = None,
     ) -> Samples:
         """Candidate chunks of conditions (B, C) from `encode`; see `sample`."""
         names = [
@@ -209,7 +236,10 @@ class NetworkPolicy:
         repeated = condition.repeat_interleave(candidates, dim=0)
         size = self.sampler.batch_rows
         chunks, evaluations = [], []
-        with deterministic(self.device), torch.inference_mode():
+        # What is guided is differentiated, which nothing made in inference mode can be.
+        plain = prefix is None
+        with deterministic(self.device), torch.inference_mode(plain), torch.no_grad():
+            repeated = repeated if plain else repeated.clone()
             for first in range(0, len(names), size):
                 rows = repeated[first : first + size]
                 result, nfe = generate(
@@ -218,6 +248,7 @@ class NetworkPolicy:
                     self._noise(names[first : first + size], size),
                     sampler=self.sampler,
                     head=self.checkpoint.config.head,
+                    guidance=self._guidance(prefix, first, candidates),
                 )
                 chunks.append(result[: len(rows)].cpu())
                 evaluations.append(nfe)
@@ -230,6 +261,14 @@ class NetworkPolicy:
         """Wait until the device has finished what was asked of it."""
         if self.device != "cpu":
             torch.cuda.synchronize(self.device)
+
+    def _guidance(self, prefix: Prefix | None, first: int, candidates: int) -> Guidance | None:
+        """Of the padded batch of candidates that begins at `first`."""
+        if prefix is None:
+            return None
+        size, normalise = self.sampler.batch_rows, self._normalisation.action.normalise
+        rows = np.arange(first, first + size).clip(max=len(prefix.actions) * candidates - 1)
+        return prefix.guidance(rows // candidates, normalise, device=self.device)
 
     def _noise(self, names: Sequence[NoiseName], rows: int) -> Callable[[int], Tensor]:
         """Noise function of one padded batch.

@@ -8,7 +8,7 @@ Finding = tuple[str, str]
 STOP_STATES = ("protective_stop", "emergency_stop")
 KINDS = frozenset({
     "observation", "phase", "epoch", "active", "invocation", "candidate", "refuse", "supervisor",
-    "recovery", "invalidate", "mode", "reset", "force", "outcome", "scene", "controller",
+    "recovery", "invalidate", "mode", "reset", "force", "outcome", "scene", "controller", "joined",
 })  # fmt: skip
 
 
