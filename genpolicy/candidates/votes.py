@@ -1,8 +1,9 @@
 """Earlier predictions of the moments that a new chunk is for: who has a vote, and what is made.
 
 A prediction may speak for a row only where its own chunk could still have been executed there: of
-the same unbroken chain, unvoided, for the same phase, calibration and session, within its horizon,
-its validity and the largest action age. So no vote brings in what the executor would refuse.
+the same unbroken chain, within its horizon, its validity and the largest action age. What voids a
+chunk (another phase, calibration or session, a stop, a contact) drops it from the queue, and with
+that the chain ends. So no vote brings in what the executor would refuse.
 """
 
 import math
@@ -58,13 +59,11 @@ class Now:
         metadata: Of the new chunk.
         execution_horizon: Actions of a chunk that may be executed.
         maximum_age_ns: Largest action age in the new chunk's phase, ns.
-        void_before_ns: What was conditioned before this is void, ns.
     """
 
     metadata: ChunkMetadata
     execution_horizon: int
     maximum_age_ns: int
-    void_before_ns: int
 
 
 class Asked(NamedTuple):
@@ -103,18 +102,6 @@ class VoteCheck(NamedTuple):
     holds: Holds
 
 
-def _same_context(asked: Asked) -> bool:
-    old, new = asked.before.metadata, asked.now.metadata
-    return (old.task_phase, old.calibration_epoch, old.session_epoch) == (
-        new.task_phase, new.calibration_epoch, new.session_epoch
-    )  # fmt: skip
-
-
-def _unvoided(asked: Asked) -> bool:
-    condition_ns = _ns(asked.before.metadata.condition_observation_event_time_s)
-    return condition_ns >= asked.now.void_before_ns
-
-
 def _young(asked: Asked) -> bool:
     condition_ns = _ns(asked.before.metadata.condition_observation_event_time_s)
     return asked.due_ns - condition_ns <= asked.now.maximum_age_ns
@@ -122,8 +109,6 @@ def _young(asked: Asked) -> bool:
 
 VOTE_CHECKS = (
     VoteCheck("chain", lambda asked: asked.linked),
-    VoteCheck("context", _same_context),
-    VoteCheck("void", _unvoided),
     VoteCheck("horizon", lambda asked: asked.row < asked.now.execution_horizon),
     VoteCheck("valid", lambda asked: asked.due_ns <= _ns(asked.before.metadata.valid_until_s)),
     VoteCheck("age", _young),

@@ -22,7 +22,6 @@ from genpolicy.execution.continuity import Continuity, bytes_of
 from genpolicy.execution.issued import issued_by_feasibility
 from genpolicy.execution.journal import Journal, encode_actions
 from genpolicy.execution.moment import ExecutorMode, Moment, View
-from genpolicy.execution.nanoseconds import NEVER_NS
 from genpolicy.execution.supervisor import Supervisor
 
 if TYPE_CHECKING:
@@ -65,12 +64,6 @@ class ControllerStub:
         self._last_due_ns: int | None = None
         self._last_sequence = -1
         self._continuity = Continuity()
-
-    @property
-    def void_before_ns(self) -> int:
-        """What was conditioned before this is void, whatever the reason."""
-        voidings = self._view.voidings.values()
-        return max((event.before_ns for event in voidings), default=NEVER_NS)
 
     def note_observation(
         self, now_ns: int, event_ns: int, phase: str, calibration_epoch: str

@@ -278,13 +278,8 @@ def generate(
     walked = guided(counted, sampler, head, guidance)
     if sampler.name in DIFFUSION_SAMPLERS or sampler.name == MULTISTEP:
         walk = sample_multistep if sampler.name == MULTISTEP else sample_diffusion
-        chunks = walk(
-            walked,
-            noise,
-            schedule=squared_cosine(head.diffusion_levels),
-            sampler=sampler,
-            prediction=head.prediction,
-        )
+        schedule = squared_cosine(head.diffusion_levels)
+        chunks = walk(walked, noise, schedule=schedule, sampler=sampler, prediction=head.prediction)
     elif sampler.name == ENERGY_SAMPLER:
         assert isinstance(network, EnergyNetwork)
         codes = search_codes(counted, noise, iterations=sampler.steps, bound=CODE_BOUND)

@@ -48,8 +48,8 @@ def prediction(number, *, start, x_m=0.0, **changes):
     return Prediction(f"s/{number}", metadata(number, start=start, **changes), actions, actions)
 
 
-def now(number, *, start, age_s=10.0, void_ns=-(1 << 62), **changes):
-    return Now(metadata(number, start=start, **changes), HORIZON, round(age_s * 1e9), void_ns)
+def now(number, *, start, age_s=10.0, **changes):
+    return Now(metadata(number, start=start, **changes), HORIZON, round(age_s * 1e9))
 
 
 def remembered(*predictions, checks=VOTE_CHECKS):
@@ -77,8 +77,6 @@ def test_each_votes_on_the_rows_that_its_own_horizon_reaches():
 
 WITHOUT_A_VOTE = {
     "chain": (TWO, {"predecessor_chunk_id": ""}),
-    "context": (TWO, {"task_phase": "insert"}),
-    "void": (TWO, {"void_ns": 10**9}),
     "horizon": ([prediction(0, start=0, valid_until_s=99.0)], {"start": 9}),
     "valid": ([prediction(0, start=0, valid_until_s=0.05)], {"start": 5}),
     "age": ([prediction(0, start=0)], {"start": 5, "age_s": 0.2}),
@@ -94,12 +92,6 @@ def test_who_breaks_one_check_has_no_vote_and_had_one_without_it(name):
     assert remembered(*before).votes(asked, first=0) == []
     others = tuple(check for check in VOTE_CHECKS if check.name != name)
     assert remembered(*before, checks=others).votes(asked, first=0) != []
-
-
-@pytest.mark.parametrize("change", ["calibration_epoch", "session_epoch"])
-def test_another_calibration_or_session_has_no_vote(change):
-    other = {"calibration_epoch": "epoch_2", "session_epoch": 1}[change]
-    assert remembered(*TWO).votes(now(2, start=5, **{change: other}), first=0) == []
 
 
 def test_a_chain_that_broke_in_between_ends_the_say_of_what_lies_before():

@@ -17,7 +17,6 @@ from genpolicy.contract.chunk import Candidate, ChunkMetadata, Proposal
 from genpolicy.evidence.stress.state import InFlight, Setup
 from genpolicy.execution.journal import Journal
 from genpolicy.execution.nanoseconds import to_ns
-from genpolicy.execution.stub import ControllerStub
 from genpolicy.feasibility.admission import Admitted
 
 
@@ -27,7 +26,6 @@ class Joined:
     Args:
         setup: What the rollout shares with the others; the rule among it.
         journal: Of the rollout.
-        stub: Knows what voids.
         checks: Who has a vote; a part of the table only for the evidence on mutants.
     """
 
@@ -35,11 +33,10 @@ class Joined:
         self,
         setup: Setup,
         journal: Journal,
-        stub: ControllerStub,
         *,
         checks: tuple[VoteCheck, ...] = VOTE_CHECKS,
     ) -> None:
-        self._setup, self._journal, self._stub = setup, journal, stub
+        self._setup, self._journal = setup, journal
         self._joining = setup.joining
         self._past = Past(checks)
 
@@ -90,6 +87,5 @@ class Joined:
             metadata=metadata,
             execution_horizon=self._setup.horizons.execution_horizon,
             maximum_age_ns=to_ns(age_s),
-            void_before_ns=self._stub.void_before_ns,
         )
         return self._past.votes(now, first=first)

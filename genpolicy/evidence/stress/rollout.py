@@ -87,7 +87,7 @@ class Rollout:
         self._deliveries = Deliveries(
             setup, self.executor, self.journal, self.tally, start=start_index
         )
-        self._joined = Joined(setup, self.journal, self.stub)
+        self._joined = Joined(setup, self.journal)
         self._fallback = Fallback(setup, self.world, self.executor, self.recovery)
         self._newest_accepted_s: float | None = None
         self._last_command_s: float | None = None
