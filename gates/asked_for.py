@@ -2,8 +2,8 @@
 
 No setting leaves one out. Written out, not imported: every stage reads the gates, and training may
 know neither feasibility nor execution. Tests hold the lists to the tables
-(`genpolicy/feasibility/checks.py`, `genpolicy/execution/checks.py`,
-`genpolicy/evidence/shadow/on_the_way.py`).
+(`genpolicy/feasibility/checks.py`, `genpolicy/execution/checks.py`, of votes
+`genpolicy/candidates/votes.py`, `genpolicy/evidence/shadow/on_the_way.py`).
 """
 
 CHECKS_ASKED_FOR = (
@@ -88,6 +88,10 @@ CHECKS_ASKED_FOR = (
     "execution.continuity",
     "execution.pace",
     "execution.watchdog",
+    "execution.vote_chain",
+    "execution.vote_horizon",
+    "execution.vote_valid",
+    "execution.vote_age",
 )
 NOT_ASKED_OF_EVERY_TASK = (
     "geometric.scene_collision",

@@ -61,6 +61,7 @@ PLANNED: Mapping[str, Planned] = {
     "stress.perturbations": Planned("", "D"),
     "stress.episode_limit_s": Planned("", "D"),
     "stress.samples": Planned("", "A"),
+    "stress.joining": Planned("", "B"),
 }
 """What the plan names beside limits."""
 SECTIONS: Mapping[str, Gate] = {"feasibility": "A", "execution": "C"}

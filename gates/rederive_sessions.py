@@ -15,6 +15,7 @@ from gates.rederive_distilled import identity
 from gates.rederive_shadow import TaskSection
 from gates.report import Gate
 from gates.stated import mapping, refuse, root_seed, section, training_seed
+from genpolicy.candidates.joining import REPLACE, JoiningSettings
 from genpolicy.candidates.judged import BASELINES, GENERATORS
 from genpolicy.evidence.stress.matched import matched_starts
 from genpolicy.evidence.stress.settings import StressSettings
@@ -22,8 +23,10 @@ from genpolicy.integrity.documents import canonical_json, read_json
 from genpolicy.integrity.hashing import sha256_bytes
 from genpolicy.tasks.api import WorldSettings, load_task
 from genpolicy.verification.begun import Begun, Maker, begun_sessions
+from genpolicy.verification.joined import LABEL
 from genpolicy.verification.journal_source import readable
 
+REPLACING = JoiningSettings()
 TOLERANCE = 1e-6
 """Of a pose, m or without unit: another processor rounds, another start is centimetres away."""
 
@@ -43,9 +46,11 @@ def rederive_sessions(
     """
     seed = training_seed(params)
 
+    joining = section(params, "stress", StressSettings).joining if gate == "D" else REPLACING
+
     @cache
     def maker(method: str) -> Maker | None:
-        return _maker(root, method, seed)
+        return _maker(root, method, seed, joining.named(method))
 
     planned = _planned(params) if gate == "D" else []
     for path in journals:
@@ -58,17 +63,18 @@ def rederive_sessions(
                 if own is None or others or not session.makers:
                     made = ", ".join(sorted(checkpoint for checkpoint, _ in others)) or "nobody"
                     refuse(gate, f"{place}: made by", made, "the policy of that name, as trained")
+                _joined(gate, place, session, joining)
                 if gate == "D":
                     _began(gate, place, session, planned)
 
 
-def _maker(root: Path, method: str, seed: object) -> Maker | None:
+def _maker(root: Path, method: str, seed: object, joining: JoiningSettings) -> Maker | None:
     """Weights and sampler of a trained policy; None where there is none of the name."""
     folder = checkpoint_of(root, method, seed)
     if folder is None:
         return None
     sampler = mapping(mapping(read_json(folder / "config.json")).get("sampler"))
-    return identity(folder), sha256_bytes(canonical_json(sampler))
+    return identity(folder), joining.sampler_hash(sha256_bytes(canonical_json(sampler)))
 
 
 def checkpoint_of(root: Path, method: str, seed: object) -> Path | None:
@@ -78,6 +84,14 @@ def checkpoint_of(root: Path, method: str, seed: object) -> Path | None:
         if (folder / "config.json").is_file():
             return folder
     return None
+
+
+def _joined(gate: Gate, place: str, session: Begun, joining: JoiningSettings) -> None:
+    """By which rule the checker held its chunks against their record is what the session says."""
+    planned = joining.named(session.labels["method"]).rule
+    said = session.labels.get(LABEL, REPLACE)
+    if said != planned:
+        refuse(gate, f"{place}: its chunks join by", said, f"{planned}, as planned")
 
 
 def _planned(params: Mapping[str, Any]) -> list[dict[str, Any]]:

@@ -56,6 +56,7 @@ def work(params: Params) -> None:
         samples=stress.samples,
         warm=section.warm,
         cold=section.cold,
+        joining=stress.joining,
     )
     with output_folder(ARTIFACTS / "latency") as folder:
         declared = declared_rows(

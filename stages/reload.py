@@ -34,6 +34,7 @@ def work(params: Params) -> None:
     section = params.section("reload", SweepSection)
     names = params.section("train_generators", MethodsSection).samplers
     seeds = params.section("policy", PolicySettings).seeds
+    stress = params.section("stress", StressSettings)
     plan = ReloadPlan(
         task=params.task.name,
         feasibility=params.section("feasibility", FeasibilitySettings),
@@ -44,7 +45,8 @@ def work(params: Params) -> None:
         deployment=Deployment(
             horizons=params.horizons,
             deadline_s=params.section("execution", AnswerDeadline).deadline_s,
-            samples=params.section("stress", StressSettings).samples,
+            samples=stress.samples,
+            joining=stress.joining,
         ),
     )
     root = ARTIFACTS / "train_generators"

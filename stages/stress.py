@@ -43,6 +43,7 @@ def work(params: Params) -> None:
         cell=Cell(params.horizons, params.section("execution", ExecutionSettings)),
         feasibility=params.section("feasibility", FeasibilitySettings),
         root_seed=params.seed,
+        joining=section.joining,
     )
     seed = params.section("policy", PolicySettings).seeds[0]
     judged = compared(ARTIFACTS, baselines=section.baselines, generators=admitted, seed=seed)

@@ -29,6 +29,7 @@ from gates.pages import (
     plots_time,
     tables_feasibility,
     tables_holds,
+    tables_stress,
 )
 from gates.pages.figures import Picturable, Table, draw_all
 from gates.pages.guide import BACK_TO, QUESTIONS, READING, label, words
@@ -64,7 +65,7 @@ PLOTS: dict[str, tuple[Picturable, ...]] = {
         *plots_incidents.PLOTS,
         *tables_holds.LISTINGS,
     ),
-    "D": plots_stress.PLOTS,
+    "D": (*plots_stress.PLOTS, *tables_stress.LISTINGS),
     "E": (),
 }
 

@@ -47,6 +47,7 @@ EVENT_FIELDS: dict[str, tuple[str, ...]] = {
     "controller": ("mode",),
     "invocation": ("id", "stage", "detail"),
     "conditioning": ("id", "key", "rows", "history"),
+    "joined": ("chunk_id", "invocation", "rule", "draw", "parents"),
     "candidate": ("chunk_id", "method", "index", "layers", "first_reason", "measures"),
     "enqueue": ("arrival", "chunk_id", "source", "method", "condition_ns", "start_ns", "period_ns",
                 "valid_until_ns", "phase", "calibration_epoch", "checkpoint", "sampler",

@@ -22,6 +22,7 @@ from genpolicy.policies.distillation import (
 )
 from genpolicy.policies.energy import CODE_BOUND, EnergyContrast, EnergyNetwork
 from genpolicy.policies.evaluations import allowed_evaluations
+from genpolicy.policies.guidance import Guidance, guided
 from genpolicy.policies.networks import Dimensions, HeadInput, PolicyNetwork
 from genpolicy.policies.objectives import (
     ConditionalVae,
@@ -269,6 +270,7 @@ def generate(
     sampler: SamplerConfig,
     head: HeadConfig,
     call_rows: Callable[[int], int],
+    guidance: Guidance | None = None,
 ) -> tuple[Tensor, int]:
     """Normalised chunks of conditions, and the network evaluations that they took.
 
@@ -279,12 +281,14 @@ def generate(
         sampler: Sampler settings.
         head: Head settings of the training.
         call_rows: Rows that a network call for so many rows has, padded.
+        guidance: What the chunks go on from; None: nothing.
 
     Returns:
         Chunks (B, K, D_a) and the counted NFE: calls of the network, as many as its slowest row
-        needed.
+        needed, and its backward passes.
 
     Raises:
+        ConfigError: Guidance of a sampler that has no path to guide.
         EvaluationCapError: The sampler's cap was reached.
     """
     times = announced_times(sampler, head)
@@ -296,15 +300,11 @@ def generate(
 
     single = sampler.name in SINGLE_EVALUATION
     counted = CountedNetwork(once if single else ahead, cap=sampler.nfe_cap)
+    walked = guided(counted, sampler, head, guidance)
     if sampler.name in DIFFUSION_SAMPLERS or sampler.name == MULTISTEP:
         walk = sample_multistep if sampler.name == MULTISTEP else sample_diffusion
-        chunks = walk(
-            counted,
-            noise,
-            schedule=squared_cosine(head.diffusion_levels),
-            sampler=sampler,
-            prediction=head.prediction,
-        )
+        schedule = squared_cosine(head.diffusion_levels)
+        chunks = walk(walked, noise, schedule=schedule, sampler=sampler, prediction=head.prediction)
     elif sampler.name == ENERGY_SAMPLER:
         assert isinstance(network, EnergyNetwork)
         codes = search_codes(counted, noise, iterations=sampler.steps, bound=CODE_BOUND)
@@ -314,7 +314,7 @@ def generate(
             counted, noise, name=sampler.name, steps=sampler.steps, tolerance=sampler.tolerance
         )
     elif sampler.name in EQUAL_STEPS:
-        chunks = sample_ode(counted, noise, name=sampler.name, steps=sampler.steps)
+        chunks = sample_ode(walked, noise, name=sampler.name, steps=sampler.steps)
     else:
         latent = conditions.stored.new_zeros(len(conditions.of_row), head.latent_dim)
         if sampler.name in ("z_prior", "offset"):

@@ -21,6 +21,7 @@ from genpolicy.policies.ahead import Conditions, padded
 from genpolicy.policies.call_shapes import call_shapes
 from genpolicy.policies.checkpoint import Checkpoint, load_checkpoint
 from genpolicy.policies.determinism import deterministic
+from genpolicy.policies.guidance import GUIDED, Guidance, Prefix
 from genpolicy.policies.methods import (
     STOCHASTIC_SAMPLERS,
     check_sampler,
@@ -83,9 +84,16 @@ class Policy(Protocol):
         """Whether candidates of one observation differ."""
 
     def sample(
-        self, observations: Array, *, noise_names: Sequence[NoiseName], candidates: int
+        self,
+        observations: Array,
+        *,
+        noise_names: Sequence[NoiseName],
+        candidates: int,
+        prefix: Prefix | None = None,
     ) -> Samples:
         """Candidate chunks of physical observations (B, H_o, D_o), one noise name per row.
+
+        `prefix` is what each row's chunks are drawn to go on from; None: nothing.
 
         A chunk that is not finite comes back as it is: the first layer of feasibility rejects it
         alone, and the others are candidates as before.
@@ -142,8 +150,18 @@ class NetworkPolicy:
         """Whether candidates of one observation differ."""
         return self.sampler.name in STOCHASTIC_SAMPLERS
 
+    @property
+    def guided(self) -> bool:
+        """Whether its chunks can be drawn to go on from given actions."""
+        return self.sampler.name in GUIDED
+
     def sample(
-        self, observations: Array, *, noise_names: Sequence[NoiseName], candidates: int
+        self,
+        observations: Array,
+        *,
+        noise_names: Sequence[NoiseName],
+        candidates: int,
+        prefix: Prefix | None = None,
     ) -> Samples:
         """Candidate chunks of a batch of observations.
 
@@ -151,11 +169,13 @@ class NetworkPolicy:
             observations: Physical units, newest last. Shape (B, H_o, D_o).
             noise_names: Names of each row's noise; equal names give equal noise. Length B.
             candidates: N >= 1, candidates per row.
+            prefix: What each row's chunks are drawn to go on from; None: nothing.
 
         Returns:
             Actions (B, N, K, D_a) in physical units, and the NFE of one sample (the most of any).
 
         Raises:
+            ConfigError: A prefix for a sampler that cannot be guided.
             ContractError: Wrong shape, wrong number of names, no candidate.
             NonFiniteError: An observation is NaN or infinite; a chunk may be, see `Policy.sample`.
             EvaluationCapError: A sample took more network evaluations than its sampler may.
@@ -169,7 +189,9 @@ class NetworkPolicy:
                 action="Name the noise of every row.",
             )
         condition = self.encode(self.preprocess(observations))
-        return self.sample_encoded(condition, noise_names=noise_names, candidates=candidates)
+        return self.sample_encoded(
+            condition, noise_names=noise_names, candidates=candidates, prefix=prefix
+        )
 
     def preprocess(self, observations: Array) -> Tensor:
         """Check and normalise observations (B, H_o, D_o); result on the device.
@@ -202,7 +224,12 @@ class NetworkPolicy:
             )
 
     def sample_encoded(
-        self, condition: Tensor, *, noise_names: Sequence[NoiseName], candidates: int
+        self,
+        condition: Tensor,
+        *,
+        noise_names: Sequence[NoiseName],
+        candidates: int,
+        prefix: Prefix | None = None,
     ) -> Samples:
         """Candidate chunks of conditions (B, C) from `encode`; see `sample`."""
         names = [
@@ -211,19 +238,23 @@ class NetworkPolicy:
             for candidate in range(candidates)
         ]
         chunks, evaluations = [], []
-        with deterministic(self.device), torch.inference_mode():
+        # What is guided is differentiated, which nothing made in inference mode can be.
+        plain = prefix is None
+        with deterministic(self.device), torch.inference_mode(plain), torch.no_grad():
+            condition = condition if plain else condition.clone()
             for first in range(0, len(names), self._calls.most):
                 own = names[first : first + self._calls.most]
                 size = self._calls.fit(len(own))
                 # A padding row is the last row again, with its condition.
-                rows = [first + min(row, len(own) - 1) for row in range(size)]
+                rows = [(first + min(row, len(own) - 1)) // candidates for row in range(size)]
                 result, nfe = generate(
                     self._network,
-                    _conditions(condition, [row // candidates for row in rows]),
+                    _conditions(condition, rows),
                     self._noise(own, size),
                     sampler=self.sampler,
                     head=self.checkpoint.config.head,
                     call_rows=self._calls.fit,
+                    guidance=self._guidance(prefix, rows),
                 )
                 chunks.append(result[: len(own)].cpu())
                 evaluations.append(nfe)
@@ -236,6 +267,13 @@ class NetworkPolicy:
         """Wait until the device has finished what was asked of it."""
         if self.device != "cpu":
             torch.cuda.synchronize(self.device)
+
+    def _guidance(self, prefix: Prefix | None, rows: list[int]) -> Guidance | None:
+        """Of the padded batch whose rows are of these observations."""
+        if prefix is None:
+            return None
+        normalise = self._normalisation.action.normalise
+        return prefix.guidance(np.array(rows), normalise, device=self.device)
 
     def _noise(self, names: Sequence[NoiseName], rows: int) -> Callable[[int], Tensor]:
         """Noise function of one padded batch.

@@ -20,7 +20,8 @@ class CountedNetwork:
     """A network function that counts its evaluations, and ends where no more are allowed.
 
     Attributes:
-        nfe: Evaluations so far; one call is one evaluation, whatever its batch size.
+        nfe: Evaluations so far; one call is one evaluation, whatever its batch size, and so is one
+            backward pass.
         cap: Largest number of them; None where nothing bounds it.
     """
 
@@ -35,6 +36,15 @@ class CountedNetwork:
         Raises:
             EvaluationCapError: The cap was reached; nothing is evaluated beyond it.
         """
+        self.spend()
+        return self._network(chunks, time)
+
+    def spend(self) -> None:
+        """Count what costs as much as an evaluation: one, or a backward pass through one.
+
+        Raises:
+            EvaluationCapError: The cap was reached.
+        """
         if self.cap is not None and not self.nfe < self.cap:
             raise EvaluationCapError(
                 where="network evaluations of one sample",
@@ -43,7 +53,6 @@ class CountedNetwork:
                 action="Reject the chunk and hold; raise the cap or the tolerance.",
             )
         self.nfe += 1
-        return self._network(chunks, time)
 
 
 def refuse_name(name: str, known: tuple[str, ...]) -> NoReturn:

@@ -5,8 +5,8 @@ about freshness: phase, calibration, newest observation, voiding events and stop
 again from the raw events, and every accepted action is compared bit for bit with the chunk that
 was admitted. Where the caller says what the robot is, executed rows are proved feasible again, by
 MuJoCo (`motion`). Rules: P1 gate to stub, P2 watchdog, P3 monotone, P4 chain, P5 newest first,
-P6 feasible, P7 stop is sticky, `clock` (no answer before its time), `conservation`, `journal`
-(form), `settings` (declared limits).
+P6 feasible (and of a blend its own admission, `joined`), P7 stop is sticky, `clock` (no answer
+before its time), `conservation`, `journal` (form), `settings` (declared limits).
 """
 
 import hashlib
@@ -18,6 +18,7 @@ from genpolicy.verification.balance import Balance
 from genpolicy.verification.continuity import Continuity
 from genpolicy.verification.expected import ExpectedSettings
 from genpolicy.verification.invocations import Invocations
+from genpolicy.verification.joined import Joined
 from genpolicy.verification.journal_source import Message, read_messages
 from genpolicy.verification.motion import ExpectedMotion, MotionProof
 from genpolicy.verification.report import CheckReport, Violation
@@ -80,6 +81,7 @@ class _Session:
         self.world = WorldView()
         self.balance = Balance()
         self.invocations = Invocations()
+        self.joined = Joined()
         self.continuity = Continuity()
         self.chunks: dict[str, Message] = {}
         self.open: dict[int, Message] = {}
@@ -117,6 +119,10 @@ class _Session:
             for rule, sentence in self.invocations.follow(kind, m):
                 self.flag(rule, sentence)
             self._follow(kind, m)
+            for rule, sentence in self.joined.follow(
+                kind, m, self.world.void_before, self.settings
+            ):
+                self.flag(rule, sentence)
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             self.flag("journal.malformed", f"A {kind} event cannot be read ({error!r}).")
 

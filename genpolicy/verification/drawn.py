@@ -4,6 +4,10 @@ An invocation states the observations that it saw and the names of its noise; ea
 was judged, the hash of what was drawn; each chunk that was admitted, the numbers. Here they are
 brought together, and held to the names that the plan gives an invocation: who may choose the noise
 may choose the answer.
+
+Where chunks join by another rule than replacing, a candidate names its invocation and its sample. A
+blend is no sample, so that of its own only the hash of what was drawn is asked; what was drawn to go
+on from an earlier plan is not drawn again, since the plan is not stated with it.
 """
 
 import hashlib
@@ -20,6 +24,8 @@ from genpolicy.verification.journal_source import Message, read_messages
 Array = NDArray[np.float64]
 Key = tuple[str | int, ...]
 
+BLENDS = frozenset({"ensemble_oldest", "ensemble_newest"})
+GUIDED = "real_time"
 FIRST_NAME = "stress"
 """What the noise of a rollout is named by first."""
 
@@ -59,7 +65,8 @@ class _Session:
     scene: dict[str, str] = field(default_factory=dict)
     begun: list[str] = field(default_factory=list)
     conditions: dict[str, tuple[Message, dict[str, str]]] = field(default_factory=dict)
-    judged: list[Message] = field(default_factory=list)
+    joined: dict[str, Message] = field(default_factory=dict)
+    judged: list[tuple[Message, Message | None]] = field(default_factory=list)
     passed: dict[str, Message] = field(default_factory=dict)
     enqueued: dict[str, Message] = field(default_factory=dict)
 
@@ -71,10 +78,13 @@ class _Session:
             self.begun.append(m["id"])
         elif kind == "conditioning":
             yield from self._conditioning(m)
+        elif kind == "joined":
+            self.joined[m["chunk_id"]] = m
         elif kind == "candidate":
-            if m["chunk_id"] not in self.conditions:
+            origin = self.joined.get(m["chunk_id"])
+            if _invocation(m, origin) not in self.conditions:
                 yield f"{m['chunk_id']!r} is judged, and nobody says what it was drawn from"
-            self.judged.append(m)
+            self.judged.append((m, origin))
             if all(passed is True for passed in m["layers"].values()):
                 self.passed[m["chunk_id"]] = m
         elif kind == "enqueue" and m["source"] == "policy":
@@ -95,6 +105,8 @@ class _Session:
             yield f"{name!r} is enqueued, and no candidate of it passed for that"
             return
         self.enqueued[name] = m
+        if _blended(self.joined.get(name)):
+            return
         if hashlib.sha256(_raw(m)).hexdigest() != self.passed[name]["measures"]["drawn_sha256"]:
             yield f"{name!r} is enqueued, and what was judged is not what it was projected from"
 
@@ -106,14 +118,17 @@ class _Session:
 
     def drawn(self) -> Iterator[Drawn]:
         """Every judged candidate."""
-        for m in self.judged:
+        for m, origin in self.judged:
+            if origin is not None and origin["rule"] == GUIDED and origin["parents"]:
+                continue
             name = m["chunk_id"]
-            told, seen = self.conditions[name]
-            chunk = self.enqueued.get(name) if self.passed.get(name) is m else None
+            told, seen = self.conditions[_invocation(m, origin)]
+            whole = self.passed.get(name) is m and not _blended(origin)
+            chunk = self.enqueued.get(name) if whole else None
             yield Drawn(
                 method=self.method,
                 chunk_id=name,
-                index=int(m["index"]),
+                index=int(m["index"] if origin is None else origin["draw"]),
                 key=tuple(told["key"]),
                 history=_floats(bytes.fromhex(told["history"])).reshape(int(told["rows"]), -1),
                 seen=seen,
@@ -148,6 +163,16 @@ def drawn_chunks(path: Path) -> tuple[list[Drawn], str]:
         for finding in session.finish():
             return [], finding
     return [item for session in sessions.values() for item in session.drawn()], ""
+
+
+def _invocation(candidate: Message, origin: Message | None) -> str:
+    """Id of the invocation that a candidate is of; its own where nothing was joined."""
+    return str(candidate["chunk_id"] if origin is None else origin["invocation"])
+
+
+def _blended(origin: Message | None) -> bool:
+    """Whether earlier predictions were mixed into a candidate's numbers."""
+    return origin is not None and origin["rule"] in BLENDS and bool(origin["parents"])
 
 
 def _raw(chunk: Message) -> bytes:

@@ -48,6 +48,9 @@ class Invocations:
             return
         elif kind == "invocation":
             yield from self._invocation(m)
+        elif kind == "joined":
+            if m["invocation"] in self._of:  # the chunk is an answer to it, whatever its own id
+                self._of[m["chunk_id"]] = self._of[m["invocation"]]
         elif kind == "candidate":
             yield from self._candidate(m)
         elif kind == "enqueue" and m["source"] == "policy":

@@ -139,6 +139,7 @@ class _Session:
     start: int
     numbers: dict[str, int]
     checks: dict[str, int]
+    answers: dict[str, str]
 
 
 def stated_otherwise(path: Path, times: Times) -> Iterator[str]:
@@ -155,9 +156,11 @@ def stated_otherwise(path: Path, times: Times) -> Iterator[str]:
         if kind == "session":
             labels = m["labels"]
             own = (str(labels["method"]), str(labels["perturbation"]), int(labels["start"]))
-            sessions[name] = _Session(*own, {}, {})
+            sessions[name] = _Session(*own, {}, {}, {})
         elif kind == "invocation":
             yield from _stated(m, sessions[name], times)
+        elif kind == "joined":
+            sessions[name].answers[m["chunk_id"]] = m["invocation"]
         elif kind == "candidate":
             yield from _arrived(m, sessions[name], times)
 
@@ -180,6 +183,6 @@ def _stated(m: Message, session: _Session, times: Times) -> Iterator[str]:
 
 
 def _arrived(m: Message, session: _Session, times: Times) -> Iterator[str]:
-    number = session.numbers[m["chunk_id"]]
+    number = session.numbers[session.answers.get(str(m["chunk_id"]), str(m["chunk_id"]))]
     if times.hit(session.condition, session.start, number).lost:
         yield f"invocation {m['chunk_id']!r} is judged, and it was to be lost"

@@ -49,6 +49,7 @@ class _Session:
     peak_n: float = 0.0
     counts: Counter[str] = field(default_factory=Counter)
     rejected_by: Counter[str] = field(default_factory=Counter)
+    answers: dict[str, str] = field(default_factory=dict)
     open_rejections: set[str] = field(default_factory=set)
     ages_ns: list[int] = field(default_factory=list)
     latencies_s: dict[str, float] = field(default_factory=dict)
@@ -59,6 +60,8 @@ class _Session:
             self.labels, self.period_ns = m["labels"], m["period_ns"]
         elif kind == "invocation":
             self._invocation(m)
+        elif kind == "joined":
+            self.answers[m["chunk_id"]] = m["invocation"]
         elif kind == "candidate":
             self._candidate(m)
         elif kind in ("accept", "fallback"):
@@ -88,10 +91,11 @@ class _Session:
 
     def _candidate(self, m: Message) -> None:
         """An invocation counts as rejected until one of its candidates passes every layer."""
+        invocation = self.answers.get(str(m["chunk_id"]), str(m["chunk_id"]))
         if all(passed is True for passed in m["layers"].values()):
-            self.open_rejections.discard(m["chunk_id"])
+            self.open_rejections.discard(invocation)
         else:
-            self.open_rejections.add(m["chunk_id"])
+            self.open_rejections.add(invocation)
             self.rejected_by[str(m["first_reason"])] += 1
 
     def columns(self) -> dict[str, Any]:

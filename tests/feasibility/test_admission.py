@@ -7,7 +7,9 @@ import pickle
 import numpy as np
 import pytest
 
-from genpolicy.contract.chunk import actions_sha256
+from genpolicy.candidates.joining import ENSEMBLES, JoiningSettings
+from genpolicy.candidates.votes import Prediction, Votes, blend
+from genpolicy.contract.chunk import Candidate, actions_sha256
 from genpolicy.errors import IntegrityError
 from genpolicy.feasibility.admission import Admitted, Rejected
 from genpolicy.feasibility.settings import LAYERS
@@ -79,17 +81,24 @@ def test_a_rejected_chunk_is_another_type_with_raw_kept(checker, kit):
     assert np.array_equal(result.projected.proposal.actions, raw)
 
 
-def test_a_blend_needs_an_admission_of_its_own(checker, kit):
-    """P6: both parents pass, what they blend into does not."""
+@pytest.mark.parametrize("rule", ENSEMBLES)
+def test_a_blend_needs_an_admission_of_its_own(checker, kit, rule):
+    """P6: both parents pass, what they blend into, by either sign, runs into the post."""
     ctx = kit.context(checker, kit.START)
     left, right = (checker.admit(kit.proposal(kit.detour(s)), context=ctx) for s in (1, -1))
     assert isinstance(left, Admitted)
     assert isinstance(right, Admitted)
-    blend = checker.admit(
-        kit.proposal((left.actions + right.actions) / 2, chunk_id="blend"), context=ctx
+    before = Prediction("earlier", left.metadata, kit.detour(1), left.actions)
+    mixed = blend(
+        Candidate(right.metadata, kit.detour(-1)),
+        [Votes(before, first=0, stop=kit.K, shift=0)],
+        JoiningSettings(rule=rule),
     )
-    assert isinstance(blend, Rejected)
-    assert blend.verdict.first_layer == "geometric"
+    assert mixed.metadata.chunk_id not in ("earlier", left.metadata.chunk_id)
+    assert mixed.selected_by == rule
+    result = checker.admit(mixed, context=ctx)
+    assert isinstance(result, Rejected)
+    assert result.verdict.first_layer == "geometric"
 
 
 def test_every_candidate_has_one_verdict_and_one_reason(checker, kit):

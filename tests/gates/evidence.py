@@ -35,6 +35,7 @@ from genpolicy.audit.rows import (
     Stratum,
 )
 from genpolicy.audit.shown_rows import Alignment, ExampleChunk
+from genpolicy.candidates.votes import VOTE_CHECKS
 from genpolicy.data.rows import EpisodeRow, FrameRow
 from genpolicy.evidence.rows.need import (
     EffectRow,
@@ -63,6 +64,7 @@ from genpolicy.evidence.rows.stress import (
     ConservationRow,
     InvocationRow,
     RolloutRow,
+    SpliceRow,
     StressCountRow,
     StressStubRow,
 )
@@ -80,6 +82,7 @@ CODE = "genpolicy/robot/impedance.py"
 CHECKS = (
     *((check.layer, check.name) for check in FEASIBILITY_CHECKS),
     *(("execution", check.name) for check in EXECUTION_CHECKS),
+    *(("execution", f"vote_{check.name}") for check in VOTE_CHECKS),
 )
 
 BASELINES = ("bc", "chunked_bc", "act")
@@ -1427,6 +1430,19 @@ def _stress(root: Path) -> None:
             for number in range(INVOCATIONS)
         ],
     )
+    splices = [
+        {
+            "method": method, "seed": 0, "perturbation": condition, "start": start,
+            "rule": "replace" if method in COMPARED else "real_time", "invocation": number,
+            "parents": int(number > 0 and method not in COMPARED),
+            "raw_jump_m": 0.001 * (start + number), "jump_m": 0.0005 * (start + number),
+            "raw_jerk_m_s3": None if number == 0 else 100.0 * (start + number),
+            "jerk_m_s3": None if number == 0 else 50.0 * (start + number),
+        }
+        for method in methods for condition in CONDITIONS
+        for start in range(STARTS) for number in range(3)
+    ]  # fmt: skip
+    table(root, "stress/splices.parquet", SpliceRow, splices)
     cells = [(m, c) for m in methods for c in CONDITIONS]
     table(
         root,

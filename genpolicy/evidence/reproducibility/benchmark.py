@@ -15,9 +15,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from genpolicy.candidates.selector import propose
+from genpolicy.candidates.joining import REAL_TIME, REPLACE, JoiningSettings
+from genpolicy.candidates.votes import Prediction, Votes, join, prefix
 from genpolicy.contract.chunk import Candidate, ChunkMetadata, Proposal
 from genpolicy.contract.latency import Term
+from genpolicy.policies.guidance import Prefix
 from genpolicy.policies.policy import NetworkPolicy, load_policy
 from genpolicy.policies.settings import SamplerConfig
 
@@ -25,6 +27,7 @@ Array = NDArray[np.float64]
 Projection = Callable[[Proposal], object]
 Temperature = Literal["cold", "warm"]
 
+REPLACING = JoiningSettings()
 CACHE_BYTES = 64 << 20
 DISCARDED = 10
 """Invocations of a process before the first that is timed as warm."""
@@ -59,6 +62,7 @@ def measure_policy(
     discarded_repeats: int = DISCARDED,
     candidates: int = 1,
     project: Projection | None = None,
+    joining: JoiningSettings = REPLACING,
 ) -> list[Measurement]:
     """Time invocations component by component.
 
@@ -73,6 +77,7 @@ def measure_policy(
         discarded_repeats: Invocations between them that are not recorded.
         candidates: Candidates drawn by an invocation, as where it is deployed.
         project: Projection of a proposal; without it the term `project` stays unknown.
+        joining: How chunks join where they are deployed.
 
     Returns:
         One measurement per component and invocation; an invocation's components share a repeat.
@@ -86,12 +91,16 @@ def measure_policy(
         policy = load()
         _evict_caches(repeat)
         row = observations[repeat % len(observations)][None]
-        spans = invoke(policy, row, repeat=repeat, candidates=candidates, project=project)
+        spans = invoke(
+            policy, row, repeat=repeat, candidates=candidates, project=project, joining=joining
+        )
         results += [Measurement(name, "cold", repeat, value) for name, value in spans.items()]
     policy = load()
     for index in range(discarded_repeats + warm_repeats):
         row = observations[index % len(observations)][None]
-        spans = invoke(policy, row, repeat=index, candidates=candidates, project=project)
+        spans = invoke(
+            policy, row, repeat=index, candidates=candidates, project=project, joining=joining
+        )
         repeat = index - discarded_repeats
         if repeat >= 0:
             results += [Measurement(name, "warm", repeat, value) for name, value in spans.items()]
@@ -105,9 +114,16 @@ def invoke(
     repeat: int,
     candidates: int,
     project: Projection | None,
+    joining: JoiningSettings = REPLACING,
 ) -> dict[str, float]:
-    """Spans of one invocation, s."""
+    """Spans of one invocation, s; by a rule that joins, behind a plan that speaks for all it may.
+
+    What that plan is takes no time here, and would have been drawn by the invocation before.
+    """
     spans: dict[str, float] = {}
+    metadata = _metadata(policy, repeat)
+    votes = [] if joining.rule == REPLACE else [_plan_before(policy, row, metadata)]
+    guided = _guided(policy, votes, joining)
     with _timed(spans, Term.PREPROCESS):
         normalised = policy.preprocess(row)
     with _timed(spans, Term.ENCODE):
@@ -115,11 +131,12 @@ def invoke(
         policy.synchronise()
     with _timed(spans, Term.SAMPLE):
         samples = policy.sample_encoded(
-            condition, noise_names=[("latency", repeat)], candidates=candidates
+            condition, noise_names=[("latency", repeat)], candidates=candidates, prefix=guided
         )
     with _timed(spans, Term.SELECT):
         metadata = _metadata(policy, repeat)
-        proposal = propose([Candidate(metadata, actions) for actions in samples.actions[0]])
+        drawn = [Candidate(metadata, actions) for actions in samples.actions[0]]
+        proposal = join(drawn, 0, votes, joining)
     if project is not None:
         with _timed(spans, Term.PROJECT):
             project(proposal)
@@ -131,6 +148,21 @@ def _timed(spans: dict[str, float], term: Term) -> Iterator[None]:
     start = time.perf_counter()
     yield
     spans[str(term)] = time.perf_counter() - start
+
+
+def _plan_before(policy: NetworkPolicy, row: Array, metadata: ChunkMetadata) -> Votes:
+    """A plan that began one period earlier, as the policy draws it."""
+    actions = policy.sample(row, noise_names=[("latency", "before")], candidates=1).actions[0, 0]
+    before = Prediction("before", metadata, actions, actions)
+    reach = min(policy.horizons.execution_horizon, len(actions)) - 1
+    return Votes(before, first=0, stop=max(reach, 0), shift=min(1, len(actions) - 1))
+
+
+def _guided(policy: NetworkPolicy, votes: list[Votes], joining: JoiningSettings) -> Prefix | None:
+    if joining.rule != REAL_TIME:
+        return None
+    actions, weights = prefix(votes, rows=policy.prediction_horizon, frozen=1)
+    return Prefix(actions[None], weights[None], joining.guidance)
 
 
 def _evict_caches(fill: int) -> None:

@@ -1,10 +1,11 @@
 """The identity card of a candidate: what a reviewer must know to speak of the same thing."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
-from genpolicy.candidates import selector
+from genpolicy.candidates import selector, votes
+from genpolicy.candidates.joining import REPLACE, JoiningSettings
 from genpolicy.candidates.judged import JudgedPolicy, candidates_of
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.data.dataset import Dataset
@@ -32,11 +33,13 @@ class Deployment:
         horizons: Horizons of the ladder.
         deadline_s: Time after which an answer is given up.
         samples: Candidates of an invocation of a stochastic method.
+        joining: How its chunks join.
     """
 
     horizons: HorizonConfig
     deadline_s: float
     samples: int
+    joining: JoiningSettings = field(default_factory=JoiningSettings)
 
 
 def identities(
@@ -72,6 +75,7 @@ def card_of(
     horizons, runs = config.horizons, regime(policy.device)
     period_s = horizons.action_period_s
     evaluations = allowed_evaluations(sampler)
+    joining = deployment.joining.of(config.method, guided=policy.guided)
     counts = dict.fromkeys((evaluations.least, evaluations.most))
     return IdentityCard(
         architecture=_architecture(config),
@@ -100,10 +104,18 @@ def card_of(
         warm_up=DISCARDED,
         batch_rows=sampler.batch_rows,
         candidates=candidates_of(policy, deployment.samples),
-        selector=selector.SELECTOR,
+        selector=joining.said(),
         selector_owner=selector.OWNER,
-        selector_sha256=sha256_file(Path(selector.__file__)),
+        selector_sha256=_rule_sha256(joining),
     )
+
+
+def _rule_sha256(joining: JoiningSettings) -> str:
+    """The file that holds the rule, or of both that do."""
+    own = sha256_file(Path(selector.__file__))
+    if joining.rule == REPLACE:
+        return own
+    return sha256_bytes((own + sha256_file(Path(votes.__file__))).encode())
 
 
 def _architecture(config: CheckpointConfig) -> str:

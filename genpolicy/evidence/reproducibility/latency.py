@@ -6,12 +6,13 @@ held against a process that it was not made from.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
+from genpolicy.candidates.joining import JoiningSettings
 from genpolicy.candidates.judged import JudgedPolicy, candidates_of
 from genpolicy.contract.chunk import Proposal
 from genpolicy.contract.horizons import HorizonConfig
@@ -49,6 +50,7 @@ class LatencyPlan:
         samples: Candidates that an invocation of a stochastic method draws where it is deployed.
         warm: Warm invocations of a process.
         cold: Cold invocations of a process.
+        joining: How chunks join where they are deployed.
     """
 
     dataset: Path
@@ -58,6 +60,7 @@ class LatencyPlan:
     samples: int
     warm: int
     cold: int
+    joining: JoiningSettings = field(default_factory=JoiningSettings)
 
 
 def measured_rows(plan: LatencyPlan, policies: Sequence[JudgedPolicy]) -> list[LatencyRow]:
@@ -162,6 +165,7 @@ def measure_terms(plan: LatencyPlan, judged: JudgedPolicy) -> list[Measurement]:
         warm_repeats=plan.warm,
         candidates=candidates_of(policy, plan.samples),
         project=project,
+        joining=plan.joining.of(judged.name, guided=policy.guided),
     )
 
 

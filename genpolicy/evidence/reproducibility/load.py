@@ -76,10 +76,12 @@ def _measured(plan: LatencyPlan, judged: JudgedPolicy, load: str) -> list[Candid
     seen = fixture_observations(load_dataset(plan.dataset), horizons=plan.horizons,
                                 count=OBSERVATIONS)  # fmt: skip
     policy, rows = judged.load(), []
+    joining = plan.joining.of(judged.name, guided=policy.guided)
     for count in COUNTS:
         for repeat in range(-DISCARDED, REPEATS):
             row = seen[repeat % len(seen)][None]
-            spans = invoke(policy, row, repeat=repeat, candidates=count, project=None)
+            spans = invoke(policy, row, repeat=repeat, candidates=count, project=None,
+                           joining=joining)  # fmt: skip
             if repeat >= 0:
                 rows.append(
                     CandidatesRow(

@@ -87,6 +87,38 @@ class InvocationRow:
 
 
 @dataclass(frozen=True)
+class SpliceRow:
+    """`splices.parquet` of stress: one chunk that entered the queue, and how it begins.
+
+    Attributes:
+        method: The method.
+        seed: Number of its training seed.
+        perturbation: What was injected.
+        start: Number of the initial state.
+        rule: How its chunks join.
+        invocation: Count in this rollout.
+        parents: Earlier predictions that had a say; 0 where nothing was to be joined.
+        raw_jump_m: Way from the last command to the first row that was due, as proposed, m.
+        raw_jerk_m_s3: Largest jerk of the TCP over the boundary, as proposed, m/s^3; None where
+            too little was commanded before.
+        jump_m: The same way, as admitted, m.
+        jerk_m_s3: The same jerk, as admitted, m/s^3.
+    """
+
+    method: str
+    seed: int
+    perturbation: str
+    start: int
+    rule: str
+    invocation: int
+    parents: int
+    raw_jump_m: float
+    raw_jerk_m_s3: float | None
+    jump_m: float
+    jerk_m_s3: float | None
+
+
+@dataclass(frozen=True)
 class StressCountRow:
     """`counts.parquet` of stress: actions discarded, by reason.
 

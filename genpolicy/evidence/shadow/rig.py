@@ -5,6 +5,7 @@ the executor, the stub and the checker can be tried with chunks of which somethi
 whole table refuses all of them, so a rig has the table minus `issued`, and its journal says so.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, cast
 
@@ -128,6 +129,7 @@ class Rig:
         stub_checks: That of the stub, where it is another.
         execution_horizon: Actions of a chunk that may be executed.
         session: Name of the session.
+        labels: What the session says of itself.
         changes: Of the settings of execution.
     """
 
@@ -137,10 +139,11 @@ class Rig:
         checks: Checks = IMITATED,
         stub_checks: Checks | None = None,
         session: str = "rig",
+        labels: Mapping[str, str] | None = None,
         execution_horizon: int = HORIZONS.execution_horizon,
         **changes: Any,
     ) -> None:
-        self.journal = Journal(session)
+        self.journal = Journal(session, labels)
         self.cell = rig_cell(execution_horizon=execution_horizon, **changes)
         self.supervisor = Supervisor(self.cell.execution, self.journal, checks=checks)
         own = checks if stub_checks is None else stub_checks
@@ -191,6 +194,14 @@ class Rig:
         values = frozen_array(actions)
         return StandIn(
             replace(metadata, **changes), values, sha256 or actions_sha256(values), verdict, context
+        )
+
+    @staticmethod
+    def remade(chunk: StandIn, metadata: ChunkMetadata, actions: Array) -> StandIn:
+        """The same with other metadata and actions."""
+        values = frozen_array(actions)
+        return replace(
+            chunk, metadata=metadata, actions=values, actions_sha256=actions_sha256(values)
         )
 
     def context(self) -> StandInContext:

@@ -22,6 +22,7 @@ from genpolicy.evidence.rows.shadow import (
 from genpolicy.evidence.shadow.found import ShadowEvidence
 from genpolicy.evidence.shadow.holds import hold_rows
 from genpolicy.evidence.shadow.mutants import run_mutants
+from genpolicy.evidence.shadow.vote_mutants import vote_mutants
 from genpolicy.execution.cell import Cell
 from genpolicy.execution.journal import write_journal
 from genpolicy.execution.ledger import Account
@@ -77,7 +78,7 @@ def all_mutants(layers: list[LayerMutant]) -> list[Mutant]:
 
     The executor's checks are owned by freshness and hand-over, layer six and beyond.
     """
-    return [*layers, *run_mutants()]
+    return [*layers, *run_mutants(), *vote_mutants()]
 
 
 def account_rows(accounts: Sequence[Account]) -> list[dict[str, Any]]:

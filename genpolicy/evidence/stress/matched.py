@@ -5,14 +5,15 @@ share the network's batches; which batch a sample was drawn in changes no bit of
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from genpolicy.candidates.joining import JoiningSettings
 from genpolicy.candidates.judged import JudgedPolicy, candidates_of
-from genpolicy.evidence.rows.stress import InvocationRow, RolloutRow, StressStubRow
+from genpolicy.evidence.rows.stress import InvocationRow, RolloutRow, SpliceRow, StressStubRow
 from genpolicy.evidence.stress.envelope import checker_under
 from genpolicy.evidence.stress.latency import LatencyModel
 from genpolicy.evidence.stress.perturbations import Perturbation
@@ -22,6 +23,7 @@ from genpolicy.execution.cell import Cell
 from genpolicy.execution.journal import write_journal
 from genpolicy.execution.ledger import Account
 from genpolicy.feasibility.settings import FeasibilitySettings
+from genpolicy.policies.guidance import Prefix
 from genpolicy.policies.policy import Policy
 from genpolicy.seeds import stream
 from genpolicy.tasks.api import Start, Task, load_task
@@ -43,6 +45,7 @@ class Comparison:
         cell: Horizons, executor, supervisor and recovery.
         feasibility: Thresholds of the six layers.
         root_seed: Root seed.
+        joining: How chunks join.
     """
 
     task: str
@@ -52,6 +55,7 @@ class Comparison:
     cell: Cell
     feasibility: FeasibilitySettings
     root_seed: int
+    joining: JoiningSettings = field(default_factory=JoiningSettings)
 
 
 @dataclass(frozen=True)
@@ -82,6 +86,7 @@ class ShardResult:
     Attributes:
         rollouts: One row per start.
         invocations: One row per invocation.
+        splices: One row per chunk that entered a queue.
         accounts: Balance of chunks, per rollout.
         ages_s: Every action age, s.
         stub: Arrivals, stale and invalid offers.
@@ -89,6 +94,7 @@ class ShardResult:
 
     rollouts: list[RolloutRow]
     invocations: list[InvocationRow]
+    splices: list[SpliceRow]
     accounts: list[Account]
     ages_s: Array
     stub: StressStubRow
@@ -104,6 +110,7 @@ def run_shard(shard: Shard) -> ShardResult:
     comparison = shard.comparison
     horizons = comparison.cell.horizons
     task, policy = load_task(comparison.task), shard.judged.load()
+    joining = comparison.joining.of(shard.judged.name, guided=policy.guided)
     setup = Setup(
         task=task,
         checker=checker_under(
@@ -120,7 +127,8 @@ def run_shard(shard: Shard) -> ShardResult:
         root_seed=comparison.root_seed,
         method=shard.judged.name,
         checkpoint=policy.checkpoint_hash,
-        sampler=policy.sampler_config_hash,
+        sampler=joining.sampler_hash(policy.sampler_config_hash),
+        joining=joining,
     )
     epoch = task.calibration_epochs[-1]
     rollouts = [
@@ -140,6 +148,7 @@ def run_shard(shard: Shard) -> ShardResult:
     return ShardResult(
         rollouts=[row for row, _ in parts],
         invocations=[row for rollout in rollouts for row in invocation_rows(shard, rollout)],
+        splices=[row for rollout in rollouts for row in splice_rows(shard, rollout)],
         accounts=[rollout.executor.conservation().chunks for rollout in rollouts],
         ages_s=np.concatenate([ages for _, ages in parts]),
         stub=StressStubRow(
@@ -172,6 +181,7 @@ def step(active: Sequence[Rollout], policy: Policy, *, samples: int) -> None:
             np.stack([rollout.conditioning() for rollout in asking]),
             noise_names=[rollout.noise_name for rollout in asking],
             candidates=candidates_of(policy, samples),
+            prefix=_prefix(asking),
         )
         for rollout, chunks in zip(asking, drawn.actions, strict=True):
             assert rollout.wanted is not None
@@ -179,6 +189,15 @@ def step(active: Sequence[Rollout], policy: Policy, *, samples: int) -> None:
     for rollout in active:
         if not rollout.done:
             rollout.act()
+
+
+def _prefix(asking: Sequence[Rollout]) -> Prefix | None:
+    """What the samples of these rollouts go on from; None under a rule that gives them nothing."""
+    given = [wanted.prefix for rollout in asking if (wanted := rollout.wanted) and wanted.prefix]
+    if not given:
+        return None
+    actions, weights = (np.stack(parts) for parts in zip(*given, strict=True))
+    return Prefix(actions, weights, asking[0].setup.joining.guidance)
 
 
 def _judge_deliveries(active: Sequence[Rollout]) -> None:
@@ -248,6 +267,21 @@ def invocation_rows(shard: Shard, rollout: Rollout) -> list[InvocationRow]:
             latency_s=latency_s,
         )
         for number, latency_s in enumerate(rollout.tally.latencies_s)
+    ]
+
+
+def splice_rows(shard: Shard, rollout: Rollout) -> list[SpliceRow]:
+    """Rows of `splices.parquet`, in the order in which the chunks entered the queue."""
+    return [
+        SpliceRow(
+            method=shard.judged.name,
+            seed=shard.judged.seed,
+            perturbation=shard.perturbation,
+            start=rollout.start_index,
+            rule=rollout.setup.joining.rule,
+            **vars(splice),
+        )
+        for splice in rollout.splices
     ]
 
 

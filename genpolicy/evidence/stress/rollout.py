@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from genpolicy.candidates.selector import propose, tries_another
+from genpolicy.candidates.selector import tries_another
 from genpolicy.contract.chunk import (
     Candidate,
     ChunkMetadata,
@@ -32,6 +32,8 @@ from genpolicy.evidence.admission_context import (
 from genpolicy.evidence.stress.deliveries import Deliveries
 from genpolicy.evidence.stress.disturbance import Disturbance
 from genpolicy.evidence.stress.fallback import Fallback
+from genpolicy.evidence.stress.joined import Joined
+from genpolicy.evidence.stress.splices import Splice, splice_of
 from genpolicy.evidence.stress.state import (
     InFlight,
     Outcome,
@@ -86,11 +88,13 @@ class Rollout:
         self.recovery = Recovery(cell.execution, self.journal)
         self.outcome: Outcome | None = None
         self.tally = Tally()
+        self.splices: list[Splice] = []
         self.tick = self.invocations = 0
         self.wanted: InFlight | None = None
         self._deliveries = Deliveries(
             setup, self.executor, self.journal, self.tally, start=start_index
         )
+        self._joined = Joined(setup, self.journal)
         self._fallback = Fallback(setup, self.world, self.executor, self.recovery)
         self._newest_accepted_s: float | None = None
         self._last_command_s: float | None = None
@@ -154,15 +158,17 @@ class Rollout:
             for index, actions in enumerate(flying.chunks)
         ]
         late = self._deliveries.late_rows(flying, self.now_s)
-        return propose(drawn, flying.candidate), self._delivery_context(late)
+        proposal = self._joined.propose(flying, drawn, late_rows=late)
+        return proposal, self._delivery_context(late)
 
     def settle(self, result: Admitted | Rejected) -> None:
-        """Take the verdict on `pending`: the selector takes the first that passes all layers."""
+        """Take the verdict on `pending`: the first that passes all layers is taken."""
         flying = self._deliveries.take()
         verdict, now_s = result.verdict, self.now_s
+        self._joined.record(flying, result.metadata.chunk_id, now_s)
         self.journal.candidate(
             now_s,
-            chunk_id=flying.metadata.chunk_id,
+            chunk_id=result.metadata.chunk_id,
             method=self.setup.method,
             index=flying.candidate,
             layers={layer.name: layer.passed for layer in verdict.layers},
@@ -174,6 +180,8 @@ class Rollout:
             self._deliveries.answered(flying, now_s)
             if self.executor.deliver(result, now_s) is None:
                 self._newest_accepted_s = flying.metadata.condition_observation_event_time_s
+                self._joined.entered(flying, result)
+                self.splices.append(splice_of(self.setup.checker, flying, result))
             return
         self.tally.refused.add(flying.metadata.chunk_id)
         counts = self.tally.rejected_by
@@ -254,6 +262,7 @@ class Rollout:
         flying = in_flight(
             self.setup, metadata, self.history[-1], start=self.start_index, number=number
         )
+        self._joined.begin(flying)
         self.executor.begin_invocation(now_s, metadata.chunk_id, repr(flying.total_s))
         self.journal.conditioning(
             now_s, invocation_id=metadata.chunk_id, key=self.noise_name, history=self.conditioning()

@@ -4,6 +4,7 @@ from typing import Annotated, Any
 
 from pydantic import Field, field_validator, model_validator
 
+from genpolicy.candidates.joining import JoiningSettings
 from genpolicy.contract.settings import Settings
 from genpolicy.evidence.stress.perturbations import Perturbation, ReducedEnvelope
 
@@ -26,6 +27,7 @@ class StressSettings(Settings):
         alpha: Pre-registered family-wise error; each candidate gets its equal share.
         planned_effect: Success of a baseline and of a candidate that is worth promoting; a gain
             of this size must be found.
+        joining: How a chunk joins the plan that it takes over from, by one rule for all methods.
     """
 
     starts: int = Field(ge=1)
@@ -36,6 +38,7 @@ class StressSettings(Settings):
     margin: float
     alpha: float = Field(gt=0.0, lt=1.0)
     planned_effect: tuple[Share, Share]
+    joining: JoiningSettings = Field(default_factory=JoiningSettings)
 
     @field_validator("planned_effect", mode="before")
     @classmethod

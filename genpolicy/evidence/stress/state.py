@@ -1,11 +1,14 @@
 """What rollouts share, and what one of them carries along."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
+from genpolicy.candidates.joining import REPLACE, JoiningSettings
+from genpolicy.candidates.votes import Votes
 from genpolicy.contract.chunk import ChunkMetadata
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.evidence.stress.latency import LatencyModel, draw_check, draw_latency
@@ -43,7 +46,8 @@ class Setup:
         root_seed: Root seed.
         method: Name of the method.
         checkpoint: Its weights.
-        sampler: Its sampler settings.
+        sampler: Its sampler settings, and the rule by which its chunks join.
+        joining: That rule.
     """
 
     task: Task
@@ -57,6 +61,7 @@ class Setup:
     method: str
     checkpoint: str
     sampler: str
+    joining: JoiningSettings = field(default_factory=JoiningSettings)
 
     def __post_init__(self) -> None:
         self.checker.cell.require_within(self.execution.force_limit_n)
@@ -67,6 +72,8 @@ class Setup:
             "method": self.method, "perturbation": self.perturbation, "start": str(start),
             "start_sha256": start_sha256,
         }  # fmt: skip
+        if self.joining.rule != REPLACE:
+            labels["joining"] = self.joining.rule
         return Journal(f"{self.method}/{self.perturbation}/{start}", labels)
 
 
@@ -85,6 +92,9 @@ class InFlight:
         chunks: Sampled candidates, filled in by the batch. Shape (N, K, D_a).
         candidate: The candidate that is judged next.
         given_up: Its deadline has passed.
+        draw: Which of the samples the candidate is.
+        votes: Earlier predictions that have a say in the candidate, oldest first.
+        prefix: Actions (K, D_a) that the samples go on from, and weights (K,); None: nothing.
     """
 
     number: int
@@ -97,6 +107,9 @@ class InFlight:
     chunks: Array | None = None
     candidate: int = 0
     given_up: bool = False
+    draw: int = 0
+    votes: Sequence[Votes] = ()
+    prefix: tuple[Array, Array] | None = None
 
     @property
     def candidates(self) -> int:
@@ -105,8 +118,8 @@ class InFlight:
 
     @property
     def drawn(self) -> Array | None:
-        """The candidate that is judged next, as drawn. Shape (K, D_a)."""
-        return None if self.chunks is None else self.chunks[self.candidate]
+        """The sample that was proposed last, as drawn. Shape (K, D_a)."""
+        return None if self.chunks is None else self.chunks[self.draw]
 
     @property
     def total_s(self) -> float:

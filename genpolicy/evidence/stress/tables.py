@@ -17,6 +17,7 @@ from genpolicy.evidence.rows.stress import (
     ConservationRow,
     InvocationRow,
     RolloutRow,
+    SpliceRow,
     StressCountRow,
     StressStubRow,
 )
@@ -54,6 +55,8 @@ def write_stress(folder: Path, shards: Sequence[Shard], *, workers: int, schedul
     write_rows(folder / "rollouts.parquet", RolloutRow, rollouts)
     invocations = [row for _, result in pairs for row in result.invocations]
     write_rows(folder / "invocations.parquet", InvocationRow, invocations)
+    splices = [row for _, result in pairs for row in result.splices]
+    write_rows(folder / "splices.parquet", SpliceRow, splices)
     counts: list[StressCountRow] = []
     balances: list[ConservationRow] = []
     for shard, result in pairs:
@@ -134,12 +137,14 @@ def plan_shards(
         journals: Folder of the journals.
 
     Raises:
-        ConfigError: A method whose latency was not measured, or an envelope that is looser
-            than the cell.
+        ConfigError: A method whose latency was not measured, an envelope that is looser than the
+            cell, or a rule of joining that a method cannot keep and is not exempt from.
     """
     for schedule in perturbations.values():
         if isinstance(schedule, ReducedEnvelope):
             require_tighter(schedule, load_task(comparison.task), comparison.feasibility)
+    for policy in judged:
+        comparison.joining.of(policy.name, guided=policy.load().guided)
     untimed = sorted({policy.name for policy in judged} - set(latency))
     if untimed:
         raise ConfigError(

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from gates.asked_for import CHECKS_ASKED_FOR, NOT_ASKED_OF_EVERY_TASK
+from genpolicy.candidates.votes import VOTE_CHECKS
 from genpolicy.evidence.shadow import layer_mutants
 from genpolicy.evidence.shadow.corruption import CORRUPTIONS, always
 from genpolicy.evidence.shadow.layer_mutants import RULES, missing_checks_evidence
@@ -47,6 +48,7 @@ def test_every_row_of_the_table_has_a_row_and_is_noticed(rows):
 def test_the_gate_asks_for_every_row_of_both_tables():
     expected = [f"{check.layer}.{check.name}" for check in CHECKS]
     expected += [f"execution.{check.name}" for check in EXECUTION_CHECKS]
+    expected += [f"execution.vote_{check.name}" for check in VOTE_CHECKS]
     assert list(CHECKS_ASKED_FOR) == expected
     some = [c for c in CORRUPTIONS if c.check and c.applicable is not always]
     assert {f"{c.layer}.{c.check}" for c in some} == set(NOT_ASKED_OF_EVERY_TASK)

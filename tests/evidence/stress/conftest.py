@@ -55,7 +55,7 @@ class Scripted:
     rollouts: dict
     stochastic: bool = False
 
-    def sample(self, observations, *, noise_names, candidates):
+    def sample(self, observations, *, noise_names, candidates, prefix=None):
         """Chunks of the rollouts that the noise names name by their start."""
         chunks = [np.asarray(self.plan(self.rollouts[name[2]])) for name in noise_names]
         return SimpleNamespace(actions=chunks, nfe=1)

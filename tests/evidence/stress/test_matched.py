@@ -110,9 +110,9 @@ def test_noise_is_redrawn_as_often_as_every_other_method_that_draws(shard, monke
     asked = {}
     drawn = NetworkPolicy.sample
 
-    def sample(policy, observations, *, noise_names, candidates):
+    def sample(policy, observations, *, candidates, **others):
         asked.setdefault(policy.method, set()).add(candidates)
-        return drawn(policy, observations, noise_names=noise_names, candidates=candidates)
+        return drawn(policy, observations, candidates=candidates, **others)
 
     monkeypatch.setattr(NetworkPolicy, "sample", sample)
     for method in METHODS:
