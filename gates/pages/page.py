@@ -31,6 +31,7 @@ from gates.pages import (
     tables_holds,
     tables_stress,
 )
+from gates.pages.desk import desk_of
 from gates.pages.figures import Picturable, Table, draw_all
 from gates.pages.guide import BACK_TO, QUESTIONS, READING, label, words
 from gates.pages.table import deciding, groups, passed_by, stops, tally
@@ -155,7 +156,8 @@ def _said(value: Any) -> str:
 def index_page(root: Path) -> str:
     """HTML of the ladder, from the reports as they lie there."""
     rows = [_row(root, gate) for gate in GATES]
-    return _render("index.html", current="", rows=rows)
+    reports = {row["gate"]: row["report"] for row in rows if row["report"] is not None}
+    return _render("index.html", current="", rows=rows, desk=desk_of(reports))
 
 
 def _row(root: Path, gate: Gate) -> dict[str, Any]:
@@ -169,7 +171,7 @@ def _row(root: Path, gate: Gate) -> dict[str, Any]:
         "tally": "",
         "decided": "",
         "decision": "",
-        "report": False,
+        "report": None,
         "verdict": "NOT JUDGED",
     }
     if not (root / f"reports/gate_{gate.lower()}.json").is_file():
@@ -185,7 +187,7 @@ def _row(root: Path, gate: Gate) -> dict[str, Any]:
         stops=stops(report),
         tally=tally(report),
         decision=report.decision,
-        report=True,
+        report=report,
     )
     return row
 

@@ -1,0 +1,106 @@
+"""What could make a verdict wrong, derived from the criteria by rules, before the good news.
+
+A reader sees that twenty-two of twenty-four hold. What would change the decision is elsewhere: what
+was never measured, what nearly broke, what was judged at a point, what nobody asked.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+from gates.closeness import by_room, closeness
+from gates.report import Answer, GateReport
+
+FEWEST_SHOWN = 3
+"""Criteria of a kind that are named one by one; more are counted, and the first are named."""
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """One reason why the verdict may be wrong.
+
+    Attributes:
+        gate: Whose evidence it is about.
+        kind: In two or three words.
+        text: What is the matter, for a person.
+        criteria: Criteria that it is about, by name; empty for a caveat of the whole gate.
+    """
+
+    gate: str
+    kind: str
+    text: str
+    criteria: tuple[str, ...] = ()
+
+
+def doubts_of(report: GateReport) -> list[Doubt]:
+    """Every doubt about one gate's verdict, the gravest kind first, caveats last."""
+    return [doubt for rule in RULES for doubt in rule(report)]
+
+
+def _not_measured(report: GateReport) -> Iterator[Doubt]:
+    """A criterion without a number says nothing, whatever the others say."""
+    for answer in report.criteria:
+        if answer.verdict == "INCONCLUSIVE" and answer.interval is None:
+            yield _about(report, "not measured", answer)
+
+
+def _not_decided(report: GateReport) -> Iterator[Doubt]:
+    """The limit lies inside the interval: other episodes of the same truth would say otherwise."""
+    for answer in report.criteria:
+        if answer.verdict == "INCONCLUSIVE" and answer.interval is not None:
+            yield _about(report, "not decided", answer)
+
+
+def _stopped(report: GateReport) -> Iterator[Doubt]:
+    """A candidate that fails beside one that passes: whoever chooses knows what fell away."""
+    for name, verdict in sorted(report.candidates.items()):
+        broken = [c for c in report.criteria if c.candidate == name and c.verdict == "FAIL"]
+        if verdict == "FAIL" and report.verdict == "PASS":
+            named = tuple(c.id for c in broken)
+            yield Doubt(report.gate, "stopped here", f"{name}: {', '.join(named)}", named)
+
+
+def _near(report: GateReport) -> Iterator[Doubt]:
+    """What holds by less than a tenth of its limit may be broken by the next draw."""
+    held = [near for near in by_room(list(report.criteria)) if near.near]
+    for near in held:
+        end = "at the worse end of its interval" if near.worse_end else "at a point"
+        used = f"{100 * near.used:.3g} % of its limit is used up, {end}"
+        yield _about(report, "near its limit", near.answer, used)
+
+
+def _at_a_point(report: GateReport) -> Iterator[Doubt]:
+    """A number without an interval holds for the very episodes that were drawn."""
+    named = [c for c in report.criteria if c.interval is None and closeness(c) is not None]
+    ids = tuple(dict.fromkeys(c.id for c in named))
+    if ids:
+        shown = ", ".join(ids[:FEWEST_SHOWN])
+        more = f" and {len(ids) - FEWEST_SHOWN} more" if len(ids) > FEWEST_SHOWN else ""
+        text = f"{len(ids)} criteria hold for what was drawn, without an interval: {shown}{more}"
+        yield Doubt(report.gate, "judged at a point", text, ids)
+
+
+def _caveats(report: GateReport) -> Iterator[Doubt]:
+    """What the gate itself says that it does not show, and what was waived."""
+    for caveat in report.caveats:
+        yield Doubt(report.gate, "not shown", caveat)
+
+
+def _about(report: GateReport, kind: str, answer: Answer, more: str = "") -> Doubt:
+    who = f" ({answer.candidate})" if answer.candidate else ""
+    why = more or answer.caveat or "nothing was recorded that answers it"
+    return Doubt(report.gate, kind, f"{answer.question}{who} {_sentence(why)}", (answer.id,))
+
+
+def _sentence(text: str) -> str:
+    return text[:1].upper() + text[1:] + ("" if text.endswith(".") else ".")
+
+
+RULES: Sequence[Callable[[GateReport], Iterator[Doubt]]] = (
+    _not_measured,
+    _not_decided,
+    _stopped,
+    _near,
+    _at_a_point,
+    _caveats,
+)
+"""In the order of their weight for a reader."""

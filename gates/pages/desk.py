@@ -1,0 +1,241 @@
+"""The reviewer's desk: what is asked, one number a gate, what could be wrong, room to each limit.
+
+Everything follows from the reports alone, so that the page is the same wherever they lie.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from gates.closeness import Closeness, by_room
+from gates.doubts import Doubt, doubts_of
+from gates.pages.guide import unit
+from gates.report import GATES, NAMES, OWNERS, Answer, Gate, GateReport
+from gates.verdicts import first_unmet
+
+HEADLINES: dict[Gate, tuple[str, str]] = {
+    "A": ("multimodal_situations", "held-out situations in which more than one way is taken"),
+    "B": ("samples_difference", "largest difference of a sample drawn again in a fresh process"),
+    "C": ("admissible_share", "of the candidates pass all six layers"),
+    "D": ("nominal_success_lower", "of undisturbed starts succeed"),
+    "E": ("owners_signed", "owners have signed"),
+}
+"""The one number of each gate, and what it is a number of."""
+RATES = (
+    "_share",
+    "_lower",
+    "_upper",
+    "_margin",
+    "_disagreement",
+    "_coverage",
+    "_deviation",
+    "_gap",
+)
+WAITS = "PENDING_REVIEW"
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What the reader is asked for.
+
+    Attributes:
+        title: In one sentence.
+        text: Why, or what has to come first.
+        pending: What waits for people; empty where nothing does.
+    """
+
+    title: str
+    text: str
+    pending: str
+
+
+@dataclass(frozen=True)
+class Box:
+    """One gate in one number.
+
+    Attributes:
+        gate: Its letter.
+        name: Its name.
+        verdict: Of its report; `NOT JUDGED` where none lies there.
+        number: As a person reads it; empty where nothing was measured.
+        of: What it is a number of.
+    """
+
+    gate: Gate
+    name: str
+    verdict: str
+    number: str
+    of: str
+
+
+@dataclass(frozen=True)
+class Bar:
+    """Room of one criterion that holds.
+
+    Attributes:
+        near: How close it came.
+        gate: Its gate.
+        measured: As a person reads it.
+        limit: Likewise.
+    """
+
+    near: Closeness
+    gate: Gate
+    measured: str
+    limit: str
+
+
+@dataclass(frozen=True)
+class Part:
+    """What one owner answers for.
+
+    Attributes:
+        owner: The role.
+        hold: How many of its criteria hold.
+        of: How many there are.
+        open: Its criteria that do not, by gate and name.
+        near: Its criteria that hold with little room, likewise.
+    """
+
+    owner: str
+    hold: int
+    of: int
+    open: tuple[str, ...]
+    near: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Desk:
+    """The page: all of it from the reports."""
+
+    asked: Asked
+    boxes: tuple[Box, ...]
+    doubts: tuple[Doubt, ...]
+    bars: tuple[Bar, ...]
+    exact: int
+    parts: tuple[Part, ...]
+
+
+def desk_of(reports: Mapping[Gate, GateReport]) -> Desk:
+    """The desk of the reports that lie there and can be read."""
+    present = [gate for gate in GATES if gate in reports]
+    bars = [
+        Bar(near, gate, at_its_end(near.answer), human(near.answer, near.answer.threshold))
+        for gate in present
+        for near in by_room(_shown(reports[gate]))
+    ]
+    judged = [answer for gate in present for answer in _shown(reports[gate])]
+    return Desk(
+        asked=_asked(reports),
+        boxes=tuple(_box(gate, reports.get(gate)) for gate in GATES),
+        doubts=tuple(doubt for gate in present for doubt in doubts_of(reports[gate])),
+        bars=tuple(sorted(bars, key=lambda bar: -bar.near.used)),
+        exact=sum(answer.verdict == "PASS" for answer in judged) - len(bars),
+        parts=tuple(_part(owner, reports) for owner in OWNERS),
+    )
+
+
+def human(answer: Answer, value: float | None) -> str:
+    """A number in the unit that a person uses: ms, mm, percent; three digits.
+
+    Args:
+        answer: The criterion, whose name says the unit and whose limit says whether it is a share.
+        value: The number; None is "not measured".
+    """
+    if value is None:
+        return "not measured"
+    suffix = unit(answer.id)
+    if suffix in ("s", "m") and abs(value) < 1 and value != 0:
+        return f"{1000 * value:.3g} m{suffix}"
+    if suffix:
+        return f"{value:.3g} {suffix}"
+    if "ratio" in answer.id:
+        return f"×{value:.3g}"
+    if answer.id.endswith(RATES) and answer.threshold is not None and answer.threshold <= 1:
+        return f"{100 * value:.3g} %"
+    return f"{value:.3g}" if value != int(value) else f"{int(value)}"
+
+
+def at_its_end(answer: Answer) -> str:
+    """What was measured; with the side of the interval on which it was judged."""
+    text = human(answer, answer.measured)
+    if answer.interval is None or answer.measured is None:
+        return text
+    return f"{'at most' if answer.comparison == '<=' else 'at least'} {text}"
+
+
+def _shown(report: GateReport) -> list[Answer]:
+    """Criteria of the whole gate, and of the candidates that pass it or of all if none does."""
+    passing = {name for name, verdict in report.candidates.items() if verdict == "PASS"}
+    kept = {report.promoted} if report.promoted else passing or set(report.candidates)
+    return [c for c in report.criteria if c.candidate is None or c.candidate in kept]
+
+
+def _asked(reports: Mapping[Gate, GateReport]) -> Asked:
+    stopped = next((gate for gate in GATES if not _passes(reports.get(gate))), None)
+    promoted = reports["D"].promoted if "D" in reports else None
+    report = reports.get(stopped) if stopped else None
+    if stopped is None:
+        title = f"Signed: {promoted} may move a robot, supervised, inside the card's envelope"
+        return Asked(title, "The card says where, how fast, and until when.", "")
+    if stopped == "E" and promoted:
+        title = f"Asked of you: let {promoted} move a robot, supervised, inside one envelope?"
+        waiting = [] if report is None else [c for c in report.criteria if c.verdict == WAITS]
+        pending = f"{len(waiting)} criteria wait for people" if waiting else "the card is not drawn"
+        return Asked(title, reports["D"].decision, pending)
+    title = f"Nothing is asked of you yet: the ladder stops at gate {stopped}, {NAMES[stopped]}"
+    if report is None:
+        return Asked(title, "It was not judged: `make ladder`.", "")
+    decided = first_unmet(report.criteria, report.verdict)
+    found = f"{decided.question} {_against(decided)} " if decided is not None else ""
+    return Asked(title, f"{found}{report.diagnosis or report.decision}", "")
+
+
+def _passes(report: GateReport | None) -> bool:
+    return report is not None and report.verdict == "PASS"
+
+
+def _against(answer: Answer) -> str:
+    """Measured, against what was required."""
+    sign = "at most" if answer.comparison == "<=" else "at least"
+    found = human(answer, answer.measured)
+    if answer.interval is not None:
+        low, high = (human(answer, end) for end in answer.interval)
+        found = f"between {low} and {high}"
+    return f"Measured {found}; required {sign} {human(answer, answer.threshold)}."
+
+
+def _box(gate: Gate, report: GateReport | None) -> Box:
+    name, of = HEADLINES[gate]
+    if report is None:
+        return Box(gate, NAMES[gate], "NOT JUDGED", "", "")
+    said = [c for c in _shown(report) if c.id == name]
+    if not said or said[0].measured is None:
+        return Box(gate, NAMES[gate], report.verdict, "", f"not measured: {of}")
+    texts = {c.candidate: at_its_end(c) for c in said}
+    if len(texts) == 1 or len(set(texts.values())) == 1:
+        return Box(gate, NAMES[gate], report.verdict, next(iter(texts.values())), of)
+    each = ", ".join(f"{candidate} {text}" for candidate, text in texts.items())
+    return Box(gate, NAMES[gate], report.verdict, each, of)
+
+
+def _part(owner: str, reports: Mapping[Gate, GateReport]) -> Part:
+    own = [
+        (gate, answer)
+        for gate in GATES
+        if gate in reports
+        for answer in _shown(reports[gate])
+        if answer.owner == owner
+    ]
+    near = by_room([answer for _, answer in own])
+    close = {id(entry.answer) for entry in near if entry.near}
+    return Part(
+        owner=owner,
+        hold=sum(answer.verdict == "PASS" for _, answer in own),
+        of=len(own),
+        open=_named([(gate, answer) for gate, answer in own if answer.verdict != "PASS"]),
+        near=_named([(gate, answer) for gate, answer in own if id(answer) in close]),
+    )
+
+
+def _named(entries: Sequence[tuple[Gate, Answer]]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(f"{gate}: {answer.id}" for gate, answer in entries))

@@ -1,0 +1,86 @@
+"""The desk: what is asked in each state of the ladder, numbers as people read them."""
+
+import evidence
+import pytest
+
+from gates.pages.desk import desk_of, human
+from gates.proof import judge
+from gates.report import GATES, read_report
+from gates.writing import write_gate
+
+
+def desk(ladder):
+    found = {}
+    for gate in GATES:
+        if (ladder / f"reports/gate_{gate.lower()}.json").is_file():
+            found[gate] = read_report(ladder, gate)[0]
+    return desk_of(found)
+
+
+def test_of_nothing_nothing_is_asked():
+    empty = desk_of({})
+    assert empty.asked.title.startswith("Nothing is asked of you yet: the ladder stops at gate A")
+    assert {box.verdict for box in empty.boxes} == {"NOT JUDGED"} and not empty.bars
+    assert all((part.hold, part.of) == (0, 0) for part in empty.parts)
+
+
+def test_a_passed_ladder_asks_for_the_promoted_and_says_what_waits(ladder):
+    before = desk(ladder)
+    assert before.asked.title.startswith("Asked of you: let ")
+    assert before.asked.pending == "the card is not drawn"
+    report = write_gate(ladder, "E")
+    waiting = sum(c.verdict == "PENDING_REVIEW" for c in report.criteria)
+    assert waiting and desk(ladder).asked.pending == f"{waiting} criteria wait for people"
+
+
+def test_a_stopped_ladder_says_where_by_what_and_never_asks(ladder):
+    evidence.edit_table(ladder, "audit/clocks.parquet", evidence.lags_apart)
+    write_gate(ladder, "A")
+    asked = desk(ladder).asked
+    assert asked.title.startswith("Nothing is asked of you yet: the ladder stops at gate A")
+    assert "Measured 4 action steps; required at most 1 action steps." in asked.text
+    text = (ladder / "reports/index.html").read_text()
+    assert asked.title in text and "Asked of you" not in text
+
+
+def test_criteria_of_others_than_the_promoted_draw_no_bar(ladder):
+    promoted = judge(ladder, "D").promoted
+    named = {bar.near.answer.candidate for bar in desk(ladder).bars if bar.gate == "D"}
+    assert named == {None, promoted}
+
+
+def test_bars_and_exact_ones_are_all_that_hold(ladder):
+    found = desk(ladder)
+    shown = sum(part.hold for part in found.parts)
+    assert len(found.bars) + found.exact == shown
+    assert [bar.near.used for bar in found.bars] == sorted(
+        (bar.near.used for bar in found.bars), reverse=True
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "limit", "value", "text"),
+    [
+        ("clock_residual_s", 0.01, 0.000892, "0.892 ms"),
+        ("latency_p95_s", 0.4, 1.25, "1.25 s"),
+        ("projection_p95_m", 0.02, 0.0094, "9.4 mm"),
+        ("force_peak_p95_n", 80, 73.94, "73.9 N"),
+        ("told_share", 0.4, 0.1575, "15.8 %"),
+        ("warm_latency_ratio_upper", 1.5, 1.26, "×1.26"),
+        ("latent_dependence_p", 0.05, 0.034, "0.034"),
+        ("stub_stale", 0, 0.0, "0"),
+        ("promotion_e_value", 60, 61.234, "61.2"),
+        ("told_share", 0.4, None, "not measured"),
+    ],
+)
+def test_numbers_stand_in_the_unit_of_a_person(ladder, name, limit, value, text):
+    answer = judge(ladder, "A").criteria[0].model_copy(update={"id": name, "threshold": limit})
+    assert human(answer, value) == text
+
+
+def test_each_owner_finds_what_is_open(ladder):
+    evidence.edit_table(ladder, "audit/clocks.parquet", evidence.lags_apart)
+    write_gate(ladder, "A")
+    parts = {part.owner: part for part in desk(ladder).parts}
+    assert "A: lag_spread_steps" in parts["controller"].open
+    assert parts["controller"].hold == parts["controller"].of - len(parts["controller"].open)

@@ -1,0 +1,74 @@
+"""What could make a verdict wrong: a planted weakness of each kind is named, and none invented."""
+
+import evidence
+import pytest
+
+from gates.doubts import doubts_of
+from gates.proof import judge
+
+
+def kinds(report):
+    return [doubt.kind for doubt in doubts_of(report)]
+
+
+def test_what_is_missing_is_the_first_doubt(ladder):
+    evidence.replace(ladder, "audit/strata.parquet", None)
+    report = judge(ladder, "A")
+    found = doubts_of(report)
+    lacking = [c.id for c in report.criteria if c.verdict == "INCONCLUSIVE"]
+    assert [d.criteria[0] for d in found if d.kind == "not measured"] == lacking
+    assert "strata_effect" in lacking and found[0].kind == "not measured"
+    assert "strata.parquet" in found[lacking.index("strata_effect")].text
+
+
+def test_a_limit_inside_its_interval_is_not_decided_and_says_why(ladder):
+    report = judge(ladder, "A")
+    (told,) = [c for c in report.criteria if c.id == "told_share"]
+    astride = told.model_copy(
+        update={"verdict": "INCONCLUSIVE", "interval": (0.1, 0.6), "caveat": "four of ten."}
+    )
+    open_one = report.model_copy(update={"criteria": (astride,)})
+    doubt = doubts_of(open_one)[0]
+    assert doubt.kind == "not decided" and doubt.text == f"{told.question} Four of ten."
+
+
+def test_a_limit_moved_to_what_was_measured_is_near(ladder):
+    held = next(c for c in judge(ladder, "A").criteria if c.id == "chunking_valid_share")
+    assert "chunking_valid_share" not in _near(judge(ladder, "A"))
+    evidence.write_params(ladder, evidence.set_limit("gate_a", held.id, held.measured * 1.05))
+    report = judge(ladder, "A")
+    assert "chunking_valid_share" in _near(report)
+    (text,) = [d.text for d in doubts_of(report) if d.criteria == (held.id,)]
+    assert "95.2 % of its limit is used up, at the worse end of its interval." in text
+
+
+def test_a_number_without_an_interval_is_said_to_be_one(ladder):
+    report = judge(ladder, "A")
+    (points,) = [d for d in doubts_of(report) if d.kind == "judged at a point"]
+    assert "mode_feasible_share" in points.criteria
+    assert "told_share" not in points.criteria and "data_defects" not in points.criteria
+    assert points.text.startswith(f"{len(points.criteria)} criteria")
+
+
+def test_a_candidate_that_fell_away_is_named_where_another_passes(ladder):
+    def slow(frame):
+        hit = (frame["method"] == "diffusion") & (frame["run"] == 2)
+        return frame.assign(seconds=frame["seconds"].where(~hit, frame["seconds"] * 9))
+
+    evidence.edit_table(ladder, "latency/latency.parquet", slow)
+    report = judge(ladder, "B")
+    (stopped,) = [d for d in doubts_of(report) if d.kind == "stopped here"]
+    assert stopped.text.startswith("diffusion: warm_latency_ratio_upper")
+
+
+@pytest.mark.parametrize("gate", "ABCD")
+def test_every_caveat_is_repeated_and_comes_last(ladder, gate):
+    report = judge(ladder, gate)
+    found = doubts_of(report)
+    count = len(report.caveats)
+    assert tuple(doubt.text for doubt in found[-count:]) == report.caveats
+    assert "not shown" not in kinds(report)[:-count]
+
+
+def _near(report):
+    return [doubt.criteria[0] for doubt in doubts_of(report) if doubt.kind == "near its limit"]
