@@ -1,6 +1,7 @@
 """The command line: exit codes, one-sentence errors, no traceback."""
 
 import json
+import sys
 from dataclasses import dataclass
 
 import evidence
@@ -178,3 +179,9 @@ def test_a_bad_settings_file_is_exit_2(repo, _run):
         _clean(result)
         assert result.exit_code == 2, text
         assert "params.yaml" in result.output
+
+
+def test_that_nothing_lies_here_is_said_before_simulation_is_loaded(tmp_path, _run, monkeypatch):
+    monkeypatch.setitem(sys.modules, "gates.rederive", None)
+    result = _run(tmp_path, "verify")
+    assert result.exit_code == 3 and result.output.startswith("No report lies here.")
