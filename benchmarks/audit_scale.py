@@ -2,10 +2,10 @@
 
 Each size runs in a process of its own, from the dataset folder to the verdict, both kinds of
 evidence included. Seconds of the processor are shown beside those of the clock: on a machine that
-does other work only they say what the audit takes. Two references are of the same run: what the
-k-d tree of SciPy takes to find the 20 nearest rows of every row in the same observations (the
-audit's time as a multiple of it), and n log n from the smallest size (1 grows just so, below 1
-slower).
+does other work only they say what the audit takes. Three references are of the same run: what
+reading and verifying the dataset takes, what the k-d tree of SciPy takes to find the 20 nearest
+rows of every row in the same observations (the audit's time as a multiple of each), and n log n
+from the smallest size (1 grows just so, below 1 slower).
 
     python -m benchmarks.audit_scale [--episodes 300 1000 3000 10000]
 """
@@ -83,7 +83,7 @@ def measure(episodes: int) -> None:
                 "scale", OBSERVATION, ACTION, ("all",), PERIOD_S, SplitRule(), "made"
             ),
         )  # fmt: skip
-        begin = time.perf_counter()
+        begin, idle = time.perf_counter(), time.process_time()
         dataset = load_dataset(out)
         loaded, spent = time.perf_counter(), time.process_time()
         report = audit(dataset, propose_settings(dataset, PAIRS))
@@ -92,7 +92,8 @@ def measure(episodes: int) -> None:
     print(
         json.dumps({
             "frames": episodes * STEPS, "load_s": loaded - begin, "audit_s": done - loaded,
-            "cpu_s": cpu_s, "reference_s": reference_s(dataset.frames.observation),
+            "cpu_s": cpu_s, "read_s": spent - idle,
+            "reference_s": reference_s(dataset.frames.observation),
             "peak_mib": peak, "verdict": judged(report.result, report.settings).name.value,
         })
     )  # fmt: skip
@@ -115,7 +116,8 @@ def main() -> None:
         measure(options.one)
         return
     print(
-        "frames | load, s | audit, s | of the processor, s | x the k-d tree | against n log n | "
+        "frames | load, s | audit, s | of the processor, s | x reading | x the k-d tree | "
+        "against n log n | "
         "peak, MiB | verdict"
     )
     first = None
@@ -127,7 +129,8 @@ def main() -> None:
         expected = first[1] * n * np.log(n) / (first[0] * np.log(first[0]))
         print(
             f"{n:9,d} | {result['load_s']:6.1f} | {result['audit_s']:7.1f} | {seconds:7.1f} | "
-            f"{seconds / result['reference_s']:6.1f} | {seconds / expected:5.2f} | "
+            f"{seconds / result['read_s']:6.1f} | {seconds / result['reference_s']:6.1f} | "
+            f"{seconds / expected:5.2f} | "
             f"{result['peak_mib']:7.0f} | {result['verdict']}",
             flush=True,
         )

@@ -8,7 +8,7 @@ from genpolicy.audit.labels import Replay, disagreement
 from genpolicy.audit.mean_versus_modes import Admissible
 from genpolicy.audit.progress import Progress, silent
 from genpolicy.audit.propose import observation_contract, propose_settings
-from genpolicy.audit.question_names import COLUMN
+from genpolicy.audit.question_names import COLUMN, OUTCOME_MISSING
 from genpolicy.audit.run import AuditResult
 from genpolicy.audit.run import audit as audit_rows
 from genpolicy.audit.settings import AuditSettings
@@ -190,7 +190,7 @@ def _rests_on(dataset: Dataset, result: AuditResult) -> list[str]:
         if not row.asked and not row.check.startswith(COLUMN)
     ]
     if not any(result.data.episodes.outcome):
-        lines.append("outcome: not recorded, so no mode can be called valid.")
+        lines.append(OUTCOME_MISSING)
     lines += [
         f"{item.component}: {NOT_LOOKED_AT[item.state]}, so nothing is said of its modes."
         for item in result.components

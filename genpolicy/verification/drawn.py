@@ -19,12 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.contract.action import ACTION_DIM
+from genpolicy.verification.joined import BLENDS
 from genpolicy.verification.journal_source import Message, read_messages
 
 Array = NDArray[np.float64]
 Key = tuple[str | int, ...]
 
-BLENDS = frozenset({"ensemble_oldest", "ensemble_newest"})
 GUIDED = "real_time"
 FIRST_NAME = "stress"
 """What the noise of a rollout is named by first."""

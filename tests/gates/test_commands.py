@@ -1,6 +1,7 @@
 """The command line: exit codes, one-sentence errors, no traceback."""
 
 import json
+import sys
 from dataclasses import dataclass
 
 import evidence
@@ -188,3 +189,9 @@ def test_a_plan_is_written_from_the_settings_beside_it(repo, _run):
     result = _run(repo, "preregister")
     assert result.exit_code == 0 and "Commit it before the evidence exists" in result.output
     assert (repo / PREREGISTRATION).read_bytes() == plan_bytes(read_params(repo))
+
+
+def test_that_nothing_lies_here_is_said_before_simulation_is_loaded(tmp_path, _run, monkeypatch):
+    monkeypatch.setitem(sys.modules, "gates.rederive", None)
+    result = _run(tmp_path, "verify")
+    assert result.exit_code == 3 and result.output.startswith("No report lies here.")

@@ -17,6 +17,7 @@ from genpolicy.audit.documents import Summary
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_bytes
 from genpolicy.pages.audit.evidence import AuditEvidence
+from genpolicy.pages.audit.kinds import kinds, record_next
 from genpolicy.pages.audit.ladder import ladder
 from genpolicy.pages.audit.origins import named
 from genpolicy.pages.audit.pictures import draw_all
@@ -62,6 +63,10 @@ def audit_page(document: Mapping[str, Any], evidence: AuditEvidence, *, name: st
         named=_named(said),
         marks=MARKS,
         topics=ladder(said, evidence),
+        kinds=kinds(evidence),
+        record_next=record_next(document, evidence),
+        guessed=[line for line in said["rests_on"] if is_guess(line)],
+        rests_on=[line for line in said["rests_on"] if not is_guess(line)],
         pictures=draw_all(evidence, {row["question"]: row["limit"] for row in limits}),
         limits=limits,
         labels=label_table(evidence),
@@ -78,6 +83,11 @@ def audit_page(document: Mapping[str, Any], evidence: AuditEvidence, *, name: st
         exact=json.dumps,
         plain=lambda value: json.dumps(value, ensure_ascii=False),
     )
+
+
+def is_guess(line: str) -> bool:
+    """Whether a line of what the report rests on is about something that was guessed."""
+    return any(word in line.lower() for word in ("guess", "times are row / rate"))
 
 
 def _limits(by_owner: Mapping[str, Mapping[str, Any]]) -> list[dict[str, Any]]:
