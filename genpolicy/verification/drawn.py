@@ -5,9 +5,9 @@ was judged, the hash of what was drawn; each chunk that was admitted, the number
 brought together, and held to the names that the plan gives an invocation: who may choose the noise
 may choose the answer.
 
-Where chunks join by another rule than replacing, a candidate names its invocation and its sample. A
-blend is no sample, so that of its own only the hash of what was drawn is asked; what was drawn to go
-on from an earlier plan is not drawn again, since the plan is not stated with it.
+Where chunks join by another rule than replacing, a candidate names its invocation and its sample.
+A blend is no sample, so only the hash of what was drawn is asked; what was drawn to go on from an
+earlier plan is not drawn again, since the plan is not stated with it.
 """
 
 import hashlib
