@@ -52,6 +52,8 @@ def found(tmp_path):
             journal.add("observation", tick * PERIOD_NS, {"phase": phase})
             for kind, payload in happens.get(tick, []):
                 journal.add(kind, tick * PERIOD_NS, payload)
+        # A rollout that is stopped ends within a tick: it has seen it, and nothing else happens.
+        journal.add("observation", ends * PERIOD_NS, {"phase": "approach"})
         journal.add("end", ends * PERIOD_NS, {})
         write_journal(tmp_path / "journal.mcap", [journal])
         return list(disturbed_otherwise(tmp_path / "journal.mcap", PLAN))
