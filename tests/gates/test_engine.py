@@ -9,7 +9,7 @@ import pytest
 from asking import SPEC
 
 from gates.criterion import Measured
-from gates.engine import environment, judge, promoted_below, upstream_hashes
+from gates.engine import ASTRIDE, environment, judge, promoted_below, upstream_hashes
 from gates.evidence import Evidence
 from gates.pipeline import TASK_IDENTITY, Basis
 from gates.report import report_bytes, report_path
@@ -120,6 +120,15 @@ def test_a_person_is_waited_for_only_where_they_can_still_decide(tmp_path):
     assert _asked(tmp_path, Measured(1.0, pending=True)).verdict == "PASS"
     assert _asked(tmp_path, Measured(0.0)).verdict == "FAIL"
     assert _asked(tmp_path, Measured(1.0, pending=True), of={}).verdict == "INCONCLUSIVE"
+
+
+def test_astride_is_said_only_of_a_number_with_a_limit_that_is_not_decided(tmp_path):
+    inside = _asked(tmp_path, Measured(0.5, (0.5, 2.0), "seen"))
+    assert (inside.verdict, inside.caveat) == ("INCONCLUSIVE", f"seen; {ASTRIDE}")
+    assert _asked(tmp_path, Measured(0.5, (0.5, 2.0))).caveat == ASTRIDE
+    for measured in (Measured(0.5), Measured(2.0), Measured(None)):
+        assert _asked(tmp_path, measured).caveat == ""
+    assert _asked(tmp_path, Measured(1.0), of={}).caveat == ""
 
 
 def test_number_and_interval_are_rounded_before_they_are_judged(tmp_path):

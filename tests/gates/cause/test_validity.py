@@ -137,6 +137,14 @@ def test_of_several_choices_the_one_whose_weaker_mode_succeeds_most_is_held():
     assert _held(starts((GOOD, POOR), worse)) == ["m2", "m3"]
 
 
+def test_the_best_choice_is_the_surest_and_not_the_one_that_may_be_best():
+    """Twelve of twelve may be all and are surely fewer than 39 of 40: the lower ends decide."""
+    few, many = ((12, 12), (12, 12)), ((39, 40), (39, 40))
+    assert clopper_pearson(12, 12)[1] > clopper_pearson(39, 40)[1]
+    assert _held(starts(few, many)) == ["m2", "m3"]
+    assert _held(starts(many, few)) == ["m0", "m1"]
+
+
 def test_starts_together_count_from_two_on_and_no_mode_below_the_limit():
     """Seven of ten is the limit itself; six of ten is below it, and surely nothing."""
     seven = [(FEW, FEW)] * 7
