@@ -54,6 +54,7 @@ class AheadNetwork:
         *,
         times: Sequence[float],
         call_rows: Callable[[int], int],
+        finish: Callable[[Prepared, Tensor], Tensor] | None = None,
     ) -> None:
         """A network for one run of a sampler.
 
@@ -62,8 +63,10 @@ class AheadNetwork:
             conditions: Of the rows of the batch.
             times: Times that the sampler will ask for, as float32 holds them, in its order.
             call_rows: Rows that a network call for so many rows has, padded.
+            finish: The rest of an evaluation, where it is another one than the network's.
         """
         self._network = network
+        self._finish = finish or network.finish
         self._conditions = conditions
         self._call_rows = call_rows
         self._times = list(dict.fromkeys(times))
@@ -83,7 +86,7 @@ class AheadNetwork:
         count = len(self._conditions.stored)
         own = slice(within * count, (within + 1) * count)
         spread = self._conditions.spread
-        return self._network.finish(self._prepared.rows(lambda rows: spread(rows[own])), values)
+        return self._finish(self._prepared.rows(lambda rows: spread(rows[own])), values)
 
     def _prepare(self, block: int) -> None:
         """Every stored condition at every time of a block, time after time."""

@@ -16,7 +16,7 @@ from genpolicy.policies.ahead import padded
 from genpolicy.policies.checkpoint import CheckpointConfig
 from genpolicy.policies.determinism import deterministic
 from genpolicy.policies.methods import (
-    ENERGY_SAMPLER,
+    ENERGY_SAMPLERS,
     SINGLE_EVALUATION,
     announced_times,
     noise_shape,
@@ -59,7 +59,7 @@ def call_shapes(
     both keep `batch_rows`.
     """
     size = sampler.batch_rows
-    if device != "cpu" or sampler.name == ENERGY_SAMPLER:
+    if device != "cpu" or sampler.name in ENERGY_SAMPLERS:
         return CallShapes((size,))
     reads = sampler.name if sampler.name in SINGLE_EVALUATION else "chunk"
     key = repr((config.method, config.dimensions, config.network, config.head, size, reads))

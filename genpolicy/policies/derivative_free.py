@@ -39,14 +39,14 @@ def search_codes(
     """
     start = noise(0)
     length = noise_length_to_code(start.shape[2])
-    codes = bound * (2.0 * _uniform(start[..., :length]) - 1.0)
+    codes = bound * (2.0 * uniform(start[..., :length]) - 1.0)
     time = start.new_zeros(len(start))
     # A product with ones is the running sum, with deterministic kernels on every device.
     ones = torch.ones(start.shape[1], start.shape[1], device=start.device).triu()
     for iteration in range(iterations):
         drawn = noise(iteration + 1)
         reached = torch.softmax(score(codes, time), dim=1) @ ones
-        wanted = _uniform(drawn[..., -1]) * reached[:, -1:]
+        wanted = uniform(drawn[..., -1]) * reached[:, -1:]
         parent = torch.searchsorted(reached, wanted).clamp(max=codes.shape[1] - 1)
         codes = codes.gather(1, parent[..., None].expand_as(codes))
         moved = drawn[..., length : 2 * length] < drawn[..., -2:-1]
@@ -72,6 +72,6 @@ def jitter(iteration: int, iterations: int) -> float:
     return float(FIRST_JITTER * (LAST_JITTER / FIRST_JITTER) ** progress)
 
 
-def _uniform(normal: Tensor) -> Tensor:
+def uniform(normal: Tensor) -> Tensor:
     """Uniform numbers of standard normal ones."""
     return 0.5 * (1.0 + torch.erf(normal / math.sqrt(2.0)))

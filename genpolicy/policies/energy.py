@@ -117,15 +117,45 @@ class EnergyHead(Head):
         self.branch_code = nn.Linear(self.code.length, hidden, bias=False)
         self.branch_out = nn.Linear(hidden, 1, bias=False)
 
-    def score(self, features: Tensor, codes: Tensor) -> Tensor:
-        """Scores (B, N) of trunk features (B, W) and candidate codes (B, N, Z)."""
-        context = self.branch_in(functional.silu(features))
-        scaled = codes * (self._gain * self.code.used)
-        hidden = context[:, None] + self.branch_code(scaled)
+    def context(self, features: Tensor) -> Tensor:
+        """What scoring needs of trunk features (B, W): no product of them is left to `score`."""
+        hidden = self.branch_in(functional.silu(features))
+        return torch.cat([hidden, self.direct(features)], dim=-1)
+
+    def score(self, context: Tensor, codes: Tensor) -> Tensor:
+        """Scores (B, N) of contexts (B, ...), or one for all, and candidate codes (B, N, Z)."""
+        scaled, hidden, direct = self._entered(context, codes)
         powers = torch.cat([scaled, scaled.square()], dim=-1)
-        quadratic = (powers * self.direct(features)[:, None]).sum(dim=-1)
+        quadratic = (powers * direct).sum(dim=-1)
         scores: Tensor = quadratic + self.branch_out(functional.silu(hidden)).squeeze(-1)
         return scores
+
+    def slopes(self, context: Tensor, codes: Tensor) -> Tensor:
+        """Derivatives of the scores by the codes, and the scores, in closed form.
+
+        The silu's derivative at h is s + h s (1 - s), with s its sigmoid.
+
+        Args:
+            context: From `context`. Shape (B, ...), or one for all.
+            codes: Candidates. Shape (B, N, Z).
+
+        Returns:
+            Shape (B, N, Z + 1), the score last.
+        """
+        scaled, hidden, direct = self._entered(context, codes)
+        linear, square = direct.chunk(2, dim=-1)
+        share = hidden.sigmoid()
+        bent = (share + hidden * share * (1.0 - share)) * self.branch_out.weight
+        slope = linear + 2.0 * scaled * square + bent @ self.branch_code.weight
+        slope = slope * (self._gain * self.code.used)
+        return torch.cat([slope, self.score(context, codes)[..., None]], dim=-1)
+
+    def _entered(self, context: Tensor, codes: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """Scaled codes, the hidden layer before its bend, and the quadratic path's weights."""
+        width = self.branch_in.out_features
+        entered, direct = context[:, None, :width], context[:, None, width:]
+        scaled = codes * (self._gain * self.code.used)
+        return scaled, entered + self.branch_code(scaled), direct
 
 
 class EnergyNetwork(PolicyNetwork):
@@ -162,14 +192,18 @@ class EnergyNetwork(PolicyNetwork):
         return self.finish(self.prepare(condition), values)
 
     def prepare(self, condition: Tensor, time: Tensor | None = None) -> Prepared:
-        """The trunk's features of conditions (B, C): candidates enter behind it."""
-        context = self.trunk.prepare(condition)
-        return Prepared(self.trunk(self.head.enter(None, len(condition)), context), None)
+        """All that conditions (B, C) decide: candidates enter behind the trunk."""
+        features = self.trunk(self.head.enter(None, len(condition)), self.trunk.prepare(condition))
+        return Prepared(self.head.context(features), None)
 
     def finish(self, prepared: Prepared, values: Tensor | None) -> Tensor:
         """Scores (B, N) of candidate codes (B, N, Z)."""
         assert values is not None
         return self.head.score(prepared.context, values)
+
+    def climb(self, prepared: Prepared, values: Tensor) -> Tensor:
+        """Slopes and scores (B, N, Z + 1) of candidate codes (B, N, Z): one batched pass."""
+        return self.head.slopes(prepared.context, values)
 
 
 class EnergyContrast(Objective):

@@ -75,6 +75,8 @@ EVALUATIONS = {
     "bosh3": Evaluations(3, once=1, growth=5),
     # Every round scores its candidates, and the last ones are scored once more.
     "derivative_free": Evaluations(1, once=1),
+    # Every move asks for slopes, which come with the scores; the last candidates are scored once.
+    "langevin": Evaluations(1, once=1),
 }
 
 

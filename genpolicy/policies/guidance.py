@@ -8,7 +8,7 @@ moves its clean estimate so. Each guided evaluation takes one backward pass thro
 which costs as much as an evaluation (weights take no gradient) and is counted as one.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -61,9 +61,10 @@ class Prefix:
     bound: float
 
     def guidance(
-        self, rows: NDArray[np.int_], normalise: Callable[[Array], Array], *, device: str
+        self, rows: Sequence[int], normalise: Callable[[Array], Array], device: str
     ) -> Guidance:
         """Of some of the rows, in this order."""
+        rows = list(rows)
         given = normalise(self.actions[rows]).astype(np.float32)
         weights = self.weights[rows, :, None].astype(np.float32)
         return Guidance(

@@ -23,6 +23,7 @@ from genpolicy.policies.distillation import (
 from genpolicy.policies.energy import CODE_BOUND, EnergyContrast, EnergyNetwork
 from genpolicy.policies.evaluations import allowed_evaluations
 from genpolicy.policies.guidance import Guidance, guided
+from genpolicy.policies.langevin import LANGEVIN, climb_codes
 from genpolicy.policies.networks import Dimensions, HeadInput, PolicyNetwork
 from genpolicy.policies.objectives import (
     ConditionalVae,
@@ -53,9 +54,11 @@ from genpolicy.policies.schedules import (
 from genpolicy.policies.settings import HeadConfig, NetworkConfig, SamplerConfig
 
 SINGLE_EVALUATION = ("direct", "z_zero", "z_prior", "offset")
-ENERGY_SAMPLER = "derivative_free"
+DERIVATIVE_FREE = "derivative_free"
+ENERGY_SAMPLERS = (DERIVATIVE_FREE, LANGEVIN)
 STOCHASTIC_SAMPLERS = (
-    "z_prior", "offset", ENERGY_SAMPLER, CONSISTENCY, MULTISTEP, *DIFFUSION_SAMPLERS, *ODE_SAMPLERS,
+    "z_prior", "offset", CONSISTENCY, MULTISTEP,
+    *ENERGY_SAMPLERS, *DIFFUSION_SAMPLERS, *ODE_SAMPLERS,
 )  # fmt: skip
 
 
@@ -140,7 +143,7 @@ METHODS = {
         # The same network and objective as `act`; drawn from its prior it is a generator and
         # stands for promotion like the others.
         Method("cvae", True, "latent", ConditionalVae, ("z_prior",)),
-        Method("ibc", True, "codes", EnergyContrast, (ENERGY_SAMPLER,)),
+        Method("ibc", True, "codes", EnergyContrast, ENERGY_SAMPLERS),
         Method("diffusion", True, "chunk", Denoising, DIFFUSION_SAMPLERS, _diffusion_gains),
         Method("flow", True, "chunk", flow_matching, ODE_SAMPLERS, _flow_gains),
         # The network of `flow`, trained to say where the flow leads, for one or few evaluations.
@@ -204,7 +207,7 @@ def check_sampler(method: Method, sampler: SamplerConfig, head: HeadConfig) -> N
             expected="exactly 1" if single else "at least 1",
             action="Correct the sampler's steps.",
         )
-    searches = sampler.name == ENERGY_SAMPLER
+    searches = sampler.name in ENERGY_SAMPLERS
     if searches != (sampler.population > 1):
         raise ConfigError(
             where=f"sampler.population of {method.name}",
@@ -247,7 +250,7 @@ def announced_times(sampler: SamplerConfig, head: HeadConfig) -> list[float]:
     An energy has one score whatever the time; an adaptive solver finds its times on the way, and
     one pass has none.
     """
-    if sampler.name == ENERGY_SAMPLER:
+    if sampler.name in ENERGY_SAMPLERS:
         return [0.0]
     schedule, times = squared_cosine(head.diffusion_levels), torch.empty(0)
     if sampler.name in DIFFUSION_SAMPLERS:
@@ -291,23 +294,24 @@ def generate(
         ConfigError: Guidance of a sampler that has no path to guide.
         EvaluationCapError: The sampler's cap was reached.
     """
-    times = announced_times(sampler, head)
-    ahead = AheadNetwork(network, conditions, times=times, call_rows=call_rows)
+    times, climbs = announced_times(sampler, head), sampler.name == LANGEVIN
+    finish = network.climb if isinstance(network, EnergyNetwork) and climbs else None
+    ahead = AheadNetwork(network, conditions, times=times, call_rows=call_rows, finish=finish)
 
     def once(values: Tensor, _: Tensor) -> Tensor:
-        read = () if sampler.name == "direct" else (values,)
-        return network.evaluate(conditions.rows, *read)
+        return network.evaluate(conditions.rows, *(() if sampler.name == "direct" else (values,)))
 
     single = sampler.name in SINGLE_EVALUATION
     counted = CountedNetwork(once if single else ahead, cap=sampler.nfe_cap)
     walked = guided(counted, sampler, head, guidance)
     if sampler.name in DIFFUSION_SAMPLERS or sampler.name == MULTISTEP:
         walk = sample_multistep if sampler.name == MULTISTEP else sample_diffusion
-        schedule = squared_cosine(head.diffusion_levels)
-        chunks = walk(walked, noise, schedule=schedule, sampler=sampler, prediction=head.prediction)
-    elif sampler.name == ENERGY_SAMPLER:
+        schedule, said = squared_cosine(head.diffusion_levels), head.prediction
+        chunks = walk(walked, noise, schedule=schedule, sampler=sampler, prediction=said)
+    elif sampler.name in ENERGY_SAMPLERS:
         assert isinstance(network, EnergyNetwork)
-        codes = search_codes(counted, noise, iterations=sampler.steps, bound=CODE_BOUND)
+        search = climb_codes if climbs else search_codes
+        codes = search(counted, noise, iterations=sampler.steps, bound=CODE_BOUND)
         chunks = network.code.decode(codes)
     elif sampler.name in ADAPTIVE_TABLEAUS:
         chunks = sample_adaptive(
@@ -327,9 +331,10 @@ def noise_shape(
     dimensions: Dimensions, sampler: SamplerConfig, head: HeadConfig
 ) -> tuple[int, ...]:
     """Shape of one row's noise per sampler step: a latent, an offset, a chunk, or codes."""
-    if sampler.name == ENERGY_SAMPLER:
+    if sampler.name in ENERGY_SAMPLERS:
         length = min(head.code_dim, dimensions.chunk_numbers)
-        return (sampler.population, noise_length(length))
+        drawn = length if sampler.name == LANGEVIN else noise_length(length)
+        return (sampler.population, drawn)
     if sampler.name == "offset":
         return (dimensions.action_dim,)
     if sampler.name in SINGLE_EVALUATION:

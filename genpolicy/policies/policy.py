@@ -21,7 +21,7 @@ from genpolicy.policies.ahead import Conditions, padded
 from genpolicy.policies.call_shapes import call_shapes
 from genpolicy.policies.checkpoint import Checkpoint, load_checkpoint
 from genpolicy.policies.determinism import deterministic
-from genpolicy.policies.guidance import GUIDED, Guidance, Prefix
+from genpolicy.policies.guidance import GUIDED, Prefix
 from genpolicy.policies.methods import (
     STOCHASTIC_SAMPLERS,
     check_sampler,
@@ -239,7 +239,7 @@ class NetworkPolicy:
         ]
         chunks, evaluations = [], []
         # What is guided is differentiated, which nothing made in inference mode can be.
-        plain = prefix is None
+        plain, normalise = prefix is None, self._normalisation.action.normalise
         with deterministic(self.device), torch.inference_mode(plain), torch.no_grad():
             condition = condition if plain else condition.clone()
             for first in range(0, len(names), self._calls.most):
@@ -254,7 +254,9 @@ class NetworkPolicy:
                     sampler=self.sampler,
                     head=self.checkpoint.config.head,
                     call_rows=self._calls.fit,
-                    guidance=self._guidance(prefix, rows),
+                    guidance=None
+                    if prefix is None
+                    else prefix.guidance(rows, normalise, self.device),
                 )
                 chunks.append(result[: len(own)].cpu())
                 evaluations.append(nfe)
@@ -267,13 +269,6 @@ class NetworkPolicy:
         """Wait until the device has finished what was asked of it."""
         if self.device != "cpu":
             torch.cuda.synchronize(self.device)
-
-    def _guidance(self, prefix: Prefix | None, rows: list[int]) -> Guidance | None:
-        """Of the padded batch whose rows are of these observations."""
-        if prefix is None:
-            return None
-        normalise = self._normalisation.action.normalise
-        return prefix.guidance(np.array(rows), normalise, device=self.device)
 
     def _noise(self, names: Sequence[NoiseName], rows: int) -> Callable[[int], Tensor]:
         """Noise function of one padded batch.

@@ -126,7 +126,7 @@ class SamplerConfig(Settings):
     name: Literal[
         "direct", "z_zero", "z_prior", "ddpm", "ddim", "dpm_1", "dpm_2m", "dpm_sde", "euler",
         "midpoint", "heun", "rk4", "bosh3", "consistency", "derivative_free", "offset",
-        "multistep_consistency",
+        "multistep_consistency", "langevin",
     ]  # fmt: skip
     steps: int = Field(default=1, le=10_000)
     clip: float | None = Field(default=1.0, gt=0.0)

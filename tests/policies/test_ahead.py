@@ -23,6 +23,7 @@ WALKS = [
     ("flow_policy", SamplerConfig(name="consistency", steps=4)),
     ("manicm", SamplerConfig(name="multistep_consistency", steps=3)),
     ("ibc", SamplerConfig(name="derivative_free", steps=5, population=32)),
+    ("ibc", SamplerConfig(name="langevin", steps=5, population=32)),
 ]
 ADAPTIVE = ("flow", SamplerConfig(name="bosh3", steps=4, tolerance=1e-4, nfe_cap=400))
 
@@ -35,8 +36,10 @@ def named(walk):
 class OneByOne:
     """The network without anything ahead, every row with its own condition."""
 
-    def __init__(self, network, conditions, **_):
+    def __init__(self, network, conditions, *, finish=None, **_):
         self.evaluate, self.condition = network.evaluate, conditions.rows
+        if finish is not None:
+            self.evaluate = lambda rows, values, time: finish(network.prepare(rows), values)
 
     def __call__(self, values, time):
         return self.evaluate(self.condition, values, time)

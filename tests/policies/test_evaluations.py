@@ -5,9 +5,16 @@ import torch
 
 from genpolicy.errors import ConfigError
 from genpolicy.policies import methods
+from genpolicy.policies.ahead import Conditions
 from genpolicy.policies.checkpoint import load_checkpoint
 from genpolicy.policies.evaluations import EVALUATIONS, allowed_evaluations
-from genpolicy.policies.methods import METHODS, SINGLE_EVALUATION, generate, noise_shape
+from genpolicy.policies.methods import (
+    ENERGY_SAMPLERS,
+    METHODS,
+    SINGLE_EVALUATION,
+    generate,
+    noise_shape,
+)
 from genpolicy.policies.ode_samplers import ADAPTIVE_TABLEAUS, sample_adaptive
 from genpolicy.policies.samplers import CountedNetwork
 from genpolicy.policies.settings import SamplerConfig
@@ -19,7 +26,7 @@ def sampler_of(name, steps):
     return SamplerConfig(
         name=name,
         steps=1 if name in SINGLE_EVALUATION else steps,
-        population=4 if name == "derivative_free" else 1,
+        population=4 if name in ENERGY_SAMPLERS else 1,
         nfe_cap=100 if name in ADAPTIVE_TABLEAUS else None,
     )
 
@@ -34,10 +41,11 @@ def counted(folder, sampler):
     with torch.no_grad():
         _, nfe = generate(
             network,
-            network.encode(seen),
+            Conditions(network.encode(seen), torch.arange(2)),
             lambda _: torch.randn(2, *shape, generator=generator),
             sampler=sampler,
             head=head,
+            call_rows=lambda count: count,
         )
     return nfe
 
@@ -57,7 +65,7 @@ def test_every_sampler_evaluates_as_often_as_its_definition_says(method, name, s
         ("direct", 1, 1), ("z_zero", 1, 1), ("z_prior", 1, 1), ("offset", 1, 1),
         ("ddpm", 10, 10), ("ddim", 16, 16), ("dpm_2m", 8, 8), ("euler", 4, 4),
         ("heun", 4, 8), ("rk4", 4, 16), ("derivative_free", 16, 17),
-        ("midpoint", 4, 8),
+        ("midpoint", 4, 8), ("langevin", 100, 101),
     ],
 )  # fmt: skip
 def test_the_counts_by_hand(name, steps, expected):

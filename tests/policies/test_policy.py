@@ -28,7 +28,7 @@ STOCHASTIC = {
     "diffusion": ("ddim", 10), "flow": ("euler", 8),
     "flow_policy": ("consistency", 2), "manicm": ("multistep_consistency", 2),
 }  # fmt: skip
-POPULATION = {"derivative_free": 32}
+POPULATION = {"derivative_free": 32, "langevin": 32}
 
 
 def sampler_of(name, steps):
@@ -97,6 +97,7 @@ def test_two_loads_give_equal_bytes(folders, method, two_mode_windows):
         ("flow_policy", "consistency", 2, 2), ("flow_policy", "consistency", 4, 4),
         ("manicm", "multistep_consistency", 1, 1), ("manicm", "multistep_consistency", 10, 10),
         ("chunked_l1", "direct", 1, 1), ("ibc", "derivative_free", 6, 7),
+        ("ibc", "langevin", 9, 10),
         ("bc_noise", "offset", 1, 1),
     ],
 )  # fmt: skip
@@ -124,7 +125,7 @@ def test_deterministic_conventions_give_equal_candidates(folders, two_mode_windo
     [("diffusion", "ddim", 101), ("diffusion", "ddim", 0), ("diffusion", "euler", 4),
      ("flow", "euler", 0), ("flow", "ddim", 4), ("bc", "direct", 2), ("ibc", "euler", 4),
      ("bc_noise", "offset", 2), ("bc_noise", "direct", 1), ("chunked_bc", "offset", 1),
-     ("flow", "derivative_free", 4), ("ibc", "derivative_free", 0),
+     ("flow", "derivative_free", 4), ("ibc", "derivative_free", 0), ("flow", "langevin", 4),
      ("flow_policy", "consistency", 1), ("flow_policy", "consistency", 3),
      ("flow_policy", "euler", 2), ("flow", "consistency", 2),
      ("manicm", "multistep_consistency", 0), ("manicm", "multistep_consistency", 11),
@@ -137,7 +138,8 @@ def test_samplers_that_do_not_fit_are_refused(folders, method, name, steps):
 
 
 @pytest.mark.parametrize(
-    ("method", "name", "population"), [("ibc", "derivative_free", 1), ("flow", "euler", 2)]
+    ("method", "name", "population"),
+    [("ibc", "derivative_free", 1), ("ibc", "langevin", 1), ("flow", "euler", 2)],
 )
 def test_a_population_belongs_to_the_search_only(folders, method, name, population):
     with pytest.raises(ConfigError, match="population"):
