@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from genpolicy.candidates.joining import REAL_TIME, REPLACE, JoiningSettings
 from genpolicy.candidates.votes import Prediction, Votes, join, prefix
+from genpolicy.contract.action import join_action
 from genpolicy.contract.chunk import Candidate, ChunkMetadata, Proposal
 from genpolicy.contract.latency import Term
 from genpolicy.policies.guidance import Prefix
@@ -122,7 +123,12 @@ def invoke(
     """
     spans: dict[str, float] = {}
     metadata = _metadata(policy, repeat)
-    votes = [] if joining.rule == REPLACE else [_plan_before(policy, row, metadata)]
+    reach = policy.horizons.execution_horizon - 1
+    votes = (
+        []
+        if joining.rule == REPLACE
+        else [_plan_before(metadata, policy.prediction_horizon, reach)]
+    )
     guided = _guided(policy, votes, joining)
     with _timed(spans, Term.PREPROCESS):
         normalised = policy.preprocess(row)
@@ -150,12 +156,14 @@ def _timed(spans: dict[str, float], term: Term) -> Iterator[None]:
     spans[str(term)] = time.perf_counter() - start
 
 
-def _plan_before(policy: NetworkPolicy, row: Array, metadata: ChunkMetadata) -> Votes:
-    """A plan that began one period earlier, as the policy draws it."""
-    actions = policy.sample(row, noise_names=[("latency", "before")], candidates=1).actions[0, 0]
-    before = Prediction("before", metadata, actions, actions)
-    reach = min(policy.horizons.execution_horizon, len(actions)) - 1
-    return Votes(before, first=0, stop=max(reach, 0), shift=min(1, len(actions) - 1))
+def _plan_before(metadata: ChunkMetadata, rows: int, reach: int) -> Votes:
+    """A plan that began one period earlier, of which `reach` rows speak; what it says is no matter.
+
+    It is not drawn: that would warm what a cold invocation pays for.
+    """
+    still = join_action(np.zeros((rows, 3)), np.broadcast_to(np.eye(3), (rows, 3, 3)), 0.0)
+    shift = min(1, rows - 1)
+    return Votes(Prediction("before", metadata, still, still), 0, min(reach, rows - shift), shift)
 
 
 def _guided(policy: NetworkPolicy, votes: list[Votes], joining: JoiningSettings) -> Prefix | None:

@@ -2,6 +2,7 @@
 
 import pytest
 
+from genpolicy.candidates.joining import JoiningSettings
 from genpolicy.evidence.reproducibility.benchmark import measure_policy
 from genpolicy.policies.fixtures import fixture_observations
 from genpolicy.policies.policy import NetworkPolicy
@@ -36,6 +37,31 @@ def test_components_and_temperatures(fleet, method, observations):
     assert projected[0].selected_by == "first_admissible"
 
 
+@pytest.mark.parametrize("method", ["bc", "flow"])
+@pytest.mark.parametrize("rule", ["ensemble_oldest", "bidirectional", "real_time"])
+def test_what_is_timed_is_joined_as_it_is_deployed(fleet, observations, monkeypatch, method, rule):
+    if (method, rule) == ("bc", "real_time"):
+        pytest.skip("cannot be guided; refused where the setting is read")
+    given, proposed, plain = [], [], NetworkPolicy.sample_encoded
+
+    def spied(self, condition, *, prefix, **others):
+        given.append(prefix)
+        return plain(self, condition, prefix=prefix, **others)
+
+    monkeypatch.setattr(NetworkPolicy, "sample_encoded", spied)
+    measure_policy(
+        fleet[0] / method / "seed_0", observations, expected_sha256=None, cold_repeats=1,
+        warm_repeats=1, discarded_repeats=0, candidates=2, project=proposed.append,
+        joining=JoiningSettings(rule=rule),
+    )  # fmt: skip
+    assert len(given) == len(proposed) == 2  # no sample beside those that are timed
+    assert all((one is not None) == (rule == "real_time") for one in given)
+    if rule == "real_time":
+        assert all((one.weights > 0).sum() == 7 for one in given)
+    blends = rule == "ensemble_oldest" and method == "flow"
+    assert all((one.selected_by == rule) == blends or method == "bc" for one in proposed)
+
+
 def test_without_a_projection_the_term_stays_unknown(fleet, observations):
     rows = measure_policy(
         fleet[0] / "bc" / "seed_0", observations, expected_sha256=None,
@@ -48,9 +74,9 @@ def test_as_many_candidates_are_drawn_as_are_deployed(fleet, observations, monke
     asked = []
     plain = NetworkPolicy.sample_encoded
 
-    def spied(self, condition, *, noise_names, candidates):
+    def spied(self, condition, *, candidates, **others):
         asked.append(candidates)
-        return plain(self, condition, noise_names=noise_names, candidates=candidates)
+        return plain(self, condition, candidates=candidates, **others)
 
     monkeypatch.setattr(NetworkPolicy, "sample_encoded", spied)
     measure_policy(
