@@ -91,7 +91,8 @@ def record_next(document: Mapping[str, Any], evidence: AuditEvidence) -> list[st
     lines = ["whether each episode succeeded"] if OUTCOME_MISSING in document["rests_on"] else []
     thin = _thin(evidence, _limit(document, "denial_share"))
     if thin:
-        least = int(evidence.settings["minimum_neighbours"])
+        settings = evidence.settings
+        least = int(settings["minimum_neighbours"])
         lines.append(
             f"more episodes from the same starts: in the {_listed(thin)} fifth of the way fewer "
             f"situations than it takes to deny modes have {least} comparable episodes"

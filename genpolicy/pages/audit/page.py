@@ -48,7 +48,7 @@ def audit_page(document: Mapping[str, Any], evidence: AuditEvidence, *, name: st
     own, _, _ = PackageLoader("genpolicy.pages.audit").get_source(environment, "audit.css")
     cause, limits = str(document["verdict"]), _limits(document["limits"])
     origins = document.get("episodes", {})
-    said = named(document, origins)
+    said, rests_on = named(document, origins), named(document["rests_on"], origins)
     summary = replace(evidence.summary, notes=named(evidence.summary.notes, origins))
     evidence = replace(
         evidence, summary=summary, origins=origins, coverage=float(document["coverage"])
@@ -65,8 +65,8 @@ def audit_page(document: Mapping[str, Any], evidence: AuditEvidence, *, name: st
         topics=ladder(said, evidence),
         kinds=kinds(evidence),
         record_next=record_next(document, evidence),
-        guessed=[line for line in said["rests_on"] if is_guess(line)],
-        rests_on=[line for line in said["rests_on"] if not is_guess(line)],
+        guessed=[line for line in rests_on if is_guess(line)],
+        rests_on=[line for line in rests_on if not is_guess(line)],
         pictures=draw_all(evidence, {row["question"]: row["limit"] for row in limits}),
         limits=limits,
         labels=label_table(evidence),
