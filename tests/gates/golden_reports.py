@@ -1,7 +1,7 @@
 """What a gate's report says, whole: worlds of synthetic evidence and their golden reports.
 
-Made by the code of decision 156 and read through then. After a change that is meant:
-`PYTHONPATH=. python tests/gates/golden_reports.py`, and read the difference.
+Made by the code of decision 156; next steps and mixed rows were read then, not every row. After a
+change that is meant: `PYTHONPATH=. python tests/gates/golden_reports.py`, and read the difference.
 """
 
 import json

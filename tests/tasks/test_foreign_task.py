@@ -252,7 +252,7 @@ class Operator:
         self.rollouts = {rollout.start_index: rollout for rollout in rollouts}
         self.place = dict.fromkeys(self.rollouts, 0)
 
-    def sample(self, observations, *, noise_names, candidates):
+    def sample(self, observations, *, noise_names, candidates, prefix=None):
         return SimpleNamespace(actions=[self._plan(name[2]) for name in noise_names], nfe=1)
 
     def _plan(self, number):

@@ -167,9 +167,9 @@ WRONGS = (
     Wrong("second_evaluation_not_counted", "sampler",
           "The network runs twice per Euler step and is counted by the definition of one.",
           "small",
-          patched(SAMPLERS, ("            slopes.append(velocity(point, time))\n",
-                             "            velocity(point, time)\n"
-                             "            slopes.append(velocity(point, time))\n")),
+          patched(SAMPLERS, ("            slopes.append(velocity(point, x.new_full",
+                             "            velocity(point, x.new_full(x.shape[:1], time))\n"
+                             "            slopes.append(velocity(point, x.new_full")),
           Expected(B, ("nfe_mismatch",), candidate="flow")),
     Wrong("definition_of_nfe_is_wrong", "sampler",
           "What a sampler's definition says of its evaluations is one too many.",

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from genpolicy.candidates.joining import REAL_TIME
 from genpolicy.candidates.judged import JudgedPolicy
 from genpolicy.compute import map_shards
 from genpolicy.errors import ConfigError
@@ -143,8 +144,6 @@ def plan_shards(
     for schedule in perturbations.values():
         if isinstance(schedule, ReducedEnvelope):
             require_tighter(schedule, load_task(comparison.task), comparison.feasibility)
-    for policy in judged:
-        comparison.joining.of(policy.name, guided=policy.load().guided)
     untimed = sorted({policy.name for policy in judged} - set(latency))
     if untimed:
         raise ConfigError(
@@ -153,6 +152,8 @@ def plan_shards(
             expected=f"methods out of {', '.join(sorted(latency))}",
             action="Correct the names, or run `dvc repro latency`.",
         )
+    for policy in judged if comparison.joining.rule == REAL_TIME else ():
+        comparison.joining.of(policy.name, guided=policy.load().guided)
     return [
         Shard(
             comparison=comparison,

@@ -1,8 +1,11 @@
 """The stress evidence: plan, tables, journals, power."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from genpolicy.candidates.joining import JoiningSettings
 from genpolicy.candidates.judged import JudgedPolicy
 from genpolicy.errors import ConfigError
 from genpolicy.evidence.documents.shadow import CHECKER
@@ -31,6 +34,7 @@ from genpolicy.verification import tables
 from genpolicy.verification.rollouts import differences
 from genpolicy.verification.tables import KEYS, derived_tables
 
+JOINED = SimpleNamespace(joining=JoiningSettings())
 PERTURBATIONS = {
     "nominal": Nominal(),
     "queue_reorder": QueueReorder(probability=0.5, magnitude_s=0.25),
@@ -73,7 +77,7 @@ def written(task, fleet, kit, tmp_path_factory):
 def test_every_method_meets_every_perturbation(tmp_path):
     judged = [JudgedPolicy(name, 0, tmp_path, "") for name in "abc"]
     models = dict.fromkeys("abc")
-    plan = plan_shards(None, judged, PERTURBATIONS, latency=models, journals=tmp_path)
+    plan = plan_shards(JOINED, judged, PERTURBATIONS, latency=models, journals=tmp_path)
     assert [(shard.perturbation, shard.judged.name) for shard in plan] == [
         (name, method) for name in PERTURBATIONS for method in "abc"
     ]
@@ -85,7 +89,7 @@ def test_a_method_whose_latency_was_not_measured_is_a_bad_setting(tmp_path):
     judged = [JudgedPolicy(name, 0, tmp_path, "") for name in "abc"]
     models = dict.fromkeys("ac")
     with pytest.raises(ConfigError, match="with b, whose latency was not measured"):
-        plan_shards(None, judged, PERTURBATIONS, latency=models, journals=tmp_path)
+        plan_shards(JOINED, judged, PERTURBATIONS, latency=models, journals=tmp_path)
 
 
 def test_starts_are_matched_by_hash(written):

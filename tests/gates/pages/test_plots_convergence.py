@@ -29,7 +29,7 @@ def test_it_says_in_words_what_it_draws(whole, judged):
     for row in by_method.values():
         assert row["from"] in report.materials  # what is drawn is bound
     page = gate_page(whole, report)
-    assert page.count("The same as a table") == 3 and f'<td class="n">{fall}</td>' in page
+    assert page.count("The same as a table") == 4 and f'<td class="n">{fall}</td>' in page
 
 
 def test_it_is_drawn_by_the_confidence_judged_by(copied):
