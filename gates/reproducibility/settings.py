@@ -51,7 +51,7 @@ def chosen_nfe(evidence: Evidence, candidate: str) -> tuple[float, float]:
     recorded, least, most = (numbers(rows, name) for name in ("recorded", "least", "most"))
     if np.all(least < most):
         return float(least.min()), float(most.max())
-    found = sorted(set(recorded.tolist()))
-    if len(found) != 1:
-        raise MissingEvidenceError(f"{candidate} records several NFE: {found}")
-    return float(found[0]), float(found[0])
+    lowest, highest = float(recorded.min()), float(recorded.max())
+    if lowest != highest:
+        raise MissingEvidenceError(f"{candidate} records several NFE: {lowest:g} to {highest:g}")
+    return lowest, highest

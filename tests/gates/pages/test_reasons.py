@@ -1,5 +1,7 @@
 """Reasons in words: every one of them, and margins as a person reads them."""
 
+import math
+
 import pytest
 
 from gates.feasibility.settings import REASONS
@@ -16,6 +18,9 @@ def test_every_reason_is_said_in_words_and_in_the_order_of_the_checks():
 def test_every_unit_has_one_that_a_person_reads():
     mixed = {Unit.M_OR_RAD}
     assert set(PERSONAL) == set(Unit) - mixed
+    for factor, name in PERSONAL.values():
+        milli = name.startswith(("mm", "ms"))
+        assert factor == (1e3 if milli else math.degrees(1.0) if "°" in name else 1.0), name
 
 
 @pytest.mark.parametrize(("values", "unit", "text"), [

@@ -2,6 +2,7 @@
 
 import evidence
 import numpy as np
+import pandas as pd
 import pytest
 from asked import asked, settings_of
 from editing import cells
@@ -249,3 +250,22 @@ def test_the_point_that_is_said_is_the_share_of_the_pool(ladder):
     half = lambda f: of(f) & (f["start"] % 2 == 0)  # noqa: E731
     evidence.edit_table(ladder, ROLLOUTS, cells("deadline_misses", 2, where=half))
     assert ": 0.05, bounded by" in flow(ladder, cost.deadline_miss_upper).caveat
+
+
+@pytest.mark.parametrize(
+    ("criterion", "column", "value"),
+    [(cost.intervention_upper, "interventions", 1), (cost.reset_upper, "outcome", "collision")],
+)
+def test_a_start_that_is_hit_under_one_seed_counts_against_it(ladder, criterion, column, value):
+    """One start of eighty, under one of two seeds: half a start is one, not none."""
+
+    def two(frame):
+        first = frame.assign(**{column: frame[column].mask(of(frame), type(value)())})
+        if column == "outcome":
+            first = frame.assign(outcome=frame["outcome"].mask(of(frame), "timeout"), success=False)
+        hit = of(first) & (first["start"] == 3) & (first["perturbation"] == "nominal")
+        second = first[of(first)].assign(seed=1)
+        return pd.concat([first.assign(**{column: first[column].mask(hit, value)}), second])
+
+    evidence.edit_table(ladder, ROLLOUTS, two)
+    assert flow(ladder, criterion).interval == clopper_pearson(1, N, 0.95)
