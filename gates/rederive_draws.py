@@ -177,12 +177,17 @@ def _draw_again(
 
 
 def _compare(gate: Gate, policy: Policy, items: Sequence[Asked], count: int) -> None:
+    # Candidates of one invocation are drawn together, and once.
+    saw = [(item.key, item.history.tobytes()) for item in items]
+    invocations = dict(zip(saw, items, strict=True))
     with readable(items[0].place):
-        drawn = policy.sample(
-            np.stack([item.history for item in items]),
-            noise_names=[item.key for item in items],
+        answers = policy.sample(
+            np.stack([one.history for one in invocations.values()]),
+            noise_names=[one.key for one in invocations.values()],
             candidates=count,
         ).actions
+    by_invocation = dict(zip(invocations, answers, strict=True))
+    drawn = [by_invocation[own] for own in saw]
     limit = f"what {policy.checkpoint_hash[:16]}… draws there, within {TOLERANCE:g}"
     to_the_bit = True
     for item, chunks in zip(items, drawn, strict=True):
