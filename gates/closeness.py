@@ -32,8 +32,8 @@ class Closeness:
 def closeness(answer: Answer) -> Closeness | None:
     """How close a criterion came; None where no share of a limit can be said.
 
-    `<=`: measured / limit. `>=`: limit / measured. A limit of 0, and one at the end of what its
-    number can be (all of them, none of them), is kept or broken: nothing lies near it.
+    `<=`: measured / limit. `>=`: limit / measured. A limit of none (`<= 0`) or of all (`>= 1` of a
+    number that is 1) is kept or broken: nothing lies near it.
 
     Args:
         answer: The criterion.
@@ -41,12 +41,9 @@ def closeness(answer: Answer) -> Closeness | None:
     limit, found = answer.threshold, answer.measured
     if answer.verdict != "PASS" or limit is None or found is None or not limit > 0:
         return None
-    if answer.comparison == ">=":
-        if limit == found:
-            return None if answer.interval is None else Closeness(answer, 1.0, True)
-        used = limit / found
-    else:
-        used = max(found, 0.0) / limit
+    if answer.comparison == ">=" and limit == found == 1:
+        return None
+    used = limit / found if answer.comparison == ">=" else max(found, 0.0) / limit
     return Closeness(answer, used, answer.interval is not None)
 
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from gates.closeness import by_room, closeness
 from gates.report import Answer, GateReport
 
-FEWEST_SHOWN = 3
-"""Criteria of a kind that are named one by one; more are counted, and the first are named."""
+MOST_NAMED = 3
+"""Criteria that one doubt names; of more it says how many there are."""
 
 
 @dataclass(frozen=True)
@@ -73,8 +73,8 @@ def _at_a_point(report: GateReport) -> Iterator[Doubt]:
     named = [c for c in report.criteria if c.interval is None and closeness(c) is not None]
     ids = tuple(dict.fromkeys(c.id for c in named))
     if ids:
-        shown = ", ".join(ids[:FEWEST_SHOWN])
-        more = f" and {len(ids) - FEWEST_SHOWN} more" if len(ids) > FEWEST_SHOWN else ""
+        shown = ", ".join(ids[:MOST_NAMED])
+        more = f" and {len(ids) - MOST_NAMED} more" if len(ids) > MOST_NAMED else ""
         text = f"{len(ids)} criteria hold for what was drawn, without an interval: {shown}{more}"
         yield Doubt(report.gate, "judged at a point", text, ids)
 

@@ -26,6 +26,7 @@ def answer(measured, threshold, comparison="<=", *, interval=None, verdict="PASS
         (-0.2, 0.5, "<=", 0.0),  # a share of guesses less what chance tells
         (0.8, 0.6, ">=", 0.75),
         (120.0, 30.0, ">=", 0.25),
+        (30.0, 30.0, ">=", 1.0),  # just as many as are needed
     ],
 )
 def test_the_share_of_the_limit_is_that_of_the_formula(found, limit, comparison, used):

@@ -193,6 +193,17 @@ def test_every_verdict_but_pass_refuses(ladder):
         admit("shadow", ladder)
 
 
+@pytest.mark.parametrize("verdict", ["FAIL", "INCONCLUSIVE"])
+def test_a_gate_that_truly_does_not_pass_is_refused_by_its_code(ladder, verdict):
+    if verdict == "FAIL":
+        evidence.edit_table(ladder, "audit/clocks.parquet", evidence.lags_apart)
+    else:
+        evidence.replace(ladder, "audit/strata.parquet", None)
+    write_bytes(ladder / report_path("A"), report_bytes(judge(ladder, "A")))
+    rung = next(rung for rung in prove_all(ladder) if rung.gate == "A")
+    assert (rung.verdict, rung.exit_code) == (verdict, 3)
+
+
 def test_prove_all_reports_each_rung(ladder):
     rungs = {rung.gate: rung for rung in prove_all(ladder)}
     assert [rungs[g].verdict for g in "ABCD"] == ["PASS"] * 4

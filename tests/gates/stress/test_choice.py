@@ -128,8 +128,9 @@ def test_the_card_goes_to_the_sooner_whatever_else_was_measured(ladder, change, 
     """Another number of the same candidate, after its latency; and a latency that is not known."""
     latency = [c for c in judge(ladder, "D").criteria if c.id == "latency_p95_s"]
     own = [c.model_copy(update=change if c.candidate == "flow" else {}) for c in latency]
-    more = [c.model_copy(update={"id": "other", "measured": 99.0}) for c in own
-            if c.candidate == "flow"]  # fmt: skip
+    # The other number would choose the other one: what breaks the tie is the latency alone.
+    more = [c.model_copy(update={"id": "other", "measured": float(c.candidate == promoted)})
+            for c in own]  # fmt: skip
     whole = [c.model_copy(update={"candidate": None, "measured": 0.0}) for c in own[:1]]
     verdicts = dict.fromkeys(evidence.CANDIDATES, "PASS")
     answers = (*own, *(more if not change else ()), *whole)
