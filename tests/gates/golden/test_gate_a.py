@@ -1,49 +1,28 @@
-"""What a gate's report says, whole: worlds of synthetic evidence and their golden reports.
+"""The whole report of Gate A, of even evidence, of uneven, and of evidence that says little."""
 
-Made by the code of decision 156; next steps and mixed rows were read then, not every row. After a
-change that is meant: `PYTHONPATH=. python tests/gates/golden_reports.py`, and read the difference.
-"""
-
-import json
-import shutil
-import sys
-import tempfile
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import evidence
 import numpy as np
 import pandas as pd
-
-if __name__ == "__main__":
-    sys.path.insert(0, str(Path(__file__).parent))
-
-import evidence
+from as_told import hold, told
 
 from gates.proof import judge
-from gates.report import GateReport
-
-FOLDER = Path(__file__).parent / "golden"
-Change = Callable[[Path], None]
 
 
-def said(report: GateReport) -> dict[str, Any]:
-    """All that the report says to a person, numbers to nine digits."""
-    return {
-        "verdict": report.verdict, "diagnosis": report.diagnosis, "decision": report.decision,
-        "promoted": report.promoted, "candidates": report.candidates,
-        "caveats": list(report.caveats), "materials": sorted(report.materials),
-        "criteria": [
-            [c.id, c.candidate, c.verdict, _plain(c.measured), c.interval and
-             [_plain(end) for end in c.interval], c.comparison, _plain(c.threshold), c.caveat,
-             list(c.evidence)]
-            for c in report.criteria
-        ],
-    }  # fmt: skip
+def test_gate_a_of_even_evidence_says_what_it_said(ladder):
+    hold("gate_a", told(judge(ladder, "A")))
 
 
-def _plain(value: float | None) -> float | None:
-    return None if value is None else float(f"{value:.9g}")
+def test_gate_a_of_uneven_evidence_says_what_it_said(ladder):
+    mixed_need(ladder)
+    hold("gate_a_uneven", told(judge(ladder, "A")))
+
+
+def test_gate_a_of_evidence_that_says_little_says_what_it_said(ladder):
+    thin_need(ladder)
+    hold("gate_a_thin", told(judge(ladder, "A")))
 
 
 def mixed_need(root: Path) -> None:
@@ -117,55 +96,3 @@ def thin_need(root: Path) -> None:
     )
     evidence.edit_document(root, "audit/summary.json", lambda d: {
         **d, "modes_with_phase": 0, "modes_without_phase": 0})  # fmt: skip
-
-
-WORLDS: dict[str, dict[str, Change]] = {
-    "A": {"as it is": lambda root: None, "mixed": mixed_need, "thin": thin_need},
-}
-
-
-def reports(evidence_root: Path, scratch: Path, gate: str) -> dict[str, Any]:
-    """What the gate says in each of its worlds."""
-    found = {}
-    for name, change in WORLDS[gate].items():
-        root = scratch / name.replace(" ", "_")
-        shutil.copytree(evidence_root, root)
-        change(root)
-        found[name] = said(judge(root, gate))
-    return json.loads(json.dumps(found))
-
-
-def golden(gate: str) -> Path:
-    """The file of a gate's golden reports."""
-    return FOLDER / f"gate_{gate.lower()}.json"
-
-
-def _written(told: dict[str, Any]) -> str:
-    """A line for each value of a list, so that a difference can be read."""
-    worlds = [
-        f" {_line(name)}: {{\n"
-        + ",\n".join(f"  {_line(key)}: {_lines(value)}" for key, value in one.items())
-        + "}"
-        for name, one in told.items()
-    ]
-    return "{\n" + ",\n".join(worlds) + "}\n"
-
-
-def _lines(value: object) -> str:
-    several = isinstance(value, list) and len(value) > 1
-    return "[\n   " + ",\n   ".join(map(_line, value)) + "]" if several else _line(value)
-
-
-def _line(value: object) -> str:
-    return json.dumps(value, ensure_ascii=False)
-
-
-if __name__ == "__main__":
-    for letter in WORLDS:
-        with tempfile.TemporaryDirectory() as folder:
-            built = Path(folder) / "built"
-            built.mkdir()
-            evidence.build(built)
-            told = reports(built, Path(folder), letter)
-        FOLDER.mkdir(exist_ok=True)
-        golden(letter).write_text(_written(told))
