@@ -36,6 +36,22 @@ def doubts_of(report: GateReport) -> list[Doubt]:
     return [doubt for rule in RULES for doubt in rule(report)]
 
 
+def for_a_card(report: GateReport, candidate: str) -> list[str]:
+    """What a person signs in spite of: doubts about one candidate and the gate, as sentences.
+
+    What is said of another candidate is left out, but for what stopped it.
+
+    Args:
+        report: Of one gate.
+        candidate: The promoted one.
+    """
+    kept = tuple(
+        c for c in report.criteria if c.candidate in (None, candidate) or c.verdict == "FAIL"
+    )
+    found = doubts_of(report.model_copy(update={"criteria": kept, "caveats": ()}))
+    return [f"Gate {doubt.gate}, {doubt.kind}: {doubt.text}" for doubt in found]
+
+
 def _not_measured(report: GateReport) -> Iterator[Doubt]:
     """A criterion without a number says nothing, whatever the others say."""
     for answer in report.criteria:

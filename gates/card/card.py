@@ -16,6 +16,7 @@ from pydantic import Field
 from gates.card.envelope import Simulated, beyond_simulation
 from gates.card.people import PersonId
 from gates.claim import CHECKPOINT_ONLY
+from gates.doubts import for_a_card
 from gates.protection import HARDEST_CONTACT_N
 from gates.report import Gate, GateReport, Point, StrictModel, parse_section
 from gates.settings import GateSettings
@@ -87,7 +88,8 @@ class TrialCard(StrictModel):
         stop_path: How the robot is stopped, from hand to drive.
         abort_thresholds: What ends the trial, by name; may be lowered, never raised.
         rollback: What runs instead.
-        caveats: What the reports do not show, or what moved since the plan; people may add some.
+        caveats: What the reports do not show, what could make them wrong, what moved since the
+            plan; people may add some.
         not_before: First day of validity, YYYY-MM-DD.
         expires: Last day of validity, YYYY-MM-DD.
         nonce: Makes this card unlike any other; at least 16 printable ASCII characters.
@@ -168,9 +170,17 @@ def draft_card(
 
 
 def caveats_of(reports: Mapping[Gate, GateReport]) -> tuple[str, ...]:
-    """Caveats of the reports, each once, after the one that speaks of what was tested."""
+    """What a signer signs in spite of, each once, after what was tested at all.
+
+    The caveats of the reports, then what could make them wrong: near a limit, judged at a point.
+
+    Raises:
+        RefusedError: Gate D promotes no one.
+    """
+    candidate = promoted(reports["D"])
     found = [caveat for gate in sorted(reports) for caveat in reports[gate].caveats]
-    return tuple(dict.fromkeys([CHECKPOINT_ONLY, *found]))
+    doubts = [text for gate in sorted(reports) for text in for_a_card(reports[gate], candidate)]
+    return tuple(dict.fromkeys([CHECKPOINT_ONLY, *found, *doubts]))
 
 
 def left_out(required: Sequence[str], card: TrialCard) -> list[str]:

@@ -3,7 +3,9 @@
 import evidence
 import pytest
 
-from gates.doubts import doubts_of
+from gates.card.card import caveats_of
+from gates.card.signing import read_draft
+from gates.doubts import doubts_of, for_a_card
 from gates.proof import judge
 
 
@@ -68,6 +70,39 @@ def test_every_caveat_is_repeated_and_comes_last(ladder, gate):
     count = len(report.caveats)
     assert tuple(doubt.text for doubt in found[-count:]) == report.caveats
     assert "not shown" not in kinds(report)[:-count]
+
+
+def test_what_a_card_is_signed_in_spite_of_speaks_of_its_candidate(ladder):
+    report = judge(ladder, "D")
+    promoted = report.promoted
+    other = next(name for name in report.candidates if name != promoted)
+    held = next(c for c in report.criteria if c.candidate == promoted and c.comparison == "<=")
+    near = {"verdict": "PASS", "interval": None, "measured": 0.95, "threshold": 1.0}
+    mine = held.model_copy(update=near)
+    theirs = held.model_copy(update={**near, "candidate": other})
+    fallen = held.model_copy(update={"id": "fell", "candidate": other, "verdict": "FAIL"})
+    narrow = report.model_copy(
+        update={
+            "criteria": (mine, theirs, fallen),
+            "candidates": {**report.candidates, other: "FAIL"},
+        }
+    )
+    assert sum(d.kind == "near its limit" for d in doubts_of(narrow)) == 2
+    said = for_a_card(narrow, promoted)
+    near_texts = [text for text in said if "95 % of its limit is used up" in text]
+    assert len(near_texts) == 1 and f"({promoted})" in near_texts[0]
+    assert f"Gate D, stopped here: {other}: fell" in said
+    assert not any(caveat in text for caveat in report.caveats for text in said)
+
+
+def test_a_draft_says_what_could_make_its_reports_wrong(ladder):
+    reports = {gate: judge(ladder, gate) for gate in "ABCD"}
+    doubts = [text for gate in "ABCD" for text in for_a_card(reports[gate], reports["D"].promoted)]
+    kinds_said = {text.split(":")[0] for text in doubts}
+    assert {f"Gate {gate}, judged at a point" for gate in "AD"} <= kinds_said
+    caveats = caveats_of(reports)
+    assert set(doubts) <= set(caveats) and caveats[-1] == doubts[-1]
+    assert caveats == read_draft(ladder).caveats
 
 
 def _near(report):
