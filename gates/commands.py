@@ -4,13 +4,10 @@ Registered in `genpolicy.commands`. Exit codes: 0 done, 1 a fault of ours, 2 bad
 3 refused: a gate that does not pass, or a report that is not what the files say.
 """
 
-import dataclasses
 import datetime
-import json
 import sys
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -19,13 +16,17 @@ from genpolicy.cli.shell import AsJson, examples, new_app, with_examples
 from genpolicy.errors import BadInputError, GenpolicyError
 
 if TYPE_CHECKING:
-    from gates.proof import Rung
     from gates.report import Gate
 
 Root = Annotated[Path, typer.Option(help="Repository root.")]
 Letter = Annotated[str, typer.Argument(help="Gate: A, B, C, D or E.")]
 
+Layout = Annotated[
+    Literal["text", "json", "junit", "github"], typer.Option("--format", help="How to print it.")
+]
+
 gates = new_app("Judge evidence, prove reports, sign and verify trial cards.")
+report = new_app("Compare the reports of two runs.")
 verify = new_app("Prove the reports that lie here, or judge the trial card.")
 
 
@@ -94,11 +95,16 @@ def shadow(
     return run_shadow(ShadowOptions(root, out, method, episode), admit("shadow", root).candidates)
 
 
-@gates.command(epilog=examples("genpolicy gates check --through C"))
+@gates.command(
+    epilog=examples(
+        "genpolicy gates check --through C", "genpolicy gates check --format junit > gates.xml"
+    )
+)
 def check(
     through: Annotated[str, typer.Option(help="Last gate that must pass.")] = "D",
     root: Root = Path(),
     as_json: AsJson = False,
+    layout: Layout = "text",
 ) -> int:
     """Prove the chain.
 
@@ -106,18 +112,31 @@ def check(
     report is untrue, 2 if a report or a setting cannot be read. Through E, git
     must show that the plan was committed before the evidence, and that nobody
     but the authors committed to the candidate; 2 where it does not.
+
+    `--format junit` prints a test for each criterion, `github` an annotation for
+    each that does not hold.
     """
     from gates.card.history import require_history
+    from gates.printed import page_problem, print_cases, print_rungs, worst
     from gates.proof import prove_all
     from gates.report import GATES
 
     last = _gate(through)
     rungs = prove_all(root)[: GATES.index(last) + 1]
-    _print_rungs(rungs, as_json)
     codes = {rung.exit_code for rung in rungs if rung.verdict != "PASS"}
+    problems = [page for page in [page_problem(root)] if page]
     if last == "E" and not codes:
-        require_history(root)
-    return _worst(codes | _pages(root))
+        try:
+            require_history(root)
+        except GenpolicyError as error:
+            problems.append(("history", str(error), "preregistration.yaml", error.exit_code))
+    if layout in ("junit", "github"):
+        print_cases(root, rungs, problems, layout)
+    else:
+        print_rungs(rungs, as_json or layout == "json")
+    for _, text, _, _ in problems:
+        print(text, file=sys.stderr)
+    return worst(codes | {code for *_, code in problems})
 
 
 @gates.command("verify", epilog=examples("genpolicy gates verify --json"))
@@ -129,6 +148,7 @@ def verify_reports(root: Root = Path(), as_json: AsJson = False) -> int:
     what its journal says; the front page must be the one that the reports give.
     Exit 3 if a report is untrue, 2 if one cannot be read.
     """
+    from gates.printed import pages_code, print_rungs, worst
     from gates.proof import prove_all
 
     rungs = [rung for rung in prove_all(root) if rung.verdict != "NOT JUDGED"]
@@ -139,9 +159,9 @@ def verify_reports(root: Root = Path(), as_json: AsJson = False) -> int:
     from gates.rederive import rederived
 
     rungs = rederived(root, rungs)
-    _print_rungs(rungs, as_json)
+    print_rungs(rungs, as_json)
     codes = {rung.exit_code for rung in rungs if rung.verdict == "REFUSED"}
-    return _worst(codes | _pages(root))
+    return worst(codes | pages_code(root))
 
 
 @gates.command(epilog=examples("genpolicy gates show C"))
@@ -213,6 +233,36 @@ def sign(
     return 0
 
 
+@report.callback()
+def _report() -> None:
+    """Compare the reports of two runs."""  # or typer takes the one command for the group
+
+
+@report.command("diff", epilog=examples("genpolicy report diff HEAD~1 reports"))
+def diff(
+    before: Annotated[str, typer.Argument(help="A checkout, a folder of reports or a commit.")],
+    after: Annotated[str, typer.Argument(help="Likewise; `reports` for what lies here.")],
+    root: Root = Path(),
+    as_json: AsJson = False,
+) -> int:
+    """What moved between two runs, and what may be why; proves nothing.
+
+    Per gate: its verdict, criteria that turned, limits that were loosened or
+    tightened, numbers, then which code, parameters and evidence are other ones.
+    Exit 0 whatever moved.
+    """
+    from gates.moved import moved, moved_text
+    from gates.past import reports_of
+    from gates.printed import print_rows
+
+    found = moved(reports_of(before, root), reports_of(after, root))
+    if as_json:
+        print_rows(found)
+    else:
+        print(moved_text(found))
+    return 0
+
+
 @gates.command("verify-card", epilog=examples("genpolicy gates verify-card --today 2027-01-31"))
 @verify.command("card", epilog=examples("genpolicy verify card --today 2027-01-31"))
 def verify_card(
@@ -242,12 +292,13 @@ def verify_card(
 def summary(root: Root = Path(), as_json: AsJson = False) -> int:
     """The ladder in one table, each report proved; always exits 0."""
     from gates.overview import as_text, overview
+    from gates.printed import print_rows
     from gates.proof import prove_all
     from gates.writing import INDEX
 
     lines = overview(root, prove_all(root))
     if as_json:
-        _print_rows(lines)
+        print_rows(lines)
         return 0
     print(as_text(lines))
     if (root / INDEX).is_file():
@@ -266,29 +317,6 @@ def _require_beneath(root: Path) -> None:
         rederive(root, gate)
 
 
-def _pages(root: Path) -> set[int]:
-    """Exit code of a printed page that says other than the reports; none where all say the same."""
-    from gates.writing import changed_page
-
-    try:
-        page = changed_page(root)
-    except GenpolicyError as error:
-        print(error, file=sys.stderr)
-        return {error.exit_code}
-    if not page:
-        return set()
-    print(
-        f"{page} is another page, expected the one that the reports give. Run "
-        "`dvc repro -f gate_a`, which prints it again; never edit a page.",
-        file=sys.stderr,
-    )
-    return {3}
-
-
-def _worst(codes: set[int]) -> int:
-    return 2 if 2 in codes else max(codes, default=0)
-
-
 def _gate(letter: str) -> "Gate":
     from gates.report import GATES
 
@@ -298,20 +326,6 @@ def _gate(letter: str) -> "Gate":
     raise BadInputError(
         where="gate", found=repr(letter), expected="A, B, C, D or E", action="Name one gate."
     )
-
-
-def _print_rungs(rungs: "Sequence[Rung]", as_json: bool) -> None:
-    if as_json:
-        _print_rows(rungs)
-        return
-    wide = max(len(rung.name) for rung in rungs)
-    for rung in rungs:
-        name = f"{rung.gate}  {rung.name:<{wide}}  {rung.verdict:<14}"
-        print(f"{name}  {rung.decided_by or rung.note}".rstrip())
-
-
-def _print_rows(rows: Sequence[Any]) -> None:
-    print(json.dumps([dataclasses.asdict(row) for row in rows], indent=2, ensure_ascii=False))
 
 
 def _day(text: str) -> datetime.date:

@@ -113,4 +113,11 @@ HONEST = (
             "report asks.", "small",
             _params(lambda p: (p.update(seed=7), p["record"].update(episodes=140))),
             note="Added after the one above was stopped; it does what the report says."),
+    Variant("more_starts", "Six starts for each condition in place of three.", "small",
+            _params(lambda p: p["stress"].update(starts=6))),
+    Variant("another_seed_more_recordings_and_starts", "Another seed, twice as many recordings and "
+            "eight starts, as its report asks.", "small",
+            _params(lambda p: (p.update(seed=7), p["record"].update(episodes=140),
+                               p["stress"].update(starts=8))),
+            note="Added after the one with three starts was stopped at Gate D."),
 )  # fmt: skip

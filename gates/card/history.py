@@ -7,14 +7,13 @@ Git shows the order of commits, not when a run took place or whose hands typed. 
 and left out of the history until the plan was committed looks like evidence that came after it.
 """
 
-import os
 import re
-import subprocess
 from collections.abc import Sequence
 from pathlib import Path
 
 from gates.card.people import ALLOW_LIST, AllowList, load_allow_list
 from gates.card.signing import read_draft
+from gates.git import git
 from gates.pipeline import LOCK, RUNGS
 from gates.preregistration import PREREGISTRATION, asked_by
 from gates.report import GATES, Gate
@@ -66,7 +65,7 @@ def require_registered_first(root: Path) -> None:
             or the plan is no older than the evidence of a stage.
     """
     _require_whole(root)
-    if _git(root, "diff", "--quiet", "HEAD", "--", PREREGISTRATION) is None:
+    if git(root, "diff", "--quiet", "HEAD", "--", PREREGISTRATION) is None:
         _refuse(PREREGISTRATION, "not committed as it lies here", "committed before the evidence")
     digests, versions = _evidence_digests(root), _versions(root)
     if not versions:
@@ -104,8 +103,8 @@ def require_makers_known(root: Path, authors: Sequence[str], allowed: AllowList)
         if not person.emails:
             found = "without addresses"
             _refuse(f"{ALLOW_LIST}: {person.id}", found, "those of their commits", NAME_ALL)
-    changed = _git(root, "status", "--porcelain", "--untracked-files=all", "--", *CANDIDATE)
-    committed = _git(root, "log", f"--format={MAKERS}", "--", *CANDIDATE)
+    changed = git(root, "status", "--porcelain", "--untracked-files=all", "--", *CANDIDATE)
+    committed = git(root, "log", f"--format={MAKERS}", "--", *CANDIDATE)
     if changed or not committed:
         name = str(changed).splitlines()[0].split(maxsplit=1)[-1] if changed else "the candidate"
         _refuse(name, "not committed as it lies here", "a commit that says who made it")
@@ -132,10 +131,10 @@ def _addresses(makers: str) -> list[str]:
 
 def _versions(root: Path) -> list[tuple[str, dict[str, object]]]:
     """Commits that changed the plan, the newest first, each with the plan as it left it."""
-    commits = (_git(root, "log", "--format=%H", "--", PREREGISTRATION) or "").split()
+    commits = (git(root, "log", "--format=%H", "--", PREREGISTRATION) or "").split()
     found = []
     for commit in commits:
-        text = _git(root, "show", f"{commit}:{PREREGISTRATION}") or ""
+        text = git(root, "show", f"{commit}:{PREREGISTRATION}") or ""
         try:
             plan = parse_yaml(text.encode(), where=f"{commit[:7]}:{PREREGISTRATION}")
         except GenpolicyError:
@@ -151,12 +150,12 @@ def _after(root: Path, versions: Sequence[tuple[str, dict[str, object]]], gate: 
     parts = [{p: v for p, v in plan.items() if asked_by(p) in reached} for _, plan in versions]
     same = next((n for n, part in enumerate(parts) if part != parts[0]), len(parts))
     planned = versions[same - 1][0]
-    return {*(_git(root, "rev-list", "--ancestry-path", f"{planned}..HEAD") or "").split()}
+    return {*(git(root, "rev-list", "--ancestry-path", f"{planned}..HEAD") or "").split()}
 
 
 def _brought(root: Path, digest: str) -> set[str]:
     """Commits that brought a hash into the lock file or took it out, on whatever branch."""
-    found = _git(root, "log", "--full-history", "-m", "--format=%H", f"-S{digest}", "--", LOCK)
+    found = git(root, "log", "--full-history", "-m", "--format=%H", f"-S{digest}", "--", LOCK)
     return {*(found or "").split()}
 
 
@@ -174,26 +173,13 @@ def _evidence_digests(root: Path) -> dict[str, str]:
 
 def _require_whole(root: Path) -> None:
     """Require a repository of git whose history goes back to its beginning."""
-    cut = _git(root, "rev-parse", "--is-shallow-repository")
+    cut = git(root, "rev-parse", "--is-shallow-repository")
     if cut is None:
         expected = "one that says what was committed first, and by whom"
         _refuse("the repository", "without git history", expected)
     if cut != "false":
         expected = "the whole history (`git fetch --unshallow`)"
         _refuse("the repository", "a shallow clone", expected)
-
-
-def _git(root: Path, *args: str) -> str | None:
-    """Output of a git command; None if it fails or there is no git."""
-    command = ["git", "--no-replace-objects", "-C", str(root), *args]
-    whole = {**os.environ, "GIT_GRAFT_FILE": os.devnull}  # or a file of ours could hide commits
-    try:
-        done = subprocess.run(
-            command, capture_output=True, text=True, check=False, errors="replace", env=whole
-        )
-    except OSError:
-        return None
-    return done.stdout.strip() if done.returncode == 0 else None
 
 
 def _refuse(where: str, found: str, expected: str, action: str = PLAN_FIRST) -> None:

@@ -1,0 +1,113 @@
+"""The state of the ladder for machines that block a merge: JUnit XML, annotations of GitHub.
+
+Whatever keeps the exit code from 0 is a failure here as well: a list that is all green beside a
+job that is red would be believed.
+"""
+
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from gates.proof import Rung
+from gates.report import Answer, Gate, GateReport, limit_text, measured_text
+
+
+@dataclass(frozen=True)
+class Case:
+    """One question that was put to a gate.
+
+    Attributes:
+        gate: Letter of the gate; empty for what lies beside the gates.
+        name: Criterion, with its candidate in brackets; `report` for the report itself.
+        state: `PASS`, or why it does not; as the report says it.
+        text: One line for a reader.
+        file: Where it stands, relative to the repository.
+        blocks: Whether it keeps the ladder from passing. What stopped a candidate beside one that
+            passes does not.
+    """
+
+    gate: str
+    name: str
+    state: str
+    text: str
+    file: str
+    blocks: bool
+
+
+def cases(rungs: Sequence[Rung], reports: Mapping[Gate, GateReport]) -> list[Case]:
+    """Every criterion of the proved reports; one case for a gate that has none to show.
+
+    Args:
+        rungs: The gates that are asked for, as proved.
+        reports: Their reports, as they lie there.
+    """
+    return [case for rung in rungs for case in _of_rung(rung, reports.get(rung.gate))]
+
+
+def beside(name: str, text: str, file: str) -> Case:
+    """What blocks though every gate passes: a page, the history."""
+    return Case("", name, "REFUSED", text, file, blocks=True)
+
+
+def as_junit(found: Sequence[Case]) -> str:
+    """JUnit XML: a suite for each gate, a test for each criterion; skipped what does not block."""
+    root = ET.Element("testsuites", name="genpolicy")
+    for gate in dict.fromkeys(case.gate for case in found):
+        own = [case for case in found if case.gate == gate]
+        suite = ET.SubElement(root, "testsuite", name=_suite(gate), tests=str(len(own)))
+        suite.set("failures", str(sum(case.blocks for case in own)))
+        suite.set("skipped", str(sum(_skipped(case) for case in own)))
+        for case in own:
+            test = ET.SubElement(suite, "testcase", classname=_suite(gate), name=case.name)
+            test.set("file", case.file)
+            if case.blocks:
+                ET.SubElement(test, "failure", type=case.state, message=case.text)
+            elif _skipped(case):
+                ET.SubElement(test, "skipped", message=f"{case.state}: {case.text}")
+    ET.indent(root)
+    return ET.tostring(root, encoding="unicode", xml_declaration=True)
+
+
+def as_github(found: Sequence[Case]) -> str:
+    """Workflow commands: an error for what blocks, a warning for what stopped one candidate."""
+    lines = []
+    for case in found:
+        if case.state != "PASS":
+            level = "error" if case.blocks else "warning"
+            title = _property(f"{_suite(case.gate)}, {case.name}: {case.state}")
+            lines.append(
+                f"::{level} file={_property(case.file)},title={title}::{_message(case.text)}"
+            )
+    return "\n".join(lines)
+
+
+def _skipped(case: Case) -> bool:
+    return not case.blocks and case.state != "PASS"
+
+
+def _suite(gate: str) -> str:
+    return f"Gate {gate}" if gate else "Beside the gates"
+
+
+def _of_rung(rung: Rung, report: GateReport | None) -> Iterator[Case]:
+    if rung.verdict in ("NOT JUDGED", "REFUSED") or report is None:
+        yield Case(rung.gate, "report", rung.verdict, rung.note, rung.report, blocks=True)
+        return
+    passes = rung.verdict == "PASS"
+    for answer in report.criteria:
+        name = f"{answer.id} ({answer.candidate})" if answer.candidate else answer.id
+        blocks = answer.verdict != "PASS" and not passes
+        yield Case(rung.gate, name, answer.verdict, _text(answer), rung.report, blocks)
+
+
+def _text(answer: Answer) -> str:
+    held = f"{measured_text(answer)}, required {limit_text(answer)}"
+    return f"{answer.question} {held}{f' ({answer.caveat})' if answer.caveat else ''}"
+
+
+def _message(text: str) -> str:
+    return text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+
+
+def _property(text: str) -> str:
+    return _message(text).replace(":", "%3A").replace(",", "%2C")

@@ -1,0 +1,72 @@
+"""What the commands of the gates print, and the exit codes of what blocks beside the gates."""
+
+import dataclasses
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from gates.for_ci import as_github, as_junit, beside, cases
+from gates.proof import Rung
+from gates.report import read_report
+from gates.writing import INDEX, changed_page
+from genpolicy.errors import GenpolicyError
+
+Problem = tuple[str, str, str, int]
+"""What blocks beside the gates: its name, a sentence, its file, an exit code."""
+
+
+def pages_code(root: Path) -> set[int]:
+    """Exit code of a printed page that says other than the reports; none where all say the same."""
+    problem = page_problem(root)
+    if problem is None:
+        return set()
+    print(problem[1], file=sys.stderr)
+    return {problem[3]}
+
+
+def page_problem(root: Path) -> Problem | None:
+    """A page that says other than the reports, or that cannot be made; None if all agree."""
+    try:
+        page = changed_page(root)
+    except GenpolicyError as error:
+        return "page", str(error), INDEX, error.exit_code
+    if not page:
+        return None
+    text = (
+        f"{page} is another page, expected the one that the reports give. Run "
+        "`dvc repro -f gate_a`, which prints it again; never edit a page."
+    )
+    return "page", text, page, 3
+
+
+def print_cases(
+    root: Path, rungs: Sequence[Rung], problems: Sequence[Problem], layout: str
+) -> None:
+    """Every criterion, and what blocks beside the gates, as JUnit XML or for GitHub."""
+    proved = [rung.gate for rung in rungs if rung.verdict not in ("NOT JUDGED", "REFUSED")]
+    found = cases(rungs, {gate: read_report(root, gate)[0] for gate in proved})
+    found += [beside(name, text, file) for name, text, file, _ in problems]
+    print(as_junit(found) if layout == "junit" else as_github(found))
+
+
+def worst(codes: set[int]) -> int:
+    """The exit code of several: what cannot be read comes before what is refused."""
+    return 2 if 2 in codes else max(codes, default=0)
+
+
+def print_rungs(rungs: Sequence[Rung], as_json: bool) -> None:
+    """A line for each gate, or JSON."""
+    if as_json:
+        print_rows(rungs)
+        return
+    wide = max(len(rung.name) for rung in rungs)
+    for rung in rungs:
+        name = f"{rung.gate}  {rung.name:<{wide}}  {rung.verdict:<14}"
+        print(f"{name}  {rung.decided_by or rung.note}".rstrip())
+
+
+def print_rows(rows: Sequence[Any]) -> None:
+    """Dataclasses as JSON."""
+    print(json.dumps([dataclasses.asdict(row) for row in rows], indent=2, ensure_ascii=False))

@@ -1,0 +1,74 @@
+"""JUnit XML and annotations: what keeps the exit code from 0 is red, nothing else is."""
+
+import xml.etree.ElementTree as ET
+
+from test_differences import REPORT
+from test_verdicts import criterion
+
+from gates.for_ci import as_github, as_junit, beside, cases
+from gates.proof import Rung
+
+
+def rung(verdict, note=""):
+    code = 0 if verdict == "PASS" else 3
+    return Rung("A", "need", verdict, "", note, "reports/gate_a.json", code)
+
+
+def report(*criteria):
+    return {"A": REPORT.model_copy(update={"criteria": criteria})}
+
+
+def suites(found):
+    return list(ET.fromstring(as_junit(found)))
+
+
+def test_what_passes_is_a_test_without_a_word():
+    found = cases([rung("PASS")], report(criterion("PASS")))
+    (suite,) = suites(found)
+    assert (suite.get("name"), suite.get("tests"), suite.get("failures")) == ("Gate A", "1", "0")
+    assert not list(suite[0]) and suite[0].get("file") == "reports/gate_a.json"
+    assert as_github(found) == ""
+
+
+def test_every_criterion_that_does_not_hold_is_red():
+    kinds = ("FAIL", "INCONCLUSIVE", "PENDING_REVIEW")
+    for verdict in kinds:
+        found = cases([rung(verdict)], report(criterion("PASS"), criterion(verdict)))
+        (suite,) = suites(found)
+        assert (suite.get("tests"), suite.get("failures")) == ("2", "1")
+        assert [child.get("type") for child in suite[1]] == [verdict]
+        assert as_github(found).startswith("::error file=reports/gate_a.json,title=Gate A%2C ")
+
+
+def test_a_candidate_that_fell_beside_one_that_passes_blocks_nothing():
+    """The job is green then, so that its list must not be red; and it must not be silent."""
+    fell = criterion("FAIL").model_copy(update={"candidate": "flow"})
+    found = cases([rung("PASS")], report(criterion("PASS"), fell))
+    (suite,) = suites(found)
+    assert (suite.get("failures"), suite.get("skipped")) == ("0", "1")
+    assert suite[1].get("name").endswith("(flow)") and suite[1][0].tag == "skipped"
+    assert as_github(found).startswith("::warning ")
+
+
+def test_a_report_that_is_not_there_or_not_true_is_one_red_test():
+    for verdict in ("NOT JUDGED", "REFUSED"):
+        found = cases([rung(verdict, "edited")], report(criterion("PASS")))
+        ((test,),) = suites(found)
+        assert (test.get("name"), test[0].get("type")) == ("report", verdict)
+        assert test[0].get("message") == "edited"
+
+
+def test_what_blocks_beside_the_gates_is_red_by_itself():
+    found = [*cases([rung("PASS")], report(criterion("PASS"))), beside("page", "other", "p.html")]
+    last = suites(found)[-1]
+    assert (last.get("name"), last.get("failures")) == ("Beside the gates", "1")
+    assert (
+        as_github(found) == "::error file=p.html,title=Beside the gates%2C page%3A REFUSED::other"
+    )
+
+
+def test_no_text_breaks_out_of_its_line():
+    found = [beside("a,b", "100 %\n::error::forged <x>", "p")]
+    assert as_github(found).count("\n") == 0
+    assert "title=Beside the gates%2C a%2Cb%3A REFUSED::100 %25%0A::error" in as_github(found)
+    assert suites(found)[0][0][0].get("message") == "100 %\n::error::forged <x>"
