@@ -58,6 +58,7 @@ def from_dataset(
             episodes=episodes,
             observation_scale=scales(contract, settings),
             observation_names=contract.component_names,
+            action_names=tuple(dataset.manifest["action_contract"]["components"]),
             observation_position=observed,
             action_position=commanded,
             action_rotation=_rotation(dataset, commanded),
