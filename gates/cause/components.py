@@ -36,12 +36,12 @@ def trembling(numbers: Numbers, limits: CauseLimits) -> tuple[str, list[Answer]]
     def wide(item: Tremor) -> bool:
         return item.ratio - limits["noise_ratio"] >= 0 and item.spread - least >= 0
 
-    worst = max(numbers.tremors, key=lambda item: (wide(item), item.share))
-    trembles = wide(worst) and worst.share - limits["white_share"] >= 0
+    worst = max(numbers.tremors, key=lambda item: (wide(item), item.white_share))
+    trembles = wide(worst) and worst.white_share - limits["white_share"] >= 0
     answer = Answer(
         "white_share", Topic.STRUCTURE,
         f"share of white noise in the spread of {worst.column}, of all numbers the most",
-        worst.share, limits["white_share"] if wide(worst) else None, "<=",
+        worst.white_share, limits["white_share"] if wide(worst) else None, "<=",
         note=f"noise ratio {worst.ratio:.2f}, {worst.spread:.2g} of what sets two modes apart",
     )  # fmt: skip
     return worst.column if trembles else "", [answer]

@@ -59,10 +59,11 @@ class Tremor:
         ratio: Median von Neumann ratio of its spread inside situations: 1 white, 0 smooth.
         spread: Median of that spread, as a share of what sets two modes apart: of the route, or a
             fifth of what the number does in all.
-        share: Median share of white noise in all of its spread, constant differences included.
+        white_share: Median share of white noise in all of its spread, constant differences
+            included.
     """
 
     column: str
     ratio: float
     spread: float
-    share: float
+    white_share: float

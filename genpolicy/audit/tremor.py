@@ -48,7 +48,7 @@ def tremors(
 def _tremor(name: str, chunks: Sequence[Array], size: float) -> Tremor:
     ratio, spread = np.median([von_neumann(part) for part in chunks], axis=0)
     share = float(np.median([min(1.0, roughness(part)) for part in chunks]))
-    return Tremor(column=name, ratio=float(ratio), spread=float(spread) * size, share=share)
+    return Tremor(column=name, ratio=float(ratio), spread=float(spread) * size, white_share=share)
 
 
 def _motion(data: AuditInput) -> Array:
