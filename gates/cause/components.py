@@ -1,8 +1,15 @@
 """In which components of the action modes were looked for, so that no verdict claims more."""
 
 from gates.cause.answers import Answer, Topic
+from gates.cause.limits import CauseLimits
 from gates.cause.numbers import Numbers
-from genpolicy.audit.component_rows import NOT_LOOKED_AT, OTHER, ComponentModes
+from genpolicy.audit.component_rows import (
+    NOT_LOOKED_AT,
+    OTHER,
+    POSITION,
+    ComponentModes,
+    Tremor,
+)
 
 # The causes of these topics speak of modes, or of their absence.
 SPEAK_OF_MODES = (Topic.STRUCTURE, Topic.HIDDEN, Topic.VALIDITY, Topic.NONE)
@@ -16,6 +23,28 @@ def components(numbers: Numbers) -> list[Answer]:
 def followed(numbers: Numbers) -> str:
     """The component whose modes the counts, variables and outcomes are about."""
     return next((item.component for item in numbers.components if item.followed), "")
+
+
+def trembling(numbers: Numbers, limits: CauseLimits) -> tuple[str, list[Answer]]:
+    """The number of the action that trembles most, if one does, and the answer about it."""
+    # As much noise beside a route as beside what sets two of its modes apart.
+    route = next((item for item in numbers.components if item.component == POSITION), None)
+    if route is None or not numbers.tremors:
+        return "", []
+    least = limits["noise_spread_m"] * numbers.metre / route.separation
+
+    def wide(item: Tremor) -> bool:
+        return item.ratio - limits["noise_ratio"] >= 0 and item.spread - least >= 0
+
+    worst = max(numbers.tremors, key=lambda item: (wide(item), item.white_share))
+    trembles = wide(worst) and worst.white_share - limits["white_share"] >= 0
+    answer = Answer(
+        "white_share", Topic.STRUCTURE,
+        f"share of white noise in the spread of {worst.column}, of all numbers the most",
+        worst.white_share, limits["white_share"] if wide(worst) else None, "<=",
+        note=f"noise ratio {worst.ratio:.2f}, {worst.spread:.2g} of what sets two modes apart",
+    )  # fmt: skip
+    return worst.column if trembles else "", [answer]
 
 
 def unreadable(numbers: Numbers) -> list[str]:

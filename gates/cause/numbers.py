@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from genpolicy.audit.component_rows import ComponentModes
+from genpolicy.audit.component_rows import ComponentModes, Tremor
 from genpolicy.audit.documents import Counts
 from genpolicy.audit.reach_rows import LOCAL, Alternative, Reach, Side
 from genpolicy.audit.rows import Finding, ModeOutcome, Prediction, Stratum
@@ -60,6 +60,7 @@ class Numbers:
         other: What the other one found; None where there is none.
         other_reach: How far that reaches.
         residuals: By question, of those that are measured whether or not they stand out.
+        tremors: White noise on single numbers of the action.
     """
 
     findings: tuple[Finding, ...]
@@ -81,6 +82,7 @@ class Numbers:
     other: Side | None = None
     other_reach: tuple[Reach, ...] = ()
     residuals: Mapping[str, Residual] = field(default_factory=dict)
+    tremors: tuple[Tremor, ...] = ()
 
 
 def turned(numbers: Numbers) -> Numbers:

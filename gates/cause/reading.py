@@ -9,7 +9,7 @@ from typing import Any, Protocol, TypeVar
 
 from gates.cause.numbers import Kept, Labels, Numbers, Residual
 from gates.evidence import MissingEvidenceError
-from genpolicy.audit.component_rows import ComponentModes
+from genpolicy.audit.component_rows import ComponentModes, Tremor
 from genpolicy.audit.documents import PERSISTENCE, SUMMARY, Summary
 from genpolicy.audit.reach_rows import Alternative, FindingDraw, Reach, Side, StructureDraw
 from genpolicy.audit.rows import (
@@ -103,6 +103,7 @@ def read_measured(documents: Documents, rows: Rows) -> Numbers:
             other=next((side for side in sides if not side.followed), None),
             other_reach=tuple(row for row in reach if row.kind != kind),
             residuals=_residuals(rows),
+            tremors=tuple(rows("tremor.parquet", Tremor)),
         )
         _check_alternatives(numbers)
         _check_known((*numbers.told, *reach, *sides))

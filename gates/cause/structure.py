@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from gates.cause.answers import Answer, CauseName, Diagnosis, Named, Topic
-from gates.cause.components import components, looked_in, unreadable
+from gates.cause.components import components, looked_in, trembling, unreadable
 from gates.cause.hidden import OBSERVED, hidden, told_by_episode
 from gates.cause.limits import CauseLimits
 from gates.cause.numbers import Numbers, turned
@@ -189,13 +189,17 @@ def _absent(
     apart = counts.incoherent / counts.analysed if counts.analysed else 0.0
     denied, falling = _denied(numbers, limits), _falling_apart(numbers, limits, apart)
     few = _few(numbers, limits)
-    answers = [*denied, falling, few]
+    column, shaking = trembling(numbers, limits)
+    answers = [*denied, falling, few, *shaking]
     beside = max(apart, _apart_of_other(numbers))
     if any(answer.red for answer in denied):
         return answers, thin(_where(numbers, limits, blank))
-    if white or falling.red:
-        what = f"The clusters of {apart:.0%} of the situations do not persist"
-        return answers, _noise("The spread is noise from action to action" if white else what)
+    if white or falling.red or column:
+        what = "The spread is noise from action to action"
+        if not white:
+            what = f"The clusters of {apart:.0%} of the situations do not persist"
+            what = what if falling.red else f"{column} trembles from action to action"
+        return answers, _noise(what, "" if white or falling.red else column)
     if few.red:
         text = (
             f"Clusters were found in {counts.two_mode_episodes} of {counts.primary_episodes} "
@@ -310,6 +314,6 @@ def thin(text: str, *, kind: str = "neighbourhoods") -> Diagnosis:
     return Diagnosis(CauseName.INSUFFICIENT_SUPPORT, "", kind, text)
 
 
-def _noise(what: str) -> Diagnosis:
+def _noise(what: str, column: str = "") -> Diagnosis:
     text = f"{what}: use chunked behaviour cloning, which averages it out."
-    return Diagnosis(CauseName.POINTWISE_NOISE, "", "", text)
+    return Diagnosis(CauseName.POINTWISE_NOISE, column, "", text)

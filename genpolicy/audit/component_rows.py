@@ -48,3 +48,22 @@ class ComponentModes:
     incoherent: int
     persistent: int
     followed: bool
+
+
+@dataclass(frozen=True)
+class Tremor:
+    """`tremor.parquet`: white noise on one number of the action, as it was recorded.
+
+    Attributes:
+        column: Its name.
+        ratio: Median von Neumann ratio of its spread inside situations: 1 white, 0 smooth.
+        spread: Median of that spread, as a share of what sets two modes apart: of the route, or a
+            fifth of what the number does in all.
+        white_share: Median share of white noise in all of its spread, constant differences
+            included.
+    """
+
+    column: str
+    ratio: float
+    spread: float
+    white_share: float

@@ -204,7 +204,7 @@ def _stroke(data: AuditInput, name: str, columns: slice | Integers | None) -> Co
     known = values[training] if np.any(training) else values
     low, high = np.quantile(known, [0.01, 0.99], axis=0)
     stroke = high - low
-    moving = stroke > STROKE_NOISE * _white(data, values)
+    moving = stroke > STROKE_NOISE * white(data, values)
     if not np.any(moving):
         return Component(name, "hardly_varies", "strokes", STROKE_SHARE)
     signal = values[:, moving] / stroke[moving]
@@ -215,8 +215,13 @@ def _stroke(data: AuditInput, name: str, columns: slice | Integers | None) -> Co
     return Component(name, "varies", "strokes", STROKE_SHARE, signal=signal, begin=begin)
 
 
-def _white(data: AuditInput, values: Array) -> Array:
-    """Deviation of white noise on each column, from third differences. Shape (d,)."""
+def white(data: AuditInput, values: Array) -> Array:
+    """Deviation of white noise on each column, from third differences. Shape (d,).
+
+    Args:
+        data: Canonical audit input, for which rows are of one episode.
+        values: Shape (N, d).
+    """
     third = np.diff(values, THIRD, axis=0)[data.episode[THIRD:] == data.episode[:-THIRD]]
     if len(third) == 0:
         return np.zeros(values.shape[1])

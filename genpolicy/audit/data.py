@@ -86,6 +86,7 @@ class AuditInput:
         phase_name: What the recordings call the phase.
         stored: Place of each episode in the files, where no clock gives an order; else None. Shape
             (E,).
+        action_names: Name of each number of the action; none where they have no names. Length D_a.
     """
 
     observation: Array
@@ -115,6 +116,7 @@ class AuditInput:
     left_out: tuple[tuple[str, str], ...] = ()
     phase_name: str = "phase"
     stored: Array | None = None
+    action_names: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         n = len(self.observation)

@@ -68,6 +68,7 @@ def write_evidence(
         "strata": result.strata,
         "structure_draws": result.structure_draws,
         "support": support_points(result),
+        "tremor": result.tremors,
     }
     for name, row in (TABLES | FURTHER_TABLES).items():
         write_rows(folder / f"{name}.parquet", row, [_known(item) for item in rows[name]])

@@ -7,7 +7,7 @@ Most are what the audit itself computes with. None is "not measured", never zero
 
 from dataclasses import dataclass
 
-from genpolicy.audit.component_rows import ComponentModes
+from genpolicy.audit.component_rows import ComponentModes, Tremor
 from genpolicy.audit.followed_rows import Demonstration
 from genpolicy.audit.hidden_rows import Asked, Prediction, Stratum
 from genpolicy.audit.shown_rows import Alignment, ExampleChunk, SupportPoint
@@ -245,5 +245,6 @@ TABLES: dict[str, type] = {
     "resamples": Resample,
     "strata": Stratum,
     "support": SupportPoint,
+    "tremor": Tremor,
 }
 """Row of each table, by name without the suffix."""

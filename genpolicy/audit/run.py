@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from genpolicy.audit.asked import Given, questions
-from genpolicy.audit.component_rows import ComponentModes
+from genpolicy.audit.component_rows import ComponentModes, Tremor
 from genpolicy.audit.components import Component
 from genpolicy.audit.data import AuditInput, Integers, canonical
 from genpolicy.audit.documents import Counts, Persistence
@@ -40,6 +40,7 @@ from genpolicy.audit.situations import (
 )
 from genpolicy.audit.strata import examine_strata
 from genpolicy.audit.structure_draws import finding_draws
+from genpolicy.audit.tremor import tremors
 
 
 @dataclass(frozen=True)
@@ -73,6 +74,7 @@ class AuditResult:
         sides: What each of them found.
         structure_draws: Support and structure of each draw.
         finding_draws: Findings of halves of the episodes.
+        tremors: White noise on single numbers of the action.
     """
 
     data: AuditInput
@@ -99,6 +101,7 @@ class AuditResult:
     sides: tuple[Side, ...] = ()
     structure_draws: tuple[StructureDraw, ...] = ()
     finding_draws: tuple[FindingDraw, ...] = ()
+    tremors: tuple[Tremor, ...] = ()
 
     @property
     def primary_phase(self) -> str:
@@ -188,7 +191,13 @@ def _views(
         "components": component_modes(data, seen, view.look.component.name),
         "reach": (*local.reach(), *learned.reach()),
         "sides": tuple(item.row(followed=item is view) for item in (local, learned)),
+        "tremors": tremors(data, settings, _most(local, learned).situations),
     }, view
+
+
+def _most(local: View, learned: View) -> View:
+    """The kind of evidence that has more situations; of equal ones the neighbours."""
+    return max((local, learned), key=lambda item: len(item.situations))
 
 
 def _draws(

@@ -39,8 +39,7 @@ def from_dataset(
         ContractError: A channel or component that the settings name does not exist, or rows do
             not fit.
     """
-    frames, table = dataset.frames, dataset.episodes
-    slices = contract.slices
+    frames, table, slices = dataset.frames, dataset.episodes, contract.slices
     named = (settings.position_channel, settings.reference_channel, *settings.context_channels)
     for name in (*named, *settings.channel_scale):
         if name is not None and name not in slices:
@@ -58,6 +57,7 @@ def from_dataset(
             episodes=episodes,
             observation_scale=scales(contract, settings),
             observation_names=contract.component_names,
+            action_names=tuple(dataset.manifest["action_contract"]["components"]),
             observation_position=observed,
             action_position=commanded,
             action_rotation=_rotation(dataset, commanded),

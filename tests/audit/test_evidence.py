@@ -20,7 +20,7 @@ FILES = {
     "settings.json", "findings.parquet", "resamples.parquet", "examples.parquet",
     "alignment.parquet", "support.parquet", "demonstrated.parquet",
     "predictions.parquet", "asked.parquet", "reach.parquet", "structure_draws.parquet",
-    "finding_draws.parquet", "sides.parquet", "alternatives.parquet",
+    "finding_draws.parquet", "sides.parquet", "alternatives.parquet", "tremor.parquet",
 }  # fmt: skip
 
 

@@ -18,7 +18,7 @@ from gates.cause.limits import OWN
 from gates.feasibility.settings import LAYERS
 from gates.preregistration import PREREGISTRATION, plan_bytes
 from gates.reproducibility.timing import MEASURED_HERE, TERMS
-from genpolicy.audit.component_rows import ComponentModes
+from genpolicy.audit.component_rows import ComponentModes, Tremor
 from genpolicy.audit.reach_rows import Alternative, FindingDraw, Reach, Side, StructureDraw
 from genpolicy.audit.rows import (
     Asked,
@@ -543,6 +543,8 @@ def _audit(root: Path) -> None:
     table(root, "audit/neighbourhoods.parquet", SituationRow, [_situation(i) for i in range(60)])
     names = ("position", "rotation", "gripper", "timing")
     table(root, "audit/components.parquet", ComponentModes, [_component(name) for name in names])
+    calm = {"column": "x_m", "ratio": 0.1, "spread": 0.05, "white_share": 0.02}
+    table(root, "audit/tremor.parquet", Tremor, [calm])
     table(
         root,
         "audit/modes.parquet",

@@ -43,8 +43,9 @@ TAKEN_OUT = 1.1
 MOST = 0.5
 # A factor between episodes may be one of units if it is also this many spreads...
 MAGNITUDE_SPREADS = 8.0
-# ...and if the scatter of the episodes is larger by that factor too, within another one: an object
-# that stands elsewhere scatters as before.
+# ...and if the scatter of the episodes is larger by that factor too, within this one, or rather so
+# than as before: an object that stands elsewhere scatters as before, and the scatter of a few dozen
+# episodes that do several things is known to no better than a factor of two or three.
 SCATTER = 2.0
 LEAST_SCATTER = 5
 # Fewer episodes are a finding beyond this only.
@@ -275,7 +276,8 @@ def _off(values: Array, settings: AuditSettings) -> Array:
             expected = float(np.exp(typical)) * scattered
             scatter = densest_half(size[side])[1]
             # What does not scatter is a constant, and another constant is no unit.
-            if not (expected > 0 and expected / SCATTER <= scatter <= expected * SCATTER):
+            within = max(SCATTER, float(np.exp(abs(typical) / 2.0)))
+            if not (expected > 0 and expected / within <= scatter <= expected * within):
                 continue
             # Nor does a unit change signs: what passes through zero is small there.
             if abs(np.mean(values[side] > 0) - np.mean(values[known & ~far] > 0)) > SIGNS:

@@ -150,6 +150,12 @@ def _atoms(column: Column, sample: Sample, notes: list[str]) -> list[Atom]:
         kept = sample.usual(values[:, i])
         usual, number = values[kept, i], sample.number[kept]
         unit = column.unit or guess_unit(column.name, "" if name == group else name, usual)
+        said = stated_unit(name) or stated_unit(column.name)
+        if not column.unit and said not in (None, unit):
+            notes.append(
+                f"{column.name}: {name} says {said}, which its numbers are too large for: its unit "
+                "is unknown."
+            )
         wrapped = unit in ("rad", "unknown") and is_wrapped_angle(usual, number)
         if unit == "rad" and not wrapped and turns(usual) > 1.0:
             notes.append(f"{column.name}: {name} spans {turns(usual):.1f} turns.")

@@ -32,6 +32,9 @@ FULL_TURN_RAD = 2.0 * np.pi
 TURNS_RAD = 3.0 * FULL_TURN_RAD
 DEGREES = 540.0
 REACH_M = 5.0
+# Most of a column lies within this, or its name says another unit than its numbers have: no sensor
+# is wider, and no hall is longer.
+MOST = {"px": 20_000.0, "m": 100.0, "cm": 10_000.0, "mm": 100_000.0}
 
 
 def tokens(name: str) -> list[str]:
@@ -57,16 +60,17 @@ def guess_unit(column: str, component: str, values: Array) -> str:
     Returns:
         A unit, `1` for a pure number, `unknown` where nothing tells.
     """
-    stated = stated_unit(component) or stated_unit(column)
-    if stated is not None:
-        return stated
     words = {*tokens(column), *tokens(component)}
+    stated = stated_unit(component) or stated_unit(column)
     finite = values[np.isfinite(values)]
     if not len(finite):
-        return UNKNOWN_UNIT
+        return stated or UNKNOWN_UNIT
     # A single wild number must not decide the unit of all others.
     low, high = np.quantile(finite, BULK)
-    return _by_words(words, float(low), float(high))
+    unit = stated or _by_words(words, float(low), float(high))
+    # Nor must episodes in another unit than the rest.
+    beyond = float(np.median(np.abs(finite))) > MOST.get(unit, np.inf)
+    return UNKNOWN_UNIT if beyond else unit
 
 
 def _by_words(words: set[str], low: float, high: float) -> str:

@@ -90,3 +90,20 @@ def test_a_unit_comes_before_a_clock_and_both_are_seen():
     kinds = [d.kind for d in measure(
         mapped(data, some(data, 0.2), lambda part: 1000 * part), SETTINGS).findings]  # fmt: skip
     assert kinds[0] == "unit" and "clock" in kinds
+
+
+@pytest.mark.parametrize(("scatter", "named"), [(3.0, True), (100.0, False)])
+def test_a_hundredth_scatters_by_what_is_nearer_to_it_than_to_as_before(scatter, named):
+    """Few episodes tell it to a factor of three; what stands elsewhere scatters as before."""
+    data = arms(45)
+    rng = np.random.default_rng(3)
+    few = np.arange(60) < 18
+    goal = np.where(few, 0.01, 1.0) + 0.02 * np.where(few, 0.01 * scatter, 1.0) * rng.normal(
+        size=60
+    )
+    found = measure(replace(
+        data, observation=np.hstack([data.observation, goal[data.episode][:, None]]),
+        observation_names=(*data.observation_names, "goal"),
+        observation_scale=np.full(4, 0.01), context={"goal": slice(3, 4)},
+    ), SETTINGS)  # fmt: skip
+    assert [(item.kind, item.variable) for item in found.findings] == [("unit", "goal")] * named

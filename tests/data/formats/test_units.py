@@ -36,6 +36,22 @@ def test_one_wild_number_decides_no_unit():
     assert guess_unit("state", "elbow", values) == "rad"
 
 
+@pytest.mark.parametrize(
+    ("column", "scale", "unit"),
+    [
+        ("agent_x_px", 512.0, "px"), ("agent_x_px", 512_000.0, "unknown"),
+        ("tool_x_m", 0.8, "m"), ("tool_x_m", 800.0, "unknown"), ("tool_x_mm", 800.0, "mm"),
+        ("agent", 512_000.0, "unknown"),
+    ],
+)  # fmt: skip
+def test_a_unit_that_no_sensor_has_is_unknown(column, scale, unit):
+    values = np.linspace(0.0, scale, 900)
+    assert guess_unit(column, "", values) == unit
+    # A third of the episodes in another unit decides nothing: the audit shall find them.
+    mixed = np.where(np.arange(900) % 3 == 0, 1000.0 * values, values)
+    assert guess_unit(column, "", mixed) == unit
+
+
 def test_tokens():
     assert tokens("kLeftShoulderPitch") == ["left", "shoulder", "pitch"]
     assert tokens("observation.state/joint_12") == ["observation", "state", "joint", "12"]

@@ -7,6 +7,7 @@ import pytest
 from planted import HIDDEN, LIMITS, TOLD, VALID, counts, learned, limit, named
 
 from gates.cause import CauseName
+from genpolicy.audit.component_rows import Tremor
 from genpolicy.audit.variable import INSIDE
 
 ABSENT = counts(two_mode_episodes=0, two_mode=0, persistent=0)
@@ -55,6 +56,25 @@ def test_white_noise_must_be_a_share_of_what_chunks_differ_by():
     trembling = {"noise_ratio": 0.9, "noise_spread": 0.01, "two_mode_episodes": 0}
     assert named(counts(**trembling, white_share=0.3)).name is CauseName.POINTWISE_NOISE
     assert named(counts(**trembling, white_share=0.05)).name is CauseName.UNIMODAL
+
+
+@pytest.mark.parametrize(
+    ("changes", "name"),
+    [
+        ({}, "pointwise_noise"),
+        ({"ratio": 0.3}, "unimodal"),  # smooth from action to action
+        ({"spread": 0.05}, "unimodal"),  # less than two of thirty millimetres
+        ({"white_share": 0.05}, "unimodal"),  # next to nothing of why chunks differ
+    ],
+)
+def test_one_number_that_trembles_is_named(changes, name):
+    calm = Tremor("x", 0.1, 0.5, 0.08)
+    shaking = replace(Tremor("elbow", 0.9, 0.13, 0.7), **changes)
+    cause = named(replace(ABSENT, tremors=(calm, shaking)))
+    assert cause.name.value == name
+    assert cause.variable == ("elbow" if name == "pointwise_noise" else "")
+    # Modes that were seen are no tremor.
+    assert named(replace(VALID, tremors=(calm, shaking))).name is CauseName.VALID_MODES
 
 
 THIN = counts(two_mode_episodes=0, two_mode=0, persistent=0, analysed=0, analysed_episodes=0)
