@@ -32,7 +32,7 @@ from gates.running import require_running_code
 from gates.settings import GateSettings, Limit, Limits, read_limits, read_params, read_settings
 from gates.verdicts import combine, first_unmet, judge_criterion, rounded
 from genpolicy.errors import IntegrityError
-from genpolicy.integrity.hashing import sha256_bytes_of
+from genpolicy.integrity.hashing import sha256_bytes_of, sha256_file
 
 UNRECORDED = "Judged outside the pipeline: dvc.lock holds no run of"
 LIBRARIES = (
@@ -280,7 +280,7 @@ def upstream_hashes(root: Path, gate: Gate) -> dict[str, str]:
     for below in GATES[: GATES.index(gate)]:
         path = root / report_path(below)
         if path.is_file():
-            found[below] = sha256_bytes_of(path, keep=False)[0]
+            found[below] = sha256_file(path)
     return found
 
 

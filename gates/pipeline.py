@@ -260,8 +260,8 @@ def _equal(recorded: Any, now: Any) -> bool:
     if isinstance(recorded, dict) and isinstance(now, dict):
         return set(recorded) == set(now) and all(_equal(recorded[k], now[k]) for k in now)
     if isinstance(recorded, list) and isinstance(now, list):
-        pairs = zip(recorded, now, strict=False)
-        return len(recorded) == len(now) and all(_equal(a, b) for a, b in pairs)
+        same = len(recorded) == len(now)
+        return same and all(_equal(a, b) for a, b in zip(recorded, now, strict=True))
     if isinstance(recorded, str) and isinstance(now, float):
         try:
             return float(recorded) == now

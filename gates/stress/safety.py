@@ -47,7 +47,7 @@ def recovery_success_lower(
         favourable=True,
     )
     found = (lower, (lower, upper), f"{share:.4g} of {len(begun)} recoveries on {starts} starts")
-    for condition, part in begun.groupby("perturbation", sort=True):
+    for condition, part in begun.groupby("perturbation"):
         own, low, high = share_interval(
             flags(part, "recovered"),
             part["start"].to_numpy(),

@@ -1,19 +1,24 @@
-"""The form of what the gates pass on: nobody writes into it.
+"""The form of what the gates pass on: nobody writes into it, and its numbers are known.
 
 Asked of every class and function of `gates` at once. A verdict that could be written over after it
 was judged, or settings that take `yes` for 1.0, would be wrong in one place; here they are in none.
 """
 
+import dis
 import importlib
 import inspect
 import pkgutil
+from collections.abc import Iterator
 from dataclasses import FrozenInstanceError, fields, is_dataclass
-from types import FunctionType
+from types import CodeType, FunctionType
+from typing import Any
 
 import pytest
+from as_told import hold
 from pydantic import BaseModel
 
 import gates
+from gates.criterion import Criterion
 
 MODULES = [
     importlib.import_module(item.name)
@@ -43,6 +48,9 @@ FUNCTIONS = [
         if isinstance(method, FunctionType) and method.__module__ == item.__module__
         if not getattr(item, "_is_protocol", False)
     ),
+]
+CRITERIA = [
+    item for module in MODULES for item in vars(module).values() if isinstance(item, Criterion)
 ]
 
 
@@ -77,3 +85,67 @@ def test_every_argument_can_be_named():
         if item.kind is item.POSITIONAL_ONLY
     }
     assert nameless == set()
+
+
+def _codes(code: CodeType) -> Iterator[CodeType]:
+    yield code
+    for inner in code.co_consts:
+        if isinstance(inner, CodeType):
+            yield from _codes(inner)
+
+
+def _pairings(code: CodeType) -> list[object]:
+    """What `strict` is in each call with an argument of that name, of a function's own code."""
+    steps = list(dis.get_instructions(code))
+    named = [i for i, step in enumerate(steps) if step.opname == "KW_NAMES"]
+    return [steps[i - 1].argval for i in named if code.co_consts[steps[i].arg] == ("strict",)]
+
+
+def test_what_is_paired_is_equally_long():
+    """A pairing that drops what is left over would judge fewer rows than there are."""
+    found = [
+        (_name(function), strict)
+        for function in (*FUNCTIONS, *(item.measure for item in CRITERIA))
+        if not function.__module__.startswith("gates.pages")
+        for code in _codes(function.__code__)
+        for strict in _pairings(code)
+    ]
+    assert len(found) > 20 and [name for name, strict in found if strict is not True] == []
+
+
+def _numbers(value: Any, place: str) -> Iterator[tuple[str, float]]:
+    """Numbers in a value of a module, with where they stand; nothing of what is not plain data."""
+    if isinstance(value, (bool, int, float)):
+        yield place, value
+    elif isinstance(value, dict):
+        for key, item in value.items():
+            yield from _numbers(item, f"{place}.{key}")
+    elif isinstance(value, (tuple, list)):
+        for index, item in enumerate(value):
+            yield from _numbers(item, f"{place}.{index}")
+    elif is_dataclass(value) and not isinstance(value, type):
+        for field in fields(value):
+            yield from _numbers(getattr(value, field.name), f"{place}.{field.name}")
+
+
+def test_every_number_that_the_code_itself_holds_is_what_it_was():
+    """Constants, defaults and the bounds of settings: what decides and stands in no `params.yaml`.
+
+    A floor that protects people, a rounding, the fewest rows of a bound: one that moves is to be
+    seen in a review, beside the reason for it. What pages draw with is theirs.
+    """
+    constants = {
+        f"{module.__name__}.{name}": value
+        for module in MODULES
+        for name, value in vars(module).items()
+        if name.isupper() and not module.__name__.startswith("gates.pages")
+    }
+    defaults = {
+        f"{_name(item)}({argument.name})": argument.default
+        for item in (*FUNCTIONS, *DATA)
+        for argument in inspect.signature(item).parameters.values()
+    }
+    bounds = {_name(kind): kind.model_json_schema() for kind in MODELS}
+    found = {"constants": constants, "defaults": defaults, "bounds": bounds}
+    assert all(dict(_numbers(values, "")) for values in found.values())
+    hold("forms", {name: dict(_numbers(values, name)) for name, values in found.items()})

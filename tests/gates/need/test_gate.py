@@ -1,14 +1,20 @@
 """Gate A as a whole: nothing waives the cause, and every red number of the data stops it."""
 
+from dataclasses import fields
+
 import evidence
 import numpy as np
 import pytest
 from editing import cells
 
 from gates.cause import default_limits
+from gates.criterion import Criterion
 from gates.engine import ASTRIDE
-from gates.proof import judge
+from gates.need.settings import NeedSettings
+from gates.proof import SPECS, judge
+from gates.settings import read_params
 from genpolicy.audit.rows import Finding
+from genpolicy.errors import ConfigError
 from genpolicy.integrity.rows import write_rows
 
 DEFECTS = {
@@ -76,7 +82,33 @@ def test_a_defect_is_red_also_where_no_mode_persists_and_recovery_differs(ladder
     assert report.verdict == "FAIL" and verdicts(report)["persistence_margin"] == "FAIL"
     assert verdicts(report)["data_defects"] == "PASS"
     find(ladder, *DEFECTS["units"])
-    assert verdicts(judge(ladder, "A"))["data_defects"] == "FAIL"
+    report = judge(ladder, "A")
+    assert report.verdict == "FAIL" and "Cause found by the audit: data_defect(" in report.diagnosis
+    assert verdicts(report)["data_defects"] == verdicts(report)["cause_accepted"] == "FAIL"
+
+
+def test_recovery_is_no_way_into_a_pass(ladder):
+    """Decision 43: a criterion, limit or setting of its own would be the second way again."""
+    params, said = read_params(ladder)["gate_a"], judge(ladder, "A").model_dump_json()
+    limits = [name for entries in params["limits"].values() for name in entries]
+    named = {*(item.id for item in SPECS["A"].criteria), *NeedSettings.model_fields, *limits}
+    assert len(named) > 30 and not [n for n in named if "recover" in n or "route" in n]
+    assert "route" not in said and not {f.name for f in fields(Criterion)} & {"route", "routes"}
+
+
+@pytest.mark.parametrize("key", ["routes", "limits.model.recovery_benefit_lower"])
+def test_a_setting_of_a_route_is_unknown(ladder, key):
+    *place, name = key.split(".")
+
+    def add(params):
+        section = params["gate_a"]
+        for part in place:
+            section = section[part]
+        section[name] = [0.1, "a second way"]
+
+    evidence.write_params(ladder, add)
+    with pytest.raises(ConfigError, match=name):
+        judge(ladder, "A")
 
 
 def test_a_number_that_keeps_its_limit_is_no_defect(ladder):
