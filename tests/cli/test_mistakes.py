@@ -67,6 +67,7 @@ SCENES = {
     "above zarr and ours": (lambda r: lay(r, "a.zarr/.zgroup", "d/manifest.json",
                                           "d/frames.parquet"), "2 data sets (a.zarr, d)"),
     "above hdf5": (lambda r: lay(r, "a.hdf5", "b.hdf5"), "a folder of 2 HDF5 files (a.hdf5, b"),
+    "one cut hdf5": (lambda r: lay(r, "a.hdf5", "notes.txt", data=HDF5[:-9]), "a.hdf5 is cut off"),
     "above parquet": (lambda r: lay(r, "push/a.parquet", "pick/a.parquet"),
                       "they lie in 2 folders (pick, push)"),
     "above mcap": (lambda r: lay(r, "push/a.mcap", "pick/a.mcap"), "2 folders (pick, push)"),
@@ -186,7 +187,7 @@ def test_files_that_options_name_and_that_hold_no_settings(place, capsys):
 
 
 NAMED_WRONGLY = {
-    "robomimic": (lambda r: lay(r, "a.hdf5"), "a folder, expected one HDF5 file"),
+    "robomimic": (lambda r: lay(r, "a.hdf5", "b.h5"), "a folder, expected one HDF5 file"),
     "lerobot": (lambda r: lay(r, "a.parquet"), "without meta/info.json"),
     "parquet": (lambda r: lay(r, ".zgroup", "data/a/.zarray"), "without a .parquet file"),
     "mcap": (lambda r: lay(r, "a.parquet"), "without a .mcap file"),

@@ -64,7 +64,7 @@ def check_named(path: Path, layout: str) -> None:
     """
     try:
         suffix = {"mcap": ".mcap", "parquet": ".parquet"}.get(layout)
-        if layout == "robomimic" and path.is_dir():
+        if layout == "robomimic" and only_hdf5(path).is_dir():
             _refuse(path, "a folder", "one HDF5 file, as --format robomimic says")
         if layout == "lerobot" and not (path / "meta" / "info.json").is_file():
             _refuse(path, "without meta/info.json", "a LeRobot dataset, as --format says")
@@ -78,6 +78,19 @@ def check_named(path: Path, layout: str) -> None:
             )
     except OSError as error:
         refuse_unreadable(path, error)
+
+
+def only_hdf5(path: Path) -> Path:
+    """The HDF5 file of a folder that holds a single one; any other path as it is.
+
+    Raises:
+        BadInputError: A folder cannot be listed.
+    """
+    try:
+        names = contents(path).files.get("robomimic", []) if path.is_dir() else []
+    except OSError as error:
+        refuse_unreadable(path, error)
+    return path / names[0] if len(names) == 1 else path
 
 
 def contents(path: Path, *, into_whole: bool = False) -> Contents:
@@ -165,7 +178,7 @@ def _folder(path: Path) -> str:
     if not found.files:
         _refuse_unknown(path, _others(found.others))
     ((layout, names),) = found.files.items()
-    if layout == "robomimic":
+    if layout == "robomimic" and len(names) > 1:
         _refuse(
             path,
             f"a folder of {_count(len(names), 'HDF5 file')} ({listed(names)})",

@@ -11,7 +11,13 @@ import os
 from pathlib import Path
 from typing import BinaryIO, NoReturn
 
-from genpolicy.data.formats.detect import HDF5_MAGIC, MCAP_MAGIC, PARQUET_MAGIC, refuse_unreadable
+from genpolicy.data.formats.detect import (
+    HDF5_MAGIC,
+    MCAP_MAGIC,
+    PARQUET_MAGIC,
+    only_hdf5,
+    refuse_unreadable,
+)
 from genpolicy.errors import IntegrityError
 
 FIRST_USER_BLOCK = 512
@@ -23,7 +29,7 @@ ADDRESSES_AT = {0: 24, 1: 28, 2: 12, 3: 12}
 
 
 def check_ends(path: Path, layout: str) -> None:
-    """Refuse a file whose ends are not those of its layout; a folder is left to its reader.
+    """Refuse a file whose ends are not those of its layout; a folder of many is left to its reader.
 
     Args:
         path: File, or folder.
@@ -35,6 +41,7 @@ def check_ends(path: Path, layout: str) -> None:
     """
     check = CHECKS.get(layout)
     try:
+        path = only_hdf5(path) if layout == "robomimic" else path
         if check is None or not path.is_file():
             return
         size = path.stat().st_size

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from genpolicy.data.assemble import Refusal
 from genpolicy.data.formats.columns import labels_of
 from genpolicy.data.formats.contract import ImportContract
+from genpolicy.data.formats.detect import only_hdf5
 from genpolicy.data.formats.hdf5_single import REWRITE, check_storage, member, read_single
 from genpolicy.data.formats.source import (
     MAXIMUM_EPISODE_ROWS,
@@ -133,8 +134,8 @@ class RobomimicFile:
 
 
 def open_source(path: Path) -> RobomimicFile:
-    """A robomimic file, described; see `RobomimicFile`."""
-    return RobomimicFile(path)
+    """A robomimic file, or the only one of a folder, described; see `RobomimicFile`."""
+    return RobomimicFile(only_hdf5(path))
 
 
 @contextmanager

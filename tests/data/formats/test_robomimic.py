@@ -1,6 +1,7 @@
 """robomimic HDF5: read from inside the file only, refused by demonstration."""
 
 import json
+import shutil
 
 import h5py
 import numpy as np
@@ -51,6 +52,21 @@ def test_every_demonstration_under_its_number(file, layouts, tmp_path):
     assert "operator was taken from the file's masks" in notes
     assert opened.contract.pairing_guessed  # robomimic names no number; they follow each other
     assert len(opened.contract.pairing or {}) == 3
+
+
+def test_the_only_file_of_a_folder_is_that_file(file, tmp_path):
+    folder = tmp_path / "mine"
+    (folder / "deeper").mkdir(parents=True)
+    (folder / "notes.txt").write_text("of Tuesday")
+    shutil.copy(file, folder / "deeper" / file.name)
+    alone, inside = (
+        open_dataset(path, out=tmp_path / f"out_{path.stem}") for path in (file, folder)
+    )
+    for name in ("frames.parquet", "episodes.parquet"):
+        assert (inside.folder / name).read_bytes() == (alone.folder / name).read_bytes()
+    with pytest.raises(BadInputError, match="several layouts"):
+        (folder / "x.parquet").write_bytes(b"PAR1")
+        open_dataset(folder, out=tmp_path / "both")
 
 
 def external_link(demo, outside):
