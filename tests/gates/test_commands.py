@@ -137,10 +137,12 @@ def test_what_cannot_be_read_is_said_before_the_front_page(ladder, _run):
 
 
 def test_show_and_judge(ladder, _run):
-    assert "Gate C: PASS" in _run(ladder, "show", "C").output
+    shown = _run(ladder, "show", "C")
+    assert shown.exit_code == 0 and "Gate C: PASS" in shown.output
     result = _run(ladder, "judge", "A")
     assert result.exit_code == 0 and "Gate A: PASS" in result.output
-    assert json.loads(_run(ladder, "show", "A", "--json").output)["gate"] == "A"
+    shown = _run(ladder, "show", "A", "--json")
+    assert shown.exit_code == 0 and json.loads(shown.output)["gate"] == "A"
 
 
 def test_judge_exits_0_on_fail(ladder, _run):

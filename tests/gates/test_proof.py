@@ -33,6 +33,15 @@ def test_stages_before_a_gate_and_gate_stages_need_nothing(tmp_path):
             assert admit(stage, tmp_path).reports == {}
 
 
+def test_a_chain_that_does_not_hold_is_a_verdict_of_gate_e_and_no_error(ladder):
+    """What lies below a card is refused by name on its page; nobody signs, and nothing breaks."""
+    (ladder / report_path("B")).unlink()
+    report = judge(ladder, "E")
+    (below,) = [c for c in report.criteria if c.id == "upstream_passed"]
+    assert below.verdict == "FAIL" and "gate_b" in below.caveat.lower().replace(" ", "_")
+    assert report.verdict == "FAIL"
+
+
 def test_unknown_stage_is_a_configuration_error(tmp_path):
     with pytest.raises(ConfigError, match="one of task, record"):
         admit("deploy", tmp_path)

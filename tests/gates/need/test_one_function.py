@@ -5,8 +5,10 @@ import pytest
 from asked import settings_of
 from editing import cells
 
+from gates.cause.answers import Answer, Topic
 from gates.cause.limits import SHARED
 from gates.evidence import Evidence
+from gates.need import cause
 from gates.need.cause import found_cause
 from gates.proof import judge
 
@@ -134,6 +136,21 @@ def test_numbers_in_another_unit_than_metres_are_held_to_the_same_limit(ladder):
     answers = {answer.id: answer for answer in judge(ladder, "A").criteria}
     assert answers["calibration_residual_m"].measured == pytest.approx(0.002)
     assert answers["calibration_residual_m"].verdict == "PASS"
+
+
+def test_an_interval_is_in_the_unit_of_its_number(ladder, monkeypatch):
+    """Of pixels, a hundred for a metre, both are told in metres; of what has no length neither."""
+    evidence.edit_document(ladder, "audit/summary.json", lambda d: {**d, "metre": 100.0})
+
+    def answered(question, numbers, limits):
+        return Answer(question, Topic.DATA, "what", 0.2, 1.0, "<=", interval=(0.1, 0.4))
+
+    monkeypatch.setattr(cause, "deciding_answer", answered)
+    settings = settings_of(ladder, "A")
+    for question, unit in (("calibration_residual_m", 100.0), ("label_disagreement", 1.0)):
+        found = cause.as_the_cause(question, Evidence(ladder), settings)
+        assert found.value == pytest.approx(0.2 / unit)
+        assert found.interval == pytest.approx((0.1 / unit, 0.4 / unit))
 
 
 def test_the_confidence_of_the_bounds_is_that_of_the_settings(ladder):
