@@ -43,8 +43,10 @@ def _of_folder(folder: Path) -> dict[Gate, bytes]:
 
 
 def _of_revision(revision: str, root: Path) -> dict[Gate, bytes]:
-    # A word that begins with a dash would be an option of git.
-    if revision.startswith("-") or git(root, "rev-parse", "--verify", "-q", revision) is None:
+    if git(root, "rev-parse", "--verify", "-q", "--end-of-options", revision) is None:
         return {}
-    texts = {gate: git(root, "show", f"{revision}:./{report_path(gate)}") for gate in GATES}
+    texts = {
+        gate: git(root, "show", "--end-of-options", f"{revision}:./{report_path(gate)}")
+        for gate in GATES
+    }
     return {gate: text.encode() for gate, text in texts.items() if text is not None}
