@@ -13,8 +13,8 @@ from gates.report import Answer, Gate, GateReport, limit_text, measured_text
 
 
 @dataclass(frozen=True)
-class Case:
-    """One question that was put to a gate.
+class ListedTest:
+    """One question that was put to a gate, as a test in a list.
 
     Attributes:
         gate: Letter of the gate; empty for what lies beside the gates.
@@ -34,7 +34,7 @@ class Case:
     blocks: bool
 
 
-def cases(rungs: Sequence[Rung], reports: Mapping[Gate, GateReport]) -> list[Case]:
+def cases(rungs: Sequence[Rung], reports: Mapping[Gate, GateReport]) -> list[ListedTest]:
     """Every criterion of the proved reports; one case for a gate that has none to show.
 
     Args:
@@ -44,12 +44,12 @@ def cases(rungs: Sequence[Rung], reports: Mapping[Gate, GateReport]) -> list[Cas
     return [case for rung in rungs for case in _of_rung(rung, reports.get(rung.gate))]
 
 
-def beside(name: str, text: str, file: str) -> Case:
+def beside(name: str, text: str, file: str) -> ListedTest:
     """What blocks though every gate passes: a page, the history."""
-    return Case("", name, "REFUSED", text, file, blocks=True)
+    return ListedTest("", name, "REFUSED", text, file, blocks=True)
 
 
-def as_junit(found: Sequence[Case]) -> str:
+def as_junit(found: Sequence[ListedTest]) -> str:
     """JUnit XML: a suite for each gate, a test for each criterion; skipped what does not block."""
     root = ET.Element("testsuites", name="genpolicy")
     for gate in dict.fromkeys(case.gate for case in found):
@@ -68,7 +68,7 @@ def as_junit(found: Sequence[Case]) -> str:
     return ET.tostring(root, encoding="unicode", xml_declaration=True)
 
 
-def as_github(found: Sequence[Case]) -> str:
+def as_github(found: Sequence[ListedTest]) -> str:
     """Workflow commands: an error for what blocks, a warning for what stopped one candidate."""
     lines = []
     for case in found:
@@ -81,7 +81,7 @@ def as_github(found: Sequence[Case]) -> str:
     return "\n".join(lines)
 
 
-def _skipped(case: Case) -> bool:
+def _skipped(case: ListedTest) -> bool:
     return not case.blocks and case.state != "PASS"
 
 
@@ -89,15 +89,15 @@ def _suite(gate: str) -> str:
     return f"Gate {gate}" if gate else "Beside the gates"
 
 
-def _of_rung(rung: Rung, report: GateReport | None) -> Iterator[Case]:
+def _of_rung(rung: Rung, report: GateReport | None) -> Iterator[ListedTest]:
     if rung.verdict in ("NOT JUDGED", "REFUSED") or report is None:
-        yield Case(rung.gate, "report", rung.verdict, rung.note, rung.report, blocks=True)
+        yield ListedTest(rung.gate, "report", rung.verdict, rung.note, rung.report, blocks=True)
         return
     passes = rung.verdict == "PASS"
     for answer in report.criteria:
         name = f"{answer.id} ({answer.candidate})" if answer.candidate else answer.id
         blocks = answer.verdict != "PASS" and not passes
-        yield Case(rung.gate, name, answer.verdict, _text(answer), rung.report, blocks)
+        yield ListedTest(rung.gate, name, answer.verdict, _text(answer), rung.report, blocks)
 
 
 def _text(answer: Answer) -> str:
