@@ -152,7 +152,7 @@ WRONGS = (
           "small",
           patched("genpolicy/evidence/stress/disturbance.py",
                   ("self._drill_s = drill_s(", "self._drill_s = None and drill_s(")),
-          Expected("D", ("recovery_lower",), refusal=r"was drilled|no drill|drill"),
+          Expected("D", refusal=r"its drill was due .* had none"),
           note="Took the place of `pushes_that_never_come`: the small ladder pushes nobody, "
                "so that nothing had been planted."),
     Wrong("a_file_beside_signed_evidence", "evidence",
