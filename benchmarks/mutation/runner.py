@@ -106,7 +106,9 @@ def _run(path: str, text: str | None, tests: Sequence[str], log: Path, scratch: 
         if text is not None:
             sys.meta_path.insert(0, _Finder(path, text))
         if path.startswith(KERNELS):  # what was compiled of the true text must not be found
-            os.environ["NUMBA_CACHE_DIR"] = str(scratch / "kernels")
+            import numba
+
+            numba.config.CACHE_DIR = str(scratch / "kernels")
         import pytest
 
         options = ["-x", "-q", "--no-header", "--tb=no", "-p", "no:cacheprovider", "--timeout=0"]
