@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from genpolicy.contract.action import POSITION
 from genpolicy.feasibility.batch import Batch, Margins
 from genpolicy.feasibility.cell import Cell
-from genpolicy.robot.kinematics import ArmKinematics, pose_error
+from genpolicy.robot.frames import pose_error
+from genpolicy.robot.kinematics import ArmKinematics
 
 Array = NDArray[np.float64]
 
