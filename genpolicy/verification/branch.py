@@ -1,12 +1,24 @@
 """How far joints turn from one row to the next for no motion of the tool, by MuJoCo alone."""
 
+from collections.abc import Iterator
 from typing import Any
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from genpolicy.verification.contact import ROUNDING
+
 Array = NDArray[np.float64]
+Finding = tuple[str, str]
+
+
+def jumped(model: Any, data: Any, site: int, ends: Array, limit_rad: float) -> Iterator[Finding]:
+    """Whether the joints come to a row (2, J) by a motion of the TCP, and not by a jump."""
+    if np.max(np.abs(ends[1] - ends[0])) > limit_rad:
+        strayed = strayed_rad(model, data, site, ends)
+        if not strayed <= limit_rad * (1 + ROUNDING):
+            yield "P6.branch", f"A joint turns {strayed:.3g} rad that its pose asks for nowhere."
 
 
 def strayed_rad(model: Any, data: Any, site: int, ends: Array) -> float:

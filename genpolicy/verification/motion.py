@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from genpolicy.contract.action import GRIPPER, POSITION, ROTATION
 from genpolicy.contract.rotation import angle_between, rotation_from_6d
 from genpolicy.verification.body import Driven, OwnBody
-from genpolicy.verification.branch import strayed_rad
+from genpolicy.verification.branch import jumped
 from genpolicy.verification.contact import ROUNDING, ExpectedContact
 from genpolicy.verification.journal_source import Message
 
@@ -139,7 +139,7 @@ class MotionProof:
         openings = np.concatenate([told[GRIPPER][None], actions[first : row + 1, GRIPPER]])
         held = bool(np.all(openings <= self.expected.held_opening_m))
         ends = path[place - 1 : place + 1]
-        yield from self._on_one_branch(ends)
+        yield from jumped(self._model, self._data, self._tcp, ends, self.expected.branch_rad)
         self._pose(path[place], float(action[GRIPPER]), held, motion["scene"])
         yield from self._reached(action)
         yield from self._within(path[place], action, before, period_s)
@@ -217,17 +217,6 @@ class MotionProof:
         turn = float(angle_between(*rotations)) / period_s
         if not turn <= expected.tcp_turn_rad_s * (1 + ROUNDING):
             yield "P6.tcp_turn", f"The TCP turns at {turn:.4g} rad/s."
-
-    def _on_one_branch(self, ends: Array) -> Iterator[Finding]:
-        """Whether the joints come to a row (2, J) by a motion of the TCP, and not by a jump."""
-        limit_rad = self.expected.branch_rad
-        if np.max(np.abs(ends[1] - ends[0])) > limit_rad:
-            strayed = strayed_rad(self._model, self._data, self._tcp, ends)
-            if not strayed <= limit_rad * (1 + ROUNDING):
-                yield (
-                    "P6.branch",
-                    f"A joint turns {strayed:.3g} rad that its pose asks for nowhere.",
-                )
 
     def _rates(self, path: Array, period_s: float, *, loaded: bool) -> Iterator[Finding]:
         """Rates and torques of the path (n, J) that ends at the row, as far as it is known.

@@ -6,7 +6,7 @@ import pytest
 
 from genpolicy.robot.kinematics import ArmKinematics
 from genpolicy.tasks.api import load_task
-from genpolicy.verification.branch import strayed_rad
+from genpolicy.verification.branch import jumped, strayed_rad
 
 HOME = np.array([0.0, -0.3, 0.0, -2.2, 0.0, 1.9, 0.785])
 
@@ -38,3 +38,15 @@ def test_a_whole_turn_of_the_last_joint_is_all_of_it(arm):
     step = np.zeros(7)
     step[-1] = 2 * np.pi
     assert strayed(arm, step) == pytest.approx(2 * np.pi)
+
+
+def test_a_jump_is_named_only_where_a_joint_turns_beyond_the_limit_and_no_motion_asks_for_it(arm):
+    model, data, site, kinematics = arm
+    null = np.linalg.svd(kinematics.jacobian(HOME[None])[0])[2][-1]
+    step = 0.3 * null / np.max(np.abs(null))
+
+    def rules(limit_rad):
+        ends = np.stack([HOME, HOME + step])
+        return [rule for rule, _ in jumped(model, data, site, ends, limit_rad)]
+
+    assert rules(0.2) == ["P6.branch"] and rules(0.31) == []
