@@ -17,6 +17,7 @@ CHECKS_ASKED_FOR = (
     "kinematic.unreachable",
     "kinematic.joint_position",
     "kinematic.singular",
+    "kinematic.branch_jump",
     "geometric.scene_collision",
     "geometric.self_collision",
     "geometric.swept_collision",

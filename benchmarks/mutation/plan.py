@@ -1,4 +1,4 @@
-"""Which wrong gates are made, and which tests must notice them."""
+"""Which wrong modules are made, and which tests must notice them."""
 
 import difflib
 import random
@@ -55,6 +55,8 @@ TESTS = {
     "gates/differences.py": ("tests/gates/test_proof.py",),
     "gates/proof.py": ("tests/gates/test_pipeline.py",),
     "gates/report.py": ("tests/gates/test_proof.py",),
+    "genpolicy/execution": ("tests/execution", "tests/verification/test_state_machine.py"),
+    "genpolicy/feasibility": ("tests/feasibility",),
 }
 """Tests that a mutant meets after those of the file that mirrors its own; elsewhere none."""
 OTHERS = {"gates/stress": "ABC", "gates/feasibility": "AB", "gates/reproducibility": "ACD"}
@@ -124,11 +126,12 @@ def change_of(mutant: Mutant) -> str:
 
 def tests_of(path: str) -> list[str]:
     """Tests that a mutant of a module is held against: its mirror first, then its folder's."""
-    place = Path(path).relative_to("gates")
-    mirror = ROOT / "tests/gates" / place.parent / f"test_{place.name}"
+    place = Path(path.removeprefix("genpolicy/"))
+    mirror = ROOT / "tests" / place.parent / f"test_{place.name}"
     first = [mirror.relative_to(ROOT).as_posix()] if mirror.is_file() else []
     found = next((tests for key, tests in TESTS.items() if path.startswith(key)), ())
-    return first + [name for name in (*found, *EVERY) if name not in first]
+    last = EVERY if path.startswith("gates/") else ()
+    return first + [name for name in (*found, *last) if name not in first]
 
 
 def cases_of(path: str) -> str:

@@ -109,6 +109,8 @@ CHECKS: tuple[Check, ...] = (
     Check(_R.SINGULAR, "kinematic", kinematic.margins, _U.NONE,
           lambda cell, _: (cell.settings.condition_limit,),
           lambda cell: cell.settings.condition_limit),
+    Check(_R.BRANCH_JUMP, "kinematic", kinematic.margins, _U.RAD,
+          lambda cell, _: (cell.settings.branch_limit_rad,)),
     Check(_R.SCENE_COLLISION, "geometric", geometric.margins, _U.M, _clearance, _close),
     Check(_R.SELF_COLLISION, "geometric", geometric.margins, _U.M, _clearance, _close),
     Check(_R.SWEPT_COLLISION, "geometric", geometric.swept_margins, _U.M, _clearance, _close),

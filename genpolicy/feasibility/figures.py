@@ -19,6 +19,8 @@ def expected_motion(robot: Cell) -> ExpectedMotion:
         torque_nm=robot.limits.torque_nm,
         tcp_speed_m_s=settings.tcp_speed_limit_m_s,
         tcp_turn_rad_s=settings.tcp_turn_limit_rad_s,
+        joint_margin_rad=settings.joint_margin_rad,
+        branch_rad=settings.branch_limit_rad,
         condition=settings.condition_limit,
         held_opening_m=settings.held_opening_m,
         contact=ExpectedContact(

@@ -37,6 +37,7 @@ class Reason(StrEnum):
     UNREACHABLE = "unreachable"
     JOINT_POSITION = "joint_position"
     SINGULAR = "singular"
+    BRANCH_JUMP = "branch_jump"
     SCENE_COLLISION = "scene_collision"
     SELF_COLLISION = "self_collision"
     SWEPT_COLLISION = "swept_collision"

@@ -26,6 +26,9 @@ class FeasibilitySettings(BaseModel):
         rotation_tolerance_rad: Most that it may miss the rotation by.
         joint_margin_rad: Distance to keep from position limits (MoveIt Servo default).
         condition_limit: Most for the condition number (MoveIt Servo default for a hard stop).
+        branch_limit_rad: Most that a joint may turn from a row to the next beyond what the motion
+            of the TCP asks for; more is another branch (an elbow or a wrist that flips). Twice what
+            a joint of the default task may turn in a period, so that it names what is no motion.
         clearance_m: Distance to keep from everything outside the contact phases.
         contact_clearance_m: The same within the contact phases.
         velocity_factor: Part of the robot's joint velocity limits that may be used.
@@ -57,6 +60,7 @@ class FeasibilitySettings(BaseModel):
     rotation_tolerance_rad: PositiveFloat = 1e-6
     joint_margin_rad: float = Field(default=0.1, ge=0)
     condition_limit: PositiveFloat = 30.0
+    branch_limit_rad: PositiveFloat = 0.2
     clearance_m: float = Field(default=0.001, ge=0)
     contact_clearance_m: float = Field(default=0.0, ge=0)
     velocity_factor: float = Field(default=0.5, gt=0, le=1)

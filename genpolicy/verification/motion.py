@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from genpolicy.contract.action import GRIPPER, POSITION, ROTATION
 from genpolicy.contract.rotation import angle_between, rotation_from_6d
 from genpolicy.verification.body import Driven, OwnBody
+from genpolicy.verification.branch import jumped
 from genpolicy.verification.contact import ROUNDING, ExpectedContact
 from genpolicy.verification.journal_source import Message
 
@@ -49,6 +50,8 @@ class ExpectedMotion:
         torque_nm: What each joint can bear. Shape (J,).
         tcp_speed_m_s: What the TCP may do.
         tcp_turn_rad_s: Likewise.
+        joint_margin_rad: What joints keep off the ends of their ranges.
+        branch_rad: What a joint may turn, from a command to the next, for no motion of the TCP.
         condition: Largest over smallest singular value that the TCP's Jacobian may have.
         held_opening_m: Above this opening nothing is held.
         contact: What touching the target must keep to.
@@ -61,6 +64,8 @@ class ExpectedMotion:
     torque_nm: Array
     tcp_speed_m_s: float
     tcp_turn_rad_s: float
+    joint_margin_rad: float
+    branch_rad: float
     condition: float
     held_opening_m: float
     contact: ExpectedContact
@@ -133,13 +138,14 @@ class MotionProof:
         place = len(before_rad) + row - first + 1
         openings = np.concatenate([told[GRIPPER][None], actions[first : row + 1, GRIPPER]])
         held = bool(np.all(openings <= self.expected.held_opening_m))
+        ends = path[place - 1 : place + 1]
+        yield from jumped(self._model, self._data, self._tcp, ends, self.expected.branch_rad)
         self._pose(path[place], float(action[GRIPPER]), held, motion["scene"])
         yield from self._reached(action)
         yield from self._within(path[place], action, before, period_s)
         yield from self._turning_freely()
         loaded = bool(np.all(openings[:-1] <= self.expected.held_opening_m))
         yield from self._rates(path[: place + 1], period_s, loaded=loaded)
-        ends = path[place - 1 : place + 1]
         if row == first:
             yield from self._from_measured(chunk, ends, period_s)
         yield from self._touching(held, phase)
@@ -201,7 +207,8 @@ class MotionProof:
         lower, upper = expected.workspace_m
         if not np.all((action[POSITION] >= lower - 1e-9) & (action[POSITION] <= upper + 1e-9)):
             yield "P6.workspace", f"The TCP goes to {action[POSITION].tolist()} m."
-        if not np.all((q_rad >= limits[0]) & (q_rad <= limits[1])):
+        inner = limits[0] + expected.joint_margin_rad, limits[1] - expected.joint_margin_rad
+        if not np.all((q_rad >= inner[0] - 1e-9) & (q_rad <= inner[1] + 1e-9)):
             yield "P6.joint_limit", f"The joints go to {q_rad.tolist()} rad."
         speed = float(np.linalg.norm(action[POSITION] - before[POSITION])) / period_s
         if not speed <= expected.tcp_speed_m_s * (1 + ROUNDING):

@@ -5,7 +5,8 @@ from dataclasses import replace
 import pytest
 
 from genpolicy.contract.chunk import ChunkMetadata, DiscardReason
-from genpolicy.execution.checks import CHECKS, Place, at, refusal
+from genpolicy.errors import ConfigError
+from genpolicy.execution.checks import CHECKS, Place, at, refusal, without
 from genpolicy.execution.moment import FALLBACK, Chunk, ExecutorMode, Moment, View
 from genpolicy.execution.nanoseconds import ChunkTimes
 
@@ -177,3 +178,10 @@ def test_a_mode_of_the_controller_that_nobody_stated_does_not_hold():
     for controller, declared in (("", ""), ("", "m"), ("m", "")):
         moment = view(controller=controller, controller_mode=declared)
         assert failing(moment) == {"controller_mode"}
+
+
+def test_a_mutant_lacks_the_named_rows_alone_and_an_unknown_name_makes_none():
+    left = [check.name for check in without(CHECKS, "pace", "issued")]
+    assert left == [check.name for check in CHECKS if check.name not in ("pace", "issued")]
+    with pytest.raises(ConfigError, match=r"\['no such row'\].*names out of"):
+        without(CHECKS, "pace", "no such row")

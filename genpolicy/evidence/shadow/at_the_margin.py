@@ -24,6 +24,11 @@ RATES = ("joint_velocity", "joint_acceleration", "joint_jerk", "tcp_speed", "tcp
 # A leap is too fast, and so is the way to it, which leads through the same.
 LEAPING = (*RATES, "measured_velocity", "measured_collision")
 
+# What swings over turns as no joint can, and by a way that nobody looked at.
+SWINGING = (
+    *RATES, "joint_torque", "payload_torque", "measured_velocity", "measured_acceleration",
+    "swept_collision", "measured_collision",
+)  # fmt: skip
 OWN_WAY = ("workspace", "swept_collision", "measured_collision")
 
 BEYOND = 1.02  # of a limit
@@ -116,6 +121,19 @@ def singular_posture(case: Case, checker: FeasibilityChecker) -> Case | None:
     """The arm stands still where it cannot move in every direction."""
     cases = [still(case, checker, q) for q in postures_of(checker.cell).singular]
     return alone(checker, cases, "singular")
+
+
+def flipped_branch(case: Case, checker: FeasibilityChecker) -> Case | None:
+    """The TCP goes on by so little that the arm must swing over to reach it: a joint is at its end.
+
+    No joint is as fast as that, nor bears it, and the way over leads through whatever is there.
+    """
+    cases = []
+    for q_rad, twist in postures_of(checker.cell).edges:
+        here = still(case, checker, q_rad)
+        beyond = still(case, checker, q_rad + step_of(checker.cell, q_rad, twist))
+        cases.append(here.with_actions(beyond.proposal.actions).as_it_is())
+    return alone(checker, cases, "branch_jump", SWINGING)
 
 
 def folded_posture(case: Case, checker: FeasibilityChecker) -> Case | None:

@@ -266,6 +266,9 @@ CORRUPTIONS = (
     Corruption("awkward_posture", margin.awkward_posture, "kinematic", "joint_position"),
     Corruption("singular_posture", margin.singular_posture, "kinematic", "singular"),
     Corruption(
+        "flipped_branch", margin.flipped_branch, "kinematic", "branch_jump", margin.SWINGING
+    ),
+    Corruption(
         "collision", collision, "geometric", "scene_collision",
         ("swept_collision", "measured_collision", "contact_surface"), with_obstacle,
     ),

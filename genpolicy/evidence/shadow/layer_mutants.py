@@ -22,6 +22,7 @@ from genpolicy.verification.checker import check_messages
 RULES = {
     "workspace": "P6.workspace",
     "unreachable": "P6.pose",
+    "joint_position": "P6.joint_limit",
     "scene_collision": "P6.collision",
     "self_collision": "P6.collision",
     "joint_velocity": "P6.joint_speed",
@@ -40,6 +41,7 @@ RULES = {
     "contact_speed": "P6.contact_speed",
     "gripper_opening": "P6.release",
     "singular": "P6.singular",
+    "branch_jump": "P6.branch",
     "swept_collision": "P6.sweep",
     "measured_collision": "P6.measured_sweep",
 }

@@ -18,6 +18,8 @@ KEPT = 24  # postures of one kind; the first that only one check refuses is used
 OUT_OF_REACH = 0.5  # of the arm's reach, away from where the TCP is
 STRETCHING = 200  # iterations until the arm has stretched as far as it goes
 NEAR_M = 0.05  # outside the workspace, but this close to it
+EDGE_RAD = 0.015  # from the end of a joint's range, where its next step leads beyond
+FOLLOWING = 0.5  # of what a joint turns, where the arm makes the motion of its turn by all joints
 PART = 0.9  # of its limit: what is to be within it keeps clear of its edge
 
 
@@ -28,6 +30,8 @@ class Postures:
     Attributes:
         singular: Badly conditioned.
         tight: A joint within the margin of its position limit.
+        edges: A joint hardly before its position limit, and the motion of the TCP (m, rad) that
+            leads it beyond, so that only another branch reaches where the TCP goes.
         outside: The TCP just outside the workspace.
         folded: The robot touches itself; the TCP may be anywhere.
         stretched: Stretched towards a place out of reach, with its position and rotation.
@@ -35,6 +39,7 @@ class Postures:
 
     singular: Array
     tight: Array
+    edges: tuple[tuple[Array, Array], ...]
     outside: Array
     folded: Array
     stretched: tuple[tuple[Array, tuple[Array, Array]], ...]
@@ -68,10 +73,24 @@ def _search(cell: Cell) -> Postures:
         tight=q[(room > 0) & (room < PART * settings.joint_margin_rad) & good & (beyond < 0)][
             :KEPT
         ],
+        edges=_edges(cell, q[(room > 0) & (room < EDGE_RAD) & good & (beyond < 0)]),
         outside=q[roomy & good & (beyond > 0.001) & (beyond < NEAR_M)][:KEPT],
         folded=_folded(cell, q[roomy & good][:SAMPLED_FOR_FOLDING])[:KEPT],
         stretched=_stretched(cell, q[roomy & good & (beyond < 0)][:KEPT]),
     )
+
+
+def _edges(cell: Cell, q_rad: Array) -> tuple[tuple[Array, Array], ...]:
+    """Those from which the smallest motion that turns their joint beyond its limit is small."""
+    arm, found = cell.kinematics, []
+    for q, jacobian in zip(q_rad, arm.jacobian(q_rad), strict=True):
+        room = np.stack([q - arm.lower_rad, arm.upper_rad - q])
+        end, joint = np.unravel_index(np.argmin(room), room.shape)
+        turn = 2.0 * EDGE_RAD * (1.0 if end else -1.0)
+        share = (np.linalg.pinv(jacobian) @ jacobian[:, joint])[joint]
+        if share > FOLLOWING:
+            found.append((q, jacobian[:, joint] * (turn / share)))
+    return tuple(found[:KEPT])
 
 
 def _folded(cell: Cell, q_rad: Array) -> Array:

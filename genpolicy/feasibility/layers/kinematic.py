@@ -1,10 +1,20 @@
-"""The kinematic layer: inside the workspace, reachable, away from joint limits and singularity?"""
+"""The kinematic layer: in the workspace, reachable, off limits and singularity, on one branch?
+
+A pose has several joint positions. Each row's are sought from the last command on, and from other
+seeds where that fails, so that a row may have an elbow or a wrist on the other side than the row
+before it. Such a jump is no motion of the tool, however slowly it were made.
+"""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from genpolicy.contract.action import POSITION
 from genpolicy.feasibility.batch import Batch, Margins
 from genpolicy.feasibility.cell import Cell
+from genpolicy.robot.frames import pose_error
+from genpolicy.robot.kinematics import ArmKinematics
+
+Array = NDArray[np.float64]
 
 POSITION_ROUNDING_M = 1e-9
 
@@ -18,6 +28,9 @@ def margins(batch: Batch, cell: Cell) -> Margins:
                         rad) of inverse kinematics
     joint_position      min over joints of (q - lower, upper - q) - joint_margin_rad, rad
     singular            limit - largest over smallest singular value of the TCP Jacobian, 1
+    branch_jump         limit - largest turn of a joint from the last command, or the row before,
+                        rad; where that is beyond the limit, only the part of the turn that the
+                        motion of the TCP does not ask for
     ==================  =======================================================================
     """
     settings, workspace, arm = cell.settings, cell.workspace, cell.kinematics
@@ -35,4 +48,28 @@ def margins(batch: Batch, cell: Cell) -> Margins:
         "unreachable": reach.min(axis=1),
         "joint_position": room.min(axis=(1, 2)) - settings.joint_margin_rad,
         "singular": settings.condition_limit - condition.max(axis=1),
+        "branch_jump": settings.branch_limit_rad - _jumps(batch, cell).max(axis=1),
     })  # fmt: skip
+
+
+def _jumps(batch: Batch, cell: Cell) -> Array:
+    """How far joints turn to each row, rad; of turns beyond the limit what is no motion. (B, n)."""
+    path = np.concatenate([batch.q_cmd_rad[:, None], batch.solved.q_rad], axis=1)
+    turns: Array = np.max(np.abs(np.diff(path, axis=1)), axis=2)
+    chunk, row = np.nonzero((turns > cell.settings.branch_limit_rad) & np.isfinite(turns))
+    if len(chunk):
+        turns[chunk, row] = _unasked(cell.kinematics, path[chunk, row], path[chunk, row + 1])
+    return turns
+
+
+def _unasked(arm: ArmKinematics, before_rad: Array, after_rad: Array) -> Array:
+    """Largest turn of a joint beyond the least joint motion that moves the TCP so. Shape (n,), rad.
+
+    The least motion is that of the Jacobian half-way, so that what it misses of a smooth step is of
+    third order. No Jacobian half-way between two branches explains the way from one to the other.
+    """
+    step = after_rad - before_rad
+    way = pose_error(arm.frames(before_rad), *arm.forward(after_rad))
+    asked = np.linalg.pinv(arm.jacobian(before_rad + step / 2)) @ way[..., None]
+    unasked: Array = np.max(np.abs(step - asked[..., 0]), axis=1)
+    return unasked

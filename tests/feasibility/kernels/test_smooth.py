@@ -47,3 +47,8 @@ def test_changes_are_the_largest_of_all_rows(kit):
     actions[2, 3:9] = [np.cos(0.1), np.sin(0.1), 0.0, np.sin(0.1), -np.cos(0.1), 0.0]
     changes_of(raw, actions, changes)
     assert changes == pytest.approx([0.005, 0.1], abs=1e-9)
+
+
+def test_what_says_that_nothing_was_smoothed_is_no_rung():
+    """Rungs count from 0; a chunk that the second one smoothed would pass for one left alone."""
+    assert LEFT_ALONE < 0

@@ -1,8 +1,11 @@
 """The kinematic layer: each of its checks alone, and the margins that it gives."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from genpolicy.contract.chunk import Projected
 from genpolicy.feasibility.layers.kinematic import margins
 
 
@@ -17,10 +20,11 @@ def cases(checker, kit):
             kit.line(start, (0.335, 0, 0.06)), ctx, settings={"joint_margin_rad": 0.2}
         ),
         "singular": kit.Outside(good, ctx, settings={"condition_limit": 5.0}),
+        "branch_jump": kit.Outside(good, ctx, settings={"branch_limit_rad": 1e-6}),
     }
 
 
-@pytest.mark.parametrize("name", ["workspace", "joint_position", "singular"])
+@pytest.mark.parametrize("name", ["workspace", "joint_position", "singular", "branch_jump"])
 def test_outside_is_refused_by_exactly_this_check(name, cases, build, kit):
     kit.turns_red(build, name, cases[name])
 
@@ -52,3 +56,45 @@ def test_the_margins_are_distances_to_the_limits(checker, cell, kit):
     worst = max(np.linalg.cond(jacobian) for jacobian in arm.jacobian(q))
     assert found["singular"][0] == pytest.approx(30 - worst, rel=1e-6)
     assert 0 <= found["unreachable"][0] <= 1e-6
+
+
+def turned_over(ctx):
+    """The joints of the last command with one of them a whole turn on: the same pose."""
+    q_rad = np.array(ctx.q_cmd)
+    q_rad[-1] += 2 * np.pi
+    return q_rad
+
+
+def test_a_branch_that_jumps_is_refused_at_its_row_by_what_no_motion_asked_for(build, kit, checker):
+    """The seed lies beyond the limits, so that the pose is reached with a joint turned back."""
+    ctx = kit.context(checker, kit.START)
+    rates = [f"joint_{name}" for name in ("velocity", "acceleration", "jerk", "torque")]
+    swept = ("measured_velocity", "measured_acceleration", "swept_collision", "payload_torque")
+    others = (*rates, *swept, "measured_collision")
+    q_rad = turned_over(ctx)
+    there = replace(ctx, q_cmd=q_rad, q_meas=q_rad, q_cmd_history=np.tile(q_rad, (2, 1)))
+    still = np.tile(ctx.last_action, (4, 1))
+    projected = Projected(kit.proposal(still), still, 0.0, 0.0)
+    seeing = build(*others)
+    verdict = seeing.check(projected, context=there)
+    assert verdict.first_reason == "branch_jump" and verdict.layer("kinematic").unit == "rad"
+    turn = np.max(np.abs(verdict.q_rad[0] - q_rad))
+    assert turn > 3.0
+    assert verdict.layer("kinematic").margin == pytest.approx(0.2 - turn, abs=1e-6)
+    located = seeing.located(projected, verdict, context=there)
+    assert located.layer("kinematic").row == 0
+    assert build("branch_jump", *others).check(projected, context=there).passed
+
+
+def test_a_step_that_the_tool_asks_for_is_no_jump_however_long(cell, checker, kit):
+    """A line in two rows turns joints by a tenth of a radian and more, and keeps its branch."""
+    ctx = kit.context(checker, kit.START)
+    tight = replace(cell, settings=cell.settings.model_copy(update={"branch_limit_rad": 0.05}))
+    actions = kit.line(kit.START, np.add(kit.START, (0.0, 0.1, 0.02)), n=2)
+    batch = kit.solved(kit.batch_of((actions, ctx)), tight)
+    path = np.concatenate([ctx.q_cmd[None], batch.solved.q_rad[0]])
+    longest = np.max(np.abs(np.diff(path, axis=0)))
+    assert longest > 0.1
+    assert 0.0 < margins(batch, tight).values["branch_jump"][0] <= 0.05
+    wide = margins(batch, cell).values["branch_jump"][0]
+    assert wide == pytest.approx(0.2 - longest)
