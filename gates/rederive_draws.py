@@ -19,6 +19,7 @@ from gates.rederive_shadow import TaskSection
 from gates.report import Gate
 from gates.stated import refuse, section, training_seed
 from genpolicy.candidates.judged import candidates_of
+from genpolicy.contract.action import ACTION_DIM
 from genpolicy.contract.chunk import actions_sha256
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.data.dataset import Dataset, load_dataset
@@ -144,7 +145,8 @@ def _of_row(data: Dataset, horizons: HorizonConfig, row: CandidateRow) -> Asked:
     back = np.maximum(np.arange(at - horizons.observation_horizon + 1, at + 1), 0)
     history = data.frames.observation[own[back]]
     with readable(place):
-        actions = np.array(row.raw).reshape(horizons.prediction_horizon, -1)
+        # As many rows as its policy predicts: plain behaviour cloning says one action.
+        actions = np.array(row.raw).reshape(-1, ACTION_DIM)
     return Asked(place, ("shadow", name, at), history, row.candidate, actions)
 
 

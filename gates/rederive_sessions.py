@@ -78,8 +78,12 @@ def _maker(root: Path, method: str, seed: object, joining: JoiningSettings) -> M
 
 
 def checkpoint_of(root: Path, method: str, seed: object) -> Path | None:
-    """Folder of a trained policy; None where there is none of the name."""
-    for stage in (BASELINES, GENERATORS):
+    """Folder of a trained policy; None where there is none of the name.
+
+    A method may be trained as a baseline for Gate A and stand as a candidate: then the candidate
+    is who was run, since none may stand in one comparison twice (`candidates.judged.compared`).
+    """
+    for stage in (GENERATORS, BASELINES):
         folder = root / "artifacts" / stage / method / f"seed_{seed}"
         if (folder / "config.json").is_file():
             return folder

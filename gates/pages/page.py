@@ -29,6 +29,7 @@ from gates.pages import (
     plots_time,
     tables_feasibility,
     tables_holds,
+    tables_overruns,
     tables_stress,
 )
 from gates.pages.desk import desk_of
@@ -56,6 +57,7 @@ PLOTS: dict[str, tuple[Picturable, ...]] = {
     "B": (
         *plots_convergence.PLOTS,
         *plots_time.PLOTS,
+        tables_overruns.DECLARED,
         *plots_front.PLOTS,
         *plots_density.PLOTS,
     ),
@@ -66,7 +68,7 @@ PLOTS: dict[str, tuple[Picturable, ...]] = {
         *plots_incidents.PLOTS,
         *tables_holds.LISTINGS,
     ),
-    "D": (*plots_stress.PLOTS, *tables_stress.LISTINGS),
+    "D": (*plots_stress.PLOTS, tables_overruns.DONE, *tables_stress.LISTINGS),
     "E": (),
 }
 

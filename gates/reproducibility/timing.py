@@ -18,18 +18,23 @@ from genpolicy.evidence.rows.reproducibility import LatencyModelRow, LatencyRow
 from genpolicy.statistics.equivalence import FEWEST, ratio_of_means, ratio_to, spread_found
 
 MODEL = "artifacts/latency/model.parquet"
+ACTIONS = (
+    "continue", "drop_observation", "skip_invocation", "cancel_candidate", "reject_candidate",
+    "reject_stale", "fallback",
+)  # fmt: skip
+"""What may be declared (`genpolicy.contract.latency.DeadlineAction`)."""
 
 
 @criterion(
     "<=",
-    question="Is each of the eleven latency terms known?",
-    look_at="Timing: a missing term is unknown, never zero; measure or declare it.",
+    question="Is each of the eleven latency terms known, and what is done where it takes too long?",
+    look_at="Timing: a missing term is unknown, never zero; measure or declare it, and its action.",
     per_candidate=True,
 )
 def latency_terms_missing(
     evidence: Evidence, settings: ReproducibilitySettings, candidate: str
 ) -> Measured:
-    """Terms of the latency that are neither measured nor declared."""
+    """Terms that are neither measured nor declared, or for which nobody declared an action."""
     rows = _latency(evidence, candidate)
     known = rows[np.isfinite(rows["seconds"].to_numpy(dtype=np.float64, na_value=np.nan))]
     measured = set(known.loc[known["source"] == "measured", "component"])
@@ -39,8 +44,12 @@ def latency_terms_missing(
         for term in TERMS
         if term not in measured and (term in MEASURED_HERE or term not in declared)
     ]
+    acted = {term for term, _, action in settings.term_deadlines if action in ACTIONS}
+    idle = [term for term in TERMS if term not in acted]
     text = f"missing: {', '.join(missing)}" if missing else f"declared: {', '.join(declared)}"
-    return Measured(float(len(missing)), caveat=text)
+    if idle:
+        text += f"; nothing is done where these take too long: {', '.join(idle)}"
+    return Measured(float(len({*missing, *idle})), caveat=text)
 
 
 def _latency(evidence: Evidence, candidate: str) -> pd.DataFrame:

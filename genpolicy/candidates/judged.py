@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from genpolicy.errors import ConfigError
 from genpolicy.policies.policy import NetworkPolicy, Policy, load_policy
 
 BASELINES = "train_baselines"
@@ -71,9 +72,18 @@ def compared(
         seed: The training seed that is promoted.
 
     Raises:
+        ConfigError: A method stands on both sides; its rows could not be told apart.
         BadInputError: A checkpoint is missing or malformed.
     """
+    candidates = list(generators)
+    if twice := sorted({*baselines} & {*candidates}):
+        raise ConfigError(
+            where="params.yaml: stress.baselines",
+            found=f"{', '.join(twice)}, also in train_generators.samplers",
+            expected="each method on one side of the comparison",
+            action="Let it stand for promotion or be what candidates are held against, not both.",
+        )
     return [
         *trained(artifacts / BASELINES, baselines, seeds=[seed]),
-        *trained(artifacts / GENERATORS, generators, seeds=[seed]),
+        *trained(artifacts / GENERATORS, candidates, seeds=[seed]),
     ]

@@ -4,6 +4,7 @@ Executor, controller stub, supervisor and recovery all read the section itself; 
 out of it. Times are in s; whole ns, for those who compare, are derived here.
 """
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -13,6 +14,7 @@ from typing import Annotated, Any
 from pydantic import Field, model_validator
 
 from genpolicy.contract.horizons import HorizonConfig
+from genpolicy.contract.latency import FITTING, DeadlineAction, Term, TermDeadline
 from genpolicy.contract.settings import Settings
 from genpolicy.errors import ConfigError
 from genpolicy.execution.moment import View
@@ -67,6 +69,9 @@ class ExecutionSettings(Settings):
             chunk is meant to take over with this row; one that begins behind it is late.
         late_chunk: Phases by what becomes of a late chunk.
         deadline_s: An invocation that takes longer has missed its deadline and is given up.
+        term_deadlines: Of each latency term `[term, most s, action]`: what it may take, and what
+            its owner does beyond that. All eleven or none; none where nobody times the terms, as
+            by the wall clock, which knows whole answers.
         watchdog_s: Silence after which the stub holds; at least one period. Polled every period,
             the hold comes within `period + watchdog` (P2).
         queue_capacity: Chunks kept; the oldest is dropped beyond it.
@@ -90,6 +95,7 @@ class ExecutionSettings(Settings):
     replan_lead_steps: int = Field(ge=0)
     late_chunk: dict[LateChunk, tuple[str, ...]]
     deadline_s: float = Field(gt=0)
+    term_deadlines: dict[Term, TermDeadline] = Field(default_factory=dict)
     watchdog_s: float = Field(gt=0)
     queue_capacity: int = Field(ge=1)
     maximum_age_s: dict[str, NotNegative]
@@ -119,6 +125,9 @@ class ExecutionSettings(Settings):
         late = complete.get("late_chunk")
         if isinstance(late, dict):
             complete["late_chunk"] = _each_once(late, phases)
+        rows = complete.get("term_deadlines")
+        if isinstance(rows, list | tuple):
+            complete["term_deadlines"] = _each_term(rows)
         plans = complete.get("recovery_plans")
         if isinstance(plans, dict):
             complete["recovery_plans"] = {phase: _plan(phase, plans[phase]) for phase in plans}
@@ -260,6 +269,43 @@ def _each_once(late: dict[Any, Any], phases: list[str]) -> dict[LateChunk, tuple
             action="Say of every phase what becomes of a late chunk; nothing is assumed.",
         )
     return {LateChunk(name): tuple(listed) for name, listed in lists.items()}
+
+
+def _each_term(rows: Iterable[Any]) -> dict[Term, TermDeadline]:
+    """Every term in one row, with a time and an action that can be executed for it; or no row."""
+    found: dict[Term, TermDeadline] = {}
+    wrong: list[str] = []
+    for row in rows:
+        deadline = _deadline(row)
+        if deadline is None:
+            wrong.append(repr(row))
+        elif Term(row[0]) in found:
+            wrong.append(f"{row[0]} twice")
+        else:
+            found[Term(row[0])] = deadline
+    wrong += [f"no {term}" for term in Term if found and term not in found]
+    if wrong:
+        raise ConfigError(
+            where="execution.term_deadlines",
+            found=", ".join(wrong)[:200],
+            expected=f"[term, most s > 0, action] of each of {', '.join(Term)}; actions that fit: "
+            + "; ".join(f"{what} ({', '.join(sorted(FITTING[what]))})" for what in DeadlineAction),
+            action="Say of every term what it may take and what is done beyond it.",
+        )
+    return found
+
+
+def _deadline(row: Any) -> TermDeadline | None:
+    """A row of the table; None if it is no term, no time, or no action that fits the term."""
+    if not isinstance(row, list | tuple) or len(row) != 3:
+        return None
+    term, most_s, action = row
+    timed = isinstance(most_s, float) and 0.0 < most_s < math.inf
+    if not timed or term not in [*Term] or action not in [*DeadlineAction]:
+        return None
+    if Term(term) not in FITTING[DeadlineAction(action)]:
+        return None
+    return TermDeadline(most_s, DeadlineAction(action))
 
 
 def _plan(phase: str, names: Any) -> tuple[RecoveryState, ...]:

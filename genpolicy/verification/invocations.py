@@ -15,6 +15,9 @@ from genpolicy.verification.journal_source import Message
 Finding = tuple[str, str]
 ROUNDING_NS = 1_000
 """Sums of seconds are rounded to nanoseconds of a tick."""
+UNCHECKED = "reject_candidate"
+"""What a journal calls a candidate that was refused because its check took too long."""
+GOES_ON = "continue"
 TIMED = "start_sha256"
 """The label of a session that runs on the virtual clock."""
 
@@ -28,6 +31,7 @@ class _Invocation:
     checks: int = 0
     judged: int = 0
     answered: bool = False
+    over: bool = False
 
     def due_ns(self) -> float:
         return self.begun_ns + self.cost_s * 1e9 - ROUNDING_NS
@@ -76,6 +80,10 @@ class Invocations:
             if not cost_s > 0.0:
                 yield "clock.check", f"The check of a candidate of {m['id']!r} takes {cost_s} s."
             own.checks, own.cost_s = own.checks + 1, own.cost_s + cost_s
+        elif m["stage"] == "overrun":
+            action = m["detail"].split()[-1]
+            own.judged += action == UNCHECKED
+            own.over |= action not in (UNCHECKED, GOES_ON)
         else:
             own.answered |= m["detail"] == "answered"
 
@@ -86,6 +94,8 @@ class Invocations:
             return
         if own.answered:
             yield "clock.order", f"{which} is judged after the answer."
+        if own.over:
+            yield "clock.overrun", f"{which} is judged, and a term of it had taken too long."
         if m["index"] != own.judged:
             yield "clock.order", f"{which} is judged, {own.judged} were judged before it."
         if m["index"] != own.checks:

@@ -10,7 +10,7 @@ import math
 import statistics
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,18 @@ CHECK = "project"
 """The term that every further candidate costs once more."""
 DELAYS = {"camera_delay": "capture", "queue_reorder": "queue", "network_jitter": "network"}
 """Which term a perturbation of this kind adds its `magnitude_s` to; of the last a share of it."""
+
+FLOW = (
+    "exposure", "capture", "decode", "transfer", "preprocess", "encode", "sample", "select",
+    "project", "network", "queue",
+)  # fmt: skip
+"""The terms in the order in which an observation meets them."""
+COLD = "sample"
+"""The term that the first call costs more of."""
+UNCHECKED, STALE = "reject_candidate", "reject_stale"
+ON_ARRIVAL = (UNCHECKED, STALE)
+"""Actions that wait for what took too long; the others act when its time is over."""
+GOES_ON = "continue"
 
 Row = Mapping[str, Any]
 
@@ -51,6 +63,7 @@ class Times:
         declared: Least and most of each declared term, s.
         perturbations: The planned ones, by name: `kind` and its fields.
         root_seed: Root seed of the ladder.
+        deadlines: What each term may take, s, and what is done beyond; none: held to nothing.
     """
 
     def __init__(
@@ -60,7 +73,9 @@ class Times:
         declared: Mapping[str, tuple[float, float]],
         perturbations: Mapping[str, Row],
         root_seed: int,
+        deadlines: Mapping[str, tuple[float, str]] | None = None,
     ) -> None:
+        self._deadlines = dict(deadlines or {})
         self._declared, self._planned, self._seed = declared, perturbations, root_seed
         warm: dict[str, dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
         whole: dict[tuple[str, str], dict[tuple[int, ...], float]] = defaultdict(dict)
@@ -81,14 +96,46 @@ class Times:
 
     def begins_with_s(self, method: str, condition: str, start: int, number: int) -> float:
         """What invocation `number` takes to its first candidate, s; NaN of an unknown method."""
-        hit, terms = self.hit(condition, start, number), self._warm.get(method, {})
-        drawn_s = self._start_s.get(method, math.nan) if number == 0 else 0.0
-        for term, (least_s, most_s) in self._declared.items():
-            drawn_s += least_s + (most_s - least_s) * self._lot(condition, start, number, term)
-        for term, seconds in terms.items():
+        return sum(self._terms_s(method, condition, start, number).values(), start=0.0)
+
+    def _terms_s(self, method: str, condition: str, start: int, number: int) -> dict[str, float]:
+        """The same by term, in the order of the flow."""
+        hit, measured = self.hit(condition, start, number), self._warm.get(method, {})
+        drawn_s = {} if measured else {COLD: math.nan}
+        for term in FLOW if measured else ():
             lot = self._lot(condition, start, number, term)
-            drawn_s += hit.factor * _at(seconds, lot)
-        return drawn_s + hit.more_s if terms else math.nan
+            if term in self._declared:
+                least_s, most_s = self._declared[term]
+                drawn_s[term] = least_s + (most_s - least_s) * lot
+            else:
+                drawn_s[term] = hit.factor * _at(measured.get(term, ()), lot)
+        if hit.term in drawn_s:
+            drawn_s[hit.term] += hit.more_s
+        if number == 0:
+            drawn_s[COLD] += self._start_s.get(method, math.nan)
+        return drawn_s
+
+    def owes(
+        self, method: str, condition: str, start: int, number: int
+    ) -> list[tuple[str, str, float]]:
+        """Terms of an invocation that take too long: which, what is done, and when it is known, s.
+
+        The last one is that which ends it, if any does.
+        """
+        found, begun_s = [], 0.0
+        for term, drawn_s in self._terms_s(method, condition, start, number).items():
+            most_s, action = self._deadlines.get(term, (math.inf, GOES_ON))
+            if not drawn_s <= most_s:
+                found.append((term, action, begun_s + most_s))
+                if action not in (*ON_ARRIVAL, GOES_ON):
+                    break
+            begun_s += drawn_s
+        return found
+
+    def check_owes(self, check_s: float) -> list[tuple[str, str]]:
+        """The same of the check of a further candidate, without when."""
+        most_s, action = self._deadlines.get(CHECK, (math.inf, GOES_ON))
+        return [] if check_s <= most_s else [(CHECK, action)]
 
     def check_s(
         self, method: str, condition: str, start: int, number: int, candidate: int
@@ -131,6 +178,45 @@ def _at(seconds: Sequence[float], lot: float) -> float:
 
 
 @dataclass
+class _Owed:
+    """What an invocation owes for terms that took too long."""
+
+    begun_ns: int
+    terms: list[tuple[str, str, float]]
+    unchecked: set[int] = field(default_factory=set)
+    checks: list[tuple[str, str]] = field(default_factory=list)
+    stated: list[tuple[str, str]] = field(default_factory=list)
+
+    def state(self, m: Message, period_ns: int) -> str:
+        """Take an overrun in; why it is not owed, or not there, in words."""
+        term, action = m["detail"].split()
+        said = (term, action)
+        self.stated.append(said)
+        owed = [one for one in self.terms if one[:2] == said]
+        if self.stated.count(said) > len(owed) + self.checks.count(said):
+            return f"states {m['detail']!r}, and that term took no longer than it may"
+        if owed and action not in ON_ARRIVAL and said not in self.checks:
+            known_ns = self.begun_ns + owed[0][2] * 1e9
+            if not -ROUNDING_S * 1e9 <= m["t"] - known_ns <= period_ns + ROUNDING_S * 1e9:
+                return f"states {m['detail']!r} at {m['t']} ns, known at {known_ns:.0f} ns"
+        return ""
+
+    def missing(self, end_ns: int, period_ns: int) -> list[tuple[str, str, float]]:
+        """What had to be stated by the end of the session, and was not."""
+        return [
+            one
+            for one in self.terms
+            if one[1] not in ON_ARRIVAL
+            and one[:2] not in self.stated
+            and self.begun_ns + one[2] * 1e9 + period_ns < end_ns
+        ]
+
+    def forbids(self, candidate: int) -> bool:
+        """Whether a candidate may not be judged, since its check or its transport took too long."""
+        return candidate in self.unchecked or any(one[1] == STALE for one in self.terms)
+
+
+@dataclass
 class _Session:
     """One rollout while its events go by."""
 
@@ -140,6 +226,8 @@ class _Session:
     numbers: dict[str, int]
     checks: dict[str, int]
     answers: dict[str, str]
+    period_ns: int
+    owed: dict[str, _Owed] = field(default_factory=dict)
 
 
 def stated_otherwise(path: Path, times: Times) -> Iterator[str]:
@@ -156,13 +244,15 @@ def stated_otherwise(path: Path, times: Times) -> Iterator[str]:
         if kind == "session":
             labels = m["labels"]
             own = (str(labels["method"]), str(labels["perturbation"]), int(labels["start"]))
-            sessions[name] = _Session(*own, {}, {}, {})
+            sessions[name] = _Session(*own, {}, {}, {}, int(m["period_ns"]))
         elif kind == "invocation":
             yield from _stated(m, sessions[name], times)
         elif kind == "joined":
             sessions[name].answers[m["chunk_id"]] = m["invocation"]
         elif kind == "candidate":
             yield from _arrived(m, sessions[name], times)
+        elif kind == "end":
+            yield from _left_out(m, sessions[name], times)
 
 
 def _stated(m: Message, session: _Session, times: Times) -> Iterator[str]:
@@ -171,11 +261,22 @@ def _stated(m: Message, session: _Session, times: Times) -> Iterator[str]:
     if m["stage"] == "begin":
         number = session.numbers.setdefault(m["id"], len(session.numbers))
         owed_s = times.begins_with_s(*own, number)
+        owed = session.owed[m["id"]] = _Owed(m["t"], times.owes(*own, number))
+        if (CHECK, UNCHECKED) in [one[:2] for one in owed.terms]:
+            owed.unchecked.add(0)
     elif m["stage"] == "check":
         number = session.numbers[m["id"]]
         candidate = session.checks[m["id"]] = session.checks.get(m["id"], 0) + 1
         which += f", candidate {candidate}"
         owed_s = times.check_s(*own, number, candidate)
+        also = times.check_owes(owed_s)
+        session.owed[m["id"]].checks += also
+        if (CHECK, UNCHECKED) in also:
+            session.owed[m["id"]].unchecked.add(candidate)
+    elif m["stage"] == "overrun":
+        if why := session.owed[m["id"]].state(m, session.period_ns):
+            yield f"{which} {why}"
+        return
     else:
         return
     if not abs(float(m["detail"]) - owed_s) <= ROUNDING_S:
@@ -183,6 +284,16 @@ def _stated(m: Message, session: _Session, times: Times) -> Iterator[str]:
 
 
 def _arrived(m: Message, session: _Session, times: Times) -> Iterator[str]:
-    number = session.numbers[session.answers.get(str(m["chunk_id"]), str(m["chunk_id"]))]
-    if times.hit(session.condition, session.start, number).lost:
+    name = session.answers.get(str(m["chunk_id"]), str(m["chunk_id"]))
+    if times.hit(session.condition, session.start, session.numbers[name]).lost:
         yield f"invocation {m['chunk_id']!r} is judged, and it was to be lost"
+    if session.owed[name].forbids(int(m["index"])):
+        yield f"candidate {m['index']} of {name!r} is judged, and it took longer than it may"
+
+
+def _left_out(m: Message, session: _Session, times: Times) -> Iterator[str]:
+    """What took too long, and of which nobody says that anything was done."""
+    for name, owed in session.owed.items():
+        lost = times.hit(session.condition, session.start, session.numbers[name]).lost
+        for term, action, _ in [] if lost else owed.missing(m["t"], session.period_ns):
+            yield f"invocation {name!r} states no {f'{term} {action}'!r}, which it owes"

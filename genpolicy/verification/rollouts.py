@@ -14,6 +14,8 @@ from genpolicy.verification.journal_source import Message, read_messages
 
 CALLS_A_PERSON = ("ask_human", "abort")
 SUCCESS = "success"
+NEVER_ANSWERED = ("deadline", "overrun")
+"""How an invocation ends that missed its deadline: that of the whole, or that of a term."""
 
 
 def derived_rollouts(path: Path) -> dict[str, dict[str, Any]]:
@@ -87,7 +89,7 @@ class _Session:
             self.latencies_s[m["id"]] = float(m["detail"])
         elif m["stage"] == "check":
             self.latencies_s[m["id"]] += float(m["detail"])
-        self.counts["misses"] += m["stage"] == "end" and m["detail"] == "deadline"
+        self.counts["misses"] += m["stage"] == "end" and m["detail"] in NEVER_ANSWERED
 
     def _candidate(self, m: Message) -> None:
         """An invocation counts as rejected until one of its candidates passes every layer."""

@@ -21,6 +21,7 @@ KEYS: dict[str, tuple[str, ...]] = {
     "counts": ("method", "perturbation", "reason"),
     "conservation": ("method", "perturbation"),
     "stub": ("method", "perturbation"),
+    "overruns": ("method", "perturbation", "term", "action"),
     "ages": ("method", "perturbation", "level"),
 }
 """Tables that are derived here, and the columns by which a row is known."""
@@ -38,12 +39,16 @@ class Condition:
     ages_ns: list[int] = field(default_factory=list)
     arrivals: int = 0
     refused: Counter[str] = field(default_factory=Counter)
+    overruns: Counter[tuple[str, str]] = field(default_factory=Counter)
 
     def read(self, kind: str, m: Message, start: int) -> None:
         """Take an event of the rollout from this start in."""
         if kind == "invocation" and m["stage"] in ("begin", "check"):
             own = self.latencies_s.setdefault(start, {})
             own[m["id"]] = own.get(m["id"], 0.0) + float(m["detail"])
+        elif kind == "invocation" and m["stage"] == "overrun":
+            term, action = m["detail"].split()
+            self.overruns[term, action] += 1
         elif kind == "enqueue":
             self.generated += 1
             self.enqueued += 1
@@ -87,6 +92,10 @@ class Condition:
                     "stale": self.refused["stale"],
                     "invalid": self.refused["invalid"],
                 }
+            ],
+            "overruns": [
+                {"term": term, "action": action, "count": count}
+                for (term, action), count in sorted(self.overruns.items()) or [(("", ""), 0)]
             ],
             "ages": [
                 {

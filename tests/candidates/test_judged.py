@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from genpolicy.candidates.judged import BASELINES, GENERATORS, compared, trained
-from genpolicy.errors import IntegrityError
+from genpolicy.errors import ConfigError, IntegrityError
 
 
 def test_checkpoints_are_listed_with_their_identity(fleet):
@@ -31,3 +31,11 @@ def test_baselines_come_before_generators_from_their_own_folders(fleet, tmp_path
     assert [(item.name, item.folder.parents[1].name) for item in found] == [
         ("chunked_bc", BASELINES), ("flow", GENERATORS),
     ]  # fmt: skip
+
+
+def test_a_method_on_both_sides_is_refused_by_name(fleet, tmp_path):
+    """Tables know a method by its name: its rows would be those of two checkpoints."""
+    for name in (BASELINES, GENERATORS):
+        (tmp_path / name).symlink_to(fleet[0])
+    with pytest.raises(ConfigError, match=r"stress\.baselines.*flow, also in train_generators"):
+        compared(tmp_path, baselines=["chunked_bc", "flow"], generators=["flow"], seed=0)

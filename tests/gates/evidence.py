@@ -63,6 +63,7 @@ from genpolicy.evidence.rows.shadow import (
 from genpolicy.evidence.rows.stress import (
     ConservationRow,
     InvocationRow,
+    OverrunRow,
     RolloutRow,
     SpliceRow,
     StressCountRow,
@@ -182,6 +183,21 @@ PARAMS: dict[str, Any] = {
     "seed": 1,
     "confidence": 0.95,
     "horizons": {"execution_horizon": 8, "action_period_s": 0.05},
+    "execution": {
+        "term_deadlines": [
+            ["exposure", 0.05, "drop_observation"],
+            ["capture", 0.15, "drop_observation"],
+            ["decode", 0.05, "skip_invocation"],
+            ["transfer", 0.05, "skip_invocation"],
+            ["preprocess", 0.05, "skip_invocation"],
+            ["encode", 0.05, "cancel_candidate"],
+            ["sample", 0.15, "cancel_candidate"],
+            ["select", 0.05, "continue"],
+            ["project", 0.1, "reject_candidate"],
+            ["network", 0.25, "reject_stale"],
+            ["queue", 0.25, "reject_stale"],
+        ]
+    },
     "task": {"name": "tabletop_insertion"},
     "train_baselines": {"samplers": {name: {} for name in (*BASELINES, *REMEDIES, DRAWN)}},
     "measure_baselines": {"latent": {"method": "act"}},
@@ -1477,6 +1493,16 @@ def _stress(root: Path) -> None:
             for m, c in cells
         ],
     )
+    table(
+        root,
+        "stress/overruns.parquet",
+        OverrunRow,
+        [
+            {"method": m, "perturbation": c, "term": term, "action": action, "count": count}
+            for m, c in cells if m in CANDIDATES
+            for term, action, count in (("queue", "reject_stale", 3), ("select", "continue", 2))
+        ],
+    )  # fmt: skip
     document(root, "stress/checker.json", checked("a.mcap", 5000))
     document(root, "stress/envelope.json", ENVELOPE)
     # Of nobody who is judged here: a distilled candidate's is written by the test that asks.

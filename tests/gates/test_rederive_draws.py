@@ -307,3 +307,13 @@ def test_a_candidate_of_another_moment_is_refused(
     write_rows(path, CandidateRow, rows)
     with pytest.raises(RefusedError, match=said):
         rederive_shadow_draws(root, shadow_params)
+
+
+def test_a_policy_of_one_action_is_read_as_what_it_says(shadows):
+    """Plain behaviour cloning: its chunk has one row, whatever the horizon of the others."""
+    (row, *_) = read_rows(shadows[0] / SHADOW / "candidates.parquet", CandidateRow)
+    data = load_dataset(shadows[0] / module.DATASET)
+    short = module._of_row(data, HORIZONS, replace(row, raw=row.raw[:10]))
+    whole = module._of_row(data, HORIZONS, row)
+    assert short.actions.shape == (1, 10) and whole.actions.shape == (16, 10)
+    np.testing.assert_array_equal(short.actions[0], whole.actions[0])

@@ -6,7 +6,7 @@ import pytest
 import yaml
 from makers import maker, write_policy
 
-from gates.rederive_sessions import rederive_sessions
+from gates.rederive_sessions import checkpoint_of, rederive_sessions
 from genpolicy.errors import BadInputError, RefusedError
 from genpolicy.execution.journal import Journal, write_journal
 from genpolicy.seeds import stream
@@ -101,3 +101,18 @@ def test_a_session_that_does_not_say_what_it_is_is_bad_input(asked):
     for journal in (unlabelled, unbegun):
         with pytest.raises(BadInputError):
             asked(journal)
+
+
+def test_a_candidate_that_was_a_baseline_of_gate_a_too_is_the_one_that_ran(tmp_path):
+    """IBC is trained for Gate A by default; named as a candidate it is trained again."""
+    folders = [
+        tmp_path / "artifacts" / stage / "ibc" / "seed_0"
+        for stage in ("train_baselines", "train_generators")
+    ]
+    for folder in folders:
+        folder.mkdir(parents=True)
+    (folders[0] / "config.json").write_text("{}")
+    assert checkpoint_of(tmp_path, "ibc", 0) == folders[0]
+    (folders[1] / "config.json").write_text("{}")
+    assert checkpoint_of(tmp_path, "ibc", 0) == folders[1]
+    assert checkpoint_of(tmp_path, "flow", 0) is None

@@ -113,7 +113,7 @@ def a_journal(path, *, condition="reorder", changed=None, judged=True):
     for start in (0, 4):
         labels = {"method": "flow", "perturbation": condition, "start": str(start)}
         journal = Journal(f"flow/{condition}/{start}", labels)
-        journal.add("session", 0, {"labels": labels})
+        journal.add("session", 0, {"labels": labels, "period_ns": 50_000_000})
         for number in range(3):
             name = f"{journal.session}/{number}"
             place = ("flow", condition, start, number)

@@ -20,6 +20,8 @@ def test_the_checkout_is_pinned():
 def test_the_values_are_those_of_the_ladder_and_one_more():
     params, limits = read_yaml(ROOT / "params.yaml"), read_yaml(ROOT / LIMITS)
     silence_s = limits["execution"].pop("silence_stop_s")
+    # By the wall clock whole answers are known, and no terms of them.
+    assert params["execution"].pop("term_deadlines") and "term_deadlines" not in limits["execution"]
     assert limits["execution"] == params["execution"]
     assert limits["horizons"] == params["horizons"]
     assert limits["feasibility"] == params["feasibility"]

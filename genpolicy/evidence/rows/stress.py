@@ -176,6 +176,25 @@ class StressStubRow:
 
 
 @dataclass(frozen=True)
+class OverrunRow:
+    """`overruns.parquet` of stress: terms that took longer than they may, and what was done.
+
+    Attributes:
+        method: The method.
+        perturbation: What was injected.
+        term: Term of the latency; empty where none took too long.
+        action: What its owner declared for it, and what the clock did; empty likewise.
+        count: How often.
+    """
+
+    method: str
+    perturbation: str
+    term: str
+    action: str
+    count: int
+
+
+@dataclass(frozen=True)
 class AgeRow:
     """`ages.parquet` of stress: quantiles of the action age over all rollouts of a shard.
 

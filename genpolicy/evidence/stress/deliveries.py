@@ -1,14 +1,23 @@
-"""Answers on their way: delivered, overdue, or waiting for the check of another candidate."""
+"""Answers on their way: delivered, overdue, or waiting for the check of another candidate.
+
+A term that takes longer than it may is dealt with as declared (`execution.term_deadlines`): where
+its action ends the invocation, at the first tick after the time of the term is over; where it
+refuses a candidate or the answer, when that comes.
+"""
 
 from collections import deque
 
+from genpolicy.candidates.selector import tries_another
 from genpolicy.contract.chunk import DiscardReason
+from genpolicy.contract.latency import ENDING, DeadlineAction, Overrun
 from genpolicy.evidence.stress.state import InFlight, Setup, Tally, next_candidate
 from genpolicy.execution.cell import LateChunk
 from genpolicy.execution.executor import Executor
 from genpolicy.execution.journal import Journal
 
 ROUNDING_S = 1e-9
+OVERRUN = "overrun"
+"""Stage and end of an invocation in the journal, where a term took longer than it may."""
 
 
 class Deliveries:
@@ -23,17 +32,19 @@ class Deliveries:
 
     Attributes:
         late_in: Phase of an answer that came late at the last tick, if that phase declares the
-            classical fallback for it; else empty.
+            classical fallback for it, or of one a term of which does; else empty.
+        late_cause: Which of the two, as recovery records it.
     """
 
     def __init__(
         self, setup: Setup, executor: Executor, journal: Journal, tally: Tally, *, start: int
     ) -> None:
-        self.late_in = ""
+        self.late_in = self.late_cause = ""
         self._setup, self._executor = setup, executor
         self._journal, self._tally, self._start = journal, tally, start
         self._flying: list[InFlight] = []
         self._arrived: deque[InFlight] = deque()
+        self._skipped: list[InFlight] = []
 
     def add(self, flying: InFlight) -> None:
         """An invocation that has begun."""
@@ -41,9 +52,14 @@ class Deliveries:
 
     def collect(self, now_s: float) -> None:
         """What is delivered by now arrives, in order; what is overdue is given up."""
-        self.late_in = ""
+        self.late_in = self.late_cause = ""
+        for flying in self._skipped:
+            self._missed(flying, now_s, OVERRUN)
+        self._skipped.clear()
         for flying in sorted(self._flying, key=_order):
-            if flying.arrival_s <= now_s and not flying.dropped:
+            if self._cut_short(flying, now_s):
+                self._flying.remove(flying)
+            elif flying.arrival_s <= now_s and not flying.dropped:
                 self._flying.remove(flying)
                 self._arrive(flying, now_s)
             elif self._overdue(flying, now_s):
@@ -69,9 +85,12 @@ class Deliveries:
             now_s, invocation_id=flying.metadata.chunk_id, stage="check", detail=repr(check_s)
         )
         self._tally.latencies_s[flying.number] += check_s
+        if self._cut_short(flying, now_s):
+            return
         if flying.arrival_s <= now_s:
-            waiting = [*self._arrived, flying]
-            self._arrived = deque(sorted(waiting, key=_order))
+            if not self._refused_unjudged(flying, now_s):
+                waiting = [*self._arrived, flying]
+                self._arrived = deque(sorted(waiting, key=_order))
             return
         self._flying.append(flying)
         if self._overdue(flying, now_s):
@@ -100,12 +119,72 @@ class Deliveries:
         phase = flying.metadata.task_phase
         falls_back = execution.late_by_phase.get(phase) == LateChunk.FALLBACK
         if late > execution.replan_lead_steps and falls_back:
-            self.late_in = phase
+            self.late_in, self.late_cause = phase, "late chunk"
+        if self._refused_unjudged(flying, now_s):
+            return
         if late >= self._setup.horizons.execution_horizon:
             self.answered(flying, now_s)
             self.write_off(flying, DiscardReason.EXPIRED, now_s)
         else:
             self._arrived.append(flying)
+
+    def _cut_short(self, flying: InFlight, now_s: float) -> bool:
+        """Whether the invocation ends here, because a term took longer than it may."""
+        for overrun in list(flying.overran):
+            ends = overrun.action in ENDING
+            on_arrival = not ends and overrun.action != DeadlineAction.CONTINUE
+            if on_arrival or not flying.begun_s + overrun.known_s <= now_s + ROUNDING_S:
+                continue
+            self._note(flying, overrun, now_s)
+            if ends:
+                if overrun.action == DeadlineAction.FALLBACK:
+                    self.late_in = flying.metadata.task_phase
+                    self.late_cause = f"overrun of {overrun.term}"
+                skips = overrun.action == DeadlineAction.SKIP_INVOCATION
+                self._give_up(flying, now_s, at_once=not skips)
+                return True
+        return False
+
+    def _refused_unjudged(self, flying: InFlight, now_s: float) -> bool:
+        """Whether what comes is refused because its transport or its check took too long."""
+        refused = {overrun.action: overrun for overrun in flying.overran}
+        if stale := refused.get(DeadlineAction.REJECT_STALE):
+            self._note(flying, stale, now_s)
+            self._give_up(flying, now_s)
+        elif unchecked := refused.get(DeadlineAction.REJECT_CANDIDATE):
+            self._note(flying, unchecked, now_s)
+            if tries_another(flying.candidate, flying.candidates, stale=False):
+                self.try_another(flying, now_s)
+            else:
+                self._give_up(flying, now_s)
+        else:
+            return False
+        return True
+
+    def _note(self, flying: InFlight, overrun: Overrun, now_s: float) -> None:
+        flying.overran.remove(overrun)
+        self._tally.overruns[overrun.term, overrun.action] += 1
+        self._journal.invocation(
+            now_s,
+            invocation_id=flying.metadata.chunk_id,
+            stage=OVERRUN,
+            detail=f"{overrun.term} {overrun.action}",
+        )
+
+    def _give_up(self, flying: InFlight, now_s: float, *, at_once: bool = True) -> None:
+        """No answer comes of it any more: a missed deadline, of the term and not of the whole."""
+        if not flying.given_up:
+            flying.given_up = True
+            if at_once:
+                self._missed(flying, now_s, OVERRUN)
+            else:
+                self._skipped.append(flying)
+        self.write_off(flying, DiscardReason.EXPIRED, now_s)
+
+    def _missed(self, flying: InFlight, now_s: float, why: str) -> None:
+        """Counted where it is written down, so that row and journal count alike."""
+        self._tally.deadline_misses += 1
+        self._executor.end_invocation(now_s, flying.metadata.chunk_id, why)
 
     def _overdue(self, flying: InFlight, now_s: float) -> bool:
         return now_s - flying.begun_s >= self._setup.execution.deadline_s - ROUNDING_S
@@ -114,8 +193,7 @@ class Deliveries:
         """The deadline has passed: the next invocation may begin; the chunk may still come."""
         if not flying.given_up:
             flying.given_up = True
-            self._tally.deadline_misses += 1
-            self._executor.end_invocation(now_s, flying.metadata.chunk_id, "deadline")
+            self._missed(flying, now_s, "deadline")
         if flying.dropped:
             self._flying.remove(flying)
             self.write_off(flying, DiscardReason.EXPIRED, now_s)

@@ -4,6 +4,7 @@ A shard is one method under one perturbation on all starts. Its worlds are stepp
 share the network's batches; which batch a sample was drawn in changes no bit of it.
 """
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,7 +14,13 @@ from numpy.typing import NDArray
 
 from genpolicy.candidates.joining import JoiningSettings
 from genpolicy.candidates.judged import JudgedPolicy, candidates_of
-from genpolicy.evidence.rows.stress import InvocationRow, RolloutRow, SpliceRow, StressStubRow
+from genpolicy.evidence.rows.stress import (
+    InvocationRow,
+    OverrunRow,
+    RolloutRow,
+    SpliceRow,
+    StressStubRow,
+)
 from genpolicy.evidence.stress.envelope import checker_under
 from genpolicy.evidence.stress.latency import LatencyModel
 from genpolicy.evidence.stress.perturbations import Perturbation
@@ -87,6 +94,7 @@ class ShardResult:
         rollouts: One row per start.
         invocations: One row per invocation.
         splices: One row per chunk that entered a queue.
+        overruns: One row per term that took longer than it may.
         accounts: Balance of chunks, per rollout.
         ages_s: Every action age, s.
         stub: Arrivals, stale and invalid offers.
@@ -95,6 +103,7 @@ class ShardResult:
     rollouts: list[RolloutRow]
     invocations: list[InvocationRow]
     splices: list[SpliceRow]
+    overruns: list[OverrunRow]
     accounts: list[Account]
     ages_s: Array
     stub: StressStubRow
@@ -149,6 +158,7 @@ def run_shard(shard: Shard) -> ShardResult:
         rollouts=[row for row, _ in parts],
         invocations=[row for rollout in rollouts for row in invocation_rows(shard, rollout)],
         splices=[row for rollout in rollouts for row in splice_rows(shard, rollout)],
+        overruns=overrun_rows(shard, rollouts),
         accounts=[rollout.executor.conservation().chunks for rollout in rollouts],
         ages_s=np.concatenate([ages for _, ages in parts]),
         stub=StressStubRow(
@@ -282,6 +292,23 @@ def splice_rows(shard: Shard, rollout: Rollout) -> list[SpliceRow]:
             **vars(splice),
         )
         for splice in rollout.splices
+    ]
+
+
+def overrun_rows(shard: Shard, rollouts: Sequence[Rollout]) -> list[OverrunRow]:
+    """Rows of `overruns.parquet`, sorted: what was done how often, over all rollouts."""
+    done: Counter[tuple[str, str]] = Counter()
+    for rollout in rollouts:
+        done.update(rollout.tally.overruns)
+    return [
+        OverrunRow(
+            method=shard.judged.name,
+            perturbation=shard.perturbation,
+            term=str(term),
+            action=str(action),
+            count=count,
+        )
+        for (term, action), count in sorted(done.items()) or [(("", ""), 0)]
     ]
 
 

@@ -285,7 +285,7 @@ class Rollout:
         silent = now_s - last_s >= self.setup.execution.hold_before_recovery_s - 1e-9
         late = self._deliveries.late_in == self.world.phase
         if not self.recovery.active and (silent or late or self._disturbance.drill(now_s)):
-            cause = "silence" if silent else "late chunk" if late else "drill"
+            cause = "silence" if silent else self._deliveries.late_cause if late else "drill"
             self.recovery.trigger(now_s, self.world.phase, cause)
         if not self.recovery.active:
             return

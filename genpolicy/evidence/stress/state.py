@@ -1,5 +1,6 @@
 """What rollouts share, and what one of them carries along."""
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -11,6 +12,7 @@ from genpolicy.candidates.joining import REPLACE, JoiningSettings
 from genpolicy.candidates.votes import Votes
 from genpolicy.contract.chunk import ChunkMetadata
 from genpolicy.contract.horizons import HorizonConfig
+from genpolicy.contract.latency import Overrun, Term, overruns
 from genpolicy.evidence.stress.latency import LatencyModel, draw_check, draw_latency
 from genpolicy.evidence.stress.perturbations import Perturbation, injection
 from genpolicy.execution.cell import ExecutionSettings
@@ -92,6 +94,7 @@ class InFlight:
         chunks: Sampled candidates, filled in by the batch. Shape (N, K, D_a).
         candidate: The candidate that is judged next.
         given_up: Its deadline has passed.
+        overran: Terms that take longer than they may and are not dealt with yet.
         draw: Which of the samples the candidate is.
         votes: Earlier predictions that have a say in the candidate, oldest first.
         prefix: Actions (K, D_a) that the samples go on from, and weights (K,); None: nothing.
@@ -107,6 +110,7 @@ class InFlight:
     chunks: Array | None = None
     candidate: int = 0
     given_up: bool = False
+    overran: list[Overrun] = field(default_factory=list)
     draw: int = 0
     votes: Sequence[Votes] = ()
     prefix: tuple[Array, Array] | None = None
@@ -140,6 +144,7 @@ class Tally:
     force_peak_n: float = 0.0
     rejected_by: dict[str, int] = field(default_factory=dict)
     refused: set[str] = field(default_factory=set)
+    overruns: Counter[tuple[str, str]] = field(default_factory=Counter)
     latencies_s: list[float] = field(default_factory=list)
     path_m: list[Array] = field(default_factory=list)
 
@@ -198,6 +203,7 @@ def in_flight(
         arrival_s=begun_s + draw.total_s,
         compute_factor=hit.compute_factor,
         dropped=hit.dropped,
+        overran=list(overruns(draw.terms, setup.execution.term_deadlines)),
     )
 
 
@@ -214,4 +220,8 @@ def next_candidate(setup: Setup, flying: InFlight, *, start: int) -> float:
         compute_factor=flying.compute_factor,
     )
     flying.arrival_s += check_s
+    project = setup.execution.term_deadlines.get(Term.PROJECT)
+    if project is not None and not check_s <= project.most_s:
+        known_s = flying.total_s - check_s + project.most_s
+        flying.overran.append(Overrun(Term.PROJECT, project.action, known_s))
     return check_s

@@ -17,6 +17,7 @@ from genpolicy.evidence.rows.stress import (
     AgeRow,
     ConservationRow,
     InvocationRow,
+    OverrunRow,
     RolloutRow,
     SpliceRow,
     StressCountRow,
@@ -79,6 +80,8 @@ def write_stress(folder: Path, shards: Sequence[Shard], *, workers: int, schedul
     write_rows(folder / "counts.parquet", StressCountRow, counts)
     write_rows(folder / "conservation.parquet", ConservationRow, balances)
     write_rows(folder / "stub.parquet", StressStubRow, [result.stub for result in results])
+    overruns = [row for _, result in pairs for row in result.overruns]
+    write_rows(folder / "overruns.parquet", OverrunRow, overruns)
     ages = [row for shard, result in pairs for row in _age_rows(shard, result)]
     write_rows(folder / "ages.parquet", AgeRow, ages)
     journals = [shard.journal for shard in shards]

@@ -28,6 +28,8 @@ METHODS = {
     "chunked_bc": SamplerConfig(name="direct"),
     "bc_noise": SamplerConfig(name="offset"),
     "flow": SamplerConfig(name="euler", steps=2),
+    "ibc": SamplerConfig(name="langevin", steps=3, population=16),
+    "bc": SamplerConfig(name="direct"),
 }
 
 
@@ -119,11 +121,12 @@ def test_noise_is_redrawn_as_often_as_every_other_method_that_draws(shard, monke
         made = shard(method)
         run_shard(made)
         assert check_journal(made.journal).violations == []
-    assert asked == {"chunked_bc": {1}, "bc_noise": {2}, "flow": {2}}
+    assert asked == {"chunked_bc": {1}, "bc_noise": {2}, "flow": {2}, "ibc": {2}, "bc": {1}}
 
 
-def test_a_shard_is_deterministic_and_proved(shard):
-    first, second = shard(), shard()
+@pytest.mark.parametrize("method", ["flow", "ibc"])
+def test_a_shard_is_deterministic_and_proved(shard, method):
+    first, second = shard(method), shard(method)
     one, two = run_shard(first), run_shard(second)
     assert one.rollouts == two.rollouts
     assert first.journal.read_bytes() == second.journal.read_bytes()
@@ -178,10 +181,19 @@ def test_a_row_that_was_changed_is_told_from_its_journal(shard, column):
     assert differences(row, columns) == [column]
 
 
-def test_company_changes_no_rollout(shard, plans):
-    together = run_shard(shard()).rollouts
+def test_one_action_is_over_when_it_comes_and_never_executed(shard):
+    """Plain behaviour cloning answers with the row of the moment that it saw; that one is past."""
+    plan = shard("bc")
+    for row in run_shard(plan).rollouts:
+        assert row.invocations > 0 and row.action_ticks == 0 and row.outcome == "timeout"
+    assert check_journal(plan.journal).violations == []
+
+
+@pytest.mark.parametrize("method", ["flow", "ibc"])
+def test_company_changes_no_rollout(shard, plans, method):
+    together = run_shard(shard(method)).rollouts
     # Start 0 keeps its index when it is alone, so it must keep its row too.
-    (alone,) = run_shard(shard(starts=(plans.starts[0].to_json(),))).rollouts
+    (alone,) = run_shard(shard(method, starts=(plans.starts[0].to_json(),))).rollouts
     assert alone == together[0]
 
 

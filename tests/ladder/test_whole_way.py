@@ -1,0 +1,77 @@
+"""Plain behaviour cloning and an energy go the whole way that they can: timed, shadowed, stressed.
+
+They are candidates as any other where `params.yaml` names them so; by default they stand at Gate A
+alone. What follows Gate A runs again with both, and the independent proof draws their chunks again.
+"""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from ladder_workspace import edit_params, repro
+
+from flows.reproduce import stage_environment
+from genpolicy.policies.energy import EnergyNetwork
+from genpolicy.policies.policy import load_policy
+
+STEPS, POPULATION = 16, 64
+ADDED = {
+    "ibc": {"name": "langevin", "steps": STEPS, "population": POPULATION},
+    "bc": {"name": "direct"},
+}
+BEHIND_GATE_A = [
+    "train_generators", "reload", "latency", "gate_b", "shadow", "gate_c", "stress", "gate_d",
+    "card", "gate_e",
+]  # fmt: skip
+
+
+def methods(workspace: Path, table: str) -> set[str]:
+    return set(pd.read_parquet(workspace / "artifacts" / table)["method"])
+
+
+def test_ibc_and_plain_bc_as_candidates(copy: Path) -> None:
+    def add(params: dict[str, Any]) -> None:
+        params["train_generators"]["samplers"] |= ADDED
+
+    edit_params(copy, add)
+    outcome, ran = repro(copy)
+    assert (outcome.code, ran) == (0, BEHIND_GATE_A), outcome.sentence
+    for table in (
+        "latency/latency.parquet", "shadow/candidates.parquet", "stress/rollouts.parquet",
+        "stress/overruns.parquet",
+    ):  # fmt: skip
+        assert "ibc" in methods(copy, table), table
+        # One action is over when it comes, so that nothing of it reaches the stub: not admitted.
+        assert ("bc" in methods(copy, table)) == (not table.startswith("stress")), table
+    report = json.loads((copy / "reports" / "gate_c.json").read_text())
+    assert (report["candidates"]["ibc"], report["candidates"]["bc"]) == ("PASS", "INCONCLUSIVE")
+    nfe = pd.read_parquet(copy / "artifacts/reload/nfe.parquet").set_index("method")
+    # Every move scores all candidates once, and the last ones are scored once more.
+    for method, evaluations in (("ibc", STEPS + 1), ("bc", 1)):
+        row = nfe.loc[method]
+        assert row["recorded"] == row["counted"] == row["expected"] == evaluations
+    folder = copy / "artifacts/train_generators/ibc/seed_0"
+    assert isinstance(load_policy(folder).checkpoint.network, EnergyNetwork)
+    samples = pd.read_parquet(copy / "artifacts/reload/samples.parquet")
+    own = samples[samples["method"].isin(list(ADDED))]
+    assert (own["sha256_trained"] == own["sha256_reloaded"]).all() and len(own) > 0
+    assert proved(copy) == {**dict.fromkeys("ABCD", "PASS"), "E": "PENDING_REVIEW"}
+
+
+def proved(workspace: Path) -> dict[str, str]:
+    """What `genpolicy verify report` says of each gate, its journals drawn again."""
+    done = subprocess.run(
+        [sys.executable, "-m", "genpolicy", "verify", "report"],
+        cwd=workspace,
+        env=stage_environment(workspace),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    lines = [line.split() for line in done.stdout.splitlines() if line[:1] in "ABCDE"]
+    return {
+        line[0]: next(word for word in line if word.isupper() and len(word) > 1) for line in lines
+    }
