@@ -23,6 +23,7 @@ from genpolicy.evidence.rows.stress import (
     AgeRow,
     ConservationRow,
     InvocationRow,
+    OverrunRow,
     RolloutRow,
     StressCountRow,
     StressStubRow,
@@ -66,7 +67,7 @@ POWER = canonical_json(
 )  # fmt: skip
 TABLES = {
     "invocations": InvocationRow, "counts": StressCountRow, "conservation": ConservationRow,
-    "stub": StressStubRow, "ages": AgeRow,
+    "stub": StressStubRow, "ages": AgeRow, "overruns": OverrunRow,
 }  # fmt: skip
 
 
@@ -222,6 +223,7 @@ FORGED_TABLES = {
     "counts": ("count", 3, "count bc/nominal/: count"),
     "conservation": ("generated", 9, "conservation bc/nominal: generated"),
     "stub": ("stale", 1, "stub bc/nominal: stale"),
+    "overruns": ("count", 2, "overrun bc/nominal//: count"),
 }
 
 
