@@ -26,7 +26,6 @@ Layout = Annotated[
 ]
 
 gates = new_app("Judge evidence, prove reports, sign and verify trial cards.")
-report = new_app("Compare the reports of two runs.")
 verify = new_app("Prove the reports that lie here, or judge the trial card.")
 
 
@@ -230,36 +229,6 @@ def sign(
     _require_beneath(root)
     path = sign_card(root, card_file=card, key_file=key, reviewer=reviewer)
     print(f"Signed {path.name} as {reviewer}. Judge gate E again to see what is missing.")
-    return 0
-
-
-@report.callback()
-def _report() -> None:
-    """Compare the reports of two runs."""  # or typer takes the one command for the group
-
-
-@report.command("diff", epilog=examples("genpolicy report diff HEAD~1 reports"))
-def diff(
-    before: Annotated[str, typer.Argument(help="A checkout, a folder of reports or a commit.")],
-    after: Annotated[str, typer.Argument(help="Likewise; `reports` for what lies here.")],
-    root: Root = Path(),
-    as_json: AsJson = False,
-) -> int:
-    """What moved between two runs, and what may be why; proves nothing.
-
-    Per gate: its verdict, criteria that turned, limits that were loosened or
-    tightened, numbers, then which code, parameters and evidence are other ones.
-    Exit 0 whatever moved.
-    """
-    from gates.moved import moved, moved_text
-    from gates.past import reports_of
-    from gates.printed import print_rows
-
-    found = moved(reports_of(before, root), reports_of(after, root))
-    if as_json:
-        print_rows(found)
-    else:
-        print(moved_text(found))
     return 0
 
 

@@ -3,7 +3,7 @@
 import dataclasses
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -70,3 +70,8 @@ def print_rungs(rungs: Sequence[Rung], as_json: bool) -> None:
 def print_rows(rows: Sequence[Any]) -> None:
     """Dataclasses as JSON."""
     print(json.dumps([dataclasses.asdict(row) for row in rows], indent=2, ensure_ascii=False))
+
+
+def print_document(document: Mapping[str, Any]) -> None:
+    """A document as JSON."""
+    print(json.dumps(document, indent=2, ensure_ascii=False))

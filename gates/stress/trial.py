@@ -5,7 +5,7 @@ import math
 from gates.criterion import Measured, criterion
 from gates.evidence import Evidence, MissingEvidenceError
 from gates.stress.rollouts import NOMINAL, STRESS, StressSettings, rollouts, success_lower
-from genpolicy.evidence.documents.stress import POWER
+from genpolicy.evidence.documents.stress import POWER, Power
 
 
 @criterion(
@@ -51,12 +51,19 @@ def _starts(evidence: Evidence, settings: StressSettings, method: str) -> set[tu
     always=True,
 )
 def verdict_reachable(evidence: Evidence, settings: StressSettings) -> Measured:
-    """Share of simulated trials that end right: where the planned effect holds, and the margin.
+    """Share of simulated trials that end right: where the planned effect holds, and the margin."""
+    return reachable(evidence.document(STRESS, POWER), settings)
+
+
+def reachable(power: Power, settings: StressSettings) -> Measured:
+    """Share of the simulated trials of a power table that end right.
 
     The lower of two: promotion in the world of the planned effect, and return in the worlds in
     which the gain is at most the margin.
+
+    Raises:
+        MissingEvidenceError: The table is for another test, or lacks one of these worlds.
     """
-    power = evidence.document(STRESS, POWER)
     for key, stated, planned in (
         ("margin", power.margin, settings.margin),
         ("alpha", power.alpha, settings.alpha),

@@ -9,7 +9,8 @@ import evidence
 import pytest
 import yaml
 
-from gates.commands import gates, report
+from gates.commands import gates
+from gates.run_commands import report
 from genpolicy.cli.shell import run_program
 
 FILES = Path(__file__).parents[2] / "docs" / "ci"

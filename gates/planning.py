@@ -1,0 +1,248 @@
+"""What Gate D can decide with the starts that are planned, said before a rollout.
+
+A limit that no result of this size can keep leaves the gate INCONCLUSIVE whatever the rollouts
+show, and a gain that is too small to be found leaves it with the simpler policy. Both follow from
+`params.yaml` alone, by the same bounds and the same test by which the gate judges afterwards.
+"""
+
+import dataclasses
+import textwrap
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from gates.bounds import counted_interval, draws_for_quantile
+from gates.evidence import MissingEvidenceError
+from gates.report import stage_of
+from gates.settings import Limits, read_limits, read_params, read_settings
+from gates.stated import section
+from gates.stress.gate import GATE
+from gates.stress.rollouts import StressSettings
+from gates.stress.trial import reachable
+from genpolicy.evidence.stress.settings import StressSettings as StressSection
+from genpolicy.evidence.stress.tables import POWER_CORRELATION, POWER_TRIALS, power_document
+from genpolicy.seeds import stream
+from genpolicy.statistics.eprocess import power_table
+
+FEWER = ("intervention_upper", "reset_upper")
+"""Criteria of which a rollout is hit or not, and hits are bad: bounded from above."""
+MORE = ("nominal_success_lower", "stress_success_lower")
+"""The same, and hits are good: bounded from below."""
+RECOVERY = "recovery_success_lower"
+TOUCHED, ANSWERED = "force_peak_p95_n", "latency_p95_s"
+QUANTILE = 0.95
+REACHABLE = "verdict_reachable"
+POWER = 0.8
+"""Power of the smallest gain, where `verdict_reachable` has no limit of its own."""
+BASELINES = (0.1, 0.3, 0.5, 0.7, 0.9)
+COLUMNS = 80
+STEPS = 100
+"""Gains are looked for in points of a hundred."""
+
+
+@dataclass(frozen=True)
+class Bound:
+    """What the planned starts can show of one criterion.
+
+    Attributes:
+        criterion: Its name.
+        decidable: Whether some result keeps the limit; None where that cannot be said before.
+        says: Which results do, or why none does.
+    """
+
+    criterion: str
+    decidable: bool | None
+    says: str
+
+
+@dataclass(frozen=True)
+class Gain:
+    """The smallest gain that the paired test finds often enough.
+
+    Attributes:
+        baseline_success: Assumed success of the best baseline.
+        candidate_success: Success from which a candidate is promoted; None: not even one that
+            always succeeds.
+        promote_share: How often, of the simulated trials.
+    """
+
+    baseline_success: float
+    candidate_success: float | None
+    promote_share: float
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is planned, and what it can decide.
+
+    Attributes:
+        starts: Starts of each method in each condition.
+        rollouts: Over all methods and conditions.
+        longest_s: Virtual time if each rollout took its limit, s.
+        margin: Gain to be shown.
+        alpha: Chance of a wrong promotion of one candidate.
+        power: Share of trials in which a gain is to be found.
+        bounds: By criterion, in the order of the gate.
+        gains: By assumed baseline.
+    """
+
+    starts: int
+    rollouts: int
+    longest_s: float
+    margin: float
+    alpha: float
+    power: float
+    bounds: tuple[Bound, ...]
+    gains: tuple[Gain, ...]
+
+    @property
+    def undecidable(self) -> tuple[str, ...]:
+        """Criteria that no result of this plan can meet."""
+        return tuple(bound.criterion for bound in self.bounds if bound.decidable is False)
+
+    def as_document(self) -> dict[str, Any]:
+        """For JSON."""
+        return {**dataclasses.asdict(self), "undecidable": self.undecidable}
+
+
+def plan_of(root: Path) -> Plan:
+    """What `params.yaml` below `root` plans, and what that can decide.
+
+    Raises:
+        ConfigError: A section is missing or wrong.
+    """
+    params = read_params(root)
+    settings = read_settings(params, stage_of("D"), StressSettings)
+    limits = read_limits(params, "D", GATE.criteria)
+    planned = section(params, "stress", StressSection)
+    methods = dict.fromkeys([*settings.candidates, *settings.baselines])
+    rollouts = len(methods) * len(settings.perturbations) * settings.planned_starts
+    power = limits.number(REACHABLE, otherwise=POWER)
+    return Plan(
+        starts=settings.planned_starts,
+        rollouts=rollouts,
+        longest_s=rollouts * planned.episode_limit_s,
+        margin=settings.margin,
+        alpha=settings.alpha,
+        power=power,
+        bounds=tuple(_bounds(settings, limits, planned)),
+        gains=tuple(_gains(settings, power)),
+    )
+
+
+def _bounds(settings: StressSettings, limits: Limits, planned: StressSection) -> Iterator[Bound]:
+    starts = settings.planned_starts
+    for item in GATE.criteria:
+        if item.id in limits.waived:
+            yield Bound(item.id, None, "declared not applicable")
+            continue
+        entry = limits.of.get(item.id)
+        limit = entry.limit if entry else None
+        if item.id in (*FEWER, *MORE, RECOVERY) and limit is not None:
+            yield _counted(item.id, limit, starts, settings.confidence)
+        elif item.id in (TOUCHED, ANSWERED):
+            yield _quantile(item.id, starts, settings.confidence)
+        elif item.id == REACHABLE and limit is not None:
+            yield _reachable(settings, planned, limit)
+
+
+def _counted(name: str, limit: float, starts: int, confidence: float) -> Bound:
+    """Fewest successes or most failures of the planned starts that keep the limit."""
+    ends = [counted_interval(hits, starts, confidence=confidence) for hits in range(starts + 1)]
+    if name in FEWER:
+        most = max((hits for hits, (_, high) in enumerate(ends) if high <= limit), default=None)
+        none = f"none of {starts} bounds it by {ends[0][1]:.3g} only"
+        kept = f"up to {most} of {starts}, in each condition"
+        return Bound(name, most is not None, none if most is None else kept)
+    fewest = min((hits for hits, (low, _) in enumerate(ends) if low >= limit), default=None)
+    what = "recoveries" if name == RECOVERY else "successes"
+    none = f"{starts} of {starts} {what} show {ends[-1][0]:.3g} only"
+    kept = f"from {fewest} {what} of {starts} on"
+    return Bound(name, fewest is not None, none if fewest is None else kept)
+
+
+def _quantile(name: str, starts: int, confidence: float) -> Bound:
+    """Whether so many starts bound a p95; many answers of one start may, if they differ."""
+    fewest = draws_for_quantile(QUANTILE, confidence)
+    if starts >= fewest:
+        touched = f"if {fewest} starts or more see contact" if name == TOUCHED else ""
+        return Bound(name, True, touched or f"{starts} starts bound a p95 ({fewest} do)")
+    if name == TOUCHED:
+        return Bound(name, False, f"{starts} starts bound no p95, {fewest} do")
+    return Bound(name, None, f"{starts} starts bound a p95 only if answers of one start differ")
+
+
+def _reachable(settings: StressSettings, planned: StressSection, limit: float) -> Bound:
+    candidates = len(settings.candidates)
+    power = power_document(planned, candidates=candidates, root_seed=settings.root_seed)
+    try:
+        found = reachable(power, settings)
+    except MissingEvidenceError as error:
+        return Bound(REACHABLE, False, str(error))
+    assert found.value is not None, "a share of trials is a number"
+    return Bound(REACHABLE, found.value >= limit, found.caveat)
+
+
+def _gains(settings: StressSettings, power: float) -> Iterator[Gain]:
+    """For some baselines, the candidate that is just found: more success is found more often."""
+    for baseline in sorted({*BASELINES, settings.planned_effect[0]}):
+
+        def found(step: int, baseline: float = baseline) -> float:
+            (row,) = power_table(
+                [(baseline, step / STEPS)],
+                margin=settings.margin,
+                alpha=settings.alpha,
+                pairs=settings.planned_starts,
+                correlation=POWER_CORRELATION,
+                trials=POWER_TRIALS,
+                rng=stream(settings.root_seed, "plan", f"{baseline:g}"),
+            )  # the same draws at every step, so that what is found grows with it
+            return row.promote_share
+
+        below, above = -1, STEPS
+        if not found(above) >= power:
+            yield Gain(baseline, None, found(above))
+            continue
+        while above - below > 1:
+            middle = (above + below) // 2
+            below, above = (below, middle) if found(middle) >= power else (middle, above)
+        yield Gain(baseline, above / STEPS, found(above))
+
+
+def plan_text(plan: Plan) -> str:
+    """The plan for a person, 80 columns."""
+    lines = [
+        f"{plan.starts} starts a condition, {plan.rollouts:,} rollouts, at most "
+        f"{plan.longest_s / 3600:.1f} h of virtual time",
+        "",
+        "What these starts can show",
+    ]
+    wide = max((len(bound.criterion) for bound in plan.bounds), default=0)
+    marks = {True: " ", False: "!", None: "?"}
+    for bound in plan.bounds:
+        begin = f"{marks[bound.decidable]} {bound.criterion:<{wide}}  "
+        indent = " " * len(begin)
+        lines += textwrap.wrap(bound.says, COLUMNS, initial_indent=begin, subsequent_indent=indent)
+    lines += [
+        "",
+        f"Smallest gain that is found in {plan.power:.0%} of trials "
+        f"(margin {plan.margin:g}, alpha {plan.alpha:.3g})",
+        *(_gain_text(gain) for gain in plan.gains),
+    ]
+    if plan.undecidable:
+        names = ", ".join(plan.undecidable)
+        lines += ["", f"Gate D would be INCONCLUSIVE whatever the rollouts show: {names}.",
+                  "Plan more starts (stress.starts) before any is run."]  # fmt: skip
+    return "\n".join(lines)
+
+
+def _gain_text(gain: Gain) -> str:
+    if gain.candidate_success is None:
+        most = f"a candidate that never fails in {gain.promote_share:.0%} only"
+        return f"  baseline {gain.baseline_success:.0%}: none; {most}"
+    points = round((gain.candidate_success - gain.baseline_success) * 100)
+    return (
+        f"  baseline {gain.baseline_success:.0%}: {points} points, a candidate of "
+        f"{gain.candidate_success:.0%}"
+    )

@@ -1,0 +1,63 @@
+"""Commands about whole runs: what a planned one can decide, and what moved between two.
+
+Registered in `genpolicy.commands`; exit codes as in `gates.commands`.
+"""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from gates.commands import Root
+from genpolicy.cli.shell import AsJson, examples, new_app, with_examples
+
+report = new_app("Compare the reports of two runs.")
+
+
+@with_examples("genpolicy plan", "genpolicy plan --json")
+def plan(root: Root = Path(), as_json: AsJson = False) -> int:
+    """Say what gate D can decide with the planned starts.
+
+    Which results keep each limit at this number of starts, and the smallest
+    gain that the paired test finds. Reads params.yaml alone. Exit 3 if a limit
+    cannot be kept by any result: the gate would be INCONCLUSIVE in any case.
+    """
+    from gates.planning import plan_of, plan_text
+    from gates.printed import print_document
+
+    found = plan_of(root)
+    if as_json:
+        print_document(found.as_document())
+    else:
+        print(plan_text(found))
+    return 3 if found.undecidable else 0
+
+
+@report.callback()
+def _report() -> None:
+    """Compare the reports of two runs."""  # or typer takes the one command for the group
+
+
+@report.command("diff", epilog=examples("genpolicy report diff HEAD~1 reports"))
+def diff(
+    before: Annotated[str, typer.Argument(help="A checkout, a folder of reports or a commit.")],
+    after: Annotated[str, typer.Argument(help="Likewise; `reports` for what lies here.")],
+    root: Root = Path(),
+    as_json: AsJson = False,
+) -> int:
+    """What moved between two runs, and what may be why; proves nothing.
+
+    Per gate: its verdict, criteria that turned, limits that were loosened or
+    tightened, numbers, then which code, parameters and evidence are other ones.
+    Exit 0 whatever moved.
+    """
+    from gates.moved import moved, moved_text
+    from gates.past import reports_of
+    from gates.printed import print_rows
+
+    found = moved(reports_of(before, root), reports_of(after, root))
+    if as_json:
+        print_rows(found)
+    else:
+        print(moved_text(found))
+    return 0

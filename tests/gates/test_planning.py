@@ -1,0 +1,175 @@
+"""What a plan can decide is what the gate would say of such rollouts."""
+
+import json
+from pathlib import Path
+
+import pandas as pd
+import pytest
+import yaml
+
+from gates import planning
+from gates.bounds import share_interval, upper_quantile
+from gates.evidence import MissingEvidenceError
+from gates.planning import plan_of, plan_text
+from gates.settings import read_params
+from gates.stress.cost import _rollouts_with
+from gates.stress.rollouts import StressSettings
+from genpolicy.cli.main import main
+from genpolicy.errors import ConfigError
+from genpolicy.evidence.stress.tables import POWER_CORRELATION
+from genpolicy.seeds import stream
+from genpolicy.statistics.eprocess import power_table
+
+ROOT = Path(__file__).parents[2]
+TRIALS = 400
+
+
+@pytest.fixture
+def planned(tmp_path, monkeypatch):
+    """The plan of the checkout with parts of section `stress` changed; few simulated trials."""
+    monkeypatch.setattr(planning, "POWER_TRIALS", TRIALS)
+
+    def plan(**changes):
+        params = read_params(ROOT)
+        params = {**params, "stress": {**params["stress"], **changes}}
+        (tmp_path / "params.yaml").write_text(yaml.safe_dump(params))
+        return plan_of(tmp_path)
+
+    return plan
+
+
+def by_name(plan):
+    return {bound.criterion: bound for bound in plan.bounds}
+
+
+def limit(gate, name):
+    owners = read_params(ROOT)["gate_d"]["limits"].values()
+    return next(entries[name][0] for entries in owners if name in entries)
+
+
+def hit(hits, starts):
+    return pd.DataFrame({
+        "perturbation": ["nominal"] * starts, "start": range(starts),
+        "hit": [number < hits for number in range(starts)],
+    })  # fmt: skip
+
+
+@pytest.mark.parametrize("starts", [36, 90])
+@pytest.mark.parametrize("name", ["intervention_upper", "reset_upper"])
+def test_most_failures_are_those_with_which_the_gate_passes(planned, name, starts):
+    bound = by_name(planned(starts=starts))[name]
+    most = int(bound.says.split()[2])
+    settings = StressSettings.model_construct(perturbations=("nominal",), confidence=0.95)
+    values = [_rollouts_with(hit(hits, starts), settings).value for hits in (most, most + 1)]
+    assert values[0] <= limit("D", name) < values[1]
+    assert bound.decidable is True
+
+
+@pytest.mark.parametrize("name", ["nominal_success_lower", "stress_success_lower"])
+def test_fewest_successes_are_those_with_which_the_gate_passes(planned, name):
+    bound = by_name(planned())[name]
+    fewest = int(bound.says.split()[1])
+    for successes, kept in ((fewest, True), (fewest - 1, False)):
+        rows = hit(successes, 90)
+        lower = share_interval(rows["hit"], rows["start"], confidence=0.95, favourable=True)[1]
+        assert (lower >= limit("D", name)) == kept
+    assert bound.decidable is True
+
+
+def test_three_starts_decide_nothing_and_the_plan_says_so(planned):
+    """Of three starts without any reset the bound is .708, and of three successes .292."""
+    plan = planned(starts=3)
+    found = by_name(plan)
+    assert found["reset_upper"].says == "none of 3 bounds it by 0.708 only"
+    assert found["nominal_success_lower"].says == "3 of 3 successes show 0.292 only"
+    assert found["recovery_success_lower"].says == "3 of 3 recoveries show 0.292 only"
+    assert found["force_peak_p95_n"].says == "3 starts bound no p95, 72 do"
+    assert found["latency_p95_s"].decidable is None
+    assert set(plan.undecidable) == {
+        "verdict_reachable", "nominal_success_lower", "stress_success_lower",
+        "recovery_success_lower", "force_peak_p95_n", "intervention_upper", "reset_upper",
+    }  # fmt: skip
+    assert "INCONCLUSIVE whatever the rollouts show: " in plan_text(plan)
+    assert all(gain.candidate_success is None for gain in plan.gains)
+
+
+@pytest.mark.parametrize("starts", [71, 72])
+def test_a_p95_takes_as_many_starts_as_bound_it(planned, starts):
+    """The gate's own quantile of so many starts, each its own draw."""
+    found = by_name(planned(starts=starts))
+    values = pd.Series(range(starts), dtype=float).to_numpy()
+    try:
+        upper_quantile(values, list(map(str, range(starts))), 0.95, confidence=0.95,
+                       rng=stream(1, "any"))  # fmt: skip
+        bounded = True
+    except MissingEvidenceError:
+        bounded = False
+    assert bounded == (starts == 72)
+    assert found["force_peak_p95_n"].decidable == bounded
+    assert found["latency_p95_s"].decidable == (True if bounded else None)
+
+
+def test_the_smallest_gain_is_found_and_one_point_less_is_not(planned):
+    plan = planned()
+    settings = read_params(ROOT)
+    for gain in plan.gains:
+        if gain.candidate_success is None:
+            assert gain.promote_share < plan.power
+            continue
+        for less, enough in ((0.0, True), (0.01, False)):
+            (row,) = power_table(
+                [(gain.baseline_success, gain.candidate_success - less)], margin=plan.margin,
+                alpha=plan.alpha, pairs=90, correlation=POWER_CORRELATION, trials=TRIALS,
+                rng=stream(settings["seed"], "plan", f"{gain.baseline_success:g}"),
+            )  # fmt: skip
+            assert (row.promote_share >= plan.power) == enough
+    shown = [gain for gain in plan.gains if gain.candidate_success is not None]
+    assert len(shown) >= 3
+    assert {gain.baseline_success for gain in plan.gains} >= {0.1, 0.5, 0.9}
+
+
+def test_more_starts_find_smaller_gains(planned):
+    few, many = planned(starts=60), planned(starts=240)
+    for before, after in zip(few.gains, many.gains, strict=True):
+        if before.candidate_success is not None:
+            assert after.candidate_success < before.candidate_success
+
+
+def test_rollouts_and_time_are_those_of_methods_conditions_and_starts(planned):
+    params = read_params(ROOT)
+    methods = {*params["train_generators"]["samplers"], *params["stress"]["baselines"]}
+    plan = planned(starts=90, episode_limit_s=6.0)
+    assert plan.rollouts == len(methods) * len(params["stress"]["perturbations"]) * 90
+    assert plan.longest_s == plan.rollouts * 6.0
+
+
+def test_what_is_waived_is_said_and_blocks_nothing(tmp_path, planned):
+    planned(starts=3)
+    path = tmp_path / "params.yaml"
+    params = yaml.safe_load(path.read_text())
+    safety = params["gate_d"]["limits"]["safety"]
+    del safety["force_peak_p95_n"]
+    params["gate_d"]["not_applicable"] = {"safety": {"force_peak_p95_n": "nothing is touched"}}
+    path.write_text(yaml.safe_dump(params))
+    plan = plan_of(tmp_path)
+    assert by_name(plan)["force_peak_p95_n"].says == "declared not applicable"
+    assert "force_peak_p95_n" not in plan.undecidable
+
+
+@pytest.mark.parametrize(("starts", "code"), [(3, 3), (90, 0)])
+def test_the_command_leaves_with_3_where_nothing_can_be_decided(
+    planned, tmp_path, capsys, starts, code
+):
+    planned(starts=starts)
+    assert main(["plan", "--root", str(tmp_path)]) == code
+    text = capsys.readouterr().out
+    assert max(map(len, text.splitlines())) <= 80
+    assert main(["plan", "--root", str(tmp_path), "--json"]) == code
+    document = json.loads(capsys.readouterr().out)
+    assert document["starts"] == starts and bool(document["undecidable"]) == (code == 3)
+
+
+def test_a_plan_without_its_section_is_bad_configuration(tmp_path):
+    (tmp_path / "params.yaml").write_text("{}\n")
+    with pytest.raises(ConfigError, match="gate_d"):
+        plan_of(tmp_path)
