@@ -16,6 +16,7 @@ from genpolicy.contract.chunk import Projected
 from genpolicy.evidence.shadow.case import Case, decide
 from genpolicy.evidence.shadow.corruption import CORRUPTIONS
 from genpolicy.feasibility.admission import Admitted
+from genpolicy.feasibility.checks import CHECKS
 from genpolicy.feasibility.reasons import Reason
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -102,3 +103,16 @@ def test_what_is_admitted_has_the_margins_that_it_had(checker, good):
         GOLDEN / "admitted.json",
         {case.context.phase: plain(stated(checker, case)) for case in good},
     )
+
+
+def test_every_limit_that_is_stated_is_what_it_was(cell, good):
+    """Of all checks, in the open and in contact: what pages state, and what margins count by."""
+    found = {
+        str(check.name): {
+            "scale": float(check.scale(cell)),
+            **{case.context.phase: plain(list(check.limit(cell, case.context))) for case in good},
+        }
+        for check in CHECKS
+    }
+    assert list(found) == list(Reason)
+    hold(GOLDEN / "limits.json", found)
