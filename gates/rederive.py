@@ -18,6 +18,7 @@ from gates.rederive_draws import rederive_rollout_draws, rederive_shadow_draws
 from gates.rederive_latency import rederive_latency
 from gates.rederive_sessions import rederive_sessions
 from gates.rederive_shadow import SHADOW, TaskSection, rederive_shadow
+from gates.rederive_splices import rederive_splices
 from gates.report import Gate
 from gates.settings import PARAMS_FILE, read_params, section_of
 from gates.stated import (
@@ -54,6 +55,7 @@ from genpolicy.verification.journal_source import readable
 from genpolicy.verification.motion import ExpectedMotion
 from genpolicy.verification.report import JournalReport
 from genpolicy.verification.rollouts import derived_rollouts
+from genpolicy.verification.spliced import Spliced
 from genpolicy.verification.tables import KEYS, derived_tables
 
 STRESS = "artifacts/stress"
@@ -103,13 +105,14 @@ def rederive(root: Path, gate: Gate) -> None:
         return
     folder, pattern = FOLDERS[gate]
     journals = sorted((root / folder).glob(pattern))
-    _check(root, gate, params, journals)
+    held_to = _held_to(params)
+    _check(root, gate, held_to, journals)
     rederive_sessions(root, gate, params, journals)
     if gate == "C":
         rederive_shadow(root, params)
         rederive_shadow_draws(root, params)
     else:
-        _tables(root, params, journals)
+        _tables(root, params, held_to[1], journals)
         rederive_latency(root, params, journals)
         rederive_disturbance(params, journals)
         rederive_rollout_draws(root, params, journals)
@@ -138,9 +141,14 @@ def _held_to(params: Mapping[str, Any]) -> tuple[ExpectedSettings, ExpectedMotio
     return expected, expected_motion(cell)
 
 
-def _check(root: Path, gate: Gate, params: Mapping[str, Any], journals: list[Path]) -> None:
+def _check(
+    root: Path,
+    gate: Gate,
+    held_to: tuple[ExpectedSettings, ExpectedMotion],
+    journals: list[Path],
+) -> None:
     """The checker's document, made again under the settings of `params.yaml`."""
-    expected, motion = _held_to(params)
+    expected, motion = held_to
     again = checked(
         {path.name: check_journal(path, expected, motion).as_document() for path in journals}
     )
@@ -160,12 +168,15 @@ def _totals(report: JournalReport | None) -> str:
     return f"{len(report.violations)} violations in {report.checked_actions} actions"
 
 
-def _tables(root: Path, params: Mapping[str, Any], journals: list[Path]) -> None:
+def _tables(
+    root: Path, params: Mapping[str, Any], motion: ExpectedMotion, journals: list[Path]
+) -> None:
     """Every table that journals speak of: each row what they say, and none without the other."""
     seed = training_seed(params)
     with readable(f"{STRESS}/journals"):
         rollouts = [row for path in journals for row in derived_rollouts(path).values()]
-        tables = derived_tables(journals)
+        spliced = Spliced(motion.scene_path)
+        tables = derived_tables(journals, spliced)
     for name, keys, rows in (
         ("rollouts", ROLLOUT, rollouts),
         *((name, KEYS[name], rows) for name, rows in tables.items()),
@@ -173,6 +184,7 @@ def _tables(root: Path, params: Mapping[str, Any], journals: list[Path]) -> None
         path = f"{STRESS}/{name}.parquet"
         stated = read_table(root / path).to_pylist()
         compare_rows("D", path, keys, stated, rows, seed=seed)
+    rederive_splices(root, params, spliced.rows)
 
 
 def _envelope(root: Path, params: Mapping[str, Any]) -> None:

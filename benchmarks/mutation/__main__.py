@@ -9,6 +9,7 @@ which operators are kept; `|` is not, since it stands in annotations mostly. See
     python -m benchmarks.mutation run gates/card --sample 60 --near --out build/mutation.jsonl
     python -m benchmarks.mutation again --out build/mutation.jsonl     # its survivors, once more
     python -m benchmarks.mutation show --out build/mutation.jsonl
+    python -m benchmarks.mutation named                                # those written by hand
 """
 
 import argparse
@@ -19,6 +20,7 @@ import time
 from dataclasses import asdict
 from pathlib import Path
 
+from benchmarks.mutation.named import run_named
 from benchmarks.mutation.plan import ROOT, Mutant, drawn, inside, modules, mutants_of
 from benchmarks.mutation.runner import run
 
@@ -59,7 +61,7 @@ def show(out: Path) -> None:
 def main() -> None:
     """Command line."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
-    parser.add_argument("what", choices=["run", "again", "count", "show"])
+    parser.add_argument("what", choices=["run", "again", "count", "show", "named"])
     parser.add_argument("places", nargs="*", default=[])
     parser.add_argument("--sample", type=int, default=0)
     parser.add_argument("--seed", type=int, default=1)
@@ -81,6 +83,8 @@ def main() -> None:
         chosen = [m for m in drawn(places, asked.sample, asked.seed) if key(asdict(m)) not in done]
         run(chosen, asked.out, asked.jobs, near=asked.near, green=asked.green)
         print(f"{time.monotonic() - started:.0f} s")
+    elif asked.what == "named":
+        sys.exit(run_named(asked.places, green=asked.green) > 0)
     elif asked.what == "again":
         left = [row for row in rows_of(asked.out) if row["outcome"] == "survived"]
         fields = Mutant.__dataclass_fields__

@@ -11,7 +11,7 @@ from enum import StrEnum
 from functools import cached_property
 from typing import Annotated, Any
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_serializer, model_validator
 
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.contract.latency import FITTING, DeadlineAction, Term, TermDeadline
@@ -132,6 +132,11 @@ class ExecutionSettings(Settings):
         if isinstance(plans, dict):
             complete["recovery_plans"] = {phase: _plan(phase, plans[phase]) for phase in plans}
         return complete
+
+    @field_serializer("term_deadlines")
+    def _as_rows(self, table: dict[Term, TermDeadline]) -> list[tuple[str, float, str]]:
+        """As `params.yaml` has it, so that what is written is read again."""
+        return [(str(term), row.most_s, str(row.action)) for term, row in table.items()]
 
     @property
     def late_by_phase(self) -> dict[str, str]:

@@ -12,6 +12,7 @@ from typing import Any
 
 from genpolicy.verification.journal_source import Message, read_messages
 from genpolicy.verification.rollouts import order_statistic
+from genpolicy.verification.spliced import Spliced
 
 AGE_LEVELS = (0.0, 0.05, 0.25, 0.5, 0.75, 0.9, 0.95, 0.99, 1.0)
 NOT_THE_ADMITTED = "infeasible"
@@ -108,8 +109,14 @@ class Condition:
         }
 
 
-def derived_tables(journals: Iterable[Path]) -> dict[str, list[dict[str, Any]]]:
+def derived_tables(
+    journals: Iterable[Path], spliced: Spliced | None = None
+) -> dict[str, list[dict[str, Any]]]:
     """Rows of the tables of `KEYS` that follow from journal files.
+
+    Args:
+        journals: The files.
+        spliced: What takes the same events in beside, so that a journal is read once.
 
     Returns:
         By table: its columns but the training seed. Times in s.
@@ -121,7 +128,11 @@ def derived_tables(journals: Iterable[Path]) -> dict[str, list[dict[str, Any]]]:
     conditions: dict[tuple[str, str], Condition] = {}
     for path in journals:
         sessions: dict[str, tuple[Condition, int]] = {}
+        if spliced is not None:
+            spliced.forget()
         for kind, message in read_messages(path):
+            if spliced is not None:
+                spliced.read(kind, message)
             name = str(message.get("session"))
             if kind == "session":
                 labels = message["labels"]

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from gates.audit import command
 from genpolicy.cli.main import main
 from genpolicy.data import assemble
 from genpolicy.data.formats import detect
@@ -307,6 +308,11 @@ def test_names_of_the_dataset_are_those_of_its_writer():
     assert (detect.MANIFEST_FILE, detect.FRAMES_FILE) == (
         assemble.MANIFEST_FILE, assemble.FRAMES_FILE,
     )  # fmt: skip
+
+
+def test_names_of_an_audit_are_those_of_its_writer():
+    written = (command.DOCUMENT, command.PAGE, f"{detect.DATASET}/{assemble.MANIFEST_FILE}")
+    assert written == detect.AUDIT_FILES
 
 
 def test_help_and_a_wrong_path_load_nothing_heavy(metadata, tmp_path):

@@ -25,6 +25,7 @@ from genpolicy.evidence.rows.stress import (
     InvocationRow,
     OverrunRow,
     RolloutRow,
+    SpliceRow,
     StressCountRow,
     StressStubRow,
 )
@@ -134,6 +135,7 @@ def root(tmp_path):
         seed = {"seed": 0} if name == "invocations" else {}
         made = [TABLES[name](**row, **seed) for row in listed]
         write_rows(folder / f"{name}.parquet", TABLES[name], made)
+    write_rows(folder / "splices.parquet", SpliceRow, [])  # nothing is delivered
     shadow.CHECKER.write(folder, checked(documents))
     (folder / "envelope.json").write_text(json.dumps(_envelope(folder)))
     (folder / "power.json").write_bytes(POWER)
@@ -225,6 +227,13 @@ FORGED_TABLES = {
     "stub": ("stale", 1, "stub bc/nominal: stale"),
     "overruns": ("count", 2, "overrun bc/nominal//: count"),
 }
+
+
+def test_a_splice_that_is_in_no_journal_is_refused(root):
+    made = SpliceRow("flow", 0, "nominal", 0, "replace", 0, 0, 0.1, None, 0.1, None)
+    write_rows(root / STRESS / "splices.parquet", SpliceRow, [made])
+    with pytest.raises(RefusedError, match=r"splice flow/nominal/0/0 is without a journal"):
+        rederive(root, "D")
 
 
 @pytest.mark.parametrize("name", FORGED_TABLES)

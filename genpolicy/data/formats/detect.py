@@ -14,6 +14,8 @@ from genpolicy.errors import BadInputError
 DATASET = "dataset"
 # Named here once more, because their home loads every table library; a test holds both together.
 MANIFEST_FILE, FRAMES_FILE = "manifest.json", "frames.parquet"
+AUDIT_FILES = ("audit.json", "audit.html", f"{DATASET}/{MANIFEST_FILE}")
+"""What `genpolicy audit` writes: never recordings, wherever it was told to write it."""
 HDF5_SUFFIXES = (".hdf5", ".h5", ".hdf")
 HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 PARQUET_MAGIC = b"PAR1"
@@ -107,6 +109,9 @@ def contents(path: Path, *, into_whole: bool = False) -> Contents:
     for here, folders, files in os.walk(path, onerror=_raise):
         folders.sort()
         place = Path(here)
+        if place != path and all((place / name).is_file() for name in AUDIT_FILES):
+            folders.clear()
+            continue
         if place != path and not into_whole and _whole(place):
             found.datasets.append(place.relative_to(path).as_posix())
             folders.clear()
@@ -121,6 +126,21 @@ def contents(path: Path, *, into_whole: bool = False) -> Contents:
                 relative = (place / name).relative_to(path).as_posix()
                 found.files.setdefault(layout, []).append(relative)
     return found
+
+
+def files_of(path: Path, layout: str) -> list[Path]:
+    """Files of one layout at or below a path, sorted; what an audit wrote is not among them.
+
+    Raises:
+        BadInputError: A folder cannot be listed.
+    """
+    if not path.is_dir():
+        return [path]
+    try:
+        names = contents(path, into_whole=True).files.get(layout, [])
+    except OSError as error:
+        refuse_unreadable(path, error)
+    return sorted(path / name for name in names)
 
 
 def refuse_unreadable(path: Path, error: OSError) -> NoReturn:

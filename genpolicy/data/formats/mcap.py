@@ -23,6 +23,7 @@ from genpolicy.data.formats.contract import (
     contract_of,
     selectors,
 )
+from genpolicy.data.formats.detect import files_of
 from genpolicy.data.formats.open_questions import open_questions
 from genpolicy.data.formats.pairing import pair_by_name
 from genpolicy.data.formats.result import Opened
@@ -78,7 +79,7 @@ def recordings(path: Path) -> list[Path]:
     Raises:
         BadInputError: There is none.
     """
-    files = sorted(path.rglob("*.mcap")) if path.is_dir() else [path]
+    files = files_of(path, "mcap")
     if not files:
         raise BadInputError(
             where=str(path),

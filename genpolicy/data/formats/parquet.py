@@ -11,6 +11,7 @@ import pyarrow.parquet as pq
 from genpolicy.data.assemble import Refusal
 from genpolicy.data.formats.columns import labels_of
 from genpolicy.data.formats.contract import ImportContract
+from genpolicy.data.formats.detect import files_of
 from genpolicy.data.formats.segments import episode_label, episodes_of, find_segments
 from genpolicy.data.formats.source import (
     MAXIMUM_EPISODE_ROWS,
@@ -42,7 +43,7 @@ class ParquetFiles:
         """
         self.name = path.name
         self._root = path if path.is_dir() else path.parent
-        self._files = sorted(path.rglob("*.parquet")) if path.is_dir() else [path]
+        self._files = files_of(path, "parquet")
         if not self._files:
             refuse(str(path), "without a .parquet file", "a file, or a folder of them")
         self._table = self._first()

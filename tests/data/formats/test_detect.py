@@ -2,7 +2,14 @@
 
 import pytest
 
-from genpolicy.data.formats.detect import detect
+from genpolicy.data.formats.detect import (
+    AUDIT_FILES,
+    FRAMES_FILE,
+    MANIFEST_FILE,
+    detect,
+    files_of,
+    only_hdf5,
+)
 from genpolicy.errors import BadInputError
 
 
@@ -25,3 +32,35 @@ def test_layouts_are_told_by_what_is_there(layouts, tmp_path):
     (tmp_path / "none" / "b.parquet").touch()
     with pytest.raises(BadInputError, match="several layouts"):
         detect(tmp_path / "none")
+
+
+@pytest.mark.parametrize("missing", [None, *AUDIT_FILES])
+def test_an_audit_written_beside_recordings_is_no_data_set(tmp_path, missing):
+    """Whoever audits one file and writes beside it can audit the folder afterwards."""
+    (tmp_path / "demo.hdf5").write_bytes(b"\x89HDF\r\n\x1a\n")
+    for name in (*AUDIT_FILES, f"dataset/{FRAMES_FILE}"):
+        if name != missing:
+            (tmp_path / "audit" / name).parent.mkdir(parents=True, exist_ok=True)
+            (tmp_path / "audit" / name).touch()
+    if missing is None:
+        assert detect(tmp_path) == "robomimic"
+        assert only_hdf5(tmp_path) == tmp_path / "demo.hdf5"
+    elif missing == f"dataset/{MANIFEST_FILE}":
+        with pytest.raises(BadInputError, match="several layouts"):
+            detect(tmp_path)
+    else:
+        with pytest.raises(BadInputError, match=r"above 1 data set \(audit/dataset"):
+            detect(tmp_path)
+
+
+@pytest.mark.parametrize("layout", ["parquet", "mcap"])
+def test_files_of_an_audit_are_not_read_as_recordings(tmp_path, layout):
+    for name in (*AUDIT_FILES, "dataset/frames.parquet", "dataset/episodes/0.mcap"):
+        (tmp_path / "audit" / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "audit" / name).touch()
+    own = [tmp_path / f"{name}.{layout}" for name in ("a", "b/c")]
+    for path in own:
+        path.parent.mkdir(exist_ok=True)
+        path.touch()
+    assert files_of(tmp_path, layout) == own
+    assert files_of(own[0], layout) == own[:1]

@@ -8,8 +8,11 @@ import pytest
 
 from genpolicy.candidates.joining import JoiningSettings
 from genpolicy.execution.cell import ExecutionSettings
+from genpolicy.execution.journal import write_journal
 from genpolicy.verification.checker import check_messages
 from genpolicy.verification.rollouts import derived_rollouts
+from genpolicy.verification.spliced import Spliced
+from genpolicy.verification.tables import derived_tables
 
 LEAD = 7
 """An invocation begins at once behind the last: plans overlap by as much as their validity lets."""
@@ -98,6 +101,21 @@ def test_every_rule_is_proved_from_its_journal(played, kit, tmp_path, rule):
         assert len(blends) >= 3 and set(blends) <= {
             m["chunk_id"] for m in of_kind(rollout, "candidate")
         }
+
+
+@pytest.mark.parametrize("rule", RULES)
+def test_how_each_chunk_begins_follows_from_the_journal_too(played, task, tmp_path, rule):
+    """Another library's kinematics, and nothing of what wrote the table."""
+    rollout = played(rule)
+    write_journal(tmp_path / "journal.mcap", [rollout.journal])
+    spliced = Spliced(task.scene_path)
+    derived_tables([tmp_path / "journal.mcap"], spliced)
+    assert len(spliced.rows) == len(rollout.splices) > 3
+    for row, splice in zip(spliced.rows, rollout.splices, strict=True):
+        assert row["rule"] == rule
+        for name, value in vars(splice).items():
+            assert row[name] == (None if value is None else pytest.approx(value, rel=1e-6))
+    assert any(row["jerk_m_s3"] for row in spliced.rows)
 
 
 def _made(rollout, entered):
