@@ -111,6 +111,17 @@ def test_collisions_are_those_of_the_robot(cell, plain, kit, question, asked):
     assert np.isfinite(ours.clearance_m).any()
 
 
+def test_bounds_of_a_piece_are_those_of_the_robot(cell, plain, kit):
+    """Also of fingers that slide while the hand turns, which bend off the straight line."""
+    these = paths(cell, kit, 40, 7, step_rad=0.3)
+    pieces = cell.collision._first_pieces(these)
+    assert np.ptp(pieces.opening, axis=1).min() < 1e-3 < np.ptp(pieces.opening, axis=1).max()
+    poses = cell.collision.poses(these.scenes)
+    ours, theirs = (c.collision._evaluate(pieces, poses) for c in (cell, plain))
+    assert np.allclose(ours.bound_m, theirs.bound_m, atol=1e-12, rtol=0)
+    assert np.allclose(ours.travel_m, theirs.travel_m, atol=1e-12, rtol=0)
+
+
 def test_a_row_has_the_same_bits_in_any_company(cell, kit):
     q = drawn(cell, 33)
     rates = np.random.default_rng(4).normal(0, 1, (2, *q.shape))

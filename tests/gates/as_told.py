@@ -9,17 +9,15 @@ moved unseen. After a change that is meant, write them again and read the differ
     GOLDEN=write python -m pytest -n 0 tests/gates/golden
 """
 
-import json
-import os
+import sys
 from pathlib import Path
 from typing import Any
 
-import pytest
+sys.path.insert(0, str(Path(__file__).parents[1]))
+import held
 
 GOLDEN = Path(__file__).parent / "golden"
 OF_REPORT = ("verdict", "candidates", "promoted", "decision", "diagnosis", "caveats", "settings")
-ROUNDING = 1e-9
-"""Of a number as a share of it, and about 0: what another library of algebra may add."""
 
 
 def told(report) -> dict[str, Any]:
@@ -32,23 +30,4 @@ def told(report) -> dict[str, Any]:
 
 def hold(name: str, found: dict[str, Any]) -> None:
     """Compare with the version of that name; with GOLDEN=write, write it, and be red."""
-    file = GOLDEN / f"{name}.json"
-    if os.environ.get("GOLDEN") == "write":
-        file.write_text(json.dumps(found, indent=1, sort_keys=True, ensure_ascii=False) + "\n")
-        pytest.fail(f"{file.name} was written: read the difference, then ask again")
-    assert list(differences(json.loads(file.read_text()), found)) == []
-
-
-def differences(golden: Any, found: Any, place: str = ""):
-    """Places at which two documents differ, with both values."""
-    if isinstance(golden, dict) and isinstance(found, dict):
-        for key in sorted({*golden, *found}):
-            yield from differences(golden.get(key), found.get(key), f"{place}/{key}")
-    elif isinstance(golden, list) and isinstance(found, list) and len(golden) == len(found):
-        for number, pair in enumerate(zip(golden, found, strict=True)):
-            yield from differences(*pair, f"{place}/{number}")
-    elif type(golden) is type(found) is float:
-        if found != pytest.approx(golden, rel=ROUNDING, abs=ROUNDING):
-            yield place, golden, found
-    elif golden != found or type(golden) is not type(found):
-        yield place, golden, found
+    held.hold(GOLDEN / f"{name}.json", found)

@@ -11,10 +11,10 @@ import pkgutil
 from collections.abc import Iterator
 from dataclasses import FrozenInstanceError, fields, is_dataclass
 from types import CodeType, FunctionType
-from typing import Any
 
 import pytest
 from as_told import hold
+from held import numbers
 from pydantic import BaseModel
 
 import gates
@@ -113,21 +113,6 @@ def test_what_is_paired_is_equally_long():
     assert len(found) > 20 and [name for name, strict in found if strict is not True] == []
 
 
-def _numbers(value: Any, place: str) -> Iterator[tuple[str, float]]:
-    """Numbers in a value of a module, with where they stand; nothing of what is not plain data."""
-    if isinstance(value, (bool, int, float)):
-        yield place, value
-    elif isinstance(value, dict):
-        for key, item in value.items():
-            yield from _numbers(item, f"{place}.{key}")
-    elif isinstance(value, (tuple, list)):
-        for index, item in enumerate(value):
-            yield from _numbers(item, f"{place}.{index}")
-    elif is_dataclass(value) and not isinstance(value, type):
-        for field in fields(value):
-            yield from _numbers(getattr(value, field.name), f"{place}.{field.name}")
-
-
 def test_every_number_that_the_code_itself_holds_is_what_it_was():
     """Constants, defaults and the bounds of settings: what decides and stands in no `params.yaml`.
 
@@ -147,5 +132,5 @@ def test_every_number_that_the_code_itself_holds_is_what_it_was():
     }
     bounds = {_name(kind): kind.model_json_schema() for kind in MODELS}
     found = {"constants": constants, "defaults": defaults, "bounds": bounds}
-    assert all(dict(_numbers(values, "")) for values in found.values())
-    hold("forms", {name: dict(_numbers(values, name)) for name, values in found.items()})
+    assert all(dict(numbers(values, "")) for values in found.values())
+    hold("forms", {name: dict(numbers(values, name)) for name, values in found.items()})

@@ -70,3 +70,22 @@ def test_the_solver_takes_so_many_steps_and_says_what_is_left(cell, kit, iterati
     assert left[0, 0] == pytest.approx(np.linalg.norm(at[-1] - target[0][0]), abs=1e-12)
     assert (left.max() <= 1e-7) == (iterations == 40)
     assert np.allclose(reached[-1], target[1][0], atol=1e-6) == (iterations == 40)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("part", ["position", "rotation", "seed"])
+def test_of_a_pose_that_is_none_nothing_is_known_and_the_others_are_solved(cell, kit, part, bad):
+    """Neither distance nor angle, whatever stood there before; the seed stays as it was."""
+    arm, rows = cell.kinematics, 3
+    rotation, position = placed(cell, kit.HOME)
+    asked = {
+        "position": np.tile(position[-1], (rows, 1)),
+        "rotation": np.tile(rotation[-1], (rows, 1, 1)),
+        "seed": np.tile(kit.HOME + 0.1, (rows, 1)),
+    }
+    asked[part][1].flat[0] = bad
+    seed, left = asked["seed"].copy(), np.full((rows, 2), 7.0)
+    solve_all(arm.turns, arm.offsets, *asked.values(), 40, FIGURES, left)
+    assert np.isnan(left[1]).tolist() == [True, True]
+    assert np.array_equal(asked["seed"][1], seed[1], equal_nan=True)
+    assert left[[0, 2]].max() <= 1e-7
