@@ -17,7 +17,7 @@ from flows.reproduce import stage_environment
 from genpolicy.policies.energy import EnergyNetwork
 from genpolicy.policies.policy import load_policy
 
-STEPS, POPULATION = 16, 64
+STEPS, POPULATION = 4, 16
 ADDED = {
     "ibc": {"name": "langevin", "steps": STEPS, "population": POPULATION},
     "bc": {"name": "direct"},

@@ -122,6 +122,8 @@ def test_a_skipped_invocation_lets_a_period_pass(play, term):
     rollout = play(term, 0.5, table(**{term: "skip_invocation"}), ticks=6)
     begun = [when for when, stage, _ in stages(rollout) if stage == "begin"]
     assert begun == [0.0, pytest.approx(2 * PERIOD_S), pytest.approx(4 * PERIOD_S)]
+    said = [detail for _, stage, detail in stages(rollout) if stage == "overrun"]
+    assert said == [f"{term} skip_invocation"] * 3
 
 
 @pytest.mark.parametrize("term", ["network", "queue"])
@@ -216,30 +218,94 @@ def test_what_ships_names_every_term_and_every_usual_answer_keeps_it(kit):
         assert most_s < shipped[term].most_s
 
 
-@pytest.mark.parametrize(("change", "said"), [
-    (lambda rows: [r for r in rows if r[1] != "overrun"], "states no 'sample cancel_candidate'"),
-    (lambda rows: [(t + 0.06, *r) if r[0] == "overrun" else (t, *r) for t, *r in rows], "known at"),
-    (lambda rows: [(t, s, d.replace("sample", "queue")) for t, s, d in rows], "no longer than"),
-])  # fmt: skip
-def test_a_journal_that_did_something_else_is_refused(play, kit, tmp_path, change, said):
-    rows = table(sample="cancel_candidate")
-    rollout = play("sample", 0.5, rows, ticks=8)
-    told = change(stages(rollout))
-    journal = type(rollout.journal)(rollout.journal.session, rollout.journal.labels)
-    (begun,) = of_kind(rollout, "session")
-    journal.add("session", 0, begun.payload)
-    number = -1
-    for when, stage, detail in told:
-        number += stage == "begin"
-        name = f"{journal.session}/{number}"
-        journal.invocation(when, invocation_id=name, stage=stage, detail=detail)
-    (end,) = of_kind(rollout, "end")
-    journal.add("end", end.t, end.payload)
-    write_journal(tmp_path / "other.mcap", [journal])
-    model = replace(
-        kit.latency(),
-        declared={n: DeclaredTerm(USUAL_S, USUAL_S) for n in kit.latency().declared},
-        measured={n: np.full(8, 0.5 if n == "sample" else USUAL_S) for n in kit.latency().measured},
+ACTIONS = {
+    "exposure": "drop_observation", "capture": "drop_observation", "decode": "skip_invocation",
+    "transfer": "skip_invocation", "preprocess": "skip_invocation", "encode": "cancel_candidate",
+    "sample": "cancel_candidate", "select": "continue", "project": "reject_candidate",
+    "network": "reject_stale", "queue": "reject_stale",
+}  # fmt: skip
+ON_ARRIVAL = ("project", "network", "queue")
+"""Terms that are dealt with when the answer comes, and not when their time is over."""
+
+
+@pytest.fixture
+def forged(play, kit, tmp_path):
+    """What the checker says of a journal whose invocations were changed, by slow term."""
+
+    def ask(term, change, candidates=()):
+        slow_s = 0.11 if term in ON_ARRIVAL else 0.5
+        rows = table(**{term: ACTIONS[term]})
+        rollout = play(term, slow_s, rows, ticks=8)
+        journal = type(rollout.journal)(rollout.journal.session, rollout.journal.labels)
+        (begun,) = of_kind(rollout, "session")
+        journal.add("session", 0, begun.payload)
+        number = -1
+        for when, stage, detail in change(stages(rollout)):
+            number += stage == "begin"
+            name = f"{journal.session}/{number}"
+            journal.invocation(when, invocation_id=name, stage=stage, detail=detail)
+        for index in candidates:
+            journal.candidate(
+                0.3, chunk_id=f"{journal.session}/0", method="scripted", index=index,
+                layers={}, first_reason=None, measures={},
+            )  # fmt: skip
+        (end,) = of_kind(rollout, "end")
+        journal.add("end", end.t, end.payload)
+        write_journal(tmp_path / "other.mcap", [journal])
+        base = kit.latency()
+        declared, measured = (
+            {n: slow_s if str(n) == term else USUAL_S for n in names}
+            for names in (base.declared, base.measured)
+        )
+        model = replace(
+            base,
+            declared={n: DeclaredTerm(span, span) for n, span in declared.items()},
+            measured={n: np.full(8, span) for n, span in measured.items()},
+        )
+        return list(stated_otherwise(tmp_path / "other.mcap", times(model, rows)))
+
+    return ask
+
+
+def of_overruns(change):
+    """A change of every overrun (when, stage, detail) that a journal states."""
+    return lambda rows: [change(*row) if row[1] == "overrun" else row for row in rows]
+
+
+@pytest.mark.parametrize("term", ACTIONS)
+def test_a_journal_that_did_what_was_declared_stands(forged, term):
+    assert forged(term, lambda rows: rows) == []
+
+
+@pytest.mark.parametrize("term", [term for term in ACTIONS if term not in ON_ARRIVAL])
+def test_what_is_not_done_is_missing(forged, term):
+    found = forged(term, lambda rows: [row for row in rows if row[1] != "overrun"])
+    assert found and f"states no '{term} {ACTIONS[term]}'" in found[0]
+
+
+@pytest.mark.parametrize("term", ON_ARRIVAL)
+def test_what_had_to_be_refused_when_it_came_may_not_be_judged(forged, term):
+    found = forged(term, lambda rows: [r for r in rows if r[1] != "overrun"], candidates=[0])
+    assert found and "is judged, and it took longer than it may" in found[0]
+
+
+@pytest.mark.parametrize("term", [term for term in ACTIONS if term not in ON_ARRIVAL])
+def test_what_is_done_too_late_is_no_answer_to_it(forged, term):
+    found = forged(term, of_overruns(lambda when, *row: (when + 0.06, *row)))
+    assert found and "known at" in found[0]
+
+
+@pytest.mark.parametrize("term", ACTIONS)
+def test_another_action_than_the_declared_one_is_not_owed(forged, term):
+    other = "fallback" if ACTIONS[term] == "continue" else "continue"
+    found = forged(term, of_overruns(lambda when, stage, _: (when, stage, f"{term} {other}")))
+    assert found and f"states '{term} {other}', and that term took no longer" in found[0]
+
+
+@pytest.mark.parametrize("term", ACTIONS)
+def test_an_overrun_of_a_term_that_was_in_time_is_not_owed(forged, term):
+    other = "queue" if term != "queue" else "network"
+    found = forged(
+        term, of_overruns(lambda when, stage, _: (when, stage, f"{other} {ACTIONS[term]}"))
     )
-    found = list(stated_otherwise(tmp_path / "other.mcap", times(model, rows)))
-    assert found and said in found[0]
+    assert found and f"states '{other} {ACTIONS[term]}', and that term took no" in found[0]
