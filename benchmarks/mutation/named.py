@@ -57,7 +57,6 @@ NAMED = (
           '        ("public_key", [person.public_key for person in found.people]),\n', ""),
     Named("the named reviewer need not sign", SIGNING,
           "if card.reviewer not in names:", "if False:"),
-    Named("a card that no reviewer signed", SIGNING, "    if not names:", "    if False:"),
     Named("dependence is not asked when judged", SIGNING,
           "card.reviewer, card.authors, signed.signers, allowed)\n    if why:",
           "card.reviewer, card.authors, signed.signers, allowed)\n    if False:"),
