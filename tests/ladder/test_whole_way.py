@@ -35,6 +35,7 @@ def methods(workspace: Path, table: str) -> set[str]:
 def test_ibc_and_plain_bc_as_candidates(copy: Path) -> None:
     def add(params: dict[str, Any]) -> None:
         params["train_generators"]["samplers"] |= ADDED
+        params["stress"]["starts"] = 1
 
     edit_params(copy, add)
     outcome, ran = repro(copy)
