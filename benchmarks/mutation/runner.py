@@ -19,8 +19,9 @@ from benchmarks.mutation.plan import ROOT, Mutant, cases_of, change_of, tests_of
 
 OURS = ("gates", "genpolicy", "tests", "benchmarks")
 KERNELS = "genpolicy/feasibility/kernels/"
-CPU_S = 150
-"""A mutant that needs more processor time than this hangs: killed. The slowest tests need 60."""
+CPU_S = 600
+"""A mutant that needs more processor time than this hangs: killed. All tests of `gates/need` need
+more than 150 on a busy machine, where a survivor was once called killed."""
 
 
 class _Changed(importlib.machinery.SourceFileLoader):

@@ -118,6 +118,13 @@ def test_two_kinds_of_evidence_speak_for_each_other_and_must_agree(numbers, name
     assert (cause.name.value, cause.kind) == (name, kind)
 
 
+@pytest.mark.parametrize(("modes", "kind"), [(0, ""), (1, "evidence_disagrees")])
+def test_one_episode_with_modes_is_a_contradiction_where_one_is_enough(modes, kind):
+    floors = {**VALID.floors, "two_mode_episodes": 1, "two_mode_share": 0.02}
+    numbers = replace(ABSENT, floors=floors, **_short_lived(modes=modes))
+    assert named(numbers, limit(two_mode_episodes=1, two_mode_share=0.02)).kind == kind
+
+
 @pytest.mark.parametrize(
     ("limits", "name"),
     [
