@@ -8,7 +8,7 @@ import evidence
 import pytest
 from team import AUTHORS, PEOPLE
 
-from gates.card.judge import CardGateSettings
+from gates.card.judge import CardGateSettings, examine
 from gates.claim import CHECKPOINT_ONLY
 from gates.report import parse_section
 from genpolicy.errors import ConfigError
@@ -267,6 +267,15 @@ def test_forged_cards_are_refused(signed, kind):
     report = signed.judge()
     assert report.verdict not in ("PASS", "PENDING_REVIEW"), kind
     assert criterion in _red(report), (kind, _red(report))
+
+
+def test_a_card_that_lies_under_the_name_of_another_is_refused(signed):
+    """Renamed with its file, as after `card.name` was changed and nothing was drafted again."""
+    assert examine(signed.root, signed.envelope.name.partition(".")[0]).refusal == ""
+    signed.envelope.rename(signed.envelope.with_name("another.dsse.json"))
+    papers = examine(signed.root, "another")
+    assert papers.refusal == "the card has another name than its file"
+    assert papers.present and papers.signed is None
 
 
 def test_a_caveat_that_people_add_stays(signed):
