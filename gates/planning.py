@@ -232,8 +232,11 @@ def plan_text(plan: Plan) -> str:
     ]
     if plan.undecidable:
         names = ", ".join(plan.undecidable)
-        lines += ["", f"Gate D would be INCONCLUSIVE whatever the rollouts show: {names}.",
-                  "Plan more starts (stress.starts) before any is run."]  # fmt: skip
+        text = (
+            f"Gate D would be INCONCLUSIVE whatever the rollouts show: {names}. Plan more starts "
+            "(stress.starts) before any is run."
+        )
+        lines += ["", *textwrap.wrap(text, COLUMNS)]
     return "\n".join(lines)
 
 

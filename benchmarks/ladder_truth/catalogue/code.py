@@ -76,9 +76,9 @@ WRONGS = (
           "The clock delivers an answer one tick before its latency has passed.",
           "small",
           patched("genpolicy/evidence/stress/deliveries.py",
-                  ("            if flying.arrival_s <= now_s and not flying.dropped:",
-                   "            early_s = self._setup.horizons.action_period_s\n"
-                   "            if flying.arrival_s <= now_s + early_s and not flying.dropped:")),
+                  ("            elif flying.arrival_s <= now_s and not flying.dropped:",
+                   "            elif (flying.arrival_s <= now_s + self._setup.horizons.action_period_s\n"
+                   "                  and not flying.dropped):")),
           Expected("D", ("checker_violations", "refusal"))),
     Wrong("latencies_a_tenth_shorter", "code",
           "The virtual clock draws every measured time a tenth shorter than it was.",
