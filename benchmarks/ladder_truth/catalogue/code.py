@@ -77,8 +77,8 @@ WRONGS = (
           "small",
           patched("genpolicy/evidence/stress/deliveries.py",
                   ("            elif flying.arrival_s <= now_s and not flying.dropped:",
-                   "            elif (flying.arrival_s <= now_s + self._setup.horizons.action_period_s\n"
-                   "                  and not flying.dropped):")),
+                   "            elif (not flying.dropped and flying.arrival_s\n"
+                   "                  <= now_s + self._setup.horizons.action_period_s):")),
           Expected("D", ("checker_violations", "refusal"))),
     Wrong("latencies_a_tenth_shorter", "code",
           "The virtual clock draws every measured time a tenth shorter than it was.",
