@@ -69,9 +69,9 @@ def print_rungs(rungs: Sequence[Rung], as_json: bool) -> None:
 
 def print_rows(rows: Sequence[Any]) -> None:
     """Dataclasses as JSON."""
-    print(json.dumps([dataclasses.asdict(row) for row in rows], indent=2, ensure_ascii=False))
+    print_document([dataclasses.asdict(row) for row in rows])
 
 
-def print_document(document: Mapping[str, Any]) -> None:
+def print_document(document: Mapping[str, Any] | list[dict[str, Any]]) -> None:
     """A document as JSON."""
     print(json.dumps(document, indent=2, ensure_ascii=False))

@@ -4,6 +4,7 @@ A version is written by `GOLDEN=write python -m pytest -n 0 FILE`, which is red 
 difference, then ask again. It says that something moved and never that a number is right.
 """
 
+import inspect
 import json
 import os
 from collections.abc import Iterator
@@ -39,6 +40,25 @@ def differences(golden: Any, found: Any, place: str = "") -> Iterator[tuple[str,
             yield place, golden, found
     elif golden != found or type(golden) is not type(found):
         yield place, golden, found
+
+
+def name_of(item: Any) -> str:
+    """Where a class or a function stands."""
+    return f"{item.__module__}.{item.__qualname__}"
+
+
+def forms(
+    constants: dict[str, Any], functions: list[Any], data: list[type], models: list[Any]
+) -> dict[str, dict[str, float]]:
+    """Numbers that code itself holds: constants, defaults of arguments, bounds of settings."""
+    defaults = {
+        f"{name_of(item)}({argument.name})": argument.default
+        for item in (*functions, *data)
+        for argument in inspect.signature(item).parameters.values()
+    }
+    bounds = {name_of(kind): kind.model_json_schema() for kind in models}
+    found = {"constants": constants, "defaults": defaults, "bounds": bounds}
+    return {name: dict(numbers(values, name)) for name, values in found.items()}
 
 
 def numbers(value: Any, place: str) -> Iterator[tuple[str, float]]:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from benchmarks.mutation.plan import ROOT, tests_of
-from benchmarks.mutation.runner import outcome, warm_up
+from benchmarks.mutation.runner import outcome, require_green, warm_up
 
 
 @dataclass(frozen=True)
@@ -185,10 +185,8 @@ def run_named(only: Sequence[str], *, green: bool) -> int:
         rows = [row for row in chosen if row.path.startswith(f"{package}/")]
         if rows:
             warm_up(sorted({name for row in rows for name in tests_of(row.path)}), package)
-        for path in () if green else dict.fromkeys(row.path for row in rows):
-            found, _, red = outcome(path, None, tests_of(path))
-            if found != "survived":
-                raise SystemExit(f"{path}: {red} is red without any wrong")
+        if not green:
+            require_green({row.path: tests_of(row.path) for row in rows})
         for row in rows:
             name, seconds, red = outcome(row.path, row.text, tests_of(row.path))
             survived += name == "survived"

@@ -10,7 +10,7 @@ import resource
 import signal
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict
 from pathlib import Path
@@ -123,6 +123,24 @@ def _run(path: str, text: str | None, tests: Sequence[str], log: Path, scratch: 
         os._exit(code)
 
 
+def require_green(tests: Mapping[str, Sequence[str]]) -> None:
+    """Ask each test once without a mutant.
+
+    Args:
+        tests: By module, what its mutants are held against.
+
+    Raises:
+        SystemExit: One is red.
+    """
+    clean: dict[str, float] = {}
+    for path in sorted(tests):
+        for name in set(tests[path]) - set(clean):
+            found, clean[name], red = outcome(path, None, [name])
+            if found != "survived":
+                raise SystemExit(f"{name} is red without any mutant: {red}")
+            print(f"{name}: green in {clean[name]} s of processor time", flush=True)
+
+
 def run(
     mutants: Sequence[Mutant], out: Path, jobs: int, *, near: bool, green: bool = False
 ) -> None:
@@ -144,13 +162,8 @@ def run(
         sorted({name for mutant in mutants for name in tests(mutant.path)}),
         "genpolicy" if "genpolicy" in packages else "gates",
     )
-    clean: dict[str, float] = {}
-    for path in sorted({mutant.path for mutant in mutants}) if not green else ():
-        for name in set(tests(path)) - set(clean):
-            found, clean[name], red = outcome(path, None, [name])
-            if found != "survived":
-                raise SystemExit(f"{name} is red without any mutant: {red}")
-            print(f"{name}: green in {clean[name]} s of processor time", flush=True)
+    if not green:
+        require_green({mutant.path: tests(mutant.path) for mutant in mutants})
 
     def one(mutant: Mutant) -> tuple[Mutant, str, float, str]:
         text = text_of(mutant.path, mutant.kind, mutant.occurrence)

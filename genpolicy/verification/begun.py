@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from genpolicy.verification.journal_source import read_messages
+from genpolicy.verification.journal_source import floats, read_messages
 
 Maker = tuple[str, str]
 """SHA-256 of weights with their configuration, and of the sampler's settings."""
@@ -45,8 +45,5 @@ def begun_sessions(path: Path) -> dict[str, Begun]:
         if kind == "active":
             session.makers.append((str(message["checkpoint"]), str(message["sampler"])))
         elif kind == "scene" and session.bodies is None:
-            session.bodies = {
-                body: np.frombuffer(bytes.fromhex(text), dtype="<f8")
-                for body, text in message["bodies"].items()
-            }
+            session.bodies = {body: floats(text) for body, text in message["bodies"].items()}
     return found

@@ -7,7 +7,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from mcap.reader import make_reader
+from numpy.typing import NDArray
 
 from genpolicy.errors import BadInputError
 from genpolicy.integrity.hashing import sha256_bytes_of
@@ -53,6 +55,11 @@ def read_messages(path: Path) -> Iterator[tuple[str, Message]]:
             expected="a whole MCAP journal",
             action="Re-run the stage that writes it.",
         ) from error
+
+
+def floats(text: str) -> NDArray[np.float64]:
+    """Numbers of a field: little-endian float64, as hex."""
+    return np.frombuffer(bytes.fromhex(text), dtype="<f8")
 
 
 @contextmanager

@@ -23,7 +23,7 @@ from genpolicy.contract.rotation import angle_between, rotation_from_6d
 from genpolicy.verification.body import Driven, OwnBody
 from genpolicy.verification.branch import jumped
 from genpolicy.verification.contact import ROUNDING, ExpectedContact
-from genpolicy.verification.journal_source import Message
+from genpolicy.verification.journal_source import Message, floats
 
 Array = NDArray[np.float64]
 Finding = tuple[str, str]
@@ -122,16 +122,16 @@ class MotionProof:
         motion = chunk["motion"]
         joints = self._joints
         first, last = chunk["checked_rows"]
-        path = _floats(motion["q_rad"])
-        q_cmd, told = _floats(motion["q_cmd_rad"]), _floats(motion["last_action"])
+        path = floats(motion["q_rad"])
+        q_cmd, told = floats(motion["q_cmd_rad"]), floats(motion["last_action"])
         if motion["joints"] != joints or path.size != (last - first) * joints:
             yield "P6.ground", f"{chunk['chunk_id']!r} has not {last - first} x {joints} joints."
             return
         if not first <= row < last:
             return  # a violation of its own (P1.checked_rows)
-        before_rad = _floats(motion["q_before_rad"]).reshape(-1, joints)
+        before_rad = floats(motion["q_before_rad"]).reshape(-1, joints)
         path = np.concatenate([before_rad, q_cmd[None], path.reshape(-1, joints)])
-        actions = _floats(chunk["actions"]).reshape(chunk["rows"], -1)
+        actions = floats(chunk["actions"]).reshape(chunk["rows"], -1)
         action = actions[row]
         before = self._last.get(session, actions[row - 1] if row > first else told)
         self._last[session] = action
@@ -166,7 +166,7 @@ class MotionProof:
         data.qpos[: self._joints] = q_rad
         data.qpos[self._slides] = max(opening_m, self._held_width_m if held else 0.0)
         for name, text in scene.items():
-            body, pose = int(model.body(name).id), _floats(text)
+            body, pose = int(model.body(name).id), floats(text)
             mocap = int(model.body_mocapid[body])
             positions, turns, index = (
                 (data.mocap_pos, data.mocap_quat, mocap)
@@ -246,11 +246,11 @@ class MotionProof:
         if not time_s > 0:
             yield "P6.measured_speed", "The arm was measured after the first row had ended."
             return
-        speed = np.abs(ends[1] - _floats(motion["q_meas_rad"])) / time_s
+        speed = np.abs(ends[1] - floats(motion["q_meas_rad"])) / time_s
         if not np.all(speed <= speed_limit * (1 + ROUNDING)):
             yield "P6.measured_speed", f"The arm must come at {speed.tolist()} rad/s."
         if motion["dq_meas_rad_s"] is not None:
-            step = (ends[1] - ends[0]) / period_s - _floats(motion["dq_meas_rad_s"])
+            step = (ends[1] - ends[0]) / period_s - floats(motion["dq_meas_rad_s"])
             if not np.all(np.abs(step) / time_s <= acceleration_limit * (1 + ROUNDING)):
                 yield "P6.measured_acceleration", f"The arm must change by {step.tolist()} rad/s."
 
@@ -261,8 +261,8 @@ class MotionProof:
         motion = chunk["motion"]
         begins_ns = chunk["start_ns"] + chunk["checked_rows"][0] * chunk["period_ns"]
         since = max(int((begins_ns - motion["measured_ns"]) // chunk["period_ns"]), 0)
-        commands = [*before_rad[max(len(before_rad) - since, 0) :], _floats(motion["q_cmd_rad"])]
-        way, scene = [_floats(motion["q_meas_rad"]), *commands], motion["scene"]
+        commands = [*before_rad[max(len(before_rad) - since, 0) :], floats(motion["q_cmd_rad"])]
+        way, scene = [floats(motion["q_meas_rad"]), *commands], motion["scene"]
         held = opening_m <= self.expected.held_opening_m
         self._pose(way[0], opening_m, held, scene)
         ways = (np.stack(ends) for ends in pairwise(way))
@@ -334,8 +334,3 @@ class MotionProof:
                 if rule != "P6.force":
                     yield "P6.sweep", f"{share:.0%} of the way there, {sentence}"
                     return
-
-
-def _floats(text: str) -> Array:
-    """Little-endian float64 numbers of their hex."""
-    return np.frombuffer(bytes.fromhex(text), dtype="<f8")

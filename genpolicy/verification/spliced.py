@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from genpolicy.contract.action import POSITION
 from genpolicy.verification.joined import LABEL
-from genpolicy.verification.journal_source import Message
+from genpolicy.verification.journal_source import Message, floats
 
 Array = NDArray[np.float64]
 
@@ -89,9 +89,9 @@ class Spliced:
         self, chunk: Message, actions: str, period_s: float
     ) -> tuple[float, float | None]:
         motion, (first, last) = chunk["motion"], chunk["checked_rows"]
-        due = _floats(actions).reshape(chunk["rows"], -1)[first:last, POSITION]
-        told = _floats(motion["last_action"])[POSITION]
-        before = _floats(motion["q_before_rad"]).reshape(-1, motion["joints"])[-EARLIER:]
+        due = floats(actions).reshape(chunk["rows"], -1)[first:last, POSITION]
+        told = floats(motion["last_action"])[POSITION]
+        before = floats(motion["q_before_rad"]).reshape(-1, motion["joints"])[-EARLIER:]
         path = np.array([*(self._where(q_rad) for q_rad in before), told, *due[:LATER]])
         steps = path[1:] - path[:-1]
         turns = steps[1:] - steps[:-1]
@@ -104,8 +104,3 @@ class Spliced:
         self._data.qpos[: len(q_rad)] = q_rad
         mujoco.mj_kinematics(self._model, self._data)
         return np.array(self._data.site_xpos[self._tcp])
-
-
-def _floats(text: str) -> Array:
-    """Little-endian float64 numbers of their hex."""
-    return np.frombuffer(bytes.fromhex(text), dtype="<f8")

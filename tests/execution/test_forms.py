@@ -19,7 +19,7 @@ import genpolicy.execution
 import genpolicy.feasibility
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from held import hold, numbers
+from held import forms, hold, name_of
 
 MODULES = [
     importlib.import_module(item.name)
@@ -44,10 +44,6 @@ WRITTEN_INTO = {
     "genpolicy.execution.ledger.QueuedChunk", "genpolicy.feasibility.checker._State",
 }  # fmt: skip
 """What counts the rows of a chunk, and what gathers margins while layers are asked."""
-
-
-def name_of(item):
-    return f"{item.__module__}.{item.__qualname__}"
 
 
 def test_there_are_classes_and_functions_to_ask():
@@ -86,13 +82,6 @@ def test_every_number_that_the_code_itself_holds_is_what_it_was():
         for name, value in vars(module).items()
         if name.lstrip("_").isupper()
     }
-    defaults = {
-        f"{name_of(item)}({argument.name})": argument.default
-        for item in (*FUNCTIONS, *DATA)
-        for argument in inspect.signature(item).parameters.values()
-    }
-    bounds = {name_of(kind): kind.model_json_schema() for kind in MODELS}
-    found = {"constants": constants, "defaults": defaults, "bounds": bounds}
-    told = {name: dict(numbers(values, name)) for name, values in found.items()}
+    told = forms(constants, FUNCTIONS, DATA, MODELS)
     assert all(told.values())
     hold(Path(__file__).parent / "golden" / "forms.json", told)

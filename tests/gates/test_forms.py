@@ -14,7 +14,7 @@ from types import CodeType, FunctionType
 
 import pytest
 from as_told import hold
-from held import numbers
+from held import forms, name_of
 from pydantic import BaseModel
 
 import gates
@@ -54,22 +54,18 @@ CRITERIA = [
 ]
 
 
-def _name(item: type | FunctionType) -> str:
-    return f"{item.__module__}.{item.__qualname__}"
-
-
 def test_there_are_classes_and_functions_to_ask():
     assert len(DATA) > 30 and len(MODELS) > 10 and len(FUNCTIONS) > 500
 
 
-@pytest.mark.parametrize("kind", DATA, ids=_name)
+@pytest.mark.parametrize("kind", DATA, ids=name_of)
 def test_nobody_writes_into_a_value_of_the_gates(kind):
     empty = object.__new__(kind)
     with pytest.raises(FrozenInstanceError):
         setattr(empty, (fields(kind) or [None])[0].name, None)
 
 
-@pytest.mark.parametrize("kind", MODELS, ids=_name)
+@pytest.mark.parametrize("kind", MODELS, ids=name_of)
 def test_a_model_is_frozen_strict_and_closed(kind):
     config = kind.model_config
     found = {name: config.get(name) for name in ("extra", "frozen", "strict", "allow_inf_nan")}
@@ -79,7 +75,7 @@ def test_a_model_is_frozen_strict_and_closed(kind):
 def test_every_argument_can_be_named():
     """What stands behind a star must be named, what stands before a slash cannot be: none does."""
     nameless = {
-        f"{_name(function)}: {item.name}"
+        f"{name_of(function)}: {item.name}"
         for function in FUNCTIONS
         for item in inspect.signature(function).parameters.values()
         if item.kind is item.POSITIONAL_ONLY
@@ -104,7 +100,7 @@ def _pairings(code: CodeType) -> list[object]:
 def test_what_is_paired_is_equally_long():
     """A pairing that drops what is left over would judge fewer rows than there are."""
     found = [
-        (_name(function), strict)
+        (name_of(function), strict)
         for function in (*FUNCTIONS, *(item.measure for item in CRITERIA))
         if not function.__module__.startswith("gates.pages")
         for code in _codes(function.__code__)
@@ -125,12 +121,6 @@ def test_every_number_that_the_code_itself_holds_is_what_it_was():
         for name, value in vars(module).items()
         if name.isupper() and not module.__name__.startswith("gates.pages")
     }
-    defaults = {
-        f"{_name(item)}({argument.name})": argument.default
-        for item in (*FUNCTIONS, *DATA)
-        for argument in inspect.signature(item).parameters.values()
-    }
-    bounds = {_name(kind): kind.model_json_schema() for kind in MODELS}
-    found = {"constants": constants, "defaults": defaults, "bounds": bounds}
-    assert all(dict(numbers(values, "")) for values in found.values())
-    hold("forms", {name: dict(numbers(values, name)) for name, values in found.items()})
+    told = forms(constants, FUNCTIONS, DATA, MODELS)
+    assert all(told.values())
+    hold("forms", told)
