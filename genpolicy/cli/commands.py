@@ -39,6 +39,15 @@ REPLAY_EXAMPLES = examples(
     "    --session flow/held_out/11 --out rejected.mcap",
 )
 
+SERVE_EXAMPLES = examples(
+    "genpolicy serve-policy artifacts/train_generators/flow/seed_0 --port 8000"
+)
+CHECK_EXAMPLES = examples(
+    "genpolicy check-candidate candidate.yaml",
+    "genpolicy check-candidate candidate.yaml --json > checked.json",
+    "genpolicy check-candidate candidate.yaml --earlier checked.json",
+)
+
 
 def program(arguments: Sequence[str]) -> int:
     """Run `genpolicy`; returns the exit code."""
@@ -47,6 +56,8 @@ def program(arguments: Sequence[str]) -> int:
     app.command("ingest", epilog=IMPORT_EXAMPLES)(ingest)
     app.command("fixtures", epilog=examples("genpolicy fixtures --pin"))(fixtures)
     app.command("replay", epilog=REPLAY_EXAMPLES)(replay)
+    app.command("serve-policy", epilog=SERVE_EXAMPLES)(serve_policy)
+    app.command("check-candidate", epilog=CHECK_EXAMPLES)(check_candidate)
     app.command("doctor", epilog=examples("genpolicy doctor --json"))(doctor)
     return run_program(app, "genpolicy", arguments)
 
@@ -124,6 +135,48 @@ def replay(
     from genpolicy.cli.replay import run_replay
 
     return run_replay(journal, out, session=session, task=task, force=force)
+
+
+def serve_policy(
+    checkpoint: Annotated[Path, typer.Argument(help="Folder of a checkpoint.")],
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port; 0 for a free one.")] = 8000,
+    sha256: Annotated[
+        str | None, typer.Option(help="What the checkpoint must be; any if absent.")
+    ] = None,
+) -> int:
+    """Serve a checkpoint to a client of openpi's protocol, on this machine.
+
+    Until an interrupt. WebSocket and msgpack: metadata first, then one answer
+    for each message; see docs/candidates.md.
+    """
+    from genpolicy.cli.candidates import run_serve
+
+    return run_serve(checkpoint, port=port, sha256=sha256)
+
+
+def check_candidate(
+    entry: Annotated[Path, typer.Argument(help="The candidate's entry, a YAML file.")],
+    dataset: Annotated[Path, typer.Option(help="Verified dataset.")] = Path("artifacts/ingest"),
+    candidates: Annotated[int, typer.Option(min=1, max=64, help="Chunks of an invocation.")] = 8,
+    deadline_s: Annotated[
+        float, typer.Option("--deadline", min=1e-3, max=60.0, help="Seconds an answer may take.")
+    ] = 0.15,
+    earlier: Annotated[
+        Path | None, typer.Option(help="Report of an earlier check, to compare with.")
+    ] = None,
+    as_json: AsJson = False,
+) -> int:
+    """Check a policy of your own behind its server, before any gate does.
+
+    It is asked about recorded moments of held-out episodes: whether it answers,
+    repeats itself, starts anew as the same, means the units that it declares,
+    looks at what it is given, and is in time. Nothing moves. Exit 3 if
+    something fails.
+    """
+    from genpolicy.cli.candidates import CheckOptions, run_check
+
+    options = CheckOptions(dataset, candidates, deadline_s, earlier)
+    return run_check(entry, options, as_json=as_json)
 
 
 def doctor(

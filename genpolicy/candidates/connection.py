@@ -1,0 +1,235 @@
+"""The wire to a policy in a process of its own, and the only module that opens a socket.
+
+The protocol is that of openpi's clients and servers: WebSocket without compression; the server
+speaks first, a map of metadata; then one message up, one down; a text instead of bytes says what
+went wrong. Nothing but a policy is reached through it: see the test of safety.
+"""
+
+import ipaddress
+import logging
+import time
+from collections.abc import Callable
+from threading import Timer
+from types import TracebackType
+from typing import Any
+from urllib.parse import urlsplit
+
+from websockets.exceptions import ConnectionClosed, InvalidHandshake, PayloadTooBig
+from websockets.sync.client import ClientConnection, connect
+from websockets.sync.server import Server, ServerConnection, serve
+
+from genpolicy.candidates.faults import Fault, PolicyError
+from genpolicy.candidates.packing import MAXIMUM_MESSAGE_BYTES, pack, unpack
+from genpolicy.errors import ConfigError, IntegrityError
+
+LOOPBACK = "127.0.0.1"
+HEALTH_PATH = "/healthz"
+PING_S = None
+"""No pings: openpi's server answers none while it infers, which is no fault of it."""
+SHORTEST_WAIT_S = 1e-3
+HANG_UP_S = 0.1
+QUIET = logging.getLogger(f"{__name__}.quiet")
+"""The library tells of a stranger's bytes with a traceback of its own; ours is `PolicyError`."""
+QUIET.addHandler(logging.NullHandler())
+QUIET.propagate = False
+BUFFERED_BYTES = 32 << 10
+"""What a line takes without waiting for who should read it."""
+SHUT_BOTH = 2
+"""`socket.SHUT_RDWR`: neither side reads or writes any more."""
+
+
+def check_address(address: str, allowed: str | None) -> None:
+    """Refuse an address that is neither on this machine nor allowed by name.
+
+    Args:
+        address: `ws://host:port`.
+        allowed: A host that a person has named besides; None for none.
+
+    Raises:
+        ConfigError: No such address, or another machine's.
+    """
+    parts = urlsplit(address)
+    try:
+        host, port = parts.hostname, parts.port
+    except ValueError:
+        host = port = None
+    if parts.scheme != "ws" or not host or not port or parts.path not in ("", "/"):
+        raise ConfigError(
+            where="address of a policy's process",
+            found=repr(address),
+            expected="ws://HOST:PORT",
+            action="Name host and port.",
+        )
+    if not (_is_loopback(host) or host == allowed):
+        raise ConfigError(
+            where="address of a policy's process",
+            found=f"{host}, another machine",
+            expected="this machine, or a host that `allow_host` names",
+            action="Name the host in `allow_host` if observations may be sent to it.",
+        )
+
+
+def _is_loopback(host: str) -> bool:
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
+class Connection:
+    """A client's end: metadata at first, then one answer to one message.
+
+    Attributes:
+        metadata: What the server said of itself.
+    """
+
+    def __init__(self, socket: ClientConnection, metadata: dict[str, Any]) -> None:
+        self._socket = socket
+        self.metadata = metadata
+
+    def ask(self, message: dict[str, Any], *, timeout_s: float) -> dict[str, Any]:
+        """The answer to a message.
+
+        After a fault the line is of no use: what comes late would answer the next message.
+
+        Raises:
+            PolicyError: None in time, one that nobody asked for, a closed or flooded line, a
+                text, or no message at all.
+        """
+        late = PolicyError(Fault.LATE, f"no answer within {timeout_s:.3g} s")
+        packed = pack(message)
+        # Sending waits for a server that does not read, unless somebody hangs up meanwhile.
+        watch = Timer(timeout_s, self._socket.socket.shutdown, [SHUT_BOTH])
+        begun = time.monotonic()
+        try:
+            self._refuse_unrequested()
+            if len(packed) > BUFFERED_BYTES:
+                watch.start()
+            self._socket.send(packed)
+            watch.cancel()
+            left = timeout_s - (time.monotonic() - begun)
+            return _message(self._socket.recv(timeout=max(left, SHORTEST_WAIT_S)))
+        except TimeoutError as error:
+            raise late from error
+        except ConnectionClosed as error:
+            raise (late if time.monotonic() - begun >= timeout_s else _closed(error)) from error
+        finally:
+            watch.cancel()
+
+    def _refuse_unrequested(self) -> None:
+        try:
+            self._socket.recv(timeout=0)
+        except TimeoutError:
+            return
+        raise PolicyError(Fault.UNREQUESTED, "a message that nothing was asked for")
+
+    def close(self) -> None:
+        """Hang up, without waiting for somebody who does not listen."""
+        self._socket.close_timeout = HANG_UP_S
+        self._socket.close()
+
+
+def dial(address: str, *, allowed: str | None, timeout_s: float) -> Connection:
+    """A connection to a server that listens already.
+
+    Raises:
+        ConfigError: See `check_address`.
+        PolicyError: Nobody listens, or what it says first is no metadata.
+    """
+    check_address(address, allowed)
+    try:
+        socket = connect(
+            address, compression=None, max_size=MAXIMUM_MESSAGE_BYTES, proxy=None,
+            open_timeout=timeout_s, ping_interval=PING_S, close_timeout=timeout_s, logger=QUIET,
+        )  # fmt: skip
+    except (OSError, InvalidHandshake) as error:  # a time-out is an OSError too
+        raise PolicyError(Fault.CLOSED, f"nobody answers at {address} ({error})") from error
+    try:
+        return Connection(socket, _message(socket.recv(timeout=timeout_s)))
+    except TimeoutError as error:
+        socket.close()
+        raise PolicyError(Fault.LATE, f"no metadata within {timeout_s:.3g} s") from error
+    except ConnectionClosed as error:
+        raise _closed(error) from error
+
+
+def _message(data: str | bytes) -> dict[str, Any]:
+    if isinstance(data, str):
+        raise PolicyError(Fault.REFUSED, f"it says {data.strip().splitlines()[-1:]}"[:300])
+    try:
+        return unpack(data)
+    except IntegrityError as error:
+        raise PolicyError(Fault.MALFORMED, error.found) from error
+
+
+def _closed(error: ConnectionClosed) -> PolicyError:
+    if isinstance(error.__cause__, PayloadTooBig) or (error.sent and error.sent.code == 1009):
+        found = f"a message of more than {MAXIMUM_MESSAGE_BYTES} bytes"
+        return PolicyError(Fault.OVERSIZE, found)
+    return PolicyError(Fault.CLOSED, f"it hung up ({error})")
+
+
+class Listening:
+    """A server's end on this machine: who connects gets the metadata, then answers.
+
+    Args:
+        answer: Message to answer; what it raises is told as text, and ends that connection.
+        metadata: Said first.
+        port: Port, or 0 for a free one.
+    """
+
+    def __init__(
+        self, answer: Callable[[dict[str, Any]], dict[str, Any]], metadata: dict[str, Any],
+        *, port: int,
+    ) -> None:  # fmt: skip
+        self._answer = answer
+        self._metadata = metadata
+        self._server: Server = serve(
+            self._talk, LOOPBACK, port, compression=None, max_size=MAXIMUM_MESSAGE_BYTES,
+            ping_interval=PING_S, process_request=_health, logger=QUIET,
+        )  # fmt: skip
+        self.port: int = self._server.socket.getsockname()[1]
+
+    def serve_forever(self) -> None:
+        """Answer until `close`, or an interrupt."""
+        self._server.serve_forever()
+
+    def close(self) -> None:
+        """Listen no more."""
+        self._server.shutdown()
+
+    def __enter__(self) -> "Listening":
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def _talk(self, line: ServerConnection) -> None:
+        try:
+            line.send(pack(self._metadata))
+            for data in line:
+                try:
+                    said = pack(self._answer(_message(data)))
+                except Exception as error:  # whatever it is, the client is told, as openpi does
+                    line.send(f"{type(error).__name__}: {error}")
+                    line.close(1011)
+                    return
+                line.send(said)
+        except ConnectionClosed:
+            return
+
+
+def free_port() -> int:
+    """A port of this machine on which nobody listens now."""
+    with Listening(lambda message: message, {}, port=0) as listening:
+        return listening.port
+
+
+def _health(line: ServerConnection, request: Any) -> Any:
+    """Whoever watches asks with plain HTTP whether it stands, as with openpi's server."""
+    return line.respond(200, "OK\n") if request.path == HEALTH_PATH else None

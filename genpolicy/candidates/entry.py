@@ -1,0 +1,213 @@
+"""A candidate's entry: what somebody's policy is, where it lies, and what its numbers mean."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from genpolicy.contract.horizons import HorizonConfig
+from genpolicy.contract.settings import Settings, parse_settings
+from genpolicy.errors import ConfigError
+from genpolicy.integrity.documents import read_yaml
+
+DIGEST = r"^[0-9a-f]{64}$"
+NAME = r"^[a-z][a-z0-9_]{0,63}$"
+PORT = "{port}"
+LENGTH = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
+"""One of the unit in m."""
+
+Column = Annotated[int, Field(ge=0, lt=4096)]
+Rotation = Literal[
+    "rotation_6d", "matrix", "quaternion_xyzw", "quaternion_wxyz", "rotation_vector_rad",
+    "euler_xyz_rad", "euler_xyz_deg",
+]  # fmt: skip
+ROTATION_WIDTH = {
+    "rotation_6d": 6, "matrix": 9, "quaternion_xyzw": 4, "quaternion_wxyz": 4,
+    "rotation_vector_rad": 3, "euler_xyz_rad": 3, "euler_xyz_deg": 3,
+}  # fmt: skip
+
+
+class Input(Settings):
+    """One array that the policy is given.
+
+    Attributes:
+        channels: Channels of the observation, or single numbers of them (`hole_pose.x_m`), one
+            after the other.
+        unit: Of lengths, as the policy wants them.
+        history: How many of the last observations, oldest first. 1 gives a shape of (n,), more
+            give (history, n).
+        dtype: Type of the numbers.
+    """
+
+    channels: list[str] = Field(min_length=1)
+    unit: Literal["m", "cm", "mm"] = "m"
+    history: int = Field(default=1, ge=1, le=64)
+    dtype: Literal["float32", "float64"] = "float32"
+
+
+class Position(Settings):
+    """Where a chunk says that the TCP shall be.
+
+    Attributes:
+        columns: Columns of x, y and z.
+        unit: Of the numbers.
+    """
+
+    columns: list[Column] = Field(min_length=3, max_length=3)
+    unit: Literal["m", "cm", "mm"]
+
+
+class Orientation(Settings):
+    """How a chunk says that the TCP shall be turned.
+
+    Attributes:
+        columns: Its columns, in the order of the form.
+        form: What the numbers are. `euler_xyz`: about fixed x, then y, then z.
+    """
+
+    columns: list[Column] = Field(min_length=3, max_length=9)
+    form: Rotation
+
+    @model_validator(mode="after")
+    def _as_wide_as_its_form(self) -> "Orientation":
+        if len(self.columns) != ROTATION_WIDTH[self.form]:
+            raise ValueError(
+                f"{self.form} has {ROTATION_WIDTH[self.form]} numbers, not {len(self.columns)}"
+            )
+        return self
+
+
+class Gripper(Settings):
+    """How far a chunk says that the gripper shall be open.
+
+    Attributes:
+        column: Its column.
+        closed: The number that means closed.
+        open: The number that means `open_m`.
+        open_m: Distance of each finger from closed at that number, m.
+    """
+
+    column: Column
+    closed: float = 0.0
+    open: float
+    open_m: float = Field(gt=0, le=1)
+
+    @model_validator(mode="after")
+    def _moves(self) -> "Gripper":
+        if self.open == self.closed:
+            raise ValueError("open and closed must differ")
+        return self
+
+
+class Anchor(Settings):
+    """The pose that relative actions start from: of the observation that conditioned them.
+
+    Attributes:
+        position: Three numbers of the observation, m: a channel, or single ones.
+        rotation: Six numbers of it, the first two columns of the rotation.
+    """
+
+    position: list[str] = Field(min_length=1)
+    rotation: list[str] = Field(min_length=1)
+
+
+class Output(Settings):
+    """What the numbers of a chunk are.
+
+    Attributes:
+        key: Their name in the answer.
+        frame: Frame of positions and rotations: the robot's base, or the TCP of the anchor.
+        motion: `absolute`; `relative` to the anchor, every row; or `increments`, each from the
+            row before it, the first from the anchor.
+        position: Where.
+        rotation: How turned; None where the policy leaves the anchor's rotation as it is.
+        gripper: How far open.
+        anchor: Where a relative motion begins; None for an absolute one.
+    """
+
+    key: str = "actions"
+    frame: Literal["robot_base", "tcp"]
+    motion: Literal["absolute", "relative", "increments"]
+    position: Position
+    rotation: Orientation | None
+    gripper: Gripper
+    anchor: Anchor | None = None
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "Output":
+        if self.motion == "absolute" and self.frame == "tcp":
+            raise ValueError("an absolute place is in the frame robot_base")
+        if self.anchor is None and (self.motion != "absolute" or self.rotation is None):
+            raise ValueError("anchor names the pose that it is relative to")
+        rotated = self.rotation.columns if self.rotation else []
+        columns = [*self.position.columns, *rotated, self.gripper.column]
+        if len(set(columns)) != len(columns):
+            raise ValueError("each column means one thing")
+        return self
+
+    @property
+    def width(self) -> int:
+        """How many columns there must be at least."""
+        rotated = self.rotation.columns if self.rotation else []
+        return 1 + max(*self.position.columns, *rotated, self.gripper.column)
+
+
+class ServerEntry(Settings):
+    """A policy behind a server that speaks the wire protocol.
+
+    Attributes:
+        name: Its name in every table.
+        kind: `server`.
+        author: Who made it, as an e-mail address; may not review it.
+        address: Of one that runs already, `ws://host:port`.
+        allow_host: Another machine that observations may be sent to; loopback needs none.
+        command: Of one that is started, watched and ended here; `{port}` stands for its port.
+        files: What it is: path, from the entry's folder, to SHA-256. Checked before it starts.
+        horizons: H_o, K, H_e and the period of an action.
+        observation: What it is given, by the name on the wire.
+        constants: What it is given besides, unchanged: a prompt, the number of a robot.
+        action: What its chunks mean.
+        start_timeout_s: How long it may take to listen.
+        timeout_s: How long an answer is waited for before it counts as none.
+    """
+
+    name: str = Field(pattern=NAME)
+    kind: Literal["server"]
+    author: str = Field(pattern=r"^[^@\s]+@[^@\s]+$")
+    address: str | None = None
+    allow_host: str | None = None
+    command: list[str] | None = Field(default=None, min_length=1)
+    files: dict[str, Annotated[str, Field(pattern=DIGEST)]] = Field(default_factory=dict)
+    horizons: HorizonConfig
+    observation: dict[str, Input] = Field(min_length=1)
+    constants: dict[str, str | int | float | bool] = Field(default_factory=dict)
+    action: Output
+    start_timeout_s: float = Field(default=60.0, gt=0, le=600)
+    timeout_s: float = Field(default=2.0, gt=0, le=60)
+
+    @model_validator(mode="after")
+    def _reachable(self) -> "ServerEntry":
+        if (self.address is None) == (self.command is None):
+            raise ValueError("address or command: one of them says where it is")
+        if self.command is not None and not any(PORT in word for word in self.command):
+            raise ValueError(f"command tells the server its port: write {PORT} where it stands")
+        if twice := sorted(set(self.observation) & set(self.constants)):
+            raise ValueError(f"{twice[0]} is given twice")
+        return self
+
+
+def read_entry(path: Path) -> ServerEntry:
+    """The entry of a file.
+
+    Raises:
+        ConfigError: No readable YAML, an unknown kind, or a field that is missing or wrong.
+    """
+    values = read_yaml(path)
+    if not isinstance(values, dict):
+        raise ConfigError(
+            where=str(path),
+            found="no map of settings",
+            expected="the fields of a candidate",
+            action="See docs/candidates.md.",
+        )
+    return parse_settings(ServerEntry, values, where=str(path))

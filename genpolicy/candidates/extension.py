@@ -1,0 +1,151 @@
+"""What a server may say beyond openpi's protocol, so that its candidate can be reproduced.
+
+The word `genpolicy` in the metadata says what it can; the same word in a message names the noise
+and the number of candidates, and in an answer what was counted. A server that never heard of it is
+asked plainly, one candidate a message, and what it does not say is unknown.
+"""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, ValidationError
+
+from genpolicy.candidates.faults import Fault, PolicyError
+from genpolicy.contract.latency import Term
+from genpolicy.contract.settings import Settings
+
+Array = NDArray[np.float64]
+
+WORD = "genpolicy"
+VERSION = 1
+MOST_CANDIDATES = 64
+DIGEST = r"^[0-9a-f]{64}$"
+NoiseName = tuple[str | int, ...]
+
+
+class Capabilities(Settings):
+    """What the metadata say; defaults are those of a server without the extension.
+
+    Attributes:
+        version: Of the extension; 0 without it.
+        checkpoint: SHA-256 of what it serves; None where it does not say.
+        sampler: SHA-256 of its sampler's settings.
+        prediction_horizon: K.
+        seeded: Equal names of noise give equal chunks.
+        candidates: Most candidates that it draws in one message.
+        counts_evaluations: It counts network evaluations at the network.
+        spans: Latency terms that it measures, by their names in the contract.
+    """
+
+    version: int = Field(default=0, ge=0)
+    checkpoint: str | None = Field(default=None, pattern=DIGEST)
+    sampler: str | None = Field(default=None, pattern=DIGEST)
+    prediction_horizon: int | None = Field(default=None, ge=1, le=512)
+    seeded: bool = False
+    candidates: int = Field(default=1, ge=1)
+    counts_evaluations: bool = False
+    spans: tuple[str, ...] = ()
+
+
+def capabilities(metadata: dict[str, Any]) -> Capabilities:
+    """What a server can, from its metadata.
+
+    Raises:
+        PolicyError: It speaks of the extension and says something else than that.
+    """
+    said = metadata.get(WORD)
+    if said is None:
+        return Capabilities()
+    try:
+        told = Capabilities.model_validate({**said, "spans": tuple(said.get("spans", ()))})
+    except (ValidationError, TypeError, AttributeError) as error:
+        raise PolicyError(Fault.MALFORMED, f"its metadata: {str(error).splitlines()[0]}") from error
+    if told.version != VERSION:
+        raise PolicyError(
+            Fault.MALFORMED, f"its metadata speak version {told.version}, known is {VERSION}"
+        )
+    if unknown := sorted(set(told.spans) - {str(term) for term in Term}):
+        raise PolicyError(Fault.MALFORMED, f"its metadata name no latency term: {unknown[0]!r}")
+    return told
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """One invocation's answer.
+
+    Attributes:
+        actions: Candidate chunks as the policy wrote them. Shape (N, K, D).
+        evaluations: Network evaluations of a sample; None where it does not count.
+        spans_s: Seconds by latency term, of the terms that it measures.
+    """
+
+    actions: Array
+    evaluations: int | None = None
+    spans_s: dict[str, float] = field(default_factory=dict)
+
+
+def request(invocation: str, noise: NoiseName, candidates: int) -> dict[str, Any]:
+    """What a message to a server with the extension says."""
+    return {WORD: {"invocation": invocation, "noise": list(noise), "candidates": candidates}}
+
+
+def read_answer(
+    answer: dict[str, Any], *, key: str, told: Capabilities, invocation: str, candidates: int
+) -> Drawn:
+    """The chunks of an answer.
+
+    Args:
+        answer: As it came.
+        key: Name of the actions in it.
+        told: What the server said of itself at first.
+        invocation: What was asked.
+        candidates: How many chunks were asked for.
+
+    Raises:
+        PolicyError: Another invocation's, another checkpoint's, or no actions of that number.
+    """
+    said: dict[str, Any] = {}
+    if told.version:
+        said = answer.get(WORD)  # type: ignore[assignment]
+        if not isinstance(said, dict):
+            raise PolicyError(Fault.MALFORMED, f"an answer without {WORD!r}")
+        if said.get("invocation") != invocation:
+            found = f"an answer to {said.get('invocation')!r}, asked was {invocation!r}"
+            raise PolicyError(Fault.UNREQUESTED, found)
+        for name in ("checkpoint", "sampler"):
+            before, now = getattr(told, name), said.get(name)
+            if before is not None and now != before:
+                raise PolicyError(
+                    Fault.CHANGED, f"its {name} was {before[:16]}…, and is {str(now)[:16]}…"
+                )
+    return Drawn(
+        _actions(answer.get(key), key, told, candidates),
+        _count(said.get("nfe")) if told.counts_evaluations else None,
+        {term: _seconds(said.get("spans_s"), term) for term in told.spans},
+    )
+
+
+def _actions(found: Any, key: str, told: Capabilities, candidates: int) -> Array:
+    if not isinstance(found, np.ndarray) or found.dtype.kind not in "fiu":
+        raise PolicyError(Fault.SHAPE, f"no array {key!r} in the answer")
+    chunks = found[None] if not told.version and found.ndim == 2 else found
+    if chunks.ndim != 3 or len(chunks) != candidates or 0 in chunks.shape:
+        expected = f"{candidates} x K x D" if told.version else "K x D"
+        shape = " x ".join(str(size) for size in found.shape)
+        raise PolicyError(Fault.SHAPE, f"{key!r} of shape {shape or '()'}, not {expected}")
+    return chunks.astype(np.float64)
+
+
+def _count(found: Any) -> int:
+    if type(found) is not int or found < 1:
+        raise PolicyError(Fault.MALFORMED, f"{found!r} network evaluations")
+    return found
+
+
+def _seconds(found: Any, term: str) -> float:
+    value = found.get(term) if isinstance(found, dict) else None
+    if not isinstance(value, int | float) or isinstance(value, bool) or not 0.0 <= value < 3600.0:
+        raise PolicyError(Fault.MALFORMED, f"{value!r} seconds of {term}, which it measures")
+    return float(value)

@@ -1,0 +1,118 @@
+"""Recorded moments that a candidate is asked about, one an episode, from start to end."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from genpolicy.contract.horizons import HorizonConfig
+from genpolicy.contract.observation import Channel, ObservationContract
+from genpolicy.data.contract import TCP_ACTION
+from genpolicy.data.dataset import Dataset
+from genpolicy.errors import ContractError
+
+Array = NDArray[np.float64]
+
+HELD_OUT = ("validation", "test")
+MOST_STARTS = 80
+"""The 95th percentile of a time has an upper end from 72 independent ones on."""
+
+
+@dataclass(frozen=True)
+class RecordedStarts:
+    """What was seen, and what a demonstrator did next.
+
+    Attributes:
+        observations: Physical units, newest last. Shape (M, H_o, D_o).
+        chunks: Recorded actions from the newest observation on. Shape (M, K, 10).
+        episodes: Identifier of each one's episode. Shape (M,).
+    """
+
+    observations: Array
+    chunks: Array
+    episodes: NDArray[np.str_]
+
+    def __len__(self) -> int:
+        return len(self.episodes)
+
+
+def observation_contract(data: Dataset) -> ObservationContract:
+    """The observation that a dataset holds."""
+    channels = data.manifest["observation_contract"]["channels"]
+    return ObservationContract(
+        tuple(
+            Channel(**{**channel, "components": tuple(channel["components"])})
+            for channel in channels
+        )
+    )
+
+
+def require_contract(data: Dataset, horizons: HorizonConfig, *, candidate: str) -> None:
+    """Refuse a dataset whose actions are others than a candidate's can be.
+
+    Raises:
+        ContractError: Another period, or actions that are no pose of the TCP.
+    """
+    action = data.manifest["action_contract"]
+    if action["sha256"] != TCP_ACTION.sha256:
+        raise ContractError(
+            where="actions of the dataset",
+            found=f"{action['dim']} numbers in the frame {action['frame']}",
+            expected="TCP pose and gripper opening in the robot's base frame",
+            action="Check the candidate on a dataset of the task that it is for.",
+        )
+    if action["period_s"] != horizons.action_period_s:
+        raise ContractError(
+            where=f"horizons.action_period_s of the candidate {candidate}",
+            found=f"{horizons.action_period_s:g} s",
+            expected=f"{action['period_s']:g} s, as in the dataset",
+            action="Declare the period that the candidate was trained with, and check it on "
+            "recordings of that period.",
+        )
+
+
+def recorded_starts(
+    data: Dataset, horizons: HorizonConfig, *, most: int = MOST_STARTS
+) -> RecordedStarts:
+    """One start of each held-out episode, evenly spread from the first row to the last whole chunk.
+
+    Args:
+        data: A verified dataset.
+        horizons: Of the candidate.
+        most: Episodes, at most; evenly chosen where there are more.
+
+    Raises:
+        ContractError: No held-out episode is as long as a chunk.
+    """
+    observations, chunks, episodes = [], [], []
+    for split in HELD_OUT:
+        cut = data.windows(
+            split, horizons.observation_horizon, horizons.prediction_horizon, only_success=False
+        )
+        whole = np.flatnonzero(~cut.is_pad.any(axis=1))
+        for episode in np.unique(cut.episode[whole]):
+            rows = whole[cut.episode[whole] == episode]
+            observations.append(cut.observations[rows])
+            chunks.append(cut.actions[rows])
+            episodes.append(data.episodes["episode_uuid"].iloc[int(episode)])
+    if not episodes:
+        raise ContractError(
+            where="held-out episodes of the dataset",
+            found=f"none of {horizons.prediction_horizon} rows",
+            expected="at least one as long as a chunk",
+            action="Record longer episodes, or declare a shorter prediction_horizon.",
+        )
+    number = min(most, len(episodes))
+    chosen = np.linspace(0, len(episodes) - 1, num=number).round().astype(np.int64)
+    # Neighbours in the list lie apart in their episodes, so that no phase is of one session only.
+    shares = np.modf(np.arange(number) * GOLDEN)[0]
+    at = [int(share * len(chunks[episode])) for share, episode in zip(shares, chosen, strict=True)]
+    return RecordedStarts(
+        np.stack([observations[episode][row] for row, episode in zip(at, chosen, strict=True)]),
+        np.stack([chunks[episode][row] for row, episode in zip(at, chosen, strict=True)]),
+        np.array([episodes[episode] for episode in chosen]),
+    )
+
+
+GOLDEN = 0.6180339887498949
+"""Multiples of the golden ratio, modulo 1, are evenly spread however many there are."""

@@ -1,0 +1,150 @@
+"""A policy behind the wire, asked as one of ours would be; whatever it does is its own fault."""
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from genpolicy.candidates.connection import Connection, dial
+from genpolicy.candidates.entry import ServerEntry
+from genpolicy.candidates.extension import (
+    Capabilities,
+    Drawn,
+    NoiseName,
+    capabilities,
+    read_answer,
+    request,
+)
+from genpolicy.candidates.faults import Fault, PolicyError
+from genpolicy.candidates.mapping import Inputs, Outputs
+from genpolicy.contract.observation import ObservationContract
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Invocation:
+    """What became of one invocation.
+
+    Attributes:
+        actions: Candidate chunks in mapped actions, finite or not. Shape (N, K, 10).
+        evaluations: Network evaluations of a sample; None where the server does not count.
+        spans_s: Seconds by latency term, of the terms that it measures.
+        seconds: From the first byte sent to the last chunk mapped, by the clock of this machine.
+    """
+
+    actions: Array
+    evaluations: int | None
+    spans_s: dict[str, float]
+    seconds: float
+
+
+class RemotePolicy:
+    """A policy that answers over the wire.
+
+    A line on which something went wrong is dropped, because a late answer on it would look like
+    the next one; the next invocation dials again.
+
+    Args:
+        entry: What it is.
+        address: Where it listens.
+        contract: The observation in force.
+
+    Raises:
+        ContractError: The entry names what the observation does not have.
+        PolicyError: Nobody listens, or says what it can in a way that is none.
+    """
+
+    def __init__(self, entry: ServerEntry, address: str, contract: ObservationContract) -> None:
+        self.entry = entry
+        self._address = address
+        self._inputs = Inputs(
+            entry.observation, contract,
+            observation_horizon=entry.horizons.observation_horizon,
+        )  # fmt: skip
+        self._outputs = Outputs(entry.action, contract)
+        self._asked = 0
+        self._line: Connection | None = None
+        self.told: Capabilities = capabilities(self._connected().metadata)
+        if self.told.prediction_horizon not in (None, entry.horizons.prediction_horizon):
+            self.close()
+            raise PolicyError(
+                Fault.SHAPE,
+                f"it predicts {self.told.prediction_horizon} actions, its entry says "
+                f"{entry.horizons.prediction_horizon}",
+            )
+
+    def invoke(self, observations: Array, *, noise: NoiseName, candidates: int) -> Invocation:
+        """Candidate chunks of one observation.
+
+        Args:
+            observations: Physical units, newest last. Shape (H_o, D_o).
+            noise: Name of the noise; a server that cannot be seeded never sees it.
+            candidates: N >= 1. Asked for one by one where the server draws no more at once.
+
+        Raises:
+            PolicyError: It did not answer, or not with what was declared; there is no chunk.
+        """
+        begun = time.perf_counter()
+        at_once = min(candidates, self.told.candidates) if self.told.version else 1
+        drawn: list[Drawn] = []
+        for first in range(0, candidates, at_once):
+            number = min(at_once, candidates - first)
+            drawn.append(self._draw(observations, (*noise, first), number))
+        chunks = np.concatenate([part.actions for part in drawn])
+        mapped = self._outputs.mapped(chunks, observations[-1])
+        counts = [part.evaluations for part in drawn if part.evaluations is not None]
+        return Invocation(
+            mapped,
+            max(counts) if counts else None,
+            {term: sum(part.spans_s[term] for part in drawn) for term in self.told.spans},
+            time.perf_counter() - begun,
+        )
+
+    def close(self) -> None:
+        """Hang up."""
+        if self._line is not None:
+            self._line.close()
+            self._line = None
+
+    def _draw(self, observations: Array, noise: NoiseName, candidates: int) -> Drawn:
+        invocation = str(self._asked)
+        self._asked += 1
+        message = {**self._inputs.of(observations), **self.entry.constants}
+        if self.told.version:
+            message |= request(invocation, noise, candidates)
+        try:
+            answer = self._connected().ask(message, timeout_s=self.entry.timeout_s)
+            drawn = read_answer(
+                answer, key=self.entry.action.key, told=self.told, invocation=invocation,
+                candidates=candidates,
+            )  # fmt: skip
+            self._check_shape(drawn)
+        except PolicyError:
+            self.close()
+            raise
+        return drawn
+
+    def _check_shape(self, drawn: Drawn) -> None:
+        """As many actions as the entry says, and every column that it gives a meaning to."""
+        rows, columns = drawn.actions.shape[1:]
+        expected, width = self.entry.horizons.prediction_horizon, self.entry.action.width
+        if rows != expected or columns < width:
+            raise PolicyError(
+                Fault.SHAPE,
+                f"chunks of {rows} actions of {columns} numbers; its entry says {expected} actions "
+                f"and names column {width - 1}",
+            )
+
+    def _connected(self) -> Connection:
+        if self._line is None:
+            line = dial(
+                self._address, allowed=self.entry.allow_host, timeout_s=self.entry.timeout_s
+            )
+            told = getattr(self, "told", None)
+            if told is not None and capabilities(line.metadata) != told:
+                line.close()
+                raise PolicyError(Fault.CHANGED, "its metadata are others than at first")
+            self._line = line
+        return self._line

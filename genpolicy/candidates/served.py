@@ -1,0 +1,118 @@
+"""One of our checkpoints behind the wire, for anybody's client."""
+
+import itertools
+import time
+from typing import Any, NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from genpolicy.candidates.extension import MOST_CANDIDATES, VERSION, WORD
+from genpolicy.contract.latency import Term
+from genpolicy.errors import ContractError
+from genpolicy.policies.policy import NetworkPolicy, NoiseName
+
+OBSERVATION = "observation"
+ACTIONS = "actions"
+UNNAMED = "unnamed"
+LONGEST_NAME = 64
+
+
+class ServedPolicy:
+    """Answers messages with a checkpoint's chunks.
+
+    A message holds `observation`, the vectors of the observation contract, newest last, of shape
+    (H_o, D_o); an answer `actions`: (K, D_a), or (N, K, D_a) for who speaks the extension. Who
+    names no noise gets the next of a fixed sequence, the same after each start.
+
+    Args:
+        policy: The verified checkpoint with its sampler.
+    """
+
+    def __init__(self, policy: NetworkPolicy) -> None:
+        self._policy = policy
+        self._unnamed = itertools.count()
+
+    @property
+    def metadata(self) -> dict[str, Any]:
+        """What is said first."""
+        return {
+            "method": self._policy.method,
+            WORD: {
+                "version": VERSION,
+                "checkpoint": self._policy.checkpoint_hash,
+                "sampler": self._policy.sampler_config_hash,
+                "prediction_horizon": self._policy.prediction_horizon,
+                "seeded": True,
+                "candidates": MOST_CANDIDATES,
+                "counts_evaluations": True,
+                "spans": [str(Term.PREPROCESS), str(Term.ENCODE), str(Term.SAMPLE)],
+            },
+        }
+
+    def answer(self, message: dict[str, Any]) -> dict[str, Any]:
+        """Chunks of one observation.
+
+        Raises:
+            ContractError: No observation of the checkpoint's shape, or an extension that is none.
+            NonFiniteError: An observation is NaN or infinite.
+        """
+        asked = _asked(message.get(WORD))
+        name: NoiseName = (UNNAMED, next(self._unnamed)) if asked is None else asked[1]
+        number = 1 if asked is None else asked[2]
+        begun = time.perf_counter()
+        prepared = self._policy.preprocess(_observation(message.get(OBSERVATION))[None])
+        preprocessed = time.perf_counter()
+        condition = self._policy.encode(prepared)
+        encoded = time.perf_counter()
+        drawn = self._policy.sample_encoded(condition, noise_names=[name], candidates=number)
+        sampled = time.perf_counter()
+        if asked is None:
+            return {ACTIONS: drawn.actions[0, 0]}
+        return {
+            ACTIONS: drawn.actions[0],
+            WORD: {
+                "invocation": asked[0],
+                "checkpoint": self._policy.checkpoint_hash,
+                "sampler": self._policy.sampler_config_hash,
+                "nfe": drawn.nfe,
+                "spans_s": {
+                    str(Term.PREPROCESS): preprocessed - begun,
+                    str(Term.ENCODE): encoded - preprocessed,
+                    str(Term.SAMPLE): sampled - encoded,
+                },
+            },
+        }
+
+
+def _observation(found: Any) -> NDArray[np.float64]:
+    if not isinstance(found, np.ndarray) or found.ndim != 2:
+        _refuse(OBSERVATION, f"{type(found).__name__}", "an array (H_o, D_o), newest last")
+    values: NDArray[np.float64] = found.astype(np.float64)
+    return values
+
+
+def _asked(found: Any) -> tuple[str, NoiseName, int] | None:
+    """Invocation, name of the noise, and number of candidates; None of a plain message."""
+    if found is None:
+        return None
+    if not isinstance(found, dict) or set(found) != {"invocation", "noise", "candidates"}:
+        _refuse(WORD, repr(found)[:80], "invocation, noise and candidates")
+    invocation, noise, number = found["invocation"], found["noise"], found["candidates"]
+    if not isinstance(invocation, str) or len(invocation) > LONGEST_NAME:
+        _refuse(f"{WORD}.invocation", repr(invocation)[:80], f"up to {LONGEST_NAME} signs")
+    named = isinstance(noise, list) and all(type(part) in (str, int) for part in noise)
+    if not named or len(noise) > LONGEST_NAME:
+        _refuse(f"{WORD}.noise", repr(noise)[:80], "a list of texts and integers")
+    if type(number) is not int or not 1 <= number <= MOST_CANDIDATES:
+        _refuse(f"{WORD}.candidates", repr(number)[:80], f"1 to {MOST_CANDIDATES}")
+    return invocation, tuple(noise), number
+
+
+def _refuse(where: str, found: str, expected: str) -> NoReturn:
+    raise ContractError(
+        where=f"message to the served policy: {where}",
+        found=found,
+        expected=expected,
+        action="See docs/candidates.md.",
+    )

@@ -1,0 +1,161 @@
+"""`genpolicy check-candidate` and `genpolicy serve-policy`: a policy in a process of its own."""
+
+import json
+import tempfile
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+from genpolicy.candidates.conformance import Conformance, check
+from genpolicy.candidates.connection import LOOPBACK, Listening
+from genpolicy.candidates.entry import ServerEntry, read_entry
+from genpolicy.candidates.launched import Launched, verify_files
+from genpolicy.candidates.recorded_starts import (
+    RecordedStarts,
+    observation_contract,
+    recorded_starts,
+    require_contract,
+)
+from genpolicy.candidates.remote import RemotePolicy
+from genpolicy.candidates.served import ServedPolicy
+from genpolicy.contract.observation import ObservationContract
+from genpolicy.data.dataset import load_dataset
+from genpolicy.errors import BadInputError, ConfigError
+from genpolicy.integrity.documents import read_json
+from genpolicy.policies.policy import load_policy
+
+REFUSED, INTERRUPTED = 3, 130
+NOT_YET = (
+    "The ladder's stages run candidates that it trained itself; nothing here is a gate's verdict."
+)
+
+
+@dataclass(frozen=True)
+class CheckOptions:
+    """What the user asked for.
+
+    Attributes:
+        dataset: Verified dataset whose held-out episodes are asked about.
+        candidates: Chunks of an invocation.
+        deadline_s: What an answer may take, s.
+        earlier: Report of an earlier check, to be compared with; None for none.
+    """
+
+    dataset: Path
+    candidates: int
+    deadline_s: float
+    earlier: Path | None = None
+
+
+def run_check(path: Path, options: CheckOptions, *, as_json: bool) -> int:
+    """Check a candidate; print what was found. Returns the exit code.
+
+    Raises:
+        BadInputError: The entry, the dataset or the earlier report is missing or wrong.
+        IntegrityError: A file of the candidate is another one.
+        PolicyError: The policy's process does not start.
+    """
+    entry = read_entry(path)
+    earlier = _earlier(options.earlier)
+    data = load_dataset(options.dataset)
+    require_contract(data, entry.horizons, candidate=entry.name)
+    contract = observation_contract(data)
+    starts = recorded_starts(data, entry.horizons)
+    folder = path.resolve().parent
+    verify_files(entry, folder)
+    found = _found(entry, folder, contract, _Asked(starts, options, earlier))
+    print(json.dumps(found.as_json(), indent=2, sort_keys=True) if as_json else _text(found))
+    return REFUSED if found.failed else 0
+
+
+def _found(
+    entry: ServerEntry, folder: Path, contract: ObservationContract, asked: "_Asked"
+) -> Conformance:
+    """Of a server that is started here, if it is to be, and ended in any case."""
+    with ExitStack() as stack:
+        log = Path(stack.enter_context(tempfile.TemporaryDirectory())) / "server.log"
+        running = stack.enter_context(Launched(entry, folder, log))
+
+        def policy_at(address: str) -> RemotePolicy:
+            policy = RemotePolicy(entry, address, contract)
+            stack.callback(policy.close)
+            return policy
+
+        def restarted() -> RemotePolicy:
+            running.end()
+            return policy_at(stack.enter_context(Launched(entry, folder, log)).address)
+
+        return check(
+            policy_at(running.address), asked.starts,
+            candidates=asked.options.candidates, deadline_s=asked.options.deadline_s,
+            restarted=restarted if entry.command is not None else None, earlier=asked.earlier,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Asked:
+    starts: RecordedStarts
+    options: CheckOptions
+    earlier: str | None
+
+
+def _earlier(path: Path | None) -> str | None:
+    if path is None:
+        return None
+    said = read_json(path)
+    digest = said.get("answers_sha256") if isinstance(said, dict) else None
+    if not isinstance(digest, str):
+        raise BadInputError(
+            where=str(path),
+            found="no report of a check whose answers repeated",
+            expected="what `genpolicy check-candidate --json` printed, with answers_sha256",
+            action="Name the report of an earlier check.",
+        )
+    return digest
+
+
+def _text(found: Conformance) -> str:
+    width = max(len(finding.name) for finding in found.findings)
+    lines = [
+        f"{found.candidate}: {found.candidates} chunks at each of {found.moments} recorded moments,"
+        " each of another episode.",
+        f"Serves {found.checkpoint or 'an unknown checkpoint'}; its answers are "
+        f"{found.answers_sha256 or 'not the same twice'}.",
+        "",
+        *(
+            f"{finding.judged:8}{finding.gate}  {finding.name:{width}}  {finding.said}"
+            for finding in found.findings
+        ),
+        "",
+        NOT_YET,
+    ]
+    if found.failed:
+        names = ", ".join(f"{one.name} (gate {one.gate})" for one in found.failed)
+        lines.append(f"Refused: {names}.")
+    return "\n".join(lines)
+
+
+def run_serve(checkpoint: Path, *, port: int, sha256: str | None) -> int:
+    """Serve a checkpoint on this machine until an interrupt. Returns the exit code.
+
+    Raises:
+        ConfigError: Nobody may listen on that port.
+        BadInputError: The checkpoint is missing, malformed, or another one.
+    """
+    served = ServedPolicy(load_policy(checkpoint, expected_sha256=sha256))
+    try:
+        listening = Listening(served.answer, served.metadata, port=port)
+    except OSError as error:
+        raise ConfigError(
+            where="--port",
+            found=f"{port}, on which nobody can listen ({error.strerror})",
+            expected="a free port of this machine",
+            action="Name another one, or 0 for any.",
+        ) from error
+    print(f"Serving {served.metadata['method']} at ws://{LOOPBACK}:{listening.port}", flush=True)
+    with listening:
+        try:
+            listening.serve_forever()
+        except KeyboardInterrupt:
+            return INTERRUPTED
+    return 0
