@@ -1,0 +1,221 @@
+import threading
+import time
+
+import numpy as np
+import pytest
+from websockets.sync.server import serve
+
+from genpolicy.candidates import connection
+from genpolicy.candidates.connection import Listening, check_address, dial, free_port
+from genpolicy.candidates.faults import Fault, PolicyError
+from genpolicy.candidates.packing import MAXIMUM_MESSAGE_BYTES, pack
+from genpolicy.errors import ConfigError
+
+HELLO = {"robot": "planted"}
+
+
+@pytest.fixture
+def raw():
+    """A server that does with its line whatever a function wants."""
+    running = []
+
+    def start(talk):
+        server = serve(talk, "127.0.0.1", 0, compression=None, max_size=None)
+        thread = threading.Thread(target=server.serve_forever, daemon=True)
+        thread.start()
+        running.append((server, thread))
+        return f"ws://127.0.0.1:{server.socket.getsockname()[1]}"
+
+    yield start
+    for server, thread in running:
+        server.shutdown()
+        thread.join(5)
+
+
+def asked(address, message=None, timeout_s=2.0):
+    line = dial(address, allowed=None, timeout_s=2.0)
+    try:
+        return line.ask(message or {"o": np.arange(3.0)}, timeout_s=timeout_s)
+    finally:
+        line.close()
+
+
+def fault_of(address, **arguments):
+    with pytest.raises(PolicyError) as error:
+        asked(address, **arguments)
+    return error.value.fault
+
+
+def test_metadata_come_first_and_then_an_answer_to_each_message(serving):
+    with serving(lambda message: {"twice": message["o"] * 2}, HELLO) as address:
+        line = dial(address, allowed=None, timeout_s=2.0)
+        assert line.metadata == HELLO
+        for number in range(3):
+            answer = line.ask({"o": np.full(2, number)}, timeout_s=2.0)
+            assert answer["twice"].tolist() == [2 * number] * 2
+        line.close()
+
+
+def test_what_the_server_raises_is_told_as_text_and_ends_that_line_only(serving):
+    def answer(message):
+        if "bad" in message:
+            raise ValueError("no such phase")
+        return {}
+
+    with serving(answer, HELLO) as address:
+        with pytest.raises(PolicyError, match="no such phase") as error:
+            asked(address, {"bad": 1})
+        assert error.value.fault is Fault.REFUSED
+        assert asked(address) == {}
+
+
+def test_nobody_there():
+    assert fault_of(f"ws://127.0.0.1:{free_port()}") is Fault.CLOSED
+
+
+def test_no_answer_in_time_is_late_and_what_comes_then_answers_nothing(serving):
+    slow = threading.Event()
+
+    def answer(message):
+        if "slow" in message:
+            slow.wait(5)
+        return dict(message)
+
+    with serving(answer, HELLO) as address:
+        line = dial(address, allowed=None, timeout_s=2.0)
+        with pytest.raises(PolicyError) as error:
+            line.ask({"slow": 1}, timeout_s=0.05)
+        assert error.value.fault is Fault.LATE
+        slow.set()
+        until = time.monotonic() + 5
+        seen = None
+        while seen is None and time.monotonic() < until:  # it comes some time
+            try:
+                line.ask({"next": 1}, timeout_s=0.5)
+            except PolicyError as later:
+                seen = later.fault
+        line.close()
+        assert seen is Fault.UNREQUESTED
+
+
+def test_a_server_that_answers_twice_is_at_fault(raw):
+    def talk(line):
+        line.send(pack(HELLO))
+        for _ in line:
+            line.send(pack({}))
+            line.send(pack({}))
+
+    line = dial(raw(talk), allowed=None, timeout_s=2.0)
+    faults = []
+    for _ in range(50):
+        try:
+            line.ask({}, timeout_s=2.0)
+        except PolicyError as error:
+            faults.append(error.fault)
+            break
+    line.close()
+    assert faults == [Fault.UNREQUESTED]
+
+
+def test_a_server_that_hangs_up_in_the_middle_is_closed(raw):
+    def talk(line):
+        line.send(pack(HELLO))
+        line.recv()
+        line.socket.shutdown(2)
+
+    assert fault_of(raw(talk)) is Fault.CLOSED
+
+
+def test_a_message_beyond_the_limit_is_oversize(raw):
+    def talk(line):
+        line.send(pack(HELLO))
+        line.recv()
+        try:
+            line.send(b"\0" * (MAXIMUM_MESSAGE_BYTES + 1))
+        except Exception:  # the reader has hung up
+            return
+
+    assert fault_of(raw(talk)) is Fault.OVERSIZE
+
+
+@pytest.mark.parametrize("said", [b"\xc1", b"", b"\x90", pack({})[:0]])
+def test_bytes_that_are_no_message_are_malformed(raw, said):
+    def talk(line):
+        line.send(pack(HELLO))
+        line.recv()
+        line.send(said)
+        line.recv()
+
+    assert fault_of(raw(talk)) is Fault.MALFORMED
+
+
+def test_a_server_that_says_nothing_first_is_late(raw):
+    with pytest.raises(PolicyError, match="no metadata within") as error:
+        dial(raw(lambda line: line.recv()), allowed=None, timeout_s=0.1)
+    assert error.value.fault is Fault.LATE
+
+
+def test_a_server_that_does_not_read_does_not_hold_us(raw):
+    end, rescued = threading.Event(), threading.Event()
+    rescue = threading.Timer(30.0, lambda: (rescued.set(), end.set()))
+    rescue.start()
+
+    def talk(line):
+        line.send(pack(HELLO))
+        end.wait()  # nothing is taken out of its queue, which fills, and then the line
+
+    line = dial(raw(talk), allowed=None, timeout_s=2.0)
+    large = {"picture": np.zeros(MAXIMUM_MESSAGE_BYTES // 2, dtype=np.uint8)}
+    faults = set()
+    for _ in range(60):
+        try:
+            line.ask(large, timeout_s=0.05)
+        except PolicyError as error:
+            faults.add(error.fault)
+    rescue.cancel()
+    end.set()
+    line.close()
+    assert not rescued.is_set()
+    assert Fault.LATE in faults
+    assert faults <= {Fault.LATE, Fault.CLOSED}
+
+
+@pytest.mark.parametrize("address", ["ws://127.0.0.1:80", "ws://localhost:80", "ws://[::1]:8000"])
+def test_this_machine_needs_no_permission(address):
+    check_address(address, None)
+
+
+def test_another_machine_needs_its_name():
+    with pytest.raises(ConfigError, match="another machine") as error:
+        check_address("ws://10.0.0.7:8000", None)
+    assert "allow_host" in error.value.action
+    check_address("ws://10.0.0.7:8000", "10.0.0.7")
+    with pytest.raises(ConfigError, match="another machine"):
+        check_address("ws://10.0.0.8:8000", "10.0.0.7")
+
+
+def test_no_line_is_opened_to_another_machine(monkeypatch):
+    monkeypatch.setattr(connection, "connect", lambda *_, **__: pytest.fail("it dialled"))
+    with pytest.raises(ConfigError, match="another machine"):
+        dial("ws://192.0.2.1:80", allowed=None, timeout_s=0.1)
+
+
+def test_no_proxy_is_asked(monkeypatch, serving):
+    monkeypatch.setenv("http_proxy", "http://192.0.2.1:3128")
+    monkeypatch.setenv("all_proxy", "http://192.0.2.1:3128")
+    with serving(lambda _: {}, HELLO) as address:
+        assert asked(address) == {}
+
+
+@pytest.mark.parametrize(
+    "address", ["http://localhost:80", "wss://localhost:80", "ws://localhost", "ws://:80",
+                "ws://localhost:80/path", "ws://localhost:99999999", "localhost:80", ""],
+)  # fmt: skip
+def test_what_is_no_address_is_refused(address):
+    with pytest.raises(ConfigError, match="expected ws://HOST:PORT"):
+        check_address(address, None)
+
+
+def test_a_server_listens_on_this_machine_only():
+    with Listening(lambda message: message, {}, port=0) as listening:
+        assert listening._server.socket.getsockname()[0] == "127.0.0.1"

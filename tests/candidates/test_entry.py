@@ -1,0 +1,67 @@
+import pytest
+import yaml
+
+from genpolicy.candidates.entry import ServerEntry, read_entry
+from genpolicy.errors import BadInputError, ConfigError
+
+from .conftest import ENTRY
+
+
+def written(tmp_path, **changes):
+    path = tmp_path / "candidate.yaml"
+    fields = {key: value for key, value in {**ENTRY, **changes}.items() if value is not None}
+    path.write_text(yaml.safe_dump(fields))
+    return path
+
+
+def test_an_entry_is_read_as_it_stands(tmp_path):
+    entry = read_entry(written(tmp_path))
+    assert entry == ServerEntry.model_validate(ENTRY)
+    assert entry.action.width == 10
+
+
+def action(**changes):
+    return {**ENTRY["action"], **changes}
+
+
+@pytest.mark.parametrize(
+    ("changes", "place", "expected"),
+    [
+        ({"kind": "pickle"}, "kind", "server"),
+        ({"name": "My Policy"}, "name", "pattern"),
+        ({"author": "somebody"}, "author", "pattern"),
+        ({"address": None}, "", "address or command"),
+        ({"command": ["serve", "{port}"]}, "", "address or command"),
+        ({"address": None, "command": ["serve"]}, "", "write {port}"),
+        ({"constants": {"observation": 1}}, "", "given twice"),
+        ({"files": {"a": "12"}}, "files.a", "pattern"),
+        ({"weights": "x"}, "weights", "Extra inputs"),
+        ({"action": action(frame="tcp")}, "action", "frame robot_base"),
+        ({"action": action(motion="relative")}, "action", "anchor"),
+        ({"action": action(rotation=None)}, "action", "anchor"),
+        ({"action": action(position={"columns": [0, 1, 9], "unit": "m"})}, "action", "one thing"),
+        ({"action": action(position={"columns": [0, 1, 2], "unit": "inch"})}, "unit", "'mm'"),
+        (
+            {"action": action(rotation={"columns": [3, 4, 5], "form": "quaternion_xyzw"})},
+            "action.rotation", "4 numbers, not 3",
+        ),
+        (
+            {"action": action(gripper={"column": 9, "open": 0.0, "open_m": 0.04})},
+            "action.gripper", "must differ",
+        ),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_named_with_its_place(tmp_path, changes, place, expected):
+    with pytest.raises(ConfigError) as error:
+        read_entry(written(tmp_path, **changes))
+    assert place in error.value.where
+    assert expected in error.value.expected
+
+
+def test_a_file_that_is_no_entry(tmp_path):
+    path = tmp_path / "candidate.yaml"
+    path.write_text("- 1\n")
+    with pytest.raises(ConfigError, match="no map of settings"):
+        read_entry(path)
+    with pytest.raises(BadInputError, match="not readable"):
+        read_entry(tmp_path / "absent.yaml")

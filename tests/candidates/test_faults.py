@@ -1,0 +1,12 @@
+import pickle
+
+import pytest
+
+from genpolicy.candidates.faults import Fault, PolicyError
+
+
+@pytest.mark.parametrize("fault", Fault)
+def test_a_fault_keeps_kind_and_words_across_processes(fault):
+    error = pickle.loads(pickle.dumps(PolicyError(fault, "no answer")))
+    assert (error.fault, error.found, error.exit_code) == (fault, "no answer", 2)
+    assert str(error) == f"the policy's process is at fault ({fault}): no answer"

@@ -1,0 +1,191 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation as Turn
+
+from genpolicy.candidates.entry import Gripper, Input, Orientation, Output
+from genpolicy.candidates.mapping import Inputs, Outputs, columns_of, opening, turns
+from genpolicy.contract.action import GRIPPER, POSITION, join_action, split_action
+from genpolicy.contract.observation import Channel, ObservationContract
+from genpolicy.errors import ContractError
+
+CONTRACT = ObservationContract((
+    Channel("place_m", ("x", "y", "z"), "m", "robot", 0.1),
+    Channel("turn", tuple("abcdef"), "1", "robot", 0.1),
+    Channel("hole", ("x_m", "yaw"), "1", "camera", 0.1),
+))  # fmt: skip
+ANCHOR = {"position": ["place_m"], "rotation": ["turn"]}
+WIDTH = {
+    "rotation_6d": 6, "matrix": 9, "quaternion_xyzw": 4, "quaternion_wxyz": 4,
+    "rotation_vector_rad": 3, "euler_xyz_rad": 3, "euler_xyz_deg": 3,
+}  # fmt: skip
+WRITE = {
+    "rotation_6d": lambda turn: np.concatenate([turn.as_matrix()[:, 0], turn.as_matrix()[:, 1]]),
+    "matrix": lambda turn: turn.as_matrix().ravel(),
+    "quaternion_xyzw": lambda turn: turn.as_quat(),
+    "quaternion_wxyz": lambda turn: np.roll(turn.as_quat(), 1),
+    "rotation_vector_rad": lambda turn: turn.as_rotvec(),
+    "euler_xyz_rad": lambda turn: turn.as_euler("xyz"),
+    "euler_xyz_deg": lambda turn: turn.as_euler("xyz", degrees=True),
+}
+
+
+def output(*, form="rotation_6d", unit="m", motion="absolute", frame="robot_base", **changes):
+    last = 3 + WIDTH[form]
+    return Output.model_validate({
+        "frame": frame, "motion": motion,
+        "position": {"columns": [0, 1, 2], "unit": unit},
+        "rotation": {"columns": list(range(3, last)), "form": form},
+        "gripper": {"column": last, "open": 1.0, "open_m": 0.04},
+        "anchor": None if motion == "absolute" else ANCHOR,
+        **changes,
+    })  # fmt: skip
+
+
+def seen(position, turn):
+    return np.concatenate([position, WRITE["rotation_6d"](turn), [0.5, 0.1]])
+
+
+def random_turns(count, seed=0):
+    return Turn.random(count, rng=np.random.default_rng(seed))
+
+
+@pytest.mark.parametrize("form", WIDTH)
+def test_every_form_says_the_same_rotation(form):
+    written = random_turns(20)
+    numbers = np.stack([WRITE[form](turn) for turn in written])
+    found = turns(Orientation(columns=list(range(WIDTH[form])), form=form), numbers)
+    np.testing.assert_allclose(found, written.as_matrix(), atol=1e-12)
+
+
+@pytest.mark.parametrize("form", WIDTH)
+def test_numbers_that_are_no_rotation_are_none_and_spoil_no_other_row(form):
+    good = WRITE[form](random_turns(1)[0])
+    bad = np.full(WIDTH[form], np.nan)
+    found = turns(Orientation(columns=list(range(WIDTH[form])), form=form), np.stack([good, bad]))
+    assert np.isfinite(found[0]).all()
+    assert np.isnan(found[1]).all()
+
+
+@pytest.mark.parametrize(
+    ("form", "numbers"),
+    [
+        ("quaternion_xyzw", np.zeros(4)),
+        ("rotation_6d", np.zeros(6)),
+        ("matrix", np.diag([1.0, 1.0, -1.0]).ravel()),  # a mirror
+        ("matrix", 2.0 * np.eye(3).ravel()),
+    ],
+)
+def test_a_row_that_describes_no_rotation_is_nan(form, numbers):
+    found = turns(Orientation(columns=list(range(len(numbers))), form=form), numbers[None])
+    assert np.isnan(found).all()
+
+
+@given(st.floats(-1, 1), st.floats(-10, 10), st.floats(0.01, 0.1))
+def test_gripper_numbers_are_shares_of_the_way_from_closed_to_open(share, closed, open_m):
+    gripper = Gripper(column=0, closed=closed, open=closed + 2.0, open_m=open_m)
+    chunk = np.array([[[closed + 2.0 * share]]])
+    np.testing.assert_allclose(opening(gripper, chunk), share * open_m, atol=1e-12)
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("m", 1.0), ("cm", 100.0), ("mm", 1000.0)])
+def test_absolute_places_in_their_unit(unit, factor):
+    turn = random_turns(1)[0]
+    chunk = np.concatenate(
+        [[0.1 * factor, 0.2 * factor, 0.3 * factor], WRITE["rotation_6d"](turn), [1.0]]
+    )
+    found = Outputs(output(unit=unit), CONTRACT).mapped(chunk[None, None], seen(np.zeros(3), turn))
+    position, rotation, gripper = split_action(found)
+    np.testing.assert_allclose(position[0, 0], [0.1, 0.2, 0.3])
+    np.testing.assert_allclose(rotation[0, 0], turn.as_matrix(), atol=1e-12)
+    assert gripper[0, 0] == pytest.approx(0.04)
+
+
+@pytest.mark.parametrize("frame", ["robot_base", "tcp"])
+@pytest.mark.parametrize("motion", ["relative", "increments"])
+@pytest.mark.parametrize("unit", ["m", "mm"])
+def test_relative_motions_are_the_absolute_ones_they_were_made_of(frame, motion, unit):
+    """A path is written relative to its anchor, by the definition of the motion, and read back."""
+    rng = np.random.default_rng(1)
+    path, rotations = rng.normal(size=(2, 5, 3)), random_turns(10, 2)
+    at, towards = rng.normal(size=3), random_turns(1, 3)[0]
+    chunks = np.empty((2, 5, 10))
+    for candidate in range(2):
+        before, faced = at, towards
+        for row in range(5):
+            target = rotations[5 * candidate + row]
+            step = path[candidate, row] - before
+            if frame == "tcp":
+                step, turn = faced.inv().apply(step), faced.inv() * target
+            else:
+                turn = target * faced.inv()
+            scale = 1000.0 if unit == "mm" else 1.0
+            chunks[candidate, row] = [*(step * scale), *WRITE["rotation_6d"](turn), 0.5]
+            if motion == "increments":
+                before, faced = path[candidate, row], target
+    declared = output(motion=motion, frame=frame, unit=unit)
+    found = Outputs(declared, CONTRACT).mapped(chunks, seen(at, towards))
+    expected = join_action(path, rotations.as_matrix().reshape(2, 5, 3, 3), 0.02)
+    np.testing.assert_allclose(found, expected, atol=1e-9)
+
+
+def test_without_a_rotation_the_anchor_keeps_its_own():
+    declared = output(
+        motion="relative", rotation=None, gripper={"column": 3, "open": 1.0, "open_m": 0.04}
+    )
+    towards = random_turns(1, 4)[0]
+    found = Outputs(declared, CONTRACT).mapped(np.zeros((1, 2, 4)), seen(np.ones(3), towards))
+    _, rotation, _ = split_action(found)
+    np.testing.assert_allclose(rotation, np.broadcast_to(towards.as_matrix(), (1, 2, 3, 3)))
+    np.testing.assert_array_equal(found[..., POSITION], 1.0)
+
+
+def test_a_number_that_is_none_stays_in_its_row():
+    chunk = np.tile(
+        np.concatenate([np.zeros(3), WRITE["rotation_6d"](Turn.identity()), [0.0]]), (1, 2, 1)
+    )
+    chunk[0, 1, 0] = np.nan
+    found = Outputs(output(), CONTRACT).mapped(chunk, seen(np.zeros(3), Turn.identity()))
+    assert np.isfinite(found[0, 0]).all()
+    assert np.isnan(found[0, 1, 0])
+    assert found[0, 1, GRIPPER] == 0.0
+
+
+def inputs(**part):
+    return Inputs({"state": Input.model_validate(part)}, CONTRACT, observation_horizon=2)
+
+
+def test_inputs_are_named_channels_in_the_order_and_type_that_is_asked_for():
+    observations = np.arange(22.0).reshape(2, 11)
+    given = inputs(channels=["hole", "place_m.y"]).of(observations)["state"]
+    assert given.dtype == np.float32
+    assert given.tolist() == [20.0, 21.0, 12.0]
+    both = inputs(channels=["place_m"], history=2, dtype="float64").of(observations)["state"]
+    assert both.tolist() == [[0.0, 1.0, 2.0], [11.0, 12.0, 13.0]]
+
+
+def test_only_lengths_are_given_in_another_unit():
+    observations = np.ones((2, 11))
+    given = inputs(channels=["place_m", "turn.a", "hole"], unit="mm").of(observations)["state"]
+    assert given.tolist() == [1000.0, 1000.0, 1000.0, 1.0, 1000.0, 1.0]
+
+
+def test_more_history_than_conditions_the_policy_is_refused():
+    with pytest.raises(ContractError, match="at most H_o = 2"):
+        inputs(channels=["place_m"], history=3)
+
+
+@pytest.mark.parametrize("name", ["place", "place_m.w", "x", ""])
+def test_a_channel_that_is_not_there_is_refused_with_those_that_are(name):
+    with pytest.raises(ContractError, match="place_m, turn, hole") as error:
+        columns_of([name], CONTRACT, where="observation.state")
+    assert "observation.state of the candidate" in error.value.where
+
+
+def test_an_anchor_that_is_no_pose_is_refused():
+    with pytest.raises(ContractError, match=r"action\.anchor\.rotation"):
+        Outputs(
+            output(motion="relative", anchor={"position": ["place_m"], "rotation": ["place_m"]}),
+            CONTRACT,
+        )
