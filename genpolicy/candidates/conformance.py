@@ -211,13 +211,14 @@ def _seeded(told: Capabilities, repeats: Finding, asked: _Asked) -> Finding:
         len(one.actions) > 1 and (one.actions[1:] != one.actions[:1]).any()
         for one in asked.answers.values()
     )
-    if not told.seeded and (draws or repeats.judged == "fails"):
-        said = "its chunks differ from draw to draw, and it takes no name of the noise"
-        return Finding("seeded", "fails", "B", said)
+    if repeats.judged == "fails" or (draws and not told.seeded):
+        takes = "it says that it can be seeded" if told.seeded else "it takes no name of the noise"
+        return Finding("seeded", "fails", "B", f"its chunks differ from draw to draw; {takes}")
     if not draws:
-        return Finding("seeded", "holds", "B", "it draws nothing: all candidates are equal")
-    judged: Judged = "holds" if repeats.judged == "holds" else repeats.judged
-    return Finding("seeded", judged, "B", "it says that named noise is repeated; see `repeats`")
+        said = "it draws nothing: all candidates are equal"
+    else:
+        said = "noise of one name gave one chunk"
+    return Finding("seeded", repeats.judged, "B", said)
 
 
 def _same(digest: str | None, earlier: str | None) -> Finding:

@@ -93,10 +93,27 @@ class Outputs:
             is NaN there, and the first check rejects it. Shape (N, K, 10).
         """
         place = chunks[..., self.output.position.columns] * LENGTH[self.output.position.unit]
+        opened = opening(self.output.gripper, chunks)
+        if self._as_predicted:
+            rotation = self.output.rotation
+            assert rotation is not None  # see `_as_predicted`
+            return np.concatenate(
+                [place, chunks[..., rotation.columns], opened[..., None]], axis=-1
+            )
         turned = self._turns(chunks)
         if self.output.motion != "absolute":
             place, turned = self._from_anchor(place, turned, conditioned_by)
-        return join_action(place, turned, opening(self.output.gripper, chunks))
+        return join_action(place, turned, opened)
+
+    @property
+    def _as_predicted(self) -> bool:
+        """Six numbers that are the action's own: how far they are from a rotation is evidence."""
+        rotation = self.output.rotation
+        return (
+            self.output.motion == "absolute"
+            and rotation is not None
+            and rotation.form == "rotation_6d"
+        )
 
     def _turns(self, chunks: Array) -> Array:
         if self.output.rotation is not None:

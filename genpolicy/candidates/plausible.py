@@ -23,6 +23,8 @@ DRAWS = 2_000
 TAIL = 0.005
 STANDS_STILL = 1e-6
 """A recorded number that moves less than this from moment to moment has no slope to compare."""
+ROUNDING = 1e-12
+"""What is left of a constant when its mean is taken off, in parts of it."""
 COPIED_M = 1e-9
 """No network comes this near to a recording in every number of a chunk."""
 
@@ -88,7 +90,8 @@ def slopes(chunks: Array, recorded: Array, *, rng: np.random.Generator) -> list[
 def _slope(theirs: Array, ours: Array) -> Array:
     """Of rows (draws, M); NaN where theirs stand still."""
     centred = theirs - theirs.mean(axis=1, keepdims=True)
-    spread = (centred**2).sum(axis=1)
+    still = np.abs(centred).max(axis=1) <= ROUNDING * np.maximum(np.abs(theirs).max(axis=1), 1.0)
+    spread = np.where(still, 0.0, (centred**2).sum(axis=1))
     covered = (centred * (ours - ours.mean(axis=1, keepdims=True))).sum(axis=1)
     slope: Array = np.full(len(spread), np.nan)
     np.divide(covered, spread, where=spread > 0.0, out=slope)
@@ -135,10 +138,8 @@ def shuffled_share(chunks: Array, recorded: Array, *, rng: np.random.Generator) 
     apart = np.sqrt(((theirs[:, None] - ours[None]) ** 2).mean(axis=2))
     own = np.trace(apart)
     rows = np.arange(len(apart))
-    as_near = sum(
-        apart[rows, rng.permutation(len(apart))].sum() <= own * (1.0 + 1e-12)
-        for _ in range(PERMUTATIONS)
-    )
+    shuffled = rng.permuted(np.tile(rows, (PERMUTATIONS, 1)), axis=1)
+    as_near = int(np.sum(apart[rows, shuffled].sum(axis=1) <= own * (1.0 + ROUNDING)))
     return float((1 + as_near) / (1 + PERMUTATIONS))
 
 

@@ -152,6 +152,12 @@ def test_a_number_that_is_none_stays_in_its_row():
     assert found[0, 1, GRIPPER] == 0.0
 
 
+def test_six_numbers_that_are_no_rotation_yet_are_left_for_feasibility_to_judge():
+    chunk = np.array([[[0.0, 0.0, 0.0, 1.1, 0.0, 0.2, 0.0, 0.9, 0.0, 0.0]]])
+    found = Outputs(output(), CONTRACT).mapped(chunk, seen(np.zeros(3), Turn.identity()))
+    np.testing.assert_array_equal(found, chunk)
+
+
 def inputs(**part):
     return Inputs({"state": Input.model_validate(part)}, CONTRACT, observation_horizon=2)
 

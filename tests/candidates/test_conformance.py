@@ -1,0 +1,300 @@
+"""Planted candidates behind the server kind: each is stopped for the reason named beforehand."""
+
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation as Turn
+
+from genpolicy.candidates.conformance import check
+from genpolicy.candidates.extension import WORD
+from genpolicy.candidates.remote import RemotePolicy
+from genpolicy.contract.action import GRIPPER
+from genpolicy.contract.rotation import rotation_from_6d
+from genpolicy.seeds import counter_noise
+
+SERVED = {
+    "version": 1, "checkpoint": "a" * 64, "sampler": "b" * 64, "prediction_horizon": 16,
+    "seeded": True, "candidates": 64, "counts_evaluations": True,
+    "spans": ["preprocess", "encode", "sample"],
+}  # fmt: skip
+ERROR_M = 0.005
+
+
+class Honest:
+    """Knows each moment, and answers what was done there, off by a draw of half a centimetre."""
+
+    def __init__(self, starts, plain=False):
+        self.starts = starts
+        self.rows = {seen.tobytes(): row for row, seen in enumerate(starts.observations)}
+        self.asked = 0
+        self.metadata = {} if plain else {WORD: dict(SERVED)}
+        self.said = {}
+
+    def __call__(self, message):
+        self.asked += 1
+        said = message.get(WORD, {"invocation": "", "noise": [self.asked], "candidates": 1})
+        row = self.rows[message["observation"].tobytes()]
+        chunks = np.stack([
+            self.chunk(row, (*said["noise"], candidate)) for candidate in range(said["candidates"])
+        ])  # fmt: skip
+        if WORD not in message:
+            return {"actions": chunks[0]}
+        spans = dict.fromkeys(SERVED["spans"], 0.001)
+        answer = {
+            "invocation": said["invocation"], "checkpoint": "a" * 64, "sampler": "b" * 64,
+            "nfe": 4, "spans_s": spans,
+        }  # fmt: skip
+        return {"actions": chunks, WORD: answer | self.said}
+
+    def chunk(self, row, noise):
+        off = np.zeros((16, 10))
+        off[:, :3] = ERROR_M * counter_noise(noise, shape=(1, 3))
+        return self.starts.chunks[row] + off
+
+
+class GlobalSeed(Honest):
+    """Draws from one generator of the process, whatever the noise is called."""
+
+    def chunk(self, row, noise):
+        return super().chunk(row, (self.asked,))
+
+
+class OtherWeights(Honest):
+    """After the first sixty questions it is another one, under the old name."""
+
+    def chunk(self, row, noise):
+        return super().chunk(row, ("other" if self.asked > 60 else "first", *noise))
+
+
+class OtherName(Honest):
+    """After ten questions it says so."""
+
+    def __call__(self, message):
+        self.said = {"checkpoint": "c" * 64} if self.asked > 10 else {}
+        return super().__call__(message)
+
+
+class RecordedFuture(Honest):
+    def chunk(self, row, noise):
+        return self.starts.chunks[row]
+
+
+class IgnoresObservation(Honest):
+    def chunk(self, row, noise):
+        return super().chunk(0, noise)
+
+
+class Millimetres(Honest):
+    def chunk(self, row, noise):
+        return super().chunk(row, noise) * np.array([1e3] * 3 + [1.0] * 7)
+
+
+class Mirrored(Honest):
+    def chunk(self, row, noise):
+        return super().chunk(row, noise) * np.array([1.0, -1.0, *[1.0] * 8])
+
+
+class Spread(Honest):
+    """Another standard deviation about the mean of the recordings than it was trained with."""
+
+    factor = 10.0
+
+    def chunk(self, row, noise):
+        mean = self.starts.chunks[..., :3].mean(axis=(0, 1))
+        chunk = super().chunk(row, noise)
+        chunk[:, :3] = mean + self.factor * (chunk[:, :3] - mean)
+        return chunk
+
+
+class Narrow(Spread):
+    factor = 0.1
+
+
+class ClosedGripper(Honest):
+    def chunk(self, row, noise):
+        chunk = super().chunk(row, noise)
+        chunk[:, GRIPPER] = 0.0
+        return chunk
+
+
+class NotANumber(Honest):
+    def chunk(self, row, noise):
+        return super().chunk(row, noise) + (np.nan if row == 3 else 0.0)
+
+
+class Fails(Honest):
+    def __call__(self, message):
+        if self.asked == 5:
+            self.asked += 1
+            raise MemoryError("CUDA out of memory")
+        return super().__call__(message)
+
+
+class Slow(Honest):
+    def __call__(self, message):
+        time.sleep(0.02)
+        return super().__call__(message)
+
+
+class NeverInTime(Honest):
+    def __call__(self, message):
+        self.asked += 1
+        if self.asked == 7:
+            time.sleep(0.5)
+        return super().__call__(message)
+
+
+class TurnedQuaternion(Honest):
+    """Says w first where its entry says it comes last."""
+
+    def chunk(self, row, noise):
+        chunk = super().chunk(row, noise)
+        quaternion = Turn.from_matrix(rotation_from_6d(chunk[:, 3:9])).as_quat()
+        return np.concatenate([chunk[:, :3], np.roll(quaternion, 1, axis=1), chunk[:, 9:]], axis=1)
+
+
+QUATERNION = {
+    "frame": "robot_base", "motion": "absolute", "position": {"columns": [0, 1, 2], "unit": "m"},
+    "rotation": {"columns": [3, 4, 5, 6], "form": "quaternion_xyzw"},
+    "gripper": {"column": 7, "open": 1.0, "open_m": 1.0},
+}  # fmt: skip
+
+
+@pytest.fixture
+def checked(serving, entry_of, starts, task):
+    """What the kit finds of a planted server."""
+
+    def run(planted, *, deadline_s=5.0, earlier=None, restarted=True, moments=starts, **fields):
+        with serving(planted, planted.metadata) as address:
+            opened = []
+
+            def policy():
+                opened.append(RemotePolicy(entry_of(**fields), address, task.observation))
+                return opened[-1]
+
+            found = check(
+                policy(), moments, candidates=4, deadline_s=deadline_s,
+                restarted=policy if restarted else None, earlier=earlier,
+            )  # fmt: skip
+            for one in opened:
+                one.close()
+        return found
+
+    return run
+
+
+def judged(found):
+    return {finding.name: finding.judged for finding in found.findings}
+
+
+def test_an_honest_candidate_holds_in_everything_that_can_be_said(checked, starts):
+    found = checked(Honest(starts))
+    # Forty moments bound no 95th percentile; no earlier check was named.
+    assert {name for name, what in judged(found).items() if what != "holds"} == {
+        "unchanged", "in_time",
+    }  # fmt: skip
+    assert found.failed == []
+    assert found.checkpoint == "a" * 64
+
+
+@pytest.mark.parametrize(
+    ("planted", "fails", "gates"),
+    [
+        (GlobalSeed, {"repeats", "restarts", "seeded"}, {"B"}),
+        (OtherName, {"answers", "repeats", "restarts", "seeded"}, {"B"}),
+        (OtherWeights, {"restarts"}, {"B"}),
+        (RecordedFuture, {"own_answers"}, {"D"}),
+        (IgnoresObservation, {"follows_observation", "scale"}, {"D"}),  # its gripper stands
+        (Millimetres, {"scale"}, {"D"}),
+        (Mirrored, {"scale"}, {"D"}),
+        (Spread, {"scale"}, {"D"}),
+        (Narrow, {"scale"}, {"D"}),
+        (ClosedGripper, {"scale"}, {"D"}),
+        (NotANumber, {"answers"}, {"B"}),
+        (Fails, {"answers"}, {"B"}),
+    ],
+)
+def test_a_planted_wrong_is_stopped_for_its_reason(checked, starts, planted, fails, gates):
+    found = checked(planted(starts))
+    assert {finding.name for finding in found.failed} == fails
+    assert {finding.gate for finding in found.failed} == gates
+
+
+def test_a_wrong_order_of_a_quaternion_is_stopped(checked, starts):
+    found = checked(TurnedQuaternion(starts), action=QUATERNION)
+    assert [finding.name for finding in found.failed] == ["orientation"]
+
+
+def test_the_axis_and_the_factor_are_told(checked, starts):
+    said = next(f.said for f in checked(Millimetres(starts)).findings if f.name == "scale")
+    assert "x 0.000995 (" in said
+    assert said.endswith("wrong: x, y, z")
+    said = next(f.said for f in checked(Mirrored(starts)).findings if f.name == "scale")
+    assert said.endswith("wrong: y")
+
+
+def test_an_answer_beyond_the_deadline_is_not_in_time(checked, starts):
+    found = checked(Slow(starts), deadline_s=0.002)
+    assert [finding.name for finding in found.failed] == ["in_time"]
+
+
+def test_an_answer_that_never_comes_is_a_fault_with_its_kind(checked, starts):
+    found = checked(NeverInTime(starts), timeout_s=0.2)
+    failed = {finding.name: finding.said for finding in found.failed}
+    assert set(failed) == {"answers", "in_time"}
+    assert "39 of 40 moments answered; late 1" in failed["answers"]
+
+
+def test_another_answer_than_at_the_earlier_check_is_another_candidate(checked, starts):
+    before = checked(Honest(starts)).answers_sha256
+    assert judged(checked(Honest(starts), earlier=before))["unchanged"] == "holds"
+
+    class Retrained(Honest):
+        def chunk(self, row, noise):
+            return super().chunk(row, ("retrained", *noise))
+
+    found = checked(Retrained(starts), earlier=before)
+    assert [finding.name for finding in found.failed] == ["unchanged"]
+
+
+def test_one_that_repeats_nothing_has_no_identity(checked, starts):
+    found = checked(GlobalSeed(starts), earlier="0" * 64)
+    assert found.answers_sha256 is None
+    assert judged(found)["unchanged"] == "fails"
+
+
+def test_a_plain_server_that_draws_cannot_be_seeded(checked, starts):
+    found = checked(Honest(starts, plain=True))
+    assert {finding.name for finding in found.failed} == {"repeats", "restarts", "seeded"}
+    assert judged(found)["evaluations"] == judged(found)["spans"] == "unknown"
+    assert "takes no name of the noise" in next(
+        finding.said for finding in found.findings if finding.name == "seeded"
+    )
+
+
+def test_a_plain_server_that_draws_nothing_reproduces(checked, starts):
+    class Mean(Honest):
+        def chunk(self, row, noise):
+            return super().chunk(row, (row,))
+
+    found = checked(Mean(starts, plain=True))
+    assert found.failed == []
+    assert judged(found)["seeded"] == "holds"
+
+
+def test_what_was_not_started_here_cannot_be_started_again(checked, starts):
+    found = checked(Honest(starts), restarted=False)
+    assert judged(found)["restarts"] == "unknown"
+    assert found.failed == []
+
+
+def test_of_few_moments_nothing_is_said_about_units(checked, starts):
+    few = replace(
+        starts, observations=starts.observations[:19], chunks=starts.chunks[:19],
+        episodes=starts.episodes[:19],
+    )  # fmt: skip
+    found = judged(checked(Millimetres(starts), moments=few))
+    names = ("follows_observation", "scale", "orientation", "own_answers")
+    assert [found[name] for name in names] == ["unknown"] * 4

@@ -1,0 +1,69 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from genpolicy.candidates.recorded_starts import (
+    observation_contract,
+    recorded_starts,
+    require_contract,
+)
+from genpolicy.errors import ContractError
+
+
+def test_one_moment_of_each_held_out_episode(data, kit):
+    starts = recorded_starts(data, kit.HORIZONS)
+    split = dict(zip(data.episodes["episode_uuid"], data.episodes["split"], strict=True))
+    assert len(set(starts.episodes)) == len(starts)
+    assert {split[uuid] for uuid in starts.episodes} == {"validation", "test"}
+    assert sorted(starts.episodes) == sorted(
+        uuid for uuid, name in split.items() if name != "train"
+    )
+
+
+def test_a_moment_is_what_was_seen_and_what_was_done_next(data, kit):
+    starts = recorded_starts(data, kit.HORIZONS)
+    uuids = data.episodes["episode_uuid"].to_numpy()
+    for row, uuid in enumerate(starts.episodes):
+        frames = data.frames.rows(np.flatnonzero(uuids[data.frames.episode] == uuid))
+        newest = np.flatnonzero(
+            (frames.observation == starts.observations[row, -1]).all(axis=1)
+            & (frames.action == starts.chunks[row, 0]).all(axis=1)
+        )
+        assert any(np.array_equal(frames.action[at : at + 16], starts.chunks[row]) for at in newest)
+
+
+def test_fewer_are_spread_over_all_and_moments_over_the_episodes(data, kit):
+    everything = replace(
+        data, episodes=data.episodes.assign(split=["train"] + ["test"] * 8 + ["validation"])
+    )
+    starts = recorded_starts(everything, kit.HORIZONS, most=4)
+    assert len(starts) == 4
+    rows = [
+        int(np.flatnonzero((data.frames.observation == seen[-1]).all(axis=1))[0])
+        for seen in starts.observations
+    ]
+    shares = [data.frames.index[row] for row in rows]
+    assert max(shares) - min(shares) > 20
+
+
+def test_chunks_longer_than_every_episode_are_refused(data, kit):
+    longest = int(data.episodes["rows"].max())
+    horizons = kit.HORIZONS.model_copy(update={"prediction_horizon": longest + 1})
+    with pytest.raises(ContractError, match="at least one as long as a chunk"):
+        recorded_starts(data, horizons)
+
+
+def test_the_observation_is_that_of_the_dataset(data, task):
+    assert observation_contract(data) == task.observation
+
+
+def test_another_period_or_another_action_is_refused_with_both_sides(data, kit):
+    require_contract(data, kit.HORIZONS, candidate="mine")
+    slower = kit.HORIZONS.model_copy(update={"action_period_s": 0.1})
+    with pytest.raises(ContractError, match=r"0\.1 s, expected 0\.05 s"):
+        require_contract(data, slower, candidate="mine")
+    action = {**data.manifest["action_contract"], "sha256": "0" * 64, "frame": "joints", "dim": 7}
+    other = replace(data, manifest={**data.manifest, "action_contract": action})
+    with pytest.raises(ContractError, match="7 numbers in the frame joints"):
+        require_contract(other, kit.HORIZONS, candidate="mine")
