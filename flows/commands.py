@@ -24,7 +24,7 @@ def reproduce(
     ] = False,
     force: Annotated[bool, typer.Option("--force", help="Run also where nothing changed.")] = False,
 ) -> int:
-    """Run `dvc repro`, and leave with a code that says why it ended.
+    """Run `dvc repro`; the exit code says why it ended.
 
     0 done, 1 a fault of ours, 2 bad input, 3 refused by a gate. Without named
     stages also 3 where the last gate does not pass and waits for nobody.
@@ -52,7 +52,7 @@ def serve(
     workspace: Workspace = Path(),
     cron: Annotated[str | None, typer.Option(help="Schedule; default: started by hand.")] = None,
 ) -> int:
-    """Serve the ladder as a deployment of a running Prefect server.
+    """Serve the ladder as a deployment of a Prefect server.
 
     The server is that of PREFECT_API_URL. One run at a time: a workspace has
     one writer.

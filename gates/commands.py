@@ -1,4 +1,4 @@
-"""Commands of the gates: judge evidence, prove reports, sign and verify trial cards.
+"""Commands of the gates: judge evidence, prove reports, sign and verify cards.
 
 Registered in `genpolicy.commands`. Exit codes: 0 done, 1 a fault of ours, 2 bad usage or input,
 3 refused: a gate that does not pass, or a report that is not what the files say.
@@ -25,7 +25,7 @@ Layout = Annotated[
     Literal["text", "json", "junit", "github"], typer.Option("--format", help="How to print it.")
 ]
 
-gates = new_app("Judge evidence, prove reports, sign and verify trial cards.")
+gates = new_app("Judge evidence, prove reports, sign and verify cards.")
 verify = new_app("Prove the reports that lie here, or judge the trial card.")
 
 
@@ -46,7 +46,7 @@ def audit(
     ] = None,
     seed: Annotated[int, typer.Option(help="Root of all random draws.")] = 0,
 ) -> int:
-    """Name the cause of different actions under one observation.
+    """Name the cause of different actions at one observation.
 
     Do the recordings hold several valid actions under one observation, or is a
     variable hidden, the data broken, a label wrong?

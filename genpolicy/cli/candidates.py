@@ -6,18 +6,18 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
-from genpolicy.candidates.conformance import Conformance, check
-from genpolicy.candidates.connection import LOOPBACK, Listening
-from genpolicy.candidates.entry import ServerEntry, read_entry
-from genpolicy.candidates.launched import Launched, verify_files
-from genpolicy.candidates.recorded_starts import (
+from genpolicy.candidates.conformance.check import Conformance, check
+from genpolicy.candidates.conformance.recorded_starts import (
     RecordedStarts,
     observation_contract,
     recorded_starts,
     require_contract,
 )
-from genpolicy.candidates.remote import RemotePolicy
-from genpolicy.candidates.served import ServedPolicy
+from genpolicy.candidates.wire.connection import LOOPBACK, Listening
+from genpolicy.candidates.wire.entry import ServerEntry, read_entry
+from genpolicy.candidates.wire.launched import Launched, verify_files
+from genpolicy.candidates.wire.remote import RemotePolicy
+from genpolicy.candidates.wire.served import ServedPolicy
 from genpolicy.contract.observation import ObservationContract
 from genpolicy.data.dataset import load_dataset
 from genpolicy.errors import BadInputError, ConfigError

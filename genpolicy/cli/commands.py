@@ -69,7 +69,7 @@ def propose(
     task: TaskName = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an old contract.yaml.")] = False,
 ) -> int:
-    """Propose the contract of an import, for a person to correct."""
+    """Propose an import's contract, for a person to correct."""
     from genpolicy.cli.beforehand import check_file, check_import
 
     check_import(path, out, format=layout, contract=None)
@@ -126,7 +126,7 @@ def replay(
     task: TaskName = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an old file.")] = False,
 ) -> int:
-    """Write a session of a journal for Foxglove.
+    """Write a journal's session for Foxglove.
 
     The messages of the session are copied, and beside them stands what they
     say: scene, arm, the action commanded, the chunk proposed, proposals that
@@ -144,9 +144,9 @@ def serve_policy(
         str | None, typer.Option(help="What the checkpoint must be; any if absent.")
     ] = None,
 ) -> int:
-    """Serve a checkpoint to a client of openpi's protocol, on this machine.
+    """Serve a checkpoint over openpi's protocol.
 
-    Until an interrupt. WebSocket and msgpack: metadata first, then one answer
+    On this machine, until an interrupt. WebSocket and msgpack: metadata first, then one answer
     for each message; see docs/candidates.md.
     """
     from genpolicy.cli.candidates import run_serve
@@ -166,7 +166,7 @@ def check_candidate(
     ] = None,
     as_json: AsJson = False,
 ) -> int:
-    """Check a policy of your own behind its server, before any gate does.
+    """Check a policy of your own, behind its server.
 
     It is asked about recorded moments of held-out episodes: whether it answers,
     repeats itself, starts anew as the same, means the units that it declares,

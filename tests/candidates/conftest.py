@@ -6,9 +6,9 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 
-from genpolicy.candidates.connection import Listening
-from genpolicy.candidates.entry import ServerEntry
-from genpolicy.candidates.recorded_starts import RecordedStarts
+from genpolicy.candidates.conformance.recorded_starts import RecordedStarts
+from genpolicy.candidates.wire.connection import Listening
+from genpolicy.candidates.wire.entry import ServerEntry
 
 CHANNELS = [
     "tcp_position_m", "tcp_rotation", "gripper_opening_m", "wrench_n", "hole_pose",

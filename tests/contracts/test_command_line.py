@@ -19,7 +19,10 @@ from genpolicy.cli.shell import GROUP, loaded
 
 COLUMNS = 80
 NAMED = r"(?:^|[`(&] ?|@|-m )genpolicy ([a-z][a-z -]*)"
-OWN = {"propose", "ingest", "fixtures", "replay", "doctor"}
+OWN = {
+    *("propose", "ingest", "fixtures", "replay", "doctor"),
+    *("serve-policy", "check-candidate"),
+}
 # Not pydantic: the library of the command line reads options with it.
 HEAVY = {
     *("torch", "mujoco", "pandas", "numpy", "scipy", "sklearn", "matplotlib", "pyarrow"),

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from genpolicy.candidates.packing import MAXIMUM_MESSAGE_BYTES, pack, unpack
+from genpolicy.candidates.wire.packing import MAXIMUM_MESSAGE_BYTES, pack, unpack
 from genpolicy.errors import IntegrityError
 
 PLAIN = st.sampled_from(["<f8", "<f4", "<f2", "<i8", "<u2", "|u1", "|b1", ">f8"])

@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 from websockets.sync.server import serve
 
-from genpolicy.candidates import connection
-from genpolicy.candidates.connection import Listening, check_address, dial, free_port
-from genpolicy.candidates.faults import Fault, PolicyError
-from genpolicy.candidates.packing import MAXIMUM_MESSAGE_BYTES, pack
+from genpolicy.candidates.wire import connection
+from genpolicy.candidates.wire.connection import Listening, check_address, dial, free_port
+from genpolicy.candidates.wire.faults import Fault, PolicyError
+from genpolicy.candidates.wire.packing import MAXIMUM_MESSAGE_BYTES, pack
 from genpolicy.errors import ConfigError
 
 HELLO = {"robot": "planted"}

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from genpolicy.candidates.extension import WORD, capabilities
-from genpolicy.candidates.remote import RemotePolicy
-from genpolicy.candidates.served import ServedPolicy
+from genpolicy.candidates.wire.extension import WORD, capabilities
+from genpolicy.candidates.wire.remote import RemotePolicy
+from genpolicy.candidates.wire.served import ServedPolicy
 from genpolicy.errors import ContractError
 
 

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from genpolicy.candidates.recorded_starts import (
+from genpolicy.candidates.conformance.recorded_starts import (
     observation_contract,
     recorded_starts,
     require_contract,

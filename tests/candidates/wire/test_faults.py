@@ -2,7 +2,7 @@ import pickle
 
 import pytest
 
-from genpolicy.candidates.faults import Fault, PolicyError
+from genpolicy.candidates.wire.faults import Fault, PolicyError
 
 
 @pytest.mark.parametrize("fault", Fault)

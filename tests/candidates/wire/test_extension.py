@@ -1,14 +1,14 @@
 import numpy as np
 import pytest
 
-from genpolicy.candidates.extension import (
+from genpolicy.candidates.wire.extension import (
     WORD,
     Capabilities,
     capabilities,
     read_answer,
     request,
 )
-from genpolicy.candidates.faults import Fault, PolicyError
+from genpolicy.candidates.wire.faults import Fault, PolicyError
 
 SAID = {
     "version": 1, "checkpoint": "a" * 64, "sampler": "b" * 64, "prediction_horizon": 3,

@@ -4,15 +4,15 @@ import time
 
 import pytest
 
-from genpolicy.candidates.connection import dial
-from genpolicy.candidates.faults import Fault, PolicyError
-from genpolicy.candidates.launched import Launched, verify_files
+from genpolicy.candidates.wire.connection import dial
+from genpolicy.candidates.wire.faults import Fault, PolicyError
+from genpolicy.candidates.wire.launched import Launched, verify_files
 from genpolicy.errors import ConfigError, IntegrityError
 from genpolicy.integrity.hashing import sha256_file
 
 SERVER = """
 import os, subprocess, sys
-from genpolicy.candidates.connection import Listening
+from genpolicy.candidates.wire.connection import Listening
 child = subprocess.Popen(["sleep", "600"])
 print("listening", flush=True)
 with Listening(lambda message: message, {"pid": os.getpid(), "child": child.pid,

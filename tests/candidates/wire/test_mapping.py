@@ -4,8 +4,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation as Turn
 
-from genpolicy.candidates.entry import Gripper, Input, Orientation, Output
-from genpolicy.candidates.mapping import Inputs, Outputs, columns_of, opening, turns
+from genpolicy.candidates.wire.entry import Gripper, Input, Orientation, Output
+from genpolicy.candidates.wire.mapping import Inputs, Outputs, columns_of, opening, turns
 from genpolicy.contract.action import GRIPPER, POSITION, join_action, split_action
 from genpolicy.contract.observation import Channel, ObservationContract
 from genpolicy.errors import ContractError

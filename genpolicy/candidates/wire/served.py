@@ -7,7 +7,7 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from genpolicy.candidates.extension import MOST_CANDIDATES, VERSION, WORD
+from genpolicy.candidates.wire.extension import MOST_CANDIDATES, VERSION, WORD
 from genpolicy.contract.latency import Term
 from genpolicy.errors import ContractError
 from genpolicy.policies.policy import NetworkPolicy, NoiseName

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation as Turn
 
-from genpolicy.candidates.entry import LENGTH, Gripper, Input, Orientation, Output
+from genpolicy.candidates.wire.entry import LENGTH, Gripper, Input, Orientation, Output
 from genpolicy.contract.action import join_action
 from genpolicy.contract.observation import ObservationContract
 from genpolicy.contract.rotation import rotation_from_6d

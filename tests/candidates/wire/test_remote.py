@@ -4,9 +4,9 @@ import time
 import numpy as np
 import pytest
 
-from genpolicy.candidates.extension import WORD
-from genpolicy.candidates.faults import Fault, PolicyError
-from genpolicy.candidates.remote import RemotePolicy
+from genpolicy.candidates.wire.extension import WORD
+from genpolicy.candidates.wire.faults import Fault, PolicyError
+from genpolicy.candidates.wire.remote import RemotePolicy
 from genpolicy.errors import ContractError
 
 CAN = {

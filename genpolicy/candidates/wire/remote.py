@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from genpolicy.candidates.connection import Connection, dial
-from genpolicy.candidates.entry import ServerEntry
-from genpolicy.candidates.extension import (
+from genpolicy.candidates.wire.connection import Connection, dial
+from genpolicy.candidates.wire.entry import ServerEntry
+from genpolicy.candidates.wire.extension import (
     Capabilities,
     Drawn,
     NoiseName,
@@ -16,8 +16,8 @@ from genpolicy.candidates.extension import (
     read_answer,
     request,
 )
-from genpolicy.candidates.faults import Fault, PolicyError
-from genpolicy.candidates.mapping import Inputs, Outputs
+from genpolicy.candidates.wire.faults import Fault, PolicyError
+from genpolicy.candidates.wire.mapping import Inputs, Outputs
 from genpolicy.contract.observation import ObservationContract
 
 Array = NDArray[np.float64]

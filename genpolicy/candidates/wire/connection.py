@@ -7,22 +7,24 @@ went wrong. Nothing but a policy is reached through it: see the test of safety.
 
 import ipaddress
 import logging
+import re
 import time
 from collections.abc import Callable
 from threading import Timer
 from types import TracebackType
 from typing import Any
-from urllib.parse import urlsplit
 
 from websockets.exceptions import ConnectionClosed, InvalidHandshake, PayloadTooBig
 from websockets.sync.client import ClientConnection, connect
 from websockets.sync.server import Server, ServerConnection, serve
 
-from genpolicy.candidates.faults import Fault, PolicyError
-from genpolicy.candidates.packing import MAXIMUM_MESSAGE_BYTES, pack, unpack
+from genpolicy.candidates.wire.faults import Fault, PolicyError
+from genpolicy.candidates.wire.packing import MAXIMUM_MESSAGE_BYTES, pack, unpack
 from genpolicy.errors import ConfigError, IntegrityError
 
 LOOPBACK = "127.0.0.1"
+ADDRESS = re.compile(r"ws://(?P<host>\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9.-]+):(?P<port>\d{1,5})/?")
+LAST_PORT = 65535
 HEALTH_PATH = "/healthz"
 PING_S = None
 """No pings: openpi's server answers none while it infers, which is no fault of it."""
@@ -48,18 +50,15 @@ def check_address(address: str, allowed: str | None) -> None:
     Raises:
         ConfigError: No such address, or another machine's.
     """
-    parts = urlsplit(address)
-    try:
-        host, port = parts.hostname, parts.port
-    except ValueError:
-        host = port = None
-    if parts.scheme != "ws" or not host or not port or parts.path not in ("", "/"):
+    parts = ADDRESS.fullmatch(address)
+    if parts is None or int(parts["port"]) > LAST_PORT:
         raise ConfigError(
             where="address of a policy's process",
             found=repr(address),
             expected="ws://HOST:PORT",
             action="Name host and port.",
         )
+    host = parts["host"].strip("[]")
     if not (_is_loopback(host) or host == allowed):
         raise ConfigError(
             where="address of a policy's process",

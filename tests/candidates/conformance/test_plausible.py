@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation as Turn
 
-from genpolicy.candidates.plausible import (
+from genpolicy.candidates.conformance.plausible import (
     copied,
     nearest,
     shuffled_share,

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation as Turn
 
-from genpolicy.candidates.conformance import check
-from genpolicy.candidates.extension import WORD
-from genpolicy.candidates.remote import RemotePolicy
+from genpolicy.candidates.conformance.check import check
+from genpolicy.candidates.wire.extension import WORD
+from genpolicy.candidates.wire.remote import RemotePolicy
 from genpolicy.contract.action import GRIPPER
 from genpolicy.contract.rotation import rotation_from_6d
 from genpolicy.seeds import counter_noise

@@ -1,10 +1,9 @@
 import pytest
 import yaml
 
-from genpolicy.candidates.entry import ServerEntry, read_entry
+from genpolicy.candidates.wire.entry import ServerEntry, read_entry
 from genpolicy.errors import BadInputError, ConfigError
-
-from .conftest import ENTRY
+from tests.candidates.conftest import ENTRY
 
 
 def written(tmp_path, **changes):

@@ -7,9 +7,9 @@ import time
 from pathlib import Path
 from types import TracebackType
 
-from genpolicy.candidates.connection import LOOPBACK, dial, free_port
-from genpolicy.candidates.entry import PORT, ServerEntry
-from genpolicy.candidates.faults import Fault, PolicyError
+from genpolicy.candidates.wire.connection import LOOPBACK, dial, free_port
+from genpolicy.candidates.wire.entry import PORT, ServerEntry
+from genpolicy.candidates.wire.faults import Fault, PolicyError
 from genpolicy.errors import ConfigError
 from genpolicy.integrity.hashing import read_verified
 

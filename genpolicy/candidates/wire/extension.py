@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, ValidationError
 
-from genpolicy.candidates.faults import Fault, PolicyError
+from genpolicy.candidates.wire.faults import Fault, PolicyError
 from genpolicy.contract.latency import Term
 from genpolicy.contract.settings import Settings
 

@@ -12,17 +12,17 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from genpolicy.candidates.extension import Capabilities, NoiseName
-from genpolicy.candidates.faults import PolicyError
-from genpolicy.candidates.plausible import (
+from genpolicy.candidates.conformance.plausible import (
     copied,
     nearest,
     shuffled_share,
     slopes,
     turned_away,
 )
-from genpolicy.candidates.recorded_starts import RecordedStarts
-from genpolicy.candidates.remote import Invocation, RemotePolicy
+from genpolicy.candidates.conformance.recorded_starts import RecordedStarts
+from genpolicy.candidates.wire.extension import Capabilities, NoiseName
+from genpolicy.candidates.wire.faults import PolicyError
+from genpolicy.candidates.wire.remote import Invocation, RemotePolicy
 from genpolicy.contract.chunk import actions_sha256
 from genpolicy.contract.latency import Term
 from genpolicy.seeds import stream

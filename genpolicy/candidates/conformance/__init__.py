@@ -1,0 +1,1 @@
+"""What a policy behind the wire does, before any gate asks it."""

@@ -1,0 +1,1 @@
+"""Somebody's policy in a process of its own: what it is, how it is asked, what its answers mean."""

@@ -1,0 +1,164 @@
+"""`genpolicy check-candidate` and `serve-policy`, as a user types them; the docs' own example."""
+
+import contextlib
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+from genpolicy.candidates.wire.connection import Listening, dial
+from genpolicy.cli.main import main
+from genpolicy.integrity.hashing import sha256_file
+
+DOCS = Path(__file__).parents[2] / "docs" / "candidates.md"
+PYTHON = [sys.executable, "-m", "genpolicy"]
+
+
+@pytest.fixture
+def folder(fleet, tmp_path):
+    """The entry of the docs beside its checkpoint."""
+    return with_entry(fleet, tmp_path)
+
+
+@pytest.fixture(scope="module")
+def checked(fleet, dataset, tmp_path_factory):
+    """The same, and the report of a check of it, as `--json` prints it."""
+    place = with_entry(fleet, tmp_path_factory.mktemp("checked"))
+    with (place / "checked.json").open("w") as out, contextlib.redirect_stdout(out):
+        assert run(place, dataset, "--deadline", "5", "--json") == 0
+    return place
+
+
+def with_entry(fleet, place):
+    shutil.copytree(fleet[0] / "flow", place / "flow")
+    [text] = re.findall(r"```yaml\n# candidate\.yaml\n(.*?)```", DOCS.read_text(), re.DOTALL)
+    digest = sha256_file(place / "flow" / "seed_0" / "model.safetensors")
+    entry = yaml.safe_load(text.replace("@weights@", digest))
+    assert entry["command"][0] == "genpolicy"
+    entry["command"][:1] = PYTHON
+    (place / "candidate.yaml").write_text(yaml.safe_dump(entry))
+    return place
+
+
+def run(folder, dataset, *words):
+    return main([
+        "check-candidate", str(folder / "candidate.yaml"), "--dataset", str(dataset), *words,
+    ])  # fmt: skip
+
+
+def change(folder, **fields):
+    path = folder / "candidate.yaml"
+    path.write_text(yaml.safe_dump({**yaml.safe_load(path.read_text()), **fields}))
+
+
+def refused(capsys, code, expected=2):
+    said = capsys.readouterr()
+    assert (code, said.out) == (expected, "")
+    [line] = said.err.splitlines()
+    assert line.startswith("genpolicy check-candidate: ")
+    return line
+
+
+def report_of(checked):
+    return json.loads((checked / "checked.json").read_text())
+
+
+def test_the_docs_commands_as_written(checked, dataset, capsys):
+    assert "genpolicy check-candidate candidate.yaml --earlier checked.json" in DOCS.read_text()
+    # Three held-out episodes of this dataset say nothing of units, and bound no percentile.
+    unknown = {"follows_observation", "scale", "orientation", "own_answers", "unchanged", "in_time"}
+    holds = {"answers", "repeats", "restarts", "seeded", "evaluations", "spans"}
+    assert {finding["name"]: finding["judged"] for finding in report_of(checked)["findings"]} == {
+        **dict.fromkeys(holds, "holds"), **dict.fromkeys(unknown, "unknown"),
+    }  # fmt: skip
+    earlier = ("--deadline", "5", "--earlier", str(checked / "checked.json"))
+    assert run(checked, dataset, *earlier) == 0
+    said = capsys.readouterr().out
+    assert "holds   B  unchanged" in said
+    assert "nothing here is a gate's verdict" in said
+
+
+def test_every_finding_of_the_docs_is_one_and_every_one_is_in_the_docs(checked):
+    rows = re.findall(r"^\| (`[a-z_`, ]+`) \| ([BCD]) \|", DOCS.read_text(), re.MULTILINE)
+    told = {name: gate for names, gate in rows for name in re.findall(r"`([a-z_]+)`", names)}
+    assert told == {finding["name"]: finding["gate"] for finding in report_of(checked)["findings"]}
+
+
+def test_another_checkpoint_behind_the_same_entry_is_told(folder, checked, fleet, dataset, capsys):
+    shutil.rmtree(folder / "flow" / "seed_0")
+    shutil.copytree(fleet[0] / "chunked_bc" / "seed_0", folder / "flow" / "seed_0")
+    assert "the entry of my_flow" in refused(capsys, run(folder, dataset))
+    change(folder, files={})
+    code = run(folder, dataset, "--deadline", "5", "--earlier", str(checked / "checked.json"))
+    assert code == 3
+    assert "Refused: unchanged (gate B)." in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("fields", "said"),
+    [
+        ({"kind": "torch"}, "candidate.yaml.kind is 'torch'"),
+        ({"observation": {"state": {"channels": ["joints"]}}}, "is 'joints', expected a channel"),
+        (
+            {"horizons": {"observation_horizon": 2, "prediction_horizon": 16,
+                          "execution_horizon": 8, "action_period_s": 0.1}},
+            "is 0.1 s, expected 0.05 s, as in the dataset",
+        ),
+        ({"command": None, "address": "ws://10.0.0.1:80"}, "is 10.0.0.1, another machine"),
+        ({"command": None, "address": "ws://127.0.0.1:1"}, "at fault (closed): nobody answers"),
+        ({"command": ["no-such-program", "{port}"]}, "'no-such-program', which does not start"),
+        ({"command": [sys.executable, "-c", "raise SystemExit('no GPU')", "{port}"]}, "no GPU"),
+    ],
+)  # fmt: skip
+def test_a_mistake_is_one_sentence(folder, dataset, capsys, fields, said):
+    change(folder, **fields)
+    if fields.get("command", "") is None:
+        path = folder / "candidate.yaml"
+        entry = yaml.safe_load(path.read_text())
+        del entry["command"]
+        path.write_text(yaml.safe_dump(entry))
+    assert said in refused(capsys, run(folder, dataset))
+
+
+def test_no_dataset_and_no_report(folder, dataset, tmp_path, capsys):
+    assert "manifest.json is not readable" in refused(capsys, run(folder, tmp_path / "none"))
+    wrong = tmp_path / "wrong.json"
+    wrong.write_text('{"answers_sha256": null}')
+    assert "no report of a check" in refused(capsys, run(folder, dataset, "--earlier", str(wrong)))
+
+
+def test_a_served_policy_says_where_it_is_and_ends_on_an_interrupt(fleet):
+    checkpoint = str(fleet[0] / "flow" / "seed_0")
+    server = subprocess.Popen(
+        [*PYTHON, "serve-policy", checkpoint, "--port", "0"], stdout=subprocess.PIPE, text=True,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+    )  # fmt: skip
+    try:
+        said = server.stdout.readline()
+        [address] = re.findall(r"^Serving flow at (ws://127\.0\.0\.1:\d+)$", said)
+        line = dial(address, allowed=None, timeout_s=5.0)
+        assert line.metadata["method"] == "flow"
+        line.close()
+        server.send_signal(signal.SIGINT)
+        assert server.wait(30) == 130
+    finally:
+        server.kill()
+        server.wait()
+
+
+def test_what_cannot_be_served(fleet, tmp_path, capsys):
+    assert main(["serve-policy", str(tmp_path)]) == 2
+    assert "config.json is not readable" in capsys.readouterr().err
+    checkpoint = str(fleet[0] / "flow" / "seed_0")
+    assert main(["serve-policy", checkpoint, "--sha256", "0" * 64]) == 2
+    assert "a checkpoint with sha256" in capsys.readouterr().err
+    with Listening(lambda message: message, {}, port=0) as taken:
+        assert main(["serve-policy", checkpoint, "--port", str(taken.port)]) == 2
+    assert f"--port is {taken.port}, on which nobody can listen" in capsys.readouterr().err
