@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from genpolicy.candidates.conformance.check import Conformance, check
+from genpolicy.candidates.conformance.findings import Admissible
 from genpolicy.candidates.conformance.recorded_starts import (
     RecordedStarts,
     observation_contract,
@@ -18,6 +19,7 @@ from genpolicy.candidates.wire.entry import ServerEntry, read_entry
 from genpolicy.candidates.wire.launched import Launched, verify_files
 from genpolicy.candidates.wire.remote import RemotePolicy
 from genpolicy.candidates.wire.served import ServedPolicy
+from genpolicy.cli.task_checks import task_checks
 from genpolicy.contract.observation import ObservationContract
 from genpolicy.data.dataset import load_dataset
 from genpolicy.errors import BadInputError, ConfigError
@@ -61,9 +63,11 @@ def run_check(path: Path, options: CheckOptions, *, as_json: bool) -> int:
     require_contract(data, entry.horizons, candidate=entry.name)
     contract = observation_contract(data)
     starts = recorded_starts(data, entry.horizons)
+    checks = task_checks(data, task=None, chunk_steps=entry.horizons.prediction_horizon)
+    asked = _Asked(starts, options, earlier, checks.admissible)
     folder = path.resolve().parent
     verify_files(entry, folder)
-    found = _found(entry, folder, contract, _Asked(starts, options, earlier))
+    found = _found(entry, folder, contract, asked)
     print(json.dumps(found.as_json(), indent=2, sort_keys=True) if as_json else _text(found))
     return REFUSED if found.failed else 0
 
@@ -89,6 +93,7 @@ def _found(
             policy_at(running.address), asked.starts,
             candidates=asked.options.candidates, deadline_s=asked.options.deadline_s,
             restarted=restarted if entry.command is not None else None, earlier=asked.earlier,
+            admissible=asked.admissible,
         )  # fmt: skip
 
 
@@ -97,6 +102,7 @@ class _Asked:
     starts: RecordedStarts
     options: CheckOptions
     earlier: str | None
+    admissible: Admissible | None
 
 
 def _earlier(path: Path | None) -> str | None:

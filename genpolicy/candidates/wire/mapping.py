@@ -90,20 +90,19 @@ class Outputs:
 
         Returns:
             Positions in m and rotations in the base frame, openings in m; a row without a rotation
-            is NaN there, and the first check rejects it. Shape (N, K, 10).
+            is NaN there, and the first check rejects it. Row by row in memory, as compiled checks
+            want it. Shape (N, K, 10).
         """
         place = chunks[..., self.output.position.columns] * LENGTH[self.output.position.unit]
         opened = opening(self.output.gripper, chunks)
         if self._as_predicted:
-            rotation = self.output.rotation
-            assert rotation is not None  # see `_as_predicted`
-            return np.concatenate(
-                [place, chunks[..., rotation.columns], opened[..., None]], axis=-1
-            )
+            assert self.output.rotation is not None  # see `_as_predicted`
+            six = chunks[..., self.output.rotation.columns]
+            return np.ascontiguousarray(np.concatenate([place, six, opened[..., None]], axis=-1))
         turned = self._turns(chunks)
         if self.output.motion != "absolute":
             place, turned = self._from_anchor(place, turned, conditioned_by)
-        return join_action(place, turned, opened)
+        return np.ascontiguousarray(join_action(place, turned, opened))
 
     @property
     def _as_predicted(self) -> bool:

@@ -166,7 +166,8 @@ QUATERNION = {
 def checked(serving, entry_of, starts, task):
     """What the kit finds of a planted server."""
 
-    def run(planted, *, deadline_s=5.0, earlier=None, restarted=True, moments=starts, **fields):
+    def run(planted, *, deadline_s=5.0, earlier=None, restarted=True, moments=starts,
+            passes=lambda _: True, **fields):  # fmt: skip
         with serving(planted, planted.metadata) as address:
             opened = []
 
@@ -177,6 +178,7 @@ def checked(serving, entry_of, starts, task):
             found = check(
                 policy(), moments, candidates=4, deadline_s=deadline_s,
                 restarted=policy if restarted else None, earlier=earlier,
+                admissible=admissible_where(passes),
             )  # fmt: skip
             for one in opened:
                 one.close()
@@ -187,6 +189,12 @@ def checked(serving, entry_of, starts, task):
 
 def judged(found):
     return {finding.name: finding.judged for finding in found.findings}
+
+
+def admissible_where(passes):
+    return lambda chunk, seen: (
+        (True, "") if passes(chunk) else (False, "geometric: scene_collision")
+    )
 
 
 def test_an_honest_candidate_holds_in_everything_that_can_be_said(checked, starts):
@@ -298,3 +306,29 @@ def test_of_few_moments_nothing_is_said_about_units(checked, starts):
     found = judged(checked(Millimetres(starts), moments=few))
     names = ("follows_observation", "scale", "orientation", "own_answers")
     assert [found[name] for name in names] == ["unknown"] * 4
+
+
+def test_how_many_moments_have_a_chunk_that_passes_every_layer(checked, starts):
+    def found_of(planted, **fields):
+        return next(f for f in checked(planted, **fields).findings if f.name == "admissible")
+
+    never = found_of(Honest(starts), passes=lambda chunk: False)
+    assert never.judged == "fails"
+    assert "at 0 of 40 moments, the recorded one at 0; geometric: scene_collision 160" in never.said
+    half = starts.chunks[20:, 0, 0]
+    sometimes = found_of(
+        Honest(starts), passes=lambda chunk: np.abs(chunk[0, 0] - half).min() < 1e-12
+    )
+    assert sometimes.judged == "fails"  # only the recorded chunks themselves, of half of them
+    assert "the recorded one at 20" in sometimes.said
+    third = iter(range(10_000))
+    one_in_four = found_of(Honest(starts), passes=lambda chunk: next(third) % 4 == 0)
+    assert one_in_four.judged == "holds"  # one chunk of four at each moment is enough
+
+
+def test_without_a_task_nothing_is_said_about_layers(serving, entry, starts, task):
+    with serving(planted := Honest(starts), planted.metadata) as address:
+        policy = RemotePolicy(entry, address, task.observation)
+        found = check(policy, starts, candidates=2, deadline_s=5.0, restarted=None)
+        policy.close()
+    assert judged(found)["admissible"] == "unknown"

@@ -158,6 +158,14 @@ def test_six_numbers_that_are_no_rotation_yet_are_left_for_feasibility_to_judge(
     np.testing.assert_array_equal(found, chunk)
 
 
+@pytest.mark.parametrize("form", ["rotation_6d", "quaternion_xyzw"])
+def test_mapped_actions_lie_row_by_row_in_memory(form):
+    chunks = np.zeros((3, 4, 10 if form == "rotation_6d" else 8))
+    chunks[..., 3] = 1.0
+    found = Outputs(output(form=form), CONTRACT).mapped(chunks, seen(np.zeros(3), Turn.identity()))
+    assert found.flags.c_contiguous
+
+
 def inputs(**part):
     return Inputs({"state": Input.model_validate(part)}, CONTRACT, observation_horizon=2)
 
