@@ -39,6 +39,7 @@ REPLAY_EXAMPLES = examples(
     "    --session flow/held_out/11 --out rejected.mcap",
 )
 
+EXPORT_EXAMPLES = examples("genpolicy export lerobot artifacts/ingest --out lerobot/")
 SERVE_EXAMPLES = examples(
     "genpolicy serve-policy artifacts/train_generators/flow/seed_0 --port 8000"
 )
@@ -56,6 +57,10 @@ def program(arguments: Sequence[str]) -> int:
     app.command("ingest", epilog=IMPORT_EXAMPLES)(ingest)
     app.command("fixtures", epilog=examples("genpolicy fixtures --pin"))(fixtures)
     app.command("replay", epilog=REPLAY_EXAMPLES)(replay)
+    exports = new_app("Write a dataset in a layout of others.")
+    exports.callback()(lambda: None)
+    exports.command("lerobot", epilog=EXPORT_EXAMPLES)(export_lerobot)
+    app.add_typer(exports, name="export")
     app.command("serve-policy", epilog=SERVE_EXAMPLES)(serve_policy)
     app.command("check-candidate", epilog=CHECK_EXAMPLES)(check_candidate)
     app.command("doctor", epilog=examples("genpolicy doctor --json"))(doctor)
@@ -135,6 +140,28 @@ def replay(
     from genpolicy.cli.replay import run_replay
 
     return run_replay(journal, out, session=session, task=task, force=force)
+
+
+def export_lerobot(
+    dataset: Annotated[Path, typer.Argument(help="A verified dataset.", metavar="DATASET")],
+    out: Annotated[Path, typer.Option(help="Folder to write.")],
+    split: Annotated[
+        Literal["train", "validation", "test"], typer.Option(help="Which episodes.")
+    ] = "train",
+) -> int:
+    """Write a split as a LeRobotDataset v3.0.
+
+    The training split, unless another one is named: who trains on it cannot
+    have seen what a candidate is held against. Only successes, where outcomes
+    are recorded.
+    """
+    from genpolicy.cli.beforehand import check_folder
+    from genpolicy.data.exports.lerobot import PROVENANCE
+
+    check_folder(out, PROVENANCE, "export")
+    from genpolicy.cli.exporting import run_export_lerobot
+
+    return run_export_lerobot(dataset, out, split=split)
 
 
 def serve_policy(

@@ -1,0 +1,1 @@
+"""Ways out of a dataset, into layouts that others train from."""
