@@ -221,7 +221,7 @@ def missing_fields(card: TrialCard) -> list[str]:
     dump: dict[str, Any] = card.model_dump()
     empty = [name for name, value in dump.items() if value in (None, "", {}, ())]
     texts = {name: value for name, value in dump.items() if isinstance(value, str) and value}
-    silent = [name for name, value in texts.items() if not _says(value)]
+    silent = [name for name, value in texts.items() if not says(value)]
     short = [] if re.fullmatch(r"[!-~]{16,}", card.nonce) else ["nonce"]
     reports = ["reports"] if set(card.reports) != {"A", "B", "C", "D"} else []
     return sorted({*empty, *silent, *short, *reports} - {"caveats"})
@@ -231,7 +231,7 @@ BLANK = "\u115f\u1160\u3164\uffa0"
 """Letters by their category, and fillers without a shape."""
 
 
-def _says(text: str) -> bool:
+def says(text: str) -> bool:
     """Whether a text holds a letter or a digit, and nothing that is not seen."""
     seen = [character for character in text if character not in "\n\t"]
     kinds = {"Cf" if c in BLANK else unicodedata.category(c) for c in seen}

@@ -1,0 +1,129 @@
+"""`genpolicy card`: from a key and the draft to a card that can be signed."""
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from gates.commands import Root, sign, verify_card
+from genpolicy.cli.shell import examples, new_app
+
+if TYPE_CHECKING:
+    from gates.card.filling import Rules
+
+SIGN = "card sign --card completed.json --key ~/keys/my_key.pem --reviewer my-id"
+card = new_app("Make a key, fill a card, sign it, verify it.")
+card.command("sign", epilog=examples(f"genpolicy {SIGN}"))(sign)
+card.command("verify", epilog=examples("genpolicy card verify --today 2027-01-31"))(verify_card)
+
+
+@card.command(epilog=examples("genpolicy card keygen --id my-id --out ~/keys/my_key.pem"))
+def keygen(
+    identifier: Annotated[str, typer.Option("--id", help="Your id, as the allow-list names it.")],
+    out: Annotated[Path, typer.Option(help="File for your private key, outside the workspace.")],
+    root: Root = Path(),
+) -> int:
+    """Make your key, and print your entry for reviewers.yaml.
+
+    The private key is readable by you alone and is never replaced. Whoever
+    reviews the change of reviewers.yaml must know that the key is yours.
+    """
+    from pydantic import TypeAdapter, ValidationError
+
+    from gates.card.key_files import make_key
+    from gates.card.people import ALLOW_LIST, PersonId
+    from genpolicy.errors import ConfigError
+
+    try:
+        TypeAdapter(PersonId).validate_python(identifier)
+    except ValidationError as error:
+        raise ConfigError(
+            where="--id",
+            found=repr(identifier),
+            expected="lower-case letters, digits, dots and dashes",
+            action="Choose an id of that form.",
+        ) from error
+    public = make_key(out.expanduser(), root=root)
+    print(f"Wrote your private key to {out}. Keep it; nobody else may read it.")
+    print(f"Your entry for {ALLOW_LIST}; complete it, and have the change reviewed:")
+    print(f"- id: {identifier}\n  name: \n  role: \n  public_key: {public}\n  emails: []")
+    return 0
+
+
+@card.command(
+    epilog=examples(
+        "genpolicy card fill --out completed.json",
+        "genpolicy card fill --out completed.json --set spotter='Ada L.' --set force_limit_n=30",
+    )
+)
+def fill(
+    out: Annotated[Path, typer.Option(help="Completed card to write.")],
+    given: Annotated[
+        list[str] | None, typer.Option("--set", help="An answer, name=value; not asked again.")
+    ] = None,
+    root: Root = Path(),
+) -> int:
+    """Fill the drafted card, question by question.
+
+    Nothing is answered for you but what the draft proposes; a wrong answer is
+    told at once. Without a terminal every answer must be given by --set.
+    """
+    from gates.card.card import card_bytes
+    from gates.card.filling import filled, rules_of
+    from gates.card.signing import utc_today
+    from genpolicy.errors import ConfigError
+    from genpolicy.integrity.atomic import write_bytes
+
+    if out.exists():
+        raise ConfigError(
+            where="--out",
+            found=f"{out}, which is there already",
+            expected="a new file",
+            action="Name another file, or remove the old card.",
+        )
+    rules = rules_of(root, utc_today())
+    answers = dict(_pair(text) for text in given or [])
+    if sys.stdin.isatty():
+        answers = _asked(rules, answers)
+    completed = filled(rules, answers)
+    write_bytes(out, card_bytes(completed))
+    print(f"Wrote {out}, with {len(completed.caveats)} caveats that a signer signs in spite of:")
+    for caveat in completed.caveats:
+        print(f"- {caveat}")
+    print("Read them. Then sign: genpolicy card sign --card FILE --key KEY --reviewer ID")
+    return 0
+
+
+def _asked(rules: "Rules", answers: dict[str, str]) -> dict[str, str]:
+    """Answers of the person at the terminal, each asked until it holds."""
+    from gates.card.filling import answer, questions
+    from genpolicy.errors import ConfigError
+
+    values: dict[str, object] = {}
+    for question in questions(rules):
+        name = question.name
+        while True:
+            said = answers.get(name)
+            if said is None:
+                said = typer.prompt(f"{name}: {question.text}", default=question.proposed)
+            try:
+                values[name] = answer(rules, name, str(said), values)
+            except ConfigError as error:
+                print(error, file=sys.stderr)
+                answers.pop(name, None)
+                continue
+            answers[name] = str(said)
+            break
+    return answers
+
+
+def _pair(text: str) -> tuple[str, str]:
+    from genpolicy.errors import ConfigError
+
+    name, sign_, value = text.partition("=")
+    if not sign_:
+        raise ConfigError(
+            where="--set", found=repr(text), expected="name=value", action="Write it so."
+        )
+    return name, value

@@ -1,0 +1,118 @@
+import datetime
+
+import pytest
+from team import FILLED, TODAY
+
+from gates.card.card import card_bytes
+from gates.card.filling import NONCE_BYTES, Rules, answer, filled, questions, rules_of
+from gates.card.people import load_allow_list
+from gates.card.signing import read_draft, sign_card
+from genpolicy.errors import ConfigError
+
+ANSWERS = {
+    name: str(FILLED[name])
+    for name in (
+        "force_limit_n",
+        "force_limit_reason",
+        "spotter",
+        "stop_path",
+        "reviewer",
+        "expires",
+    )
+}
+
+
+@pytest.fixture
+def rules(team):
+    return Rules(read_draft(team.root), load_allow_list(team.root), TODAY, 30)
+
+
+def test_what_was_answered_and_nothing_else_is_in_the_card(rules):
+    card = filled(rules, ANSWERS)
+    draft = rules.draft.model_dump()
+    changed = {name for name, value in card.model_dump().items() if value != draft[name]}
+    assert changed == {*ANSWERS, "not_before", "nonce"}
+    assert card.force_limit_n == 30.0
+    assert card.not_before == TODAY.isoformat()
+    assert card.abort_thresholds == rules.draft.abort_thresholds
+
+
+def test_a_nonce_is_drawn_for_each(rules):
+    first, second = filled(rules, ANSWERS).nonce, filled(rules, ANSWERS).nonce
+    assert first != second
+    assert len(first) == 2 * NONCE_BYTES
+
+
+def test_what_is_filled_can_be_signed(team, rules):
+    path = team.root / "completed.json"
+    path.write_bytes(card_bytes(filled(rules, ANSWERS)))
+    envelope = sign_card(team.root, card_file=path, key_file=team.folder / "rita", reviewer="rita")
+    assert envelope.is_file()
+
+
+def test_a_threshold_may_be_lowered(rules):
+    name = sorted(rules.draft.abort_thresholds)[0]
+    most = rules.draft.abort_thresholds[name]
+    card = filled(rules, {**ANSWERS, f"abort.{name}": repr(most / 2)})
+    assert card.abort_thresholds == {**rules.draft.abort_thresholds, name: most / 2}
+    with pytest.raises(ConfigError, match="lowered, never raised"):
+        filled(rules, {**ANSWERS, f"abort.{name}": repr(most * 1.001)})
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        *(("force_limit_n", said) for said in ("0", "-1", "80.1", "nan", "inf", "thirty", "")),
+        *(("spotter", said) for said in ("", "  ", "-", "\u200b\u200b", "sam\u202e")),
+        *(("stop_path", said) for said in ("", "--")),
+        *(("force_limit_reason", said) for said in ("", "?")),
+        *(("reviewer", said) for said in ("", "nobody", "ada", "mo", "Rita")),
+        *(
+            ("expires", said)
+            for said in ("", "2026-11-20", "2026-12-21", "21.11.2026", "2026-02-30")
+        ),
+        *(("not_before", said) for said in ("", "tomorrow", "2026-13-01")),
+        ("abort.latency_s", "nan"),
+        ("abort.latency_s", "-1"),
+        ("abort.latency_s", "soon"),
+    ],
+)
+def test_an_answer_that_signing_would_refuse_is_refused_at_once(rules, name, said):
+    with pytest.raises(ConfigError, match=f"the card's {name}"):
+        answer(rules, name, said, {"not_before": TODAY.isoformat()})
+
+
+@pytest.mark.parametrize(
+    ("first", "last"),
+    [("2026-11-21", "2026-11-21"), ("2026-11-20", "2026-11-30"), ("2026-12-05", "2027-01-03")],
+)
+def test_days_of_a_card_that_will_be_valid_are_taken(rules, first, last):
+    card = filled(rules, {**ANSWERS, "not_before": first, "expires": last})
+    assert (card.not_before, card.expires) == (first, last)
+
+
+def test_more_days_than_a_card_may_have_are_refused(rules):
+    with pytest.raises(ConfigError, match="valid for more than 30 days"):
+        filled(rules, {**ANSWERS, "not_before": "2026-12-05", "expires": "2027-01-04"})
+
+
+@pytest.mark.parametrize("name", ANSWERS)
+def test_nothing_without_a_default_is_answered_for_a_person(rules, name):
+    asked = {question.name: question for question in questions(rules)}
+    assert asked[name].proposed is None
+    rest = {other: said for other, said in ANSWERS.items() if other != name}
+    with pytest.raises(ConfigError, match=f"the card's {name} is not answered"):
+        filled(rules, rest)
+
+
+@pytest.mark.parametrize("name", ["speed_limit_m_s", "caveats", "abort.nothing", "nonce"])
+def test_what_the_draft_fixes_cannot_be_answered(rules, name):
+    with pytest.raises(ConfigError, match=f"the card's {name} is not asked"):
+        filled(rules, {**ANSWERS, name: "1"})
+
+
+def test_the_rules_are_those_of_the_workspace(team):
+    found = rules_of(team.root, datetime.date(2026, 11, 22))
+    assert found.draft == read_draft(team.root)
+    assert found.allowed == load_allow_list(team.root)
+    assert found.maximum_days == 30
