@@ -12,7 +12,7 @@ from genpolicy.cli.shell import examples, new_app
 if TYPE_CHECKING:
     from gates.card.filling import Rules
 
-SIGN = "card sign --card completed.json --key ~/keys/my_key.pem --reviewer my-id"
+SIGN = "card sign --card completed.json --key my_key.pem --reviewer my-id"
 card = new_app("Make a key, fill a card, sign it, verify it.")
 card.command("sign", epilog=examples(f"genpolicy {SIGN}"))(sign)
 card.command("verify", epilog=examples("genpolicy card verify --today 2027-01-31"))(verify_card)
@@ -54,7 +54,7 @@ def keygen(
 @card.command(
     epilog=examples(
         "genpolicy card fill --out completed.json",
-        "genpolicy card fill --out completed.json --set spotter='Ada L.' --set force_limit_n=30",
+        "genpolicy card fill --out completed.json --set spotter=Sam",
     )
 )
 def fill(

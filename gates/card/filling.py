@@ -158,7 +158,7 @@ def _first(rules: Rules, name: str, said: str, before: Mapping[str, Any]) -> str
 
 
 def _last(rules: Rules, name: str, said: str, before: Mapping[str, Any]) -> str:
-    return _valid(rules, name, said, (before["not_before"], said))
+    return _valid(rules, name, said, (str(before.get("not_before")), said))
 
 
 def _valid(rules: Rules, name: str, said: str, days: tuple[str, str]) -> str:
