@@ -6,6 +6,7 @@
 #   make soak     twenty million random events against executor, stub and supervisor, ten thousand
 #                 random chunks at every millisecond (an hour and a half)
 #   make lint     make test without the tests
+#   make lerobot  LeRobot's own environment in build/lerobot, to train and serve its policies
 #   make doctor   versions against the pins, disk, memory, telemetry, DVC
 #   make clean    remove what was generated and is not versioned; the DVC cache stays
 #
@@ -26,6 +27,7 @@ VENV := .venv
 BIN := $(CURDIR)/$(VENV)/bin
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 JOBS ?= 2
+PYTHON_LEROBOT ?= $(shell command -v python3.12 || command -v python3.13)
 TORCH_PIN := $(shell grep -E '^torch==' constraints.txt)
 
 export DVC_NO_ANALYTICS := 1
@@ -45,10 +47,10 @@ export PATH := $(BIN):$(PATH)
 SHA256 := $(shell command -v sha256sum >/dev/null && echo sha256sum || echo 'shasum -a 256')
 WANTED := $(shell cat constraints.txt pyproject.toml | $(SHA256) | cut -d' ' -f1)
 
-.PHONY: help env ladder smoke test soak lint doctor clean
+.PHONY: help env ladder smoke test soak lerobot lint doctor clean
 
 help:
-	@sed -n '1,19p' Makefile | sed 's/^# \{0,1\}//'
+	@sed -n '1,20p' Makefile | sed 's/^# \{0,1\}//'
 
 env:
 	@if [ "$$(cat $(VENV)/.ok 2>/dev/null)" = "$(WANTED)" ]; then exit 0; fi; \
@@ -75,6 +77,15 @@ smoke: env
 test: env
 	@code=0; $(MAKE) --no-print-directory lint || code=1; \
 	python -m pytest -q -n $(JOBS) --dist loadfile || code=1; exit $$code
+
+# LeRobot needs a newer Python and older libraries than ours: it never shares our environment.
+lerobot:
+	@if ! "$(PYTHON_LEROBOT)" -c '' 2>/dev/null; then \
+	  echo "No Python 3.12 or 3.13 found, which LeRobot needs; skipped. Install one, or name it: make PYTHON_LEROBOT=/path/to/python3.12 lerobot"; \
+	  exit 0; fi; \
+	"$(PYTHON_LEROBOT)" -m venv build/lerobot; \
+	build/lerobot/bin/python -m pip install --quiet 'lerobot[dataset]==0.6.1' accelerate websockets msgpack; \
+	echo "LeRobot is in build/lerobot; docs/candidates.md says how to train and to serve with it."
 
 soak: env
 	@python tests/feasibility/dense.py
