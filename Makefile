@@ -74,7 +74,7 @@ smoke: env
 
 test: env
 	@code=0; $(MAKE) --no-print-directory lint || code=1; \
-	python -m pytest -q -n $(JOBS) --dist loadfile || code=1; exit $$code
+	python -m pytest -q -n $(JOBS) --dist loadfile --no-loadscope-reorder || code=1; exit $$code
 
 soak: env
 	@python tests/feasibility/dense.py
