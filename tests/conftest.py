@@ -30,6 +30,9 @@ from genpolicy.policies.settings import HeadConfig, NetworkConfig, SamplerConfig
 from genpolicy.tasks.api import load_task
 from genpolicy.tasks.demonstrations import record_session
 
+sys.path.insert(0, str(Path(__file__).parent))
+from order import longest_first
+
 PARAMS = read_yaml(Path(__file__).parents[1] / "params.yaml")
 HORIZONS = HorizonConfig(**PARAMS["horizons"])
 EXECUTION = ExecutionSettings(**PARAMS["execution"])
@@ -51,6 +54,10 @@ POLICY = PolicySettings(
     seeds=[0],
     fixtures=5,
 )  # fmt: skip
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    longest_first(items)
 
 
 def write_situations(folder, rows):

@@ -17,25 +17,29 @@ def test_nothing_wrong_reaches_the_controller(seed):
 
 
 @pytest.mark.parametrize(
-    ("check", "said"),
+    ("check", "said", "first"),
     [
-        ("continuity", "m from the last command"),
-        ("pace", "too soon after the last command"),
-        ("stopped", "a command while stopped"),
-        ("intervention", "a command while a person commands"),
-        ("phase_transition", "of another phase or calibration"),
-        ("expired", "later than its validity"),
-        ("stale_observation late_chunk", "older than allowed"),
-        ("late_chunk", "begins late in contact"),
-        ("after_stop", "conditioned before a voiding event"),
+        ("continuity", "m from the last command", 0),
+        ("pace", "too soon after the last command", 0),
+        ("stopped", "a command while stopped", 0),
+        ("intervention", "a command while a person commands", 0),
+        ("phase_transition", "of another phase or calibration", 0),
+        ("expired", "later than its validity", 0),
+        ("stale_observation late_chunk", "older than allowed", 2),
+        ("late_chunk", "begins late in contact", 22),
+        ("after_stop", "conditioned before a voiding event", 7),
     ],
 )
-def test_without_a_check_the_model_objects(check, said):
-    """Each is found by the model or, first, by the checker; alone in its own words."""
-    table, seed, wrongs = without(IMITATED, *check.split()), 0, []
-    while not any(said in wrong for wrong in wrongs) and seed < 40:
+def test_without_a_check_the_model_objects(check, said, first):
+    """Each is found by the model or, first, by the checker; alone in its own words.
+
+    A rare one is found in the walk of one seed of many, so that the search begins with that seed.
+    """
+    table, wrongs = without(IMITATED, *check.split()), []
+    for seed in range(first, first + 40):
         wrongs += soak(seed, 20_000, table).wrongs
-        seed += 1
+        if any(said in wrong for wrong in wrongs):
+            break
     assert any(said in wrong for wrong in wrongs), wrongs[:5]
 
 

@@ -1,7 +1,8 @@
 """Plain behaviour cloning and an energy go the whole way that they can: timed, shadowed, stressed.
 
 They are candidates as any other where `params.yaml` names them so; by default they stand at Gate A
-alone. What follows Gate A runs again with both, and the independent proof draws their chunks again.
+alone. What follows Gate A runs again with these two, and the independent proof draws their chunks
+again.
 """
 
 import json
@@ -34,7 +35,7 @@ def methods(workspace: Path, table: str) -> set[str]:
 
 def test_ibc_and_plain_bc_as_candidates(copy: Path) -> None:
     def add(params: dict[str, Any]) -> None:
-        params["train_generators"]["samplers"] |= ADDED
+        params["train_generators"]["samplers"] = ADDED  # the others' way: the finished ladder
         params["stress"]["starts"] = 1
 
     edit_params(copy, add)

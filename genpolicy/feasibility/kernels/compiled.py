@@ -1,7 +1,8 @@
 """Compilation of the kernels: once per machine and version of the code, then read from a cache.
 
-numba keeps what it compiled beside the source, but looks at the age of the calling file alone. So
-the folder is named after a hash of all kernels: an edited callee never leaves a stale caller.
+numba keeps what it compiled beside the source, but looks at the calling file alone. So the folder
+is named after a hash of all kernels: an edited callee never leaves a stale caller. And nothing else
+names it: numba would add the path of the checkout, so that a copy or a moved one compiled again.
 """
 
 import hashlib
@@ -11,6 +12,7 @@ from typing import Any, TypeVar, cast
 
 import numba
 import numpy as np
+from numba.core.caching import InTreeCacheLocator
 from numpy.typing import NDArray
 
 F = TypeVar("F", bound=Callable[..., object])
@@ -28,6 +30,18 @@ def cache_folder() -> Path:
 _FOLDER = str(cache_folder())
 
 
+class HashedFolder(InTreeCacheLocator):
+    """Where numba looks for a kernel: in the folder of this very code, wherever that lies."""
+
+    def get_cache_path(self) -> str:
+        """The folder that holds what was compiled."""
+        return _FOLDER
+
+
+# By name, as numba asks for them; the last one is for a checkout that nobody may write.
+_LOCATORS = f"{__name__}.{HashedFolder.__name__},UserWideCacheLocator"
+
+
 def compiled(signature: str) -> Callable[[F], F]:
     """Compile a kernel for arguments of this one signature; any other is refused, not compiled.
 
@@ -36,12 +50,13 @@ def compiled(signature: str) -> Callable[[F], F]:
 
     def compile_one(function: F) -> F:
         config: Any = numba.config
-        elsewhere = config.CACHE_DIR
-        config.CACHE_DIR = elsewhere or _FOLDER
+        before = config.CACHE_LOCATOR_CLASSES
+        if not (before or config.CACHE_DIR):  # the user's own choice goes first
+            config.CACHE_LOCATOR_CLASSES = _LOCATORS
         try:
             made = numba.njit(signature, cache=True, error_model="numpy")(function)
         finally:
-            config.CACHE_DIR = elsewhere
+            config.CACHE_LOCATOR_CLASSES = before
         return cast(F, made)
 
     return compile_one

@@ -1,5 +1,11 @@
 """Kernels are compiled for one signature, and kept under a name of all their code."""
 
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -20,6 +26,36 @@ def test_the_folder_of_the_cache_is_named_after_all_the_code(tmp_path, monkeypat
 
 def test_what_is_compiled_lies_in_that_folder():
     assert list(module.cache_folder().rglob("*.nbi"))
+
+
+def test_a_copy_of_the_code_compiles_nothing_again(tmp_path):
+    """Wrong before: numba named it by the path of the code, so that each workspace compiled."""
+    package = Path(module.__file__).parents[2]
+    shutil.copytree(package, tmp_path / package.name)
+    code = (
+        "from genpolicy.feasibility.kernels import turn\n"
+        "print(turn.__file__, sum(turn.angle.stats.cache_misses.values()))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(tmp_path)}, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    path, misses = done.stdout.split()
+    assert Path(path).is_relative_to(tmp_path)
+    assert misses == "0"
+
+
+def test_the_users_own_place_goes_first(tmp_path, monkeypatch):
+    monkeypatch.setattr(module.numba.config, "CACHE_DIR", str(tmp_path))
+
+    @module.compiled("f8(f8)")
+    def twice(value):
+        return 2.0 * value
+
+    assert twice(2.0) == 4.0
+    assert list(tmp_path.rglob("*twice*.nbi"))
+    assert not list(module.cache_folder().rglob("*twice*"))
+    assert not module.numba.config.CACHE_LOCATOR_CLASSES
 
 
 def test_another_kind_of_array_is_refused_and_not_compiled(cell):

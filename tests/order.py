@@ -1,0 +1,40 @@
+"""Which files of tests begin first, of several processes that each take a file at a time.
+
+A process that has nothing left waits for the one that took a long file last. So the long ones come
+first. The first of them builds the ladder that the others of its folder copy; the second needs none
+and mostly sleeps, so that nobody waits while it is built.
+"""
+
+from pathlib import Path
+from typing import Protocol, TypeVar
+
+TESTS = Path(__file__).parent
+LONG = (
+    "ladder/test_whole_way.py",
+    "wall_clock/test_run.py",
+    "execution/test_soak.py",
+    "feasibility/test_dense.py",
+    "ladder/test_refusals.py",
+    "ladder/test_kills.py",
+    "ladder/test_who_failed_stays_out.py",
+    "flows/test_ladder.py",
+    "ladder/test_repro.py",
+    "ladder/test_truth.py",
+    "ladder/test_settings.py",
+)
+"""Files of half a minute and more, the longest first."""
+
+
+class Item(Protocol):
+    """What is asked of a test."""
+
+    path: Path
+
+
+T = TypeVar("T", bound=Item)
+
+
+def longest_first(items: list[T]) -> None:
+    """Sort tests by their file: the long ones as listed, then the others as they were."""
+    places = {TESTS / name: place for place, name in enumerate(LONG)}
+    items.sort(key=lambda item: places.get(item.path, len(places)))
