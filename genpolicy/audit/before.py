@@ -100,5 +100,5 @@ def seen_before(
 def _undecided(data: AuditInput, settings: AuditSettings, rows: Integers, modes: Integers) -> bool:
     """Whether rows of several modes, more than one of each, have not begun to go apart."""
     counts = np.bincount(modes)
-    several = np.count_nonzero(counts >= MINIMUM_PER_MODE) > 1
+    several = bool(np.count_nonzero(counts >= MINIMUM_PER_MODE) > 1)
     return several and not courses_part(data, settings, rows, modes)
