@@ -10,11 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from genpolicy.audit.choices import LEAST_SHARE, Choices
-from genpolicy.audit.data import Array, AuditInput
+from genpolicy.audit.data import Array, AuditInput, Integers
 from genpolicy.audit.history import centred_ranks, past_features, present_features, shortest_gap
 from genpolicy.audit.modes import Clustering
 from genpolicy.audit.neighbourhoods import Neighbourhood
-from genpolicy.audit.resolution import observed_gap
+from genpolicy.audit.persistence import MINIMUM_PER_MODE
+from genpolicy.audit.resolution import courses_part, observed_gap
 from genpolicy.audit.settings import AuditSettings
 
 # Clusters that differ this much in what is observed have begun to move apart, in scales.
@@ -49,9 +50,10 @@ def seen_before(
 
     Of its situations long enough after the start it is the one whose clusters differ least in what
     is observed now. Episodes that have none had nothing to see before, or moved apart at once;
-    they are left out. How frequent a mode is, is read off that situation too: in an earlier one a
-    cue may still be seen, its neighbours are those who saw the same cue, and what it tells would
-    pass for what everybody can see.
+    they are left out. So are rows that stand together and go apart: the more episodes there are,
+    the nearer they stand, and where each came from then tells where it goes. How frequent a mode
+    is, is read off that situation too: in an earlier one a cue may still be seen, its neighbours
+    are those who saw the same cue, and what it tells would pass for what everybody can see.
 
     Args:
         data: Canonical audit input.
@@ -73,7 +75,7 @@ def seen_before(
         at = np.array([place[int(data.episode[row])] for row in rows], dtype=np.int64)
         reached[at] = True
         new, together = missing[at], STILL_TOGETHER - gaps[int(number)] > 0
-        if not together or not new.any() or len(np.unique(choices.mode[at])) < 2:
+        if not together or not new.any() or not _undecided(data, settings, rows, choices.mode[at]):
             continue
         earlier = past_features(data, settings, rows)[0]
         now = present_features(data, settings, rows)
@@ -93,3 +95,10 @@ def seen_before(
     share = share[known] / share[known].sum(axis=1, keepdims=True)
     part = Choices(choices.episode[known], choices.mode[known], share)
     return Before(part, past[known], present[known], int(np.count_nonzero(reached)))
+
+
+def _undecided(data: AuditInput, settings: AuditSettings, rows: Integers, modes: Integers) -> bool:
+    """Whether rows of several modes, more than one of each, have not begun to go apart."""
+    counts = np.bincount(modes)
+    several = bool(np.count_nonzero(counts >= MINIMUM_PER_MODE) > 1)
+    return several and not courses_part(data, settings, rows, modes)

@@ -64,7 +64,8 @@ def resolved_by_observation(
     """
     least = 1.0 if route else ONSET
     together = not route and _told_by_speed(data, settings, situation, clustering)
-    observed, steps = _observed(data, settings, situation), _steps(data, settings, situation)
+    observed = _observed(data, settings, situation)
+    steps = _steps(data, settings, situation.members)
     place, auc = _place(data), settings.resolved_auc
     if len(place):
         masks = _masks(clustering.labels, clustering.count)
@@ -186,11 +187,27 @@ def _told_by_course(
     )
 
 
-def _steps(
-    data: AuditInput, settings: AuditSettings, situation: Neighbourhood
-) -> tuple[Array, float]:
-    """Last observed step of each member, in scales, and the usual length; 0 without a history."""
-    rows = situation.members
+def courses_part(
+    data: AuditInput, settings: AuditSettings, rows: Integers, labels: Integers
+) -> bool:
+    """Whether rows that stand together go on by their modes, on courses that tell them apart.
+
+    Args:
+        data: Canonical audit input.
+        settings: How well a course must tell.
+        rows: Rows of one situation. Shape (n,).
+        labels: Mode of each; one with a single row, or all others but one, has no course. Shape
+            (n,).
+    """
+    place, masks = _place(data), [labels == mode for mode in np.unique(labels)]
+    masks = [inside for inside in masks if 1 < np.count_nonzero(inside) < len(rows) - 1]
+    return len(place) > 0 and _told_by_course(
+        _steps(data, settings, rows), place, masks, settings.resolved_auc
+    )
+
+
+def _steps(data: AuditInput, settings: AuditSettings, rows: Integers) -> tuple[Array, float]:
+    """Last observed step of each row, in scales, and the usual length; 0 without a history."""
     used = np.flatnonzero(np.isfinite(data.observation_scale))
     if settings.observation_horizon < 2:
         return np.zeros((len(rows), len(used))), 0.0

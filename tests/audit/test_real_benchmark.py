@@ -142,6 +142,20 @@ def test_what_is_observed_follows_what_is_commanded(base):
         assert min(errors) < 0.1 * np.ptp(told[:, moving], axis=0).max()
 
 
+@pytest.mark.parametrize("base", [b for b in OWN if fits(b, ["what decides is observed"])])
+def test_an_observed_cue_tells_what_is_done_within_the_next_actions_as_well(base):
+    """Who chooses again in an episode chooses within a chunk: the cue of now says nothing of it."""
+    recording = small(base, "what decides is observed", episodes=48)
+    (cue,) = (name for name in recording.episodes[0].seen if name.endswith("cue"))
+    told = {}
+    for episode in recording.episodes:
+        for row, shown in enumerate(episode.seen[cue].tolist()):
+            later = episode.mode[row:]
+            then = later[later != later[0]][:1].tolist()
+            told.setdefault(tuple(shown), set()).add((int(later[0]), *then))
+    assert all(len(done) == 1 for done in told.values())
+
+
 def test_an_hour_tells_the_way_and_is_never_the_same_twice():
     recording = small("avoiding", "hour decides, in every row", episodes=40)
     hours = np.array([e.rows["hour"][0] for e in recording.episodes])

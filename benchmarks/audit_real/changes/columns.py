@@ -89,21 +89,37 @@ def _row(name: str, value: Callable[[int, np.random.Generator, int], np.ndarray]
 
 
 def _observed(recording: Recording, place: Place, strength: float) -> Recording:
+    """What decides now, and what will decide next where an episode chooses again.
+
+    A chunk reaches over the row in which the next choice is carried out: of a cue of now alone
+    two ways follow there, and no policy could see which.
+    """
     first = next(iter(recording.names))
     name = {"obs": "obs_cue", "obs/": "obs/cue"}.get(first[:4].rstrip("_r"), "observation.cue")
     name = "obs/cue" if first.startswith("obs/") else name
-    width = recording.truth.modes
+    width, again = recording.truth.modes, not steady(recording)
 
     def change(episode: Episode) -> Episode:
         shown = np.eye(width)[episode.mode % width]
+        if again:
+            shown = np.concatenate([shown, _next_shown(episode.mode, width)], axis=1)
         rows = {k: v for k, v in episode.rows.items() if k != recording.truth.decided_by}
         return replace(episode, seen={**episode.seen, name: shown}, rows=rows)
 
     changed = recording.each(change)
-    names = {**recording.names, name: tuple(f"cue_{k}" for k in range(width))}
+    cues = tuple(f"cue_{k}" for k in range(width * (1 + again)))
+    names = {**recording.names, name: cues}
     if recording.layout == "robomimic" or not recording.names[first]:
         names[name] = ()
     return replace(changed, names=names).true(observed=True, decided_by="cue", undecided="")
+
+
+def _next_shown(mode: np.ndarray, width: int) -> np.ndarray:
+    """The way after the next change of way in each row; nothing where there is none. (T, width)."""
+    begins = np.flatnonzero(np.diff(mode)) + 1
+    following = np.searchsorted(begins, np.arange(len(mode)), side="right")
+    shown = np.concatenate([np.eye(width)[mode[begins] % width], np.zeros((1, width))])
+    return shown[following]
 
 
 def _absent(recording: Recording, place: Place, strength: float) -> Recording:

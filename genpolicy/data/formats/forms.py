@@ -142,7 +142,7 @@ def read_forms(
     evidence = _evidence(observed, commanded, episode)
     # What is one number in an episode is a goal or a cue, and answers nothing that moves in it.
     still = _stands(observed, episode)[None, :] & ~_stands(commanded, episode)[:, None]
-    evidence = evidence.without(still)
+    evidence = evidence.without(still | _flags(observed, evidence, named))
     score = _score(evidence)
     score[~moves] = -np.inf
     score[:, ~varies(observed)] = -np.inf
@@ -168,6 +168,13 @@ def read_forms(
         pairs = {}
     same = frozenset(a for a, o in pairs.items() if named.get(a) == o)
     return Reading(pairs, tuple(forms), same, contradicted, strangers)
+
+
+def _flags(observed: Array, evidence: _Evidence, named: dict[int, int]) -> Flags:
+    """Pairs of a flag, mostly down where a small command is, and more than two values."""
+    apart = np.array([[is_two_valued(v) for v in observed.T]]) & ~evidence.two_valued[:, None]
+    apart[list(named), list(named.values())] = False
+    return np.asarray(apart)
 
 
 def _stands(values: Array, episode: Integers) -> Flags:

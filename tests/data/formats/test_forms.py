@@ -213,3 +213,15 @@ def test_an_arm_that_is_parked_in_most_episodes_keeps_its_pairs():
     seen[parked, 2:], asked[parked, 2:] = 0.0, 0.0
     asked += np.random.default_rng(3).normal(0, 1e-4, asked.shape)
     assert read(seen, asked, named={k: k for k in range(4)}).pairs == {k: k for k in range(4)}
+
+
+def test_a_flag_that_is_down_in_most_episodes_answers_no_command_but_one_of_two_values():
+    """Of the usual episode both are about 0: taken for a place, it froze every file."""
+    path = paths()
+    up = np.repeat(np.arange(10) % 4 == 0, 40) & np.tile(np.arange(40) < 20, 10)
+    flag = up.astype(np.float64)[:, None]
+    seen = later(path, 1) + np.random.default_rng(1).normal(0, 1e-3, path.shape)
+    observed = np.concatenate([flag, seen], axis=1)
+    assert read(observed, change(path)).pairs == {0: 1, 1: 2, 2: 3}
+    hand = np.concatenate([change(path), flag], axis=1)
+    assert read(np.concatenate([later(flag, 1), seen], axis=1), hand).pairs[3] == 0
