@@ -157,6 +157,8 @@ NAMED = (
     Named("five layers are enough", ARRIVAL, "len(layers) == LAYER_COUNT and ", ""),
     Named("a chunk that was turned away uses up its name", ARRIVAL,
           "if at_door is None:  # what is turned away must not use up", "if True:  #"),
+    Named("the executor keeps old observations over a reset", EXECUTOR,
+          "session_epoch=epoch, newest_observation_ns=None)", "session_epoch=epoch)"),
     Named("a reset keeps what is in flight", EXECUTOR, "        self._in_flight.clear()\n", ""),
     Named("only the person hands back: anybody does", EXECUTOR,
           "if self.mode is ExecutorMode.INTERVENTION:\n            self._enter(now_ns, "

@@ -130,6 +130,37 @@ def test_the_stub_takes_nothing_from_before_a_reset():
     assert rig.stub.offer(chunk, chunk.actions[0], **offer) == "reset"
 
 
+def test_what_the_session_before_a_reset_saw_is_seen_by_nobody_after_it():
+    """At the moment of the reset itself: what was seen then is not void by its time."""
+    rig = Rig()
+    rig.advance(0.1)
+    rig.observe()
+    rig.executor.reset(rig.now_s)
+    chunk = rig.chunk()
+    assert chunk.metadata.session_epoch == 1
+    offer = {"row": 0, "source": "policy", "arrival": 0, "now_ns": rig.now_ns}
+    assert rig.stub.offer(chunk, chunk.actions[0], sequence=1, **offer) == "future_observation"
+    assert rig.deliver(chunk) is DiscardReason.FUTURE_OBSERVATION
+    rig.observe()
+    assert rig.stub.offer(chunk, chunk.actions[0], sequence=2, **offer) is None
+
+
+@pytest.mark.parametrize("name, there", [("phase", "insert"), ("epoch", "epoch-2")])
+def test_what_a_session_begins_in_is_no_change(name, there):
+    """Another phase or calibration than before the reset voids nothing that the session saw."""
+    rig = Rig()
+    rig.observe()
+    rig.advance(0.1)
+    rig.executor.reset(rig.now_s)
+    setattr(rig, name, there)
+    chunk = rig.chunk()
+    rig.advance(0.01)
+    rig.observe()
+    offer = {"row": 0, "source": "policy", "arrival": 0, "now_ns": rig.now_ns}
+    assert rig.deliver(chunk) is None
+    assert rig.stub.offer(chunk, chunk.actions[0], sequence=1, **offer) is None
+
+
 @pytest.mark.parametrize(
     "bad", [{"row": None}, {"row": "0"}, {"row": True}, {"sequence": "x"}, {"sequence": 1.0},
             {"source": []}, {"source": "nobody"}, {"source": None}],
