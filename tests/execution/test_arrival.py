@@ -206,11 +206,11 @@ def test_a_chunk_that_feasibility_issued_is_taken_and_a_tampered_one_is_not():
             seal=admission._SEAL,
         )  # fmt: skip
 
+    good, bad = issued(), issued()
     forged = object.__new__(admission.Admitted)  # behind the seal's back, all else in order
     for name in ("projected", "actions_sha256", "verdict", "context"):
-        object.__setattr__(forged, name, getattr(issued(), name))
-    assert strict.deliver(forged, 0.0) is R.INFEASIBLE
-    good, bad = issued(), issued()
+        object.__setattr__(forged, name, getattr(good, name))
+    assert strict.deliver(forged, 0.0) is R.INFEASIBLE  # and does not use up the name of `good`
     bad.projected.actions.flags.writeable = True
     bad.projected.actions[0, 0] += 1e-9
     assert strict.deliver(bad, 0.0) is R.INFEASIBLE
