@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from benchmarks.mutation.plan import ROOT, tests_of
-from benchmarks.mutation.runner import outcome, require_green, warm_up
+from benchmarks.mutation.runner import KILLED, outcome, require_green, warm_up
 
 
 @dataclass(frozen=True)
@@ -176,13 +176,13 @@ def run_named(only: Sequence[str], *, green: bool) -> int:
         green: Whether the tests are known to be green without a wrong, and not asked first.
 
     Returns:
-        How many survived.
+        How many turned no test red.
 
     Raises:
         SystemExit: A test is red without any wrong.
     """
     chosen = [row for row in NAMED if not only or row.path.startswith(tuple(only))]
-    survived = 0
+    left = 0
     for package in ("genpolicy", "gates"):  # to ask of `gates`, genpolicy is imported for good
         rows = [row for row in chosen if row.path.startswith(f"{package}/")]
         if rows:
@@ -191,7 +191,7 @@ def run_named(only: Sequence[str], *, green: bool) -> int:
             require_green({row.path: tests_of(row.path) for row in rows})
         for row in rows:
             name, seconds, red = outcome(row.path, row.text, tests_of(row.path))
-            survived += name == "survived"
+            left += name != KILLED
             print(f"{name} | {row.path} | {row.wrong} | {seconds:.1f} s | {red}", flush=True)
-    print(f"{len(chosen)} wrongs, {survived} survived")
-    return survived
+    print(f"{len(chosen)} wrongs, {left} turned no test red")
+    return left
