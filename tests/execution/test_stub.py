@@ -5,7 +5,7 @@ import pytest
 
 from genpolicy.contract.chunk import DiscardReason
 from genpolicy.evidence.shadow.mutants import SCENARIOS
-from genpolicy.evidence.shadow.rig import CHECKPOINT, IMITATED, SAMPLER, Rig
+from genpolicy.evidence.shadow.rig import CHECKPOINT, IMITATED, SAMPLER, Rig, StandInContext
 from genpolicy.execution.checks import CHECKS, Place, without
 from genpolicy.execution.executor import Executor
 from genpolicy.verification.checker import check_messages
@@ -159,6 +159,24 @@ def test_what_a_session_begins_in_is_no_change(name, there):
     offer = {"row": 0, "source": "policy", "arrival": 0, "now_ns": rig.now_ns}
     assert rig.deliver(chunk) is None
     assert rig.stub.offer(chunk, chunk.actions[0], sequence=1, **offer) is None
+
+
+@pytest.mark.parametrize("person", [True, False])
+def test_after_a_person_the_last_command_says_nothing_of_where_the_arm_is(person):
+    """A chunk from where the person left the arm goes on; without a person nothing led there."""
+    rig = Rig()
+    rig.run(2)
+    if person:
+        rig.executor.intervene(rig.now_s)
+        rig.advance(0.1)
+        rig.executor.hand_back(rig.now_s)
+    rig.observe()
+    chunk = rig.chunk(predecessor_chunk_id="", context=StandInContext(last_action=np.full(10, 0.3)))
+    if not person:
+        offer = {"row": 0, "source": "policy", "arrival": 9, "sequence": 99, "now_ns": rig.now_ns}
+        assert rig.stub.offer(chunk, chunk.actions[0], **offer) == "broken_predecessor"
+    assert rig.deliver(chunk) is None
+    assert rig.tick()[0].kind == ("action" if person else "hold")
 
 
 @pytest.mark.parametrize(
