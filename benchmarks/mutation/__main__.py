@@ -22,7 +22,7 @@ from pathlib import Path
 
 from benchmarks.mutation.named import run_named
 from benchmarks.mutation.plan import ROOT, Mutant, drawn, inside, modules, mutants_of
-from benchmarks.mutation.runner import run
+from benchmarks.mutation.runner import KILLED, SURVIVED, run
 
 
 def rows_of(out: Path) -> list[dict]:
@@ -37,7 +37,11 @@ def key(row: dict) -> tuple[str, str, int]:
 
 
 def show(out: Path) -> None:
-    """Print the table of kills by folder, with exact intervals, and the survivors."""
+    """Print the table of kills by folder, with exact intervals, and what no test noticed.
+
+    Killed is what turned a test red. What was stopped for its time, or by a fault of the process,
+    was noticed by nobody: it stands apart, and lowers the share.
+    """
     from genpolicy.statistics.intervals import clopper_pearson
 
     groups: dict[str, list[dict]] = {}
@@ -45,17 +49,26 @@ def show(out: Path) -> None:
         folder = "/".join(row["path"].split("/")[:2])
         groups.setdefault(folder if not folder.endswith(".py") else "gates/*.py", []).append(row)
     whole = [row for rows in groups.values() for row in rows]
-    print("| where | mutants | killed | survived | share killed | 95 % interval |\n" + "|---" * 6)
+    print("| where | mutants | killed | stopped | survived | share killed | 95 % interval |")
+    print("|---" * 7 + "|")
     for name, rows in (*sorted(groups.items()), ("all", whole)):
-        killed = sum(row["outcome"] != "survived" for row in rows)
+        killed = sum(said(row) == KILLED for row in rows)
+        survived = sum(said(row) == SURVIVED for row in rows)
         low, high = clopper_pearson(killed, len(rows))
         share = f"{killed / len(rows):.3f} | {low:.3f} to {high:.3f}"
-        print(f"| `{name}` | {len(rows)} | {killed} | {len(rows) - killed} | {share} |")
+        stopped = len(rows) - killed - survived
+        print(f"| `{name}` | {len(rows)} | {killed} | {stopped} | {survived} | {share} |")
     print()
     for row in whole:
-        if row["outcome"] == "survived":
+        if said(row) != KILLED:
             change = " -> ".join(line[1:].strip() for line in row["change"].splitlines())
-            print(f"- `{row['path']}`, {row['inside']}: `{change}` ({row['kind'][5:]})")
+            place = f"`{row['path']}`, {row['inside']}"
+            print(f"- {said(row)}: {place}: `{change}` ({row['kind'][5:]})")
+
+
+def said(row: dict) -> str:
+    """The outcome; `killed (time)` was written once of what was stopped."""
+    return row["outcome"].replace("killed (", "stopped (")
 
 
 def main() -> None:
@@ -86,7 +99,7 @@ def main() -> None:
     elif asked.what == "named":
         sys.exit(run_named(asked.places, green=asked.green) > 0)
     elif asked.what == "again":
-        left = [row for row in rows_of(asked.out) if row["outcome"] == "survived"]
+        left = [row for row in rows_of(asked.out) if row["outcome"] == SURVIVED]
         fields = Mutant.__dataclass_fields__
         again = [Mutant(**{name: row[name] for name in fields}) for row in left]
         chosen = [mutant for mutant in again if inside(mutant.path, places)]

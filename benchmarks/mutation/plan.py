@@ -44,7 +44,11 @@ TESTS = {
     "gates/cause": ("tests/gates/cause", f"{GOLDEN}a.py", "tests/gates/need"),
     "gates/audit": ("tests/gates/audit",),
     "gates/need": (f"{GOLDEN}a.py", "tests/gates/need", *JUDGED),
-    "gates/pages": ("tests/gates/pages", "tests/gates/test_overview.py"),
+    "gates/pages": (
+        "tests/gates/test_writing.py",
+        "tests/gates/pages",
+        "tests/gates/test_overview.py",
+    ),
     "gates/stress": (f"{GOLDEN}d.py", "tests/gates/stress", *JUDGED),
     "gates/feasibility": (f"{GOLDEN}c.py", "tests/gates/feasibility", *JUDGED),
     "gates/reproducibility": (f"{GOLDEN}b.py", "tests/gates/reproducibility", *JUDGED),

@@ -20,8 +20,12 @@ from benchmarks.mutation.plan import ROOT, Mutant, cases_of, change_of, tests_of
 OURS = ("gates", "genpolicy", "tests", "benchmarks")
 KERNELS = "genpolicy/feasibility/kernels/"
 CPU_S = 600
-"""A mutant that needs more processor time than this hangs: killed. All tests of `gates/need` need
-more than 150 on a busy machine, where a survivor was once called killed."""
+"""A mutant that needs more processor time than this is stopped; it may hang. All tests of
+`gates/need` need more than 150 on a busy machine, where a survivor was once called killed."""
+SURVIVED, KILLED = "survived", "killed"
+"""What tests say of a mutant; every other outcome is none of theirs."""
+NO_TEST = 5
+"""Exit code of pytest where no test was chosen."""
 
 
 class _Changed(importlib.machinery.SourceFileLoader):
@@ -82,7 +86,10 @@ def _silence(file: str | Path) -> None:
 
 
 def outcome(path: str, text: str | None, tests: Sequence[str]) -> tuple[str, float, str]:
-    """Run tests with a module of other text: outcome, processor seconds, and what turned red."""
+    """Run tests with a module of other text: outcome, processor seconds, and what turned red.
+
+    An outcome that is neither `SURVIVED` nor `KILLED` is said in brackets: no test turned red.
+    """
     with tempfile.TemporaryDirectory() as scratch:
         log = Path(scratch) / "log"
         child = os.fork()
@@ -92,8 +99,20 @@ def outcome(path: str, text: str | None, tests: Sequence[str]) -> tuple[str, flo
         said = log.read_text(errors="replace") if log.is_file() else ""
     code = os.waitstatus_to_exitcode(status)
     red = [line.split(" - ")[0] for line in said.splitlines() if line.startswith(("FAILED", "ERR"))]
-    name = "survived" if code == 0 else "killed" if code > 0 else "killed (time)"
-    return name, round(used.ru_utime + used.ru_stime, 2), (red or [""])[0]
+    return name_of(code), round(used.ru_utime + used.ru_stime, 2), (red or [""])[0]
+
+
+def name_of(code: int) -> str:
+    """What an exit code says of a mutant: only what a test noticed is killed.
+
+    A signal ended the others, that of too much processor time mostly: such a mutant may hang, or
+    only be slow, or survive on a faster machine.
+    """
+    if code in (-signal.SIGXCPU, -signal.SIGKILL):
+        return "stopped (time)"
+    if code < 0:
+        return f"stopped ({signal.Signals(-code).name})"
+    return {0: SURVIVED, NO_TEST: "stopped (no test)"}.get(code, KILLED)
 
 
 def _run(path: str, text: str | None, tests: Sequence[str], log: Path, scratch: Path) -> None:
@@ -136,7 +155,7 @@ def require_green(tests: Mapping[str, Sequence[str]]) -> None:
     for path in sorted(tests):
         for name in set(tests[path]) - set(clean):
             found, clean[name], red = outcome(path, None, [name])
-            if found != "survived":
+            if found != SURVIVED:
                 raise SystemExit(f"{name} is red without any mutant: {red}")
             print(f"{name}: green in {clean[name]} s of processor time", flush=True)
 
@@ -181,5 +200,5 @@ def run(
             }
             lines.write(json.dumps(row) + "\n")
             lines.flush()
-            if name == "survived":
-                print(f"survived {mutant.path}:{mutant.line} {row['change']}", flush=True)
+            if name != KILLED:
+                print(f"{name} {mutant.path}:{mutant.line} {row['change']}", flush=True)

@@ -136,7 +136,7 @@ def _versions(root: Path) -> list[tuple[str, dict[str, object]]]:
     for commit in commits:
         text = git(root, "show", f"{commit}:{PREREGISTRATION}") or ""
         try:
-            plan = parse_yaml(text.encode(), where=f"{commit[:7]}:{PREREGISTRATION}")
+            plan = parse_yaml(text.encode(), where=PREREGISTRATION)
         except GenpolicyError:
             plan = None  # what could not be read was another plan than the one that can
         known = plan.items() if isinstance(plan, dict) else ()

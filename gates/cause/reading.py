@@ -186,6 +186,9 @@ def _check_alternatives(numbers: Numbers) -> None:
     named = {name for row in numbers.alternatives for name in (row.mode, row.other)}
     if not named <= known:
         raise ValueError(f"alternatives names the modes {sorted(named - known)}, which are none")
+    for row in numbers.alternatives:
+        if row.mode == row.other:  # one good mode would be a choice between two
+            raise ValueError(f"alternatives has the mode {row.mode} beside itself")
 
 
 def folder_numbers(folder: Path) -> tuple[Numbers, tuple[Numbers, ...]]:

@@ -99,9 +99,9 @@ def _disagree(
     here, there = WORDS[first.kind], WORDS[second.kind]
     learned = second.other if second.kind == LOCAL else first.other
     asked = (learned.confirmed, learned.contradicted) if learned else (0, 0)
-    modes, denied = first.counts.two_mode_episodes, said is not None
+    modes = first.counts.two_mode_episodes
     few = limits["confirmed_share"] * sum(asked) - asked[0] > 0
-    if not denied and few and asked[1] - limits["contradicted_situations"] >= 0:
+    if said is None and few and asked[1] - limits["contradicted_situations"] >= 0:
         # What the policy sees and takes for near is told by what predicts: no contradiction.
         told = hidden(first, limits)[1]
         if told is not None and told.kind == OBSERVED:
@@ -111,14 +111,11 @@ def _disagree(
             f"them by {there} as well, and {asked[1]} do not, though they would be seen"
         )
     elif (
-        denied
-        and said is not None
+        said is not None
         and said.name is CauseName.UNIMODAL
         and spoke
-        and (
-            opinion is None
-            or (opinion.kind == "persistence" and second.counts.two_mode_episodes > 0)
-        )
+        # Whether modes persist is asked only where enough were found.
+        and (opinion is None or opinion.kind == "persistence")
     ):
         text = (
             f"No modes were found by {here}, and in {second.counts.two_mode_episodes} of "

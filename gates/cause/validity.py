@@ -23,7 +23,7 @@ def validity(numbers: Numbers, limits: CauseLimits) -> Named:
     modes = numbers.modes
     count = Answer("modes", Topic.VALIDITY, "modes followed over situations", len(modes), 2.0, ">=")
     chosen = _best_choice(numbers, limits)
-    together = [] if chosen or len(modes) < 2 else _together(numbers, limits)
+    together = [] if chosen else _together(numbers, limits)
     answers = [count, *together]
     for mode in modes:
         beside = chosen and mode.mode not in chosen

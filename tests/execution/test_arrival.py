@@ -7,7 +7,15 @@ import pytest
 from playing import begin, judged
 
 from genpolicy.contract.chunk import DiscardReason
-from genpolicy.evidence.shadow.rig import CHECKPOINT, SAMPLER, Rig
+from genpolicy.evidence.shadow.rig import (
+    CHECKPOINT,
+    ROWS,
+    SAMPLER,
+    Rig,
+    StandInVerdict,
+    passing_verdict,
+)
+from genpolicy.execution.arrival import LAYER_COUNT
 from genpolicy.execution.executor import Executor
 
 R = DiscardReason
@@ -154,6 +162,27 @@ def test_broken_actions_are_refused_though_their_hash_is_right(actions):
     judged(rig)
 
 
+def _refused_for_its_layers(layers):
+    rig = Rig()
+    rig.observe()
+    assert rig.deliver(rig.chunk(verdict=StandInVerdict(tuple(layers), (0, ROWS)))) is R.INFEASIBLE
+    judged(rig)
+
+
+@pytest.mark.parametrize("layer", range(LAYER_COUNT))
+@pytest.mark.parametrize("passed", [False, None, 1, "unknown", np.nan])
+def test_a_layer_that_does_not_say_that_it_passed_did_not(layer, passed):
+    layers = list(passing_verdict().layers)
+    layers[layer] = replace(layers[layer], passed=passed)
+    _refused_for_its_layers(layers)
+
+
+def test_layers_that_passed_are_six_and_no_other_number():
+    layers = passing_verdict().layers
+    for wrong in ((), layers[:-1], layers[1:], (*layers, layers[0])):
+        _refused_for_its_layers(wrong)
+
+
 def test_a_chunk_that_feasibility_issued_is_taken_and_a_tampered_one_is_not():
     from genpolicy.contract.chunk import Projected, Proposal
     from genpolicy.feasibility import admission
@@ -177,11 +206,11 @@ def test_a_chunk_that_feasibility_issued_is_taken_and_a_tampered_one_is_not():
             seal=admission._SEAL,
         )  # fmt: skip
 
+    good, bad = issued(), issued()
     forged = object.__new__(admission.Admitted)  # behind the seal's back, all else in order
     for name in ("projected", "actions_sha256", "verdict", "context"):
-        object.__setattr__(forged, name, getattr(issued(), name))
-    assert strict.deliver(forged, 0.0) is R.INFEASIBLE
-    good, bad = issued(), issued()
+        object.__setattr__(forged, name, getattr(good, name))
+    assert strict.deliver(forged, 0.0) is R.INFEASIBLE  # and does not use up the name of `good`
     bad.projected.actions.flags.writeable = True
     bad.projected.actions[0, 0] += 1e-9
     assert strict.deliver(bad, 0.0) is R.INFEASIBLE

@@ -5,7 +5,7 @@ import pytest
 
 from genpolicy.contract.chunk import DiscardReason
 from genpolicy.evidence.shadow.mutants import SCENARIOS
-from genpolicy.evidence.shadow.rig import CHECKPOINT, IMITATED, SAMPLER, Rig
+from genpolicy.evidence.shadow.rig import CHECKPOINT, IMITATED, SAMPLER, Rig, StandInContext
 from genpolicy.execution.checks import CHECKS, Place, without
 from genpolicy.execution.executor import Executor
 from genpolicy.verification.checker import check_messages
@@ -128,6 +128,55 @@ def test_the_stub_takes_nothing_from_before_a_reset():
     chunk = rig.chunk(condition_observation_event_time_s=0.05)
     offer = {"row": 0, "source": "policy", "arrival": 0, "sequence": 1, "now_ns": rig.now_ns}
     assert rig.stub.offer(chunk, chunk.actions[0], **offer) == "reset"
+
+
+def test_what_the_session_before_a_reset_saw_is_seen_by_nobody_after_it():
+    """At the moment of the reset itself: what was seen then is not void by its time."""
+    rig = Rig()
+    rig.advance(0.1)
+    rig.observe()
+    rig.executor.reset(rig.now_s)
+    chunk = rig.chunk()
+    assert chunk.metadata.session_epoch == 1
+    offer = {"row": 0, "source": "policy", "arrival": 0, "now_ns": rig.now_ns}
+    assert rig.stub.offer(chunk, chunk.actions[0], sequence=1, **offer) == "future_observation"
+    assert rig.deliver(chunk) is DiscardReason.FUTURE_OBSERVATION
+    rig.observe()
+    assert rig.stub.offer(chunk, chunk.actions[0], sequence=2, **offer) is None
+
+
+@pytest.mark.parametrize("name, there", [("phase", "insert"), ("epoch", "epoch-2")])
+def test_what_a_session_begins_in_is_no_change(name, there):
+    """Another phase or calibration than before the reset voids nothing that the session saw."""
+    rig = Rig()
+    rig.observe()
+    rig.advance(0.1)
+    rig.executor.reset(rig.now_s)
+    setattr(rig, name, there)
+    chunk = rig.chunk()
+    rig.advance(0.01)
+    rig.observe()
+    offer = {"row": 0, "source": "policy", "arrival": 0, "now_ns": rig.now_ns}
+    assert rig.deliver(chunk) is None
+    assert rig.stub.offer(chunk, chunk.actions[0], sequence=1, **offer) is None
+
+
+@pytest.mark.parametrize("person", [True, False])
+def test_after_a_person_the_last_command_says_nothing_of_where_the_arm_is(person):
+    """A chunk from where the person left the arm goes on; without a person nothing led there."""
+    rig = Rig()
+    rig.run(2)
+    if person:
+        rig.executor.intervene(rig.now_s)
+        rig.advance(0.1)
+        rig.executor.hand_back(rig.now_s)
+    rig.observe()
+    chunk = rig.chunk(predecessor_chunk_id="", context=StandInContext(last_action=np.full(10, 0.3)))
+    if not person:
+        offer = {"row": 0, "source": "policy", "arrival": 9, "sequence": 99, "now_ns": rig.now_ns}
+        assert rig.stub.offer(chunk, chunk.actions[0], **offer) == "broken_predecessor"
+    assert rig.deliver(chunk) is None
+    assert rig.tick()[0].kind == ("action" if person else "hold")
 
 
 @pytest.mark.parametrize(

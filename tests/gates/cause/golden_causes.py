@@ -130,7 +130,7 @@ WORLDS: dict[str, Numbers] = {
     "told perhaps": _told(("operator", 0.45, 0.1)),
     "told by no more than a guess": _told(("operator", 0.0, 0.1), ("object", -0.1, 0.1)),
     "nothing to tell": replace(VALID, told=(), strata=()),
-    "one mode": replace(VALID, modes=VALID.modes[:1]),
+    "one mode": replace(VALID, modes=VALID.modes[:1], alternatives=()),
     "modes never side by side": replace(VALID, alternatives=()),
     "no outcome": _modes((0, 0), (0, 0)),
     "one mode fails": _modes((38, 40), (8, 40)),

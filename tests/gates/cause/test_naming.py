@@ -51,7 +51,7 @@ def test_a_frozen_stream_is_a_defect_beyond_its_own_limit_and_no_other():
      (counts(persistent=29), "persistence"),
      (counts(two_mode_episodes=0, queries=500), "neighbourhoods"),
      (replace(VALID, labels=Labels(10, 0)), "replay"),
-     (replace(VALID, modes=VALID.modes[:1]), "linking")],
+     (replace(VALID, modes=VALID.modes[:1], alternatives=()), "linking")],
 )  # fmt: skip
 def test_too_little_is_said_to_be_too_little(numbers, kind):
     cause = named(numbers)

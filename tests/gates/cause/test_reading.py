@@ -11,7 +11,15 @@ from planted import OFFSET, VALID
 from gates.cause.reading import read_measured, read_numbers
 from gates.evidence import MissingEvidenceError
 from genpolicy.audit.documents import PERSISTENCE, SUMMARY, Persistence, Summary
-from genpolicy.audit.reach_rows import LEARNED, LOCAL, FindingDraw, Reach, Side, StructureDraw
+from genpolicy.audit.reach_rows import (
+    LEARNED,
+    LOCAL,
+    Alternative,
+    FindingDraw,
+    Reach,
+    Side,
+    StructureDraw,
+)
 from genpolicy.audit.rows import Calibration, Clock, ReplayRow, Resample
 from genpolicy.errors import BadInputError, IntegrityError
 
@@ -98,6 +106,7 @@ def test_a_table_of_residuals_that_is_not_there_leaves_only_its_question_open():
     [({"modes": [replace(VALID.modes[0], successes=41), VALID.modes[1]]}, "41 of 40 episodes"),
      ({"modes": [replace(VALID.modes[0], admissible=51), VALID.modes[1]]}, "51 of 50 chunks"),
      ({"modes": VALID.modes[:1]}, "alternatives names the modes"),
+     ({"alternatives": (Alternative("approach", "m0", "m0", 120),)}, "m0 beside itself"),
      ({"predictions": [replace(VALID.told[0], told_upper=None)]}, r"told_upper is not known"),
      ({"sides": []}, "StopIteration")],
 )  # fmt: skip

@@ -1,9 +1,11 @@
 """The desk: what is asked in each state of the ladder, numbers as people read them."""
 
+import re
+
 import evidence
 import pytest
 
-from gates.pages.desk import desk_of, human
+from gates.pages.desk import HEADLINES, desk_of, human
 from gates.proof import judge
 from gates.report import GATES, read_report
 from gates.writing import write_gate
@@ -84,3 +86,74 @@ def test_each_owner_finds_what_is_open(ladder):
     parts = {part.owner: part for part in desk(ladder).parts}
     assert "A: lag_spread_steps" in parts["controller"].open
     assert parts["controller"].hold == parts["controller"].of - len(parts["controller"].open)
+
+
+FACTORS = {"ms": 1e-3, "mm": 1e-3, "%": 1e-2}
+
+
+def _read(text):
+    """Side and number, in units of the evidence, of what a person reads on the desk."""
+    side, number, unit = re.fullmatch(r"(at most |at least |)×?([-+.e\d]+) ?(.*)", text).groups()
+    return side.strip(), float(number) * FACTORS.get(unit, 1.0)
+
+
+def _close(value):
+    return pytest.approx(value, rel=0.006)  # three digits are shown
+
+
+def _side(answer):
+    return "" if answer.interval is None else {"<=": "at most", ">=": "at least"}[answer.comparison]
+
+
+@pytest.mark.parametrize("spoilt", [False, True])
+def test_every_number_of_the_desk_is_one_of_the_reports(ladder, spoilt):
+    write_gate(ladder, "E")
+    if spoilt:
+        evidence.edit_table(ladder, "audit/clocks.parquet", evidence.lags_apart)
+        write_gate(ladder, "A")
+    reports = {gate: read_report(ladder, gate)[0] for gate in GATES}
+    found = desk_of(reports)
+    for gate, box in zip(GATES, found.boxes, strict=True):
+        report, name = reports[gate], HEADLINES[gate][0]
+        assert (box.gate, box.verdict) == (gate, report.verdict)
+        said = [c for c in report.criteria if c.id == name]
+        said = [c for c in said if c.candidate in (None, report.promoted)] or said
+        shown = re.split(r", (?=[a-z])", box.number) if box.number else []
+        assert len(shown) in (1, len(said)) if said[0].measured is not None else not shown
+        for text, c in zip(shown, said, strict=False):
+            assert _read(text.removeprefix(f"{c.candidate} ")) == (_side(c), _close(c.measured))
+    for bar in found.bars:
+        c = bar.near.answer
+        assert c in reports[bar.gate].criteria and c.verdict == "PASS"
+        assert _read(bar.measured) == (_side(c), _close(c.measured))
+        assert _read(bar.limit) == ("", _close(c.threshold))
+        ends = (c.measured, c.threshold) if c.comparison == "<=" else (c.threshold, c.measured)
+        assert bar.near.used == pytest.approx(max(ends[0], 0.0) / ends[1])
+
+
+def test_each_owner_finds_all_of_theirs_and_nobody_elses(ladder):
+    """Of candidates those of the promoted, or of all that pass their gate."""
+    write_gate(ladder, "E")  # waits for people
+    evidence.edit_table(ladder, "audit/clocks.parquet", evidence.lags_apart)
+    write_gate(ladder, "A")
+    reports = {gate: read_report(ladder, gate)[0] for gate in GATES}
+
+    def counts(report, candidate):
+        passing = [n for n, verdict in report.candidates.items() if verdict == "PASS"]
+        return candidate in (None, *([report.promoted] if report.promoted else passing))
+
+    for part in desk_of(reports).parts:
+        own = [
+            (gate, c) for gate, report in reports.items() for c in report.criteria
+            if c.owner == part.owner and counts(report, c.candidate)
+        ]  # fmt: skip
+        assert (part.hold, part.of) == (sum(c.verdict == "PASS" for _, c in own), len(own))
+        names = [f"{gate}: {c.id}" for gate, c in own if c.verdict != "PASS"]
+        assert part.open == tuple(dict.fromkeys(names))
+        near = [
+            f"{gate}: {c.id}" for gate, c in own
+            if c.verdict == "PASS" and c.measured is not None and c.threshold
+            and c.threshold > 0 and not (c.comparison == ">=" and c.threshold == c.measured == 1)
+            and min(c.measured, c.threshold) >= 0.9 * max(c.measured, c.threshold)
+        ]  # fmt: skip
+        assert part.near == tuple(dict.fromkeys(near))

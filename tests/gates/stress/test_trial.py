@@ -1,6 +1,7 @@
 """The trial: fewer starts than planned give no verdict, no gain returns to the baseline."""
 
 import evidence
+import pandas as pd
 import pytest
 from asked import asked, settings_of
 from editing import cells
@@ -37,6 +38,43 @@ def test_a_reset_that_ignores_its_start_is_one_start(ladder):
     with pytest.raises(MissingEvidenceError, match=f"1 states for {evidence.STARTS} starts"):
         asked(ladder, unmatched_starts, "flow", gate="D")
     assert judge(ladder, "D").verdict == "INCONCLUSIVE"
+
+
+OTHER = "cd" * 32
+
+
+@pytest.mark.parametrize("method", ["flow", "chunked_bc"])
+def test_one_start_from_another_state_is_two_states_that_are_not_shared(ladder, method):
+    """The state that the candidate began from, and that of the baseline."""
+
+    def one(frame):
+        at = frame["method"] == method
+        return at & (frame["start"] == 3) & (frame["perturbation"] == "nominal")
+
+    others = len(settings_of(ladder, "D").baselines) if method == "flow" else 1
+    evidence.edit_table(ladder, "stress/rollouts.parquet", cells("start_sha256", OTHER, where=one))
+    found = asked(ladder, unmatched_starts, "flow", gate="D")
+    assert found.value == 2.0 * others and "chunked_bc 2" in found.caveat
+
+
+@pytest.mark.parametrize("method", ["flow", "chunked_bc"])
+def test_a_second_training_seed_begins_where_the_first_began(ladder, method):
+    """Only one of the two lacks a state then: either of them."""
+    evidence.edit_table(
+        ladder,
+        "stress/rollouts.parquet",
+        lambda f: pd.concat([f, f[f["method"] == method].assign(seed=1)]),
+    )
+    assert asked(ladder, unmatched_starts, "flow", gate="D").value == 0.0
+
+    def one(frame):
+        at = (frame["method"] == method) & (frame["seed"] == 1)
+        return at & (frame["start"] == 3) & (frame["perturbation"] == "nominal")
+
+    others = len(settings_of(ladder, "D").baselines) if method == "flow" else 1
+    evidence.edit_table(ladder, "stress/rollouts.parquet", cells("start_sha256", OTHER, where=one))
+    assert asked(ladder, unmatched_starts, "flow", gate="D").value == others
+    assert judge(ladder, "D").candidates["flow"] == "FAIL"
 
 
 def test_starts_that_nobody_planned_are_no_trial(ladder):
