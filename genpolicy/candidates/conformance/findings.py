@@ -136,7 +136,7 @@ def plausible(asked: Asked, starts: RecordedStarts) -> list[Finding]:
     drawn = np.stack([asked.answers[row].actions for row in rows])
     recorded = starts.chunks[rows]
     chunks = nearest(drawn, recorded)
-    share = shuffled_share(chunks, recorded, rng=stream(0, "conformance", "shuffle"))
+    share = shuffled_share(drawn, recorded, rng=stream(0, "conformance", "shuffle"))
     copies = copied(drawn, recorded)
     return [
         Finding(
@@ -144,7 +144,7 @@ def plausible(asked: Asked, starts: RecordedStarts) -> list[Finding]:
             f"as near to other moments' recordings in {share:.4f} of the shuffles, at most "
             f"{KNOWS_THE_MOMENT}",
         ),
-        _scale(chunks, recorded),
+        _scale(chunks, recorded, follows=share <= KNOWS_THE_MOMENT),
         _turned(chunks, recorded),
         Finding(
             names[3], "fails" if copies else "holds", "D",
@@ -153,7 +153,7 @@ def plausible(asked: Asked, starts: RecordedStarts) -> list[Finding]:
     ]  # fmt: skip
 
 
-def _scale(chunks: Array, recorded: Array) -> Finding:
+def _scale(chunks: Array, recorded: Array, *, follows: bool) -> Finding:
     found = slopes(chunks, recorded, rng=stream(0, "conformance", "slopes"))
     text = ", ".join(
         f"{one.name} {one.slope:.3g} ({one.low:.3g} to {one.high:.3g})" for one in found
@@ -168,7 +168,8 @@ def _scale(chunks: Array, recorded: Array) -> Finding:
     if wrong:
         return Finding("scale", "fails", "D", f"{said}; wrong: {', '.join(wrong)}")
     inside = all(one.low >= 1.0 / SAME_SCALE and one.high <= SAME_SCALE for one in found)
-    return Finding("scale", "holds" if inside else "unknown", "D", said)
+    # Of many chunks that know nothing the nearest lie on the line too.
+    return Finding("scale", "holds" if inside and follows else "unknown", "D", said)
 
 
 def _turned(chunks: Array, recorded: Array) -> Finding:

@@ -25,8 +25,8 @@ STANDS_STILL = 1e-6
 """A recorded number that moves less than this from moment to moment has no slope to compare."""
 ROUNDING = 1e-12
 """What is left of a constant when its mean is taken off, in parts of it."""
-COPIED_M = 1e-9
-"""No network comes this near to a recording in every number of a chunk."""
+COPIED_M = 2e-7
+"""Rounding to float32, as on the wire; no network comes so near in every number of a chunk."""
 
 
 @dataclass(frozen=True)
@@ -117,27 +117,34 @@ SMALL_TURN_RAD = 0.05
 """Three degrees: what a good policy may be off where all recordings are turned alike."""
 
 
-def shuffled_share(chunks: Array, recorded: Array, *, rng: np.random.Generator) -> float:
+def shuffled_share(candidates: Array, recorded: Array, *, rng: np.random.Generator) -> float:
     """Share of shuffles in which the chunks are as near to the recordings of other moments.
 
-    Displacements from each chunk's first row are compared, in spreads of the recordings, so that
-    a constant displacement from an observed pose knows nothing; single actions are compared as
-    they are. A permutation test of "the chunk does not depend on the moment".
+    At each moment the candidate nearest to the recording it is held against counts, its own or
+    another's alike: taken by its own recording only, chance would favour it. Displacements from
+    each chunk's first row are compared, in spreads of the recordings, so that a constant
+    displacement from an observed pose knows nothing; single actions are compared as they are. A
+    permutation test of "the chunks do not depend on the moment".
 
     Args:
-        chunks: Shape (M, K, 10).
-        recorded: Likewise.
+        candidates: Shape (M, N, K, 10).
+        recorded: Shape (M, K, 10).
         rng: For the shuffles.
     """
-    theirs, ours = _motion(chunks), _motion(recorded)
+    moments, number = candidates.shape[:2]
+    theirs = _motion(candidates.reshape(-1, *candidates.shape[2:]))
+    ours = _motion(recorded)
     spread = ours.std(axis=0)
     moves = spread > STANDS_STILL
     if not moves.any():
         return 1.0
     theirs, ours = theirs[:, moves] / spread[moves], ours[:, moves] / spread[moves]
-    apart = np.sqrt(((theirs[:, None] - ours[None]) ** 2).mean(axis=2))
+    apart = np.stack([
+        np.sqrt(((theirs - one) ** 2).mean(axis=1)).reshape(moments, number).min(axis=1)
+        for one in ours
+    ], axis=1)  # fmt: skip
     own = np.trace(apart)
-    rows = np.arange(len(apart))
+    rows = np.arange(moments)
     shuffled = rng.permuted(np.tile(rows, (PERMUTATIONS, 1)), axis=1)
     as_near = int(np.sum(apart[rows, shuffled].sum(axis=1) <= own * (1.0 + ROUNDING)))
     return float((1 + as_near) / (1 + PERMUTATIONS))

@@ -5,6 +5,7 @@ speaks first, a map of metadata; then one message up, one down; a text instead o
 went wrong. Nothing but a policy is reached through it: see the test of safety.
 """
 
+import contextlib
 import ipaddress
 import logging
 import re
@@ -34,8 +35,6 @@ QUIET = logging.getLogger(f"{__name__}.quiet")
 """The library tells of a stranger's bytes with a traceback of its own; ours is `PolicyError`."""
 QUIET.addHandler(logging.NullHandler())
 QUIET.propagate = False
-BUFFERED_BYTES = 32 << 10
-"""What a line takes without waiting for who should read it."""
 SHUT_BOTH = 2
 """`socket.SHUT_RDWR`: neither side reads or writes any more."""
 
@@ -97,13 +96,14 @@ class Connection:
         """
         late = PolicyError(Fault.LATE, f"no answer within {timeout_s:.3g} s")
         packed = pack(message)
-        # Sending waits for a server that does not read, unless somebody hangs up meanwhile.
-        watch = Timer(timeout_s, self._socket.socket.shutdown, [SHUT_BOTH])
+        # Sending waits for a server that does not read, or for the library that answers its pings,
+        # unless somebody hangs up meanwhile.
+        watch = Timer(timeout_s, self._cut)
+        watch.daemon = True
         begun = time.monotonic()
         try:
             self._refuse_unrequested()
-            if len(packed) > BUFFERED_BYTES:
-                watch.start()
+            watch.start()
             self._socket.send(packed)
             watch.cancel()
             left = timeout_s - (time.monotonic() - begun)
@@ -115,6 +115,10 @@ class Connection:
         finally:
             watch.cancel()
 
+    def _cut(self) -> None:
+        with contextlib.suppress(OSError):  # it may be closed already
+            self._socket.socket.shutdown(SHUT_BOTH)
+
     def _refuse_unrequested(self) -> None:
         try:
             self._socket.recv(timeout=0)
@@ -124,6 +128,7 @@ class Connection:
 
     def close(self) -> None:
         """Hang up, without waiting for somebody who does not listen."""
+        self._cut()
         self._socket.close_timeout = HANG_UP_S
         self._socket.close()
 

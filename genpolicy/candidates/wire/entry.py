@@ -137,7 +137,9 @@ class Output(Settings):
     def _consistent(self) -> "Output":
         if self.motion == "absolute" and self.frame == "tcp":
             raise ValueError("an absolute place is in the frame robot_base")
-        if self.anchor is None and (self.motion != "absolute" or self.rotation is None):
+        if self.motion == "absolute" and self.rotation is None:
+            raise ValueError("an absolute motion says its rotation")
+        if self.anchor is None and self.motion != "absolute":
             raise ValueError("anchor names the pose that it is relative to")
         rotated = self.rotation.columns if self.rotation else []
         columns = [*self.position.columns, *rotated, self.gripper.column]

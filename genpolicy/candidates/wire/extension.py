@@ -111,12 +111,13 @@ def read_answer(
         said = answer.get(WORD)  # type: ignore[assignment]
         if not isinstance(said, dict):
             raise PolicyError(Fault.MALFORMED, f"an answer without {WORD!r}")
-        if said.get("invocation") != invocation:
-            found = f"an answer to {said.get('invocation')!r}, asked was {invocation!r}"
+        named = said.get("invocation")
+        if not isinstance(named, str) or named != invocation:
+            found = f"an answer to {str(named)[:40]!r}, asked was {invocation!r}"
             raise PolicyError(Fault.UNREQUESTED, found)
         for name in ("checkpoint", "sampler"):
             before, now = getattr(told, name), said.get(name)
-            if before is not None and now != before:
+            if before is not None and not (isinstance(now, str) and now == before):
                 raise PolicyError(
                     Fault.CHANGED, f"its {name} was {before[:16]}…, and is {str(now)[:16]}…"
                 )

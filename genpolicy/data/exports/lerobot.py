@@ -90,9 +90,8 @@ def export_lerobot(data: Dataset, folder: Path, *, split: str) -> Exported:
     fps = _fps(float(data.manifest["action_contract"]["period_s"]))
     part = data.split(split)
     outcomes = part.episodes["outcome"].to_numpy()
-    chosen = np.flatnonzero(outcomes == "success") if (outcomes == "success").any() else (
-        np.arange(len(outcomes))
-    )  # fmt: skip
+    known = (data.episodes["outcome"].to_numpy() == "success").any()
+    chosen = np.flatnonzero(outcomes == "success") if known else np.arange(len(outcomes))
     if not len(chosen):
         raise ContractError(
             where=f"split {split}",

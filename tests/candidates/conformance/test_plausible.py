@@ -62,7 +62,7 @@ def test_a_candidate_that_stands_has_no_slope_and_a_recording_that_stands_none_t
 
 
 def test_motions_of_the_moment_are_nearer_than_those_of_others(recorded, rng):
-    assert shuffled_share(recorded + 0.01, recorded, rng=rng) < 0.001
+    assert shuffled_share(recorded[:, None] + 0.01, recorded, rng=rng) < 0.001
 
 
 @pytest.mark.parametrize("what", ["one chunk", "the same displacement", "another moment's"])
@@ -72,14 +72,14 @@ def test_what_does_not_depend_on_the_moment_is_as_near_to_others(recorded, rng, 
         "the same displacement": recorded[:, :1] + (recorded[:1] - recorded[:1, :1]),
         "another moment's": recorded[rng.permutation(30)],
     }[what]
-    assert shuffled_share(chunks, recorded, rng=rng) > 0.01
+    assert shuffled_share(chunks[:, None], recorded, rng=rng) > 0.01
 
 
 def test_the_shuffle_is_exact_for_chunks_that_know_nothing():
     """Of 200 candidates that draw at random, about one in a hundred is below 0.01."""
     rng = np.random.default_rng(5)
     shares = [
-        shuffled_share(rng.normal(size=(12, 4, 10)), rng.normal(size=(12, 4, 10)), rng=rng)
+        shuffled_share(rng.normal(size=(12, 2, 4, 10)), rng.normal(size=(12, 4, 10)), rng=rng)
         for _ in range(40)
     ]
     assert 0.3 < np.mean(shares) < 0.7
@@ -88,7 +88,7 @@ def test_the_shuffle_is_exact_for_chunks_that_know_nothing():
 
 def test_single_actions_are_compared_as_they_are(recorded, rng):
     one = recorded[:, :1]
-    assert shuffled_share(one + 0.01, one, rng=rng) < 0.001
+    assert shuffled_share(one[:, None] + 0.01, one, rng=rng) < 0.001
 
 
 def test_a_quaternion_in_the_other_order_is_turned_away(recorded):
@@ -106,7 +106,12 @@ def test_a_rotation_that_is_none_counts_as_turned_away(recorded):
 
 
 def test_a_recording_is_known_whichever_candidate_it_is(recorded, rng):
-    drawn = recorded[:, None] + 1e-6 * rng.normal(size=(30, 3, 1, 1))
+    drawn = recorded[:, None] + 1e-4 * (1.0 + np.abs(rng.normal(size=(30, 3, 1, 1))))
     assert copied(drawn, recorded) == 0
-    drawn[4, 2] = recorded[4]
+    drawn[4, 2] = recorded[4].astype(np.float32)
     assert copied(drawn, recorded) == 1
+
+
+def test_many_chunks_of_other_moments_know_nothing_of_this_one(recorded, rng):
+    drawn = recorded[rng.integers(30, size=(30, 8))]
+    assert shuffled_share(drawn, recorded, rng=rng) > 0.01

@@ -37,7 +37,7 @@ def action(**changes):
         ({"weights": "x"}, "weights", "Extra inputs"),
         ({"action": action(frame="tcp")}, "action", "frame robot_base"),
         ({"action": action(motion="relative")}, "action", "anchor"),
-        ({"action": action(rotation=None)}, "action", "anchor"),
+        ({"action": action(rotation=None)}, "action", "says its rotation"),
         ({"action": action(position={"columns": [0, 1, 9], "unit": "m"})}, "action", "one thing"),
         ({"action": action(position={"columns": [0, 1, 2], "unit": "inch"})}, "unit", "'mm'"),
         (

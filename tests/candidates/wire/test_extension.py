@@ -101,6 +101,8 @@ def test_a_plain_answer_is_one_chunk():
         ({"actions": ANSWER["actions"]}, Fault.MALFORMED),
         (answered(invocation="6"), Fault.UNREQUESTED),
         (answered(invocation=7), Fault.UNREQUESTED),
+        (answered(invocation=np.zeros(3)), Fault.UNREQUESTED),
+        (answered(checkpoint=np.zeros(3)), Fault.CHANGED),
         (answered(checkpoint="c" * 64), Fault.CHANGED),
         (answered(checkpoint=None), Fault.CHANGED),
         (answered(sampler="c" * 64), Fault.CHANGED),
