@@ -102,8 +102,8 @@ def turned_away(chunks: Array, recorded: Array) -> tuple[int, int]:
     """At how many moments a chunk is turned farther from the recorded one than others are.
 
     Returns:
-        That number, and how many moments could be compared: those where a recorded chunk is turned
-        otherwise than the median of the others by more than a hundredth of a rad, or all.
+        That number, and the number of moments. Others are as far away as the recordings of nine
+        in ten other moments are; where all are turned alike, `SMALL_TURN_RAD`.
     """
     ours = rotation_from_6d(recorded[:, 0, ROTATION])
     theirs = rotation_from_6d(chunks[:, 0, ROTATION])

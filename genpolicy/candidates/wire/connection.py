@@ -5,14 +5,13 @@ speaks first, a map of metadata; then one message up, one down; a text instead o
 went wrong. Nothing but a policy is reached through it: see the test of safety.
 """
 
-import contextlib
 import ipaddress
 import logging
 import re
 import time
 from collections.abc import Callable
+from contextlib import AbstractContextManager, suppress
 from threading import Timer
-from types import TracebackType
 from typing import Any
 
 from websockets.exceptions import ConnectionClosed, InvalidHandshake, PayloadTooBig
@@ -116,7 +115,7 @@ class Connection:
             watch.cancel()
 
     def _cut(self) -> None:
-        with contextlib.suppress(OSError):  # it may be closed already
+        with suppress(OSError):  # it may be closed already
             self._socket.socket.shutdown(SHUT_BOTH)
 
     def _refuse_unrequested(self) -> None:
@@ -173,7 +172,7 @@ def _closed(error: ConnectionClosed) -> PolicyError:
     return PolicyError(Fault.CLOSED, f"it hung up ({error})")
 
 
-class Listening:
+class Listening(AbstractContextManager["Listening"]):
     """A server's end on this machine: who connects gets the metadata, then answers.
 
     Args:
@@ -202,15 +201,7 @@ class Listening:
         """Listen no more."""
         self._server.shutdown()
 
-    def __enter__(self) -> "Listening":
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def _talk(self, line: ServerConnection) -> None:

@@ -4,8 +4,8 @@ import os
 import signal
 import subprocess
 import time
+from contextlib import AbstractContextManager
 from pathlib import Path
-from types import TracebackType
 
 from genpolicy.candidates.wire.connection import LOOPBACK, dial, free_port
 from genpolicy.candidates.wire.entry import PORT, ServerEntry
@@ -32,7 +32,7 @@ def verify_files(entry: ServerEntry, folder: Path) -> None:
         read_verified(folder / name, sha256=digest, named_by=f"the entry of {entry.name}")
 
 
-class Launched:
+class Launched(AbstractContextManager["Launched"]):
     """A server that runs; to be used in a `with`.
 
     Args:
@@ -107,15 +107,7 @@ class Launched:
                 )
             time.sleep(LOOK_S)
 
-    def __enter__(self) -> "Launched":
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.end()
 
 
