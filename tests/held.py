@@ -7,6 +7,7 @@ difference, then ask again. It says that something moved and never that a number
 import inspect
 import json
 import os
+import re
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
 from pathlib import Path
@@ -17,12 +18,16 @@ import pytest
 ROUNDING = 1e-9
 """Of a number as a share of it, and about 0: what another library of algebra may add."""
 
+SERIES = re.compile(r"\[(?:\s+-?[\w.+-]+,){2,}\s+-?[\w.+-]+\s+\]")
+"""A list of three numbers or more, which takes one line."""
+
 
 def hold(file: Path, found: dict[str, Any]) -> None:
     """Compare with a file; with GOLDEN=write, write it, and be red."""
     if os.environ.get("GOLDEN") == "write":
         file.parent.mkdir(exist_ok=True)
-        file.write_text(json.dumps(found, indent=1, sort_keys=True, ensure_ascii=False) + "\n")
+        text = json.dumps(found, indent=1, sort_keys=True, ensure_ascii=False)
+        file.write_text(SERIES.sub(lambda series: " ".join(series[0].split()), text) + "\n")
         pytest.fail(f"{file.name} was written: read the difference, then ask again")
     assert list(differences(json.loads(file.read_text()), found)) == []
 

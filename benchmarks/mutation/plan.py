@@ -36,7 +36,21 @@ EVERY = ("tests/gates/test_forms.py",)
 JUDGED = ("tests/gates/test_criteria.py",)
 GOLDEN = "tests/gates/golden/test_gate_"
 FORMS = "tests/execution/test_forms.py"
+PAGES = ("tests/gates/test_writing.py", "tests/gates/pages", "tests/gates/test_overview.py")
+ON_PAGE = {
+    "a": ("plots_factors", "plots_need", "plots_scene"),
+    "b": ("plots_convergence", "plots_density", "plots_front", "plots_time"),
+    "c": ("plots_feasibility", "plots_incidents", "plots_rejected", "tables_feasibility",
+          "tables_holds"),
+    "d": ("plots_stress", "tables_overruns", "tables_stress"),
+}  # fmt: skip
+"""Modules that one gate's page alone shows."""
 TESTS = {
+    **{
+        f"gates/pages/{name}.py": (f"{GOLDEN}{gate}.py", *PAGES)
+        for gate, names in ON_PAGE.items()
+        for name in names
+    },
     "gates/card/keys.py": (),
     "gates/card/history.py": (),
     "gates/card/envelope.py": ("tests/gates/card/test_card.py", "tests/gates/card"),
@@ -44,11 +58,7 @@ TESTS = {
     "gates/cause": ("tests/gates/cause", f"{GOLDEN}a.py", "tests/gates/need"),
     "gates/audit": ("tests/gates/audit",),
     "gates/need": (f"{GOLDEN}a.py", "tests/gates/need", *JUDGED),
-    "gates/pages": (
-        "tests/gates/test_writing.py",
-        "tests/gates/pages",
-        "tests/gates/test_overview.py",
-    ),
+    "gates/pages": (f"{GOLDEN}c.py", *PAGES),
     "gates/stress": (f"{GOLDEN}d.py", "tests/gates/stress", *JUDGED),
     "gates/feasibility": (f"{GOLDEN}c.py", "tests/gates/feasibility", *JUDGED),
     "gates/reproducibility": (f"{GOLDEN}b.py", "tests/gates/reproducibility", *JUDGED),

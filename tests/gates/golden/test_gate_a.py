@@ -7,6 +7,7 @@ import evidence
 import numpy as np
 import pandas as pd
 from as_told import hold, told
+from drawn import hold_pictures
 
 from gates.proof import judge
 
@@ -18,6 +19,11 @@ def test_gate_a_of_even_evidence_says_what_it_said(ladder):
 def test_gate_a_of_uneven_evidence_says_what_it_said(ladder):
     mixed_need(ladder)
     hold("gate_a_uneven", told(judge(ladder, "A")))
+
+
+def test_gate_a_of_uneven_evidence_draws_what_it_drew(ladder):
+    mixed_need(ladder)
+    hold_pictures("gate_a_drawn", "A", ladder, judge(ladder, "A"))
 
 
 def test_gate_a_of_evidence_that_says_little_says_what_it_said(ladder):

@@ -3,6 +3,7 @@
 import evidence
 import pandas as pd
 from as_told import hold, told
+from drawn import hold_pictures
 
 from gates.proof import judge
 
@@ -32,12 +33,16 @@ def _modes(earlier):
     return change
 
 
-def _latency(frame):
+def _timed(frame):
     n = frame["repeat"] + 3 * frame["process"] + 5 * frame["run"]
-    unknown = (frame["component"] == "queue") & _flow(frame)
     return frame.assign(
-        seconds=(frame["seconds"] * (1 + 0.003 * (n % 7)) * (1 + 0.02 * frame["run"])).mask(unknown)
+        seconds=frame["seconds"] * (1 + 0.003 * (n % 7)) * (1 + 0.02 * frame["run"])
     )
+
+
+def _latency(frame):
+    unknown = (frame["component"] == "queue") & _flow(frame)
+    return _timed(frame).assign(seconds=lambda f: f["seconds"].mask(unknown))
 
 
 def _model(frame):
@@ -78,7 +83,7 @@ def test_gate_b_of_even_evidence_says_what_it_said(ladder):
     hold("gate_b", told(judge(ladder, "B")))
 
 
-def test_gate_b_of_uneven_evidence_says_what_it_said(ladder):
+def _make_uneven(ladder, latency):
     for table, change in (
         ("reload/modes", _modes(0)), ("reload/modes_earlier", _modes(1)),
         ("reload/nfe", lambda f: _again(f).assign(counted=8 + _flow(_again(f)))),
@@ -86,12 +91,22 @@ def test_gate_b_of_uneven_evidence_says_what_it_said(ladder):
             sha256_reloaded=f["sha256_reloaded"].mask(_flow(f) & (f["row"] > 5), "0" * 64),
             max_abs_difference=0.125 * (_flow(f) & (f["row"] > 5)) * (f["row"] - 5),
         )),
-        ("latency/latency", _latency), ("latency/model", _model),
+        ("latency/latency", latency), ("latency/model", _model),
     ):  # fmt: skip
         evidence.edit_table(ladder, f"{table}.parquet", change)
     evidence.edit_document(ladder, "train_generators/matched.json", _configured)
     evidence.edit_document(ladder, "reload/identity.json", _identity)
     _learning(ladder)
+
+
+def test_gate_b_of_uneven_evidence_says_what_it_said(ladder):
+    _make_uneven(ladder, _latency)
     report = judge(ladder, "B")
     assert all(c.measured is not None for c in report.criteria)
     hold("gate_b_uneven", told(report))
+
+
+def test_gate_b_of_uneven_evidence_draws_what_it_drew(ladder):
+    """With every time known: of an unknown one no figure of times is drawn."""
+    _make_uneven(ladder, _timed)
+    hold_pictures("gate_b_drawn", "B", ladder, judge(ladder, "B"))

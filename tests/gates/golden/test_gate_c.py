@@ -2,6 +2,7 @@
 
 import evidence
 from as_told import hold, told
+from drawn import hold_pictures
 from editing import cells
 
 from gates.proof import judge
@@ -63,7 +64,7 @@ def test_gate_c_of_even_evidence_says_what_it_said(ladder):
     hold("gate_c", told(judge(ladder, "C")))
 
 
-def test_gate_c_of_uneven_evidence_says_what_it_said(ladder):
+def _make_uneven(ladder):
     flow = lambda f: f["method"] == "flow"  # noqa: E731
     evidence.edit_table(ladder, SHADOW + "candidates.parquet", _uneven)
     evidence.edit_table(ladder, SHADOW + "stub.parquet", _arrived)
@@ -76,6 +77,15 @@ def test_gate_c_of_uneven_evidence_says_what_it_said(ladder):
         cells("count", 11, where=lambda f: flow(f) & (f["fixture"] == "reset_on_the_way")),
     )  # fmt: skip
     _watchers(ladder)
+
+
+def test_gate_c_of_uneven_evidence_says_what_it_said(ladder):
+    _make_uneven(ladder)
     report = judge(ladder, "C")
     assert all(c.measured is not None for c in report.criteria)
     hold("gate_c_uneven", told(report))
+
+
+def test_gate_c_of_uneven_evidence_draws_what_it_drew(ladder):
+    _make_uneven(ladder)
+    hold_pictures("gate_c_drawn", "C", ladder, judge(ladder, "C"))

@@ -5,6 +5,7 @@ import json
 import evidence
 import pandas as pd
 from as_told import hold, told
+from drawn import hold_pictures
 
 from gates.proof import judge
 
@@ -67,12 +68,21 @@ def test_gate_d_of_even_evidence_says_what_it_said(ladder):
     hold("gate_d", told(judge(ladder, "D")))
 
 
-def test_gate_d_of_uneven_evidence_says_what_it_said(ladder):
+def _make_uneven(ladder):
     evidence.edit_table(ladder, ROLLOUTS, _uneven)
     evidence.edit_table(ladder, INVOCATIONS, _later)
     evidence.edit_document(ladder, "stress/power.json", _power)
     evidence.edit_document(ladder, "stress/distilled.json", lambda d: {"flow": d["manicm"]})
     _elsewhere(ladder)
+
+
+def test_gate_d_of_uneven_evidence_says_what_it_said(ladder):
+    _make_uneven(ladder)
     found = told(judge(ladder, "D"))
     assert not json.dumps(found).count("missing"), "a number that is not measured guards nothing"
     hold("gate_d_uneven", found)
+
+
+def test_gate_d_of_uneven_evidence_draws_what_it_drew(ladder):
+    _make_uneven(ladder)
+    hold_pictures("gate_d_drawn", "D", ladder, judge(ladder, "D"))
