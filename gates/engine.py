@@ -29,7 +29,15 @@ from gates.report import (
     stage_of,
 )
 from gates.running import require_running_code
-from gates.settings import GateSettings, Limit, Limits, read_limits, read_params, read_settings
+from gates.settings import (
+    GateSettings,
+    Limit,
+    Limits,
+    read_limits,
+    read_params,
+    read_settings,
+    waived_criterion,
+)
 from gates.verdicts import combine, first_unmet, judge_criterion, rounded
 from genpolicy.errors import IntegrityError
 from genpolicy.integrity.hashing import sha256_bytes_of, sha256_file
@@ -243,11 +251,7 @@ def _lacking(evidence: Evidence) -> list[str]:
 
 
 def _waivers(limits: Limits) -> list[str]:
-    return [
-        f"{name} was not asked: the {waiver.owner} owner says that it does not apply here "
-        f"({waiver.reason})."
-        for name, waiver in limits.waived.items()
-    ]
+    return [waived_criterion(name, waiver) for name, waiver in limits.waived.items()]
 
 
 def _diagnosis(spec: GateSpec, judged: Judged) -> str:

@@ -142,7 +142,12 @@ NAMED: tuple[Named, ...] = (
         ("stale_observation", "infeasible_rotation", "phase_change", "reordered_chunk"),
         "what is never tried is never refused",
     ),
-    Named("D", "stress.baselines", ("chunked_bc", "chunked_l1", "bc_noise", "act"), SIMPLER),
+    Named(
+        "D",
+        "stress.baselines",
+        ("chunked_bc", "chunked_l1", "one_mode_bc", "bc_noise", "act"),
+        SIMPLER,
+    ),
     Named(
         "D",
         "stress.perturbations",

@@ -15,6 +15,7 @@ A number has one home. What another section says already is read from there (`Ga
 
 import functools
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -51,6 +52,27 @@ class Waiver:
 
     reason: str
     owner: Owner
+
+
+WAIVED = re.compile(
+    r"\S+ (was not asked: the \w+ owner says|need not be asked of the data: the \w+ owner answers)"
+)
+
+
+def waived_criterion(name: str, waiver: Waiver) -> str:
+    """What a report says of a criterion that was declared not applicable."""
+    return (
+        f"{name} was not asked: the {waiver.owner} owner says that it does not apply here "
+        f"({waiver.reason})."
+    )
+
+
+def waived_question(name: str, waiver: Waiver) -> str:
+    """What a report says of a question to the data that could not be asked."""
+    return (
+        f"{name} need not be asked of the data: the {waiver.owner} owner answers for it "
+        f"({waiver.reason})."
+    )
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field
 
 from gates.report import Owner
-from gates.settings import GateSettings
+from gates.settings import GateSettings, Waiver, waived_question
 
 AUDIT = "artifacts/audit"
 TRAINED = "artifacts/train_baselines"
@@ -70,7 +70,7 @@ class NeedSettings(GateSettings):
     def caveats(self) -> tuple[str, ...]:
         """Who answers for which question that was not asked, and why."""
         return tuple(
-            f"{check} need not be asked of the data: the {owner} owner answers for it ({reason})."
+            waived_question(check, Waiver(reason, owner))
             for owner, checks in self.waived_checks.items()
             for check, reason in checks.items()
         )

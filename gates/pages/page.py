@@ -35,7 +35,7 @@ from gates.pages import (
 from gates.pages.desk import desk_of
 from gates.pages.figures import Picturable, Table, draw_all
 from gates.pages.guide import BACK_TO, QUESTIONS, READING, label, words
-from gates.pages.table import deciding, groups, passed_by, stops, tally
+from gates.pages.table import deciding, groups, not_asked, passed_by, stops, tally
 from gates.report import GATES, NAMES, Gate, GateReport, read_report, report_bytes
 from gates.reproducibility.settings import RELOAD
 from genpolicy.errors import IntegrityError
@@ -94,6 +94,7 @@ def gate_page(root: Path, report: GateReport) -> str:
         question=QUESTIONS[report.gate],
         decided=deciding(report) or passed_by(report),
         tally=tally(report),
+        not_asked=not_asked(report),
         stops=stops(report),
         groups=groups(report),
         reading=READING[report.gate],

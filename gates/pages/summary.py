@@ -3,7 +3,7 @@
 import re
 
 from gates.pages.guide import unit
-from gates.pages.table import deciding, passed_by, sign, stops, tally, waived
+from gates.pages.table import deciding, not_asked, passed_by, sign, stops, tally, waived
 from gates.report import NAMES, Answer, GateReport, limit_text, measured_text, report_path
 
 SPECIAL = re.compile(r"([\\`*_\[\]()|#!~])")
@@ -30,6 +30,8 @@ def markdown(report: GateReport) -> str:
         label = "Diagnosis" if report.verdict == "PASS" else "Look first at"
         lines += [f"**{label}:** {plain(report.diagnosis)}", ""]
     lines += [f"**Criteria:** {plain(tally(report))}.", ""]
+    if unasked := not_asked(report):
+        lines += [f"**Not asked:** {plain(' '.join(unasked))}", ""]
     lines += _candidates(report)
     unmet = [c for c in report.criteria if c.verdict != "PASS"]
     if unmet:

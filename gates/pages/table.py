@@ -6,6 +6,7 @@ from itertools import groupby
 
 from gates.pages.guide import unit
 from gates.report import Answer, GateReport, limit_text, measured_text
+from gates.settings import WAIVED
 from gates.verdicts import first_unmet
 
 
@@ -61,6 +62,11 @@ def waived(criterion: Answer, report: GateReport) -> str:
     if criterion.candidate is not None and report.verdict == "PASS":
         return f"stops {criterion.candidate} only"
     return ""
+
+
+def not_asked(report: GateReport) -> tuple[str, ...]:
+    """What was left unasked, and who answers for it: it stands above what holds."""
+    return tuple(caveat for caveat in report.caveats if WAIVED.match(caveat))
 
 
 def tally(report: GateReport) -> str:

@@ -135,6 +135,5 @@ def _run(workspace: Path, home: Path, **variables: str) -> "subprocess.Completed
         env={**environment, "PREFECT_HOME": str(home / "prefect"), **variables},
         capture_output=True,
         text=True,
-        timeout=240,
         check=False,
     )

@@ -101,7 +101,7 @@ def test_a_killed_writer_frees_the_lock_and_its_rest_is_swept(tmp_path):
         with pytest.raises(BadInputError, match="held by another process"), output_folder(out):
             pass
         os.kill(holder.pid, signal.SIGKILL)
-        holder.wait(timeout=10)
+        holder.wait()
         time.sleep(0)
         assert not out.exists()
         with output_folder(out) as folder:
@@ -110,7 +110,7 @@ def test_a_killed_writer_frees_the_lock_and_its_rest_is_swept(tmp_path):
         assert names(out) == ["whole"]
     finally:
         holder.kill()
-        holder.wait(timeout=10)
+        holder.wait()
         holder.stdout.close()
 
 

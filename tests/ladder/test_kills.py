@@ -18,7 +18,6 @@ from flows.reproduce import stage_environment
 # reading, the work, the writing. Drawn once; the last ones are near the end on a quick machine.
 KILLS_PER_STAGE = 3
 DVC_STARTS_S = 2.0
-WRITES_WITHIN_S = 400.0
 STAGES = ("ingest", "audit", "gate_a", "shadow")
 
 
@@ -41,8 +40,7 @@ def kill_group(process: "subprocess.Popen[bytes]") -> None:
 
 def child_of(process: "subprocess.Popen[bytes]", stage: str) -> int:
     """The stage's interpreter, waited for."""
-    deadline = time.monotonic() + 60
-    while time.monotonic() < deadline:
+    while process.poll() is None:
         for folder in Path("/proc").glob("[0-9]*"):
             try:
                 command = (folder / "cmdline").read_bytes().split(b"\0")
@@ -59,9 +57,8 @@ def wait_for_writer(workspace: Path, stage: str, process: "subprocess.Popen[byte
     """Until the stage has opened its temporary folder; earlier dead ones do not count."""
     artifacts = workspace / "artifacts"
     dead = set(artifacts.glob(f".{stage}.tmp.*"))
-    deadline = time.monotonic() + WRITES_WITHIN_S
     while not set(artifacts.glob(f".{stage}.tmp.*")) - dead:
-        assert process.poll() is None and time.monotonic() < deadline, f"{stage} never wrote"
+        assert process.poll() is None, f"{stage} never wrote"
         time.sleep(0.01)
 
 
@@ -110,8 +107,7 @@ def test_a_stage_that_outlives_its_dvc_keeps_a_second_writer_out(copy: Path) -> 
         assert code == 2 and "one writer at a time" in said
     finally:
         os.kill(child, signal.SIGCONT)
-    deadline = time.monotonic() + 120
-    while Path(f"/proc/{child}").exists() and time.monotonic() < deadline:
+    while Path(f"/proc/{child}").exists():
         if b"Z (zombie)" in Path(f"/proc/{child}/status").read_bytes():
             break
         time.sleep(0.1)

@@ -69,7 +69,6 @@ def process() -> Callable[..., tuple[int, str]]:
             capture_output=True,
             text=True,
             check=False,
-            timeout=300,
             **options,
         )
         return done.returncode, done.stderr

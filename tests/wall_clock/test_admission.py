@@ -70,7 +70,7 @@ def test_one_that_never_ends_takes_no_other_and_lets_nobody_wait():
     assert thread.submit("first") and not thread.submit("second")
     assert thread.result() is None
     release.set()
-    assert wait_for(thread.result, "the result") == ("first", True)
+    assert wait_for(thread.result) == ("first", True)
 
 
 def test_one_that_cannot_be_judged_is_not_admitted_and_the_next_one_is():
@@ -81,6 +81,6 @@ def test_one_that_cannot_be_judged_is_not_admitted_and_the_next_one_is():
 
     thread = AdmissionThread(judged)
     thread.submit("bad")
-    assert wait_for(thread.result, "the result") == ("bad", None)
+    assert wait_for(thread.result) == ("bad", None)
     assert thread.failures == 1
-    assert thread.submit("good") and wait_for(thread.result, "the next") == ("good", "good")
+    assert thread.submit("good") and wait_for(thread.result) == ("good", "good")

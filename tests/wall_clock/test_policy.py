@@ -21,7 +21,7 @@ def test_an_answer_is_the_sample_of_that_observation(fleet, policy, data):
     seen = data.frames.observation[:2]
     outbox, inbox = Outbox(asks_w), Inbox(answers_r)
     outbox.send(Ask("0", seen, ("episode", "1")).encoded())
-    answer = read_answer(wait_for(inbox.read, "an answer")[0])
+    answer = read_answer(wait_for(inbox.read)[0])
     drawn = policy.sample(seen[None], noise_names=[("episode", "1")], candidates=1)
     assert answer.actions.tobytes() == np.ascontiguousarray(drawn.actions[0, 0]).tobytes()
     assert (answer.invocation, answer.method) == ("0", "flow")

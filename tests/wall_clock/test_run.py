@@ -107,7 +107,7 @@ def test_words_of_a_person_from_the_policy_are_no_words_of_a_person(pinned, stan
     """The policy resets, after the operator has stopped: nothing moves any more."""
     root = linked(pinned, tmp_path)
     running = begun(root, root / "run", standing, "operator")
-    wait_for(lambda: has(events(running.folder), "accept"), "an accepted command")
+    wait_for(lambda: has(events(running.folder), "accept"))
     assert running.say(Order.EMERGENCY_STOP, "spotter")
     seen = ended(running)
     assert seen.outcome["state"] == EMERGENCY
@@ -119,16 +119,16 @@ def test_words_of_a_person_from_the_policy_are_no_words_of_a_person(pinned, stan
 def test_a_stop_outlives_the_policy_and_ends_with_a_person(pinned, standing, tmp_path):
     root = linked(pinned, tmp_path)
     running = begun(root, root / "run", longer(standing, 3), "good")
-    wait_for(lambda: has(events(running.folder), "accept"), "an accepted command")
+    wait_for(lambda: has(events(running.folder), "accept"))
     running.say(Order.EMERGENCY_STOP, "spotter")
-    wait_for(lambda: has(events(running.folder), "supervisor"), "the stop")
+    wait_for(lambda: has(events(running.folder), "supervisor"))
     running.say(Order.RESET, "  ")  # a reset without a person
     running.say(Order.RESET, "spotter")
-    wait_for(lambda: has(events(running.folder), "supervisor", 2), "the reset")
+    wait_for(lambda: has(events(running.folder), "supervisor", 2))
     at = len(events(running.folder))
-    wait_for(lambda: has(events(running.folder)[at:], "accept"), "a command after the reset")
+    wait_for(lambda: has(events(running.folder)[at:], "accept"))
     running.say(Order.EMERGENCY_STOP, "spotter")
-    wait_for(lambda: has(events(running.folder), "supervisor", 3), "the second stop")
+    wait_for(lambda: has(events(running.folder), "supervisor", 3))
     running.policy.kill()
     seen = ended(running)
     assert seen.outcome["state"] == EMERGENCY and seen.outcome["policy_gone"]
@@ -140,7 +140,7 @@ def test_a_stop_outlives_the_policy_and_ends_with_a_person(pinned, standing, tmp
 def test_where_nobody_can_stop_it_any_more_it_stops(pinned, standing, tmp_path):
     root = linked(pinned, tmp_path)
     running = begun(root, root / "run", longer(standing, 20), "good")
-    wait_for(lambda: has(events(running.folder), "accept"), "an accepted command")
+    wait_for(lambda: has(events(running.folder), "accept"))
     running.operator.close()
     seen = ended(running)
     assert seen.outcome["state"] == EMERGENCY
@@ -167,7 +167,7 @@ def test_a_supervisor_that_was_paused_stops_before_anything_moves(pinned, standi
     """What it slept through is late and silent; the checker sees that nobody was there to hold."""
     root = linked(pinned, tmp_path)
     running = begun(root, root / "run", longer(standing, 3), "good")
-    wait_for(lambda: has(events(running.folder), "accept"), "an accepted command")
+    wait_for(lambda: has(events(running.folder), "accept"))
     running.supervisor.send_signal(signal.SIGSTOP)
     time.sleep(1.5 * SLOW["silence_stop_s"])
     running.supervisor.send_signal(signal.SIGCONT)
@@ -182,7 +182,7 @@ def test_a_supervisor_that_is_killed_leaves_a_journal_and_begins_stopped(
 ):
     root = linked(pinned, tmp_path)
     running = begun(root, root / "run", standing, "good")
-    wait_for(lambda: has(events(running.folder), "accept"), "an accepted command")
+    wait_for(lambda: has(events(running.folder), "accept"))
     running.supervisor.kill()
     with pytest.raises(GenpolicyError, match="died with -9"):
         running.wait(60.0)
@@ -200,7 +200,7 @@ def test_a_supervisor_that_is_killed_leaves_a_journal_and_begins_stopped(
     assert (after.supervisor(), after.outcome["accepted"]) == (["restarted"], 0)  # still stopped
 
     cleared = begun(root, root / "run", longer(standing, 3), "good")
-    wait_for(lambda: has(events(running.folder, 3), "supervisor"), "the restart")
+    wait_for(lambda: has(events(running.folder, 3), "supervisor"))
     cleared.say(Order.RESET, "spotter")
     seen = ended(cleared, number=3)
     assert seen.supervisor() == ["restarted", "human_reset"]

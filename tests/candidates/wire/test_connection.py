@@ -1,5 +1,4 @@
 import threading
-import time
 
 import numpy as np
 import pytest
@@ -87,9 +86,8 @@ def test_no_answer_in_time_is_late_and_what_comes_then_answers_nothing(serving):
             line.ask({"slow": 1}, timeout_s=0.05)
         assert error.value.fault is Fault.LATE
         slow.set()
-        until = time.monotonic() + 5
         seen = None
-        while seen is None and time.monotonic() < until:  # it comes some time
+        while seen is None:  # it comes some time
             try:
                 line.ask({"next": 1}, timeout_s=0.5)
             except PolicyError as later:

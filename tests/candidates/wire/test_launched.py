@@ -49,11 +49,8 @@ def test_it_runs_in_the_folder_of_its_entry_and_ends_with_all_that_it_started(en
         assert running.died() is None
         assert alive(said["pid"])
         assert alive(said["child"])
-    until = time.monotonic() + 10
-    while (alive(said["pid"]) or alive(said["child"])) and time.monotonic() < until:
+    while alive(said["pid"]) or alive(said["child"]):
         time.sleep(0.05)
-    assert not alive(said["pid"])
-    assert not alive(said["child"])
 
 
 def test_a_server_that_ends_at_once_is_told_with_its_last_words(entry_of, tmp_path):

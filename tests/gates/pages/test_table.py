@@ -1,5 +1,7 @@
 """What the page and the summary say about what decided: waived, counted, with units."""
 
+import html
+import re
 from types import SimpleNamespace
 
 import evidence
@@ -7,7 +9,7 @@ import pytest
 
 from gates.pages.page import index_page
 from gates.pages.summary import markdown
-from gates.pages.table import deciding, groups, passed_by, stops, tally, waived
+from gates.pages.table import deciding, groups, not_asked, passed_by, stops, tally, waived
 from gates.writing import write_gate
 
 
@@ -41,6 +43,36 @@ def test_a_candidate_that_stops_names_its_criterion(ladder):
         (ladder / "reports/gate_b.html").read_text(),
     ):
         assert "latency" in text and "required ≤ 1.5" in text
+
+
+def _waive(params):
+    del params["gate_a"]["limits"]["perception"]["calibration_residual_m"]
+    params["gate_a"]["not_applicable"] = {"perception": {"calibration_residual_m": "no camera"}}
+    params["gate_a"]["waived_checks"] = {"model": {"operator": "one person demonstrated"}}
+
+
+def test_who_answers_for_what_was_not_asked_stands_above_the_good_news(ladder):
+    """Wrong before: a waiver was the last line of a page that said PASS in its first."""
+    evidence.write_params(ladder, _waive)
+    report = write_gate(ladder, "A")
+    page = html.unescape((ladder / "reports/gate_a.html").read_text())
+    for text, below in ((page, "Read this page"), (plain_again(markdown(report)), "All 23")):
+        top = text[: text.index(below)]
+        assert "calibration_residual_m was not asked: the perception owner" in top
+        assert "operator need not be asked of the data: the model owner" in top
+        assert "(no camera)" in top and "(one person demonstrated)" in top
+    assert len(not_asked(report)) == 2
+
+
+def test_where_everything_was_asked_nobody_answers_for_a_gap(ladder):
+    report = write_gate(ladder, "A")
+    assert not_asked(report) == () and "Not asked" not in markdown(report)
+    assert "<dt>Not asked</dt>" not in (ladder / "reports/gate_a.html").read_text()
+
+
+def plain_again(text: str) -> str:
+    """A summary as a reader sees it."""
+    return html.unescape(re.sub(r"\\(.)", r"\1", text))
 
 
 @pytest.mark.parametrize("gate", "ABCD")
