@@ -253,7 +253,7 @@ def verify_card(
     else:
         print(f"{report.verdict}: {report.decision}")
         for c in report.criteria:
-            print(f"  {c.verdict:<14} {c.id}: {c.caveat}")
+            print(f"  {c.verdict:<14} {c.id}: {'; '.join(filter(None, (c.counted, c.caveat)))}")
     return 0 if report.verdict == "PASS" else 3
 
 

@@ -21,12 +21,15 @@ class Measured:
         interval: Its interval, if it has one.
         caveat: What the reader must know about it.
         pending: Set where only a person can supply the answer and has not yet.
+        counted: The independent units that the number rests on: "24 of 25 episodes"; empty for a
+            number that counts none.
     """
 
     value: float | None
     interval: tuple[float, float] | None = None
     caveat: str = ""
     pending: bool = False
+    counted: str = ""
 
 
 @dataclass(frozen=True)

@@ -237,6 +237,7 @@ def _answer(
         verdict=verdict,
         evidence=tuple(touched),
         caveat=caveat,
+        counted=measured.counted,
     )
 
 

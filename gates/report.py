@@ -13,7 +13,7 @@ from genpolicy.errors import BadInputError, ConfigError, IntegrityError
 from genpolicy.integrity.documents import canonical_json, parse_json
 from genpolicy.integrity.hashing import sha256_bytes_of
 
-SCHEMA_VERSION = 3
+SCHEMA_VERSION = 4
 
 Gate = Literal["A", "B", "C", "D", "E"]
 Owner = Literal["model", "perception", "controller", "safety"]
@@ -58,6 +58,7 @@ class Answer(StrictModel):
         reason: Why the limit is what it is.
         evidence: Files that were read for the number, relative to the repository.
         caveat: What the reader must know about this number.
+        counted: The independent units that the number rests on; empty where it counts none.
     """
 
     id: str
@@ -72,6 +73,7 @@ class Answer(StrictModel):
     verdict: Verdict
     evidence: tuple[str, ...]
     caveat: str
+    counted: str
 
 
 class GateReport(StrictModel):

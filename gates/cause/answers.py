@@ -46,6 +46,7 @@ class Answer:
         unit: Unit of both; empty for counts and shares.
         note: Where, or why it is not known.
         interval: Interval of the number, where it has one.
+        counted: The units that the number rests on; empty where it counts none.
     """
 
     question: str
@@ -57,6 +58,7 @@ class Answer:
     unit: str = ""
     note: str = ""
     interval: tuple[float, float] | None = None
+    counted: str = ""
 
     @property
     def holds(self) -> bool | None:

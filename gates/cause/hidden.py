@@ -102,6 +102,7 @@ def _answer(row: Stratum, limits: CauseLimits) -> Answer:
         limits["strata_effect"] if _held(row, limits) else None,
         note=f"{detail}{row.phase}, adjusted p {_number(row.p_adjusted):.3g}{unsure}",
         interval=(lower, upper) if math.isfinite(lower + upper) else None,
+        counted=f"{row.n} episodes",
     )  # fmt: skip
 
 

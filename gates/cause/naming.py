@@ -262,6 +262,7 @@ def _labels(numbers: Numbers, limits: CauseLimits) -> Named:
         if known
         else "no replay: labels are taken as they are",
         interval=ends if known else None,
+        counted=f"{labels.disagreements} of {labels.replays} replays",
     )
     if not answer.red:
         return [answer], None

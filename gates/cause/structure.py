@@ -149,6 +149,7 @@ def _seen(numbers: Numbers, limits: CauseLimits) -> Named:
         "episodes that keep their mode a chunk later, beyond what chance reaches in 95 of 100",
         kept.observed - kept.null_q95 if kept.n else None, limits["persistence_margin"], ">=",
         note=f"{kept.observed:.2f} against {kept.null_q95:.2f}" if kept.n else "not measured",
+        counted=f"{kept.n} situations",
     )  # fmt: skip
     persistent = Answer(
         "multimodal_situations", Topic.STRUCTURE, "situations whose modes persist",

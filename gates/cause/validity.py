@@ -170,7 +170,7 @@ def _success_of(who: str, successes: int, episodes: int, limits: CauseLimits) ->
         "mode_success_lower", Topic.VALIDITY, f"success of {who}, lower bound",
         ends[0] if known else None, limits["mode_success_lower"], ">=",
         note=f"{successes} of {episodes} succeed" if known else "not recorded",
-        interval=ends if known else None,
+        interval=ends if known else None, counted=f"{successes} of {episodes} episodes",
     )  # fmt: skip
 
 
@@ -184,6 +184,7 @@ def _feasible(mode: ModeOutcome, limits: CauseLimits) -> Answer:
         "mode_feasible_share", Topic.VALIDITY, f"feasible chunks of {mode.mode}",
         mode.admissible / mode.checked if known else None, limits["mode_feasible_share"], ">=",
         note=f"{mode.admissible} of {mode.checked}" if known else "no chunk was checked",
+        counted=f"{mode.admissible} of {mode.checked} chunks",
     )  # fmt: skip
 
 

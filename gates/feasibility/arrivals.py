@@ -21,7 +21,7 @@ from genpolicy.evidence.rows.shadow import ShadowCountRow, ShadowStubRow
 def stub_stale(evidence: Evidence, settings: FeasibilitySettings, candidate: str) -> Measured:
     """Stale actions that arrived at the stub."""
     bad, arrivals = _stub(evidence, settings, candidate, "stale")
-    return Measured(bad, caveat=f"of {arrivals:g} arrivals")
+    return Measured(bad, counted=f"{bad:g} of {arrivals:g} arrivals")
 
 
 def at_the_stub(rows: pd.DataFrame, *columns: str) -> tuple[float, float]:
@@ -68,7 +68,7 @@ def _stub(
 def stub_invalid(evidence: Evidence, settings: FeasibilitySettings, candidate: str) -> Measured:
     """Actions of no admitted chunk that arrived at the stub."""
     bad, arrivals = _stub(evidence, settings, candidate, "invalid")
-    return Measured(bad, caveat=f"of {arrivals:g} arrivals")
+    return Measured(bad, counted=f"{bad:g} of {arrivals:g} arrivals")
 
 
 @criterion(
@@ -100,7 +100,8 @@ def stub_violation_upper(
             f"{interval[1]:.4g} only"
         )
     text = f"{bad:g} of {observations:g} observations that delivered; exact upper bound"
-    return Measured(interval[1], interval, text)
+    counted = f"{bad:g} of {observations:g} observations"
+    return Measured(interval[1], interval, text, counted=counted)
 
 
 @criterion(

@@ -94,7 +94,8 @@ def mode_admissible_gap(
     interval, more, less = widest_gap(shares, confidence=settings.confidence)
     text = ", ".join(f"{m} {p['admissible'].mean():.4g} of {seen[m]}" for m, p in by_mode.items())
     text += f" episodes answered in several modes; upper bound of {more} minus {less}{said}"
-    return Measured(interval[1], interval, text)
+    counted = f"{min(seen.values())} episodes of the rarer mode"
+    return Measured(interval[1], interval, text, counted=counted)
 
 
 def _odd(rows: pd.DataFrame, settings: FeasibilitySettings) -> tuple[list[str], str]:
@@ -131,7 +132,7 @@ def admissible_share(evidence: Evidence, settings: FeasibilitySettings, candidat
         f"observations; lower bound over {episodes.nunique()} episodes, whose observations are "
         f"not independent{_unknown(rows)}"
     )
-    return Measured(lower, (lower, upper), text)
+    return Measured(lower, (lower, upper), text, counted=f"{episodes.nunique()} episodes")
 
 
 @criterion(
@@ -178,7 +179,8 @@ def _of_admissible(
         f"p95 {point:.4g}, largest {values.max():.4g}; {len(rows)} admissible candidates of "
         f"{rows['observation'].nunique()} held-out observations in {episodes.nunique()} episodes"
     )
-    return Measured(interval[1], interval, text)
+    counted = f"{episodes.nunique()} episodes"
+    return Measured(interval[1], interval, text, counted=counted)
 
 
 @criterion(
@@ -205,4 +207,5 @@ def corrupted_refused_share(
     text = f"{len(rows)} candidates of {rows['fixture'].nunique()} corrupted fixtures" + (
         f"; let through or refused without reason: {', '.join(through)}" if through else ""
     )
-    return Measured(float(refused.mean()), interval, text)
+    counted = f"{refused.sum()} of {len(rows)} candidates"
+    return Measured(float(refused.mean()), interval, text, counted=counted)

@@ -68,7 +68,7 @@ def as_the_cause(
     unit = numbers.metre if question in IN_METRES else 1.0
     text = "; ".join(filter(None, [answer.what, answer.note, also]))
     interval = answer.interval and (answer.interval[0] / unit, answer.interval[1] / unit)
-    return Measured(answer.measured / unit, interval, text)
+    return Measured(answer.measured / unit, interval, text, counted=answer.counted)
 
 
 def _limits(settings: NeedSettings) -> CauseLimits:

@@ -49,12 +49,14 @@ def told_share(evidence: Evidence, settings: NeedSettings) -> Measured:
     row = int(np.argmax(lower if beyond else upper))
     interval = (float(lower[row]), float(upper[row]))
     chosen = frame.iloc[row]
-    text = f"{chosen['variable']} in {chosen['phase']}, {chosen['n']} episodes that had a choice"
+    counted = f"{chosen['n']} episodes"
+    text = f"{chosen['variable']} in {chosen['phase']}, {counted} that had a choice"
     if beyond:
-        return Measured(interval[0], interval, f"{text}; lower end")
+        return Measured(interval[0], interval, f"{text}; lower end", counted=counted)
     if least - interval[1] >= 0:
-        return Measured(interval[1], interval, f"{text}; upper end")
-    return Measured(None, interval, f"not decided: the limit lies inside the interval of {text}")
+        return Measured(interval[1], interval, f"{text}; upper end", counted=counted)
+    text = f"not decided: the limit lies inside the interval of {text}"
+    return Measured(None, interval, text, counted=counted)
 
 
 @criterion(
@@ -91,4 +93,4 @@ def phase_collapse_share(evidence: Evidence, settings: NeedSettings) -> Measured
         f"episodes with modes: {without} without the phase, {seen} with it; upper bound. With "
         "one phase only both are the same, because there is nothing to look at"
     )
-    return Measured(interval[1], interval, text)
+    return Measured(interval[1], interval, text, counted=f"{lost} of {without} episodes")

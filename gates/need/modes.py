@@ -116,11 +116,12 @@ def mean_defeated_share(evidence: Evidence, settings: NeedSettings) -> Measured:
         confidence=settings.confidence,
         favourable=True,
     )
+    episodes = rows["episode_uuid"].nunique()
     text = (
-        f"share {share:.4g} of {len(rows)} situations; lower bound over "
-        f"{rows['episode_uuid'].nunique()} episodes, whose situations are not independent"
+        f"share {share:.4g} of {len(rows)} situations; lower bound over {episodes} episodes, whose "
+        f"situations are not independent; {_median(evidence, settings)}"
     )
-    return Measured(lower, (lower, upper), f"{text}; {_median(evidence, settings)}")
+    return Measured(lower, (lower, upper), text, counted=f"{episodes} episodes")
 
 
 def _median(evidence: Evidence, settings: NeedSettings) -> str:

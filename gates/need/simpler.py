@@ -64,12 +64,12 @@ def chunking_valid_share(evidence: Evidence, settings: NeedSettings) -> Measured
     method = settings.chunked_baseline
     rows = evidence.of(MODES, ModeRow, method)
     rows = rows[rows["convention"].isin(settings.deployed_conventions)]
-    share, lower, upper, count = valid_share(rows, confidence=settings.confidence)
+    share, lower, upper, (count, episodes) = valid_share(rows, confidence=settings.confidence)
     text = (
         f"{method} reaches a mode with an admissible chunk in {share:.4g} of {count} situations; "
         "upper bound over episodes"
     )
-    return Measured(upper, (lower, upper), text)
+    return Measured(upper, (lower, upper), text, counted=f"{episodes} episodes")
 
 
 @criterion(
@@ -102,9 +102,10 @@ def remedy_valid_share(evidence: Evidence, settings: NeedSettings) -> Measured:
             confidence=confidence,
             favourable=False,
         )
-        bounds.append((upper, lower, share, method, len(rows)))
+        sizes = (len(rows), rows["episode_uuid"].nunique())
+        bounds.append((upper, lower, share, method, sizes))
     *judged, shown = bounds
-    upper, lower, share, method, count = max(judged)
+    upper, lower, share, method, (count, episodes) = max(judged)
     each = ", ".join(f"{name} {value:.3g}" for _, _, value, name, _ in judged)
     text = (
         f"{method} with {share:.4g} of {count} situations, {settings.redraws} candidates each "
@@ -112,7 +113,7 @@ def remedy_valid_share(evidence: Evidence, settings: NeedSettings) -> Measured:
         f"{shown[3]} {shown[2]:.3g} (shown, not judged: with one valid mode it stays valid, and "
         "what it loses shows in motion, at Gate D)"
     )
-    return Measured(upper, (lower, upper), text)
+    return Measured(upper, (lower, upper), text, counted=f"{episodes} episodes")
 
 
 def redrawn_validity(rows: pd.DataFrame, *, redraws: int) -> Array:
@@ -132,8 +133,13 @@ def redrawn_validity(rows: pd.DataFrame, *, redraws: int) -> Array:
     return chance
 
 
-def valid_share(rows: pd.DataFrame, *, confidence: float) -> tuple[float, float, float, int]:
-    """Share of two-mode situations with valid samples only, its interval, and how many there are.
+def valid_share(
+    rows: pd.DataFrame, *, confidence: float
+) -> tuple[float, float, float, tuple[int, int]]:
+    """Share of two-mode situations with valid samples only, its interval, and what it is of.
+
+    Returns:
+        Share, lower end, upper end, and the numbers of situations and of their episodes.
 
     Valid: every sample passes all six layers, none lies between modes, some mode is reached.
 
@@ -148,7 +154,7 @@ def valid_share(rows: pd.DataFrame, *, confidence: float) -> tuple[float, float,
     share, lower, upper = share_interval(
         valid, list(rows["episode_uuid"]), confidence=confidence, favourable=False
     )
-    return share, lower, upper, len(rows)
+    return share, lower, upper, (len(rows), rows["episode_uuid"].nunique())
 
 
 @criterion(
@@ -182,9 +188,11 @@ def latent_dependence_p(evidence: Evidence, settings: NeedSettings) -> Measured:
         f"{worst.distance_correlation:.3g}; p-value of this training, with the interval that "
         f"{worst.permutations} permutations leave"
     )
+    counted = f"{worst.situations} situations"
     if upper > level and not shown:
-        return Measured(None, interval, f"not decided, neither a strategy nor a style: {text}")
-    return Measured(upper, interval, text)
+        undecided = f"not decided, neither a strategy nor a style: {text}"
+        return Measured(None, interval, undecided, counted=counted)
+    return Measured(upper, interval, text, counted=counted)
 
 
 @criterion(
@@ -228,14 +236,14 @@ def factor_valid_share(evidence: Evidence, settings: NeedSettings) -> Measured:
     bounds = []
     for name in names:
         rows = frame[frame["variant"] == name]
-        share, lower, upper, _ = valid_share(rows, confidence=confidence)
-        bounds.append((upper, lower, share, name))
-    upper, lower, share, name = max(bounds)
+        share, lower, upper, (_, episodes) = valid_share(rows, confidence=confidence)
+        bounds.append((upper, lower, share, name, episodes))
+    upper, lower, share, name, episodes = max(bounds)
     text = (
         f"largest of {len(names)} variants ({', '.join(names)}), {name} with {share:.4g}; upper "
         "bound over episodes, level divided among the variants; short training"
     )
-    return Measured(upper, (lower, upper), text)
+    return Measured(upper, (lower, upper), text, counted=f"{episodes} episodes")
 
 
 def _variants(evidence: Evidence) -> dict[str, TrainedVariant]:

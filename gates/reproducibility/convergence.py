@@ -71,14 +71,16 @@ def late_change_upper(
             gained.to_numpy(), samples.to_numpy(), confidence=settings.confidence
         )
         unseen = counted_interval(0.0, float(len(samples)), confidence=settings.confidence)[1]
-        found.append((max(-change[1], change[2], unseen), change, len(rows)))
-    upper, (point, low, high), situations = max(found)
+        sizes = (len(rows), len(samples))
+        found.append((max(-change[1], change[2], unseen), change, sizes))
+    upper, (point, low, high), (situations, episodes) = max(found)
     fall = last_quarter(evidence, GENERATORS, candidate, confidence=settings.confidence)
     text = (
         f"valid samples {point:+.4g} ({low:.4g} to {high:.4g}) at {situations} situations over the "
         f"last quarter; not judged: validation loss falls {_text(fall)}"
     )
-    return Measured(upper, (max(low, -high, 0.0), upper), text)
+    ends = (max(low, -high, 0.0), upper)
+    return Measured(upper, ends, text, counted=f"{episodes} episodes")
 
 
 def _valid(rows: pd.DataFrame) -> pd.DataFrame:
@@ -107,7 +109,7 @@ def baseline_fall_upper(evidence: Evidence, settings: ReproducibilitySettings) -
     upper, _, worst = max(found)
     each = "; ".join(f"{method} {_text(fall)}" for _, method, fall in found)
     text = each + (f"; no training of its own: {', '.join(foreign)}" if foreign else "")
-    return Measured(upper, worst.interval, text)
+    return Measured(upper, worst.interval, text, counted=f"{worst.episodes} episodes")
 
 
 def last_quarter(evidence: Evidence, root: str, method: str, *, confidence: float) -> Fall:

@@ -31,13 +31,14 @@ def mode_coverage_lower(
         reached = float((numbers(rows, "modes_covered") >= numbers(rows, "modes_present")).mean())
         found.append((lower, upper, int(hits.sum()), rows, reached))
     lower, upper, covered, rows, reached = min(found, key=lambda seed: seed[0])
+    episodes = rows["episode_uuid"].nunique()
     text = (
         f"in {covered} of {len(rows)} two-mode situations every mode gets at least "
         f"{settings.mode_minimum_share:g} of the samples, admissible; "
         f"one sample, whether or not it may be executed, reaches every mode in {reached:.4g}; "
-        f"lower bound over {rows['episode_uuid'].nunique()} episodes"
+        f"lower bound over {episodes} episodes"
     )
-    return Measured(lower, (lower, upper), text)
+    return Measured(lower, (lower, upper), text, counted=f"{episodes} episodes")
 
 
 @criterion(
@@ -59,13 +60,14 @@ def outside_modes_upper(
             confidence=settings.confidence,
             favourable=False,
         )
-        found.append((upper, lower, share, float(far.sum()), len(rows)))
-    upper, lower, share, far_away, situations = max(found)
+        sizes = (len(rows), rows["episode_uuid"].nunique())
+        found.append((upper, lower, share, float(far.sum()), sizes))
+    upper, lower, share, far_away, (situations, episodes) = max(found)
     text = (
         f"share {share:.4g} over {situations} two-mode situations, {far_away:g} samples far from "
         "every mode; upper bound over episodes"
     )
-    return Measured(upper, (lower, upper), text)
+    return Measured(upper, (lower, upper), text, counted=f"{episodes} episodes")
 
 
 def situations_of(evidence: Evidence, candidate: str, *, table: str = MODES) -> pd.DataFrame:

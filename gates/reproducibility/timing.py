@@ -77,7 +77,8 @@ def _ratio_of_runs(
     if limit is not None and limit.limit is not None and limit.limit > 1.0:
         spread = spread_found(limit.limit, len(first), confidence=settings.confidence)
         text += f"; equal runs pass in four of five if processes differ by {spread:.2g} at most"
-    return Measured(slower, interval=(least, slower), caveat=text)
+    counted = f"{len(first)} and {len(second)} processes"
+    return Measured(slower, (least, slower), text, counted=counted)
 
 
 def _least_stable(rows: pd.DataFrame, temperature: str) -> str:
@@ -130,17 +131,17 @@ def latency_model_ratio_upper(
     """
     asked = [(candidate, True), *((name, False) for name in settings.baselines)]
     found = [_held(evidence, settings, name, longer=longer) for name, longer in asked]
-    upper, interval, text = max(found)
-    return Measured(upper, interval=interval, caveat=text)
+    upper, interval, text, processes = max(found)
+    return Measured(upper, interval, text, counted=f"{processes} processes")
 
 
 def _held(
     evidence: Evidence, settings: ReproducibilitySettings, method: str, *, longer: bool
-) -> tuple[float, tuple[float, float], str]:
+) -> tuple[float, tuple[float, float], str, int]:
     """How much longer (or shorter) a method's processes took than was drawn of the others.
 
     Returns:
-        Upper end, interval, and both in words.
+        Upper end, interval, both in words, and the number of processes.
     """
     rows = evidence.of(MODEL, LatencyModelRow, method)
     high = rows[rows["level"] == P95]
@@ -156,4 +157,4 @@ def _held(
         f"{np.median(drawn) * MILLI:.4g} ms from the others: "
         f"{'took' if longer else 'drawn'} {ratio:.3g} of it"
     )
-    return upper, (lower, upper), text
+    return upper, (lower, upper), text, len(high)

@@ -4,6 +4,8 @@ Each must be within its limit in every planned condition. Where one rollout hold
 (ticks, invocations), the starts are drawn again, whole; where it holds one, the bound is exact.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 
@@ -86,7 +88,7 @@ def latency_p95_s(evidence: Evidence, settings: StressSettings, candidate: str) 
     if evidence.bind(f"{STRESS}/{DISTILLED.file}"):
         said = evidence.document(STRESS, DISTILLED).get(candidate)
         text = f"{text}; {spent(said)}" if said else text
-    return Measured(found.value, found.interval, text)
+    return replace(found, caveat=text)
 
 
 @criterion(
@@ -226,7 +228,7 @@ def force_peak_p95_n(evidence: Evidence, settings: StressSettings, candidate: st
 
     found = in_every_condition(rows, settings.perturbations, measure)
     text = f"{found.caveat}; contact on {touched} starts, largest {forces.max():.4g} N"
-    return Measured(found.value, found.interval, text)
+    return replace(found, caveat=text)
 
 
 @criterion(

@@ -39,7 +39,7 @@ def promotion_e_value(evidence: Evidence, settings: StressSettings, candidate: s
         f"lowest over baselines, against {baseline}: mean gain {gain:.4g} over "
         f"{settings.planned_starts} starts, margin {settings.margin:g}"
     )
-    return Measured(value, caveat=text)
+    return Measured(value, caveat=text, counted=f"{settings.planned_starts} starts")
 
 
 def best_baseline(evidence: Evidence, settings: StressSettings) -> str:

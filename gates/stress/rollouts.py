@@ -132,12 +132,14 @@ def in_every_condition(
     """
     found = []
     for condition in conditions:
-        point, lower, upper = measure(rows[rows["perturbation"] == condition], condition)
-        found.append((upper, lower, point, condition))
-    upper, lower, point, condition = max(found)
-    others = ", ".join(f"{name} {end:.4g}" for end, _, _, name in found if name != condition)
+        part = rows[rows["perturbation"] == condition]
+        point, lower, upper = measure(part, condition)
+        found.append((upper, lower, point, condition, part["start"].nunique()))
+    upper, lower, point, condition, starts = max(found)
+    others = ", ".join(f"{name} {end:.4g}" for end, _, _, name, _ in found if name != condition)
     text = f"worst in {condition}: {point:.4g}, bounded by {upper:.4g}"
-    return Measured(upper, (lower, upper), text + (f"; {others}" if others else ""))
+    text += f"; {others}" if others else ""
+    return Measured(upper, (lower, upper), text, counted=f"{starts} starts")
 
 
 def success_lower(
@@ -161,4 +163,4 @@ def success_lower(
         found.append((lower, upper, share, condition, part["start"].nunique()))
     lower, upper, share, condition, starts = min(found)
     text = f"{condition}: share {share:.4g}, lower bound over {starts} starts"
-    return Measured(lower, (lower, upper), text)
+    return Measured(lower, (lower, upper), text, counted=f"{starts} starts")

@@ -46,7 +46,8 @@ def recovery_success_lower(
         confidence=settings.confidence,
         favourable=True,
     )
-    found = (lower, (lower, upper), f"{share:.4g} of {len(begun)} recoveries on {starts} starts")
+    text = f"{share:.4g} of {len(begun)} recoveries on {starts} starts"
+    worst, found = lower, Measured(lower, (lower, upper), text, counted=f"{starts} starts")
     for condition, part in begun.groupby("perturbation"):
         own, low, high = share_interval(
             flags(part, "recovered"),
@@ -55,8 +56,10 @@ def recovery_success_lower(
             favourable=False,
         )
         text = f"worst in {condition}: {own:.4g} of {len(part)} recoveries, at best {high:.4g}"
-        found = min(found, (high, (low, high), text))
-    return Measured(*found)
+        if high < worst:
+            counted = f"{part['start'].nunique()} starts"
+            worst, found = high, Measured(high, (low, high), text, counted=counted)
+    return found
 
 
 @criterion(
@@ -71,7 +74,8 @@ def stub_violations(evidence: Evidence, settings: StressSettings, candidate: str
     rows = evidence.of(f"{STRESS}/stub.parquet", StressStubRow, candidate)
     require_played(rows, "perturbation", settings.perturbations)
     bad, arrivals = at_the_stub(rows, "stale", "invalid")
-    return Measured(bad, caveat=f"stale or invalid, of {arrivals:g} arrivals")
+    counted = f"{bad:g} of {arrivals:g} arrivals"
+    return Measured(bad, caveat="stale or invalid", counted=counted)
 
 
 @criterion(

@@ -28,6 +28,7 @@ def criterion(verdict: str, candidate: str | None = None, name: str = "x"):
         verdict=verdict,
         evidence=(),
         caveat="",
+        counted="",
     )
 
 

@@ -32,15 +32,16 @@ def rows(**changes):
     ],
 )  # fmt: skip
 def test_valid_is_a_reached_mode_and_every_sample_admissible(changes, share):
-    value, lower, upper, count = valid_share(rows(**changes), confidence=0.95)
-    assert (value, count) == (share, 10)
+    value, lower, upper, (count, episodes) = valid_share(rows(**changes), confidence=0.95)
+    assert (value, count, episodes) == (share, 10, 10)
     assert (lower, upper) == clopper_pearson(int(10 * share), 10, 0.95)
 
 
 def test_valid_share_counts_episodes_and_only_situations_with_two_modes():
     frame = pd.concat([rows(), rows(modes_present=1)])
-    assert valid_share(frame, confidence=0.95)[3] == 10
+    assert valid_share(frame, confidence=0.95)[3] == (10, 10)
     one = rows().assign(episode_uuid="same")
+    assert valid_share(one, confidence=0.95)[3] == (10, 1)
     assert valid_share(one, confidence=0.95)[1] == clopper_pearson(1, 1, 0.95)[0]
     with pytest.raises(MissingEvidenceError, match="two modes"):
         valid_share(rows(modes_present=1), confidence=0.95)

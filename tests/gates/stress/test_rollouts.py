@@ -104,12 +104,15 @@ def test_a_rollout_without_outcome_is_missing_evidence(ladder):
 
 
 def test_the_highest_bound_of_all_conditions_is_judged_and_the_others_are_said():
-    rows = pd.DataFrame({"perturbation": ["calm", "storm", "storm"], "value": [1.0, 2.0, 3.0]})
+    rows = pd.DataFrame(
+        {"perturbation": ["calm", *3 * ["storm"]], "start": [0, 0, 1, 1], "value": [1.0, 2, 3, 2.5]}
+    )
     found = in_every_condition(
         rows, ("calm", "storm"), lambda part, _: (part["value"].mean(), 0.0, part["value"].max())
     )
     assert (found.value, found.interval) == (3.0, (0.0, 3.0))
     assert found.caveat == "worst in storm: 2.5, bounded by 3; calm 1"
+    assert found.counted == "2 starts"
 
 
 def test_the_undisturbed_condition_alone_is_no_comparison(ladder):

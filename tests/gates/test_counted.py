@@ -1,0 +1,37 @@
+"""Every number with an interval says what it rests on, and the desk shows it."""
+
+import re
+
+import evidence
+import pytest
+
+from gates.proof import judge
+from gates.writing import write_gate, write_index
+
+UNITS = "episodes|situations|processes|observations|candidates|starts|replays"
+COUNTED = re.compile(rf"\d+( of \d+| and \d+)? ({UNITS})( of the rarer mode)?")
+
+
+@pytest.mark.parametrize("gate", "ABCD")
+def test_an_interval_says_how_many_independent_units_it_is_of(ladder, gate):
+    answers = [c for c in judge(ladder, gate).criteria if c.interval is not None]
+    assert answers
+    assert [c.id for c in answers if not COUNTED.fullmatch(c.counted)] == []
+
+
+def test_a_share_names_the_units_that_it_is_of(ladder):
+    """Half of the starts away: the count follows the evidence, not the plan."""
+    rows = {c.id: c for c in judge(ladder, "C").criteria if c.candidate == "flow"}
+    few = rows["stub_violation_upper"]
+    assert few.counted == "0 of 400 observations"
+    evidence.edit_table(ladder, "shadow/stub.parquet", lambda f: f.assign(delivered=399))
+    rows = {c.id: c for c in judge(ladder, "C").criteria if c.candidate == "flow"}
+    assert rows["stub_violation_upper"].counted == "0 of 399 observations"
+
+
+def test_the_desk_and_the_page_show_what_a_number_rests_on(ladder):
+    report = write_gate(ladder, "C")
+    write_index(ladder)
+    counted = next(c.counted for c in report.criteria if c.id == "admissible_share")
+    for page in ("index", "gate_c"):
+        assert counted in (ladder / f"reports/{page}.html").read_text()
