@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from gates.report import Gate, stage_of
+from gates.severity import PLACE, too_mild
 from genpolicy.errors import ConfigError
 
 REHEARSAL = "rehearsal"
@@ -46,19 +47,27 @@ def _counts(gate: Gate, reason: str, *criteria: str) -> list[Bound]:
 
 
 def _executed(gate: Gate) -> list[Bound]:
-    """Fixtures of the simulated cell that stop what went wrong."""
+    """Fixtures of the simulated cell that stop what went wrong, and what makes a chunk void."""
     silence = "a stub that goes on in silence executes what nobody commands any more"
     force = "the hardest contact that is simulated; beyond it no stop would ever be seen"
     return [
         Bound(gate, "execution.watchdog_s", "<=", 0.1, silence),
         Bound(gate, "execution.force_limit_n", "<=", HARDEST_CONTACT_N, force),
+        Bound(gate, "execution.maximum_age_s", "<=", 1.0, "a second ago the scene was another one"),
+        Bound(gate, "execution.maximum_divergence_m", "<=", 0.2, "the arm is where nobody planned"),
+        Bound(gate, "feasibility.position_change_limit_m", "<=", 0.1, "a chunk bent so far is new"),
     ]
 
 
 SHARED = ("confidence",)
 """Places that are settings of their own in `params.yaml`, and no criteria."""
+FOUND = "refused_recordings_accounted"
 PINNED = "what comes back otherwise than it was judged is another policy"
 BOUNDS: tuple[Bound, ...] = (
+    *_counts("A", "whoever trains on a defect of the data learns it", "data_defects"),
+    *_counts("A", "a recording that vanished may be the one that fails", FOUND),
+    *_counts("A", "a comparison with other settings compares nothing", "baselines_matched"),
+    Bound("A", "cause_accepted", ">=", 1.0, "modes of another cause are no reason for a generator"),
     *_counts("B", PINNED, "unpinned_items", "metadata_mismatches", "nfe_mismatch"),
     *_counts("B", "a NaN weight commands nothing that can be checked", "nonfinite_weights"),
     Bound("B", "samples_difference", "<=", 1e-5, f"{PINNED}; so much differs between machines"),
@@ -84,6 +93,10 @@ BOUNDS: tuple[Bound, ...] = (
         "the hardest contact that is simulated",
         True,
     ),
+    Bound("D", "deadline_miss_upper", "<=", 0.5, "late more often than not, it controls nothing"),
+    Bound("D", "hold_share_upper", "<=", 0.5, "it stands more than it acts"),
+    Bound("D", "fallback_share_upper", "<=", 0.5, "the fallback drives, not the policy"),
+    Bound("D", "stress_success_lower", ">=", 0.05, "what never works under stress withstood none"),
     Bound("D", "intervention_upper", "<=", 0.2, "more often a person drives, not the policy"),
     Bound("D", "reset_upper", "<=", 0.1, "each protective stop sends a person to the arm"),
     Bound("D", "verdict_reachable", ">=", 0.8, "a trial that seldom ends right proves nothing"),
@@ -232,6 +245,8 @@ def _keeps(value: object, bound: Bound) -> bool:
 def require_protection(params: Mapping[str, Any], gate: Gate) -> tuple[str, ...]:
     """Refuse settings that go beyond a bound.
 
+    Disturbances that are too mild to be one are refused by Gate D likewise.
+
     Returns:
         Caveats for the report; empty unless this is a rehearsal.
 
@@ -239,8 +254,10 @@ def require_protection(params: Mapping[str, Any], gate: Gate) -> tuple[str, ...]
         ConfigError: A looser setting, in a ladder that is no rehearsal.
     """
     beyond, absent = loosened(params, gate), lacking(params, gate)
+    milder = too_mild(params) if gate == "D" else []
     if is_rehearsal(params):
-        names = ", ".join([*(bound.place for bound, _ in beyond), *(n.place for n, _ in absent)])
+        places = [*(bound.place for bound, _ in beyond), *(named.place for named, _ in absent)]
+        names = ", ".join([*places, *(f"{PLACE}: {item.kind}" for item, _ in milder)])
         return (f"{REHEARSED} Looser: {names or 'none of this gate'}.",)
     for bound, value in beyond:
         raise ConfigError(
@@ -257,6 +274,13 @@ def require_protection(params: Mapping[str, Any], gate: Gate) -> tuple[str, ...]
             found=f"{found:.200}",
             expected=f"{what} {', '.join(named.names)}, because {named.reason}",
             action="Restore it. What it names stands in the code; a rehearsal may differ.",
+        )
+    for mildest, texts in milder:
+        raise ConfigError(
+            where=f"params.yaml: {PLACE}",
+            found=f"{texts:.200}",
+            expected=f"a condition of kind {mildest.kind} that hits: {mildest.reason}",
+            action="Plan a harder one. The least stands in the code; a rehearsal may differ.",
         )
     return ()
 

@@ -27,15 +27,22 @@ DEFAULTED = ("remedies", "conditioning_factors")
 """Settings of Gate A with a default in code."""
 # Where each bound lies, as it was decided. Moving one is a decision of its own: the reason for it
 # stands beside it in the code, that of the numbers from elsewhere here (ISO 10218-1: 0.25 m/s).
+EXECUTED = {
+    "execution.watchdog_s": 0.1, "execution.force_limit_n": 80, "execution.maximum_age_s": 1,
+    "execution.maximum_divergence_m": 0.2, "feasibility.position_change_limit_m": 0.1,
+}  # fmt: skip
 GOLDEN = {
+    "A": {"data_defects": 0, "refused_recordings_accounted": 0, "baselines_matched": 0,
+          "cause_accepted": 1},
     "B": {"unpinned_items": 0, "metadata_mismatches": 0, "nfe_mismatch": 0,
           "nonfinite_weights": 0, "samples_difference": 1e-5},
-    "C": {"execution.watchdog_s": 0.1, "execution.force_limit_n": 80, "gate_c.mode_observations":
-          30, "stub_stale": 0, "stub_invalid": 0, "checker_violations": 0, "mutants_undetected": 0,
+    "C": {**EXECUTED, "gate_c.mode_observations": 30, "stub_stale": 0,
+          "stub_invalid": 0, "checker_violations": 0, "mutants_undetected": 0,
           "conservation_error": 0, "incidents_miscounted": 0,
           "corrupted_refused_share": 1, "stub_violation_upper": 0.01},
     "D": {"stub_violations": 0, "checker_violations": 0, "conservation_error": 0,
-          "unmatched_starts": 0, "execution.watchdog_s": 0.1, "execution.force_limit_n": 80,
+          "unmatched_starts": 0, **EXECUTED, "deadline_miss_upper": 0.5,
+          "hold_share_upper": 0.5, "fallback_share_upper": 0.5, "stress_success_lower": 0.05,
           "force_peak_p95_n": 80, "intervention_upper": 0.2, "reset_upper": 0.1,
           "verdict_reachable": 0.8, "stress.starts": 59, "confidence": 0.9, "stress.alpha": 0.1,
           "stress.margin": 0, "stress.perturbations.envelope.speed_limit_m_s": 0.25},
@@ -46,7 +53,7 @@ GOLDEN = {
 
 
 def test_golden_where_each_bound_lies():
-    assert {gate: {b.place: b.bound for b in BOUNDS if b.gate == gate} for gate in "BCDE"} == GOLDEN
+    assert {gate: {b.place: b.bound for b in BOUNDS if b.gate == gate} for gate in GATES} == GOLDEN
     assert len(BOUNDS) == sum(map(len, GOLDEN.values()))
     assert [bound.place for bound in BOUNDS if bound.waivable] == ["force_peak_p95_n"]
 
@@ -227,6 +234,10 @@ def test_a_protective_criterion_cannot_be_waived_but_what_a_task_may_lack(bound)
         ("D", "verdict_reachable", 0), ("D", "stress.starts", 2),
         ("C", "execution.watchdog_s", 100.0), ("D", "execution.watchdog_s", 100.0),
         ("D", "execution.force_limit_n", {"open": 40.0, "touch": 1e6}),
+        ("D", "execution.maximum_age_s", {"default": 0.3, "insert": 5.0}),
+        ("C", "execution.maximum_divergence_m", 9.0), ("A", "data_defects", 99),
+        ("C", "feasibility.position_change_limit_m", 9.0), ("A", "cause_accepted", 0),
+        ("D", "deadline_miss_upper", 0.9), ("D", "stress_success_lower", 0.0),
     ],
 )  # fmt: skip
 def test_what_people_and_the_proof_rest_on_has_a_bound_in_code(gate, place, value, tmp_path):
@@ -279,5 +290,6 @@ def test_the_shipped_ladder_keeps_every_bound_and_the_smoke_ladder_is_a_rehearsa
     looser = {bound.place for gate in GATES for bound, _ in loosened(smoke, gate)}
     assert looser == {
         "stub_violation_upper", "stress.alpha", "stress.starts", "gate_c.mode_observations",
-        "verdict_reachable", "intervention_upper", "reset_upper",
+        "verdict_reachable", "intervention_upper", "reset_upper", "hold_share_upper",
+        "fallback_share_upper", "stress_success_lower",
     }  # fmt: skip
