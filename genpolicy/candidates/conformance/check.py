@@ -12,8 +12,10 @@ import numpy as np
 
 from genpolicy.candidates.conformance import findings as found
 from genpolicy.candidates.conformance.asked import Asked, asked_again
-from genpolicy.candidates.conformance.findings import Admissible, Finding
+from genpolicy.candidates.conformance.finding import Finding
+from genpolicy.candidates.conformance.findings import Admissible
 from genpolicy.candidates.conformance.recorded_starts import RecordedStarts
+from genpolicy.candidates.conformance.units import plausible
 from genpolicy.candidates.wire.faults import PolicyError
 from genpolicy.candidates.wire.remote import RemotePolicy
 from genpolicy.contract.chunk import actions_sha256
@@ -95,7 +97,7 @@ def check(
         found.admissible(first, starts, admissible),
         found.spans(told),
         found.in_time(first, deadline_s),
-        *found.plausible(first, starts),
+        *plausible(first, starts),
     ]
     return Conformance(
         policy.entry.name, len(starts), candidates, told.checkpoint, digest, tuple(findings)

@@ -2,56 +2,23 @@
 
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.candidates.conformance.asked import Asked
-from genpolicy.candidates.conformance.plausible import (
-    copied,
-    nearest,
-    shuffled_share,
-    slopes,
-    turned_away,
-)
+from genpolicy.candidates.conformance.finding import Finding, Judged
 from genpolicy.candidates.conformance.recorded_starts import RecordedStarts
 from genpolicy.candidates.wire.extension import Capabilities
 from genpolicy.contract.latency import Term
-from genpolicy.seeds import stream
 from genpolicy.statistics.intervals import clopper_pearson, order_statistic_interval
 
 Array = NDArray[np.float64]
-Judged = Literal["holds", "fails", "unknown"]
 Admissible = Callable[[Array, Array], tuple[bool, str]]
 """`(chunk (K, 10), newest observation (D_o,))`: whether it passes every layer, and why not."""
 
-FEWEST = 20
-"""Moments below which nothing is said of units: a slope of few is anything."""
-SAME_SCALE = 3.0
-"""A slope beyond a factor of three either way is another unit, sign or spread: a weak policy's
-slope is still nearer to 1, a wrong unit's is 10 times off."""
-KNOWS_THE_MOMENT = 0.001
 ONE_IN_TWO = 0.5
 SAMPLER_TERMS = (Term.PREPROCESS, Term.ENCODE, Term.SAMPLE)
-
-
-@dataclass(frozen=True)
-class Finding:
-    """One thing that was looked at.
-
-    Attributes:
-        name: Its name.
-        judged: Whether it holds.
-        gate: Letter of the gate that asks for it.
-        said: What was seen.
-    """
-
-    name: str
-    judged: Judged
-    gate: str
-    said: str
 
 
 def answers(asked: Asked, moments: int) -> Finding:
@@ -124,64 +91,6 @@ def evaluations(told: Capabilities) -> Finding:
     if told.counts_evaluations:
         return Finding("evaluations", "holds", "B", "it counts its network evaluations")
     return Finding("evaluations", "unknown", "B", "it does not say how often its network ran")
-
-
-def plausible(asked: Asked, starts: RecordedStarts) -> list[Finding]:
-    """Whether its chunks speak of the moment, in the units that were declared."""
-    names = ("follows_observation", "scale", "orientation", "own_answers")
-    rows = [row for row, one in sorted(asked.answers.items()) if np.isfinite(one.actions).all()]
-    if len(rows) < FEWEST:
-        said = f"{len(rows)} finite answers, {FEWEST} are needed"
-        return [Finding(name, "unknown", "D", said) for name in names]
-    drawn = np.stack([asked.answers[row].actions for row in rows])
-    recorded = starts.chunks[rows]
-    chunks = nearest(drawn, recorded)
-    share = shuffled_share(drawn, recorded, rng=stream(0, "conformance", "shuffle"))
-    copies = copied(drawn, recorded)
-    return [
-        Finding(
-            names[0], "holds" if share <= KNOWS_THE_MOMENT else "fails", "D",
-            f"as near to other moments' recordings in {share:.4f} of the shuffles, at most "
-            f"{KNOWS_THE_MOMENT}",
-        ),
-        _scale(chunks, recorded, follows=share <= KNOWS_THE_MOMENT),
-        _turned(chunks, recorded),
-        Finding(
-            names[3], "fails" if copies else "holds", "D",
-            f"{copies} of {len(rows)} moments answered with the recording itself",
-        ),
-    ]  # fmt: skip
-
-
-def _scale(chunks: Array, recorded: Array, *, follows: bool) -> Finding:
-    found = slopes(chunks, recorded, rng=stream(0, "conformance", "slopes"))
-    text = ", ".join(
-        f"{one.name} {one.slope:.3g} ({one.low:.3g} to {one.high:.3g})" for one in found
-    )
-    said = f"recorded per declared unit, 1 is right: {text}"
-    if not found:
-        return Finding("scale", "unknown", "D", "nothing moves in the recordings")
-    wrong = [
-        one.name for one in found
-        if np.isnan(one.slope) or one.high < 1.0 / SAME_SCALE or one.low > SAME_SCALE
-    ]  # fmt: skip
-    if wrong:
-        return Finding("scale", "fails", "D", f"{said}; wrong: {', '.join(wrong)}")
-    inside = all(one.low >= 1.0 / SAME_SCALE and one.high <= SAME_SCALE for one in found)
-    # Of many chunks that know nothing the nearest lie on the line too.
-    return Finding("scale", "holds" if inside and follows else "unknown", "D", said)
-
-
-def _turned(chunks: Array, recorded: Array) -> Finding:
-    off, compared = turned_away(chunks, recorded)
-    low, high = clopper_pearson(off, compared)
-    judged: Judged = "unknown"
-    if low > ONE_IN_TWO:
-        judged = "fails"
-    elif high < ONE_IN_TWO:
-        judged = "holds"
-    said = f"at {off} of {compared} turned farther from the recording than recordings are apart"
-    return Finding("orientation", judged, "D", said)
 
 
 def admissible(asked: Asked, starts: RecordedStarts, passes: Admissible | None) -> Finding:

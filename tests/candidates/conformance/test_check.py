@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation as Turn
 from genpolicy.candidates.conformance.check import check
 from genpolicy.candidates.wire.extension import WORD
 from genpolicy.candidates.wire.remote import RemotePolicy
-from genpolicy.contract.action import GRIPPER
-from genpolicy.contract.rotation import rotation_from_6d
+from genpolicy.contract.action import GRIPPER, ROTATION
+from genpolicy.contract.rotation import rotation_from_6d, rotation_to_6d
 from genpolicy.seeds import counter_noise
 
 SERVED = {
@@ -119,6 +119,45 @@ class ClosedGripper(Honest):
         return chunk
 
 
+class OtherOrigin(Honest):
+    """Measures places from a point that lies five centimetres aside."""
+
+    def chunk(self, row, noise):
+        return super().chunk(row, noise) + np.array([0.0, 0.05, *[0.0] * 8])
+
+
+class Turned(Honest):
+    """Its tool is mounted twenty degrees off."""
+
+    def chunk(self, row, noise):
+        chunk = super().chunk(row, noise)
+        turn = Turn.from_euler("z", 20, degrees=True).as_matrix()
+        chunk[:, ROTATION] = rotation_to_6d(rotation_from_6d(chunk[:, ROTATION]) @ turn)
+        return chunk
+
+
+class Exchanged(Honest):
+    def chunk(self, row, noise):
+        return super().chunk(row, noise)[:, [1, 0, *range(2, 10)]]
+
+
+class OtherWay(Honest):
+    """Goes to the other side of where the robot stands than was done: another mode."""
+
+    def chunk(self, row, noise):
+        chunk = super().chunk(row, noise)
+        side = self.starts.measured[row, 1]
+        chunk[:, 1] = side - (chunk[:, 1] - side)
+        return chunk
+
+
+class NoisyGripper(Honest):
+    def chunk(self, row, noise):
+        chunk = super().chunk(row, noise)
+        chunk[:, GRIPPER] += 0.005 * counter_noise(("gripper", *noise), shape=(1,))
+        return chunk
+
+
 class NotANumber(Honest):
     def chunk(self, row, noise):
         return super().chunk(row, noise) + (np.nan if row == 3 else 0.0)
@@ -214,12 +253,16 @@ def test_an_honest_candidate_holds_in_everything_that_can_be_said(checked, start
         (OtherName, {"answers", "repeats", "restarts", "seeded"}, {"B"}),
         (OtherWeights, {"restarts"}, {"B"}),
         (RecordedFuture, {"own_answers"}, {"D"}),
-        (IgnoresObservation, {"follows_observation", "scale"}, {"D"}),  # its gripper stands
+        # Its gripper stands, and its hand is turned as at one moment only.
+        (IgnoresObservation, {"follows_observation", "scale", "orientation"}, {"D"}),
         (Millimetres, {"scale"}, {"D"}),
         (Mirrored, {"scale"}, {"D"}),
         (Spread, {"scale"}, {"D"}),
         (Narrow, {"scale"}, {"D"}),
         (ClosedGripper, {"scale"}, {"D"}),
+        (OtherOrigin, {"origin"}, {"D"}),
+        (Turned, {"orientation"}, {"D"}),
+        (Exchanged, {"origin"}, {"D"}),
         (NotANumber, {"answers"}, {"B"}),
         (Fails, {"answers"}, {"B"}),
     ],
@@ -228,6 +271,13 @@ def test_a_planted_wrong_is_stopped_for_its_reason(checked, starts, planted, fai
     found = checked(planted(starts))
     assert {finding.name for finding in found.failed} == fails
     assert {finding.gate for finding in found.failed} == gates
+
+
+@pytest.mark.parametrize("planted", [OtherWay, NoisyGripper])
+def test_another_way_and_a_noisy_gripper_are_no_wrong(checked, starts, planted):
+    found = checked(planted(starts))
+    assert found.failed == []
+    assert judged(found)["origin"] == "holds"
 
 
 def test_a_wrong_order_of_a_quaternion_is_stopped(checked, starts):
@@ -301,11 +351,11 @@ def test_what_was_not_started_here_cannot_be_started_again(checked, starts):
 def test_of_few_moments_nothing_is_said_about_units(checked, starts):
     few = replace(
         starts, observations=starts.observations[:19], chunks=starts.chunks[:19],
-        episodes=starts.episodes[:19],
+        episodes=starts.episodes[:19], measured=starts.measured[:19],
     )  # fmt: skip
     found = judged(checked(Millimetres(starts), moments=few))
-    names = ("follows_observation", "scale", "orientation", "own_answers")
-    assert [found[name] for name in names] == ["unknown"] * 4
+    names = ("follows_observation", "scale", "origin", "orientation", "own_answers")
+    assert [found[name] for name in names] == ["unknown"] * 5
 
 
 def test_how_many_moments_have_a_chunk_that_passes_every_layer(checked, starts):
