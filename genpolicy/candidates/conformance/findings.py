@@ -18,6 +18,11 @@ Admissible = Callable[[Array, Array], tuple[bool, str]]
 """`(chunk (K, 10), newest observation (D_o,))`: whether it passes every layer, and why not."""
 
 ONE_IN_TWO = 0.5
+CLOCKS_APART = 1e-3
+"""Part by which the clocks of two machines may run apart, and more than any two do."""
+MESSAGE_S = 0.01
+"""What reading and writing a message may take beside the terms, a busy machine allowed for:
+`serve-policy` takes 1 to 3 ms."""
 SAMPLER_TERMS = (Term.PREPROCESS, Term.ENCODE, Term.SAMPLE)
 
 
@@ -77,20 +82,38 @@ def seeded(told: Capabilities, repeats: Finding, asked: Asked) -> Finding:
     return Finding("seeded", repeats.judged, "B", said)
 
 
-def unchanged(digest: str | None, earlier: str | None) -> Finding:
-    """Whether it answers as in an earlier check."""
+def unchanged(digest: str | None, earlier: str | None, *, complete: bool) -> Finding:
+    """Whether it answers as in an earlier check; `complete` where nothing was left unanswered."""
     if earlier is None:
         return Finding("unchanged", "unknown", "B", "no earlier check was named (--earlier)")
+    if not complete:
+        return Finding("unchanged", "unknown", "B", "not all that is compared was answered")
     if digest == earlier:
         return Finding("unchanged", "holds", "B", "it answers as in the earlier check")
     return Finding("unchanged", "fails", "B", "it answers otherwise than in the earlier check")
 
 
-def evaluations(told: Capabilities) -> Finding:
-    """Whether it counts how often its network ran."""
-    if told.counts_evaluations:
-        return Finding("evaluations", "holds", "B", "it counts its network evaluations")
-    return Finding("evaluations", "unknown", "B", "it does not say how often its network ran")
+def evaluations(told: Capabilities, first: Asked, again: Asked) -> Finding:
+    """Whether it counts how often its network ran, alike for equal noise."""
+    if not told.counts_evaluations:
+        return Finding("evaluations", "unknown", "B", "it does not say how often its network ran")
+    other = [
+        f"{first.answers[row].evaluations} and {answer.evaluations}"
+        for row, answer in again.answers.items()
+        if answer.evaluations != first.answers[row].evaluations
+    ]
+    if other:
+        said = f"it counts otherwise for the same noise at {len(other)} moments: {other[0]}"
+        return Finding("evaluations", "fails", "B", said)
+    counts = {one.evaluations for one in first.answers.values() if one.evaluations is not None}
+    if not counts:
+        return Finding("evaluations", "unknown", "B", "nothing was answered")
+    said = f"it counts {_range(counts)} for a sample, which nobody else can"
+    return Finding("evaluations", "holds", "B", said)
+
+
+def _range(counts: set[int]) -> str:
+    return f"{min(counts)}" if len(counts) == 1 else f"{min(counts)} to {max(counts)}"
 
 
 def admissible(asked: Asked, starts: RecordedStarts, passes: Admissible | None) -> Finding:
@@ -117,13 +140,53 @@ def admissible(asked: Asked, starts: RecordedStarts, passes: Admissible | None) 
     return Finding("admissible", judged, "C", said)
 
 
-def spans(told: Capabilities) -> Finding:
-    """Whether it measures its own latency terms."""
+def spans(told: Capabilities, asked: Asked, wire: list[float]) -> Finding:
+    """Whether it measures its own latency terms, and what it says can be.
+
+    Its terms together are shorter than the answer took. What is longer than they are is the wire
+    and the writing of messages; where that is most of it, at most moments, the terms leave
+    something out.
+
+    Args:
+        told: What it says that it measures.
+        asked: Its answers.
+        wire: Round trips of a ping, s; empty where none was answered.
+    """
     missing = [str(term) for term in SAMPLER_TERMS if term not in told.spans]
     if missing:
         said = f"it does not measure {', '.join(missing)}: unknown, not zero"
         return Finding("spans", "unknown", "C", said)
-    return Finding("spans", "holds", "C", f"it measures {', '.join(told.spans)}")
+    answers = list(asked.answers.values())
+    if not answers:
+        return Finding("spans", "unknown", "C", "nothing was answered")
+    lasted = np.array([one.seconds for one in answers])
+    claimed = np.array([sum(one.spans_s.values()) for one in answers])
+    impossible = int(np.sum(claimed > lasted * (1.0 + CLOCKS_APART)))
+    if impossible:
+        at = int(np.argmax(claimed - lasted))
+        said = (
+            f"at {impossible} of {len(answers)} moments its terms are longer than the answer "
+            f"took: {1e3 * claimed[at]:.3g} of {1e3 * lasted[at]:.3g} ms"
+        )
+        return Finding("spans", "fails", "C", said)
+    messages = np.array([one.messages for one in answers])
+    besides = lasted - claimed - messages * (max(wire, default=0.0) + MESSAGE_S)
+    low, _ = order_statistic_interval(besides - claimed, ONE_IN_TWO)
+    said = (
+        f"it measures {', '.join(told.spans)}: {1e3 * float(np.median(claimed)):.3g} of "
+        f"{1e3 * float(np.median(lasted)):.3g} ms; {_wire(wire)}"
+    )
+    if low <= 0.0:
+        return Finding("spans", "holds", "C", said)
+    # Without a ping it may be the wire that takes so long.
+    judged: Judged = "fails" if wire else "unknown"
+    return Finding("spans", judged, "C", f"{said}; most of the time is in none of them")
+
+
+def _wire(wire: list[float]) -> str:
+    if not wire:
+        return "it answers no ping"
+    return f"a ping takes up to {1e3 * max(wire):.3g} ms"
 
 
 def in_time(asked: Asked, deadline_s: float) -> Finding:
