@@ -1,12 +1,11 @@
 """`genpolicy check-candidate` and `genpolicy serve-policy`: a policy in a process of its own."""
 
 import json
-import tempfile
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from genpolicy.candidates.conformance.check import Conformance, check
+from genpolicy.candidates.conformance.check import Conformance, Question, check, question
 from genpolicy.candidates.conformance.findings import Admissible
 from genpolicy.candidates.conformance.recorded_starts import (
     RecordedStarts,
@@ -58,13 +57,14 @@ def run_check(path: Path, options: CheckOptions, *, as_json: bool) -> int:
         PolicyError: The policy's process does not start.
     """
     entry = read_entry(path)
-    earlier = _earlier(options.earlier)
     data = load_dataset(options.dataset)
     require_contract(data, entry.horizons, candidate=entry.name)
     contract = observation_contract(data)
     starts = recorded_starts(data, entry.horizons)
     checks = task_checks(data, task=None, chunk_steps=entry.horizons.prediction_horizon)
-    asked = _Asked(starts, options, earlier, checks.admissible)
+    what = question(starts, dataset=data.manifest_sha256, candidates=options.candidates)
+    earlier = _earlier(options.earlier, what)
+    asked = _Asked(starts, what, options.deadline_s, earlier, checks.admissible)
     folder = path.resolve().parent
     verify_files(entry, folder)
     found = _found(entry, folder, contract, asked)
@@ -77,21 +77,19 @@ def _found(
 ) -> Conformance:
     """Of a server that is started here, if it is to be, and ended in any case."""
     with ExitStack() as stack:
-        log = Path(stack.enter_context(tempfile.TemporaryDirectory())) / "server.log"
-        running = stack.enter_context(Launched(entry, folder, log))
+        running = stack.enter_context(Launched(entry, folder))
 
-        def policy_at(address: str) -> RemotePolicy:
-            policy = RemotePolicy(entry, address, contract)
+        def policy_of(server: Launched) -> RemotePolicy:
+            policy = RemotePolicy(entry, server.address, contract, ended=server.died)
             stack.callback(policy.close)
             return policy
 
         def restarted() -> RemotePolicy:
             running.end()
-            return policy_at(stack.enter_context(Launched(entry, folder, log)).address)
+            return policy_of(stack.enter_context(Launched(entry, folder)))
 
         return check(
-            policy_at(running.address), asked.starts,
-            candidates=asked.options.candidates, deadline_s=asked.options.deadline_s,
+            policy_of(running), asked.starts, asked=asked.what, deadline_s=asked.deadline_s,
             restarted=restarted if entry.command is not None else None, earlier=asked.earlier,
             admissible=asked.admissible,
         )  # fmt: skip
@@ -100,31 +98,43 @@ def _found(
 @dataclass(frozen=True)
 class _Asked:
     starts: RecordedStarts
-    options: CheckOptions
+    what: Question
+    deadline_s: float
     earlier: str | None
     admissible: Admissible | None
 
 
-def _earlier(path: Path | None) -> str | None:
+def _earlier(path: Path | None, now: Question) -> str | None:
+    """The answers of an earlier check, if it asked the same."""
     if path is None:
         return None
     said = read_json(path)
     digest = said.get("answers_sha256") if isinstance(said, dict) else None
-    if not isinstance(digest, str):
+    before = said.get("asked") if isinstance(said, dict) else None
+    if not isinstance(digest, str) or not isinstance(before, dict):
         raise BadInputError(
             where=str(path),
             found="no report of a check whose answers repeated",
             expected="what `genpolicy check-candidate --json` printed, with answers_sha256",
             action="Name the report of an earlier check.",
         )
+    for name, value in asdict(now).items():
+        if before.get(name) != value:
+            raise BadInputError(
+                where=f"{path}: asked.{name}",
+                found=f"{before.get(name)!r}",
+                expected=f"{value!r}, as is asked now",
+                action="Check on the dataset of the earlier check, with its --candidates; answers "
+                "to other questions are not to be compared.",
+            )
     return digest
 
 
 def _text(found: Conformance) -> str:
     width = max(len(finding.name) for finding in found.findings)
     lines = [
-        f"{found.candidate}: {found.candidates} chunks at each of {found.moments} recorded moments,"
-        " each of another episode.",
+        f"{found.candidate}: {found.asked.candidates} chunks at each of {found.asked.moments} "
+        "recorded moments, each of another episode.",
         f"Serves {found.checkpoint or 'an unknown checkpoint'}; its answers are "
         f"{found.answers_sha256 or 'not the same twice'}.",
         "",

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 
-from genpolicy.candidates.conformance.recorded_starts import RecordedStarts
+from genpolicy.candidates.conformance.recorded_starts import RecordedStarts, measured
 from genpolicy.candidates.wire.connection import Listening
 from genpolicy.candidates.wire.entry import ServerEntry
 
@@ -62,7 +62,7 @@ def serving():
 
 
 @pytest.fixture(scope="session")
-def starts(data):
+def starts(data, task):
     """Four moments of each of ten episodes; more of an episode than the kit itself takes."""
     cut = data.windows("train", 2, 16)
     parts = [data.windows(split, 2, 16) for split in ("validation", "test")]
@@ -70,4 +70,7 @@ def starts(data):
     chunks = np.concatenate([cut.actions, *(part.actions for part in parts)])
     whole = np.flatnonzero(~np.concatenate([cut.is_pad, *(part.is_pad for part in parts)]).any(1))
     rows = whole[np.linspace(0, len(whole) - 1, num=40).astype(int)]
-    return RecordedStarts(observations[rows], chunks[rows], np.array([str(row) for row in rows]))
+    return RecordedStarts(
+        observations[rows], chunks[rows], np.array([str(row) for row in rows]),
+        measured(observations[rows], task.observation),
+    )  # fmt: skip

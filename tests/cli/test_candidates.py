@@ -74,8 +74,8 @@ def test_the_docs_commands_as_written(checked, dataset, capsys):
     assert "genpolicy check-candidate candidate.yaml --earlier checked.json" in DOCS.read_text()
     # Three held-out episodes of this dataset say nothing of units, and bound no percentile.
     unknown = {
-        "follows_observation", "scale", "orientation", "own_answers", "unchanged", "in_time",
-        "admissible",
+        "follows_observation", "scale", "origin", "orientation", "own_answers", "unchanged",
+        "in_time", "admissible",
     }  # fmt: skip
     holds = {"answers", "repeats", "restarts", "seeded", "evaluations", "spans"}
     assert {finding["name"]: finding["judged"] for finding in report_of(checked)["findings"]} == {
@@ -102,6 +102,26 @@ def test_another_checkpoint_behind_the_same_entry_is_told(folder, checked, fleet
     code = run(folder, dataset, "--deadline", "5", "--earlier", str(checked / "checked.json"))
     assert code == 3
     assert "Refused: unchanged (gate B)." in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("candidates", 8, ("--candidates", "4")),
+        ("moments", 80, ()),
+        ("dataset", "0" * 64, ()),
+        ("observations_sha256", "0" * 64, ()),
+    ],
+)
+def test_answers_to_another_question_are_not_compared(
+    checked, dataset, tmp_path, capsys, name, value, words
+):
+    report = report_of(checked)
+    report["asked"][name] = value
+    path = tmp_path / "checked.json"
+    path.write_text(json.dumps(report))
+    said = refused(capsys, run(checked, dataset, *words, "--earlier", str(path)))
+    assert f"asked.{name} is {value!r}, expected " in said
 
 
 @pytest.mark.parametrize(
@@ -134,6 +154,8 @@ def test_no_dataset_and_no_report(folder, dataset, tmp_path, capsys):
     assert "manifest.json is not readable" in refused(capsys, run(folder, tmp_path / "none"))
     wrong = tmp_path / "wrong.json"
     wrong.write_text('{"answers_sha256": null}')
+    assert "no report of a check" in refused(capsys, run(folder, dataset, "--earlier", str(wrong)))
+    wrong.write_text(json.dumps({"answers_sha256": "0" * 64, "moments": 3, "candidates": 8}))
     assert "no report of a check" in refused(capsys, run(folder, dataset, "--earlier", str(wrong)))
 
 

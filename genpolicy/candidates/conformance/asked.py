@@ -11,6 +11,10 @@ AGAIN = 16
 """Moments that are asked a second time, and after a new start."""
 
 
+PINGS = 9
+"""Of which the longest is what the wire may take."""
+
+
 class Asked:
     """Answers by moment.
 
@@ -40,9 +44,32 @@ class Asked:
 def asked_again(
     policy: RemotePolicy, starts: RecordedStarts, first: Asked, candidates: int
 ) -> Asked:
-    """Some of the moments a second time, last one first, on a line of its own."""
+    """Some of the moments a second time, last one first, on a line of its own.
+
+    Which ones does not depend on the answers; who gave none at first has none to repeat.
+    """
     policy.close()
     asked = Asked()
-    for row in sorted(first.answers, reverse=True)[:: max(1, len(first.answers) // AGAIN)]:
-        asked.ask(policy, starts, row, candidates)
+    for row in reversed(repeated(len(starts))):
+        if row in first.answers:
+            asked.ask(policy, starts, row, candidates)
     return asked
+
+
+def repeated(moments: int) -> list[int]:
+    """The moments that are asked again."""
+    return list(range(moments))[:: max(1, moments // AGAIN)]
+
+
+def round_trips(policy: RemotePolicy) -> list[float]:
+    """How long the wire itself takes, s, a few times; none where pings are not answered."""
+    found: list[float] = []
+    for _ in range(PINGS):
+        try:
+            lasted = policy.round_trip_s()
+        except PolicyError:
+            return []  # what is wrong will be seen when it is asked
+        if lasted is None:
+            return []
+        found.append(lasted)
+    return found

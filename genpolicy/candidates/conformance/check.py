@@ -11,12 +11,38 @@ from typing import Any
 import numpy as np
 
 from genpolicy.candidates.conformance import findings as found
-from genpolicy.candidates.conformance.asked import Asked, asked_again
-from genpolicy.candidates.conformance.findings import Admissible, Finding
+from genpolicy.candidates.conformance.asked import Asked, asked_again, repeated, round_trips
+from genpolicy.candidates.conformance.finding import Finding
+from genpolicy.candidates.conformance.findings import Admissible
 from genpolicy.candidates.conformance.recorded_starts import RecordedStarts
+from genpolicy.candidates.conformance.units import plausible
 from genpolicy.candidates.wire.faults import PolicyError
 from genpolicy.candidates.wire.remote import RemotePolicy
 from genpolicy.contract.chunk import actions_sha256
+from genpolicy.integrity.hashing import sha256_bytes
+
+
+@dataclass(frozen=True)
+class Question:
+    """What a candidate is asked.
+
+    Attributes:
+        dataset: SHA-256 of the manifest of the dataset.
+        moments: Recorded moments, each of another episode.
+        candidates: Chunks asked for at each.
+        observations_sha256: Of the observations at the moments that are asked twice.
+    """
+
+    dataset: str
+    moments: int
+    candidates: int
+    observations_sha256: str
+
+
+def question(starts: RecordedStarts, *, dataset: str, candidates: int) -> Question:
+    """What is asked of whoever is checked at these moments."""
+    again = np.ascontiguousarray(starts.observations[repeated(len(starts))])
+    return Question(dataset, len(starts), candidates, sha256_bytes(again.tobytes()))
 
 
 @dataclass(frozen=True)
@@ -25,17 +51,15 @@ class Conformance:
 
     Attributes:
         candidate: Its name.
-        moments: Recorded moments that it was asked about, each of another episode.
-        candidates: Chunks asked for at each.
+        asked: What it was asked; answers to something else are not to be compared.
         checkpoint: What it says that it serves; None where it does not.
         answers_sha256: Of its chunks at the moments that were asked twice: what it is, by what it
-            does. None where it did not repeat itself.
+            does. None where it did not repeat itself, or left one out.
         findings: In the order of the gates.
     """
 
     candidate: str
-    moments: int
-    candidates: int
+    asked: Question
     checkpoint: str | None
     answers_sha256: str | None
     findings: tuple[Finding, ...]
@@ -54,7 +78,7 @@ def check(
     policy: RemotePolicy,
     starts: RecordedStarts,
     *,
-    candidates: int,
+    asked: Question,
     deadline_s: float,
     restarted: Callable[[], RemotePolicy] | None,
     earlier: str | None = None,
@@ -65,12 +89,14 @@ def check(
     Args:
         policy: Behind the wire.
         starts: Moments.
-        candidates: N, chunks of an invocation.
+        asked: What is asked; see `question`.
         deadline_s: What an answer may take, s.
         restarted: Ends its process and starts another; None where we did not start it.
         earlier: `answers_sha256` of an earlier check; None for none.
         admissible: Whether a chunk passes every layer of the task; None where there is none.
     """
+    candidates = asked.candidates
+    wire = round_trips(policy)
     first = Asked()
     for row in range(len(starts)):
         first.ask(policy, starts, row, candidates)
@@ -84,22 +110,21 @@ def check(
         except PolicyError as error:
             restart_fault = str(error)
     repeats = found.repeats("repeats", first, again, "asked again in another order on a new line")
-    digest = _digest(again) if repeats.judged == "holds" else None
+    complete = sorted(again.answers) == repeated(len(starts))
+    digest = _digest(again) if repeats.judged == "holds" and complete else None
     findings = [
         found.answers(first, len(starts)),
         repeats,
         found.restarts(first, after, restart_fault),
         found.seeded(told, repeats, first),
-        found.unchanged(digest, earlier),
-        found.evaluations(told),
+        found.unchanged(digest, earlier, complete=complete),
+        found.evaluations(told, first, again),
         found.admissible(first, starts, admissible),
-        found.spans(told),
+        found.spans(told, first, wire),
         found.in_time(first, deadline_s),
-        *found.plausible(first, starts),
+        *plausible(first, starts),
     ]
-    return Conformance(
-        policy.entry.name, len(starts), candidates, told.checkpoint, digest, tuple(findings)
-    )
+    return Conformance(policy.entry.name, asked, told.checkpoint, digest, tuple(findings))
 
 
 def _digest(asked: Asked) -> str:

@@ -2,56 +2,28 @@
 
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.candidates.conformance.asked import Asked
-from genpolicy.candidates.conformance.plausible import (
-    copied,
-    nearest,
-    shuffled_share,
-    slopes,
-    turned_away,
-)
+from genpolicy.candidates.conformance.finding import Finding, Judged
 from genpolicy.candidates.conformance.recorded_starts import RecordedStarts
 from genpolicy.candidates.wire.extension import Capabilities
 from genpolicy.contract.latency import Term
-from genpolicy.seeds import stream
 from genpolicy.statistics.intervals import clopper_pearson, order_statistic_interval
 
 Array = NDArray[np.float64]
-Judged = Literal["holds", "fails", "unknown"]
 Admissible = Callable[[Array, Array], tuple[bool, str]]
 """`(chunk (K, 10), newest observation (D_o,))`: whether it passes every layer, and why not."""
 
-FEWEST = 20
-"""Moments below which nothing is said of units: a slope of few is anything."""
-SAME_SCALE = 3.0
-"""A slope beyond a factor of three either way is another unit, sign or spread: a weak policy's
-slope is still nearer to 1, a wrong unit's is 10 times off."""
-KNOWS_THE_MOMENT = 0.001
 ONE_IN_TWO = 0.5
+CLOCKS_APART = 1e-3
+"""Part by which the clocks of two machines may run apart, and more than any two do."""
+MESSAGE_S = 0.01
+"""What reading and writing a message may take beside the terms, a busy machine allowed for:
+`serve-policy` takes 1 to 3 ms."""
 SAMPLER_TERMS = (Term.PREPROCESS, Term.ENCODE, Term.SAMPLE)
-
-
-@dataclass(frozen=True)
-class Finding:
-    """One thing that was looked at.
-
-    Attributes:
-        name: Its name.
-        judged: Whether it holds.
-        gate: Letter of the gate that asks for it.
-        said: What was seen.
-    """
-
-    name: str
-    judged: Judged
-    gate: str
-    said: str
 
 
 def answers(asked: Asked, moments: int) -> Finding:
@@ -110,78 +82,38 @@ def seeded(told: Capabilities, repeats: Finding, asked: Asked) -> Finding:
     return Finding("seeded", repeats.judged, "B", said)
 
 
-def unchanged(digest: str | None, earlier: str | None) -> Finding:
-    """Whether it answers as in an earlier check."""
+def unchanged(digest: str | None, earlier: str | None, *, complete: bool) -> Finding:
+    """Whether it answers as in an earlier check; `complete` where nothing was left unanswered."""
     if earlier is None:
         return Finding("unchanged", "unknown", "B", "no earlier check was named (--earlier)")
+    if not complete:
+        return Finding("unchanged", "unknown", "B", "not all that is compared was answered")
     if digest == earlier:
         return Finding("unchanged", "holds", "B", "it answers as in the earlier check")
     return Finding("unchanged", "fails", "B", "it answers otherwise than in the earlier check")
 
 
-def evaluations(told: Capabilities) -> Finding:
-    """Whether it counts how often its network ran."""
-    if told.counts_evaluations:
-        return Finding("evaluations", "holds", "B", "it counts its network evaluations")
-    return Finding("evaluations", "unknown", "B", "it does not say how often its network ran")
+def evaluations(told: Capabilities, first: Asked, again: Asked) -> Finding:
+    """Whether it counts how often its network ran, alike for equal noise."""
+    if not told.counts_evaluations:
+        return Finding("evaluations", "unknown", "B", "it does not say how often its network ran")
+    other = [
+        f"{first.answers[row].evaluations} and {answer.evaluations}"
+        for row, answer in again.answers.items()
+        if answer.evaluations != first.answers[row].evaluations
+    ]
+    if other:
+        said = f"it counts otherwise for the same noise at {len(other)} moments: {other[0]}"
+        return Finding("evaluations", "fails", "B", said)
+    counts = {one.evaluations for one in first.answers.values() if one.evaluations is not None}
+    if not counts:
+        return Finding("evaluations", "unknown", "B", "nothing was answered")
+    said = f"it counts {_range(counts)} for a sample, which nobody else can"
+    return Finding("evaluations", "holds", "B", said)
 
 
-def plausible(asked: Asked, starts: RecordedStarts) -> list[Finding]:
-    """Whether its chunks speak of the moment, in the units that were declared."""
-    names = ("follows_observation", "scale", "orientation", "own_answers")
-    rows = [row for row, one in sorted(asked.answers.items()) if np.isfinite(one.actions).all()]
-    if len(rows) < FEWEST:
-        said = f"{len(rows)} finite answers, {FEWEST} are needed"
-        return [Finding(name, "unknown", "D", said) for name in names]
-    drawn = np.stack([asked.answers[row].actions for row in rows])
-    recorded = starts.chunks[rows]
-    chunks = nearest(drawn, recorded)
-    share = shuffled_share(drawn, recorded, rng=stream(0, "conformance", "shuffle"))
-    copies = copied(drawn, recorded)
-    return [
-        Finding(
-            names[0], "holds" if share <= KNOWS_THE_MOMENT else "fails", "D",
-            f"as near to other moments' recordings in {share:.4f} of the shuffles, at most "
-            f"{KNOWS_THE_MOMENT}",
-        ),
-        _scale(chunks, recorded, follows=share <= KNOWS_THE_MOMENT),
-        _turned(chunks, recorded),
-        Finding(
-            names[3], "fails" if copies else "holds", "D",
-            f"{copies} of {len(rows)} moments answered with the recording itself",
-        ),
-    ]  # fmt: skip
-
-
-def _scale(chunks: Array, recorded: Array, *, follows: bool) -> Finding:
-    found = slopes(chunks, recorded, rng=stream(0, "conformance", "slopes"))
-    text = ", ".join(
-        f"{one.name} {one.slope:.3g} ({one.low:.3g} to {one.high:.3g})" for one in found
-    )
-    said = f"recorded per declared unit, 1 is right: {text}"
-    if not found:
-        return Finding("scale", "unknown", "D", "nothing moves in the recordings")
-    wrong = [
-        one.name for one in found
-        if np.isnan(one.slope) or one.high < 1.0 / SAME_SCALE or one.low > SAME_SCALE
-    ]  # fmt: skip
-    if wrong:
-        return Finding("scale", "fails", "D", f"{said}; wrong: {', '.join(wrong)}")
-    inside = all(one.low >= 1.0 / SAME_SCALE and one.high <= SAME_SCALE for one in found)
-    # Of many chunks that know nothing the nearest lie on the line too.
-    return Finding("scale", "holds" if inside and follows else "unknown", "D", said)
-
-
-def _turned(chunks: Array, recorded: Array) -> Finding:
-    off, compared = turned_away(chunks, recorded)
-    low, high = clopper_pearson(off, compared)
-    judged: Judged = "unknown"
-    if low > ONE_IN_TWO:
-        judged = "fails"
-    elif high < ONE_IN_TWO:
-        judged = "holds"
-    said = f"at {off} of {compared} turned farther from the recording than recordings are apart"
-    return Finding("orientation", judged, "D", said)
+def _range(counts: set[int]) -> str:
+    return f"{min(counts)}" if len(counts) == 1 else f"{min(counts)} to {max(counts)}"
 
 
 def admissible(asked: Asked, starts: RecordedStarts, passes: Admissible | None) -> Finding:
@@ -208,13 +140,53 @@ def admissible(asked: Asked, starts: RecordedStarts, passes: Admissible | None) 
     return Finding("admissible", judged, "C", said)
 
 
-def spans(told: Capabilities) -> Finding:
-    """Whether it measures its own latency terms."""
+def spans(told: Capabilities, asked: Asked, wire: list[float]) -> Finding:
+    """Whether it measures its own latency terms, and what it says can be.
+
+    Its terms together are shorter than the answer took. What is longer than they are is the wire
+    and the writing of messages; where that is most of it, at most moments, the terms leave
+    something out.
+
+    Args:
+        told: What it says that it measures.
+        asked: Its answers.
+        wire: Round trips of a ping, s; empty where none was answered.
+    """
     missing = [str(term) for term in SAMPLER_TERMS if term not in told.spans]
     if missing:
         said = f"it does not measure {', '.join(missing)}: unknown, not zero"
         return Finding("spans", "unknown", "C", said)
-    return Finding("spans", "holds", "C", f"it measures {', '.join(told.spans)}")
+    answers = list(asked.answers.values())
+    if not answers:
+        return Finding("spans", "unknown", "C", "nothing was answered")
+    lasted = np.array([one.seconds for one in answers])
+    claimed = np.array([sum(one.spans_s.values()) for one in answers])
+    impossible = int(np.sum(claimed > lasted * (1.0 + CLOCKS_APART)))
+    if impossible:
+        at = int(np.argmax(claimed - lasted))
+        said = (
+            f"at {impossible} of {len(answers)} moments its terms are longer than the answer "
+            f"took: {1e3 * claimed[at]:.3g} of {1e3 * lasted[at]:.3g} ms"
+        )
+        return Finding("spans", "fails", "C", said)
+    messages = np.array([one.messages for one in answers])
+    besides = lasted - claimed - messages * (max(wire, default=0.0) + MESSAGE_S)
+    low, _ = order_statistic_interval(besides - claimed, ONE_IN_TWO)
+    said = (
+        f"it measures {', '.join(told.spans)}: {1e3 * float(np.median(claimed)):.3g} of "
+        f"{1e3 * float(np.median(lasted)):.3g} ms; {_wire(wire)}"
+    )
+    if low <= 0.0:
+        return Finding("spans", "holds", "C", said)
+    # Without a ping it may be the wire that takes so long.
+    judged: Judged = "fails" if wire else "unknown"
+    return Finding("spans", judged, "C", f"{said}; most of the time is in none of them")
+
+
+def _wire(wire: list[float]) -> str:
+    if not wire:
+        return "it answers no ping"
+    return f"a ping takes up to {1e3 * max(wire):.3g} ms"
 
 
 def in_time(asked: Asked, deadline_s: float) -> Finding:

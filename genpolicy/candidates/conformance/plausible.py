@@ -1,19 +1,21 @@
 """Do a candidate's chunks speak of the same metres as the recordings, and of what was observed?
 
 For every recorded moment the candidate whose places lie nearest to what was done is taken, since
-several ways may be right. Over moments of different episodes the recorded places are then a line of
-the candidate's: slope 1 for the same unit, axis and sign, 0.001 for millimetres, -1 for a mirrored
-axis, 10 for a spread that is ten times too small. A candidate that knows the moment is nearer to
-what was done there than to what was done elsewhere; one that does not is as near to all.
+several ways may be right. Over moments of different episodes the recorded numbers are then a line
+of the candidate's: slope 1 for the same unit, axis and sign, 0.001 for millimetres, -1 for a
+mirrored axis or a transposed rotation, 10 for a spread that is ten times too small. A candidate
+that knows the moment is nearer to what was done there than to what was done elsewhere; one that
+does not is as near to all.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation as Turn
 
 from genpolicy.contract.action import GRIPPER, POSITION, ROTATION
-from genpolicy.contract.rotation import angle_between, rotation_from_6d
+from genpolicy.contract.rotation import rotation_from_6d
 
 Array = NDArray[np.float64]
 
@@ -21,8 +23,14 @@ AXES = ("x", "y", "z")
 PERMUTATIONS = 9_999
 DRAWS = 2_000
 TAIL = 0.005
-STANDS_STILL = 1e-6
-"""A recorded number that moves less than this from moment to moment has no slope to compare."""
+STANDS_M = 1e-3
+"""What a place or an opening moves at least from moment to moment to be compared: ten times the
+repeatability of the arms that this is for (0.1 mm by ISO 9283, data sheet of the Franka Emika
+Panda), twice the position resolution of a usual gripper (0.4 mm, Robotiq 2F-85)."""
+STANDS_RAD = 1e-2
+"""The same of a turn: a place that moves so far at a lever of 0.1 m."""
+NOTHING = 1e-6
+"""A number of a chunk that differs less from moment to moment is rounding, in m or of a column."""
 ROUNDING = 1e-12
 """What is left of a constant when its mean is taken off, in parts of it."""
 COPIED_M = 2e-7
@@ -33,17 +41,25 @@ COPIED_M = 2e-7
 class Slope:
     """How much one recorded number moves as the candidate's moves by one.
 
+    Both sides hold noise: least squares of one on the other are too flat. The true factor lies
+    between that slope and the inverse of the slope the other way round (Frisch 1934), so the
+    interval goes from the lower end of the first to the upper end of the second.
+
     Attributes:
-        name: `x`, `y`, `z` or `gripper`.
-        slope: Least squares over moments; NaN where the candidate's does not move.
-        low: Lower end of its interval.
-        high: Upper end.
+        name: `x`, `y`, `z`, `gripper`, or `turn` about an axis.
+        slope: Recorded on candidate, least squares over moments; NaN where the candidate's does
+            not move.
+        low: Lower end of the factor.
+        high: Upper end; both are infinite where the two may have nothing to do with each other.
+        stands: The candidate's moves less than `STANDS_M` or `STANDS_RAD`, at the upper end, where
+            the recorded one moves more than three times as much, at the lower end.
     """
 
     name: str
     slope: float
     low: float
     high: float
+    stands: bool
 
 
 def nearest(candidates: Array, recorded: Array) -> Array:
@@ -63,58 +79,107 @@ def nearest(candidates: Array, recorded: Array) -> Array:
 
 
 def slopes(chunks: Array, recorded: Array, *, rng: np.random.Generator) -> list[Slope]:
-    """Slope of each number that moves in the recordings, with a bootstrap over moments.
+    """Slope of each place and of the opening, where it moves in the recordings.
 
     Args:
         chunks: Shape (M, K, 10).
         recorded: Likewise.
-        rng: For the bootstrap.
+        rng: For the bootstrap over moments.
     """
     columns = [*range(POSITION.stop), GRIPPER]
+    theirs, ours = chunks[..., columns].mean(axis=1), recorded[..., columns].mean(axis=1)
+    return _compared((*AXES, "gripper"), theirs, ours, STANDS_M, rng)
+
+
+def turn_slopes(chunks: Array, recorded: Array, *, rng: np.random.Generator) -> list[Slope]:
+    """Slope of the turn of a chunk's first action about each axis of the recordings' mean one.
+
+    Args:
+        chunks: Shape (M, K, 10).
+        recorded: Likewise.
+        rng: For the bootstrap over moments.
+    """
+    first = [rotation_from_6d(of[:, 0, ROTATION]) for of in (chunks, recorded)]
+    whole = ~np.isnan(first[0]).any(axis=(1, 2)) & ~np.isnan(first[1]).any(axis=(1, 2))
+    if whole.sum() < FEWEST_TURNS:
+        return []
+    theirs, ours = (Turn.from_matrix(of[whole]) for of in first)
+    back = ours.mean().inv()
+    names = tuple(f"turn about {axis}" for axis in AXES)
+    return _compared(names, (back * theirs).as_rotvec(), (back * ours).as_rotvec(), STANDS_RAD, rng)
+
+
+FEWEST_TURNS = 20
+"""Below which a slope is anything."""
+
+
+def _compared(
+    names: tuple[str, ...], theirs: Array, ours: Array, stands: float, rng: np.random.Generator
+) -> list[Slope]:
+    """Of numbers (M, C), those of which the recordings move at the worse end."""
+    rows = rng.integers(len(ours), size=(DRAWS, len(ours)))
     found = []
-    for name, column in zip((*AXES, "gripper"), columns, strict=True):
-        ours, theirs = recorded[..., column].mean(axis=1), chunks[..., column].mean(axis=1)
-        if np.ptp(ours) <= STANDS_STILL:
+    for column, name in enumerate(names):
+        drawn = _moments(theirs[rows, column], ours[rows, column])
+        moved = np.sqrt(np.quantile(drawn.ours, TAIL))
+        if moved <= stands:
             continue
-        rows = rng.integers(len(ours), size=(DRAWS, len(ours)))
-        drawn = _slope(theirs[rows], ours[rows])
-        ends = (
-            np.nanquantile(drawn, [TAIL, 1.0 - TAIL]) if not np.isnan(drawn).all() else [np.nan] * 2
-        )
+        one = _moments(theirs[None, :, column], ours[None, :, column])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            alike = drawn.both / np.sqrt(drawn.ours * drawn.theirs)
+            flat, steep = drawn.both / drawn.theirs, drawn.ours / drawn.both
+            slope = float((one.both / one.theirs)[0])
+        still = np.sqrt(np.quantile(drawn.theirs, 1.0 - TAIL)) <= stands
+        low, high = _between(alike, flat, steep)
         found.append(
-            Slope(name, float(_slope(theirs[None], ours[None])[0]), float(ends[0]), float(ends[1]))
-        )
+            Slope(
+                name, slope if np.isfinite(slope) else np.nan, low, high,
+                stands=bool(still and moved > STANDS_APART * stands),
+            )
+        )  # fmt: skip
     return found
 
 
-def _slope(theirs: Array, ours: Array) -> Array:
-    """Of rows (draws, M); NaN where theirs stand still."""
-    centred = theirs - theirs.mean(axis=1, keepdims=True)
-    still = np.abs(centred).max(axis=1) <= ROUNDING * np.maximum(np.abs(theirs).max(axis=1), 1.0)
-    spread = np.where(still, 0.0, (centred**2).sum(axis=1))
-    covered = (centred * (ours - ours.mean(axis=1, keepdims=True))).sum(axis=1)
-    slope: Array = np.full(len(spread), np.nan)
-    np.divide(covered, spread, where=spread > 0.0, out=slope)
-    return slope
+STANDS_APART = 3.0
+"""A candidate that stands is told from one that moves little by the factor of another scale."""
 
 
-def turned_away(chunks: Array, recorded: Array) -> tuple[int, int]:
-    """At how many moments a chunk is turned farther from the recorded one than others are.
+def _between(alike: Array, flat: Array, steep: Array) -> tuple[float, float]:
+    """Ends of a factor, of draws of the correlation and of both slopes.
 
-    Returns:
-        That number, and the number of moments. Others are as far away as the recordings of nine
-        in ten other moments are; where all are turned alike, `SMALL_TURN_RAD`.
+    A draw in which the candidate stands says nothing, so that nothing is known.
     """
-    ours = rotation_from_6d(recorded[:, 0, ROTATION])
-    theirs = rotation_from_6d(chunks[:, 0, ROTATION])
-    off = angle_between(ours, theirs)
-    apart = np.stack([angle_between(np.broadcast_to(one, ours.shape), ours) for one in ours])
-    usual = np.quantile(apart, 0.9, axis=1)
-    return int(np.sum(~(off <= np.maximum(usual, SMALL_TURN_RAD)))), len(ours)
+    if np.isnan(alike).any():
+        return -np.inf, np.inf
+    if np.quantile(alike, TAIL) > 0.0:
+        return float(np.quantile(flat, TAIL)), float(np.quantile(steep, 1.0 - TAIL))
+    if np.quantile(alike, 1.0 - TAIL) < 0.0:
+        return float(np.quantile(steep, TAIL)), float(np.quantile(flat, 1.0 - TAIL))
+    return -np.inf, np.inf
 
 
-SMALL_TURN_RAD = 0.05
-"""Three degrees: what a good policy may be off where all recordings are turned alike."""
+@dataclass(frozen=True)
+class _Moments:
+    """Variances of draws, and what is common; 0 where a number is the same but for rounding."""
+
+    theirs: Array
+    ours: Array
+    both: Array
+
+
+def _moments(theirs: Array, ours: Array) -> _Moments:
+    """Of rows (draws, M)."""
+    centred, wanted = (_centred(of) for of in (theirs, ours))
+    return _Moments(
+        (centred**2).mean(axis=1), (wanted**2).mean(axis=1), (centred * wanted).mean(axis=1)
+    )
+
+
+def _centred(values: Array) -> Array:
+    centred = values - values.mean(axis=1, keepdims=True)
+    still = np.abs(centred).max(axis=1) <= ROUNDING * np.maximum(np.abs(values).max(axis=1), 1.0)
+    kept: Array = np.where(still[:, None], 0.0, centred)
+    return kept
 
 
 def shuffled_share(candidates: Array, recorded: Array, *, rng: np.random.Generator) -> float:
@@ -135,7 +200,7 @@ def shuffled_share(candidates: Array, recorded: Array, *, rng: np.random.Generat
     theirs = _motion(candidates.reshape(-1, *candidates.shape[2:]))
     ours = _motion(recorded)
     spread = ours.std(axis=0)
-    moves = spread > STANDS_STILL
+    moves = spread > NOTHING
     if not moves.any():
         return 1.0
     theirs, ours = theirs[:, moves] / spread[moves], ours[:, moves] / spread[moves]

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from genpolicy.contract.action import ACTION_DIM, GRIPPER, POSITION, ROTATION
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.contract.observation import Channel, ObservationContract
 from genpolicy.data.contract import TCP_ACTION
@@ -14,6 +15,11 @@ from genpolicy.errors import ContractError
 Array = NDArray[np.float64]
 
 HELD_OUT = ("validation", "test")
+MEASURED = {
+    "tcp_position_m": POSITION, "tcp_rotation": ROTATION,
+    "gripper_opening_m": slice(GRIPPER, GRIPPER + 1),
+}  # fmt: skip
+"""Channels of the robot's own state, as tasks and importers name them, by columns of an action."""
 MOST_STARTS = 80
 """The 95th percentile of a time has an upper end from 72 independent ones on."""
 
@@ -26,11 +32,14 @@ class RecordedStarts:
         observations: Physical units, newest last. Shape (M, H_o, D_o).
         chunks: Recorded actions from the newest observation on. Shape (M, K, 10).
         episodes: Identifier of each one's episode. Shape (M,).
+        measured: Where the TCP and the gripper were at the newest observation, in the columns of
+            an action; NaN where the observation does not say. Shape (M, 10).
     """
 
     observations: Array
     chunks: Array
     episodes: NDArray[np.str_]
+    measured: Array
 
     def __len__(self) -> int:
         return len(self.episodes)
@@ -45,6 +54,16 @@ def observation_contract(data: Dataset) -> ObservationContract:
             for channel in channels
         )
     )
+
+
+def measured(observations: Array, contract: ObservationContract) -> Array:
+    """The newest observations (M, H_o, D_o) of pose and gripper, as actions (M, 10)."""
+    found = np.full((len(observations), ACTION_DIM), np.nan)
+    for name, columns in MEASURED.items():
+        part = contract.slices.get(name)
+        if part is not None and part.stop - part.start == columns.stop - columns.start:
+            found[:, columns] = observations[:, -1, part]
+    return found
 
 
 def require_contract(data: Dataset, horizons: HorizonConfig, *, candidate: str) -> None:
@@ -107,10 +126,14 @@ def recorded_starts(
     # Neighbours in the list lie apart in their episodes, so that no phase is of one session only.
     shares = np.modf(np.arange(number) * GOLDEN)[0]
     at = [int(share * len(chunks[episode])) for share, episode in zip(shares, chosen, strict=True)]
+    seen = np.stack([
+        observations[episode][row] for row, episode in zip(at, chosen, strict=True)
+    ])  # fmt: skip
     return RecordedStarts(
-        np.stack([observations[episode][row] for row, episode in zip(at, chosen, strict=True)]),
+        seen,
         np.stack([chunks[episode][row] for row, episode in zip(at, chosen, strict=True)]),
         np.array([episodes[episode] for episode in chosen]),
+        measured(seen, observation_contract(data)),
     )
 
 

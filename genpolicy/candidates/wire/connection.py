@@ -34,6 +34,8 @@ QUIET = logging.getLogger(f"{__name__}.quiet")
 """The library tells of a stranger's bytes with a traceback of its own; ours is `PolicyError`."""
 QUIET.addHandler(logging.NullHandler())
 QUIET.propagate = False
+Clock = Callable[[], float]
+"""Seconds of a clock that only goes forward."""
 SHUT_BOTH = 2
 """`socket.SHUT_RDWR`: neither side reads or writes any more."""
 
@@ -125,10 +127,18 @@ class Connection:
             return
         raise PolicyError(Fault.UNREQUESTED, "a message that nothing was asked for")
 
+    def round_trip_s(self, *, timeout_s: float, clock: Clock) -> float | None:
+        """How long a ping and its answer take, s; None where none comes, which is no fault."""
+        begun = clock()
+        try:
+            answered = self._socket.ping()
+        except ConnectionClosed:
+            return None
+        return clock() - begun if answered.wait(timeout_s) else None
+
     def close(self) -> None:
         """Hang up, without waiting for somebody who does not listen."""
         self._cut()
-        self._socket.close_timeout = HANG_UP_S
         self._socket.close()
 
 
@@ -143,14 +153,23 @@ def dial(address: str, *, allowed: str | None, timeout_s: float) -> Connection:
     try:
         socket = connect(
             address, compression=None, max_size=MAXIMUM_MESSAGE_BYTES, proxy=None,
-            open_timeout=timeout_s, ping_interval=PING_S, close_timeout=timeout_s, logger=QUIET,
+            open_timeout=timeout_s, ping_interval=PING_S, close_timeout=HANG_UP_S, logger=QUIET,
         )  # fmt: skip
     except (OSError, InvalidHandshake) as error:  # a time-out is an OSError too
         raise PolicyError(Fault.CLOSED, f"nobody answers at {address} ({error})") from error
+    line = Connection(socket, {})
     try:
-        return Connection(socket, _message(socket.recv(timeout=timeout_s)))
+        line.metadata = _first(socket, timeout_s)
+    except BaseException:
+        line.close()  # whatever came instead: nobody else holds this line
+        raise
+    return line
+
+
+def _first(socket: ClientConnection, timeout_s: float) -> dict[str, Any]:
+    try:
+        return _message(socket.recv(timeout=timeout_s))
     except TimeoutError as error:
-        socket.close()
         raise PolicyError(Fault.LATE, f"no metadata within {timeout_s:.3g} s") from error
     except ConnectionClosed as error:
         raise _closed(error) from error

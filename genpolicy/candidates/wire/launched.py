@@ -1,21 +1,33 @@
 """A server of somebody's policy: its files verified, started on a free port, watched, ended."""
 
 import os
+import secrets
 import signal
 import subprocess
 import time
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, suppress
 from pathlib import Path
 
 from genpolicy.candidates.wire.connection import LOOPBACK, dial, free_port
 from genpolicy.candidates.wire.entry import PORT, ServerEntry
 from genpolicy.candidates.wire.faults import Fault, PolicyError
+from genpolicy.candidates.wire.printed import Printed
+from genpolicy.candidates.wire.processes import listens, marked
 from genpolicy.errors import ConfigError
 from genpolicy.integrity.hashing import read_verified
 
 LOOK_S = 0.05
 END_S = 5.0
 LAST_WORDS = 300
+END_ROUNDS = 20
+PORTS = 3
+"""Free ports that are tried: between the choice of one and the server, somebody may take it."""
+MARK = "GENPOLICY_LAUNCH"
+"""In the environment of a server, so that what it starts is found whatever session it is in."""
+
+
+class PortTakenError(Exception):
+    """Somebody else listens where a server was told to."""
 
 
 def verify_files(entry: ServerEntry, folder: Path) -> None:
@@ -38,7 +50,6 @@ class Launched(AbstractContextManager["Launched"]):
     Args:
         entry: What it is.
         folder: Of the entry's file; the command runs there.
-        log: File for what it prints.
 
     Attributes:
         address: Where it listens.
@@ -48,30 +59,35 @@ class Launched(AbstractContextManager["Launched"]):
         PolicyError: It ended, or did not listen in time.
     """
 
-    def __init__(self, entry: ServerEntry, folder: Path, log: Path) -> None:
-        self._log = log
+    def __init__(self, entry: ServerEntry, folder: Path) -> None:
         self._process: subprocess.Popen[bytes] | None = None
+        self._printed: Printed | None = None
+        self._mark = secrets.token_hex(16)
         if entry.command is None:
             assert entry.address is not None  # an entry has one of the two
             self.address = entry.address
             return
-        port = free_port()
-        self.address = f"ws://{LOOPBACK}:{port}"
-        words = [word.replace(PORT, str(port)) for word in entry.command]
-        with log.open("ab") as printed:
-            self._process = _begin(words, folder, printed.fileno(), entry.name)
-        try:
-            self._await(entry)
-        except BaseException:
-            self.end()
-            raise
+        until = time.monotonic() + entry.start_timeout_s
+        for _ in range(PORTS):
+            try:
+                self._start(entry, entry.command, folder, until)
+            except PortTakenError:
+                continue
+            return
+        raise PolicyError(
+            Fault.CLOSED,
+            f"who listens is no process of its command, on each of {PORTS} ports; start it, and "
+            "name its address",
+        )
 
     def died(self) -> str | None:
         """Why it is not there any more; None while it is, or where somebody else runs it."""
         code = self._process.poll() if self._process else None
         if code is None:
             return None
-        said = self._log.read_bytes()[-LAST_WORDS:].decode(errors="replace").strip()
+        assert self._printed is not None  # a process prints
+        self._printed.drained(LOOK_S)
+        said = self._printed.last_words(LAST_WORDS)
         return f"it ended with {code}; its last words: {said.splitlines()[-1:]}"
 
     def end(self) -> None:
@@ -86,21 +102,55 @@ class Launched(AbstractContextManager["Launched"]):
                 break
             except subprocess.TimeoutExpired:
                 continue
+        # Who has left the group is still marked; who is started meanwhile, the next time round.
+        for _ in range(END_ROUNDS):
+            left = [pid for pid in marked(MARK, self._mark) if pid != self._process.pid]
+            for pid in left:
+                with suppress(ProcessLookupError):
+                    os.kill(pid, signal.SIGKILL)
+            if not left:
+                break
         self._process.wait()
         self._process = None
+        if self._printed is not None:
+            self._printed.close()
 
-    def _await(self, entry: ServerEntry) -> None:
-        until = time.monotonic() + entry.start_timeout_s
+    def _start(self, entry: ServerEntry, command: list[str], folder: Path, until: float) -> None:
+        port = free_port()
+        self.address = f"ws://{LOOPBACK}:{port}"
+        words = [word.replace(PORT, str(port)) for word in command]
+        self._printed = Printed()
+        try:
+            self._process = _begin(
+                words, folder, self._printed.write_end, {MARK: self._mark}, entry.name
+            )
+        except BaseException:
+            self._printed.close()
+            raise
+        finally:
+            os.close(self._printed.write_end)
+        try:
+            self._await(entry, port, until)
+        except BaseException:
+            self.end()
+            raise
+
+    def _await(self, entry: ServerEntry, port: int, until: float) -> None:
         while True:
             if ended := self.died():
+                if _taken(port):
+                    raise PortTakenError
                 raise PolicyError(Fault.CLOSED, ended)
             left = until - time.monotonic()
             try:
                 dial(self.address, allowed=None, timeout_s=max(left, LOOK_S)).close()
-                return
             except PolicyError as fault:
                 if fault.fault is not Fault.CLOSED:
                     raise
+            else:
+                if listens(port, marked(MARK, self._mark)) is not False:
+                    return
+                raise PortTakenError
             if left <= 0.0:
                 raise PolicyError(
                     Fault.LATE, f"it does not listen after {entry.start_timeout_s:g} s"
@@ -111,12 +161,19 @@ class Launched(AbstractContextManager["Launched"]):
         self.end()
 
 
-def _begin(words: list[str], folder: Path, log: int, name: str) -> "subprocess.Popen[bytes]":
+def _taken(port: int) -> bool:
+    """Whether somebody listens there, after a server of ours has ended."""
+    return listens(port, []) is not None
+
+
+def _begin(
+    words: list[str], folder: Path, printed: int, mark: dict[str, str], name: str
+) -> "subprocess.Popen[bytes]":
     """In a session of its own, so that an interrupt here lets us end it in order."""
     try:
         return subprocess.Popen(
-            words, cwd=folder, stdin=subprocess.DEVNULL, stdout=log, stderr=log,
-            start_new_session=True,
+            words, cwd=folder, stdin=subprocess.DEVNULL, stdout=printed, stderr=printed,
+            env={**os.environ, **mark}, start_new_session=True,
         )  # fmt: skip
     except OSError as error:
         raise ConfigError(

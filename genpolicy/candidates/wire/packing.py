@@ -19,6 +19,10 @@ MAXIMUM_MESSAGE_BYTES = 16 << 20
 PLAIN_KINDS = "biuf"
 PLAIN_TYPE = re.compile(r"[<>|](b1|[iu][1248]|f[248])")
 MOST_AXES = 8
+MOST_ITEMS = 4096
+"""Of one list or map: msgpack takes room for all that its header promises before one is there."""
+MOST_OF_ALL = 65_536
+"""Things in a message: an empty map is a byte on the wire and sixty in memory."""
 
 
 def pack(message: dict[str, Any]) -> bytes:
@@ -44,7 +48,7 @@ def unpack(data: bytes) -> dict[str, Any]:
     if len(data) > MAXIMUM_MESSAGE_BYTES:
         raise _refused(f"of {len(data)} bytes")
     try:
-        message = msgpack.unpackb(data, object_hook=_array, strict_map_key=True)
+        message = _read(data)
     except IntegrityError:
         raise
     except (ValueError, RecursionError) as error:  # msgpack's own errors are ValueErrors
@@ -52,6 +56,22 @@ def unpack(data: bytes) -> dict[str, Any]:
     if not isinstance(message, dict) or not all(isinstance(key, str) for key in message):
         raise _refused("no map of names")
     return message
+
+
+def _read(data: bytes) -> Any:
+    items = 0
+
+    def counted(found: Any) -> Any:
+        nonlocal items
+        items += 1 + len(found)
+        if items > MOST_OF_ALL:
+            raise _refused(f"of more than {MOST_OF_ALL} things")
+        return found
+
+    return msgpack.unpackb(
+        data, object_hook=lambda found: _array(counted(found)), list_hook=counted,
+        max_array_len=MOST_ITEMS, max_map_len=MOST_ITEMS, strict_map_key=True,
+    )  # fmt: skip
 
 
 def _plain(value: object) -> dict[bytes, Any]:

@@ -1,12 +1,13 @@
 """A policy behind the wire, asked as one of ours would be; whatever it does is its own fault."""
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from genpolicy.candidates.wire.connection import Connection, dial
+from genpolicy.candidates.wire.connection import Clock, Connection, dial
 from genpolicy.candidates.wire.entry import ServerEntry
 from genpolicy.candidates.wire.extension import (
     Capabilities,
@@ -32,12 +33,14 @@ class Invocation:
         evaluations: Network evaluations of a sample; None where the server does not count.
         spans_s: Seconds by latency term, of the terms that it measures.
         seconds: From the first byte sent to the last chunk mapped, by the clock of this machine.
+        messages: In how many messages it was asked.
     """
 
     actions: Array
     evaluations: int | None
     spans_s: dict[str, float]
     seconds: float
+    messages: int
 
 
 class RemotePolicy:
@@ -50,14 +53,21 @@ class RemotePolicy:
         entry: What it is.
         address: Where it listens.
         contract: The observation in force.
+        clock: Of this machine.
+        ended: Why its process is not there any more, where we started it; None while it is.
 
     Raises:
         ContractError: The entry names what the observation does not have.
         PolicyError: Nobody listens, or says what it can in a way that is none.
     """
 
-    def __init__(self, entry: ServerEntry, address: str, contract: ObservationContract) -> None:
+    def __init__(
+        self, entry: ServerEntry, address: str, contract: ObservationContract, *,
+        clock: Clock = time.perf_counter, ended: Callable[[], str | None] = lambda: None,
+    ) -> None:  # fmt: skip
         self.entry = entry
+        self._clock = clock
+        self._ended = ended
         self._address = address
         self._inputs = Inputs(
             entry.observation, contract,
@@ -86,7 +96,7 @@ class RemotePolicy:
         Raises:
             PolicyError: It did not answer, or not with what was declared; there is no chunk.
         """
-        begun = time.perf_counter()
+        begun = self._clock()
         at_once = min(candidates, self.told.candidates) if self.told.version else 1
         drawn: list[Drawn] = []
         for first in range(0, candidates, at_once):
@@ -99,8 +109,17 @@ class RemotePolicy:
             mapped,
             max(counts) if counts else None,
             {term: sum(part.spans_s[term] for part in drawn) for term in self.told.spans},
-            time.perf_counter() - begun,
+            self._clock() - begun,
+            len(drawn),
         )
+
+    def round_trip_s(self) -> float | None:
+        """How long the wire itself takes, s; None where the server answers no ping.
+
+        Raises:
+            PolicyError: Nobody listens.
+        """
+        return self._connected().round_trip_s(timeout_s=self.entry.timeout_s, clock=self._clock)
 
     def close(self) -> None:
         """Hang up."""
@@ -121,8 +140,10 @@ class RemotePolicy:
                 candidates=candidates,
             )  # fmt: skip
             self._check_shape(drawn)
-        except PolicyError:
+        except PolicyError as error:
             self.close()
+            if ended := self._ended():
+                raise PolicyError(Fault.CLOSED, ended) from error
             raise
         return drawn
 

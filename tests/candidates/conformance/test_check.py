@@ -1,17 +1,17 @@
 """Planted candidates behind the server kind: each is stopped for the reason named beforehand."""
 
-import time
+import threading
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation as Turn
 
-from genpolicy.candidates.conformance.check import check
+from genpolicy.candidates.conformance.check import check, question
 from genpolicy.candidates.wire.extension import WORD
 from genpolicy.candidates.wire.remote import RemotePolicy
-from genpolicy.contract.action import GRIPPER
-from genpolicy.contract.rotation import rotation_from_6d
+from genpolicy.contract.action import GRIPPER, ROTATION
+from genpolicy.contract.rotation import rotation_from_6d, rotation_to_6d
 from genpolicy.seeds import counter_noise
 
 SERVED = {
@@ -22,13 +22,27 @@ SERVED = {
 ERROR_M = 0.005
 
 
+class Clock:
+    """Of client and server; goes on by what a server takes, and by nothing else."""
+
+    def __init__(self):
+        self.now = 0.0
+
+    def __call__(self):
+        return self.now
+
+
 class Honest:
     """Knows each moment, and answers what was done there, off by a draw of half a centimetre."""
+
+    takes_s = 0.003
+    says_s = 0.0029
 
     def __init__(self, starts, plain=False):
         self.starts = starts
         self.rows = {seen.tobytes(): row for row, seen in enumerate(starts.observations)}
         self.asked = 0
+        self.clock = Clock()
         self.metadata = {} if plain else {WORD: dict(SERVED)}
         self.said = {}
 
@@ -41,10 +55,10 @@ class Honest:
         ])  # fmt: skip
         if WORD not in message:
             return {"actions": chunks[0]}
-        spans = dict.fromkeys(SERVED["spans"], 0.001)
+        self.clock.now += self.takes_s
         answer = {
             "invocation": said["invocation"], "checkpoint": "a" * 64, "sampler": "b" * 64,
-            "nfe": 4, "spans_s": spans,
+            "nfe": 4, "spans_s": dict.fromkeys(SERVED["spans"], self.says_s / 3.0),
         }  # fmt: skip
         return {"actions": chunks, WORD: answer | self.said}
 
@@ -119,30 +133,99 @@ class ClosedGripper(Honest):
         return chunk
 
 
+class OtherOrigin(Honest):
+    """Measures places from a point that lies five centimetres aside."""
+
+    def chunk(self, row, noise):
+        return super().chunk(row, noise) + np.array([0.0, 0.05, *[0.0] * 8])
+
+
+class Turned(Honest):
+    """Its tool is mounted twenty degrees off."""
+
+    def chunk(self, row, noise):
+        chunk = super().chunk(row, noise)
+        turn = Turn.from_euler("z", 20, degrees=True).as_matrix()
+        chunk[:, ROTATION] = rotation_to_6d(rotation_from_6d(chunk[:, ROTATION]) @ turn)
+        return chunk
+
+
+class Exchanged(Honest):
+    def chunk(self, row, noise):
+        return super().chunk(row, noise)[:, [1, 0, *range(2, 10)]]
+
+
+class OtherWay(Honest):
+    """Goes to the other side of where the robot stands than was done: another mode."""
+
+    def chunk(self, row, noise):
+        chunk = super().chunk(row, noise)
+        side = self.starts.measured[row, 1]
+        chunk[:, 1] = side - (chunk[:, 1] - side)
+        return chunk
+
+
+class NoisyGripper(Honest):
+    def chunk(self, row, noise):
+        chunk = super().chunk(row, noise)
+        chunk[:, GRIPPER] += 0.005 * counter_noise(("gripper", *noise), shape=(1,))
+        return chunk
+
+
 class NotANumber(Honest):
     def chunk(self, row, noise):
         return super().chunk(row, noise) + (np.nan if row == 3 else 0.0)
 
 
 class Fails(Honest):
+    at = 5
+
     def __call__(self, message):
-        if self.asked == 5:
+        if self.asked == self.at:
             self.asked += 1
             raise MemoryError("CUDA out of memory")
         return super().__call__(message)
 
 
 class Slow(Honest):
+    takes_s = 0.02
+    says_s = 0.019
+
+
+class Flatters(Honest):
+    """Half a second, of which it tells a millisecond."""
+
+    takes_s = 0.5
+    says_s = 0.001
+
+
+class Boasts(Honest):
+    """Says a minute for what takes a second, at one moment."""
+
+    @property
+    def says_s(self):
+        return 60.0 if self.asked == 5 else 0.0029
+
+
+class CountsAnew(Honest):
+    """Counts what it was asked, and not how often its network ran."""
+
     def __call__(self, message):
-        time.sleep(0.02)
+        self.said = {"nfe": self.asked + 1}
         return super().__call__(message)
 
 
 class NeverInTime(Honest):
+    """The seventh answer comes when nobody waits any more."""
+
+    def __init__(self, starts):
+        super().__init__(starts)
+        self.over = threading.Event()
+
     def __call__(self, message):
-        self.asked += 1
-        if self.asked == 7:
-            time.sleep(0.5)
+        if self.asked == 6:
+            self.asked += 1
+            self.over.wait(60)
         return super().__call__(message)
 
 
@@ -172,12 +255,14 @@ def checked(serving, entry_of, starts, task):
             opened = []
 
             def policy():
-                opened.append(RemotePolicy(entry_of(**fields), address, task.observation))
+                opened.append(RemotePolicy(
+                    entry_of(**fields), address, task.observation, clock=planted.clock
+                ))  # fmt: skip
                 return opened[-1]
 
             found = check(
-                policy(), moments, candidates=4, deadline_s=deadline_s,
-                restarted=policy if restarted else None, earlier=earlier,
+                policy(), moments, asked=question(moments, dataset="d" * 64, candidates=4),
+                deadline_s=deadline_s, restarted=policy if restarted else None, earlier=earlier,
                 admissible=admissible_where(passes),
             )  # fmt: skip
             for one in opened:
@@ -214,12 +299,19 @@ def test_an_honest_candidate_holds_in_everything_that_can_be_said(checked, start
         (OtherName, {"answers", "repeats", "restarts", "seeded"}, {"B"}),
         (OtherWeights, {"restarts"}, {"B"}),
         (RecordedFuture, {"own_answers"}, {"D"}),
-        (IgnoresObservation, {"follows_observation", "scale"}, {"D"}),  # its gripper stands
+        # Its gripper stands, and its hand is turned as at one moment only.
+        (IgnoresObservation, {"follows_observation", "scale", "orientation"}, {"D"}),
         (Millimetres, {"scale"}, {"D"}),
         (Mirrored, {"scale"}, {"D"}),
         (Spread, {"scale"}, {"D"}),
         (Narrow, {"scale"}, {"D"}),
         (ClosedGripper, {"scale"}, {"D"}),
+        (OtherOrigin, {"origin"}, {"D"}),
+        (Turned, {"orientation"}, {"D"}),
+        (Exchanged, {"origin"}, {"D"}),
+        (Flatters, {"spans"}, {"C"}),
+        (Boasts, {"spans"}, {"C"}),
+        (CountsAnew, {"evaluations"}, {"B"}),
         (NotANumber, {"answers"}, {"B"}),
         (Fails, {"answers"}, {"B"}),
     ],
@@ -228,6 +320,13 @@ def test_a_planted_wrong_is_stopped_for_its_reason(checked, starts, planted, fai
     found = checked(planted(starts))
     assert {finding.name for finding in found.failed} == fails
     assert {finding.gate for finding in found.failed} == gates
+
+
+@pytest.mark.parametrize("planted", [OtherWay, NoisyGripper])
+def test_another_way_and_a_noisy_gripper_are_no_wrong(checked, starts, planted):
+    found = checked(planted(starts))
+    assert found.failed == []
+    assert judged(found)["origin"] == "holds"
 
 
 def test_a_wrong_order_of_a_quaternion_is_stopped(checked, starts):
@@ -249,10 +348,60 @@ def test_an_answer_beyond_the_deadline_is_not_in_time(checked, starts):
 
 
 def test_an_answer_that_never_comes_is_a_fault_with_its_kind(checked, starts):
-    found = checked(NeverInTime(starts), timeout_s=0.2)
+    never = NeverInTime(starts)
+    found = checked(never, timeout_s=2.0)
+    never.over.set()
     failed = {finding.name: finding.said for finding in found.failed}
     assert set(failed) == {"answers", "in_time"}
     assert "39 of 40 moments answered; late 1" in failed["answers"]
+
+
+def said_of(found, name):
+    return next(finding.said for finding in found.findings if finding.name == name)
+
+
+def test_what_a_server_says_of_its_time_stands_beside_what_it_took(checked, starts):
+    assert "2.9 of 3 ms; a ping takes up to 0 ms" in said_of(checked(Honest(starts)), "spans")
+    assert "1 of 500 ms" in said_of(checked(Flatters(starts)), "spans")
+    boasts = said_of(checked(Boasts(starts)), "spans")
+    assert boasts.startswith("at 1 of 40 moments")
+    assert boasts.endswith("6e+04 of 3 ms")
+
+
+def test_without_a_ping_the_wire_may_be_what_takes_so_long(checked, starts, monkeypatch):
+    monkeypatch.setattr(RemotePolicy, "round_trip_s", lambda _: None)
+    found = checked(Flatters(starts))
+    assert found.failed == []
+    assert judged(found)["spans"] == "unknown"
+    assert judged(checked(Honest(starts)))["spans"] == "holds"
+
+
+def test_what_is_as_long_as_the_wire_is_the_wire(checked, starts, monkeypatch):
+    monkeypatch.setattr(RemotePolicy, "round_trip_s", lambda _: 0.49)
+    assert judged(checked(Flatters(starts)))["spans"] == "holds"
+
+
+def test_a_count_is_a_claim(checked, starts):
+    said = said_of(checked(Honest(starts)), "evaluations")
+    assert said == "it counts 4 for a sample, which nobody else can"
+
+
+def test_what_left_an_answer_out_is_not_compared(checked, starts):
+    before = checked(Honest(starts)).answers_sha256
+    fails = Fails(starts)
+    fails.at = 4  # a moment that is asked again
+    found = checked(fails, earlier=before)
+    assert found.answers_sha256 is None
+    assert judged(found)["unchanged"] == "unknown"
+
+
+def test_a_question_is_its_moments_their_number_and_the_dataset(starts):
+    one = question(starts, dataset="d" * 64, candidates=4)
+    assert one == question(starts, dataset="d" * 64, candidates=4)
+    other = starts.observations.copy()
+    other[0, 0, 0] += 1e-9
+    moved = question(replace(starts, observations=other), dataset="d" * 64, candidates=4)
+    assert moved.observations_sha256 != one.observations_sha256
 
 
 def test_another_answer_than_at_the_earlier_check_is_another_candidate(checked, starts):
@@ -301,11 +450,11 @@ def test_what_was_not_started_here_cannot_be_started_again(checked, starts):
 def test_of_few_moments_nothing_is_said_about_units(checked, starts):
     few = replace(
         starts, observations=starts.observations[:19], chunks=starts.chunks[:19],
-        episodes=starts.episodes[:19],
+        episodes=starts.episodes[:19], measured=starts.measured[:19],
     )  # fmt: skip
     found = judged(checked(Millimetres(starts), moments=few))
-    names = ("follows_observation", "scale", "orientation", "own_answers")
-    assert [found[name] for name in names] == ["unknown"] * 4
+    names = ("follows_observation", "scale", "origin", "orientation", "own_answers")
+    assert [found[name] for name in names] == ["unknown"] * 5
 
 
 def test_how_many_moments_have_a_chunk_that_passes_every_layer(checked, starts):
@@ -329,6 +478,9 @@ def test_how_many_moments_have_a_chunk_that_passes_every_layer(checked, starts):
 def test_without_a_task_nothing_is_said_about_layers(serving, entry, starts, task):
     with serving(planted := Honest(starts), planted.metadata) as address:
         policy = RemotePolicy(entry, address, task.observation)
-        found = check(policy, starts, candidates=2, deadline_s=5.0, restarted=None)
+        found = check(
+            policy, starts, asked=question(starts, dataset="d" * 64, candidates=2),
+            deadline_s=5.0, restarted=None,
+        )  # fmt: skip
         policy.close()
     assert judged(found)["admissible"] == "unknown"

@@ -7,9 +7,11 @@ from genpolicy.candidates.conformance.plausible import (
     nearest,
     shuffled_share,
     slopes,
-    turned_away,
+    turn_slopes,
 )
-from genpolicy.contract.action import join_action
+from genpolicy.candidates.conformance.units import orientation, scale
+from genpolicy.contract.action import GRIPPER, ROTATION, join_action
+from genpolicy.contract.rotation import rotation_from_6d, rotation_to_6d
 
 
 @pytest.fixture
@@ -57,7 +59,10 @@ def test_a_candidate_that_stands_has_no_slope_and_a_recording_that_stands_none_t
     recorded, rng
 ):
     still = recorded[:1].repeat(30, 0)
-    assert np.isnan(slope_of("x", still, recorded, rng).slope)
+    stands = slope_of("x", still, recorded, rng)
+    assert np.isnan(stands.slope)
+    assert stands.stands
+    assert (stands.low, stands.high) == (-np.inf, np.inf)
     assert slopes(recorded, still, rng=rng) == []
 
 
@@ -91,18 +96,90 @@ def test_single_actions_are_compared_as_they_are(recorded, rng):
     assert shuffled_share(one[:, None] + 0.01, one, rng=rng) < 0.001
 
 
-def test_a_quaternion_in_the_other_order_is_turned_away(recorded):
-    quaternion = Turn.from_euler("z", np.zeros((30, 1))).as_quat()
-    wrong = Turn.from_quat(np.roll(quaternion, 1, axis=1)).as_matrix()
-    chunks = join_action(recorded[..., :3], wrong[:, None].repeat(8, 1), 0.0)
-    assert turned_away(chunks, recorded) == (30, 30)
-    assert turned_away(recorded, recorded) == (0, 30)
+def transposed(chunks):
+    turned = chunks.copy()
+    turned[..., ROTATION] = rotation_to_6d(
+        np.swapaxes(rotation_from_6d(chunks[..., ROTATION]), -1, -2)
+    )
+    return turned
 
 
-def test_a_rotation_that_is_none_counts_as_turned_away(recorded):
+@pytest.mark.parametrize("most_rad", [0.5, 0.05])
+def test_a_transposed_rotation_turns_the_other_way(recorded, rng, most_rad):
+    """Of small turns too, which lie nearer to the right one than recordings do to each other."""
+    turn = Turn.from_euler("z", rng.uniform(-most_rad, most_rad, (30, 1))).as_matrix()
+    ours = join_action(recorded[..., :3], turn[:, None].repeat(8, 1), 0.0)
+    found = turn_slopes(transposed(ours), ours, rng=rng)
+    assert [one.name for one in found] == ["turn about z"]
+    assert found[0].high == pytest.approx(-1.0)
+    assert orientation(transposed(ours), ours, ours[:, 0]).judged == "fails"
+    assert orientation(ours, ours, ours[:, 0]).judged == "holds"
+
+
+def test_what_is_its_own_transpose_is_the_same_rotation(recorded):
+    """A hand that points down and turns about the vertical: there is nothing to tell apart."""
+    turn = Turn.from_euler("xz", np.stack([np.full(30, np.pi), np.linspace(-0.5, 0.5, 30)], 1))
+    down = join_action(recorded[..., :3], turn.as_matrix()[:, None].repeat(8, 1), 0.0)
+    np.testing.assert_allclose(transposed(down), down, atol=1e-12)
+    assert orientation(transposed(down), down, down[:, 0]).judged == "holds"
+
+
+def test_turns_smaller_than_a_floor_have_no_slope(recorded, rng):
+    turn = Turn.from_euler("z", rng.uniform(-0.01, 0.01, (30, 1))).as_matrix()
+    ours = join_action(recorded[..., :3], turn[:, None].repeat(8, 1), 0.0)
+    assert turn_slopes(transposed(ours), ours, rng=rng) == []
+
+
+def test_a_gripper_that_only_trembles_is_not_compared(recorded, rng):
+    """Ten micrometres of a sensor are no motion that a candidate must show."""
+    recorded[..., GRIPPER] = 0.02 + 1e-5 * rng.normal(size=(30, 1))
     chunks = recorded.copy()
-    chunks[:3, :, 3:9] = 0.0
-    assert turned_away(chunks, recorded) == (3, 30)
+    chunks[..., GRIPPER] = 0.02
+    assert [one.name for one in slopes(chunks, recorded, rng=rng)] == ["x", "y", "z"]
+    assert scale(chunks, recorded, follows=True).judged == "holds"
+
+
+@pytest.mark.parametrize("error", [0.0, 1e-5])
+def test_a_gripper_that_stands_where_the_recorded_one_moves_is_wrong(recorded, rng, error):
+    chunks = recorded.copy()
+    chunks[..., GRIPPER] = 0.02 + error * rng.normal(size=(30, 1))
+    found = scale(chunks, recorded, follows=True)
+    assert (found.judged, found.said.rpartition("wrong: ")[2]) == ("fails", "gripper")
+
+
+def test_a_gripper_that_moved_at_two_moments_of_thirty_says_nothing(recorded):
+    recorded[..., GRIPPER] = 0.0
+    recorded[:2, :, GRIPPER] = 0.04
+    chunks = recorded.copy()
+    chunks[..., GRIPPER] = 0.0
+    assert scale(chunks, recorded, follows=True).judged == "holds"
+
+
+def test_noise_of_a_candidate_is_no_other_unit(recorded):
+    """Least squares alone call 1.7 spreads of error a factor of four."""
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        chunks = recorded.copy()
+        spread = recorded[..., :3].mean(axis=1).std(axis=0)
+        chunks[..., :3] += 1.7 * spread * rng.normal(size=(30, 1, 3))
+        assert scale(chunks, recorded, follows=True).judged != "fails"
+        chunks[..., :3] *= 1000.0
+        assert scale(chunks, recorded, follows=True).judged != "holds"
+
+
+def test_noise_of_the_recordings_is_no_other_unit(recorded, rng):
+    """A policy that says the mean of what people do moves less than they do."""
+    noisy = recorded.copy()
+    spread = recorded[..., :3].mean(axis=1).std(axis=0)
+    noisy[..., :3] += 1.5 * spread * rng.normal(size=(30, 1, 3))
+    assert scale(recorded, noisy, follows=True).judged != "fails"
+
+
+def test_of_nothing_in_common_nothing_is_known(recorded, rng):
+    other = recorded.copy()
+    other[..., 0] = recorded[rng.permutation(30), :, 0]
+    found = slope_of("x", other, recorded, rng)
+    assert (found.low, found.high) == (-np.inf, np.inf)
 
 
 def test_a_recording_is_known_whichever_candidate_it_is(recorded, rng):

@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 
 from genpolicy.candidates.conformance.recorded_starts import (
+    measured,
     observation_contract,
     recorded_starts,
     require_contract,
 )
+from genpolicy.contract.observation import ObservationContract
 from genpolicy.errors import ContractError
 
 
@@ -31,6 +33,22 @@ def test_a_moment_is_what_was_seen_and_what_was_done_next(data, kit):
             & (frames.action == starts.chunks[row, 0]).all(axis=1)
         )
         assert any(np.array_equal(frames.action[at : at + 16], starts.chunks[row]) for at in newest)
+
+
+def test_where_the_robot_was_is_read_from_its_own_channels(data, kit, task):
+    starts = recorded_starts(data, kit.HORIZONS)
+    part = task.observation.slices
+    newest = starts.observations[:, -1]
+    np.testing.assert_array_equal(starts.measured[:, :3], newest[:, part["tcp_position_m"]])
+    np.testing.assert_array_equal(starts.measured[:, 3:9], newest[:, part["tcp_rotation"]])
+    np.testing.assert_array_equal(starts.measured[:, 9:], newest[:, part["gripper_opening_m"]])
+
+
+def test_what_is_not_observed_is_no_number(task):
+    wrench = ObservationContract(
+        tuple(one for one in task.observation.channels if one.name == "wrench_n")
+    )
+    assert np.isnan(measured(np.zeros((4, 2, 3)), wrench)).all()
 
 
 def test_fewer_are_spread_over_all_and_moments_over_the_episodes(data, kit):

@@ -2,6 +2,7 @@ import threading
 
 import numpy as np
 import pytest
+from websockets.sync.client import ClientConnection, connect
 from websockets.sync.server import serve
 
 from genpolicy.candidates.wire import connection
@@ -77,7 +78,7 @@ def test_no_answer_in_time_is_late_and_what_comes_then_answers_nothing(serving):
 
     def answer(message):
         if "slow" in message:
-            slow.wait(5)
+            slow.wait(60)
         return dict(message)
 
     with serving(answer, HELLO) as address:
@@ -86,14 +87,12 @@ def test_no_answer_in_time_is_late_and_what_comes_then_answers_nothing(serving):
             line.ask({"slow": 1}, timeout_s=0.05)
         assert error.value.fault is Fault.LATE
         slow.set()
-        seen = None
-        while seen is None:  # it comes some time
-            try:
-                line.ask({"next": 1}, timeout_s=0.5)
-            except PolicyError as later:
-                seen = later.fault
+        # It comes some time: taken for an answer, it makes the next one come unasked.
+        with pytest.raises(PolicyError) as later:
+            for _ in range(1000):
+                line.ask({"next": 1}, timeout_s=60.0)
         line.close()
-        assert seen is Fault.UNREQUESTED
+        assert later.value.fault is Fault.UNREQUESTED
 
 
 def test_a_server_that_answers_twice_is_at_fault(raw):
@@ -176,6 +175,98 @@ def test_a_server_that_does_not_read_does_not_hold_us(raw):
     assert not rescued.is_set()
     assert Fault.LATE in faults
     assert faults <= {Fault.LATE, Fault.CLOSED}
+
+
+PINGS = bytes([0x89, 125]) + b"x" * 125
+"""A ping as a server sends it (RFC 6455, 5.5.2), of the longest text that it may have."""
+
+
+def test_a_server_that_floods_pings_and_reads_no_answer_does_not_hold_us(raw):
+    """Answering them fills the line, behind which our own message waits."""
+    rescued = threading.Event()
+
+    def talk(line):
+        line.send(pack(HELLO))
+        while not rescued.is_set():
+            try:
+                line.socket.sendall(PINGS * 400)
+            except OSError:
+                return
+
+    line = dial(raw(talk), allowed=None, timeout_s=60.0)
+    rescue = threading.Timer(60.0, lambda: (rescued.set(), line._cut()))
+    rescue.start()
+    with pytest.raises(PolicyError) as error:
+        for _ in range(1000):
+            line.ask({"o": np.zeros(100_000)}, timeout_s=0.2)
+    line.close()
+    rescue.cancel()
+    assert not rescued.is_set()
+    assert error.value.fault in {Fault.LATE, Fault.CLOSED}
+
+
+@pytest.mark.parametrize("first", ["no model", b"\xc1", None])
+def test_a_line_that_begins_wrongly_is_hung_up_and_leaves_no_thread(raw, first):
+    end = threading.Event()
+
+    def talk(line):
+        if first is not None:
+            line.send(first)
+        end.wait(60)
+
+    address = raw(talk)
+    before = set(threading.enumerate())
+    with pytest.raises(PolicyError) as error:
+        dial(address, allowed=None, timeout_s=0.2 if first is None else 60.0)
+    assert error.value.fault is {str: Fault.REFUSED, bytes: Fault.MALFORMED}.get(
+        type(first), Fault.LATE
+    )
+    ours = [
+        thread for thread in set(threading.enumerate()) - before
+        if getattr(thread, "_target", None) is not None
+        and isinstance(getattr(thread._target, "__self__", None), ClientConnection)
+    ]  # fmt: skip
+    for thread in ours:
+        thread.join(60)  # far more than the tenth of a second that hanging up takes
+    end.set()
+    assert not any(thread.is_alive() for thread in ours)
+
+
+def test_hanging_up_waits_once_and_not_as_long_as_an_answer(raw, monkeypatch):
+    opened = []
+
+    def connected(*words, **settings):
+        opened.append(settings)
+        return connect(*words, **settings)
+
+    monkeypatch.setattr(connection, "connect", connected)
+    with pytest.raises(PolicyError, match="no metadata"):
+        dial(raw(lambda line: line.recv()), allowed=None, timeout_s=0.2)
+    assert [one["close_timeout"] for one in opened] == [connection.HANG_UP_S]
+
+
+def test_a_round_trip_is_that_of_a_ping(raw, serving):
+    ticks = iter(range(10))
+    with serving(lambda _: {}, HELLO) as address:
+        line = dial(address, allowed=None, timeout_s=60.0)
+        assert line.round_trip_s(timeout_s=60.0, clock=lambda: float(next(ticks))) == 1.0
+        line.close()
+        assert line.round_trip_s(timeout_s=60.0, clock=lambda: float(next(ticks))) is None
+
+
+def test_who_answers_no_ping_is_not_at_fault(raw):
+    end = threading.Event()
+
+    def talk(line):
+        line.send(pack(HELLO))
+        line.protocol_mutex.acquire()  # its library answers nothing any more
+        end.wait(60)
+        line.protocol_mutex.release()
+
+    line = dial(raw(talk), allowed=None, timeout_s=60.0)
+    assert line.round_trip_s(timeout_s=0.2, clock=time.monotonic) is None
+    end.set()
+    line.close()
 
 
 @pytest.mark.parametrize("address", ["ws://127.0.0.1:80", "ws://localhost:80", "ws://[::1]:8000"])

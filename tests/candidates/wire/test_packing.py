@@ -1,4 +1,5 @@
 import contextlib
+import tracemalloc
 
 import msgpack
 import numpy as np
@@ -101,3 +102,32 @@ def test_a_message_beyond_the_limit_is_not_read():
 def test_only_plain_values_are_written(value):
     with pytest.raises(IntegrityError, match="not to be written"):
         pack({"a": value})
+
+
+def many(count, what=b"\x80"):
+    return b"\x81\xa1a\xdd" + count.to_bytes(4, "big") + what * count
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        many(1 << 20),  # an empty map is a byte here and sixty in memory
+        many(1 << 20, b"\x90"),
+        many(1 << 20, b"\xc0"),
+        many(17, b"\xdc\x10\x00" + b"\xc0" * 4096),
+        many(1000, b"\xdc\x00\x42" + b"\x80" * 66),
+        b"\x81\xa1a" + b"\xdd\x7f\xff\xff\xff" * 500,  # room is taken for what is promised
+    ],
+)
+def test_a_message_of_very_many_things_is_refused_before_it_is_built(data):
+    tracemalloc.start()
+    with pytest.raises(IntegrityError):
+        unpack(data)
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert most < 16 << 20
+
+
+def test_as_many_things_as_a_message_needs_are_read():
+    rows = {"rows": [[number] * 64 for number in range(900)], "of": {"a": {}, "b": {}}}
+    assert unpack(pack(rows)) == rows

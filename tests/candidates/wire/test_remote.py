@@ -1,9 +1,10 @@
+import itertools
 import threading
-import time
 
 import numpy as np
 import pytest
 
+from genpolicy.candidates.wire.connection import Connection
 from genpolicy.candidates.wire.extension import WORD
 from genpolicy.candidates.wire.faults import Fault, PolicyError
 from genpolicy.candidates.wire.remote import RemotePolicy
@@ -74,6 +75,7 @@ def test_candidates_come_in_as_many_messages_as_it_needs(line, seen):
     assert found.evaluations == 4
     assert found.spans_s == {"sample": 1.5}
     assert found.seconds > 0.0
+    assert found.messages == 3
 
 
 def test_a_plain_server_is_asked_once_for_each_and_never_sees_the_extension(line, seen, entry_of):
@@ -96,22 +98,27 @@ def test_after_a_fault_it_dials_again(line, seen):
     assert policy.invoke(seen, noise=("a",), candidates=1).actions.shape == (1, 16, 10)
 
 
-def test_a_late_answer_is_never_taken_for_the_next_one(line, seen, entry_of):
-    """Three answers that come late, then one in time: it is to its own question."""
-    slow = threading.Event()
+def test_a_late_answer_is_never_taken_for_the_next_one(line, seen, monkeypatch):
+    """Three answers that come after nobody waits for them, then one in time: to its question."""
+    given_up = [threading.Event() for _ in range(3)]
+    number, ask = itertools.count(), Connection.ask
+    monkeypatch.setattr(Connection, "ask", lambda self, message, timeout_s: ask(
+        self, message, timeout_s=0.05 if next(number) < len(given_up) else 60.0
+    ))  # fmt: skip
 
     class Slow(Planted):
         def __call__(self, message):
-            if not slow.is_set():
-                time.sleep(0.2)
-            return super().__call__(message)
+            answer = super().__call__(message)
+            if len(self.asked) <= len(given_up):
+                given_up[len(self.asked) - 1].wait(60)
+            return answer
 
-    policy = line(Slow(), metadata={}, entry=entry_of(timeout_s=0.1))
-    for number in range(3):
+    policy = line(Slow(), metadata={})
+    for late, over in enumerate(given_up):
         with pytest.raises(PolicyError) as error:
-            policy.invoke(seen + number, noise=("a",), candidates=1)
+            policy.invoke(seen + late, noise=("a",), candidates=1)
         assert error.value.fault is Fault.LATE
-    slow.set()
+        over.set()
     found = policy.invoke(seen + 100.0, noise=("a",), candidates=1)
     np.testing.assert_array_equal(found.actions[0, 0, :3], seen[-1, :3] + 100.0)
 

@@ -1,0 +1,138 @@
+"""Findings about a candidate's numbers: do they speak of the moment, in the declared units?"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from genpolicy.candidates.conformance.asked import Asked
+from genpolicy.candidates.conformance.finding import Finding, Judged
+from genpolicy.candidates.conformance.placed import Offset, offsets, turned_away
+from genpolicy.candidates.conformance.plausible import (
+    STANDS_M,
+    Slope,
+    copied,
+    nearest,
+    shuffled_share,
+    slopes,
+    turn_slopes,
+)
+from genpolicy.candidates.conformance.recorded_starts import RecordedStarts
+from genpolicy.seeds import stream
+from genpolicy.statistics.intervals import clopper_pearson
+
+Array = NDArray[np.float64]
+
+NAMES = ("follows_observation", "scale", "origin", "orientation", "own_answers")
+FEWEST = 20
+"""Moments below which nothing is said of units: a slope of few is anything."""
+SAME_SCALE = 3.0
+"""A slope beyond a factor of three either way is another unit, sign or spread: a weak policy's
+slope is still nearer to 1, a wrong unit's is 10 times off."""
+KNOWS_THE_MOMENT = 0.001
+ONE_IN_TWO = 0.5
+
+
+def plausible(asked: Asked, starts: RecordedStarts) -> list[Finding]:
+    """Whether its chunks speak of the moment, in the units that were declared."""
+    rows = [row for row, one in sorted(asked.answers.items()) if np.isfinite(one.actions).all()]
+    if len(rows) < FEWEST:
+        said = f"{len(rows)} finite answers, {FEWEST} are needed"
+        return [Finding(name, "unknown", "D", said) for name in NAMES]
+    drawn = np.stack([asked.answers[row].actions for row in rows])
+    recorded, measured = starts.chunks[rows], starts.measured[rows]
+    chunks = nearest(drawn, recorded)
+    share = shuffled_share(drawn, recorded, rng=stream(0, "conformance", "shuffle"))
+    follows = share <= KNOWS_THE_MOMENT
+    copies = copied(drawn, recorded)
+    scaled = scale(chunks, recorded, follows=follows)
+    return [
+        Finding(
+            NAMES[0], "holds" if follows else "fails", "D",
+            f"as near to other moments' recordings in {share:.4f} of the shuffles, at most "
+            f"{KNOWS_THE_MOMENT}",
+        ),
+        scaled,
+        origin(offsets(drawn, recorded, measured), follows and scaled.judged != "fails"),
+        orientation(chunks, recorded, measured),
+        Finding(
+            NAMES[4], "fails" if copies else "holds", "D",
+            f"{copies} of {len(rows)} moments answered with the recording itself",
+        ),
+    ]  # fmt: skip
+
+
+def scale(chunks: Array, recorded: Array, *, follows: bool) -> Finding:
+    """Whether places and the opening move as recorded ones do. Chunks: (M, K, 10)."""
+    found = slopes(chunks, recorded, rng=stream(0, "conformance", "slopes"))
+    if not found:
+        return Finding("scale", "unknown", "D", "nothing moves in the recordings")
+    said = f"recorded per declared unit, 1 is right: {_listed(found)}"
+    if wrong := [one.name for one in found if _wrong(one)]:
+        return Finding("scale", "fails", "D", f"{said}; wrong: {', '.join(wrong)}")
+    # Of many chunks that know nothing the nearest lie on the line too.
+    right = follows and all(_right(one) for one in found)
+    return Finding("scale", "holds" if right else "unknown", "D", said)
+
+
+def _wrong(one: Slope) -> bool:
+    """Beyond what noise on both sides explains."""
+    return one.stands or one.high < 1.0 / SAME_SCALE or one.low > SAME_SCALE
+
+
+def _right(one: Slope) -> bool:
+    return one.low >= 1.0 / SAME_SCALE and one.high <= SAME_SCALE
+
+
+def _listed(found: list[Slope]) -> str:
+    return ", ".join(
+        f"{one.name} {one.slope:.3g} ({one.low:.3g} to {one.high:.3g})" for one in found
+    )
+
+
+def origin(found: list[Offset], comparable: bool) -> Finding:
+    """Whether chunks begin where the robot is.
+
+    Args:
+        found: Offsets of first actions.
+        comparable: Its numbers speak of the moment and in its units; else none of them is a place.
+    """
+    if not comparable:
+        said = "its numbers do not speak of the moment in the declared units"
+        return Finding("origin", "unknown", "D", said)
+    if not any(np.isfinite(one.step) for one in found):
+        return Finding("origin", "unknown", "D", "the observation does not say where the TCP is")
+    far = [one for one in found if one.low > one.step or one.high < -one.step]
+    off = [one for one in found if one.apart_low > STANDS_M or one.apart_high < -STANDS_M]
+    if far:
+        text = ", ".join(
+            f"{one.name} {1e3 * one.low:.3g} to {1e3 * one.high:.3g} mm (a step is "
+            f"{1e3 * one.step:.3g} mm)" for one in far
+        )  # fmt: skip
+        return Finding("origin", "fails", "D", f"chunks begin off the measured place: {text}")
+    if off:
+        text = ", ".join(
+            f"{one.name} {1e3 * one.apart_low:.3g} to {1e3 * one.apart_high:.3g} mm" for one in off
+        )
+        said = f"beside the recorded first actions by too little to tell offset from bias: {text}"
+        return Finding("origin", "unknown", "D", said)
+    across = [one.name for one in found if one.low < -one.step or one.high > one.step]
+    if across:
+        said = f"begin too far apart from each other to say: {', '.join(across)}"
+        return Finding("origin", "unknown", "D", said)
+    reach = 1e3 * max(max(abs(one.apart_low), abs(one.apart_high)) for one in found)
+    said = f"chunks begin where the recorded ones do, to within {reach:.3g} mm"
+    return Finding("origin", "holds", "D", said)
+
+
+def orientation(chunks: Array, recorded: Array, measured: Array) -> Finding:
+    """Whether chunks begin turned as the hand is, and turn the way recordings turn."""
+    away, compared, step = turned_away(chunks, recorded, measured)
+    low, high = clopper_pearson(away, compared)
+    turns = turn_slopes(chunks, recorded, rng=stream(0, "conformance", "turns"))
+    said = f"at {away} of {compared} turned from the hand by more than {step:.3g} rad"
+    said += f"; recorded per turn: {_listed(turns)}" if turns else ""
+    judged: Judged = "unknown"
+    if low > ONE_IN_TWO or any(one.high < 0.0 for one in turns):
+        judged = "fails"
+    elif high < ONE_IN_TWO and all(_right(one) for one in turns):
+        judged = "holds"
+    return Finding("orientation", judged, "D", said)
