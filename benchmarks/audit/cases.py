@@ -53,11 +53,14 @@ def _modes(count: int, contexts: int) -> Cause:
 
 
 TOLD = "7 of 10 modes are told, the limit of what may be"
+OBEYED = (0.2, 0.4, 0.6, 0.8, 1.0)
 
 
-def _decided(name: str, decided_by: str, answers: tuple[Answer, ...]) -> Cause:
+def _decided(
+    name: str, decided_by: str, answers: tuple[Answer, ...], obeyed: tuple[float, ...] = OBEYED
+) -> Cause:
     return Cause(
-        name, "hidden_state", "share of episodes that obey", (0.2, 0.4, 0.6, 0.8, 1.0), 0.4, TOLD,
+        name, "hidden_state", "share of episodes that obey", obeyed, 0.4, TOLD,
         lambda seed, s, task: Plan(seed, shares=HALF, decided_by=decided_by, fidelity=s),
         answers, (VALID,),
     )  # fmt: skip
@@ -98,7 +101,8 @@ HIDDEN = (
     _decided("side in turns", "alternation", (ORDER,)),
     _decided("early lamp", "lamp_early", (hidden("unrecorded"),)),
     _decided("early path", "path_early", (hidden("unrecorded"), hidden("start_position"))),
-    _decided("habit", "habit", (ORDER,)),
+    # Whoever always does as the time before has one way only.
+    _decided("habit", "habit", (ORDER,), OBEYED[:-1]),
     Cause(
         "drift over the session", "hidden_state", "change of a mode's share over the session",
         (0.4, 0.8, 1.0), 0.8, TOLD,

@@ -26,6 +26,8 @@ SHARED = 0.5
 IDENTIFIERS = {"uuid", "id", "index", "idx", "number", "seed", "hash", "name", "count", "counter"}
 ENDS = re.compile(r"_?(index|idx|id|uuid|number|code)$", re.IGNORECASE)
 CLOCK = re.compile(r"(\d{1,2}):(\d{2})(?::(\d{2}(?:\.\d+)?))?")
+# Dates of several days are also asked by their time of day, where it varies by so many seconds.
+TIME_OF_DAY, HOUR_S = "time of day", 3600.0
 # What the audit itself calls a variable; a column of that name is told apart.
 RESERVED = {
     *("phase", "episode_order", "time_in_episode", "recording_sequence", "history"),
@@ -34,7 +36,9 @@ RESERVED = {
 }
 LABELS = ("operator", "object", "calibration_epoch")
 PREFIXES = ("mode_of_", "start_position.")
-TASK, FILE, FOLDER = "task", "file", "folder"
+TASK, FILE, FOLDER, CALLED = "task", "file", "folder", "file name"
+PLACES = (FILE, FOLDER, CALLED)
+NUMBER = re.compile(r"\d+")
 # In these layouts files are filled one after the other: which one an episode is in is its place.
 FILLED_IN_TURN = ("lerobot",)
 EVERY_EPISODE = "another value in nearly every episode: it names the episode"
@@ -80,7 +84,8 @@ def candidates(table: pd.DataFrame, manifest: Mapping[str, object], data: AuditI
     order = [place[str(uuid)] for uuid in data.episodes.uuid]
     found: list[Variable] = []
     left: list[tuple[str, str]] = []
-    for name, runs in _columns(table, manifest).items():
+    columns = _columns(table, manifest)
+    for name, runs in {**_times_of_day(columns), **columns}.items():
         made = _variable(name, [runs[number] for number in order], data)
         if isinstance(made, Variable):
             found.append(made)
@@ -99,7 +104,35 @@ def _columns(table: pd.DataFrame, manifest: Mapping[str, object]) -> Columns:
         folders = [text.rpartition("/")[0] for text in files]
         found.setdefault(FILE, _whole(files))
         found.setdefault(FOLDER, _whole(folders))
+        # `ada_003` and `ada_004` are of one collector.
+        called = [NUMBER.sub("", text.rpartition("/")[2]) for text in files]
+        found.setdefault(CALLED, _whole(called))
     return found
+
+
+def _times_of_day(columns: Columns) -> Columns:
+    """Columns of dates by their time of day: what is done in the mornings, whatever the date."""
+    found: Columns = {}
+    for name, runs in columns.items():
+        kept = [item for item in runs if item is not None]
+        texts = {str(value).strip() for item in kept for value in item.values}
+        moments = {text: _moment(text) for text in texts if text.lower() not in NOT_RECORDED}
+        dates = [moment for moment in moments.values() if moment is not None]
+        seconds = [_second(moment) for moment in dates]
+        if len(dates) < len(moments) or len({moment.date() for moment in dates}) < 2:
+            continue
+        if max(seconds) - min(seconds) >= HOUR_S:
+            said = {text: str(moment.time()) for text, moment in moments.items() if moment}
+            found[f"{name} ({TIME_OF_DAY})"] = [
+                item and Runs(item.rows, tuple(said.get(str(v).strip(), "") for v in item.values))
+                for item in runs
+            ]
+    return found
+
+
+def _second(moment: datetime) -> float:
+    """Second of the day."""
+    return (moment - moment.replace(hour=0, minute=0, second=0, microsecond=0)).total_seconds()
 
 
 def _whole(values: Sequence[object]) -> list[Runs | None]:
@@ -123,7 +156,7 @@ def _variable(name: str, runs: list[Runs | None], data: AuditInput) -> Variable 
         few = len(np.unique(numbers[known])) <= MOST_GROUPS
         values = numbered(np.where(known, numbers, np.inf)) if few else numbers
     if not by_row and why:
-        return "" if name in (FILE, FOLDER) else why
+        return "" if name in PLACES else why
     spread = values[np.repeat(np.arange(len(values)), counts)] if by_row else values
     final = spread if spread.dtype.kind == "f" else numbered(spread)
     return Variable(_called(name, data), final, by_row)
@@ -162,11 +195,16 @@ def _number(text: str) -> float | None:
     clock = CLOCK.fullmatch(text)
     if clock is not None:
         return int(clock[1]) * 3600.0 + int(clock[2]) * 60.0 + float(clock[3] or 0.0)
+    moment = _moment(text)
+    return None if moment is None else (moment - datetime(1970, 1, 1)).total_seconds()
+
+
+def _moment(text: str) -> datetime | None:
+    """A date, by the clock that its recorder had."""
     try:
-        moment = datetime.fromisoformat(text)
+        return datetime.fromisoformat(text).replace(tzinfo=None)
     except ValueError:
         return None
-    return (moment.replace(tzinfo=None) - datetime(1970, 1, 1)).total_seconds()
 
 
 def _is_counted(name: str, numbers: Array) -> bool:
@@ -250,7 +288,7 @@ def _comparable(values: Values) -> Values:
 
 def _meaning(name: str) -> tuple[bool, bool, int, str]:
     """Words before numbers of words, recorded columns before where the file lay."""
-    return name in (FILE, FOLDER), ENDS.search(name) is not None, len(name), name
+    return name in PLACES, ENDS.search(name) is not None, len(name), name
 
 
 def _phase_name(manifest: Mapping[str, object]) -> str:

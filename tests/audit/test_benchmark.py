@@ -160,6 +160,19 @@ def test_a_habit_repeats_and_a_drift_moves_as_far_as_said():
     assert np.mean(drift[-400:]) == pytest.approx(0.86, abs=0.05)
 
 
+HIDDEN = {cause.name: cause for cause in CAUSES if cause.group == "hidden_state"}
+
+
+@pytest.mark.parametrize("cause", HIDDEN.values(), ids=HIDDEN)
+def test_what_is_to_be_hidden_decides_between_two_ways(cause):
+    # A habit of strength 1 gave one way in every episode, and `unimodal` was counted as wrong.
+    for strength in filter(cause.strong, cause.strengths):
+        plan = cause.plan(5, strength, "planar")
+        mode = draw_roster(plan, 0.01).mode
+        share = np.bincount(mode, minlength=2) / len(mode)
+        assert len(plan.shares) == 1 or np.sort(share)[-2] > 0.2
+
+
 def test_what_goes_together_goes_together_and_decides_nothing():
     roster = draw_roster(Plan(7, shares=(0.5, 0.5), correlation=0.9, episodes=4000), 0.01)
     birch = roster.operator == "birch"

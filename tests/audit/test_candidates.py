@@ -67,6 +67,32 @@ def test_measures(data, name, values, first):
         assert item.values.min() == pytest.approx(first)
 
 
+def test_dates_are_asked_by_their_time_of_day_too(data):
+    # Mornings one way and evenings the other, over a month: the date tells nothing of it.
+    hours = [8 + k % 2 * 9 for k in range(N)]
+    texts = [
+        f"2024-03-{1 + (k * 7) % 28:02d}T{hour:02d}:{k:02d}:00" for k, hour in enumerate(hours)
+    ]
+    texts[4] = None
+    by_name = {item.name: item for item in found(data, **{"variable.made": texts}).variables}
+    day = by_name["made (time of day)"]
+    assert day.is_measure and np.isnan(day.values[4]) and len(by_name) == 2
+    assert day.values[5] == 17 * 3600 + 5 * 60
+
+
+@pytest.mark.parametrize(
+    "values",
+    [[f"2024-03-{1 + k % 20:02d}" for k in range(N)],
+     [f"2024-03-01T{8 + k % 9:02d}:{k:02d}:00" for k in range(N)],
+     [f"2024-03-{1 + k % 20:02d}T08:00:{k:02d}" for k in range(N)],
+     [f"2024-03-{1 + k % 20:02d}T{k % 24:02d}:00:00" if k else "later" for k in range(N)],
+     [1709280000.0 + 40000 * k for k in range(N)]],
+    ids=["no times", "one day", "within an hour", "one is no date", "numbers"],
+)  # fmt: skip
+def test_what_has_no_time_of_day_is_asked_by_none(data, values):
+    assert not any("time of day" in name for name in names(found(data, **{"variable.a": values})))
+
+
 @pytest.mark.parametrize(
     ("name", "values", "why"),
     [("uuid", [f"{k:08x}-x" for k in range(N)], EVERY_EPISODE),
@@ -196,3 +222,12 @@ def test_the_file_is_a_reason_where_files_are_no_order(data, source, expected):
     assert names(found(data, {"source_kind": source}, source_file=files)) == expected
     one_each = [f"day/{k}.parquet" for k in range(N)]
     assert found(data, {"source_kind": source}, source_file=one_each).left_out == ()
+
+
+def test_what_a_file_is_called_beside_its_number_is_a_reason(data):
+    files = [f"day_{k % 3}/{'ada' if k % 4 else 'ben'}_{k:03d}.parquet#0" for k in range(N)]
+    result = found(data, {"source_kind": "parquet"}, source_file=files)
+    assert names(result) == ["file name", "folder"] and result.left_out == ()
+    whose = {"variable.collector": ["ada" if k % 4 else "ben" for k in range(N)]}
+    result = found(data, {"source_kind": "parquet"}, source_file=files, **whose)
+    assert names(result) == ["collector", "folder"]

@@ -14,12 +14,14 @@ from genpolicy.audit import predictability
 from genpolicy.audit.before import STILL_TOGETHER, Before, seen_before
 from genpolicy.audit.choices import Choices, choices
 from genpolicy.audit.data import canonical
+from genpolicy.audit.guesses import by_value
 from genpolicy.audit.history import shortest_gap
 from genpolicy.audit.linking import link
 from genpolicy.audit.predictability import (
     HISTORY,
     LEAST_EPISODES,
     NOTHING_BEFORE,
+    denied_where_known,
     predictions,
 )
 from genpolicy.audit.resolution import observed_gap
@@ -201,3 +203,62 @@ def test_a_past_that_by_itself_may_tell_too_much_is_not_denied_for_what_is_seen_
     assert both.told_lower < 0.0 < both.told_upper  # beyond the present nothing is proved, and
     assert both.told_upper > 0.4  # nothing is denied
     assert told(nothing, nothing).told_upper < 0.4 and told(nothing, parted).told_upper < 0.4
+
+
+def habit(seed, fidelity, n, *, unknown):
+    """Modes of episodes that do as the one before, or as chance says; -1 where nobody can tell."""
+    rng = np.random.default_rng([9, seed])
+    modes = rng.integers(0, 2, n)
+    for at in range(1, n):
+        modes[at] = modes[at - 1] if rng.random() < fidelity else modes[at]
+    return np.where(rng.random(n) < unknown, -1, modes)
+
+
+def of_all(links):
+    """Who chose, and what the two episodes before tell, whether or not their modes are known."""
+    chose = np.flatnonzero(links >= 0)
+    share = np.bincount(links[chose], minlength=2) / len(chose)
+    chosen = Choices(chose, links[chose], np.tile(share, (len(chose), 1)))
+    order, one = np.arange(len(links)), np.zeros(len(links), dtype=np.int64)
+    rng = np.random.default_rng(1)
+    guess = by_value(predictability._before(links, order, one)[chose])
+    hits = predictability._hits(chosen, guess, rng, repeats=5)
+    row = predictability._row("previous_episodes", "approach", chosen, hits, 0.95)
+    return row, chosen, predictability._just_before(links, order, one)[chose], rng
+
+
+@pytest.mark.parametrize(("n", "unknown"), [(150, 0.25), (150, 0.5), (80, 0.25)])
+def test_a_habit_at_the_limit_is_denied_no_more_often_than_the_confidence_says(n, unknown):
+    # A guess at an episode whose predecessor nobody could read is worth nothing, and counted as
+    # proof: a habit that tells exactly .4 was surely below .4 in 28 to 62 of a hundred.
+    before, after = [], []
+    for seed in range(100):
+        row, chosen, told_by, rng = of_all(habit(seed, 0.4, n, unknown=unknown))
+        before.append(row.told_upper <= 0.4)
+        after.append(denied_where_known(row, chosen, told_by, rng, 0.95).told_upper <= 0.4)
+    assert sum(before) > 20 and sum(after) <= 10
+
+
+def test_where_every_mode_is_known_a_free_choice_is_still_told_by_no_habit():
+    denied = 0
+    for seed in range(50):
+        row, chosen, told_by, rng = of_all(habit(seed, 0.0, 150, unknown=0.0))
+        denied += denied_where_known(row, chosen, told_by, rng, 0.95).told_upper <= 0.4
+    assert denied >= 45
+
+
+def test_nothing_is_denied_where_no_mode_is_known_of_what_would_tell():
+    data = canonical(record("planar", planned()).data)
+    settings = SETTINGS.model_copy(update={"query_stride": 20})
+    several = [(i, c) for _, i, c in find_situations(data, settings, 0)[0] if c.count > 1]
+    early = data.index < np.median(data.index)
+    data = replace(data, phase=np.where(early, "begin", "approach"))
+    modes, place = np.random.default_rng(4).integers(0, 2, N), np.arange(N)
+    links = {
+        "approach": np.where(place % 2 == 0, modes, -1),  # nobody just before can be read
+        "begin": np.where(place < LEAST_EPISODES, modes[::-1], -1),
+    }
+    rows = predictions(data, settings, {"approach": several}, links, root_seed=0)
+    upper = {row.variable: row.told_upper for row in rows}
+    assert upper["previous_episodes"] == 1.0 and upper["mode_of_begin"] == 1.0
+    assert upper["object"] < 0.4
