@@ -12,7 +12,7 @@ import numpy as np
 
 from genpolicy.audit.forms import forms_of, in_place
 from genpolicy.audit.settings import AuditSettings
-from genpolicy.contract.observation import Channel, ObservationContract
+from genpolicy.contract.observation import ObservationContract
 from genpolicy.contract.settings import parse_settings
 from genpolicy.data.dataset import Dataset
 from genpolicy.data.grips import is_two_valued
@@ -36,14 +36,6 @@ LENGTHS = ("m", "px")
 FORMS = ("action_forms", "action_gains", "action_offsets")
 
 
-def observation_contract(dataset: Dataset) -> ObservationContract:
-    """The observation contract as the manifest carries it."""
-    stored = dataset.manifest["observation_contract"]["channels"]
-    return ObservationContract(
-        tuple(Channel(**{**item, "components": tuple(item["components"])}) for item in stored)
-    )
-
-
 def propose_settings(
     dataset: Dataset,
     overrides: Mapping[str, Any] | None = None,
@@ -64,7 +56,7 @@ def propose_settings(
         ConfigError: An override that does not exist or does not fit.
     """
     source = source or dataset.manifest.get("import_contract") or {}
-    contract = observation_contract(dataset)
+    contract = dataset.observation_contract
     stated = {**(source.get("audit") or {}), **(overrides or {})}
     paired: Mapping[str, str] = source.get("pairing") or {}
     training = dataset.split("train").frames

@@ -7,7 +7,7 @@ from genpolicy.audit.component_rows import NOT_LOOKED_AT, OTHER
 from genpolicy.audit.labels import Replay, disagreement
 from genpolicy.audit.mean_versus_modes import Admissible
 from genpolicy.audit.progress import Progress, silent
-from genpolicy.audit.propose import observation_contract, propose_settings
+from genpolicy.audit.propose import propose_settings
 from genpolicy.audit.question_names import COLUMN, OUTCOME_MISSING
 from genpolicy.audit.run import AuditResult
 from genpolicy.audit.run import audit as audit_rows
@@ -83,7 +83,7 @@ def audit(
     settings = config or propose_settings(dataset)
     data = from_dataset(
         dataset,
-        contract=observation_contract(dataset),
+        contract=dataset.observation_contract,
         settings=settings,
         period_s=float(dataset.manifest["action_contract"]["period_s"]),
     )

@@ -9,7 +9,6 @@ from genpolicy.candidates.conformance.check import Conformance, Question, check,
 from genpolicy.candidates.conformance.findings import Admissible
 from genpolicy.candidates.conformance.recorded_starts import (
     RecordedStarts,
-    observation_contract,
     recorded_starts,
     require_contract,
 )
@@ -59,7 +58,7 @@ def run_check(path: Path, options: CheckOptions, *, as_json: bool) -> int:
     entry = read_entry(path)
     data = load_dataset(options.dataset)
     require_contract(data, entry.horizons, candidate=entry.name)
-    contract = observation_contract(data)
+    contract = data.observation_contract
     starts = recorded_starts(data, entry.horizons)
     checks = task_checks(data, task=None, chunk_steps=entry.horizons.prediction_horizon)
     what = question(starts, dataset=data.manifest_sha256, candidates=options.candidates)

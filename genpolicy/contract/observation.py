@@ -1,7 +1,9 @@
 """The observation: named channels with unit, size, clock and maximum age."""
 
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from functools import cached_property
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +44,13 @@ class ObservationContract:
     """The ordered channels of one observation vector."""
 
     channels: tuple[Channel, ...]
+
+    @classmethod
+    def of_document(cls, channels: Iterable[Mapping[str, Any]]) -> Self:
+        """The contract as a manifest carries it: one mapping of the fields for each channel."""
+        return cls(
+            tuple(Channel(**{**item, "components": tuple(item["components"])}) for item in channels)
+        )
 
     @property
     def dim(self) -> int:

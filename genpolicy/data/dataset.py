@@ -10,6 +10,7 @@ import pandas as pd
 import pyarrow as pa
 
 from genpolicy.contract.normalisation import Normalisation, statistics_of
+from genpolicy.contract.observation import ObservationContract
 from genpolicy.data.assemble import (
     EPISODES_FILE,
     FLAGS,
@@ -50,6 +51,11 @@ class Dataset:
     manifest: dict[str, Any]
     manifest_sha256: str
     normalisation: Normalisation
+
+    @property
+    def observation_contract(self) -> ObservationContract:
+        """The observation that it holds, as the manifest carries it."""
+        return ObservationContract.of_document(self.manifest["observation_contract"]["channels"])
 
     def split(self, name: str) -> "Dataset":
         """The dataset of one split; `frames.episode` counts the rows of its own `episodes`.

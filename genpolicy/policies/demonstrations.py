@@ -28,11 +28,6 @@ def episodes_of_one_mode(followed: Mapping[str, str], data: Dataset) -> list[str
 
 def phase_columns(data: Dataset) -> tuple[int, ...]:
     """Numbers of an observation that name the phase; empty where it is not observed."""
-    found: list[int] = []
-    start = 0
-    for channel in data.manifest["observation_contract"]["channels"]:
-        size = len(channel["components"])
-        if channel["stream"] == PHASE_STREAM:
-            found += range(start, start + size)
-        start += size
-    return tuple(found)
+    contract = data.observation_contract
+    seen = [c.name for c in contract.channels if c.stream == PHASE_STREAM]
+    return tuple(n for name in seen for n in range(contract.dim)[contract.slices[name]])

@@ -1,7 +1,8 @@
 """The observation: ordered channels, one vector, one hash, and refusals by name."""
 
 import hashlib
-from dataclasses import replace
+import json
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -25,6 +26,12 @@ def test_what_is_joined_lies_where_the_slices_say():
     assert CONTRACT.dim == len(joined) == len(CONTRACT.component_names)
     assert CONTRACT.component_names[:3] == ("q_rad.a", "q_rad.b", "force_n.x")
     assert CONTRACT.streams == ("joints", "wrench")
+
+
+def test_a_manifest_gives_back_what_it_was_written_from():
+    stored = json.loads(json.dumps([asdict(channel) for channel in CONTRACT.channels]))
+    assert ObservationContract.of_document(stored) == CONTRACT
+    assert ObservationContract.of_document(stored[::-1]).hash() != CONTRACT.hash()
 
 
 def test_leading_axes_stay():

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from genpolicy.contract.action import ACTION_DIM, GRIPPER, POSITION, ROTATION
 from genpolicy.contract.horizons import HorizonConfig
-from genpolicy.contract.observation import Channel, ObservationContract
+from genpolicy.contract.observation import ObservationContract
 from genpolicy.data.contract import TCP_ACTION
 from genpolicy.data.dataset import Dataset
 from genpolicy.errors import ContractError
@@ -43,17 +43,6 @@ class RecordedStarts:
 
     def __len__(self) -> int:
         return len(self.episodes)
-
-
-def observation_contract(data: Dataset) -> ObservationContract:
-    """The observation that a dataset holds."""
-    channels = data.manifest["observation_contract"]["channels"]
-    return ObservationContract(
-        tuple(
-            Channel(**{**channel, "components": tuple(channel["components"])})
-            for channel in channels
-        )
-    )
 
 
 def measured(observations: Array, contract: ObservationContract) -> Array:
@@ -133,7 +122,7 @@ def recorded_starts(
         seen,
         np.stack([chunks[episode][row] for row, episode in zip(at, chosen, strict=True)]),
         np.array([episodes[episode] for episode in chosen]),
-        measured(seen, observation_contract(data)),
+        measured(seen, data.observation_contract),
     )
 
 

@@ -5,7 +5,6 @@ import pytest
 
 from genpolicy.candidates.conformance.recorded_starts import (
     measured,
-    observation_contract,
     recorded_starts,
     require_contract,
 )
@@ -73,7 +72,7 @@ def test_chunks_longer_than_every_episode_are_refused(data, kit):
 
 
 def test_the_observation_is_that_of_the_dataset(data, task):
-    assert observation_contract(data) == task.observation
+    assert data.observation_contract == task.observation
 
 
 def test_another_period_or_another_action_is_refused_with_both_sides(data, kit):
