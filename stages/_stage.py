@@ -23,12 +23,17 @@ from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.contract.settings import Settings, parse_settings
 from genpolicy.errors import ConfigError, GenpolicyError
 from genpolicy.integrity.documents import read_yaml
+from genpolicy.progress import LOG_EVERY_S, STAGE, still_at_it
 
 Model = TypeVar("Model", bound=BaseModel)
 
 PARAMS = Path("params.yaml")
 ARTIFACTS = Path("artifacts")
 TIMES = Path("build/times")
+SILENT = ("latency",)
+"""Stages that measure time: nothing else runs in their process meanwhile."""
+TRAINS, RARELY_S = "train_", 60.0
+"""Stages whose processes say how far they are; how often the stage itself speaks beside them."""
 
 STAGES = (
     "task", "record", "ingest", "audit", "train_baselines", "measure_baselines", "train_factors",
@@ -126,10 +131,15 @@ def main(name: str, work: Callable[[Params], None]) -> NoReturn:
         work: Admits, measures or judges, and writes the outputs.
     """
     started = time.perf_counter()
+    usual_s = _taken(name)
     with contextlib.suppress(OSError):
         (TIMES / f"{name}.json").unlink(missing_ok=True)
+    os.environ[STAGE] = f"[{STAGES.index(name) + 1}/{len(STAGES)}] {name}"
+    every_s = RARELY_S if name.startswith(TRAINS) else LOG_EVERY_S
+    said = contextlib.nullcontext() if name in SILENT else still_at_it(usual_s, every_s=every_s)
     try:
-        work(load_params())
+        with said:
+            work(load_params())
     except GenpolicyError as error:
         print(f"{name}: {error}", file=sys.stderr)
         _record(name, started, error.exit_code)
@@ -144,6 +154,15 @@ def main(name: str, work: Callable[[Params], None]) -> NoReturn:
         sys.exit(1)
     _record(name, started, 0)
     sys.exit(0)
+
+
+def _taken(name: str) -> float | None:
+    """Wall time of the last run that was done, s; None where none is known."""
+    try:
+        last = json.loads((TIMES / f"{name}.json").read_text())
+        return float(last["seconds"]) if last["exit_code"] == 0 else None
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
 
 
 def _record(name: str, started: float, code: int) -> None:

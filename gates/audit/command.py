@@ -20,7 +20,6 @@ from genpolicy.audit.evidence import write_evidence
 from genpolicy.audit.propose import propose_settings
 from genpolicy.audit.settings import AuditSettings
 from genpolicy.audit.standalone import AuditReport, audit
-from genpolicy.cli.progress import ProgressLine
 from genpolicy.cli.remember import Answers, remembered_admissible, remembered_replay
 from genpolicy.cli.resume import DATASET, work_folder
 from genpolicy.cli.task_checks import TaskChecks, task_checks
@@ -34,6 +33,7 @@ from genpolicy.pages.audit.evidence import read_evidence
 from genpolicy.pages.audit.origins import named, origins_of, origins_shown
 from genpolicy.pages.audit.page import audit_page
 from genpolicy.pages.audit.words import TITLES
+from genpolicy.progress import ProgressLine
 
 DOCUMENT, PAGE, CONTRACT, EVIDENCE = "audit.json", "audit.html", "contract.yaml", "evidence"
 SHOWN_REFUSALS = 5

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from genpolicy.cli.ingest import Recordings, given_contract
-from genpolicy.cli.progress import ProgressLine
 from genpolicy.cli.resume import fingerprint, kept_or_new, work_folder
 from genpolicy.data.formats import Opened, open_dataset
+from genpolicy.progress import ProgressLine
 
 
 @dataclass(frozen=True)

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from genpolicy.cli.progress import ProgressLine
 from genpolicy.data.formats import Opened, open_dataset, propose
 from genpolicy.data.formats.contract import ImportContract, load_contract, write_contract
 from genpolicy.data.formats.open_questions import open_questions
+from genpolicy.progress import ProgressLine
 
 SHOWN_REFUSALS = 20
 

@@ -50,6 +50,7 @@ from genpolicy.policies.validation_row import (
     three_quarters,
 )
 from genpolicy.policies.windows import Windows, as_batch
+from genpolicy.progress import counting
 from genpolicy.seeds import integer_seed, stream
 
 
@@ -276,7 +277,7 @@ def _optimise(
     order = _batch_order(len(data.actions), config.batch_size, request.seed)
     total, counted = torch.zeros((), device=device), 0
     measured_after = moments(config)
-    for step in range(config.steps):
+    for step in counting(config.steps, f"{request.method}, update"):
         rows = torch.as_tensor(next(order)).to(device)
         batch = Batch(data.observations[rows], data.actions[rows], data.weight[rows])
         for group in optimiser.param_groups:

@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 import yaml
 
+from genpolicy.progress import STAGE
 from genpolicy.tasks.fixtures import PINS
 from stages._stage import main
 
@@ -27,6 +28,7 @@ def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     shutil.copy(ROOT / PINS, tmp_path)
     (tmp_path / "params.yaml").write_bytes((ROOT / "params.yaml").read_bytes())
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv(STAGE, "")  # each stage sets it, and no test behind sees it
     return tmp_path
 
 

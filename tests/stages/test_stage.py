@@ -1,6 +1,8 @@
 """What every stage does around its work: settings with a place, exit codes, times."""
 
+import contextlib
 import json
+import os
 import re
 from pathlib import Path
 
@@ -9,6 +11,7 @@ import yaml
 
 from genpolicy.errors import ContractError, RefusedError
 from genpolicy.evidence.stress.latency import LatencySection
+from genpolicy.progress import STAGE
 from stages._stage import SHARED, STAGES, load_params, main
 
 BAD_SETTINGS = {
@@ -192,6 +195,44 @@ def test_exit_codes_mean_one_thing_each(workspace, capsys, work, code, sentence)
     times = json.loads((workspace / "build" / "times" / "record.json").read_text())
     assert (times["stage"], times["exit_code"]) == ("record", code)
     assert times["seconds"] >= 0 and times["peak_mib"] > 0
+
+
+@pytest.mark.parametrize(
+    ("stage", "last", "usual_s", "every_s"),
+    [
+        ("record", {"seconds": 12.5, "exit_code": 0}, 12.5, 10.0),
+        ("record", {"seconds": 1.5, "exit_code": 3}, None, 10.0),
+        ("record", "[", None, 10.0),
+        ("train_baselines", None, None, 60.0),
+    ],
+)
+def test_a_stage_says_its_place_and_for_how_long_it_is_at_it(
+    workspace, monkeypatch, stage, last, usual_s, every_s
+) -> None:
+    file = workspace / "build" / "times" / f"{stage}.json"
+    file.parent.mkdir(parents=True)
+    if last is not None:
+        file.write_text(last if isinstance(last, str) else json.dumps(last))
+    seen = []
+
+    def spoken(usual, *, every_s):
+        seen.append((usual, every_s))
+        return contextlib.nullcontext()
+
+    monkeypatch.setattr("stages._stage.still_at_it", spoken)
+    with pytest.raises(SystemExit):
+        main(stage, lambda _: seen.append(os.environ[STAGE]))
+    assert seen == [(usual_s, every_s), f"[{STAGES.index(stage) + 1}/19] {stage}"]
+
+
+def test_nothing_speaks_beside_what_measures_time(workspace, monkeypatch) -> None:
+    def spoken(usual, *, every_s):
+        raise AssertionError("a thread beside the clock")
+
+    monkeypatch.setattr("stages._stage.still_at_it", spoken)
+    with pytest.raises(SystemExit) as end:
+        main("latency", lambda _: None)
+    assert end.value.code == 0
 
 
 def test_times_that_cannot_be_written_fail_no_stage(workspace, capsys) -> None:
