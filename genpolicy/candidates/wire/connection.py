@@ -155,7 +155,8 @@ def dial(address: str, *, allowed: str | None, timeout_s: float) -> Connection:
             address, compression=None, max_size=MAXIMUM_MESSAGE_BYTES, proxy=None,
             open_timeout=timeout_s, ping_interval=PING_S, close_timeout=HANG_UP_S, logger=QUIET,
         )  # fmt: skip
-    except (OSError, InvalidHandshake) as error:  # a time-out is an OSError too
+    # A time-out is an OSError too; who hangs up in the handshake may be any of the three.
+    except (OSError, InvalidHandshake, ConnectionClosed) as error:
         raise PolicyError(Fault.CLOSED, f"nobody answers at {address} ({error})") from error
     line = Connection(socket, {})
     try:

@@ -20,7 +20,7 @@ PLAIN_KINDS = "biuf"
 PLAIN_TYPE = re.compile(r"[<>|](b1|[iu][1248]|f[248])")
 MOST_AXES = 8
 MOST_ITEMS = 4096
-"""Of one list or map: msgpack takes room for all that its header promises before one is there."""
+"""Of one list or map, as its header says; what is in it is counted only when it is whole."""
 MOST_OF_ALL = 65_536
 """Things in a message: an empty map is a byte on the wire and sixty in memory."""
 

@@ -168,7 +168,11 @@ def _frames(part: Dataset, row: int, features: _Features, place: _Place) -> pa.T
     for name, places in features.columns.items():
         values = part.frames.action if name == ACTION else part.frames.observation
         numbers = np.ascontiguousarray(values[keep][:, places], dtype=np.float32)
-        columns[name] = pa.FixedSizeListArray.from_arrays(pa.array(numbers.ravel()), len(places))
+        flat = pa.array(numbers.ravel())
+        # LeRobot reads a feature of shape (1,) as a column of numbers, and refuses lists of one.
+        columns[name] = (
+            pa.FixedSizeListArray.from_arrays(flat, len(places)) if len(places) > 1 else flat
+        )
     frame = np.arange(length, dtype=np.int64)
     task = place.tasks.index(part.episodes["task"].iloc[row])
     columns |= {

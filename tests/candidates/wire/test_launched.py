@@ -1,5 +1,7 @@
 import os
+import socketserver
 import sys
+import threading
 import time
 
 import numpy as np
@@ -139,6 +141,28 @@ def test_a_port_that_somebody_else_took_is_not_asked(entry, tmp_path, monkeypatc
         ports[:] = [taken] * launched.PORTS
         with pytest.raises(PolicyError, match="no process of its command"):
             Launched(entry, tmp_path)
+
+
+class HangsUp(socketserver.BaseRequestHandler):
+    """Speaks no WebSocket."""
+
+    def handle(self):
+        self.request.close()
+
+
+def test_a_port_of_somebody_who_is_no_policy_is_left_alone(entry, tmp_path, monkeypatch):
+    """The server ends, because it cannot listen there; another port is tried."""
+    with socketserver.TCPServer(("127.0.0.1", 0), HangsUp) as stranger:
+        thread = threading.Thread(target=stranger.serve_forever)
+        thread.start()
+        try:
+            ports = [stranger.server_address[1], free_port()]
+            monkeypatch.setattr(launched, "free_port", lambda: ports.pop(0))
+            with Launched(entry, tmp_path) as running:
+                assert metadata(running.address)["pid"] == running._process.pid
+        finally:
+            stranger.shutdown()
+            thread.join()
 
 
 def test_who_listens_is_known_by_its_sockets(serving):

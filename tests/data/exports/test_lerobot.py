@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
@@ -205,3 +206,34 @@ def test_a_rate_that_is_no_whole_number_is_refused_before_anything_is_written(da
 @pytest.mark.parametrize("rate", [10, 15, 20, 30, 50, 60, 100])
 def test_common_rates_are_whole_numbers(rate):
     assert lerobot._fps(1.0 / rate) == rate
+
+
+def test_a_feature_of_one_number_is_a_column_of_numbers(data, tmp_path):
+    """LeRobot 0.4 casts shape (1,) to a plain number, and refuses a list of one."""
+    channels = data.manifest["observation_contract"]["channels"]
+    starts = np.cumsum([0, *(len(channel["components"]) for channel in channels)])
+    kept = [
+        number for number, channel in enumerate(channels)
+        if channel["stream"] == "robot" or channel["name"] == "post_position_m"
+    ]  # fmt: skip
+    columns = np.concatenate([np.arange(starts[one], starts[one + 1]) for one in kept])
+    contract = {**data.manifest["observation_contract"], "channels": [channels[k] for k in kept]}
+    narrow = replace(
+        data, manifest={**data.manifest, "observation_contract": contract},
+        frames=replace(data.frames, observation=data.frames.observation[:, columns]),
+    )  # fmt: skip
+    written = export_lerobot(narrow, tmp_path / "out", split="train")
+    name = "observation.environment_state"
+    assert written.features[name] == 1
+    [path] = (tmp_path / "out" / "data").rglob("*.parquet")
+    assert pq.read_schema(path).field(name).type == pa.float32()
+    seen = data.split("train").frames.observation[:, columns[-1]].astype(np.float32)
+    np.testing.assert_array_equal(frames_of(tmp_path / "out")[name], seen)
+    info = json.loads((tmp_path / "out/meta/info.json").read_text())
+    assert info["features"][name]["shape"] == [1]
+    stats = json.loads((tmp_path / "out/meta/stats.json").read_text())
+    assert stats[name]["mean"] == [pytest.approx(seen.astype(np.float64).mean())]
+    opened = open_dataset(tmp_path / "out", out=tmp_path / "back")
+    assert (opened.accepted, opened.refused) == (written.episodes, ())
+    back = load_dataset(tmp_path / "back").frames.observation
+    assert np.isin(seen, back.astype(np.float32)).all()
