@@ -18,7 +18,7 @@ from pathlib import Path
 from benchmarks.mutation.plan import ROOT, Mutant, cases_of, change_of, tests_of, text_of
 
 OURS = ("gates", "genpolicy", "tests", "benchmarks")
-KERNELS = "genpolicy/feasibility/kernels/"
+KERNELS = ("genpolicy/compiled.py", "genpolicy/feasibility/kernels/", "genpolicy/policies/kernels/")
 CPU_S = 600
 """A mutant that needs more processor time than this is stopped; it may hang. All tests of
 `gates/need` need more than 150 on a busy machine, where a survivor was once called killed."""

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from genpolicy.compiled import owned
 from genpolicy.feasibility.kernels.arm import place_all, solve_all
-from genpolicy.feasibility.kernels.compiled import owned
 from genpolicy.feasibility.kernels.spheres import centres, lower_bounds, travel
 from genpolicy.feasibility.kernels.sweep import clear
 from genpolicy.feasibility.kernels.torque import torques

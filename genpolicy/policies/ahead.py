@@ -13,7 +13,10 @@ from operator import itemgetter
 import torch
 from torch import Tensor
 
-from genpolicy.policies.networks import PolicyNetwork, Prepared, joined
+from genpolicy.policies.networks import PolicyNetwork, Prepared, apart, joined
+
+# (what was prepared, values (B, ...)) -> the rest of an evaluation (B, ...)
+Finish = Callable[[Prepared, Tensor], Tensor]
 
 # Times prepared together; bounds the memory that a sampler of many steps takes.
 TIMES_AHEAD = 32
@@ -54,7 +57,7 @@ class AheadNetwork:
         *,
         times: Sequence[float],
         call_rows: Callable[[int], int],
-        finish: Callable[[Prepared, Tensor], Tensor] | None = None,
+        finish: Finish | None = None,
     ) -> None:
         """A network for one run of a sampler.
 
@@ -71,7 +74,7 @@ class AheadNetwork:
         self._call_rows = call_rows
         self._times = list(dict.fromkeys(times))
         self._place = {time: place for place, time in enumerate(self._times)}
-        self._block, self._prepared = -1, Prepared(conditions.stored, None)
+        self._block, self._prepared = -1, list[Prepared]()
         self.unannounced = 0
 
     def __call__(self, values: Tensor, time: Tensor) -> Tensor:
@@ -79,14 +82,17 @@ class AheadNetwork:
         place = self._place.get(float(time[0]))
         if place is None:
             self.unannounced += 1
-            return self._network.evaluate(self._conditions.rows, values, time)
+            return self._whole(values, time)
         block, within = divmod(place, TIMES_AHEAD)
         if self._block != block:
             self._prepare(block)
-        count = len(self._conditions.stored)
-        own = slice(within * count, (within + 1) * count)
-        spread = self._conditions.spread
-        return self._finish(self._prepared.rows(lambda rows: spread(rows[own])), values)
+        return self._finish(self._prepared[within].rows(self._conditions.spread), values)
+
+    def _whole(self, values: Tensor, time: Tensor) -> Tensor:
+        """An evaluation with nothing computed ahead, in a call of the network's own size."""
+        count, size = len(values), self._call_rows(len(values))
+        rows = (self._conditions.rows, values, time)
+        return self._network.evaluate(*(padded(own, size) for own in rows))[:count]
 
     def _prepare(self, block: int) -> None:
         """Every stored condition at every time of a block, time after time."""
@@ -99,7 +105,7 @@ class AheadNetwork:
             size = self._call_rows(len(condition))
             part = self._network.prepare(padded(condition, size), padded(time, size))
             parts.append(part.rows(itemgetter(slice(len(condition)))))
-        self._block, self._prepared = block, joined(parts)
+        self._block, self._prepared = block, apart(joined(parts), len(stored))
 
 
 def padded(rows: Tensor, size: int) -> Tensor:

@@ -268,8 +268,10 @@ def _load_weights(network: PolicyNetwork, weights: bytes, *, where: Path) -> Non
     for name, tensor in tensors.items():
         if not bool(torch.isfinite(tensor).all()):
             _refuse(where, f"holding a weight that is not finite, in {name}", "finite weights")
-    network.to_empty(device="cpu")
-    network.load_state_dict(tensors, strict=True)
+    # Taken over, not copied into empty ones: torch makes empty tensors like meta ones by code that
+    # imports a computer algebra system, half of what loading a policy took.
+    own = {name: tensor.clone() for name, tensor in tensors.items()}
+    network.load_state_dict(own, strict=True, assign=True)
 
 
 def _check_header(weights: bytes, expected: dict[str, list[int]], *, where: Path) -> None:

@@ -11,10 +11,9 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import torch
 from torch import Tensor
 
-from genpolicy.policies.predictions import PREDICTIONS
+from genpolicy.policies.predictions import PREDICTIONS, root
 from genpolicy.policies.samplers import NetworkFunction, NoiseFunction, refuse_name
 from genpolicy.policies.schedules import DiffusionSchedule, trailing_levels
 from genpolicy.policies.settings import SamplerConfig
@@ -67,9 +66,9 @@ def _ddpm(step: Step) -> Tensor:
 
 def _ddim(step: Step) -> Tensor:
     """One step with the noise that the bounded clean estimate leaves, and eta of fresh noise."""
-    rest = (step.x - math.sqrt(step.now) * step.clean) / math.sqrt(1.0 - step.now)
-    fresh = step.eta * step.deviation
-    x = math.sqrt(step.after) * step.clean + math.sqrt(1.0 - step.after - fresh**2) * rest
+    kind, fresh = step.x.dtype, step.eta * step.deviation
+    rest = (step.x - root(step.now, kind) * step.clean) / root(1.0 - step.now, kind)
+    x = root(step.after, kind) * step.clean + root(1.0 - step.after - fresh**2, kind) * rest
     return x + fresh * step.draw() if fresh > 0.0 else x
 
 
@@ -149,8 +148,8 @@ def sample_diffusion(
     kept = [float(schedule.alpha_bar[level]) for level in visited] + [1.0]
     x = noise(0)
     before: Tensor | None = None
-    for index, level in enumerate(visited):
-        time = schedule.level_time(torch.full(x.shape[:1], level, dtype=x.dtype, device=x.device))
+    times = schedule.level_time(x.new_tensor(visited))[:, None].expand(-1, len(x)).unbind()
+    for index, time in enumerate(times):
         clean = kind.clean(x, network(x, time), kept[index])
         if sampler.clip is not None:
             clean = clean.clamp(-sampler.clip, sampler.clip)

@@ -100,8 +100,8 @@ def ddim_step(x: Tensor, clean: Tensor, *, now: Share, after: Share) -> Tensor:
     Source:
         Song et al., arXiv 2010.02502, with eta = 0.
     """
-    rest = (x - root(now) * clean) / root(1.0 - now)
-    return root(after) * clean + root(1.0 - after) * rest
+    rest = (x - root(now, x.dtype) * clean) / root(1.0 - now, x.dtype)
+    return root(after, x.dtype) * clean + root(1.0 - after, x.dtype) * rest
 
 
 def clean_end(

@@ -10,7 +10,7 @@ from torch import Tensor
 
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.errors import ConfigError
-from genpolicy.policies.ahead import AheadNetwork, Conditions
+from genpolicy.policies.ahead import AheadNetwork, Conditions, Finish
 from genpolicy.policies.consistency import SegmentConsistency
 from genpolicy.policies.derivative_free import noise_length, search_codes
 from genpolicy.policies.diffusion_samplers import DIFFUSION_SAMPLERS, sample_diffusion
@@ -273,6 +273,7 @@ def generate(
     sampler: SamplerConfig,
     head: HeadConfig,
     call_rows: Callable[[int], int],
+    finish: Finish | None = None,
     guidance: Guidance | None = None,
 ) -> tuple[Tensor, int]:
     """Normalised chunks of conditions, and the network evaluations that they took.
@@ -281,21 +282,21 @@ def generate(
         network: Trained network of a method that fits the sampler.
         conditions: Encoded observations of B rows.
         noise: Noise of a sampler step, of `noise_shape` per row.
-        sampler: Sampler settings.
-        head: Head settings of the training.
+        sampler, head: Settings, of the sampler and of the training.
         call_rows: Rows that a network call for so many rows has, padded.
+        finish: The rest of an evaluation with the network's bits; None: the network's own.
         guidance: What the chunks go on from; None: nothing.
 
     Returns:
-        Chunks (B, K, D_a) and the counted NFE: calls of the network, as many as its slowest row
-        needed, and its backward passes.
+        Chunks (B, K, D_a) and the counted NFE: calls, as many as the slowest row needed, and
+        backward passes.
 
     Raises:
         ConfigError: Guidance of a sampler that has no path to guide.
         EvaluationCapError: The sampler's cap was reached.
     """
     times, climbs = announced_times(sampler, head), sampler.name == LANGEVIN
-    finish = network.climb if isinstance(network, EnergyNetwork) and climbs else None
+    finish = network.climb if isinstance(network, EnergyNetwork) and climbs else finish
     ahead = AheadNetwork(network, conditions, times=times, call_rows=call_rows, finish=finish)
 
     def once(values: Tensor, _: Tensor) -> Tensor:
@@ -320,9 +321,8 @@ def generate(
     elif sampler.name in EQUAL_STEPS:
         chunks = sample_ode(walked, noise, name=sampler.name, steps=sampler.steps)
     else:
-        latent = conditions.stored.new_zeros(len(conditions.of_row), head.latent_dim)
-        if sampler.name in ("z_prior", "offset"):
-            latent = noise(0)
+        drawn, rows = sampler.name in ("z_prior", "offset"), len(conditions.of_row)
+        latent = noise(0) if drawn else conditions.stored.new_zeros(rows, head.latent_dim)
         chunks = counted(latent, latent.new_zeros(len(latent)))
     return chunks, counted.nfe
 

@@ -98,6 +98,17 @@ def joined(parts: Sequence[Prepared]) -> Prepared:
     )
 
 
+def apart(prepared: Prepared, count: int) -> list[Prepared]:
+    """Parts of `count` rows, one after the other; of none left over."""
+    contexts, gains = torch.split(prepared.context, count), prepared.gains
+    if gains is None:
+        return [Prepared(context, None) for context in contexts]
+    own = (torch.split(part, count) for part in (gains.inner, gains.skip, gains.outer))
+    return [
+        Prepared(context, Gains(*parts)) for context, *parts in zip(contexts, *own, strict=True)
+    ]
+
+
 class Encoder(nn.Module):
     """Condition vector of the last H_o observations."""
 

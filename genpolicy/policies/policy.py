@@ -18,7 +18,7 @@ from torch import Tensor
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.errors import ContractError, IntegrityError, NonFiniteError
 from genpolicy.policies.ahead import Conditions, padded
-from genpolicy.policies.call_shapes import call_shapes
+from genpolicy.policies.call_shapes import call_shapes, compiled_calls
 from genpolicy.policies.checkpoint import Checkpoint, load_checkpoint
 from genpolicy.policies.determinism import deterministic
 from genpolicy.policies.guidance import GUIDED, Prefix
@@ -118,6 +118,9 @@ class NetworkPolicy:
         self._normalisation = checkpoint.normalisation
         self._network = checkpoint.network.to(device).requires_grad_(False)
         self._calls = call_shapes(self._network, config, self.sampler, device=device)
+        self._compiled = compiled_calls(
+            self._network, config, self.sampler, most=self._calls.most, device=device
+        )
         self._sampler_hash = self.sampler.hash()
 
     @property
@@ -216,12 +219,11 @@ class NetworkPolicy:
     def encode(self, observations: Tensor) -> Tensor:
         """Conditions (B, C) of normalised observations (B, H_o, D_o)."""
         with deterministic(self.device), torch.inference_mode():
-            return torch.cat(
-                [
-                    self._network.encode(padded(rows, self._calls.fit(len(rows))))[: len(rows)]
-                    for rows in torch.split(observations, self._calls.most)
-                ]
-            )
+            parts = [
+                self._network.encode(padded(rows, self._calls.fit(len(rows))))[: len(rows)]
+                for rows in torch.split(observations, self._calls.most)
+            ]
+            return torch.cat(parts)
 
     def sample_encoded(
         self,
@@ -240,11 +242,13 @@ class NetworkPolicy:
         chunks, evaluations = [], []
         # What is guided is differentiated, which nothing made in inference mode can be.
         plain, normalise = prefix is None, self._normalisation.action.normalise
+        compiled = self._compiled if plain else None
+        calls = compiled.shapes if compiled else self._calls
         with deterministic(self.device), torch.inference_mode(plain), torch.no_grad():
             condition = condition if plain else condition.clone()
-            for first in range(0, len(names), self._calls.most):
-                own = names[first : first + self._calls.most]
-                size = self._calls.fit(len(own))
+            for first in range(0, len(names), calls.most):
+                own = names[first : first + calls.most]
+                size = calls.fit(len(own))
                 # A padding row is the last row again, with its condition.
                 rows = [(first + min(row, len(own) - 1)) // candidates for row in range(size)]
                 result, nfe = generate(
@@ -254,9 +258,8 @@ class NetworkPolicy:
                     sampler=self.sampler,
                     head=self.checkpoint.config.head,
                     call_rows=self._calls.fit,
-                    guidance=None
-                    if prefix is None
-                    else prefix.guidance(rows, normalise, self.device),
+                    finish=compiled.finish(size) if compiled else None,
+                    guidance=prefix.guidance(rows, normalise, self.device) if prefix else None,
                 )
                 chunks.append(result[: len(own)].cpu())
                 evaluations.append(nfe)

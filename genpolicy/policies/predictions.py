@@ -4,10 +4,12 @@ At a level with a share `kept` of the clean variance, x = sqrt(kept) clean + sqr
 The three predictions say the same; they differ in what the training weighs.
 """
 
+import functools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import torch
 from torch import Tensor
 
 from genpolicy.policies.schedules import DiffusionSchedule, Gains, noise_gains
@@ -31,9 +33,19 @@ class Prediction:
     gains: Callable[..., Gains]
 
 
-def root(share: Share) -> Share:
+@functools.lru_cache(maxsize=4096)
+def scalar(number: float, dtype: torch.dtype) -> Tensor:
+    """A number as a tensor without axes.
+
+    torch makes one of a number at every use, which takes longer than a product of a few rows.
+    """
+    with torch.inference_mode(mode=False):
+        return torch.tensor(number, dtype=dtype)
+
+
+def root(share: Share, dtype: torch.dtype) -> Tensor:
     """Square root of a share, of one number or of one for each chunk."""
-    return share.sqrt() if isinstance(share, Tensor) else math.sqrt(share)
+    return share.sqrt() if isinstance(share, Tensor) else scalar(math.sqrt(share), dtype)
 
 
 def _variance(schedule: DiffusionSchedule, time: Tensor, data_std: float) -> tuple[Tensor, Tensor]:
@@ -65,12 +77,12 @@ def clean_gains(schedule: DiffusionSchedule, time: Tensor, *, data_std: float) -
 PREDICTIONS = {
     "noise": Prediction(
         target=lambda clean, noise, kept: noise,
-        clean=lambda x, noise, kept: (x - root(1.0 - kept) * noise) / root(kept),
+        clean=lambda x, noise, kept: (x - root(1.0 - kept, x.dtype) * noise) / root(kept, x.dtype),
         gains=noise_gains,
     ),
     "v": Prediction(
         target=lambda clean, noise, kept: kept.sqrt() * noise - (1.0 - kept).sqrt() * clean,
-        clean=lambda x, v, kept: root(kept) * x - root(1.0 - kept) * v,
+        clean=lambda x, v, kept: root(kept, x.dtype) * x - root(1.0 - kept, x.dtype) * v,
         gains=v_gains,
     ),
     "x0": Prediction(

@@ -22,9 +22,7 @@ ALLOWED: dict[str, str] = {
     "genpolicy.execution.recovery:Recovery.human_resolved": (
         "the way out of `ask_human`: a person's, so nothing of ours may take it"
     ),
-    "genpolicy.feasibility.kernels.compiled:HashedFolder.get_cache_path": (
-        "numba asks its locators for it"
-    ),
+    "genpolicy.compiled:HashedFolder.get_cache_path": ("numba asks its locators for it"),
     "genpolicy.integrity.documents:_StrictLoader.compose_node": YAML,
     "genpolicy.integrity.documents:_StrictLoader.construct_mapping": YAML,
     "genpolicy.robot.collision:CollisionModel.in_collision": (

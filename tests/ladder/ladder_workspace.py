@@ -14,7 +14,7 @@ import yaml
 from flows.reproduce import RunEnd, reproduce, stage_environment
 from flows.workspace import make_workspace
 from gates.proof import SPECS
-from genpolicy.feasibility.kernels.compiled import cache_folder
+from genpolicy.compiled import cache_folder
 
 ROOT = Path(__file__).parents[2]
 OVERRIDES = Path(__file__).with_name("overrides.yaml")
@@ -72,9 +72,11 @@ def make_small_ladder(target: Path) -> Path:
     overrides["gate_a"]["waived_checks"] = {"model": dict.fromkeys(UNASKED, REASON)}
     make_workspace(ROOT, target, overrides)
     # The same code, so that what it was compiled to is its own too; another process may be writing.
-    compiled = cache_folder()
     unfinished = shutil.ignore_patterns("*.tmp.*")
-    shutil.copytree(compiled, target / compiled.relative_to(ROOT), ignore=unfinished)
+    for part in ("feasibility", "policies"):
+        compiled = cache_folder(ROOT / "genpolicy" / part / "kernels")
+        if compiled.exists():  # those of the policies are imported where they are used
+            shutil.copytree(compiled, target / compiled.relative_to(ROOT), ignore=unfinished)
 
     def drop(params: dict[str, Any]) -> None:
         for section, places in DROPPED.items():

@@ -47,6 +47,22 @@ def test_a_network_whose_small_calls_differ_keeps_the_size_that_defines_it(folde
     assert 16 in spoiled and not {4, 8} & set(spoiled)
 
 
+def test_a_time_at_which_the_network_says_nothing_hides_no_bit(folders, monkeypatch):
+    """One jump begins at pure noise, where the gain of what the network says is next to nothing:
+    tried at that time alone, all sizes came out equal, and other samplers took them over."""
+    monkeypatch.setattr(module, "_measured", {})
+    policy = load_policy(folders["manicm"])
+    assert policy.sampler.steps == 1
+    network, config = policy.checkpoint.network, policy.checkpoint.config
+    honest = network.head.read_out
+    monkeypatch.setattr(
+        network.head, "read_out", lambda rows: honest(rows) * (1 + 1e-6 * (len(rows) < 9))
+    )
+    monkeypatch.setattr(module, "_measured", {})
+    spoiled = call_shapes(network, config, policy.sampler, device="cpu").sizes
+    assert 16 in spoiled and not {4, 8} & set(spoiled)
+
+
 def test_the_search_of_an_energy_and_other_devices_keep_the_size(folders):
     policy = load_policy(folders["ibc"])
     assert policy._calls.sizes == (policy.sampler.batch_rows,)

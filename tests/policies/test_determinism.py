@@ -81,13 +81,24 @@ def test_the_regime_is_left_as_it_was_found() -> None:
         torch.set_deterministic_debug_mode(before)
 
 
-def test_a_process_that_samples_imports_no_compiler() -> None:
-    """It would take a second of the first call, for a flag of a compiler that nothing uses."""
+@pytest.mark.parametrize("method", ["diffusion", "ibc"])
+def test_a_process_that_samples_imports_no_compiler(folders, method) -> None:
+    """A second of the first call for a flag of a compiler that nothing uses, and a third of one of
+    the loading for weights that were made empty first: both were what a fresh process took."""
     program = (
         "import sys, torch\n"
+        "from pathlib import Path\n"
+        "import numpy as np\n"
         "from genpolicy.policies.determinism import deterministic\n"
+        "from genpolicy.policies.policy import load_policy\n"
         "with deterministic('cpu'):\n"
         "    assert torch.are_deterministic_algorithms_enabled()\n"
-        "sys.exit('torch._inductor' in sys.modules)\n"
+        "policy = load_policy(Path(sys.argv[1]))\n"
+        "policy.sample(np.zeros((1, 2, 3)), noise_names=[('a',)], candidates=2)\n"
+        "print(*sorted({'torch._inductor', 'torch._dynamo', 'sympy'} & set(sys.modules)))\n"
     )
-    assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0
+    done = subprocess.run(
+        [sys.executable, "-c", program, str(folders[method])],
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert done.stdout.split() == []

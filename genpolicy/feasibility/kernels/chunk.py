@@ -5,9 +5,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from genpolicy.compiled import compiled
 from genpolicy.contract.action import ACTION_DIM, GRIPPER
 from genpolicy.feasibility.kernels.arm import place, solve_all
-from genpolicy.feasibility.kernels.compiled import compiled
 from genpolicy.feasibility.kernels.turn import angle, from_columns, to_columns
 
 Array = NDArray[np.float64]

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from genpolicy.compiled import compiled
 from genpolicy.contract.action import GRIPPER
 from genpolicy.feasibility.kernels.chunk import (
     AT,
@@ -12,7 +13,6 @@ from genpolicy.feasibility.kernels.chunk import (
     rate_excess,
     solve_rows,
 )
-from genpolicy.feasibility.kernels.compiled import compiled
 from genpolicy.feasibility.kernels.turn import angle, from_columns
 
 Array = NDArray[np.float64]

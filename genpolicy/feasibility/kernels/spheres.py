@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from genpolicy.feasibility.kernels.compiled import compiled
+from genpolicy.compiled import compiled
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]

@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from genpolicy.compiled import compiled
 from genpolicy.feasibility.kernels.arm import place_all
-from genpolicy.feasibility.kernels.compiled import compiled
 from genpolicy.feasibility.kernels.spheres import centres, lower_bounds, travel
 
 Array = NDArray[np.float64]

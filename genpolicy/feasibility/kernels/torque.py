@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from genpolicy.compiled import compiled
 from genpolicy.feasibility.kernels.arm import place
-from genpolicy.feasibility.kernels.compiled import compiled
 
 Array = NDArray[np.float64]
 Vector = tuple[float, float, float]

@@ -5,8 +5,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from genpolicy.compiled import compiled
 from genpolicy.contract.rotation import DEGENERATE_NORM
-from genpolicy.feasibility.kernels.compiled import compiled
 
 Array = NDArray[np.float64]
 
