@@ -192,3 +192,14 @@ def test_a_recording_is_known_whichever_candidate_it_is(recorded, rng):
 def test_many_chunks_of_other_moments_know_nothing_of_this_one(recorded, rng):
     drawn = recorded[rng.integers(30, size=(30, 8))]
     assert shuffled_share(drawn, recorded, rng=rng) > 0.01
+
+
+def test_the_factor_lies_between_both_slopes(rng):
+    """Of many moments noise of two spreads makes one slope a fifth, and the other one right."""
+    recorded = np.zeros((2000, 1, 10))
+    recorded[..., 0] = rng.normal(size=(2000, 1))
+    chunks = recorded.copy()
+    chunks[..., 0] += 2.0 * rng.normal(size=(2000, 1))
+    [found] = slopes(chunks, recorded, rng=rng)
+    assert found.slope == pytest.approx(0.2, abs=0.03)
+    assert found.low < 0.2 < 1.0 < found.high
