@@ -41,7 +41,7 @@ def test_another_schema_version_asks_to_judge_again(ladder, version):
         "",
         "{",
         '{"schema_version": 2}',
-        '{"schema_version": 3}',
+        '{"schema_version": 4}',
     ],
 )
 def test_a_malformed_report_is_an_integrity_error(ladder, text):

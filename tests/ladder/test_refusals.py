@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from ladder_workspace import edit_params, flip_a_bit, hashes, repro, run_stage, set_limit
 
-from gates.report import read_report, report_bytes
+from gates.report import SCHEMA_VERSION, read_report, report_bytes
 from genpolicy.integrity.tables import read_table, write_table
 
 Tamper = Callable[[Path], Any]
@@ -125,7 +125,8 @@ CASES: dict[str, tuple[Tamper, str, int, str]] = {
     ),
     "older schema version": (
         edit_report("gate_a", lambda d: d.update(schema_version=0)), "train_generators", 2,
-        r"reports/gate_a\.json: schema_version is 0, expected 3\. Run `dvc repro -f gate_a`",
+        rf"reports/gate_a\.json: schema_version is 0, expected {SCHEMA_VERSION}\. "
+        r"Run `dvc repro -f gate_a`",
     ),
     "report of another gate": (
         lambda w: shutil.copy(w / "reports" / "gate_a.json", w / "reports" / "gate_b.json"),
