@@ -25,8 +25,8 @@ FRAMES = "artifacts/ingest/frames.parquet"
 EPISODES = "artifacts/ingest/episodes.parquet"
 DEMONSTRATED = f"{AUDIT}/demonstrated.parquet"
 SUMMARY_FILE = f"{AUDIT}/{SUMMARY.file}"
-POINTS = 32
-"""Points kept of each path; the recorded ones lie a few millimetres apart."""
+POINTS, FEWEST, TOGETHER = 32, 8, 11_520
+"""Points kept of a path, at most and at least, and of all: a page of many episodes stays small."""
 UNTOLD = "no mode"
 """Episodes that the audit saw near no situation with several modes."""
 
@@ -74,11 +74,12 @@ def _demonstrations(evidence: Evidence, report: GateReport) -> Figure:
     if not every:
         raise MissingEvidenceError(f"{FRAMES} has no rows of an accepted episode")
     obstacles = evidence.document(AUDIT, SUMMARY).obstacles
+    points = int(np.clip(TOGETHER // len(every), FEWEST, POINTS))
     figure, (above, aside) = new_figure(height=3.5, columns=2)
     for name, colour in colours(path.mode for path in every).items():
         of_mode = [path for path in every if path.mode == name]
-        _draw_paths(above, of_mode, 1, colour)
-        _draw_paths(aside, of_mode, 2, colour)
+        _draw_paths(above, of_mode, 1, colour, points=points)
+        _draw_paths(aside, of_mode, 2, colour, points=points)
         good = sum(path.success for path in of_mode)
         label = f"{name}: {len(of_mode)} episodes, {good} succeed"
         above.plot([], [], color=colour, lw=2, label=label)
@@ -112,9 +113,9 @@ def colours(modes: Iterable[str]) -> dict[str, str]:
     }
 
 
-def _draw_paths(axes: Axes, chosen: list[Path], second: int, colour: str) -> None:
+def _draw_paths(axes: Axes, chosen: list[Path], second: int, colour: str, *, points: int) -> None:
     lines = [
-        path.points_m[np.linspace(0, len(path.points_m) - 1, POINTS).round().astype(int)][
+        path.points_m[np.linspace(0, len(path.points_m) - 1, points).round().astype(int)][
             :, [0, second]
         ]
         for path in chosen

@@ -110,3 +110,13 @@ def test_an_action_that_is_not_finite_is_named_and_not_drawn(ladder):
     )
     with pytest.raises(MissingEvidenceError, match="finite position"):
         paths(Evidence(ladder))
+
+
+@pytest.mark.parametrize(("episodes", "points"), [(1, 32), (360, 32), (720, 16), (100_000, 8)])
+def test_of_many_episodes_fewer_points_of_each_are_drawn(ladder, monkeypatch, episodes, points):
+    path = plots_scene.Path(np.linspace([0.0, 0.0, 0.0], [1.0, 1.0, 1.0], 50), True, "left")
+    monkeypatch.setattr(plots_scene, "paths", lambda _: [path] * episodes)
+    drawn = []
+    monkeypatch.setattr(plots_scene, "_draw_paths", lambda *_, points: drawn.append(points))
+    plots_scene.PLOTS[1].draw(Evidence(ladder), judge(ladder, "A"))
+    assert drawn == [points, points]
