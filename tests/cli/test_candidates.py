@@ -161,10 +161,15 @@ def test_no_dataset_and_no_report(folder, dataset, tmp_path, capsys):
 
 def test_a_served_policy_says_where_it_is_and_ends_on_an_interrupt(fleet):
     checkpoint = str(fleet[0] / "flow" / "seed_0")
-    server = subprocess.Popen(
-        [*PYTHON, "serve-policy", checkpoint, "--port", "0"], stdout=subprocess.PIPE, text=True,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
-    )  # fmt: skip
+    # A shell starts what runs in its background deaf to interrupts, and its children inherit that.
+    heard = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        server = subprocess.Popen(
+            [*PYTHON, "serve-policy", checkpoint, "--port", "0"], stdout=subprocess.PIPE, text=True,
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+        )  # fmt: skip
+    finally:
+        signal.signal(signal.SIGINT, heard)
     try:
         said = server.stdout.readline()
         [address] = re.findall(r"^Serving flow at (ws://127\.0\.0\.1:\d+)$", said)

@@ -9,7 +9,7 @@ from gates.report import Answer
 def answer(measured, threshold, comparison="<=", *, interval=None, verdict="PASS", **more):
     fields = {
         "id": "some_share", "question": "Is it so?", "owner": "model", "candidate": None,
-        "reason": "because", "evidence": (), "caveat": "",
+        "reason": "because", "evidence": (), "caveat": "", "counted": "",
     }  # fmt: skip
     return Answer(
         **{**fields, **more},
