@@ -4,6 +4,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 Judged = Literal["holds", "fails", "unknown"]
+ONE_IN_TWO = 0.5
+"""A share of moments is held against most of them, at the worse end of its interval."""
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.candidates.conformance.asked import Asked
-from genpolicy.candidates.conformance.finding import Finding, Judged
+from genpolicy.candidates.conformance.finding import ONE_IN_TWO, Finding, Judged
 from genpolicy.candidates.conformance.recorded_starts import RecordedStarts
 from genpolicy.candidates.wire.extension import Capabilities
 from genpolicy.contract.latency import Term
@@ -17,7 +17,6 @@ Array = NDArray[np.float64]
 Admissible = Callable[[Array, Array], tuple[bool, str]]
 """`(chunk (K, 10), newest observation (D_o,))`: whether it passes every layer, and why not."""
 
-ONE_IN_TWO = 0.5
 CLOCKS_APART = 1e-3
 """Part by which the clocks of two machines may run apart, and more than any two do."""
 MESSAGE_S = 0.01

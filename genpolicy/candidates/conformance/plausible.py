@@ -29,6 +29,8 @@ repeatability of the arms that this is for (0.1 mm by ISO 9283, data sheet of th
 Panda), twice the position resolution of a usual gripper (0.4 mm, Robotiq 2F-85)."""
 STANDS_RAD = 1e-2
 """The same of a turn: a place that moves so far at a lever of 0.1 m."""
+FEWEST = 20
+"""Moments below which nothing is said of units: a slope of few is anything."""
 NOTHING = 1e-6
 """A number of a chunk that differs less from moment to moment is rounding, in m or of a column."""
 ROUNDING = 1e-12
@@ -101,16 +103,12 @@ def turn_slopes(chunks: Array, recorded: Array, *, rng: np.random.Generator) -> 
     """
     first = [rotation_from_6d(of[:, 0, ROTATION]) for of in (chunks, recorded)]
     whole = ~np.isnan(first[0]).any(axis=(1, 2)) & ~np.isnan(first[1]).any(axis=(1, 2))
-    if whole.sum() < FEWEST_TURNS:
+    if whole.sum() < FEWEST:
         return []
     theirs, ours = (Turn.from_matrix(of[whole]) for of in first)
     back = ours.mean().inv()
     names = tuple(f"turn about {axis}" for axis in AXES)
     return _compared(names, (back * theirs).as_rotvec(), (back * ours).as_rotvec(), STANDS_RAD, rng)
-
-
-FEWEST_TURNS = 20
-"""Below which a slope is anything."""
 
 
 def _compared(

@@ -4,9 +4,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.candidates.conformance.asked import Asked
-from genpolicy.candidates.conformance.finding import Finding, Judged
+from genpolicy.candidates.conformance.finding import ONE_IN_TWO, Finding, Judged
 from genpolicy.candidates.conformance.placed import Offset, offsets, turned_away
 from genpolicy.candidates.conformance.plausible import (
+    FEWEST,
     STANDS_M,
     Slope,
     copied,
@@ -22,13 +23,10 @@ from genpolicy.statistics.intervals import clopper_pearson
 Array = NDArray[np.float64]
 
 NAMES = ("follows_observation", "scale", "origin", "orientation", "own_answers")
-FEWEST = 20
-"""Moments below which nothing is said of units: a slope of few is anything."""
 SAME_SCALE = 3.0
 """A slope beyond a factor of three either way is another unit, sign or spread: a weak policy's
 slope is still nearer to 1, a wrong unit's is 10 times off."""
 KNOWS_THE_MOMENT = 0.001
-ONE_IN_TWO = 0.5
 
 
 def plausible(asked: Asked, starts: RecordedStarts) -> list[Finding]:
