@@ -33,7 +33,7 @@ RUNGS: dict[Gate, tuple[str, ...]] = {
         "task", "record", "ingest", "audit", "train_baselines", "measure_baselines",
         "train_factors", "measure_factors",
     ),
-    "B": ("train_generators", "reload", "latency"),
+    "B": ("candidates", "train_generators", "reload", "latency"),
     "C": ("shadow",),
     "D": ("stress",),
     "E": ("card",),

@@ -41,6 +41,7 @@ PLANNED: Mapping[str, Planned] = {
     "policy.seeds": Planned("", "A"),
     "policy.training.steps": Planned("", "A"),
     "train_generators.samplers": Planned("", "B"),
+    "candidates": Planned("", "B"),
     "confidence": Planned(">=", "A"),
     "gate_a.held_out_splits": Planned("", "A"),
     "gate_a.deployed_conventions": Planned("", "A"),

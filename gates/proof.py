@@ -50,6 +50,7 @@ STAGE_REQUIRES: dict[str, Gate | None] = {
     "train_factors": None,
     "measure_factors": None,
     "gate_a": None,
+    "candidates": "A",
     "train_generators": "A",
     "reload": "A",
     "latency": "A",

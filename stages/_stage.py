@@ -37,8 +37,8 @@ TRAINS, RARELY_S = "train_", 60.0
 
 STAGES = (
     "task", "record", "ingest", "audit", "train_baselines", "measure_baselines", "train_factors",
-    "measure_factors", "gate_a", "train_generators", "reload", "latency", "gate_b", "shadow",
-    "gate_c", "stress", "gate_d", "card", "gate_e",
+    "measure_factors", "gate_a", "candidates", "train_generators", "reload", "latency", "gate_b",
+    "shadow", "gate_c", "stress", "gate_d", "card", "gate_e",
 )  # fmt: skip
 SHARED = (
     "seed", "confidence", "task", "source", "horizons", "compute", "policy", "feasibility",

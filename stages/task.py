@@ -2,12 +2,14 @@
 
 It runs every time (`always_changed`): a task may be installed and recordings may lie outside the
 tree, where nothing else sees an edit. What it writes changes only when they do. Coming first, it
-also stops the ladder before a stage would replace files that somebody else put in its folder, and
-where a fixture (controller, limits, supervisor, scene) is not the one that is pinned.
+also stops the ladder before a stage would replace files that somebody else put in its folder,
+where a fixture (controller, limits, supervisor, scene) is not the one that is pinned, and where a
+policy that is brought is not what its entry says: before anything trains.
 """
 
 from pathlib import Path
 
+from genpolicy.candidates.brought import BroughtSection, require_brought
 from genpolicy.documents.task import IDENTITY
 from genpolicy.integrity.atomic import output_folder, write_bytes
 from genpolicy.integrity.documents import canonical_json
@@ -22,6 +24,7 @@ def work(params: Params) -> None:
     """Write both identities."""
     refuse_foreign_files()
     require_own_files(Path.cwd())
+    require_brought(params.section("candidates", BroughtSection).root, horizons=params.horizons)
     identity = task_identity(params.task.name)
     require_pinned(Path.cwd(), params.task.name, fixture_hashes(identity))
     source = source_document(params.section("source", SourceSection))

@@ -13,8 +13,8 @@ from genpolicy.candidates.conformance.recorded_starts import (
     require_contract,
 )
 from genpolicy.candidates.wire.connection import LOOPBACK, Listening
-from genpolicy.candidates.wire.entry import ServerEntry, read_entry
-from genpolicy.candidates.wire.launched import Launched, verify_files
+from genpolicy.candidates.wire.entry import ServerEntry, read_entry, verify_files
+from genpolicy.candidates.wire.launched import Launched
 from genpolicy.candidates.wire.remote import RemotePolicy
 from genpolicy.candidates.wire.served import ServedPolicy
 from genpolicy.cli.task_checks import task_checks

@@ -76,12 +76,20 @@ class Policy(Protocol):
         """SHA-256 of the sampler's settings."""
 
     @property
+    def horizons(self) -> HorizonConfig:
+        """Horizons of the method; K = H_e = 1 for methods without chunks."""
+
+    @property
     def prediction_horizon(self) -> int:
         """K, actions of one chunk."""
 
     @property
     def stochastic(self) -> bool:
         """Whether candidates of one observation differ."""
+
+    @property
+    def guided(self) -> bool:
+        """Whether its chunks can be drawn to go on from given actions."""
 
     def sample(
         self,

@@ -9,6 +9,7 @@ from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.contract.settings import Settings, parse_settings
 from genpolicy.errors import ConfigError
 from genpolicy.integrity.documents import read_yaml
+from genpolicy.integrity.hashing import read_verified
 
 DIGEST = r"^[0-9a-f]{64}$"
 NAME = r"^[a-z][a-z0-9_]{0,63}$"
@@ -154,6 +155,42 @@ class Output(Settings):
         return 1 + max(*self.position.columns, *rotated, self.gripper.column)
 
 
+class Declared(Settings):
+    """What nobody but its maker can say of a policy, for the identity card of Gate B.
+
+    Attributes:
+        dataset: SHA-256 of the manifest of the dataset that it was trained on.
+        training_seed: Root seed of its training.
+        architecture: Encoder, trunk and head with their sizes.
+        parameters: Of the network that runs.
+        path: Noise schedule, or path between noise and action; that there is none.
+        sampler: Name of the sampler.
+        sampler_steps: Its steps.
+        eta: Share of the ancestral noise; None of a sampler that has none.
+        tolerance: Error of a step; None of a sampler that does not choose its steps.
+        evaluations: Network evaluations of a sample, by the definition of the sampler.
+        precision: Number format of weights and arithmetic.
+        device: Where it runs.
+        threads: Threads of its arithmetic.
+        batch_rows: Rows of a network call.
+    """
+
+    dataset: str = Field(pattern=DIGEST)
+    training_seed: int
+    architecture: str = Field(min_length=1)
+    parameters: int = Field(ge=1)
+    path: str = Field(min_length=1)
+    sampler: str = Field(min_length=1)
+    sampler_steps: int = Field(ge=1)
+    eta: float | None = None
+    tolerance: float | None = None
+    evaluations: int = Field(ge=1)
+    precision: str = Field(min_length=1)
+    device: str = Field(min_length=1)
+    threads: int = Field(ge=1)
+    batch_rows: int = Field(ge=1)
+
+
 class ServerEntry(Settings):
     """A policy behind a server that speaks the wire protocol.
 
@@ -169,6 +206,8 @@ class ServerEntry(Settings):
         observation: What it is given, by the name on the wire.
         constants: What it is given besides, unchanged: a prompt, the number of a robot.
         action: What its chunks mean.
+        stochastic: Whether the candidates of one observation differ; else one is drawn.
+        declared: What the identity card of Gate B asks for; without it the gate fails by name.
         start_timeout_s: How long it may take to listen.
         timeout_s: How long an answer is waited for before it counts as none.
     """
@@ -184,6 +223,8 @@ class ServerEntry(Settings):
     observation: dict[str, Input] = Field(min_length=1)
     constants: dict[str, str | int | float | bool] = Field(default_factory=dict)
     action: Output
+    stochastic: bool = True
+    declared: Declared | None = None
     start_timeout_s: float = Field(default=60.0, gt=0, le=600)
     timeout_s: float = Field(default=2.0, gt=0, le=60)
 
@@ -213,3 +254,17 @@ def read_entry(path: Path) -> ServerEntry:
             action="See docs/candidates.md.",
         )
     return parse_settings(ServerEntry, values, where=str(path))
+
+
+def verify_files(entry: ServerEntry, folder: Path) -> None:
+    """Hold every file that is the candidate against its hash.
+
+    Args:
+        entry: What it is.
+        folder: Of the entry's file; paths in it start there.
+
+    Raises:
+        IntegrityError: A file is missing, or is another one.
+    """
+    for name, digest in sorted(entry.files.items()):
+        read_verified(folder / name, sha256=digest, named_by=f"the entry of {entry.name}")

@@ -14,7 +14,6 @@ from genpolicy.candidates.wire.faults import Fault, PolicyError
 from genpolicy.candidates.wire.printed import Printed
 from genpolicy.candidates.wire.processes import listens, marked
 from genpolicy.errors import ConfigError
-from genpolicy.integrity.hashing import read_verified
 
 LOOK_S = 0.05
 END_S = 5.0
@@ -28,20 +27,6 @@ MARK = "GENPOLICY_LAUNCH"
 
 class PortTakenError(Exception):
     """Somebody else listens where a server was told to."""
-
-
-def verify_files(entry: ServerEntry, folder: Path) -> None:
-    """Hold every file that is the candidate against its hash.
-
-    Args:
-        entry: What it is.
-        folder: Of the entry's file; paths in it start there.
-
-    Raises:
-        IntegrityError: A file is missing, or is another one.
-    """
-    for name, digest in sorted(entry.files.items()):
-        read_verified(folder / name, sha256=digest, named_by=f"the entry of {entry.name}")
 
 
 class Launched(AbstractContextManager["Launched"]):

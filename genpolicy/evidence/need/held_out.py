@@ -20,7 +20,7 @@ from genpolicy.evidence.need.method_modes import (
 )
 from genpolicy.evidence.rows.need import ModeRow
 from genpolicy.feasibility.admission import FeasibilityChecker
-from genpolicy.policies.policy import NetworkPolicy
+from genpolicy.policies.policy import Policy
 from genpolicy.tasks.api import Task
 
 Array = NDArray[np.float64]
@@ -54,7 +54,7 @@ def held_out_situations(audit: Path, dataset: Dataset, *, horizons: HorizonConfi
 
 
 def modes_of_policy(
-    policy: NetworkPolicy,
+    policy: Policy,
     held_out: HeldOut,
     *,
     seed: int,
@@ -63,12 +63,15 @@ def modes_of_policy(
     task: Task,
     checker: FeasibilityChecker,
 ) -> list[ModeRow]:
-    """Rows of `modes.parquet`: modes reached and admissible samples, per situation."""
+    """Rows of `modes.parquet`: modes reached and admissible samples, per situation.
+
+    A chunk that is not finite is a sample like any other: no layer passes it, and it is far from
+    every mode.
+    """
     if not held_out.situations:
         return []
     names = [("modes", s.episode_uuid, s.index) for s in held_out.situations]
-    asked = policy.sample(held_out.observations, noise_names=names, candidates=samples)
-    drawn = asked.finite()
+    drawn = policy.sample(held_out.observations, noise_names=names, candidates=samples)
     rows = []
     for situation, observation, chunks in zip(
         held_out.situations, held_out.observations[:, -1], drawn.actions, strict=True
@@ -95,10 +98,16 @@ def modes_of_policy(
                 modes_valid=int((valid > 0).sum()),
                 fewest_admissible=int(valid.min()),
                 nfe=drawn.nfe,
-                spread_m=float(chunks[:, :, POSITION].std(axis=0).mean()),
+                spread_m=_spread_m(chunks[:, :, POSITION]),
             )
         )
     return rows
+
+
+def _spread_m(paths_m: Array) -> float:
+    """Mean standard deviation over those paths (S, K, P) that are finite, m; 0 of none."""
+    finite = paths_m[np.isfinite(paths_m).all(axis=(1, 2))]
+    return float(finite.std(axis=0).mean()) if len(finite) else 0.0
 
 
 def admissible_chunks(

@@ -9,8 +9,9 @@ import pytest
 
 from genpolicy.candidates.wire import launched, processes
 from genpolicy.candidates.wire.connection import dial, free_port
+from genpolicy.candidates.wire.entry import verify_files
 from genpolicy.candidates.wire.faults import Fault, PolicyError
-from genpolicy.candidates.wire.launched import Launched, verify_files
+from genpolicy.candidates.wire.launched import Launched
 from genpolicy.candidates.wire.printed import KEPT_BYTES, Printed
 from genpolicy.candidates.wire.processes import listens, marked
 from genpolicy.candidates.wire.remote import RemotePolicy

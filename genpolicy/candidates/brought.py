@@ -1,0 +1,124 @@
+"""Policies that somebody brings to the ladder: which entry is whose, and how one is asked.
+
+A brought policy is its entry: what the entry says, and the files that it names by hash. Both are
+looked at before anything trains, and the files again each time that its server is started.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from pydantic import RootModel
+
+from genpolicy.candidates.wire.entry import ServerEntry, read_entry, verify_files
+from genpolicy.contract.horizons import HorizonConfig
+from genpolicy.errors import ConfigError
+from genpolicy.integrity.documents import canonical_json
+from genpolicy.integrity.hashing import sha256_bytes
+
+SEED = 0
+"""Number of the training seed in every table: somebody trained it once."""
+
+
+SAMPLER = ("sampler", "sampler_steps", "eta", "tolerance")
+
+
+class BroughtSection(RootModel[dict[str, str]]):
+    """Section `candidates`: path of each entry, from the root of the workspace, by name."""
+
+
+@dataclass(frozen=True)
+class BroughtPolicy:
+    """One policy that is measured, compared or promoted, and was not trained here.
+
+    Attributes:
+        name: Its name in every table.
+        path: Its entry.
+        entry: What the entry says.
+        sha256: Of what it says, the hashes of its files among it: the identity in every journal.
+    """
+
+    name: str
+    path: Path
+    entry: ServerEntry
+    sha256: str
+
+    @property
+    def folder(self) -> Path:
+        """Where its files lie, and where its command runs."""
+        return self.path.resolve().parent
+
+    @property
+    def sampler_sha256(self) -> str:
+        """Of what it says of its sampler."""
+        said = self.entry.declared.model_dump(mode="json") if self.entry.declared else {}
+        sampler = {
+            name: said.get(name) for name in ("sampler", "sampler_steps", "eta", "tolerance")
+        }
+        return sha256_bytes(canonical_json({"entry": self.sha256, **sampler}))
+
+
+def read_brought(section: Mapping[str, str], *, root: Path = Path()) -> list[BroughtPolicy]:
+    """The policies of a section, by name; nothing is started and no file of theirs is read.
+
+    Raises:
+        ConfigError: An entry that cannot be read, or that has another name.
+    """
+    return [_read(name, root / path) for name, path in sorted(section.items())]
+
+
+def require_brought(
+    section: Mapping[str, str],
+    *,
+    horizons: HorizonConfig,
+    trained: Iterable[str] = (),
+    root: Path = Path(),
+) -> list[BroughtPolicy]:
+    """The same, of the names, horizons and files that the ladder can work with.
+
+    Args:
+        section: Path of each entry by name.
+        horizons: Of the ladder.
+        trained: Methods that the ladder trains; a name means one policy.
+        root: Of the workspace.
+
+    Raises:
+        ConfigError: As `read_brought`; a name of a trained method, or other horizons.
+        IntegrityError: A file that is missing, or another one than its entry says.
+    """
+    found, taken = read_brought(section, root=root), set(trained)
+    for policy in found:
+        if policy.name in taken:
+            raise ConfigError(
+                where=f"params.yaml: candidates.{policy.name}",
+                found="a name that a trained method has",
+                expected="another one: rows of the two could not be told apart",
+                action=f"Give it another name, here and in {policy.path}.",
+            )
+        if policy.entry.horizons != horizons:
+            raise ConfigError(
+                where=f"{policy.path}: horizons",
+                found=_said(policy.entry.horizons),
+                expected=f"{_said(horizons)}, as in params.yaml",
+                action="Bring a policy of these horizons, or set the horizons of the ladder.",
+            )
+        verify_files(policy.entry, policy.folder)
+    return found
+
+
+def _read(name: str, path: Path) -> BroughtPolicy:
+    entry = read_entry(path)
+    if entry.name != name:
+        raise ConfigError(
+            where=f"params.yaml: candidates.{name}",
+            found=f"{path}, the entry of {entry.name}",
+            expected=f"the entry of {name}",
+            action="Give both the same name.",
+        )
+    return BroughtPolicy(
+        name, path, entry, sha256_bytes(canonical_json(entry.model_dump(mode="json")))
+    )
+
+
+def _said(horizons: HorizonConfig) -> str:
+    return ", ".join(f"{name} {value}" for name, value in horizons.model_dump().items())

@@ -1,0 +1,50 @@
+"""`candidates.json` of the stage `candidates`: who was brought to the ladder."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from genpolicy.candidates.brought import BroughtPolicy
+from genpolicy.documents.document import Document
+
+
+@dataclass(frozen=True)
+class Brought:
+    """A policy that was not trained here.
+
+    Attributes:
+        entry: Path of its entry.
+        author: Who made it, as an e-mail address; may not review it.
+        sha256: Of what its entry says.
+        files: What it is: SHA-256 of each file, by path from the entry's folder.
+        started_here: Whether the ladder starts its server; else somebody else does.
+        dataset: SHA-256 of the manifest of the dataset that it was trained on; empty if unsaid.
+        training_seed: Root seed of its training; None if unsaid.
+    """
+
+    entry: str
+    author: str
+    sha256: str
+    files: dict[str, str]
+    started_here: bool
+    dataset: str
+    training_seed: int | None
+
+
+BROUGHT = Document("candidates.json", dict[str, Brought])
+"""By name."""
+
+
+def brought_document(policies: Sequence[BroughtPolicy]) -> dict[str, Brought]:
+    """What the stage writes of the policies that were brought."""
+    return {
+        policy.name: Brought(
+            entry=policy.path.as_posix(),
+            author=policy.entry.author,
+            sha256=policy.sha256,
+            files=dict(policy.entry.files),
+            started_here=policy.entry.command is not None,
+            dataset=policy.entry.declared.dataset if policy.entry.declared else "",
+            training_seed=policy.entry.declared.training_seed if policy.entry.declared else None,
+        )
+        for policy in policies
+    }
