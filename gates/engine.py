@@ -171,6 +171,8 @@ def judge(
             continue
         limit = limits.of.get(item.id)
         for name in candidates if item.per_candidate else (None,):
+            if settings.excepted(item.id, name):
+                continue
             answers.append(_answer(item, evidence, inputs, limit, name))
     verdict, verdicts = combine(answers, expects_candidates=spec.below is not None)
     evidence.bind(*spec.bind)

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from gates.proof import Rung
+from gates.rederive_brought import rederive_brought
 from gates.rederive_dataset import TRAININGS, rederive_dataset, rederive_trainings, trainings
 from gates.rederive_distilled import rederive_costs, rederive_distilled
 from gates.rederive_disturbance import rederive_disturbance
@@ -100,6 +101,7 @@ def rederive(root: Path, gate: Gate) -> None:
     if gate in TRAININGS:
         rederive_trainings(root, gate, params)
     if gate == "B":
+        rederive_brought(root, params)
         rederive_costs(root, trainings(root, gate, params))
     if gate not in FOLDERS:
         return
@@ -214,7 +216,8 @@ def _power(root: Path, params: Mapping[str, Any]) -> None:
             action="Restore the file from version control.",
         )
     stress = section(params, "stress", StressSettings)
-    again = power_document(stress, candidates=len(samplers), root_seed=root_seed(params))
+    registered = len(samplers) + len(mapping(section_of(params, "candidates")))
+    again = power_document(stress, candidates=registered, root_seed=root_seed(params))
     compare_keys(
         "D", path, mapping(read_json(root / path)), POWER.plain(again), "as simulated again"
     )

@@ -14,11 +14,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gates.rederive_brought import brought_policy
 from gates.rederive_sessions import checkpoint_of
 from gates.rederive_shadow import TaskSection
 from gates.report import Gate
 from gates.stated import refuse, section, training_seed
 from genpolicy.candidates.judged import candidates_of
+from genpolicy.candidates.wire.policy import running
 from genpolicy.contract.action import ACTION_DIM
 from genpolicy.contract.chunk import actions_sha256
 from genpolicy.contract.horizons import HorizonConfig
@@ -169,7 +171,13 @@ def _draw_again(
         samples: Candidates of an invocation.
         always: A policy that always draws the same was asked for as many, too.
     """
+    contract = load_task(section(params, "task", TaskSection).name).observation
     for method, items in sorted(asked.items()):
+        other = brought_policy(root, params, method)
+        if other is not None:
+            with running(other, contract) as wire:
+                _compare(gate, wire, items, samples if always else candidates_of(wire, samples))
+            continue
         folder = checkpoint_of(root, method, training_seed(params))
         if folder is None:
             refuse(gate, items[0].place, f"drawn by {method}", "a policy that was trained")

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from gates.rederive_brought import brought_policy
 from gates.rederive_distilled import identity
 from gates.rederive_shadow import TaskSection
 from gates.report import Gate
@@ -50,6 +51,9 @@ def rederive_sessions(
 
     @cache
     def maker(method: str) -> Maker | None:
+        other = brought_policy(root, params, method)
+        if other is not None:
+            return other.sha256, joining.named(method).sampler_hash(other.sampler_sha256)
         return _maker(root, method, seed, joining.named(method))
 
     planned = _planned(params) if gate == "D" else []

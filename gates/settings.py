@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any, ClassVar, NoReturn, Self, TypeVar
 
 import numpy as np
-from pydantic import Field, PrivateAttr
+from pydantic import Field, PrivateAttr, model_validator
 
 from gates.criterion import Criterion
 from gates.report import OWNERS, Gate, Owner, StrictModel, parse_section, stage_of
@@ -110,6 +110,10 @@ class GateSettings(StrictModel):
         """What the reader must know because of these settings."""
         return ()
 
+    def excepted(self, criterion: str, candidate: str | None) -> bool:
+        """Whether a criterion is not asked of a candidate, by a written exception."""
+        return False
+
     def under(self, limits: Limits) -> Self:
         """The same settings, with the limits that the gate judges by."""
         settings = self.model_copy()
@@ -122,7 +126,8 @@ class CandidateSettings(GateSettings):
 
     Attributes:
         confidence: Coverage of every interval.
-        candidates: Methods that stand for promotion.
+        candidates: Methods that stand for promotion; those that were brought behind the others.
+        brought: Those of them that were not trained here.
         root_seed: Root of the named streams that intervals over clusters are drawn from.
     """
 
@@ -130,11 +135,21 @@ class CandidateSettings(GateSettings):
         "root_seed": "seed",
         "confidence": "confidence",
         "candidates": "train_generators.samplers",
+        "brought": "candidates",
     }
 
     confidence: float = Field(gt=0.5, lt=1.0)
     candidates: tuple[str, ...]
+    brought: tuple[str, ...] = ()
     root_seed: int
+
+    @model_validator(mode="before")
+    @classmethod
+    def _whoever_was_brought_stands(cls, values: Any) -> Any:
+        if not isinstance(values, dict) or not values.get("brought"):
+            return values
+        every = dict.fromkeys([*values.get("candidates", ()), *values["brought"]])
+        return {**values, "candidates": list(every)}
 
     def draws(self, *names: str) -> np.random.Generator:
         """Generator of an interval, the same whenever and wherever the gate is judged."""

@@ -6,7 +6,9 @@ Measured times live here and nowhere else, so that everything else is byte-repro
 from pathlib import Path
 
 from gates.proof import admit
-from genpolicy.candidates.judged import compared
+from genpolicy.candidates.brought import BroughtSection, read_brought
+from genpolicy.candidates.judged import JudgedPolicy
+from genpolicy.candidates.standing import in_comparison
 from genpolicy.evidence.reproducibility.latency import (
     PROCESSES,
     LatencyPlan,
@@ -42,11 +44,14 @@ def work(params: Params) -> None:
     stress = params.section("stress", StressSettings)
     generators = params.section("train_generators", MethodsSection).samplers
     sweep = params.section("reload", SweepSection).sweep
-    policies = compared(
+    seed = params.section("policy", PolicySettings).seeds[0]
+    brought = read_brought(params.section("candidates", BroughtSection).root, seed=seed)
+    policies = in_comparison(
         ARTIFACTS,
         baselines=stress.baselines,
-        generators=generators,
-        seed=params.section("policy", PolicySettings).seeds[0],
+        candidates=[*generators, *(policy.name for policy in brought)],
+        brought=brought,
+        seed=seed,
     )
     plan = LatencyPlan(
         dataset=ARTIFACTS / "ingest",
@@ -73,7 +78,11 @@ def work(params: Params) -> None:
         write_rows(
             folder / "sweep.parquet",
             SweepLatencyRow,
-            sweep_latency_rows(plan, [p for p in policies if p.name in generators], sweep),
+            sweep_latency_rows(
+                plan,
+                [p for p in policies if isinstance(p, JudgedPolicy) and p.name in generators],
+                sweep,
+            ),
         )
 
 

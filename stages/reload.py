@@ -5,6 +5,7 @@ from pathlib import Path
 from pydantic import ConfigDict, Field
 
 from gates.proof import admit
+from genpolicy.candidates.brought import BroughtSection, read_brought
 from genpolicy.candidates.judged import trained
 from genpolicy.contract.settings import Settings
 from genpolicy.evidence.reproducibility.identity import Deployment
@@ -51,8 +52,9 @@ def work(params: Params) -> None:
     )
     root = ARTIFACTS / "train_generators"
     candidates = trained(root, names, seeds=seeds)
+    brought = read_brought(params.section("candidates", BroughtSection).root, seed=seeds[0])
     with output_folder(ARTIFACTS / "reload") as folder:
-        write_reload(plan, candidates, root / "fixtures.parquet", folder)
+        write_reload(plan, candidates, root / "fixtures.parquet", folder, brought=brought)
 
 
 if __name__ == "__main__":

@@ -3,7 +3,8 @@
 from pathlib import Path
 
 from gates.proof import admit
-from genpolicy.candidates.judged import GENERATORS, trained
+from genpolicy.candidates.brought import BroughtSection, read_brought
+from genpolicy.candidates.standing import opened, standing
 from genpolicy.data.dataset import load_dataset
 from genpolicy.evidence.admission_context import make_checker
 from genpolicy.evidence.shadow.gallery import gallery_of
@@ -50,11 +51,15 @@ def work(params: Params) -> None:
         count=section.observations,
         generator=stream(params.seed, "shadow", "observations"),
     )
+    brought = read_brought(params.section("candidates", BroughtSection).root, seed=seed)
     with output_folder(ARTIFACTS / "shadow") as folder:
-        found = [
-            shadow_policy(shadow, candidate.load(), observations, seed=seed, two_mode=two_mode)
-            for candidate in trained(ARTIFACTS / GENERATORS, admitted, seeds=[seed])
-        ]
+        found = []
+        for candidate in standing(ARTIFACTS, admitted, brought, seed=seed):
+            with opened(candidate, task.observation) as policy:
+                seen = shadow_policy(
+                    shadow, policy, observations, seed=candidate.seed, two_mode=two_mode
+                )
+            found.append(seen)
         mutants = missing_checks_evidence(shadow, spread(observations, section.mutant_observations))
         rows = [row for item in found for row in item.candidates]
         gallery = gallery_of(shadow, observations, rows)

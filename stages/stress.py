@@ -3,7 +3,8 @@
 from pathlib import Path
 
 from gates.proof import admit
-from genpolicy.candidates.judged import compared
+from genpolicy.candidates.brought import BroughtSection, read_brought
+from genpolicy.candidates.standing import in_comparison
 from genpolicy.evidence.documents.stress import POWER
 from genpolicy.evidence.reproducibility.latency import latency_models
 from genpolicy.evidence.rows.reproducibility import LatencyRow
@@ -46,9 +47,13 @@ def work(params: Params) -> None:
         joining=section.joining,
     )
     seed = params.section("policy", PolicySettings).seeds[0]
-    judged = compared(ARTIFACTS, baselines=section.baselines, generators=admitted, seed=seed)
+    brought = read_brought(params.section("candidates", BroughtSection).root, seed=seed)
+    judged = in_comparison(
+        ARTIFACTS, baselines=section.baselines, candidates=admitted, brought=brought, seed=seed
+    )
     # Alpha is shared between all that were registered, not between those that came this far.
-    registered = len(params.section("train_generators", MethodsSection).samplers)
+    trained = params.section("train_generators", MethodsSection).samplers
+    registered = len(trained) + len(brought)
     power = power_document(section, candidates=registered, root_seed=params.seed)
     with output_folder(ARTIFACTS / "stress") as folder:
         shards = plan_shards(

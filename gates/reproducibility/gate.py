@@ -13,12 +13,14 @@ from gates.reproducibility import convergence, modes, timing
 from gates.reproducibility.front import SWEEP
 from gates.reproducibility.identity import contradicted, unrecorded
 from gates.reproducibility.settings import (
+    BROUGHT_FOLDER,
     COVERAGE,
     DENSITY,
     GENERATORS,
     RELOAD,
     ReproducibilitySettings,
 )
+from genpolicy.evidence.documents.brought import BROUGHT, Brought
 from genpolicy.evidence.documents.given import MATCHED, DistilledConfig, TrainedConfig
 from genpolicy.evidence.documents.reproducibility import CANDIDATES, CandidateIdentity
 from genpolicy.evidence.rows.reproducibility import NfeRow, SampleRow
@@ -37,6 +39,12 @@ def unmatched_keys(
     evidence: Evidence, settings: ReproducibilitySettings, candidate: str
 ) -> Measured:
     """Settings in which the candidate differs although no whitelist allows it."""
+    if candidate in settings.brought:
+        text = (
+            f"{candidate} was trained elsewhere: nothing of its training is matched, and no "
+            f"exception is written (gate_b.unmatched.{candidate}: owner, reason, expires)"
+        )
+        return Measured(1.0, caveat=text)
     return unmatched(evidence, GENERATORS, (candidate,))
 
 
@@ -90,6 +98,8 @@ def unpinned_items(
         "sampler": entry.sampler,
     }
     missing = [name for name, pin in pins.items() if not pin]
+    if candidate in settings.brought:
+        return _unpinned_of_brought(evidence, settings, candidate, missing)
     files = evidence.bind(
         f"{GENERATORS}/{candidate}/seed_*/model.safetensors",
         f"{GENERATORS}/{candidate}/seed_*/config.json",
@@ -100,6 +110,35 @@ def unpinned_items(
         missing.append("dataset: trained on another one than the audited")
     missing += unrecorded(entry.card) + contradicted(entry, _config(evidence, candidate))
     return Measured(float(len(missing)), caveat=", ".join(missing) or "all pinned by hash")
+
+
+def _unpinned_of_brought(
+    evidence: Evidence, settings: ReproducibilitySettings, candidate: str, missing: list[str]
+) -> Measured:
+    """Of a policy behind the wire: its entry pins what it is, and says what is on the card."""
+    entry, brought = _identity(evidence, candidate), _brought(evidence, candidate)
+    if not brought.files:
+        missing.append("checkpoint file: its entry names none by hash")
+    if entry.checkpoint != brought.sha256:
+        missing.append("checkpoint: another entry was asked than stands in the stage candidates")
+    if brought.training_seed is None or entry.seed != [brought.training_seed]:
+        missing.append("seed: not the one that its entry declares")
+    text = "entry and files pinned by hash; what its maker declares is not checked"
+    if entry.dataset != evidence.digest(MANIFEST):
+        other = "dataset: trained on another one than the audited"
+        if candidate in settings.unmatched:
+            text += f"; {other}, by exception"
+        else:
+            missing.append(other)
+    missing += unrecorded(entry.card)
+    return Measured(float(len(missing)), caveat=", ".join(missing) or text)
+
+
+def _brought(evidence: Evidence, candidate: str) -> Brought:
+    entry = evidence.document(BROUGHT_FOLDER, BROUGHT).get(candidate)
+    if entry is None:
+        raise MissingEvidenceError(f"{BROUGHT_FOLDER}/{BROUGHT.file} has no entry of {candidate}")
+    return entry
 
 
 def _config(evidence: Evidence, candidate: str) -> TrainedConfig:
@@ -126,8 +165,12 @@ def _identity(evidence: Evidence, candidate: str) -> CandidateIdentity:
 def nonfinite_weights(
     evidence: Evidence, settings: ReproducibilitySettings, candidate: str
 ) -> Measured:
-    """Weights that are NaN or infinite."""
-    return Measured(float(_identity(evidence, candidate).nonfinite_weights))
+    """Weights that are NaN or infinite; behind the wire, answers that are none or not finite."""
+    found = float(_identity(evidence, candidate).nonfinite_weights)
+    if candidate not in settings.brought:
+        return Measured(found)
+    text = "behind the wire nobody sees weights: counted are invocations without a finite chunk"
+    return Measured(found, caveat=text)
 
 
 @criterion(

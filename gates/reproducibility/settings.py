@@ -1,12 +1,14 @@
 """Settings of Gate B, and where its evidence lies."""
 
+import datetime
 from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, field_validator, model_validator
 
 from gates.evidence import Evidence, MissingEvidenceError, numbers
+from gates.report import Owner, StrictModel
 from gates.settings import CandidateSettings
 from genpolicy.evidence.rows.reproducibility import NfeRow
 
@@ -16,6 +18,31 @@ MODES = f"{RELOAD}/modes.parquet"
 MODES_EARLIER = f"{RELOAD}/modes_earlier.parquet"
 DENSITY = f"{RELOAD}/density.parquet"
 GENERATORS = "artifacts/train_generators"
+BROUGHT_FOLDER = "artifacts/candidates"
+
+
+MATCHING = ("unmatched_keys", "parameter_budget_deviation", "late_change_upper")
+"""What asks whether a comparison is matched; of whoever was brought it may stay unasked."""
+
+
+class Unmatched(StrictModel):
+    """The written exception of a candidate that was brought: it is compared, and not matched.
+
+    Attributes:
+        owner: Who answers for it.
+        reason: Why it may be compared although it was trained in another way.
+        expires: Last day on which it holds, as YYYY-MM-DD; no card may outlive it.
+    """
+
+    owner: Owner
+    reason: str = Field(min_length=1)
+    expires: str = Field(pattern=r"^\d{4}-\d{2}-\d{2}$")
+
+    @field_validator("expires")
+    @classmethod
+    def _a_day(cls, value: str) -> str:
+        datetime.date.fromisoformat(value)
+        return value
 
 
 class ReproducibilitySettings(CandidateSettings):
@@ -27,6 +54,7 @@ class ReproducibilitySettings(CandidateSettings):
         budget_reference: Method whose parameter count is the budget.
         mode_minimum_share: Share of the samples of a situation that must be admissible and reach
             a mode, for that mode to be covered.
+        unmatched: Exceptions of candidates that were brought, by name.
     """
 
     homes: ClassVar[Mapping[str, str]] = {
@@ -39,6 +67,30 @@ class ReproducibilitySettings(CandidateSettings):
     term_deadlines: tuple[tuple[str, float, str], ...]
     budget_reference: str
     mode_minimum_share: float = Field(gt=0.0, le=0.5)
+    unmatched: dict[str, Unmatched] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _exceptions_of_brought(self) -> "ReproducibilitySettings":
+        if others := sorted(set(self.unmatched) - set(self.brought)):
+            raise ValueError(
+                f"{', '.join(others)} is excepted and not among `candidates`; what is trained here "
+                "is matched"
+            )
+        return self
+
+    def excepted(self, criterion: str, candidate: str | None) -> bool:
+        """Whether a criterion of matching is not asked of a candidate."""
+        return criterion in MATCHING and candidate in self.unmatched
+
+    @property
+    def caveats(self) -> tuple[str, ...]:
+        """Who is not matched, and who answers for it until when."""
+        return tuple(
+            f"{name} is unmatched evidence: it was trained elsewhere, and {', '.join(MATCHING)} "
+            f"were not asked of it. The {entry.owner} owner answers for it until {entry.expires}: "
+            f"{entry.reason}."
+            for name, entry in sorted(self.unmatched.items())
+        )
 
 
 def chosen_nfe(evidence: Evidence, candidate: str) -> tuple[float, float]:

@@ -19,6 +19,8 @@ from gates.stress.pairs import paired_differences
 from gates.stress.rollouts import StressSettings
 from genpolicy.statistics.eprocess import paired_e_value
 
+PASSED_UNMATCHED = "also passed, unmatched and so not ranked"
+
 
 @dataclass(frozen=True)
 class Comparison:
@@ -44,7 +46,28 @@ def choose(judged: Judged) -> Decision:
         MissingEvidenceError: Two that passed do not share their starts.
     """
     settings: StressSettings = judged.settings
-    passed = [name for name in settings.candidates if judged.candidates.get(name) == "PASS"]
+    every = [name for name in settings.candidates if judged.candidates.get(name) == "PASS"]
+    passed = [name for name in every if name not in settings.unmatched]
+    if not passed:
+        return _of_unmatched(every, judged)
+    if len(passed) < len(every):
+        decision = _of_matched(passed, judged, settings)
+        beside = ", ".join(name for name in every if name not in passed)
+        return Decision(f"{decision.text}; {PASSED_UNMATCHED}: {beside}", decision.promoted)
+    return _of_matched(passed, judged, settings)
+
+
+def _of_unmatched(passed: Sequence[str], judged: Judged) -> Decision:
+    """Of those that nobody may rank the one whose answers come sooner is drafted."""
+    chosen = sooner(passed, _latency(judged)) if len(passed) > 1 else passed[0]
+    others = [name for name in passed if name != chosen]
+    text = f"promote {chosen}, {IN_SHORT}, on unmatched evidence"
+    if others:
+        text += f"; {PASSED_UNMATCHED}: {', '.join(others)}"
+    return Decision(text, promoted=chosen)
+
+
+def _of_matched(passed: Sequence[str], judged: Judged, settings: StressSettings) -> Decision:
     if len(passed) == 1:
         return Decision(f"promote {passed[0]}, {IN_SHORT}", promoted=passed[0])
     needed = 1.0 / pair_alpha(settings)

@@ -79,7 +79,8 @@ GATE = GateSpec(
         "Simulation: contact, sensing and delays are models; nothing here was seen on hardware.",
         "Starts are the unit of independence; conditions and seeds of one start are averaged.",
         "Every cost and every bound of success holds in each planned condition, not on average.",
-        "Only methods matched in data, encoder, horizons, resets and deadlines are compared.",
+        "Only methods matched in data, encoder, horizons, resets and deadlines are compared, but "
+        "for those that are named as unmatched.",
     ),
     below="C",
     decide=_decide,

@@ -38,6 +38,7 @@ class StressSettings(CandidateSettings):
         planned_effect: Success of baseline and candidate that the test must be able to tell apart.
         execution_horizon: Actions of a chunk that may be executed.
         action_period_s: Period of the actions, s.
+        unmatched: Candidates that are compared by exception; none is ranked among the others.
     """
 
     homes: ClassVar[Mapping[str, str]] = {
@@ -50,6 +51,7 @@ class StressSettings(CandidateSettings):
         "planned_effect": "stress.planned_effect",
         "execution_horizon": "horizons.execution_horizon",
         "action_period_s": "horizons.action_period_s",
+        "unmatched": "gate_b.unmatched",
     }
 
     candidates: tuple[str, ...] = Field(min_length=1)
@@ -61,6 +63,16 @@ class StressSettings(CandidateSettings):
     planned_effect: tuple[float, float]
     execution_horizon: int = Field(gt=0)
     action_period_s: float = Field(gt=0.0)
+    unmatched: tuple[str, ...] = ()
+
+    @property
+    def caveats(self) -> tuple[str, ...]:
+        """Whose gain may be one of its training, and not of its method."""
+        return tuple(
+            f"{name} is unmatched evidence: a gain of it may be one of other data or a longer "
+            "training. It is ranked with nobody."
+            for name in sorted(self.unmatched)
+        )
 
     @property
     def usable_s(self) -> float:

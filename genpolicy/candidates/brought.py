@@ -16,10 +16,6 @@ from genpolicy.errors import ConfigError
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_bytes
 
-SEED = 0
-"""Number of the training seed in every table: somebody trained it once."""
-
-
 SAMPLER = ("sampler", "sampler_steps", "eta", "tolerance")
 
 
@@ -36,12 +32,14 @@ class BroughtPolicy:
         path: Its entry.
         entry: What the entry says.
         sha256: Of what it says, the hashes of its files among it: the identity in every journal.
+        seed: Number of the training seed under which it stands in tables, that which is promoted.
     """
 
     name: str
     path: Path
     entry: ServerEntry
     sha256: str
+    seed: int
 
     @property
     def folder(self) -> Path:
@@ -58,13 +56,20 @@ class BroughtPolicy:
         return sha256_bytes(canonical_json({"entry": self.sha256, **sampler}))
 
 
-def read_brought(section: Mapping[str, str], *, root: Path = Path()) -> list[BroughtPolicy]:
+def read_brought(
+    section: Mapping[str, str], *, seed: int, root: Path = Path()
+) -> list[BroughtPolicy]:
     """The policies of a section, by name; nothing is started and no file of theirs is read.
+
+    Args:
+        section: Path of each entry by name.
+        seed: Number of the training seed that is promoted.
+        root: Of the workspace.
 
     Raises:
         ConfigError: An entry that cannot be read, or that has another name.
     """
-    return [_read(name, root / path) for name, path in sorted(section.items())]
+    return [_read(name, root / path, seed) for name, path in sorted(section.items())]
 
 
 def require_brought(
@@ -86,7 +91,7 @@ def require_brought(
         ConfigError: As `read_brought`; a name of a trained method, or other horizons.
         IntegrityError: A file that is missing, or another one than its entry says.
     """
-    found, taken = read_brought(section, root=root), set(trained)
+    found, taken = read_brought(section, seed=0, root=root), set(trained)
     for policy in found:
         if policy.name in taken:
             raise ConfigError(
@@ -106,7 +111,7 @@ def require_brought(
     return found
 
 
-def _read(name: str, path: Path) -> BroughtPolicy:
+def _read(name: str, path: Path, seed: int) -> BroughtPolicy:
     entry = read_entry(path)
     if entry.name != name:
         raise ConfigError(
@@ -116,7 +121,7 @@ def _read(name: str, path: Path) -> BroughtPolicy:
             action="Give both the same name.",
         )
     return BroughtPolicy(
-        name, path, entry, sha256_bytes(canonical_json(entry.model_dump(mode="json")))
+        name, path, entry, sha256_bytes(canonical_json(entry.model_dump(mode="json"))), seed
     )
 
 

@@ -160,6 +160,7 @@ class Declared(Settings):
 
     Attributes:
         dataset: SHA-256 of the manifest of the dataset that it was trained on.
+        split: SHA-256 of the list of episodes that trained it.
         training_seed: Root seed of its training.
         architecture: Encoder, trunk and head with their sizes.
         parameters: Of the network that runs.
@@ -172,10 +173,12 @@ class Declared(Settings):
         precision: Number format of weights and arithmetic.
         device: Where it runs.
         threads: Threads of its arithmetic.
+        cpu_capability: Instruction set of its kernels.
         batch_rows: Rows of a network call.
     """
 
     dataset: str = Field(pattern=DIGEST)
+    split: str = Field(pattern=DIGEST)
     training_seed: int
     architecture: str = Field(min_length=1)
     parameters: int = Field(ge=1)
@@ -188,6 +191,7 @@ class Declared(Settings):
     precision: str = Field(min_length=1)
     device: str = Field(min_length=1)
     threads: int = Field(ge=1)
+    cpu_capability: str = Field(min_length=1)
     batch_rows: int = Field(ge=1)
 
 

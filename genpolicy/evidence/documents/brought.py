@@ -12,7 +12,6 @@ class Brought:
     """A policy that was not trained here.
 
     Attributes:
-        entry: Path of its entry.
         author: Who made it, as an e-mail address; may not review it.
         sha256: Of what its entry says.
         files: What it is: SHA-256 of each file, by path from the entry's folder.
@@ -21,7 +20,6 @@ class Brought:
         training_seed: Root seed of its training; None if unsaid.
     """
 
-    entry: str
     author: str
     sha256: str
     files: dict[str, str]
@@ -38,7 +36,6 @@ def brought_document(policies: Sequence[BroughtPolicy]) -> dict[str, Brought]:
     """What the stage writes of the policies that were brought."""
     return {
         policy.name: Brought(
-            entry=policy.path.as_posix(),
             author=policy.entry.author,
             sha256=policy.sha256,
             files=dict(policy.entry.files),

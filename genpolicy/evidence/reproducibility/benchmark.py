@@ -7,7 +7,7 @@ for everything that the process does once.
 
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -17,11 +17,12 @@ from numpy.typing import NDArray
 
 from genpolicy.candidates.joining import REAL_TIME, REPLACE, JoiningSettings
 from genpolicy.candidates.votes import Prediction, Votes, join, prefix
+from genpolicy.candidates.wire.policy import WirePolicy
 from genpolicy.contract.action import join_action
 from genpolicy.contract.chunk import Candidate, ChunkMetadata, Proposal
 from genpolicy.contract.latency import Term
 from genpolicy.policies.guidance import Prefix
-from genpolicy.policies.policy import NetworkPolicy, load_policy
+from genpolicy.policies.policy import NetworkPolicy, Policy, load_policy
 from genpolicy.policies.settings import SamplerConfig
 
 Array = NDArray[np.float64]
@@ -108,8 +109,46 @@ def measure_policy(
     return results
 
 
+def measure_running(
+    start: Callable[[], AbstractContextManager[WirePolicy]],
+    observations: Array,
+    *,
+    warm_repeats: int,
+    discarded_repeats: int = DISCARDED,
+    candidates: int,
+    project: Projection | None,
+    joining: JoiningSettings,
+) -> list[Measurement]:
+    """The same of a policy behind the wire: the first answer of a new server is the cold one.
+
+    Args:
+        start: Starts the server, and ends it.
+        observations: As in `measure_policy`.
+        warm_repeats: Warm invocations.
+        discarded_repeats: Invocations between the first and them that are not recorded.
+        candidates: Candidates drawn by an invocation.
+        project: Projection of a proposal.
+        joining: How chunks join where they are deployed.
+    """
+    results = []
+    with start() as policy:
+        _evict_caches(0)
+        for index in range(-1 - discarded_repeats, warm_repeats):
+            spans = invoke(
+                policy, observations[index % len(observations)][None], repeat=index,
+                candidates=candidates, project=project, joining=joining,
+            )  # fmt: skip
+            temperature: Temperature = "warm" if index >= 0 else "cold"
+            if index >= 0 or index == -1 - discarded_repeats:
+                results += [
+                    Measurement(name, temperature, max(index, 0), value)
+                    for name, value in spans.items()
+                ]
+    return results
+
+
 def invoke(
-    policy: NetworkPolicy,
+    policy: NetworkPolicy | WirePolicy,
     row: Array,
     *,
     repeat: int,
@@ -129,24 +168,46 @@ def invoke(
         if joining.rule == REPLACE
         else [_plan_before(metadata, policy.prediction_horizon, reach)]
     )
-    guided = _guided(policy, votes, joining)
-    with _timed(spans, Term.PREPROCESS):
-        normalised = policy.preprocess(row)
-    with _timed(spans, Term.ENCODE):
-        condition = policy.encode(normalised)
-        policy.synchronise()
-    with _timed(spans, Term.SAMPLE):
-        samples = policy.sample_encoded(
-            condition, noise_names=[("latency", repeat)], candidates=candidates, prefix=guided
-        )
+    asked = _Asked(row, repeat, candidates, _guided(policy, votes, joining))
+    chunks = _drawn(policy, asked, spans)
     with _timed(spans, Term.SELECT):
         metadata = _metadata(policy, repeat)
-        drawn = [Candidate(metadata, actions) for actions in samples.actions[0]]
+        drawn = [Candidate(metadata, actions) for actions in chunks]
         proposal = join(drawn, 0, votes, joining)
     if project is not None:
         with _timed(spans, Term.PROJECT):
             project(proposal)
     return spans
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """One observation (1, H_o, D_o), which invocation, its candidates and what they go on from."""
+
+    row: Array
+    repeat: int
+    candidates: int
+    guided: Prefix | None
+
+
+def _drawn(policy: NetworkPolicy | WirePolicy, asked: _Asked, spans: dict[str, float]) -> Array:
+    """Chunks (N, K, D_a) of an observation, and what the terms of the model took."""
+    name = ("latency", asked.repeat)
+    if isinstance(policy, WirePolicy):
+        terms, chunks = policy.timed(asked.row[0], noise=name, candidates=asked.candidates)
+        spans.update({str(term): seconds for term, seconds in terms.items()})
+        return chunks
+    with _timed(spans, Term.PREPROCESS):
+        normalised = policy.preprocess(asked.row)
+    with _timed(spans, Term.ENCODE):
+        condition = policy.encode(normalised)
+        policy.synchronise()
+    with _timed(spans, Term.SAMPLE):
+        samples = policy.sample_encoded(
+            condition, noise_names=[name], candidates=asked.candidates, prefix=asked.guided
+        )
+    own: Array = samples.actions[0]
+    return own
 
 
 @contextmanager
@@ -166,7 +227,7 @@ def _plan_before(metadata: ChunkMetadata, rows: int, reach: int) -> Votes:
     return Votes(Prediction("before", metadata, still, still), 0, min(reach, rows - shift), shift)
 
 
-def _guided(policy: NetworkPolicy, votes: list[Votes], joining: JoiningSettings) -> Prefix | None:
+def _guided(policy: Policy, votes: list[Votes], joining: JoiningSettings) -> Prefix | None:
     if joining.rule != REAL_TIME:
         return None
     actions, weights = prefix(votes, rows=policy.prediction_horizon, frozen=1)
@@ -178,7 +239,7 @@ def _evict_caches(fill: int) -> None:
     np.full(CACHE_BYTES // 8, float(fill)).sum()
 
 
-def _metadata(policy: NetworkPolicy, repeat: int) -> ChunkMetadata:
+def _metadata(policy: Policy, repeat: int) -> ChunkMetadata:
     period_s = policy.horizons.action_period_s
     return ChunkMetadata(
         chunk_id=f"latency-{repeat}",

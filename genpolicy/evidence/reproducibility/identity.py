@@ -106,11 +106,11 @@ def card_of(
         candidates=candidates_of(policy, deployment.samples),
         selector=joining.said(),
         selector_owner=selector.OWNER,
-        selector_sha256=_rule_sha256(joining),
+        selector_sha256=rule_sha256(joining),
     )
 
 
-def _rule_sha256(joining: JoiningSettings) -> str:
+def rule_sha256(joining: JoiningSettings) -> str:
     """The file that holds the rule, or of both that do."""
     own = sha256_file(Path(selector.__file__))
     if joining.rule == REPLACE:

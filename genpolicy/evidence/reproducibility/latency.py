@@ -5,6 +5,7 @@ machine. So each of the two measurements takes several processes, in turns, and 
 held against a process that it was not made from.
 """
 
+import functools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,15 +13,22 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from genpolicy.candidates.brought import BroughtPolicy
 from genpolicy.candidates.joining import JoiningSettings
-from genpolicy.candidates.judged import JudgedPolicy, candidates_of
+from genpolicy.candidates.judged import candidates_of
+from genpolicy.candidates.standing import Standing
+from genpolicy.candidates.wire.policy import running
 from genpolicy.contract.chunk import Proposal
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.contract.latency import DECLARED_TERMS, MEASURED_TERMS, OWNERS, Term
 from genpolicy.data.dataset import load_dataset
 from genpolicy.errors import ContractError
 from genpolicy.evidence.admission_context import context_at_rest, make_checker, recorded_proposal
-from genpolicy.evidence.reproducibility.benchmark import Measurement, measure_policy
+from genpolicy.evidence.reproducibility.benchmark import (
+    Measurement,
+    measure_policy,
+    measure_running,
+)
 from genpolicy.evidence.reproducibility.measure import in_fresh_process
 from genpolicy.evidence.rows.reproducibility import LatencyModelRow, LatencyRow
 from genpolicy.evidence.stress.latency import DeclaredTerm, LatencyModel, draw_latency
@@ -63,7 +71,7 @@ class LatencyPlan:
     joining: JoiningSettings = field(default_factory=JoiningSettings)
 
 
-def measured_rows(plan: LatencyPlan, policies: Sequence[JudgedPolicy]) -> list[LatencyRow]:
+def measured_rows(plan: LatencyPlan, policies: Sequence[Standing]) -> list[LatencyRow]:
     """Terms measured on this machine: two runs of several processes per method, in turns.
 
     Methods and runs take turns, so that a machine which grows slower slows all of them.
@@ -134,14 +142,17 @@ def declared_rows(
     return rows
 
 
-def measure_terms(plan: LatencyPlan, judged: JudgedPolicy) -> list[Measurement]:
-    """Cold and warm spans of one method, with the six layers timed as `project`."""
+def measure_terms(plan: LatencyPlan, judged: Standing) -> list[Measurement]:
+    """Cold and warm spans of one method, with the six layers timed as `project`.
+
+    Of a policy that was brought, the first answer of a server that was started for it is the cold
+    one: how long it loads is nobody's latency.
+    """
     data, task = load_dataset(plan.dataset), load_task(plan.task)
     observations = fixture_observations(data, horizons=plan.horizons, count=OBSERVATIONS)
     checker = make_checker(task, plan.feasibility, action_period_s=plan.horizons.action_period_s)
     contexts = [context_at_rest(task, checker, row[-1]) for row in observations]
-    policy = judged.load()
-    period_s = policy.horizons.action_period_s
+    period_s = plan.horizons.action_period_s
     calls = 0
 
     def project(proposal: Proposal) -> object:
@@ -157,6 +168,16 @@ def measure_terms(plan: LatencyPlan, judged: JudgedPolicy) -> list[Measurement]:
         )
         return checker.admit(recorded, context=contexts[row])
 
+    if isinstance(judged, BroughtPolicy):
+        return measure_running(
+            functools.partial(running, judged, data.observation_contract),
+            observations,
+            warm_repeats=plan.warm,
+            candidates=plan.samples if judged.entry.stochastic else 1,
+            project=project,
+            joining=plan.joining.of(judged.name, guided=False),
+        )
+    policy = judged.load()
     return measure_policy(
         judged.folder,
         observations,
@@ -174,6 +195,8 @@ def latency_models(
 ) -> dict[str, LatencyModel]:
     """The virtual clock's model of each method, from `latency.parquet`.
 
+    A term that a policy behind the wire does not measure is NaN: its time is in its term `sample`.
+
     Raises:
         ContractError: A method lacks a measured term.
     """
@@ -183,7 +206,7 @@ def latency_models(
         warm, cold = rows[rows["temperature"] == "warm"], rows[rows["temperature"] == "cold"]
         terms = {
             str(name): np.sort(part["seconds"].to_numpy(dtype=np.float64))
-            for name, part in warm.groupby("component", sort=True)
+            for name, part in warm.fillna({"seconds": 0.0}).groupby("component", sort=True)
         }
         missing = [str(name) for name in MEASURED_TERMS if name not in terms]
         if missing or len(cold) == 0:

@@ -8,8 +8,9 @@ from multiprocessing.synchronize import Event, Semaphore
 
 import numpy as np
 
-from genpolicy.candidates.judged import JudgedPolicy
-from genpolicy.data.dataset import load_dataset
+from genpolicy.candidates.brought import BroughtPolicy
+from genpolicy.candidates.standing import Running, Standing, opened
+from genpolicy.data.dataset import Dataset, load_dataset
 from genpolicy.evidence.reproducibility.benchmark import invoke
 from genpolicy.evidence.reproducibility.latency import OBSERVATIONS, LatencyPlan
 from genpolicy.evidence.reproducibility.measure import in_fresh_process
@@ -24,7 +25,7 @@ SIDE = 256
 START_S = 60.0
 
 
-def candidates_rows(plan: LatencyPlan, policies: Sequence[JudgedPolicy]) -> list[CandidatesRow]:
+def candidates_rows(plan: LatencyPlan, policies: Sequence[Standing]) -> list[CandidatesRow]:
     """What an invocation costs that draws several candidates, without the checks of them.
 
     Args:
@@ -34,16 +35,24 @@ def candidates_rows(plan: LatencyPlan, policies: Sequence[JudgedPolicy]) -> list
     return [
         row
         for judged in policies
-        if judged.load().stochastic
+        if _draws(judged)
         for row in in_fresh_process(measure_counts, plan, judged)
     ]
 
 
-def measure_counts(plan: LatencyPlan, judged: JudgedPolicy) -> list[CandidatesRow]:
+def _draws(judged: Standing) -> bool:
+    if isinstance(judged, BroughtPolicy):
+        return judged.entry.stochastic
+    return judged.load().stochastic
+
+
+def measure_counts(plan: LatencyPlan, judged: Standing) -> list[CandidatesRow]:
     """Rows of one method, measured in this process."""
-    rows = _measured(plan, judged, QUIET)
-    with competing():
-        return rows + _measured(plan, judged, BUSY)
+    data = load_dataset(plan.dataset)
+    with opened(judged, data.observation_contract) as policy:
+        rows = _measured(plan, policy, data, judged.name, QUIET)
+        with competing():
+            return rows + _measured(plan, policy, data, judged.name, BUSY)
 
 
 @contextmanager
@@ -72,11 +81,12 @@ def _burn(stop: Event, ready: Semaphore) -> None:
         matrix = matrix @ matrix
 
 
-def _measured(plan: LatencyPlan, judged: JudgedPolicy, load: str) -> list[CandidatesRow]:
-    seen = fixture_observations(load_dataset(plan.dataset), horizons=plan.horizons,
-                                count=OBSERVATIONS)  # fmt: skip
-    policy, rows = judged.load(), []
-    joining = plan.joining.of(judged.name, guided=policy.guided)
+def _measured(
+    plan: LatencyPlan, policy: Running, data: Dataset, name: str, load: str
+) -> list[CandidatesRow]:
+    seen = fixture_observations(data, horizons=plan.horizons, count=OBSERVATIONS)
+    rows = []
+    joining = plan.joining.of(name, guided=policy.guided)
     for count in COUNTS:
         for repeat in range(-DISCARDED, REPEATS):
             row = seen[repeat % len(seen)][None]
@@ -85,8 +95,8 @@ def _measured(plan: LatencyPlan, judged: JudgedPolicy, load: str) -> list[Candid
             if repeat >= 0:
                 rows.append(
                     CandidatesRow(
-                        method=judged.name, candidates=count, load=load, repeat=repeat,
-                        seconds=sum(spans.values()),
+                        method=name, candidates=count, load=load, repeat=repeat,
+                        seconds=float(np.nansum(list(spans.values()))),
                     )
                 )  # fmt: skip
     return rows

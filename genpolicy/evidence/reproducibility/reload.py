@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
+from genpolicy.candidates.brought import BroughtPolicy
 from genpolicy.candidates.judged import JudgedPolicy
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.data.dataset import Dataset, load_dataset
@@ -12,6 +13,7 @@ from genpolicy.evidence.admission_context import make_checker
 from genpolicy.evidence.documents.reproducibility import CANDIDATES
 from genpolicy.evidence.need.held_out import HeldOut, held_out_situations, modes_of_policy
 from genpolicy.evidence.need.offline import offline_rows
+from genpolicy.evidence.reproducibility.brought import Asked, ask_brought
 from genpolicy.evidence.reproducibility.identity import Deployment, identities
 from genpolicy.evidence.reproducibility.likelihood import density_rows, drawn_situations
 from genpolicy.evidence.reproducibility.measure import in_fresh_process
@@ -87,7 +89,12 @@ class ReloadRows:
 
 
 def write_reload(
-    plan: ReloadPlan, candidates: Sequence[JudgedPolicy], fixtures: Path, folder: Path
+    plan: ReloadPlan,
+    candidates: Sequence[JudgedPolicy],
+    fixtures: Path,
+    folder: Path,
+    *,
+    brought: Sequence[BroughtPolicy] = (),
 ) -> None:
     """Reload every candidate in a fresh process, compare, sweep the NFE, write the evidence.
 
@@ -99,9 +106,11 @@ def write_reload(
         candidates: Every candidate and training seed.
         fixtures: The table of fixtures that training wrote.
         folder: Existing folder to write into.
+        brought: Candidates that were not trained here.
 
     Raises:
         ContractError: Training left no fixture of a candidate.
+        PolicyError: The server of a brought one does not start.
     """
     data, task = load_dataset(plan.dataset), load_task(plan.task)
     checker = make_checker(task, plan.feasibility, action_period_s=plan.horizons.action_period_s)
@@ -136,6 +145,12 @@ def write_reload(
         rows.density += density_rows(
             policy, drawn_situations(held_out), data, seed=candidate.seed, samples=plan.samples
         )
+    asked = Asked(data, task, checker, held_out, plan.samples, plan.deployment)
+    for other in brought:
+        answered = ask_brought(other, asked)
+        identity[other.name] = answered.identity
+        for name in ("samples", "nfe", "modes", "coverage"):
+            getattr(rows, name).extend(getattr(answered, name))
     rows.write(folder)
     CANDIDATES.write(folder, identity)
 

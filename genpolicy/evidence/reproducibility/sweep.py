@@ -24,7 +24,7 @@ from genpolicy.evidence.rows.reproducibility import CoverageRow, SweepLatencyRow
 from genpolicy.policies.fixtures import fixture_observations
 from genpolicy.policies.matched_training import training_windows
 from genpolicy.policies.ode_samplers import ADAPTIVE_TABLEAUS
-from genpolicy.policies.policy import NetworkPolicy, NoiseName
+from genpolicy.policies.policy import NetworkPolicy, NoiseName, Policy
 from genpolicy.policies.settings import SamplerConfig
 from genpolicy.policies.windows import Windows
 from genpolicy.statistics.intervals import clopper_pearson
@@ -80,7 +80,7 @@ def swept_windows(data: Dataset, horizons: HorizonConfig) -> Windows:
     return Windows(whole.observations[rows], whole.actions[rows], whole.is_pad[rows])
 
 
-def quality_of(policy: NetworkPolicy, windows: Windows, data: Dataset) -> Quality:
+def quality_of(policy: Policy, windows: Windows, data: Dataset) -> Quality:
     """One candidate per window, against the demonstrated chunk and in itself.
 
     The jerk is that of the chunk as it is drawn, before projection and without the boundary to
@@ -115,15 +115,31 @@ def coverage_row(
     found: Sequence[ModeRow], *, sampler: SamplerConfig, quality: Quality
 ) -> CoverageRow:
     """One row of `coverage.parquet` from the modes of every situation, at least one."""
+    adaptive = sampler.name in ADAPTIVE_TABLEAUS
+    return drawn_by(
+        found, steps=sampler.steps, sampler_sha256=sampler.hash(),
+        tolerance=sampler.tolerance if adaptive else None, quality=quality,
+    )  # fmt: skip
+
+
+def drawn_by(
+    found: Sequence[ModeRow],
+    *,
+    steps: int,
+    sampler_sha256: str,
+    tolerance: float | None,
+    quality: Quality,
+) -> CoverageRow:
+    """The same, of a sampler that is known by its steps, its settings' hash and its tolerance."""
     whole = sum(row.modes_covered == row.modes_present for row in found)
     drawn = sum(row.samples for row in found)
     return CoverageRow(
         method=found[0].method,
         seed=found[0].seed,
         sampler=found[0].convention,
-        steps=sampler.steps,
-        sampler_sha256=sampler.hash(),
-        tolerance=sampler.tolerance if sampler.name in ADAPTIVE_TABLEAUS else None,
+        steps=steps,
+        sampler_sha256=sampler_sha256,
+        tolerance=tolerance,
         nfe=max(row.nfe for row in found),
         situations=len(found),
         modes_covered_share=whole / len(found),

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.candidates.joining import JoiningSettings
-from genpolicy.candidates.judged import JudgedPolicy, candidates_of
+from genpolicy.candidates.judged import candidates_of
+from genpolicy.candidates.standing import Standing, opened
 from genpolicy.evidence.rows.stress import (
     InvocationRow,
     OverrunRow,
@@ -79,7 +80,7 @@ class Shard:
     """
 
     comparison: Comparison
-    judged: JudgedPolicy
+    judged: Standing
     latency: LatencyModel
     perturbation: str
     schedule: Perturbation
@@ -117,8 +118,14 @@ def matched_starts(task: Task, *, root_seed: int, count: int) -> list[Start]:
 def run_shard(shard: Shard) -> ShardResult:
     """All rollouts of a shard, in lockstep; writes its journal."""
     comparison = shard.comparison
+    task = load_task(comparison.task)
+    with opened(shard.judged, task.observation) as policy:
+        return _run(shard, task, policy)
+
+
+def _run(shard: Shard, task: Task, policy: Policy) -> ShardResult:
+    comparison = shard.comparison
     horizons = comparison.cell.horizons
-    task, policy = load_task(comparison.task), shard.judged.load()
     joining = comparison.joining.of(shard.judged.name, guided=policy.guided)
     setup = Setup(
         task=task,

@@ -8,6 +8,7 @@ import numpy as np
 
 from genpolicy.candidates.joining import REAL_TIME
 from genpolicy.candidates.judged import JudgedPolicy
+from genpolicy.candidates.standing import Standing
 from genpolicy.compute import map_shards
 from genpolicy.errors import ConfigError
 from genpolicy.evidence.documents.given import Distilled
@@ -107,15 +108,18 @@ def _write_envelope(folder: Path, shards: Sequence[Shard]) -> None:
     ENVELOPE.write(folder, envelope_document(first.perturbation, first.schedule, reached))
 
 
-def write_distilled(folder: Path, judged: Iterable[JudgedPolicy]) -> None:
+def write_distilled(folder: Path, judged: Iterable[Standing]) -> None:
     """`distilled.json`, where a compared policy has a teacher: which, and what it took.
+
+    What it took to make a policy that was brought, nobody here knows.
 
     Raises:
         IntegrityError: The files of a policy are not those of its identity.
         BadInputError: They are missing, or the place cannot be written.
     """
     found = {}
-    for policy in {one.name: one for one in judged}.values():
+    ours = {one.name: one for one in judged if isinstance(one, JudgedPolicy)}
+    for policy in ours.values():
         said = policy.load().checkpoint.config.distilled
         if said is not None:
             found[policy.name] = Distilled(**said.model_dump())
@@ -125,7 +129,7 @@ def write_distilled(folder: Path, judged: Iterable[JudgedPolicy]) -> None:
 
 def plan_shards(
     comparison: Comparison,
-    judged: Sequence[JudgedPolicy],
+    judged: Sequence[Standing],
     perturbations: Mapping[str, Perturbation],
     *,
     latency: Mapping[str, LatencyModel],
@@ -150,13 +154,14 @@ def plan_shards(
     untimed = sorted({policy.name for policy in judged} - set(latency))
     if untimed:
         raise ConfigError(
-            where="params.yaml: stress.baselines, train_generators.samplers",
+            where="params.yaml: stress.baselines, train_generators.samplers, candidates",
             found=f"with {', '.join(untimed)}, whose latency was not measured",
             expected=f"methods out of {', '.join(sorted(latency))}",
             action="Correct the names, or run `dvc repro latency`.",
         )
     for policy in judged if comparison.joining.rule == REAL_TIME else ():
-        comparison.joining.of(policy.name, guided=policy.load().guided)
+        guided = isinstance(policy, JudgedPolicy) and policy.load().guided
+        comparison.joining.of(policy.name, guided=guided)
     return [
         Shard(
             comparison=comparison,

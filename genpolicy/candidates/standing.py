@@ -1,0 +1,75 @@
+"""Who stands in the ladder: trained here or brought, and how each is asked."""
+
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from genpolicy.candidates.brought import BroughtPolicy
+from genpolicy.candidates.judged import GENERATORS, JudgedPolicy, compared, trained
+from genpolicy.candidates.wire.policy import WirePolicy, running
+from genpolicy.contract.observation import ObservationContract
+from genpolicy.policies.policy import NetworkPolicy
+
+Standing = JudgedPolicy | BroughtPolicy
+Running = NetworkPolicy | WirePolicy
+
+
+@contextmanager
+def opened(candidate: Standing, contract: ObservationContract) -> Iterator[Running]:
+    """A candidate that can be asked, until the end of the block.
+
+    Args:
+        candidate: Who it is.
+        contract: The observation in force.
+
+    Raises:
+        IntegrityError: Its files are not those of its identity.
+        BadInputError: Its files are missing or malformed.
+        PolicyError: It is behind the wire, and its server is not there.
+    """
+    if isinstance(candidate, BroughtPolicy):
+        with running(candidate, contract) as policy:
+            yield policy
+    else:
+        yield candidate.load()
+
+
+def standing(
+    artifacts: Path, admitted: Sequence[str], brought: Sequence[BroughtPolicy], *, seed: int
+) -> list[Standing]:
+    """Those that a gate admitted, in its order.
+
+    Raises:
+        BadInputError: A checkpoint is missing or malformed.
+    """
+    others = {policy.name: policy for policy in brought}
+    own = [name for name in admitted if name not in others]
+    of_ours = {one.name: one for one in trained(artifacts / GENERATORS, own, seeds=[seed])}
+    return [others.get(name) or of_ours[name] for name in admitted]
+
+
+def in_comparison(
+    artifacts: Path,
+    *,
+    baselines: Sequence[str],
+    candidates: Collection[str],
+    brought: Sequence[BroughtPolicy],
+    seed: int,
+) -> list[Standing]:
+    """Baselines, then trained candidates, then brought ones: who stands in the comparison.
+
+    Args:
+        artifacts: Folder of the stages' outputs.
+        baselines: Simpler methods in it.
+        candidates: Names of the candidates in it.
+        brought: Every policy that was brought; those that are no candidate stay out.
+        seed: The training seed that is promoted.
+
+    Raises:
+        ConfigError: A method stands on both sides.
+        BadInputError: A checkpoint is missing or malformed.
+    """
+    others = {policy.name for policy in brought}
+    own = [name for name in candidates if name not in others]
+    ours = compared(artifacts, baselines=baselines, generators=own, seed=seed)
+    return [*ours, *(policy for policy in brought if policy.name in candidates)]

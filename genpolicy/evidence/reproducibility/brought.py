@@ -1,0 +1,228 @@
+"""Gate B's evidence of a policy that was brought: does it answer, and again the same?
+
+It is started twice. Between the two nothing is left of it, and the second time it is asked in the
+opposite order: what depends on who was asked before, or on a seed of its own, answers otherwise.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from genpolicy.candidates import selector
+from genpolicy.candidates.brought import BroughtPolicy
+from genpolicy.candidates.wire.entry import ServerEntry
+from genpolicy.candidates.wire.policy import WirePolicy, running
+from genpolicy.contract.chunk import actions_sha256
+from genpolicy.data.dataset import Dataset
+from genpolicy.errors import NonFiniteError
+from genpolicy.evidence.documents.reproducibility import CandidateIdentity, IdentityCard
+from genpolicy.evidence.need.held_out import HeldOut, modes_of_policy
+from genpolicy.evidence.reproducibility.benchmark import DISCARDED
+from genpolicy.evidence.reproducibility.identity import Deployment, rule_sha256
+from genpolicy.evidence.reproducibility.sweep import drawn_by, quality_of, swept_windows
+from genpolicy.evidence.rows.need import ModeRow
+from genpolicy.evidence.rows.reproducibility import CoverageRow, NfeRow, SampleRow
+from genpolicy.feasibility.admission import FeasibilityChecker
+from genpolicy.policies.fixtures import CANDIDATES, fixture_observations
+from genpolicy.tasks.api import Task
+
+Array = NDArray[np.float64]
+
+UNSAID = "unsaid"
+FIXTURES = 32
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What everybody who was brought is asked.
+
+    Attributes:
+        data: The dataset.
+        task: The task.
+        checker: The six layers.
+        held_out: Two-mode situations.
+        samples: Candidates per situation.
+        deployment: Horizons, deadline and candidates of an invocation.
+    """
+
+    data: Dataset
+    task: Task
+    checker: FeasibilityChecker
+    held_out: HeldOut
+    samples: int
+    deployment: Deployment
+
+
+@dataclass
+class Answered:
+    """What one of them answered.
+
+    Attributes:
+        identity: What pins and names it.
+        samples: Fixtures, before and after the new start.
+        nfe: Counted network evaluations; empty where its server does not count.
+        modes: Two-mode situations.
+        coverage: The same in one row; empty where an answer was none.
+    """
+
+    identity: CandidateIdentity
+    samples: list[SampleRow] = field(default_factory=list)
+    nfe: list[NfeRow] = field(default_factory=list)
+    modes: list[ModeRow] = field(default_factory=list)
+    coverage: list[CoverageRow] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class _Session:
+    """Fixtures of one start. Shape (F, N, K, D_a), evaluations, and what it told of itself."""
+
+    chunks: Array
+    evaluations: int
+    told: object
+
+
+def ask_brought(candidate: BroughtPolicy, asked: Asked) -> Answered:
+    """Start it, ask, end it, start it again, ask again.
+
+    Raises:
+        IntegrityError: A file of it is another one.
+        PolicyError: Its server does not start.
+    """
+    seen = fixture_observations(asked.data, horizons=asked.deployment.horizons, count=FIXTURES)
+    contract = asked.data.observation_contract
+    with running(candidate, contract) as policy:
+        first = _fixtures(policy, seen, range(len(seen)))
+        modes = modes_of_policy(
+            policy, asked.held_out, seed=candidate.seed, convention=_sampler(candidate.entry),
+            samples=asked.samples, task=asked.task, checker=asked.checker,
+        )  # fmt: skip
+        coverage = _coverage(policy, candidate, asked, modes)
+        broken = sum(policy.faults.values())
+    with running(candidate, contract) as policy:
+        again = _fixtures(policy, seen, range(len(seen))[::-1])
+        broken += sum(policy.faults.values())
+    # Chunks that came and hold a number that is none, beside questions that got no chunk.
+    broken += int((~np.isfinite(first.chunks)).any(axis=(2, 3)).sum())
+    return Answered(
+        identity=_identity(candidate, asked.deployment, broken, int(first.told != again.told)),
+        samples=_compared(candidate, first.chunks, again.chunks),
+        nfe=_evaluations(candidate, first.evaluations, again.evaluations),
+        modes=modes,
+        coverage=coverage,
+    )
+
+
+def _fixtures(policy: WirePolicy, seen: Array, order: Sequence[int]) -> _Session:
+    parts, evaluations = {}, 0
+    for row in order:
+        drawn = policy.sample(
+            seen[row][None], noise_names=[("fixture", row)], candidates=CANDIDATES
+        )
+        parts[row] = drawn.actions[0]
+        evaluations = max(evaluations, drawn.nfe)
+    return _Session(np.stack([parts[row] for row in sorted(parts)]), evaluations, policy.told)
+
+
+def _compared(candidate: BroughtPolicy, first: Array, again: Array) -> list[SampleRow]:
+    return [
+        SampleRow(
+            method=candidate.name,
+            seed=candidate.seed,
+            row=row,
+            sha256_trained=actions_sha256(before),
+            sha256_reloaded=actions_sha256(after),
+            max_abs_difference=float(np.abs(before - after).max()),
+        )
+        for row, (before, after) in enumerate(zip(first, again, strict=True))
+    ]
+
+
+def _evaluations(candidate: BroughtPolicy, first: int, again: int) -> list[NfeRow]:
+    """One row where it is counted and declared; else nothing is known."""
+    declared = candidate.entry.declared
+    if declared is None or not (first and again):
+        return []
+    expected = declared.evaluations
+    return [NfeRow(candidate.name, candidate.seed, first, again, expected, expected, expected)]
+
+
+def _coverage(
+    policy: WirePolicy, candidate: BroughtPolicy, asked: Asked, modes: Sequence[ModeRow]
+) -> list[CoverageRow]:
+    declared = candidate.entry.declared
+    if not modes or declared is None:
+        return []
+    try:
+        quality = quality_of(
+            policy, swept_windows(asked.data, asked.deployment.horizons), asked.data
+        )
+    except NonFiniteError:
+        return []
+    return [
+        drawn_by(
+            modes, steps=declared.sampler_steps, sampler_sha256=candidate.sampler_sha256,
+            tolerance=declared.tolerance, quality=quality,
+        )
+    ]  # fmt: skip
+
+
+def _sampler(entry: ServerEntry) -> str:
+    return entry.declared.sampler if entry.declared else UNSAID
+
+
+def _identity(
+    candidate: BroughtPolicy, deployment: Deployment, broken: int, differing: int
+) -> CandidateIdentity:
+    declared = candidate.entry.declared
+    return CandidateIdentity(
+        checkpoint=candidate.sha256,
+        checkpoints=[candidate.sha256],
+        config=[candidate.sha256],
+        dataset=declared.dataset if declared else "",
+        normalisation=candidate.sha256,
+        seed=[declared.training_seed] if declared else [],
+        sampler=candidate.sampler_sha256,
+        metadata_mismatches=differing,
+        nonfinite_weights=broken,
+        card=card_of_brought(candidate, deployment),
+    )
+
+
+def card_of_brought(candidate: BroughtPolicy, deployment: Deployment) -> IdentityCard:
+    """The card of a brought policy, from what its maker declares; the rest is empty."""
+    said, horizons = candidate.entry.declared, candidate.entry.horizons
+    period_s = horizons.action_period_s
+    joining = deployment.joining.of(candidate.name, guided=False)
+    return IdentityCard(
+        architecture=said.architecture if said else "",
+        parameters=said.parameters if said else 0,
+        training_seeds=[str(said.training_seed)] if said else [],
+        dataset=said.dataset if said else "",
+        split=said.split if said else "",
+        action_semantics=candidate.sha256,
+        observation_semantics=candidate.sha256,
+        observation_horizon=horizons.observation_horizon,
+        prediction_horizon=horizons.prediction_horizon,
+        execution_horizon=horizons.execution_horizon,
+        control_rate_hz=1.0 / period_s,
+        invocation_rate_hz=1.0 / (horizons.execution_horizon * period_s),
+        deadline_s=deployment.deadline_s,
+        path=said.path if said else "",
+        sampler=said.sampler if said else "",
+        sampler_steps=said.sampler_steps if said else 0,
+        eta=said.eta if said else None,
+        tolerance=said.tolerance if said else None,
+        evaluations=str(said.evaluations) if said else "",
+        precision=said.precision if said else "",
+        device=said.device if said else "",
+        threads=said.threads if said else 0,
+        cpu_capability=said.cpu_capability if said else "",
+        warm_up=DISCARDED,
+        batch_rows=said.batch_rows if said else 0,
+        candidates=deployment.samples if candidate.entry.stochastic else 1,
+        selector=joining.said(),
+        selector_owner=selector.OWNER,
+        selector_sha256=rule_sha256(joining),
+    )
