@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any, ClassVar, NoReturn, Self, TypeVar
 
 import numpy as np
-from pydantic import Field, PrivateAttr, model_validator
+from pydantic import Field, PrivateAttr
 
 from gates.criterion import Criterion
 from gates.report import OWNERS, Gate, Owner, StrictModel, parse_section, stage_of
@@ -34,6 +34,8 @@ from genpolicy.seeds import stream
 PARAMS_FILE = "params.yaml"
 DEEPEST = 30  # levels of `params.yaml`; it has six
 DERIVED = "derived"
+AND = " and "
+"""Between two homes of one list."""
 LIMITS, NOT_APPLICABLE = "limits", "not_applicable"
 
 
@@ -93,7 +95,8 @@ class GateSettings(StrictModel):
 
     Attributes:
         homes: Where in `params.yaml` a field stands, if not in the gate's own section, as a dotted
-            path. Of a mapping there, the names are taken, in their order.
+            path. Of a mapping there, the names are taken, in their order; of two homes, those of
+            both.
     """
 
     homes: ClassVar[Mapping[str, str]] = {}
@@ -134,7 +137,7 @@ class CandidateSettings(GateSettings):
     homes: ClassVar[Mapping[str, str]] = {
         "root_seed": "seed",
         "confidence": "confidence",
-        "candidates": "train_generators.samplers",
+        "candidates": f"train_generators.samplers{AND}candidates",
         "brought": "candidates",
     }
 
@@ -142,14 +145,6 @@ class CandidateSettings(GateSettings):
     candidates: tuple[str, ...]
     brought: tuple[str, ...] = ()
     root_seed: int
-
-    @model_validator(mode="before")
-    @classmethod
-    def _whoever_was_brought_stands(cls, values: Any) -> Any:
-        if not isinstance(values, dict) or not values.get("brought"):
-            return values
-        every = dict.fromkeys([*values.get("candidates", ()), *values["brought"]])
-        return {**values, "candidates": list(every)}
 
     def draws(self, *names: str) -> np.random.Generator:
         """Generator of an interval, the same whenever and wherever the gate is judged."""
@@ -248,6 +243,8 @@ def read_settings(params: Mapping[str, Any], name: str, model: type[Settings]) -
 
 
 def _at(params: Mapping[str, Any], path: str) -> Any:
+    if AND in path:
+        return [name for part in path.split(AND) for name in _at(params, part)]
     value: Any = params
     for part in path.split("."):
         if not isinstance(value, dict) or part not in value:

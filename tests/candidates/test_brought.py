@@ -1,0 +1,82 @@
+"""Policies that were brought: entries are read, and files held against their hashes."""
+
+import pytest
+import yaml
+
+from genpolicy.candidates.brought import read_brought, require_brought
+from genpolicy.candidates.standing import in_comparison, standing
+from genpolicy.errors import ConfigError, IntegrityError
+from genpolicy.integrity.hashing import sha256_file
+from tests.candidates.conftest import ENTRY
+from tests.conftest import HORIZONS
+
+
+@pytest.fixture
+def brought(tmp_path):
+    """Writes an entry with a file of weights; returns the section that names it."""
+    (tmp_path / "own").mkdir()
+    weights = tmp_path / "own" / "weights.bin"
+    weights.write_bytes(b"weights")
+
+    def write(**changes):
+        entry = {**ENTRY, "files": {"weights.bin": sha256_file(weights)}, **changes}
+        (tmp_path / "own" / "planted.yaml").write_text(yaml.safe_dump(entry))
+        return {"planted": "own/planted.yaml"}
+
+    return write
+
+
+def test_who_was_brought_is_its_entry(brought, tmp_path):
+    (one,) = read_brought(brought(), seed=3, root=tmp_path)
+    (same,) = read_brought(brought(), seed=3, root=tmp_path)
+    (other,) = read_brought(brought(timeout_s=4.0), seed=3, root=tmp_path)
+    assert (one.name, one.seed, one.folder) == ("planted", 3, tmp_path / "own")
+    assert one.sha256 == same.sha256 != other.sha256
+    assert one.sampler_sha256 != other.sampler_sha256
+
+
+def test_the_files_are_part_of_who_it_is(brought, tmp_path):
+    (one,) = read_brought(brought(), seed=0, root=tmp_path)
+    (other,) = read_brought(brought(files={"weights.bin": "0" * 64}), seed=0, root=tmp_path)
+    assert one.sha256 != other.sha256
+
+
+def test_a_changed_file_is_refused_before_anything_runs(brought, tmp_path):
+    section = brought()
+    assert len(require_brought(section, horizons=HORIZONS, root=tmp_path)) == 1
+    (tmp_path / "own" / "weights.bin").write_bytes(b"weightz")
+    with pytest.raises(IntegrityError, match="planted"):
+        require_brought(section, horizons=HORIZONS, root=tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"name": "another"}, r"candidates\.planted.*the entry of another"),
+        ({"horizons": {**ENTRY["horizons"], "prediction_horizon": 32}},
+         "prediction_horizon 32.*prediction_horizon 16"),
+    ],
+)  # fmt: skip
+def test_what_the_ladder_cannot_work_with_is_refused_by_name(brought, tmp_path, changes, told):
+    with pytest.raises(ConfigError, match=told):
+        require_brought(brought(**changes), horizons=HORIZONS, root=tmp_path)
+
+
+def test_a_name_means_one_policy(brought, tmp_path):
+    with pytest.raises(ConfigError, match="a name that a trained method has"):
+        require_brought(brought(), horizons=HORIZONS, trained=["planted"], root=tmp_path)
+
+
+def test_who_stands_is_who_was_admitted_in_its_order(fleet, brought, tmp_path):
+    (tmp_path / "train_generators").symlink_to(fleet[0])
+    (tmp_path / "train_baselines").symlink_to(fleet[0])
+    others = read_brought(brought(), seed=0, root=tmp_path)
+    found = standing(tmp_path, ["planted", "flow"], others, seed=0)
+    assert [one.name for one in found] == ["planted", "flow"]
+    assert standing(tmp_path, ["flow"], others, seed=0)[0].name == "flow"
+    compared = in_comparison(
+        tmp_path, baselines=["bc"], candidates=["flow", "planted"], brought=others, seed=0
+    )
+    assert [one.name for one in compared] == ["bc", "flow", "planted"]
+    only = in_comparison(tmp_path, baselines=["bc"], candidates=["flow"], brought=others, seed=0)
+    assert [one.name for one in only] == ["bc", "flow"]

@@ -1,0 +1,131 @@
+"""A policy behind the wire in the place of ours: its faults are chunks that are none."""
+
+import numpy as np
+import pytest
+
+from genpolicy.candidates.brought import BroughtPolicy
+from genpolicy.candidates.wire.extension import WORD
+from genpolicy.candidates.wire.policy import GONE_AFTER, WirePolicy, running
+from genpolicy.candidates.wire.remote import RemotePolicy
+from genpolicy.contract.latency import Term
+from genpolicy.errors import ConfigError, IntegrityError
+from genpolicy.policies.guidance import Prefix
+from tests.candidates.wire.test_remote import CAN, Planted
+
+
+@pytest.fixture
+def wire(serving, entry, task, tmp_path):
+    """A planted policy in the place of ours, and its server's answering function."""
+    opened = []
+
+    def open_line(planted, entry=entry, **clock):
+        context = serving(planted, {WORD: planted.can})
+        remote = RemotePolicy(entry, context.__enter__(), task.observation, **clock)
+        opened.append((context, remote))
+        brought = BroughtPolicy("planted", tmp_path / "planted.yaml", entry, "c" * 64, 0)
+        return WirePolicy(brought, remote)
+
+    yield open_line
+    for context, remote in opened:
+        remote.close()
+        context.__exit__(None, None, None)
+
+
+def seen(count, task):
+    return np.tile(np.arange(count, dtype=float)[:, None, None], (1, 2, task.observation.dim))
+
+
+def test_each_observation_is_asked_under_its_own_name(wire, task):
+    planted = Planted()
+    policy = wire(planted)
+    drawn = policy.sample(seen(3, task), noise_names=[("a", 1), ("b",), ("c", 2)], candidates=3)
+    assert drawn.actions.shape == (3, 3, 16, 10)
+    assert drawn.nfe == 4
+    np.testing.assert_array_equal(drawn.actions[:, 0, 0, 0], [0.0, 1.0, 2.0])
+    assert [asked[WORD]["noise"][:2] for asked in planted.asked] == [["a", 1], ["b", 0], ["c", 2]]
+    assert (policy.asked, dict(policy.faults)) == (3, {})
+    assert (policy.method, policy.guided, policy.prediction_horizon) == ("planted", False, 16)
+
+
+class Fails(Planted):
+    """Refuses every question of some numbers."""
+
+    def __init__(self, *numbers):
+        super().__init__()
+        self.numbers = numbers
+
+    def __call__(self, message):
+        if len(self.asked) in self.numbers:
+            self.asked.append(message)
+            raise ValueError("no")
+        return super().__call__(message)
+
+
+def test_a_fault_is_a_chunk_of_nan_and_the_next_answer_counts_again(wire, task):
+    policy = wire(Fails(1))
+    names = [("a", number) for number in range(3)]
+    drawn = policy.sample(seen(3, task), noise_names=names, candidates=2).actions
+    assert np.isnan(drawn[1]).all()
+    assert np.isfinite(drawn[[0, 2]]).all()
+    assert dict(policy.faults) == {"refused": 1}
+
+
+def test_who_fails_again_and_again_is_asked_no_more(wire, task):
+    planted = Fails(*range(100))
+    policy = wire(planted)
+    names = [("a", number) for number in range(GONE_AFTER + 3)]
+    drawn = policy.sample(seen(len(names), task), noise_names=names, candidates=1).actions
+    assert np.isnan(drawn).all()
+    assert len(planted.asked) == GONE_AFTER
+    assert dict(policy.faults) == {"refused": GONE_AFTER, "gone": 3}
+
+
+def test_faults_that_are_not_in_a_row_do_not_end_it(wire, task):
+    policy = wire(Fails(*range(0, 100, 2)))
+    names = [("a", number) for number in range(4 * GONE_AFTER)]
+    policy.sample(seen(len(names), task), noise_names=names, candidates=1)
+    assert dict(policy.faults) == {"refused": 2 * GONE_AFTER}
+
+
+def test_one_that_always_draws_the_same_is_asked_for_one(wire, task, entry_of):
+    planted = Planted()
+    policy = wire(planted, entry=entry_of(stochastic=False))
+    drawn = policy.sample(seen(1, task), noise_names=[("a",)], candidates=3).actions
+    assert drawn.shape == (1, 3, 16, 10)
+    assert [asked[WORD]["candidates"] for asked in planted.asked] == [1]
+    np.testing.assert_array_equal(drawn[0, 0], drawn[0, 2])
+
+
+def test_time_that_no_span_explains_is_of_the_sampler(wire, task):
+    ticks = iter(np.arange(0.0, 100.0, 2.0))
+    policy = wire(Planted(spans=["sample"]), clock=lambda: next(ticks))
+    terms, chunks = policy.timed(seen(1, task)[0], noise=("a",), candidates=1)
+    assert chunks.shape == (1, 16, 10)
+    assert np.isnan([terms[Term.PREPROCESS], terms[Term.ENCODE]]).all()
+    # The server says .5 s; by the clock here it took 2 s from first byte to last chunk.
+    assert terms[Term.SAMPLE] == 2.0
+
+
+def test_a_server_that_measures_nothing_is_all_sampling(wire, task):
+    ticks = iter(np.arange(0.0, 100.0, 2.0))
+    policy = wire(Planted(spans=[]), clock=lambda: next(ticks))
+    terms, _ = policy.timed(seen(1, task)[0], noise=("a",), candidates=1)
+    assert terms[Term.SAMPLE] == 2.0
+
+
+def test_no_server_is_asked_to_go_on_from_a_prefix(wire, task):
+    prefix = Prefix(np.zeros((1, 16, 10)), np.zeros((1, 16)), 5.0)
+    with pytest.raises(ConfigError, match="prefix for planted"):
+        wire(Planted()).sample(seen(1, task), noise_names=[("a",)], candidates=1, prefix=prefix)
+
+
+def test_files_are_held_against_their_hashes_each_time_it_starts(entry_of, task, tmp_path):
+    entry = entry_of(files={"weights.bin": "0" * 64})
+    (tmp_path / "weights.bin").write_bytes(b"others")
+    brought = BroughtPolicy("planted", tmp_path / "planted.yaml", entry, "c" * 64, 0)
+    with pytest.raises(IntegrityError, match="planted"), running(brought, task.observation):
+        pytest.fail("it ran")
+
+
+def test_it_speaks_the_capabilities_of_its_server(wire):
+    assert wire(Planted()).told.checkpoint == CAN["checkpoint"]
