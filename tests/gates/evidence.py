@@ -203,6 +203,7 @@ PARAMS: dict[str, Any] = {
     "measure_baselines": {"latent": {"method": "act"}},
     "train_factors": {"variants": {name: {} for name in VARIANTS}},
     "train_generators": {"samplers": {name: {} for name in CANDIDATES}},
+    "candidates": {},
     "stress": {
         "starts": STARTS,
         "baselines": list(COMPARED),
@@ -248,6 +249,7 @@ PARAMS: dict[str, Any] = {
     "gate_b": {
         "budget_reference": "chunked_bc",
         "mode_minimum_share": 0.125,
+        "unmatched": {},
         "limits": by_owner(
             unmatched_keys=(0, "model"),
             parameter_budget_deviation=(0.05, "model"),
@@ -998,6 +1000,7 @@ def _generators(root: Path) -> None:
     manifest = (root / "artifacts/ingest/manifest.json").read_bytes()
     dataset = hashlib.sha256(manifest).hexdigest()
     document(root, "train_generators/matched.json", _matched(CANDIDATES, dataset=dataset))
+    document(root, "candidates/candidates.json", {})
     table(root, "reload/offline.parquet", OfflineRow, [_offline("flow")])
     table(root, "reload/density.parquet", DensityRow, _densities())
     _checkpoints(root, "train_generators", CANDIDATES)

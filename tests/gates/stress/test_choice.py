@@ -136,3 +136,39 @@ def test_the_card_goes_to_the_sooner_whatever_else_was_measured(ladder, change, 
     answers = (*own, *(more if not change else ()), *whole)
     judged = Judged(Evidence(ladder), settings_of(ladder, "D"), answers, "PASS", verdicts)
     assert choose(judged).promoted == promoted
+
+
+def unmatched(root, *names):
+    """Let some of the candidates stand by exception."""
+
+    def change(params):
+        for name in names:
+            del params["train_generators"]["samplers"][name]
+            params["candidates"][name] = f"own/{name}.yaml"
+            params["gate_b"]["unmatched"][name] = {
+                "owner": "model", "reason": "brought", "expires": "2027-01-31",
+            }  # fmt: skip
+
+    evidence.write_params(root, change)
+    evidence.record(root)
+
+
+def test_who_stands_by_exception_is_ranked_with_nobody(ladder):
+    """Flow answers sooner, and would be drafted among equals."""
+    unmatched(ladder, "flow")
+    report = judge(ladder, "D")
+    assert report.candidates == {"diffusion": "PASS", "flow": "PASS"}
+    assert report.promoted == "diffusion"
+    assert report.decision == (
+        f"promote diffusion, {IN_SHORT}; also passed, unmatched and so not ranked: flow"
+    )
+    assert any("flow is unmatched evidence" in text for text in report.caveats)
+
+
+def test_of_those_that_nobody_may_rank_the_sooner_is_drafted_and_it_says_so(ladder):
+    unmatched(ladder, "flow", "diffusion")
+    report = judge(ladder, "D")
+    assert report.promoted == "flow"
+    assert "on unmatched evidence; also passed, unmatched and so not ranked: diffusion" in (
+        report.decision
+    )

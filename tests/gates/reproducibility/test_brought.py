@@ -1,0 +1,144 @@
+"""A policy that was brought: what it cannot show fails by name, and an exception says who answers.
+
+The synthetic `flow` stands for one: its rows are there, and nothing of its training.
+"""
+
+import evidence
+import pytest
+from asked import found_in
+
+from gates.proof import judge
+from gates.reproducibility.settings import MATCHING
+from genpolicy.errors import ConfigError
+
+EXCEPTION = {"owner": "model", "reason": "trained by its maker", "expires": "2027-01-31"}
+ENTRY = "own/flow.yaml"
+
+
+def bring(root, *, unmatched, change=None, document=None):
+    """Let `flow` be brought: no training of it is left, and its entry is in the evidence."""
+
+    def params(found):
+        del found["train_generators"]["samplers"]["flow"]
+        found["candidates"] = {"flow": ENTRY}
+        found["gate_b"]["unmatched"] = {"flow": unmatched} if unmatched else {}
+
+    evidence.write_params(root, params)
+
+    def untrained(found):
+        for name in ("methods", "differing_keys"):
+            found[name].pop("flow")
+
+    evidence.edit_document(root, "train_generators/matched.json", untrained)
+    identity = {}
+    evidence.edit_document(
+        root, "reload/identity.json", lambda found: identity.update(found["flow"])
+    )
+    pinned = {
+        "author": "author@example.org", "sha256": identity["checkpoint"],
+        "files": {"weights.bin": "a" * 64}, "started_here": True, "dataset": identity["dataset"],
+        "training_seed": identity["seed"][0],
+    }  # fmt: skip
+    evidence.document(root, "candidates/candidates.json", {"flow": {**pinned, **(document or {})}})
+    evidence.edit_document(
+        root, "reload/identity.json",
+        lambda found: found["flow"].update({"seed": identity["seed"][:1], **(change or {})}),
+    )  # fmt: skip
+    evidence.record(root)
+
+
+def of_flow(report, name):
+    (answer,) = [item for item in found_in(report, name) if item.candidate == "flow"]
+    return answer
+
+
+def test_by_exception_it_passes_and_the_report_says_who_answers(ladder):
+    bring(ladder, unmatched=EXCEPTION)
+    report = judge(ladder, "B")
+    assert report.candidates == {"diffusion": "PASS", "flow": "PASS"}
+    asked = {item.id for item in report.criteria if item.candidate == "flow"}
+    assert not asked & set(MATCHING)
+    of_ours = {item.id for item in report.criteria if item.candidate == "diffusion"}
+    assert set(MATCHING) <= of_ours
+    (said,) = [text for text in report.caveats if "unmatched evidence" in text]
+    assert "model owner answers for it until 2027-01-31: trained by its maker" in said
+
+
+def test_without_an_exception_it_fails_by_name_and_the_others_stand(ladder):
+    bring(ladder, unmatched=None)
+    report = judge(ladder, "B")
+    assert report.candidates == {"diffusion": "PASS", "flow": "FAIL"}
+    answer = of_flow(report, "unmatched_keys")
+    assert answer.verdict == "FAIL" and "gate_b.unmatched.flow" in answer.caveat
+
+
+@pytest.mark.parametrize(
+    ("document", "said"),
+    [
+        ({"files": {}}, "checkpoint file"),
+        ({"sha256": "b" * 64}, "another entry was asked"),
+        ({"training_seed": None}, "seed"),
+        ({"training_seed": 99}, "seed"),
+    ],
+)
+def test_what_nobody_pins_fails_by_name(ladder, document, said):
+    bring(ladder, unmatched=EXCEPTION, document=document)
+    answer = of_flow(judge(ladder, "B"), "unpinned_items")
+    assert (answer.verdict, answer.measured) == ("FAIL", 1.0) and said in answer.caveat
+
+
+def test_what_its_maker_does_not_declare_is_missing_from_the_card(ladder):
+    def undeclared(found):
+        found["flow"]["card"].update({"architecture": "", "threads": 0})
+
+    bring(ladder, unmatched=EXCEPTION)
+    evidence.edit_document(ladder, "reload/identity.json", undeclared)
+    evidence.record(ladder)
+    answer = of_flow(judge(ladder, "B"), "unpinned_items")
+    assert answer.verdict == "FAIL" and "architecture, threads" in answer.caveat
+
+
+def test_other_data_are_told_by_exception_and_unpinned_without(ladder):
+    bring(ladder, unmatched=EXCEPTION, change={"dataset": "c" * 64})
+    answer = of_flow(judge(ladder, "B"), "unpinned_items")
+    assert (
+        answer.verdict == "PASS" and "another one than the audited, by exception" in answer.caveat
+    )
+    bring_again = {"candidates": {"flow": ENTRY}}
+
+    def without(found):
+        del found["train_generators"]["samplers"]["flow"]
+        found.update(bring_again)
+
+    evidence.write_params(ladder, without)
+    evidence.record(ladder)
+    assert of_flow(judge(ladder, "B"), "unpinned_items").verdict == "FAIL"
+
+
+def test_an_answer_that_is_none_counts_where_nobody_sees_weights(ladder):
+    bring(ladder, unmatched=EXCEPTION, change={"nonfinite_weights": 1})
+    answer = of_flow(judge(ladder, "B"), "nonfinite_weights")
+    assert answer.verdict == "FAIL" and "behind the wire" in answer.caveat
+
+
+@pytest.mark.parametrize(
+    ("exception", "told"),
+    [
+        ({**EXCEPTION, "expires": "2027-02-30"}, "expires"),
+        ({**EXCEPTION, "expires": "soon"}, "expires"),
+        ({**EXCEPTION, "owner": "nobody"}, "owner"),
+        ({**EXCEPTION, "reason": ""}, "reason"),
+    ],
+)
+def test_an_exception_names_owner_reason_and_day(ladder, exception, told):
+    bring(ladder, unmatched=exception)
+    with pytest.raises(ConfigError, match=told):
+        judge(ladder, "B")
+
+
+def test_who_is_trained_here_is_matched_or_fails(ladder):
+    evidence.write_params(
+        ladder, lambda found: found["gate_b"].update(unmatched={"diffusion": EXCEPTION})
+    )
+    with pytest.raises(ConfigError, match="diffusion is excepted and not among"):
+        judge(ladder, "B")
