@@ -17,11 +17,14 @@ from gates.git import git
 from gates.pipeline import LOCK, RUNGS
 from gates.preregistration import PREREGISTRATION, asked_by
 from gates.report import GATES, Gate
+from gates.reproducibility.settings import BROUGHT_FOLDER
 from genpolicy.errors import GenpolicyError, IntegrityError
+from genpolicy.evidence.documents.brought import BROUGHT
 from genpolicy.integrity.documents import parse_yaml, read_yaml
 
 MADE = (
-    "task", "record", "ingest", "train_baselines", "train_factors", "train_generators", "card",
+    "task", "record", "ingest", "train_baselines", "train_factors", "candidates",
+    "train_generators", "card",
 )  # fmt: skip
 """Stages that make what is measured, or the card: no gate holds a figure of theirs to a limit."""
 MEASURED: dict[str, Gate] = {
@@ -44,12 +47,15 @@ def require_history(root: Path) -> None:
     """Require of the draft below `root` that its plan came first and its makers are its authors.
 
     Raises:
-        IntegrityError: As `require_registered_first` and `require_makers_known`.
+        IntegrityError: As `require_registered_first`, `require_makers_known` and
+            `require_author_of_brought`.
         BadInputError: The draft is missing or malformed.
         ConfigError: A malformed allow-list.
     """
     require_registered_first(root)
-    require_makers_known(root, read_draft(root).authors, load_allow_list(root))
+    draft, allowed = read_draft(root), load_allow_list(root)
+    require_makers_known(root, draft.authors, allowed)
+    require_author_of_brought(root, draft.candidate, draft.authors, allowed)
 
 
 def require_registered_first(root: Path) -> None:
@@ -115,6 +121,35 @@ def require_makers_known(root: Path, authors: Sequence[str], allowed: AllowList)
             found = f"by {who}, who committed as {mail or 'nobody: the address is empty'}"
             expected = f"commits of its authors alone ({', '.join(authors) or 'none is named'})"
             _refuse("the candidate", found, expected, NAME_ALL)
+
+
+def require_author_of_brought(
+    root: Path, candidate: str, authors: Sequence[str], allowed: AllowList
+) -> None:
+    """Require that whoever made a candidate that was brought is named among its authors.
+
+    No commit of this repository says who made it; its entry does.
+
+    Args:
+        root: Repository root.
+        candidate: Who is promoted.
+        authors: Identifiers that the card names.
+        allowed: The allow-list.
+
+    Raises:
+        IntegrityError: The author of its entry is nobody on the list, or no author of the card.
+    """
+    folder = root / BROUGHT_FOLDER
+    brought = BROUGHT.read(folder) if (folder / BROUGHT.file).is_file() else {}
+    if candidate not in brought:
+        return
+    mail = brought[candidate].author.casefold()
+    owner = {own.casefold(): person.id for person in allowed.people for own in person.emails}
+    if owner.get(mail) not in authors:
+        who = owner.get(mail, f"somebody not on {ALLOW_LIST}")
+        found = f"by {who}, whom its entry names as {mail}"
+        expected = f"one of the authors of the card ({', '.join(authors) or 'none is named'})"
+        _refuse(f"the candidate {candidate}", found, expected, NAME_ALL)
 
 
 def _addresses(makers: str) -> list[str]:

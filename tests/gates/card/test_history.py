@@ -2,6 +2,7 @@
 
 import os
 import subprocess
+from dataclasses import replace
 
 import pytest
 import yaml
@@ -10,13 +11,16 @@ from team import KEYS
 from gates.card.history import (
     MADE,
     MEASURED,
+    require_author_of_brought,
     require_history,
     require_makers_known,
     require_registered_first,
 )
 from gates.card.people import AllowList, Person
 from gates.pipeline import RUNGS
+from gates.reproducibility.settings import BROUGHT_FOLDER
 from genpolicy.errors import IntegrityError
+from genpolicy.evidence.documents.brought import BROUGHT, Brought
 from genpolicy.integrity.documents import canonical_json
 
 PLAN, LOCK = "preregistration.yaml", "dvc.lock"
@@ -448,3 +452,23 @@ def test_a_plan_that_once_could_not_be_read_is_another_plan_and_no_end(history, 
     commit(plan="a: 1")
     commit(lock=_lock())
     require_registered_first(root)
+
+
+def test_who_made_a_policy_that_was_brought_is_an_author_of_the_card(history, people):
+    """Its maker has no commit here: without this the maker could review it."""
+    root, _ = history
+    entry = Brought(
+        author="Rita@example.org", sha256="a" * 64, files={}, started_here=True, dataset="",
+        training_seed=None,
+    )  # fmt: skip
+    require_author_of_brought(root, "flow", ["ada"], people)  # nobody was brought
+    folder = root / BROUGHT_FOLDER
+    folder.mkdir(parents=True)
+    BROUGHT.write(folder, {"flow": entry})
+    require_author_of_brought(root, "diffusion", ["ada"], people)
+    require_author_of_brought(root, "flow", ["ada", "rita"], people)
+    with pytest.raises(IntegrityError, match=r"by rita, whom its entry names as rita@example\.org"):
+        require_author_of_brought(root, "flow", ["ada"], people)
+    BROUGHT.write(folder, {"flow": replace(entry, author="who@example.org")})
+    with pytest.raises(IntegrityError, match="by somebody not on"):
+        require_author_of_brought(root, "flow", ["ada"], people)

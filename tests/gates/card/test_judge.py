@@ -328,3 +328,22 @@ def test_a_card_may_last_a_day_and_no_less(days, good):
     else:
         with pytest.raises(ConfigError, match="maximum_days"):
             parse_section(CardGateSettings, section, where="gate_e")
+
+
+@pytest.mark.parametrize(("until", "days_beyond"), [("2026-12-31", False), ("2026-11-25", True)])
+def test_a_card_does_not_outlive_the_exception_by_which_its_candidate_stands(
+    signed, until, days_beyond
+):
+    draft = json.loads((signed.root / "artifacts/card/card.json").read_bytes())
+    exception = {"owner": "model", "reason": "brought", "expires": until}
+
+    def stands(params):
+        params["gate_b"]["unmatched"] = {draft["candidate"]: exception}
+
+    evidence.write_params(signed.root, stands)
+    found = {c.id: c for c in signed.judge().criteria}["not_expired"]
+    assert (found.verdict == "FAIL") == days_beyond
+    assert ("outlives the exception" in found.caveat) == days_beyond
+    others = {"gate_b": {"unmatched": {"another": exception}}}
+    evidence.write_params(signed.root, lambda params: params["gate_b"].update(others["gate_b"]))
+    assert {c.id: c for c in signed.judge().criteria}["not_expired"].verdict == "PASS"
