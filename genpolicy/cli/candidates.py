@@ -25,8 +25,8 @@ from genpolicy.integrity.documents import read_json
 from genpolicy.policies.policy import load_policy
 
 REFUSED, INTERRUPTED = 3, 130
-NOT_YET = (
-    "The ladder's stages run candidates that it trained itself; nothing here is a gate's verdict."
+NO_VERDICT = (
+    "Nothing here is a gate's verdict: name the entry in params.yaml (candidates) for those."
 )
 
 
@@ -142,7 +142,7 @@ def _text(found: Conformance) -> str:
             for finding in found.findings
         ),
         "",
-        NOT_YET,
+        NO_VERDICT,
     ]
     if found.failed:
         names = ", ".join(f"{one.name} (gate {one.gate})" for one in found.failed)

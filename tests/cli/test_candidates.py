@@ -85,7 +85,7 @@ def test_the_docs_commands_as_written(checked, dataset, capsys):
     assert run(checked, dataset, *earlier) == 0
     said = capsys.readouterr().out
     assert "holds   B  unchanged" in said
-    assert "nothing here is a gate's verdict" in said
+    assert "Nothing here is a gate's verdict" in said
 
 
 def test_every_finding_of_the_docs_is_one_and_every_one_is_in_the_docs(checked):
