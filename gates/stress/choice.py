@@ -53,7 +53,8 @@ def choose(judged: Judged) -> Decision:
     if len(passed) < len(every):
         decision = _of_matched(passed, judged, settings)
         beside = ", ".join(name for name in every if name not in passed)
-        return Decision(f"{decision.text}; {PASSED_UNMATCHED}: {beside}", decision.promoted)
+        text = f"{decision.text.removesuffix('.')}; {PASSED_UNMATCHED}: {beside}"
+        return Decision(text, decision.promoted)
     return _of_matched(passed, judged, settings)
 
 

@@ -1,8 +1,9 @@
 """Plain behaviour cloning and an energy go the whole way that they can: timed, shadowed, stressed.
 
 They are candidates as any other where `params.yaml` names them so; by default they stand at Gate A
-alone. What follows Gate A runs again with these two, and the independent proof draws their chunks
-again.
+alone. With them goes a policy in a process of its own, as somebody else would bring it: the flow
+that the finished ladder trained. What follows Gate A runs again with these three, and the
+independent proof draws their chunks again.
 """
 
 import json
@@ -12,7 +13,8 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
-from ladder_workspace import edit_params, repro
+from brought import NAME, bring_flow
+from ladder_workspace import edit_params, flip_a_bit, repro
 
 from flows.reproduce import stage_environment
 from genpolicy.policies.energy import EnergyNetwork
@@ -33,10 +35,16 @@ def methods(workspace: Path, table: str) -> set[str]:
     return set(pd.read_parquet(workspace / "artifacts" / table)["method"])
 
 
-def test_ibc_and_plain_bc_as_candidates(copy: Path) -> None:
+def test_ibc_plain_bc_and_a_policy_of_somebody_else_as_candidates(copy: Path) -> None:
+    entry = bring_flow(copy)
+
     def add(params: dict[str, Any]) -> None:
         params["train_generators"]["samplers"] = ADDED  # the others' way: the finished ladder
         params["stress"]["starts"] = 1
+        params["candidates"] = {NAME: entry.relative_to(copy).as_posix()}
+        params["gate_b"]["unmatched"] = {
+            NAME: {"owner": "model", "reason": "trained by its maker", "expires": "2030-01-31"}
+        }
 
     edit_params(copy, add)
     outcome, ran = repro(copy)
@@ -60,7 +68,34 @@ def test_ibc_and_plain_bc_as_candidates(copy: Path) -> None:
     samples = pd.read_parquet(copy / "artifacts/reload/samples.parquet")
     own = samples[samples["method"].isin(list(ADDED))]
     assert (own["sha256_trained"] == own["sha256_reloaded"]).all() and len(own) > 0
+    brought_went_the_same_way(copy)
     assert proved(copy) == {**dict.fromkeys("ABCD", "PASS"), "E": "PENDING_REVIEW"}
+    other_weights_stop_the_ladder_before_anything_runs(copy)
+
+
+def brought_went_the_same_way(copy: Path) -> None:
+    """It is measured in every table, judged by every gate, and said to be unmatched."""
+    for table in (
+        "reload/modes.parquet", "reload/coverage.parquet", "latency/latency.parquet",
+        "latency/candidates.parquet", "shadow/candidates.parquet", "stress/rollouts.parquet",
+    ):  # fmt: skip
+        assert NAME in methods(copy, table), table
+    samples = pd.read_parquet(copy / "artifacts/reload/samples.parquet")
+    own = samples[samples["method"] == NAME]
+    assert len(own) > 0 and (own["sha256_trained"] == own["sha256_reloaded"]).all()
+    for gate in "bcd":
+        report = json.loads((copy / "reports" / f"gate_{gate}.json").read_text())
+        assert report["candidates"][NAME] == "PASS", (gate, report["candidates"])
+        unmatched = [text for text in report["caveats"] if f"{NAME} is unmatched" in text]
+        assert bool(unmatched) == (gate != "c")
+
+
+def other_weights_stop_the_ladder_before_anything_runs(copy: Path) -> None:
+    """Weights that changed behind Gate B: what was measured is of others."""
+    flip_a_bit(copy / "own/flow/model.safetensors")
+    outcome, ran = repro(copy)
+    assert (outcome.code, ran) == (2, [])
+    assert NAME in outcome.sentence and "model.safetensors" in outcome.sentence
 
 
 def proved(workspace: Path) -> dict[str, str]:
