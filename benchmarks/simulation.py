@@ -43,7 +43,8 @@ from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.documents import read_yaml
 from genpolicy.policies.checkpoint import Provenance
 from genpolicy.policies.matched_training import PolicySettings
-from genpolicy.policies.policy import NetworkPolicy, Samples, load_policy
+from genpolicy.policies.policy import NetworkPolicy, load_policy
+from genpolicy.policies.protocol import Samples
 from genpolicy.policies.settings import SamplerConfig
 from genpolicy.policies.training import train
 from genpolicy.policies.training_request import TrainingRequest

@@ -32,7 +32,8 @@ from genpolicy.evidence.stress.settings import StressSettings
 from genpolicy.execution.journal import encode_poses
 from genpolicy.integrity.hashing import sha256_file
 from genpolicy.integrity.rows import read_rows
-from genpolicy.policies.policy import NoiseName, Policy, load_policy
+from genpolicy.policies.policy import load_policy
+from genpolicy.policies.protocol import NoiseName, Policy
 from genpolicy.seeds import stream
 from genpolicy.tasks.api import Task, load_task
 from genpolicy.verification.drawn import Drawn, drawn_chunks

@@ -57,7 +57,8 @@ class Waiver:
 
 
 WAIVED = re.compile(
-    r"\S+ (was not asked: the \w+ owner says|need not be asked of the data: the \w+ owner answers)"
+    r"\S+ (was not asked: the \w+ owner says|need not be asked of the data: the \w+ owner answers"
+    r"|is unmatched evidence)"
 )
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from gates.proof import admit
 from genpolicy.candidates.brought import BroughtSection, read_brought
+from genpolicy.candidates.contenders import in_comparison
 from genpolicy.candidates.judged import JudgedPolicy
-from genpolicy.candidates.standing import in_comparison
 from genpolicy.evidence.reproducibility.latency import (
     PROCESSES,
     LatencyPlan,

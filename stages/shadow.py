@@ -4,7 +4,7 @@ from pathlib import Path
 
 from gates.proof import admit
 from genpolicy.candidates.brought import BroughtSection, read_brought
-from genpolicy.candidates.standing import opened, standing
+from genpolicy.candidates.contenders import admitted_contenders, opened
 from genpolicy.data.dataset import load_dataset
 from genpolicy.evidence.admission_context import make_checker
 from genpolicy.evidence.shadow.gallery import gallery_of
@@ -54,7 +54,7 @@ def work(params: Params) -> None:
     brought = read_brought(params.section("candidates", BroughtSection).root, seed=seed)
     with output_folder(ARTIFACTS / "shadow") as folder:
         found = []
-        for candidate in standing(ARTIFACTS, admitted, brought, seed=seed):
+        for candidate in admitted_contenders(ARTIFACTS, admitted, brought, seed=seed):
             with opened(candidate, task.observation) as policy:
                 seen = shadow_policy(
                     shadow, policy, observations, seed=candidate.seed, two_mode=two_mode

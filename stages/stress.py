@@ -4,7 +4,7 @@ from pathlib import Path
 
 from gates.proof import admit
 from genpolicy.candidates.brought import BroughtSection, read_brought
-from genpolicy.candidates.standing import in_comparison
+from genpolicy.candidates.contenders import in_comparison
 from genpolicy.evidence.documents.stress import POWER
 from genpolicy.evidence.reproducibility.latency import latency_models
 from genpolicy.evidence.rows.reproducibility import LatencyRow

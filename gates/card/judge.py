@@ -7,7 +7,7 @@ import datetime
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from pydantic import Field
 
@@ -39,10 +39,10 @@ from gates.evidence import Evidence, MissingEvidenceError
 from gates.pipeline import check_record
 from gates.preregistration import NONE, PREREGISTRATION, moved_caveats, read_plan
 from gates.protection import REHEARSED, is_rehearsal, require_protection
-from gates.report import OWNERS, Gate, GateReport, parse_section, stage_of
-from gates.reproducibility.settings import RELOAD, Unmatched
+from gates.report import OWNERS, Gate, GateReport, stage_of
+from gates.reproducibility.settings import RELOAD, excepted_until
 from gates.running import require_running_code
-from gates.settings import GateSettings, read_limits, read_params, read_settings, section_of
+from gates.settings import GateSettings, read_limits, read_params, read_settings
 from genpolicy.errors import BadInputError, GenpolicyError, IntegrityError
 from genpolicy.evidence.documents.reproducibility import CANDIDATES
 from genpolicy.integrity.hashing import sha256_bytes_of
@@ -97,8 +97,7 @@ class Dossier:
         papers: The draft and the envelope.
         chain_error: Why gates A to D, or the draft, do not hold; empty if they do.
         today: Day of the judgement, UTC.
-        excepted_until: Last day of the exception by which the candidate stands, YYYY-MM-DD; empty
-            where it stands without one.
+        excepted_until: Last day of the exception by which the candidate stands; empty without one.
     """
 
     settings: CardGateSettings
@@ -125,7 +124,7 @@ def judge_card(root: Path, chain: Chain, *, today: datetime.date | None = None) 
     caveats = (*require_protection(params, "E"), *moved_caveats(root, params, "E"))
     papers = examine(root, settings.card)
     error = chain.error or _chain_error(root, chain, papers.draft)
-    until = _excepted_until(params, papers.draft)
+    until = excepted_until(params, papers.draft.candidate) if papers.draft else ""
     dossier = Dossier(settings, papers, error, today or utc_today(), until)
     limits = read_limits(params, "E", GATE.criteria)
     evidence = recorded_evidence(root, "E")
@@ -133,15 +132,6 @@ def judge_card(root: Path, chain: Chain, *, today: datetime.date | None = None) 
     check_record(root, "E", report.materials)
     require_running_code(root)
     return report
-
-
-def _excepted_until(params: Mapping[str, Any], draft: TrialCard | None) -> str:
-    """Last day on which the candidate of a draft may stand unmatched; empty if it is matched."""
-    unmatched = section_of(params, stage_of("B")).get("unmatched")
-    if draft is None or not isinstance(unmatched, dict) or draft.candidate not in unmatched:
-        return ""
-    where = f"params.yaml: {stage_of('B')}.unmatched.{draft.candidate}"
-    return parse_section(Unmatched, unmatched[draft.candidate], where=where).expires
 
 
 def examine(root: Path, name: str) -> Papers:
@@ -327,10 +317,7 @@ def envelope_within_limits(evidence: Evidence, dossier: Dossier) -> Measured:
     always=True,
 )
 def not_expired(evidence: Evidence, dossier: Dossier) -> Measured:
-    """1 if today lies in the days of the card and they are not too many, else 0.
-
-    A candidate that stands by exception has no card beyond the last day of the exception.
-    """
+    """1 if today lies in its days, they are not too many, and no exception ends before, else 0."""
     found = _signed(dossier.papers, "give the days of validity")
     if isinstance(found, Measured):
         return found

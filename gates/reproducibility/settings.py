@@ -2,14 +2,14 @@
 
 import datetime
 from collections.abc import Mapping
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from gates.evidence import Evidence, MissingEvidenceError, numbers
-from gates.report import Owner, StrictModel
-from gates.settings import CandidateSettings
+from gates.report import Owner, StrictModel, parse_section, stage_of
+from gates.settings import CandidateSettings, section_of
 from genpolicy.evidence.rows.reproducibility import NfeRow
 
 RELOAD = "artifacts/reload"
@@ -110,3 +110,16 @@ def chosen_nfe(evidence: Evidence, candidate: str) -> tuple[float, float]:
     if lowest != highest:
         raise MissingEvidenceError(f"{candidate} records several NFE: {lowest:g} to {highest:g}")
     return lowest, highest
+
+
+def excepted_until(params: Mapping[str, Any], candidate: str) -> str:
+    """Last day on which a candidate may stand unmatched, YYYY-MM-DD; empty if it is matched.
+
+    Raises:
+        ConfigError: The exception is malformed, or the section is missing.
+    """
+    unmatched = section_of(params, stage_of("B")).get("unmatched")
+    if not isinstance(unmatched, dict) or candidate not in unmatched:
+        return ""
+    where = f"params.yaml: {stage_of('B')}.unmatched.{candidate}"
+    return parse_section(Unmatched, unmatched[candidate], where=where).expires

@@ -16,8 +16,6 @@ from genpolicy.errors import ConfigError
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_bytes
 
-SAMPLER = ("sampler", "sampler_steps", "eta", "tolerance")
-
 
 class BroughtSection(RootModel[dict[str, str]]):
     """Section `candidates`: path of each entry, from the root of the workspace, by name."""

@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Literal
 
 from genpolicy.errors import ConfigError
-from genpolicy.policies.policy import NetworkPolicy, Policy, load_policy
+from genpolicy.policies.policy import NetworkPolicy, load_policy
+from genpolicy.policies.protocol import Policy
 
 BASELINES = "train_baselines"
 GENERATORS = "train_generators"

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from genpolicy.contract.action import POSITION
 from genpolicy.errors import ContractError
 from genpolicy.policies.normalisation import Normalisation
-from genpolicy.policies.policy import NoiseName, Policy
+from genpolicy.policies.protocol import NoiseName, Policy
 from genpolicy.policies.windows import Windows
 
 

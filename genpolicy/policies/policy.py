@@ -6,9 +6,7 @@ not depend on its company.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 import torch
@@ -16,7 +14,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from genpolicy.contract.horizons import HorizonConfig
-from genpolicy.errors import ContractError, IntegrityError, NonFiniteError
+from genpolicy.errors import ContractError, IntegrityError
 from genpolicy.policies.ahead import Conditions, padded
 from genpolicy.policies.call_shapes import call_shapes, compiled_calls
 from genpolicy.policies.checkpoint import Checkpoint, load_checkpoint
@@ -29,83 +27,11 @@ from genpolicy.policies.methods import (
     method_named,
     noise_shape,
 )
+from genpolicy.policies.protocol import NoiseName, Samples, check_finite
 from genpolicy.policies.settings import SamplerConfig
 from genpolicy.seeds import counter_noise
 
 Array = NDArray[np.float64]
-NoiseName = tuple[str | int, ...]
-
-
-@dataclass(frozen=True)
-class Samples:
-    """Result of one batched invocation.
-
-    Attributes:
-        actions: Candidate chunks, physical units. Shape (B, N, K, D_a).
-        nfe: Network evaluations per sample, counted at the network. Where a sampler chooses its
-            steps by itself, those of the sample that took most: the calls that its batch waited
-            for, which is what the deadline sees.
-    """
-
-    actions: Array
-    nfe: int
-
-    def finite(self) -> "Samples":
-        """The same, for whoever computes with all of them: shares and distances know no NaN.
-
-        Raises:
-            NonFiniteError: A number of a chunk is NaN or infinite.
-        """
-        _check_finite(self.actions, "sampled chunks", "Look at the weights; the training diverged.")
-        return self
-
-
-class Policy(Protocol):
-    """What every policy offers, learned or scripted."""
-
-    @property
-    def method(self) -> str:
-        """Name of the method."""
-
-    @property
-    def checkpoint_hash(self) -> str:
-        """SHA-256 of weights and config."""
-
-    @property
-    def sampler_config_hash(self) -> str:
-        """SHA-256 of the sampler's settings."""
-
-    @property
-    def horizons(self) -> HorizonConfig:
-        """Horizons of the method; K = H_e = 1 for methods without chunks."""
-
-    @property
-    def prediction_horizon(self) -> int:
-        """K, actions of one chunk."""
-
-    @property
-    def stochastic(self) -> bool:
-        """Whether candidates of one observation differ."""
-
-    @property
-    def guided(self) -> bool:
-        """Whether its chunks can be drawn to go on from given actions."""
-
-    def sample(
-        self,
-        observations: Array,
-        *,
-        noise_names: Sequence[NoiseName],
-        candidates: int,
-        prefix: Prefix | None = None,
-    ) -> Samples:
-        """Candidate chunks of physical observations (B, H_o, D_o), one noise name per row.
-
-        `prefix` is what each row's chunks are drawn to go on from; None: nothing.
-
-        A chunk that is not finite comes back as it is: the first layer of feasibility rejects it
-        alone, and the others are candidates as before.
-        """
 
 
 class NetworkPolicy:
@@ -220,7 +146,7 @@ class NetworkPolicy:
                 expected=f"(B, {expected[0]}, {expected[1]}) with B >= 1",
                 action="Deliver the last H_o observation vectors.",
             )
-        _check_finite(observations, "observations of a policy invocation", "Hold.")
+        check_finite(observations, "observations of a policy invocation", "Hold.")
         normalised = self._normalisation.observation.normalise(observations)
         return torch.as_tensor(normalised.astype(np.float32)).to(self.device)
 
@@ -345,14 +271,3 @@ def _conditions(condition: Tensor, observations: Sequence[int]) -> Conditions:
     first, last = observations[0], observations[-1]
     of_row = torch.tensor(observations, device=condition.device) - first
     return Conditions(condition[first : last + 1], of_row)
-
-
-def _check_finite(values: Array, where: str, action: str) -> None:
-    if not np.isfinite(values).all():
-        place = np.argwhere(~np.isfinite(values))[0].tolist()
-        raise NonFiniteError(
-            where=f"{where}, {place}",
-            found=str(values[tuple(place)]),
-            expected="a finite number",
-            action=action,
-        )

@@ -4,7 +4,7 @@ import pytest
 import yaml
 
 from genpolicy.candidates.brought import read_brought, require_brought
-from genpolicy.candidates.standing import in_comparison, standing
+from genpolicy.candidates.contenders import admitted_contenders, in_comparison
 from genpolicy.errors import ConfigError, IntegrityError
 from genpolicy.integrity.hashing import sha256_file
 from tests.candidates.conftest import ENTRY
@@ -71,9 +71,9 @@ def test_who_stands_is_who_was_admitted_in_its_order(fleet, brought, tmp_path):
     (tmp_path / "train_generators").symlink_to(fleet[0])
     (tmp_path / "train_baselines").symlink_to(fleet[0])
     others = read_brought(brought(), seed=0, root=tmp_path)
-    found = standing(tmp_path, ["planted", "flow"], others, seed=0)
+    found = admitted_contenders(tmp_path, ["planted", "flow"], others, seed=0)
     assert [one.name for one in found] == ["planted", "flow"]
-    assert standing(tmp_path, ["flow"], others, seed=0)[0].name == "flow"
+    assert admitted_contenders(tmp_path, ["flow"], others, seed=0)[0].name == "flow"
     compared = in_comparison(
         tmp_path, baselines=["bc"], candidates=["flow", "planted"], brought=others, seed=0
     )

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from gates.overview import as_text, overview
+from gates.overview import Line, as_text, overview
 from gates.present import present_runs
 from gates.proof import STAGE_REQUIRES, prove_all
 
@@ -106,3 +106,11 @@ def test_a_file_of_a_folder_that_another_stage_wrote_is_compared_by_its_bytes(
     assert present_runs(tmp_path) == {"task", "record"}
     identity.write_text("[]")
     assert present_runs(tmp_path) == {"task"}
+
+
+def test_a_line_says_what_was_recorded_and_leaves_out_what_was_not() -> None:
+    recorded = Line("audit", "done", "", 12.34, 99)
+    text = as_text([recorded, Line("card", "", "", None, None)]).splitlines()
+    assert text[1].split() == ["audit", "done", "12.3", "s", "99", "MiB"]
+    assert text[2] == "card"
+    assert text[3].split() == ["12.3", "s"]

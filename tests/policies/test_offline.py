@@ -5,7 +5,7 @@ import pytest
 
 from genpolicy.policies.normalisation import MinMax, Normalisation
 from genpolicy.policies.offline import masked_errors
-from genpolicy.policies.policy import Samples
+from genpolicy.policies.protocol import Samples
 from genpolicy.policies.windows import Windows
 
 

@@ -24,7 +24,7 @@ from genpolicy.contract.latency import Term
 from genpolicy.contract.observation import ObservationContract
 from genpolicy.errors import ConfigError
 from genpolicy.policies.guidance import Prefix
-from genpolicy.policies.policy import NoiseName, Samples
+from genpolicy.policies.protocol import NoiseName, Samples
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from genpolicy.candidates.wire.extension import MOST_CANDIDATES, VERSION, WORD
 from genpolicy.contract.latency import Term
 from genpolicy.errors import ContractError
-from genpolicy.policies.policy import NetworkPolicy, NoiseName
+from genpolicy.policies.policy import NetworkPolicy
+from genpolicy.policies.protocol import NoiseName
 
 OBSERVATION = "observation"
 ACTIONS = "actions"

@@ -24,7 +24,8 @@ from genpolicy.evidence.need.offline import offline_rows
 from genpolicy.evidence.rows.need import ModeRow, OfflineRow
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.rows import write_rows
-from genpolicy.policies.policy import NetworkPolicy, Policy
+from genpolicy.policies.policy import NetworkPolicy
+from genpolicy.policies.protocol import Policy
 from genpolicy.policies.settings import SamplerConfig
 from genpolicy.tasks.api import load_task
 

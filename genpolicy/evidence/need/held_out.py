@@ -20,7 +20,7 @@ from genpolicy.evidence.need.method_modes import (
 )
 from genpolicy.evidence.rows.need import ModeRow
 from genpolicy.feasibility.admission import FeasibilityChecker
-from genpolicy.policies.policy import Policy
+from genpolicy.policies.protocol import Policy
 from genpolicy.tasks.api import Task
 
 Array = NDArray[np.float64]

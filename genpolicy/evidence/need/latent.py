@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from genpolicy.contract.action import POSITION
 from genpolicy.evidence.documents.need import Dependence, is_the_same
 from genpolicy.evidence.need.held_out import HeldOut
-from genpolicy.policies.policy import NetworkPolicy, NoiseName
+from genpolicy.policies.policy import NetworkPolicy
+from genpolicy.policies.protocol import NoiseName
 from genpolicy.seeds import stream
 
 Array = NDArray[np.float64]

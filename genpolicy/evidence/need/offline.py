@@ -7,7 +7,8 @@ from genpolicy.data.dataset import Dataset
 from genpolicy.evidence.rows.need import OfflineRow
 from genpolicy.policies.matched_training import training_windows
 from genpolicy.policies.offline import masked_errors
-from genpolicy.policies.policy import NetworkPolicy, NoiseName
+from genpolicy.policies.policy import NetworkPolicy
+from genpolicy.policies.protocol import NoiseName
 
 SPLITS = ("validation", "test")
 

@@ -22,7 +22,8 @@ from genpolicy.contract.action import join_action
 from genpolicy.contract.chunk import Candidate, ChunkMetadata, Proposal
 from genpolicy.contract.latency import Term
 from genpolicy.policies.guidance import Prefix
-from genpolicy.policies.policy import NetworkPolicy, Policy, load_policy
+from genpolicy.policies.policy import NetworkPolicy, load_policy
+from genpolicy.policies.protocol import Policy
 from genpolicy.policies.settings import SamplerConfig
 
 Array = NDArray[np.float64]

@@ -14,9 +14,9 @@ import numpy as np
 import pandas as pd
 
 from genpolicy.candidates.brought import BroughtPolicy
+from genpolicy.candidates.contenders import Contender
 from genpolicy.candidates.joining import JoiningSettings
 from genpolicy.candidates.judged import candidates_of
-from genpolicy.candidates.standing import Standing
 from genpolicy.candidates.wire.policy import running
 from genpolicy.contract.chunk import Proposal
 from genpolicy.contract.horizons import HorizonConfig
@@ -71,7 +71,7 @@ class LatencyPlan:
     joining: JoiningSettings = field(default_factory=JoiningSettings)
 
 
-def measured_rows(plan: LatencyPlan, policies: Sequence[Standing]) -> list[LatencyRow]:
+def measured_rows(plan: LatencyPlan, policies: Sequence[Contender]) -> list[LatencyRow]:
     """Terms measured on this machine: two runs of several processes per method, in turns.
 
     Methods and runs take turns, so that a machine which grows slower slows all of them.
@@ -142,7 +142,7 @@ def declared_rows(
     return rows
 
 
-def measure_terms(plan: LatencyPlan, judged: Standing) -> list[Measurement]:
+def measure_terms(plan: LatencyPlan, judged: Contender) -> list[Measurement]:
     """Cold and warm spans of one method, with the six layers timed as `project`.
 
     Of a policy that was brought, the first answer of a server that was started for it is the cold

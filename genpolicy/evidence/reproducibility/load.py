@@ -9,7 +9,7 @@ from multiprocessing.synchronize import Event, Semaphore
 import numpy as np
 
 from genpolicy.candidates.brought import BroughtPolicy
-from genpolicy.candidates.standing import Running, Standing, opened
+from genpolicy.candidates.contenders import Contender, Running, opened
 from genpolicy.data.dataset import Dataset, load_dataset
 from genpolicy.evidence.reproducibility.benchmark import invoke
 from genpolicy.evidence.reproducibility.latency import OBSERVATIONS, LatencyPlan
@@ -25,7 +25,7 @@ SIDE = 256
 START_S = 60.0
 
 
-def candidates_rows(plan: LatencyPlan, policies: Sequence[Standing]) -> list[CandidatesRow]:
+def candidates_rows(plan: LatencyPlan, policies: Sequence[Contender]) -> list[CandidatesRow]:
     """What an invocation costs that draws several candidates, without the checks of them.
 
     Args:
@@ -40,13 +40,13 @@ def candidates_rows(plan: LatencyPlan, policies: Sequence[Standing]) -> list[Can
     ]
 
 
-def _draws(judged: Standing) -> bool:
+def _draws(judged: Contender) -> bool:
     if isinstance(judged, BroughtPolicy):
         return judged.entry.stochastic
     return judged.load().stochastic
 
 
-def measure_counts(plan: LatencyPlan, judged: Standing) -> list[CandidatesRow]:
+def measure_counts(plan: LatencyPlan, judged: Contender) -> list[CandidatesRow]:
     """Rows of one method, measured in this process."""
     data = load_dataset(plan.dataset)
     with opened(judged, data.observation_contract) as policy:

@@ -24,7 +24,8 @@ from genpolicy.evidence.rows.reproducibility import CoverageRow, SweepLatencyRow
 from genpolicy.policies.fixtures import fixture_observations
 from genpolicy.policies.matched_training import training_windows
 from genpolicy.policies.ode_samplers import ADAPTIVE_TABLEAUS
-from genpolicy.policies.policy import NetworkPolicy, NoiseName, Policy
+from genpolicy.policies.policy import NetworkPolicy
+from genpolicy.policies.protocol import NoiseName, Policy
 from genpolicy.policies.settings import SamplerConfig
 from genpolicy.policies.windows import Windows
 from genpolicy.statistics.intervals import clopper_pearson

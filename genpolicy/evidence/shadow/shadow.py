@@ -30,7 +30,7 @@ from genpolicy.evidence.shadow.session import (
 )
 from genpolicy.execution.cell import Cell
 from genpolicy.feasibility.admission import Admitted, FeasibilityChecker, Rejected
-from genpolicy.policies.policy import Policy
+from genpolicy.policies.protocol import Policy
 from genpolicy.tasks.api import Task
 
 Array = NDArray[np.float64]

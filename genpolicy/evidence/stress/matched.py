@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from genpolicy.candidates.contenders import Contender, opened
 from genpolicy.candidates.joining import JoiningSettings
 from genpolicy.candidates.judged import candidates_of
-from genpolicy.candidates.standing import Standing, opened
 from genpolicy.evidence.rows.stress import (
     InvocationRow,
     OverrunRow,
@@ -32,7 +32,7 @@ from genpolicy.execution.journal import write_journal
 from genpolicy.execution.ledger import Account
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.policies.guidance import Prefix
-from genpolicy.policies.policy import Policy
+from genpolicy.policies.protocol import Policy
 from genpolicy.seeds import stream
 from genpolicy.tasks.api import Start, Task, load_task
 
@@ -80,7 +80,7 @@ class Shard:
     """
 
     comparison: Comparison
-    judged: Standing
+    judged: Contender
     latency: LatencyModel
     perturbation: str
     schedule: Perturbation

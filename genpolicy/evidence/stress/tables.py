@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
+from genpolicy.candidates.contenders import Contender
 from genpolicy.candidates.joining import REAL_TIME
 from genpolicy.candidates.judged import JudgedPolicy
-from genpolicy.candidates.standing import Standing
 from genpolicy.compute import map_shards
 from genpolicy.errors import ConfigError
 from genpolicy.evidence.documents.given import Distilled
@@ -108,7 +108,7 @@ def _write_envelope(folder: Path, shards: Sequence[Shard]) -> None:
     ENVELOPE.write(folder, envelope_document(first.perturbation, first.schedule, reached))
 
 
-def write_distilled(folder: Path, judged: Iterable[Standing]) -> None:
+def write_distilled(folder: Path, judged: Iterable[Contender]) -> None:
     """`distilled.json`, where a compared policy has a teacher: which, and what it took.
 
     What it took to make a policy that was brought, nobody here knows.
@@ -129,7 +129,7 @@ def write_distilled(folder: Path, judged: Iterable[Standing]) -> None:
 
 def plan_shards(
     comparison: Comparison,
-    judged: Sequence[Standing],
+    judged: Sequence[Contender],
     perturbations: Mapping[str, Perturbation],
     *,
     latency: Mapping[str, LatencyModel],

@@ -11,7 +11,7 @@ from genpolicy.evidence.need.held_out import (
     held_out_situations,
     modes_of_policy,
 )
-from genpolicy.policies.policy import Samples
+from genpolicy.policies.protocol import Samples
 
 
 def rows_of(data, number):

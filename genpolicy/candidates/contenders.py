@@ -10,12 +10,12 @@ from genpolicy.candidates.wire.policy import WirePolicy, running
 from genpolicy.contract.observation import ObservationContract
 from genpolicy.policies.policy import NetworkPolicy
 
-Standing = JudgedPolicy | BroughtPolicy
+Contender = JudgedPolicy | BroughtPolicy
 Running = NetworkPolicy | WirePolicy
 
 
 @contextmanager
-def opened(candidate: Standing, contract: ObservationContract) -> Iterator[Running]:
+def opened(candidate: Contender, contract: ObservationContract) -> Iterator[Running]:
     """A candidate that can be asked, until the end of the block.
 
     Args:
@@ -34,9 +34,9 @@ def opened(candidate: Standing, contract: ObservationContract) -> Iterator[Runni
         yield candidate.load()
 
 
-def standing(
+def admitted_contenders(
     artifacts: Path, admitted: Sequence[str], brought: Sequence[BroughtPolicy], *, seed: int
-) -> list[Standing]:
+) -> list[Contender]:
     """Those that a gate admitted, in its order.
 
     Raises:
@@ -55,7 +55,7 @@ def in_comparison(
     candidates: Collection[str],
     brought: Sequence[BroughtPolicy],
     seed: int,
-) -> list[Standing]:
+) -> list[Contender]:
     """Baselines, then trained candidates, then brought ones: who stands in the comparison.
 
     Args:
