@@ -323,10 +323,8 @@ def not_expired(evidence: Evidence, dossier: Dossier) -> Measured:
         return found
     days = dossier.settings.maximum_days
     valid, text = validity(found.card, today=dossier.today, maximum_days=days)
-    until = dossier.excepted_until
-    if valid and until and found.card.expires > until:
-        text = f"it outlives the exception of {found.card.candidate}, which ends on {until}"
-        return Measured(0.0, caveat=text)
+    if valid and (until := dossier.excepted_until) and found.card.expires > until:
+        valid, text = False, f"it outlives the exception of its candidate, which ends on {until}"
     return Measured(float(valid), caveat=text)
 
 
