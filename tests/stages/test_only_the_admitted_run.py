@@ -35,7 +35,7 @@ def weightless(monkeypatch):
 
 
 def nothing(*_, **__):
-    return SimpleNamespace(cell=None, checker=SimpleNamespace(cell=None))
+    return SimpleNamespace(cell=None, checker=SimpleNamespace(cell=None), observation=None)
 
 
 def without(monkeypatch, module, *names):
