@@ -205,6 +205,17 @@ def test_what_came_after_the_question_has_no_say(session):
     assert not list(session.enter(chunk("d", 60, before="b")))
 
 
+def test_a_plan_that_came_after_the_invocation_began_is_none_to_go_on_from(session):
+    """Whatever predecessor it names."""
+    session.begin({"id": "d", "t": 60})
+    assert not entered(session, chunk("c", 60, before="b"), parents={"a": [1, 2], "b": [1, 6]})
+    own = {"chunk_id": "d", "invocation": "d", "rule": "real_time", "t": 90, "draw": 0,
+           "parents": {"c": [0, 8]}}  # fmt: skip
+    assert not [*session.join(own), *session.judge({"chunk_id": "d", "index": 0})]
+    (found,) = session.enter(chunk("d", 60, before="c"))
+    assert found == "'d' rests on {'c': [0, 8]}, required {} by its journal"
+
+
 def test_the_candidates_of_an_invocation_rest_on_one_plan(session):
     own = {"chunk_id": "c", "invocation": "c", "rule": "bidirectional", "t": 70, "draw": 1,
            "parents": {"b": [1, 6]}}  # fmt: skip
