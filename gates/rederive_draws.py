@@ -15,10 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gates.rederive_brought import brought_policy
-from gates.rederive_sessions import checkpoint_of
+from gates.rederive_joined import Rule, hold_joined, prefixes_of
+from gates.rederive_sessions import REPLACING, checkpoint_of
 from gates.rederive_shadow import TaskSection
 from gates.report import Gate
 from gates.stated import refuse, section, training_seed
+from genpolicy.candidates.joining import JoiningSettings
 from genpolicy.candidates.judged import candidates_of
 from genpolicy.candidates.wire.policy import running
 from genpolicy.contract.action import ACTION_DIM
@@ -36,10 +38,13 @@ from genpolicy.policies.policy import load_policy
 from genpolicy.policies.protocol import NoiseName, Policy
 from genpolicy.seeds import stream
 from genpolicy.tasks.api import Task, load_task
-from genpolicy.verification.drawn import Drawn, drawn_chunks
+from genpolicy.verification.drawn import Drawn, Source, drawn_chunks
 from genpolicy.verification.journal_source import readable
+from genpolicy.verification.rejoined import Made
 
 Array = NDArray[np.float64]
+Invocation = tuple[NoiseName, bytes, bytes]
+"""Names of the noise, what was seen, and what was gone on from."""
 
 TOLERANCE = 1e-5
 """Of a number of a chunk, m or without unit: what another processor may make of the same sample."""
@@ -57,19 +62,36 @@ class Asked:
 
     Attributes:
         place: Where it stands, in words.
-        key: Names of the noise.
-        history: What the policy saw. Shape (H_o, D_o).
+        source: Names of the noise, and what the policy saw.
         index: Number of the candidate.
         actions: What was drawn, where the numbers are there. Shape (K, 10).
         sha256: Its hash, where only that is.
+        joined: The same as its journal states it, with what it was made of; None at Gate C.
     """
 
     place: str
-    key: NoiseName
-    history: Array
+    source: Source
     index: int
     actions: Array | None
     sha256: str = ""
+    joined: Drawn | None = None
+
+    @property
+    def invocation(self) -> Invocation:
+        """What is drawn together with it: the same noise, seen and gone on from."""
+        return _named(self.source, self.goes_on)
+
+    @property
+    def goes_on(self) -> Made | None:
+        """What it was made of, where it was drawn to go on from an earlier plan."""
+        made = self.joined.made if self.joined else None
+        return made if made is not None and made.guided else None
+
+    @property
+    def blended_from(self) -> Mapping[str, Source]:
+        """Earlier invocations that were mixed into its numbers."""
+        mixed = self.joined is not None and self.joined.blended is not None
+        return self.joined.earlier if self.joined is not None and mixed else {}
 
 
 def rederive_rollout_draws(root: Path, params: Mapping[str, Any], journals: Sequence[Path]) -> None:
@@ -92,7 +114,7 @@ def rederive_rollout_draws(root: Path, params: Mapping[str, Any], journals: Sequ
             refuse("D", path.name, wrong, "every invocation with what it saw and its own noise")
         for item in _some(drawn, OF_A_JOURNAL, path):
             asked[item.method].append(_asked(task, path, item))
-    _draw_again("D", root, params, asked, samples=stress.samples)
+    _draw_again("D", root, params, asked, samples=stress.samples, joining=stress.joining)
 
 
 def rederive_shadow_draws(root: Path, params: Mapping[str, Any]) -> None:
@@ -117,7 +139,7 @@ def rederive_shadow_draws(root: Path, params: Mapping[str, Any]) -> None:
         chosen = _some(sorted(of_method), OF_A_METHOD, root / SHADOW / "journal.mcap")
         rows = [row for moment in chosen for row in of_method[moment]]
         asked[method] = [_of_row(data, horizons, row) for row in rows]
-    _draw_again("C", root, params, asked, samples=shadow.samples, always=True)
+    _draw_again("C", root, params, asked, samples=shadow.samples, joining=REPLACING, always=True)
 
 
 def _some(items: Sequence[Any], count: int, path: Path) -> Iterable[Any]:
@@ -131,10 +153,10 @@ def _asked(task: Task, path: Path, item: Drawn) -> Asked:
     """A judged candidate of a rollout; what its policy saw is the scene that was there."""
     place = f"{path.name}: {item.chunk_id}, candidate {item.index}"
     with readable(place):
-        seen = encode_poses(task.scene_poses(item.history[-1]))
+        seen = encode_poses(task.scene_poses(item.source.history[-1]))
     if seen != item.seen:
         refuse("D", f"{place}: saw", "another scene", "the scene of its session at that time")
-    return Asked(place, item.key, item.history, item.index, item.actions, item.sha256)
+    return Asked(place, item.source, item.index, item.actions, item.sha256, item)
 
 
 def _of_row(data: Dataset, horizons: HorizonConfig, row: CandidateRow) -> Asked:
@@ -150,7 +172,7 @@ def _of_row(data: Dataset, horizons: HorizonConfig, row: CandidateRow) -> Asked:
     with readable(place):
         # As many rows as its policy predicts: plain behaviour cloning says one action.
         actions = np.array(row.raw).reshape(-1, ACTION_DIM)
-    return Asked(place, ("shadow", name, at), history, row.candidate, actions)
+    return Asked(place, Source(("shadow", name, at), history), row.candidate, actions)
 
 
 def _draw_again(
@@ -160,6 +182,7 @@ def _draw_again(
     asked: Mapping[str, Sequence[Asked]],
     *,
     samples: int,
+    joining: JoiningSettings,
     always: bool = False,
 ) -> None:
     """Hold what each method is said to have drawn against its checkpoint.
@@ -170,35 +193,29 @@ def _draw_again(
         params: Its parameters.
         asked: By method.
         samples: Candidates of an invocation.
+        joining: How chunks of all methods join.
         always: A policy that always draws the same was asked for as many, too.
     """
     contract = load_task(section(params, "task", TaskSection).name).observation
+    rows = section(params, "horizons", HorizonConfig).prediction_horizon
     for method, items in sorted(asked.items()):
         other = brought_policy(root, params, method)
         if other is not None:
             with running(other, contract) as wire:
-                _compare(gate, wire, items, samples if always else candidates_of(wire, samples))
+                count = samples if always else candidates_of(wire, samples)
+                _compare(gate, wire, items, count=count, rule=Rule(joining.named(method), rows))
             continue
         folder = checkpoint_of(root, method, training_seed(params))
         if folder is None:
             refuse(gate, items[0].place, f"drawn by {method}", "a policy that was trained")
         policy = load_policy(folder)
         count = samples if always else candidates_of(policy, samples)
-        _compare(gate, policy, items, count)
+        _compare(gate, policy, items, count=count, rule=Rule(joining.named(method), rows))
 
 
-def _compare(gate: Gate, policy: Policy, items: Sequence[Asked], count: int) -> None:
-    # Candidates of one invocation are drawn together, and once.
-    saw = [(item.key, item.history.tobytes()) for item in items]
-    invocations = dict(zip(saw, items, strict=True))
-    with readable(items[0].place):
-        answers = policy.sample(
-            np.stack([one.history for one in invocations.values()]),
-            noise_names=[one.key for one in invocations.values()],
-            candidates=count,
-        ).actions
-    by_invocation = dict(zip(invocations, answers, strict=True))
-    drawn = [by_invocation[own] for own in saw]
+def _compare(gate: Gate, policy: Policy, items: Sequence[Asked], *, count: int, rule: Rule) -> None:
+    by_invocation = _drawn_again(policy, items, count, rule)
+    drawn = [by_invocation[item.invocation] for item in items]
     limit = f"what {policy.checkpoint_hash[:16]}… draws there, within {TOLERANCE:g}"
     to_the_bit = True
     for item, chunks in zip(items, drawn, strict=True):
@@ -219,6 +236,38 @@ def _compare(gate: Gate, policy: Policy, items: Sequence[Asked], count: int) -> 
             and actions_sha256(chunks[item.index]) != item.sha256
         ):
             refuse(gate, item.place, f"drawn as {item.sha256[:16]}…", limit)
+    for item, chunks in zip(items, drawn, strict=True):
+        told, decay = item.joined, rule.joining.decay
+        if told is not None:
+            earlier = {
+                name: by_invocation[_named(source)] for name, source in item.blended_from.items()
+            }
+            hold_joined(gate, item.place, told, own=chunks, earlier=earlier, decay=decay)
+
+
+def _drawn_again(
+    policy: Policy, items: Sequence[Asked], count: int, rule: Rule
+) -> dict[Invocation, Array]:
+    """What each invocation draws, and each that a blend rests on. Shapes (N, K, 10)."""
+    asked: dict[Invocation, tuple[Source, Made | None]] = {}
+    for item in items:
+        # Candidates of one invocation are drawn together, and once.
+        asked[item.invocation] = item.source, item.goes_on
+        for source in item.blended_from.values():
+            asked.setdefault(_named(source), (source, None))
+    with readable(items[0].place):
+        answers = policy.sample(
+            np.stack([source.history for source, _ in asked.values()]),
+            noise_names=[source.key for source, _ in asked.values()],
+            candidates=count,
+            prefix=prefixes_of([made for _, made in asked.values()], rule),
+        ).actions
+    return dict(zip(asked, answers, strict=True))
+
+
+def _named(source: Source, goes_on: Made | None = None) -> Invocation:
+    before = b"".join(one.commanded.tobytes() for one in (goes_on.said if goes_on else ()))
+    return source.key, source.history.tobytes(), before
 
 
 def _alike(one: Array, other: Array) -> bool:

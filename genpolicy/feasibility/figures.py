@@ -6,6 +6,7 @@ from genpolicy.feasibility.cell import Cell
 from genpolicy.robot.impedance import STIFFNESS_N_M
 from genpolicy.verification.contact import ExpectedContact
 from genpolicy.verification.motion import ExpectedMotion
+from genpolicy.verification.projected import ExpectedProjection
 
 
 def expected_motion(robot: Cell) -> ExpectedMotion:
@@ -32,5 +33,11 @@ def expected_motion(robot: Cell) -> ExpectedMotion:
             cone_rad=settings.approach_cone_rad,
             forgiven_m=settings.step_tolerance_m,
             release_depth_m=settings.release_depth_m,
+        ),
+        projection=ExpectedProjection(
+            opening_m=(settings.gripper_lower_m, settings.gripper_upper_m),
+            beyond_m=settings.gripper_tolerance_m,
+            moved_m=settings.position_change_limit_m,
+            turned_rad=settings.rotation_change_limit_rad,
         ),
     )

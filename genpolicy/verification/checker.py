@@ -301,9 +301,13 @@ class _Session:
         self.head = (m["arrival"], chunk_id)
 
     def _check_ground(self, chunk: Message) -> None:
-        """What a chunk was checked against: the scene that was seen, and a state that is young."""
+        """What it was projected from, the scene that was seen, and a state that is young."""
         motion = chunk["motion"]
-        if self.proof is None or motion is None:
+        if self.proof is None:
+            return
+        for rule, sentence in self.proof.expected.projection.objections(chunk):
+            self.flag(rule, sentence)
+        if motion is None:
             return  # a row of it that is executed is a violation of its own (P6.ground)
         if motion["scene"] != self.world.scene:
             self.flag("P6.scene", f"{chunk['chunk_id']!r} was checked in another scene than seen.")

@@ -5,9 +5,9 @@ was judged, the hash of what was drawn; each chunk that was admitted, the number
 brought together, and held to the names that the plan gives an invocation: who may choose the noise
 may choose the answer.
 
-Where chunks join by another rule than replacing, a candidate names its invocation and its sample.
-A blend is no sample, so only the hash of what was drawn is asked; what was drawn to go on from an
-earlier plan is not drawn again, since the plan is not stated with it.
+Where chunks join by another rule than replacing, a candidate names its invocation and its sample,
+and what earlier chunks had a say is derived again (`rejoined`). A blend is no sample: its numbers
+stand beside the hash of what was drawn for it.
 """
 
 import hashlib
@@ -21,13 +21,26 @@ from numpy.typing import NDArray
 from genpolicy.contract.action import ACTION_DIM
 from genpolicy.verification.joined import BLENDS
 from genpolicy.verification.journal_source import Message, read_messages
+from genpolicy.verification.rejoined import Made, Rejoined
 
 Array = NDArray[np.float64]
 Key = tuple[str | int, ...]
 
-GUIDED = "real_time"
 FIRST_NAME = "stress"
 """What the noise of a rollout is named by first."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """What an invocation draws from.
+
+    Attributes:
+        key: Names of the noise.
+        history: What the policy saw, oldest first. Shape (H_o, D_o).
+    """
+
+    key: Key
+    history: Array
 
 
 @dataclass(frozen=True)
@@ -38,21 +51,25 @@ class Drawn:
         method: Method of its session.
         chunk_id: The invocation.
         index: Number of the candidate.
-        key: Names of the noise.
-        history: What the policy saw, oldest first. Shape (H_o, D_o).
+        source: What its invocation drew from.
         seen: The scene at that time: x, y, z, m, and w, x, y, z by body, in hex.
         sha256: Of what was drawn, as stated when it was judged.
         actions: What was drawn, where it was admitted and enqueued. Shape (K, 10).
+        made: What it was made of; None where chunks replace each other.
+        earlier: What the invocations drew from that had a say in it.
+        blended: What was enqueued of it, where earlier predictions were mixed in. Shape (K, 10).
     """
 
     method: str
     chunk_id: str
     index: int
-    key: Key
-    history: Array
+    source: Source
     seen: dict[str, str]
     sha256: str
     actions: Array | None
+    made: Made | None = None
+    earlier: dict[str, Source] = field(default_factory=dict)
+    blended: Array | None = None
 
 
 @dataclass
@@ -62,6 +79,7 @@ class _Session:
     method: str
     condition: str
     start: int
+    rejoined: Rejoined
     scene: dict[str, str] = field(default_factory=dict)
     begun: list[str] = field(default_factory=list)
     conditions: dict[str, tuple[Message, dict[str, str]]] = field(default_factory=dict)
@@ -76,12 +94,16 @@ class _Session:
             self.scene = m["bodies"]
         elif kind == "invocation" and m["stage"] == "begin":
             self.begun.append(m["id"])
+            self.rejoined.begin(m)
         elif kind == "conditioning":
             yield from self._conditioning(m)
         elif kind == "joined":
             self.joined[m["chunk_id"]] = m
+            yield from self.rejoined.join(m)
         elif kind == "candidate":
             origin = self.joined.get(m["chunk_id"])
+            if origin is not None:
+                yield from self.rejoined.judge(m)
             if _invocation(m, origin) not in self.conditions:
                 yield f"{m['chunk_id']!r} is judged, and nobody says what it was drawn from"
             self.judged.append((m, origin))
@@ -105,6 +127,8 @@ class _Session:
             yield f"{name!r} is enqueued, and no candidate of it passed for that"
             return
         self.enqueued[name] = m
+        if name in self.joined:
+            yield from self.rejoined.enter(m)
         if _blended(self.joined.get(name)):
             return
         if hashlib.sha256(_raw(m)).hexdigest() != self.passed[name]["measures"]["drawn_sha256"]:
@@ -119,22 +143,31 @@ class _Session:
     def drawn(self) -> Iterator[Drawn]:
         """Every judged candidate."""
         for m, origin in self.judged:
-            if origin is not None and origin["rule"] == GUIDED and origin["parents"]:
-                continue
             name = m["chunk_id"]
-            told, seen = self.conditions[_invocation(m, origin)]
-            whole = self.passed.get(name) is m and not _blended(origin)
-            chunk = self.enqueued.get(name) if whole else None
+            own = _invocation(m, origin)
+            chunk = self.enqueued.get(name) if self.passed.get(name) is m else None
+            raw = None if chunk is None else _floats(_raw(chunk)).reshape(-1, ACTION_DIM)
+            made = None if origin is None else self.rejoined.made(m, origin)
+            mixed = made is not None and made.blended
             yield Drawn(
                 method=self.method,
                 chunk_id=name,
-                index=int(m["index"] if origin is None else origin["draw"]),
-                key=tuple(told["key"]),
-                history=_floats(bytes.fromhex(told["history"])).reshape(int(told["rows"]), -1),
-                seen=seen,
+                index=int(m["index"] if made is None else made.draw),
+                source=self._source(own),
+                seen=self.conditions[own][1],
                 sha256=str(m["measures"]["drawn_sha256"]),
-                actions=None if chunk is None else _floats(_raw(chunk)).reshape(-1, ACTION_DIM),
+                actions=None if mixed else raw,
+                made=made,
+                earlier={one.invocation: self._source(one.invocation) for one in made.said}
+                if made
+                else {},
+                blended=raw if mixed else None,
             )
+
+    def _source(self, invocation: str) -> Source:
+        told, _ = self.conditions[invocation]
+        history = _floats(bytes.fromhex(told["history"])).reshape(int(told["rows"]), -1)
+        return Source(tuple(told["key"]), history)
 
 
 def drawn_chunks(path: Path) -> tuple[list[Drawn], str]:
@@ -155,7 +188,7 @@ def drawn_chunks(path: Path) -> tuple[list[Drawn], str]:
         if kind == "session":
             labels = m["labels"]
             own = (str(labels["method"]), str(labels["perturbation"]), int(labels["start"]))
-            sessions[name] = _Session(*own)
+            sessions[name] = _Session(*own, Rejoined(m))
             continue
         for finding in sessions[name].read(kind, m):
             return [], finding

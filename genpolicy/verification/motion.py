@@ -24,6 +24,7 @@ from genpolicy.verification.body import Driven, OwnBody
 from genpolicy.verification.branch import jumped
 from genpolicy.verification.contact import ROUNDING, ExpectedContact
 from genpolicy.verification.journal_source import Message, floats
+from genpolicy.verification.projected import ExpectedProjection
 
 Array = NDArray[np.float64]
 Finding = tuple[str, str]
@@ -55,6 +56,7 @@ class ExpectedMotion:
         condition: Largest over smallest singular value that the TCP's Jacobian may have.
         held_opening_m: Above this opening nothing is held.
         contact: What touching the target must keep to.
+        projection: What may be made of a chunk before it is admitted.
     """
 
     scene_path: Path
@@ -69,6 +71,7 @@ class ExpectedMotion:
     condition: float
     held_opening_m: float
     contact: ExpectedContact
+    projection: ExpectedProjection
 
 
 class MotionProof:

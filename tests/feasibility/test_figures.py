@@ -33,6 +33,11 @@ def test_every_figure_is_that_of_the_cell(cell):
     assert contact.cone_rad == settings.approach_cone_rad
     assert contact.forgiven_m == settings.step_tolerance_m
     assert contact.release_depth_m == settings.release_depth_m
+    projection = found.projection
+    assert projection.opening_m == (settings.gripper_lower_m, settings.gripper_upper_m)
+    assert projection.beyond_m == settings.gripper_tolerance_m
+    assert projection.moved_m == settings.position_change_limit_m
+    assert projection.turned_rad == settings.rotation_change_limit_rad
 
 
 def test_a_stricter_cell_gives_stricter_figures(cell):

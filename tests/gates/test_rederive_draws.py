@@ -2,125 +2,46 @@
 
 import shutil
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
+from one_flow import HORIZONS, PARAMS, SAMPLES, TASK, edited, folder_of, roll_out, train_flow
 
 from gates import rederive_draws as module
 from gates.rederive_draws import SHADOW, rederive_rollout_draws, rederive_shadow_draws
-from genpolicy.candidates.judged import JudgedPolicy
-from genpolicy.contract.horizons import HorizonConfig
-from genpolicy.contract.normalisation import MinMax, Normalisation
 from genpolicy.data.dataset import load_dataset
 from genpolicy.errors import BadInputError, RefusedError
 from genpolicy.evidence.admission_context import make_checker
 from genpolicy.evidence.rows.shadow import CandidateRow
 from genpolicy.evidence.shadow.observations import held_out_observations
 from genpolicy.evidence.shadow.shadow import Shadow, shadow_policy
-from genpolicy.evidence.stress.latency import (
-    DECLARED_TERMS,
-    MEASURED_TERMS,
-    DeclaredTerm,
-    LatencyModel,
-)
-from genpolicy.evidence.stress.matched import Comparison, Shard, matched_starts, run_shard
-from genpolicy.evidence.stress.perturbations import ReducedEnvelope
 from genpolicy.execution.cell import Cell, ExecutionSettings
-from genpolicy.execution.journal import Journal, encode_actions, read_journal, write_journal
+from genpolicy.execution.journal import encode_actions, read_journal
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.rows import read_rows, write_rows
-from genpolicy.policies.checkpoint import Provenance
-from genpolicy.policies.settings import HeadConfig, NetworkConfig, SamplerConfig, TrainingConfig
-from genpolicy.policies.training import train
-from genpolicy.policies.training_request import TrainingRequest
-from genpolicy.policies.windows import Windows
 from genpolicy.seeds import stream
-from genpolicy.tasks.api import WorldSettings, load_task
-
-PARAMS = yaml.safe_load((Path(__file__).parents[2] / "params.yaml").read_text())
-HORIZONS = HorizonConfig(**PARAMS["horizons"])
-TASK = load_task("tabletop_insertion")
-STARTS = matched_starts(TASK, root_seed=PARAMS["seed"], count=4)
-SAMPLES = 2
-
-
-def _train(folder, *, seed):
-    """A flow that barely moves from where it is, to either side."""
-    rng = stream(2, "windows")
-    worlds = [TASK.make_world(s, settings=WorldSettings(TASK.calibration_epochs[-1]))
-              for s in STARTS]  # fmt: skip
-    seen = np.repeat(np.stack([world.observe() for world in worlds]), 30, axis=0)
-    observations = np.repeat(seen[:, None], 2, axis=1) + rng.normal(0, 1e-3, (120, 2, 24))
-    actions = np.repeat(np.stack([world.last_action for world in worlds]), 30, axis=0)
-    actions = np.repeat(actions[:, None], 16, axis=1)
-    actions[:, :, 1] += np.linspace(0, 0.02, 16) * rng.choice([-1.0, 1.0], 120)[:, None]
-    ends = {
-        name: MinMax(rows.min(axis=(0, 1)), rows.max(axis=(0, 1)))
-        for name, rows in (("observation", observations), ("action", actions))
-    }
-    request = TrainingRequest(
-        method="flow", horizons=HORIZONS, normalisation=Normalisation(**ends),
-        network=NetworkConfig(
-            encoder_width=16, condition_dim=16, trunk_width=48, trunk_blocks=1, time_features=16,
-            head_parameters=40_000,
-        ),
-        head=HeadConfig(posterior_width=16),
-        training=TrainingConfig(steps=60, batch_size=64, learning_rate=3e-3, warmup_steps=5),
-        sampler=SamplerConfig(name="euler", steps=2),
-        provenance=Provenance(
-            dataset_manifest_sha256="a" * 64, action_contract_sha256="b" * 64,
-            observation_contract_sha256="c" * 64,
-        ),
-        seed=seed,
-    )  # fmt: skip
-    return train(folder, request, windows=Windows(observations, actions, np.zeros((120, 16), bool)))
-
-
-def _folder(root):
-    return root / "artifacts" / "train_generators" / "flow" / "seed_0"
 
 
 @pytest.fixture(scope="module")
 def checkpoints(tmp_path_factory):
     """Two trainings of one method: folder and identity."""
     root = tmp_path_factory.mktemp("trained")
-    return [(root / str(seed), _train(root / str(seed), seed=seed)) for seed in (3, 4)]
+    return [(root / str(seed), train_flow(root / str(seed), seed=seed)) for seed in (3, 4)]
 
 
 @pytest.fixture(scope="module")
 def journals(checkpoints, tmp_path_factory):
     """One shard of rollouts of either training, of a second, in which some chunks are refused."""
-    found = []
-    for folder, sha256 in checkpoints:
-        path = tmp_path_factory.mktemp("journals") / "flow__envelope.mcap"
-        comparison = Comparison(
-            task=TASK.name, starts=tuple(start.to_json() for start in STARTS),
-            episode_limit_s=1.0, samples=SAMPLES,
-            cell=Cell(HORIZONS, ExecutionSettings(**PARAMS["execution"])),
-            feasibility=FeasibilitySettings(
-                **(PARAMS["feasibility"] | {"position_change_limit_m": 0.006})
-            ),
-            root_seed=PARAMS["seed"],
-        )  # fmt: skip
-        slow = ReducedEnvelope(
-            **(PARAMS["stress"]["perturbations"]["envelope"] | {"speed_limit_m_s": 0.008})
-        )
-        times = LatencyModel(
-            {name: DeclaredTerm(0.001, 0.002) for name in DECLARED_TERMS},
-            {name: np.full(8, 0.004) for name in MEASURED_TERMS}, 0.0,
-        )  # fmt: skip
-        judged = JudgedPolicy("flow", 0, folder, sha256)
-        run_shard(Shard(comparison, judged, times, "envelope", slow, path))
-        found.append(path)
-    return found
+    return [
+        roll_out(tmp_path_factory.mktemp("journals") / "flow__envelope.mcap", checkpoint)
+        for checkpoint in checkpoints
+    ]
 
 
 @pytest.fixture
 def root(checkpoints, tmp_path):
     """A workspace in which the first training is the trained policy."""
-    shutil.copytree(checkpoints[0][0], _folder(tmp_path))
+    shutil.copytree(checkpoints[0][0], folder_of(tmp_path))
     return tmp_path
 
 
@@ -146,24 +67,9 @@ def test_rollouts_of_another_checkpoint_under_this_name_are_refused(root, params
 
 
 def test_a_policy_that_nobody_trained_drew_nothing(root, params, journals):
-    shutil.rmtree(_folder(root))
+    shutil.rmtree(folder_of(root))
     with pytest.raises(RefusedError, match="drawn by flow"):
         rederive_rollout_draws(root, params, journals[:1])
-
-
-def _edited(path, target, change):
-    """The journal with some events changed; None leaves one out."""
-    sessions = []
-    for name, events in read_journal(path).items():
-        journal = Journal(name)
-        for event in events:
-            payload = change(event.kind, dict(event.payload))
-            if payload is not None:
-                journal.add(event.kind, event.t, payload)
-        sessions.append(journal)
-    target.parent.mkdir(exist_ok=True)
-    write_journal(target, sessions)
-    return target
 
 
 def _other_noise(kind, payload):
@@ -197,7 +103,7 @@ def test_what_was_not_drawn_so_is_refused_by_name(
     root, params, journals, tmp_path, change, said, monkeypatch
 ):
     monkeypatch.setattr(module, "OF_A_JOURNAL", 1000)
-    path = _edited(journals[0], tmp_path / "edited" / "flow__envelope.mcap", change)
+    path = edited(journals[0], tmp_path / "edited" / "flow__envelope.mcap", change)
     with pytest.raises(RefusedError, match=said):
         rederive_rollout_draws(root, params, [path])
 
@@ -206,7 +112,7 @@ def test_an_invocation_that_cannot_be_read_is_bad_input(root, params, journals, 
     def change(kind, payload):
         return payload | {"rows": 7} if kind == "conditioning" else payload
 
-    path = _edited(journals[0], tmp_path / "edited" / "flow__envelope.mcap", change)
+    path = edited(journals[0], tmp_path / "edited" / "flow__envelope.mcap", change)
     with pytest.raises(BadInputError, match="cannot be read"):
         rederive_rollout_draws(root, params, [path])
 
@@ -269,7 +175,7 @@ def shadows(checkpoints, dataset, tmp_path_factory):
         write_rows(root / SHADOW / "candidates.parquet", CandidateRow, rows)
         (root / SHADOW / "journal.mcap").write_bytes(b"only its hash is asked for")
         shutil.copytree(dataset, root / module.DATASET)
-        shutil.copytree(checkpoints[0][0], _folder(root))
+        shutil.copytree(checkpoints[0][0], folder_of(root))
         found.append(root)
     return found
 

@@ -20,6 +20,8 @@ from genpolicy.feasibility.figures import expected_motion
 from genpolicy.verification.checker import check_messages
 
 RULES = {
+    "gripper_range": "P6.gripper",
+    "projection_too_large": "P6.projection",
     "workspace": "P6.workspace",
     "unreachable": "P6.pose",
     "joint_position": "P6.joint_limit",

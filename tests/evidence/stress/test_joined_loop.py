@@ -70,7 +70,10 @@ def test_every_candidate_is_what_its_checkpoint_draws_from_what_it_names(folder,
     assert wrong == "" and drawn
     policy = load_policy(fleet[0] / "flow" / "seed_0")
     for item in drawn:
-        again = policy.sample(item.history[None], noise_names=[item.key], candidates=SAMPLES)
+        if item.made.guided:
+            continue  # of another question: `tests/gates/test_rederive_joined.py`
+        source = item.source
+        again = policy.sample(source.history[None], noise_names=[source.key], candidates=SAMPLES)
         assert actions_sha256(again.actions[0, item.index]) == item.sha256
     if rule == "bidirectional":
         assert any(message["draw"] for message in joined), "never another than the first"
