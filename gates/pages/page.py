@@ -33,6 +33,7 @@ from gates.pages import (
     tables_stress,
 )
 from gates.pages.desk import desk_of
+from gates.pages.desk_line import line_of
 from gates.pages.figures import Picturable, Table, draw_all
 from gates.pages.guide import BACK_TO, QUESTIONS, READING, label, words
 from gates.pages.table import deciding, groups, not_asked, passed_by, stops, tally
@@ -160,7 +161,14 @@ def index_page(root: Path) -> str:
     """HTML of the ladder, from the reports as they lie there."""
     rows = [_row(root, gate) for gate in GATES]
     reports = {row["gate"]: row["report"] for row in rows if row["report"] is not None}
-    return _render("index.html", current="", rows=rows, desk=desk_of(reports))
+    evidence = Evidence(root)
+    return _render(
+        "index.html",
+        current="",
+        rows=rows,
+        desk=desk_of(reports),
+        line=line_of(reports, evidence, None),
+    )
 
 
 def _row(root: Path, gate: Gate) -> dict[str, Any]:
