@@ -11,7 +11,7 @@ import typer
 from gates.commands import Root
 from genpolicy.cli.shell import AsJson, examples, new_app, with_examples
 
-report = new_app("What the reports of a run say beside their pages, and what moved since another.")
+report = new_app("What no page says of a run, and what moved between two.")
 
 
 @with_examples("genpolicy plan", "genpolicy plan --json")

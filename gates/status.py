@@ -154,5 +154,7 @@ def _signed(root: Path, commit: str) -> dict[str, str]:
     names = git(root, "show", "--format=", "--name-only", "--relative", commit, "--", *CARDS)
     text = git(root, "show", "--end-of-options", f"{commit}:./{(names or '').splitlines()[0]}")
     envelope = parse_json((text or "").encode(), where="the card")
-    payload = parse_json(base64.b64decode(envelope["payload"]), where="the card")
-    return {str(gate): str(digest) for gate, digest in payload["predicate"]["reports"].items()}
+    payload = parse_json(base64.b64decode(envelope.get("payload")), where="the card")
+    return {
+        str(gate): str(digest) for gate, digest in payload.get("predicate").get("reports").items()
+    }

@@ -33,6 +33,8 @@ from gates.pages import (
     tables_stress,
 )
 from gates.pages.desk import desk_of
+from gates.pages.desk_card import card_of, papers_of, signing_of
+from gates.pages.desk_costs import HEADS, costs_of
 from gates.pages.desk_line import line_of
 from gates.pages.figures import Picturable, Table, draw_all
 from gates.pages.guide import BACK_TO, QUESTIONS, READING, label, words
@@ -162,12 +164,16 @@ def index_page(root: Path) -> str:
     rows = [_row(root, gate) for gate in GATES]
     reports = {row["gate"]: row["report"] for row in rows if row["report"] is not None}
     evidence = Evidence(root)
+    papers = papers_of(reports, evidence)
     return _render(
         "index.html",
         current="",
         rows=rows,
         desk=desk_of(reports),
-        line=line_of(reports, evidence, None),
+        line=line_of(reports, evidence, card_of(papers)),
+        heads=HEADS,
+        costs=costs_of(reports, evidence),
+        signing=signing_of(reports, evidence, papers),
     )
 
 
