@@ -11,7 +11,7 @@ import typer
 from gates.commands import Root
 from genpolicy.cli.shell import AsJson, examples, new_app, with_examples
 
-report = new_app("Compare the reports of two runs.")
+report = new_app("What no page says of a run, and what moved between two.")
 
 
 @with_examples("genpolicy plan", "genpolicy plan --json")
@@ -31,11 +31,6 @@ def plan(root: Root = Path(), as_json: AsJson = False) -> int:
     else:
         print(plan_text(found))
     return 3 if found.undecidable else 0
-
-
-@report.callback()
-def _report() -> None:
-    """Compare the reports of two runs."""  # or typer takes the one command for the group
 
 
 @report.command("diff", epilog=examples("genpolicy report diff HEAD~1 reports"))
@@ -60,4 +55,28 @@ def diff(
         print_rows(found)
     else:
         print(moved_text(found))
+    return 0
+
+
+@report.command(
+    "status", epilog=examples("genpolicy report status", "genpolicy report status --json")
+)
+def status(root: Root = Path(), as_json: AsJson = False) -> int:
+    """When the ladder ran, by whom, at which commit; is it proved?
+
+    What no versioned page may say, since the same evidence gives the same page.
+    Proves every report now, and says what moved since the run that the newest
+    signed card was signed over. Exit 0 whatever it finds.
+    """
+    from dataclasses import asdict
+
+    from gates.printed import print_document
+    from gates.proof import prove_all
+    from gates.status import status_of, status_text
+
+    found = status_of(root, prove_all(root))
+    if as_json:
+        print_document(asdict(found))
+    else:
+        print(status_text(found))
     return 0

@@ -57,7 +57,7 @@ def changed_page(root: Path) -> str:
         GenpolicyError: A report or its evidence cannot be read.
     """
     path = root / INDEX
-    if path.is_file() and path.read_bytes() != index_page(root).encode():
+    if path.is_file() and path.read_bytes() != index_page(root).encode() and _built(root):
         return INDEX
     for gate in GATES:
         base = root / report_path(gate)
@@ -75,6 +75,19 @@ def changed_page(root: Path) -> str:
             if page.read_bytes() != again.encode():
                 return name
     return ""
+
+
+def _built(root: Path) -> bool:
+    """Whether all evidence of the reports lies there; without it the first page shows less.
+
+    Whatever lacks is told where the reports are proved.
+    """
+    return all(
+        (root / material).is_file()
+        for gate in GATES
+        if (root / report_path(gate)).is_file()
+        for material in read_report(root, gate)[0].materials
+    )
 
 
 def _remove(path: Path) -> None:

@@ -87,7 +87,7 @@ class TrialCard(StrictModel):
         spotter: Who stands at the stop.
         stop_path: How the robot is stopped, from hand to drive.
         abort_thresholds: What ends the trial, by name; may be lowered, never raised.
-        rollback: What runs instead.
+        rollback: What runs instead: one policy, its checkpoint, its own success.
         caveats: What the reports do not show, what could make them wrong, what moved since the
             plan; people may add some.
         not_before: First day of validity, YYYY-MM-DD.
@@ -124,7 +124,9 @@ def draft_card(
     reports: Mapping[Gate, GateReport],
     hashes: Mapping[Gate, str],
     checkpoint: str,
+    *,
     simulated: Simulated,
+    rollback: str,
 ) -> TrialCard:
     """Draft from the passed reports, with the fields of the reviewer left empty.
 
@@ -134,13 +136,13 @@ def draft_card(
         hashes: Their SHA-256.
         checkpoint: Hash of the promoted candidate's checkpoint, as Gate B pinned it.
         simulated: Robot, workspace and speed that its rollouts were held to.
+        rollback: What runs instead, as `gates.card.rollback` says it.
 
     Raises:
         RefusedError: Gate D promotes no one.
     """
     candidate = promoted(reports["D"])
     limits = {c.id: c.threshold for c in reports["D"].criteria if c.threshold is not None}
-    baselines = reports["D"].settings.get("baselines", ())
     return TrialCard(
         schema_version=CARD_SCHEMA_VERSION,
         name=settings.name,
@@ -160,7 +162,7 @@ def draft_card(
         abort_thresholds={
             name: limits[criterion] for name, criterion in ABORT_FROM.items() if criterion in limits
         },
-        rollback=f"stop, then the simpler policy (one of {', '.join(baselines)}) or manual control",
+        rollback=rollback,
         caveats=caveats_of(reports),
         reviewer="",
         not_before="",

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from gates.card.card import CardSettings, TrialCard, draft_card, promoted
 from gates.card.envelope import simulated_envelope, was_judged
+from gates.card.rollback import rollback_of
 from gates.evidence import Evidence
 from gates.report import Gate, GateReport
 from gates.reproducibility.settings import RELOAD
@@ -23,8 +24,8 @@ def draft(root: Path, reports: Mapping[Gate, GateReport], hashes: Mapping[Gate, 
 
     Raises:
         ConfigError: Section `card` is missing or wrong.
-        IntegrityError: Gate B pinned no checkpoint of the promoted candidate, or no rollouts ran
-            inside an envelope.
+        IntegrityError: Gate B pinned no checkpoint of the promoted candidate, no rollouts ran
+            inside an envelope, or there is no simple policy to go back to.
         RefusedError: Gate D promotes no one.
     """
     settings = read_settings(read_params(root), "card", CardSettings)
@@ -45,4 +46,7 @@ def draft(root: Path, reports: Mapping[Gate, GateReport], hashes: Mapping[Gate, 
             expected="the hash of the promoted checkpoint",
             action="Run `dvc repro reload`.",
         )
-    return draft_card(settings, reports, hashes, pinned.checkpoint, simulated)
+    rollback = rollback_of(reports, Evidence(root)).text
+    return draft_card(
+        settings, reports, hashes, pinned.checkpoint, simulated=simulated, rollback=rollback
+    )

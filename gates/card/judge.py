@@ -25,6 +25,7 @@ from gates.card.card import (
 )
 from gates.card.envelope import ENVELOPE_FILE, simulated_envelope, was_judged
 from gates.card.people import ALLOW_LIST, load_allow_list
+from gates.card.rollback import require_rollback
 from gates.card.signing import (
     CARDS,
     SignedCard,
@@ -181,6 +182,7 @@ def _chain_error(root: Path, chain: Chain, draft: TrialCard | None) -> str:
         if not was_judged(chain.reports["D"], simulated.condition):
             return f"gate D did not judge the condition {simulated.condition!r} of the card"
         entry = Evidence(root).document(RELOAD, CANDIDATES).get(candidate)
+        require_rollback(draft.rollback, chain.reports, Evidence(root))
     except (MissingEvidenceError, GenpolicyError) as error:
         return str(error)
     pinned = entry.checkpoint if entry else None

@@ -3,10 +3,10 @@
 Everything follows from the reports alone, so that the page is the same wherever they lie.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
-from gates.closeness import Closeness, by_room
+from gates.closeness import Closeness, by_room, closeness
 from gates.doubts import Doubt, doubts_of
 from gates.pages.guide import unit
 from gates.report import GATES, NAMES, OWNERS, Answer, Gate, GateReport
@@ -85,22 +85,37 @@ class Bar:
 
 
 @dataclass(frozen=True)
+class Duty:
+    """One criterion that an owner answers for.
+
+    Attributes:
+        gate: Its gate.
+        answer: The criterion.
+        measured: As a person reads it.
+        limit: Likewise.
+        remark: What the owner has to look at, or why little is to be looked at.
+    """
+
+    gate: Gate
+    answer: Answer
+    measured: str
+    limit: str
+    remark: str
+
+
+@dataclass(frozen=True)
 class Part:
     """What one owner answers for.
 
     Attributes:
         owner: The role.
         hold: How many of its criteria hold.
-        of: How many there are.
-        open: Its criteria that do not, by gate and name.
-        near: Its criteria that hold with little room, likewise.
+        duties: Its criteria: what does not hold first, then what holds, the nearest first.
     """
 
     owner: str
     hold: int
-    of: int
-    open: tuple[str, ...]
-    near: tuple[str, ...]
+    duties: tuple[Duty, ...]
 
 
 @dataclass(frozen=True)
@@ -226,16 +241,36 @@ def _part(owner: str, reports: Mapping[Gate, GateReport]) -> Part:
         for answer in _shown(reports[gate])
         if answer.owner == owner
     ]
-    near = by_room([answer for _, answer in own])
-    close = {id(entry.answer) for entry in near if entry.near}
+    own.sort(key=lambda entry: _weight(entry[1]))
     return Part(
         owner=owner,
         hold=sum(answer.verdict == "PASS" for _, answer in own),
-        of=len(own),
-        open=_named([(gate, answer) for gate, answer in own if answer.verdict != "PASS"]),
-        near=_named([(gate, answer) for gate, answer in own if id(answer) in close]),
+        duties=tuple(
+            Duty(gate, c, at_its_end(c), human(c, c.threshold), remark(c)) for gate, c in own
+        ),
     )
 
 
-def _named(entries: Sequence[tuple[Gate, Answer]]) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(f"{gate}: {answer.id}" for gate, answer in entries))
+def _weight(answer: Answer) -> tuple[int, float]:
+    """What does not hold, what holds nearly, what holds exactly."""
+    if answer.verdict != "PASS":
+        return (0, 0.0)
+    near = closeness(answer)
+    return (2, 0.0) if near is None else (1, -near.used)
+
+
+def remark(answer: Answer) -> str:
+    """What the owner of a criterion has to know of it, in one sentence."""
+    why = answer.caveat or "nothing was recorded that answers it"
+    if answer.verdict == "INCONCLUSIVE":
+        unsure = "not measured" if answer.interval is None else "not decided, more evidence decides"
+        return f"{unsure}: {why}"
+    if answer.verdict != "PASS":
+        return why
+    near = closeness(answer)
+    if near is None:
+        return "holds exactly; there is no room to speak of"
+    used = f"{100 * near.used:.3g} % of the limit is used up"
+    if near.near:
+        return f"near: {used}, and another draw may break it"
+    return used if near.worse_end else f"{used}; no interval says how sure that is"

@@ -33,6 +33,9 @@ from gates.pages import (
     tables_stress,
 )
 from gates.pages.desk import desk_of
+from gates.pages.desk_card import card_of, papers_of, signing_of
+from gates.pages.desk_costs import HEADS, costs_of
+from gates.pages.desk_line import line_of
 from gates.pages.figures import Picturable, Table, draw_all
 from gates.pages.guide import BACK_TO, QUESTIONS, READING, label, words
 from gates.pages.table import deciding, groups, not_asked, passed_by, stops, tally
@@ -160,7 +163,18 @@ def index_page(root: Path) -> str:
     """HTML of the ladder, from the reports as they lie there."""
     rows = [_row(root, gate) for gate in GATES]
     reports = {row["gate"]: row["report"] for row in rows if row["report"] is not None}
-    return _render("index.html", current="", rows=rows, desk=desk_of(reports))
+    evidence = Evidence(root)
+    papers = papers_of(reports, evidence)
+    return _render(
+        "index.html",
+        current="",
+        rows=rows,
+        desk=desk_of(reports),
+        line=line_of(reports, evidence, card_of(papers)),
+        heads=HEADS,
+        costs=costs_of(reports, evidence),
+        signing=signing_of(reports, evidence, papers),
+    )
 
 
 def _row(root: Path, gate: Gate) -> dict[str, Any]:

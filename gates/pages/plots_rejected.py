@@ -12,6 +12,7 @@ from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from gates.evidence import Array, Evidence, MissingEvidenceError
 from gates.feasibility.settings import LAYERS, SHADOW, UNKNOWN
+from gates.pages.bound import require_bound
 from gates.pages.figures import Drawing, Series, colours
 from gates.pages.reasons import LIMIT_WORDS, REASON_WORDS, personal, said
 from gates.report import GateReport
@@ -28,9 +29,8 @@ LOOKS = {"obstacle": STONE, "target": "#CFE3DA", "scene": "#E8E1D3"}
 
 
 def _drawings(evidence: Evidence, report: GateReport) -> list[Drawing]:
+    require_bound(evidence, report, FILE)
     gallery = evidence.document(SHADOW, GALLERY)
-    if report.materials.get(FILE) != evidence.digest(FILE):
-        raise MissingEvidenceError(f"{FILE} is not the file that the report names")
     if not gallery.examples:
         raise MissingEvidenceError("no held-out candidate that has a path was rejected")
     look = colours(example.method for example in gallery.examples)

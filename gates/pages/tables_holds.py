@@ -6,8 +6,9 @@ from typing import Literal
 
 import pandas as pd
 
-from gates.evidence import Evidence, MissingEvidenceError, counts
+from gates.evidence import Evidence, counts
 from gates.feasibility.settings import HELD_OUT, SHADOW
+from gates.pages.bound import require_bound
 from gates.pages.figures import Folded, Listing, Table, in_order
 from gates.pages.reasons import said
 from gates.report import GateReport
@@ -21,9 +22,8 @@ MOST_NAMED = 4
 
 
 def _held(evidence: Evidence, report: GateReport) -> pd.DataFrame:
+    require_bound(evidence, report, FILE)
     frame = evidence.rows(FILE, ShadowHoldRow)
-    if report.materials.get(FILE) != evidence.digest(FILE):
-        raise MissingEvidenceError(f"{FILE} is not the file that the report names")
     return frame.assign(count=counts(frame, "count"))
 
 

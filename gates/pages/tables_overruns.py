@@ -2,7 +2,8 @@
 
 import math
 
-from gates.evidence import Evidence, MissingEvidenceError, numbers
+from gates.evidence import Evidence, numbers
+from gates.pages.bound import require_bound
 from gates.pages.figures import Folded, Listing, Table, in_order
 from gates.report import GateReport
 from gates.reproducibility.latency_budget import LATENCY, MILLI, TERMS
@@ -46,9 +47,8 @@ def _conditions(evidence: Evidence, report: GateReport) -> Table:
 
 
 def _counted(evidence: Evidence, report: GateReport, *, by: list[str]) -> Table:
+    require_bound(evidence, report, FILE)
     frame = evidence.rows(FILE, OverrunRow)
-    if report.materials.get(FILE) != evidence.digest(FILE):
-        raise MissingEvidenceError(f"{FILE} is not the file that the report names")
     counts = frame.assign(count=numbers(frame, "count")).groupby(by, sort=True)["count"].sum()
     index = counts.index.to_frame(index=False).astype(str)
     cells = [*(index[name] for name in by), (f"{count:g}" for count in counts)]

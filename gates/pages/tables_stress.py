@@ -3,7 +3,8 @@
 import numpy as np
 import pandas as pd
 
-from gates.evidence import Evidence, MissingEvidenceError, numbers
+from gates.evidence import Evidence, numbers
+from gates.pages.bound import require_bound
 from gates.pages.figures import Folded, Listing, Table, in_order
 from gates.report import GateReport
 from gates.stress.rollouts import STRESS
@@ -18,10 +19,8 @@ MM_PER_M = 1000.0
 
 
 def _splices(evidence: Evidence, report: GateReport) -> pd.DataFrame:
-    frame = evidence.rows(FILE, SpliceRow)
-    if report.materials.get(FILE) != evidence.digest(FILE):
-        raise MissingEvidenceError(f"{FILE} is not the file that the report names")
-    return frame
+    require_bound(evidence, report, FILE)
+    return evidence.rows(FILE, SpliceRow)
 
 
 def _typical(rows: pd.DataFrame, column: str, scale: float = 1.0) -> str:

@@ -5,7 +5,7 @@ import re
 import evidence
 import pytest
 
-from gates.pages.desk import HEADLINES, desk_of, human
+from gates.pages.desk import HEADLINES, desk_of, human, remark
 from gates.proof import judge
 from gates.report import GATES, read_report
 from gates.writing import write_gate
@@ -23,7 +23,7 @@ def test_of_nothing_nothing_is_asked():
     empty = desk_of({})
     assert empty.asked.title.startswith("Nothing is asked of you yet: the ladder stops at gate A")
     assert {box.verdict for box in empty.boxes} == {"NOT JUDGED"} and not empty.bars
-    assert all((part.hold, part.of) == (0, 0) for part in empty.parts)
+    assert all((part.hold, part.duties) == (0, ()) for part in empty.parts)
 
 
 def test_a_passed_ladder_asks_for_the_promoted_and_says_what_waits(ladder):
@@ -83,9 +83,41 @@ def test_numbers_stand_in_the_unit_of_a_person(ladder, name, limit, value, text)
 def test_each_owner_finds_what_is_open(ladder):
     evidence.edit_table(ladder, "audit/clocks.parquet", evidence.lags_apart)
     write_gate(ladder, "A")
-    parts = {part.owner: part for part in desk(ladder).parts}
-    assert "A: lag_spread_steps" in parts["controller"].open
-    assert parts["controller"].hold == parts["controller"].of - len(parts["controller"].open)
+    [part] = [part for part in desk(ladder).parts if part.owner == "controller"]
+    first = part.duties[0]
+    assert (first.gate, first.answer.id, first.measured) == (
+        "A",
+        "lag_spread_steps",
+        "4 action steps",
+    )
+    assert first.remark == first.answer.caveat
+    assert part.hold == sum(duty.answer.verdict == "PASS" for duty in part.duties)
+    text = (ladder / "reports/index.html").read_text()
+    assert "<details open><summary><b>controller</b>" in text
+    assert "<details><summary><b>perception</b>" in text
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"verdict": "INCONCLUSIVE"}, "not measured: c"),
+        (
+            {"verdict": "INCONCLUSIVE", "interval": (0.0, 9.0)},
+            "not decided, more evidence decides: c",
+        ),
+        ({"verdict": "FAIL", "measured": 5.0}, "c"),
+        ({"verdict": "FAIL", "caveat": ""}, "nothing was recorded that answers it"),
+        ({"measured": 1.9}, "near: 95 % of the limit is used up, and another draw may break it"),
+        ({"measured": 1.0}, "50 % of the limit is used up; no interval says how sure that is"),
+        ({"measured": 1.0, "interval": (0.5, 1.0)}, "50 % of the limit is used up"),
+        ({"measured": 0.0, "threshold": 0.0}, "holds exactly; there is no room to speak of"),
+    ],
+)  # fmt: skip
+def test_a_remark_says_what_its_owner_has_to_look_at(judged, changes, said):
+    plain = {
+        "comparison": "<=", "threshold": 2.0, "interval": None, "verdict": "PASS", "caveat": "c",
+    }  # fmt: skip
+    assert remark(judged("A").criteria[0].model_copy(update={**plain, **changes})) == said
 
 
 FACTORS = {"ms": 1e-3, "mm": 1e-3, "%": 1e-2}
@@ -147,13 +179,22 @@ def test_each_owner_finds_all_of_theirs_and_nobody_elses(ladder):
             (gate, c) for gate, report in reports.items() for c in report.criteria
             if c.owner == part.owner and counts(report, c.candidate)
         ]  # fmt: skip
-        assert (part.hold, part.of) == (sum(c.verdict == "PASS" for _, c in own), len(own))
-        names = [f"{gate}: {c.id}" for gate, c in own if c.verdict != "PASS"]
-        assert part.open == tuple(dict.fromkeys(names))
-        near = [
-            f"{gate}: {c.id}" for gate, c in own
-            if c.verdict == "PASS" and c.measured is not None and c.threshold
-            and c.threshold > 0 and not (c.comparison == ">=" and c.threshold == c.measured == 1)
-            and min(c.measured, c.threshold) >= 0.9 * max(c.measured, c.threshold)
-        ]  # fmt: skip
-        assert part.near == tuple(dict.fromkeys(near))
+        assert part.hold == sum(c.verdict == "PASS" for _, c in own)
+        assert sorted(map(_known, own)) == sorted(_known((d.gate, d.answer)) for d in part.duties)
+        used = [_used(duty.answer) for duty in part.duties]
+        assert used == sorted(used, reverse=True)
+
+
+def _known(entry):
+    gate, c = entry
+    return gate, c.id, c.candidate or ""
+
+
+def _used(c):
+    """Above 1 what does not hold, then the share of the limit, below 0 what has none."""
+    if c.verdict != "PASS":
+        return 2.0
+    exact = c.comparison == ">=" and c.threshold == c.measured == 1
+    if exact or c.measured is None or not c.threshold or c.threshold <= 0:
+        return -1.0
+    return c.threshold / c.measured if c.comparison == ">=" else max(c.measured, 0.0) / c.threshold

@@ -1,0 +1,93 @@
+"""What runs instead: one simple policy, by its checkpoint and by what it did on the same starts."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from gates.evidence import Evidence, MissingEvidenceError, flags
+from gates.report import Gate, GateReport
+from gates.stress.rollouts import ROLLOUTS
+from genpolicy.errors import IntegrityError
+from genpolicy.evidence.rows.stress import RolloutRow
+
+TRAINED = "artifacts/train_baselines"
+WEIGHTS = "model.safetensors"
+
+
+@dataclass(frozen=True)
+class Rollback:
+    """One policy to go back to.
+
+    Attributes:
+        policy: Name of the simple method.
+        checkpoint_sha256: Of the weights of its first seed, as gate A's report names them.
+        succeeded: Rollouts of the comparison in which it succeeded.
+        rollouts: Of how many, all planned conditions together.
+    """
+
+    policy: str
+    checkpoint_sha256: str
+    succeeded: int
+    rollouts: int
+
+    @property
+    def text(self) -> str:
+        """As a card says it."""
+        return (
+            f"stop, then {self.policy} (checkpoint {self.checkpoint_sha256}), which succeeded in "
+            f"{self.succeeded} of {self.rollouts} rollouts on the same starts, or manual control"
+        )
+
+
+def rollback_of(reports: Mapping[Gate, GateReport], evidence: Evidence) -> Rollback:
+    """The simple method with the most successes over all planned conditions; of equals the first.
+
+    Args:
+        reports: Of gates A and D at least.
+        evidence: Below the same root.
+
+    Raises:
+        IntegrityError: No simple method rolled out, or gate A's report names no weights of it.
+    """
+    settings = reports["D"].settings
+    try:
+        rows = evidence.rows(ROLLOUTS, RolloutRow)
+        rows = rows[rows["perturbation"].isin(settings["perturbations"])]
+        tried = {
+            name: flags(rows[rows["method"] == name], "success") for name in settings["baselines"]
+        }
+    except MissingEvidenceError as error:
+        raise _unknown(ROLLOUTS, str(error), "rollouts of the simple methods") from error
+    shares = {name: float(found.mean()) for name, found in tried.items() if len(found)}
+    if not shares:
+        raise _unknown(ROLLOUTS, "no rollout of a simple method", "the comparison of gate D")
+    best = max(shares, key=lambda name: shares[name])
+    weights = sorted(
+        (path, digest)
+        for path, digest in reports["A"].materials.items()
+        if path.startswith(f"{TRAINED}/{best}/") and path.endswith(f"/{WEIGHTS}")
+    )
+    if not weights:
+        raise _unknown("reports/gate_a.json: materials", f"no weights of {best}", "their hash")
+    return Rollback(best, weights[0][1], int(tried[best].sum()), len(tried[best]))
+
+
+def require_rollback(text: str, reports: Mapping[Gate, GateReport], evidence: Evidence) -> None:
+    """Require that a draft rolls back to the policy that the comparison shows to do best.
+
+    Raises:
+        IntegrityError: It names something else, or as `rollback_of`.
+    """
+    expected = rollback_of(reports, evidence).text
+    if text != expected:
+        raise IntegrityError(
+            where="the draft's rollback",
+            found=repr(text[:60]),
+            expected=expected,
+            action="Draft the card again: `dvc repro card`.",
+        )
+
+
+def _unknown(where: str, found: str, expected: str) -> IntegrityError:
+    return IntegrityError(
+        where=where, found=found, expected=expected, action="Run the ladder again: `dvc repro`."
+    )

@@ -1,0 +1,225 @@
+"""What you sign, on the desk: each field as seen in simulation, as proposed, and as people set it.
+
+What was not seen in simulation is not proposed: a force limit, who stands at the stop, how the
+robot is stopped and for which days are left to the people who answer for them.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from gates.card.card import ABORT_FROM, DRAFT_PATH, TrialCard
+from gates.card.envelope import ENVELOPE_FILE
+from gates.card.judge import Papers, examine
+from gates.card.people import REVIEWER
+from gates.card.rollback import rollback_of
+from gates.evidence import Evidence, MissingEvidenceError, numbers
+from gates.pages.bound import require_bound
+from gates.pages.desk import at_its_end, human
+from gates.report import OWNERS, Answer, Gate, GateReport, Point
+from gates.stress.rollouts import ROLLOUTS, STRESS
+from genpolicy.errors import IntegrityError
+from genpolicy.evidence.documents.stress import ENVELOPE
+from genpolicy.evidence.rows.stress import RolloutRow
+from genpolicy.verification.report import Reached
+
+NOTHING = "nothing that simulation can show"
+NOT_PROPOSED = "not proposed"
+ELSEWHERE = "not built here"
+AS_SIMULATED = "as simulated; for another one plan it and run again"
+ABORTS = {
+    "latency_s": "95 % of answers come later than",
+    "deadline_miss_share": "missed deadlines above",
+    "hold_share": "time it waits above",
+    "rejection_share": "answers rejected whole above",
+    "fallback_share": "time of the fallback above",
+    "intervention_share": "runs with a person above",
+    "reset_share": "runs that stop, to be reset, above",
+}
+"""What each abort threshold of a card ends the trial at, in words."""
+MM_PER_M = 1000.0
+SHOWN_HASH = 12
+"""Characters of a hash that a reader compares; the card holds all of it."""
+
+
+@dataclass(frozen=True)
+class Item:
+    """One field of the card.
+
+    Attributes:
+        field: In words.
+        seen: What rollouts of the candidate did.
+        proposed: By the draft; not proposed where nothing was seen that could carry it.
+        yours: What people set, of a signed card; what is left to them of a draft. Empty where a
+            line is to be filled.
+        owner: Who answers for it.
+    """
+
+    field: str
+    seen: str
+    proposed: str
+    yours: str
+    owner: str
+
+
+@dataclass(frozen=True)
+class Signing:
+    """What is to be signed, or why nothing is.
+
+    Attributes:
+        items: Fields of the card.
+        caveats: How many sentences the signer signs in spite of.
+        signed: Who has signed, `id (role)`.
+        lacking: Roles that have not.
+        refusal: Why the card that lies there is refused; empty if none is.
+        missing: Why nothing is shown; empty if something is.
+    """
+
+    items: tuple[Item, ...] = ()
+    caveats: int = 0
+    signed: tuple[str, ...] = ()
+    lacking: tuple[str, ...] = ()
+    refusal: str = ""
+    missing: str = ""
+
+
+def papers_of(reports: Mapping[Gate, GateReport], evidence: Evidence) -> Papers | None:
+    """The card that Gate E judged, as draft and as signed; None where there is none to show."""
+    report = reports.get("E")
+    if report is None:
+        return None
+    try:
+        require_bound(evidence, report, DRAFT_PATH)
+    except MissingEvidenceError:
+        return None
+    return examine(evidence.root, str(report.settings["card"]))
+
+
+def card_of(papers: Papers | None) -> TrialCard | None:
+    """The signed card, or the draft."""
+    if papers is None:
+        return None
+    return papers.signed.card if papers.signed else papers.draft
+
+
+def signing_of(
+    reports: Mapping[Gate, GateReport], evidence: Evidence, papers: Papers | None
+) -> Signing:
+    """The fields of the card beside what was seen.
+
+    Args:
+        reports: By gate.
+        evidence: Below the same root.
+        papers: As `papers_of` gives them.
+    """
+    draft = papers.draft if papers else None
+    if papers is None or draft is None or "D" not in reports:
+        return Signing(missing="no card is drafted; only a gate D that passes leads to one")
+    people = papers.signed.signers if papers.signed else ()
+    roles = {person.role for person in people}
+    return Signing(
+        items=_items(draft, papers.signed.card if papers.signed else None, reports, evidence),
+        caveats=len(draft.caveats),
+        signed=tuple(f"{person.id} ({person.role})" for person in people),
+        lacking=tuple(role for role in (REVIEWER, *OWNERS) if role not in roles),
+        refusal=papers.refusal,
+    )
+
+
+def _items(
+    draft: TrialCard,
+    signed: TrialCard | None,
+    reports: Mapping[Gate, GateReport],
+    evidence: Evidence,
+) -> tuple[Item, ...]:
+    report = reports["D"]
+    reached = _reached(draft.candidate, report, evidence)
+    went = _box(reached.lowest_m, reached.highest_m) if reached else ELSEWHERE
+    fastest = reached.fastest_m_s if reached else None
+    box = _box(draft.workspace_lower_m, draft.workspace_upper_m)
+    return (
+        Item("Workspace, mm", went, box, AS_SIMULATED, "controller"),
+        Item(
+            "Speed of the tool",
+            ELSEWHERE if fastest is None else f"at most {fastest:.3g} m/s",
+            f"at most {draft.speed_limit_m_s:.3g} m/s",
+            AS_SIMULATED,
+            "controller",
+        ),
+        Item(
+            "Ends it: contact force above",
+            _force(draft.candidate, report, evidence),
+            NOT_PROPOSED,
+            f"{signed.force_limit_n:.3g} N: {signed.force_limit_reason}" if signed else "",
+            "safety",
+        ),
+        *_aborts(draft, signed, report),
+        _rollback(reports, evidence),
+        Item("Stop path", NOTHING, NOT_PROPOSED, signed.stop_path if signed else "", "safety"),
+        Item("Who stands at it", NOTHING, NOT_PROPOSED, signed.spotter if signed else "", "safety"),
+        Item(
+            "Days of validity",
+            NOTHING,
+            NOT_PROPOSED,
+            f"{signed.not_before} to {signed.expires}" if signed else "",
+            REVIEWER,
+        ),
+    )
+
+
+def _reached(candidate: str, report: GateReport, evidence: Evidence) -> Reached | None:
+    """How far the candidate's commands went inside the envelope; None where it is not built."""
+    try:
+        require_bound(evidence, report, ENVELOPE_FILE)
+        return evidence.document(STRESS, ENVELOPE).reached.get(candidate)
+    except MissingEvidenceError:
+        return None
+
+
+def _box(low: Point | None, high: Point | None) -> str:
+    if low is None or high is None:
+        return ELSEWHERE
+    sides = zip("xyz", low, high, strict=True)
+    return ", ".join(f"{a} {MM_PER_M * x:.0f} to {MM_PER_M * y:.0f}" for a, x, y in sides)
+
+
+def _force(candidate: str, report: GateReport, evidence: Evidence) -> str:
+    try:
+        require_bound(evidence, report, ROLLOUTS)
+        force = numbers(evidence.of(ROLLOUTS, RolloutRow, candidate), "force_peak_n")
+    except MissingEvidenceError:
+        return ELSEWHERE
+    touched = int((force > 0).sum())
+    if touched == 0:
+        return f"no contact in {len(force):,} rollouts: nothing is known"
+    return f"at most {force.max():.3g} N; contact in {touched:,} of {len(force):,} rollouts"
+
+
+def _aborts(draft: TrialCard, signed: TrialCard | None, report: GateReport) -> list[Item]:
+    judged = {c.id: c for c in report.criteria if c.candidate == draft.candidate}
+    items = []
+    for name, most in sorted(draft.abort_thresholds.items()):
+        answer: Answer = judged[ABORT_FROM[name]]
+        items.append(
+            Item(
+                f"Ends it: {ABORTS[name]}",
+                f"{at_its_end(answer)} in the worst condition",
+                human(answer, most),
+                human(answer, signed.abort_thresholds[name]) if signed else "",
+                answer.owner or "nobody",
+            )
+        )
+    return items
+
+
+def _rollback(reports: Mapping[Gate, GateReport], evidence: Evidence) -> Item:
+    seen, proposed = ELSEWHERE, ELSEWHERE
+    try:
+        require_bound(evidence, reports["D"], ROLLOUTS)
+        found = rollback_of(reports, evidence)
+        share = 100 * found.succeeded / found.rollouts
+        seen = f"succeeds in {share:.3g} %, {found.succeeded:,} of {found.rollouts:,} rollouts"
+        known = found.checkpoint_sha256[:SHOWN_HASH]
+        proposed = f"stop, then {found.policy} (checkpoint {known}…), or by hand"
+    except (MissingEvidenceError, IntegrityError, KeyError):
+        pass
+    return Item("What runs instead", seen, proposed, "as proposed", "model")

@@ -1,0 +1,64 @@
+"""What runs instead: the simple policy that did best, by its checkpoint and its own success."""
+
+import json
+
+import evidence
+import pytest
+
+from gates.card.rollback import rollback_of
+from gates.evidence import Evidence
+from gates.proof import judge
+from gates.report import read_report
+from genpolicy.errors import IntegrityError
+from genpolicy.integrity.documents import canonical_json
+from genpolicy.integrity.hashing import sha256_file
+
+ROLLOUTS = "stress/rollouts.parquet"
+
+
+def reports(root):
+    return {gate: read_report(root, gate)[0] for gate in "AD"}
+
+
+def _better(frame):
+    """`act` succeeds in all rollouts, and so does a candidate, which is no policy to go back to."""
+    return frame.assign(success=frame["success"] | (frame["method"] == "act"))
+
+
+def test_the_best_simple_policy_with_its_weights_and_its_success(ladder):
+    evidence.edit_table(ladder, ROLLOUTS, _better)
+    found = rollback_of(reports(ladder), Evidence(ladder))
+    rollouts = evidence.STARTS * len(evidence.CONDITIONS)
+    assert (found.policy, found.succeeded, found.rollouts) == ("act", rollouts, rollouts)
+    weights = ladder / "artifacts/train_baselines/act/seed_0/model.safetensors"
+    assert found.checkpoint_sha256 == sha256_file(weights)
+    for said in ("stop, then act", found.checkpoint_sha256, f"{rollouts} of {rollouts} rollouts"):
+        assert said in found.text
+
+
+def test_of_equals_the_one_that_is_named_first(ladder):
+    assert rollback_of(reports(ladder), Evidence(ladder)).policy == "bc"
+
+
+def test_without_rollouts_or_weights_of_it_nothing_is_named(ladder):
+    known = reports(ladder)
+    bare = known["A"].model_copy(update={"materials": {}})
+    with pytest.raises(IntegrityError, match="no weights of bc"):
+        rollback_of({**known, "A": bare}, Evidence(ladder))
+    evidence.edit_table(ladder, ROLLOUTS, lambda f: f[f["method"].isin(evidence.CANDIDATES)])
+    with pytest.raises(IntegrityError, match="no rollout of a simple method"):
+        rollback_of(known, Evidence(ladder))
+    (ladder / "artifacts" / ROLLOUTS).unlink()
+    with pytest.raises(IntegrityError, match="is missing"):
+        rollback_of(known, Evidence(ladder))
+
+
+def test_a_draft_that_names_another_rollback_is_not_of_this_chain(ladder):
+    path = ladder / "artifacts/card/card.json"
+    document = json.loads(path.read_text())
+    assert document["rollback"] == rollback_of(reports(ladder), Evidence(ladder)).text
+    document["rollback"] = "stop"
+    path.write_bytes(canonical_json(document))
+    evidence.record(ladder)
+    [chain] = [c for c in judge(ladder, "E").criteria if c.id == "upstream_passed"]
+    assert chain.verdict == "FAIL" and "the draft's rollback is 'stop'" in chain.caveat
