@@ -20,33 +20,30 @@ from gates.card.card import (
     left_out,
     missing_fields,
     promoted,
-    read_card,
     validity,
 )
 from gates.card.envelope import ENVELOPE_FILE, simulated_envelope, was_judged
+from gates.card.papers import Papers, examine
 from gates.card.people import ALLOW_LIST, load_allow_list
 from gates.card.rollback import require_rollback
 from gates.card.signing import (
     CARDS,
     SignedCard,
-    conflicting_cards,
     independence,
-    open_envelope,
     utc_today,
 )
 from gates.criterion import Measured, criteria_of, criterion
 from gates.engine import GateSpec, judge, recorded_evidence
 from gates.evidence import Evidence, MissingEvidenceError
 from gates.pipeline import check_record
-from gates.preregistration import NONE, PREREGISTRATION, moved_caveats, read_plan
-from gates.protection import REHEARSED, is_rehearsal, require_protection
+from gates.preregistration import PREREGISTRATION, moved_caveats
+from gates.protection import require_protection
 from gates.report import OWNERS, Gate, GateReport, stage_of
 from gates.reproducibility.settings import RELOAD, excepted_until
 from gates.running import require_running_code
 from gates.settings import GateSettings, read_limits, read_params, read_settings
-from genpolicy.errors import BadInputError, GenpolicyError, IntegrityError
+from genpolicy.errors import GenpolicyError, IntegrityError
 from genpolicy.evidence.documents.reproducibility import CANDIDATES
-from genpolicy.integrity.hashing import sha256_bytes_of
 
 
 class CardGateSettings(GateSettings):
@@ -70,23 +67,6 @@ class Chain:
     reports: Mapping[Gate, GateReport]
     hashes: Mapping[Gate, str]
     error: str = ""
-
-
-@dataclass(frozen=True)
-class Papers:
-    """The draft and the envelope as they lie there.
-
-    Attributes:
-        draft: The draft card, if it can be read.
-        present: Whether an envelope lies in `cards/`.
-        signed: The verified card; None if there is none or it is refused.
-        refusal: Why the envelope is refused; empty if it is not.
-    """
-
-    draft: TrialCard | None
-    present: bool
-    signed: SignedCard | None
-    refusal: str
 
 
 @dataclass(frozen=True)
@@ -133,44 +113,6 @@ def judge_card(root: Path, chain: Chain, *, today: datetime.date | None = None) 
     check_record(root, "E", report.materials)
     require_running_code(root)
     return report
-
-
-def examine(root: Path, name: str) -> Papers:
-    """Read the draft and verify the envelope of that name, if there is one."""
-    draft = _draft(root)
-    path = root / CARDS / f"{name}.dsse.json"
-    present = path.exists() or path.is_symlink()
-    signed, refusal = None, ""
-    if present:
-        try:
-            others = conflicting_cards(root, name)
-            if others:
-                raise BadInputError(
-                    where=CARDS,
-                    found=f"holding {', '.join(others)} as well",
-                    expected="one card",
-                    action="Retire the others.",
-                )
-            data = sha256_bytes_of(path, keep=True)[1]
-            allowed = load_allow_list(root)
-            signed = open_envelope(root, data, where=path.name, allowed=allowed)
-            if signed.card.name != name:
-                signed, refusal = None, "the card has another name than its file"
-            if read_plan(root) is None:
-                signed, refusal = None, NONE
-            if is_rehearsal(read_params(root)):
-                signed, refusal = None, REHEARSED
-        except GenpolicyError as error:
-            signed, refusal = None, str(error)
-    return Papers(draft, present, signed, refusal)
-
-
-def _draft(root: Path) -> TrialCard | None:
-    try:
-        data = sha256_bytes_of(root / DRAFT_PATH, keep=True)[1]
-        return read_card(data, where=DRAFT_PATH)
-    except BadInputError:
-        return None
 
 
 def _chain_error(root: Path, chain: Chain, draft: TrialCard | None) -> str:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from gates.card.card import ABORT_FROM, DRAFT_PATH, TrialCard
 from gates.card.envelope import ENVELOPE_FILE
-from gates.card.judge import Papers, examine
+from gates.card.papers import Papers, examine
 from gates.card.people import REVIEWER
 from gates.card.rollback import rollback_of
 from gates.evidence import Evidence, MissingEvidenceError, numbers

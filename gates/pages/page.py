@@ -15,7 +15,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from gates.card.card import DRAFT_PATH, TrialCard
-from gates.card.judge import examine
+from gates.card.papers import examine
 from gates.evidence import Evidence, MissingEvidenceError
 from gates.pages import (
     plots_convergence,

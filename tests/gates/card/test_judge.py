@@ -8,7 +8,8 @@ import evidence
 import pytest
 from team import AUTHORS, PEOPLE
 
-from gates.card.judge import CardGateSettings, examine
+from gates.card.judge import CardGateSettings
+from gates.card.papers import examine
 from gates.claim import CHECKPOINT_ONLY
 from gates.report import parse_section
 from genpolicy.errors import ConfigError
