@@ -1,4 +1,4 @@
-"""Commands of the gates: judge evidence, prove reports, sign and verify cards.
+"""Commands of the gates: judge evidence, prove reports; what `gates.card.commands` registers.
 
 Registered in `genpolicy.commands`. Exit codes: 0 done, 1 a fault of ours, 2 bad usage or input,
 3 refused: a gate that does not pass, or a report that is not what the files say.
@@ -7,7 +7,7 @@ Registered in `genpolicy.commands`. Exit codes: 0 done, 1 a fault of ours, 2 bad
 import datetime
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -25,8 +25,8 @@ Layout = Annotated[
     Literal["text", "json", "junit", "github"], typer.Option("--format", help="How to print it.")
 ]
 
-gates = new_app("Judge evidence, prove reports, sign and verify cards.")
-verify = new_app("Prove the reports that lie here, or judge the trial card.")
+gates = new_app("Judge evidence, prove reports; cards: `genpolicy card`.")
+verify = new_app("Prove the reports that lie here.")
 
 
 @with_examples(
@@ -205,12 +205,7 @@ def preregister(root: Root = Path()) -> int:
     return 0
 
 
-SIGN_EXAMPLE = "sign --card card.json --key my_key.pem --reviewer my-id"
-
-
-@gates.command(epilog=examples(f"genpolicy gates {SIGN_EXAMPLE}"))
-@with_examples(f"genpolicy {SIGN_EXAMPLE}")
-def sign(
+def sign_card(
     card: Annotated[Path, typer.Option(help="Completed card, or an envelope to sign as well.")],
     key: Annotated[Path, typer.Option(help="Your private key, PEM, Ed25519.")],
     reviewer: Annotated[str, typer.Option(help="Your id on reviewers.yaml.")],
@@ -222,18 +217,16 @@ def sign(
     before the evidence, nobody but the authors may have committed to the
     candidate, and the evidence must be what its journals say (minutes).
     """
-    from gates.card.signing import sign_card
+    from gates.card import signing
     from gates.proof import prove_chain
 
     prove_chain(root, "D")
     _require_beneath(root)
-    path = sign_card(root, card_file=card, key_file=key, reviewer=reviewer)
+    path = signing.sign_card(root, card_file=card, key_file=key, reviewer=reviewer)
     print(f"Signed {path.name} as {reviewer}. Judge gate E again to see what is missing.")
     return 0
 
 
-@gates.command("verify-card", epilog=examples("genpolicy gates verify-card --today 2027-01-31"))
-@verify.command("card", epilog=examples("genpolicy verify card --today 2027-01-31"))
 def verify_card(
     root: Root = Path(),
     today: Annotated[str, typer.Option(help="Day to judge for, YYYY-MM-DD; default today.")] = "",
@@ -241,7 +234,7 @@ def verify_card(
 ) -> int:
     """Judge gate E without writing. Exit 0 only for a valid, complete, signed card.
 
-    Where it would pass, all is asked that `sign` asks before a signature.
+    Where it would pass, all is asked that `card sign` asks before a signature.
     """
     from gates.proof import judge
 
@@ -273,6 +266,39 @@ def summary(root: Root = Path(), as_json: AsJson = False) -> int:
     if (root / INDEX).is_file():
         print(f"Reports: {INDEX}")
     return 0
+
+
+WHATEVER: dict[str, Any] = {"ignore_unknown_options": True, "allow_extra_args": True}
+"""What was typed behind a retired name is not read."""
+
+
+def retired(group: typer.Typer, name: str, instead: str) -> None:
+    """Keep a name that is no command any more, so that it says what is.
+
+    Args:
+        group: Where it was.
+        name: The name.
+        instead: What to type in its place.
+    """
+
+    def say(context: typer.Context) -> int:
+        raise BadInputError(
+            where=context.command_path,
+            found="no command any more",
+            expected=f"genpolicy {instead}",
+            action=f"See `genpolicy {instead} --help`.",
+        )
+
+    say.__doc__ = f"No command any more: `genpolicy {instead}`."
+    epilog = examples(f"genpolicy {instead} --help")
+    group.command(name, hidden=True, context_settings=WHATEVER, epilog=epilog)(say)
+
+
+sign = new_app("No command any more: `genpolicy card sign`.")
+retired(sign, "sign", "card sign")
+retired(gates, "sign", "card sign")
+retired(gates, "verify-card", "card verify")
+retired(verify, "card", "card verify")
 
 
 def _require_beneath(root: Path) -> None:

@@ -33,7 +33,7 @@ def replace_payload(workspace: Path, statement: dict[str, Any]) -> None:
 
 
 def sign_statement(workspace: Path, statement: dict[str, Any], signers: Sequence[str]) -> None:
-    """Sign a statement with real keys, past every check of `genpolicy sign`."""
+    """Sign a statement with real keys, past every check of `genpolicy card sign`."""
     data = canonical_json(statement)
     sealed = b"DSSEv1 %d %b %d %b" % (len(PAYLOAD_TYPE), PAYLOAD_TYPE.encode(), len(data), data)
     signatures = []

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gates.commands import Root, sign, verify_card
+from gates.commands import Root, sign_card, verify_card
 from genpolicy.cli.shell import examples, new_app
 
 if TYPE_CHECKING:
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 SIGN = "card sign --card completed.json --key my_key.pem --reviewer my-id"
 card = new_app("Make a key, fill a card, sign it, verify it.")
-card.command("sign", epilog=examples(f"genpolicy {SIGN}"))(sign)
+card.command("sign", epilog=examples(f"genpolicy {SIGN}"))(sign_card)
 card.command("verify", epilog=examples("genpolicy card verify --today 2027-01-31"))(verify_card)
 
 

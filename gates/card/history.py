@@ -1,6 +1,6 @@
 """What only the history of the repository knows: what came first, and who committed.
 
-Asked by the commands `sign`, `verify card` and `gates check --through E`, not by the judge: the
+Asked by the commands `card sign`, `card verify`, `gates check --through E`, not by the judge: the
 same evidence gives the same report, whatever is committed afterwards.
 
 Git shows the order of commits, not when a run took place or whose hands typed. What was measured

@@ -55,6 +55,8 @@ def every_command() -> list[tuple[str, ...]]:
     found: list[tuple[str, ...]] = []
 
     def walk(command, words) -> None:
+        if command.hidden:  # a retired name, which says what to type
+            return
         found.append(words)
         if isinstance(command, TyperGroup):
             for name in command.list_commands(None):
@@ -78,13 +80,13 @@ def test_the_help_of_every_command_fits_80_columns_and_shows_an_example(words, c
 
 def test_the_program_lists_every_command_and_no_name_twice(capsys) -> None:
     listed = re.findall(r"^  (\S+)  ", help_of([], capsys).partition("Commands:")[2], re.MULTILINE)
-    assert set(listed) == OWN | registered()
+    assert set(listed) == OWN | {words[0] for words in every_command() if words}
     assert len(listed) == len(set(listed))
 
 
 def test_a_command_that_prints_a_table_also_prints_json(capsys) -> None:
     for words in (["gates", "check"], ["gates", "summary"], ["gates", "show"], ["gates", "verify"],
-                  ["verify", "report"], ["verify", "card"], ["doctor"], ["ingest"]):  # fmt: skip
+                  ["verify", "report"], ["card", "verify"], ["doctor"], ["ingest"]):  # fmt: skip
         assert "--json" in help_of(words, capsys), words
 
 

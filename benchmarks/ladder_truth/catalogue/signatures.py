@@ -27,7 +27,7 @@ def _people(change: Callable[[list[dict[str, Any]]], Any]) -> Plant:
 def _signed_again(
     change: Callable[[dict[str, Any]], Any], signers: tuple[str, ...] = base.SIGNERS
 ) -> Plant:
-    """Real keys over another statement, past every check of `genpolicy sign`."""
+    """Real keys over another statement, past every check of `genpolicy card sign`."""
 
     def plant(workspace: Path) -> None:
         statement = base.statement_of(workspace)

@@ -1,4 +1,4 @@
-"""What `sign`, `verify card` and `gates check --through E` ask beside the proof of the chain."""
+"""What `card sign`, `card verify` and `gates check --through E` ask beside the chain."""
 
 import subprocess
 
@@ -7,7 +7,8 @@ import yaml
 from team import AUTHORS, PEOPLE
 
 from gates import proof
-from gates.commands import gates
+from gates.card.commands import card
+from gates.commands import gates, verify
 from gates.proof import Rung
 from genpolicy.cli.shell import run_program
 from genpolicy.errors import RefusedError
@@ -21,7 +22,8 @@ def run(team, capsys):
     """A command on the ladder: exit code, and all that it printed."""
 
     def run(*args):
-        code = run_program(gates, "gates", [*args, "--root", str(team.root)])
+        group = gates if args[0] == "check" else card
+        code = run_program(group, "genpolicy", [*args, "--root", str(team.root)])
         printed = capsys.readouterr()
         return code, printed.out + printed.err
 
@@ -55,8 +57,8 @@ def commit(team):
 
 
 def _sign(team, run, name="rita"):
-    card = team.envelope if team.envelope.exists() else team.complete()
-    return run("sign", "--card", str(card), "--key", str(team.folder / name), "--reviewer", name)
+    file = team.envelope if team.envelope.exists() else team.complete()
+    return run("sign", "--card", str(file), "--key", str(team.folder / name), "--reviewer", name)
 
 
 def test_a_card_is_signed_and_verified_where_all_of_it_holds(team, run, journals, commit):
@@ -65,7 +67,7 @@ def test_a_card_is_signed_and_verified_where_all_of_it_holds(team, run, journals
         assert code == 0, said
     assert set(journals) == set("ABCD")
     journals.clear()
-    code, said = run("verify-card", *DAY)
+    code, said = run("verify", *DAY)
     assert code == 0 and "PASS" in said, said
     assert set(journals) == set("ABCD")
 
@@ -97,7 +99,7 @@ def test_evidence_that_its_journals_do_not_say_is_refused(team, run, commit, mon
     assert code == 3 and f"Gate {gate} refuses: rollout is 1" in said, said
     assert not team.envelope.exists()
     team.sign(team.complete(), PEOPLE)
-    code, said = run("verify-card", *DAY)
+    code, said = run("verify", *DAY)
     assert code == 3 and f"Gate {gate} refuses: rollout is 1" in said, said
 
 
@@ -111,7 +113,7 @@ def asked(team, run, journals, monkeypatch):
     team.sign(team.complete(), PEOPLE)
 
     def asked():
-        return [run("verify-card", *DAY), run("check", "--through", "E")]
+        return [run("verify", *DAY), run("check", "--through", "E")]
 
     return asked
 
@@ -160,3 +162,17 @@ def test_a_verdict_below_is_said_before_the_history(run, monkeypatch):
     monkeypatch.setattr(proof, "prove_all", lambda root: failed)
     code, said = run("check", "--through", "E")
     assert code == 3 and "git" not in said
+
+
+@pytest.mark.parametrize(
+    ("group", "typed", "instead"),
+    [
+        (gates, "sign", "card sign"), (gates, "verify-card", "card verify"),
+        (verify, "card", "card verify"), ("gates.commands:sign", None, "card sign"),
+    ],
+)  # fmt: skip
+def test_a_retired_name_says_what_to_type(group, typed, instead, capsys):
+    words = [*([typed] if typed else []), "--card", "c.json", "--today", "2027-01-31"]
+    assert run_program(group, "genpolicy", words) == 2
+    said = capsys.readouterr()
+    assert f"no command any more, expected genpolicy {instead}." in said.err and not said.out
