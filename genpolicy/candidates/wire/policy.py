@@ -4,6 +4,7 @@ An invocation that ends in a fault gives chunks of NaN, which the first layer of
 one by one: the candidate pays for it, and whoever asked goes on.
 """
 
+import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -13,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.candidates.brought import BroughtPolicy
+from genpolicy.candidates.wire.connection import Clock
 from genpolicy.candidates.wire.entry import verify_files
 from genpolicy.candidates.wire.extension import Capabilities
 from genpolicy.candidates.wire.faults import PolicyError
@@ -40,6 +42,7 @@ class WirePolicy:
     Args:
         brought: Who it is.
         remote: How it is asked.
+        clock: Of this machine.
 
     Attributes:
         asked: Invocations so far.
@@ -48,8 +51,10 @@ class WirePolicy:
 
     guided = False
 
-    def __init__(self, brought: BroughtPolicy, remote: RemotePolicy) -> None:
-        self._brought, self._remote = brought, remote
+    def __init__(
+        self, brought: BroughtPolicy, remote: RemotePolicy, *, clock: Clock = time.perf_counter
+    ) -> None:
+        self._brought, self._remote, self._clock = brought, remote, clock
         self._in_a_row = 0
         self.asked = 0
         self.faults: Counter[str] = Counter()
@@ -124,10 +129,13 @@ class WirePolicy:
 
         Whatever no span of its server explains is counted as sampling: the message itself, and all
         of a server that measures nothing. A term that nobody measured is NaN: unknown, not zero.
+        An invocation that ends in a fault took as long as it was waited for.
         """
+        begun = self._clock()
         answer = self.invoke(observations, noise=noise, candidates=candidates)
         if answer is None:
-            return dict.fromkeys(OWN_TERMS, np.nan), self._chunks(None, candidates)
+            waited = {**dict.fromkeys(OWN_TERMS, np.nan), Term.SAMPLE: self._clock() - begun}
+            return waited, self._chunks(None, candidates)
         spans = {term: answer.spans_s.get(str(term), np.nan) for term in OWN_TERMS}
         rest_s = answer.seconds - sum(answer.spans_s.get(str(term), 0.0) for term in OWN_TERMS)
         known_s = 0.0 if np.isnan(spans[Term.SAMPLE]) else spans[Term.SAMPLE]

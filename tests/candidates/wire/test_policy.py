@@ -23,7 +23,7 @@ def wire(serving, entry, task, tmp_path):
         remote = RemotePolicy(entry, context.__enter__(), task.observation, **clock)
         opened.append((context, remote))
         brought = BroughtPolicy("planted", tmp_path / "planted.yaml", entry, "c" * 64, 0)
-        return WirePolicy(brought, remote)
+        return WirePolicy(brought, remote, **clock)
 
     yield open_line
     for context, remote in opened:
@@ -111,6 +111,14 @@ def test_a_server_that_measures_nothing_is_all_sampling(wire, task):
     policy = wire(Planted(spans=[]), clock=lambda: next(ticks))
     terms, _ = policy.timed(seen(1, task)[0], noise=("a",), candidates=1)
     assert terms[Term.SAMPLE] == 2.0
+
+
+def test_a_fault_took_as_long_as_it_was_waited_for(wire, task):
+    ticks = iter(np.arange(0.0, 1000.0, 2.0))
+    policy = wire(Fails(0), clock=lambda: next(ticks))
+    terms, chunks = policy.timed(seen(1, task)[0], noise=("a",), candidates=1)
+    assert np.isnan(chunks).all() and np.isnan(terms[Term.ENCODE])
+    assert terms[Term.SAMPLE] >= 2.0
 
 
 def test_no_server_is_asked_to_go_on_from_a_prefix(wire, task):
