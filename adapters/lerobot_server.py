@@ -23,6 +23,31 @@ from websockets.sync.server import serve
 
 MAXIMUM_MESSAGE_BYTES = 16 << 20
 MOST_CANDIDATES = 64
+NETWORKS = {"act": "model.forward", "diffusion": "diffusion.unet.forward"}
+"""What runs once per evaluation, by type of policy; of other types nobody counts."""
+ENCODERS = {"act": "model.encoder.forward", "diffusion": "diffusion._prepare_global_conditioning"}
+"""What makes a condition of the observation, by type of policy; its time is the term `encode`."""
+
+
+class Watched:
+    """A function of the policy that is counted and timed where it is called."""
+
+    def __init__(self, policy: torch.nn.Module, path: str) -> None:
+        self.calls, self.seconds = 0, 0.0
+        owner, _, name = path.rpartition(".")
+        for part in owner.split("."):
+            policy = getattr(policy, part)
+        inner = getattr(policy, name)
+
+        def watched(*args: object, **kwargs: object) -> object:
+            begun = time.perf_counter()
+            try:
+                return inner(*args, **kwargs)
+            finally:
+                self.calls += 1
+                self.seconds += time.perf_counter() - begun
+
+        setattr(policy, name, watched)
 
 
 class Served:
@@ -41,6 +66,9 @@ class Served:
         self.history = getattr(config, "n_obs_steps", 1)
         self.inputs = [name for name in config.input_features if not name.startswith("action")]
         self.asked = 0
+        kind = config.type
+        self.network = Watched(self.policy, NETWORKS[kind]) if kind in NETWORKS else None
+        self.encoder = Watched(self.policy, ENCODERS[kind]) if kind in ENCODERS else None
 
     @property
     def metadata(self) -> dict:
@@ -51,7 +79,8 @@ class Served:
             "genpolicy": {
                 "version": 1, "checkpoint": self.checkpoint,
                 "seeded": True, "candidates": MOST_CANDIDATES,
-                "spans": ["preprocess", "sample"],
+                "counts_evaluations": self.network is not None,
+                "spans": ["preprocess", *(["encode"] if self.encoder else []), "sample"],
             },
         }  # fmt: skip
 
@@ -71,17 +100,21 @@ class Served:
             }
         prepared = time.perf_counter()
         wanted = said["candidates"] if said else 1
+        for watched in (self.network, self.encoder):
+            if watched:
+                watched.calls, watched.seconds = 0, 0.0
         drawn = [self.draw(batch, noise, number) for number in range(wanted)]
         sampled = time.perf_counter()
         if not said:
             return {"actions": drawn[0]}
-        return {
-            "actions": np.stack(drawn),
-            "genpolicy": {
-                "invocation": said["invocation"], "checkpoint": self.checkpoint,
-                "spans_s": {"preprocess": prepared - begun, "sample": sampled - prepared},
-            },
-        }  # fmt: skip
+        encoding = self.encoder.seconds if self.encoder else 0.0
+        spans = {"preprocess": prepared - begun, "sample": sampled - prepared - encoding}
+        if self.encoder:
+            spans["encode"] = encoding
+        told = {"invocation": said["invocation"], "checkpoint": self.checkpoint, "spans_s": spans}
+        if self.network:
+            told["nfe"] = self.network.calls // wanted
+        return {"actions": np.stack(drawn), "genpolicy": told}
 
     def draw(self, batch: dict, noise: list, number: int) -> np.ndarray:
         """One chunk (K, D), from torch's own generator, seeded by the name of the noise."""

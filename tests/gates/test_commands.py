@@ -60,7 +60,9 @@ def test_summary_prints_one_line_per_stage_and_exits_0(ladder, _run):
     assert "reports/index.html" not in result.output, "a page that is not there is not announced"
     (ladder / "reports" / "index.html").write_text("")
     assert "reports/index.html" in _run(ladder, "summary").output
-    rows = json.loads(_run(ladder, "summary", "--json").output)
+    as_json = _run(ladder, "summary", "--json")
+    assert as_json.exit_code == 0
+    rows = json.loads(as_json.output)
     verdicts = {row["stage"]: row["verdict"] for row in rows}
     assert [verdicts[f"gate_{letter}"] for letter in "abcd"] == ["PASS"] * 4
 
