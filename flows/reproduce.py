@@ -25,6 +25,7 @@ from genpolicy.outputs import require_own_files
 
 EXIT_DONE, EXIT_FAULT, EXIT_BAD_INPUT, EXIT_REFUSED = 0, 1, 2, 3
 KEPT_LINES = 400
+FIRST_PAGE = "reports/index.html"
 GRACE_S = 5.0
 
 FAILED_STAGE = re.compile(
@@ -120,10 +121,24 @@ def reproduce(
         if process.poll() is None:
             stop_group(process)
         _running.discard(process)
+    if code == 0:
+        _print_first_page(workspace)
     duration_s = time.monotonic() - started
     if code == 0 and not stages:
         return _of_the_last_gate(workspace, duration_s)
     return _outcome(code, list(lines), duration_s)
+
+
+def _print_first_page(workspace: Path) -> None:
+    """Once more, where there is one: DVC may have brought back what it was printed without.
+
+    Each gate prints it. What stands on a gate that was judged again to the same bytes does not run,
+    and is put back behind it. Whether the page is right is told by `genpolicy report status`.
+    """
+    if (workspace / FIRST_PAGE).is_file():
+        command = [sys.executable, "-m", "gates.writing"]
+        environment = stage_environment(workspace)
+        subprocess.run(command, cwd=workspace, env=environment, check=False, capture_output=True)
 
 
 def stage_environment(workspace: Path) -> dict[str, str]:

@@ -1,7 +1,7 @@
 """Writing reports: judge, render, and put the JSON there last.
 
 The old JSON is removed first, so that a crash in between leaves no verdict rather than an old
-one.
+one. `python -m gates.writing` prints the ladder's first page once more.
 """
 
 import contextlib
@@ -101,3 +101,7 @@ def _remove(path: Path) -> None:
             expected="a writable reports folder",
             action="Fix the permissions, then judge again.",
         ) from error
+
+
+if __name__ == "__main__":
+    write_index(Path())

@@ -187,14 +187,14 @@ def test_a_failed_gate_stops_repro_and_the_report_says_why(copy: Path) -> None:
         "artifacts/measure_baselines",
     )
     outcome, ran = repro(copy)
-    assert (outcome.code, outcome.stage) == (3, "train_generators")
-    assert ran == ["gate_a", "train_generators"]
+    assert (outcome.code, outcome.stage) == (3, "candidates")  # the first behind the gate
+    assert ran == ["gate_a"]
     assert re.search(
         r"Gate A refuses: persistence_margin is [\d.]+, required >= 1e\+09; "
         r"see reports/gate_a\.json",
         outcome.sentence,
     ), outcome.sentence
-    assert not (copy / "artifacts" / "train_generators").exists()
+    assert not (copy / "artifacts" / "candidates").exists()
     assert (
         hashes(
             copy,
