@@ -12,6 +12,7 @@ from gates.card.envelope import ENVELOPE_FILE
 from gates.card.papers import Papers, examine
 from gates.card.people import REVIEWER
 from gates.card.rollback import rollback_of
+from gates.engine import upstream_hashes
 from gates.evidence import Evidence, MissingEvidenceError, numbers
 from gates.pages.bound import require_bound
 from gates.pages.desk import at_its_end, human
@@ -114,6 +115,9 @@ def signing_of(
     draft = papers.draft if papers else None
     if papers is None or draft is None or "D" not in reports:
         return Signing(missing="no card is drafted; only a gate D that passes leads to one")
+    if draft.reports != upstream_hashes(evidence.root, "E"):
+        # While a gate is judged again, the draft of the run before still lies there.
+        return Signing(missing="the card that lies here was drafted from other reports")
     people = papers.signed.signers if papers.signed else ()
     roles = {person.role for person in people}
     return Signing(

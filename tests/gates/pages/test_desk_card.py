@@ -117,3 +117,12 @@ def test_a_refused_card_is_said_to_be_refused(copied, judged):
     signing, card = of(copied, reports)
     assert "unknown key" in signing.refusal and signing.signed == ()
     assert card == read_draft(copied)
+
+
+def test_a_card_of_other_reports_is_not_shown_as_what_one_signs(copied, waits):
+    """While Gate D is judged again, for other candidates too: the draft before lies there still."""
+    path = copied / "reports/gate_d.json"
+    path.write_bytes(path.read_bytes() + b" ")
+    other = waits["D"].model_copy(update={"criteria": (), "promoted": "another"})
+    signing, _ = of(copied, {**waits, "D": other})
+    assert signing.items == () and "drafted from other reports" in signing.missing
