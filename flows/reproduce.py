@@ -121,10 +121,9 @@ def reproduce(
         if process.poll() is None:
             stop_group(process)
         _running.discard(process)
-    if code == 0:
-        _print_first_page(workspace)
     duration_s = time.monotonic() - started
     if code == 0 and not stages:
+        _print_first_page(workspace)
         return _of_the_last_gate(workspace, duration_s)
     return _outcome(code, list(lines), duration_s)
 

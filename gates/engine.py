@@ -170,10 +170,9 @@ def judge(
         if item.id in limits.waived:
             continue
         limit = limits.of.get(item.id)
-        for name in candidates if item.per_candidate else (None,):
-            if settings.excepted(item.id, name):
-                continue
-            answers.append(_answer(item, evidence, inputs, limit, name))
+        names = candidates if item.per_candidate else (None,)
+        asked = (name for name in names if not settings.excepted(item.id, name))
+        answers += [_answer(item, evidence, inputs, limit, name) for name in asked]
     verdict, verdicts = combine(answers, expects_candidates=spec.below is not None)
     evidence.bind(*spec.bind)
     lacking = _lacking(evidence)

@@ -43,6 +43,7 @@ class Named:
 PEOPLE, SIGNING, CARD = "gates/card/people.py", "gates/card/signing.py", "gates/card/card.py"
 JUDGE, TRIAL, ROLLOUTS = "gates/card/judge.py", "gates/stress/trial.py", "gates/stress/rollouts.py"
 BOUNDS, VERDICTS = "gates/bounds.py", "gates/verdicts.py"
+PAPERS = "gates/card/papers.py"
 STUB, QUEUE = "genpolicy/execution/stub.py", "genpolicy/execution/chunk_queue.py"
 ARRIVAL, EXECUTOR = "genpolicy/execution/arrival.py", "genpolicy/execution/executor.py"
 NAMED = (
@@ -76,9 +77,9 @@ NAMED = (
           "if is_rehearsal(read_params(root)):", "if False:"),
     Named("one person signs twice", SIGNING,
           'if person.key.keyid in {entry["keyid"] for entry in signatures}:', "if False:"),
-    Named("an envelope of another card", JUDGE, "if signed.card.name != name:", "if False:"),
-    Named("two cards at once", JUDGE, "            if others:", "            if False:"),
-    Named("a rehearsal is judged as signed", JUDGE,
+    Named("an envelope of another card", PAPERS, "if signed.card.name != name:", "if False:"),
+    Named("two cards at once", PAPERS, "            if others:", "            if False:"),
+    Named("a rehearsal is judged as signed", PAPERS,
           "if is_rehearsal(read_params(root)):", "if False:"),
     Named("a draft that names other reports", JUDGE,
           "if draft.reports != chain.hashes:", "if False:"),

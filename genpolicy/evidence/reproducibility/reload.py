@@ -10,10 +10,10 @@ from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.data.dataset import Dataset, load_dataset
 from genpolicy.errors import ContractError
 from genpolicy.evidence.admission_context import make_checker
-from genpolicy.evidence.documents.reproducibility import CANDIDATES
+from genpolicy.evidence.documents.reproducibility import CANDIDATES, CandidateIdentity
 from genpolicy.evidence.need.held_out import HeldOut, held_out_situations, modes_of_policy
 from genpolicy.evidence.need.offline import offline_rows
-from genpolicy.evidence.reproducibility.brought import Asked, ask_brought
+from genpolicy.evidence.reproducibility.brought import Answered, Asked, ask_brought
 from genpolicy.evidence.reproducibility.identity import Deployment, identities
 from genpolicy.evidence.reproducibility.likelihood import density_rows, drawn_situations
 from genpolicy.evidence.reproducibility.measure import in_fresh_process
@@ -77,6 +77,14 @@ class ReloadRows:
     earlier: list[ModeRow] = field(default_factory=list)
     density: list[DensityRow] = field(default_factory=list)
 
+    def take(self, answered: Answered) -> CandidateIdentity:
+        """Add the rows of a policy that was brought; returns who it is."""
+        self.samples += answered.samples
+        self.nfe += answered.nfe
+        self.modes += answered.modes
+        self.coverage += answered.coverage
+        return answered.identity
+
     def write(self, folder: Path) -> None:
         """Write every table."""
         write_rows(folder / "samples.parquet", SampleRow, self.samples)
@@ -98,8 +106,8 @@ def write_reload(
 ) -> None:
     """Reload every candidate in a fresh process, compare, sweep the NFE, write the evidence.
 
-    Modes are counted a second time with the weights of three quarters of the training: what the
-    last quarter still changes, a longer training might go on changing.
+    Modes are counted again with the weights of three quarters of the training: what the last
+    quarter changes, a longer training might go on changing.
 
     Args:
         plan: What is reloaded and swept.
@@ -127,30 +135,25 @@ def write_reload(
             + _reloaded(plan, candidate, before, rows),
             nonfinite_weights=entry.nonfinite_weights + nonfinite_weights(policy),
         )
-        rows.offline += offline_rows(policy, data, seed=candidate.seed, horizons=plan.horizons)
-        own, swept = _sweep(
-            plan, policy, held_out, candidate.seed, task=task, checker=checker, data=data
-        )
-        rows.modes += own
+        seed = candidate.seed
+        rows.offline += offline_rows(policy, data, seed=seed, horizons=plan.horizons)
+        own, swept = _sweep(plan, policy, held_out, seed, task=task, checker=checker, data=data)
+        rows.modes, rows.coverage = rows.modes + own, rows.coverage + swept
         rows.earlier += modes_of_policy(
             load_policy(candidate.folder / EARLIER_FOLDER),
             held_out,
-            seed=candidate.seed,
+            seed=seed,
             convention=policy.sampler.name,
             samples=plan.samples,
             task=task,
             checker=checker,
         )
-        rows.coverage += swept
         rows.density += density_rows(
-            policy, drawn_situations(held_out), data, seed=candidate.seed, samples=plan.samples
+            policy, drawn_situations(held_out), data, seed=seed, samples=plan.samples
         )
-    asked = Asked(data, task, checker, held_out, plan.samples, plan.deployment)
     for other in brought:
-        answered = ask_brought(other, asked)
-        identity[other.name] = answered.identity
-        for name in ("samples", "nfe", "modes", "coverage"):
-            getattr(rows, name).extend(getattr(answered, name))
+        asked = Asked(data, task, checker, held_out, plan.samples, plan.deployment)
+        identity[other.name] = rows.take(ask_brought(other, asked))
     rows.write(folder)
     CANDIDATES.write(folder, identity)
 
