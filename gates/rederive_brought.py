@@ -6,9 +6,9 @@ from typing import Any
 
 from gates.reproducibility.settings import BROUGHT_FOLDER
 from gates.settings import section_of
-from gates.stated import compare_keys, mapping, section, training_seed
-from genpolicy.candidates.brought import BroughtPolicy, read_brought, require_brought
-from genpolicy.contract.horizons import HorizonConfig
+from gates.stated import compare_keys, mapping, training_seed
+from genpolicy.candidates.brought import BroughtPolicy, read_brought
+from genpolicy.candidates.wire.entry import verify_files
 from genpolicy.evidence.documents.brought import BROUGHT, brought_document
 from genpolicy.integrity.documents import read_json
 
@@ -36,8 +36,10 @@ def rederive_brought(root: Path, params: Mapping[str, Any]) -> None:
         ConfigError: An entry cannot be read.
     """
     entries = {name: str(path) for name, path in section_of(params, "candidates").items()}
-    horizons = section(params, "horizons", HorizonConfig)
-    found = brought_document(require_brought(entries, horizons=horizons, root=root))
+    policies = read_brought(entries, seed=0, root=root)
+    for policy in policies:
+        verify_files(policy.entry, policy.folder)
+    found = brought_document(policies)
     stated = mapping(read_json(root / BROUGHT_FOLDER / BROUGHT.file))
     how = "as its entry says now"
     compare_keys("B", f"{BROUGHT_FOLDER}/{BROUGHT.file}", stated, BROUGHT.plain(found), how)

@@ -36,7 +36,15 @@ DOCUMENTS = documents()
 
 @pytest.fixture(scope="module")
 def root(tmp_path_factory, _ladder):
-    return shutil.copytree(_ladder, tmp_path_factory.mktemp("documents") / "repo")
+    copied = shutil.copytree(_ladder, tmp_path_factory.mktemp("documents") / "repo")
+    # Nobody is brought to that ladder, and of nobody no key can be left out.
+    somebody = {
+        "author": "a@example.org", "sha256": "a" * 64, "files": {"weights": "b" * 64},
+        "started_here": True, "dataset": "c" * 64, "training_seed": 1,
+    }  # fmt: skip
+    path = copied / "artifacts/candidates/candidates.json"
+    path.write_bytes(canonical_json({"flow": somebody}))
+    return copied
 
 
 def folders(root, of):

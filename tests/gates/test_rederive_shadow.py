@@ -64,7 +64,8 @@ class Demonstrator:
     def __init__(self, observations):
         self.chunks = {(o.episode_uuid, o.index): o.demonstrated for o in observations}
 
-    def sample(self, seen, *, noise_names, candidates):
+    def sample(self, seen, *, noise_names, candidates, prefix=None):
+        assert prefix is None  # Gate C draws from nothing that went before
         good = np.stack([self.chunks[name[1:]] for name in noise_names])
         wide = good.copy()
         wide[:, 5:, -1] = 0.2

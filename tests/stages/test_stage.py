@@ -222,7 +222,7 @@ def test_a_stage_says_its_place_and_for_how_long_it_is_at_it(
     monkeypatch.setattr("stages._stage.still_at_it", spoken)
     with pytest.raises(SystemExit):
         main(stage, lambda _: seen.append(os.environ[STAGE]))
-    assert seen == [(usual_s, every_s), f"[{STAGES.index(stage) + 1}/19] {stage}"]
+    assert seen == [(usual_s, every_s), f"[{STAGES.index(stage) + 1}/{len(STAGES)}] {stage}"]
 
 
 def test_nothing_speaks_beside_what_measures_time(workspace, monkeypatch) -> None:
