@@ -123,39 +123,52 @@ def write_reload(
     data, task = load_dataset(plan.dataset), load_task(plan.task)
     checker = make_checker(task, plan.feasibility, action_period_s=plan.horizons.action_period_s)
     held_out = held_out_situations(plan.audit, data, horizons=plan.horizons)
+    asked = Asked(data, task, checker, held_out, plan.samples, plan.deployment)
     written = read_rows(fixtures, FixtureRow)
     rows, identity = ReloadRows(), identities(candidates, data, plan.deployment)
     for candidate in candidates:
         before = [r for r in written if (r.method, r.seed) == (candidate.name, candidate.seed)]
+        differing = _reloaded(plan, candidate, before, rows)
         policy = candidate.load()
         entry = identity[candidate.name]
         identity[candidate.name] = replace(
             entry,
-            metadata_mismatches=entry.metadata_mismatches
-            + _reloaded(plan, candidate, before, rows),
+            metadata_mismatches=entry.metadata_mismatches + differing,
             nonfinite_weights=entry.nonfinite_weights + nonfinite_weights(policy),
         )
-        seed = candidate.seed
-        rows.offline += offline_rows(policy, data, seed=seed, horizons=plan.horizons)
-        own, swept = _sweep(plan, policy, held_out, seed, task=task, checker=checker, data=data)
-        rows.modes, rows.coverage = rows.modes + own, rows.coverage + swept
-        rows.earlier += modes_of_policy(
-            load_policy(candidate.folder / EARLIER_FOLDER),
-            held_out,
-            seed=seed,
-            convention=policy.sampler.name,
-            samples=plan.samples,
-            task=task,
-            checker=checker,
-        )
-        rows.density += density_rows(
-            policy, drawn_situations(held_out), data, seed=seed, samples=plan.samples
-        )
+        _measured(plan, candidate, policy, asked, rows)
     for other in brought:
-        asked = Asked(data, task, checker, held_out, plan.samples, plan.deployment)
         identity[other.name] = rows.take(ask_brought(other, asked))
     rows.write(folder)
     CANDIDATES.write(folder, identity)
+
+
+def _measured(
+    plan: ReloadPlan,
+    candidate: JudgedPolicy,
+    policy: NetworkPolicy,
+    asked: Asked,
+    rows: ReloadRows,
+) -> None:
+    """Errors, modes, sweep and densities of a candidate that came back."""
+    data, held_out, seed = asked.data, asked.held_out, candidate.seed
+    task, checker = asked.task, asked.checker
+    rows.offline += offline_rows(policy, data, seed=seed, horizons=plan.horizons)
+    own, swept = _sweep(plan, policy, held_out, seed, task=task, checker=checker, data=data)
+    rows.modes += own
+    rows.coverage += swept
+    rows.earlier += modes_of_policy(
+        load_policy(candidate.folder / EARLIER_FOLDER),
+        held_out,
+        seed=seed,
+        convention=policy.sampler.name,
+        samples=plan.samples,
+        task=task,
+        checker=checker,
+    )
+    rows.density += density_rows(
+        policy, drawn_situations(held_out), data, seed=seed, samples=plan.samples
+    )
 
 
 def nonfinite_weights(policy: NetworkPolicy) -> int:
