@@ -114,10 +114,8 @@ def require_makers_known(root: Path, authors: Sequence[str], allowed: AllowList)
     if changed or not committed:
         name = str(changed).splitlines()[0].split(maxsplit=1)[-1] if changed else "the candidate"
         _refuse(name, "not committed as it lies here", "a commit that says who made it")
-    owner = {mail.casefold(): person.id for person in allowed.people for mail in person.emails}
     for mail in _addresses(str(committed)):
-        if owner.get(mail) not in authors:
-            who = owner.get(mail, f"somebody not on {ALLOW_LIST}")
+        if who := _no_author(mail, authors, allowed):
             found = f"by {who}, who committed as {mail or 'nobody: the address is empty'}"
             expected = f"commits of its authors alone ({', '.join(authors) or 'none is named'})"
             _refuse("the candidate", found, expected, NAME_ALL)
@@ -144,12 +142,23 @@ def require_author_of_brought(
     if candidate not in brought:
         return
     mail = brought[candidate].author.casefold()
-    owner = {own.casefold(): person.id for person in allowed.people for own in person.emails}
-    if owner.get(mail) not in authors:
-        who = owner.get(mail, f"somebody not on {ALLOW_LIST}")
+    if who := _no_author(mail, authors, allowed):
         found = f"by {who}, whom its entry names as {mail}"
         expected = f"one of the authors of the card ({', '.join(authors) or 'none is named'})"
         _refuse(f"the candidate {candidate}", found, expected, NAME_ALL)
+
+
+def _no_author(mail: str, authors: Sequence[str], allowed: AllowList) -> str:
+    """Whose address it is, where it is none of the authors'; empty where it is.
+
+    Args:
+        mail: The address, without regard to case.
+        authors: Identifiers that the card names.
+        allowed: The allow-list; an address belongs to one person of it.
+    """
+    owner = {own.casefold(): person.id for person in allowed.people for own in person.emails}
+    who = owner.get(mail, f"somebody not on {ALLOW_LIST}")
+    return "" if owner.get(mail) in authors else who
 
 
 def _addresses(makers: str) -> list[str]:
