@@ -256,15 +256,17 @@ def test_a_round_trip_is_that_of_a_ping(raw, serving):
 
 
 def test_who_answers_no_ping_is_not_at_fault(raw):
-    end = threading.Event()
+    deaf, end = threading.Event(), threading.Event()
 
     def talk(line):
         line.send(pack(HELLO))
         line.protocol_mutex.acquire()  # its library answers nothing any more
+        deaf.set()
         end.wait(60)
         line.protocol_mutex.release()
 
     line = dial(raw(talk), allowed=None, timeout_s=60.0)
+    assert deaf.wait(60)  # before, a ping may still be answered
     assert line.round_trip_s(timeout_s=0.2, clock=time.monotonic) is None
     end.set()
     line.close()
