@@ -25,7 +25,6 @@ def opened(candidate: Contender, contract: ObservationContract) -> Iterator[Runn
     Raises:
         IntegrityError: Its files are not those of its identity.
         BadInputError: Its files are missing or malformed.
-        PolicyError: It is behind the wire, and its server is not there.
     """
     if isinstance(candidate, BroughtPolicy):
         with running(candidate, contract) as policy:

@@ -1,5 +1,6 @@
 """A candidate's entry: what somebody's policy is, where it lies, and what its numbers mean."""
 
+import shutil
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -258,6 +259,28 @@ def read_entry(path: Path) -> ServerEntry:
             action="See docs/candidates.md.",
         )
     return parse_settings(ServerEntry, values, where=str(path))
+
+
+def require_program(entry: ServerEntry, folder: Path) -> None:
+    """Refuse an entry whose command cannot be run on this machine, before anything runs.
+
+    Args:
+        entry: What it is.
+        folder: Of the entry's file; the command runs there.
+
+    Raises:
+        ConfigError: There is no such program.
+    """
+    if entry.command is None:
+        return
+    program = entry.command[0]
+    if shutil.which(program if "/" not in program else str(folder / program)) is None:
+        raise ConfigError(
+            where=f"command of the candidate {entry.name}",
+            found=f"{program!r}, which is no program of this machine",
+            expected="one that can be run",
+            action="Install it, or name its full path.",
+        )
 
 
 def verify_files(entry: ServerEntry, folder: Path) -> None:

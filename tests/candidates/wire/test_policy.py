@@ -1,10 +1,13 @@
 """A policy behind the wire in the place of ours: its faults are chunks that are none."""
 
+import sys
+
 import numpy as np
 import pytest
 
 from genpolicy.candidates.brought import BroughtPolicy
-from genpolicy.candidates.wire.extension import WORD
+from genpolicy.candidates.wire.extension import WORD, Capabilities
+from genpolicy.candidates.wire.faults import Fault
 from genpolicy.candidates.wire.policy import GONE_AFTER, WirePolicy, running
 from genpolicy.candidates.wire.remote import RemotePolicy
 from genpolicy.contract.latency import Term
@@ -68,6 +71,58 @@ def test_a_fault_is_a_chunk_of_nan_and_the_next_answer_counts_again(wire, task):
     assert np.isnan(drawn[1]).all()
     assert np.isfinite(drawn[[0, 2]]).all()
     assert dict(policy.faults) == {"refused": 1}
+
+
+def test_each_row_says_how_it_failed(wire, task):
+    policy = wire(Fails(1))
+    names = [("a", number) for number in range(3)]
+    drawn = policy.sample(seen(3, task), noise_names=names, candidates=2)
+    assert drawn.faults == (None, Fault.REFUSED, None)
+    assert "no" in policy.last_words
+
+
+class SendsNone(Planted):
+    """Of the chunks of a message the first ones hold a number that is none."""
+
+    def __init__(self, broken):
+        super().__init__()
+        self.broken = broken
+
+    def __call__(self, message):
+        answer = super().__call__(message)
+        answer["actions"][: self.broken, 5, 2] = np.nan
+        return answer
+
+
+def test_an_answer_without_one_finite_chunk_is_a_fault_and_one_with_one_is_none(wire, task):
+    names = [("a", number) for number in range(GONE_AFTER + 2)]
+    policy = wire(SendsNone(3))
+    drawn = policy.sample(seen(len(names), task), noise_names=names, candidates=3)
+    assert set(drawn.faults) == {Fault.NONFINITE} and np.isnan(drawn.actions).all()
+    assert policy.faults == {"nonfinite": len(names)}  # it did answer, and is asked on
+    drawn = wire(SendsNone(2)).sample(seen(1, task), noise_names=[("a",)], candidates=3)
+    assert drawn.faults == (None,)
+    np.testing.assert_array_equal(np.isfinite(drawn.actions[0]).all(axis=(1, 2)), [0, 0, 1])
+
+
+@pytest.mark.parametrize("command", [
+    [sys.executable, "-c", "raise SystemExit('no weights here')  # {port}"],
+    [sys.executable, "-c", "import time; time.sleep(60)  # {port}"],
+])  # fmt: skip
+def test_a_server_that_does_not_start_fails_every_invocation_and_stops_nobody(
+    entry_of, task, tmp_path, command
+):
+    entry = entry_of(address=None, command=command, start_timeout_s=1.0)
+    brought = BroughtPolicy("planted", tmp_path / "planted.yaml", entry, "c" * 64, 0)
+    with running(brought, task.observation) as policy:
+        assert (policy.guided, policy.told) == (False, Capabilities())
+        names = [("a", number) for number in range(GONE_AFTER + 1)]
+        drawn = policy.sample(seen(len(names), task), noise_names=names, candidates=2)
+        assert drawn.actions.shape == (len(names), 2, 16, 10) and np.isnan(drawn.actions).all()
+        assert drawn.faults[-1] == Fault.GONE and len(set(drawn.faults[:-1])) == 1
+        assert ("no weights here" if "raise" in command[2] else "does not listen") in (
+            policy.last_words
+        )
 
 
 def test_who_fails_again_and_again_is_asked_no_more(wire, task):
