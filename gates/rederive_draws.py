@@ -196,12 +196,12 @@ def _draw_again(
         joining: How chunks of all methods join.
         always: A policy that always draws the same was asked for as many, too.
     """
-    contract = load_task(section(params, "task", TaskSection).name).observation
+    task = load_task(section(params, "task", TaskSection).name)
     rows = section(params, "horizons", HorizonConfig).prediction_horizon
     for method, items in sorted(asked.items()):
         other = brought_policy(root, params, method)
         if other is not None:
-            with running(other, contract) as wire:
+            with running(other, task.observation, scene=task.scene_path) as wire:
                 count = samples if always else candidates_of(wire, samples)
                 _compare(gate, wire, items, count=count, rule=Rule(joining.named(method), rows))
             continue

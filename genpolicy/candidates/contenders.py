@@ -15,19 +15,22 @@ Running = NetworkPolicy | WirePolicy
 
 
 @contextmanager
-def opened(candidate: Contender, contract: ObservationContract) -> Iterator[Running]:
+def opened(
+    candidate: Contender, contract: ObservationContract, *, scene: Path | None = None
+) -> Iterator[Running]:
     """A candidate that can be asked, until the end of the block.
 
     Args:
         candidate: Who it is.
         contract: The observation in force.
+        scene: The MJCF that describes the robot; None where nobody knows it.
 
     Raises:
         IntegrityError: Its files are not those of its identity.
         BadInputError: Its files are missing or malformed.
     """
     if isinstance(candidate, BroughtPolicy):
-        with running(candidate, contract) as policy:
+        with running(candidate, contract, scene=scene) as policy:
             yield policy
     else:
         yield candidate.load()

@@ -194,7 +194,9 @@ class WirePolicy:
 
 
 @contextmanager
-def running(brought: BroughtPolicy, contract: ObservationContract) -> Iterator[WirePolicy]:
+def running(
+    brought: BroughtPolicy, contract: ObservationContract, *, scene: Path | None = None
+) -> Iterator[WirePolicy]:
     """A brought policy, its files verified, its server started here and ended.
 
     One that does not start, or says what it can in a way that is none, is a policy all of whose
@@ -203,11 +205,12 @@ def running(brought: BroughtPolicy, contract: ObservationContract) -> Iterator[W
     Args:
         brought: Who it is.
         contract: The observation in force.
+        scene: The MJCF that describes the robot; None where nobody knows it.
 
     Raises:
         IntegrityError: A file of it is another one.
         ConfigError: Its program is not there.
-        ContractError: Its entry names what the observation does not have.
+        ContractError: Its entry names what the observation or the robot does not have.
     """
     folder: Path = brought.folder
     verify_files(brought.entry, folder)
@@ -215,7 +218,9 @@ def running(brought: BroughtPolicy, contract: ObservationContract) -> Iterator[W
         remote: RemotePolicy | PolicyError
         try:
             server = stack.enter_context(Launched(brought.entry, folder))
-            remote = RemotePolicy(brought.entry, server.address, contract, ended=server.died)
+            remote = RemotePolicy(
+                brought.entry, server.address, contract, scene=scene, ended=server.died
+            )
             stack.callback(remote.close)
         except PolicyError as fault:
             remote = fault

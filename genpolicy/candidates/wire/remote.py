@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,15 +55,17 @@ class RemotePolicy:
         address: Where it listens.
         contract: The observation in force.
         clock: Of this machine.
+        scene: The MJCF that describes the robot; None where nobody knows it.
         ended: Why its process is not there any more, where we started it; None while it is.
 
     Raises:
-        ContractError: The entry names what the observation does not have.
+        ContractError: The entry names what the observation or the robot does not have.
         PolicyError: Nobody listens, or says what it can in a way that is none.
     """
 
     def __init__(
         self, entry: ServerEntry, address: str, contract: ObservationContract, *,
+        scene: Path | None = None,
         clock: Clock = time.perf_counter, ended: Callable[[], str | None] = lambda: None,
     ) -> None:  # fmt: skip
         self.entry = entry
@@ -73,7 +76,7 @@ class RemotePolicy:
             entry.observation, contract,
             observation_horizon=entry.horizons.observation_horizon,
         )  # fmt: skip
-        self._outputs = Outputs(entry.action, contract)
+        self._outputs = Outputs(entry.action, contract, scene=scene)
         self._asked = 0
         self._line: Connection | None = None
         self.told: Capabilities = capabilities(self._connected().metadata)

@@ -97,7 +97,7 @@ def ask_brought(candidate: BroughtPolicy, asked: Asked) -> Answered:
     """
     seen = fixture_observations(asked.data, horizons=asked.deployment.horizons, count=FIXTURES)
     contract = asked.data.observation_contract
-    with running(candidate, contract) as policy:
+    with running(candidate, contract, scene=asked.task.scene_path) as policy:
         first = _fixtures(policy, seen, range(len(seen)))
         modes = modes_of_policy(
             policy, asked.held_out, seed=candidate.seed, convention=_sampler(candidate.entry),
@@ -105,7 +105,7 @@ def ask_brought(candidate: BroughtPolicy, asked: Asked) -> Answered:
         )  # fmt: skip
         coverage = _coverage(policy, candidate, asked, modes)
     before = policy
-    with running(candidate, contract) as policy:
+    with running(candidate, contract, scene=asked.task.scene_path) as policy:
         again = _fixtures(policy, seen, range(len(seen))[::-1])
     failed = _failed(before, policy)
     broken = sum(failed.faults.values())

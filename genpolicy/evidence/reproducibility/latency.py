@@ -170,7 +170,7 @@ def measure_terms(plan: LatencyPlan, judged: Contender) -> list[Measurement]:
 
     if isinstance(judged, BroughtPolicy):
         return measure_running(
-            functools.partial(running, judged, data.observation_contract),
+            functools.partial(running, judged, data.observation_contract, scene=task.scene_path),
             observations,
             warm_repeats=plan.warm,
             candidates=plan.samples if judged.entry.stochastic else 1,

@@ -123,7 +123,7 @@ def run_shard(shard: Shard) -> ShardResult:
     """All rollouts of a shard, in lockstep; writes its journal."""
     comparison = shard.comparison
     task = load_task(comparison.task)
-    with opened(shard.judged, task.observation) as policy:
+    with opened(shard.judged, task.observation, scene=task.scene_path) as policy:
         return _run(shard, task, policy)
 
 

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation as Turn
 
 from genpolicy.candidates.wire.entry import Gripper, Input, Orientation, Output
-from genpolicy.candidates.wire.mapping import Inputs, Outputs, columns_of, opening, turns
+from genpolicy.candidates.wire.mapping import Inputs, Outputs, opening, turns
 from genpolicy.contract.action import GRIPPER, POSITION, join_action, split_action
 from genpolicy.contract.observation import Channel, ObservationContract
 from genpolicy.errors import ContractError
@@ -188,13 +188,6 @@ def test_only_lengths_are_given_in_another_unit():
 def test_more_history_than_conditions_the_policy_is_refused():
     with pytest.raises(ContractError, match="at most H_o = 2"):
         inputs(channels=["place_m"], history=3)
-
-
-@pytest.mark.parametrize("name", ["place", "place_m.w", "x", ""])
-def test_a_channel_that_is_not_there_is_refused_with_those_that_are(name):
-    with pytest.raises(ContractError, match="place_m, turn, hole") as error:
-        columns_of([name], CONTRACT, where="observation.state")
-    assert "observation.state of the candidate" in error.value.where
 
 
 def test_an_anchor_that_is_no_pose_is_refused():
