@@ -199,12 +199,18 @@ Picturable = Plot | Photo | Listing | Series
 """What a page can be given to show."""
 
 
+def left_out(plot: Picturable, report: GateReport) -> bool:
+    """Whether a report has no such figure, since there was nothing to write."""
+    optional = isinstance(plot, Listing) and plot.optional
+    return optional and plot.source not in report.materials
+
+
 def draw_all(plots: Sequence[Picturable], evidence: Evidence, report: GateReport) -> list[Shown]:
     """Draw what the evidence allows; what is missing is said, never left out in silence."""
     pictures = []
     for index, plot in enumerate(plots):
         sources = (plot.source, *plot.also)
-        if isinstance(plot, Listing) and plot.optional and plot.source not in report.materials:
+        if left_out(plot, report):
             continue
         try:
             found = plot.picture(evidence, report, f"{report.gate}{index}")

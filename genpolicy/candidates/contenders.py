@@ -5,6 +5,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from genpolicy.candidates.brought import BroughtPolicy
+from genpolicy.candidates.joining import JoiningSettings
 from genpolicy.candidates.judged import GENERATORS, JudgedPolicy, compared, trained
 from genpolicy.candidates.wire.policy import WirePolicy, running
 from genpolicy.contract.observation import ObservationContract
@@ -34,6 +35,18 @@ def opened(
             yield policy
     else:
         yield candidate.load()
+
+
+def joining_of(rule: JoiningSettings, policy: Running) -> JoiningSettings:
+    """How the chunks of a policy that is asked join; of one that did not start, as it is written.
+
+    Raises:
+        ConfigError: `real_time` of one whose chunks cannot go on from given actions and that is not
+            named as exempt, or that can and is.
+    """
+    if isinstance(policy, WirePolicy) and policy.absent:
+        return rule.named(policy.method)
+    return rule.of(policy.method, guided=policy.guided)
 
 
 def admitted_contenders(

@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation as Turn
 from genpolicy.candidates.wire.channels import columns_of
 from genpolicy.candidates.wire.entry import LENGTH, Gripper, Input, Orientation, Output
 from genpolicy.candidates.wire.joints import JointSpace
+from genpolicy.candidates.wire.writing import written
 from genpolicy.contract.action import join_action
 from genpolicy.contract.observation import ObservationContract
 from genpolicy.contract.rotation import rotation_from_6d
@@ -120,6 +121,24 @@ class Outputs:
         if self.output.motion != "absolute":
             place, turned = self._from_anchor(place, turned, conditioned_by)
         return np.ascontiguousarray(join_action(place, turned, opened))
+
+    def written(self, actions: Array, conditioned_by: Array) -> Array:
+        """The inverse: mapped actions as the policy would say them, after this observation.
+
+        Args:
+            actions: Shape (K, 10).
+            conditioned_by: Newest observation that it is given. Shape (D_o,).
+
+        Returns:
+            Shape (K, D).
+
+        Raises:
+            ContractError: A form in which they cannot be said (see `not_writable`).
+        """
+        if self._anchor is None:
+            return written(self.output, actions, None)
+        position, rotation = conditioned_by[self._anchor[0]], conditioned_by[self._anchor[1]]
+        return written(self.output, actions, (position, rotation_from_6d(rotation)))
 
     @property
     def _as_predicted(self) -> bool:

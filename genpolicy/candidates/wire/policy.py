@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from genpolicy.candidates.brought import BroughtPolicy
 from genpolicy.candidates.wire.connection import Clock
 from genpolicy.candidates.wire.entry import verify_files
-from genpolicy.candidates.wire.extension import Capabilities
+from genpolicy.candidates.wire.extension import Capabilities, GoesOn
 from genpolicy.candidates.wire.faults import Fault, PolicyError
 from genpolicy.candidates.wire.launched import Launched
 from genpolicy.candidates.wire.remote import Invocation, RemotePolicy
@@ -63,8 +63,6 @@ class WirePolicy:
         last_words: What was seen at the last fault that had a cause; empty without any.
     """
 
-    guided = False
-
     def __init__(
         self, brought: BroughtPolicy, remote: RemotePolicy | PolicyError, *,
         clock: Clock = time.perf_counter,
@@ -106,6 +104,16 @@ class WirePolicy:
         return self._brought.entry.stochastic
 
     @property
+    def absent(self) -> bool:
+        """Whether its server did not start."""
+        return isinstance(self._remote, PolicyError)
+
+    @property
+    def guided(self) -> bool:
+        """Whether its server takes a prefix, and its entry says actions in which one is written."""
+        return isinstance(self._remote, RemotePolicy) and not self._remote.unguided
+
+    @property
     def told(self) -> Capabilities:
         """What its server says of itself; nothing, of one that is not there."""
         return Capabilities() if isinstance(self._remote, PolicyError) else self._remote.told
@@ -121,18 +129,12 @@ class WirePolicy:
         """Candidate chunks, one observation a message; NaN where there is no answer.
 
         Raises:
-            ConfigError: A prefix, which no server is asked to go on from.
+            ConfigError: A prefix, of one whose chunks cannot be drawn to go on from it.
         """
-        if prefix is not None:
-            raise ConfigError(
-                where=f"a prefix for {self.method}",
-                found="an invocation that shall go on from given actions",
-                expected="none, of a policy behind the wire",
-                action="Add it to `stress.joining.exempt`, or choose another rule.",
-            )
         drawn, faults, counts = [], [], [0]
-        for row, name in zip(observations, noise_names, strict=True):
-            answer = self.invoke(row, noise=name, candidates=candidates)
+        for number, (row, name) in enumerate(zip(observations, noise_names, strict=True)):
+            given = self._given(prefix, number)
+            answer = self.invoke(row, noise=name, candidates=candidates, prefix=given)
             drawn.append(self._chunks(answer, candidates))
             faults.append(answer if isinstance(answer, Fault) else None)
             if isinstance(answer, Invocation) and answer.evaluations is not None:
@@ -140,8 +142,9 @@ class WirePolicy:
         return WireSamples(np.stack(drawn), max(counts), tuple(faults))
 
     def timed(
-        self, observations: Array, *, noise: NoiseName, candidates: int
-    ) -> tuple[dict[Term, float], Array]:
+        self, observations: Array, *, noise: NoiseName, candidates: int,
+        prefix: Prefix | None = None,
+    ) -> tuple[dict[Term, float], Array]:  # fmt: skip
         """One invocation with what its terms took, s, and its chunks (N, K, D_a).
 
         Whatever no span of its server explains is counted as sampling: the message itself, and all
@@ -149,7 +152,8 @@ class WirePolicy:
         An invocation that ends in a fault took as long as it was waited for.
         """
         begun = self._clock()
-        answer = self.invoke(observations, noise=noise, candidates=candidates)
+        given = self._given(prefix, 0)
+        answer = self.invoke(observations, noise=noise, candidates=candidates, prefix=given)
         if isinstance(answer, Fault):
             waited = {**dict.fromkeys(OWN_TERMS, np.nan), Term.SAMPLE: self._clock() - begun}
             return waited, self._chunks(answer, candidates)
@@ -159,8 +163,9 @@ class WirePolicy:
         return {**spans, Term.SAMPLE: known_s + max(0.0, rest_s)}, self._chunks(answer, candidates)
 
     def invoke(
-        self, observations: Array, *, noise: NoiseName, candidates: int
-    ) -> Invocation | Fault:
+        self, observations: Array, *, noise: NoiseName, candidates: int,
+        prefix: GoesOn | None = None,
+    ) -> Invocation | Fault:  # fmt: skip
         """One invocation (H_o, D_o), or the fault in which it ended, which is counted."""
         self.asked += 1
         if self._in_a_row >= GONE_AFTER:
@@ -170,7 +175,7 @@ class WirePolicy:
         try:
             if isinstance(self._remote, PolicyError):
                 raise self._remote
-            answer = self._remote.invoke(observations, noise=noise, candidates=count)
+            answer = self._remote.invoke(observations, noise=noise, candidates=count, prefix=prefix)
         except PolicyError as error:
             self._in_a_row += 1
             return self._counted(error)
@@ -178,6 +183,28 @@ class WirePolicy:
         if not np.isfinite(answer.actions).all(axis=(1, 2)).any():
             return self._counted(PolicyError(Fault.NONFINITE, "no chunk of finite numbers"))
         return answer
+
+    def _given(self, prefix: Prefix | None, row: int) -> GoesOn | None:
+        """What a row goes on from; None of one without a weight, which is asked plainly.
+
+        Behind the last weight the last given action stands, which is a pose in every form.
+        """
+        if prefix is None or self.absent:
+            return None
+        assert isinstance(self._remote, RemotePolicy)  # it is not absent
+        if why := self._remote.unguided:
+            raise ConfigError(
+                where=f"a prefix for {self.method}",
+                found=why,
+                expected="a policy whose chunks can be drawn to go on from given actions",
+                action="Add it to `stress.joining.exempt`, or choose another rule.",
+            )
+        weights = prefix.weights[row]
+        known = np.flatnonzero(weights > 0.0)
+        if len(known) == 0:
+            return None
+        rows = np.minimum(np.arange(len(weights)), known[-1])
+        return GoesOn(prefix.actions[row][rows], weights, prefix.bound)
 
     def _counted(self, error: PolicyError) -> Fault:
         self.faults[error.fault] += 1

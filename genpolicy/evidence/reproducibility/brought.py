@@ -6,13 +6,14 @@ opposite order: what depends on who was asked before, or on a seed of its own, a
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.candidates import selector
 from genpolicy.candidates.brought import BroughtPolicy
+from genpolicy.candidates.contenders import joining_of
 from genpolicy.candidates.wire.entry import ServerEntry
 from genpolicy.candidates.wire.faults import Fault
 from genpolicy.candidates.wire.policy import WirePolicy, running
@@ -98,6 +99,7 @@ def ask_brought(candidate: BroughtPolicy, asked: Asked) -> Answered:
     seen = fixture_observations(asked.data, horizons=asked.deployment.horizons, count=FIXTURES)
     contract = asked.data.observation_contract
     with running(candidate, contract, scene=asked.task.scene_path) as policy:
+        own = replace(asked.deployment, joining=joining_of(asked.deployment.joining, policy))
         first = _fixtures(policy, seen, range(len(seen)))
         modes = modes_of_policy(
             policy, asked.held_out, seed=candidate.seed, convention=_sampler(candidate.entry),
@@ -112,7 +114,7 @@ def ask_brought(candidate: BroughtPolicy, asked: Asked) -> Answered:
     # Chunks that came and hold a number that is none, beside questions that got no chunk.
     broken += int((~np.isfinite(first.chunks)).any(axis=(2, 3)).sum())
     return Answered(
-        identity=_identity(candidate, asked.deployment, broken, int(first.told != again.told)),
+        identity=_identity(candidate, own, broken, int(first.told != again.told)),
         failed=failed,
         samples=_compared(candidate, first.chunks, again.chunks),
         nfe=_evaluations(candidate, first.evaluations, again.evaluations),
@@ -212,7 +214,6 @@ def card_of_brought(candidate: BroughtPolicy, deployment: Deployment) -> Identit
     """The card of a brought policy, from what its maker declares; the rest is empty."""
     said, horizons = candidate.entry.declared, candidate.entry.horizons
     period_s = horizons.action_period_s
-    joining = deployment.joining.of(candidate.name, guided=False)
     return IdentityCard(
         architecture=said.architecture if said else "",
         parameters=said.parameters if said else 0,
@@ -240,7 +241,7 @@ def card_of_brought(candidate: BroughtPolicy, deployment: Deployment) -> Identit
         warm_up=DISCARDED,
         batch_rows=said.batch_rows if said else 0,
         candidates=deployment.samples if candidate.entry.stochastic else 1,
-        selector=joining.said(),
+        selector=deployment.joining.said(),
         selector_owner=selector.OWNER,
-        selector_sha256=rule_sha256(joining),
+        selector_sha256=rule_sha256(deployment.joining),
     )

@@ -175,7 +175,7 @@ def measure_terms(plan: LatencyPlan, judged: Contender) -> list[Measurement]:
             warm_repeats=plan.warm,
             candidates=plan.samples if judged.entry.stochastic else 1,
             project=project,
-            joining=plan.joining.of(judged.name, guided=False),
+            joining=plan.joining,
         )
     policy = judged.load()
     return measure_policy(

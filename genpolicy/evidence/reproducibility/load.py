@@ -9,7 +9,7 @@ from multiprocessing.synchronize import Event, Semaphore
 import numpy as np
 
 from genpolicy.candidates.brought import BroughtPolicy
-from genpolicy.candidates.contenders import Contender, Running, opened
+from genpolicy.candidates.contenders import Contender, Running, joining_of, opened
 from genpolicy.data.dataset import Dataset, load_dataset
 from genpolicy.evidence.reproducibility.benchmark import invoke
 from genpolicy.evidence.reproducibility.latency import OBSERVATIONS, LatencyPlan
@@ -88,7 +88,7 @@ def _measured(
 ) -> list[CandidatesRow]:
     seen = fixture_observations(data, horizons=plan.horizons, count=OBSERVATIONS)
     rows = []
-    joining = plan.joining.of(name, guided=policy.guided)
+    joining = joining_of(plan.joining, policy)
     for count in COUNTS:
         for repeat in range(-DISCARDED, REPEATS):
             row = seen[repeat % len(seen)][None]

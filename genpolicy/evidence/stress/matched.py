@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from genpolicy.candidates.contenders import Contender, opened
+from genpolicy.candidates.contenders import Contender, Running, joining_of, opened
 from genpolicy.candidates.joining import JoiningSettings
 from genpolicy.candidates.judged import candidates_of
 from genpolicy.candidates.wire.policy import WireSamples
@@ -127,10 +127,10 @@ def run_shard(shard: Shard) -> ShardResult:
         return _run(shard, task, policy)
 
 
-def _run(shard: Shard, task: Task, policy: Policy) -> ShardResult:
+def _run(shard: Shard, task: Task, policy: Running) -> ShardResult:
     comparison = shard.comparison
     horizons = comparison.cell.horizons
-    joining = comparison.joining.of(shard.judged.name, guided=policy.guided)
+    joining = joining_of(comparison.joining, policy)
     setup = Setup(
         task=task,
         checker=checker_under(

@@ -171,8 +171,8 @@ def plan_shards(
             action="Correct the names, or run `dvc repro latency`.",
         )
     for policy in judged if comparison.joining.rule == REAL_TIME else ():
-        guided = isinstance(policy, JudgedPolicy) and policy.load().guided
-        comparison.joining.of(policy.name, guided=guided)
+        if isinstance(policy, JudgedPolicy):  # a server says it when it is asked
+            comparison.joining.of(policy.name, guided=policy.load().guided)
     return [
         Shard(
             comparison=comparison,
