@@ -183,7 +183,7 @@ def _tables(
         tables = derived_tables(journals, spliced)
     written = root / FAULTS
     stated_faults = read_table(written).to_pylist() if written.is_file() else []
-    _faults(params, stated_faults, tables.pop("faults"))
+    _faults(params, stated_faults, tables.pop(Path(FAULTS).stem))
     for name, keys, rows in (
         ("rollouts", ROLLOUT, rollouts),
         *((name, KEYS[name], rows) for name, rows in tables.items()),
@@ -202,7 +202,7 @@ def _faults(params: Mapping[str, Any], stated: Sequence[Row], derived: Sequence[
             named = f"fault {row['method']}/{row['perturbation']}/{row['fault']}"
             refuse("D", named, f"{row['count']} of a policy that runs here", "none of it")
     own = [row for row in derived if row["method"] in brought]
-    compare_rows("D", FAULTS, KEYS["faults"], stated, own, seed=None)
+    compare_rows("D", FAULTS, KEYS[Path(FAULTS).stem], stated, own, seed=None)
 
 
 def _envelope(root: Path, params: Mapping[str, Any]) -> None:
