@@ -68,6 +68,7 @@ def refused(capsys, code, expected=2):
 
 IN_JOINTS = """
 import sys
+from pathlib import Path
 import numpy as np
 from genpolicy.candidates.wire.connection import Listening
 from genpolicy.candidates.wire.served import ServedPolicy
@@ -76,7 +77,7 @@ from genpolicy.policies.policy import load_policy
 from genpolicy.robot.kinematics import ArmKinematics
 from genpolicy.tasks.api import load_task
 
-task, served = load_task("tabletop_insertion"), ServedPolicy(load_policy("flow/seed_0"))
+task, served = load_task("tabletop_insertion"), ServedPolicy(load_policy(Path("flow/seed_0")))
 arm = ArmKinematics(task.scene_path)
 
 def answer(message):
