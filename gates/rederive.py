@@ -23,6 +23,7 @@ from gates.rederive_splices import rederive_splices
 from gates.report import Gate
 from gates.settings import PARAMS_FILE, read_params, section_of
 from gates.stated import (
+    Row,
     compare_keys,
     compare_rows,
     mapping,
@@ -31,6 +32,7 @@ from gates.stated import (
     section,
     training_seed,
 )
+from gates.stress.rollouts import FAULTS
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.errors import ConfigError, GenpolicyError
 from genpolicy.evidence.documents.shadow import CHECKER
@@ -179,6 +181,9 @@ def _tables(
         rollouts = [row for path in journals for row in derived_rollouts(path).values()]
         spliced = Spliced(motion.scene_path)
         tables = derived_tables(journals, spliced)
+    written = root / FAULTS
+    stated_faults = read_table(written).to_pylist() if written.is_file() else []
+    _faults(params, stated_faults, tables.pop(Path(FAULTS).stem))
     for name, keys, rows in (
         ("rollouts", ROLLOUT, rollouts),
         *((name, KEYS[name], rows) for name, rows in tables.items()),
@@ -187,6 +192,17 @@ def _tables(
         stated = read_table(root / path).to_pylist()
         compare_rows("D", path, keys, stated, rows, seed=seed)
     rederive_splices(root, params, spliced.rows)
+
+
+def _faults(params: Mapping[str, Any], stated: Sequence[Row], derived: Sequence[Row]) -> None:
+    """`faults.parquet`: of policies in a process of their own, and of nobody else."""
+    brought = mapping(section_of(params, "candidates"))
+    for row in derived:
+        if row["fault"] and row["method"] not in brought:
+            named = f"fault {row['method']}/{row['perturbation']}/{row['fault']}"
+            refuse("D", named, f"{row['count']} of a policy that runs here", "none of it")
+    own = [row for row in derived if row["method"] in brought]
+    compare_rows("D", FAULTS, KEYS[Path(FAULTS).stem], stated, own, seed=None)
 
 
 def _envelope(root: Path, params: Mapping[str, Any]) -> None:

@@ -22,7 +22,7 @@ from gates.report import Gate
 from gates.stated import refuse, section, training_seed
 from genpolicy.candidates.joining import JoiningSettings
 from genpolicy.candidates.judged import candidates_of
-from genpolicy.candidates.wire.policy import running
+from genpolicy.candidates.wire.policy import WirePolicy, running
 from genpolicy.contract.action import ACTION_DIM
 from genpolicy.contract.chunk import actions_sha256
 from genpolicy.contract.horizons import HorizonConfig
@@ -196,12 +196,12 @@ def _draw_again(
         joining: How chunks of all methods join.
         always: A policy that always draws the same was asked for as many, too.
     """
-    contract = load_task(section(params, "task", TaskSection).name).observation
+    task = load_task(section(params, "task", TaskSection).name)
     rows = section(params, "horizons", HorizonConfig).prediction_horizon
     for method, items in sorted(asked.items()):
         other = brought_policy(root, params, method)
         if other is not None:
-            with running(other, contract) as wire:
+            with running(other, task.observation, scene=task.scene_path) as wire:
                 count = samples if always else candidates_of(wire, samples)
                 _compare(gate, wire, items, count=count, rule=Rule(joining.named(method), rows))
             continue
@@ -225,7 +225,7 @@ def _compare(gate: Gate, policy: Policy, items: Sequence[Asked], *, count: int, 
         if item.actions is None:
             continue
         if not _alike(again, item.actions):
-            refuse(gate, item.place, _apart(again, item.actions), limit)
+            refuse(gate, item.place, _failed(policy) or _apart(again, item.actions), limit)
         to_the_bit = to_the_bit and np.array_equal(again, item.actions, equal_nan=True)
     for item, chunks in zip(items, drawn, strict=True):
         # Of what was refused only the hash is there. It says something where this machine rounds
@@ -235,7 +235,8 @@ def _compare(gate: Gate, policy: Policy, items: Sequence[Asked], *, count: int, 
             and item.actions is None
             and actions_sha256(chunks[item.index]) != item.sha256
         ):
-            refuse(gate, item.place, f"drawn as {item.sha256[:16]}…", limit)
+            said = _failed(policy) or f"drawn as {item.sha256[:16]}…"
+            refuse(gate, item.place, said, limit)
     for item, chunks in zip(items, drawn, strict=True):
         told = item.joined
         if told is not None:
@@ -276,6 +277,13 @@ def _alike(one: Array, other: Array) -> bool:
     return one.shape == other.shape and np.allclose(
         one, other, rtol=0.0, atol=TOLERANCE, equal_nan=True
     )
+
+
+def _failed(policy: Policy) -> str:
+    """That a process was asked again and failed, with its last words; empty where none did."""
+    if not isinstance(policy, WirePolicy) or not policy.faults:
+        return ""
+    return f"asked again without an answer ({policy.last_words})"
 
 
 def _apart(one: Array, other: Array) -> str:

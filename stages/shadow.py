@@ -55,7 +55,7 @@ def work(params: Params) -> None:
     with output_folder(ARTIFACTS / "shadow") as folder:
         found = []
         for candidate in admitted_contenders(ARTIFACTS, admitted, brought, seed=seed):
-            with opened(candidate, task.observation) as policy:
+            with opened(candidate, task.observation, scene=task.scene_path) as policy:
                 seen = shadow_policy(
                     shadow, policy, observations, seed=candidate.seed, two_mode=two_mode
                 )

@@ -10,10 +10,12 @@ policy that is brought is not what its entry says: before anything trains.
 from pathlib import Path
 
 from genpolicy.candidates.brought import BroughtSection, require_brought
+from genpolicy.candidates.mapped import require_mapped
 from genpolicy.documents.task import IDENTITY
 from genpolicy.integrity.atomic import output_folder, write_bytes
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.outputs import require_own_files
+from genpolicy.tasks.api import load_task
 from genpolicy.tasks.fixtures import fixture_hashes, require_pinned
 from genpolicy.tasks.identity import task_identity
 from stages._source import SOURCE_FILE, SourceSection, refuse_foreign_files, source_document
@@ -24,7 +26,10 @@ def work(params: Params) -> None:
     """Write both identities."""
     refuse_foreign_files()
     require_own_files(Path.cwd())
-    require_brought(params.section("candidates", BroughtSection).root, horizons=params.horizons)
+    entries = params.section("candidates", BroughtSection).root
+    brought = require_brought(entries, horizons=params.horizons)
+    if brought:
+        require_mapped(brought, load_task(params.task.name))
     identity = task_identity(params.task.name)
     require_pinned(Path.cwd(), params.task.name, fixture_hashes(identity))
     source = source_document(params.section("source", SourceSection))

@@ -115,6 +115,7 @@ class Listing:
 
     Attributes:
         also: Further files that it is read from.
+        optional: Left out where the report names no such source: then there was none to write.
     """
 
     title: str
@@ -123,6 +124,7 @@ class Listing:
     read: Callable[[Evidence, GateReport], Table]
     folded: tuple[Folded, ...] = ()
     also: tuple[str, ...] = ()
+    optional: bool = False
 
     def picture(self, evidence: Evidence, report: GateReport, salt: str) -> dict[str, Any]:
         """What this adds to a `Shown`; a table has no inner names and needs no salt."""
@@ -197,11 +199,19 @@ Picturable = Plot | Photo | Listing | Series
 """What a page can be given to show."""
 
 
+def left_out(plot: Picturable, report: GateReport) -> bool:
+    """Whether a report has no such figure, since there was nothing to write."""
+    optional = isinstance(plot, Listing) and plot.optional
+    return optional and plot.source not in report.materials
+
+
 def draw_all(plots: Sequence[Picturable], evidence: Evidence, report: GateReport) -> list[Shown]:
     """Draw what the evidence allows; what is missing is said, never left out in silence."""
     pictures = []
     for index, plot in enumerate(plots):
         sources = (plot.source, *plot.also)
+        if left_out(plot, report):
+            continue
         try:
             found = plot.picture(evidence, report, f"{report.gate}{index}")
         except (MissingEvidenceError, KeyError, ValueError, TypeError, IndexError) as error:

@@ -20,7 +20,7 @@ from gates.reproducibility.settings import (
     RELOAD,
     ReproducibilitySettings,
 )
-from genpolicy.evidence.documents.brought import BROUGHT, Brought
+from genpolicy.evidence.documents.brought import BROUGHT, FAULTS, Brought
 from genpolicy.evidence.documents.given import MATCHED, DistilledConfig, TrainedConfig
 from genpolicy.evidence.documents.reproducibility import CANDIDATES, CandidateIdentity
 from genpolicy.evidence.rows.reproducibility import NfeRow, SampleRow
@@ -170,7 +170,18 @@ def nonfinite_weights(
     if candidate not in settings.brought:
         return Measured(found)
     text = "behind the wire nobody sees weights: counted are invocations without a finite chunk"
-    return Measured(found, caveat=text)
+    return Measured(found, caveat=f"{text}{_failed(evidence, candidate)}")
+
+
+def _failed(evidence: Evidence, candidate: str) -> str:
+    """How its process failed, by kind, and its last words; empty where it did not."""
+    if not evidence.bind(f"{RELOAD}/{FAULTS.file}"):
+        return ""
+    own = evidence.document(RELOAD, FAULTS).get(candidate)
+    if own is None or not own.faults:
+        return ""
+    kinds = ", ".join(f"{kind} {number}" for kind, number in sorted(own.faults.items()))
+    return f"; of {own.asked} invocations failed: {kinds}; the last because {own.last_words}"
 
 
 @criterion(

@@ -15,6 +15,7 @@ from gates.distilled import spent
 from gates.evidence import Evidence, MissingEvidenceError, counts, numbers
 from gates.stress.rollouts import (
     DRILL,
+    FAULTS,
     INVOCATIONS,
     NOMINAL,
     STRESS,
@@ -25,7 +26,7 @@ from gates.stress.rollouts import (
     success_lower,
 )
 from genpolicy.evidence.documents.stress import DISTILLED
-from genpolicy.evidence.rows.stress import InvocationRow
+from genpolicy.evidence.rows.stress import FaultRow, InvocationRow
 from genpolicy.statistics.clustered import ratio_interval
 
 STOPS = ("collision", "force_stop")
@@ -40,7 +41,22 @@ STOPS = ("collision", "force_stop")
 )
 def deadline_miss_upper(evidence: Evidence, settings: StressSettings, candidate: str) -> Measured:
     """Upper bound of the share of invocations that miss their deadline."""
-    return _share_of(evidence, settings, candidate, "deadline_misses", "invocations")
+    found = _share_of(evidence, settings, candidate, "deadline_misses", "invocations")
+    said = _faults(evidence, candidate)
+    return replace(found, caveat=f"{found.caveat}; {said}") if said else found
+
+
+def _faults(evidence: Evidence, candidate: str) -> str:
+    """How many of its misses are faults of its process, by kind; empty of one that has none."""
+    if not evidence.bind(FAULTS):
+        return ""
+    rows = evidence.rows(FAULTS, FaultRow)
+    own = rows[rows["method"] == candidate]
+    if len(own) == 0:
+        return ""
+    kinds = own.assign(count=counts(own, "count")).groupby("fault", sort=True)["count"].sum()
+    told = ", ".join(f"{kind} {number:g}" for kind, number in kinds.items() if kind)
+    return f"of them because its process failed: {told or 'none'}"
 
 
 @criterion(

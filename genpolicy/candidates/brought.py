@@ -10,7 +10,12 @@ from pathlib import Path
 
 from pydantic import RootModel
 
-from genpolicy.candidates.wire.entry import ServerEntry, read_entry, verify_files
+from genpolicy.candidates.wire.entry import (
+    ServerEntry,
+    read_entry,
+    require_program,
+    verify_files,
+)
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.errors import ConfigError
 from genpolicy.integrity.documents import canonical_json
@@ -77,7 +82,7 @@ def require_brought(
     trained: Iterable[str] = (),
     root: Path = Path(),
 ) -> list[BroughtPolicy]:
-    """The same, of the names, horizons and files that the ladder can work with.
+    """The same, of the names, horizons, files and programs that the ladder can work with.
 
     Args:
         section: Path of each entry by name.
@@ -86,7 +91,8 @@ def require_brought(
         root: Of the workspace.
 
     Raises:
-        ConfigError: As `read_brought`; a name of a trained method, or other horizons.
+        ConfigError: As `read_brought`; a name of a trained method, or other horizons;
+            or a command that this machine does not have.
         IntegrityError: A file that is missing, or another one than its entry says.
     """
     found, taken = read_brought(section, seed=0, root=root), set(trained)
@@ -106,6 +112,7 @@ def require_brought(
                 action="Bring a policy of these horizons, or set the horizons of the ladder.",
             )
         verify_files(policy.entry, policy.folder)
+        require_program(policy.entry, policy.folder)
     return found
 
 

@@ -5,6 +5,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from genpolicy.candidates.brought import BroughtPolicy
+from genpolicy.candidates.joining import JoiningSettings
 from genpolicy.candidates.judged import GENERATORS, JudgedPolicy, compared, trained
 from genpolicy.candidates.wire.policy import WirePolicy, running
 from genpolicy.contract.observation import ObservationContract
@@ -15,23 +16,37 @@ Running = NetworkPolicy | WirePolicy
 
 
 @contextmanager
-def opened(candidate: Contender, contract: ObservationContract) -> Iterator[Running]:
+def opened(
+    candidate: Contender, contract: ObservationContract, *, scene: Path | None = None
+) -> Iterator[Running]:
     """A candidate that can be asked, until the end of the block.
 
     Args:
         candidate: Who it is.
         contract: The observation in force.
+        scene: The MJCF that describes the robot; None where nobody knows it.
 
     Raises:
         IntegrityError: Its files are not those of its identity.
         BadInputError: Its files are missing or malformed.
-        PolicyError: It is behind the wire, and its server is not there.
     """
     if isinstance(candidate, BroughtPolicy):
-        with running(candidate, contract) as policy:
+        with running(candidate, contract, scene=scene) as policy:
             yield policy
     else:
         yield candidate.load()
+
+
+def joining_of(rule: JoiningSettings, policy: Running) -> JoiningSettings:
+    """How the chunks of a policy that is asked join; of one that did not start, as it is written.
+
+    Raises:
+        ConfigError: `real_time` of one whose chunks cannot go on from given actions and that is not
+            named as exempt, or that can and is.
+    """
+    if isinstance(policy, WirePolicy) and policy.absent:
+        return rule.named(policy.method)
+    return rule.of(policy.method, guided=policy.guided)
 
 
 def admitted_contenders(

@@ -63,7 +63,7 @@ def run_check(path: Path, options: CheckOptions, *, as_json: bool) -> int:
     checks = task_checks(data, task=None, chunk_steps=entry.horizons.prediction_horizon)
     what = question(starts, dataset=data.manifest_sha256, candidates=options.candidates)
     earlier = _earlier(options.earlier, what)
-    asked = _Asked(starts, what, options.deadline_s, earlier, checks.admissible)
+    asked = _Asked(starts, what, options.deadline_s, earlier, checks.admissible, checks.scene)
     folder = path.resolve().parent
     verify_files(entry, folder)
     found = _found(entry, folder, contract, asked)
@@ -79,7 +79,9 @@ def _found(
         running = stack.enter_context(Launched(entry, folder))
 
         def policy_of(server: Launched) -> RemotePolicy:
-            policy = RemotePolicy(entry, server.address, contract, ended=server.died)
+            policy = RemotePolicy(
+                entry, server.address, contract, scene=asked.scene, ended=server.died
+            )
             stack.callback(policy.close)
             return policy
 
@@ -101,6 +103,7 @@ class _Asked:
     deadline_s: float
     earlier: str | None
     admissible: Admissible | None
+    scene: Path | None
 
 
 def _earlier(path: Path | None, now: Question) -> str | None:

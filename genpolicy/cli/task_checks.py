@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from importlib.metadata import entry_points
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -27,11 +28,13 @@ class TaskChecks:
         admissible: Feasibility of a chunk at a recorded observation.
         replay: Outcome of a replayed episode, by identifier.
         obstacles: Round obstacles of the scene plane, for figures.
+        scene: The MJCF that describes the robot.
     """
 
     admissible: Admissible | None = None
     replay: Replay | None = None
     obstacles: list[Obstacle] = field(default_factory=list)
+    scene: Path | None = None
 
 
 def task_checks(dataset: Dataset, *, task: str | None, chunk_steps: int) -> TaskChecks:
@@ -75,6 +78,7 @@ def task_checks(dataset: Dataset, *, task: str | None, chunk_steps: int) -> Task
         admissible=is_admissible,
         replay=(lambda uuid: replay_episode(plugin, dataset, uuid)) if recorded else None,
         obstacles=round_obstacles(plugin),
+        scene=plugin.scene_path,
     )
 
 

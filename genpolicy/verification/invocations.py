@@ -3,6 +3,8 @@
 An invocation states how long it takes, and each check of another candidate what that takes. An
 answer that is judged sooner than stated, or after fewer checks than candidates, would be faster on
 paper than any policy is. That the stated times are those of the latency model is not asked here.
+A policy in a process of its own that failed has no answer: its kind of fault is of a closed list,
+the deadline is missed with it, and nothing of it is judged.
 A session of a rollout (its labels name the start) has a clock, and states every time; one of the
 shadow evaluation has none, and there nothing is asked.
 """
@@ -18,6 +20,13 @@ ROUNDING_NS = 1_000
 UNCHECKED = "reject_candidate"
 """What a journal calls a candidate that was refused because its check took too long."""
 GOES_ON = "continue"
+FAULTS = (
+    "late", "closed", "refused", "oversize", "malformed", "shape", "unrequested", "changed",
+    "nonfinite", "gone",
+)  # fmt: skip
+"""How a policy in a process of its own can fail."""
+MISSED = ("deadline", "overrun")
+"""How an invocation ends that was not answered in time."""
 TIMED = "start_sha256"
 """The label of a session that runs on the virtual clock."""
 
@@ -32,6 +41,7 @@ class _Invocation:
     judged: int = 0
     answered: bool = False
     over: bool = False
+    failed: bool = False
 
     def due_ns(self) -> float:
         return self.begun_ns + self.cost_s * 1e9 - ROUNDING_NS
@@ -43,6 +53,7 @@ class Invocations:
     def __init__(self) -> None:
         self._of: dict[str, _Invocation] = {}
         self._timed = False
+        self._failing = ""
 
     def follow(self, kind: str, m: Message) -> Iterator[Finding]:
         """Take an event in; yields what it could not have cost so little."""
@@ -51,6 +62,7 @@ class Invocations:
         elif not self._timed:
             return
         elif kind == "invocation":
+            yield from self._missed(m)
             yield from self._invocation(m)
         elif kind == "joined":
             if m["invocation"] in self._of:  # the chunk is an answer to it, whatever its own id
@@ -63,6 +75,15 @@ class Invocations:
                 yield "clock.unknown", f"{m['chunk_id']!r} comes, and nothing of it was judged."
             else:
                 yield from self._early(repr(m["chunk_id"]), own, m)
+        elif kind == "end" and self._failing:
+            yield "clock.fault", f"{self._failing!r} failed, and its deadline is not missed."
+
+    def _missed(self, m: Message) -> Iterator[Finding]:
+        """A fault and the deadline that it costs stand side by side."""
+        failing, self._failing = self._failing, ""
+        ended = m["id"] == failing and m["stage"] == "end" and m["detail"] in MISSED
+        if failing and not ended:
+            yield "clock.fault", f"{failing!r} failed, and its deadline is not missed."
 
     def _invocation(self, m: Message) -> Iterator[Finding]:
         own = self._of.get(m["id"])
@@ -84,8 +105,16 @@ class Invocations:
             action = m["detail"].split()[-1]
             own.judged += action == UNCHECKED
             own.over |= action not in (UNCHECKED, GOES_ON)
+        elif m["stage"] == "fault":
+            if m["detail"] not in FAULTS:
+                yield "clock.fault", f"{m['id']!r} failed by {m['detail']!r}, which is no fault."
+            if own.failed or own.judged or own.answered:
+                yield "clock.fault", f"{m['id']!r} failed, and had been judged or failed before."
+            own.failed, self._failing = True, m["id"]
         else:
             own.answered |= m["detail"] == "answered"
+            if own.failed and own.answered:
+                yield "clock.fault", f"{m['id']!r} failed, and is answered."
 
     def _candidate(self, m: Message) -> Iterator[Finding]:
         which, own = f"Candidate {m['index']} of {m['chunk_id']!r}", self._of.get(m["chunk_id"])
@@ -94,6 +123,8 @@ class Invocations:
             return
         if own.answered:
             yield "clock.order", f"{which} is judged after the answer."
+        if own.failed:
+            yield "clock.fault", f"{which} is judged, and its policy had failed."
         if own.over:
             yield "clock.overrun", f"{which} is judged, and a term of it had taken too long."
         if m["index"] != own.judged:

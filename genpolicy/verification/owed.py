@@ -186,6 +186,7 @@ class _Owed:
     unchecked: set[int] = field(default_factory=set)
     checks: list[tuple[str, str]] = field(default_factory=list)
     stated: list[tuple[str, str]] = field(default_factory=list)
+    failed_ns: float = math.inf
 
     def state(self, m: Message, period_ns: int) -> str:
         """Take an overrun in; why it is not owed, or not there, in words."""
@@ -201,8 +202,12 @@ class _Owed:
                 return f"states {m['detail']!r} at {m['t']} ns, known at {known_ns:.0f} ns"
         return ""
 
-    def missing(self, end_ns: int, period_ns: int) -> list[tuple[str, str, float]]:
-        """What had to be stated by the end of the session, and was not."""
+    def missing(self, end_ns: float, period_ns: int) -> list[tuple[str, str, float]]:
+        """What had to be stated by the end of the session, and was not.
+
+        What a policy that failed would have taken after its deadline, nobody waits for.
+        """
+        end_ns = min(end_ns, self.failed_ns)
         return [
             one
             for one in self.terms
@@ -276,6 +281,9 @@ def _stated(m: Message, session: _Session, times: Times) -> Iterator[str]:
     elif m["stage"] == "overrun":
         if why := session.owed[m["id"]].state(m, session.period_ns):
             yield f"{which} {why}"
+        return
+    elif m["stage"] == "fault":
+        session.owed[m["id"]].failed_ns = m["t"]
         return
     else:
         return

@@ -23,6 +23,7 @@ KEYS: dict[str, tuple[str, ...]] = {
     "conservation": ("method", "perturbation"),
     "stub": ("method", "perturbation"),
     "overruns": ("method", "perturbation", "term", "action"),
+    "faults": ("method", "perturbation", "fault"),
     "ages": ("method", "perturbation", "level"),
 }
 """Tables that are derived here, and the columns by which a row is known."""
@@ -41,6 +42,7 @@ class Condition:
     arrivals: int = 0
     refused: Counter[str] = field(default_factory=Counter)
     overruns: Counter[tuple[str, str]] = field(default_factory=Counter)
+    faults: Counter[str] = field(default_factory=Counter)
 
     def read(self, kind: str, m: Message, start: int) -> None:
         """Take an event of the rollout from this start in."""
@@ -50,6 +52,8 @@ class Condition:
         elif kind == "invocation" and m["stage"] == "overrun":
             term, action = m["detail"].split()
             self.overruns[term, action] += 1
+        elif kind == "invocation" and m["stage"] == "fault":
+            self.faults[m["detail"]] += 1
         elif kind == "enqueue":
             self.generated += 1
             self.enqueued += 1
@@ -97,6 +101,10 @@ class Condition:
             "overruns": [
                 {"term": term, "action": action, "count": count}
                 for (term, action), count in sorted(self.overruns.items()) or [(("", ""), 0)]
+            ],
+            "faults": [
+                {"fault": fault, "count": count}
+                for fault, count in sorted(self.faults.items()) or [("", 0)]
             ],
             "ages": [
                 {

@@ -62,6 +62,19 @@ def test_what_the_ladder_cannot_work_with_is_refused_by_name(brought, tmp_path, 
         require_brought(brought(**changes), horizons=HORIZONS, root=tmp_path)
 
 
+def test_a_program_that_is_not_there_is_refused_before_anything_runs(brought, tmp_path):
+    def require(*command):
+        section = brought(address=None, command=[*command, "{port}"])
+        return require_brought(section, horizons=HORIZONS, root=tmp_path)
+
+    (tmp_path / "own" / "serve").write_text("#!/bin/sh")
+    for program in ("no_such_program", "./missing", "./serve"):  # the last is not executable
+        with pytest.raises(ConfigError, match=f"command of the candidate planted.*{program}"):
+            require(program)
+    (tmp_path / "own" / "serve").chmod(0o755)
+    assert len(require("./serve")) == len(require("sh")) == 1
+
+
 def test_a_name_means_one_policy(brought, tmp_path):
     with pytest.raises(ConfigError, match="a name that a trained method has"):
         require_brought(brought(), horizons=HORIZONS, trained=["planted"], root=tmp_path)

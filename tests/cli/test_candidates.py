@@ -66,6 +66,52 @@ def refused(capsys, code, expected=2):
     return line
 
 
+IN_JOINTS = """
+import sys
+from pathlib import Path
+import numpy as np
+from genpolicy.candidates.wire.connection import Listening
+from genpolicy.candidates.wire.served import ServedPolicy
+from genpolicy.contract.action import split_action
+from genpolicy.policies.policy import load_policy
+from genpolicy.robot.kinematics import ArmKinematics
+from genpolicy.tasks.api import load_task
+
+task, served = load_task("tabletop_insertion"), ServedPolicy(load_policy(Path("flow/seed_0")))
+arm = ArmKinematics(task.scene_path)
+
+def answer(message):
+    said = served.answer(message)
+    rows = said["actions"].reshape(-1, 10)
+    place, turned, opened = split_action(rows)
+    seed = np.tile(task.posture_rad, (len(rows), 1))
+    q = arm.solve(place, turned, q_seed_rad=seed).q_rad
+    chunks = np.concatenate([q, opened[:, None]], axis=1)
+    return {**said, "actions": chunks.reshape(*said["actions"].shape[:-1], 8)}
+
+with Listening(answer, served.metadata, port=int(sys.argv[1])) as listening:
+    listening.serve_forever()
+"""
+
+
+def test_a_server_in_joint_space_is_checked_like_any_other(folder, dataset, capsys):
+    """Its joints become poses by the robot's kinematics; the docs' own lines say so."""
+    [said] = re.findall(r"```yaml\n# joints\n(.*?)```", DOCS.read_text(), re.DOTALL)
+    (folder / "serve.py").write_text(IN_JOINTS)
+    command = [sys.executable, "serve.py", "{port}"]
+    change(folder, command=command, **yaml.safe_load(said))
+    assert run(folder, dataset, "--deadline", "5", "--json") == 0
+    found = {one["name"]: one["judged"] for one in json.loads(capsys.readouterr().out)["findings"]}
+    assert {name for name, what in found.items() if what == "holds"} == {
+        "answers", "repeats", "restarts", "seeded", "evaluations", "spans",
+    }  # fmt: skip
+    action = yaml.safe_load(said)["action"]
+    action["joints"]["columns"] = action["joints"]["columns"][:6]
+    change(folder, action=action)
+    line = refused(capsys, run(folder, dataset))
+    assert "6 joints, expected 7" in line
+
+
 def report_of(checked):
     return json.loads((checked / "checked.json").read_text())
 

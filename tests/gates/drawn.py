@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 
 from gates.evidence import Evidence, MissingEvidenceError
 from gates.pages.desk import desk_of
-from gates.pages.figures import Folded, Listing, Plot, Series
+from gates.pages.figures import Folded, Listing, Plot, Series, left_out
 from gates.pages.page import PLOTS, gate_page
 
 HASH = re.compile(r"\b[0-9a-f]{7,64}\b|^\d+\.\d+\.\d+(\+\w+)?$")
@@ -29,7 +29,8 @@ LONGEST = 12
 def hold_pictures(name, gate, root, report) -> None:
     """Compare what the page of a gate would draw from evidence with the version of that name."""
     found = Evidence(root)
-    shown = {plot.title: _said_of(plot, found, report) for plot in PLOTS[gate]}
+    plots = [plot for plot in PLOTS[gate] if not left_out(plot, report)]
+    shown = {plot.title: _said_of(plot, found, report) for plot in plots}
     desk = asdict(desk_of({gate: report}))
     page = _words(gate_page(root, report))
     whole = {"figures": shown, "desk": desk, "page": page}

@@ -44,6 +44,8 @@ def root(tmp_path_factory, _ladder):
     }  # fmt: skip
     path = copied / "artifacts/candidates/candidates.json"
     path.write_bytes(canonical_json({"flow": somebody}))
+    failed = {"asked": 64, "faults": {"late": 1}, "last_words": "no answer within 2 s"}
+    (copied / "artifacts/reload/faults.json").write_bytes(canonical_json({"flow": failed}))
     return copied
 
 

@@ -22,6 +22,7 @@ from genpolicy.evidence.rows.reproducibility import LatencyRow
 from genpolicy.evidence.rows.stress import (
     AgeRow,
     ConservationRow,
+    FaultRow,
     InvocationRow,
     OverrunRow,
     RolloutRow,
@@ -81,7 +82,7 @@ def _scene(start: int) -> dict[str, Any]:
     return task.scene_poses(world.observe())
 
 
-def _session(name: str, start: int) -> Journal:
+def _session(name: str, start: int, fault: str = "") -> Journal:
     """A rollout in which nothing is delivered: it holds, touches something and ends."""
     method, _, perturbation = name.partition("__")
     labels = {
@@ -103,6 +104,8 @@ def _session(name: str, start: int) -> Journal:
     executor.begin_invocation(0.2, "one", repr(FIRST_S))
     key = ["stress", perturbation, start, 1]
     journal.conditioning(0.2, invocation_id="one", key=key, history=np.zeros((2, 24)))
+    if fault:
+        journal.invocation(0.2, invocation_id="one", stage="fault", detail=fault)
     executor.end_invocation(0.2, "one", "deadline")
     for force_n in (3.0, 7.5, 2.0):
         journal.add("force", journal.clock(0.2), {"force_n": force_n})
@@ -132,6 +135,8 @@ def root(tmp_path):
             rows.append(RolloutRow(**columns, seed=0))
     write_rows(folder / "rollouts.parquet", RolloutRow, rows)
     for name, listed in derived_tables(sorted((folder / "journals").iterdir())).items():
+        if name == "faults":  # nobody was brought
+            continue
         seed = {"seed": 0} if name == "invocations" else {}
         made = [TABLES[name](**row, **seed) for row in listed]
         write_rows(folder / f"{name}.parquet", TABLES[name], made)
@@ -251,6 +256,48 @@ def test_a_forged_cell_of_every_other_table_is_refused_by_name(root, name):
     write_rows(path, TABLES[name], [TABLES[name](**row) for row in (*rows, rows[0])])
     with pytest.raises(RefusedError, match="is stated twice"):
         rederive(root, "D")
+
+
+def _failing(root, *, brought):
+    """The first rollout of `flow` misses its deadline because its process failed."""
+    name = "flow__nominal"
+    path = root / STRESS / "journals" / f"{name}.mcap"
+    write_journal(path, [_session(name, 0, "late"), _session(name, 1)])
+    expected, _ = module._held_to(PARAMS)
+    reports = {
+        p.name: check_journal(p, expected).as_document()
+        for p in sorted((root / STRESS / "journals").iterdir())
+    }
+    shadow.CHECKER.write(root / STRESS, checked(reports))
+    section = {"flow": "own/flow.yaml"} if brought else {}
+    return {**PARAMS, "candidates": section}, sorted((root / STRESS / "journals").iterdir())
+
+
+def test_a_fault_of_a_policy_that_runs_here_is_refused(root):
+    params, journals = _failing(root, brought=False)
+    with pytest.raises(RefusedError, match=r"fault flow/nominal/late.*1 of a policy that runs"):
+        module._tables(root, params, module._held_to(PARAMS)[1], journals)
+
+
+def test_faults_are_what_journals_say_of_those_that_were_brought(root):
+    params, journals = _failing(root, brought=True)
+    path = root / STRESS / "faults.parquet"
+    rows = [FaultRow("flow", "envelope", "", 0), FaultRow("flow", "nominal", "late", 1)]
+
+    def held():
+        module._tables(root, params, module._held_to(PARAMS)[1], journals)
+
+    write_rows(path, FaultRow, rows)
+    held()
+    write_rows(path, FaultRow, [rows[0], replace(rows[1], count=0)])
+    with pytest.raises(RefusedError, match=r"fault flow/nominal/late: count is 0"):
+        held()
+    write_rows(path, FaultRow, [rows[0], replace(rows[1], fault="shape")])
+    with pytest.raises(RefusedError, match=r"fault flow/nominal/late is only in a journal"):
+        held()
+    path.unlink()
+    with pytest.raises(RefusedError, match=r"fault flow/envelope/ is only in a journal"):
+        held()
 
 
 def test_ages_of_actions_that_no_journal_has_are_refused(root):

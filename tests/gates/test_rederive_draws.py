@@ -1,6 +1,7 @@
 """Chunks of another checkpoint, from other noise or of another moment are no proof of this one."""
 
 import shutil
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,8 @@ from one_flow import HORIZONS, PARAMS, SAMPLES, TASK, edited, folder_of, roll_ou
 
 from gates import rederive_draws as module
 from gates.rederive_draws import SHADOW, rederive_rollout_draws, rederive_shadow_draws
+from genpolicy.candidates.brought import BroughtPolicy
+from genpolicy.candidates.wire.entry import ServerEntry
 from genpolicy.data.dataset import load_dataset
 from genpolicy.errors import BadInputError, RefusedError
 from genpolicy.evidence.admission_context import make_checker
@@ -20,6 +23,7 @@ from genpolicy.execution.journal import encode_actions, read_journal
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.rows import read_rows, write_rows
 from genpolicy.seeds import stream
+from tests.candidates.conftest import ENTRY
 
 
 @pytest.fixture(scope="module")
@@ -69,6 +73,17 @@ def test_rollouts_of_another_checkpoint_under_this_name_are_refused(root, params
 def test_a_policy_that_nobody_trained_drew_nothing(root, params, journals):
     shutil.rmtree(folder_of(root))
     with pytest.raises(RefusedError, match="drawn by flow"):
+        rederive_rollout_draws(root, params, journals[:1])
+
+
+def test_a_server_that_does_not_start_again_is_refused_with_its_last_words(
+    root, params, journals, monkeypatch, tmp_path
+):
+    command = [sys.executable, "-c", "raise SystemExit('no weights here')  # {port}"]
+    entry = ServerEntry.model_validate({**ENTRY, "address": None, "command": command})
+    other = BroughtPolicy("flow", tmp_path / "flow.yaml", entry, "c" * 64, 0)
+    monkeypatch.setattr(module, "brought_policy", lambda *_: other)
+    with pytest.raises(RefusedError, match=r"asked again without an answer.*no weights here"):
         rederive_rollout_draws(root, params, journals[:1])
 
 

@@ -35,7 +35,8 @@ def weightless(monkeypatch):
 
 
 def nothing(*_, **__):
-    return SimpleNamespace(cell=None, checker=SimpleNamespace(cell=None), observation=None)
+    checker = SimpleNamespace(cell=None)
+    return SimpleNamespace(cell=None, checker=checker, observation=None, scene_path=None)
 
 
 def without(monkeypatch, module, *names):

@@ -2,7 +2,8 @@
 
 import pytest
 
-from genpolicy.verification.invocations import Invocations
+from genpolicy.candidates.wire.faults import Fault
+from genpolicy.verification.invocations import FAULTS, Invocations
 
 MS = 1_000_000
 SESSION = ("session", {"t": 0, "labels": {"start_sha256": "ab"}})
@@ -11,6 +12,10 @@ CHECK = ("invocation", {"t": 200 * MS, "id": "a", "stage": "check", "detail": "0
 FIRST = ("candidate", {"t": 200 * MS, "chunk_id": "a", "index": 0})
 SECOND = ("candidate", {"t": 200 * MS, "chunk_id": "a", "index": 1})
 QUEUED = ("enqueue", {"t": 200 * MS, "chunk_id": "a", "source": "policy"})
+FAULT = ("invocation", {"t": 250 * MS, "id": "a", "stage": "fault", "detail": "late"})
+MISSED = ("invocation", {"t": 250 * MS, "id": "a", "stage": "end", "detail": "deadline"})
+OTHER = ("invocation", {"t": 250 * MS, "id": "b", "stage": "begin", "detail": "0.06"})
+END = ("end", {"t": 400 * MS})
 ANSWERED = ("invocation", {"t": 200 * MS, "id": "a", "stage": "end", "detail": "answered"})
 
 
@@ -54,6 +59,28 @@ def test_an_answer_in_its_time_is_right():
 )
 def test_what_comes_too_cheap_is_found(events, rule):
     assert rule in rules(*events)
+
+
+def test_a_fault_is_a_missed_deadline():
+    assert rules(BEGIN, FAULT, MISSED, OTHER, END) == []
+    assert rules(BEGIN, FAULT, changed(MISSED, detail="overrun"), END) == []
+
+
+@pytest.mark.parametrize("events", [
+    (BEGIN, FAULT, END), (BEGIN, FAULT, OTHER), (BEGIN, FAULT, FAULT, MISSED),
+    (BEGIN, FAULT, changed(MISSED, detail="answered")),
+    (BEGIN, FAULT, changed(MISSED, id="b")),
+    (BEGIN, changed(FAULT, detail="tired"), MISSED),
+    (BEGIN, FAULT, MISSED, changed(FIRST, t=300 * MS)),
+    (BEGIN, FIRST, FAULT, MISSED),
+    (BEGIN, FAULT, MISSED, FAULT, MISSED),
+])  # fmt: skip
+def test_a_fault_that_costs_no_deadline_or_that_was_answered_is_found(events):
+    assert "clock.fault" in rules(*events)
+
+
+def test_the_kinds_are_those_of_the_wire():
+    assert set(FAULTS) == set(map(str, Fault))
 
 
 def test_a_sum_of_seconds_may_round_by_less_than_a_microsecond():

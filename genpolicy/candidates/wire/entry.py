@@ -1,5 +1,6 @@
 """A candidate's entry: what somebody's policy is, where it lies, and what its numbers mean."""
 
+import shutil
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -78,6 +79,18 @@ class Orientation(Settings):
         return self
 
 
+class Joints(Settings):
+    """How a chunk says that the joints of the arm shall be.
+
+    Attributes:
+        columns: One for each joint, from the base to the hand.
+        unit: Of the numbers.
+    """
+
+    columns: list[Column] = Field(min_length=1, max_length=32)
+    unit: Literal["rad", "deg"]
+
+
 class Gripper(Settings):
     """How far a chunk says that the gripper shall be open.
 
@@ -101,15 +114,26 @@ class Gripper(Settings):
 
 
 class Anchor(Settings):
-    """The pose that relative actions start from: of the observation that conditioned them.
+    """What relative actions start from: of the observation that conditioned them.
+
+    A pose, or where they are joint positions, those.
 
     Attributes:
         position: Three numbers of the observation, m: a channel, or single ones.
         rotation: Six numbers of it, the first two columns of the rotation.
+        joints: Measured joint positions.
     """
 
-    position: list[str] = Field(min_length=1)
-    rotation: list[str] = Field(min_length=1)
+    position: list[str] | None = Field(default=None, min_length=1)
+    rotation: list[str] | None = Field(default=None, min_length=1)
+    joints: list[str] | None = Field(default=None, min_length=1)
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> "Anchor":
+        pose = [self.position is None, self.rotation is None]
+        if pose != [self.joints is not None] * 2:
+            raise ValueError("anchor names position and rotation, or joints")
+        return self
 
 
 class Output(Settings):
@@ -117,42 +141,61 @@ class Output(Settings):
 
     Attributes:
         key: Their name in the answer.
-        frame: Frame of positions and rotations: the robot's base, or the TCP of the anchor.
+        frame: Frame of positions and rotations: the robot's base, or the TCP of the anchor. None
+            of joints, which have none.
         motion: `absolute`; `relative` to the anchor, every row; or `increments`, each from the
             row before it, the first from the anchor.
-        position: Where.
-        rotation: How turned; None where the policy leaves the anchor's rotation as it is.
+        position: Where; None of joints.
+        rotation: How turned; None of joints, and where the policy leaves the anchor's rotation as
+            it is.
+        joints: Positions of the arm's joints, in place of position and rotation.
         gripper: How far open.
         anchor: Where a relative motion begins; None for an absolute one.
     """
 
     key: str = "actions"
-    frame: Literal["robot_base", "tcp"]
+    frame: Literal["robot_base", "tcp"] | None = None
     motion: Literal["absolute", "relative", "increments"]
-    position: Position
-    rotation: Orientation | None
+    position: Position | None = None
+    rotation: Orientation | None = None
+    joints: Joints | None = None
     gripper: Gripper
     anchor: Anchor | None = None
+
+    @model_validator(mode="after")
+    def _one_space(self) -> "Output":
+        said = {name: getattr(self, name) is not None for name in ("frame", "position", "rotation")}
+        if self.joints is not None and any(said.values()):
+            raise ValueError("joints stand alone: no frame, position or rotation beside them")
+        pose = said["frame"] and said["position"] and "rotation" in self.model_fields_set
+        if self.joints is None and not pose:
+            raise ValueError("frame, position and rotation say a pose, or joints say it")
+        if self.anchor is not None and (self.anchor.joints is None) != (self.joints is None):
+            raise ValueError("anchor is joint positions of a motion of joints, and of no other")
+        return self
 
     @model_validator(mode="after")
     def _consistent(self) -> "Output":
         if self.motion == "absolute" and self.frame == "tcp":
             raise ValueError("an absolute place is in the frame robot_base")
-        if self.motion == "absolute" and self.rotation is None:
+        if self.motion == "absolute" and self.rotation is None and self.joints is None:
             raise ValueError("an absolute motion says its rotation")
         if self.anchor is None and self.motion != "absolute":
             raise ValueError("anchor names the pose that it is relative to")
-        rotated = self.rotation.columns if self.rotation else []
-        columns = [*self.position.columns, *rotated, self.gripper.column]
-        if len(set(columns)) != len(columns):
+        if len(set(self.columns)) != len(self.columns):
             raise ValueError("each column means one thing")
         return self
 
     @property
+    def columns(self) -> list[int]:
+        """Every column that has a meaning."""
+        parts = (self.position, self.rotation, self.joints)
+        return [*(c for part in parts if part for c in part.columns), self.gripper.column]
+
+    @property
     def width(self) -> int:
         """How many columns there must be at least."""
-        rotated = self.rotation.columns if self.rotation else []
-        return 1 + max(*self.position.columns, *rotated, self.gripper.column)
+        return 1 + max(self.columns)
 
 
 class Declared(Settings):
@@ -258,6 +301,28 @@ def read_entry(path: Path) -> ServerEntry:
             action="See docs/candidates.md.",
         )
     return parse_settings(ServerEntry, values, where=str(path))
+
+
+def require_program(entry: ServerEntry, folder: Path) -> None:
+    """Refuse an entry whose command cannot be run on this machine, before anything runs.
+
+    Args:
+        entry: What it is.
+        folder: Of the entry's file; the command runs there.
+
+    Raises:
+        ConfigError: There is no such program.
+    """
+    if entry.command is None:
+        return
+    program = entry.command[0]
+    if shutil.which(program if "/" not in program else str(folder / program)) is None:
+        raise ConfigError(
+            where=f"command of the candidate {entry.name}",
+            found=f"{program!r}, which is no program of this machine",
+            expected="one that can be run",
+            action="Install it, or name its full path.",
+        )
 
 
 def verify_files(entry: ServerEntry, folder: Path) -> None:

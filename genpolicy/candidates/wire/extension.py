@@ -37,6 +37,7 @@ class Capabilities(Settings):
         candidates: Most candidates that it draws in one message.
         counts_evaluations: It counts network evaluations at the network.
         spans: Latency terms that it measures, by their names in the contract.
+        prefix: It can draw chunks that go on from given actions.
     """
 
     version: int = Field(default=0, ge=0)
@@ -47,6 +48,7 @@ class Capabilities(Settings):
     candidates: int = Field(default=1, ge=1)
     counts_evaluations: bool = False
     spans: tuple[str, ...] = ()
+    prefix: bool = False
 
 
 def capabilities(metadata: dict[str, Any]) -> Capabilities:
@@ -86,9 +88,38 @@ class Drawn:
     spans_s: dict[str, float] = field(default_factory=dict)
 
 
-def request(invocation: str, noise: NoiseName, candidates: int) -> dict[str, Any]:
+@dataclass(frozen=True)
+class GoesOn:
+    """What the chunks of one invocation are drawn to go on from.
+
+    Attributes:
+        actions: Given actions, finite; of no consequence where the weight is 0. Shape (K, D).
+        weights: From 0, free, to 1, as given; falling. Shape (K,).
+        bound: Largest factor of the guidance, > 0.
+    """
+
+    actions: Array
+    weights: Array
+    bound: float
+
+    @property
+    def frozen(self) -> int:
+        """First rows that are executed whatever is drawn: those of weight 1."""
+        return int(np.cumprod(self.weights >= 1.0).sum())
+
+
+def request(
+    invocation: str, noise: NoiseName, candidates: int, prefix: GoesOn | None = None
+) -> dict[str, Any]:
     """What a message to a server with the extension says."""
-    return {WORD: {"invocation": invocation, "noise": list(noise), "candidates": candidates}}
+    said = {"invocation": invocation, "noise": list(noise), "candidates": candidates}
+    if prefix is None:
+        return {WORD: said}
+    given = {
+        "actions": prefix.actions, "weights": prefix.weights, "frozen": prefix.frozen,
+        "bound": prefix.bound,
+    }  # fmt: skip
+    return {WORD: {**said, "prefix": given}}
 
 
 def read_answer(

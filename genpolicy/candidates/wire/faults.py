@@ -6,7 +6,7 @@ from genpolicy.errors import GenpolicyError
 
 
 class Fault(StrEnum):
-    """Kinds of faults, as a journal writes them."""
+    """Kinds of faults, as a journal writes them; each ends the invocation."""
 
     LATE = "late"
     """No answer in time."""
@@ -24,6 +24,10 @@ class Fault(StrEnum):
     """An answer to something that was not asked."""
     CHANGED = "changed"
     """It says that it is another one than it was."""
+    NONFINITE = "nonfinite"
+    """It answered, and no chunk of the answer is finite numbers throughout."""
+    GONE = "gone"
+    """It failed so often in a row that it is asked no more."""
 
 
 class PolicyError(GenpolicyError):

@@ -1,17 +1,22 @@
 """From named observation channels to a policy's inputs, and from its numbers to the mapped action.
 
 Everything before the first check of feasibility: whatever a policy says, in mm or quaternions, from
-the base or from the hand, becomes the one action that all methods are judged by. Relative actions
-start at the state that conditioned them, never at a newer one: the chunk says what it meant then.
+the base or from the hand, or as joint positions, becomes the one action that all methods are judged
+by. Relative actions start at the state that conditioned them, never at a newer one: the chunk says
+what it meant then.
 """
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation as Turn
 
+from genpolicy.candidates.wire.channels import columns_of
 from genpolicy.candidates.wire.entry import LENGTH, Gripper, Input, Orientation, Output
+from genpolicy.candidates.wire.joints import JointSpace
+from genpolicy.candidates.wire.writing import written
 from genpolicy.contract.action import join_action
 from genpolicy.contract.observation import ObservationContract
 from genpolicy.contract.rotation import rotation_from_6d
@@ -67,15 +72,23 @@ class Outputs:
     Args:
         output: As declared.
         contract: The observation in force, which holds the anchor.
+        scene: The MJCF that describes the robot, for whoever says joint positions; None where
+            nobody knows it.
 
     Raises:
-        ContractError: An anchor that the observation does not have.
+        ContractError: An anchor that the observation does not have, or other joints than the
+            robot's.
     """
 
-    def __init__(self, output: Output, contract: ObservationContract) -> None:
+    def __init__(
+        self, output: Output, contract: ObservationContract, *, scene: Path | None = None
+    ) -> None:
         self.output = output
         self._anchor: tuple[Indices, Indices] | None = None
-        if output.anchor is not None:
+        self._joints: JointSpace | None = None
+        if output.joints is not None:
+            self._joints = JointSpace(output.joints, output, contract, scene)
+        elif output.anchor is not None:
             self._anchor = (
                 _sized(output.anchor.position, contract, "action.anchor.position", POSITION_SIZE),
                 _sized(output.anchor.rotation, contract, "action.anchor.rotation", ROTATION_SIZE),
@@ -93,8 +106,13 @@ class Outputs:
             is NaN there, and the first check rejects it. Row by row in memory, as compiled checks
             want it. Shape (N, K, 10).
         """
-        place = chunks[..., self.output.position.columns] * LENGTH[self.output.position.unit]
         opened = opening(self.output.gripper, chunks)
+        if self._joints is not None:
+            place, turned = self._joints.poses(chunks, conditioned_by)
+            return np.ascontiguousarray(join_action(place, turned, opened))
+        position = self.output.position
+        assert position is not None  # an entry without joints has one
+        place = chunks[..., position.columns] * LENGTH[position.unit]
         if self._as_predicted:
             assert self.output.rotation is not None  # see `_as_predicted`
             six = chunks[..., self.output.rotation.columns]
@@ -103,6 +121,24 @@ class Outputs:
         if self.output.motion != "absolute":
             place, turned = self._from_anchor(place, turned, conditioned_by)
         return np.ascontiguousarray(join_action(place, turned, opened))
+
+    def written(self, actions: Array, conditioned_by: Array) -> Array:
+        """The inverse: mapped actions as the policy would say them, after this observation.
+
+        Args:
+            actions: Shape (K, 10).
+            conditioned_by: Newest observation that it is given. Shape (D_o,).
+
+        Returns:
+            Shape (K, D).
+
+        Raises:
+            ContractError: A form in which they cannot be said (see `not_writable`).
+        """
+        if self._anchor is None:
+            return written(self.output, actions, None)
+        position, rotation = conditioned_by[self._anchor[0]], conditioned_by[self._anchor[1]]
+        return written(self.output, actions, (position, rotation_from_6d(rotation)))
 
     @property
     def _as_predicted(self) -> bool:
@@ -136,30 +172,6 @@ class Outputs:
             towards = towards @ turned[:, row] if in_hand else turned[:, row] @ towards
             places[:, row], rotations[:, row] = at, towards
         return places, rotations
-
-
-def columns_of(names: Sequence[str], contract: ObservationContract, *, where: str) -> Indices:
-    """Where channels, or single numbers of them, stand in the observation vector.
-
-    Raises:
-        ContractError: One of them does not exist.
-    """
-    single = {name: column for column, name in enumerate(contract.component_names)}
-    found: list[int] = []
-    for name in names:
-        if name in contract.slices:
-            part = contract.slices[name]
-            found += range(part.start, part.stop)
-        elif name in single:
-            found.append(single[name])
-        else:
-            raise ContractError(
-                where=f"{where} of the candidate",
-                found=repr(name),
-                expected=f"a channel ({', '.join(contract.slices)}) or `channel.component` of one",
-                action="Name what the observation contract holds.",
-            )
-    return np.array(found, dtype=np.int64)
 
 
 def opening(gripper: Gripper, chunks: Array) -> Array:
@@ -217,8 +229,10 @@ def _lengths(contract: ObservationContract) -> NDArray[np.bool_]:
     ])  # fmt: skip
 
 
-def _sized(names: Sequence[str], contract: ObservationContract, where: str, size: int) -> Indices:
-    columns = columns_of(names, contract, where=where)
+def _sized(
+    names: Sequence[str] | None, contract: ObservationContract, where: str, size: int
+) -> Indices:
+    columns = columns_of(names or (), contract, where=where)
     if len(columns) != size:
         raise ContractError(
             where=f"{where} of the candidate",

@@ -1,13 +1,15 @@
-"""A policy behind the wire in the place of one of ours: what it does wrong is a chunk that is none.
+"""A policy behind the wire in the place of one of ours: what it does wrong ends that invocation.
 
-An invocation that ends in a fault gives chunks of NaN, which the first layer of feasibility refuses
-one by one: the candidate pays for it, and whoever asked goes on.
+An invocation that ends in a fault has a kind and no chunk; whoever wants numbers of all rows gets
+NaN in its place, which the first layer of feasibility refuses. The candidate pays for it, and
+whoever asked goes on. So it is with a server that does not even start.
 """
 
 import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +18,8 @@ from numpy.typing import NDArray
 from genpolicy.candidates.brought import BroughtPolicy
 from genpolicy.candidates.wire.connection import Clock
 from genpolicy.candidates.wire.entry import verify_files
-from genpolicy.candidates.wire.extension import Capabilities
-from genpolicy.candidates.wire.faults import PolicyError
+from genpolicy.candidates.wire.extension import Capabilities, GoesOn
+from genpolicy.candidates.wire.faults import Fault, PolicyError
 from genpolicy.candidates.wire.launched import Launched
 from genpolicy.candidates.wire.remote import Invocation, RemotePolicy
 from genpolicy.contract.action import ACTION_DIM
@@ -36,28 +38,40 @@ OWN_TERMS = (Term.PREPROCESS, Term.ENCODE, Term.SAMPLE)
 """What happens in its process."""
 
 
+@dataclass(frozen=True)
+class WireSamples(Samples):
+    """Chunks of which some rows may be none.
+
+    Attributes:
+        faults: Of each row: how its invocation failed; None where it was answered.
+    """
+
+    faults: tuple[Fault | None, ...]
+
+
 class WirePolicy:
-    """A brought policy that is running; see `genpolicy.policies.policy.Policy`.
+    """A brought policy that is asked; see `genpolicy.policies.policy.Policy`.
 
     Args:
         brought: Who it is.
-        remote: How it is asked.
+        remote: How it is asked; or why it cannot be: then every invocation ends in that fault.
         clock: Of this machine.
 
     Attributes:
         asked: Invocations so far.
         faults: How many of them ended in each kind of fault.
+        last_words: What was seen at the last fault that had a cause; empty without any.
     """
 
-    guided = False
-
     def __init__(
-        self, brought: BroughtPolicy, remote: RemotePolicy, *, clock: Clock = time.perf_counter
-    ) -> None:
+        self, brought: BroughtPolicy, remote: RemotePolicy | PolicyError, *,
+        clock: Clock = time.perf_counter,
+    ) -> None:  # fmt: skip
         self._brought, self._remote, self._clock = brought, remote, clock
         self._in_a_row = 0
         self.asked = 0
-        self.faults: Counter[str] = Counter()
+        self.faults: Counter[Fault] = Counter()
+        self.last_words = ""
 
     @property
     def method(self) -> str:
@@ -90,9 +104,19 @@ class WirePolicy:
         return self._brought.entry.stochastic
 
     @property
+    def absent(self) -> bool:
+        """Whether its server did not start."""
+        return isinstance(self._remote, PolicyError)
+
+    @property
+    def guided(self) -> bool:
+        """Whether its server takes a prefix, and its entry says actions in which one is written."""
+        return isinstance(self._remote, RemotePolicy) and not self._remote.unguided
+
+    @property
     def told(self) -> Capabilities:
-        """What its server says of itself."""
-        return self._remote.told
+        """What its server says of itself; nothing, of one that is not there."""
+        return Capabilities() if isinstance(self._remote, PolicyError) else self._remote.told
 
     def sample(
         self,
@@ -101,30 +125,26 @@ class WirePolicy:
         noise_names: Sequence[NoiseName],
         candidates: int,
         prefix: Prefix | None = None,
-    ) -> Samples:
+    ) -> WireSamples:
         """Candidate chunks, one observation a message; NaN where there is no answer.
 
         Raises:
-            ConfigError: A prefix, which no server is asked to go on from.
+            ConfigError: A prefix, of one whose chunks cannot be drawn to go on from it.
         """
-        if prefix is not None:
-            raise ConfigError(
-                where=f"a prefix for {self.method}",
-                found="an invocation that shall go on from given actions",
-                expected="none, of a policy behind the wire",
-                action="Add it to `stress.joining.exempt`, or choose another rule.",
-            )
-        drawn, counts = [], [0]
-        for row, name in zip(observations, noise_names, strict=True):
-            answer = self.invoke(row, noise=name, candidates=candidates)
+        drawn, faults, counts = [], [], [0]
+        for number, (row, name) in enumerate(zip(observations, noise_names, strict=True)):
+            given = self._given(prefix, number)
+            answer = self.invoke(row, noise=name, candidates=candidates, prefix=given)
             drawn.append(self._chunks(answer, candidates))
-            if answer is not None and answer.evaluations is not None:
+            faults.append(answer if isinstance(answer, Fault) else None)
+            if isinstance(answer, Invocation) and answer.evaluations is not None:
                 counts.append(answer.evaluations)
-        return Samples(np.stack(drawn), max(counts))
+        return WireSamples(np.stack(drawn), max(counts), tuple(faults))
 
     def timed(
-        self, observations: Array, *, noise: NoiseName, candidates: int
-    ) -> tuple[dict[Term, float], Array]:
+        self, observations: Array, *, noise: NoiseName, candidates: int,
+        prefix: Prefix | None = None,
+    ) -> tuple[dict[Term, float], Array]:  # fmt: skip
         """One invocation with what its terms took, s, and its chunks (N, K, D_a).
 
         Whatever no span of its server explains is counted as sampling: the message itself, and all
@@ -132,36 +152,68 @@ class WirePolicy:
         An invocation that ends in a fault took as long as it was waited for.
         """
         begun = self._clock()
-        answer = self.invoke(observations, noise=noise, candidates=candidates)
-        if answer is None:
+        given = self._given(prefix, 0)
+        answer = self.invoke(observations, noise=noise, candidates=candidates, prefix=given)
+        if isinstance(answer, Fault):
             waited = {**dict.fromkeys(OWN_TERMS, np.nan), Term.SAMPLE: self._clock() - begun}
-            return waited, self._chunks(None, candidates)
+            return waited, self._chunks(answer, candidates)
         spans = {term: answer.spans_s.get(str(term), np.nan) for term in OWN_TERMS}
         rest_s = answer.seconds - sum(answer.spans_s.get(str(term), 0.0) for term in OWN_TERMS)
         known_s = 0.0 if np.isnan(spans[Term.SAMPLE]) else spans[Term.SAMPLE]
         return {**spans, Term.SAMPLE: known_s + max(0.0, rest_s)}, self._chunks(answer, candidates)
 
     def invoke(
-        self, observations: Array, *, noise: NoiseName, candidates: int
-    ) -> Invocation | None:
-        """One invocation (H_o, D_o); None if it ended in a fault, which is counted."""
+        self, observations: Array, *, noise: NoiseName, candidates: int,
+        prefix: GoesOn | None = None,
+    ) -> Invocation | Fault:  # fmt: skip
+        """One invocation (H_o, D_o), or the fault in which it ended, which is counted."""
         self.asked += 1
         if self._in_a_row >= GONE_AFTER:
-            self.faults["gone"] += 1
-            return None
+            self.faults[Fault.GONE] += 1
+            return Fault.GONE
         count = candidates if self.stochastic else 1
         try:
-            answer = self._remote.invoke(observations, noise=noise, candidates=count)
+            if isinstance(self._remote, PolicyError):
+                raise self._remote
+            answer = self._remote.invoke(observations, noise=noise, candidates=count, prefix=prefix)
         except PolicyError as error:
-            self.faults[str(error.fault)] += 1
             self._in_a_row += 1
-            return None
-        self._in_a_row = 0
+            return self._counted(error)
+        self._in_a_row = 0  # whatever it says, it costs no timeout
+        if not np.isfinite(answer.actions).all(axis=(1, 2)).any():
+            return self._counted(PolicyError(Fault.NONFINITE, "no chunk of finite numbers"))
         return answer
 
-    def _chunks(self, answer: Invocation | None, candidates: int) -> Array:
+    def _given(self, prefix: Prefix | None, row: int) -> GoesOn | None:
+        """What a row goes on from; None of one without a weight, which is asked plainly.
+
+        Behind the last weight the last given action stands, which is a pose in every form.
+        """
+        if prefix is None or self.absent:
+            return None
+        assert isinstance(self._remote, RemotePolicy)  # it is not absent
+        if why := self._remote.unguided:
+            raise ConfigError(
+                where=f"a prefix for {self.method}",
+                found=why,
+                expected="a policy whose chunks can be drawn to go on from given actions",
+                action="Add it to `stress.joining.exempt`, or choose another rule.",
+            )
+        weights = prefix.weights[row]
+        known = np.flatnonzero(weights > 0.0)
+        if len(known) == 0:
+            return None
+        rows = np.minimum(np.arange(len(weights)), known[-1])
+        return GoesOn(prefix.actions[row][rows], weights, prefix.bound)
+
+    def _counted(self, error: PolicyError) -> Fault:
+        self.faults[error.fault] += 1
+        self.last_words = str(error)
+        return error.fault
+
+    def _chunks(self, answer: Invocation | Fault, candidates: int) -> Array:
         """Shape (N, K, D_a); one that is always the same is there N times."""
-        if answer is None:
+        if isinstance(answer, Fault):
             return np.full((candidates, self.prediction_horizon, ACTION_DIM), np.nan)
         if len(answer.actions) == candidates:
             return answer.actions
@@ -169,24 +221,34 @@ class WirePolicy:
 
 
 @contextmanager
-def running(brought: BroughtPolicy, contract: ObservationContract) -> Iterator[WirePolicy]:
+def running(
+    brought: BroughtPolicy, contract: ObservationContract, *, scene: Path | None = None
+) -> Iterator[WirePolicy]:
     """A brought policy, its files verified, its server started here and ended.
+
+    One that does not start, or says what it can in a way that is none, is a policy all of whose
+    invocations fail: that costs this candidate, and no other.
 
     Args:
         brought: Who it is.
         contract: The observation in force.
+        scene: The MJCF that describes the robot; None where nobody knows it.
 
     Raises:
         IntegrityError: A file of it is another one.
         ConfigError: Its program is not there.
-        ContractError: Its entry names what the observation does not have.
-        PolicyError: It does not listen, or says what it can in a way that is none.
+        ContractError: Its entry names what the observation or the robot does not have.
     """
     folder: Path = brought.folder
     verify_files(brought.entry, folder)
-    with Launched(brought.entry, folder) as server:
-        remote = RemotePolicy(brought.entry, server.address, contract, ended=server.died)
+    with ExitStack() as stack:
+        remote: RemotePolicy | PolicyError
         try:
-            yield WirePolicy(brought, remote)
-        finally:
-            remote.close()
+            server = stack.enter_context(Launched(brought.entry, folder))
+            remote = RemotePolicy(
+                brought.entry, server.address, contract, scene=scene, ended=server.died
+            )
+            stack.callback(remote.close)
+        except PolicyError as fault:
+            remote = fault
+        yield WirePolicy(brought, remote)

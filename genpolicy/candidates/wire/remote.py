@@ -2,7 +2,8 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from genpolicy.candidates.wire.entry import ServerEntry
 from genpolicy.candidates.wire.extension import (
     Capabilities,
     Drawn,
+    GoesOn,
     NoiseName,
     capabilities,
     read_answer,
@@ -19,6 +21,7 @@ from genpolicy.candidates.wire.extension import (
 )
 from genpolicy.candidates.wire.faults import Fault, PolicyError
 from genpolicy.candidates.wire.mapping import Inputs, Outputs
+from genpolicy.candidates.wire.writing import not_writable
 from genpolicy.contract.observation import ObservationContract
 
 Array = NDArray[np.float64]
@@ -54,15 +57,17 @@ class RemotePolicy:
         address: Where it listens.
         contract: The observation in force.
         clock: Of this machine.
+        scene: The MJCF that describes the robot; None where nobody knows it.
         ended: Why its process is not there any more, where we started it; None while it is.
 
     Raises:
-        ContractError: The entry names what the observation does not have.
+        ContractError: The entry names what the observation or the robot does not have.
         PolicyError: Nobody listens, or says what it can in a way that is none.
     """
 
     def __init__(
         self, entry: ServerEntry, address: str, contract: ObservationContract, *,
+        scene: Path | None = None,
         clock: Clock = time.perf_counter, ended: Callable[[], str | None] = lambda: None,
     ) -> None:  # fmt: skip
         self.entry = entry
@@ -73,7 +78,7 @@ class RemotePolicy:
             entry.observation, contract,
             observation_horizon=entry.horizons.observation_horizon,
         )  # fmt: skip
-        self._outputs = Outputs(entry.action, contract)
+        self._outputs = Outputs(entry.action, contract, scene=scene)
         self._asked = 0
         self._line: Connection | None = None
         self.told: Capabilities = capabilities(self._connected().metadata)
@@ -85,23 +90,39 @@ class RemotePolicy:
                 f"{entry.horizons.prediction_horizon}",
             )
 
-    def invoke(self, observations: Array, *, noise: NoiseName, candidates: int) -> Invocation:
+    @property
+    def unguided(self) -> str:
+        """Why its chunks cannot be drawn to go on from given actions; empty where they can."""
+        if not self.told.prefix:
+            return "a server that takes no prefix"
+        return not_writable(self.entry.action)
+
+    def invoke(
+        self, observations: Array, *, noise: NoiseName, candidates: int,
+        prefix: GoesOn | None = None,
+    ) -> Invocation:  # fmt: skip
         """Candidate chunks of one observation.
 
         Args:
             observations: Physical units, newest last. Shape (H_o, D_o).
             noise: Name of the noise; a server that cannot be seeded never sees it.
             candidates: N >= 1. Asked for one by one where the server draws no more at once.
+            prefix: Mapped actions that the chunks go on from, of one that takes a prefix.
 
         Raises:
+            ContractError: A prefix in whose form the entry says no actions.
             PolicyError: It did not answer, or not with what was declared; there is no chunk.
         """
         begun = self._clock()
         at_once = min(candidates, self.told.candidates) if self.told.version else 1
+        given = None
+        if prefix is not None:
+            own = self._outputs.written(prefix.actions, observations[-1])
+            given = replace(prefix, actions=own)
         drawn: list[Drawn] = []
         for first in range(0, candidates, at_once):
             number = min(at_once, candidates - first)
-            drawn.append(self._draw(observations, (*noise, first), number))
+            drawn.append(self._draw(observations, (*noise, first), number, given))
         chunks = np.concatenate([part.actions for part in drawn])
         mapped = self._outputs.mapped(chunks, observations[-1])
         counts = [part.evaluations for part in drawn if part.evaluations is not None]
@@ -127,12 +148,14 @@ class RemotePolicy:
             self._line.close()
             self._line = None
 
-    def _draw(self, observations: Array, noise: NoiseName, candidates: int) -> Drawn:
+    def _draw(
+        self, observations: Array, noise: NoiseName, candidates: int, prefix: GoesOn | None
+    ) -> Drawn:
         invocation = str(self._asked)
         self._asked += 1
         message = {**self._inputs.of(observations), **self.entry.constants}
         if self.told.version:
-            message |= request(invocation, noise, candidates)
+            message |= request(invocation, noise, candidates, prefix)
         try:
             answer = self._connected().ask(message, timeout_s=self.entry.timeout_s)
             drawn = read_answer(

@@ -1,6 +1,7 @@
 """One of our checkpoints behind the wire, for anybody's client."""
 
 import itertools
+import math
 import time
 from typing import Any, NoReturn
 
@@ -8,8 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.candidates.wire.extension import MOST_CANDIDATES, VERSION, WORD
+from genpolicy.contract.action import ACTION_DIM
 from genpolicy.contract.latency import Term
 from genpolicy.errors import ContractError
+from genpolicy.policies.guidance import Prefix
 from genpolicy.policies.policy import NetworkPolicy
 from genpolicy.policies.protocol import NoiseName
 
@@ -48,6 +51,7 @@ class ServedPolicy:
                 "candidates": MOST_CANDIDATES,
                 "counts_evaluations": True,
                 "spans": [str(Term.PREPROCESS), str(Term.ENCODE), str(Term.SAMPLE)],
+                "prefix": self._policy.guided,
             },
         }
 
@@ -61,12 +65,15 @@ class ServedPolicy:
         asked = _asked(message.get(WORD))
         name: NoiseName = (UNNAMED, next(self._unnamed)) if asked is None else asked[1]
         number = 1 if asked is None else asked[2]
+        prefix = self._prefix((message.get(WORD) or {}).get("prefix"))
         begun = time.perf_counter()
         prepared = self._policy.preprocess(_observation(message.get(OBSERVATION))[None])
         preprocessed = time.perf_counter()
         condition = self._policy.encode(prepared)
         encoded = time.perf_counter()
-        drawn = self._policy.sample_encoded(condition, noise_names=[name], candidates=number)
+        drawn = self._policy.sample_encoded(
+            condition, noise_names=[name], candidates=number, prefix=prefix
+        )
         sampled = time.perf_counter()
         if asked is None:
             return {ACTIONS: drawn.actions[0, 0]}
@@ -85,6 +92,34 @@ class ServedPolicy:
             },
         }
 
+    def _prefix(self, found: Any) -> Prefix | None:
+        """What the chunks go on from, in the actions of the checkpoint, which are the mapped."""
+        if found is None:
+            return None
+        where = f"{WORD}.prefix"
+        if not self._policy.guided:
+            _refuse(where, "given actions", "none: its sampler has no path to guide")
+        names = {"actions", "weights", "frozen", "bound"}
+        if not isinstance(found, dict) or set(found) != names:
+            _refuse(where, repr(found)[:80], ", ".join(sorted(names)))
+        rows = self._policy.prediction_horizon
+        actions = _finite(found["actions"], (rows, ACTION_DIM), f"{where}.actions")
+        weights = _finite(found["weights"], (rows,), f"{where}.weights")
+        if not ((weights >= 0.0) & (weights <= 1.0)).all():
+            _refuse(f"{where}.weights", "a weight outside", "weights from 0 to 1")
+        bound = found["bound"]
+        if not isinstance(bound, float) or not 0.0 < bound < math.inf:
+            _refuse(f"{where}.bound", repr(bound)[:80], "a number above 0")
+        return Prefix(actions[None], weights[None], bound)
+
+
+def _finite(found: Any, shape: tuple[int, ...], where: str) -> NDArray[np.float64]:
+    known = isinstance(found, np.ndarray) and found.dtype.kind == "f" and found.shape == shape
+    if not known or not np.isfinite(found).all():
+        _refuse(where, type(found).__name__, f"finite numbers of shape {shape}")
+    values: NDArray[np.float64] = found.astype(np.float64)
+    return values
+
 
 def _observation(found: Any) -> NDArray[np.float64]:
     if not isinstance(found, np.ndarray) or found.ndim != 2:
@@ -97,8 +132,9 @@ def _asked(found: Any) -> tuple[str, NoiseName, int] | None:
     """Invocation, name of the noise, and number of candidates; None of a plain message."""
     if found is None:
         return None
-    if not isinstance(found, dict) or set(found) != {"invocation", "noise", "candidates"}:
-        _refuse(WORD, repr(found)[:80], "invocation, noise and candidates")
+    names = {"invocation", "noise", "candidates"}
+    if not isinstance(found, dict) or set(found) - {"prefix"} != names:
+        _refuse(WORD, repr(found)[:80], "invocation, noise and candidates; prefix besides")
     invocation, noise, number = found["invocation"], found["noise"], found["candidates"]
     if not isinstance(invocation, str) or len(invocation) > LONGEST_NAME:
         _refuse(f"{WORD}.invocation", repr(invocation)[:80], f"up to {LONGEST_NAME} signs")

@@ -1,10 +1,10 @@
-"""`candidates.json` of the stage `candidates`: who was brought to the ladder."""
+"""Who was brought (`candidates.json`), and whose process failed in reload (`faults.json`)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from genpolicy.candidates.brought import BroughtPolicy
-from genpolicy.documents.document import Document
+from genpolicy.documents.document import Count, Document
 
 
 @dataclass(frozen=True)
@@ -30,6 +30,25 @@ class Brought:
 
 BROUGHT = Document("candidates.json", dict[str, Brought])
 """By name."""
+
+
+@dataclass(frozen=True)
+class Failed:
+    """How the process of a brought policy failed while it was reloaded.
+
+    Attributes:
+        asked: Invocations.
+        faults: How many of them ended in each kind of fault.
+        last_words: What was seen at the last of them; empty without any.
+    """
+
+    asked: Count
+    faults: dict[str, Count]
+    last_words: str
+
+
+FAULTS = Document("faults.json", dict[str, Failed])
+"""By name, of those that were brought; missing where none was."""
 
 
 def brought_document(policies: Sequence[BroughtPolicy]) -> dict[str, Brought]:

@@ -15,6 +15,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from genpolicy.candidates.contenders import joining_of
 from genpolicy.candidates.joining import REAL_TIME, REPLACE, JoiningSettings
 from genpolicy.candidates.votes import Prediction, Votes, join, prefix
 from genpolicy.candidates.wire.policy import WirePolicy
@@ -129,15 +130,16 @@ def measure_running(
         discarded_repeats: Invocations between the first and them that are not recorded.
         candidates: Candidates drawn by an invocation.
         project: Projection of a proposal.
-        joining: How chunks join where they are deployed.
+        joining: How chunks of all methods join where they are deployed.
     """
     results = []
     with start() as policy:
+        own = joining_of(joining, policy)
         _evict_caches(0)
         for index in range(-1 - discarded_repeats, warm_repeats):
             spans = invoke(
                 policy, observations[index % len(observations)][None], repeat=index,
-                candidates=candidates, project=project, joining=joining,
+                candidates=candidates, project=project, joining=own,
             )  # fmt: skip
             temperature: Temperature = "warm" if index >= 0 else "cold"
             if index >= 0 or index == -1 - discarded_repeats:
@@ -195,7 +197,9 @@ def _drawn(policy: NetworkPolicy | WirePolicy, asked: _Asked, spans: dict[str, f
     """Chunks (N, K, D_a) of an observation, and what the terms of the model took."""
     name = ("latency", asked.repeat)
     if isinstance(policy, WirePolicy):
-        terms, chunks = policy.timed(asked.row[0], noise=name, candidates=asked.candidates)
+        terms, chunks = policy.timed(
+            asked.row[0], noise=name, candidates=asked.candidates, prefix=asked.guided
+        )
         spans.update({str(term): seconds for term, seconds in terms.items()})
         return chunks
     with _timed(spans, Term.PREPROCESS):

@@ -4,19 +4,23 @@ It is started twice. Between the two nothing is left of it, and the second time 
 opposite order: what depends on who was asked before, or on a seed of its own, answers otherwise.
 """
 
+from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.candidates import selector
 from genpolicy.candidates.brought import BroughtPolicy
+from genpolicy.candidates.contenders import joining_of
 from genpolicy.candidates.wire.entry import ServerEntry
+from genpolicy.candidates.wire.faults import Fault
 from genpolicy.candidates.wire.policy import WirePolicy, running
 from genpolicy.contract.chunk import actions_sha256
 from genpolicy.data.dataset import Dataset
 from genpolicy.errors import NonFiniteError
+from genpolicy.evidence.documents.brought import Failed
 from genpolicy.evidence.documents.reproducibility import CandidateIdentity, IdentityCard
 from genpolicy.evidence.need.held_out import HeldOut, modes_of_policy
 from genpolicy.evidence.reproducibility.benchmark import DISCARDED
@@ -61,6 +65,7 @@ class Answered:
 
     Attributes:
         identity: What pins and names it.
+        failed: Its faults.
         samples: Fixtures, before and after the new start.
         nfe: Counted network evaluations; empty where its server does not count.
         modes: Two-mode situations.
@@ -68,6 +73,7 @@ class Answered:
     """
 
     identity: CandidateIdentity
+    failed: Failed
     samples: list[SampleRow] = field(default_factory=list)
     nfe: list[NfeRow] = field(default_factory=list)
     modes: list[ModeRow] = field(default_factory=list)
@@ -84,33 +90,47 @@ class _Session:
 
 
 def ask_brought(candidate: BroughtPolicy, asked: Asked) -> Answered:
-    """Start it, ask, end it, start it again, ask again.
+    """Start it, ask, end it, start it again, ask again; a server that does not start answers none.
 
     Raises:
         IntegrityError: A file of it is another one.
-        PolicyError: Its server does not start.
+        ConfigError: Its program is not there.
     """
     seen = fixture_observations(asked.data, horizons=asked.deployment.horizons, count=FIXTURES)
     contract = asked.data.observation_contract
-    with running(candidate, contract) as policy:
+    with running(candidate, contract, scene=asked.task.scene_path) as policy:
+        own = replace(asked.deployment, joining=joining_of(asked.deployment.joining, policy))
         first = _fixtures(policy, seen, range(len(seen)))
         modes = modes_of_policy(
             policy, asked.held_out, seed=candidate.seed, convention=_sampler(candidate.entry),
             samples=asked.samples, task=asked.task, checker=asked.checker,
         )  # fmt: skip
         coverage = _coverage(policy, candidate, asked, modes)
-        broken = sum(policy.faults.values())
-    with running(candidate, contract) as policy:
+    before = policy
+    with running(candidate, contract, scene=asked.task.scene_path) as policy:
         again = _fixtures(policy, seen, range(len(seen))[::-1])
-        broken += sum(policy.faults.values())
+    failed = _failed(before, policy)
+    broken = sum(failed.faults.values())
     # Chunks that came and hold a number that is none, beside questions that got no chunk.
     broken += int((~np.isfinite(first.chunks)).any(axis=(2, 3)).sum())
     return Answered(
-        identity=_identity(candidate, asked.deployment, broken, int(first.told != again.told)),
+        identity=_identity(candidate, own, broken, int(first.told != again.told)),
+        failed=failed,
         samples=_compared(candidate, first.chunks, again.chunks),
         nfe=_evaluations(candidate, first.evaluations, again.evaluations),
         modes=modes,
         coverage=coverage,
+    )
+
+
+def _failed(*starts: WirePolicy) -> Failed:
+    """Faults over all starts; the last words are those of the last that failed."""
+    counted = sum((policy.faults for policy in starts), Counter[Fault]())
+    words = [policy.last_words for policy in starts if policy.last_words]
+    return Failed(
+        asked=sum(policy.asked for policy in starts),
+        faults={str(kind): number for kind, number in sorted(counted.items())},
+        last_words=words[-1] if words else "",
     )
 
 
@@ -194,7 +214,6 @@ def card_of_brought(candidate: BroughtPolicy, deployment: Deployment) -> Identit
     """The card of a brought policy, from what its maker declares; the rest is empty."""
     said, horizons = candidate.entry.declared, candidate.entry.horizons
     period_s = horizons.action_period_s
-    joining = deployment.joining.of(candidate.name, guided=False)
     return IdentityCard(
         architecture=said.architecture if said else "",
         parameters=said.parameters if said else 0,
@@ -222,7 +241,7 @@ def card_of_brought(candidate: BroughtPolicy, deployment: Deployment) -> Identit
         warm_up=DISCARDED,
         batch_rows=said.batch_rows if said else 0,
         candidates=deployment.samples if candidate.entry.stochastic else 1,
-        selector=joining.said(),
+        selector=deployment.joining.said(),
         selector_owner=selector.OWNER,
-        selector_sha256=rule_sha256(joining),
+        selector_sha256=rule_sha256(deployment.joining),
     )

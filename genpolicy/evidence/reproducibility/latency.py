@@ -170,12 +170,12 @@ def measure_terms(plan: LatencyPlan, judged: Contender) -> list[Measurement]:
 
     if isinstance(judged, BroughtPolicy):
         return measure_running(
-            functools.partial(running, judged, data.observation_contract),
+            functools.partial(running, judged, data.observation_contract, scene=task.scene_path),
             observations,
             warm_repeats=plan.warm,
             candidates=plan.samples if judged.entry.stochastic else 1,
             project=project,
-            joining=plan.joining.of(judged.name, guided=False),
+            joining=plan.joining,
         )
     policy = judged.load()
     return measure_policy(

@@ -9,13 +9,14 @@ from multiprocessing.synchronize import Event, Semaphore
 import numpy as np
 
 from genpolicy.candidates.brought import BroughtPolicy
-from genpolicy.candidates.contenders import Contender, Running, opened
+from genpolicy.candidates.contenders import Contender, Running, joining_of, opened
 from genpolicy.data.dataset import Dataset, load_dataset
 from genpolicy.evidence.reproducibility.benchmark import invoke
 from genpolicy.evidence.reproducibility.latency import OBSERVATIONS, LatencyPlan
 from genpolicy.evidence.reproducibility.measure import in_fresh_process
 from genpolicy.evidence.rows.reproducibility import CandidatesRow
 from genpolicy.policies.fixtures import fixture_observations
+from genpolicy.tasks.api import load_task
 
 COUNTS = (1, 4, 8, 32)
 REPEATS = 20
@@ -49,7 +50,8 @@ def _draws(judged: Contender) -> bool:
 def measure_counts(plan: LatencyPlan, judged: Contender) -> list[CandidatesRow]:
     """Rows of one method, measured in this process."""
     data = load_dataset(plan.dataset)
-    with opened(judged, data.observation_contract) as policy:
+    scene = load_task(plan.task).scene_path
+    with opened(judged, data.observation_contract, scene=scene) as policy:
         rows = _measured(plan, policy, data, judged.name, QUIET)
         with competing():
             return rows + _measured(plan, policy, data, judged.name, BUSY)
@@ -86,7 +88,7 @@ def _measured(
 ) -> list[CandidatesRow]:
     seen = fixture_observations(data, horizons=plan.horizons, count=OBSERVATIONS)
     rows = []
-    joining = plan.joining.of(name, guided=policy.guided)
+    joining = joining_of(plan.joining, policy)
     for count in COUNTS:
         for repeat in range(-DISCARDED, REPEATS):
             row = seen[repeat % len(seen)][None]

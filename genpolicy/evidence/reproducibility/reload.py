@@ -10,6 +10,7 @@ from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.data.dataset import Dataset, load_dataset
 from genpolicy.errors import ContractError
 from genpolicy.evidence.admission_context import make_checker
+from genpolicy.evidence.documents.brought import FAULTS
 from genpolicy.evidence.documents.reproducibility import CANDIDATES, CandidateIdentity
 from genpolicy.evidence.need.held_out import HeldOut, held_out_situations, modes_of_policy
 from genpolicy.evidence.need.offline import offline_rows
@@ -118,7 +119,6 @@ def write_reload(
 
     Raises:
         ContractError: Training left no fixture of a candidate.
-        PolicyError: The server of a brought one does not start.
     """
     data, task = load_dataset(plan.dataset), load_task(plan.task)
     checker = make_checker(task, plan.feasibility, action_period_s=plan.horizons.action_period_s)
@@ -137,9 +137,12 @@ def write_reload(
             nonfinite_weights=entry.nonfinite_weights + nonfinite_weights(policy),
         )
         _measured(plan, candidate, policy, asked, rows)
-    for other in brought:
-        identity[other.name] = rows.take(ask_brought(other, asked))
+    answered = {other.name: ask_brought(other, asked) for other in brought}
+    for name, answers in answered.items():
+        identity[name] = rows.take(answers)
     rows.write(folder)
+    if answered:
+        FAULTS.write(folder, {name: answers.failed for name, answers in answered.items()})
     CANDIDATES.write(folder, identity)
 
 

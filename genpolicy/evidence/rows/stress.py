@@ -195,6 +195,23 @@ class OverrunRow:
 
 
 @dataclass(frozen=True)
+class FaultRow:
+    """`faults.parquet` of stress: deadlines missed since a policy's process failed, by kind.
+
+    Attributes:
+        method: The method: one that was brought.
+        perturbation: What was injected.
+        fault: Kind, as `genpolicy.candidates.wire.faults.Fault`; empty where none was counted.
+        count: How often.
+    """
+
+    method: str
+    perturbation: str
+    fault: str
+    count: int
+
+
+@dataclass(frozen=True)
 class AgeRow:
     """`ages.parquet` of stress: quantiles of the action age over all rollouts of a shard.
 

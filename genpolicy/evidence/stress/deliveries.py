@@ -2,7 +2,8 @@
 
 A term that takes longer than it may is dealt with as declared (`execution.term_deadlines`): where
 its action ends the invocation, at the first tick after the time of the term is over; where it
-refuses a candidate or the answer, when that comes.
+refuses a candidate or the answer, when that comes. A policy in a process of its own that failed
+gives no answer: its deadline is missed, and the journal says beside it how it failed.
 """
 
 from collections import deque
@@ -18,6 +19,8 @@ from genpolicy.execution.journal import Journal
 ROUNDING_S = 1e-9
 OVERRUN = "overrun"
 """Stage and end of an invocation in the journal, where a term took longer than it may."""
+FAULT = "fault"
+"""Stage of one that missed its deadline because the policy's process failed; how, is its detail."""
 
 
 class Deliveries:
@@ -59,7 +62,7 @@ class Deliveries:
         for flying in sorted(self._flying, key=_order):
             if self._cut_short(flying, now_s):
                 self._flying.remove(flying)
-            elif flying.arrival_s <= now_s and not flying.dropped:
+            elif flying.arrival_s <= now_s and flying.comes:
                 self._flying.remove(flying)
                 self._arrive(flying, now_s)
             elif self._overdue(flying, now_s):
@@ -183,8 +186,12 @@ class Deliveries:
 
     def _missed(self, flying: InFlight, now_s: float, why: str) -> None:
         """Counted where it is written down, so that row and journal count alike."""
+        name = flying.metadata.chunk_id
+        if flying.fault:
+            self._tally.faults[flying.fault] += 1
+            self._journal.invocation(now_s, invocation_id=name, stage=FAULT, detail=flying.fault)
         self._tally.deadline_misses += 1
-        self._executor.end_invocation(now_s, flying.metadata.chunk_id, why)
+        self._executor.end_invocation(now_s, name, why)
 
     def _overdue(self, flying: InFlight, now_s: float) -> bool:
         return now_s - flying.begun_s >= self._setup.execution.deadline_s - ROUNDING_S
@@ -194,7 +201,7 @@ class Deliveries:
         if not flying.given_up:
             flying.given_up = True
             self._missed(flying, now_s, "deadline")
-        if flying.dropped:
+        if not flying.comes:
             self._flying.remove(flying)
             self.write_off(flying, DiscardReason.EXPIRED, now_s)
 

@@ -12,10 +12,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from genpolicy.candidates.contenders import Contender, opened
+from genpolicy.candidates.contenders import Contender, Running, joining_of, opened
 from genpolicy.candidates.joining import JoiningSettings
 from genpolicy.candidates.judged import candidates_of
+from genpolicy.candidates.wire.policy import WireSamples
 from genpolicy.evidence.rows.stress import (
+    FaultRow,
     InvocationRow,
     OverrunRow,
     RolloutRow,
@@ -96,6 +98,7 @@ class ShardResult:
         invocations: One row per invocation.
         splices: One row per chunk that entered a queue.
         overruns: One row per term that took longer than it may.
+        faults: One row per kind in which the policy's process failed.
         accounts: Balance of chunks, per rollout.
         ages_s: Every action age, s.
         stub: Arrivals, stale and invalid offers.
@@ -105,6 +108,7 @@ class ShardResult:
     invocations: list[InvocationRow]
     splices: list[SpliceRow]
     overruns: list[OverrunRow]
+    faults: list[FaultRow]
     accounts: list[Account]
     ages_s: Array
     stub: StressStubRow
@@ -119,14 +123,14 @@ def run_shard(shard: Shard) -> ShardResult:
     """All rollouts of a shard, in lockstep; writes its journal."""
     comparison = shard.comparison
     task = load_task(comparison.task)
-    with opened(shard.judged, task.observation) as policy:
+    with opened(shard.judged, task.observation, scene=task.scene_path) as policy:
         return _run(shard, task, policy)
 
 
-def _run(shard: Shard, task: Task, policy: Policy) -> ShardResult:
+def _run(shard: Shard, task: Task, policy: Running) -> ShardResult:
     comparison = shard.comparison
     horizons = comparison.cell.horizons
-    joining = comparison.joining.of(shard.judged.name, guided=policy.guided)
+    joining = joining_of(comparison.joining, policy)
     setup = Setup(
         task=task,
         checker=checker_under(
@@ -166,6 +170,7 @@ def _run(shard: Shard, task: Task, policy: Policy) -> ShardResult:
         invocations=[row for rollout in rollouts for row in invocation_rows(shard, rollout)],
         splices=[row for rollout in rollouts for row in splice_rows(shard, rollout)],
         overruns=overrun_rows(shard, rollouts),
+        faults=fault_rows(shard, rollouts),
         accounts=[rollout.executor.conservation().chunks for rollout in rollouts],
         ages_s=np.concatenate([ages for _, ages in parts]),
         stub=StressStubRow(
@@ -200,9 +205,13 @@ def step(active: Sequence[Rollout], policy: Policy, *, samples: int) -> None:
             candidates=candidates_of(policy, samples),
             prefix=_prefix(asking),
         )
-        for rollout, chunks in zip(asking, drawn.actions, strict=True):
+        faults = drawn.faults if isinstance(drawn, WireSamples) else (None,) * len(asking)
+        for rollout, chunks, fault in zip(asking, drawn.actions, faults, strict=True):
             assert rollout.wanted is not None
-            rollout.wanted.chunks = chunks
+            if fault is None:
+                rollout.wanted.chunks = chunks
+            else:
+                rollout.wanted.fault = str(fault)
     for rollout in active:
         if not rollout.done:
             rollout.act()
@@ -317,6 +326,15 @@ def overrun_rows(shard: Shard, rollouts: Sequence[Rollout]) -> list[OverrunRow]:
         )
         for (term, action), count in sorted(done.items()) or [(("", ""), 0)]
     ]
+
+
+def fault_rows(shard: Shard, rollouts: Sequence[Rollout]) -> list[FaultRow]:
+    """Rows of `faults.parquet`, sorted: how often which fault cost an answer."""
+    found: Counter[str] = Counter()
+    for rollout in rollouts:
+        found.update(rollout.tally.faults)
+    rows = sorted(found.items()) or [("", 0)]
+    return [FaultRow(shard.judged.name, shard.perturbation, *row) for row in rows]
 
 
 def _quantile(values: Array, level: float) -> float | None:

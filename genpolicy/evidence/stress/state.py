@@ -98,6 +98,7 @@ class InFlight:
         draw: Which of the samples the candidate is.
         votes: Earlier predictions that have a say in the candidate, oldest first.
         prefix: Actions (K, D_a) that the samples go on from, and weights (K,); None: nothing.
+        fault: How a policy in a process of its own failed it; empty where it did not.
     """
 
     number: int
@@ -114,6 +115,12 @@ class InFlight:
     draw: int = 0
     votes: Sequence[Votes] = ()
     prefix: tuple[Array, Array] | None = None
+    fault: str = ""
+
+    @property
+    def comes(self) -> bool:
+        """Whether there is an answer that is on its way."""
+        return not self.dropped and not self.fault
 
     @property
     def candidates(self) -> int:
@@ -145,6 +152,7 @@ class Tally:
     rejected_by: dict[str, int] = field(default_factory=dict)
     refused: set[str] = field(default_factory=set)
     overruns: Counter[tuple[str, str]] = field(default_factory=Counter)
+    faults: Counter[str] = field(default_factory=Counter)
     latencies_s: list[float] = field(default_factory=list)
     path_m: list[Array] = field(default_factory=list)
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from genpolicy.candidates.brought import BroughtPolicy
 from genpolicy.candidates.contenders import Contender
 from genpolicy.candidates.joining import REAL_TIME
 from genpolicy.candidates.judged import JudgedPolicy
@@ -17,6 +18,7 @@ from genpolicy.evidence.documents.stress import DISTILLED, ENVELOPE, Power
 from genpolicy.evidence.rows.stress import (
     AgeRow,
     ConservationRow,
+    FaultRow,
     InvocationRow,
     OverrunRow,
     RolloutRow,
@@ -83,6 +85,7 @@ def write_stress(folder: Path, shards: Sequence[Shard], *, workers: int, schedul
     write_rows(folder / "stub.parquet", StressStubRow, [result.stub for result in results])
     overruns = [row for _, result in pairs for row in result.overruns]
     write_rows(folder / "overruns.parquet", OverrunRow, overruns)
+    _write_faults(folder, pairs)
     ages = [row for shard, result in pairs for row in _age_rows(shard, result)]
     write_rows(folder / "ages.parquet", AgeRow, ages)
     journals = [shard.journal for shard in shards]
@@ -95,6 +98,14 @@ def write_stress(folder: Path, shards: Sequence[Shard], *, workers: int, schedul
     CHECKER.write(folder, checker_document(journals, cell=comparison.cell, robot=robot))
     _write_envelope(folder, shards)
     write_distilled(folder, [shard.judged for shard in shards])
+
+
+def _write_faults(folder: Path, pairs: Sequence[tuple[Shard, ShardResult]]) -> None:
+    """`faults.parquet`, where a policy in a process of its own was compared."""
+    asked = [result for shard, result in pairs if isinstance(shard.judged, BroughtPolicy)]
+    if asked:
+        rows = [row for result in asked for row in result.faults]
+        write_rows(folder / "faults.parquet", FaultRow, rows)
 
 
 def _write_envelope(folder: Path, shards: Sequence[Shard]) -> None:
@@ -160,8 +171,8 @@ def plan_shards(
             action="Correct the names, or run `dvc repro latency`.",
         )
     for policy in judged if comparison.joining.rule == REAL_TIME else ():
-        guided = isinstance(policy, JudgedPolicy) and policy.load().guided
-        comparison.joining.of(policy.name, guided=guided)
+        if isinstance(policy, JudgedPolicy):  # a server says it when it is asked
+            comparison.joining.of(policy.name, guided=policy.load().guided)
     return [
         Shard(
             comparison=comparison,

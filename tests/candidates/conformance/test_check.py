@@ -10,9 +10,11 @@ from scipy.spatial.transform import Rotation as Turn
 from genpolicy.candidates.conformance.check import check, question
 from genpolicy.candidates.wire.extension import WORD
 from genpolicy.candidates.wire.remote import RemotePolicy
-from genpolicy.contract.action import GRIPPER, ROTATION
+from genpolicy.contract.action import GRIPPER, ROTATION, split_action
 from genpolicy.contract.rotation import rotation_from_6d, rotation_to_6d
+from genpolicy.robot.kinematics import ArmKinematics
 from genpolicy.seeds import counter_noise
+from genpolicy.tasks.api import load_task
 
 SERVED = {
     "version": 1, "checkpoint": "a" * 64, "sampler": "b" * 64, "prediction_horizon": 16,
@@ -245,6 +247,35 @@ QUATERNION = {
 }  # fmt: skip
 
 
+class InJoints(Honest):
+    """Says where its joints shall be; in degrees where its entry says rad, if it is wrong."""
+
+    wrong = 1.0
+
+    def __init__(self, *args, **fields):
+        super().__init__(*args, **fields)
+        self.arm = ArmKinematics(load_task("tabletop_insertion").scene_path)
+        self.posture = np.array(load_task("tabletop_insertion").posture_rad)
+
+    def chunk(self, row, noise):
+        chunk = super().chunk(row, noise)
+        place, turned, opened = split_action(chunk)
+        seed = np.tile(self.posture, (len(chunk), 1))
+        solved = self.arm.solve_with_restarts(place, turned, q_seed_rad=seed)
+        assert solved.converged.all()
+        return np.concatenate([self.wrong * solved.q_rad, opened[:, None]], axis=1)
+
+
+class InDegrees(InJoints):
+    wrong = 180.0 / np.pi
+
+
+JOINTS = {
+    "motion": "absolute", "joints": {"columns": list(range(7)), "unit": "rad"},
+    "gripper": {"column": 7, "open": 1.0, "open_m": 1.0},
+}  # fmt: skip
+
+
 @pytest.fixture
 def checked(serving, entry_of, starts, task):
     """What the kit finds of a planted server."""
@@ -256,7 +287,8 @@ def checked(serving, entry_of, starts, task):
 
             def policy():
                 opened.append(RemotePolicy(
-                    entry_of(**fields), address, task.observation, clock=planted.clock
+                    entry_of(**fields), address, task.observation, clock=planted.clock,
+                    scene=task.scene_path,
                 ))  # fmt: skip
                 return opened[-1]
 
@@ -473,6 +505,13 @@ def test_how_many_moments_have_a_chunk_that_passes_every_layer(checked, starts):
     third = iter(range(10_000))
     one_in_four = found_of(Honest(starts), passes=lambda chunk: next(third) % 4 == 0)
     assert one_in_four.judged == "holds"  # one chunk of four at each moment is enough
+
+
+def test_a_candidate_in_joint_space_is_judged_as_the_same_one_in_poses(checked, starts):
+    found = checked(InJoints(starts), action=JOINTS)
+    assert judged(found) == judged(checked(Honest(starts)))
+    wrong = checked(InDegrees(starts), action=JOINTS)
+    assert {"follows_observation", "orientation"} <= {finding.name for finding in wrong.failed}
 
 
 def test_without_a_task_nothing_is_said_about_layers(serving, entry, starts, task):

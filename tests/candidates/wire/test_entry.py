@@ -23,6 +23,17 @@ def action(**changes):
     return {**ENTRY["action"], **changes}
 
 
+def joints(**changes):
+    said = {"motion": "absolute", "joints": {"columns": [0, 1, 2], "unit": "rad"}}
+    return {**said, "gripper": {"column": 3, "open": 1.0, "open_m": 1.0}, **changes}
+
+
+def test_an_entry_may_say_joints_in_place_of_a_pose(tmp_path):
+    entry = read_entry(written(tmp_path, action=joints()))
+    assert (entry.action.width, entry.action.position, entry.action.frame) == (4, None, None)
+    assert ServerEntry.model_validate(entry.model_dump()) == entry
+
+
 @pytest.mark.parametrize(
     ("changes", "place", "expected"),
     [
@@ -37,6 +48,24 @@ def action(**changes):
         ({"weights": "x"}, "weights", "Extra inputs"),
         ({"action": action(frame="tcp")}, "action", "frame robot_base"),
         ({"action": action(motion="relative")}, "action", "anchor"),
+        ({"action": joints(frame="robot_base")}, "action", "stand alone"),
+        ({"action": joints(rotation=action()["rotation"])}, "action", "stand alone"),
+        ({"action": joints(joints=None)}, "action", "or joints say it"),
+        ({"action": joints(motion="relative")}, "action", "anchor"),
+        (
+            {"action": joints(motion="relative", anchor={"position": ["p"], "rotation": ["r"]})},
+            "action", "of a motion of joints",
+        ),
+        (
+            {"action": joints(motion="relative", anchor={"position": ["p"], "joints": ["q"]})},
+            "action.anchor", "or joints",
+        ),
+        (
+            {"action": action(motion="relative", anchor={"joints": ["q"]})},
+            "action", "of a motion of joints",
+        ),
+        ({"action": joints(gripper={"column": 2, "open": 1.0, "open_m": 1.0})}, "action", "one"),
+        ({"action": joints(joints={"columns": [0], "unit": "turns"})}, "unit", "'deg'"),
         ({"action": action(rotation=None)}, "action", "says its rotation"),
         ({"action": action(position={"columns": [0, 1, 9], "unit": "m"})}, "action", "one thing"),
         ({"action": action(position={"columns": [0, 1, 2], "unit": "inch"})}, "unit", "'mm'"),

@@ -5,10 +5,11 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation as Turn
 
 from genpolicy.candidates.wire.entry import Gripper, Input, Orientation, Output
-from genpolicy.candidates.wire.mapping import Inputs, Outputs, columns_of, opening, turns
+from genpolicy.candidates.wire.mapping import Inputs, Outputs, opening, turns
 from genpolicy.contract.action import GRIPPER, POSITION, join_action, split_action
 from genpolicy.contract.observation import Channel, ObservationContract
 from genpolicy.errors import ContractError
+from genpolicy.tasks.api import load_task
 
 CONTRACT = ObservationContract((
     Channel("place_m", ("x", "y", "z"), "m", "robot", 0.1),
@@ -190,11 +191,47 @@ def test_more_history_than_conditions_the_policy_is_refused():
         inputs(channels=["place_m"], history=3)
 
 
-@pytest.mark.parametrize("name", ["place", "place_m.w", "x", ""])
-def test_a_channel_that_is_not_there_is_refused_with_those_that_are(name):
-    with pytest.raises(ContractError, match="place_m, turn, hole") as error:
-        columns_of([name], CONTRACT, where="observation.state")
-    assert "observation.state of the candidate" in error.value.where
+@pytest.mark.parametrize("form", WIDTH)
+@pytest.mark.parametrize(("motion", "frame"), [
+    ("absolute", "robot_base"), ("relative", "robot_base"), ("relative", "tcp"),
+    ("increments", "robot_base"), ("increments", "tcp"),
+])  # fmt: skip
+@pytest.mark.parametrize("unit", ["m", "mm"])
+def test_what_is_written_in_a_form_is_read_back_as_it_was(form, motion, frame, unit):
+    rng = np.random.default_rng(5)
+    path, rotations = rng.normal(size=(6, 3)), random_turns(6, 4).as_matrix()
+    actions = join_action(path, rotations, rng.uniform(0.0, 0.04, 6))
+    declared = output(
+        form=form, motion=motion, frame=frame, unit=unit,
+        gripper={"column": 3 + WIDTH[form], "closed": -1.0, "open": 2.0, "open_m": 0.04},
+    )  # fmt: skip
+    mapping = Outputs(declared, CONTRACT)
+    at = seen(rng.normal(size=3), random_turns(1, 6)[0])
+    written = mapping.written(actions, at)
+    assert written.shape == (6, declared.width)
+    np.testing.assert_allclose(mapping.mapped(written[None], at)[0], actions, atol=1e-9)
+
+
+def test_our_own_form_is_written_to_the_bit():
+    """Six numbers as they are: not even made orthonormal again."""
+    rng = np.random.default_rng(6)
+    actions = rng.normal(size=(4, 10))
+    declared = output(gripper={"column": 9, "open": 1.0, "open_m": 1.0})
+    written = Outputs(declared, CONTRACT).written(actions, seen(np.zeros(3), Turn.identity()))
+    assert written.tobytes() == actions.tobytes()
+
+
+def test_given_actions_cannot_be_said_as_joints_or_without_a_rotation():
+    joints = Output.model_validate({
+        "motion": "absolute", "joints": {"columns": list(range(7)), "unit": "rad"},
+        "gripper": {"column": 7, "open": 1.0, "open_m": 0.04},
+    })  # fmt: skip
+    scene = load_task("tabletop_insertion").scene_path
+    unturned = output(motion="relative", rotation=None)
+    at = seen(np.zeros(3), Turn.identity())
+    for declared, told in ((joints, "joints"), (unturned, "no rotation")):
+        with pytest.raises(ContractError, match=told):
+            Outputs(declared, CONTRACT, scene=scene).written(np.zeros((2, 10)), at)
 
 
 def test_an_anchor_that_is_no_pose_is_refused():

@@ -1,15 +1,21 @@
 """A policy behind the wire in the place of ours: its faults are chunks that are none."""
 
+import sys
+
 import numpy as np
 import pytest
 
 from genpolicy.candidates.brought import BroughtPolicy
-from genpolicy.candidates.wire.extension import WORD
+from genpolicy.candidates.contenders import joining_of
+from genpolicy.candidates.joining import JoiningSettings
+from genpolicy.candidates.wire.extension import WORD, Capabilities
+from genpolicy.candidates.wire.faults import Fault
 from genpolicy.candidates.wire.policy import GONE_AFTER, WirePolicy, running
 from genpolicy.candidates.wire.remote import RemotePolicy
 from genpolicy.contract.latency import Term
 from genpolicy.errors import ConfigError, IntegrityError
 from genpolicy.policies.guidance import Prefix
+from tests.candidates.conftest import ENTRY
 from tests.candidates.wire.test_remote import CAN, Planted
 
 
@@ -20,7 +26,9 @@ def wire(serving, entry, task, tmp_path):
 
     def open_line(planted, entry=entry, **clock):
         context = serving(planted, {WORD: planted.can})
-        remote = RemotePolicy(entry, context.__enter__(), task.observation, **clock)
+        remote = RemotePolicy(
+            entry, context.__enter__(), task.observation, scene=task.scene_path, **clock
+        )
         opened.append((context, remote))
         brought = BroughtPolicy("planted", tmp_path / "planted.yaml", entry, "c" * 64, 0)
         return WirePolicy(brought, remote, **clock)
@@ -68,6 +76,62 @@ def test_a_fault_is_a_chunk_of_nan_and_the_next_answer_counts_again(wire, task):
     assert np.isnan(drawn[1]).all()
     assert np.isfinite(drawn[[0, 2]]).all()
     assert dict(policy.faults) == {"refused": 1}
+
+
+def test_each_row_says_how_it_failed(wire, task):
+    policy = wire(Fails(1))
+    names = [("a", number) for number in range(3)]
+    drawn = policy.sample(seen(3, task), noise_names=names, candidates=2)
+    assert drawn.faults == (None, Fault.REFUSED, None)
+    assert "no" in policy.last_words
+
+
+class SendsNone(Planted):
+    """Of the chunks of a message the first ones hold a number that is none."""
+
+    def __init__(self, broken):
+        super().__init__()
+        self.broken = broken
+
+    def __call__(self, message):
+        answer = super().__call__(message)
+        answer["actions"][: self.broken, 5, 2] = np.nan
+        return answer
+
+
+def test_an_answer_without_one_finite_chunk_is_a_fault_and_one_with_one_is_none(wire, task):
+    names = [("a", number) for number in range(GONE_AFTER + 2)]
+    policy = wire(SendsNone(3))
+    drawn = policy.sample(seen(len(names), task), noise_names=names, candidates=3)
+    assert set(drawn.faults) == {Fault.NONFINITE} and np.isnan(drawn.actions).all()
+    assert policy.faults == {"nonfinite": len(names)}  # it did answer, and is asked on
+    drawn = wire(SendsNone(2)).sample(seen(1, task), noise_names=[("a",)], candidates=3)
+    assert drawn.faults == (None,)
+    np.testing.assert_array_equal(np.isfinite(drawn.actions[0]).all(axis=(1, 2)), [0, 0, 1])
+
+
+@pytest.mark.parametrize("command", [
+    [sys.executable, "-c", "raise SystemExit('no weights here')  # {port}"],
+    [sys.executable, "-c", "import time; time.sleep(60)  # {port}"],
+])  # fmt: skip
+def test_a_server_that_does_not_start_fails_every_invocation_and_stops_nobody(
+    entry_of, task, tmp_path, command
+):
+    entry = entry_of(address=None, command=command, start_timeout_s=1.0)
+    brought = BroughtPolicy("planted", tmp_path / "planted.yaml", entry, "c" * 64, 0)
+    with running(brought, task.observation) as policy:
+        assert (policy.guided, policy.told) == (False, Capabilities())
+        names = [("a", number) for number in range(GONE_AFTER + 1)]
+        drawn = policy.sample(seen(len(names), task), noise_names=names, candidates=2)
+        assert drawn.actions.shape == (len(names), 2, 16, 10) and np.isnan(drawn.actions).all()
+        again = policy.sample(seen(1, task), noise_names=[("a",)], candidates=1, prefix=given(1.0))
+        assert again.faults == (Fault.GONE,)  # no setting of ours is to blame
+        real_time = JoiningSettings(rule="real_time")
+        assert joining_of(real_time, policy) is real_time
+        assert drawn.faults[-1] == Fault.GONE and len(set(drawn.faults[:-1])) == 1
+        assert ("no weights here" if "raise" in command[2] else "does not listen") in (
+            policy.last_words
+        )
 
 
 def test_who_fails_again_and_again_is_asked_no_more(wire, task):
@@ -121,10 +185,66 @@ def test_a_fault_took_as_long_as_it_was_waited_for(wire, task):
     assert terms[Term.SAMPLE] >= 2.0
 
 
-def test_no_server_is_asked_to_go_on_from_a_prefix(wire, task):
-    prefix = Prefix(np.zeros((1, 16, 10)), np.zeros((1, 16)), 5.0)
-    with pytest.raises(ConfigError, match="prefix for planted"):
-        wire(Planted()).sample(seen(1, task), noise_names=[("a",)], candidates=1, prefix=prefix)
+def given(*weights):
+    """One action from which a chunk goes on for as many rows as there are weights."""
+    actions = np.zeros((1, 16, 10))
+    actions[..., [3, 7]] = 1.0
+    actions[0, : len(weights), 0] = np.arange(1, len(weights) + 1)
+    actions[0, len(weights) :] = 0.0
+    return Prefix(actions, np.array([[*weights, *[0.0] * (16 - len(weights))]]), 5.0)
+
+
+def test_no_server_without_the_word_is_asked_to_go_on_from_a_prefix(wire, task):
+    with pytest.raises(ConfigError, match=r"prefix for planted.*takes no prefix"):
+        wire(Planted()).sample(seen(1, task), noise_names=[("a",)], candidates=1, prefix=given(1.0))
+
+
+def test_a_prefix_goes_over_the_wire_with_its_weights(wire, task):
+    planted = Planted(prefix=True)
+    policy = wire(planted)
+    assert policy.guided
+    policy.sample(seen(1, task), noise_names=[("a",)], candidates=2, prefix=given(1.0, 1.0, 0.25))
+    said = planted.asked[0][WORD]["prefix"]
+    assert (said["frozen"], said["bound"]) == (2, 5.0)
+    np.testing.assert_array_equal(said["weights"], [1.0, 1.0, 0.25, *[0.0] * 13])
+    # Behind the last weight the last given action stands: a pose, in whatever form.
+    np.testing.assert_array_equal(said["actions"][:, 0], [1.0, 2.0, 3.0, *[3.0] * 13])
+
+
+def test_the_rule_that_draws_on_is_of_who_takes_a_prefix(wire):
+    real_time = JoiningSettings(rule="real_time")
+    assert joining_of(real_time, wire(Planted(prefix=True))) is real_time
+    with pytest.raises(ConfigError, match="planted"):
+        joining_of(real_time, wire(Planted()))
+    exempt = JoiningSettings(rule="real_time", exempt=["planted"])
+    assert joining_of(exempt, wire(Planted())).rule == "replace"
+
+
+def test_what_nothing_is_given_to_is_asked_plainly(wire, task):
+    planted = Planted(prefix=True)
+    names = [("a",), ("b",)]
+    prefix = Prefix(
+        np.concatenate([given().actions, given(1.0).actions]),
+        np.concatenate([given().weights, given(1.0).weights]), 5.0,
+    )  # fmt: skip
+    wire(planted).sample(seen(2, task), noise_names=names, candidates=1, prefix=prefix)
+    assert ["prefix" in asked[WORD] for asked in planted.asked] == [False, True]
+
+
+@pytest.mark.parametrize(("changes", "told"), [
+    ({"position": None, "rotation": None, "frame": None,
+      "joints": {"columns": list(range(7)), "unit": "rad"}}, "joints"),
+    ({"rotation": None, "motion": "relative",
+      "anchor": {"position": ["tcp_position_m"], "rotation": ["tcp_rotation"]}}, "no rotation"),
+])  # fmt: skip
+def test_a_form_in_which_given_actions_cannot_be_said_is_no_guided_one(
+    wire, task, entry_of, changes, told
+):
+    entry = entry_of(action={**ENTRY["action"], **changes})
+    policy = wire(Planted(prefix=True), entry=entry)
+    assert not policy.guided
+    with pytest.raises(ConfigError, match=told):
+        policy.sample(seen(1, task), noise_names=[("a",)], candidates=1, prefix=given(1.0))
 
 
 def test_files_are_held_against_their_hashes_each_time_it_starts(entry_of, task, tmp_path):

@@ -1,6 +1,7 @@
 """A policy that was brought is started twice: what does not come back the same shows."""
 
 import itertools
+import sys
 
 import numpy as np
 import pytest
@@ -119,6 +120,22 @@ def test_a_question_without_an_answer_is_a_sample_that_reaches_no_mode(answered,
     assert (mode.samples, mode.admissible, mode.valid, mode.modes_covered) == (2, 0, 0, 0)
     assert mode.far_from_modes == 2
     assert found.identity.nonfinite_weights == 1
+
+
+def test_a_server_that_does_not_start_costs_this_candidate_and_says_why(
+    asking,
+    entry_of,  # noqa: F811
+    tmp_path,
+):
+    command = [sys.executable, "-c", "raise SystemExit('no weights here')  # {port}"]
+    entry = entry_of(address=None, command=command, declared=DECLARED)
+    brought = BroughtPolicy("planted", tmp_path / "planted.yaml", entry, "c" * 64, 0)
+    found = ask_brought(brought, asking)
+    assert found.identity.nonfinite_weights >= found.failed.asked > 64
+    assert found.failed.faults == {"closed": 16, "gone": found.failed.asked - 16}
+    assert "no weights here" in found.failed.last_words
+    assert np.isnan([row.max_abs_difference for row in found.samples]).all()
+    assert (found.nfe, found.coverage) == ([], [])
 
 
 def test_other_metadata_after_the_new_start_are_counted(answered, policy, monkeypatch):

@@ -1,10 +1,12 @@
 """The stress evidence: plan, tables, journals, power."""
 
+import sys
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from genpolicy.candidates.brought import BroughtPolicy
 from genpolicy.candidates.joining import JoiningSettings
 from genpolicy.candidates.judged import JudgedPolicy
 from genpolicy.errors import ConfigError
@@ -33,6 +35,7 @@ from genpolicy.policies.settings import NetworkConfig, SamplerConfig, TrainingCo
 from genpolicy.verification import tables
 from genpolicy.verification.rollouts import differences
 from genpolicy.verification.tables import KEYS, derived_tables
+from tests.candidates.conftest import entry_of  # noqa: F401
 
 JOINED = SimpleNamespace(joining=JoiningSettings())
 PERTURBATIONS = {
@@ -72,6 +75,52 @@ def written(task, fleet, kit, tmp_path_factory):
     )
     write_stress(folder, shards, workers=1, scheduler="local")
     return folder
+
+
+def test_a_server_that_does_not_start_costs_its_deadlines_and_nobody_else_s(
+    task,
+    fleet,
+    kit,
+    entry_of,  # noqa: F811
+    tmp_path,
+):
+    """It is compared beside one of ours; nothing of it is chosen by who reads the tables."""
+    root, trained = fleet
+    command = [sys.executable, "-c", "raise SystemExit('no weights here')  # {port}"]
+    entry = entry_of(address=None, command=command)
+    judged = [
+        JudgedPolicy("flow", 0, root / "flow" / "seed_0", trained["flow"][0]),
+        BroughtPolicy("planted", tmp_path / "planted.yaml", entry, "c" * 64, 0),
+    ]
+    starts = tuple(s.to_json() for s in matched_starts(task, root_seed=1, count=1))
+    latency = LatencyModel(
+        {name: DeclaredTerm(0.001, 0.002) for name in DECLARED_TERMS},
+        {name: np.full(4, 0.006) for name in MEASURED_TERMS},
+        0.0,
+    )
+    comparison = Comparison(
+        task=task.name, starts=starts, episode_limit_s=3.0, samples=2,
+        cell=Cell(kit.HORIZONS, kit.EXECUTION), feasibility=kit.FEASIBILITY, root_seed=1,
+    )  # fmt: skip
+    shards = plan_shards(
+        comparison, judged, {"nominal": Nominal()}, latency=dict.fromkeys(["flow", "planted"],
+        latency), journals=tmp_path / "journals",
+    )  # fmt: skip
+    write_stress(tmp_path, shards, workers=1, scheduler="local")
+    rows = read_table(tmp_path / "faults.parquet").to_pylist()
+    assert {row["method"] for row in rows} == {"planted"}
+    counted = {row["fault"]: row["count"] for row in rows}
+    journals = sorted((tmp_path / "journals").iterdir())
+    derived = [row for row in derived_tables(journals)["faults"] if row["method"] == "planted"]
+    assert {row["fault"]: row["count"] for row in derived} == counted
+    by_method = {
+        row["method"]: row for row in read_table(tmp_path / "rollouts.parquet").to_pylist()
+    }
+    planted = by_method["planted"]
+    assert set(counted) <= {"closed", "gone"} and planted["rejections"] == 0
+    assert 0 < planted["deadline_misses"] == sum(counted.values())
+    assert by_method["flow"]["deadline_misses"] == 0
+    assert CHECKER.read(tmp_path).violations == []
 
 
 def test_every_method_meets_every_perturbation(tmp_path):
@@ -126,7 +175,11 @@ def test_every_invocation_of_a_rollout_is_a_row_and_the_first_is_cold(written):
 
 def test_every_table_follows_from_the_journals(written):
     derived = derived_tables(sorted((written / "journals").iterdir()))
+    assert not (written / "faults.parquet").exists()  # nobody was brought
     for name, keys in KEYS.items():
+        if name == "faults":
+            assert {row["count"] for row in derived[name]} == {0}
+            continue
         stated = read_table(written / f"{name}.parquet").to_pylist()
         assert len(stated) == len(derived[name])
         assert stated or name == "ages"  # barely trained: it may be that nothing was accepted

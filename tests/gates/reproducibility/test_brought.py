@@ -66,6 +66,20 @@ def test_by_exception_it_passes_and_the_report_says_who_answers(ladder):
     assert WAIVED.match(said)  # so it stands at the top of the page
 
 
+def test_a_process_that_failed_fails_by_its_last_words(ladder):
+    failed = {"asked": 64, "faults": {"closed": 16, "gone": 48}, "last_words": "no weights here"}
+    evidence.document(ladder, "reload/faults.json", {"flow": failed})
+    bring(ladder, unmatched=EXCEPTION, change={"nonfinite_weights": 64})
+    report = judge(ladder, "B")
+    assert report.candidates == {"diffusion": "PASS", "flow": "FAIL"}
+    answer = of_flow(report, "nonfinite_weights")
+    assert answer.verdict == "FAIL"
+    assert answer.caveat.endswith(
+        "; of 64 invocations failed: closed 16, gone 48; the last because no weights here"
+    )
+    assert "artifacts/reload/faults.json" in report.materials
+
+
 def test_without_an_exception_it_fails_by_name_and_the_others_stand(ladder):
     bring(ladder, unmatched=None)
     report = judge(ladder, "B")
