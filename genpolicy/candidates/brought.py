@@ -10,7 +10,8 @@ from pathlib import Path
 
 from pydantic import RootModel
 
-from genpolicy.candidates.wire.entry import ServerEntry, read_entry, verify_files
+from genpolicy.candidates.hosts.kinds import read_entry
+from genpolicy.candidates.wire.entry import Entry, verify_files
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.errors import ConfigError
 from genpolicy.integrity.documents import canonical_json
@@ -35,7 +36,7 @@ class BroughtPolicy:
 
     name: str
     path: Path
-    entry: ServerEntry
+    entry: Entry
     sha256: str
     seed: int
 
@@ -118,9 +119,7 @@ def _read(name: str, path: Path, seed: int) -> BroughtPolicy:
             expected=f"the entry of {name}",
             action="Give both the same name.",
         )
-    return BroughtPolicy(
-        name, path, entry, sha256_bytes(canonical_json(entry.model_dump(mode="json"))), seed
-    )
+    return BroughtPolicy(name, path, entry, entry.sha256, seed)
 
 
 def _said(horizons: HorizonConfig) -> str:

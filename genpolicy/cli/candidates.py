@@ -12,8 +12,12 @@ from genpolicy.candidates.conformance.recorded_starts import (
     recorded_starts,
     require_contract,
 )
+from genpolicy.candidates.hosts.hosted import Served
+from genpolicy.candidates.hosts.kinds import read_entry
+from genpolicy.candidates.hosts.serving import hosted
+from genpolicy.candidates.hosts.translation import as_server
 from genpolicy.candidates.wire.connection import LOOPBACK, Listening
-from genpolicy.candidates.wire.entry import ServerEntry, read_entry, verify_files
+from genpolicy.candidates.wire.entry import ServerEntry, verify_files
 from genpolicy.candidates.wire.launched import Launched
 from genpolicy.candidates.wire.remote import RemotePolicy
 from genpolicy.candidates.wire.served import ServedPolicy
@@ -55,7 +59,7 @@ def run_check(path: Path, options: CheckOptions, *, as_json: bool) -> int:
         IntegrityError: A file of the candidate is another one.
         PolicyError: The policy's process does not start.
     """
-    entry = read_entry(path)
+    entry, folder = read_entry(path), path.resolve().parent
     data = load_dataset(options.dataset)
     require_contract(data, entry.horizons, candidate=entry.name)
     contract = data.observation_contract
@@ -64,9 +68,8 @@ def run_check(path: Path, options: CheckOptions, *, as_json: bool) -> int:
     what = question(starts, dataset=data.manifest_sha256, candidates=options.candidates)
     earlier = _earlier(options.earlier, what)
     asked = _Asked(starts, what, options.deadline_s, earlier, checks.admissible)
-    folder = path.resolve().parent
     verify_files(entry, folder)
-    found = _found(entry, folder, contract, asked)
+    found = _found(as_server(entry, path, contract), folder, contract, asked)
     print(json.dumps(found.as_json(), indent=2, sort_keys=True) if as_json else _text(found))
     return REFUSED if found.failed else 0
 
@@ -157,7 +160,34 @@ def run_serve(checkpoint: Path, *, port: int, sha256: str | None) -> int:
         ConfigError: Nobody may listen on that port.
         BadInputError: The checkpoint is missing, malformed, or another one.
     """
-    served = ServedPolicy(load_policy(checkpoint, expected_sha256=sha256))
+    policy = load_policy(checkpoint, expected_sha256=sha256)
+    return _listen(ServedPolicy(policy), policy.method, port)
+
+
+def run_host(path: Path, *, port: int, sha256: str | None, widths: list[str]) -> int:
+    """Serve what an entry names on this machine until an interrupt. Returns the exit code.
+
+    Raises:
+        ConfigError: Nobody may listen on that port, or a width that is none.
+        BadInputError: The entry or a file of it is missing, wrong, or another one.
+    """
+    served = hosted(path, sha256=sha256, widths=dict(_width(said) for said in widths))
+    return _listen(served, str(path), port)
+
+
+def _width(said: str) -> tuple[str, int]:
+    name, _, number = said.rpartition("=")
+    if not name or not number.isdecimal():
+        raise ConfigError(
+            where="--width",
+            found=repr(said),
+            expected="NAME=NUMBER, as observation=34",
+            action="Leave it out: what the wire brings is looked at in any case.",
+        )
+    return name, int(number)
+
+
+def _listen(served: Served, what: str, port: int) -> int:
     try:
         listening = Listening(served.answer, served.metadata, port=port)
     except OSError as error:
@@ -167,7 +197,7 @@ def run_serve(checkpoint: Path, *, port: int, sha256: str | None) -> int:
             expected="a free port of this machine",
             action="Name another one, or 0 for any.",
         ) from error
-    print(f"Serving {served.metadata['method']} at ws://{LOOPBACK}:{listening.port}", flush=True)
+    print(f"Serving {what} at ws://{LOOPBACK}:{listening.port}", flush=True)
     with listening:
         try:
             listening.serve_forever()

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.candidates.brought import BroughtPolicy
+from genpolicy.candidates.hosts.translation import as_server
 from genpolicy.candidates.wire.connection import Clock
 from genpolicy.candidates.wire.entry import verify_files
 from genpolicy.candidates.wire.extension import Capabilities
@@ -184,8 +185,9 @@ def running(brought: BroughtPolicy, contract: ObservationContract) -> Iterator[W
     """
     folder: Path = brought.folder
     verify_files(brought.entry, folder)
-    with Launched(brought.entry, folder) as server:
-        remote = RemotePolicy(brought.entry, server.address, contract, ended=server.died)
+    entry = as_server(brought.entry, brought.path, contract)
+    with Launched(entry, folder) as server:
+        remote = RemotePolicy(entry, server.address, contract, ended=server.died)
         try:
             yield WirePolicy(brought, remote)
         finally:
