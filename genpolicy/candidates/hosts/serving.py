@@ -93,10 +93,9 @@ def _program(entry: ProgramEntry, folder: Path, widths: Mapping[str, int]) -> Ho
 def _loaded(entry: ProgramEntry, folder: Path, name: str) -> Program:
     data, where = _bytes(entry, folder, name), str(folder / name)
     if isinstance(entry, TorchEntry):
-        from genpolicy.candidates.hosts.torch_program import TorchProgram, settle  # noqa: PLC0415
+        from genpolicy.candidates.hosts.torch_program import TorchProgram  # noqa: PLC0415
 
-        settle(entry.threads)
-        return TorchProgram(data, where=where)
+        return TorchProgram(data, where=where, threads=entry.threads)
     assert isinstance(entry, OnnxEntry)  # there is no third kind of program
     require_onnx("onnx", "onnxruntime")
     from genpolicy.candidates.hosts.onnx_program import OnnxProgram  # noqa: PLC0415

@@ -14,6 +14,7 @@ from torch.utils._pytree import tree_unflatten
 from genpolicy.candidates.hosts.ports import Port
 from genpolicy.candidates.hosts.torch_archive import without_code
 from genpolicy.errors import BadInputError, ContractError, IntegrityError
+from genpolicy.policies.determinism import deterministic
 
 Array = NDArray[Any]
 
@@ -24,6 +25,7 @@ class TorchProgram:
     Args:
         data: Bytes of the `.pt2` archive.
         where: Its path, for the error text.
+        threads: Of an operator; operators run one after the other.
 
     Attributes:
         inputs: By name.
@@ -34,7 +36,8 @@ class TorchProgram:
         ContractError: Inputs that are no arrays, not one output, or draws of its own.
     """
 
-    def __init__(self, data: bytes, *, where: str) -> None:
+    def __init__(self, data: bytes, *, where: str, threads: int) -> None:
+        self._threads = threads
         self._program = _loaded(without_code(data, where=where), where)
         _require_no_draws(self._program, where)
         signature, values = self._program.graph_signature, {}
@@ -62,7 +65,8 @@ class TorchProgram:
         in_spec = self._program.call_spec.in_spec
         assert in_spec is not None  # an exported program has one
         positional, named = tree_unflatten(flat, in_spec)
-        with torch.inference_mode():
+        with deterministic("cpu"), torch.inference_mode():
+            torch.set_num_threads(self._threads)
             found = self._module(*positional, **named)
         array: Array = (found if isinstance(found, torch.Tensor) else found[0]).numpy()
         return array
@@ -75,13 +79,6 @@ class TorchProgram:
             if names.get(node.name) == weight:
                 return len(node.users)
         return None
-
-
-def settle(threads: int) -> None:
-    """Threads and kernels of this process, once, before anything is run."""
-    torch.set_num_threads(threads)
-    torch.set_num_interop_threads(1)
-    torch.set_deterministic_debug_mode("error")
 
 
 def _loaded(data: bytes, where: str) -> ExportedProgram:
