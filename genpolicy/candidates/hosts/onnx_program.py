@@ -80,12 +80,9 @@ class OnnxProgram:
 
 def _parsed(data: bytes, where: str) -> onnx.ModelProto:
     try:
-        model = onnx.load_model_from_string(data)
-        onnx.checker.check_model(model)
-    # What it raises is of protobuf and of the checker, and has no common base but this.
-    except Exception as error:
-        _refuse(where, str(error).splitlines()[0][:120], cause=error)
-    return model
+        return onnx.load_model_from_string(data)
+    except Exception as error:  # of protobuf, which has no public base for it
+        _refuse(where, f"no ONNX file ({error})", cause=error)
 
 
 def _nodes(model: onnx.ModelProto) -> Iterator[onnx.NodeProto]:
@@ -126,6 +123,10 @@ def _embed(model: onnx.ModelProto, where: str, external: Callable[[str], bytes])
 
 
 def _session(data: bytes, where: str, threads: int) -> onnxruntime.InferenceSession:
+    try:
+        onnx.checker.check_model(data)
+    except onnx.checker.ValidationError as error:
+        _refuse(where, str(error).strip().splitlines()[0][:120], cause=error)
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = threads
     options.inter_op_num_threads = threads

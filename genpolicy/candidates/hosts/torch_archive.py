@@ -57,8 +57,8 @@ def without_code(data: bytes, *, where: str) -> bytes:
     for folder, (config, pattern) in PAYLOADS.items():
         text = _member(members, folder + config, where)
         kept[folder + config] = text
-        for name, payload in _parsed(text, where).get("config", {}).items():
-            path = payload.get("path_name")
+        for name, payload in _map(_parsed(text, where).get("config"), where).items():
+            path = _map(payload, where).get("path_name")
             if payload.get("use_pickle") is not False or not pattern.fullmatch(str(path)):
                 _refuse(where, f"{name!r} stored as a pickle ({folder}{path})")
             kept[folder + path] = _member(members, folder + path, where)
@@ -89,8 +89,12 @@ def _parsed(text: bytes, where: str) -> dict[str, Any]:
         found = parse_json(text, where=where)
     except BadInputError as error:
         _refuse(where, error.found, cause=error)
+    return _map(found, where)
+
+
+def _map(found: Any, where: str) -> dict[str, Any]:
     if not isinstance(found, dict):
-        _refuse(where, "a graph that is no map")
+        _refuse(where, "a part of the archive that is no map")
     return found
 
 

@@ -1,7 +1,8 @@
 """A program of `torch.export`, loaded without a pickle and run on the CPU."""
 
 import io
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -65,8 +66,7 @@ class TorchProgram:
         in_spec = self._program.call_spec.in_spec
         assert in_spec is not None  # an exported program has one
         positional, named = tree_unflatten(flat, in_spec)
-        with deterministic("cpu"), torch.inference_mode():
-            torch.set_num_threads(self._threads)
+        with deterministic("cpu"), _threads(self._threads), torch.inference_mode():
             found = self._module(*positional, **named)
         array: Array = (found if isinstance(found, torch.Tensor) else found[0]).numpy()
         return array
@@ -79,6 +79,19 @@ class TorchProgram:
             if names.get(node.name) == weight:
                 return len(node.users)
         return None
+
+
+@contextmanager
+def _threads(number: int) -> Iterator[None]:
+    """So many threads instead of the one of `deterministic`."""
+    if number == 1:
+        yield
+        return
+    torch.set_num_threads(number)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(1)
 
 
 def _loaded(data: bytes, where: str) -> ExportedProgram:
