@@ -31,8 +31,8 @@ FORMAT = {
 MAXIMUM_BYTES = 1 << 30
 OPERATOR = re.compile(r"torch\.ops\.aten\.\w+\.\w+|_operator\.getitem")
 READS_FILES = ("torch.ops.aten.from_file",)
-WORD = re.compile(r"[A-Za-z0-9_.:]*")
-"""A name, an operator, a type: nothing that is more than a name when it is evaluated."""
+WORD = re.compile(r"[A-Za-z0-9_.:-]*")
+"""A name, an operator, a type, `-Infinity`: nothing that calls when it is evaluated."""
 FREE_TEXT = {"as_string", "torch_version"}
 """Texts that stay texts: an argument of an operator, and who wrote the archive."""
 STRUCTURES = {"in_spec", "out_spec"}
@@ -58,8 +58,8 @@ def without_code(data: bytes, *, where: str) -> bytes:
         text = _member(members, folder + config, where)
         kept[folder + config] = text
         for name, payload in _map(_parsed(text, where).get("config"), where).items():
-            path = _map(payload, where).get("path_name")
-            if payload.get("use_pickle") is not False or not pattern.fullmatch(str(path)):
+            path = str(_map(payload, where).get("path_name"))
+            if payload.get("use_pickle") is not False or not pattern.fullmatch(path):
                 _refuse(where, f"{name!r} stored as a pickle ({folder}{path})")
             kept[folder + path] = _member(members, folder + path, where)
     return _archive(kept)

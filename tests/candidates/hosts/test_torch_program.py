@@ -41,6 +41,17 @@ def test_it_computes_what_the_module_computes(torch_data):
     assert found.tobytes() == expected.tobytes()
 
 
+def test_numbers_that_json_has_no_word_for_and_texts_of_operators_are_read():
+    def masked(x):
+        filled = x.masked_fill(x < 0, -float("inf"))
+        return torch.einsum("ab,cb->ac", torch.nn.functional.gelu(x), x) + filled.softmax(-1)
+
+    rows = np.arange(9, dtype=np.float32).reshape(3, 3) - 2
+    program = loaded(exported(Of(masked), torch.zeros(3, 3)))
+    expected = masked(torch.from_numpy(rows)).numpy()
+    assert np.allclose(program.run({"x": rows}), expected, atol=1e-6)
+
+
 def test_uses_of_a_weight_are_counted_in_the_graph(torch_data):
     program = loaded(torch_data)
     assert program.uses("layer.weight") == 2
