@@ -13,12 +13,14 @@ the chunks are. Who is compared must do the same work.
     python -m benchmarks.candidates
 """
 
+import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, redirect_stdout
 from io import StringIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Literal
 
 import numpy as np
 import torch
@@ -53,10 +55,19 @@ def entries(folder: Path, horizons: dict[str, object], channels: list[str]) -> I
         f"{CHECKPOINT}/{name}": sha256_file(folder / CHECKPOINT / name)
         for name in ("config.json", "model.safetensors")
     }
-    serve = ["genpolicy", "serve-policy", CHECKPOINT, "--port", "{port}"]
+    serve = [
+        sys.executable,
+        "-P",
+        "-m",
+        "genpolicy",
+        "serve-policy",
+        CHECKPOINT,
+        "--port",
+        "{port}",
+    ]
     (folder / "script.py").write_text(SCRIPT)
     script = {"script.py": sha256_file(folder / "script.py")}
-    kinds = {
+    kinds: dict[str, dict[str, object]] = {
         "server": {"command": serve, "files": weights},
         "trained": {"checkpoint": CHECKPOINT, "files": weights},
         "torch": exported(folder, "torch", ".pt2"),
@@ -83,7 +94,7 @@ def entries(folder: Path, horizons: dict[str, object], channels: list[str]) -> I
         yield path
 
 
-def exported(folder: Path, kind: str, ending: str) -> dict[str, object]:
+def exported(folder: Path, kind: Literal["torch", "onnx"], ending: str) -> dict[str, object]:
     """What the command prints for an entry."""
     with redirect_stdout(StringIO()) as said:
         run_export_program(
@@ -132,7 +143,8 @@ def bare(policy: NetworkPolicy) -> Way:
             time_ = torch.zeros(candidates)
             for _ in range(SAMPLER.steps):
                 x = network.evaluate(rows, x, time_)
-        return x.numpy().astype(np.float64)
+        found: Array = x.numpy().astype(np.float64)
+        return found
 
     return ask
 

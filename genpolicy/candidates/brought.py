@@ -87,7 +87,8 @@ def require_brought(
         root: Of the workspace.
 
     Raises:
-        ConfigError: As `read_brought`; a name of a trained method, or other horizons.
+        ConfigError: As `read_brought`; a name of a trained method, other horizons, or nothing on
+            this machine that runs it.
         IntegrityError: A file that is missing, or another one than its entry says.
     """
     found, taken = read_brought(section, seed=0, root=root), set(trained)
@@ -107,6 +108,7 @@ def require_brought(
                 action="Bring a policy of these horizons, or set the horizons of the ladder.",
             )
         verify_files(policy.entry, policy.folder)
+        policy.entry.require_host()
     return found
 
 

@@ -1,4 +1,4 @@
-"""`genpolicy check-candidate` and `genpolicy serve-policy`: a policy in a process of its own."""
+"""`genpolicy check-candidate`: somebody's policy in a process of its own, and what is found."""
 
 import json
 from contextlib import ExitStack
@@ -12,23 +12,18 @@ from genpolicy.candidates.conformance.recorded_starts import (
     recorded_starts,
     require_contract,
 )
-from genpolicy.candidates.hosts.hosted import Served
 from genpolicy.candidates.hosts.kinds import read_entry
-from genpolicy.candidates.hosts.serving import hosted
 from genpolicy.candidates.hosts.translation import as_server
-from genpolicy.candidates.wire.connection import LOOPBACK, Listening
 from genpolicy.candidates.wire.entry import ServerEntry, verify_files
 from genpolicy.candidates.wire.launched import Launched
 from genpolicy.candidates.wire.remote import RemotePolicy
-from genpolicy.candidates.wire.served import ServedPolicy
 from genpolicy.cli.task_checks import task_checks
 from genpolicy.contract.observation import ObservationContract
 from genpolicy.data.dataset import load_dataset
-from genpolicy.errors import BadInputError, ConfigError
+from genpolicy.errors import BadInputError
 from genpolicy.integrity.documents import read_json
-from genpolicy.policies.policy import load_policy
 
-REFUSED, INTERRUPTED = 3, 130
+REFUSED = 3
 NO_VERDICT = (
     "Nothing here is a gate's verdict: name the entry in params.yaml (candidates) for those."
 )
@@ -151,56 +146,3 @@ def _text(found: Conformance) -> str:
         names = ", ".join(f"{one.name} (gate {one.gate})" for one in found.failed)
         lines.append(f"Refused: {names}.")
     return "\n".join(lines)
-
-
-def run_serve(checkpoint: Path, *, port: int, sha256: str | None) -> int:
-    """Serve a checkpoint on this machine until an interrupt. Returns the exit code.
-
-    Raises:
-        ConfigError: Nobody may listen on that port.
-        BadInputError: The checkpoint is missing, malformed, or another one.
-    """
-    policy = load_policy(checkpoint, expected_sha256=sha256)
-    return _listen(ServedPolicy(policy), policy.method, port)
-
-
-def run_host(path: Path, *, port: int, sha256: str | None, widths: list[str]) -> int:
-    """Serve what an entry names on this machine until an interrupt. Returns the exit code.
-
-    Raises:
-        ConfigError: Nobody may listen on that port, or a width that is none.
-        BadInputError: The entry or a file of it is missing, wrong, or another one.
-    """
-    served = hosted(path, sha256=sha256, widths=dict(_width(said) for said in widths))
-    return _listen(served, str(path), port)
-
-
-def _width(said: str) -> tuple[str, int]:
-    name, _, number = said.rpartition("=")
-    if not name or not number.isdecimal():
-        raise ConfigError(
-            where="--width",
-            found=repr(said),
-            expected="NAME=NUMBER, as observation=34",
-            action="Leave it out: what the wire brings is looked at in any case.",
-        )
-    return name, int(number)
-
-
-def _listen(served: Served, what: str, port: int) -> int:
-    try:
-        listening = Listening(served.answer, served.metadata, port=port)
-    except OSError as error:
-        raise ConfigError(
-            where="--port",
-            found=f"{port}, on which nobody can listen ({error.strerror})",
-            expected="a free port of this machine",
-            action="Name another one, or 0 for any.",
-        ) from error
-    print(f"Serving {what} at ws://{LOOPBACK}:{listening.port}", flush=True)
-    with listening:
-        try:
-            listening.serve_forever()
-        except KeyboardInterrupt:
-            return INTERRUPTED
-    return 0

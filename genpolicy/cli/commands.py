@@ -227,7 +227,7 @@ def serve_policy(
     On this machine, until an interrupt. WebSocket and msgpack: metadata first, then one answer
     for each message; see docs/candidates.md.
     """
-    from genpolicy.cli.candidates import run_serve
+    from genpolicy.cli.serving import run_serve
 
     return run_serve(checkpoint, port=port, sha256=sha256)
 
@@ -247,7 +247,7 @@ def serve_candidate(
     On this machine, until an interrupt, over openpi's protocol. `check-candidate` and the ladder
     start it themselves, in a process of its own.
     """
-    from genpolicy.cli.candidates import run_host
+    from genpolicy.cli.serving import run_host
 
     return run_host(entry, port=port, sha256=sha256, widths=width or [])
 

@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from genpolicy.candidates.hosts.onnx_library import require_onnx
 from genpolicy.candidates.wire.entry import DIGEST, Entry, ServerEntry
 from genpolicy.contract.settings import Settings, parse_settings
 from genpolicy.errors import ConfigError
@@ -151,6 +152,10 @@ class OnnxEntry(ProgramEntry):
 
     kind: Literal["onnx"]
 
+    def require_host(self) -> None:
+        """The libraries of the extra."""
+        require_onnx("onnx", "onnxruntime")
+
 
 class ScriptedEntry(DrawingEntry):
     """A Python function: a planner, a replay, whatever a policy is held against.
@@ -193,6 +198,16 @@ class LeRobotEntry(Entry):
         read = [*place.glob("*.json"), *place.glob("*.safetensors")]
         names = {path.name for path in read} - {TRAINING_RECORD} | set(CHECKPOINT_FILES)
         return [_below(self.pretrained_model, name) for name in sorted(names)]
+
+    def require_host(self) -> None:
+        """Its interpreter."""
+        if not Path(self.interpreter).is_file():
+            raise ConfigError(
+                where=f"interpreter of the candidate {self.name}",
+                found=f"{self.interpreter}, which is not there",
+                expected="a Python that has LeRobot",
+                action="Run `make lerobot`, or name another `interpreter`.",
+            )
 
 
 KINDS: dict[str, type[Entry]] = {

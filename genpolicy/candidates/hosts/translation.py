@@ -21,11 +21,12 @@ def as_server(entry: Entry, path: Path, contract: ObservationContract) -> Server
         contract: The observation in force, which says how wide its inputs are.
 
     Raises:
-        ConfigError: There is no interpreter of LeRobot, or no adapter.
+        ConfigError: Nothing on this machine runs it.
         ContractError: It names what the observation does not have.
     """
     if isinstance(entry, ServerEntry):
         return entry
+    entry.require_host()
     common = {name: getattr(entry, name) for name in Entry.model_fields if name != "kind"}
     command = _lerobot(entry) if isinstance(entry, LeRobotEntry) else _own(entry, path, contract)
     return ServerEntry(**common, kind="server", command=command)
@@ -47,15 +48,11 @@ def _own(entry: Entry, path: Path, contract: ObservationContract) -> list[str]:
 def _lerobot(entry: LeRobotEntry) -> list[str]:
     # Not resolved: the link to an interpreter is what makes its environment.
     interpreter = Path(entry.interpreter).absolute()
-    for file, action in (
-        (interpreter, "Run `make lerobot`, or name another `interpreter`."),
-        (ADAPTER, "Work in a checkout of genpolicy; the adapter is no part of the package."),
-    ):
-        if not file.is_file():
-            raise ConfigError(
-                where=f"the candidate {entry.name}, of kind lerobot",
-                found=f"without {file}",
-                expected="a Python that has LeRobot, and the adapter that serves its policies",
-                action=action,
-            )
+    if not ADAPTER.is_file():
+        raise ConfigError(
+            where=f"the candidate {entry.name}, of kind lerobot",
+            found=f"without {ADAPTER}",
+            expected="the adapter that serves policies of LeRobot",
+            action="Work in a checkout of genpolicy; the adapter is no part of the package.",
+        )
     return [str(interpreter), str(ADAPTER), entry.pretrained_model, "--port", PORT]

@@ -246,6 +246,13 @@ class Entry(Settings):
         """Files that are the candidate, so that `files` must name them; paths as there."""
         return []
 
+    def require_host(self) -> None:
+        """Refuse a candidate that nothing on this machine can run.
+
+        Raises:
+            ConfigError: A library or an interpreter is not there.
+        """
+
 
 class ServerEntry(Entry):
     """A policy behind a server that speaks the wire protocol.

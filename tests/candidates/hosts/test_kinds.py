@@ -1,5 +1,7 @@
 import pytest
 
+from genpolicy.candidates.brought import require_brought
+from genpolicy.candidates.hosts import onnx_library
 from genpolicy.candidates.hosts.kinds import KINDS, read_entry
 from genpolicy.candidates.wire.entry import verify_files
 from genpolicy.errors import ConfigError, IntegrityError
@@ -77,6 +79,19 @@ def test_what_is_wrong_is_named(written, kind, changes, expected):
     with pytest.raises(ConfigError) as error:
         read_entry(written(kind, **changes))
     assert expected in error.value.expected
+
+
+def test_what_nothing_here_can_run_is_refused_before_anything_trains(
+    written, tmp_path, monkeypatch
+):
+    for kind in ("trained", "torch", "onnx", "scripted"):
+        read_entry(written(kind)).require_host()
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(onnx_library, "find_spec", lambda name: None)
+    for kind, action in (("onnx", "pip install"), ("lerobot", "make lerobot")):
+        path = written(kind)
+        with pytest.raises(ConfigError, match=action):
+            require_brought({"planted": str(path)}, horizons=read_entry(path).horizons)
 
 
 def test_noise_of_several_steps_has_an_axis_more(written):
