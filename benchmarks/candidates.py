@@ -39,9 +39,8 @@ from genpolicy.tasks.api import load_task
 
 CANDIDATES = (1, 8)
 REPEATS, DISCARDED = 40, 5
-TOLERANCE = 1e-3
-"""m, or of a number of a rotation: untrained weights and few numbers that are nearly constant
-stretch what a trained checkpoint keeps within 2e-5."""
+TOLERANCE = 1e-4
+"""m, or of a number of a rotation; 6e-6 (torch) and 5e-5 (ONNX) were seen."""
 CHECKPOINT = "policy"
 SCRIPT = "import numpy as np\ndef nothing(given):\n    return np.zeros((16, 10))\n"
 

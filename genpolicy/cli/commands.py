@@ -66,7 +66,7 @@ def program(arguments: Sequence[str]) -> int:
     app.command("ingest", epilog=IMPORT_EXAMPLES)(ingest)
     app.command("fixtures", epilog=examples("genpolicy fixtures --pin"))(fixtures)
     app.command("replay", epilog=REPLAY_EXAMPLES)(replay)
-    exports = new_app("Write a dataset or a checkpoint in a form of others.")
+    exports = new_app("Write a dataset or a checkpoint for others.")
     exports.callback()(lambda: None)
     exports.command("lerobot", epilog=EXPORT_EXAMPLES)(export_lerobot)
     exports.command("torch", epilog=TORCH_EXAMPLES)(export_torch)
@@ -242,9 +242,9 @@ def serve_candidate(
         list[str] | None, typer.Option(help="NAME=NUMBER: how wide an input is.")
     ] = None,
 ) -> int:
-    """Host what an entry names: trained, torch, onnx or scripted.
+    """Host the candidate of an entry.
 
-    On this machine, until an interrupt, over openpi's protocol. `check-candidate` and the ladder
+    Of kind trained, torch, onnx or scripted. On this machine, until an interrupt, over openpi's protocol. `check-candidate` and the ladder
     start it themselves, in a process of its own.
     """
     from genpolicy.cli.serving import run_host
