@@ -244,8 +244,9 @@ def serve_candidate(
 ) -> int:
     """Host the candidate of an entry.
 
-    Of kind trained, torch, onnx or scripted. On this machine, until an interrupt, over openpi's protocol. `check-candidate` and the ladder
-    start it themselves, in a process of its own.
+    Of kind trained, torch, onnx or scripted. On this machine, until an interrupt,
+    over openpi's protocol. `check-candidate` and the ladder start it themselves,
+    in a process of its own.
     """
     from genpolicy.cli.serving import run_host
 
