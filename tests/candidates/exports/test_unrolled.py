@@ -18,9 +18,9 @@ from genpolicy.policies.settings import SamplerConfig
 from genpolicy.seeds import counter_noise
 
 TORCH, ONNX = 1e-6, 2e-5
-"""m, or of a number of a rotation. Measured on small checkpoints: torch up to 5e-8, from the rows of
-a call alone; ONNX up to 5e-6 (DDIM), since its runtime adds in another order and the first step of
-a diffusion divides by a small number. Networks of the configured size: see docs/candidates.md."""
+"""m, or of a number of a rotation. Measured on small checkpoints: torch up to 5e-8, from the rows
+of a call alone; ONNX up to 5e-6 (DDIM), since its runtime adds in another order and the first step
+of a diffusion divides by a small number. Of the configured size: see docs/candidates.md."""
 SAMPLERS = {
     "flow": ("euler", "heun"), "diffusion": ("ddim", "ddpm"), "chunked_bc": ("direct",),
     "act": ("z_prior",), "bc_noise": ("offset",), "manicm": ("multistep_consistency",),
