@@ -4,12 +4,21 @@ A reader sees that twenty-two of twenty-four hold. What would change the decisio
 was never measured, what nearly broke, what was judged at a point, what nobody asked.
 """
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 from gates.closeness import by_room, closeness
+from gates.preregistration import PREREGISTRATION
+from gates.protection import REHEARSED
 from gates.report import Answer, GateReport
+from gates.settings import WAIVED
 
+OF_ALL = {
+    REHEARSED: "a rehearsal",
+    f"Loosened since {PREREGISTRATION}": "limits loosened",
+    f"Changed since {PREREGISTRATION}": "plan changed",
+}
+"""How caveats begin that each gate repeats of those below it, and their kind on the first page."""
 MOST_NAMED = 3
 """Criteria that one doubt names; of more it says how many there are."""
 
@@ -34,6 +43,29 @@ class Doubt:
 def doubts_of(report: GateReport) -> list[Doubt]:
     """Every doubt about one gate's verdict, the gravest kind first, caveats last."""
     return [doubt for rule in RULES for doubt in rule(report)]
+
+
+def of_a_ladder(reports: Iterable[GateReport]) -> tuple[list[Doubt], list[Doubt]]:
+    """Doubts about all gates: what a reader weighs one by one, and what no gate shows.
+
+    The gravest kind first, whatever its gate. What several gates say is said once: a rehearsal and
+    moved limits by the gate that names most of them, which hold for those below it too.
+
+    Returns:
+        The first are few, and begin with rehearsal, moved limits and what was waived; the second
+        are caveats.
+    """
+    every = list(reports)
+    weighed = [doubt for rule in RULES[:-1] for report in every for doubt in rule(report)]
+    caveats: dict[str, Doubt] = {}
+    for doubt in (doubt for report in every for doubt in _caveats(report)):
+        key = next((head for head in OF_ALL if doubt.text.startswith(head)), doubt.text)
+        if key not in caveats or len(doubt.text) > len(caveats[key].text):
+            caveats[key] = doubt
+    first = [replace(caveats[head], kind=kind) for head, kind in OF_ALL.items() if head in caveats]
+    others = [doubt for key, doubt in caveats.items() if key not in OF_ALL]
+    waived = [replace(doubt, kind="not asked") for doubt in others if WAIVED.match(doubt.text)]
+    return first + waived + weighed, [one for one in others if not WAIVED.match(one.text)]
 
 
 def for_a_card(report: GateReport, candidate: str) -> list[str]:

@@ -237,12 +237,14 @@ def _compare(gate: Gate, policy: Policy, items: Sequence[Asked], *, count: int, 
         ):
             refuse(gate, item.place, f"drawn as {item.sha256[:16]}…", limit)
     for item, chunks in zip(items, drawn, strict=True):
-        told, decay = item.joined, rule.joining.decay
+        told = item.joined
         if told is not None:
             earlier = {
                 name: by_invocation[_named(source)] for name, source in item.blended_from.items()
             }
-            hold_joined(gate, item.place, told, own=chunks, earlier=earlier, decay=decay)
+            hold_joined(
+                gate, item.place, told, own=chunks, earlier=earlier, joining=rule.joining
+            )  # fmt: skip
 
 
 def _drawn_again(

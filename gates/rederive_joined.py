@@ -63,7 +63,7 @@ def hold_joined(
     *,
     own: Array,
     earlier: Mapping[str, Array],
-    decay: float,
+    joining: JoiningSettings,
 ) -> None:
     """Hold the choice of a sample, and the mean that was made of it, against what was drawn again.
 
@@ -73,7 +73,7 @@ def hold_joined(
         item: The candidate.
         own: Samples of its invocation, drawn again. Shape (N, K, 10).
         earlier: The same of those who had a say in it, by invocation.
-        decay: How much less each counts, by the rule of its method.
+        joining: The rule of its method.
 
     Raises:
         RefusedError: Another sample was due, or the blend is another mean.
@@ -82,14 +82,16 @@ def hold_joined(
     if made is None or not made.said:
         return
     if made.chosen:
-        ways_m = ways_to_plan(made, own, decay)
+        ways_m = ways_to_plan(made, own, joining.decay)
         due_m = np.sort(ways_m)[made.turn] if 0 <= made.turn < len(ways_m) else np.nan
         if not np.isclose(ways_m[made.draw], due_m, rtol=0.0, atol=WAY_TOLERANCE_M):
             found = f"is sample {made.draw}, {ways_m[made.draw]:.4g} m from the plan before"
             refuse(gate, place, found, f"the one {due_m:.4g} m from it, whose turn it is")
     if item.blended is not None:
         said = {one.invocation: _sample(gate, place, one, earlier) for one in made.said}
-        again = mean_of(made, own[made.draw], said, decay)
+        again = mean_of(
+            made, own[made.draw], said, decay=joining.decay, newest=joining.newest
+        )  # fmt: skip
         if again.shape != item.blended.shape or not np.allclose(
             again, item.blended, rtol=0.0, atol=MEAN_TOLERANCE
         ):

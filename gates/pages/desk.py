@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from gates.closeness import Closeness, by_room, closeness
-from gates.doubts import Doubt, doubts_of
+from gates.doubts import Doubt, of_a_ladder
 from gates.pages.guide import unit
 from gates.report import GATES, NAMES, OWNERS, Answer, Gate, GateReport
 from gates.verdicts import first_unmet
@@ -125,6 +125,7 @@ class Desk:
     asked: Asked
     boxes: tuple[Box, ...]
     doubts: tuple[Doubt, ...]
+    not_shown: tuple[Doubt, ...]
     bars: tuple[Bar, ...]
     exact: int
     parts: tuple[Part, ...]
@@ -139,10 +140,12 @@ def desk_of(reports: Mapping[Gate, GateReport]) -> Desk:
         for near in by_room(_shown(reports[gate]))
     ]
     judged = [answer for gate in present for answer in _shown(reports[gate])]
+    doubts, not_shown = of_a_ladder(reports[gate] for gate in present)
     return Desk(
         asked=_asked(reports),
         boxes=tuple(_box(gate, reports.get(gate)) for gate in GATES),
-        doubts=tuple(doubt for gate in present for doubt in doubts_of(reports[gate])),
+        doubts=tuple(doubts),
+        not_shown=tuple(not_shown),
         bars=tuple(sorted(bars, key=lambda bar: -bar.near.used)),
         exact=sum(answer.verdict == "PASS" for answer in judged) - len(bars),
         parts=tuple(_part(owner, reports) for owner in OWNERS),

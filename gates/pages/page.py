@@ -32,9 +32,11 @@ from gates.pages import (
     tables_overruns,
     tables_stress,
 )
+from gates.pages.clips import clips_of
 from gates.pages.desk import desk_of
 from gates.pages.desk_card import card_of, papers_of, signing_of
 from gates.pages.desk_costs import HEADS, costs_of
+from gates.pages.desk_gain import gain_of
 from gates.pages.desk_line import line_of
 from gates.pages.figures import Picturable, Table, draw_all
 from gates.pages.guide import BACK_TO, QUESTIONS, READING, label, words
@@ -171,6 +173,8 @@ def index_page(root: Path) -> str:
         rows=rows,
         desk=desk_of(reports),
         line=line_of(reports, evidence, card_of(papers)),
+        gain=gain_of(reports, evidence),
+        clips=clips_of(reports, evidence),
         heads=HEADS,
         costs=costs_of(reports, evidence),
         signing=signing_of(reports, evidence, papers),

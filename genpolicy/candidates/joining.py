@@ -2,9 +2,11 @@
 
 `replace` takes the chunk as it is. The ensembling rules blend it with what earlier invocations
 predicted for the same moments (Zhao et al., arXiv 2304.13705); the published codes differ in which
-prediction weighs most, so there are two names. `bidirectional` chooses among the candidates the one
-that is nearest to the previous plan (Liu et al., arXiv 2408.17355, the backward term).
-`real_time` draws the candidates so that they go on from it (Black et al., arXiv 2506.07339).
+prediction weighs most, so there are two names. `running_average` blends each new prediction into
+what was blended before, as LeRobot's asynchronous client fills its queue. `bidirectional` chooses
+among the candidates the one that is nearest to the previous plan (Liu et al., arXiv 2408.17355, the
+backward term). `real_time` draws the candidates so that they go on from it (Black et al., arXiv
+2506.07339).
 Whatever comes out is a proposal without any authority.
 """
 
@@ -20,10 +22,12 @@ from genpolicy.integrity.hashing import sha256_bytes
 
 REPLACE, BIDIRECTIONAL, REAL_TIME = "replace", "bidirectional", "real_time"
 ENSEMBLE_OLDEST, ENSEMBLE_NEWEST = "ensemble_oldest", "ensemble_newest"
-ENSEMBLES = (ENSEMBLE_OLDEST, ENSEMBLE_NEWEST)
+RUNNING_AVERAGE = "running_average"
+BLENDS = (ENSEMBLE_OLDEST, ENSEMBLE_NEWEST, RUNNING_AVERAGE)
+"""Rules that make a chunk of several predictions."""
 READS = {
     REPLACE: (), ENSEMBLE_OLDEST: ("decay",), ENSEMBLE_NEWEST: ("decay",),
-    BIDIRECTIONAL: ("decay",), REAL_TIME: ("guidance",),
+    RUNNING_AVERAGE: ("newest",), BIDIRECTIONAL: ("decay",), REAL_TIME: ("guidance",),
 }  # fmt: skip
 """What each rule reads of the settings, beside its name."""
 
@@ -33,18 +37,24 @@ class JoiningSettings(Settings):
 
     Attributes:
         rule: `replace`; `ensemble_oldest` (ACT: the oldest prediction weighs most) or
-            `ensemble_newest` (Reactive Diffusion: the newest does); `bidirectional`; `real_time`.
+            `ensemble_newest` (Reactive Diffusion: the newest does); `running_average`;
+            `bidirectional`; `real_time`.
         decay: Weights fall by exp(-decay) from one prediction to the next, and in `bidirectional`
             from row to row; 0.01 as published for ACT.
+        newest: Share of the newest prediction in `running_average`, all before it have the rest:
+            LeRobot's `weighted_average` is 0.7, `average` 0.5, `conservative` 0.3. Its
+            `latest_only` is `replace`.
         guidance: Largest factor of the guidance of `real_time`; 5 as published.
         exempt: Methods that take `replace` under `real_time`, since no path leads from noise to
             their chunks; each of them is named, and no other.
     """
 
     rule: Literal[
-        "replace", "ensemble_oldest", "ensemble_newest", "bidirectional", "real_time"
+        "replace", "ensemble_oldest", "ensemble_newest", "running_average", "bidirectional",
+        "real_time",
     ] = "replace"  # fmt: skip
     decay: float = Field(default=0.01, ge=0.0, le=10.0)
+    newest: float = Field(default=0.7, gt=0.0, lt=1.0)
     guidance: float = Field(default=5.0, gt=0.0, le=100.0)
     exempt: list[str] = Field(default_factory=list)
 

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from genpolicy.candidates.joining import (
     BIDIRECTIONAL,
+    BLENDS,
     ENSEMBLE_NEWEST,
-    ENSEMBLES,
+    RUNNING_AVERAGE,
     JoiningSettings,
 )
 from genpolicy.candidates.selector import propose
@@ -195,14 +196,15 @@ class Past:
 def blend(candidate: Candidate, votes: Sequence[Votes], joining: JoiningSettings) -> Proposal:
     """The weighted mean of all predictions of each row: a chunk of its own, without authority.
 
-    Weights are exp(-decay i), i = 0 at the oldest prediction of a row or at the newest. Rotations
-    are averaged in their two columns and made orthonormal again; where the mean is no rotation the
+    Weights are exp(-decay i), i = 0 at the oldest prediction of a row or at the newest; of the
+    running average, `newest` of each prediction and the rest of what was before it. Rotations are
+    averaged in their two columns and made orthonormal again; where the mean is no rotation the
     row is NaN, and the first layer refuses it.
 
     Args:
         candidate: The new prediction.
         votes: Earlier ones, oldest first, at least one.
-        joining: Rule and decay.
+        joining: Rule and weights.
     """
     own = candidate.actions
     blended = np.array(own)
@@ -256,7 +258,7 @@ def join(
     """
     if joining.rule == BIDIRECTIONAL:
         index = nearest_first(drawn, votes, joining)[index]
-    elif joining.rule in ENSEMBLES and votes:
+    elif joining.rule in BLENDS and votes:
         return blend(drawn[index], votes, joining)
     return propose(drawn, index)
 
@@ -295,13 +297,22 @@ def _renamed(metadata: ChunkMetadata) -> ChunkMetadata:
 
 def _mean(said: list[Array], joining: JoiningSettings) -> Array:
     """Mean of the predictions of one row, oldest first. Shapes (D_a,)."""
-    ranks = np.arange(len(said), dtype=float)
-    if joining.rule == ENSEMBLE_NEWEST:
-        ranks = ranks[::-1]
-    weights = np.exp(-joining.decay * ranks)
+    weights = _weights(len(said), joining)
     mean: Array = weights @ np.stack(said) / weights.sum()
     mean[ROTATION] = rotation_to_6d(rotation_from_6d(mean[ROTATION]))
     return mean
+
+
+def _weights(predictions: int, joining: JoiningSettings) -> Array:
+    """Of predictions of one row, oldest first. Shape (n,)."""
+    ranks = np.arange(predictions, dtype=float)
+    if joining.rule == RUNNING_AVERAGE:
+        weights: Array = joining.newest * (1.0 - joining.newest) ** ranks[::-1]
+        weights[0] = (1.0 - joining.newest) ** ranks[-1]  # nothing was there to blend it into
+        return weights
+    if joining.rule == ENSEMBLE_NEWEST:
+        ranks = ranks[::-1]
+    return np.exp(-joining.decay * ranks)
 
 
 def _distance(actions: Array, plan: Votes, decay: float) -> float:

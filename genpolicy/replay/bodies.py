@@ -1,6 +1,6 @@
 """The cell as primitives of a viewer: links, tool and scene, from the shapes that are checked."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,13 +10,12 @@ from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.replay.messages import Colour, Json, cylinder, line, solid
 from genpolicy.robot.collision import CollisionModel
 from genpolicy.robot.kinematics import ArmKinematics
+from genpolicy.robot.outlines import Placed
 from genpolicy.robot.scene_state import SceneState
 from genpolicy.robot.shapes import HELD, Shape
 from genpolicy.tasks.api import Task, Workspace
 
 Array = NDArray[np.float64]
-Placed = tuple[Shape, Array, Array]
-"""A shape with its rotation (3, 3) and position (3,), m, in the base frame."""
 
 STONE: Colour = (0.55, 0.55, 0.52, 0.9)
 TABLE: Colour = (0.80, 0.76, 0.70, 0.6)
@@ -144,3 +143,12 @@ def frame_of(workspace: Workspace) -> Json:
         if np.count_nonzero(a != b) == 1
     ]
     return line(np.array(pairs).reshape(-1, 3), EDGE, width_px=1.0, pairs=True)
+
+
+def poses_of(bodies: Mapping[str, str]) -> dict[str, tuple[Array, Array]]:
+    """Position, m, and quaternion of each body, as a journal writes them."""
+    found = {}
+    for name, text in bodies.items():
+        numbers = np.frombuffer(bytes.fromhex(text), dtype="<f8")
+        found[name] = (numbers[:3], numbers[3:])
+    return found

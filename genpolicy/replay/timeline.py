@@ -16,7 +16,7 @@ from genpolicy.contract.action import GRIPPER, POSITION, split_action
 from genpolicy.data.recording.wire import LOG_SCHEMA_NAME
 from genpolicy.execution.journal import Event, decode_actions
 from genpolicy.execution.moment import FALLBACK
-from genpolicy.replay.bodies import DrawnCell, Placed, frame_of, primitives
+from genpolicy.replay.bodies import DrawnCell, frame_of, poses_of, primitives
 from genpolicy.replay.journal_file import Drawn
 from genpolicy.replay.messages import (
     IDENTITY,
@@ -35,6 +35,7 @@ from genpolicy.replay.messages import (
 )
 from genpolicy.replay.proposals import Proposals, RejectedProposal
 from genpolicy.replay.words import said_of
+from genpolicy.robot.outlines import Placed
 from genpolicy.robot.scene_state import SceneState
 
 Array = NDArray[np.float64]
@@ -143,7 +144,7 @@ class Timeline:
         if bodies == self._bodies:
             return
         self._bodies = bodies
-        self._scene = self._cell.scene(SceneState(_poses(bodies)))
+        self._scene = self._cell.scene(SceneState(poses_of(bodies)))
         entities = [entity("workspace", now_ns, lines=[frame_of(self._cell.workspace)])]
         self._changed[SCENE] = entities + self._entities(now_ns, self._scene)
 
@@ -276,12 +277,3 @@ def _joints(motion: Mapping[str, Any], name: str) -> Array:
     """Joint positions of an `enqueue` event, rad. Shape (n, J)."""
     values = np.frombuffer(bytes.fromhex(motion[name]), dtype="<f8")
     return values.reshape(-1, int(motion["joints"]))
-
-
-def _poses(bodies: Mapping[str, str]) -> dict[str, tuple[Array, Array]]:
-    """Position, m, and quaternion of each body."""
-    found = {}
-    for name, text in bodies.items():
-        numbers = np.frombuffer(bytes.fromhex(text), dtype="<f8")
-        found[name] = (numbers[:3], numbers[3:])
-    return found

@@ -7,6 +7,7 @@ a grid. By Ville's inequality it exceeds 1 / alpha with probability at most alph
 looks. Source: Waudby-Smith and Ramdas 2024; Shafer and Vovk 2001.
 """
 
+from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -21,6 +22,7 @@ Array = NDArray[np.float64]
 WAGER_SHARES = (0.35, 0.45, 0.55, 0.65, 0.75, 0.85)
 """Wagers as shares of the largest, 1 / (1 + margin). Log-optimal wagers of gains of 0.15 to 0.5
 beyond the margin lie here; what is staked below and above buys no power at a hundred pairs."""
+MARGINS = tuple(float(step) / 1000.0 for step in range(-999, 1000))
 
 
 @dataclass(frozen=True)
@@ -91,6 +93,41 @@ def paired_e_value(differences: Array, *, margin: float, alpha: float) -> EProce
         pairs_needed=int(reached[0]) + 1 if len(reached) else None,
         e_value=float(path.max()) if len(path) else 1.0,
     )
+
+
+def gain_interval(differences: Array, *, confidence: float) -> tuple[float, float]:
+    """The gains that the pairs do not speak against, on either side, whenever one looks.
+
+    The lower end is the largest margin that is shown to be exceeded, the upper end likewise of the
+    mirrored question; each wrong with at most half of what the confidence leaves.
+
+    Args:
+        differences: As of `paired_e_value`. Shape (n,).
+        confidence: Coverage of both ends together, in (0, 1).
+
+    Returns:
+        Lower and upper end, to a thousandth; -1 and 1 where nothing is shown.
+
+    Raises:
+        ContractError: A value outside its range, or NaN.
+    """
+    d, alpha = np.asarray(differences, dtype=np.float64), (1.0 - confidence) / 2.0
+    return _shown(d, alpha), -_shown(-d, alpha)
+
+
+def _shown(differences: Array, alpha: float) -> float:
+    """The largest margin of a grid that is exceeded; -1 if none is.
+
+    Evidence only falls with the margin, since (D - margin) / (1 + margin) does.
+    """
+    exceeded = bisect_left(
+        MARGINS,
+        True,
+        key=lambda margin: (
+            paired_e_value(differences, margin=margin, alpha=alpha).decision != "promote"
+        ),
+    )
+    return MARGINS[exceeded - 1] if exceeded else -1.0
 
 
 def power_table(

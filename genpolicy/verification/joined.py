@@ -13,7 +13,7 @@ from genpolicy.verification.journal_source import Message
 
 Finding = tuple[str, str]
 LABEL = "joining"
-BLENDS = ("ensemble_oldest", "ensemble_newest")
+BLENDS = ("ensemble_oldest", "ensemble_newest", "running_average")
 
 
 class Joined:

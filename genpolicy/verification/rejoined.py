@@ -20,7 +20,7 @@ from genpolicy.verification.journal_source import Message, floats
 
 Array = NDArray[np.float64]
 
-OLDEST = "ensemble_oldest"
+OLDEST, RUNNING = "ensemble_oldest", "running_average"
 NEAREST, GUIDED = "bidirectional", "real_time"
 ONE_PLAN = (NEAREST, GUIDED)
 """Rules that look at the newest earlier plan alone, the same for every candidate."""
@@ -207,7 +207,9 @@ def _chain(chunk_id: str, entered: Sequence[Message]) -> set[str]:
     return found
 
 
-def mean_of(made: Made, own: Array, earlier: Mapping[str, Array], decay: float) -> Array:
+def mean_of(
+    made: Made, own: Array, earlier: Mapping[str, Array], *, decay: float, newest: float
+) -> Array:
     """The blend of samples: in each row the weighted mean of those who had a say.
 
     Args:
@@ -216,21 +218,34 @@ def mean_of(made: Made, own: Array, earlier: Mapping[str, Array], decay: float) 
         earlier: Samples of the earlier ones, by invocation. Shapes (K, 10).
         decay: Each prediction weighs exp(-decay) of the one before, counted from the oldest or
             the newest as the rule is called.
+        newest: Share of each prediction in the running average of it and all before.
     """
     blended = np.array(own)
     for row in range(min(one.first for one in made.said), max(one.stop for one in made.said)):
         speaking = [one for one in made.said if one.first <= row < one.stop]
         sides = [earlier[one.invocation][row + one.shift] for one in speaking] + [own[row]]
-        if made.rule != OLDEST:
-            sides.reverse()
-        total, share, whole = np.zeros(ACTION_DIM), 1.0, 0.0
-        for side in sides:
-            total += share * side
-            whole += share
-            share *= math.exp(-decay)
-        blended[row] = total / whole
+        if made.rule == RUNNING:
+            blended[row] = _one_into_the_next(sides, newest)
+        else:
+            blended[row] = _fading(sides if made.rule == OLDEST else sides[::-1], decay)
         blended[row, ROTATION] = _upright(blended[row, ROTATION])
     return blended
+
+
+def _fading(sides: Sequence[Array], decay: float) -> Array:
+    total, share, whole = np.zeros(ACTION_DIM), 1.0, 0.0
+    for side in sides:
+        total += share * side
+        whole += share
+        share *= math.exp(-decay)
+    return total / whole
+
+
+def _one_into_the_next(sides: Sequence[Array], newest: float) -> Array:
+    mean = sides[0]
+    for side in sides[1:]:
+        mean = mean + newest * (side - mean)
+    return mean
 
 
 def _upright(columns: Array) -> Array:

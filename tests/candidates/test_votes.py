@@ -106,17 +106,18 @@ def test_a_chunk_between_the_periods_of_the_new_one_has_no_vote():
 
 
 @pytest.mark.parametrize(
-    ("rule", "expected"),
-    [("ensemble_oldest", (1.0 + 2.0 / 2 + 4.0 / 4) / 1.75),
-     ("ensemble_newest", (1.0 / 4 + 2.0 / 2 + 4.0) / 1.75)],
+    ("rule", "expected", "two"),
+    [("ensemble_oldest", (1.0 + 2.0 / 2 + 4.0 / 4) / 1.75, (2.0 + 4.0 / 2) / 1.5),
+     ("ensemble_newest", (1.0 / 4 + 2.0 / 2 + 4.0) / 1.75, (2.0 / 2 + 4.0) / 1.5),
+     ("running_average", 0.3 * (0.3 * 1.0 + 0.7 * 2.0) + 0.7 * 4.0, 0.3 * 2.0 + 0.7 * 4.0)],
 )  # fmt: skip
-def test_weights_by_hand(rule, expected):
-    """Halved from one prediction to the next: 4, 2, 1 parts of seven from the first in line."""
+def test_weights_by_hand(rule, expected, two):
+    """Halved from one prediction to the next, 4, 2, 1 parts of seven from the first in line; or
+    seven tenths of each blended into what was there."""
     joining = JoiningSettings(rule=rule, decay=float(np.log(2.0)))
     votes = remembered(*TWO).votes(now(2, start=5), first=1)
     mixed = blend(Candidate(metadata(2, start=5), chunk(4.0)), votes, joining)
     assert mixed.actions[1:3, 0] == pytest.approx(expected)
-    two = (2.0 + 4.0 / 2) / 1.5 if rule == "ensemble_oldest" else (2.0 / 2 + 4.0) / 1.5
     assert mixed.actions[3:6, 0] == pytest.approx(two)
     assert np.array_equal(mixed.actions[[0, *range(6, 16)]], chunk(4.0)[[0, *range(6, 16)]])
     assert mixed.metadata == replace(metadata(2, start=5), chunk_id="s/2/blend")
@@ -187,11 +188,13 @@ def test_the_prefix_is_frozen_where_it_will_be_executed_and_fades_behind():
 
 
 def test_a_hash_of_the_sampler_tells_rules_apart_and_replacing_changes_none():
-    rules = ("ensemble_oldest", "ensemble_newest", "bidirectional", "real_time")
+    rules = ("ensemble_oldest", "ensemble_newest", "running_average", "bidirectional", "real_time")
     found = {JoiningSettings(rule=rule).sampler_hash("own") for rule in rules}
-    assert JoiningSettings().sampler_hash("own") == "own" and len(found | {"own"}) == 5
+    assert JoiningSettings().sampler_hash("own") == "own" and len(found | {"own"}) == 6
     sharper = JoiningSettings(rule="ensemble_oldest", decay=0.5).sampler_hash("own")
     assert sharper not in found
+    quicker = JoiningSettings(rule="running_average", newest=0.5).sampler_hash("own")
+    assert quicker not in found
     # What a rule does not read is not in its identity.
     assert JoiningSettings(rule="real_time", decay=0.5).sampler_hash("own") in found
 

@@ -7,7 +7,7 @@ import pickle
 import numpy as np
 import pytest
 
-from genpolicy.candidates.joining import ENSEMBLES, JoiningSettings
+from genpolicy.candidates.joining import BLENDS, JoiningSettings
 from genpolicy.candidates.votes import Prediction, Votes, blend
 from genpolicy.contract.chunk import Candidate, actions_sha256
 from genpolicy.errors import IntegrityError
@@ -81,7 +81,7 @@ def test_a_rejected_chunk_is_another_type_with_raw_kept(checker, kit):
     assert np.array_equal(result.projected.proposal.actions, raw)
 
 
-@pytest.mark.parametrize("rule", ENSEMBLES)
+@pytest.mark.parametrize("rule", BLENDS)
 def test_a_blend_needs_an_admission_of_its_own(checker, kit, rule):
     """P6: both parents pass, what they blend into, by either sign, runs into the post."""
     ctx = kit.context(checker, kit.START)

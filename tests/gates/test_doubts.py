@@ -5,7 +5,7 @@ import pytest
 
 from gates.card.card import caveats_of
 from gates.card.signing import read_draft
-from gates.doubts import doubts_of, for_a_card
+from gates.doubts import OF_ALL, doubts_of, for_a_card, of_a_ladder
 from gates.proof import judge
 
 
@@ -107,3 +107,41 @@ def test_a_draft_says_what_could_make_its_reports_wrong(ladder):
 
 def _near(report):
     return [doubt.criteria[0] for doubt in doubts_of(report) if doubt.kind == "near its limit"]
+
+
+# -- of all gates together ------------------------------------------------------------------------
+
+
+@pytest.fixture
+def reports(ladder):
+    return {gate: judge(ladder, gate) for gate in "ABCD"}
+
+
+def test_the_gravest_kind_comes_first_whatever_its_gate(reports):
+    first, rest = of_a_ladder(reports.values())
+    order = [doubt.kind for report in reports.values() for doubt in doubts_of(report)]
+    ranks = [
+        "not asked", "not measured", "not decided", "stopped here", "near its limit",
+        "judged at a point",
+    ]  # fmt: skip
+    found = [ranks.index(doubt.kind) for doubt in first]
+    assert found == sorted(found) and len(set(found)) > 1
+    assert {doubt.kind for doubt in rest} == {"not shown"}
+    weighed = [doubt.kind for doubt in first if doubt.kind != "not asked"]
+    assert sorted(weighed) == sorted(kind for kind in order if kind != "not shown")
+
+
+def test_what_each_gate_repeats_is_said_once_by_who_names_most(reports):
+    rehearsal, loosened = list(OF_ALL)[:2]
+    waived = "a_b was not asked: the safety owner says that it does not apply here (none)."
+    told = []
+    for n, (gate, report) in enumerate(reports.items(), start=1):
+        repeated = f"{rehearsal} Looser: {'x' * n}.", f"{loosened}: {'y' * n}."
+        caveats = (*repeated, "the same", f"own of {gate}", waived)
+        told.append(report.model_copy(update={"caveats": caveats}))
+    first, rest = of_a_ladder(told)
+    assert [(doubt.kind, doubt.gate) for doubt in first[:3]] == [
+        ("a rehearsal", "D"), ("limits loosened", "D"), ("not asked", "A"),
+    ]  # fmt: skip
+    own = [f"own of {gate}" for gate in reports]
+    assert sorted(doubt.text for doubt in rest) == sorted(["the same", *own])

@@ -24,6 +24,7 @@ from genpolicy.verification.checker import check_journal
 
 OLDEST = JoiningSettings(rule="ensemble_oldest", decay=1.0)
 NEWEST = JoiningSettings(rule="ensemble_newest", decay=1.0)
+RUNNING = JoiningSettings(rule="running_average", newest=0.6)
 NEAREST = JoiningSettings(rule="bidirectional", decay=0.3)
 GUIDED = JoiningSettings(rule="real_time")
 LEAD = 6
@@ -77,7 +78,9 @@ def made(path):
     ]
 
 
-@pytest.mark.parametrize("joining", [OLDEST, NEWEST, NEAREST, GUIDED], ids=lambda own: own.rule)
+@pytest.mark.parametrize(
+    "joining", [OLDEST, NEWEST, RUNNING, NEAREST, GUIDED], ids=lambda own: own.rule
+)
 def test_what_was_joined_as_it_says_stands(root, rolled, joining):
     path = rolled(joining)
     assert not seen_by_the_checker(path, joining, motion=True)
@@ -114,6 +117,8 @@ def as_drawn(drawn, index, votes, joining):
     (OLDEST, by(rule="ensemble_newest"), "beside it"),
     (NEWEST, by(rule="ensemble_oldest"), "beside it"),
     (NEWEST, by(decay=1.1), "beside it"),
+    (RUNNING, leaning, "a blend up to 0.0015 beside it"),
+    (RUNNING, by(newest=0.65), "beside it"),
     (NEAREST, as_drawn, "is sample"),
 ])  # fmt: skip
 def test_a_blend_or_a_choice_that_is_another_is_refused(
@@ -145,6 +150,7 @@ def later(self, votes):
 @pytest.mark.parametrize(("joining", "forged"), [
     (OLDEST, nobody), (NEWEST, nobody), (NEAREST, nobody), (GUIDED, nobody),
     (OLDEST, without_the_oldest), (NEWEST, shorter), (NEAREST, shorter), (GUIDED, shorter),
+    (RUNNING, shorter), (RUNNING, without_the_oldest),
     (OLDEST, later), (NEAREST, later),
 ])  # fmt: skip
 def test_who_had_a_say_cannot_be_chosen(root, rolled, monkeypatch, joining, forged):

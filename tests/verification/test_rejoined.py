@@ -21,6 +21,7 @@ from genpolicy.verification.rejoined import (
 
 ROWS = 16
 STRAIGHT = np.array([1.0, 0.0, 0.0, 0.0, 1.0, 0.0])
+HALVED, STEEP = {"decay": math.log(2.0), "newest": 0.7}, {"decay": 50.0, "newest": 0.7}
 OPENED = {"execution_horizon": 8, "maximum_age_ns": {"approach": 90}, "replan_lead_steps": 3}
 
 
@@ -49,13 +50,16 @@ def test_the_weights_of_a_mean_by_hand():
     oldest, newest, own = parts
     said = said_by("a", 2, 3, 8, oldest), said_by("b", 2, 4, 4, newest)
     earlier = {"a": oldest, "b": newest}
-    by_age = mean_of(made_of("ensemble_oldest", *said), own, earlier, math.log(2.0))
+    by_age = mean_of(made_of("ensemble_oldest", *said), own, earlier, **HALVED)
     np.testing.assert_allclose(by_age[2, :3], (0 * 4 + 1 * 2 + 2 * 1) / 7)
     np.testing.assert_allclose(by_age[3, :3], (1 * 2 + 2 * 1) / 3)
-    by_youth = mean_of(made_of("ensemble_newest", *said), own, earlier, math.log(2.0))
+    by_youth = mean_of(made_of("ensemble_newest", *said), own, earlier, **HALVED)
     np.testing.assert_allclose(by_youth[2, :3], (0 * 1 + 1 * 2 + 2 * 4) / 7)
     np.testing.assert_allclose(by_youth[3, :3], (1 * 1 + 2 * 2) / 3)
-    for blended in (by_age, by_youth):
+    running = mean_of(made_of("running_average", *said), own, earlier, **HALVED)
+    np.testing.assert_allclose(running[2, :3], 0.3 * (0.3 * 0 + 0.7 * 1) + 0.7 * 2)
+    np.testing.assert_allclose(running[3, :3], 0.3 * 1 + 0.7 * 2)
+    for blended in (by_age, by_youth, running):
         np.testing.assert_array_equal(np.delete(blended, (2, 3), axis=0), own[:14])
         np.testing.assert_allclose(blended[2:4, 3:9], [STRAIGHT, STRAIGHT])
 
@@ -63,11 +67,11 @@ def test_the_weights_of_a_mean_by_hand():
 def test_the_row_of_an_earlier_sample_is_the_one_that_is_due_then():
     own, before = samples(2)
     blended = mean_of(
-        made_of("ensemble_newest", said_by("a", 1, 3, 5, before)), own, {"a": before}, 50.0
+        made_of("ensemble_newest", said_by("a", 1, 3, 5, before)), own, {"a": before}, **STEEP
     )
     np.testing.assert_allclose(blended, own, atol=1e-9)
     blended = mean_of(
-        made_of("ensemble_oldest", said_by("a", 1, 3, 5, before)), own, {"a": before}, 50.0
+        made_of("ensemble_oldest", said_by("a", 1, 3, 5, before)), own, {"a": before}, **STEEP
     )
     np.testing.assert_allclose(blended[1:3], before[6:8], atol=1e-9)
 
@@ -78,13 +82,15 @@ def voted(name, first, stop, shift, sample):
     )
 
 
-@pytest.mark.parametrize("rule", ["ensemble_oldest", "ensemble_newest", "bidirectional"])
+@pytest.mark.parametrize(
+    "rule", ["ensemble_oldest", "ensemble_newest", "running_average", "bidirectional"]
+)
 @pytest.mark.parametrize("seed", range(20))
 def test_two_programs_agree(rule, seed):
     """The blend and the choice of the product, and the weights of what a chunk goes on from."""
     oldest, newest, *drawn = samples(6, seed)
     rows = [("a", 1, 3, 8, oldest), ("b", 1, 6, 4, newest)]
-    joining = JoiningSettings(rule=rule, decay=0.05 * seed)
+    joining = JoiningSettings(rule=rule, decay=0.05 * seed, newest=(seed + 1) / 22)
     votes = [voted(*row) for row in rows]
     candidates = [SimpleNamespace(metadata=METADATA, actions=sample) for sample in drawn]
     said = tuple(said_by(*row) for row in rows)
@@ -97,7 +103,9 @@ def test_two_programs_agree(rule, seed):
         np.testing.assert_allclose(own[1], weights, rtol=1e-14)
     else:
         told = blend(candidates[0], votes, joining).actions
-        own = mean_of(made_of(rule, *said), drawn[0], {"a": oldest, "b": newest}, joining.decay)
+        earlier = {"a": oldest, "b": newest}
+        weights = {"decay": joining.decay, "newest": joining.newest}
+        own = mean_of(made_of(rule, *said), drawn[0], earlier, **weights)
         np.testing.assert_allclose(own, told, atol=1e-12)
 
 

@@ -4,7 +4,6 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull
 
 from genpolicy.contract.action import GRIPPER, POSITION, ROTATION
 from genpolicy.contract.chunk import Projected
@@ -15,12 +14,12 @@ from genpolicy.feasibility.cell import Cell
 from genpolicy.feasibility.context import Context
 from genpolicy.feasibility.settings import LAYERS
 from genpolicy.feasibility.verdict import Verdict
+from genpolicy.robot.outlines import outlines
 from genpolicy.robot.scene_state import SceneState
 from genpolicy.robot.shapes import HELD, Shape
 
 Array = NDArray[np.float64]
 
-ROUND_CORNERS = 24
 DECIMALS = 6  # of metres: a thousandth of a millimetre, below what a drawing or a scene knows
 
 
@@ -107,34 +106,11 @@ def _tool_at(
 def _drawn(
     shape: Shape, kind: str, rotation: Array, position_m: Array, touching: Sequence[str]
 ) -> DrawnBody:
-    points = _surface(shape) @ np.asarray(rotation).T + np.asarray(position_m)
+    above, aside = outlines([(shape, rotation, position_m)])
     return DrawnBody(
         name=shape.name,
         kind=kind,
         touches=shape.name in touching,
-        above_m=_outline(points[:, [0, 1]]),
-        aside_m=_outline(points[:, [0, 2]]),
+        above_m=np.round(above, DECIMALS).tolist(),
+        aside_m=np.round(aside, DECIMALS).tolist(),
     )
-
-
-def _outline(points: Array) -> list[list[float]]:
-    corners = points[ConvexHull(points).vertices]
-    rounded: list[list[float]] = np.round(corners, DECIMALS).tolist()
-    return rounded
-
-
-def _surface(shape: Shape) -> Array:
-    """Points whose hull is the shape, in its own frame. Shape (n, 3)."""
-    x, y, z = shape.half_size_m
-    if shape.kind == "box":
-        signs = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)])
-        return np.asarray(signs * shape.half_size_m)
-    turn = 2 * np.pi * np.arange(ROUND_CORNERS) / ROUND_CORNERS
-    ring = np.stack([np.cos(turn), np.sin(turn), np.zeros(ROUND_CORNERS)], axis=1)
-    if shape.kind == "cylinder":
-        return np.concatenate([ring * (x, y, 0) + (0, 0, end) for end in (-z, z)])
-    # A sphere, and a capsule: a sphere at either end of its axis.
-    ends = (-z, z) if shape.kind == "capsule" else (0.0,)
-    tilts = np.pi * np.arange(ROUND_CORNERS // 2 + 1) / (ROUND_CORNERS // 2)
-    ball = np.concatenate([x * (np.sin(t) * ring + (0, 0, np.cos(t))) for t in tilts])
-    return np.concatenate([ball + np.array([0.0, 0.0, end]) for end in ends])

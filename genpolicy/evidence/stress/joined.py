@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from genpolicy.candidates.joining import BIDIRECTIONAL, ENSEMBLES, REAL_TIME, REPLACE
+from genpolicy.candidates.joining import BIDIRECTIONAL, BLENDS, REAL_TIME, REPLACE
 from genpolicy.candidates.votes import (
     VOTE_CHECKS,
     Now,
@@ -55,7 +55,7 @@ class Joined:
         """What is proposed of an answer, when its turn is `flying.candidate`."""
         rule, turn = self._joining.rule, flying.candidate
         # What orders the candidates stays what it was at the first of them.
-        if rule in ENSEMBLES or (rule == BIDIRECTIONAL and turn == 0):
+        if rule in BLENDS or (rule == BIDIRECTIONAL and turn == 0):
             votes = self._votes(flying.metadata, first=late_rows)
             flying.votes = votes[-1:] if rule == BIDIRECTIONAL else votes
         proposal = join(drawn, turn, flying.votes, self._joining)

@@ -32,7 +32,13 @@ LATENCY = LatencyModel(
 
 @pytest.fixture(
     scope="module",
-    params=["ensemble_oldest", "ensemble_newest", "bidirectional", "real_time"],
+    params=[
+        "ensemble_oldest",
+        "ensemble_newest",
+        "running_average",
+        "bidirectional",
+        "real_time",
+    ],
 )
 def rule(request):
     return request.param

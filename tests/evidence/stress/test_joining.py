@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from genpolicy.candidates.joining import JoiningSettings
+from genpolicy.candidates.joining import BLENDS, JoiningSettings
 from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.execution.journal import write_journal
 from genpolicy.verification.checker import check_messages
@@ -16,7 +16,7 @@ from genpolicy.verification.tables import derived_tables
 
 LEAD = 7
 """An invocation begins at once behind the last: plans overlap by as much as their validity lets."""
-RULES = ("replace", "ensemble_oldest", "ensemble_newest", "bidirectional")
+RULES = ("replace", "ensemble_oldest", "ensemble_newest", "running_average", "bidirectional")
 
 
 def of_kind(rollout, kind):
@@ -96,7 +96,7 @@ def test_every_rule_is_proved_from_its_journal(played, kit, tmp_path, rule):
     assert [splice.parents > 0 for splice in rollout.splices] == [
         bool(payload["parents"]) for payload in _made(rollout, entered)
     ]
-    if rule.startswith("ensemble"):
+    if rule in BLENDS:
         blends = [m["chunk_id"] for m in entered if m["chunk_id"].endswith("/blend")]
         assert len(blends) >= 3 and set(blends) <= {
             m["chunk_id"] for m in of_kind(rollout, "candidate")

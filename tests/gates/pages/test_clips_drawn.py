@@ -1,0 +1,104 @@
+"""The moving drawing: numbers of a film by hand, in the places where a reader looks for them."""
+
+import re
+
+import numpy as np
+import pytest
+
+from gates.pages.clips_drawn import GAP, MARGIN_M, STRIP, WIDTH, drawn_clip
+from genpolicy.replay.film import Film, Frame
+from genpolicy.tasks.api import Workspace
+
+SPACE = Workspace(lower_m=(0.3, -0.2, 0.0), upper_m=(0.7, 0.2, 0.2))
+SCALE = (WIDTH - GAP) / 2 / (0.4 + 2 * MARGIN_M)
+
+
+def square(x, y, half=0.01):
+    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half
+    return corners + np.array([x, y]), corners + np.array([x, 0.1])
+
+
+def film(**changes):
+    scene = (("obstacle", square(0.5, 0.0)),)
+    hands = [None, square(0.4, 0.1), square(0.6, 0.1)]
+    values = {
+        "frames": tuple(Frame(hand, None, scene) for hand in hands),
+        "path_m": np.array([[0.4, 0.1, 0.1], [0.6, 0.1, 0.1]]),
+        "duration_s": 2.0,
+        "forces": ((0.5, 5.0), (1.0, 20.0)),
+        "ages": (),
+        "phases": ((0.0, "approach"), (1.9, "in<sert"), (1.95, "end")),
+        "modes": ((1.0, "fallback"), (1.5, "intervention"), (1.75, "ended")),
+    }
+    return Film(**{**values, **changes})
+
+
+def points(text):
+    return [tuple(map(float, pair.split(","))) for pair in text.split()]
+
+
+def of_class(svg, name):
+    return re.findall(rf'<(?:polygon|polyline) class="{name}" points="([^"]*)"', str(svg))
+
+
+def test_places_are_to_scale_and_up_is_up():
+    above, aside = of_class(drawn_clip(film(), SPACE, 1), "hand")
+    middle = np.mean(points(above), axis=0)
+    assert middle[0] == pytest.approx((0.6 - 0.3 + MARGIN_M) * SCALE, abs=0.1)
+    height = (0.4 + 2 * MARGIN_M) * SCALE
+    assert middle[1] == pytest.approx(height - (0.1 + 0.2 + MARGIN_M) * SCALE, abs=0.1)
+    side = np.mean(points(aside), axis=0)
+    assert side[0] - middle[0] == pytest.approx((WIDTH + GAP) / 2, abs=0.1)
+    lower = (0.2 + 2 * MARGIN_M) * SCALE
+    assert side[1] == pytest.approx(lower - (0.1 + MARGIN_M) * SCALE, abs=0.1)
+
+
+def test_it_stands_at_the_end_and_plays_from_the_beginning():
+    svg = str(drawn_clip(film(), SPACE, 7))
+    (values,) = set(re.findall(r'class="hand" points="[^"]*"><animate [^>]*values="([^"]*)"', svg)
+                    [:1])  # fmt: skip
+    frames = values.split(";")
+    assert len(frames) == 3 and frames[0] == "" and frames[1] != frames[2]
+    assert of_class(svg, "hand")[0] == frames[2]
+    assert set(re.findall(r'begin="([^"]*)"', svg)) == {"clip7.click"}
+    assert set(re.findall(r'dur="([^"]*)"', svg)) == {"0.3s"}
+
+
+def test_what_stands_still_is_not_animated():
+    svg = str(drawn_clip(film(), SPACE, 1))
+    assert len(re.findall(r'class="obstacle" points="[^"]*"/>', svg)) == 2
+    assert of_class(svg, "held") == ["", ""]
+
+
+def test_bars_are_as_high_as_what_was_measured():
+    svg = str(drawn_clip(film(), SPACE, 1))
+    (bars,) = re.findall(r'class="measured" d="([^"]*)"', svg)
+    found = [tuple(map(float, bar)) for bar in re.findall(r"M([\d.]+) [\d.]+v-([\d.]+)", bars)]
+    assert found == [(WIDTH / 4, STRIP / 4), (WIDTH / 2, STRIP)]
+    assert "force, at most 20 N" in svg and "age of action: none" in svg
+
+
+def test_a_tremor_does_not_fill_its_strip():
+    svg = str(drawn_clip(film(forces=((1.0, 0.1),)), SPACE, 1))
+    assert f"v-{STRIP / 100:.1f}" in svg
+
+
+def test_phases_are_named_where_there_is_room_and_names_are_no_markup():
+    svg = str(drawn_clip(film(), SPACE, 1))
+    assert ">approach<" in svg and "in<sert" not in svg and "sert" not in svg and ">end<" not in svg
+    wide = str(drawn_clip(film(phases=((0.0, "in<sert"),)), SPACE, 1))
+    assert ">in&lt;sert<" in wide
+    assert len(re.findall('class="phase"', svg)) == 3
+
+
+def test_who_commands_is_marked_while_it_does():
+    svg = str(drawn_clip(film(), SPACE, 1))
+    rows = re.findall(r'<rect class="(fallback|person)" x="([\d.]+)" y="[\d.]+" width="([\d.]+)"',
+                      svg)  # fmt: skip
+    assert rows == [("fallback", "160.0", "80.0"), ("person", "240.0", "40.0")]
+
+
+def test_a_film_of_nothing_is_drawn():
+    empty = film(frames=(Frame(None, None, ()),), path_m=np.zeros((0, 3)), duration_s=0.0,
+                 forces=(), ages=(), phases=(), modes=())  # fmt: skip
+    assert "force: none" in drawn_clip(empty, SPACE, 1)
