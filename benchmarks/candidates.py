@@ -124,7 +124,10 @@ def here(policy: NetworkPolicy) -> Way:
 
     def ask(seen: Array, name: int, candidates: int) -> Array:
         names = [("benchmark", name, 0)]
-        return policy.sample(seen[None], noise_names=names, candidates=candidates).actions[0]
+        found: Array = policy.sample(seen[None], noise_names=names, candidates=candidates).actions[
+            0
+        ]
+        return found
 
     return ask
 
