@@ -10,12 +10,9 @@ from pathlib import Path
 
 from pydantic import RootModel
 
-from genpolicy.candidates.wire.entry import (
-    ServerEntry,
-    read_entry,
-    require_program,
-    verify_files,
-)
+from genpolicy.candidates.hosts.kinds import read_entry
+from genpolicy.candidates.wire.entry import Entry, ServerEntry, verify_files
+from genpolicy.candidates.wire.launched import require_program
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.errors import ConfigError
 from genpolicy.integrity.documents import canonical_json
@@ -40,7 +37,7 @@ class BroughtPolicy:
 
     name: str
     path: Path
-    entry: ServerEntry
+    entry: Entry
     sha256: str
     seed: int
 
@@ -91,8 +88,8 @@ def require_brought(
         root: Of the workspace.
 
     Raises:
-        ConfigError: As `read_brought`; a name of a trained method, or other horizons;
-            or a command that this machine does not have.
+        ConfigError: As `read_brought`; a name of a trained method, other horizons, or nothing on
+            this machine that runs it.
         IntegrityError: A file that is missing, or another one than its entry says.
     """
     found, taken = read_brought(section, seed=0, root=root), set(trained)
@@ -112,7 +109,9 @@ def require_brought(
                 action="Bring a policy of these horizons, or set the horizons of the ladder.",
             )
         verify_files(policy.entry, policy.folder)
-        require_program(policy.entry, policy.folder)
+        policy.entry.require_host()
+        if isinstance(policy.entry, ServerEntry):
+            require_program(policy.entry, policy.folder)
     return found
 
 
@@ -125,9 +124,7 @@ def _read(name: str, path: Path, seed: int) -> BroughtPolicy:
             expected=f"the entry of {name}",
             action="Give both the same name.",
         )
-    return BroughtPolicy(
-        name, path, entry, sha256_bytes(canonical_json(entry.model_dump(mode="json"))), seed
-    )
+    return BroughtPolicy(name, path, entry, entry.sha256, seed)
 
 
 def _said(horizons: HorizonConfig) -> str:

@@ -1,4 +1,4 @@
-"""`genpolicy check-candidate` and `genpolicy serve-policy`: a policy in a process of its own."""
+"""`genpolicy check-candidate`: somebody's policy in a process of its own, and what is found."""
 
 import json
 from contextlib import ExitStack
@@ -12,19 +12,18 @@ from genpolicy.candidates.conformance.recorded_starts import (
     recorded_starts,
     require_contract,
 )
-from genpolicy.candidates.wire.connection import LOOPBACK, Listening
-from genpolicy.candidates.wire.entry import ServerEntry, read_entry, verify_files
+from genpolicy.candidates.hosts.kinds import read_entry
+from genpolicy.candidates.hosts.translation import as_server
+from genpolicy.candidates.wire.entry import ServerEntry, verify_files
 from genpolicy.candidates.wire.launched import Launched
 from genpolicy.candidates.wire.remote import RemotePolicy
-from genpolicy.candidates.wire.served import ServedPolicy
 from genpolicy.cli.task_checks import task_checks
 from genpolicy.contract.observation import ObservationContract
 from genpolicy.data.dataset import load_dataset
-from genpolicy.errors import BadInputError, ConfigError
+from genpolicy.errors import BadInputError
 from genpolicy.integrity.documents import read_json
-from genpolicy.policies.policy import load_policy
 
-REFUSED, INTERRUPTED = 3, 130
+REFUSED = 3
 NO_VERDICT = (
     "Nothing here is a gate's verdict: name the entry in params.yaml (candidates) for those."
 )
@@ -55,7 +54,7 @@ def run_check(path: Path, options: CheckOptions, *, as_json: bool) -> int:
         IntegrityError: A file of the candidate is another one.
         PolicyError: The policy's process does not start.
     """
-    entry = read_entry(path)
+    entry, folder = read_entry(path), path.resolve().parent
     data = load_dataset(options.dataset)
     require_contract(data, entry.horizons, candidate=entry.name)
     contract = data.observation_contract
@@ -64,9 +63,8 @@ def run_check(path: Path, options: CheckOptions, *, as_json: bool) -> int:
     what = question(starts, dataset=data.manifest_sha256, candidates=options.candidates)
     earlier = _earlier(options.earlier, what)
     asked = _Asked(starts, what, options.deadline_s, earlier, checks.admissible, checks.scene)
-    folder = path.resolve().parent
     verify_files(entry, folder)
-    found = _found(entry, folder, contract, asked)
+    found = _found(as_server(entry, path, contract), folder, contract, asked)
     print(json.dumps(found.as_json(), indent=2, sort_keys=True) if as_json else _text(found))
     return REFUSED if found.failed else 0
 
@@ -151,29 +149,3 @@ def _text(found: Conformance) -> str:
         names = ", ".join(f"{one.name} (gate {one.gate})" for one in found.failed)
         lines.append(f"Refused: {names}.")
     return "\n".join(lines)
-
-
-def run_serve(checkpoint: Path, *, port: int, sha256: str | None) -> int:
-    """Serve a checkpoint on this machine until an interrupt. Returns the exit code.
-
-    Raises:
-        ConfigError: Nobody may listen on that port.
-        BadInputError: The checkpoint is missing, malformed, or another one.
-    """
-    served = ServedPolicy(load_policy(checkpoint, expected_sha256=sha256))
-    try:
-        listening = Listening(served.answer, served.metadata, port=port)
-    except OSError as error:
-        raise ConfigError(
-            where="--port",
-            found=f"{port}, on which nobody can listen ({error.strerror})",
-            expected="a free port of this machine",
-            action="Name another one, or 0 for any.",
-        ) from error
-    print(f"Serving {served.metadata['method']} at ws://{LOOPBACK}:{listening.port}", flush=True)
-    with listening:
-        try:
-            listening.serve_forever()
-        except KeyboardInterrupt:
-            return INTERRUPTED
-    return 0

@@ -43,6 +43,15 @@ EXPORT_EXAMPLES = examples("genpolicy export lerobot artifacts/ingest --out lero
 SERVE_EXAMPLES = examples(
     "genpolicy serve-policy artifacts/train_generators/flow/seed_0 --port 8000"
 )
+HOST_EXAMPLES = examples("genpolicy serve-candidate candidate.yaml --port 8000")
+TORCH_EXAMPLES = examples(
+    "genpolicy export torch artifacts/train_generators/flow/seed_0 --out policy.pt2",
+    "genpolicy export torch artifacts/train_generators/flow/seed_0 --out sampler.pt2 \\",
+    "    --encoder encoder.pt2",
+)
+ONNX_EXAMPLES = examples(
+    "genpolicy export onnx artifacts/train_generators/flow/seed_0 --out policy.onnx",
+)
 CHECK_EXAMPLES = examples(
     "genpolicy check-candidate candidate.yaml",
     "genpolicy check-candidate candidate.yaml --json > checked.json",
@@ -57,11 +66,14 @@ def program(arguments: Sequence[str]) -> int:
     app.command("ingest", epilog=IMPORT_EXAMPLES)(ingest)
     app.command("fixtures", epilog=examples("genpolicy fixtures --pin"))(fixtures)
     app.command("replay", epilog=REPLAY_EXAMPLES)(replay)
-    exports = new_app("Write a dataset in a layout of others.")
+    exports = new_app("Write a dataset or a checkpoint for others.")
     exports.callback()(lambda: None)
     exports.command("lerobot", epilog=EXPORT_EXAMPLES)(export_lerobot)
+    exports.command("torch", epilog=TORCH_EXAMPLES)(export_torch)
+    exports.command("onnx", epilog=ONNX_EXAMPLES)(export_onnx)
     app.add_typer(exports, name="export")
     app.command("serve-policy", epilog=SERVE_EXAMPLES)(serve_policy)
+    app.command("serve-candidate", epilog=HOST_EXAMPLES)(serve_candidate)
     app.command("check-candidate", epilog=CHECK_EXAMPLES)(check_candidate)
     app.command("doctor", epilog=examples("genpolicy doctor --json"))(doctor)
     return run_program(app, "genpolicy", arguments)
@@ -164,6 +176,45 @@ def export_lerobot(
     return run_export_lerobot(dataset, out, split=split)
 
 
+Checkpoint = Annotated[Path, typer.Argument(help="Folder of a checkpoint.")]
+Encoder = Annotated[
+    Path | None,
+    typer.Option(help="A file of its own for the encoder, so that its time is known."),
+]
+Replace = Annotated[bool, typer.Option("--force", help="Replace old files.")]
+
+
+def export_torch(
+    checkpoint: Checkpoint,
+    out: Annotated[Path, typer.Option(help="File to write, policy.pt2.")],
+    encoder: Encoder = None,
+    force: Replace = False,
+) -> int:
+    """Write a checkpoint as a torch.export program.
+
+    Normalisation and every step of its sampler are in it; observation and noise go in, actions
+    come out. It holds no pickle. What an entry of kind torch says of it is printed.
+    """
+    from genpolicy.cli.programs import run_export_program
+
+    return run_export_program(checkpoint, out, kind="torch", encoder=encoder, force=force)
+
+
+def export_onnx(
+    checkpoint: Checkpoint,
+    out: Annotated[Path, typer.Option(help="File to write, policy.onnx.")],
+    encoder: Encoder = None,
+    force: Replace = False,
+) -> int:
+    """Write a checkpoint as an ONNX file.
+
+    As `export torch`, for an entry of kind onnx. Needs the extra onnx.
+    """
+    from genpolicy.cli.programs import run_export_program
+
+    return run_export_program(checkpoint, out, kind="onnx", encoder=encoder, force=force)
+
+
 def serve_policy(
     checkpoint: Annotated[Path, typer.Argument(help="Folder of a checkpoint.")],
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port; 0 for a free one.")] = 8000,
@@ -176,9 +227,30 @@ def serve_policy(
     On this machine, until an interrupt. WebSocket and msgpack: metadata first, then one answer
     for each message; see docs/candidates.md.
     """
-    from genpolicy.cli.candidates import run_serve
+    from genpolicy.cli.serving import run_serve
 
     return run_serve(checkpoint, port=port, sha256=sha256)
+
+
+def serve_candidate(
+    entry: Annotated[Path, typer.Argument(help="The candidate's entry, a YAML file.")],
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port; 0 for a free one.")] = 8000,
+    sha256: Annotated[
+        str | None, typer.Option(help="What the entry must say; anything if absent.")
+    ] = None,
+    width: Annotated[
+        list[str] | None, typer.Option(help="NAME=NUMBER: how wide an input is.")
+    ] = None,
+) -> int:
+    """Host the candidate of an entry.
+
+    Of kind trained, torch, onnx or scripted. On this machine, until an interrupt,
+    over openpi's protocol. `check-candidate` and the ladder start it themselves,
+    in a process of its own.
+    """
+    from genpolicy.cli.serving import run_host
+
+    return run_host(entry, port=port, sha256=sha256, widths=width or [])
 
 
 def check_candidate(
@@ -193,7 +265,7 @@ def check_candidate(
     ] = None,
     as_json: AsJson = False,
 ) -> int:
-    """Check a policy of your own, behind its server.
+    """Check a policy of your own, of any kind.
 
     It is asked about recorded moments of held-out episodes: whether it answers,
     repeats itself, starts anew as the same, means the units that it declares,

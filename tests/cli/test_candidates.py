@@ -173,7 +173,7 @@ def test_answers_to_another_question_are_not_compared(
 @pytest.mark.parametrize(
     ("fields", "said"),
     [
-        ({"kind": "torch"}, "candidate.yaml.kind is 'torch'"),
+        ({"kind": "pickle"}, "candidate.yaml.kind is 'pickle'"),
         ({"observation": {"state": {"channels": ["joints"]}}}, "is 'joints', expected a channel"),
         (
             {"horizons": {"observation_horizon": 2, "prediction_horizon": 16,

@@ -21,7 +21,7 @@ COLUMNS = 80
 NAMED = r"(?:^|[`(&] ?|@|-m )genpolicy ([a-z][a-z -]*)"
 OWN = {
     *("propose", "ingest", "fixtures", "replay", "doctor"),
-    *("serve-policy", "check-candidate", "export"),
+    *("serve-policy", "serve-candidate", "check-candidate", "export"),
 }
 # Not pydantic: the library of the command line reads options with it.
 HEAVY = {

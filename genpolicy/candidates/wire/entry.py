@@ -1,16 +1,15 @@
 """A candidate's entry: what somebody's policy is, where it lies, and what its numbers mean."""
 
-import shutil
 from pathlib import Path
 from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
 from genpolicy.contract.horizons import HorizonConfig
-from genpolicy.contract.settings import Settings, parse_settings
+from genpolicy.contract.settings import Settings
 from genpolicy.errors import ConfigError
-from genpolicy.integrity.documents import read_yaml
-from genpolicy.integrity.hashing import read_verified
+from genpolicy.integrity.documents import canonical_json
+from genpolicy.integrity.hashing import read_verified, sha256_bytes
 
 DIGEST = r"^[0-9a-f]{64}$"
 NAME = r"^[a-z][a-z0-9_]{0,63}$"
@@ -238,16 +237,13 @@ class Declared(Settings):
     batch_rows: int = Field(ge=1)
 
 
-class ServerEntry(Settings):
-    """A policy behind a server that speaks the wire protocol.
+class Entry(Settings):
+    """What every kind of candidate says of itself.
 
     Attributes:
         name: Its name in every table.
-        kind: `server`.
+        kind: How it is hosted.
         author: Who made it, as an e-mail address; may not review it.
-        address: Of one that runs already, `ws://host:port`.
-        allow_host: Another machine that observations may be sent to; loopback needs none.
-        command: Of one that is started, watched and ended here; `{port}` stands for its port.
         files: What it is: path, from the entry's folder, to SHA-256. Checked before it starts.
         horizons: H_o, K, H_e and the period of an action.
         observation: What it is given, by the name on the wire.
@@ -260,11 +256,8 @@ class ServerEntry(Settings):
     """
 
     name: str = Field(pattern=NAME)
-    kind: Literal["server"]
+    kind: str
     author: str = Field(pattern=r"^[^@\s]+@[^@\s]+$")
-    address: str | None = None
-    allow_host: str | None = None
-    command: list[str] | None = Field(default=None, min_length=1)
     files: dict[str, Annotated[str, Field(pattern=DIGEST)]] = Field(default_factory=dict)
     horizons: HorizonConfig
     observation: dict[str, Input] = Field(min_length=1)
@@ -276,56 +269,63 @@ class ServerEntry(Settings):
     timeout_s: float = Field(default=2.0, gt=0, le=60)
 
     @model_validator(mode="after")
+    def _given_once(self) -> "Entry":
+        if twice := sorted(set(self.observation) & set(self.constants)):
+            raise ValueError(f"{twice[0]} is given twice")
+        return self
+
+    @property
+    def sha256(self) -> str:
+        """Of all that it says, the hashes of its files among it."""
+        return sha256_bytes(canonical_json(self.model_dump(mode="json")))
+
+    @property
+    def started_here(self) -> bool:
+        """Whether its server is started and ended here."""
+        return True
+
+    def essential(self, folder: Path) -> list[str]:
+        """Files that are the candidate, so that `files` must name them; paths as there."""
+        return []
+
+    def require_host(self) -> None:
+        """Refuse a candidate that nothing on this machine can run.
+
+        Raises:
+            ConfigError: A library or an interpreter is not there.
+        """
+
+
+class ServerEntry(Entry):
+    """A policy behind a server that speaks the wire protocol.
+
+    Attributes:
+        kind: `server`.
+        address: Of one that runs already, `ws://host:port`.
+        allow_host: Another machine that observations may be sent to; loopback needs none.
+        command: Of one that is started, watched and ended here; `{port}` stands for its port.
+    """
+
+    kind: Literal["server"]
+    address: str | None = None
+    allow_host: str | None = None
+    command: list[str] | None = Field(default=None, min_length=1)
+
+    @property
+    def started_here(self) -> bool:
+        """Whether it has a command; else it runs already."""
+        return self.command is not None
+
+    @model_validator(mode="after")
     def _reachable(self) -> "ServerEntry":
         if (self.address is None) == (self.command is None):
             raise ValueError("address or command: one of them says where it is")
         if self.command is not None and not any(PORT in word for word in self.command):
             raise ValueError(f"command tells the server its port: write {PORT} where it stands")
-        if twice := sorted(set(self.observation) & set(self.constants)):
-            raise ValueError(f"{twice[0]} is given twice")
         return self
 
 
-def read_entry(path: Path) -> ServerEntry:
-    """The entry of a file.
-
-    Raises:
-        ConfigError: No readable YAML, an unknown kind, or a field that is missing or wrong.
-    """
-    values = read_yaml(path)
-    if not isinstance(values, dict):
-        raise ConfigError(
-            where=str(path),
-            found="no map of settings",
-            expected="the fields of a candidate",
-            action="See docs/candidates.md.",
-        )
-    return parse_settings(ServerEntry, values, where=str(path))
-
-
-def require_program(entry: ServerEntry, folder: Path) -> None:
-    """Refuse an entry whose command cannot be run on this machine, before anything runs.
-
-    Args:
-        entry: What it is.
-        folder: Of the entry's file; the command runs there.
-
-    Raises:
-        ConfigError: There is no such program.
-    """
-    if entry.command is None:
-        return
-    program = entry.command[0]
-    if shutil.which(program if "/" not in program else str(folder / program)) is None:
-        raise ConfigError(
-            where=f"command of the candidate {entry.name}",
-            found=f"{program!r}, which is no program of this machine",
-            expected="one that can be run",
-            action="Install it, or name its full path.",
-        )
-
-
-def verify_files(entry: ServerEntry, folder: Path) -> None:
+def verify_files(entry: Entry, folder: Path) -> None:
     """Hold every file that is the candidate against its hash.
 
     Args:
@@ -333,7 +333,16 @@ def verify_files(entry: ServerEntry, folder: Path) -> None:
         folder: Of the entry's file; paths in it start there.
 
     Raises:
+        ConfigError: A file that is the candidate has no hash.
         IntegrityError: A file is missing, or is another one.
     """
+    for name in entry.essential(folder):
+        if name not in entry.files:
+            raise ConfigError(
+                where=f"files of the candidate {entry.name}",
+                found=f"without {name}, which is a part of it",
+                expected=f"the SHA-256 of each file that a candidate of kind {entry.kind} is",
+                action=f"Write `{name}: <sha256>` into `files`.",
+            )
     for name, digest in sorted(entry.files.items()):
         read_verified(folder / name, sha256=digest, named_by=f"the entry of {entry.name}")

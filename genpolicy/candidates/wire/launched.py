@@ -2,6 +2,7 @@
 
 import os
 import secrets
+import shutil
 import signal
 import subprocess
 import time
@@ -23,6 +24,28 @@ PORTS = 3
 """Free ports that are tried: between the choice of one and the server, somebody may take it."""
 MARK = "GENPOLICY_LAUNCH"
 """In the environment of a server, so that what it starts is found whatever session it is in."""
+
+
+def require_program(entry: ServerEntry, folder: Path) -> None:
+    """Refuse an entry whose command cannot be run on this machine, before anything runs.
+
+    Args:
+        entry: What it is.
+        folder: Of the entry's file; the command runs there.
+
+    Raises:
+        ConfigError: There is no such program.
+    """
+    if entry.command is None:
+        return
+    program = entry.command[0]
+    if shutil.which(program if "/" not in program else str(folder / program)) is None:
+        raise ConfigError(
+            where=f"command of the candidate {entry.name}",
+            found=f"{program!r}, which is no program of this machine",
+            expected="one that can be run",
+            action="Install it, or name its full path.",
+        )
 
 
 class PortTakenError(Exception):

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.candidates.brought import BroughtPolicy
+from genpolicy.candidates.hosts.translation import as_server
 from genpolicy.candidates.wire.connection import Clock
 from genpolicy.candidates.wire.entry import verify_files
 from genpolicy.candidates.wire.extension import Capabilities, GoesOn
@@ -241,13 +242,12 @@ def running(
     """
     folder: Path = brought.folder
     verify_files(brought.entry, folder)
+    entry = as_server(brought.entry, brought.path, contract)
     with ExitStack() as stack:
         remote: RemotePolicy | PolicyError
         try:
-            server = stack.enter_context(Launched(brought.entry, folder))
-            remote = RemotePolicy(
-                brought.entry, server.address, contract, scene=scene, ended=server.died
-            )
+            server = stack.enter_context(Launched(entry, folder))
+            remote = RemotePolicy(entry, server.address, contract, scene=scene, ended=server.died)
             stack.callback(remote.close)
         except PolicyError as fault:
             remote = fault

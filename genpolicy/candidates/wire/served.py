@@ -62,7 +62,7 @@ class ServedPolicy:
             ContractError: No observation of the checkpoint's shape, or an extension that is none.
             NonFiniteError: An observation is NaN or infinite.
         """
-        asked = _asked(message.get(WORD))
+        asked = read_request(message.get(WORD))
         name: NoiseName = (UNNAMED, next(self._unnamed)) if asked is None else asked[1]
         number = 1 if asked is None else asked[2]
         prefix = self._prefix((message.get(WORD) or {}).get("prefix"))
@@ -128,8 +128,12 @@ def _observation(found: Any) -> NDArray[np.float64]:
     return values
 
 
-def _asked(found: Any) -> tuple[str, NoiseName, int] | None:
-    """Invocation, name of the noise, and number of candidates; None of a plain message."""
+def read_request(found: Any) -> tuple[str, NoiseName, int] | None:
+    """Invocation, name of the noise, and number of candidates; None of a plain message.
+
+    Raises:
+        ContractError: An extension that is none.
+    """
     if found is None:
         return None
     names = {"invocation", "noise", "candidates"}

@@ -58,7 +58,7 @@ def brought_document(policies: Sequence[BroughtPolicy]) -> dict[str, Brought]:
             author=policy.entry.author,
             sha256=policy.sha256,
             files=dict(policy.entry.files),
-            started_here=policy.entry.command is not None,
+            started_here=policy.entry.started_here,
             dataset=policy.entry.declared.dataset if policy.entry.declared else "",
             training_seed=policy.entry.declared.training_seed if policy.entry.declared else None,
         )

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from genpolicy.candidates import selector
 from genpolicy.candidates.brought import BroughtPolicy
 from genpolicy.candidates.contenders import joining_of
-from genpolicy.candidates.wire.entry import ServerEntry
+from genpolicy.candidates.wire.entry import Entry
 from genpolicy.candidates.wire.faults import Fault
 from genpolicy.candidates.wire.policy import WirePolicy, running
 from genpolicy.contract.chunk import actions_sha256
@@ -188,7 +188,7 @@ def _coverage(
     ]  # fmt: skip
 
 
-def _sampler(entry: ServerEntry) -> str:
+def _sampler(entry: Entry) -> str:
     return entry.declared.sampler if entry.declared else UNSAID
 
 

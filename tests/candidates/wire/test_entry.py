@@ -1,7 +1,8 @@
 import pytest
 import yaml
 
-from genpolicy.candidates.wire.entry import ServerEntry, read_entry
+from genpolicy.candidates.hosts.kinds import read_entry
+from genpolicy.candidates.wire.entry import ServerEntry
 from genpolicy.errors import BadInputError, ConfigError
 from tests.candidates.conftest import ENTRY
 

@@ -1,0 +1,58 @@
+"""From an entry of any kind to the server that hosts it: one command, in a child of its own."""
+
+import sys
+from pathlib import Path
+
+from genpolicy.candidates.hosts.kinds import LeRobotEntry
+from genpolicy.candidates.wire.entry import PORT, Entry, ServerEntry
+from genpolicy.contract.observation import ObservationContract
+from genpolicy.errors import ConfigError
+from genpolicy.integrity.rows import columns_of
+
+ADAPTER = Path(__file__).parents[3] / "adapters" / "lerobot_server.py"
+
+
+def as_server(entry: Entry, path: Path, contract: ObservationContract) -> ServerEntry:
+    """The entry of the server that hosts a candidate; a server is its own.
+
+    Args:
+        entry: What it is.
+        path: Its file, which the child reads again and holds against this entry.
+        contract: The observation in force, which says how wide its inputs are.
+
+    Raises:
+        ConfigError: Nothing on this machine runs it.
+        ContractError: It names what the observation does not have.
+    """
+    if isinstance(entry, ServerEntry):
+        return entry
+    entry.require_host()
+    common = {name: getattr(entry, name) for name in Entry.model_fields if name != "kind"}
+    command = _lerobot(entry) if isinstance(entry, LeRobotEntry) else _own(entry, path, contract)
+    return ServerEntry(**common, kind="server", command=command)
+
+
+def _own(entry: Entry, path: Path, contract: ObservationContract) -> list[str]:
+    """Our host. `-P`: what lies beside the entry is not found by an `import`."""
+    widths = {
+        name: len(columns_of(part.channels, contract, where=f"observation.{name}"))
+        for name, part in entry.observation.items()
+    }
+    return [
+        sys.executable, "-P", "-m", "genpolicy", "serve-candidate", str(path.resolve()),
+        "--port", PORT, "--sha256", entry.sha256,
+        *(word for name, width in widths.items() for word in ("--width", f"{name}={width}")),
+    ]  # fmt: skip
+
+
+def _lerobot(entry: LeRobotEntry) -> list[str]:
+    # Not resolved: the link to an interpreter is what makes its environment.
+    interpreter = Path(entry.interpreter).absolute()
+    if not ADAPTER.is_file():
+        raise ConfigError(
+            where=f"the candidate {entry.name}, of kind lerobot",
+            found=f"without {ADAPTER}",
+            expected="the adapter that serves policies of LeRobot",
+            action="Work in a checkout of genpolicy; the adapter is no part of the package.",
+        )
+    return [str(interpreter), str(ADAPTER), entry.pretrained_model, "--port", PORT]

@@ -1,0 +1,100 @@
+import pytest
+
+from genpolicy.candidates.brought import require_brought
+from genpolicy.candidates.hosts import onnx_library
+from genpolicy.candidates.hosts.kinds import KINDS, read_entry
+from genpolicy.candidates.wire.entry import verify_files
+from genpolicy.errors import ConfigError, IntegrityError
+from tests.candidates.conftest import ENTRY
+from tests.candidates.hosts.conftest import NOISE
+
+HOSTED = ("trained", "torch", "onnx", "scripted", "lerobot")
+DECLARED = {
+    "dataset": "0" * 64, "split": "0" * 64, "training_seed": 1, "architecture": "a",
+    "parameters": 1, "path": "p", "sampler": "euler", "sampler_steps": 2, "evaluations": 2,
+    "precision": "float32", "device": "cpu", "threads": 4, "cpu_capability": "AVX2",
+    "batch_rows": 1,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", HOSTED)
+def test_each_kind_is_read_with_its_files(written, kind):
+    path = written(kind)
+    entry = read_entry(path)
+    assert type(entry) is KINDS[kind]
+    assert entry.started_here
+    verify_files(entry, path.parent)
+
+
+@pytest.mark.parametrize("kind", HOSTED)
+def test_a_file_that_is_the_candidate_must_be_pinned(written, kind):
+    path = written(kind)
+    entry = read_entry(path)
+    for name in entry.files:
+        rest = {other: digest for other, digest in entry.files.items() if other != name}
+        fewer = read_entry(written(kind, files=rest))
+        with pytest.raises(ConfigError, match="without") as error:
+            verify_files(fewer, path.parent)
+        assert name in error.value.found
+    changed = path.parent / next(iter(entry.files))
+    changed.write_bytes(b"another")
+    with pytest.raises(IntegrityError, match="the entry of planted"):
+        verify_files(entry, path.parent)
+
+
+def test_all_that_lerobot_reads_must_be_pinned(written):
+    path = written("lerobot")
+    entry = read_entry(path)
+    folder = path.parent / "act"
+    (folder / "train_config.json").write_text("{}")
+    verify_files(entry, path.parent)
+    (folder / "policy_postprocessor_step_0.safetensors").write_bytes(b"statistics")
+    with pytest.raises(ConfigError, match="act/policy_postprocessor_step_0"):
+        verify_files(entry, path.parent)
+
+
+def test_an_unknown_kind_names_the_known_ones(written):
+    path = written("torch")
+    path.write_text(path.read_text().replace("kind: torch", "kind: pickle"))
+    with pytest.raises(ConfigError, match="server, trained, torch, onnx, lerobot, scripted"):
+        read_entry(path)
+
+
+@pytest.mark.parametrize(
+    ("kind", "changes", "expected"),
+    [
+        ("torch", {"noise": None}, "stochastic: true needs `noise`"),
+        ("torch", {"stochastic": False}, "and false none"),
+        ("torch", {"noise": {**NOISE, "input": "observation"}}, "observation is given twice"),
+        ("torch", {"constants": {"prompt": "go"}}, "no constants"),
+        ("torch", {"declared": DECLARED}, "threads is 1, declared.threads 4"),
+        ("trained", {"threads": 2}, "Input should be 1"),
+        ("trained", {"observation": {"state": ENTRY["observation"]["observation"]}}, "one input"),
+        ("scripted", {"function": "os.path:join"}, "pattern"),
+        ("torch", {"address": "ws://127.0.0.1:1"}, "Extra inputs"),
+        ("torch", {"noise": {**NOISE, "stream": "12"}}, "pattern"),
+    ],
+)
+def test_what_is_wrong_is_named(written, kind, changes, expected):
+    with pytest.raises(ConfigError) as error:
+        read_entry(written(kind, **changes))
+    assert expected in error.value.expected
+
+
+def test_what_nothing_here_can_run_is_refused_before_anything_trains(
+    written, tmp_path, monkeypatch
+):
+    for kind in ("trained", "torch", "onnx", "scripted"):
+        read_entry(written(kind)).require_host()
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(onnx_library, "find_spec", lambda name: None)
+    for kind, action in (("onnx", "pip install"), ("lerobot", "make lerobot")):
+        path = written(kind)
+        with pytest.raises(ConfigError, match=action):
+            require_brought({"planted": str(path)}, horizons=read_entry(path).horizons)
+
+
+def test_noise_of_several_steps_has_an_axis_more(written):
+    noise = read_entry(written("torch", noise={**NOISE, "steps": 5})).noise
+    assert noise.whole_shape == (5, 16, 10)
+    assert read_entry(written("torch")).noise.whole_shape == (16, 10)

@@ -1,0 +1,60 @@
+import sys
+
+import pytest
+
+from genpolicy.candidates.hosts import translation
+from genpolicy.candidates.hosts.kinds import read_entry
+from genpolicy.candidates.hosts.translation import as_server
+from genpolicy.errors import ConfigError, ContractError
+from tests.candidates.conftest import ENTRY
+
+
+def test_a_server_is_its_own(entry, task, tmp_path):
+    assert as_server(entry, tmp_path / "candidate.yaml", task.observation) is entry
+
+
+@pytest.mark.parametrize("kind", ["trained", "torch", "onnx", "scripted"])
+def test_others_are_hosted_by_one_command_that_holds_the_entry_to_what_it_says(written, task, kind):
+    path = written(kind)
+    entry = read_entry(path)
+    server = as_server(entry, path, task.observation)
+    assert server.command[:5] == [sys.executable, "-P", "-m", "genpolicy", "serve-candidate"]
+    assert server.command[5:] == [
+        str(path), "--port", "{port}", "--sha256", entry.sha256,
+        "--width", f"observation={task.observation.dim}",
+    ]  # fmt: skip
+    same = ("name", "author", "files", "horizons", "observation", "action", "timeout_s")
+    assert all(getattr(server, name) == getattr(entry, name) for name in same)
+
+
+def test_a_channel_that_is_none_is_refused_before_anything_starts(written, task):
+    path = written("torch", observation={"observation": {"channels": ["joints"]}})
+    with pytest.raises(ContractError, match="'joints'"):
+        as_server(read_entry(path), path, task.observation)
+
+
+def test_lerobot_runs_in_its_own_interpreter(written, task, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    path = written("lerobot")
+    with pytest.raises(ConfigError, match="make lerobot"):
+        as_server(read_entry(path), path, task.observation)
+    interpreter = tmp_path / "build" / "lerobot" / "bin" / "python"
+    interpreter.parent.mkdir(parents=True)
+    interpreter.symlink_to(sys.executable)
+    server = as_server(read_entry(path), path, task.observation)
+    assert server.command == [
+        str(interpreter), str(translation.ADAPTER), "act", "--port", "{port}",
+    ]  # fmt: skip
+    monkeypatch.setattr(translation, "ADAPTER", tmp_path / "absent.py")
+    with pytest.raises(ConfigError, match=r"absent\.py"):
+        as_server(read_entry(path), path, task.observation)
+
+
+def test_the_identity_of_a_server_is_what_it_was(entry_of):
+    """Taken from the code before there were kinds, for the planted entry of these tests."""
+    assert entry_of().sha256 == IDENTITY
+    assert entry_of(name="another").sha256 != IDENTITY
+    assert "address" in ENTRY
+
+
+IDENTITY = "8b3641bfa8030e8790030913cc8a16caed97f41a2c6a492ada55a1c73e453650"
