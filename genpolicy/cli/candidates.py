@@ -25,6 +25,8 @@ from genpolicy.integrity.documents import read_json
 from genpolicy.policies.policy import load_policy
 
 REFUSED, INTERRUPTED = 3, 130
+MOMENTS_SEED = 0
+"""Of the moments of a check; the ladder's are drawn from its own root seed."""
 NO_VERDICT = (
     "Nothing here is a gate's verdict: name the entry in params.yaml (candidates) for those."
 )
@@ -59,7 +61,7 @@ def run_check(path: Path, options: CheckOptions, *, as_json: bool) -> int:
     data = load_dataset(options.dataset)
     require_contract(data, entry.horizons, candidate=entry.name)
     contract = data.observation_contract
-    starts = recorded_starts(data, entry.horizons)
+    starts = recorded_starts(data, entry.horizons, seed=MOMENTS_SEED)
     checks = task_checks(data, task=None, chunk_steps=entry.horizons.prediction_horizon)
     what = question(starts, dataset=data.manifest_sha256, candidates=options.candidates)
     earlier = _earlier(options.earlier, what)

@@ -90,6 +90,11 @@ class WirePolicy:
         return self._brought.entry.stochastic
 
     @property
+    def remote(self) -> RemotePolicy:
+        """How it is asked where a fault is to be seen as what it is."""
+        return self._remote
+
+    @property
     def told(self) -> Capabilities:
         """What its server says of itself."""
         return self._remote.told

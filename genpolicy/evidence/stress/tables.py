@@ -14,6 +14,7 @@ from genpolicy.errors import ConfigError
 from genpolicy.evidence.documents.given import Distilled
 from genpolicy.evidence.documents.shadow import CHECKER
 from genpolicy.evidence.documents.stress import DISTILLED, ENVELOPE, Power
+from genpolicy.evidence.rows.brought import FixtureAgainRow
 from genpolicy.evidence.rows.stress import (
     AgeRow,
     ConservationRow,
@@ -83,6 +84,8 @@ def write_stress(folder: Path, shards: Sequence[Shard], *, workers: int, schedul
     write_rows(folder / "stub.parquet", StressStubRow, [result.stub for result in results])
     overruns = [row for _, result in pairs for row in result.overruns]
     write_rows(folder / "overruns.parquet", OverrunRow, overruns)
+    again = [row for _, result in pairs for row in result.again]
+    write_rows(folder / "fixtures.parquet", FixtureAgainRow, again)
     ages = [row for shard, result in pairs for row in _age_rows(shard, result)]
     write_rows(folder / "ages.parquet", AgeRow, ages)
     journals = [shard.journal for shard in shards]
