@@ -16,6 +16,7 @@ from gates.rederive_brought import brought_policy
 from gates.rederive_draws import TOLERANCE
 from gates.reproducibility.settings import RELOAD
 from gates.stated import refuse, root_seed, section
+from genpolicy.candidates.conformance.asked import repeated
 from genpolicy.candidates.conformance.check import question
 from genpolicy.candidates.conformance.recorded_starts import RecordedStarts, recorded_starts
 from genpolicy.candidates.wire.policy import WirePolicy, running
@@ -23,7 +24,7 @@ from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.data.dataset import load_dataset
 from genpolicy.evidence.documents.conformance import CONFORMANCE, Conformance
 from genpolicy.evidence.reproducibility.conformance import drawn, findings_again, invocation_of
-from genpolicy.evidence.rows.brought import FIRST, AnswerRow
+from genpolicy.evidence.rows.brought import AGAIN, ANEW, FIRST, AnswerRow
 from genpolicy.integrity.hashing import sha256_file
 from genpolicy.integrity.rows import read_rows
 from genpolicy.seeds import stream
@@ -65,6 +66,8 @@ def rederive_conformance(root: Path, params: Mapping[str, Any]) -> None:
         policy = brought_policy(root, params, name)
         assert policy is not None  # it is one of the section
         number = drawn(stochastic=policy.entry.stochastic)
+        here = policy.entry.command is not None
+        _hold_moments(name, answered[name], starts, started_here=here)
         _hold_findings(name, stated[name], answered[name], starts, candidates=number)
         if any(one.judged == "fails" for one in stated[name].findings if one.name in REPEATS):
             continue
@@ -76,6 +79,26 @@ def section_names(params: Mapping[str, Any]) -> list[str]:
     """Names of those that were brought."""
     found = params.get("candidates")
     return [str(name) for name in found] if isinstance(found, dict) else []
+
+
+def _hold_moments(
+    name: str, rows: Sequence[AnswerRow], starts: RecordedStarts, *, started_here: bool
+) -> None:
+    """Every moment once, and again those that the kit asks again: what differs is not left out."""
+    for row in rows:
+        if not 0 <= row.moment < len(starts) or starts.episodes[row.moment] != row.episode_uuid:
+            refuse("B", f"{ANSWERS}: {name}/{row.moment}", row.episode_uuid, "a moment of its own")
+    came = {row.moment for row in rows if row.session == FIRST and not row.fault}
+    again = [moment for moment in repeated(len(starts)) if moment in came]
+    for session, expected in (
+        (FIRST, list(range(len(starts)))),
+        (AGAIN, again),
+        (ANEW, again if started_here else []),
+    ):
+        told = sorted(row.moment for row in rows if row.session == session)
+        if told != expected:
+            refuse("B", f"{ANSWERS}: {name}, {session}", f"{len(told)} moments",
+                   f"{len(expected)}, each that was asked")  # fmt: skip
 
 
 def _hold_findings(
@@ -97,9 +120,6 @@ def _hold_findings(
                f"{candidates} at {len(starts)}, as the dataset has")  # fmt: skip
     if stated.observations_sha256 != asked.observations_sha256:
         refuse("B", place, "asked about other moments", "those that the root seed draws")
-    for row in rows:
-        if not 0 <= row.moment < len(starts) or starts.episodes[row.moment] != row.episode_uuid:
-            refuse("B", f"{ANSWERS}: {name}/{row.moment}", row.episode_uuid, "a moment of its own")
     with readable(ANSWERS):
         again = findings_again(rows, starts, stated)
     told = [(one.name, one.gate, one.judged) for one in stated.findings]

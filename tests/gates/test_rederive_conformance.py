@@ -17,9 +17,8 @@ from genpolicy.evidence.reproducibility.conformance import (
     answer_rows,
     conformance_of,
     first_session,
-    second_session,
 )
-from genpolicy.evidence.rows.brought import FIRST, AnswerRow
+from genpolicy.evidence.rows.brought import AGAIN, ANEW, FIRST, AnswerRow
 from genpolicy.integrity.rows import read_rows, write_rows
 from tests.candidates.conftest import ENTRY, serving  # noqa: F401
 
@@ -61,9 +60,8 @@ def workspace(server, serving, dataset, tmp_path):  # noqa: F811
         starts = recorded_starts(data, brought.entry.horizons, seed=SEED)
         with running(brought, data.observation_contract) as wire:
             session, told = first_session(wire, starts), wire.told
-            anew = second_session(wire, starts, session)
-        found = conformance_of(starts, told, session, anew, candidates=4)
-        rows = answer_rows("planted", starts, session, anew)
+        found = conformance_of(starts, told, session, None, candidates=4)
+        rows = answer_rows("planted", starts, session, None)
         CONFORMANCE.write(folder, {"planted": found})
         write_rows(folder / "answers.parquet", AnswerRow, rows)
         yield tmp_path
@@ -106,7 +104,7 @@ def test_what_another_processor_rounds_is_no_other_answer(workspace, server):
     rederive_conformance(workspace, PARAMS)
 
 
-@pytest.mark.parametrize(("name", "how"), [("scale", "holds"), ("repeats", "unknown")])
+@pytest.mark.parametrize(("name", "how"), [("scale", "holds"), ("restarts", "holds")])
 def test_a_finding_that_does_not_follow_is_refused(workspace, name, how):
     judged(workspace, name, how)
     refused(workspace, rf"planted: {name}")
@@ -126,9 +124,17 @@ def test_answers_that_were_made_up_are_refused(workspace):
     refused(workspace, "another answer than it gives now")
 
 
-def test_a_moment_that_is_left_out_is_refused(workspace):
-    rewrite(workspace, lambda row: None if (row.session, row.moment) == (FIRST, 0) else row)
-    refused(workspace, r"planted: answers|another")
+@pytest.mark.parametrize("session", [FIRST, AGAIN])
+def test_a_moment_that_is_left_out_is_refused(workspace, session):
+    rewrite(workspace, lambda row: None if (row.session, row.moment) == (session, 0) else row)
+    refused(workspace, rf"planted, {session}")
+
+
+def test_a_new_start_of_what_was_not_started_here_is_refused(workspace):
+    written = read_rows(workspace / ANSWERS, AnswerRow)
+    anew = [replace(row, session=ANEW) for row in written if row.session == AGAIN]
+    write_rows(workspace / ANSWERS, AnswerRow, [*written, *anew])
+    refused(workspace, "planted, anew")
 
 
 def test_a_moment_of_another_episode_is_refused(workspace):
@@ -167,6 +173,6 @@ def test_who_is_said_to_answer_otherwise_is_not_asked_again(workspace, server):
             row, actions=tuple(x + 1e-3 for x in row.actions)
         ),
     )  # fmt: skip
-    for name in ("repeats", "restarts", "seeded"):
+    for name in ("repeats", "seeded"):
         judged(workspace, name, "fails")
     rederive_conformance(workspace, PARAMS)

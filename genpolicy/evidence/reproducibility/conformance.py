@@ -81,12 +81,12 @@ def conformance_of(
 def answer_rows(
     method: str, starts: RecordedStarts, session: Session, anew: Asked | None
 ) -> list[AnswerRow]:
-    """What was answered, session by session and moment by moment."""
+    """What was answered, session by session, in the order in which it was asked."""
     parts = {FIRST: session.first, AGAIN: session.again, ANEW: anew or Asked()}
     return [
         AnswerRow(method, name, row, str(starts.episodes[row]), *_told(asked, row))
         for name, asked in parts.items()
-        for row in sorted({*asked.answers, *asked.failures})
+        for row in sorted({*asked.answers, *asked.failures}, reverse=name != FIRST)
     ]
 
 
