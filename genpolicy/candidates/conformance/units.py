@@ -1,5 +1,7 @@
 """Findings about a candidate's numbers: do they speak of the moment, in the declared units?"""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,6 +16,7 @@ from genpolicy.candidates.conformance.plausible import (
     nearest,
     shuffled_share,
     slopes,
+    start_slopes,
     turn_slopes,
 )
 from genpolicy.candidates.conformance.recorded_starts import RecordedStarts
@@ -40,7 +43,8 @@ def plausible(asked: Asked, starts: RecordedStarts) -> list[Finding]:
     share = shuffled_share(drawn, recorded, rng=stream(0, "conformance", "shuffle"))
     follows = share <= KNOWS_THE_MOMENT
     copies = copied(drawn, recorded)
-    scaled = scale(chunks, recorded, follows=follows)
+    begun = beginnings(drawn, recorded, measured)
+    scaled = scale(chunks, recorded, follows=follows, begun=begun)
     return [
         Finding(
             PLAUSIBLE[0], "holds" if follows else "fails", "B",
@@ -57,9 +61,26 @@ def plausible(asked: Asked, starts: RecordedStarts) -> list[Finding]:
     ]  # fmt: skip
 
 
-def scale(chunks: Array, recorded: Array, *, follows: bool) -> Finding:
-    """Whether places and the opening move as recorded ones do. Chunks: (M, K, 10)."""
-    found = slopes(chunks, recorded, rng=stream(0, "conformance", "slopes"))
+def beginnings(drawn: Array, recorded: Array, measured: Array) -> list[Slope]:
+    """How places that chunks begin at follow the robot, on axes on which recordings follow it."""
+    ours, theirs = (
+        start_slopes(of, measured, rng=stream(0, "conformance", "starts"))
+        for of in (recorded[:, None], drawn)
+    )
+    follow = {one.name for one in ours if _right(one)}
+    return [one for one in theirs if one.name in follow]
+
+
+def scale(chunks: Array, recorded: Array, *, follows: bool, begun: Sequence[Slope] = ()) -> Finding:
+    """Whether places and the opening move as recorded ones do. Chunks: (M, K, 10).
+
+    Args:
+        chunks: The nearest of each moment.
+        recorded: What was done there.
+        follows: Whether chunks speak of the moment.
+        begun: See `beginnings`.
+    """
+    found = [*slopes(chunks, recorded, rng=stream(0, "conformance", "slopes")), *begun]
     if not found:
         return Finding("scale", "unknown", "B", "nothing moves in the recordings")
     said = f"recorded per declared unit, 1 is right: {_listed(found)}"
