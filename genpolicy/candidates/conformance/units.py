@@ -80,14 +80,16 @@ def scale(chunks: Array, recorded: Array, *, follows: bool, begun: Sequence[Slop
         follows: Whether chunks speak of the moment.
         begun: See `beginnings`.
     """
-    found = [*slopes(chunks, recorded, rng=stream(0, "conformance", "slopes")), *begun]
+    moved = slopes(chunks, recorded, rng=stream(0, "conformance", "slopes"))
+    found = [*moved, *begun]
     if not found:
         return Finding("scale", "unknown", "B", "nothing moves in the recordings")
     said = f"recorded per declared unit, 1 is right: {_listed(found)}"
     if wrong := [one.name for one in found if _wrong(one)]:
         return Finding("scale", "fails", "B", f"{said}; wrong: {', '.join(wrong)}")
     # Of many chunks that know nothing the nearest lie on the line too.
-    right = follows and all(_right(one) for one in found)
+    # Where chunks begin accuses only: a rough policy hardly knows where it stands.
+    right = follows and bool(moved) and all(_right(one) for one in moved)
     return Finding("scale", "holds" if right else "unknown", "B", said)
 
 
