@@ -66,8 +66,7 @@ def rederive_conformance(root: Path, params: Mapping[str, Any]) -> None:
         policy = brought_policy(root, params, name)
         assert policy is not None  # it is one of the section
         number = drawn(stochastic=policy.entry.stochastic)
-        here = policy.entry.command is not None
-        _hold_moments(name, answered[name], starts, started_here=here)
+        _hold_moments(name, answered[name], starts, started_here=policy.started_here)
         _hold_findings(name, stated[name], answered[name], starts, candidates=number)
         if any(one.judged == "fails" for one in stated[name].findings if one.name in REPEATS):
             continue

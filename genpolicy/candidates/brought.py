@@ -45,6 +45,11 @@ class BroughtPolicy:
         return self.path.resolve().parent
 
     @property
+    def started_here(self) -> bool:
+        """Whether its process is started, and so can be started anew, by whoever asks it."""
+        return self.entry.command is not None
+
+    @property
     def sampler_sha256(self) -> str:
         """Of what it says of its sampler."""
         said = self.entry.declared.model_dump(mode="json") if self.entry.declared else {}

@@ -122,8 +122,7 @@ def ask_brought(candidate: BroughtPolicy, asked: Asked) -> Answered:
         again = _fixtures(policy, seen, range(len(seen))[::-1])
         broken += sum(policy.faults.values())
         # What somebody else runs is not started anew by us, and nothing is known of that.
-        here = candidate.entry.command is not None
-        anew = second_session(policy, starts, session) if here else None
+        anew = second_session(policy, starts, session) if candidate.started_here else None
     number = drawn(stochastic=candidate.entry.stochastic)
     # Chunks that came and hold a number that is none, beside questions that got no chunk.
     broken += int((~np.isfinite(first.chunks)).any(axis=(2, 3)).sum())
