@@ -121,13 +121,15 @@ def _hold_findings(
         refuse("B", place, "asked about other moments", "those that the root seed draws")
     with readable(ANSWERS):
         again = findings_again(rows, starts, stated)
-    told = [(one.name, one.gate, one.judged) for one in stated.findings]
-    for one, said in zip(again, [*told, *[("", "", "")] * len(again)], strict=False):
-        if (one.name, one.gate, one.judged) != said:
-            refuse("B", f"{place}: {one.name}", " ".join(said).strip() or "nothing",
-                   f"{one.judged}, as its answers say ({one.said})")  # fmt: skip
-    if len(told) != len(again):
-        refuse("B", place, f"{len(told)} findings", f"{len(again)}, as its answers say")
+    told = {one.name: f"{one.gate} {one.judged}" for one in stated.findings}
+    if [one.name for one in stated.findings] != [one.name for one in again]:
+        refuse(
+            "B", place, ", ".join(told), f"{', '.join(one.name for one in again)}, in this order"
+        )
+    for one in again:
+        if told[one.name] != f"{one.gate} {one.judged}":
+            refuse("B", f"{place}: {one.name}", told[one.name],
+                   f"{one.gate} {one.judged}, as its answers say ({one.said})")  # fmt: skip
 
 
 def _ask_again(
