@@ -25,21 +25,21 @@ CANDIDATES = 4
 
 
 @dataclass(frozen=True)
-class Session:
+class FirstStart:
     """Answers of one start: at every moment, and at some of them again in another order."""
 
     first: Asked
     again: Asked
 
 
-def first_session(policy: WirePolicy, starts: RecordedStarts) -> Session:
+def first_session(policy: WirePolicy, starts: RecordedStarts) -> FirstStart:
     """Ask about every moment, then about some of them again."""
     number = drawn(stochastic=policy.stochastic)
     first = asked_first(policy.remote, starts, number)
-    return Session(first, asked_again(policy.remote, starts, first, number))
+    return FirstStart(first, asked_again(policy.remote, starts, first, number))
 
 
-def second_session(policy: WirePolicy, starts: RecordedStarts, before: Session) -> Asked:
+def second_session(policy: WirePolicy, starts: RecordedStarts, before: FirstStart) -> Asked:
     """Ask the same ones again, after a new start."""
     number = drawn(stochastic=policy.stochastic)
     return asked_again(policy.remote, starts, before.first, number)
@@ -53,7 +53,7 @@ def drawn(*, stochastic: bool) -> int:
 def conformance_of(
     starts: RecordedStarts,
     told: Capabilities,
-    session: Session,
+    session: FirstStart,
     anew: Asked | None,
     *,
     candidates: int,
@@ -79,7 +79,7 @@ def conformance_of(
 
 
 def answer_rows(
-    method: str, starts: RecordedStarts, session: Session, anew: Asked | None
+    method: str, starts: RecordedStarts, session: FirstStart, anew: Asked | None
 ) -> list[AnswerRow]:
     """What was answered, session by session, in the order in which it was asked."""
     parts = {FIRST: session.first, AGAIN: session.again, ANEW: anew or Asked()}
