@@ -12,6 +12,7 @@ from typing import Any
 
 from gates.proof import Rung
 from gates.rederive_brought import rederive_brought
+from gates.rederive_conformance import rederive_conformance
 from gates.rederive_dataset import TRAININGS, rederive_dataset, rederive_trainings, trainings
 from gates.rederive_distilled import rederive_costs, rederive_distilled
 from gates.rederive_disturbance import rederive_disturbance
@@ -104,6 +105,7 @@ def rederive(root: Path, gate: Gate) -> None:
         rederive_trainings(root, gate, params)
     if gate == "B":
         rederive_brought(root, params)
+        rederive_conformance(root, params)
         rederive_costs(root, trainings(root, gate, params))
     if gate not in FOLDERS:
         return

@@ -49,6 +49,7 @@ def work(params: Params) -> None:
             samples=stress.samples,
             joining=stress.joining,
         ),
+        root_seed=params.seed,
     )
     root = ARTIFACTS / "train_generators"
     candidates = trained(root, names, seeds=seeds)

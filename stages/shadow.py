@@ -7,6 +7,8 @@ from genpolicy.candidates.brought import BroughtSection, read_brought
 from genpolicy.candidates.contenders import admitted_contenders, opened
 from genpolicy.data.dataset import load_dataset
 from genpolicy.evidence.admission_context import make_checker
+from genpolicy.evidence.fixtures_again import NO_FIXTURES, asked_again, brought_fixtures
+from genpolicy.evidence.rows.brought import AFTER, BEFORE
 from genpolicy.evidence.shadow.gallery import gallery_of
 from genpolicy.evidence.shadow.layer_mutants import missing_checks_evidence
 from genpolicy.evidence.shadow.observations import (
@@ -52,18 +54,24 @@ def work(params: Params) -> None:
         generator=stream(params.seed, "shadow", "observations"),
     )
     brought = read_brought(params.section("candidates", BroughtSection).root, seed=seed)
+    fixtures = brought_fixtures(data, params.horizons) if brought else NO_FIXTURES
     with output_folder(ARTIFACTS / "shadow") as folder:
-        found = []
+        found, again = [], []
         for candidate in admitted_contenders(ARTIFACTS, admitted, brought, seed=seed):
             with opened(candidate, task.observation, scene=task.scene_path) as policy:
+                again += asked_again(policy, fixtures, condition="shadow", when=BEFORE)
                 seen = shadow_policy(
                     shadow, policy, observations, seed=candidate.seed, two_mode=two_mode
                 )
+                again += asked_again(policy, fixtures, condition="shadow", when=AFTER)
             found.append(seen)
         mutants = missing_checks_evidence(shadow, spread(observations, section.mutant_observations))
         rows = [row for item in found for row in item.candidates]
         gallery = gallery_of(shadow, observations, rows)
-        write_shadow(folder, found, mutants, gallery, cell=shadow.cell, robot=shadow.checker.cell)
+        write_shadow(
+            folder, found, mutants, gallery, cell=shadow.cell, robot=shadow.checker.cell,
+            again=again,
+        )  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -5,7 +5,9 @@ from pathlib import Path
 from gates.proof import admit
 from genpolicy.candidates.brought import BroughtSection, read_brought
 from genpolicy.candidates.contenders import in_comparison
+from genpolicy.data.dataset import load_dataset
 from genpolicy.evidence.documents.stress import POWER
+from genpolicy.evidence.fixtures_again import NO_FIXTURES, brought_fixtures
 from genpolicy.evidence.reproducibility.latency import latency_models
 from genpolicy.evidence.rows.reproducibility import LatencyRow
 from genpolicy.evidence.stress.latency import LatencySection
@@ -35,6 +37,11 @@ def work(params: Params) -> None:
     timing = params.section("latency", LatencySection)
     table = read_columns(ARTIFACTS / "latency" / "latency.parquet", LatencyRow).to_pandas()
     task = load_task(params.task.name)
+    seed = params.section("policy", PolicySettings).seeds[0]
+    brought = read_brought(params.section("candidates", BroughtSection).root, seed=seed)
+    fixtures = NO_FIXTURES
+    if brought:
+        fixtures = brought_fixtures(load_dataset(ARTIFACTS / "ingest"), params.horizons)
     starts = matched_starts(task, root_seed=params.seed, count=section.starts)
     comparison = Comparison(
         task=params.task.name,
@@ -45,9 +52,8 @@ def work(params: Params) -> None:
         feasibility=params.section("feasibility", FeasibilitySettings),
         root_seed=params.seed,
         joining=section.joining,
+        fixtures=fixtures,
     )
-    seed = params.section("policy", PolicySettings).seeds[0]
-    brought = read_brought(params.section("candidates", BroughtSection).root, seed=seed)
     judged = in_comparison(
         ARTIFACTS, baselines=section.baselines, candidates=admitted, brought=brought, seed=seed
     )

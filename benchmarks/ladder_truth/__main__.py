@@ -17,9 +17,10 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 
 from benchmarks.ladder_truth import tables, workspace
+from benchmarks.ladder_truth.bringing import TWIN
 from benchmarks.ladder_truth.catalogue import WRONGS
 from benchmarks.ladder_truth.honest import HONEST, Variant
-from benchmarks.ladder_truth.outcome import Seen, count, run
+from benchmarks.ladder_truth.outcome import Seen, count, of_candidate, run
 from benchmarks.ladder_truth.planting import Wrong
 
 
@@ -86,40 +87,67 @@ def try_one(item: Wrong | Variant, base: Path, copy: Path) -> dict[str, object]:
         What is written to its JSON file. `count` is `right`, `elsewhere` or `not at all` for a
         wrong, `let through` or `stopped` for a variant, `broken` where the machinery failed.
     """
+    return try_together([item], base, copy)[0]
+
+
+def try_together(
+    items: Sequence[Wrong | Variant], base: Path, copy: Path
+) -> list[dict[str, object]]:
+    """The same of several that are planted into one copy and run once, each as one candidate."""
     began = time.monotonic()
-    seen, counted = Seen(()), "broken"
-    note = ""
+    seen, note = Seen(()), ""
     try:
         shutil.copytree(base, copy, symlinks=True)
-        item.plant(copy)
-        seen = run(copy, item.base)
-        if isinstance(item, Wrong):
-            counted = count(item.expected, seen)
-        else:
-            counted = "stopped" if seen.stops else "let through"
+        for item in items:
+            item.plant(copy)
+        seen = run(copy, items[0].base)
     except Exception:
         note = traceback.format_exc()[-2000:]
     finally:
         shutil.rmtree(copy, ignore_errors=True)
-    expected = dataclasses.asdict(item.expected) if isinstance(item, Wrong) else None
+    seconds = round(time.monotonic() - began, 1)
+    return [_result(item, seen, note, seconds) for item in items]
+
+
+def _result(item: Wrong | Variant, seen: Seen, note: str, seconds: float) -> dict[str, object]:
+    if item.together:
+        twin = "" if isinstance(item, Wrong) else TWIN
+        seen = of_candidate(seen, item.candidate, twin=twin)
+    if note:
+        counted = "broken"
+    elif isinstance(item, Wrong):
+        counted = count(item.expected, seen)
+    else:
+        counted = "stopped" if seen.stops else "let through"
     return {
         "name": item.name,
         "area": area_of(item),
         "base": item.base,
-        "expected": expected,
+        "expected": dataclasses.asdict(item.expected) if isinstance(item, Wrong) else None,
         "count": counted,
         "seen": dataclasses.asdict(seen),
-        "seconds": round(time.monotonic() - began, 1),
+        "seconds": seconds,
         "fault": note,
     }
 
 
-def _one(item: Wrong | Variant, work: Path, out: Path) -> dict[str, object]:
-    result = try_one(item, work / item.base, work / "copies" / f"{item.name}-{os.getpid()}")
-    path = out / f"{item.name}.json"
-    path.with_suffix(".tmp").write_text(json.dumps(result, indent=1, sort_keys=True) + "\n")
-    path.with_suffix(".tmp").rename(path)
-    return result
+def in_lots(items: Sequence[Wrong | Variant]) -> list[list[Wrong | Variant]]:
+    """What runs in one copy: alone, or with all of those asked for that name the same lot."""
+    lots: dict[str, list[Wrong | Variant]] = {}
+    for item in items:
+        lots.setdefault(item.together or item.name, []).append(item)
+    return list(lots.values())
+
+
+def _one(lot: Sequence[Wrong | Variant], work: Path, out: Path) -> list[dict[str, object]]:
+    first = lot[0]
+    copy = work / "copies" / f"{first.together or first.name}-{os.getpid()}"
+    results = try_together(lot, work / first.base, copy)
+    for result in results:
+        path = out / f"{result['name']}.json"
+        path.with_suffix(".tmp").write_text(json.dumps(result, indent=1, sort_keys=True) + "\n")
+        path.with_suffix(".tmp").rename(path)
+    return results
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -136,9 +164,10 @@ def main(argv: Sequence[str] | None = None) -> int:
             base_of(base, args.work.resolve())
         places = (args.work.resolve(), args.out.resolve())
         with ThreadPoolExecutor(max_workers=args.jobs) as pool:
-            futures = [pool.submit(_one, item, *places) for item in open_ones]
+            futures = [pool.submit(_one, lot, *places) for lot in in_lots(open_ones)]
             for future in as_completed(futures):
-                print(tables.line(future.result()), flush=True)
+                for result in future.result():
+                    print(tables.line(result), flush=True)
     results = [
         json.loads(path.read_text())
         for item in items

@@ -1,10 +1,11 @@
 """Honest changes, which must not be stopped: what a team does on any day."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from benchmarks.ladder_truth.bringing import AS_QUATERNION, IN_MM, Brings
 from benchmarks.ladder_truth.planting import Plant, all_of, recordings, with_metadata
 from benchmarks.ladder_truth.workspace import BROUGHT, edit_params, set_limit
 
@@ -19,6 +20,8 @@ class Variant:
         base: Honest ladder that it is made in.
         plant: Makes it.
         note: What changed about it after a run, and why; empty as first written.
+        together: Variants of one such name are made in one copy and run once.
+        candidate: The candidate that was brought; what stops its twin as well does not count.
     """
 
     name: str
@@ -26,6 +29,8 @@ class Variant:
     base: str
     plant: Plant
     note: str = ""
+    together: str = ""
+    candidate: str = ""
 
 
 def _params(change: Callable[[dict[str, Any]], Any]) -> Plant:
@@ -59,6 +64,11 @@ def _comment(file: str) -> Plant:
         path.write_text(f"{path.read_text()}\n# Read again; nothing was changed.\n")
 
     return plant
+
+
+def _brought(name: str, what: str, served: str, action: Mapping[str, Any] | None = None) -> Variant:
+    return Variant(name, what, "small", Brings(name, served, action or {}),
+                   together="brought_honestly", candidate=name)  # fmt: skip
 
 
 def _note(workspace: Path) -> None:
@@ -120,4 +130,8 @@ HONEST = (
             _params(lambda p: (p.update(seed=7), p["record"].update(episodes=140),
                                p["stress"].update(starts=8))),
             note="Added after the one with three starts was stopped at Gate D."),
+    _brought("brought_plainly", "The flow's weights behind a server.", "plain"),
+    _brought("brought_in_mm", "The same, numbers in mm, as its entry says.", "millimetres", IN_MM),
+    _brought("brought_as_quaternion", "The same, turns as quaternions, as its entry says.",
+             "quaternion", AS_QUATERNION),
 )  # fmt: skip

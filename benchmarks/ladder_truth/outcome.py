@@ -8,7 +8,7 @@ import json
 import re
 import subprocess
 import sys
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
@@ -19,7 +19,7 @@ GATE_OF_STAGE = {
     **dict.fromkeys(
         ("task", "record", "ingest", "audit", "train_baselines", "measure_baselines",
          "train_factors", "measure_factors", "gate_a"), "A"),
-    **dict.fromkeys(("train_generators", "reload", "latency", "gate_b"), "B"),
+    **dict.fromkeys(("candidates", "train_generators", "reload", "latency", "gate_b"), "B"),
     **dict.fromkeys(("shadow", "gate_c"), "C"),
     **dict.fromkeys(("stress", "gate_d"), "D"),
     **dict.fromkeys(("card", "gate_e"), "E"),
@@ -85,19 +85,21 @@ class Expected:
         refusal: Pattern of the refusal that names it; empty where a criterion must. Evidence that a
             criterion says it cannot be measured from is refused too, in the words of its gate.
         candidate: Method whose verdict it must be; empty for any.
+        said: Pattern of what the criterion must say beside its number; empty for anything.
     """
 
     gate: str
     criteria: tuple[str, ...] = ()
     refusal: str = ""
     candidate: str = ""
+    said: str = ""
 
     def names(self, stop: Stop) -> bool:
         """Whether a stop gives this reason, at whatever gate."""
         if self.candidate and stop.candidate and stop.candidate != self.candidate:
             return False
         if stop.reason in self.criteria:
-            return True
+            return not self.said or bool(re.search(self.said, stop.detail))
         said = stop.detail if stop.reason == "refusal" else _unmeasured(stop.detail)
         return bool(self.refusal and said and re.search(self.refusal, said))
 
@@ -220,6 +222,23 @@ def count(expected: Expected, seen: Seen) -> Count:
     right = [stop for stop in seen.stops if stop.gate == expected.gate and expected.names(stop)]
     lowest = min(stop.gate for stop in seen.stops)
     return "right" if right and lowest == expected.gate else "elsewhere"
+
+
+def of_candidate(seen: Seen, candidate: str, *, twin: str = "") -> Seen:
+    """What stops one candidate: what speaks of it, and what speaks of nobody in particular.
+
+    Args:
+        seen: Of the whole workspace.
+        candidate: Whose.
+        twin: Another candidate; what stops that one for the same reason is left out.
+    """
+    others = {(stop.gate, stop.reason) for stop in seen.stops if twin and stop.candidate == twin}
+    stops = tuple(
+        stop
+        for stop in seen.stops
+        if stop.candidate in ("", candidate) and (stop.gate, stop.reason) not in others
+    )
+    return replace(seen, stops=stops)
 
 
 def _said(sentence: str, lines: list[str]) -> str:

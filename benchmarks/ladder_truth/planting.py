@@ -45,6 +45,8 @@ class Wrong:
         plant: Puts it there.
         expected: Gate and reason, named before anything was run.
         note: What changed about the expectation afterwards, and why; empty as first written.
+        together: Wrongs of one such name are planted into one copy and run once: each is one
+            candidate more, and is counted by what stops that one. Empty where it runs alone.
     """
 
     name: str
@@ -54,6 +56,12 @@ class Wrong:
     plant: Plant
     expected: Expected
     note: str = ""
+    together: str = ""
+
+    @property
+    def candidate(self) -> str:
+        """The candidate that it is, where it runs together with others."""
+        return self.expected.candidate
 
 
 @dataclass(frozen=True)

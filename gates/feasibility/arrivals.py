@@ -4,6 +4,7 @@ from collections.abc import Iterable
 
 import pandas as pd
 
+from gates.again import changed_since_gate_b
 from gates.bounds import counted_interval
 from gates.criterion import Measured, criterion
 from gates.evidence import Evidence, MissingEvidenceError, counts
@@ -22,6 +23,18 @@ def stub_stale(evidence: Evidence, settings: FeasibilitySettings, candidate: str
     """Stale actions that arrived at the stub."""
     bad, arrivals = _stub(evidence, settings, candidate, "stale")
     return Measured(bad, counted=f"{bad:g} of {arrivals:g} arrivals")
+
+
+@criterion(
+    "<=",
+    question="Does whoever was brought still answer as at Gate B?",
+    look_at="Policy process: it is another one than was judged; see what it reads beside files.",
+    per_candidate=True,
+    always=True,
+)
+def changed_answers(evidence: Evidence, settings: FeasibilitySettings, candidate: str) -> Measured:
+    """Fixtures of Gate B that its server answers otherwise in the shadow test."""
+    return changed_since_gate_b(evidence, SHADOW, candidate, ("shadow",))
 
 
 def at_the_stub(rows: pd.DataFrame, *columns: str) -> tuple[float, float]:

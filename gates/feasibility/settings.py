@@ -2,6 +2,7 @@
 
 from pydantic import Field
 
+from gates.again import CHANGED
 from gates.asked_for import CHECKS_ASKED_FOR
 from gates.settings import CandidateSettings
 
@@ -33,3 +34,7 @@ class FeasibilitySettings(CandidateSettings):
 
     required_fixtures: tuple[str, ...]
     mode_observations: int = Field(ge=2)
+
+    def excepted(self, criterion: str, candidate: str | None) -> bool:
+        """Whether a criterion is asked of those that were brought only, and this one was not."""
+        return criterion == CHANGED and candidate not in self.brought

@@ -9,7 +9,7 @@ from gates.engine import GateSpec
 from gates.evidence import Array, Evidence, MissingEvidenceError, numbers
 from gates.need.settings import TRAINED as BASELINES
 from gates.need.simpler import unmatched
-from gates.reproducibility import convergence, modes, timing
+from gates.reproducibility import conformance, convergence, modes, timing
 from gates.reproducibility.front import SWEEP
 from gates.reproducibility.identity import contradicted, unrecorded
 from gates.reproducibility.settings import (
@@ -250,9 +250,12 @@ def _range(values: Array) -> str:
 GATE = GateSpec(
     gate="B",
     settings=ReproducibilitySettings,
-    criteria=criteria_of(globals(), vars(convergence), vars(modes), vars(timing)),
+    criteria=criteria_of(
+        globals(), vars(conformance), vars(convergence), vars(modes), vars(timing)
+    ),
     bind=(
         f"{RELOAD}/offline.parquet",
+        f"{RELOAD}/answers.parquet",
         COVERAGE,
         DENSITY,
         "artifacts/latency/candidates.parquet",

@@ -25,6 +25,10 @@ MATCHING = ("unmatched_keys", "parameter_budget_deviation", "late_change_upper")
 """What asks whether a comparison is matched; of whoever was brought it may stay unasked."""
 
 
+CONFORMANCE = "conformance"
+"""What is asked of who was brought only: what is trained here has its units from the dataset."""
+
+
 class Unmatched(StrictModel):
     """The written exception of a candidate that was brought: it is compared, and not matched.
 
@@ -79,7 +83,9 @@ class ReproducibilitySettings(CandidateSettings):
         return self
 
     def excepted(self, criterion: str, candidate: str | None) -> bool:
-        """Whether a criterion of matching is not asked of a candidate."""
+        """Whether matching is excepted, or what only those that were brought are asked."""
+        if criterion == CONFORMANCE:
+            return candidate not in self.brought
         return criterion in MATCHING and candidate in self.unmatched
 
     @property

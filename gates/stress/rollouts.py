@@ -6,6 +6,7 @@ from typing import ClassVar
 import pandas as pd
 from pydantic import Field, field_validator
 
+from gates.again import CHANGED
 from gates.bounds import share_interval
 from gates.criterion import Measured
 from gates.evidence import Evidence, MissingEvidenceError, flags
@@ -66,6 +67,10 @@ class StressSettings(CandidateSettings):
     execution_horizon: int = Field(gt=0)
     action_period_s: float = Field(gt=0.0)
     unmatched: tuple[str, ...] = ()
+
+    def excepted(self, criterion: str, candidate: str | None) -> bool:
+        """Whether a criterion is asked of those that were brought only, and this one was not."""
+        return criterion == CHANGED and candidate not in self.brought
 
     @property
     def caveats(self) -> tuple[str, ...]:

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from gates.again import changed_since_gate_b
 from gates.bounds import counted_interval, share_interval
 from gates.criterion import Measured, criterion
 from gates.evidence import Evidence, MissingEvidenceError, counts, flags
@@ -60,6 +61,18 @@ def recovery_success_lower(
             counted = f"{part['start'].nunique()} starts"
             worst, found = high, Measured(high, (low, high), text, counted=counted)
     return found
+
+
+@criterion(
+    "<=",
+    question="Does whoever was brought still answer as at Gate B?",
+    look_at="Policy process: it is another one than was judged; see what it reads beside files.",
+    per_candidate=True,
+    always=True,
+)
+def changed_answers(evidence: Evidence, settings: StressSettings, candidate: str) -> Measured:
+    """Fixtures of Gate B that its server answers otherwise in a condition of the comparison."""
+    return changed_since_gate_b(evidence, STRESS, candidate, settings.perturbations)
 
 
 @criterion(

@@ -24,6 +24,8 @@ from genpolicy.errors import BadInputError
 from genpolicy.integrity.documents import read_json
 
 REFUSED = 3
+MOMENTS_SEED = 0
+"""Of the moments of a check; the ladder's are drawn from its own root seed."""
 NO_VERDICT = (
     "Nothing here is a gate's verdict: name the entry in params.yaml (candidates) for those."
 )
@@ -58,7 +60,7 @@ def run_check(path: Path, options: CheckOptions, *, as_json: bool) -> int:
     data = load_dataset(options.dataset)
     require_contract(data, entry.horizons, candidate=entry.name)
     contract = data.observation_contract
-    starts = recorded_starts(data, entry.horizons)
+    starts = recorded_starts(data, entry.horizons, seed=MOMENTS_SEED)
     checks = task_checks(data, task=None, chunk_steps=entry.horizons.prediction_horizon)
     what = question(starts, dataset=data.manifest_sha256, candidates=options.candidates)
     earlier = _earlier(options.earlier, what)

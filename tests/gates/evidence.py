@@ -98,6 +98,8 @@ CONDITIONS = (
 )  # fmt: skip
 STARTS = 80
 INVOCATIONS = 20
+OF_BROUGHT = {"B": {"conformance"}, "C": {"changed_answers"}, "D": {"changed_answers"}}
+"""Criteria that are asked of those only who were brought; nobody is, here."""
 UPDATES = 4000
 PNG = base64.b64decode(
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAAAAAA6fptVAAAACklEQVR4nGNgAAAAAgABSK+kcQAAAABJRU5ErkJggg=="
@@ -258,6 +260,7 @@ PARAMS: dict[str, Any] = {
             metadata_mismatches=(0, "model"),
             samples_difference=(0, "model"),
             nfe_mismatch=(0, "model"),
+            conformance=(0, "model"),
             mode_coverage_lower=(0.6, "model"),
             outside_modes_upper=(0.25, "model"),
             late_change_upper=(0.15, "model"),
@@ -277,6 +280,7 @@ PARAMS: dict[str, Any] = {
             projection_p95_m=(0.02, "controller"),
             boundary_jerk_p95_m_s3=(500, "controller"),
             corrupted_refused_share=(1, "controller"),
+            changed_answers=(0, "safety"),
             stub_stale=(0, "safety"),
             stub_invalid=(0, "safety"),
             stub_violation_upper=(0.01, "safety"),
@@ -299,6 +303,7 @@ PARAMS: dict[str, Any] = {
             recovery_success_lower=(0.5, "safety"),
             fallback_share_upper=(0.15, "safety"),
             intervention_upper=(0.1, "safety"),
+            changed_answers=(0, "safety"),
             stub_violations=(0, "safety"),
             force_peak_p95_n=(20, "safety"),
             stress_success_lower=(0.6, "model"),
@@ -347,8 +352,9 @@ def set_limit(gate: str, name: str, limit: Any) -> Callable[[dict[str, Any]], No
 
 
 def limited(gate: str) -> set[str]:
-    """Criteria of a gate that have a limit."""
-    return {name for entries in PARAMS[gate]["limits"].values() for name in entries}
+    """Criteria of a gate that have a limit and are asked of who was trained here."""
+    of_brought = OF_BROUGHT.get(gate[-1].upper(), set())
+    return {name for entries in PARAMS[gate]["limits"].values() for name in entries} - of_brought
 
 
 def table(root: Path, path: str, row: type, rows: list[dict[str, Any]]) -> None:

@@ -55,14 +55,14 @@ def test_what_guards_people_or_the_proof_always_applies():
     }  # fmt: skip
     assert always["B"] == {
         "unpinned_items", "metadata_mismatches", "nfe_mismatch", "nonfinite_weights",
-        "samples_difference",
+        "samples_difference", "conformance",
     }  # fmt: skip
     assert always["C"] == {
         "stub_stale", "stub_invalid", "stub_violation_upper", "conservation_error",
-        "incidents_miscounted", "checker_violations", "mutants_undetected",
+        "incidents_miscounted", "checker_violations", "mutants_undetected", "changed_answers",
     }  # fmt: skip
     assert always["D"] == {
         "stub_violations", "conservation_error", "checker_violations", "promotion_e_value",
-        "unmatched_starts", "verdict_reachable",
+        "unmatched_starts", "verdict_reachable", "changed_answers",
     }  # fmt: skip
     assert always["E"] == {item.id for item in SPECS["E"].criteria}

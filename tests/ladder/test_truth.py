@@ -1,15 +1,31 @@
 """The benchmark of planted wrongs tells its three outcomes apart, on real runs."""
 
+import json
 from pathlib import Path
 
 import pytest
+import yaml
 
-from benchmarks.ladder_truth.__main__ import chosen, try_one
+from benchmarks.ladder_truth.__main__ import chosen, in_lots, try_one
+from benchmarks.ladder_truth.bringing import OWN, Brings
 from benchmarks.ladder_truth.catalogue import WRONGS
 from benchmarks.ladder_truth.honest import HONEST
-from benchmarks.ladder_truth.outcome import Expected, Seen, Stop, count, look, refused_by
+from benchmarks.ladder_truth.outcome import (
+    GATE_OF_STAGE,
+    Expected,
+    Seen,
+    Stop,
+    count,
+    look,
+    of_candidate,
+    refused_by,
+)
+from benchmarks.ladder_truth.planted_server import WRONGS as SERVED
 from benchmarks.ladder_truth.planting import Wrong, patches_of, silently
 from benchmarks.ladder_truth.workspace import ROOT
+from gates.pipeline import RUNGS
+from gates.report import stage_of
+from genpolicy.candidates.wire.entry import read_entry, verify_files
 
 BIT = silently("artifacts/ingest/frames.parquet")
 AT_A = Expected("A", refusal=r"sha256 of artifacts/ingest/frames\.parquet")
@@ -104,3 +120,74 @@ def test_the_catalogue_is_large_enough_and_names_are_asked_for_exactly() -> None
     assert [item.name for item in chosen(["two_cards"], [])] == ["two_cards"]
     with pytest.raises(SystemExit, match="no_such_wrong"):
         chosen(["no_such_wrong"], [])
+
+
+def test_every_stage_counts_for_the_gate_that_judges_it() -> None:
+    of_stage = {name: gate for gate, names in RUNGS.items() for name in (*names, stage_of(gate))}
+    assert of_stage == GATE_OF_STAGE
+
+
+def test_what_is_planted_together_runs_once_and_each_is_a_candidate_of_its_own() -> None:
+    together = [item for item in (*WRONGS, *HONEST) if item.together]
+    lots = in_lots([*WRONGS, *HONEST])
+    assert len(lots) == len(WRONGS) + len(HONEST) - len(together) + 2
+    for lot in (lot for lot in lots if lot[0].together):
+        assert len({item.candidate for item in lot}) == len(lot)
+        for item in lot:
+            assert isinstance(item.plant, Brings)
+            assert item.plant.name == item.candidate and item.plant.wrong in SERVED
+
+
+OWN_STOPS = (
+    Stop("B", "conformance", "1 (scale: mm)", "planted"),
+    Stop("B", "nfe_mismatch", "", "other"),
+    Stop("D", "verdict_reachable", ""),
+    Stop("D", "reset_upper", "", "flow"),
+    Stop("D", "reset_upper", "", "planted"),
+)
+
+
+def test_a_candidate_is_stopped_by_what_speaks_of_it_and_of_nobody_in_particular() -> None:
+    seen = of_candidate(Seen(OWN_STOPS), "planted")
+    assert [stop.reason for stop in seen.stops] == [
+        "conformance", "verdict_reachable", "reset_upper",
+    ]  # fmt: skip
+    beyond = of_candidate(Seen(OWN_STOPS), "planted", twin="flow")
+    assert [stop.reason for stop in beyond.stops] == ["conformance", "verdict_reachable"]
+
+
+def test_what_a_criterion_says_is_asked_for_where_it_is_named() -> None:
+    seen = of_candidate(Seen(OWN_STOPS), "planted")
+    for said, counted in (("scale", "right"), ("own_answers", "elsewhere"), ("", "right")):
+        expected = Expected("B", ("conformance",), candidate="planted", said=said)
+        assert count(expected, seen) == counted
+
+
+def test_a_planted_candidate_is_an_entry_with_pinned_files(tmp_path: Path) -> None:
+    flow = tmp_path / "artifacts/train_generators/flow/seed_0"
+    flow.mkdir(parents=True)
+    for name in ("model.safetensors", "config.json"):
+        (flow / name).write_bytes(name.encode())
+    (tmp_path / "artifacts/reload").mkdir()
+    card = {
+        "dataset": "d" * 64, "split": "e" * 64, "architecture": "small", "parameters": 10,
+        "path": "straight", "sampler": "euler", "sampler_steps": 4, "precision": "float32",
+        "device": "cpu", "threads": 1, "cpu_capability": "AVX2", "batch_rows": 1,
+        "evaluations": "4",
+    }  # fmt: skip
+    identity = {"flow": {"card": card, "seed": [7]}}
+    (tmp_path / "artifacts/reload/identity.json").write_text(json.dumps(identity))
+    horizons = {
+        "observation_horizon": 2, "prediction_horizon": 16, "execution_horizon": 8,
+        "action_period_s": 0.05,
+    }  # fmt: skip
+    params = {"horizons": horizons, "candidates": {}, "gate_b": {"unmatched": {}}}
+    (tmp_path / "params.yaml").write_text(yaml.safe_dump(params))
+    for item in (item for item in (*WRONGS, *HONEST) if item.together):
+        item.plant(tmp_path)
+        entry = read_entry(tmp_path / OWN / f"{item.candidate}.yaml")
+        verify_files(entry, tmp_path / OWN)
+        assert entry.name == item.candidate and len(entry.files) == 3
+    found = yaml.safe_load((tmp_path / "params.yaml").read_text())
+    assert set(found["candidates"]) == set(found["gate_b"]["unmatched"])
+    assert len(found["candidates"]) == 12

@@ -4,6 +4,7 @@ Written down before any of them was run. What was changed afterwards says so in 
 """
 
 from benchmarks.ladder_truth.catalogue import (
+    brought,
     candidates,
     code,
     data,
@@ -17,6 +18,7 @@ from benchmarks.ladder_truth.planting import Wrong
 WRONGS: tuple[Wrong, ...] = (
     *data.WRONGS,
     *candidates.WRONGS,
+    *brought.WRONGS,
     *execution.WRONGS,
     *code.WRONGS,
     *evidence.WRONGS,

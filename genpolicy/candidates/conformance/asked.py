@@ -5,10 +5,13 @@ from collections import Counter
 from genpolicy.candidates.conformance.recorded_starts import RecordedStarts
 from genpolicy.candidates.wire.extension import NoiseName
 from genpolicy.candidates.wire.faults import PolicyError
+from genpolicy.candidates.wire.policy import GONE_AFTER
 from genpolicy.candidates.wire.remote import Invocation, RemotePolicy
 
 AGAIN = 16
 """Moments that are asked a second time, and after a new start."""
+GONE = "gone"
+"""Kind of what is not asked any more, after so many faults in a row."""
 
 
 PINGS = 9
@@ -20,25 +23,47 @@ class Asked:
 
     Attributes:
         answers: By number of the moment.
-        faults: How many questions ended in each kind of fault.
-        last: What the last of them was.
+        failures: Kind of the fault and what was seen, by number of the moment.
     """
 
     def __init__(self) -> None:
         self.answers: dict[int, Invocation] = {}
-        self.faults: Counter[str] = Counter()
-        self.last = ""
+        self.failures: dict[int, tuple[str, str]] = {}
+        self._in_a_row = 0
+
+    @property
+    def faults(self) -> Counter[str]:
+        """How many questions ended in each kind of fault."""
+        return Counter(kind for kind, _ in self.failures.values())
+
+    @property
+    def last(self) -> str:
+        """What the last fault was."""
+        return next(reversed(self.failures.values()), ("", ""))[1]
 
     def ask(self, policy: RemotePolicy, starts: RecordedStarts, row: int, candidates: int) -> None:
-        """One moment; a fault is counted."""
+        """One moment; a fault is counted, and after many in a row nobody is asked any more."""
+        if self._in_a_row >= GONE_AFTER:
+            self.failures[row] = (GONE, f"not asked any more after {GONE_AFTER} faults in a row")
+            return
         name: NoiseName = ("conformance", row)
         try:
             self.answers[row] = policy.invoke(
                 starts.observations[row], noise=name, candidates=candidates
             )
         except PolicyError as error:
-            self.faults[str(error.fault)] += 1
-            self.last = error.found
+            self.failures[row] = (str(error.fault), error.found)
+            self._in_a_row += 1
+        else:
+            self._in_a_row = 0
+
+
+def asked_first(policy: RemotePolicy, starts: RecordedStarts, candidates: int) -> Asked:
+    """Every moment, in their order."""
+    asked = Asked()
+    for row in range(len(starts)):
+        asked.ask(policy, starts, row, candidates)
+    return asked
 
 
 def asked_again(

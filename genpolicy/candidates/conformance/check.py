@@ -11,11 +11,18 @@ from typing import Any
 import numpy as np
 
 from genpolicy.candidates.conformance import findings as found
-from genpolicy.candidates.conformance.asked import Asked, asked_again, repeated, round_trips
+from genpolicy.candidates.conformance.asked import (
+    Asked,
+    asked_again,
+    asked_first,
+    repeated,
+    round_trips,
+)
 from genpolicy.candidates.conformance.finding import Finding
 from genpolicy.candidates.conformance.findings import Admissible
 from genpolicy.candidates.conformance.recorded_starts import RecordedStarts
 from genpolicy.candidates.conformance.units import plausible
+from genpolicy.candidates.wire.extension import Capabilities
 from genpolicy.candidates.wire.faults import PolicyError
 from genpolicy.candidates.wire.remote import RemotePolicy
 from genpolicy.contract.chunk import actions_sha256
@@ -74,6 +81,46 @@ class Conformance:
         return asdict(self)
 
 
+@dataclass(frozen=True)
+class Answered:
+    """What was answered to a question.
+
+    Attributes:
+        first: At every moment.
+        again: At some of them a second time, in another order, on a new line.
+        after: At the same ones after a new start; None where nobody could start it anew.
+        restart_fault: Why it did not start anew; empty if it did.
+    """
+
+    first: Asked
+    again: Asked
+    after: Asked | None
+    restart_fault: str = ""
+
+
+def findings_of(starts: RecordedStarts, answered: Answered, told: Capabilities) -> list[Finding]:
+    """What answers alone say: the same again, and in the declared units. Gate B asks for each.
+
+    No clock has a say in it, so that equal answers give equal findings.
+
+    Args:
+        starts: The moments.
+        answered: What was answered there.
+        told: What the server says that it can.
+    """
+    first = answered.first
+    how = "asked again in another order on a new line"
+    repeats = found.repeats("repeats", first, answered.again, how)
+    return [
+        found.answers(first, len(starts)),
+        repeats,
+        found.restarts(first, answered.after, answered.restart_fault),
+        found.seeded(told, repeats, first),
+        found.evaluations(told, first, answered.again),
+        *plausible(first, starts),
+    ]
+
+
 def check(
     policy: RemotePolicy,
     starts: RecordedStarts,
@@ -97,9 +144,7 @@ def check(
     """
     candidates = asked.candidates
     wire = round_trips(policy)
-    first = Asked()
-    for row in range(len(starts)):
-        first.ask(policy, starts, row, candidates)
+    first = asked_first(policy, starts, candidates)
     told = policy.told
     again = asked_again(policy, starts, first, candidates)
     after: Asked | None = None
@@ -109,20 +154,17 @@ def check(
             after = asked_again(restarted(), starts, first, candidates)
         except PolicyError as error:
             restart_fault = str(error)
-    repeats = found.repeats("repeats", first, again, "asked again in another order on a new line")
+    answered = Answered(first, again, after, restart_fault)
+    of_answers = findings_of(starts, answered, told)
+    repeats = next(one for one in of_answers if one.name == "repeats")
     complete = sorted(again.answers) == repeated(len(starts))
     digest = _digest(again) if repeats.judged == "holds" and complete else None
     findings = [
-        found.answers(first, len(starts)),
-        repeats,
-        found.restarts(first, after, restart_fault),
-        found.seeded(told, repeats, first),
+        *of_answers,
         found.unchanged(digest, earlier, complete=complete),
-        found.evaluations(told, first, again),
         found.admissible(first, starts, admissible),
         found.spans(told, first, wire),
         found.in_time(first, deadline_s),
-        *plausible(first, starts),
     ]
     return Conformance(policy.entry.name, asked, told.checkpoint, digest, tuple(findings))
 

@@ -4,6 +4,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 Judged = Literal["holds", "fails", "unknown"]
+PLAUSIBLE = ("follows_observation", "scale", "origin", "orientation", "own_answers")
+"""What its numbers say."""
+OF_ANSWERS = ("answers", "repeats", "restarts", "seeded", "evaluations", *PLAUSIBLE)
+"""What answers alone say, whatever the clock: Gate B asks for each."""
 ONE_IN_TWO = 0.5
 """A share of moments is held against most of them, at the worse end of its interval."""
 

@@ -8,7 +8,7 @@ that knows the moment is nearer to what was done there than to what was done els
 does not is as near to all.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,7 +48,7 @@ class Slope:
     interval goes from the lower end of the first to the upper end of the second.
 
     Attributes:
-        name: `x`, `y`, `z`, `gripper`, or `turn` about an axis.
+        name: `x`, `y`, `z`, `gripper`, a place at the start, or `turn` about an axis.
         slope: Recorded on candidate, least squares over moments; NaN where the candidate's does
             not move.
         low: Lower end of the factor.
@@ -91,6 +91,25 @@ def slopes(chunks: Array, recorded: Array, *, rng: np.random.Generator) -> list[
     columns = [*range(POSITION.stop), GRIPPER]
     theirs, ours = chunks[..., columns].mean(axis=1), recorded[..., columns].mean(axis=1)
     return _compared((*AXES, "gripper"), theirs, ours, STANDS_M, rng)
+
+
+def start_slopes(candidates: Array, measured: Array, *, rng: np.random.Generator) -> list[Slope]:
+    """Slope of where the robot is on where chunks begin, axis by axis.
+
+    An arm begins where it stands, whichever way it takes: of two mirrored ways the recorded one may
+    be either, and says nothing of a mirrored axis; the place that it begins at does.
+
+    Args:
+        candidates: Shape (M, N, K, 10). The median over N is taken.
+        measured: Where the robot was; NaN where the observation does not say. Shape (M, 10).
+        rng: For the bootstrap over moments.
+    """
+    begun, stood = np.median(candidates[:, :, 0, POSITION], axis=1), measured[:, POSITION]
+    if not np.isfinite(stood).all():
+        return []
+    names = tuple(f"{axis} at the start" for axis in AXES)
+    # One that commands a goal far ahead from its first action on stands, and is not another unit.
+    return [replace(one, stands=False) for one in _compared(names, begun, stood, STANDS_M, rng)]
 
 
 def turn_slopes(chunks: Array, recorded: Array, *, rng: np.random.Generator) -> list[Slope]:

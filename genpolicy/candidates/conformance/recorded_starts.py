@@ -11,6 +11,7 @@ from genpolicy.contract.observation import ObservationContract
 from genpolicy.data.contract import TCP_ACTION
 from genpolicy.data.dataset import Dataset
 from genpolicy.errors import ContractError
+from genpolicy.seeds import stream
 
 Array = NDArray[np.float64]
 
@@ -80,14 +81,18 @@ def require_contract(data: Dataset, horizons: HorizonConfig, *, candidate: str) 
 
 
 def recorded_starts(
-    data: Dataset, horizons: HorizonConfig, *, most: int = MOST_STARTS
+    data: Dataset, horizons: HorizonConfig, *, seed: int, most: int = MOST_STARTS
 ) -> RecordedStarts:
     """One start of each held-out episode, evenly spread from the first row to the last whole chunk.
+
+    Each episode draws its place from a stream of its own name, so that the same moments are asked
+    about in whatever order episodes lie, and nobody knows them who does not know the seed.
 
     Args:
         data: A verified dataset.
         horizons: Of the candidate.
-        most: Episodes, at most; evenly chosen where there are more.
+        seed: Root seed.
+        most: Episodes, at most.
 
     Raises:
         ContractError: No held-out episode is as long as a chunk.
@@ -111,9 +116,10 @@ def recorded_starts(
             action="Record longer episodes, or declare a shorter prediction_horizon.",
         )
     number = min(most, len(episodes))
-    chosen = np.linspace(0, len(episodes) - 1, num=number).round().astype(np.int64)
-    # Neighbours in the list lie apart in their episodes, so that no phase is of one session only.
+    drawn = {str(uuid): stream(seed, *STREAM, str(uuid)).random() for uuid in episodes}
+    chosen = sorted(range(len(episodes)), key=lambda one: (drawn[str(episodes[one])], one))[:number]
     shares = np.modf(np.arange(number) * GOLDEN)[0]
+    # Neighbours in the list lie apart in their episodes, so that every phase is asked about.
     at = [int(share * len(chunks[episode])) for share, episode in zip(shares, chosen, strict=True)]
     seen = np.stack([
         observations[episode][row] for row, episode in zip(at, chosen, strict=True)
@@ -126,5 +132,6 @@ def recorded_starts(
     )
 
 
+STREAM = ("conformance", "moments")
 GOLDEN = 0.6180339887498949
 """Multiples of the golden ratio, modulo 1, are evenly spread however many there are."""

@@ -1,10 +1,12 @@
 """Findings about a candidate's numbers: do they speak of the moment, in the declared units?"""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from genpolicy.candidates.conformance.asked import Asked
-from genpolicy.candidates.conformance.finding import ONE_IN_TWO, Finding, Judged
+from genpolicy.candidates.conformance.finding import ONE_IN_TWO, PLAUSIBLE, Finding, Judged
 from genpolicy.candidates.conformance.placed import Offset, offsets, turned_away
 from genpolicy.candidates.conformance.plausible import (
     FEWEST,
@@ -14,6 +16,7 @@ from genpolicy.candidates.conformance.plausible import (
     nearest,
     shuffled_share,
     slopes,
+    start_slopes,
     turn_slopes,
 )
 from genpolicy.candidates.conformance.recorded_starts import RecordedStarts
@@ -22,7 +25,6 @@ from genpolicy.statistics.intervals import clopper_pearson
 
 Array = NDArray[np.float64]
 
-NAMES = ("follows_observation", "scale", "origin", "orientation", "own_answers")
 SAME_SCALE = 3.0
 """A slope beyond a factor of three either way is another unit, sign or spread: a weak policy's
 slope is still nearer to 1, a wrong unit's is 10 times off."""
@@ -34,17 +36,18 @@ def plausible(asked: Asked, starts: RecordedStarts) -> list[Finding]:
     rows = [row for row, one in sorted(asked.answers.items()) if np.isfinite(one.actions).all()]
     if len(rows) < FEWEST:
         said = f"{len(rows)} finite answers, {FEWEST} are needed"
-        return [Finding(name, "unknown", "D", said) for name in NAMES]
+        return [Finding(name, "unknown", "B", said) for name in PLAUSIBLE]
     drawn = np.stack([asked.answers[row].actions for row in rows])
     recorded, measured = starts.chunks[rows], starts.measured[rows]
     chunks = nearest(drawn, recorded)
     share = shuffled_share(drawn, recorded, rng=stream(0, "conformance", "shuffle"))
     follows = share <= KNOWS_THE_MOMENT
     copies = copied(drawn, recorded)
-    scaled = scale(chunks, recorded, follows=follows)
+    begun = beginnings(drawn, recorded, measured)
+    scaled = scale(chunks, recorded, follows=follows, begun=begun)
     return [
         Finding(
-            NAMES[0], "holds" if follows else "fails", "D",
+            PLAUSIBLE[0], "holds" if follows else "fails", "B",
             f"as near to other moments' recordings in {share:.4f} of the shuffles, at most "
             f"{KNOWS_THE_MOMENT}",
         ),
@@ -52,23 +55,42 @@ def plausible(asked: Asked, starts: RecordedStarts) -> list[Finding]:
         origin(offsets(drawn, recorded, measured), follows and scaled.judged != "fails"),
         orientation(chunks, recorded, measured),
         Finding(
-            NAMES[4], "fails" if copies else "holds", "D",
+            PLAUSIBLE[4], "fails" if copies else "holds", "B",
             f"{copies} of {len(rows)} moments answered with the recording itself",
         ),
     ]  # fmt: skip
 
 
-def scale(chunks: Array, recorded: Array, *, follows: bool) -> Finding:
-    """Whether places and the opening move as recorded ones do. Chunks: (M, K, 10)."""
-    found = slopes(chunks, recorded, rng=stream(0, "conformance", "slopes"))
+def beginnings(drawn: Array, recorded: Array, measured: Array) -> list[Slope]:
+    """How places that chunks begin at follow the robot, on axes on which recordings follow it."""
+    ours, theirs = (
+        start_slopes(of, measured, rng=stream(0, "conformance", "starts"))
+        for of in (recorded[:, None], drawn)
+    )
+    follow = {one.name for one in ours if _right(one)}
+    return [one for one in theirs if one.name in follow]
+
+
+def scale(chunks: Array, recorded: Array, *, follows: bool, begun: Sequence[Slope] = ()) -> Finding:
+    """Whether places and the opening move as recorded ones do. Chunks: (M, K, 10).
+
+    Args:
+        chunks: The nearest of each moment.
+        recorded: What was done there.
+        follows: Whether chunks speak of the moment.
+        begun: See `beginnings`.
+    """
+    moved = slopes(chunks, recorded, rng=stream(0, "conformance", "slopes"))
+    found = [*moved, *begun]
     if not found:
-        return Finding("scale", "unknown", "D", "nothing moves in the recordings")
+        return Finding("scale", "unknown", "B", "nothing moves in the recordings")
     said = f"recorded per declared unit, 1 is right: {_listed(found)}"
     if wrong := [one.name for one in found if _wrong(one)]:
-        return Finding("scale", "fails", "D", f"{said}; wrong: {', '.join(wrong)}")
+        return Finding("scale", "fails", "B", f"{said}; wrong: {', '.join(wrong)}")
     # Of many chunks that know nothing the nearest lie on the line too.
-    right = follows and all(_right(one) for one in found)
-    return Finding("scale", "holds" if right else "unknown", "D", said)
+    # Where chunks begin accuses only: a rough policy hardly knows where it stands.
+    right = follows and bool(moved) and all(_right(one) for one in moved)
+    return Finding("scale", "holds" if right else "unknown", "B", said)
 
 
 def _wrong(one: Slope) -> bool:
@@ -95,9 +117,9 @@ def origin(found: list[Offset], comparable: bool) -> Finding:
     """
     if not comparable:
         said = "its numbers do not speak of the moment in the declared units"
-        return Finding("origin", "unknown", "D", said)
+        return Finding("origin", "unknown", "B", said)
     if not any(np.isfinite(one.step) for one in found):
-        return Finding("origin", "unknown", "D", "the observation does not say where the TCP is")
+        return Finding("origin", "unknown", "B", "the observation does not say where the TCP is")
     far = [one for one in found if one.low > one.step or one.high < -one.step]
     off = [one for one in found if one.apart_low > STANDS_M or one.apart_high < -STANDS_M]
     if far:
@@ -105,20 +127,20 @@ def origin(found: list[Offset], comparable: bool) -> Finding:
             f"{one.name} {1e3 * one.low:.3g} to {1e3 * one.high:.3g} mm (a step is "
             f"{1e3 * one.step:.3g} mm)" for one in far
         )  # fmt: skip
-        return Finding("origin", "fails", "D", f"chunks begin off the measured place: {text}")
+        return Finding("origin", "fails", "B", f"chunks begin off the measured place: {text}")
     if off:
         text = ", ".join(
             f"{one.name} {1e3 * one.apart_low:.3g} to {1e3 * one.apart_high:.3g} mm" for one in off
         )
         said = f"beside the recorded first actions by too little to tell offset from bias: {text}"
-        return Finding("origin", "unknown", "D", said)
+        return Finding("origin", "unknown", "B", said)
     across = [one.name for one in found if one.low < -one.step or one.high > one.step]
     if across:
         said = f"begin too far apart from each other to say: {', '.join(across)}"
-        return Finding("origin", "unknown", "D", said)
+        return Finding("origin", "unknown", "B", said)
     reach = 1e3 * max(max(abs(one.apart_low), abs(one.apart_high)) for one in found)
     said = f"chunks begin where the recorded ones do, to within {reach:.3g} mm"
-    return Finding("origin", "holds", "D", said)
+    return Finding("origin", "holds", "B", said)
 
 
 def orientation(chunks: Array, recorded: Array, measured: Array) -> Finding:
@@ -133,4 +155,4 @@ def orientation(chunks: Array, recorded: Array, measured: Array) -> Finding:
         judged = "fails"
     elif high < ONE_IN_TWO and all(_right(one) for one in turns):
         judged = "holds"
-    return Finding("orientation", judged, "D", said)
+    return Finding("orientation", judged, "B", said)

@@ -4,10 +4,10 @@ import sys
 from pathlib import Path
 
 from genpolicy.candidates.hosts.kinds import LeRobotEntry
+from genpolicy.candidates.wire.channels import columns_of
 from genpolicy.candidates.wire.entry import PORT, Entry, ServerEntry
 from genpolicy.contract.observation import ObservationContract
 from genpolicy.errors import ConfigError
-from genpolicy.integrity.rows import columns_of
 
 ADAPTER = Path(__file__).parents[3] / "adapters" / "lerobot_server.py"
 

@@ -115,6 +115,11 @@ class WirePolicy:
         return isinstance(self._remote, RemotePolicy) and not self._remote.unguided
 
     @property
+    def remote(self) -> RemotePolicy | PolicyError:
+        """How it is asked where a fault is to be seen as what it is; or why it did not start."""
+        return self._remote
+
+    @property
     def told(self) -> Capabilities:
         """What its server says of itself; nothing, of one that is not there."""
         return Capabilities() if isinstance(self._remote, PolicyError) else self._remote.told

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from genpolicy.candidates import selector
 from genpolicy.candidates.brought import BroughtPolicy
+from genpolicy.candidates.conformance.recorded_starts import recorded_starts
 from genpolicy.candidates.contenders import joining_of
 from genpolicy.candidates.wire.entry import Entry
 from genpolicy.candidates.wire.faults import Fault
@@ -21,21 +22,30 @@ from genpolicy.contract.chunk import actions_sha256
 from genpolicy.data.dataset import Dataset
 from genpolicy.errors import NonFiniteError
 from genpolicy.evidence.documents.brought import Failed
+from genpolicy.evidence.documents.conformance import Conformance
 from genpolicy.evidence.documents.reproducibility import CandidateIdentity, IdentityCard
+from genpolicy.evidence.fixtures_again import brought_fixtures, fixture_name
 from genpolicy.evidence.need.held_out import HeldOut, modes_of_policy
 from genpolicy.evidence.reproducibility.benchmark import DISCARDED
+from genpolicy.evidence.reproducibility.conformance import (
+    answer_rows,
+    conformance_of,
+    drawn,
+    first_session,
+    second_session,
+)
 from genpolicy.evidence.reproducibility.identity import Deployment, rule_sha256
 from genpolicy.evidence.reproducibility.sweep import drawn_by, quality_of, swept_windows
+from genpolicy.evidence.rows.brought import AnswerRow
 from genpolicy.evidence.rows.need import ModeRow
 from genpolicy.evidence.rows.reproducibility import CoverageRow, NfeRow, SampleRow
 from genpolicy.feasibility.admission import FeasibilityChecker
-from genpolicy.policies.fixtures import CANDIDATES, fixture_observations
+from genpolicy.policies.fixtures import CANDIDATES
 from genpolicy.tasks.api import Task
 
 Array = NDArray[np.float64]
 
 UNSAID = "unsaid"
-FIXTURES = 32
 
 
 @dataclass(frozen=True)
@@ -49,6 +59,7 @@ class Asked:
         held_out: Two-mode situations.
         samples: Candidates per situation.
         deployment: Horizons, deadline and candidates of an invocation.
+        root_seed: Of the recorded moments.
     """
 
     data: Dataset
@@ -57,6 +68,7 @@ class Asked:
     held_out: HeldOut
     samples: int
     deployment: Deployment
+    root_seed: int
 
 
 @dataclass
@@ -66,6 +78,8 @@ class Answered:
     Attributes:
         identity: What pins and names it.
         failed: Its faults.
+        conformance: What its answers at recorded moments say.
+        answers: These answers.
         samples: Fixtures, before and after the new start.
         nfe: Counted network evaluations; empty where its server does not count.
         modes: Two-mode situations.
@@ -74,6 +88,8 @@ class Answered:
 
     identity: CandidateIdentity
     failed: Failed
+    conformance: Conformance
+    answers: list[AnswerRow] = field(default_factory=list)
     samples: list[SampleRow] = field(default_factory=list)
     nfe: list[NfeRow] = field(default_factory=list)
     modes: list[ModeRow] = field(default_factory=list)
@@ -96,8 +112,9 @@ def ask_brought(candidate: BroughtPolicy, asked: Asked) -> Answered:
         IntegrityError: A file of it is another one.
         ConfigError: Its program is not there.
     """
-    seen = fixture_observations(asked.data, horizons=asked.deployment.horizons, count=FIXTURES)
+    seen = brought_fixtures(asked.data, asked.deployment.horizons)
     contract = asked.data.observation_contract
+    starts = recorded_starts(asked.data, asked.deployment.horizons, seed=asked.root_seed)
     with running(candidate, contract, scene=asked.task.scene_path) as policy:
         own = replace(asked.deployment, joining=joining_of(asked.deployment.joining, policy))
         first = _fixtures(policy, seen, range(len(seen)))
@@ -106,16 +123,22 @@ def ask_brought(candidate: BroughtPolicy, asked: Asked) -> Answered:
             samples=asked.samples, task=asked.task, checker=asked.checker,
         )  # fmt: skip
         coverage = _coverage(policy, candidate, asked, modes)
+        session, told = first_session(policy, starts), policy.told
     before = policy
     with running(candidate, contract, scene=asked.task.scene_path) as policy:
         again = _fixtures(policy, seen, range(len(seen))[::-1])
+        # What somebody else runs is not started anew by us, and nothing is known of that.
+        anew = second_session(policy, starts, session) if candidate.entry.started_here else None
     failed = _failed(before, policy)
     broken = sum(failed.faults.values())
+    number = drawn(stochastic=candidate.entry.stochastic)
     # Chunks that came and hold a number that is none, beside questions that got no chunk.
     broken += int((~np.isfinite(first.chunks)).any(axis=(2, 3)).sum())
     return Answered(
         identity=_identity(candidate, own, broken, int(first.told != again.told)),
         failed=failed,
+        conformance=conformance_of(starts, told, session, anew, candidates=number),
+        answers=answer_rows(candidate.name, starts, session, anew),
         samples=_compared(candidate, first.chunks, again.chunks),
         nfe=_evaluations(candidate, first.evaluations, again.evaluations),
         modes=modes,
@@ -138,7 +161,7 @@ def _fixtures(policy: WirePolicy, seen: Array, order: Sequence[int]) -> _Session
     parts, evaluations = {}, 0
     for row in order:
         drawn = policy.sample(
-            seen[row][None], noise_names=[("fixture", row)], candidates=CANDIDATES
+            seen[row][None], noise_names=[fixture_name(row)], candidates=CANDIDATES
         )
         parts[row] = drawn.actions[0]
         evaluations = max(evaluations, drawn.nfe)

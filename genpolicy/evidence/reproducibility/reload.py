@@ -11,6 +11,7 @@ from genpolicy.data.dataset import Dataset, load_dataset
 from genpolicy.errors import ContractError
 from genpolicy.evidence.admission_context import make_checker
 from genpolicy.evidence.documents.brought import FAULTS
+from genpolicy.evidence.documents.conformance import CONFORMANCE, Conformance
 from genpolicy.evidence.documents.reproducibility import CANDIDATES, CandidateIdentity
 from genpolicy.evidence.need.held_out import HeldOut, held_out_situations, modes_of_policy
 from genpolicy.evidence.need.offline import offline_rows
@@ -25,6 +26,7 @@ from genpolicy.evidence.reproducibility.sweep import (
     swept_samplers,
     swept_windows,
 )
+from genpolicy.evidence.rows.brought import AnswerRow
 from genpolicy.evidence.rows.need import ModeRow, OfflineRow
 from genpolicy.evidence.rows.reproducibility import CoverageRow, DensityRow, NfeRow, SampleRow
 from genpolicy.feasibility.admission import FeasibilityChecker
@@ -50,6 +52,7 @@ class ReloadPlan:
             the chosen one.
         samples: Candidates per situation.
         deployment: Horizons, deadline and candidates of an invocation.
+        root_seed: Of the recorded moments that brought policies are asked about.
     """
 
     task: str
@@ -59,6 +62,7 @@ class ReloadPlan:
     sweep: Sweep
     samples: int
     deployment: Deployment
+    root_seed: int
 
     @property
     def horizons(self) -> HorizonConfig:
@@ -77,13 +81,17 @@ class ReloadRows:
     modes: list[ModeRow] = field(default_factory=list)
     earlier: list[ModeRow] = field(default_factory=list)
     density: list[DensityRow] = field(default_factory=list)
+    answers: list[AnswerRow] = field(default_factory=list)
+    conformance: dict[str, Conformance] = field(default_factory=dict)
 
-    def take(self, answered: Answered) -> CandidateIdentity:
+    def take(self, name: str, answered: Answered) -> CandidateIdentity:
         """Add the rows of a policy that was brought; returns who it is."""
         self.samples += answered.samples
         self.nfe += answered.nfe
         self.modes += answered.modes
         self.coverage += answered.coverage
+        self.answers += answered.answers
+        self.conformance[name] = answered.conformance
         return answered.identity
 
     def write(self, folder: Path) -> None:
@@ -95,6 +103,8 @@ class ReloadRows:
         write_rows(folder / "modes.parquet", ModeRow, self.modes)
         write_rows(folder / "modes_earlier.parquet", ModeRow, self.earlier)
         write_rows(folder / "density.parquet", DensityRow, self.density)
+        write_rows(folder / "answers.parquet", AnswerRow, self.answers)
+        CONFORMANCE.write(folder, self.conformance)
 
 
 def write_reload(
@@ -123,7 +133,7 @@ def write_reload(
     data, task = load_dataset(plan.dataset), load_task(plan.task)
     checker = make_checker(task, plan.feasibility, action_period_s=plan.horizons.action_period_s)
     held_out = held_out_situations(plan.audit, data, horizons=plan.horizons)
-    asked = Asked(data, task, checker, held_out, plan.samples, plan.deployment)
+    asked = Asked(data, task, checker, held_out, plan.samples, plan.deployment, plan.root_seed)
     written = read_rows(fixtures, FixtureRow)
     rows, identity = ReloadRows(), identities(candidates, data, plan.deployment)
     for candidate in candidates:
@@ -139,7 +149,7 @@ def write_reload(
         _measured(plan, candidate, policy, asked, rows)
     answered = {other.name: ask_brought(other, asked) for other in brought}
     for name, answers in answered.items():
-        identity[name] = rows.take(answers)
+        identity[name] = rows.take(name, answers)
     rows.write(folder)
     if answered:
         FAULTS.write(folder, {name: answers.failed for name, answers in answered.items()})

@@ -13,6 +13,7 @@ from genpolicy.evidence.documents.shadow import (
     LayerMutant,
     Mutant,
 )
+from genpolicy.evidence.rows.brought import FixtureAgainRow
 from genpolicy.evidence.rows.shadow import (
     CandidateRow,
     ShadowCountRow,
@@ -42,6 +43,7 @@ def write_shadow(
     *,
     cell: Cell,
     robot: FeasibilityCell,
+    again: Sequence[FixtureAgainRow] = (),
 ) -> None:
     """Write everything; the checker reads the journal back from the file.
 
@@ -52,7 +54,9 @@ def write_shadow(
         gallery: Examples of what was rejected.
         cell: What every session must have run under.
         robot: What every executed row must keep to.
+        again: Gate B's fixtures, asked again of those that were brought.
     """
+    write_rows(folder / "fixtures.parquet", FixtureAgainRow, again)
     candidates = [row for item in found for row in item.candidates]
     write_rows(folder / "candidates.parquet", CandidateRow, candidates)
     stub = [row for item in found for row in _stub_rows(item)]

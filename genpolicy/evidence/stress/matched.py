@@ -6,7 +6,7 @@ share the network's batches; which batch a sample was drawn in changes no bit of
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +16,8 @@ from genpolicy.candidates.contenders import Contender, Running, joining_of, open
 from genpolicy.candidates.joining import JoiningSettings
 from genpolicy.candidates.judged import candidates_of
 from genpolicy.candidates.wire.policy import WireSamples
+from genpolicy.evidence.fixtures_again import NO_FIXTURES, asked_again
+from genpolicy.evidence.rows.brought import AFTER, BEFORE, FixtureAgainRow
 from genpolicy.evidence.rows.stress import (
     FaultRow,
     InvocationRow,
@@ -56,6 +58,7 @@ class Comparison:
         feasibility: Thresholds of the six layers.
         root_seed: Root seed.
         joining: How chunks join.
+        fixtures: Those of Gate B, for who was brought. Shape (F, H_o, D_o).
     """
 
     task: str
@@ -66,6 +69,7 @@ class Comparison:
     feasibility: FeasibilitySettings
     root_seed: int
     joining: JoiningSettings = field(default_factory=JoiningSettings)
+    fixtures: Array = field(default_factory=lambda: NO_FIXTURES, compare=False)
 
 
 @dataclass(frozen=True)
@@ -102,6 +106,7 @@ class ShardResult:
         accounts: Balance of chunks, per rollout.
         ages_s: Every action age, s.
         stub: Arrivals, stale and invalid offers.
+        again: Gate B's fixtures, before and after; none of what runs here.
     """
 
     rollouts: list[RolloutRow]
@@ -112,6 +117,7 @@ class ShardResult:
     accounts: list[Account]
     ages_s: Array
     stub: StressStubRow
+    again: list[FixtureAgainRow] = field(default_factory=list)
 
 
 def matched_starts(task: Task, *, root_seed: int, count: int) -> list[Start]:
@@ -121,10 +127,16 @@ def matched_starts(task: Task, *, root_seed: int, count: int) -> list[Start]:
 
 def run_shard(shard: Shard) -> ShardResult:
     """All rollouts of a shard, in lockstep; writes its journal."""
-    comparison = shard.comparison
-    task = load_task(comparison.task)
+    task = load_task(shard.comparison.task)
     with opened(shard.judged, task.observation, scene=task.scene_path) as policy:
-        return _run(shard, task, policy)
+        before = _again(shard, policy, BEFORE)
+        result = _run(shard, task, policy)
+        return replace(result, again=[*before, *_again(shard, policy, AFTER)])
+
+
+def _again(shard: Shard, policy: Policy, when: str) -> list[FixtureAgainRow]:
+    fixtures = shard.comparison.fixtures
+    return asked_again(policy, fixtures, condition=shard.perturbation, when=when)
 
 
 def _run(shard: Shard, task: Task, policy: Running) -> ShardResult:

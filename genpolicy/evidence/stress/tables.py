@@ -15,6 +15,7 @@ from genpolicy.errors import ConfigError
 from genpolicy.evidence.documents.given import Distilled
 from genpolicy.evidence.documents.shadow import CHECKER
 from genpolicy.evidence.documents.stress import DISTILLED, ENVELOPE, Power
+from genpolicy.evidence.rows.brought import FixtureAgainRow
 from genpolicy.evidence.rows.stress import (
     AgeRow,
     ConservationRow,
@@ -86,6 +87,8 @@ def write_stress(folder: Path, shards: Sequence[Shard], *, workers: int, schedul
     overruns = [row for _, result in pairs for row in result.overruns]
     write_rows(folder / "overruns.parquet", OverrunRow, overruns)
     _write_faults(folder, pairs)
+    again = [row for _, result in pairs for row in result.again]
+    write_rows(folder / "fixtures.parquet", FixtureAgainRow, again)
     ages = [row for shard, result in pairs for row in _age_rows(shard, result)]
     write_rows(folder / "ages.parquet", AgeRow, ages)
     journals = [shard.journal for shard in shards]

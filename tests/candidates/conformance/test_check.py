@@ -167,6 +167,25 @@ class OtherWay(Honest):
         return chunk
 
 
+class EitherWay(Honest):
+    """Begins where the robot stands and goes left or right of there, by chance."""
+
+    mirrored = 1.0
+
+    def chunk(self, row, noise):
+        chunk = super().chunk(row, noise)
+        side = np.sign(counter_noise(("side", *noise), shape=(1,)))
+        chunk[:, 1] = self.starts.measured[row, 1] + side * np.linspace(0.0, 0.3, 16)
+        chunk[:, 1] *= self.mirrored
+        return chunk
+
+
+class MirroredEitherWay(EitherWay):
+    """Ways to both sides look the same in a mirror; where they begin does not."""
+
+    mirrored = -1.0
+
+
 class NoisyGripper(Honest):
     def chunk(self, row, noise):
         chunk = super().chunk(row, noise)
@@ -330,17 +349,18 @@ def test_an_honest_candidate_holds_in_everything_that_can_be_said(checked, start
         (GlobalSeed, {"repeats", "restarts", "seeded"}, {"B"}),
         (OtherName, {"answers", "repeats", "restarts", "seeded"}, {"B"}),
         (OtherWeights, {"restarts"}, {"B"}),
-        (RecordedFuture, {"own_answers"}, {"D"}),
+        (RecordedFuture, {"own_answers"}, {"B"}),
         # Its gripper stands, and its hand is turned as at one moment only.
-        (IgnoresObservation, {"follows_observation", "scale", "orientation"}, {"D"}),
-        (Millimetres, {"scale"}, {"D"}),
-        (Mirrored, {"scale"}, {"D"}),
-        (Spread, {"scale"}, {"D"}),
-        (Narrow, {"scale"}, {"D"}),
-        (ClosedGripper, {"scale"}, {"D"}),
-        (OtherOrigin, {"origin"}, {"D"}),
-        (Turned, {"orientation"}, {"D"}),
-        (Exchanged, {"origin"}, {"D"}),
+        (IgnoresObservation, {"follows_observation", "scale", "orientation"}, {"B"}),
+        (Millimetres, {"scale"}, {"B"}),
+        (Mirrored, {"scale"}, {"B"}),
+        (MirroredEitherWay, {"scale"}, {"B"}),
+        (Spread, {"scale"}, {"B"}),
+        (Narrow, {"scale"}, {"B"}),
+        (ClosedGripper, {"scale"}, {"B"}),
+        (OtherOrigin, {"origin"}, {"B"}),
+        (Turned, {"orientation"}, {"B"}),
+        (Exchanged, {"origin"}, {"B"}),
         (Flatters, {"spans"}, {"C"}),
         (Boasts, {"spans"}, {"C"}),
         (CountsAnew, {"evaluations"}, {"B"}),
@@ -361,6 +381,12 @@ def test_another_way_and_a_noisy_gripper_are_no_wrong(checked, starts, planted):
     assert judged(found)["origin"] == "holds"
 
 
+def test_a_mirror_is_told_by_where_chunks_begin(checked, starts):
+    assert checked(EitherWay(starts)).failed == []
+    said = said_of(checked(MirroredEitherWay(starts)), "scale")
+    assert said.endswith("wrong: y at the start")
+
+
 def test_a_wrong_order_of_a_quaternion_is_stopped(checked, starts):
     found = checked(TurnedQuaternion(starts), action=QUATERNION)
     assert [finding.name for finding in found.failed] == ["orientation"]
@@ -369,9 +395,9 @@ def test_a_wrong_order_of_a_quaternion_is_stopped(checked, starts):
 def test_the_axis_and_the_factor_are_told(checked, starts):
     said = next(f.said for f in checked(Millimetres(starts)).findings if f.name == "scale")
     assert "x 0.000995 (" in said
-    assert said.endswith("wrong: x, y, z")
+    assert "wrong: x, y, z, x at the start" in said
     said = next(f.said for f in checked(Mirrored(starts)).findings if f.name == "scale")
-    assert said.endswith("wrong: y")
+    assert said.endswith("wrong: y, y at the start")
 
 
 def test_an_answer_beyond_the_deadline_is_not_in_time(checked, starts):

@@ -10,13 +10,21 @@ from asked import found_in
 from gates.proof import judge
 from gates.reproducibility.settings import MATCHING
 from gates.settings import WAIVED
+from genpolicy.candidates.conformance.finding import OF_ANSWERS
 from genpolicy.errors import ConfigError
 
+FINDINGS = [
+    {"name": name, "judged": "holds", "gate": "B", "said": "as it should"} for name in OF_ANSWERS
+]
+ANSWERED = {
+    "moments": 40, "candidates": 4, "observations_sha256": "f" * 64, "seeded": True,
+    "counts_evaluations": True, "findings": FINDINGS,
+}  # fmt: skip
 EXCEPTION = {"owner": "model", "reason": "trained by its maker", "expires": "2027-01-31"}
 ENTRY = "own/flow.yaml"
 
 
-def bring(root, *, unmatched, change=None, document=None):
+def bring(root, *, unmatched, change=None, document=None, findings=None):
     """Let `flow` be brought: no training of it is left, and its entry is in the evidence."""
 
     def params(found):
@@ -41,6 +49,8 @@ def bring(root, *, unmatched, change=None, document=None):
         "training_seed": identity["seed"][0],
     }  # fmt: skip
     evidence.document(root, "candidates/candidates.json", {"flow": {**pinned, **(document or {})}})
+    said = {**ANSWERED, "findings": FINDINGS if findings is None else findings}
+    evidence.document(root, "reload/conformance.json", {"flow": said})
     evidence.edit_document(
         root, "reload/identity.json",
         lambda found: found["flow"].update({"seed": identity["seed"][:1], **(change or {})}),

@@ -1,0 +1,101 @@
+"""How a planted candidate gets into a workspace: the ladder's own flow behind a server script."""
+
+import shutil
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from benchmarks.ladder_truth.workspace import edit_params
+from genpolicy.integrity.documents import read_json
+from genpolicy.integrity.hashing import sha256_file
+
+SERVER = Path(__file__).with_name("planted_server.py")
+OWN = "own"
+FLOW = "artifacts/train_generators/flow/seed_0"
+TWIN = "flow"
+"""Whose weights are served: what a ladder says of it, it says of an honest copy."""
+CHANNELS = [
+    "tcp_position_m", "tcp_rotation", "gripper_opening_m", "wrench_n", "hole_pose",
+    "post_position_m", "phase",
+]  # fmt: skip
+AS_TRAINED = (
+    "dataset", "split", "architecture", "parameters", "path", "sampler", "sampler_steps",
+    "precision", "device", "threads", "cpu_capability", "batch_rows",
+)  # fmt: skip
+ACTION: Mapping[str, Any] = {
+    "frame": "robot_base",
+    "motion": "absolute",
+    "position": {"columns": [0, 1, 2], "unit": "m"},
+    "rotation": {"columns": [3, 4, 5, 6, 7, 8], "form": "rotation_6d"},
+    "gripper": {"column": 9, "open": 1.0, "open_m": 1.0},
+}
+IN_MM: Mapping[str, Any] = {
+    "position": {"columns": [0, 1, 2], "unit": "mm"},
+    "gripper": {"column": 9, "open": 1000.0, "open_m": 1.0},
+}
+AS_QUATERNION: Mapping[str, Any] = {
+    "rotation": {"columns": [3, 4, 5, 6], "form": "quaternion_xyzw"},
+    "gripper": {"column": 7, "open": 1.0, "open_m": 1.0},
+}
+REASON = "the weights of the twin, served by a script"
+
+
+@dataclass(frozen=True)
+class Brings:
+    """Brings one candidate behind the server script; a plant.
+
+    Attributes:
+        name: Of the candidate.
+        wrong: What the script does (`planted_server.WRONGS`).
+        action: Of the entry, what differs from the checkpoint's own columns.
+    """
+
+    name: str
+    wrong: str
+    action: Mapping[str, Any] = field(default_factory=dict)
+
+    def __call__(self, workspace: Path) -> None:
+        """Files, entry, and the lines of `params.yaml`."""
+        own = workspace / OWN
+        if not (own / TWIN).exists():
+            shutil.copytree(workspace / FLOW, own / TWIN)
+            shutil.copyfile(SERVER, own / SERVER.name)
+        entry = own / f"{self.name}.yaml"
+        entry.write_text(yaml.safe_dump(self._entry(workspace), sort_keys=False))
+
+        def change(params: dict[str, Any]) -> None:
+            params["candidates"][self.name] = f"{OWN}/{entry.name}"
+            params["gate_b"]["unmatched"][self.name] = {
+                "owner": "model", "reason": REASON, "expires": "2099-01-01",
+            }  # fmt: skip
+
+        edit_params(workspace, change)
+
+    def _entry(self, workspace: Path) -> dict[str, Any]:
+        identity = read_json(workspace / "artifacts/reload/identity.json")[TWIN]
+        card = identity["card"]
+        files = (f"{TWIN}/model.safetensors", f"{TWIN}/config.json", SERVER.name)
+        return {
+            "name": self.name,
+            "kind": "server",
+            "author": "author@example.org",
+            "command": [
+                sys.executable, SERVER.name, TWIN, self.wrong, "--port", "{port}",
+                "--name", self.name,
+            ],
+            "files": {name: sha256_file(workspace / OWN / name) for name in files},
+            "horizons": yaml.safe_load((workspace / "params.yaml").read_text())["horizons"],
+            "observation": {
+                "observation": {"channels": CHANNELS, "history": 2, "dtype": "float64"}
+            },
+            "action": {**ACTION, **self.action},
+            "declared": {
+                **{name: card[name] for name in AS_TRAINED},
+                "training_seed": identity["seed"][0],
+                "evaluations": int(card["evaluations"]),
+            },
+        }  # fmt: skip

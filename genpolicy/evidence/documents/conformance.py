@@ -1,0 +1,31 @@
+"""`conformance.json` of reload: what answers of a brought policy at recorded moments say of it."""
+
+from dataclasses import dataclass
+
+from genpolicy.candidates.conformance.finding import Finding
+from genpolicy.documents.document import Count, Document
+
+
+@dataclass(frozen=True)
+class Conformance:
+    """What was asked of one candidate, and what was found.
+
+    Attributes:
+        moments: Recorded moments, each of another held-out episode.
+        candidates: Chunks asked for at each.
+        observations_sha256: Of what it was shown at the moments that it was asked twice.
+        seeded: Whether its server says that equal names of noise give equal chunks.
+        counts_evaluations: Whether it says that it counts network evaluations.
+        findings: What follows from its answers.
+    """
+
+    moments: Count
+    candidates: Count
+    observations_sha256: str
+    seeded: bool
+    counts_evaluations: bool
+    findings: list[Finding]
+
+
+CONFORMANCE = Document("conformance.json", dict[str, Conformance])
+"""By name of the candidate."""
