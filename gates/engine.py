@@ -90,6 +90,7 @@ class GateSpec:
         below: Gate that candidates must have passed to stand here; None without candidates.
         note: Text behind the diagnosis, where a gate has one.
         decide: Own decision, where the common one does not do.
+        said: What the report says of the evidence beside criteria, as caveats.
     """
 
     gate: Gate
@@ -102,6 +103,7 @@ class GateSpec:
     below: Gate | None = None
     note: Callable[[Judged], str] | None = None
     decide: Callable[[Judged], Decision] | None = None
+    said: Callable[[Judged], Sequence[str]] | None = None
 
 
 def judge_gate(spec: GateSpec, root: Path) -> GateReport:
@@ -181,6 +183,7 @@ def judge(
     judged = Judged(evidence, inputs, tuple(answers), verdict, verdicts)
     decision = (spec.decide or _decision(spec))(judged)
     note = spec.note(judged) if spec.note else ""
+    caveats = (*(spec.said(judged) if spec.said else ()), *caveats)
     return GateReport(
         schema_version=SCHEMA_VERSION,
         gate=spec.gate,

@@ -27,6 +27,7 @@ from gates.pages import (
     plots_rejected,
     plots_stress,
     plots_time,
+    tables_clocks,
     tables_feasibility,
     tables_holds,
     tables_overruns,
@@ -71,7 +72,12 @@ PLOTS: dict[str, tuple[Picturable, ...]] = {
         *plots_incidents.PLOTS,
         *tables_holds.LISTINGS,
     ),
-    "D": (*plots_stress.PLOTS, tables_overruns.DONE, *tables_stress.LISTINGS),
+    "D": (
+        *plots_stress.PLOTS,
+        tables_clocks.CLOCKS,
+        tables_overruns.DONE,
+        *tables_stress.LISTINGS,
+    ),
     "E": (),
 }
 

@@ -9,6 +9,7 @@ from pydantic import Field, field_validator
 from gates.bounds import share_interval
 from gates.criterion import Measured
 from gates.evidence import Evidence, MissingEvidenceError, flags
+from gates.report import Owner
 from gates.settings import CandidateSettings
 from genpolicy.evidence.rows.stress import RolloutRow
 
@@ -39,6 +40,7 @@ class StressSettings(CandidateSettings):
         execution_horizon: Actions of a chunk that may be executed.
         action_period_s: Period of the actions, s.
         unmatched: Candidates that are compared by exception; none is ranked among the others.
+        tolerances: By owner: what the two clocks may differ by, and why; nothing is judged by it.
     """
 
     homes: ClassVar[Mapping[str, str]] = {
@@ -64,6 +66,11 @@ class StressSettings(CandidateSettings):
     execution_horizon: int = Field(gt=0)
     action_period_s: float = Field(gt=0.0)
     unmatched: tuple[str, ...] = ()
+    tolerances: dict[Owner, dict[str, tuple[float, str]]] = Field(default_factory=dict)
+
+    def tolerance(self, name: str) -> float | None:
+        """What the clocks may differ by in one respect; None where nobody has said."""
+        return next((of[name][0] for of in self.tolerances.values() if name in of), None)
 
     @property
     def caveats(self) -> tuple[str, ...]:

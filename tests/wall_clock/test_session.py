@@ -172,9 +172,9 @@ def test_what_could_not_be_judged_is_infeasible(told):
 
 
 def test_a_recorded_force_above_the_limit_stops(told, kit):
-    limit_n = kit.EXECUTION.force_limit_n[told.session._replay.phases[0]]
-    forces = [limit_n, limit_n + 1e-6] + [0.0] * (len(told.session._replay) - 2)
-    told.session._replay = told.session._replay.model_copy(update={"forces_n": tuple(forces)})
+    limit_n = kit.EXECUTION.force_limit_n[told.session.replay.phases[0]]
+    forces = [limit_n, limit_n + 1e-6] + [0.0] * (len(told.session.replay) - 2)
+    told.session.replay = told.session.replay.model_copy(update={"forces_n": tuple(forces)})
     told.answer(told.tick())
     told.decide()
     assert not told.session.stub.supervisor.stopped

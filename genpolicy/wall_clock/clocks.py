@@ -1,0 +1,342 @@
+"""The two clocks on the same recorded windows: one candidate, its journals, and what they say.
+
+By the wall clock the policy answers in a process of its own while the supervisor's ticks, and the
+terms that this machine has none of (exposure to transfer, network, queue) are delays of the line
+between them. By the virtual clock the same draws of these terms are added to draws of what Gate B
+measured. Both replay the windows one after the other, each a session of its own.
+"""
+
+import shutil
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import yaml
+from pydantic import Field
+
+from genpolicy.candidates.brought import BroughtPolicy
+from genpolicy.candidates.contenders import Contender, Running
+from genpolicy.candidates.judged import candidates_of
+from genpolicy.candidates.wire.entry import verify_files
+from genpolicy.candidates.wire.launched import Launched
+from genpolicy.candidates.wire.policy import WirePolicy
+from genpolicy.candidates.wire.remote import RemotePolicy
+from genpolicy.contract.latency import Term
+from genpolicy.contract.observation import ObservationContract
+from genpolicy.contract.settings import Settings
+from genpolicy.data.dataset import Dataset
+from genpolicy.evidence.admission_context import make_checker
+from genpolicy.evidence.documents.shadow import CHECKER
+from genpolicy.evidence.rows.clocks import ClockAgeRow, ClockInvocationRow, ClockTickRow
+from genpolicy.evidence.shadow.tables import checker_document
+from genpolicy.evidence.stress.latency import LatencyModel, draw_latency
+from genpolicy.execution.cell import Cell
+from genpolicy.feasibility.admission import FeasibilityChecker
+from genpolicy.feasibility.settings import FeasibilitySettings
+from genpolicy.integrity.atomic import write_bytes
+from genpolicy.integrity.documents import canonical_json
+from genpolicy.integrity.rows import write_rows
+from genpolicy.seeds import stream
+from genpolicy.tasks.api import Task, load_task
+from genpolicy.tasks.fixtures import PINS
+from genpolicy.verification.clocks import derived_windows
+from genpolicy.wall_clock.admission import judge
+from genpolicy.wall_clock.limits import LIMITS, pin_limits, read_limits
+from genpolicy.wall_clock.policy import answer_of
+from genpolicy.wall_clock.proxy import LinePlan, planned
+from genpolicy.wall_clock.recorded import replay_of
+from genpolicy.wall_clock.replay import Replay
+from genpolicy.wall_clock.request import WallClockRequest
+from genpolicy.wall_clock.run import POLICY, PROXY, start
+from genpolicy.wall_clock.session import SupervisedSession
+from genpolicy.wall_clock.streamed import JOURNAL, StreamedJournal, collect, session_file
+from genpolicy.wall_clock.virtual import run_virtually
+
+WALL, VIRTUAL = "wall", "virtual"
+CONDITION = "wall_clock"
+"""Name of the draws, in the place of a perturbation."""
+TO_POLICY = (Term.EXPOSURE, Term.CAPTURE, Term.DECODE, Term.TRANSFER)
+TO_SUPERVISOR = (Term.NETWORK, Term.QUEUE)
+PLAN = "line.json"
+HELD_OUT = "test"
+TABLES: dict[type, str] = {
+    ClockInvocationRow: "invocations.parquet",
+    ClockAgeRow: "ages.parquet",
+    ClockTickRow: "ticks.parquet",
+}
+
+
+class WallClockSection(Settings):
+    """Section `wall_clock`.
+
+    Attributes:
+        episodes: Held-out episodes of which a window is replayed, at most.
+        rows: Rows of a window.
+    """
+
+    episodes: int = Field(ge=1)
+    rows: int = Field(ge=1)
+
+
+@dataclass(frozen=True)
+class Bench:
+    """What all candidates share.
+
+    Attributes:
+        root: Workspace with the pinned limits of the run.
+        task: The task.
+        windows: What is replayed.
+        samples: Candidates that an invocation of a stochastic method draws.
+        root_seed: Root of the draws.
+    """
+
+    root: Path
+    task: Task
+    windows: Sequence[Replay]
+    samples: int
+    root_seed: int
+
+    def terms_s(self, model: LatencyModel, window: int, invocation: int) -> Mapping[str, float]:
+        """The drawn terms of an invocation, s; equal for both clocks where they are declared."""
+        drawn = draw_latency(
+            model, root_seed=self.root_seed, perturbation=CONDITION, start=window,
+            invocation=invocation, extra_s={}, compute_factor=1.0,
+        )  # fmt: skip
+        return drawn.terms
+
+    def checker(self) -> FeasibilityChecker:
+        """The six layers."""
+        limits = read_limits(self.root)
+        return make_checker(
+            self.task, limits.feasibility, action_period_s=limits.horizons.action_period_s
+        )
+
+
+@contextmanager
+def bench(
+    data: Dataset,
+    *,
+    task: str,
+    cell: Cell,
+    feasibility: FeasibilitySettings,
+    section: WallClockSection,
+    samples: int,
+    root_seed: int,
+    pins: Path,
+) -> Iterator[Bench]:
+    """Windows, and limits pinned in a workspace of its own: those of Gate D, and the silence.
+
+    Args:
+        data: The dataset.
+        task: Name of the task.
+        cell: As in Gate D. The deadlines of single terms are left out: a wall clock knows whole
+            answers. Silence stops after as long as recovery begins there.
+        feasibility: Thresholds of the six layers.
+        section: How much is replayed.
+        samples: Candidates that an invocation of a stochastic method draws.
+        root_seed: Root of the draws.
+        pins: The workspace's pinned fixtures.
+    """
+    loaded, execution = load_task(task), cell.execution
+    held_to = execution.model_dump(mode="json", exclude={"term_deadlines", "silence_stop_s"})
+    limits = {
+        "task": task,
+        "horizons": cell.horizons.model_dump(mode="json"),
+        "execution": held_to | {"silence_stop_s": execution.hold_before_recovery_s},
+        "feasibility": feasibility.model_dump(mode="json"),
+    }
+    with TemporaryDirectory() as scratch:
+        root = Path(scratch)
+        write_bytes(root / LIMITS, yaml.safe_dump(limits).encode())
+        shutil.copyfile(pins, root / PINS)
+        pin_limits(root)
+        found = windows(data, loaded, section, root_seed=root_seed)
+        yield Bench(root, loaded, found, samples, root_seed)
+
+
+def windows(
+    data: Dataset, task: Task, section: WallClockSection, *, root_seed: int
+) -> list[Replay]:
+    """A window of each of some held-out episodes that are long enough, from a drawn row on."""
+    generator = stream(root_seed, CONDITION, "windows")
+    held_out = data.split(HELD_OUT).episodes
+    names = sorted(held_out["episode_uuid"].astype(str))
+    whole = (replay_of(data, task, names[at]) for at in generator.permutation(len(names)))
+    found: list[Replay] = []
+    for replay in whole:
+        if len(found) == section.episodes:
+            break
+        if len(replay) >= section.rows:
+            first = int(generator.integers(0, len(replay) - section.rows + 1))
+            found.append(replay.part(first, section.rows))
+    return found
+
+
+def write_clocks(
+    folder: Path,
+    shared: Bench,
+    candidates: Sequence[Contender],
+    models: Mapping[str, LatencyModel],
+) -> None:
+    """Journals of every candidate by both clocks, what they say, and what the checker says of them.
+
+    Args:
+        folder: Existing folder.
+        shared: What all candidates share.
+        candidates: Who is replayed.
+        models: Latency of each, by name.
+    """
+    journals = folder / "journals"
+    journals.mkdir()
+    paths = [
+        path
+        for candidate in candidates
+        for path in run_both(shared, candidate, models[candidate.name], journals=journals)
+    ]
+    cell = read_limits(shared.root).cell
+    found = derived_windows(paths, deadline_s=cell.execution.deadline_s)
+    for row, columns in (
+        (ClockInvocationRow, found.invocations), (ClockAgeRow, found.ages),
+        (ClockTickRow, found.ticks),
+    ):  # fmt: skip
+        write_rows(folder / TABLES[row], row, [row(**values) for values in columns])
+    checker = shared.checker()
+    CHECKER.write(folder, checker_document(paths, cell=cell, robot=checker.cell))
+
+
+def run_both(
+    shared: Bench, candidate: Contender, model: LatencyModel, *, journals: Path
+) -> tuple[Path, Path]:
+    """Replay every window by the wall clock, then by the virtual one.
+
+    Args:
+        shared: What all candidates share.
+        candidate: Who answers.
+        model: Its latency, as Gate B measured it.
+        journals: Existing folder.
+
+    Returns:
+        Paths of the two journals.
+
+    Raises:
+        PolicyError: It is behind the wire, and its server is not there.
+        GenpolicyError: The supervisor's process died.
+        IntegrityError: Its files are not those of its identity.
+    """
+    paths = tuple(journals / f"{candidate.name}__{clock}.mcap" for clock in (WALL, VIRTUAL))
+    with TemporaryDirectory() as scratch, _asked_elsewhere(candidate, shared) as asked:
+        request = WallClockRequest(
+            root=str(shared.root), method=candidate.name, checkpoint=asked.checkpoint,
+            sampler=asked.sampler, replay=shared.windows[0], then=tuple(shared.windows[1:]),
+        )  # fmt: skip
+        by_the_wall = Path(scratch) / WALL
+        by_the_wall.mkdir()
+        write_bytes(by_the_wall / PLAN, canonical_json(line(shared, model)))
+        running = start(
+            by_the_wall, request, [*asked.command, "--candidates", str(asked.candidates)],
+            line=[*PROXY, str(by_the_wall / PLAN)],
+        )  # fmt: skip
+        running.wait()
+        shutil.move(by_the_wall / JOURNAL, paths[0])
+        with asked.here() as policy:
+            virtually(shared, policy, asked.candidates, request, model, folder=Path(scratch))
+        shutil.move(Path(scratch) / JOURNAL, paths[1])
+    return paths[0], paths[1]
+
+
+def line(shared: Bench, model: LatencyModel) -> dict[str, object]:
+    """Plan of the line: the declared terms of each invocation, before it and behind it."""
+    asks, answers = {}, {}
+    for window, replay in enumerate(shared.windows):
+        for number in range(len(replay)):
+            terms = shared.terms_s(model, window, number)
+            asks[window, number] = [sum(terms[term] for term in TO_POLICY)]
+            answers[window, number] = [sum(terms[term] for term in TO_SUPERVISOR)]
+    return LinePlan(asks=planned(asks), answers=planned(answers)).model_dump(mode="json")
+
+
+def virtually(
+    shared: Bench,
+    policy: Running,
+    count: int,
+    request: WallClockRequest,
+    model: LatencyModel,
+    *,
+    folder: Path,
+) -> None:
+    """The same windows by the virtual clock; the journal of all is left in the folder."""
+    limits = read_limits(shared.root)
+    checker = shared.checker()
+    for number, replay in enumerate(shared.windows):
+        name = f"{policy.method}/virtual_clock/{number}"
+        labels = {"method": policy.method, "episode": replay.episode_uuid}
+        session = SupervisedSession(
+            shared.task, limits.cell, request.model_copy(update={"replay": replay, "then": ()}),
+            StreamedJournal(name, session_file(folder, number), labels), stop_stands=False,
+        )  # fmt: skip
+        run_virtually(
+            session,
+            sample=partial(answer_of, policy, candidates=count),
+            latency_s=partial(_total_s, shared, model, number),
+            judged=partial(judge, shared.task, checker),
+        )
+    collect(folder)
+
+
+def _total_s(shared: Bench, model: LatencyModel, window: int, invocation: int) -> float:
+    return sum(shared.terms_s(model, window, invocation).values())
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """A candidate that another process asks, and then this one; never both at once.
+
+    Attributes:
+        checkpoint: Its weights.
+        sampler: Its sampler settings.
+        candidates: Drawn in an invocation.
+        command: Of the process that asks it.
+        here: The same, asked here.
+    """
+
+    checkpoint: str
+    sampler: str
+    candidates: int
+    command: list[str]
+    here: Callable[[], AbstractContextManager[Running]]
+
+
+@contextmanager
+def _asked_elsewhere(candidate: Contender, shared: Bench) -> Iterator[_Asked]:
+    """The server of one that was brought is started and ended here: no kill leaves it behind."""
+    if not isinstance(candidate, BroughtPolicy):
+        policy = candidate.load()
+        yield _Asked(
+            policy.checkpoint_hash, policy.sampler_config_hash,
+            candidates_of(policy, shared.samples),
+            [*POLICY, str(candidate.folder), candidate.sha256], lambda: nullcontext(policy),
+        )  # fmt: skip
+        return
+    verify_files(candidate.entry, candidate.folder)
+    with Launched(candidate.entry, candidate.folder) as server:
+        words = [str(candidate.path), candidate.sha256, "--address", server.address]
+        yield _Asked(
+            candidate.sha256, candidate.sampler_sha256,
+            shared.samples if candidate.entry.stochastic else 1,
+            [*POLICY, *words, "--task", read_limits(shared.root).task],
+            partial(_connected, candidate, server, shared.task.observation),
+        )  # fmt: skip
+
+
+@contextmanager
+def _connected(
+    brought: BroughtPolicy, server: Launched, contract: ObservationContract
+) -> Iterator[WirePolicy]:
+    remote = RemotePolicy(brought.entry, server.address, contract, ended=server.died)
+    try:
+        yield WirePolicy(brought, remote)
+    finally:
+        remote.close()
