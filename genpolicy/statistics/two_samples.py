@@ -2,11 +2,9 @@
 
 A unit (an episode) is done once each way, so units are drawn again in pairs. Equivalence is shown
 where the whole interval lies within the tolerance (Schuirmann 1987; Westlake 1981), never by a
-difference that was not found. Neither interval is narrower than what so many units of which none
-differs cannot exclude. Sources: as `clustered`; Newcombe 1998, method 10, for two shares.
+difference that was not found. No interval is narrower than what so many units of which none
+differs cannot exclude, and fewer units than `clustered.MINIMUM_CLUSTERS` tell nothing.
 """
-
-import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,9 +42,11 @@ def distance_interval(
             expected="values on both sides, of the same units",
             action="Run both ways on the same units.",
         )
+    point = float(_distances(first.sum(axis=0)[None], second.sum(axis=0)[None])[0])
+    if n < clustered.MINIMUM_CLUSTERS:
+        return point, 0.0, 1.0
     counts = _drawn(n, rng)
     drawn = _distances(counts @ first, counts @ second)
-    point = float(_distances(first.sum(axis=0)[None], second.sum(axis=0)[None])[0])
     tail = (1.0 - confidence) / 2.0
     lower, upper = np.nanquantile(drawn, [tail, 1.0 - tail])
     unseen = clopper_pearson(0, n, confidence)[1]
@@ -62,8 +62,8 @@ def share_difference(
 ) -> tuple[float, float, float]:
     """Difference of two shares, the first less the second, with its interval over units.
 
-    The wider, at either end, of units drawn again in pairs and of what the two shares' own
-    intervals, which are never narrower than exact ones of so many units, allow.
+    Neither end lies nearer to the difference than the share of units that may do otherwise where
+    none of n did.
 
     Args:
         first: Hits of each unit, and of how many, one way. Shape (n,) each; a unit may have none.
@@ -75,25 +75,24 @@ def share_difference(
         ContractError: No units with anything to count on a side.
     """
     n = len(first[0])
-    counts = _drawn(n, rng) if n else np.zeros((0, 0))
-    ends, shares = [], []
-    for hits, whole in (first, second):
-        some = whole > 0
-        ends.append(
-            clustered.ratio_interval(hits[some], whole[some], confidence=confidence, rng=rng)
+    if n == 0 or not min(first[1].sum(), second[1].sum()) > 0:
+        raise ContractError(
+            where="a difference of two shares",
+            found=f"{first[1].sum():g} and {second[1].sum():g} cases in {n} units",
+            expected="cases on both sides, of the same units",
+            action="Run both ways on the same units.",
         )
-        shares.append(float(hits.sum() / whole.sum()))
+    point = float(first[0].sum() / first[1].sum() - second[0].sum() / second[1].sum())
+    if n < clustered.MINIMUM_CLUSTERS:
+        return point, -1.0, 1.0
+    counts = _drawn(n, rng)
     with np.errstate(invalid="ignore", divide="ignore"):
-        drawn = (counts @ first[0]) / (counts @ first[1]) - (counts @ second[0]) / (
-            counts @ second[1]
-        )
+        one = (counts @ first[0]) / (counts @ first[1])
+        other = (counts @ second[0]) / (counts @ second[1])
     tail = (1.0 - confidence) / 2.0
-    low, high = np.nanquantile(drawn, [tail, 1.0 - tail])
-    (p_low, p_high), (q_low, q_high) = ends
-    p, q = shares
-    wide_low = p - q - math.hypot(p - min(p, p_low), max(q, q_high) - q)
-    wide_high = p - q + math.hypot(max(p, p_high) - p, q - min(q, q_low))
-    return p - q, min(float(low), wide_low), max(float(high), wide_high)
+    low, high = np.nanquantile(one - other, [tail, 1.0 - tail])
+    unseen = clopper_pearson(0, n, confidence)[1]
+    return point, min(float(low), point - unseen), max(float(high), point + unseen)
 
 
 def _drawn(n: int, rng: np.random.Generator) -> Array:
