@@ -1,8 +1,9 @@
 """Between policy and supervisor: a line that delays, drops, doubles and overtakes, as planned.
 
-`python -m genpolicy.wall_clock.proxy PLAN.json --asks FD --answers FD …`: the plan names, for a message of an invocation, when each copy of it goes on: none is a message
-that is lost, two are one that is doubled, and a long one is overtaken by the next. It knows
-nothing of what it passes on but the name of the invocation.
+`python -m genpolicy.wall_clock.proxy PLAN.json --asks FD --answers FD …`. The plan names, for a
+message of an invocation, when each copy of it goes on: none is a message that is lost, two are one
+that is doubled, and a long one is overtaken by the next. It knows nothing of what it passes on but
+the name of the invocation.
 """
 
 import argparse

@@ -1,4 +1,4 @@
-"""Two ways of doing the same units: what is shown alike, what is shown to differ, and what neither."""
+"""Two ways of doing the same units: shown alike, shown to differ, or neither."""
 
 import numpy as np
 import pytest
@@ -91,5 +91,8 @@ def test_nothing_to_compare_is_refused():
         distance(none, np.ones((UNITS, 2)))
     with pytest.raises(ContractError, match="cases on both sides"):
         share_difference(
-            (np.zeros(3), np.zeros(3)), (np.zeros(3), np.ones(3)), confidence=0.9, rng=stream(0, "t")
+            (np.zeros(3), np.zeros(3)),
+            (np.zeros(3), np.ones(3)),
+            confidence=0.9,
+            rng=stream(0, "t"),
         )

@@ -54,9 +54,7 @@ def test_each_kind_of_difference_is_seen(ladder, path, column, value):
 
 
 def test_a_tenth_of_the_episodes_is_neither_shown_alike_nor_different(ladder):
-    evidence.edit_table(
-        ladder, INVOCATIONS, lambda f: on_the_wall(f, "missed", True, share=0.1)
-    )
+    evidence.edit_table(ladder, INVOCATIONS, lambda f: on_the_wall(f, "missed", True, share=0.1))
     assert of(ladder).answer == UNTOLD
 
 
