@@ -20,7 +20,8 @@ from genpolicy.integrity.atomic import output_folder
 from genpolicy.integrity.rows import read_columns
 from genpolicy.policies.matched_training import PolicySettings
 from genpolicy.tasks.fixtures import PINS
-from genpolicy.wall_clock.clocks import WallClockSection, bench, write_clocks
+from genpolicy.wall_clock.bench import WallClockSection, bench, limits_of
+from genpolicy.wall_clock.clocks import write_clocks
 from stages._contracts import require_one_contract
 from stages._stage import ARTIFACTS, Params, main
 
@@ -37,9 +38,11 @@ def work(params: Params) -> None:
         output_folder(ARTIFACTS / "wall_clock") as folder,
         bench(
             load_dataset(ARTIFACTS / "ingest"),
-            task=params.task.name,
-            cell=Cell(params.horizons, params.section("execution", ExecutionSettings)),
-            feasibility=params.section("feasibility", FeasibilitySettings),
+            limits_of(
+                params.task.name,
+                Cell(params.horizons, params.section("execution", ExecutionSettings)),
+                params.section("feasibility", FeasibilitySettings),
+            ),
             section=params.section("wall_clock", WallClockSection),
             samples=params.section("stress", StressSettings).samples,
             root_seed=params.seed,

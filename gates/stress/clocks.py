@@ -27,6 +27,8 @@ WALL_CLOCK = "artifacts/wall_clock"
 INVOCATIONS, AGES = f"{WALL_CLOCK}/invocations.parquet", f"{WALL_CLOCK}/ages.parquet"
 WALL, VIRTUAL = "wall", "virtual"
 AGE, MISSES, DISCARDS, REPLACED = "age_distance", "deadline_misses", "discards", "replacements"
+SHARE = "share"
+"""Tolerance of everything but ages."""
 SHOWN = {
     AGE: "ages of actions", MISSES: "missed deadlines", DISCARDS: "discards",
     REPLACED: "replacements",
@@ -43,7 +45,7 @@ class Difference:
     """One thing that both clocks did.
 
     Attributes:
-        name: What; its tolerance is that of the word before a colon.
+        name: What; a reason stands behind a colon.
         wall: By the wall clock: a share; None of ages.
         virtual: By the virtual clock, likewise.
         interval: Of the difference of the two, or of the distance of ages.
@@ -204,8 +206,7 @@ def _shares(
             rng=stream(settings.root_seed, "clocks", candidate, name),
         )  # fmt: skip
         shares = [float(counted[c][0].sum() / counted[c][1].sum()) for c in (WALL, VIRTUAL)]
-        tolerance = settings.tolerance(name.partition(":")[0])
-        found.append(Difference(name, shares[0], shares[1], (low, high), tolerance))
+        found.append(Difference(name, shares[0], shares[1], (low, high), settings.tolerance(SHARE)))
     return found
 
 

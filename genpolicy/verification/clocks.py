@@ -8,7 +8,6 @@ from typing import Any
 
 from genpolicy.verification.journal_source import Message, read_messages
 
-CLOCKS = ("wall", "virtual")
 GAVE_WAY = ("reset", "superseded")
 """Reasons by which the rest of a chunk ends because another one begins."""
 NS_PER_S = 1e9

@@ -14,9 +14,6 @@ from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import yaml
-from pydantic import Field
-
 from genpolicy.candidates.brought import BroughtPolicy
 from genpolicy.candidates.contenders import Contender, Running
 from genpolicy.candidates.judged import candidates_of
@@ -26,29 +23,19 @@ from genpolicy.candidates.wire.policy import WirePolicy
 from genpolicy.candidates.wire.remote import RemotePolicy
 from genpolicy.contract.latency import Term
 from genpolicy.contract.observation import ObservationContract
-from genpolicy.contract.settings import Settings
-from genpolicy.data.dataset import Dataset
-from genpolicy.evidence.admission_context import make_checker
 from genpolicy.evidence.documents.shadow import CHECKER
 from genpolicy.evidence.rows.clocks import ClockAgeRow, ClockInvocationRow, ClockTickRow
 from genpolicy.evidence.shadow.tables import checker_document
-from genpolicy.evidence.stress.latency import LatencyModel, draw_latency
-from genpolicy.execution.cell import Cell
-from genpolicy.feasibility.admission import FeasibilityChecker
-from genpolicy.feasibility.settings import FeasibilitySettings
+from genpolicy.evidence.stress.latency import LatencyModel
 from genpolicy.integrity.atomic import write_bytes
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.rows import write_rows
-from genpolicy.seeds import stream
-from genpolicy.tasks.api import Task, load_task
-from genpolicy.tasks.fixtures import PINS
 from genpolicy.verification.clocks import derived_windows
 from genpolicy.wall_clock.admission import judge
-from genpolicy.wall_clock.limits import LIMITS, pin_limits, read_limits
+from genpolicy.wall_clock.bench import Bench
+from genpolicy.wall_clock.limits import read_limits
 from genpolicy.wall_clock.policy import answer_of
 from genpolicy.wall_clock.proxy import LinePlan, planned
-from genpolicy.wall_clock.recorded import replay_of
-from genpolicy.wall_clock.replay import Replay
 from genpolicy.wall_clock.request import WallClockRequest
 from genpolicy.wall_clock.run import POLICY, PROXY, start
 from genpolicy.wall_clock.session import SupervisedSession
@@ -56,123 +43,14 @@ from genpolicy.wall_clock.streamed import JOURNAL, StreamedJournal, collect, ses
 from genpolicy.wall_clock.virtual import run_virtually
 
 WALL, VIRTUAL = "wall", "virtual"
-CONDITION = "wall_clock"
-"""Name of the draws, in the place of a perturbation."""
 TO_POLICY = (Term.EXPOSURE, Term.CAPTURE, Term.DECODE, Term.TRANSFER)
 TO_SUPERVISOR = (Term.NETWORK, Term.QUEUE)
 PLAN = "line.json"
-HELD_OUT = "test"
 TABLES: dict[type, str] = {
     ClockInvocationRow: "invocations.parquet",
     ClockAgeRow: "ages.parquet",
     ClockTickRow: "ticks.parquet",
 }
-
-
-class WallClockSection(Settings):
-    """Section `wall_clock`.
-
-    Attributes:
-        episodes: Held-out episodes of which a window is replayed, at most.
-        rows: Rows of a window.
-    """
-
-    episodes: int = Field(ge=1)
-    rows: int = Field(ge=1)
-
-
-@dataclass(frozen=True)
-class Bench:
-    """What all candidates share.
-
-    Attributes:
-        root: Workspace with the pinned limits of the run.
-        task: The task.
-        windows: What is replayed.
-        samples: Candidates that an invocation of a stochastic method draws.
-        root_seed: Root of the draws.
-    """
-
-    root: Path
-    task: Task
-    windows: Sequence[Replay]
-    samples: int
-    root_seed: int
-
-    def terms_s(self, model: LatencyModel, window: int, invocation: int) -> Mapping[str, float]:
-        """The drawn terms of an invocation, s; equal for both clocks where they are declared."""
-        drawn = draw_latency(
-            model, root_seed=self.root_seed, perturbation=CONDITION, start=window,
-            invocation=invocation, extra_s={}, compute_factor=1.0,
-        )  # fmt: skip
-        return drawn.terms
-
-    def checker(self) -> FeasibilityChecker:
-        """The six layers."""
-        limits = read_limits(self.root)
-        return make_checker(
-            self.task, limits.feasibility, action_period_s=limits.horizons.action_period_s
-        )
-
-
-@contextmanager
-def bench(
-    data: Dataset,
-    *,
-    task: str,
-    cell: Cell,
-    feasibility: FeasibilitySettings,
-    section: WallClockSection,
-    samples: int,
-    root_seed: int,
-    pins: Path,
-) -> Iterator[Bench]:
-    """Windows, and limits pinned in a workspace of its own: those of Gate D, and the silence.
-
-    Args:
-        data: The dataset.
-        task: Name of the task.
-        cell: As in Gate D. The deadlines of single terms are left out: a wall clock knows whole
-            answers. Silence stops after as long as recovery begins there.
-        feasibility: Thresholds of the six layers.
-        section: How much is replayed.
-        samples: Candidates that an invocation of a stochastic method draws.
-        root_seed: Root of the draws.
-        pins: The workspace's pinned fixtures.
-    """
-    loaded, execution = load_task(task), cell.execution
-    held_to = execution.model_dump(mode="json", exclude={"term_deadlines", "silence_stop_s"})
-    limits = {
-        "task": task,
-        "horizons": cell.horizons.model_dump(mode="json"),
-        "execution": held_to | {"silence_stop_s": execution.hold_before_recovery_s},
-        "feasibility": feasibility.model_dump(mode="json"),
-    }
-    with TemporaryDirectory() as scratch:
-        root = Path(scratch)
-        write_bytes(root / LIMITS, yaml.safe_dump(limits).encode())
-        shutil.copyfile(pins, root / PINS)
-        pin_limits(root)
-        found = windows(data, loaded, section, root_seed=root_seed)
-        yield Bench(root, loaded, found, samples, root_seed)
-
-
-def windows(
-    data: Dataset, task: Task, section: WallClockSection, *, root_seed: int
-) -> list[Replay]:
-    """A window of each of some held-out episodes that are long enough, from a drawn row on."""
-    generator = stream(root_seed, CONDITION, "windows")
-    held_out = data.split(HELD_OUT).episodes
-    names = sorted(held_out["episode_uuid"].astype(str))
-    whole = (replay_of(data, task, names[at]) for at in generator.permutation(len(names)))
-    found: list[Replay] = []
-    for replay in whole:
-        if len(found) == section.episodes:
-            break
-        if len(replay) >= section.rows:
-            first = int(generator.integers(0, len(replay) - section.rows + 1))
-            found.append(replay.part(first, section.rows))
-    return found
 
 
 def write_clocks(

@@ -133,17 +133,25 @@ def start(
     with log:
         supervising = _begin([*supervisor, str(folder)], theirs, log)
         if line:
-            (far_asks_r, far_asks_w), (far_answers_r, far_answers_w) = os.pipe(), os.pipe()
-            ends = {"asks": asks_r, "answers": far_answers_r, "ask-out": far_asks_w,
-                    "answer-out": answers_w}  # fmt: skip
-            between = _begin(line, ends, None)
-            for descriptor in ends.values():
-                os.close(descriptor)
-            asks_r, answers_w = far_asks_r, far_answers_w
+            between, asks_r, answers_w = _lay(line, asks_r, answers_w)
         proposing = _begin(policy, {"asks": asks_r, "answers": answers_w}, None)
     for descriptor in (*theirs.values(), asks_r, answers_w):
         os.close(descriptor)
     return Running(folder, supervising, proposing, Outbox(operator_w), between)
+
+
+def _lay(
+    line: Sequence[str], asks_r: int, answers_w: int
+) -> tuple["subprocess.Popen[bytes]", int, int]:
+    """A process between the two, and the ends that the policy gets in the place of these."""
+    (asks_out_r, asks_out_w), (answers_in_r, answers_in_w) = os.pipe(), os.pipe()
+    ends = {
+        "asks": asks_r, "answers": answers_in_r, "ask-out": asks_out_w, "answer-out": answers_w,
+    }  # fmt: skip
+    process = _begin(line, ends, None)
+    for descriptor in ends.values():
+        os.close(descriptor)
+    return process, asks_out_r, answers_in_w
 
 
 def _begin(

@@ -288,12 +288,7 @@ PARAMS: dict[str, Any] = {
         ),
     },
     "gate_d": {
-        "tolerances": by_owner(
-            age_distance=(0.15, "controller"),
-            deadline_misses=(0.1, "controller"),
-            discards=(0.1, "controller"),
-            replacements=(0.1, "controller"),
-        ),
+        "tolerances": by_owner(age_distance=(0.15, "controller"), share=(0.1, "controller")),
         "limits": by_owner(
             unmatched_starts=(0, "model"),
             verdict_reachable=(0.8, "model"),

@@ -14,8 +14,10 @@ from genpolicy.evidence.stress.latency import DeclaredTerm, LatencyModel
 from genpolicy.execution.cell import Cell
 from genpolicy.integrity.tables import read_table
 from genpolicy.verification.clocks import derived_windows
+from genpolicy.wall_clock import bench as bench_module
 from genpolicy.wall_clock import clocks
-from genpolicy.wall_clock.clocks import WallClockSection, bench, line, windows, write_clocks
+from genpolicy.wall_clock.bench import WallClockSection, bench, limits_of, windows
+from genpolicy.wall_clock.clocks import line, write_clocks
 from genpolicy.wall_clock.limits import read_limits
 from tests.candidates.conftest import entry_of, serving  # noqa: F401
 
@@ -30,18 +32,17 @@ MODEL = LatencyModel(
 @pytest.fixture
 def shared(data, kit, monkeypatch):
     """Two windows, on limits so slow that a busy machine does not decide."""
-    monkeypatch.setattr(clocks, "HELD_OUT", "train")
+    monkeypatch.setattr(bench_module, "HELD_OUT", "train")
     horizons = kit.HORIZONS.model_copy(update={"action_period_s": PERIOD_S})
     slow = {name: value for name, value in SLOW.items() if name != "maximum_age_s"}
     ages = dict.fromkeys(kit.EXECUTION.maximum_age_s, SLOW["maximum_age_s"])
     execution = kit.EXECUTION.model_copy(
         update=slow | {"maximum_age_s": ages, "hold_before_recovery_s": SLOW["silence_stop_s"]}
     )
-    with bench(
-        data, task="tabletop_insertion", cell=Cell(horizons, execution),
-        feasibility=kit.FEASIBILITY, section=WallClockSection(episodes=2, rows=ROWS), samples=2,
-        root_seed=3, pins=ROOT / "fixtures.yaml",
-    ) as made:  # fmt: skip
+    limits = limits_of("tabletop_insertion", Cell(horizons, execution), kit.FEASIBILITY)
+    section = WallClockSection(episodes=2, rows=ROWS)
+    pins = ROOT / "fixtures.yaml"
+    with bench(data, limits, section=section, samples=2, root_seed=3, pins=pins) as made:
         yield made
 
 
@@ -97,8 +98,8 @@ def test_both_clocks_draw_the_same_declared_terms(shared):
 def test_a_policy_behind_the_wire_is_asked_by_both(
     shared,
     policy,
-    serving,
-    entry_of,
+    serving,  # noqa: F811
+    entry_of,  # noqa: F811
     tmp_path,
 ):
     served = ServedPolicy(policy)
@@ -116,7 +117,7 @@ def test_a_policy_behind_the_wire_is_asked_by_both(
 
 
 def test_windows_are_drawn_by_name_and_short_episodes_are_left_out(data, task, monkeypatch):
-    monkeypatch.setattr(clocks, "HELD_OUT", "train")
+    monkeypatch.setattr(bench_module, "HELD_OUT", "train")
     section = WallClockSection(episodes=3, rows=ROWS)
     first = windows(data, task, section, root_seed=3)
     assert first == windows(data, task, section, root_seed=3)
