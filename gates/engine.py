@@ -90,6 +90,7 @@ class GateSpec:
         below: Gate that candidates must have passed to stand here; None without candidates.
         note: Text behind the diagnosis, where a gate has one.
         decide: Own decision, where the common one does not do.
+        said: What the report says of the evidence beside criteria, as caveats.
     """
 
     gate: Gate
@@ -102,6 +103,7 @@ class GateSpec:
     below: Gate | None = None
     note: Callable[[Judged], str] | None = None
     decide: Callable[[Judged], Decision] | None = None
+    said: Callable[[Judged], Sequence[str]] | None = None
 
 
 def judge_gate(spec: GateSpec, root: Path) -> GateReport:
@@ -177,10 +179,10 @@ def judge(
     evidence.bind(*spec.bind)
     lacking = _lacking(evidence)
     verdict = "INCONCLUSIVE" if lacking and verdict == "PASS" else verdict
-    basis = evidence.basis
     judged = Judged(evidence, inputs, tuple(answers), verdict, verdicts)
     decision = (spec.decide or _decision(spec))(judged)
     note = spec.note(judged) if spec.note else ""
+    said = spec.said(judged) if spec.said else ()
     return GateReport(
         schema_version=SCHEMA_VERSION,
         gate=spec.gate,
@@ -189,12 +191,12 @@ def judge(
         criteria=judged.answers,
         materials=evidence.materials,
         upstream=upstream_hashes(evidence.root, spec.gate),
-        code=dict(basis.code),
-        parameters=dict(basis.parameters),
-        pipeline=dict(basis.pipeline),
+        code=dict(evidence.basis.code),
+        parameters=dict(evidence.basis.parameters),
+        pipeline=dict(evidence.basis.pipeline),
         settings=settings.model_dump(mode="json"),
         environment=environment(),
-        caveats=(*spec.caveats, *_waivers(limits), *settings.caveats, *caveats, *lacking),
+        caveats=(*spec.caveats, *_waivers(limits), *settings.caveats, *said, *caveats, *lacking),
         diagnosis=f"{_diagnosis(spec, judged)} {note}".strip(),
         decision=decision.text,
         promoted=decision.promoted,

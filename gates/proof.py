@@ -57,6 +57,7 @@ STAGE_REQUIRES: dict[str, Gate | None] = {
     "gate_b": None,
     "shadow": "B",
     "gate_c": None,
+    "wall_clock": "C",
     "stress": "C",
     "gate_d": None,
     "card": "D",

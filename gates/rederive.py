@@ -12,6 +12,7 @@ from typing import Any
 
 from gates.proof import Rung
 from gates.rederive_brought import rederive_brought
+from gates.rederive_clocks import rederive_clocks
 from gates.rederive_conformance import rederive_conformance
 from gates.rederive_dataset import TRAININGS, rederive_dataset, rederive_trainings, trainings
 from gates.rederive_distilled import rederive_costs, rederive_distilled
@@ -119,6 +120,7 @@ def rederive(root: Path, gate: Gate) -> None:
         rederive_shadow_draws(root, params)
     else:
         _tables(root, params, held_to[1], journals)
+        rederive_clocks(root, params, held_to)
         rederive_latency(root, params, journals)
         rederive_disturbance(params, journals)
         rederive_rollout_draws(root, params, journals)

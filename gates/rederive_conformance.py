@@ -146,7 +146,7 @@ def _ask_again(
     if wire.absent:
         if first:
             refuse("B", f"{ANSWERS}: {wire.method}", f"{len(first)} answers of a server",
-                   f"one that starts ({wire.last_words})")  # fmt: skip
+                   f"one that starts ({wire.remote})")  # fmt: skip
         return
     told = (wire.told.seeded, wire.told.counts_evaluations)
     if told != (stated.seeded, stated.counts_evaluations):

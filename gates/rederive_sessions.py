@@ -33,11 +33,23 @@ TOLERANCE = 1e-6
 
 
 def rederive_sessions(
-    root: Path, gate: Gate, params: Mapping[str, Any], journals: Sequence[Path]
+    root: Path,
+    gate: Gate,
+    params: Mapping[str, Any],
+    journals: Sequence[Path],
+    *,
+    recorded: bool = False,
 ) -> None:
     """Hold the maker of every session against the trained policies, and its start against the plan.
 
     Gate C changes the active maker within a session on purpose; there the first one counts.
+
+    Args:
+        root: Root of the workspace.
+        gate: Whose evidence it is.
+        params: `params.yaml`.
+        journals: Their files.
+        recorded: Whether they replay recordings, where nothing joins and no start was planned.
 
     Raises:
         RefusedError: A session was made by another policy, or began elsewhere.
@@ -46,8 +58,8 @@ def rederive_sessions(
         BadInputError: A file cannot be read.
     """
     seed = training_seed(params)
-
-    joining = section(params, "stress", StressSettings).joining if gate == "D" else REPLACING
+    simulated = gate == "D" and not recorded
+    joining = section(params, "stress", StressSettings).joining if simulated else REPLACING
 
     @cache
     def maker(method: str) -> Maker | None:
@@ -56,7 +68,7 @@ def rederive_sessions(
             return other.sha256, joining.named(method).sampler_hash(other.sampler_sha256)
         return _maker(root, method, seed, joining.named(method))
 
-    planned = _planned(params) if gate == "D" else []
+    planned = _planned(params) if simulated else []
     for path in journals:
         with readable(f"{path.parent.name}/{path.name}"):
             sessions = begun_sessions(path)
@@ -68,7 +80,7 @@ def rederive_sessions(
                     made = ", ".join(sorted(checkpoint for checkpoint, _ in others)) or "nobody"
                     refuse(gate, f"{place}: made by", made, "the policy of that name, as trained")
                 _joined(gate, place, session, joining)
-                if gate == "D":
+                if simulated:
                     _began(gate, place, session, planned)
 
 

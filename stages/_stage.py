@@ -30,7 +30,7 @@ Model = TypeVar("Model", bound=BaseModel)
 PARAMS = Path("params.yaml")
 ARTIFACTS = Path("artifacts")
 TIMES = Path("build/times")
-SILENT = ("latency",)
+SILENT = ("latency", "wall_clock")
 """Stages that measure time: nothing else runs in their process meanwhile."""
 TRAINS, RARELY_S = "train_", 60.0
 """Stages whose processes say how far they are; how often the stage itself speaks beside them."""
@@ -38,7 +38,7 @@ TRAINS, RARELY_S = "train_", 60.0
 STAGES = (
     "task", "record", "ingest", "audit", "train_baselines", "measure_baselines", "train_factors",
     "measure_factors", "gate_a", "candidates", "train_generators", "reload", "latency", "gate_b",
-    "shadow", "gate_c", "stress", "gate_d", "card", "gate_e",
+    "shadow", "gate_c", "wall_clock", "stress", "gate_d", "card", "gate_e",
 )  # fmt: skip
 SHARED = (
     "seed", "confidence", "task", "source", "horizons", "compute", "policy", "feasibility",

@@ -27,6 +27,7 @@ from gates.pages import (
     plots_rejected,
     plots_stress,
     plots_time,
+    tables_clocks,
     tables_faults,
     tables_feasibility,
     tables_holds,
@@ -76,6 +77,7 @@ PLOTS: dict[str, tuple[Picturable, ...]] = {
     ),
     "D": (
         *plots_stress.PLOTS,
+        tables_clocks.CLOCKS,
         tables_overruns.DONE,
         tables_faults.FAILED,
         *tables_stress.LISTINGS,

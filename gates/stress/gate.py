@@ -14,6 +14,7 @@ from gates.evidence import Evidence, MissingEvidenceError, flags
 from gates.preregistration import PREREGISTRATION
 from gates.stress import cost, safety, trial
 from gates.stress.choice import choose
+from gates.stress.clocks import clocks_said
 from gates.stress.pairs import paired_differences
 from gates.stress.rollouts import JOURNALS, StressSettings, rollouts
 from genpolicy.statistics.eprocess import paired_e_value
@@ -84,4 +85,5 @@ GATE = GateSpec(
     ),
     below="C",
     decide=_decide,
+    said=clocks_said,
 )

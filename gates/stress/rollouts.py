@@ -10,6 +10,7 @@ from gates.again import CHANGED
 from gates.bounds import share_interval
 from gates.criterion import Measured
 from gates.evidence import Evidence, MissingEvidenceError, flags
+from gates.report import Owner
 from gates.settings import CandidateSettings
 from genpolicy.evidence.rows.stress import RolloutRow
 
@@ -42,6 +43,7 @@ class StressSettings(CandidateSettings):
         execution_horizon: Actions of a chunk that may be executed.
         action_period_s: Period of the actions, s.
         unmatched: Candidates that are compared by exception; none is ranked among the others.
+        tolerances: By owner: what the two clocks may differ by, and why; nothing is judged by it.
     """
 
     homes: ClassVar[Mapping[str, str]] = {
@@ -67,6 +69,11 @@ class StressSettings(CandidateSettings):
     execution_horizon: int = Field(gt=0)
     action_period_s: float = Field(gt=0.0)
     unmatched: tuple[str, ...] = ()
+    tolerances: dict[Owner, dict[str, tuple[float, str]]] = Field(default_factory=dict)
+
+    def tolerance(self, name: str) -> float | None:
+        """What the clocks may differ by in one respect; None where nobody has said."""
+        return next((of[name][0] for of in self.tolerances.values() if name in of), None)
 
     def excepted(self, criterion: str, candidate: str | None) -> bool:
         """Whether a criterion is asked of those that were brought only, and this one was not."""

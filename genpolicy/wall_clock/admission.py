@@ -7,6 +7,8 @@ and the watchdog from nothing.
 
 import os
 import threading
+import time
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from queue import SimpleQueue
@@ -20,6 +22,9 @@ from genpolicy.feasibility.admission import Admitted, FeasibilityChecker, Reject
 from genpolicy.tasks.api import Task
 
 Array = NDArray[np.float64]
+
+REMEMBERED, MOST_SHARE = 64, 0.9
+"""Jobs that are remembered, and the share of them that the usual time covers."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +89,14 @@ class AdmissionThread:
         self._jobs: SimpleQueue[Job] = SimpleQueue()
         self._results: SimpleQueue[tuple[Job, Result]] = SimpleQueue()
         self._busy = False
+        self._took_s: deque[float] = deque(maxlen=REMEMBERED)
         threading.Thread(target=self._work, name="admission", daemon=True).start()
+
+    @property
+    def usual_s(self) -> float:
+        """How long most of the last jobs took, s; 0 before the first."""
+        known = sorted(self._took_s)
+        return known[int(MOST_SHARE * len(known))] if known else 0.0
 
     def submit(self, job: Job) -> bool:
         """Whether the job was taken; not while another one is judged."""
@@ -105,10 +117,12 @@ class AdmissionThread:
     def _work(self) -> None:
         while True:
             job = self._jobs.get()
+            begun_s = time.monotonic()
             found: Result = None
             try:
                 found = self._judged(job)
             except Exception:  # whatever a policy answered, the thread goes on
                 self.failures += 1
+            self._took_s.append(time.monotonic() - begun_s)
             self._results.put((job, found))
             os.write(self._wake, b".")

@@ -152,7 +152,9 @@ class Loop:
             if answer is None:
                 session.tally.dropped["malformed"] += 1
             else:
-                session.answer(answer, now_s, self._admission.submit)
+                session.answer(
+                    answer, now_s, self._admission.submit, judging_s=self._admission.usual_s
+                )
         judged = self._admission.result()
         if judged is not None:
             session.decide(*judged, self._now())

@@ -1,6 +1,8 @@
-"""The policy's process: `python -m genpolicy.wall_clock.policy CHECKPOINT SHA256 --asks FD …`.
+"""The policy's process: `python -m genpolicy.wall_clock.policy POLICY SHA256 --asks FD …`.
 
-It answers what it is asked, one candidate each, and is trusted with nothing.
+POLICY is the folder of a checkpoint, or the file of an entry whose server listens at `--address`.
+It answers what it is asked, the first of the candidates that an invocation draws, and is trusted
+with nothing.
 """
 
 import argparse
@@ -10,7 +12,14 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from genpolicy.candidates.brought import BroughtPolicy
+from genpolicy.candidates.hosts.kinds import read_entry
+from genpolicy.candidates.hosts.translation import as_server
+from genpolicy.candidates.wire.policy import WirePolicy
+from genpolicy.candidates.wire.remote import RemotePolicy
 from genpolicy.policies.policy import load_policy
+from genpolicy.policies.protocol import Policy
+from genpolicy.tasks.api import load_task
 from genpolicy.wall_clock.channel import Inbox, frame
 from genpolicy.wall_clock.messages import Answer, Ask
 
@@ -18,25 +27,51 @@ from genpolicy.wall_clock.messages import Answer, Ask
 def main(arguments: Sequence[str] | None = None) -> int:
     """Answer until nobody asks any more. Returns the exit code."""
     parser = argparse.ArgumentParser(prog="genpolicy.wall_clock.policy")
-    parser.add_argument("checkpoint", type=Path)
+    parser.add_argument("policy", type=Path)
     parser.add_argument("sha256")
+    parser.add_argument("--candidates", type=int, default=1, help="drawn in an invocation")
+    parser.add_argument("--address", default="", help="of the server of a policy that is brought")
+    parser.add_argument("--task", default="", help="whose observation the server is given")
     for name in ("asks", "answers"):
         parser.add_argument(f"--{name}", type=int, required=True, help="file descriptor")
     given = parser.parse_args(arguments)
-    policy = load_policy(given.checkpoint, expected_sha256=given.sha256)
+    if given.address:
+        policy: Policy = _behind_the_wire(given.policy, given.sha256, given.address, given.task)
+    else:
+        policy = load_policy(given.policy, expected_sha256=given.sha256)
     inbox = Inbox(given.asks)
     while not inbox.closed:
         select.select([inbox.descriptor], [], [])
         for payload in inbox.read():
-            ask = Ask.decoded(payload)
-            drawn = policy.sample(ask.observations[None], noise_names=[ask.noise], candidates=1)
-            answer = Answer(
-                ask.invocation, policy.checkpoint_hash, policy.sampler_config_hash, policy.method,
-                drawn.actions[0, 0],
-            )  # fmt: skip
+            answer = answer_of(policy, Ask.decoded(payload), candidates=given.candidates)
             if not _send(given.answers, frame(answer.encoded())):
                 return 0
     return 0
+
+
+def answer_of(policy: Policy, ask: Ask, *, candidates: int) -> Answer:
+    """The first of the candidates that a policy draws for what it is asked.
+
+    Args:
+        policy: Who answers.
+        ask: The invocation.
+        candidates: How many are drawn; their number is part of the latency.
+    """
+    drawn = policy.sample(ask.observations[None], noise_names=[ask.noise], candidates=candidates)
+    return Answer(
+        ask.invocation, policy.checkpoint_hash, policy.sampler_config_hash, policy.method,
+        drawn.actions[0, 0],
+    )  # fmt: skip
+
+
+def _behind_the_wire(path: Path, sha256: str, address: str, task: str) -> WirePolicy:
+    """A brought policy whose server runs, and is ended, elsewhere."""
+    entry, cell = read_entry(path), load_task(task)
+    brought = BroughtPolicy(entry.name, path, entry, sha256, seed=0)
+    server = as_server(entry, path, cell.observation)
+    return WirePolicy(
+        brought, RemotePolicy(server, address, cell.observation, scene=cell.scene_path)
+    )
 
 
 def _send(descriptor: int, data: bytes) -> bool:

@@ -13,7 +13,7 @@ import signal
 import sys
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -64,24 +64,41 @@ def main(arguments: Sequence[str] | None = None, *, clock: Clock = time.monotoni
         request = read_request(given.folder)
         limits = read_limits(Path(request.root))
         task, checker = _cell(limits)
-        earlier = sessions_of(given.folder)
-        name = f"{request.method}/wall_clock/{len(earlier)}"
-        labels = {"method": request.method, "episode": request.replay.episode_uuid}
-        journal = StreamedJournal(name, session_file(given.folder, len(earlier)), labels)
+        sessions = _sessions(given.folder, request, limits, task)
+        session = next(sessions)
     except BadInputError as error:
         print(error, file=sys.stderr)
         return error.exit_code
     sys.setswitchinterval(SWITCH_INTERVAL_S)
+    answers, operator, asks = Inbox(given.answers), Inbox(given.operator), Outbox(given.asks)
+    admission = AdmissionThread(partial(judge, task, checker))
+    while True:
+        loop = Loop(
+            session, rows=len(session.replay), answers=answers, asks=asks, operator=operator,
+            admission=admission, clock=clock,
+        )  # fmt: skip
+        loop.run()
+        _conclude(given.folder, request, loop, {"answers": answers, "operator": operator})
+        over = session.ended or operator.closed or bool(session.journal.lost)
+        following = None if over else next(sessions, None)
+        if following is None:
+            return 0
+        session = following
+
+
+def _sessions(
+    folder: Path, request: WallClockRequest, limits: WallClockLimits, task: Task
+) -> Iterator[SupervisedSession]:
+    """A session for each replay; one that goes on in the folder of a stop begins stopped."""
+    earlier = sessions_of(folder)
     stands = bool(earlier) and stop_may_stand(earlier[-1])
-    session = SupervisedSession(task, limits.cell, request, journal, stop_stands=stands)
-    answers, operator = Inbox(given.answers), Inbox(given.operator)
-    loop = Loop(
-        session, rows=len(request.replay), answers=answers, asks=Outbox(given.asks),
-        operator=operator, admission=AdmissionThread(partial(judge, task, checker)), clock=clock,
-    )  # fmt: skip
-    loop.run()
-    _conclude(given.folder, request, loop, {"answers": answers, "operator": operator})
-    return 0
+    for number, replay in enumerate((request.replay, *request.then), start=len(earlier)):
+        name = f"{request.method}/wall_clock/{number}"
+        labels = {"method": request.method, "episode": replay.episode_uuid}
+        journal = StreamedJournal(name, session_file(folder, number), labels)
+        one = request.model_copy(update={"replay": replay, "then": ()})
+        yield SupervisedSession(task, limits.cell, one, journal, stop_stands=stands)
+        stands = False
 
 
 def _refuse_learned() -> None:

@@ -47,6 +47,15 @@ class Replay(Settings):
     def __len__(self) -> int:
         return len(self.phases)
 
+    def part(self, begin: int, rows: int) -> "Replay":
+        """Some rows of it, from one on, as a replay of its own."""
+        cut = slice(begin, begin + rows)
+        return Replay(
+            episode_uuid=self.episode_uuid, calibration_epoch=self.calibration_epoch,
+            phases=self.phases[cut], observations=self.observations[cut],
+            actions=self.actions[cut], forces_n=self.forces_n[cut],
+        )  # fmt: skip
+
     @cached_property
     def observation_rows(self) -> Array:
         """Observations. Shape (n, D_o)."""

@@ -25,6 +25,7 @@ class WallClockRequest(Settings):
         checkpoint: Weights that may command; chunks of others are discarded.
         sampler: Sampler settings that may.
         replay: The recorded episode.
+        then: Further ones, each a session of its own that begins like the first of a folder.
     """
 
     root: str
@@ -32,6 +33,7 @@ class WallClockRequest(Settings):
     checkpoint: str = Field(max_length=LONGEST_NAME)
     sampler: str = Field(max_length=LONGEST_NAME)
     replay: Replay
+    then: tuple[Replay, ...] = ()
 
     def write(self, folder: Path) -> None:
         """Put it into the folder of a run.

@@ -22,6 +22,7 @@ from genpolicy.wall_clock.request import OUTCOME, WallClockRequest
 from genpolicy.wall_clock.streamed import collect
 
 SUPERVISOR = (sys.executable, "-m", "genpolicy.wall_clock.process")
+PROXY = (sys.executable, "-m", "genpolicy.wall_clock.proxy")
 POLICY = (sys.executable, "-m", "genpolicy.wall_clock.policy")
 LOG = "supervisor.log"
 REFUSED = 2
@@ -36,12 +37,14 @@ class Running:
         supervisor: The supervisor's process.
         policy: The policy's process.
         operator: To the supervisor's process, from a person.
+        line: The process between the two, where there is one.
     """
 
     folder: Path
     supervisor: "subprocess.Popen[bytes]"
     policy: "subprocess.Popen[bytes]"
     operator: Outbox
+    line: "subprocess.Popen[bytes] | None" = None
 
     def say(self, order: Order, person: str = "") -> bool:
         """Whether what a person wants went on its way.
@@ -65,8 +68,10 @@ class Running:
                 and the next run in this folder begins stopped.
         """
         code = self.supervisor.wait(timeout_s)
-        self.policy.kill()
-        self.policy.wait()
+        for process in (self.policy, self.line):
+            if process is not None:
+                process.kill()
+                process.wait()
         self.operator.close()
         if code == REFUSED:
             raise ConfigError(
@@ -91,6 +96,7 @@ def start(
     policy: Sequence[str],
     *,
     supervisor: Sequence[str] = SUPERVISOR,
+    line: Sequence[str] = (),
 ) -> Running:
     """Start a run.
 
@@ -100,6 +106,7 @@ def start(
         request: What is replayed, and who may command.
         policy: Command of the policy's process; `--asks FD --answers FD` are added.
         supervisor: Command of the supervisor's.
+        line: Command of a process between the two, if any.
 
     Raises:
         ConfigError: Limits or fixtures are not as pinned.
@@ -122,12 +129,29 @@ def start(
         os.pipe() for _ in range(3)
     )
     theirs = {"answers": answers_r, "asks": asks_w, "operator": operator_r}
+    between: subprocess.Popen[bytes] | None = None
     with log:
         supervising = _begin([*supervisor, str(folder)], theirs, log)
+        if line:
+            between, asks_r, answers_w = _lay(line, asks_r, answers_w)
         proposing = _begin(policy, {"asks": asks_r, "answers": answers_w}, None)
     for descriptor in (*theirs.values(), asks_r, answers_w):
         os.close(descriptor)
-    return Running(folder, supervising, proposing, Outbox(operator_w))
+    return Running(folder, supervising, proposing, Outbox(operator_w), between)
+
+
+def _lay(
+    line: Sequence[str], asks_r: int, answers_w: int
+) -> tuple["subprocess.Popen[bytes]", int, int]:
+    """A process between the two, and the ends that the policy gets in the place of these."""
+    (asks_out_r, asks_out_w), (answers_in_r, answers_in_w) = os.pipe(), os.pipe()
+    ends = {
+        "asks": asks_r, "answers": answers_in_r, "ask-out": asks_out_w, "answer-out": answers_w,
+    }  # fmt: skip
+    process = _begin(line, ends, None)
+    for descriptor in ends.values():
+        os.close(descriptor)
+    return process, asks_out_r, answers_in_w
 
 
 def _begin(

@@ -6,6 +6,7 @@ policy answered and what a person wants. Nothing moves: before each invocation t
 to where the recorded arm is, which clears no stop.
 """
 
+import math
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -28,6 +29,9 @@ from genpolicy.wall_clock.messages import Answer, Ask, Operator, Order
 from genpolicy.wall_clock.replay import Replay
 from genpolicy.wall_clock.request import WallClockRequest
 from genpolicy.wall_clock.streamed import StreamedJournal
+
+ROUNDING = 1e-6
+"""Of a period."""
 
 
 @dataclass
@@ -75,6 +79,7 @@ class SupervisedSession:
     Attributes:
         ended: A person wants the end.
         tally: What is counted.
+        replay: What is replayed.
     """
 
     def __init__(
@@ -88,7 +93,7 @@ class SupervisedSession:
     ) -> None:
         self.journal, self.cell, self.tally, self.ended = journal, cell, Tally(), False
         self._task, self._request = task, request
-        self._replay: Replay = request.replay
+        self.replay: Replay = request.replay
         self.stub = ControllerStub(cell, journal, Supervisor(cell.execution, journal))
         self.executor = Executor(cell, journal, self.stub)
         self.executor.set_active(0.0, request.checkpoint, request.sampler)
@@ -109,21 +114,21 @@ class SupervisedSession:
         Returns:
             What the policy is asked next, if anything.
         """
-        self._row, replay, executor = row, self._replay, self.executor
+        self._row, replay, executor = row, self.replay, self.executor
         phase = replay.phases[row]
         executor.observe(now_s, now_s, phase, replay.calibration_epoch)
         if self.stub.supervisor.observe_force(now_s, replay.forces_n[row], phase):
             executor.force_event(now_s)
         executor.tick(now_s)
         asked = self._asked
-        if asked is not None and not now_s - asked.asked_s <= self.cell.execution.deadline_s:
+        if asked is not None and self._overdue(asked, now_s):
             self._give_up(asked, now_s)
         if self.journal.doubt or self._asked is not None or not executor.needs_invocation(now_s):
             return None
         return self._ask(now_s, row)
 
     def _ask(self, now_s: float, row: int) -> Ask:
-        executor, replay, horizons = self.executor, self._replay, self.cell.horizons
+        executor, replay, horizons = self.executor, self.replay, self.cell.horizons
         phase, start_s = replay.phases[row], row * horizons.action_period_s
         if self._asks:  # the arm is where the operator brought it, not where the last chunk ended
             executor.reset(now_s)
@@ -153,8 +158,22 @@ class SupervisedSession:
             (replay.episode_uuid, str(row)),
         )
 
-    def answer(self, answer: Answer, now_s: float, submit: Callable[[Job], bool]) -> None:
-        """A policy answers; only the first answer to what was asked is taken."""
+    def answer(
+        self,
+        answer: Answer,
+        now_s: float,
+        submit: Callable[[Job], bool],
+        *,
+        judging_s: float = 0.0,
+    ) -> None:
+        """A policy answers; only the first answer to what was asked is taken.
+
+        Args:
+            answer: What it says.
+            now_s: Time, s.
+            submit: Whether a job was taken by who judges.
+            judging_s: How long a verdict usually takes, s.
+        """
         asked = self._asked
         if asked is None or asked.answered_s is not None:
             self.tally.dropped["unsolicited"] += 1
@@ -168,8 +187,8 @@ class SupervisedSession:
             sampler_config_hash=answer.sampler, method=answer.method,
         )  # fmt: skip
         self.executor.end_invocation(now_s, asked.metadata.chunk_id, "answered")
-        replay, row = self._replay, asked.row
-        late_rows = self._row + 1 - row
+        replay, row = self.replay, asked.row
+        late_rows = self._next_row(now_s, judging_s) - row
         if late_rows >= self.cell.horizons.execution_horizon:
             self._write_off(asked, DiscardReason.EXPIRED, now_s, dropped="too_late")
             return
@@ -234,6 +253,21 @@ class SupervisedSession:
             self._give_up(self._asked, now_s)
         return self.executor.end_episode(now_s)
 
+    def _overdue(self, asked: Asked, now_s: float) -> bool:
+        """Whether its deadline is over, in whole periods: a tick is late by less than one."""
+        period_s = self.cell.horizons.action_period_s
+        waited = (now_s - asked.asked_s) / period_s
+        if not math.isfinite(waited):
+            return True
+        return round(waited) >= self.cell.execution.deadline_s / period_s - ROUNDING
+
+    def _next_row(self, now_s: float, judging_s: float) -> int:
+        """The first row for which a verdict is in time: a chunk cannot begin behind its first."""
+        period_s = self.cell.horizons.action_period_s
+        next_s = (self._row + 1) * period_s
+        beyond = (min(now_s, next_s) + judging_s - next_s) / period_s
+        return self._row + 1 + max(0, math.ceil(beyond - ROUNDING))
+
     def _give_up(self, asked: Asked, now_s: float) -> None:
         if asked.answered_s is None:
             self.executor.end_invocation(now_s, asked.metadata.chunk_id, "deadline")
@@ -250,7 +284,7 @@ class SupervisedSession:
 
     def _in_force(self) -> Session:
         return Session(
-            calibration_epoch=self._replay.calibration_epoch,
+            calibration_epoch=self.replay.calibration_epoch,
             session_epoch=self.executor.session_epoch,
             checkpoint=self._request.checkpoint,
             sampler=self._request.sampler,

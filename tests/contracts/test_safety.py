@@ -186,6 +186,7 @@ MAY_IMPORT = {
     *("argparse", "collections", "dataclasses", "enum", "functools", "json", "math", "pathlib"),
     *("os", "queue", "select", "signal", "struct", "subprocess", "sys", "threading", "time"),
     *("typing", "zlib", "genpolicy", "mcap", "numpy", "pydantic", "yaml"),
+    *("contextlib", "heapq", "shutil", "tempfile"),
 }
 
 

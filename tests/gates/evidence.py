@@ -37,6 +37,7 @@ from genpolicy.audit.rows import (
 from genpolicy.audit.shown_rows import Alignment, ExampleChunk
 from genpolicy.candidates.votes import VOTE_CHECKS
 from genpolicy.data.rows import EpisodeRow, FrameRow
+from genpolicy.evidence.rows.clocks import ClockAgeRow, ClockInvocationRow, ClockTickRow
 from genpolicy.evidence.rows.need import (
     EffectRow,
     FactorErrorRow,
@@ -291,6 +292,7 @@ PARAMS: dict[str, Any] = {
         ),
     },
     "gate_d": {
+        "tolerances": by_owner(age_distance=(0.15, "controller"), share=(0.1, "controller")),
         "limits": by_owner(
             unmatched_starts=(0, "model"),
             verdict_reachable=(0.8, "model"),
@@ -434,6 +436,7 @@ def build(root: Path) -> None:
     _candidates_drawn(root)
     _shadow(root)
     _stress(root)
+    _clocks(root)
     (root / CODE).parent.mkdir(parents=True)
     (root / CODE).write_text("STIFFNESS = 1\n")
     (root / "dvc.yaml").write_text(yaml.safe_dump({"stages": {}}))
@@ -1398,6 +1401,45 @@ def _succeeds(method: str, start: int) -> bool:
 def _answer_s(method: str, lot: int) -> float:
     """Between 0.05 and 0.06 s; of diffusion, 0.02 s more."""
     return 0.05 + 0.0001 * (lot % 100) + (0.02 if method == "diffusion" else 0.0)
+
+
+def _clocks(root: Path) -> None:
+    """One candidate's clocks agree; by the wall clock the other misses every second deadline."""
+    windows = [
+        (method, clock, f"held_out_{n:02}")
+        for method in CANDIDATES for clock in ("wall", "virtual") for n in range(48)
+    ]  # fmt: skip
+
+    def key(window: tuple[str, str, str]) -> dict[str, Any]:
+        return dict(zip(("method", "clock", "episode"), window, strict=True))
+
+    def late(method: str, clock: str, number: int) -> bool:
+        return method == "diffusion" and clock == "wall" and number % 2 == 1
+
+    asked = [(*window, number) for window in windows for number in range(3)]
+    rows = [
+        {
+            **key((m, c, e)), "invocation": n, "in_time": True, "missed": late(m, c, n),
+            "discarded_by": "expired" if late(m, c, n) else "", "replaced": not late(m, c, n),
+        }
+        for m, c, e, n in asked
+    ]  # fmt: skip
+    table(root, "wall_clock/invocations.parquet", ClockInvocationRow, rows)
+    ages = [
+        {**key((m, c, e)), "invocation": n, "row": row, "age_s": 0.05 * row + 0.001}
+        for m, c, e, n in asked for row in (1, 2, 3) if not late(m, c, n)
+    ]  # fmt: skip
+    table(root, "wall_clock/ages.parquet", ClockAgeRow, ages)
+    ticks = [{**key(w), "ticks": 16, "late_p95_s": 0.002, "late_max_s": 0.004} for w in windows]
+    table(root, "wall_clock/ticks.parquet", ClockTickRow, ticks)
+    names = [f"{m}__{c}.mcap" for m in CANDIDATES for c in ("wall", "virtual")]
+    (root / "artifacts/wall_clock/journals").mkdir()
+    for name in names:
+        (root / "artifacts/wall_clock/journals" / name).write_bytes(b"journal")
+    read = [checked(name, 100) for name in names]
+    each = {name: of for one in read for name, of in one["journals"].items()}
+    total = {"violations": [], "checked_actions": 400, "reproved_actions": 400}
+    document(root, "wall_clock/checker.json", total | {"journals": each})
 
 
 def _stress(root: Path) -> None:

@@ -172,9 +172,9 @@ def test_what_could_not_be_judged_is_infeasible(told):
 
 
 def test_a_recorded_force_above_the_limit_stops(told, kit):
-    limit_n = kit.EXECUTION.force_limit_n[told.session._replay.phases[0]]
-    forces = [limit_n, limit_n + 1e-6] + [0.0] * (len(told.session._replay) - 2)
-    told.session._replay = told.session._replay.model_copy(update={"forces_n": tuple(forces)})
+    limit_n = kit.EXECUTION.force_limit_n[told.session.replay.phases[0]]
+    forces = [limit_n, limit_n + 1e-6] + [0.0] * (len(told.session.replay) - 2)
+    told.session.replay = told.session.replay.model_copy(update={"forces_n": tuple(forces)})
     told.answer(told.tick())
     told.decide()
     assert not told.session.stub.supervisor.stopped
@@ -224,3 +224,26 @@ def test_a_cause_without_a_person_is_an_emergency_stop(told):
     told.tick()
     told.session.fail(0.01, "no clock")
     assert told.session.journal.last("supervisor")["detail"] == "no clock"
+
+
+@pytest.mark.parametrize(
+    ("at", "judging_s", "first"),
+    [(0.01, 0.0, 1), (0.01, 0.03, 1), (0.01, 0.05, 2), (0.045, 0.01, 2), (0.06, 0.01, 2)],
+)
+def test_a_chunk_is_judged_for_the_first_row_that_its_verdict_can_be_in_time_for(
+    told, at, judging_s, first
+):
+    """Another first row than the one that was checked could not begin: nobody checked the way."""
+    ask = told.tick()
+    actions = np.tile(told.task.action_at(ask.observations[-1]), (16, 1))
+    answer = Answer(ask.invocation, "c" * 64, "5" * 64, "m", actions)
+    told.session.answer(answer, at, told.take, judging_s=judging_s)
+    assert told.jobs[0].late_rows == first
+
+
+def test_a_deadline_of_three_periods_passes_at_the_third_tick_however_it_jitters(told):
+    told.tick(0.004)
+    told.tick(0.05)
+    told.tick(0.1)
+    told.tick(0.1501)
+    assert told.session.tally.dropped["deadline"] == 1
