@@ -8,7 +8,7 @@ measured. Both replay the windows one after the other, each a session of its own
 
 import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -74,8 +74,11 @@ def write_clocks(
     paths: list[Path] = []
     for candidate in candidates:
         # A server that is not there costs its candidate the comparison, and Gate D says so.
-        with suppress(PolicyError):
+        try:
             paths += run_both(shared, candidate, models[candidate.name], journals=journals)
+        except PolicyError:
+            for left in journals.glob(f"{candidate.name}__*"):
+                left.unlink()
     cell = read_limits(shared.root).cell
     found = derived_windows(paths, deadline_s=cell.execution.deadline_s)
     for row, columns in (
@@ -102,7 +105,7 @@ def run_both(
         Paths of the two journals.
 
     Raises:
-        PolicyError: It is behind the wire, and its server is not there; no journal is left.
+        PolicyError: It is behind the wire, and its server is not there.
         GenpolicyError: The supervisor's process died.
         IntegrityError: Its files are not those of its identity.
     """
