@@ -25,7 +25,6 @@ from genpolicy.replay.journal_file import read_session
 from genpolicy.tasks.api import load_task
 
 MOST = 6
-SUCCESS = "success"
 KEPT_FILMS = 16
 """The desk is printed again by every gate; the same journal is not read twice in a process."""
 

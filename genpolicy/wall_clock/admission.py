@@ -89,13 +89,13 @@ class AdmissionThread:
         self._jobs: SimpleQueue[Job] = SimpleQueue()
         self._results: SimpleQueue[tuple[Job, Result]] = SimpleQueue()
         self._busy = False
-        self._took_s: deque[float] = deque(maxlen=REMEMBERED)
+        self._lasted_s: deque[float] = deque(maxlen=REMEMBERED)
         threading.Thread(target=self._work, name="admission", daemon=True).start()
 
     @property
     def usual_s(self) -> float:
         """How long most of the last jobs took, s; 0 before the first."""
-        known = sorted(self._took_s)
+        known = sorted(self._lasted_s)
         return known[int(MOST_SHARE * len(known))] if known else 0.0
 
     def submit(self, job: Job) -> bool:
@@ -123,6 +123,6 @@ class AdmissionThread:
                 found = self._judged(job)
             except Exception:  # whatever a policy answered, the thread goes on
                 self.failures += 1
-            self._took_s.append(time.monotonic() - begun_s)
+            self._lasted_s.append(time.monotonic() - begun_s)
             self._results.put((job, found))
             os.write(self._wake, b".")

@@ -25,6 +25,9 @@ TASK_STAGE, IDENTITY = "task", "artifacts/task/identity.json"
 # what it decides about (`artifacts/gate_x/verdict.json`), so that an edit of a gate or of a report
 # template re-judges, and re-trains only if the verdict changed.
 ADMISSION = "gates.proof"
+# The ladder's first page is no output of any stage: every gate prints it again, and a whole run
+# once more. What draws on it alone is no reason to judge anything again.
+FIRST_PAGE = ("gates.pages.page", "gates.pages.clips")
 # The table of checks is read by feasibility too (decision 30), so it stands below it: each of these
 # files has a row of its own, and the row of the folder is that of the others.
 BELOW = {
@@ -43,6 +46,7 @@ def graph() -> grimp.ImportGraph:
     for stage in built.find_modules_that_directly_import(ADMISSION):
         if stage.startswith("stages."):
             built.remove_import(importer=stage, imported=ADMISSION)
+    built.remove_import(importer=FIRST_PAGE[0], imported=FIRST_PAGE[1])
     return built
 
 

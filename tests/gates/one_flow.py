@@ -15,8 +15,9 @@ from genpolicy.evidence.stress.latency import (
     DeclaredTerm,
     LatencyModel,
 )
-from genpolicy.evidence.stress.matched import Comparison, Shard, matched_starts, run_shard
+from genpolicy.evidence.stress.matched import matched_starts, run_shard
 from genpolicy.evidence.stress.perturbations import ReducedEnvelope
+from genpolicy.evidence.stress.shard import Comparison, Shard
 from genpolicy.execution.cell import Cell, ExecutionSettings
 from genpolicy.execution.journal import Journal, read_journal, write_journal
 from genpolicy.feasibility.settings import FeasibilitySettings

@@ -89,7 +89,7 @@ def test_one_that_cannot_be_judged_is_not_admitted_and_the_next_one_is():
 def test_the_usual_time_covers_most_of_the_last_jobs_and_no_outlier():
     thread = AdmissionThread(lambda job: None)
     assert thread.usual_s == 0.0
-    thread._took_s.extend([0.01] * 63 + [1.0])
+    thread._lasted_s.extend([0.01] * 63 + [1.0])
     assert thread.usual_s == 0.01
-    thread._took_s.extend([0.5] * 32)
+    thread._lasted_s.extend([0.5] * 32)
     assert thread.usual_s == 0.5

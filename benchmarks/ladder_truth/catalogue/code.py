@@ -98,7 +98,7 @@ WRONGS = (
     Wrong("rollouts_are_called_success", "code",
           "Whoever writes down the rollouts writes success for each of them.",
           "small",
-          patched("genpolicy/evidence/stress/matched.py",
+          patched("genpolicy/evidence/stress/shard_rows.py",
                   ("success=rollout.outcome is Outcome.SUCCESS,", "success=True,")),
           Expected(D, refusal=r"rollout .*success")),
     Wrong("post_is_thinner", "code",

@@ -4,37 +4,32 @@ A shard is one method under one perturbation on all starts. Its worlds are stepp
 share the network's batches; which batch a sample was drawn in changes no bit of it.
 """
 
-from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from pathlib import Path
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from genpolicy.candidates.contenders import Contender, Running, joining_of, opened
-from genpolicy.candidates.joining import JoiningSettings
+from genpolicy.candidates.contenders import Running, joining_of, opened
 from genpolicy.candidates.judged import candidates_of
 from genpolicy.candidates.wire.policy import WireSamples
-from genpolicy.evidence.fixtures_again import NO_FIXTURES, asked_again
+from genpolicy.evidence.fixtures_again import asked_again
 from genpolicy.evidence.rows.brought import AFTER, BEFORE, FixtureAgainRow
 from genpolicy.evidence.rows.stress import (
-    FaultRow,
-    InvocationRow,
-    OverrunRow,
-    RolloutRow,
-    SpliceRow,
     StressStubRow,
 )
 from genpolicy.evidence.stress.envelope import checker_under
-from genpolicy.evidence.stress.latency import LatencyModel
-from genpolicy.evidence.stress.perturbations import Perturbation
 from genpolicy.evidence.stress.rollout import Rollout
+from genpolicy.evidence.stress.shard import Shard, ShardResult
+from genpolicy.evidence.stress.shard_rows import (
+    fault_rows,
+    invocation_rows,
+    overrun_rows,
+    rollout_row,
+    splice_rows,
+)
 from genpolicy.evidence.stress.state import Outcome, Setup
-from genpolicy.execution.cell import Cell
 from genpolicy.execution.journal import write_journal
-from genpolicy.execution.ledger import Account
-from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.policies.guidance import Prefix
 from genpolicy.policies.protocol import Policy
 from genpolicy.seeds import stream
@@ -43,81 +38,6 @@ from genpolicy.tasks.api import Start, Task, load_task
 Array = NDArray[np.float64]
 
 NS_PER_S = 1e9
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """What all shards share.
-
-    Attributes:
-        task: Registered name of the task.
-        starts: Initial states as JSON texts, in order.
-        episode_limit_s: Longest rollout.
-        samples: Candidates per invocation of a stochastic method.
-        cell: Horizons, executor, supervisor and recovery.
-        feasibility: Thresholds of the six layers.
-        root_seed: Root seed.
-        joining: How chunks join.
-        fixtures: Those of Gate B, for who was brought. Shape (F, H_o, D_o).
-    """
-
-    task: str
-    starts: tuple[str, ...]
-    episode_limit_s: float
-    samples: int
-    cell: Cell
-    feasibility: FeasibilitySettings
-    root_seed: int
-    joining: JoiningSettings = field(default_factory=JoiningSettings)
-    fixtures: Array = field(default_factory=lambda: NO_FIXTURES, compare=False)
-
-
-@dataclass(frozen=True)
-class Shard:
-    """One method under one perturbation.
-
-    Attributes:
-        comparison: What all shards share.
-        judged: The method's policy.
-        latency: Latency of the method.
-        perturbation: Name of the perturbation.
-        schedule: What it injects.
-        journal: File to write the journal to.
-    """
-
-    comparison: Comparison
-    judged: Contender
-    latency: LatencyModel
-    perturbation: str
-    schedule: Perturbation
-    journal: Path
-
-
-@dataclass(frozen=True)
-class ShardResult:
-    """Rows of a shard.
-
-    Attributes:
-        rollouts: One row per start.
-        invocations: One row per invocation.
-        splices: One row per chunk that entered a queue.
-        overruns: One row per term that took longer than it may.
-        faults: One row per kind in which the policy's process failed.
-        accounts: Balance of chunks, per rollout.
-        ages_s: Every action age, s.
-        stub: Arrivals, stale and invalid offers.
-        again: Gate B's fixtures, before and after; none of what runs here.
-    """
-
-    rollouts: list[RolloutRow]
-    invocations: list[InvocationRow]
-    splices: list[SpliceRow]
-    overruns: list[OverrunRow]
-    faults: list[FaultRow]
-    accounts: list[Account]
-    ages_s: Array
-    stub: StressStubRow
-    again: list[FixtureAgainRow] = field(default_factory=list)
 
 
 def matched_starts(task: Task, *, root_seed: int, count: int) -> list[Start]:
@@ -251,110 +171,3 @@ def _judge_deliveries(active: Sequence[Rollout]) -> None:
         )
         for (rollout, _), result in zip(open_ones, results, strict=True):
             rollout.settle(result)
-
-
-def rollout_row(shard: Shard, rollout: Rollout) -> tuple[RolloutRow, Array]:
-    """One row of `rollouts.parquet`, and the ages of its actions, computed from the journal."""
-    events = rollout.journal.events()
-    ages = np.array(
-        [event.payload["age_ns"] / NS_PER_S for event in events if event.kind == "accept"]
-    )
-    balance = rollout.executor.conservation().chunks
-    tally = rollout.tally
-    assert rollout.outcome is not None
-    row = RolloutRow(
-        method=shard.judged.name,
-        seed=shard.judged.seed,
-        perturbation=shard.perturbation,
-        start=rollout.start_index,
-        start_sha256=rollout.start_sha256,
-        outcome=str(rollout.outcome),
-        success=rollout.outcome is Outcome.SUCCESS,
-        duration_s=rollout.now_s,
-        ticks=rollout.tick,
-        action_ticks=tally.action_ticks,
-        hold_ticks=tally.hold_ticks,
-        fallback_ticks=tally.fallback_ticks,
-        invocations=rollout.invocations,
-        deadline_misses=tally.deadline_misses,
-        discards=sum(balance.discarded.values()),
-        rejections=tally.rejections,
-        rejected_by=_most_common(tally.rejected_by),
-        recovery_attempted=rollout.recovery.attempts > 0,
-        recovered=rollout.recovery.attempts > 0 and rollout.outcome is Outcome.SUCCESS,
-        interventions=tally.interventions,
-        action_age_p50_s=_quantile(ages, 0.5),
-        action_age_p95_s=_quantile(ages, 0.95),
-        action_age_max_s=_quantile(ages, 1.0),
-        latency_p95_s=_quantile(np.array(tally.latencies_s), 0.95),
-        force_peak_n=tally.force_peak_n,
-        mode=tally.mode,
-    )
-    return row, ages
-
-
-def invocation_rows(shard: Shard, rollout: Rollout) -> list[InvocationRow]:
-    """Rows of `invocations.parquet`, in the order in which they began."""
-    return [
-        InvocationRow(
-            method=shard.judged.name,
-            seed=shard.judged.seed,
-            perturbation=shard.perturbation,
-            start=rollout.start_index,
-            invocation=number,
-            latency_s=latency_s,
-        )
-        for number, latency_s in enumerate(rollout.tally.latencies_s)
-    ]
-
-
-def splice_rows(shard: Shard, rollout: Rollout) -> list[SpliceRow]:
-    """Rows of `splices.parquet`, in the order in which the chunks entered the queue."""
-    return [
-        SpliceRow(
-            method=shard.judged.name,
-            seed=shard.judged.seed,
-            perturbation=shard.perturbation,
-            start=rollout.start_index,
-            rule=rollout.setup.joining.rule,
-            **vars(splice),
-        )
-        for splice in rollout.splices
-    ]
-
-
-def overrun_rows(shard: Shard, rollouts: Sequence[Rollout]) -> list[OverrunRow]:
-    """Rows of `overruns.parquet`, sorted: what was done how often, over all rollouts."""
-    done: Counter[tuple[str, str]] = Counter()
-    for rollout in rollouts:
-        done.update(rollout.tally.overruns)
-    return [
-        OverrunRow(
-            method=shard.judged.name,
-            perturbation=shard.perturbation,
-            term=str(term),
-            action=str(action),
-            count=count,
-        )
-        for (term, action), count in sorted(done.items()) or [(("", ""), 0)]
-    ]
-
-
-def fault_rows(shard: Shard, rollouts: Sequence[Rollout]) -> list[FaultRow]:
-    """Rows of `faults.parquet`, sorted: how often which fault cost an answer."""
-    found: Counter[str] = Counter()
-    for rollout in rollouts:
-        found.update(rollout.tally.faults)
-    rows = sorted(found.items()) or [("", 0)]
-    return [FaultRow(shard.judged.name, shard.perturbation, *row) for row in rows]
-
-
-def _quantile(values: Array, level: float) -> float | None:
-    """Order statistic; None where nothing was recorded, never 0."""
-    if len(values) == 0:
-        return None
-    return float(np.quantile(values, level, method="higher"))
-
-
-def _most_common(counts: Mapping[str, int]) -> str:
-    return max(sorted(counts), key=lambda name: counts[name], default="")

@@ -30,9 +30,10 @@ from genpolicy.evidence.rows.stress import (
 from genpolicy.evidence.shadow.tables import account_rows, checker_document
 from genpolicy.evidence.stress.envelope import envelope_document, require_tighter
 from genpolicy.evidence.stress.latency import LatencyModel
-from genpolicy.evidence.stress.matched import Comparison, Shard, ShardResult, run_shard
+from genpolicy.evidence.stress.matched import run_shard
 from genpolicy.evidence.stress.perturbations import Perturbation, ReducedEnvelope
 from genpolicy.evidence.stress.settings import StressSettings
+from genpolicy.evidence.stress.shard import Comparison, Shard, ShardResult
 from genpolicy.feasibility.cell import cell_of
 from genpolicy.integrity.rows import write_rows
 from genpolicy.seeds import stream

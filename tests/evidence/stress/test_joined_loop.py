@@ -14,8 +14,9 @@ from genpolicy.evidence.stress.latency import (
     DeclaredTerm,
     LatencyModel,
 )
-from genpolicy.evidence.stress.matched import Comparison, matched_starts
+from genpolicy.evidence.stress.matched import matched_starts
 from genpolicy.evidence.stress.perturbations import Nominal
+from genpolicy.evidence.stress.shard import Comparison
 from genpolicy.evidence.stress.tables import plan_shards, write_stress
 from genpolicy.execution.cell import Cell
 from genpolicy.policies.policy import load_policy

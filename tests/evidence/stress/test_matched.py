@@ -8,8 +8,9 @@ import pytest
 from genpolicy.candidates.judged import JudgedPolicy
 from genpolicy.contract.normalisation import MinMax, Normalisation
 from genpolicy.errors import IntegrityError
-from genpolicy.evidence.stress.matched import Comparison, Shard, matched_starts, run_shard
+from genpolicy.evidence.stress.matched import matched_starts, run_shard
 from genpolicy.evidence.stress.perturbations import NetworkJitter, Nominal, ReducedEnvelope
+from genpolicy.evidence.stress.shard import Comparison, Shard
 from genpolicy.execution.cell import Cell
 from genpolicy.execution.journal import read_journal
 from genpolicy.policies.checkpoint import Provenance

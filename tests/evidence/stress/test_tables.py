@@ -18,9 +18,10 @@ from genpolicy.evidence.stress.latency import (
     DeclaredTerm,
     LatencyModel,
 )
-from genpolicy.evidence.stress.matched import Comparison, matched_starts
+from genpolicy.evidence.stress.matched import matched_starts
 from genpolicy.evidence.stress.perturbations import Nominal, QueueReorder
 from genpolicy.evidence.stress.settings import StressSettings
+from genpolicy.evidence.stress.shard import Comparison
 from genpolicy.evidence.stress.tables import (
     AGE_LEVELS,
     plan_shards,

@@ -1,0 +1,102 @@
+"""What a shard of the matched comparison is, and what comes of it."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from genpolicy.candidates.contenders import Contender
+from genpolicy.candidates.joining import JoiningSettings
+from genpolicy.evidence.fixtures_again import NO_FIXTURES
+from genpolicy.evidence.rows.brought import FixtureAgainRow
+from genpolicy.evidence.rows.stress import (
+    FaultRow,
+    InvocationRow,
+    OverrunRow,
+    RolloutRow,
+    SpliceRow,
+    StressStubRow,
+)
+from genpolicy.evidence.stress.latency import LatencyModel
+from genpolicy.evidence.stress.perturbations import Perturbation
+from genpolicy.execution.cell import Cell
+from genpolicy.execution.ledger import Account
+from genpolicy.feasibility.settings import FeasibilitySettings
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What all shards share.
+
+    Attributes:
+        task: Registered name of the task.
+        starts: Initial states as JSON texts, in order.
+        episode_limit_s: Longest rollout.
+        samples: Candidates per invocation of a stochastic method.
+        cell: Horizons, executor, supervisor and recovery.
+        feasibility: Thresholds of the six layers.
+        root_seed: Root seed.
+        joining: How chunks join.
+        fixtures: Those of Gate B, for who was brought. Shape (F, H_o, D_o).
+    """
+
+    task: str
+    starts: tuple[str, ...]
+    episode_limit_s: float
+    samples: int
+    cell: Cell
+    feasibility: FeasibilitySettings
+    root_seed: int
+    joining: JoiningSettings = field(default_factory=JoiningSettings)
+    fixtures: Array = field(default_factory=lambda: NO_FIXTURES, compare=False)
+
+
+@dataclass(frozen=True)
+class Shard:
+    """One method under one perturbation.
+
+    Attributes:
+        comparison: What all shards share.
+        judged: The method's policy.
+        latency: Latency of the method.
+        perturbation: Name of the perturbation.
+        schedule: What it injects.
+        journal: File to write the journal to.
+    """
+
+    comparison: Comparison
+    judged: Contender
+    latency: LatencyModel
+    perturbation: str
+    schedule: Perturbation
+    journal: Path
+
+
+@dataclass(frozen=True)
+class ShardResult:
+    """Rows of a shard.
+
+    Attributes:
+        rollouts: One row per start.
+        invocations: One row per invocation.
+        splices: One row per chunk that entered a queue.
+        overruns: One row per term that took longer than it may.
+        faults: One row per kind in which the policy's process failed.
+        accounts: Balance of chunks, per rollout.
+        ages_s: Every action age, s.
+        stub: Arrivals, stale and invalid offers.
+        again: Gate B's fixtures, before and after; none of what runs here.
+    """
+
+    rollouts: list[RolloutRow]
+    invocations: list[InvocationRow]
+    splices: list[SpliceRow]
+    overruns: list[OverrunRow]
+    faults: list[FaultRow]
+    accounts: list[Account]
+    ages_s: Array
+    stub: StressStubRow
+    again: list[FixtureAgainRow] = field(default_factory=list)
