@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from genpolicy.candidates.contenders import Running, joining_of, opened
 from genpolicy.candidates.judged import candidates_of
@@ -34,10 +33,6 @@ from genpolicy.policies.guidance import Prefix
 from genpolicy.policies.protocol import Policy
 from genpolicy.seeds import stream
 from genpolicy.tasks.api import Start, Task, load_task
-
-Array = NDArray[np.float64]
-
-NS_PER_S = 1e9
 
 
 def matched_starts(task: Task, *, root_seed: int, count: int) -> list[Start]:
