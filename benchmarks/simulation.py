@@ -22,16 +22,12 @@ import mujoco
 import numpy as np
 
 from genpolicy.contract.horizons import HorizonConfig
+from genpolicy.contract.latency import DECLARED_TERMS, MEASURED_TERMS
 from genpolicy.contract.normalisation import MinMax, Normalisation
 from genpolicy.evidence.admission_context import make_checker
 from genpolicy.evidence.stress import rollout as rollout_module
 from genpolicy.evidence.stress import state as state_module
-from genpolicy.evidence.stress.latency import (
-    DECLARED_TERMS,
-    MEASURED_TERMS,
-    DeclaredTerm,
-    LatencyModel,
-)
+from genpolicy.evidence.stress.latency import DeclaredTerm, LatencyModel
 from genpolicy.evidence.stress.matched import step
 from genpolicy.evidence.stress.perturbations import Nominal
 from genpolicy.evidence.stress.rollout import Rollout
@@ -72,7 +68,12 @@ class Rehearsed:
         self.memory: dict[int, tuple[int, int, str]] = {}
 
     def sample(
-        self, observations: np.ndarray, *, noise_names: Sequence[Any], candidates: int
+        self,
+        observations: np.ndarray,
+        *,
+        noise_names: Sequence[Any],
+        candidates: int,
+        prefix: None = None,  # no rule of joining is asked for here
     ) -> Samples:
         """The network's work, the operator's chunks."""
         drawn = self.network.sample(observations, noise_names=noise_names, candidates=candidates)
