@@ -11,6 +11,7 @@ See docs/candidates.md for the entry that asks it.
 
 import argparse
 import hashlib
+import threading
 import time
 from pathlib import Path
 
@@ -54,6 +55,7 @@ class Served:
     """A checkpoint with its processors."""
 
     def __init__(self, folder: Path, device: str) -> None:
+        self.one_at_a_time = threading.Lock()
         config = PreTrainedConfig.from_pretrained(folder)
         config.device = device
         self.checkpoint = digest(folder)
@@ -85,6 +87,11 @@ class Served:
         }  # fmt: skip
 
     def answer(self, message: dict) -> dict:
+        """One at a time: torch's generator and the counters are of the whole process."""
+        with self.one_at_a_time:
+            return self._answered(message)
+
+    def _answered(self, message: dict) -> dict:
         said = message.get("genpolicy")
         noise = said["noise"] if said else ["unnamed", self.asked]
         self.asked += 1

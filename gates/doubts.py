@@ -12,6 +12,7 @@ from gates.preregistration import PREREGISTRATION
 from gates.protection import REHEARSED
 from gates.report import Answer, GateReport
 from gates.settings import WAIVED
+from gates.stress.clocks import DIFFER, UNSEEN
 
 OF_ALL = {
     REHEARSED: "a rehearsal",
@@ -19,6 +20,8 @@ OF_ALL = {
     f"Changed since {PREREGISTRATION}": "plan changed",
 }
 """How caveats begin that each gate repeats of those below it, and their kind on the first page."""
+CLOCKS = (f"the wall clock {DIFFER} (", f"the wall clock was {UNSEEN} (")
+"""In caveats of Gate D that contradict its timing, or leave it without a witness."""
 MOST_NAMED = 3
 """Criteria that one doubt names; of more it says how many there are."""
 
@@ -32,12 +35,14 @@ class Doubt:
         kind: In two or three words.
         text: What is the matter, for a person.
         criteria: Criteria that it is about, by name; empty for a caveat of the whole gate.
+        candidate: Whose criterion it is; empty where it is one of the whole gate, or several.
     """
 
     gate: str
     kind: str
     text: str
     criteria: tuple[str, ...] = ()
+    candidate: str = ""
 
 
 def doubts_of(report: GateReport) -> list[Doubt]:
@@ -52,8 +57,8 @@ def of_a_ladder(reports: Iterable[GateReport]) -> tuple[list[Doubt], list[Doubt]
     moved limits by the gate that names most of them, which hold for those below it too.
 
     Returns:
-        The first are few, and begin with rehearsal, moved limits and what was waived; the second
-        are caveats.
+        The first are few, and begin with rehearsal, moved limits, what was waived and clocks that
+        differ; the second are caveats.
     """
     every = list(reports)
     weighed = [doubt for rule in RULES[:-1] for report in every for doubt in rule(report)]
@@ -64,8 +69,14 @@ def of_a_ladder(reports: Iterable[GateReport]) -> tuple[list[Doubt], list[Doubt]
             caveats[key] = doubt
     first = [replace(caveats[head], kind=kind) for head, kind in OF_ALL.items() if head in caveats]
     others = [doubt for key, doubt in caveats.items() if key not in OF_ALL]
+    clocks = [
+        replace(doubt, kind="two clocks")
+        for doubt in others
+        if any(sign in doubt.text for sign in CLOCKS)
+    ]
     waived = [replace(doubt, kind="not asked") for doubt in others if WAIVED.match(doubt.text)]
-    return first + waived + weighed, [one for one in others if not WAIVED.match(one.text)]
+    said = {doubt.text for doubt in (*waived, *clocks)}
+    return first + waived + clocks + weighed, [one for one in others if one.text not in said]
 
 
 def for_a_card(report: GateReport, candidate: str) -> list[str]:
@@ -136,7 +147,8 @@ def _caveats(report: GateReport) -> Iterator[Doubt]:
 def _about(report: GateReport, kind: str, answer: Answer, more: str = "") -> Doubt:
     who = f" ({answer.candidate})" if answer.candidate else ""
     why = more or answer.caveat or "nothing was recorded that answers it"
-    return Doubt(report.gate, kind, f"{answer.question}{who} {_sentence(why)}", (answer.id,))
+    return Doubt(report.gate, kind, f"{answer.question}{who} {_sentence(why)}", (answer.id,),
+                 answer.candidate or "")  # fmt: skip
 
 
 def _sentence(text: str) -> str:

@@ -11,18 +11,13 @@ from genpolicy.candidates.brought import BroughtSection, require_brought
 from genpolicy.evidence.documents.brought import BROUGHT, brought_document
 from genpolicy.integrity.atomic import output_folder
 from stages._stage import ARTIFACTS, Params, main
-from stages._training import MethodsSection
 
 
 def work(params: Params) -> None:
     """Admit through gate A, then write who they are."""
     admit("candidates", Path.cwd())
     section = params.section("candidates", BroughtSection)
-    found = require_brought(
-        section.root,
-        horizons=params.horizons,
-        trained=params.section("train_generators", MethodsSection).samplers,
-    )
+    found = require_brought(section.root, horizons=params.horizons)
     with output_folder(ARTIFACTS / "candidates") as folder:
         BROUGHT.write(folder, brought_document(found))
 

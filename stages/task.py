@@ -9,7 +9,7 @@ policy that is brought is not what its entry says: before anything trains.
 
 from pathlib import Path
 
-from genpolicy.candidates.brought import BroughtSection, require_brought
+from genpolicy.candidates.brought import BroughtSection, NamesSection, require_brought
 from genpolicy.candidates.mapped import require_mapped
 from genpolicy.documents.task import IDENTITY
 from genpolicy.integrity.atomic import output_folder, write_bytes
@@ -27,7 +27,12 @@ def work(params: Params) -> None:
     refuse_foreign_files()
     require_own_files(Path.cwd())
     entries = params.section("candidates", BroughtSection).root
-    brought = require_brought(entries, horizons=params.horizons)
+    trained = [
+        name
+        for stage in ("train_baselines", "train_generators")
+        for name in params.section(stage, NamesSection).samplers
+    ]
+    brought = require_brought(entries, horizons=params.horizons, trained=trained)
     if brought:
         require_mapped(brought, load_task(params.task.name))
     identity = task_identity(params.task.name)

@@ -62,7 +62,7 @@ def clips_of(reports: Mapping[Gate, GateReport], evidence: Evidence) -> Clips:
             _clip(evidence, report, row, ", ".join(why), number)
             for number, (row, why) in enumerate(chosen[:MOST], start=1)
         ]
-    except (MissingEvidenceError, GenpolicyError, KeyError, ValueError, TypeError) as error:
+    except (MissingEvidenceError, GenpolicyError, LookupError, ValueError, TypeError) as error:
         return Clips(missing=" ".join(str(error).split())[:200])
     return Clips(
         method=method,
@@ -131,7 +131,7 @@ def _clip(evidence: Evidence, report: GateReport, row: pd.Series, why: str, numb
             f"{touched}{aged}.",
             f"genpolicy replay {journal} --session {session} --out watch.mcap",
         ),
-        drawn_clip(film, load_task(task).workspace, number),
+        drawn_clip(film, load_task(task).workspace, number, said=why),
     )
 
 

@@ -24,6 +24,7 @@ NARROW = 34.0
 """A phase that takes less of the strip is not named in it."""
 OTHERS = {"fallback": "fallback", "intervention": "person"}
 """Who commands where the policy does not, and how that is drawn."""
+LEAST_WIDE = 6.0
 ABOVE, ASIDE = 0, 1
 
 
@@ -52,13 +53,14 @@ class View:
         return " ".join(f"{x:.1f},{y:.1f}" for x, y in zip(across, down, strict=True))
 
 
-def drawn_clip(film: Film, workspace: Workspace, number: int) -> Markup:
+def drawn_clip(film: Film, workspace: Workspace, number: int, *, said: str) -> Markup:
     """The drawing of a film.
 
     Args:
         film: What to draw.
         workspace: Where the TCP may be: what is shown, the same in every clip.
         number: Of the clip on its page; a click on it plays it and no other.
+        said: What it shows, for who does not see it.
     """
     name = f"clip{number}"
     views = _views(workspace)
@@ -67,8 +69,8 @@ def drawn_clip(film: Film, workspace: Workspace, number: int) -> Markup:
     parts = [
         Markup(
             '<svg class="clip" id="{}" viewBox="0 0 {:.0f} {:.0f}" role="img" '
-            'aria-label="A rollout, from above and from the side; a click plays it">'
-        ).format(name, WIDTH, height)
+            'aria-label="{}: a rollout from above and from the side; a click plays it">'
+        ).format(name, WIDTH, height, said)
     ]
     for view, title in zip(views, ("from above", "from the side"), strict=True):
         parts += [*_view(film, view, name), _text(view.left + 3, 11, title)]
@@ -175,15 +177,13 @@ def _phases(film: Film, height: float) -> Iterator[Markup]:
             yield _text(left + 2, height - 3, phase)
     for mode, begin_s, end_s in _spans(film, film.modes):
         if mode in OTHERS:
+            # An intervention ends a rollout: what has no width is drawn where it is seen.
+            wide = max(_x(film, end_s) - _x(film, begin_s), LEAST_WIDE)
             yield Markup(
                 '<rect class="{}" x="{:.1f}" y="{:.1f}" width="{:.1f}" height="4">'
                 "<title>{}</title></rect>"
             ).format(
-                OTHERS[mode],
-                _x(film, begin_s),
-                height - LABELS - 4,
-                max(_x(film, end_s) - _x(film, begin_s), 2.0),
-                mode,
+                OTHERS[mode], min(_x(film, begin_s), WIDTH - wide), height - LABELS - 4, wide, mode
             )
 
 

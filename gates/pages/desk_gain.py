@@ -38,14 +38,15 @@ def _said(report: GateReport, rows: pd.DataFrame) -> str:
     differences = np.asarray(own - other, dtype=np.float64)
     if not len(differences) or np.any(np.isnan(differences)):
         raise MissingEvidenceError(f"{promoted} and {best} did not roll out from the same starts")
-    confidence = float(report.settings["confidence"])
-    low, high = gain_interval(differences, confidence=confidence)
+    # As the promotion is tested, so that a gain that it shows is one that stands here.
+    alpha = float(report.settings["family_alpha"]) / len(report.settings["candidates"])
+    low, high = gain_interval(differences, alpha=alpha)
     conditions = rows["perturbation"].nunique()
     return (
         f"{promoted} succeeds in {_share(rows, promoted)}, the best simple policy, {best}, in "
         f"{_share(rows, best)}: {_points(differences.mean())} points on the same "
         f"{len(differences)} starts in {conditions} conditions, between {_points(low)} and "
-        f"{_points(high)} at {100 * confidence:.3g} %; more than "
+        f"{_points(high)} (each end wrong with at most {100 * alpha:.3g} %); more than "
         f"{_points(float(report.settings['margin']))} had to be shown."
     )
 

@@ -106,6 +106,8 @@ def compared(evidence: Evidence, settings: StressSettings, candidate: str) -> Co
             _ages(invocations, ages, settings, candidate, episodes),
             *(_shares(invocations, settings, candidate, episodes)),
         ]
+    except MissingEvidenceError as error:
+        return Compared(UNSEEN, str(error))
     except GenpolicyError as error:
         return Compared(UNTOLD, str(error), len(episodes))
     return _answered(tuple(found), len(episodes), broken)

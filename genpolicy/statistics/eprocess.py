@@ -95,15 +95,15 @@ def paired_e_value(differences: Array, *, margin: float, alpha: float) -> EProce
     )
 
 
-def gain_interval(differences: Array, *, confidence: float) -> tuple[float, float]:
+def gain_interval(differences: Array, *, alpha: float) -> tuple[float, float]:
     """The gains that the pairs do not speak against, on either side, whenever one looks.
 
     The lower end is the largest margin that is shown to be exceeded, the upper end likewise of the
-    mirrored question; each wrong with at most half of what the confidence leaves.
+    mirrored question.
 
     Args:
         differences: As of `paired_e_value`. Shape (n,).
-        confidence: Coverage of both ends together, in (0, 1).
+        alpha: Probability with which an end is wrong, each, in (0, 1).
 
     Returns:
         Lower and upper end, to a thousandth; -1 and 1 where nothing is shown.
@@ -111,7 +111,7 @@ def gain_interval(differences: Array, *, confidence: float) -> tuple[float, floa
     Raises:
         ContractError: A value outside its range, or NaN.
     """
-    d, alpha = np.asarray(differences, dtype=np.float64), (1.0 - confidence) / 2.0
+    d = np.asarray(differences, dtype=np.float64)
     return _shown(d, alpha), -_shown(-d, alpha)
 
 

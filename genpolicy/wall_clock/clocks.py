@@ -120,7 +120,7 @@ def run_both(
         write_bytes(by_the_wall / PLAN, canonical_json(line(shared, model)))
         running = start(
             by_the_wall, request, [*asked.command, "--candidates", str(asked.candidates)],
-            line=[*PROXY, str(by_the_wall / PLAN)],
+            line=[*PROXY, str(by_the_wall / PLAN)], ready=True,
         )  # fmt: skip
         running.wait()
         shutil.move(by_the_wall / JOURNAL, paths[0])

@@ -15,7 +15,7 @@ from pathlib import Path
 from genpolicy.candidates.brought import BroughtPolicy
 from genpolicy.candidates.hosts.kinds import read_entry
 from genpolicy.candidates.hosts.translation import as_server
-from genpolicy.candidates.wire.policy import WirePolicy
+from genpolicy.candidates.wire.policy import WirePolicy, WireSamples
 from genpolicy.candidates.wire.remote import RemotePolicy
 from genpolicy.policies.policy import load_policy
 from genpolicy.policies.protocol import Policy
@@ -34,23 +34,29 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--task", default="", help="whose observation the server is given")
     for name in ("asks", "answers"):
         parser.add_argument(f"--{name}", type=int, required=True, help="file descriptor")
+    parser.add_argument("--ready", type=int, help="file descriptor to say on that it has loaded")
     given = parser.parse_args(arguments)
     if given.address:
         policy: Policy = _behind_the_wire(given.policy, given.sha256, given.address, given.task)
     else:
         policy = load_policy(given.policy, expected_sha256=given.sha256)
+    if given.ready is not None:
+        os.write(given.ready, b".")
+        os.close(given.ready)
     inbox = Inbox(given.asks)
     while not inbox.closed:
         select.select([inbox.descriptor], [], [])
         for payload in inbox.read():
             answer = answer_of(policy, Ask.decoded(payload), candidates=given.candidates)
-            if not _send(given.answers, frame(answer.encoded())):
+            if answer is not None and not _send(given.answers, frame(answer.encoded())):
                 return 0
     return 0
 
 
-def answer_of(policy: Policy, ask: Ask, *, candidates: int) -> Answer:
+def answer_of(policy: Policy, ask: Ask, *, candidates: int) -> Answer | None:
     """The first of the candidates that a policy draws for what it is asked.
+
+    None where its process failed: what is no answer misses its deadline, as in rollouts.
 
     Args:
         policy: Who answers.
@@ -58,6 +64,8 @@ def answer_of(policy: Policy, ask: Ask, *, candidates: int) -> Answer:
         candidates: How many are drawn; their number is part of the latency.
     """
     drawn = policy.sample(ask.observations[None], noise_names=[ask.noise], candidates=candidates)
+    if isinstance(drawn, WireSamples) and drawn.faults[0] is not None:
+        return None
     return Answer(
         ask.invocation, policy.checkpoint_hash, policy.sampler_config_hash, policy.method,
         drawn.actions[0, 0],

@@ -97,6 +97,7 @@ def start(
     *,
     supervisor: Sequence[str] = SUPERVISOR,
     line: Sequence[str] = (),
+    ready: bool = False,
 ) -> Running:
     """Start a run.
 
@@ -107,6 +108,8 @@ def start(
         policy: Command of the policy's process; `--asks FD --answers FD` are added.
         supervisor: Command of the supervisor's.
         line: Command of a process between the two, if any.
+        ready: Whether the supervisor begins only when the policy says that it has loaded; its
+            command gets `--ready FD` then. Otherwise the clock runs while it loads.
 
     Raises:
         ConfigError: Limits or fixtures are not as pinned.
@@ -131,13 +134,24 @@ def start(
     theirs = {"answers": answers_r, "asks": asks_w, "operator": operator_r}
     between: subprocess.Popen[bytes] | None = None
     with log:
-        supervising = _begin([*supervisor, str(folder)], theirs, log)
         if line:
             between, asks_r, answers_w = _lay(line, asks_r, answers_w)
-        proposing = _begin(policy, {"asks": asks_r, "answers": answers_w}, None)
+        ends = {"asks": asks_r, "answers": answers_w}
+        proposing = _loaded(policy, ends) if ready else _begin(policy, ends, None)
+        supervising = _begin([*supervisor, str(folder)], theirs, log)
     for descriptor in (*theirs.values(), asks_r, answers_w):
         os.close(descriptor)
     return Running(folder, supervising, proposing, Outbox(operator_w), between)
+
+
+def _loaded(policy: Sequence[str], ends: dict[str, int]) -> "subprocess.Popen[bytes]":
+    """The policy's process, when it has said that it is ready, or has died."""
+    ready_r, ready_w = os.pipe()
+    process = _begin(policy, {**ends, "ready": ready_w}, None)
+    os.close(ready_w)
+    os.read(ready_r, 1)  # nothing, of a process that died: the supervisor will see nobody
+    os.close(ready_r)
+    return process
 
 
 def _lay(

@@ -32,7 +32,7 @@ class Flying:
 def run_virtually(
     session: SupervisedSession,
     *,
-    sample: Callable[[Ask], Answer],
+    sample: Callable[[Ask], Answer | None],
     latency_s: Callable[[int], float],
     judged: Callable[[Job], Admitted | Rejected],
 ) -> None:
@@ -40,7 +40,7 @@ def run_virtually(
 
     Args:
         session: What is ticked; its journal is closed at the end.
-        sample: What the policy answers; it takes no virtual time.
+        sample: What the policy answers, nothing if it failed; it takes no virtual time.
         latency_s: From observation to verdict, by number of the invocation, s.
         judged: The six layers.
     """
@@ -64,7 +64,8 @@ def run_virtually(
                 session.decide(job, judged(job), now_s)
         ask = session.tick(now_s, row)
         if ask is not None:
-            flying.append(Flying(now_s + latency_s(asked), sample(ask)))
+            if (answer := sample(ask)) is not None:
+                flying.append(Flying(now_s + latency_s(asked), answer))
             asked += 1
     session.end(now_s)
     session.journal.close()

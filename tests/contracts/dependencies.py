@@ -28,6 +28,9 @@ ADMISSION = "gates.proof"
 # The ladder's first page is no output of any stage: every gate prints it again, and a whole run
 # once more. What draws on it alone is no reason to judge anything again.
 FIRST_PAGE = ("gates.pages.page", "gates.pages.clips")
+# What hosts a candidate runs in a child, by a command: no import shows that its code decides what
+# is answered.
+HOSTED = ("genpolicy.candidates.hosts.translation", "genpolicy.cli.serving")
 # The table of checks is read by feasibility too (decision 30), so it stands below it: each of these
 # files has a row of its own, and the row of the folder is that of the others.
 BELOW = {
@@ -47,6 +50,7 @@ def graph() -> grimp.ImportGraph:
         if stage.startswith("stages."):
             built.remove_import(importer=stage, imported=ADMISSION)
     built.remove_import(importer=FIRST_PAGE[0], imported=FIRST_PAGE[1])
+    built.add_import(importer=HOSTED[0], imported=HOSTED[1])
     return built
 
 

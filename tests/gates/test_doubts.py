@@ -121,13 +121,13 @@ def test_the_gravest_kind_comes_first_whatever_its_gate(reports):
     first, rest = of_a_ladder(reports.values())
     order = [doubt.kind for report in reports.values() for doubt in doubts_of(report)]
     ranks = [
-        "not asked", "not measured", "not decided", "stopped here", "near its limit",
+        "not asked", "two clocks", "not measured", "not decided", "stopped here", "near its limit",
         "judged at a point",
     ]  # fmt: skip
     found = [ranks.index(doubt.kind) for doubt in first]
     assert found == sorted(found) and len(set(found)) > 1
     assert {doubt.kind for doubt in rest} == {"not shown"}
-    weighed = [doubt.kind for doubt in first if doubt.kind != "not asked"]
+    weighed = [doubt.kind for doubt in first if doubt.kind not in ("not asked", "two clocks")]
     assert sorted(weighed) == sorted(kind for kind in order if kind != "not shown")
 
 
@@ -145,3 +145,15 @@ def test_what_each_gate_repeats_is_said_once_by_who_names_most(reports):
     ]  # fmt: skip
     own = [f"own of {gate}" for gate in reports]
     assert sorted(doubt.text for doubt in rest) == sorted(["the same", *own])
+
+
+@pytest.mark.parametrize(("said", "weighed"), [
+    ("flow: the virtual clock and the wall clock differ (age; 48 episodes).", True),
+    ("flow: the wall clock was not looked at (no rows).", True),
+    ("flow: the virtual clock and the wall clock agree (age; 48 episodes).", False),
+])  # fmt: skip
+def test_clocks_that_differ_are_no_general_caveat(reports, said, weighed):
+    report = reports["D"].model_copy(update={"caveats": (said,)})
+    first, rest = of_a_ladder([report])
+    assert [doubt.text for doubt in first if doubt.kind == "two clocks"] == [said] * weighed
+    assert [doubt.text for doubt in rest] == [said] * (not weighed)

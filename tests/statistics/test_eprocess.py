@@ -96,25 +96,25 @@ def test_an_interval_holds_the_gain_that_is_true(gain):
     rng = stream(9, "interval", str(gain))
     missed, trials = 0, 200
     for d in simulate_pairs(0.5, 0.5 + gain, correlation=0.5, shape=(trials, 60), rng=rng):
-        low, high = gain_interval(d, confidence=0.9)
+        low, high = gain_interval(d, alpha=0.05)
         missed += not low <= gain <= high
     assert missed <= 0.1 * trials
 
 
 def test_both_ends_by_their_definition_and_mirrored():
     d = simulate_pairs(0.4, 0.8, correlation=0.5, shape=(1, 90), rng=stream(10, "ends"))[0]
-    low, high = gain_interval(d, confidence=0.95)
+    low, high = gain_interval(d, alpha=0.025)
     assert -1 < low < d.mean() < high < 1
     for margin, decision in ((low, "promote"), (low + 0.001, "continue")):
         assert paired_e_value(d, margin=margin, alpha=0.025).decision == decision
-    assert gain_interval(-d, confidence=0.95) == (-high, -low)
-    wider = gain_interval(d, confidence=0.99)
+    assert gain_interval(-d, alpha=0.025) == (-high, -low)
+    wider = gain_interval(d, alpha=0.005)
     assert wider[0] < low and wider[1] > high
 
 
 def test_of_few_pairs_nothing_is_said():
-    assert gain_interval(np.zeros(0), confidence=0.95) == (-1.0, 1.0)
-    low, high = gain_interval(np.ones(2), confidence=0.95)
+    assert gain_interval(np.zeros(0), alpha=0.025) == (-1.0, 1.0)
+    low, high = gain_interval(np.ones(2), alpha=0.025)
     assert low < 0 and high == 1.0
     with pytest.raises(ContractError):
-        gain_interval(np.array([np.nan]), confidence=0.95)
+        gain_interval(np.array([np.nan]), alpha=0.025)

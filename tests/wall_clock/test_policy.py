@@ -2,22 +2,29 @@
 
 import os
 import threading
+from types import SimpleNamespace
 
 import numpy as np
 from arranged import GUARD_S, wait_for
 
+from genpolicy.candidates.wire.faults import Fault
+from genpolicy.candidates.wire.policy import WireSamples
 from genpolicy.wall_clock.channel import Inbox, Outbox
 from genpolicy.wall_clock.messages import Ask, read_answer
-from genpolicy.wall_clock.policy import main
+from genpolicy.wall_clock.policy import answer_of, main
 
 
 def test_an_answer_is_the_sample_of_that_observation(fleet, policy, data):
     folder = fleet[0] / "flow" / "seed_0"
     (asks_r, asks_w), (answers_r, answers_w) = os.pipe(), os.pipe()
+    ready_r, ready_w = os.pipe()
     words = [str(folder), policy.checkpoint_hash, "--asks", str(asks_r), "--answers",
-             str(answers_w)]  # fmt: skip
+             str(answers_w), "--ready", str(ready_w)]  # fmt: skip
     serving = threading.Thread(target=main, args=(words,), daemon=True)
     serving.start()
+    assert os.read(ready_r, 1) == b"."  # nobody has asked it yet
+    assert os.read(ready_r, 1) == b""
+    os.close(ready_r)
     seen = data.frames.observation[:2]
     outbox, inbox = Outbox(asks_w), Inbox(answers_r)
     outbox.send(Ask("0", seen, ("episode", "1")).encoded())
@@ -31,3 +38,16 @@ def test_an_answer_is_the_sample_of_that_observation(fleet, policy, data):
     outbox.close()
     serving.join(GUARD_S)
     assert not serving.is_alive()
+
+
+def test_an_invocation_whose_process_failed_is_no_answer(data):
+    """It would be a refusal by feasibility, where rollouts count a missed deadline."""
+    chunks = np.full((1, 1, 16, 10), np.nan)
+    for fault in (Fault.LATE, None):
+        drawn = WireSamples(chunks, 0, (fault,))
+        policy = SimpleNamespace(
+            sample=lambda *_, drawn=drawn, **__: drawn,
+            checkpoint_hash="c", sampler_config_hash="s", method="m",
+        )  # fmt: skip
+        asked = Ask("0", data.frames.observation[:2], ("episode", "1"))
+        assert (answer_of(policy, asked, candidates=1) is None) == (fault is not None)

@@ -18,15 +18,17 @@ PERIOD_S = 0.05
 def told(kit, task, checker, standing, tmp_path):
     """Events of a session of sixteen rows whose answers take so long."""
 
-    def run(latency_s):
+    def run(latency_s, fails=()):
         execution = kit.EXECUTION.model_copy(update={"silence_stop_s": 0.6})
-        path = tmp_path / f"session_{latency_s}.mcap"
+        path = tmp_path / f"session_{latency_s}_{len(fails)}.mcap"
         session = SupervisedSession(
             task, Cell(kit.HORIZONS, execution), request_of(tmp_path, standing.part(0, 16)),
             StreamedJournal("m/virtual_clock/0", path), stop_stands=False,
         )  # fmt: skip
 
         def still(ask):
+            if ask.invocation.endswith(tuple(f"/{number}" for number in fails)):
+                return None
             actions = np.tile(task.action_at(ask.observations[-1]), (16, 1))
             return Answer(ask.invocation, CHECKPOINT, SAMPLER, "m", actions)
 
@@ -64,3 +66,12 @@ def test_the_deadline_passes_after_whole_periods(told):
     begun = [e.t / 1e9 for e in told(0.5)
              if e.kind == "invocation" and e.payload["stage"] == "begin"]  # fmt: skip
     assert np.diff(begun)[:2] == pytest.approx([0.15, 0.15])
+
+
+def test_an_invocation_that_failed_misses_its_deadline_and_no_other(told):
+    def ends(events):
+        return [e.payload["detail"] for e in events
+                if e.kind == "invocation" and e.payload["stage"] == "end"]  # fmt: skip
+
+    assert "deadline" not in ends(told(0.001))
+    assert ends(told(0.001, fails=[1])).count("deadline") == 1

@@ -6,7 +6,8 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from genpolicy.candidates.hosts.onnx_library import require_onnx
-from genpolicy.candidates.wire.entry import DIGEST, Entry, ServerEntry
+from genpolicy.candidates.wire.declared import DIGEST
+from genpolicy.candidates.wire.entry import Entry, ServerEntry
 from genpolicy.contract.settings import Settings, parse_settings
 from genpolicy.errors import ConfigError
 from genpolicy.integrity.documents import read_yaml
@@ -76,6 +77,14 @@ class TrainedEntry(HostedEntry):
     def _asked_as_it_is(self) -> "TrainedEntry":
         if list(self.observation) != ["observation"] or self.constants:
             raise ValueError("a checkpoint is given one input, which is named observation")
+        given = self.observation["observation"]
+        if (given.dtype, given.unit) != ("float64", "m"):
+            raise ValueError("a checkpoint is given float64 numbers, lengths in m")
+        if given.history != self.horizons.observation_horizon:
+            raise ValueError(
+                f"a checkpoint is given its {self.horizons.observation_horizon} last observations, "
+                f"not {given.history}"
+            )
         return self
 
     def essential(self, folder: Path) -> list[str]:

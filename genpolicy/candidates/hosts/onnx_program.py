@@ -1,6 +1,6 @@
 """An ONNX file, run by ONNX Runtime on the CPU, in one order and with so many threads."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NoReturn
 
 import numpy as np
@@ -46,7 +46,7 @@ class OnnxProgram:
         for node in _nodes(model):
             if node.domain not in DOMAINS:
                 _refuse(where, f"the operator {node.domain}::{node.op_type}")
-            if node.op_type in DRAWS:
+            if node.op_type in DRAWS or (node.op_type == "Dropout" and len(node.input) > 2):
                 _refuse(where, f"{node.op_type}, which draws by itself: make noise an input")
         _embed(model, where, external)
         self._model = model
@@ -120,6 +120,21 @@ def _embed(model: onnx.ModelProto, where: str, external: Callable[[str], bytes])
         tensor.raw_data = data[begin : begin + length]
         tensor.ClearField("external_data")
         tensor.data_location = onnx.TensorProto.DEFAULT
+    if name := next(_elsewhere(model), None):
+        _refuse(where, f"{name or 'a tensor'} in another file, which is no weight of its graphs")
+
+
+def _elsewhere(message: Any) -> Iterator[str]:
+    """Tensors anywhere in a model that the runtime would fetch from a file by itself."""
+    for field, value in message.ListFields():
+        if field.message_type is None:
+            continue
+        for item in value if isinstance(value, Sequence) else [value]:
+            if isinstance(item, onnx.TensorProto):
+                if item.data_location == onnx.TensorProto.EXTERNAL:
+                    yield item.name or "a tensor"
+            else:
+                yield from _elsewhere(item)
 
 
 def _session(data: bytes, where: str, threads: int) -> onnxruntime.InferenceSession:

@@ -124,7 +124,7 @@ def _look(found: Any, where: str) -> None:
             _word(key, where)
             if key in STRUCTURES and isinstance(item, str):
                 _structure(item, where)
-            elif key not in FREE_TEXT:
+            elif key not in FREE_TEXT or not isinstance(item, str):
                 _look(item, where)
     elif isinstance(found, str):
         _word(found, where)
@@ -148,12 +148,22 @@ def _structure(text: str, where: str) -> None:
         elif isinstance(found, dict):
             if found.get("type") not in STRUCTURE_TYPES:
                 _refuse(where, f"a program that takes or gives {found.get('type')!r}")
+            if not _names_only(found.get("context")):
+                _refuse(where, "a structure of arguments that says more than names")
             look(found.get("children_spec"))
 
     try:
         look(json.loads(text))
     except ValueError as error:
         _refuse(where, "a structure of arguments that is none", cause=error)
+
+
+def _names_only(context: Any) -> bool:
+    """Whether a context is none, or the list of a map's names: torch imports what others name."""
+    found = json.loads(context) if isinstance(context, str) else context
+    if found is None:
+        return True
+    return isinstance(found, list) and all(isinstance(name, str) for name in found)
 
 
 def _archive(members: dict[str, bytes]) -> bytes:

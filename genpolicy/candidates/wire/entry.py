@@ -5,15 +5,16 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from genpolicy.candidates.wire.declared import DIGEST, Declared
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.contract.settings import Settings
 from genpolicy.errors import ConfigError
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import read_verified, sha256_bytes
 
-DIGEST = r"^[0-9a-f]{64}$"
 NAME = r"^[a-z][a-z0-9_]{0,63}$"
 PORT = "{port}"
+RESERVED = "genpolicy"
 LENGTH = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 """One of the unit in m."""
 
@@ -197,46 +198,6 @@ class Output(Settings):
         return 1 + max(self.columns)
 
 
-class Declared(Settings):
-    """What nobody but its maker can say of a policy, for the identity card of Gate B.
-
-    Attributes:
-        dataset: SHA-256 of the manifest of the dataset that it was trained on.
-        split: SHA-256 of the list of episodes that trained it.
-        training_seed: Root seed of its training.
-        architecture: Encoder, trunk and head with their sizes.
-        parameters: Of the network that runs.
-        path: Noise schedule, or path between noise and action; that there is none.
-        sampler: Name of the sampler.
-        sampler_steps: Its steps.
-        eta: Share of the ancestral noise; None of a sampler that has none.
-        tolerance: Error of a step; None of a sampler that does not choose its steps.
-        evaluations: Network evaluations of a sample, by the definition of the sampler.
-        precision: Number format of weights and arithmetic.
-        device: Where it runs.
-        threads: Threads of its arithmetic.
-        cpu_capability: Instruction set of its kernels.
-        batch_rows: Rows of a network call.
-    """
-
-    dataset: str = Field(pattern=DIGEST)
-    split: str = Field(pattern=DIGEST)
-    training_seed: int
-    architecture: str = Field(min_length=1)
-    parameters: int = Field(ge=1)
-    path: str = Field(min_length=1)
-    sampler: str = Field(min_length=1)
-    sampler_steps: int = Field(ge=1)
-    eta: float | None = None
-    tolerance: float | None = None
-    evaluations: int = Field(ge=1)
-    precision: str = Field(min_length=1)
-    device: str = Field(min_length=1)
-    threads: int = Field(ge=1)
-    cpu_capability: str = Field(min_length=1)
-    batch_rows: int = Field(ge=1)
-
-
 class Entry(Settings):
     """What every kind of candidate says of itself.
 
@@ -272,6 +233,11 @@ class Entry(Settings):
     def _given_once(self) -> "Entry":
         if twice := sorted(set(self.observation) & set(self.constants)):
             raise ValueError(f"{twice[0]} is given twice")
+        if RESERVED in {**self.observation, **self.constants}:
+            raise ValueError(f"{RESERVED} is the word of what is asked beside the observation")
+        for name, value in self.constants.items():
+            if isinstance(value, int) and not -(2**63) <= value < 2**63:
+                raise ValueError(f"{name} is {value}, and a message holds integers of 64 bits")
         return self
 
     @property

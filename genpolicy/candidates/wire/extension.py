@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 WORD = "genpolicy"
 VERSION = 1
 MOST_CANDIDATES = 64
+MOST_EVALUATIONS = 2**31 - 1
 DIGEST = r"^[0-9a-f]{64}$"
 NoiseName = tuple[str | int, ...]
 
@@ -171,8 +172,8 @@ def _actions(found: Any, key: str, told: Capabilities, candidates: int) -> Array
 
 
 def _count(found: Any) -> int:
-    if type(found) is not int or found < 1:
-        raise PolicyError(Fault.MALFORMED, f"{found!r} network evaluations")
+    if type(found) is not int or not 1 <= found <= MOST_EVALUATIONS:
+        raise PolicyError(Fault.MALFORMED, f"{found!r} network evaluations"[:80])
     return found
 
 

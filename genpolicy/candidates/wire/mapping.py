@@ -103,9 +103,15 @@ class Outputs:
 
         Returns:
             Positions in m and rotations in the base frame, openings in m; a row without a rotation
-            is NaN there, and the first check rejects it. Row by row in memory, as compiled checks
+            is NaN there, and the first check rejects it; so is a number beyond `LARGEST`, which no
+            arithmetic behind it has to bear. Row by row in memory, as compiled checks
             want it. Shape (N, K, 10).
         """
+        mapped = self._mapped(np.where(np.abs(chunks) <= LARGEST, chunks, np.nan), conditioned_by)
+        mapped[~(np.abs(mapped) <= LARGEST)] = np.nan
+        return mapped
+
+    def _mapped(self, chunks: Array, conditioned_by: Array) -> Array:
         opened = opening(self.output.gripper, chunks)
         if self._joints is not None:
             place, turned = self._joints.poses(chunks, conditioned_by)
@@ -216,6 +222,8 @@ def _matrices(form: str, rows: Array) -> Array:
     return matrices
 
 
+LARGEST = 1e6
+"""Of the numbers of a chunk: a thousand kilometres, and nothing that overflows when squared."""
 MATRIX_TOLERANCE = 1e-2
 """Of a network's matrix, per number; the six-number form is judged by feasibility itself."""
 

@@ -81,7 +81,11 @@ class RemotePolicy:
         self._outputs = Outputs(entry.action, contract, scene=scene)
         self._asked = 0
         self._line: Connection | None = None
-        self.told: Capabilities = capabilities(self._connected().metadata)
+        try:
+            self.told: Capabilities = capabilities(self._connected().metadata)
+        except PolicyError:
+            self.close()
+            raise
         if self.told.prediction_horizon not in (None, entry.horizons.prediction_horizon):
             self.close()
             raise PolicyError(

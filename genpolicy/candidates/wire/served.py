@@ -122,9 +122,10 @@ def _finite(found: Any, shape: tuple[int, ...], where: str) -> NDArray[np.float6
 
 
 def _observation(found: Any) -> NDArray[np.float64]:
-    if not isinstance(found, np.ndarray) or found.ndim != 2:
-        _refuse(OBSERVATION, f"{type(found).__name__}", "an array (H_o, D_o), newest last")
-    values: NDArray[np.float64] = found.astype(np.float64)
+    if not isinstance(found, np.ndarray) or found.ndim not in (1, 2):
+        shape = f" of shape {found.shape}" if isinstance(found, np.ndarray) else ""
+        _refuse(OBSERVATION, f"{type(found).__name__}{shape}", "an array (H_o, D_o), newest last")
+    values: NDArray[np.float64] = np.atleast_2d(found.astype(np.float64))  # a history of one
     return values
 
 

@@ -16,6 +16,8 @@ DECLARED = {
     "batch_rows": 1,
 }  # fmt: skip
 
+OBSERVED = ENTRY["observation"]["observation"]
+
 
 @pytest.mark.parametrize("kind", HOSTED)
 def test_each_kind_is_read_with_its_files(written, kind):
@@ -70,6 +72,9 @@ def test_an_unknown_kind_names_the_known_ones(written):
         ("torch", {"declared": DECLARED}, "threads is 1, declared.threads 4"),
         ("trained", {"threads": 2}, "Input should be 1"),
         ("trained", {"observation": {"state": ENTRY["observation"]["observation"]}}, "one input"),
+        ("trained", {"observation": {"observation": {**OBSERVED, "dtype": "float32"}}}, "float64"),
+        ("trained", {"observation": {"observation": {**OBSERVED, "unit": "mm"}}}, "lengths in m"),
+        ("trained", {"observation": {"observation": {**OBSERVED, "history": 1}}}, "its 2 last"),
         ("scripted", {"function": "os.path:join"}, "pattern"),
         ("torch", {"address": "ws://127.0.0.1:1"}, "Extra inputs"),
         ("torch", {"noise": {**NOISE, "stream": "12"}}, "pattern"),

@@ -114,3 +114,24 @@ def test_what_is_no_file_of_onnx_and_more_than_one_output():
     both = onnx_model([add("a"), add("b")], a=[16, 10], b=[16, 10])
     with pytest.raises(ContractError, match="2 outputs"):
         loaded(both.SerializeToString())
+
+
+def test_a_tensor_of_an_operator_that_lies_in_a_file_is_refused_unread():
+    """ONNX Runtime would fetch it from the folder of the entry, which no hash pins."""
+    model = onnx_model()
+    beside = helper.make_tensor("secret", TensorProto.FLOAT, (10,), np.zeros(10))
+    beside.ClearField("float_data")
+    beside.data_location = TensorProto.EXTERNAL
+    beside.external_data.add(key="location", value="secret.bin")
+    model.graph.node.insert(0, helper.make_node("Constant", [], ["secret"], value=beside))
+    with pytest.raises(IntegrityError, match="secret in another file"):
+        loaded(model.SerializeToString())
+
+
+def test_dropout_that_draws_is_refused():
+    model = onnx_model()
+    model.graph.node.insert(
+        0, helper.make_node("Dropout", ["noise", "weight", "weight"], ["dropped"])
+    )
+    with pytest.raises(IntegrityError, match="draws by itself"):
+        loaded(model.SerializeToString())

@@ -165,3 +165,23 @@ def test_an_archive_that_is_none(torch_data, changes, found):
 def test_another_file_is_no_archive(data):
     with pytest.raises(IntegrityError, match="no archive"):
         without_code(data, where="policy.pt2")
+
+
+@pytest.mark.parametrize("context", [
+    '{"__enum__": true, "fqn": "this:s", "name": 0}',
+    '[{"__enum__": true, "fqn": "this:s", "name": 0}]',
+    {"__enum__": True, "fqn": "this:s", "name": 0},
+])  # fmt: skip
+def test_a_structure_that_names_a_module_is_refused(torch_data, context):
+    """torch imports what such a context names."""
+
+    def change(graph):
+        for signature in graph["graph_module"]["module_call_graph"]:
+            if signature["signature"] is None:
+                continue
+            said = json.loads(signature["signature"]["in_spec"])
+            said[1]["context"] = context
+            signature["signature"]["in_spec"] = json.dumps(said)
+
+    with pytest.raises(IntegrityError, match="more than names"):
+        without_code(with_graph(torch_data, change), where="policy.pt2")

@@ -50,11 +50,11 @@ def test_lerobot_runs_in_its_own_interpreter(written, task, tmp_path, monkeypatc
         as_server(read_entry(path), path, task.observation)
 
 
-def test_the_identity_of_a_server_is_what_it_was(entry_of):
-    """Taken from the code before there were kinds, for the planted entry of these tests."""
+def test_the_identity_of_an_entry_does_not_move_without_a_word(entry_of):
+    """Evidence names it: another one makes all that was recorded another candidate's."""
     assert entry_of().sha256 == IDENTITY
     assert entry_of(name="another").sha256 != IDENTITY
     assert "address" in ENTRY
 
 
-IDENTITY = "8b3641bfa8030e8790030913cc8a16caed97f41a2c6a492ada55a1c73e453650"
+IDENTITY = "182f4f2b352cea8d5831d33bda549a712e098533586666be76f782aec22d3429"

@@ -45,6 +45,8 @@ def test_an_entry_may_say_joints_in_place_of_a_pose(tmp_path):
         ({"command": ["serve", "{port}"]}, "", "address or command"),
         ({"address": None, "command": ["serve"]}, "", "write {port}"),
         ({"constants": {"observation": 1}}, "", "given twice"),
+        ({"constants": {"genpolicy": 1}}, "", "the word of what is asked"),
+        ({"constants": {"seed": 10**20}}, "", "integers of 64 bits"),
         ({"files": {"a": "12"}}, "files.a", "pattern"),
         ({"weights": "x"}, "weights", "Extra inputs"),
         ({"action": action(frame="tcp")}, "action", "frame robot_base"),

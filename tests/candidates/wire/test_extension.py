@@ -44,7 +44,7 @@ def test_a_server_that_never_heard_of_it_can_nothing_of_it():
 
 def test_what_it_says_is_what_it_can():
     told = capabilities(said())
-    assert told.model_dump() == {**SAID, "spans": ("encode", "sample")}
+    assert told.model_dump() == {**SAID, "spans": ("encode", "sample"), "prefix": False}
 
 
 @pytest.mark.parametrize(
@@ -108,6 +108,7 @@ def test_a_plain_answer_is_one_chunk():
         (answered(sampler="c" * 64), Fault.CHANGED),
         (answered(nfe=0), Fault.MALFORMED),
         (answered(nfe=True), Fault.MALFORMED),
+        (answered(nfe=2**31), Fault.MALFORMED),
         (answered(nfe=4.0), Fault.MALFORMED),
         (answered(spans_s={"encode": 0.001}), Fault.MALFORMED),
         (answered(spans_s={"encode": -0.001, "sample": 0.0}), Fault.MALFORMED),

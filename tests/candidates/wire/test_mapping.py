@@ -240,3 +240,21 @@ def test_an_anchor_that_is_no_pose_is_refused():
             output(motion="relative", anchor={"position": ["place_m"], "rotation": ["place_m"]}),
             CONTRACT,
         )
+
+
+@pytest.mark.parametrize("form", ["rotation_6d", "quaternion_xyzw", "matrix"])
+@pytest.mark.parametrize("huge", [1e7, 1e200, -1e300])
+def test_a_row_with_a_number_that_would_overflow_is_none_at_all(form, huge):
+    turn = random_turns(1)[0]
+    row = np.concatenate([[0.4, 0.0, 0.2], WRITE[form](turn), [0.5]])
+    chunks = np.tile(row, (1, 3, 1))
+    chunks[0, 1, 3] = huge
+    mapped = Outputs(output(form=form), CONTRACT).mapped(chunks, seen(np.zeros(3), turn))
+    assert np.isnan(mapped[0, 1]).any() and np.isfinite(mapped[0, [0, 2]]).all()
+
+
+def test_a_motion_that_leaves_the_earth_is_none_though_its_numbers_are():
+    turn = Turn.identity()
+    chunks = np.tile(np.concatenate([[9e5, 0, 0], WRITE["rotation_6d"](turn), [0.5]]), (1, 2, 1))
+    found = Outputs(output(motion="increments"), CONTRACT).mapped(chunks, seen(np.zeros(3), turn))
+    assert np.isfinite(found[0, 0]).all() and np.isnan(found[0, 1, 0])

@@ -156,7 +156,8 @@ def test_equal_names_are_equal_chunks_whatever_was_asked_between(served, seen):
     [
         ({}, "NoneType"),
         ({"observation": [[1.0]]}, "list"),
-        ({"observation": np.zeros(3)}, "ndarray"),
+        ({"observation": np.zeros(3)}, "of shape (1, 1, 3)"),
+        ({"observation": np.zeros((1, 2, 3))}, "ndarray of shape (1, 2, 3)"),
         ({"observation": np.zeros((2, 3))}, "of shape"),
         ({"observation": np.zeros((2, 3)), WORD: 1}, "1"),
         ({"observation": np.zeros((2, 3)), WORD: {"noise": []}}, "noise"),

@@ -42,7 +42,7 @@ def of_class(svg, name):
 
 
 def test_places_are_to_scale_and_up_is_up():
-    above, aside = of_class(drawn_clip(film(), SPACE, 1), "hand")
+    above, aside = of_class(drawn_clip(film(), SPACE, 1, said="largest force"), "hand")
     middle = np.mean(points(above), axis=0)
     assert middle[0] == pytest.approx((0.6 - 0.3 + MARGIN_M) * SCALE, abs=0.1)
     height = (0.4 + 2 * MARGIN_M) * SCALE
@@ -54,7 +54,7 @@ def test_places_are_to_scale_and_up_is_up():
 
 
 def test_it_stands_at_the_end_and_plays_from_the_beginning():
-    svg = str(drawn_clip(film(), SPACE, 7))
+    svg = str(drawn_clip(film(), SPACE, 7, said="largest force"))
     (values,) = set(re.findall(r'class="hand" points="[^"]*"><animate [^>]*values="([^"]*)"', svg)
                     [:1])  # fmt: skip
     frames = values.split(";")
@@ -65,13 +65,13 @@ def test_it_stands_at_the_end_and_plays_from_the_beginning():
 
 
 def test_what_stands_still_is_not_animated():
-    svg = str(drawn_clip(film(), SPACE, 1))
+    svg = str(drawn_clip(film(), SPACE, 1, said="largest force"))
     assert len(re.findall(r'class="obstacle" points="[^"]*"/>', svg)) == 2
     assert of_class(svg, "held") == ["", ""]
 
 
 def test_bars_are_as_high_as_what_was_measured():
-    svg = str(drawn_clip(film(), SPACE, 1))
+    svg = str(drawn_clip(film(), SPACE, 1, said="largest force"))
     (bars,) = re.findall(r'class="measured" d="([^"]*)"', svg)
     found = [tuple(map(float, bar)) for bar in re.findall(r"M([\d.]+) [\d.]+v-([\d.]+)", bars)]
     assert found == [(WIDTH / 4, STRIP / 4), (WIDTH / 2, STRIP)]
@@ -79,26 +79,37 @@ def test_bars_are_as_high_as_what_was_measured():
 
 
 def test_a_tremor_does_not_fill_its_strip():
-    svg = str(drawn_clip(film(forces=((1.0, 0.1),)), SPACE, 1))
+    svg = str(drawn_clip(film(forces=((1.0, 0.1),)), SPACE, 1, said="largest force"))
     assert f"v-{STRIP / 100:.1f}" in svg
 
 
 def test_phases_are_named_where_there_is_room_and_names_are_no_markup():
-    svg = str(drawn_clip(film(), SPACE, 1))
+    svg = str(drawn_clip(film(), SPACE, 1, said="largest force"))
     assert ">approach<" in svg and "in<sert" not in svg and "sert" not in svg and ">end<" not in svg
-    wide = str(drawn_clip(film(phases=((0.0, "in<sert"),)), SPACE, 1))
+    wide = str(drawn_clip(film(phases=((0.0, "in<sert"),)), SPACE, 1, said="largest force"))
     assert ">in&lt;sert<" in wide
     assert len(re.findall('class="phase"', svg)) == 3
 
 
 def test_who_commands_is_marked_while_it_does():
-    svg = str(drawn_clip(film(), SPACE, 1))
+    svg = str(drawn_clip(film(), SPACE, 1, said="largest force"))
     rows = re.findall(r'<rect class="(fallback|person)" x="([\d.]+)" y="[\d.]+" width="([\d.]+)"',
                       svg)  # fmt: skip
     assert rows == [("fallback", "160.0", "80.0"), ("person", "240.0", "40.0")]
 
 
+def test_a_person_who_ends_a_rollout_is_seen_at_its_end():
+    ended = film(modes=((2.0, "intervention"), (2.0, "ended")))
+    (row,) = re.findall(r'<rect class="person" x="([\d.]+)" y="[\d.]+" width="([\d.]+)"',
+                        str(drawn_clip(ended, SPACE, 1, said="largest force")))  # fmt: skip
+    assert float(row[0]) + float(row[1]) == WIDTH and float(row[1]) > 3
+
+
+def test_its_label_says_what_it_shows():
+    assert 'aria-label="a &lt; b: a rollout' in drawn_clip(film(), SPACE, 1, said="a < b")
+
+
 def test_a_film_of_nothing_is_drawn():
     empty = film(frames=(Frame(None, None, ()),), path_m=np.zeros((0, 3)), duration_s=0.0,
                  forces=(), ages=(), phases=(), modes=())  # fmt: skip
-    assert "force: none" in drawn_clip(empty, SPACE, 1)
+    assert "force: none" in drawn_clip(empty, SPACE, 1, said="largest force")

@@ -34,11 +34,13 @@ def test_every_number_of_the_sentence_is_counted_again(ladder):
         for name in (report.promoted, best)
     }
     differences = (means[report.promoted] - means[best]).to_numpy()
-    low, high = gain_interval(differences, confidence=report.settings["confidence"])
+    alpha = report.settings["family_alpha"] / len(report.settings["candidates"])
+    low, high = gain_interval(differences, alpha=alpha)
     points = [float(found) / 100 for found in re.findall(r"[+-][\d.]+", said.replace("−", "-"))]
     expected = [np.mean(differences), low, high, report.settings["margin"]]
     assert points == pytest.approx(expected, abs=0.0006)  # three digits are shown
     assert f"same {len(differences)} starts in {rows['perturbation'].nunique()} conditions" in said
+    assert low >= report.settings["margin"] - 0.001  # it was promoted
     write_gate(ladder, "D")
     assert said in (ladder / "reports/index.html").read_text()
 

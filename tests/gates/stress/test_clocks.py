@@ -142,3 +142,10 @@ def test_the_page_has_every_number(ladder):
     assert missed[2:4] == ("0.5", "0") and missed[5:7] == ("0.1", "outside")
     ticks = tables_clocks.CLOCKS.folded[0].read(Evidence(ladder), report)
     assert ticks[1] == ("diffusion", str(48 * 16), "2", "4")
+
+
+def test_an_age_that_is_no_number_is_said_and_stops_no_gate(ladder):
+    evidence.edit_table(ladder, AGES, lambda f: on_the_wall(f, "age_s", float("nan"), share=0.1))
+    found = of(ladder)
+    assert found.answer == UNSEEN and "age_s" in found.why
+    judge(ladder, "D")
