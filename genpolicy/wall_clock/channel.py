@@ -136,3 +136,13 @@ class Outbox:
         if not self._shut:
             self._shut = self.closed = True
             os.close(self._descriptor)
+
+
+def send_all(descriptor: int, data: bytes) -> bool:
+    """Whether somebody reads; waits as long as the pipe is full."""
+    try:
+        while data:
+            data = data[os.write(descriptor, data) :]
+    except BrokenPipeError:
+        return False
+    return True

@@ -20,7 +20,7 @@ from genpolicy.candidates.wire.remote import RemotePolicy
 from genpolicy.policies.policy import load_policy
 from genpolicy.policies.protocol import Policy
 from genpolicy.tasks.api import load_task
-from genpolicy.wall_clock.channel import Inbox, frame
+from genpolicy.wall_clock.channel import Inbox, frame, send_all
 from genpolicy.wall_clock.messages import Answer, Ask
 
 
@@ -48,7 +48,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         select.select([inbox.descriptor], [], [])
         for payload in inbox.read():
             answer = answer_of(policy, Ask.decoded(payload), candidates=given.candidates)
-            if answer is not None and not _send(given.answers, frame(answer.encoded())):
+            if answer is not None and not send_all(given.answers, frame(answer.encoded())):
                 return 0
     return 0
 
@@ -80,16 +80,6 @@ def _behind_the_wire(path: Path, sha256: str, address: str, task: str) -> WirePo
     return WirePolicy(
         brought, RemotePolicy(server, address, cell.observation, scene=cell.scene_path)
     )
-
-
-def _send(descriptor: int, data: bytes) -> bool:
-    """Whether somebody reads; waits as long as the pipe is full."""
-    try:
-        while data:
-            data = data[os.write(descriptor, data) :]
-    except BrokenPipeError:
-        return False
-    return True
 
 
 if __name__ == "__main__":

@@ -8,7 +8,6 @@ the name of the invocation.
 
 import argparse
 import heapq
-import os
 import select
 import sys
 import time
@@ -19,7 +18,7 @@ from pydantic import Field, NonNegativeFloat
 
 from genpolicy.contract.settings import Settings
 from genpolicy.integrity.documents import parse_json
-from genpolicy.wall_clock.channel import Inbox, frame
+from genpolicy.wall_clock.channel import Inbox, frame, send_all
 
 AT_ONCE = (0.0,)
 Delays = dict[str, tuple[NonNegativeFloat, ...]]
@@ -61,7 +60,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                     heapq.heappush(waiting, (due_s, count, out, frame(payload)))
         while waiting and waiting[0][0] <= time.monotonic():
             _, _, out, data = heapq.heappop(waiting)
-            if not _sent(out, data):
+            if not send_all(out, data):
                 return 0
     return 0
 
@@ -77,16 +76,6 @@ def _invocation(payload: bytes) -> str:
         return "/".join(str(parse_json(payload, where="a message")["invocation"]).split("/")[-2:])
     except Exception:  # whatever somebody sends is passed on
         return ""
-
-
-def _sent(descriptor: int, data: bytes) -> bool:
-    """Whether somebody reads; waits as long as the pipe is full."""
-    try:
-        while data:
-            data = data[os.write(descriptor, data) :]
-    except BrokenPipeError:
-        return False
-    return True
 
 
 if __name__ == "__main__":
