@@ -25,7 +25,8 @@ from benchmarks.ladder_truth.planting import Wrong, patches_of, silently
 from benchmarks.ladder_truth.workspace import ROOT
 from gates.pipeline import RUNGS
 from gates.report import stage_of
-from genpolicy.candidates.wire.entry import read_entry, verify_files
+from genpolicy.candidates.hosts.kinds import read_entry
+from genpolicy.candidates.wire.entry import verify_files
 
 BIT = silently("artifacts/ingest/frames.parquet")
 AT_A = Expected("A", refusal=r"sha256 of artifacts/ingest/frames\.parquet")
