@@ -37,6 +37,7 @@ from genpolicy.audit.rows import (
 from genpolicy.audit.shown_rows import Alignment, ExampleChunk
 from genpolicy.candidates.votes import VOTE_CHECKS
 from genpolicy.data.rows import EpisodeRow, FrameRow
+from genpolicy.evidence.rows.brought import AFTER, BEFORE, AnswerRow, FixtureAgainRow
 from genpolicy.evidence.rows.clocks import ClockAgeRow, ClockInvocationRow, ClockTickRow
 from genpolicy.evidence.rows.need import (
     EffectRow,
@@ -1056,6 +1057,29 @@ def _reload(root: Path) -> None:
             for i in range(8)
         ],
     )
+    # Nobody is brought; fixtures that were asked again are there for tests that bring one of them.
+    document(root, "reload/conformance.json", {})
+    table(root, "reload/answers.parquet", AnswerRow, [])
+    for folder, conditions in (("shadow", ("shadow",)), ("stress", CONDITIONS)):
+        table(
+            root,
+            f"{folder}/fixtures.parquet",
+            FixtureAgainRow,
+            [
+                {
+                    "method": m,
+                    "condition": condition,
+                    "when": when,
+                    "row": i,
+                    "answered": True,
+                    "sha256": digest,
+                }
+                for m in CANDIDATES
+                for condition in conditions
+                for when in (BEFORE, AFTER)
+                for i in range(8)
+            ],
+        )
     table(
         root,
         "reload/nfe.parquet",

@@ -25,6 +25,7 @@ from tests.candidates.conftest import ENTRY, serving  # noqa: F401
 SEED = 3
 PARAMS = {
     "seed": SEED,
+    "task": {"name": "tabletop_insertion"},
     "candidates": {"planted": "planted.yaml"},
     "horizons": ENTRY["horizons"],
     "policy": {"seeds": [0]},

@@ -8,7 +8,6 @@ went wrong. Nothing but a policy is reached through it: see the test of safety.
 import ipaddress
 import logging
 import re
-import threading
 import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager, suppress
@@ -207,8 +206,6 @@ class Listening(AbstractContextManager["Listening"]):
         *, port: int,
     ) -> None:  # fmt: skip
         self._answer = answer
-        # Who hung up may be dialled anew while his last question is still being answered.
-        self._one_at_a_time = threading.Lock()
         self._metadata = metadata
         self._server: Server = serve(
             self._talk, LOOPBACK, port, compression=None, max_size=MAXIMUM_MESSAGE_BYTES,
@@ -232,8 +229,7 @@ class Listening(AbstractContextManager["Listening"]):
             line.send(pack(self._metadata))
             for data in line:
                 try:
-                    with self._one_at_a_time:
-                        said = pack(self._answer(_message(data)))
+                    said = pack(self._answer(_message(data)))
                 except Exception as error:  # whatever it is, the client is told, as openpi does
                     line.send(f"{type(error).__name__}: {error}")
                     line.close(1011)

@@ -114,12 +114,17 @@ def test_a_limit_of_a_higher_gate_may_be_planned_until_its_own_evidence_is_there
     old = {s: o["outs"][0]["md5"] for s, o in yaml.safe_load(_lock("old"))["stages"].items()}
     commit(lock=_lock("old"))
     commit(plan=first.replace("90", "120"))
-    with pytest.raises(IntegrityError, match=r"what gate D judges by is no older than .*stress"):
+    with pytest.raises(
+        IntegrityError, match=r"what gate D judges by is no older than .*(wall_clock|stress)"
+    ):
         require_registered_first(root)
     commit(lock=_lock("old", stress="f" * 32))
+    with pytest.raises(IntegrityError, match="wall_clock"):
+        require_registered_first(root)
+    commit(lock=_lock("old", stress="f" * 32, wall_clock="f" * 32))
     require_registered_first(root)
     commit(plan=first.replace("0]\nstress", "1]\nstress").replace("90", "120"))
-    commit(lock=_lock("old", stress="e" * 32))
+    commit(lock=_lock("old", stress="e" * 32, wall_clock="e" * 32))
     with pytest.raises(IntegrityError, match=r"what gate A judges by is no older than .*audit"):
         require_registered_first(root)
     assert old["audit"] in (root / LOCK).read_text()
