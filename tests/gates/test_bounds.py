@@ -165,7 +165,7 @@ def test_every_criterion_rounds_its_counts_against_whom_it_judges(gate, repo, mo
     met = set()
     for item in SPECS[gate].criteria:
         if item.id == "conformance":
-            continue  # of who was brought: here nobody is, and it names findings, and counts nothing
+            continue  # of who was brought, and nobody is; it names findings and counts nothing
         asked.clear()
         item.measure(Evidence(repo), settings, *(["flow"] if item.per_candidate else []))
         assert all(confidence >= settings.confidence for confidence, _ in asked), item.id
