@@ -27,6 +27,7 @@ import torch
 import yaml
 from numpy.typing import NDArray
 
+from benchmarks.ladder_truth.bringing import ACTION
 from benchmarks.sampling import HORIZONS, SAMPLER, untrained
 from genpolicy.candidates.hosts.kinds import read_entry
 from genpolicy.candidates.hosts.translation import as_server
@@ -77,13 +78,7 @@ def entries(folder: Path, horizons: dict[str, object], channels: list[str]) -> I
         "author": "author@example.org",
         "horizons": horizons,
         "observation": {"observation": {"channels": channels, "history": 2, "dtype": "float64"}},
-        "action": {
-            "frame": "robot_base",
-            "motion": "absolute",
-            "position": {"columns": [0, 1, 2], "unit": "m"},
-            "rotation": {"columns": [3, 4, 5, 6, 7, 8], "form": "rotation_6d"},
-            "gripper": {"column": 9, "open": 1.0, "open_m": 1.0},
-        },
+        "action": ACTION,
         "timeout_s": 30.0,
         "start_timeout_s": 300.0,
     }

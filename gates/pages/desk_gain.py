@@ -3,13 +3,14 @@
 from collections.abc import Mapping
 
 import numpy as np
-import pandas as pd
+from pydantic import ValidationError
 
 from gates.evidence import Evidence, MissingEvidenceError, flags
 from gates.pages.bound import require_bound
 from gates.report import Gate, GateReport
-from gates.stress.rollouts import ROLLOUTS
-from genpolicy.evidence.rows.stress import RolloutRow
+from gates.stress.gate import best_baseline
+from gates.stress.pairs import paired_differences
+from gates.stress.rollouts import ROLLOUTS, StressSettings, rollouts
 from genpolicy.statistics.eprocess import gain_interval
 
 
@@ -23,43 +24,30 @@ def gain_of(reports: Mapping[Gate, GateReport], evidence: Evidence) -> str:
     if report is None or report.promoted is None:
         return ""
     try:
+        settings = StressSettings.model_validate(report.settings, strict=False)
         require_bound(evidence, report, ROLLOUTS)
-        rows = evidence.rows(ROLLOUTS, RolloutRow)
-        rows = rows.assign(success=flags(rows, "success"))
-        return _said(report, rows[rows["perturbation"].isin(report.settings["perturbations"])])
-    except (MissingEvidenceError, KeyError):
+        return _said(report.promoted, evidence, settings)
+    except (MissingEvidenceError, ValidationError):
         return ""
 
 
-def _said(report: GateReport, rows: pd.DataFrame) -> str:
-    promoted, simple = str(report.promoted), list(report.settings["baselines"])
-    best = max(simple, key=lambda name: rows[rows["method"] == name]["success"].mean())
-    own, other = (_by_start(rows, name) for name in (promoted, best))
-    differences = np.asarray(own - other, dtype=np.float64)
-    if not len(differences) or np.any(np.isnan(differences)):
-        raise MissingEvidenceError(f"{promoted} and {best} did not roll out from the same starts")
+def _said(promoted: str, evidence: Evidence, settings: StressSettings) -> str:
+    best = best_baseline(evidence, settings)
+    differences = paired_differences(evidence, settings, promoted, best)
     # As the promotion is tested, so that a gain that it shows is one that stands here.
-    alpha = float(report.settings["family_alpha"]) / len(report.settings["candidates"])
-    low, high = gain_interval(differences, alpha=alpha)
-    conditions = rows["perturbation"].nunique()
+    low, high = gain_interval(differences, alpha=settings.alpha)
     return (
-        f"{promoted} succeeds in {_share(rows, promoted)}, the best simple policy, {best}, in "
-        f"{_share(rows, best)}: {_points(differences.mean())} points on the same "
-        f"{len(differences)} starts in {conditions} conditions, between {_points(low)} and "
-        f"{_points(high)} (each end wrong with at most {100 * alpha:.3g} %); more than "
-        f"{_points(float(report.settings['margin']))} had to be shown."
+        f"{promoted} succeeds in {_share(evidence, settings, promoted)}, the best simple policy, "
+        f"{best}, in {_share(evidence, settings, best)}: {_points(differences.mean())} points on "
+        f"the same {len(differences)} starts in {len(settings.perturbations)} conditions, between "
+        f"{_points(low)} and {_points(high)} (each end wrong with at most "
+        f"{100 * settings.alpha:.3g} %); more than {_points(settings.margin)} had to be shown."
     )
 
 
-def _by_start(rows: pd.DataFrame, method: str) -> "pd.Series[float]":
-    """Mean success of each start, over conditions and training seeds, which are no draws."""
-    own = rows[rows["method"] == method].groupby(["start", "perturbation"])["success"].mean()
-    return own.groupby("start").mean().sort_index()
-
-
-def _share(rows: pd.DataFrame, method: str) -> str:
-    own = rows[rows["method"] == method]["success"]
-    return f"{100 * own.mean():.3g} % ({int(own.sum()):,} of {len(own):,})"
+def _share(evidence: Evidence, settings: StressSettings, method: str) -> str:
+    won = flags(rollouts(evidence, settings, method), "success")
+    return f"{100 * np.mean(won):.3g} % ({int(won.sum()):,} of {len(won):,})"
 
 
 def _points(share: float) -> str:

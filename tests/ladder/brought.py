@@ -7,17 +7,10 @@ from pathlib import Path
 
 import yaml
 
+from benchmarks.ladder_truth.bringing import ACTION, AS_TRAINED, CHANNELS
 from genpolicy.integrity.hashing import sha256_file
 
 NAME = "brought_flow"
-CHANNELS = [
-    "tcp_position_m", "tcp_rotation", "gripper_opening_m", "wrench_n", "hole_pose",
-    "post_position_m", "phase",
-]  # fmt: skip
-AS_TRAINED = (
-    "dataset", "split", "architecture", "parameters", "path", "sampler", "sampler_steps",
-    "precision", "device", "threads", "cpu_capability", "batch_rows",
-)  # fmt: skip
 
 
 def bring_flow(workspace: Path) -> Path:
@@ -37,13 +30,7 @@ def bring_flow(workspace: Path) -> Path:
         "files": {name: sha256_file(own / name) for name in files},
         "horizons": horizons,
         "observation": {"observation": {"channels": CHANNELS, "history": 2, "dtype": "float64"}},
-        "action": {
-            "frame": "robot_base",
-            "motion": "absolute",
-            "position": {"columns": [0, 1, 2], "unit": "m"},
-            "rotation": {"columns": [3, 4, 5, 6, 7, 8], "form": "rotation_6d"},
-            "gripper": {"column": 9, "open": 1.0, "open_m": 1.0},
-        },
+        "action": ACTION,
         "declared": {
             **{name: card[name] for name in AS_TRAINED},
             "training_seed": identity["seed"][0],
