@@ -3,23 +3,27 @@
 It runs every time (`always_changed`): a task may be installed and recordings may lie outside the
 tree, where nothing else sees an edit. What it writes changes only when they do. Coming first, it
 also stops the ladder before a stage would replace files that somebody else put in its folder,
-where a fixture (controller, limits, supervisor, scene) is not the one that is pinned, and where a
-policy that is brought is not what its entry says: before anything trains.
+where a fixture (controller, limits, supervisor, scene) is not the one that is pinned, where a
+policy that is brought is not what its entry says, and where a method or its sampler is none:
+before anything trains.
 """
 
 from pathlib import Path
 
-from genpolicy.candidates.brought import BroughtSection, NamesSection, require_brought
+from genpolicy.candidates.brought import BroughtSection, require_brought
 from genpolicy.candidates.mapped import require_mapped
 from genpolicy.documents.task import IDENTITY
 from genpolicy.integrity.atomic import output_folder, write_bytes
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.outputs import require_own_files
+from genpolicy.policies.matched_training import PolicySettings
+from genpolicy.policies.methods import check_sampler, method_named
 from genpolicy.tasks.api import load_task
 from genpolicy.tasks.fixtures import fixture_hashes, require_pinned
 from genpolicy.tasks.identity import task_identity
 from stages._source import SOURCE_FILE, SourceSection, refuse_foreign_files, source_document
 from stages._stage import ARTIFACTS, Params, main
+from stages._training import MethodsSection
 
 
 def work(params: Params) -> None:
@@ -27,12 +31,7 @@ def work(params: Params) -> None:
     refuse_foreign_files()
     require_own_files(Path.cwd())
     entries = params.section("candidates", BroughtSection).root
-    trained = [
-        name
-        for stage in ("train_baselines", "train_generators")
-        for name in params.section(stage, NamesSection).samplers
-    ]
-    brought = require_brought(entries, horizons=params.horizons, trained=trained)
+    brought = require_brought(entries, horizons=params.horizons, trained=_required_methods(params))
     if brought:
         require_mapped(brought, load_task(params.task.name))
     identity = task_identity(params.task.name)
@@ -41,6 +40,17 @@ def work(params: Params) -> None:
     with output_folder(ARTIFACTS / "task") as folder:
         write_bytes(folder / IDENTITY.file, canonical_json(identity))
         write_bytes(folder / SOURCE_FILE, canonical_json(source))
+
+
+def _required_methods(params: Params) -> list[str]:
+    """Names of all that is trained here, each a method with a sampler that fits it."""
+    head = params.section("policy", PolicySettings).head
+    names = []
+    for stage in ("train_baselines", "train_generators"):
+        for name, sampler in params.section(stage, MethodsSection).samplers.items():
+            check_sampler(method_named(name), sampler, head)
+            names.append(name)
+    return names
 
 
 if __name__ == "__main__":

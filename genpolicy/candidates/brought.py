@@ -7,7 +7,6 @@ looked at before anything trains, and the files again each time that its server 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from pydantic import RootModel
 
@@ -15,7 +14,6 @@ from genpolicy.candidates.hosts.kinds import read_entry
 from genpolicy.candidates.wire.entry import Entry, ServerEntry, verify_files
 from genpolicy.candidates.wire.launched import require_program
 from genpolicy.contract.horizons import HorizonConfig
-from genpolicy.contract.settings import Settings
 from genpolicy.errors import ConfigError
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_bytes
@@ -23,16 +21,6 @@ from genpolicy.integrity.hashing import sha256_bytes
 
 class BroughtSection(RootModel[dict[str, str]]):
     """Section `candidates`: path of each entry, from the root of the workspace, by name."""
-
-
-class NamesSection(Settings):
-    """Section `train_baselines` or `train_generators`, of which the names are wanted alone.
-
-    Attributes:
-        samplers: Methods, and the sampler of each.
-    """
-
-    samplers: dict[str, Any]
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Settings that only make sense together, found by the stage or by the gate that needs both."""
+"""Settings that only make sense together, found before anything trains or by the gate of both."""
 
 from pathlib import Path
 
@@ -14,10 +14,10 @@ def test_more_sampler_steps_than_training_levels_is_a_bad_setting(copy: Path) ->
         params["train_generators"]["samplers"]["diffusion"]["steps"] = levels + 1
 
     edit_params(copy, too_many)
-    before = hashes(copy, "artifacts", "reports", leave=("artifacts/train_generators/",))
-    code, said = run_stage(copy, "train_generators")
+    before = hashes(copy, "artifacts", "reports")
+    code, said = run_stage(copy, "task")
     assert code == 2, said
-    assert said.startswith("train_generators: ") and "101" in said and "100" in said
+    assert said.startswith("task: ") and "101" in said and "100" in said
     assert hashes(copy, "artifacts", "reports") == before
 
 
@@ -26,9 +26,30 @@ def test_a_sampler_of_another_method_is_a_bad_setting(copy: Path) -> None:
         params["train_generators"]["samplers"]["flow"] = {"name": "ddim", "steps": 4}
 
     edit_params(copy, swapped)
-    code, said = run_stage(copy, "train_generators")
+    code, said = run_stage(copy, "task")
     assert code == 2, said
-    assert said.startswith("train_generators: ") and "ddim" in said
+    assert said.startswith("task: ") and "ddim" in said
+
+
+def test_a_method_that_does_not_exist_is_a_bad_setting(copy: Path) -> None:
+    def misnamed(params: dict) -> None:
+        samplers = params["train_generators"]["samplers"]
+        samplers["flou"] = samplers.pop("flow")
+
+    edit_params(copy, misnamed)
+    code, said = run_stage(copy, "task")
+    assert code == 2, said
+    assert said.startswith("task: ") and "'flou'" in said and "flow" in said
+
+
+def test_samplers_other_than_those_judged_are_not_trained(copy: Path) -> None:
+    def fewer(params: dict) -> None:
+        params["train_generators"]["samplers"]["diffusion"]["steps"] -= 1
+
+    edit_params(copy, fewer)
+    code, said = run_stage(copy, "train_generators")
+    assert code == 3, said
+    assert "train_generators.samplers" in said and "as judged" in said
 
 
 @pytest.mark.parametrize(("key", "value"), [("starts", 4), ("margin", -0.8)])

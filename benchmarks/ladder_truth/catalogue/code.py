@@ -76,8 +76,8 @@ WRONGS = (
           "The clock delivers an answer one tick before its latency has passed.",
           "small",
           patched("genpolicy/evidence/stress/deliveries.py",
-                  ("            elif flying.arrival_s <= now_s and not flying.dropped:",
-                   "            elif (not flying.dropped and flying.arrival_s\n"
+                  ("            elif flying.arrival_s <= now_s and flying.comes:",
+                   "            elif (flying.comes and flying.arrival_s\n"
                    "                  <= now_s + self._setup.horizons.action_period_s):")),
           Expected("D", ("checker_violations", "refusal"))),
     Wrong("latencies_a_tenth_shorter", "code",
