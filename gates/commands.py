@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from gates.package.commands import verify_bundle
 from genpolicy.cli.commands import Contract, Format, Recordings, TaskName
 from genpolicy.cli.shell import AsJson, examples, new_app, with_examples
 from genpolicy.errors import BadInputError, GenpolicyError
@@ -26,7 +27,10 @@ Layout = Annotated[
 ]
 
 gates = new_app("Judge evidence, prove reports; cards: `genpolicy card`.")
-verify = new_app("Prove the reports that lie here.")
+verify = new_app("Prove the reports that lie here, or a bundle.")
+verify.command(
+    "bundle", epilog=examples("genpolicy verify bundle flow.zip --address 0123456789ab")
+)(verify_bundle)
 
 
 @with_examples(

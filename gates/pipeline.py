@@ -73,11 +73,11 @@ def basis_of(root: Path, gate: Gate) -> Basis:
     for name in names:
         stage = stages.get(name) or {}
         if name in RUNGS[gate]:  # the gate's own are re-derived, with a better sentence
-            keys |= set(_texts(stage.get("params")))
-        for dep in _texts(stage.get("deps")):
+            keys |= set(names_in(stage.get("params")))
+        for dep in names_in(stage.get("deps")):
             if PurePosixPath(dep).parts[0] not in CODE:
                 continue
-            for file in _files(root, dep):
+            for file in files_at(root, dep):
                 files.setdefault(PurePosixPath(file).parent.as_posix(), {})[file] = ""
     code = {
         package: sha256_bytes(canonical_json({name: sha256_file(root / name) for name in members}))
@@ -150,7 +150,7 @@ def outputs_of(root: Path, gate: Gate) -> tuple[str, ...]:
     names: set[str] = set()
     for stage in RUNGS[gate]:
         if (root / "artifacts" / stage).is_dir():
-            names |= set(_files(root, f"artifacts/{stage}"))
+            names |= set(files_at(root, f"artifacts/{stage}"))
     return tuple(sorted(names))
 
 
@@ -182,7 +182,7 @@ class Disk:
             if target.is_dir():
                 listed = [
                     {"md5": self._file(name), "relpath": str(PurePosixPath(name).relative_to(path))}
-                    for name in _files(self._root, path)
+                    for name in files_at(self._root, path)
                 ]
                 listed.sort(key=lambda item: item["relpath"])
                 text = json.dumps(listed, sort_keys=True).encode()
@@ -207,7 +207,7 @@ def _md5(data: bytes) -> str:
     return hashlib.md5(data, usedforsecurity=False).hexdigest()
 
 
-def _files(root: Path, path: str) -> Iterator[str]:
+def files_at(root: Path, path: str) -> Iterator[str]:
     """Files at or below a path, without those that DVC ignores; nothing where nothing lies."""
     target = root / path
     if not target.is_dir():
@@ -231,7 +231,7 @@ def _ignored(root: Path) -> tuple[str, ...]:
 
 def _same_names(stage: str, kind: str, recorded: Any, listed: Any) -> None:
     found = {str(entry.get("path")) for entry in recorded or ()}
-    expected = set(_texts(listed))
+    expected = set(names_in(listed))
     if found != expected:
         raise IntegrityError(
             where=f"{LOCK}: {stage}.{kind}",
@@ -244,7 +244,7 @@ def _same_names(stage: str, kind: str, recorded: Any, listed: Any) -> None:
 def _same_parameters(
     stage: str, recorded: Mapping[str, Any], listed: Mapping[str, Any], params: Any
 ) -> None:
-    for key in sorted({*recorded, *_texts(listed.get("params"))}):
+    for key in sorted({*recorded, *names_in(listed.get("params"))}):
         now = _at(params, key)
         if key not in recorded or not _equal(recorded[key], now):
             raise IntegrityError(
@@ -308,7 +308,7 @@ def _at(params: Any, key: str) -> Any:
     return params
 
 
-def _texts(entries: Any) -> list[str]:
+def names_in(entries: Any) -> list[str]:
     """Paths or keys of a list of `dvc.yaml`: texts, or mappings with one key."""
     return [
         name

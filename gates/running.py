@@ -29,7 +29,7 @@ def require_running_code(root: Path) -> None:
         running, own = Path(str(package.__file__)).parent, root / package.__name__
         if not (own / "__init__.py").is_file() or own.resolve() == running.resolve():
             continue
-        here, there = _files(running), _files(own)
+        here, there = code_files(running), code_files(own)
         for name in sorted(here | there):
             found = sha256_file(running / name) if name in here else "missing"
             expected = sha256_file(own / name) if name in there else "missing"
@@ -42,7 +42,8 @@ def require_running_code(root: Path) -> None:
                 )
 
 
-def _files(folder: Path) -> frozenset[str]:
+def code_files(folder: Path) -> frozenset[str]:
+    """Files of a package, by path inside it, without what the interpreter compiles."""
     return frozenset(
         path.relative_to(folder).as_posix()
         for path in folder.rglob("*")

@@ -1,0 +1,32 @@
+"""A judged workspace in which every part of the eleven groups has a file."""
+
+import shutil
+from pathlib import Path
+
+import evidence
+import pytest
+from conftest import judge_all
+
+from gates.package.groups import STRESS
+from genpolicy.evidence.rows.stress import AgeRow
+from genpolicy.integrity.rows import write_rows
+
+
+@pytest.fixture(scope="session")
+def _whole(tmp_path_factory: pytest.TempPathFactory, _ladder: Path) -> Path:
+    root = tmp_path_factory.mktemp("whole") / "repo"
+    shutil.copytree(_ladder, root)
+    (root / "limits.yaml").write_text("{}\n")
+    write_rows(root / STRESS / "ages.parquet", AgeRow, [AgeRow("flow", "nominal", 0.5, 0.2, 9)])
+    (root / STRESS / "journals").mkdir(exist_ok=True)
+    (root / STRESS / "journals" / "flow__nominal.mcap").write_bytes(b"a journal")
+    evidence.record(root)
+    judge_all(root, "D")
+    return root
+
+
+@pytest.fixture
+def whole(tmp_path: Path, _whole: Path) -> Path:
+    """A copy to package or to harm."""
+    shutil.copytree(_whole, tmp_path / "whole")
+    return tmp_path / "whole"

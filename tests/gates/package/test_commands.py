@@ -1,0 +1,77 @@
+"""`genpolicy package` and `genpolicy verify bundle`: what is printed, and exit codes."""
+
+import pytest
+
+from gates.commands import verify
+from gates.package import bundling
+from gates.package.archive import read_index
+from gates.package.commands import package
+from gates.proof import Rung
+from genpolicy.cli.shell import run_program
+
+
+@pytest.fixture
+def run(capsys):
+    def run(command, *arguments):
+        code = run_program(command, "genpolicy", [str(word) for word in arguments])
+        printed = capsys.readouterr()
+        return code, printed.out + printed.err
+
+    return run
+
+
+@pytest.fixture
+def bundle(whole, tmp_path, run):
+    code, said = run(package, "flow", "--out", tmp_path / "flow.zip", "--root", whole)
+    assert code == 0, said
+    assert f"Address {read_index(tmp_path / 'flow.zip').address}" in said
+    assert "not measured: out-of-distribution probes" in said
+    return tmp_path / "flow.zip"
+
+
+@pytest.fixture
+def proved(monkeypatch):
+    """Verdicts that a bundle is said to have; the ladder's tests prove real ones."""
+
+    def of(*verdicts):
+        rungs = [
+            Rung(gate, "name", verdict, "", "note", "report", 0 if verdict == "PASS" else 3)
+            for gate, verdict in zip("ABCD", verdicts, strict=True)
+        ]
+        monkeypatch.setattr(
+            bundling, "prove_bundle", lambda path, folder, **_: (read_index(path), rungs)
+        )
+
+    return of
+
+
+def test_what_holds_exits_0_whatever_the_verdicts_are(run, bundle, proved):
+    proved("PASS", "PASS", "FAIL", "INCONCLUSIVE")
+    code, said = run(verify, "bundle", bundle)
+    assert code == 0 and "files are what the address names" in said
+
+
+def test_an_untrue_report_exits_3(run, bundle, proved):
+    proved("PASS", "REFUSED", "PASS", "PASS")
+    code, said = run(verify, "bundle", bundle)
+    assert code == 3 and "files are what" not in said
+
+
+def test_the_address_that_was_handed_over_must_be_its_own(run, bundle, proved):
+    proved("PASS", "PASS", "PASS", "PASS")
+    address = read_index(bundle).address
+    assert run(verify, "bundle", bundle, "--address", address)[0] == 0
+    assert run(verify, "bundle", bundle, "--address", address[:12])[0] == 0
+    code, said = run(verify, "bundle", bundle, "--address", "0" * 64)
+    assert code == 2 and "another bundle" in said
+    assert run(verify, "bundle", bundle, "--address", address[:11])[0] == 2
+
+
+def test_a_bundle_that_is_none_exits_2(run, tmp_path):
+    code, said = run(verify, "bundle", tmp_path / "absent.zip")
+    assert code == 2 and "is no file" in said
+
+
+def test_a_candidate_without_evidence_exits_2(run, whole, tmp_path):
+    code, said = run(package, "nobody", "--out", tmp_path / "x.zip", "--root", whole)
+    assert code == 2 and "eleven groups" in said

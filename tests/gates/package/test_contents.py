@@ -1,0 +1,78 @@
+"""What travels: all that the verdicts rest on, and nothing from elsewhere."""
+
+import shutil
+
+import pytest
+import yaml
+
+from gates.package.contents import brought, files_of_the_run
+from gates.pipeline import IGNORED
+from gates.report import read_report
+from genpolicy.errors import ConfigError
+from genpolicy.integrity.hashing import sha256_bytes
+
+ENTRY = {
+    "name": "mine",
+    "kind": "server",
+    "author": "author@example.org",
+    "address": "ws://127.0.0.1:1",
+    "files": {"serve": sha256_bytes(b"a program")},
+    "horizons": {
+        "observation_horizon": 2, "prediction_horizon": 16, "execution_horizon": 8,
+        "action_period_s": 0.05,
+    },
+    "observation": {"observation": {"channels": ["tcp_position_m"]}},
+    "action": {
+        "frame": "robot_base",
+        "motion": "absolute",
+        "position": {"columns": [0, 1, 2], "unit": "m"},
+        "rotation": {"columns": [3, 4, 5, 6, 7, 8], "form": "rotation_6d"},
+        "gripper": {"column": 9, "open": 1.0, "open_m": 1.0},
+    },
+}  # fmt: skip
+
+
+def test_everything_that_a_report_names_is_carried(whole):
+    files = set(files_of_the_run(whole))
+    for gate in "ABCD":
+        assert set(read_report(whole, gate)[0].materials) <= files
+    assert {"dvc.yaml", "dvc.lock", "params.yaml", "reviewers.yaml"} <= files
+    assert not any(name.startswith("build/") for name in files)
+
+
+def test_all_code_is_carried_but_what_the_interpreter_writes(whole):
+    (whole / IGNORED).write_text("__pycache__\n")
+    for name in ("gates/new.py", "gates/__pycache__/new.pyc", "stages/s.py"):
+        (whole / name).parent.mkdir(parents=True, exist_ok=True)
+        (whole / name).write_text("")
+    files = set(files_of_the_run(whole))
+    assert {"gates/new.py", "stages/s.py"} <= files
+    assert "gates/__pycache__/new.pyc" not in files
+
+
+@pytest.fixture
+def own(whole):
+    """A policy that was brought: its entry and its file, in a folder of its own."""
+    (whole / "own").mkdir()
+    (whole / "own/serve").write_bytes(b"a program")
+    (whole / "own/mine.yaml").write_text(yaml.safe_dump(ENTRY))
+    name(whole, "own/mine.yaml")
+    return whole
+
+
+def name(whole, path):
+    params = yaml.safe_load((whole / "params.yaml").read_text())
+    params["candidates"] = {"mine": path}
+    (whole / "params.yaml").write_text(yaml.safe_dump(params))
+
+
+def test_a_policy_that_was_brought_comes_with_its_entry_and_files(own):
+    assert [policy.name for policy in brought(own)] == ["mine"]
+    assert {"own/mine.yaml", "own/serve"} <= set(files_of_the_run(own))
+
+
+def test_a_policy_that_lies_elsewhere_cannot_be_carried(own, tmp_path):
+    shutil.move(own / "own", tmp_path / "elsewhere")
+    name(own, "../elsewhere/mine.yaml")
+    with pytest.raises(ConfigError, match="outside the workspace"):
+        files_of_the_run(own)
