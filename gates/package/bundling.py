@@ -54,7 +54,7 @@ def package(root: Path, candidate: str, out: Path | None = None) -> Packaged:
         ConfigError: The pipeline, the parameters or an entry cannot be read.
     """
     rungs = prove_all(root)
-    _require_standing(rungs)
+    _require_judged(rungs)
     policies = {policy.name for policy in brought(root)}
     groups = contents(root, candidate, brought=candidate in policies)
     checkpoint = str(read_json(root / IDENTITY)[candidate]["checkpoint"])
@@ -113,7 +113,7 @@ def prove_bundle(path: Path, folder: Path, *, run_programs: bool) -> tuple[Bundl
             action="Read their entries, then give `--run-programs`, best in a container.",
         )
     rungs = prove_all(folder)
-    _require_standing(rungs)
+    _require_judged(rungs)
     judged = [rung.gate for rung in rungs if rung.gate in index.verdicts]
     again = _statements(folder, judged, index.candidate, index.checkpoint)
     for gate in sorted({*again, *statements}):
@@ -140,7 +140,7 @@ def _as_stated(rung: Rung, index: BundleIndex) -> Rung:
     return replace(rung, verdict="REFUSED", decided_by="", note=note, exit_code=3)
 
 
-def _require_standing(rungs: Sequence[Rung]) -> None:
+def _require_judged(rungs: Sequence[Rung]) -> None:
     """Every gate that a bundle needs is judged, and its report is what the files say."""
     for rung in rungs:
         untrue = rung.verdict == "REFUSED"

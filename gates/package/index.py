@@ -14,7 +14,6 @@ from genpolicy.errors import IntegrityError
 from genpolicy.integrity.documents import canonical_json, parse_json
 from genpolicy.integrity.hashing import sha256_bytes
 
-SCHEMA = 1
 Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 
 
