@@ -15,6 +15,7 @@ from pydantic import Field
 
 from gates.card.envelope import Simulated, beyond_simulation
 from gates.card.people import PersonId
+from gates.card.windows import AbortWindow
 from gates.claim import CHECKPOINT_ONLY
 from gates.doubts import for_a_card
 from gates.protection import HARDEST_CONTACT_N
@@ -23,7 +24,7 @@ from gates.settings import GateSettings
 from genpolicy.errors import RefusedError
 from genpolicy.integrity.documents import canonical_json, parse_json
 
-CARD_SCHEMA_VERSION = 2
+CARD_SCHEMA_VERSION = 3
 DRAFT_PATH = "artifacts/card/card.json"
 CardName = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]{0,63}$")]
 
@@ -41,6 +42,7 @@ FIXED = (
     "workspace_lower_m",
     "workspace_upper_m",
     "speed_limit_m_s",
+    "abort_windows",
     "rollback",
 )
 ABORT_FROM = {
@@ -87,6 +89,7 @@ class TrialCard(StrictModel):
         spotter: Who stands at the stop.
         stop_path: How the robot is stopped, from hand to drive.
         abort_thresholds: What ends the trial, by name; may be lowered, never raised.
+        abort_windows: Over what each of them is counted.
         rollback: What runs instead: one policy, its checkpoint, its own success.
         caveats: What the reports do not show, what could make them wrong, what moved since the
             plan; people may add some.
@@ -111,6 +114,7 @@ class TrialCard(StrictModel):
     spotter: str
     stop_path: str
     abort_thresholds: dict[str, float]
+    abort_windows: dict[str, AbortWindow]
     rollback: str
     caveats: tuple[str, ...]
     reviewer: str
@@ -126,6 +130,7 @@ def draft_card(
     checkpoint: str,
     *,
     simulated: Simulated,
+    windows: Mapping[str, AbortWindow],
     rollback: str,
 ) -> TrialCard:
     """Draft from the passed reports, with the fields of the reviewer left empty.
@@ -136,18 +141,17 @@ def draft_card(
         hashes: Their SHA-256.
         checkpoint: Hash of the promoted candidate's checkpoint, as Gate B pinned it.
         simulated: Robot, workspace and speed that its rollouts were held to.
+        windows: Over what each threshold is counted.
         rollback: What runs instead, as `gates.card.rollback` says it.
 
     Raises:
         RefusedError: Gate D promotes no one.
     """
-    candidate = promoted(reports["D"])
-    limits = {c.id: c.threshold for c in reports["D"].criteria if c.threshold is not None}
     return TrialCard(
         schema_version=CARD_SCHEMA_VERSION,
         name=settings.name,
         task=settings.task,
-        candidate=candidate,
+        candidate=promoted(reports["D"]),
         candidate_checkpoint_sha256=checkpoint,
         robot_model=simulated.robot,
         authors=settings.authors,
@@ -159,9 +163,8 @@ def draft_card(
         force_limit_reason="",
         spotter="",
         stop_path="",
-        abort_thresholds={
-            name: limits[criterion] for name, criterion in ABORT_FROM.items() if criterion in limits
-        },
+        abort_thresholds=thresholds_of(reports["D"]),
+        abort_windows=dict(windows),
         rollback=rollback,
         caveats=caveats_of(reports),
         reviewer="",
@@ -169,6 +172,12 @@ def draft_card(
         expires="",
         nonce="",
     )
+
+
+def thresholds_of(report: GateReport) -> dict[str, float]:
+    """Limits of Gate D that end a trial, by the name of the threshold."""
+    limits = {c.id: c.threshold for c in report.criteria if c.threshold is not None}
+    return {name: limits[found] for name, found in ABORT_FROM.items() if found in limits}
 
 
 def caveats_of(reports: Mapping[Gate, GateReport]) -> tuple[str, ...]:

@@ -3,9 +3,10 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-from gates.card.card import CardSettings, TrialCard, draft_card, promoted
+from gates.card.card import CardSettings, TrialCard, draft_card, promoted, thresholds_of
 from gates.card.envelope import simulated_envelope, was_judged
 from gates.card.rollback import rollback_of
+from gates.card.windows import windows_of
 from gates.evidence import Evidence
 from gates.report import Gate, GateReport
 from gates.reproducibility.settings import RELOAD
@@ -24,8 +25,8 @@ def draft(root: Path, reports: Mapping[Gate, GateReport], hashes: Mapping[Gate, 
 
     Raises:
         ConfigError: Section `card` is missing or wrong.
-        IntegrityError: Gate B pinned no checkpoint of the promoted candidate, no rollouts ran
-            inside an envelope, or there is no simple policy to go back to.
+        IntegrityError: Gate B pinned no checkpoint of the promoted candidate, no rollouts of
+            it ran inside an envelope, or there is no simple policy to go back to.
         RefusedError: Gate D promotes no one.
     """
     settings = read_settings(read_params(root), "card", CardSettings)
@@ -46,7 +47,13 @@ def draft(root: Path, reports: Mapping[Gate, GateReport], hashes: Mapping[Gate, 
             expected="the hash of the promoted checkpoint",
             action="Run `dvc repro reload`.",
         )
-    rollback = rollback_of(reports, Evidence(root)).text
+    thresholds = thresholds_of(reports["D"])
     return draft_card(
-        settings, reports, hashes, pinned.checkpoint, simulated=simulated, rollback=rollback
+        settings,
+        reports,
+        hashes,
+        pinned.checkpoint,
+        simulated=simulated,
+        windows=windows_of(Evidence(root), candidate, simulated.condition, thresholds),
+        rollback=rollback_of(reports, Evidence(root)).text,
     )

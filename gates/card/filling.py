@@ -66,7 +66,8 @@ def questions(rules: Rules) -> list[Question]:
     thresholds = [
         Question(
             f"{ABORT}{name}",
-            f"abort the trial when {name} exceeds; the reports hold at most {value:g}",
+            f"abort the trial when {name} {rules.draft.abort_windows[name].over} exceeds; the "
+            f"reports hold at most {value:g}",
             repr(value),
         )
         for name, value in sorted(rules.draft.abort_thresholds.items())

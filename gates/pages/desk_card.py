@@ -206,8 +206,9 @@ def _aborts(draft: TrialCard, signed: TrialCard | None, report: GateReport) -> l
         items.append(
             Item(
                 f"Ends it: {ABORTS[name]}",
-                f"{at_its_end(answer)} in the worst condition",
-                human(answer, most),
+                f"{at_its_end(answer)} in the worst condition; inside the envelope it "
+                f"{draft.abort_windows[name].tried}",
+                f"{human(answer, most)}, {draft.abort_windows[name].over}",
                 human(answer, signed.abort_thresholds[name]) if signed else "",
                 answer.owner or "nobody",
             )

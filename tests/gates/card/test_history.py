@@ -429,12 +429,12 @@ def test_both_are_asked_of_the_card_that_lies_here(history):
 
 
 CARD = {
-    "schema_version": 2, "name": "trial", "task": "t", "candidate": "flow",
+    "schema_version": 3, "name": "trial", "task": "t", "candidate": "flow",
     "candidate_checkpoint_sha256": "0", "robot_model": "r", "authors": ["ada"], "reports": {},
     "workspace_lower_m": [0.0, 0.0, 0.0], "workspace_upper_m": [1.0, 1.0, 1.0],
     "speed_limit_m_s": 0.1, "force_limit_n": None, "force_limit_reason": "", "spotter": "",
-    "stop_path": "", "abort_thresholds": {}, "rollback": "stop", "caveats": [], "reviewer": "",
-    "not_before": "", "expires": "", "nonce": "",
+    "stop_path": "", "abort_thresholds": {}, "abort_windows": {}, "rollback": "stop",
+    "caveats": [], "reviewer": "", "not_before": "", "expires": "", "nonce": "",
 }  # fmt: skip
 
 
