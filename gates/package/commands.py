@@ -54,12 +54,12 @@ def verify_bundle(
     Every byte is hashed, every gate judged again and the evidence derived again:
     the independent checker reads the journals. By the code that runs here, which
     must be the code that judged; that of the bundle is never run. Exit 0 if all
-    is as it says (whatever the verdicts are), 3 if a report is untrue, 2 if the
-    bundle cannot be read or its bytes are others.
+    is as it says (whatever the verdicts are), 3 if a report or the front page is
+    untrue, 2 if the bundle cannot be read or its bytes are others.
     """
     from gates.package.archive import read_index
     from gates.package.bundling import prove_bundle
-    from gates.printed import print_rungs, worst
+    from gates.printed import pages_code, print_rungs, worst
     from genpolicy.errors import BadInputError
 
     found = read_index(bundle).address
@@ -72,8 +72,9 @@ def verify_bundle(
         )
     with tempfile.TemporaryDirectory(prefix="genpolicy-bundle-") as folder:
         index, rungs = prove_bundle(bundle, Path(folder), run_programs=run_programs)
+        codes = {rung.exit_code for rung in rungs if rung.verdict == "REFUSED"}
+        codes |= pages_code(Path(folder))
     print_rungs(rungs, as_json)
-    codes = {rung.exit_code for rung in rungs if rung.verdict == "REFUSED"}
     if not as_json and not codes:
         print(f"{index.candidate}: all {len(index.files)} files are what the address names.")
     return worst(codes)

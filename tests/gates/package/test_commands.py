@@ -57,6 +57,13 @@ def test_an_untrue_report_exits_3(run, bundle, proved):
     assert code == 3 and "files are what" not in said
 
 
+def test_a_front_page_that_says_other_than_the_reports_exits_3(run, bundle, monkeypatch, proved):
+    proved("PASS", "PASS", "PASS", "PASS")
+    monkeypatch.setattr("gates.printed.changed_page", lambda root: "reports/index.html")
+    code, said = run(verify, "bundle", bundle)
+    assert code == 3 and "another page" in said and "files are what" not in said
+
+
 def test_the_address_that_was_handed_over_must_be_its_own(run, bundle, proved):
     proved("PASS", "PASS", "PASS", "PASS")
     address = read_index(bundle).address
