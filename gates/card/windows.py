@@ -53,6 +53,8 @@ class AbortWindow(StrictModel):
     @property
     def over(self) -> str:
         """Over what it is counted, as a person reads it."""
+        if self.count == 1:
+            return f"over the last {self.unit.removesuffix('s')}"
         return f"over the last {self.count:,} {self.unit}"
 
     @property

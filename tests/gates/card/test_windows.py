@@ -91,6 +91,7 @@ def test_fewer_rollouts_than_a_window_holds_try_nothing(rolled):
 def test_a_window_is_read_as_a_sentence():
     window = AbortWindow(unit="answers", count=20, ended=1, seen=30)
     assert window.over == "over the last 20 answers"
+    assert window.model_copy(update={"count": 1}).over == "over the last answer"
     assert window.tried == "would have ended 1 of 30 of its rollouts"
 
 
