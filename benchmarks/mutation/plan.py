@@ -69,7 +69,10 @@ TESTS = {
     "gates/engine.py": ("tests/gates/test_pipeline.py", *JUDGED),
     "gates/differences.py": ("tests/gates/test_proof.py",),
     "gates/proof.py": ("tests/gates/test_pipeline.py",),
+    "gates/rederive_disturbance.py": ("tests/gates/test_rederive.py",),
+    "gates/rederive_latency.py": ("tests/gates/test_rederive.py",),
     "gates/report.py": ("tests/gates/test_proof.py",),
+    "gates/run_commands.py": ("tests/gates/test_ci_files.py", "tests/gates/test_status.py"),
     "genpolicy/execution": (
         "tests/execution/test_golden_journal.py",
         FORMS,
