@@ -39,6 +39,20 @@ def _clean(result):
     assert "Traceback" not in result.output
 
 
+def test_a_report_is_shown_as_it_lies_there_line_by_line(tmp_path, _run, monkeypatch):
+    ours = criterion("FAIL", "flow", "nfe")
+    report = REPORT.model_copy(update={"criteria": (*REPORT.criteria, ours)})
+    monkeypatch.setattr("gates.report.read_report", lambda root, gate: (report, "0123456789abcdef"))
+    head = "Gate A: PASS  (report 0123456789ab, not proved)\nDecision: Go on.\n"
+    rows = "  PASS           x: 1, required <= 1\n  FAIL           nfe (flow): 1, required <= 1\n"
+    assert _run(tmp_path, "show", "a") == Result(0, head + rows)
+    report = report.model_copy(update={"diagnosis": "Broken."})
+    assert _run(tmp_path, "show", "gate_a") == Result(0, f"{head}Diagnosis: Broken.\n{rows}")
+    as_json = _run(tmp_path, "show", "Gate_A", "--json").output
+    assert GateReport.model_validate_json(as_json) == report
+    assert as_json.startswith('{\n  "schema_version": 1,\n')
+
+
 def test_check_passes_through_d_and_not_through_e(ladder, _run):
     assert _run(ladder, "check").exit_code == 0
     result = _run(ladder, "check", "--through", "E")
@@ -149,20 +163,6 @@ def test_show_and_judge(ladder, _run):
     assert result.exit_code == 0 and "Gate A: PASS" in result.output
     shown = _run(ladder, "show", "A", "--json")
     assert shown.exit_code == 0 and json.loads(shown.output)["gate"] == "A"
-
-
-def test_a_report_is_shown_as_it_lies_there_line_by_line(tmp_path, _run, monkeypatch):
-    ours = criterion("FAIL", "flow", "nfe")
-    report = REPORT.model_copy(update={"criteria": (*REPORT.criteria, ours)})
-    monkeypatch.setattr("gates.report.read_report", lambda root, gate: (report, "0123456789abcdef"))
-    head = "Gate A: PASS  (report 0123456789ab, not proved)\nDecision: Go on.\n"
-    rows = "  PASS           x: 1, required <= 1\n  FAIL           nfe (flow): 1, required <= 1\n"
-    assert _run(tmp_path, "show", "a") == Result(0, head + rows)
-    report = report.model_copy(update={"diagnosis": "Broken."})
-    assert _run(tmp_path, "show", "gate_a") == Result(0, f"{head}Diagnosis: Broken.\n{rows}")
-    as_json = _run(tmp_path, "show", "Gate_A", "--json").output
-    assert GateReport.model_validate_json(as_json) == report
-    assert as_json.startswith('{\n  "schema_version": 1,\n')
 
 
 def test_judge_exits_0_on_fail(ladder, _run):
