@@ -63,7 +63,10 @@ TESTS = {
     "gates/feasibility": (f"{GOLDEN}c.py", "tests/gates/feasibility", *JUDGED),
     "gates/reproducibility": (f"{GOLDEN}b.py", "tests/gates/reproducibility", *JUDGED),
     "gates/bounds.py": ("tests/gates/stress",),
-    "gates/commands.py": ("tests/gates/card/test_card_commands.py",),
+    "gates/commands.py": (
+        "tests/gates/test_commands_of_a_ladder.py",
+        "tests/gates/card/test_card_commands.py",
+    ),
     "gates/criterion.py": ("tests/gates/test_engine.py",),
     "gates/evidence.py": JUDGED,
     "gates/engine.py": ("tests/gates/test_pipeline.py", *JUDGED),
