@@ -21,7 +21,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from benchmarks.mutation.named import run_named
-from benchmarks.mutation.plan import ROOT, Mutant, drawn, inside, modules, mutants_of
+from benchmarks.mutation.plan import ROOT, Mutant, drawn, inside, modules, mutants_of, tests_of
 from benchmarks.mutation.runner import KILLED, SURVIVED, run
 
 
@@ -39,8 +39,9 @@ def key(row: dict) -> tuple[str, str, int]:
 def show(out: Path) -> None:
     """Print the table of kills by folder, with exact intervals, and what no test noticed.
 
-    Killed is what turned a test red. What was stopped for its time, or by a fault of the process,
-    was noticed by nobody: it stands apart, and lowers the share.
+    Killed is what turned a test red; of these, the nearest noticed by themselves, being asked
+    first. What was stopped for its time, or by a fault of the process, was noticed by nobody: it
+    stands apart, and lowers the share.
     """
     from genpolicy.statistics.intervals import clopper_pearson
 
@@ -49,15 +50,17 @@ def show(out: Path) -> None:
         folder = "/".join(row["path"].split("/")[:2])
         groups.setdefault(folder if not folder.endswith(".py") else "gates/*.py", []).append(row)
     whole = [row for rows in groups.values() for row in rows]
-    print("| where | mutants | killed | stopped | survived | share killed | 95 % interval |")
-    print("|---" * 7 + "|")
+    print("| where | mutants | killed | by the nearest | stopped | survived | share killed "
+          "| 95 % interval |")  # fmt: skip
+    print("|---" * 8 + "|")
     for name, rows in (*sorted(groups.items()), ("all", whole)):
         killed = sum(said(row) == KILLED for row in rows)
         survived = sum(said(row) == SURVIVED for row in rows)
         low, high = clopper_pearson(killed, len(rows))
         share = f"{killed / len(rows):.3f} | {low:.3f} to {high:.3f}"
         stopped = len(rows) - killed - survived
-        print(f"| `{name}` | {len(rows)} | {killed} | {stopped} | {survived} | {share} |")
+        near = sum(said(row) == KILLED and by_nearest(row) for row in rows)
+        print(f"| `{name}` | {len(rows)} | {killed} | {near} | {stopped} | {survived} | {share} |")
     print()
     for row in whole:
         if said(row) != KILLED:
@@ -69,6 +72,11 @@ def show(out: Path) -> None:
 def said(row: dict) -> str:
     """The outcome; `killed (time)` was written once of what was stopped."""
     return row["outcome"].replace("killed (", "stopped (")
+
+
+def by_nearest(row: dict) -> bool:
+    """Whether the test that turned red is of the file that is asked first."""
+    return f" {tests_of(row['path'])[0]}::" in row["red"]
 
 
 def main() -> None:

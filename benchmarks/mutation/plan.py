@@ -63,13 +63,19 @@ TESTS = {
     "gates/feasibility": (f"{GOLDEN}c.py", "tests/gates/feasibility", *JUDGED),
     "gates/reproducibility": (f"{GOLDEN}b.py", "tests/gates/reproducibility", *JUDGED),
     "gates/bounds.py": ("tests/gates/stress",),
-    "gates/commands.py": ("tests/gates/card/test_card_commands.py",),
+    "gates/commands.py": (
+        "tests/gates/test_commands_of_a_ladder.py",
+        "tests/gates/card/test_card_commands.py",
+    ),
     "gates/criterion.py": ("tests/gates/test_engine.py",),
     "gates/evidence.py": JUDGED,
     "gates/engine.py": ("tests/gates/test_pipeline.py", *JUDGED),
     "gates/differences.py": ("tests/gates/test_proof.py",),
     "gates/proof.py": ("tests/gates/test_pipeline.py",),
+    "gates/rederive_disturbance.py": ("tests/gates/test_rederive.py",),
+    "gates/rederive_latency.py": ("tests/gates/test_rederive.py",),
     "gates/report.py": ("tests/gates/test_proof.py",),
+    "gates/run_commands.py": ("tests/gates/test_ci_files.py", "tests/gates/test_status.py"),
     "genpolicy/execution": (
         "tests/execution/test_golden_journal.py",
         FORMS,
@@ -152,13 +158,23 @@ def change_of(mutant: Mutant) -> str:
 
 
 def tests_of(path: str) -> list[str]:
-    """Tests that a mutant of a module is held against: its mirror first, then its folder's."""
+    """Tests that a mutant of a module is held against: its mirror first, then its folder's.
+
+    File by file: pytest drops a file that is named beside its folder, and the mirror would be met
+    where the alphabet has it.
+    """
     place = Path(path.removeprefix("genpolicy/"))
-    mirror = ROOT / "tests" / place.parent / f"test_{place.name}"
-    first = [mirror.relative_to(ROOT).as_posix()] if mirror.is_file() else []
+    mirror = f"tests/{place.parent}/test_{place.name}"
     found = next((tests for key, tests in TESTS.items() if path.startswith(key)), ())
-    last = EVERY if path.startswith("gates/") else ()
-    return first + [name for name in (*found, *last) if name not in first]
+    named = (mirror, *found, *(EVERY if path.startswith("gates/") else ()))
+    return list(dict.fromkeys(file for name in named for file in _files(name)))
+
+
+def _files(name: str) -> list[str]:
+    """A file of tests, if it is there; of a folder those in it."""
+    place = ROOT / name
+    found = sorted(place.rglob("test_*.py")) if place.is_dir() else [place]
+    return [file.relative_to(ROOT).as_posix() for file in found if file.is_file()]
 
 
 def cases_of(path: str) -> str:

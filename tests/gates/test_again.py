@@ -104,4 +104,10 @@ def test_a_silent_server_that_also_changed_is_red(brought):
     asked_again(brought, "C", change)
     rows = read_table(brought / "artifacts/shadow/fixtures.parquet").to_pandas()
     assert isinstance(rows, pd.DataFrame) and len(rows)
-    assert of_flow(judge(brought, "C"), "changed_answers").verdict == "FAIL"
+    answer = of_flow(judge(brought, "C"), "changed_answers")
+    silent = int((~rows["answered"]).sum())
+    changed = len(rows) - silent
+    assert silent == 2 and (answer.verdict, answer.measured) == ("FAIL", changed)
+    assert answer.counted == "2 times" and answer.caveat.startswith(
+        f"{changed} of {len(rows)} answers, {changed} other than at Gate B, the first one "
+    )

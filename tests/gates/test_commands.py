@@ -1,205 +1,299 @@
-"""The command line: exit codes, one-sentence errors, no traceback."""
+"""What each command asks, in which order, and what it leaves with: its parts are stand-ins.
 
+The same is asked of whole ladders in `test_commands_of_a_ladder.py` and of signed cards in
+`card/test_card_commands.py`; here a command that passes on too little is seen in a moment.
+"""
+
+import datetime
 import json
-import sys
-from dataclasses import dataclass
+from pathlib import Path
 
-import evidence
 import pytest
+import typer
+from test_differences import REPORT
+from test_verdicts import criterion
 
-from gates.card.commands import card
-from gates.commands import gates
-from gates.preregistration import PREREGISTRATION, plan_bytes
-from gates.proof import STAGE_REQUIRES
-from gates.settings import read_params
+from gates import commands
+from gates.commands import gates, sign, verify
+from gates.proof import Admission, Rung
 from genpolicy.cli.shell import run_program
-from genpolicy.errors import RefusedError
+from genpolicy.errors import BadInputError, IntegrityError
+
+ROOT = Path("somewhere")
+STATES = ("PASS", 0), ("FAIL", 3), ("REFUSED", 2), ("REFUSED", 3), ("NOT JUDGED", 3)
+HISTORY = IntegrityError(where="the plan", found="late", expected="early", action="Stop.")
 
 
-@dataclass(frozen=True)
-class Result:
-    exit_code: int
-    output: str
+def rungs(**states):
+    """Every gate; those that are not named pass."""
+    return [
+        Rung(gate, "n", *(states.get(gate, ("PASS", 0))[:1]), "", "", f"{gate}.json",
+             states.get(gate, ("PASS", 0))[1])
+        for gate in "ABCDE"
+    ]  # fmt: skip
 
 
 @pytest.fixture
-def _run(capsys):
-    def run(root, *args):
-        code = run_program(gates, "gates", [*args, "--root", str(root)])
-        printed = capsys.readouterr()
-        return Result(code, printed.out + printed.err)
+def stand_in(monkeypatch):
+    """Put an answer in the place of a part; an error is raised. Returns what was asked."""
+    calls = []
 
-    return run
+    def put(place, answer=None):
+        name = place.rpartition(".")[2]
 
+        def part(*args, **named):
+            calls.append((name, *args, *named.values()))
+            if isinstance(answer, Exception):
+                raise answer
+            return answer
 
-def _clean(result):
-    assert "Traceback" not in result.output
+        monkeypatch.setattr(place, part)
 
-
-def test_check_passes_through_d_and_not_through_e(ladder, _run):
-    assert _run(ladder, "check").exit_code == 0
-    result = _run(ladder, "check", "--through", "E")
-    assert result.exit_code == 3
-    assert "NOT JUDGED" in result.output
+    return put, calls
 
 
-def test_check_says_3_for_a_verdict_2_for_what_cannot_be_read_and_never_1(ladder, _run):
-    evidence.edit_table(ladder, "audit/clocks.parquet", evidence.lags_apart)
-    assert _run(ladder, "judge", "A").exit_code == 0
-    assert _run(ladder, "check", "--through", "A").exit_code == 3
-    (ladder / "reports" / "gate_a.json").write_text("{")
-    assert _run(ladder, "check", "--through", "A").exit_code == 2
-    assert _run(ladder, "verify").exit_code == 2
+@pytest.fixture
+def proved(stand_in):
+    """A ladder in some state, a front page in another, and a history that may not hold."""
+    put, calls = stand_in
+
+    def proved(states, *, page=None, history=None):
+        put("gates.proof.prove_all", states)
+        put("gates.printed.page_problem", page)
+        put("gates.card.history.require_history", history)
+        put("gates.printed.print_rungs")
+        put("gates.printed.print_cases")
+        calls.clear()
+        return calls
+
+    return proved
 
 
-def test_summary_prints_one_line_per_stage_and_exits_0(ladder, _run):
-    result = _run(ladder, "summary")
-    assert result.exit_code == 0
-    stages = [line.split()[0] for line in result.output.splitlines()[1 : 1 + len(STAGE_REQUIRES)]]
-    assert stages == list(STAGE_REQUIRES)
-    assert "reports/index.html" not in result.output, "a page that is not there is not announced"
-    (ladder / "reports" / "index.html").write_text("")
-    assert "reports/index.html" in _run(ladder, "summary").output
-    as_json = _run(ladder, "summary", "--json")
-    assert as_json.exit_code == 0
-    rows = json.loads(as_json.output)
-    verdicts = {row["stage"]: row["verdict"] for row in rows}
-    assert [verdicts[f"gate_{letter}"] for letter in "abcd"] == ["PASS"] * 4
+@pytest.mark.parametrize("through", "ABCDE")
+@pytest.mark.parametrize(("verdict", "code"), STATES)
+@pytest.mark.parametrize("gate", "AC")
+def test_what_is_checked_ends_with_the_gate_that_is_named(proved, gate, verdict, code, through):
+    states = rungs(**{gate: (verdict, code)})
+    calls = proved(states)
+    reached = gate <= through
+    assert commands.check(through.lower(), ROOT) == (code if reached else 0)
+    assert ("print_rungs", states[: "ABCDE".index(through) + 1], False) in calls
+    holds = through == "E" and verdict == "PASS"
+    assert (("require_history", ROOT) in calls) == holds, "asked where all of it passes, to the end"
 
 
-@pytest.fixture(autouse=True)
-def _no_journals(monkeypatch):
-    """The journals of this evidence are no journals; tests/gates/test_rederive.py has some."""
-    monkeypatch.setattr("gates.rederive.rederive", lambda root, gate: None)
+def test_what_passes_may_stand_for_any_code(proved):
+    proved(rungs(A=("PASS", 3)))
+    assert commands.check("D", ROOT) == 0
 
 
-def test_verify_asks_the_journals_too(ladder, _run, monkeypatch):
-    def differs(root, gate):
-        if gate == "D":
-            raise RefusedError(
-                gate="D", criterion="rollout", measured="1", limit="0", report="r", action="Stop."
-            )
-
-    monkeypatch.setattr("gates.rederive.rederive", differs)
-    result = _run(ladder, "verify")
-    assert result.exit_code == 3
-    assert "Gate D refuses: rollout is 1" in result.output
-
-
-def test_verify_finds_a_changed_byte(ladder, _run):
-    assert _run(ladder, "verify").exit_code == 0
-    file = ladder / "artifacts/reload/identity.json"
-    file.write_bytes(file.read_bytes() + b" ")
-    result = _run(ladder, "verify")
-    _clean(result)
-    assert result.exit_code == 3
-    assert "identity.json" in result.output
+@pytest.mark.parametrize(("page", "history", "code"), [
+    (None, None, 0), (("page", "another page", "p", 3), None, 3),
+    (None, HISTORY, HISTORY.exit_code), (("page", "no page", "p", 2), HISTORY, 2),
+])  # fmt: skip
+@pytest.mark.parametrize("layout", ["text", "json", "junit", "github"])
+def test_what_blocks_beside_the_gates_is_said_in_every_layout(
+    proved, capsys, page, history, code, layout
+):
+    calls = proved(rungs(), page=page, history=history)
+    assert commands.check("E", ROOT, False, layout) == code
+    beside = [(*page[:3], page[3])] if page else []
+    if history:
+        beside.append(("history", str(history), "preregistration.yaml", history.exit_code))
+    assert capsys.readouterr().err == "".join(f"{text}\n" for _, text, *_ in beside)
+    printed = [call for call in calls if call[0].startswith("print")]
+    if layout in ("text", "json"):
+        assert printed == [("print_rungs", rungs(), layout == "json")]
+    else:
+        assert printed == [("print_cases", ROOT, rungs(), beside, layout)]
 
 
-@pytest.mark.parametrize("command", [("verify",), ("check", "--through", "A")])
-def test_a_front_page_that_says_other_than_the_reports_refuses(ladder, _run, command):
-    assert _run(ladder, "judge", "A").exit_code == 0
-    assert _run(ladder, *command).exit_code == 0
-    page = ladder / "reports" / "index.html"
-    page.write_text(page.read_text().replace("PASS", "FAIL", 1))
-    result = _run(ladder, *command)
-    _clean(result)
-    assert result.exit_code == 3
-    assert "reports/index.html is another page, expected the one that the reports give" in (
-        result.output
+def test_the_last_gate_that_must_pass_is_d_unless_another_is_named(proved):
+    calls = proved(rungs(E=("NOT JUDGED", 3)))
+    assert commands.check(root=ROOT, as_json=True) == 0
+    assert calls[-1] == ("print_rungs", rungs()[:4], True)
+
+
+@pytest.mark.parametrize(("verdict", "code"), STATES)
+@pytest.mark.parametrize("page", [set(), {3}, {2}])
+def test_verifying_refuses_what_is_untrue_and_no_verdict(proved, stand_in, verdict, code, page):
+    states = rungs(C=(verdict, code), E=("NOT JUDGED", 3))
+    calls = proved(states)
+    put, _ = stand_in
+    kept = [rung for rung in states if rung.verdict != "NOT JUDGED"]
+    put("gates.rederive.rederived", kept)
+    put("gates.printed.pages_code", page)
+    codes = page | ({code} if verdict == "REFUSED" else set())
+    assert commands.verify_reports(ROOT) == (2 if 2 in codes else 3 if codes else 0)
+    assert ("rederived", ROOT, kept) in calls and ("print_rungs", kept, False) in calls
+
+
+def test_verifying_nothing_is_refused(proved, capsys):
+    calls = proved(rungs(**dict.fromkeys("ABCDE", ("NOT JUDGED", 3))))
+    assert commands.verify_reports(ROOT) == 3
+    assert capsys.readouterr().err == "No report lies here. Run `dvc repro gate_a`.\n"
+    assert calls == [("prove_all", ROOT)]
+
+
+@pytest.fixture
+def beneath(stand_in):
+    """The history, and what journals say."""
+    put, calls = stand_in
+    put("gates.card.history.require_history")
+    put("gates.rederive.rederive")
+    return [("require_history", ROOT), *(("rederive", ROOT, gate) for gate in "ABCD")], calls
+
+
+def test_nobody_signs_before_chain_history_and_journals_were_asked(stand_in, beneath, capsys):
+    put, calls = stand_in
+    put("gates.proof.prove_chain")
+    put("gates.card.signing.sign_card", Path("cards/x.json"))
+    calls.clear()
+    assert commands.sign_card(Path("c.json"), Path("k.pem"), "rita", ROOT) == 0
+    signed = ("sign_card", ROOT, Path("c.json"), Path("k.pem"), "rita")
+    assert calls == [("prove_chain", ROOT, "D"), *beneath[0], signed]
+    said = "Signed x.json as rita. Judge gate E again to see what is missing.\n"
+    assert capsys.readouterr().out == said
+
+
+@pytest.mark.parametrize("verdict", ["PASS", "FAIL", "PENDING_REVIEW", "INCONCLUSIVE"])
+@pytest.mark.parametrize("as_json", [False, True])
+def test_a_card_is_valid_only_where_all_beneath_it_was_asked(
+    stand_in, beneath, capsys, verdict, as_json
+):
+    put, calls = stand_in
+    answers = [
+        criterion("FAIL", None, name).model_copy(update={"counted": counted, "caveat": caveat})
+        for name, counted, caveat in (("a", "2 of 3", "late"), ("b", "", "late"), ("c", "1", ""))
+    ]
+    changes = {"verdict": verdict, "criteria": tuple(answers)}
+    report = REPORT.model_copy(update=changes)
+    put("gates.proof.judge", report)
+    assert commands.verify_card(ROOT, "2026-11-21", as_json) == (0 if verdict == "PASS" else 3)
+    judged = ("judge", ROOT, "E", datetime.date(2026, 11, 21))
+    assert calls == [judged, *(beneath[0] if verdict == "PASS" else [])]
+    out = capsys.readouterr().out
+    if as_json:
+        assert json.loads(out)["verdict"] == verdict and out.startswith('{\n  "schema_version"')
+    else:
+        rows = [f"  FAIL           {row}" for row in ("a: 2 of 3; late", "b: late", "c: 1")]
+        assert out.splitlines() == [f"{verdict}: Go on.", *rows]
+
+
+def test_without_a_day_a_card_is_judged_for_today(stand_in, beneath):
+    put, calls = stand_in
+    put("gates.proof.judge", REPORT)
+    commands.verify_card(ROOT)
+    assert calls[0] == ("judge", ROOT, "E", None)
+    for day in ("soon", "2026-13-01", "21.11.2026"):
+        with pytest.raises(BadInputError, match=rf"--today is '{day}', expected YYYY-MM-DD"):
+            commands.verify_card(ROOT, day)
+
+
+def test_a_plan_is_the_bytes_of_the_settings(stand_in, tmp_path, capsys):
+    put, calls = stand_in
+    put("gates.settings.read_params", {"a": 1})
+    put("gates.preregistration.plan_bytes", b"plan")
+    assert commands.preregister(tmp_path) == 0
+    assert (tmp_path / "preregistration.yaml").read_bytes() == b"plan"
+    assert calls == [("read_params", tmp_path), ("plan_bytes", {"a": 1})]
+    said = "Wrote preregistration.yaml. Commit it before the evidence exists.\n"
+    assert capsys.readouterr().out == said
+
+
+@pytest.mark.parametrize(("decided", "said"), [("x: 2, required <= 1", "x: 2, required <= 1"),
+                                               ("", "Go on.")])  # fmt: skip
+def test_a_judged_gate_says_what_decided_or_what_follows(stand_in, capsys, decided, said):
+    put, calls = stand_in
+    put("gates.writing.write_gate", REPORT)
+    put("gates.proof.decided_text", decided)
+    assert commands.judge("a", ROOT) == 0
+    assert calls[0] == ("write_gate", ROOT, "A")
+    assert capsys.readouterr().out == f"Gate A: PASS. {said}\n"
+
+
+@pytest.mark.parametrize("limits", [None, Path("params.yaml")])
+def test_an_audit_reads_its_limits_before_its_recordings(stand_in, limits):
+    put, calls = stand_in
+    for place in (
+        "beforehand.check_settings",
+        "beforehand.check_import",
+        "beforehand.check_folder",
+    ):
+        put(f"genpolicy.cli.{place}")
+    put("gates.need.gate.read_cause_limits")
+    put("gates.audit.importing.import_recordings", "opened")
+    put("gates.audit.command.run_audit", 7)
+    path, out = Path("in"), Path("out")
+    assert commands.audit(path, out, "mcap", None, "task", limits, 5) == 7
+    names = [call[0] for call in calls]
+    assert names == [
+        "check_settings", "check_import", "check_folder", *["read_cause_limits"] * bool(limits),
+        "import_recordings", "run_audit",
+    ]  # fmt: skip
+    assert calls[0][1:] == (limits, "--limits", "gate_a")
+    assert calls[1][1:] == (path, out, "mcap", None) and calls[2][1:] == (
+        out,
+        "audit.json",
+        "audit",
     )
-    assert json.loads(_run(ladder, *command, "--json").output.partition("\n]")[0] + "]")
-    assert _run(ladder, "judge", "A").exit_code == 0
-    assert _run(ladder, *command).exit_code == 0
+    options = calls[-1][1]
+    assert (options.path, options.out, options.format) == (path, out, "mcap")
+    assert (options.task, options.limits, options.seed) == ("task", limits, 5)
+    assert calls[-1][2] == "opened" and calls[-2][1] == options
 
 
-@pytest.mark.parametrize("suffix", ["html", "md"])
-@pytest.mark.parametrize("command", [("verify",), ("check", "--through", "A")])
-def test_a_page_that_no_run_recorded_is_printed_again_and_compared(ladder, _run, command, suffix):
-    """A forged page, and its entry taken out of the lock: nothing held it to anything."""
-    assert _run(ladder, "judge", "A").exit_code == 0
-    page = ladder / "reports" / f"gate_a.{suffix}"
-    page.write_text(page.read_text().replace("PASS", "FAIL", 1))
-    result = _run(ladder, *command)
-    _clean(result)
-    assert result.exit_code == 3
-    assert f"reports/gate_a.{suffix} is another page" in result.output
+def test_a_shadow_runs_with_those_that_gate_b_admits(stand_in):
+    put, calls = stand_in
+    below = {gate: REPORT.model_copy(update={"gate": gate, "candidates": judged})
+             for gate, judged in (("A", {}), ("B", {"flow": "PASS", "act": "FAIL"}))}  # fmt: skip
+    put("gates.proof.admit", Admission("shadow", below, {}))
+    put("genpolicy.cli.shadow.run_shadow", 1)
+    assert commands.shadow("flow", Path("out"), "e1", ROOT) == 1
+    assert calls[0] == ("admit", "shadow", ROOT)
+    options = calls[1][1]
+    assert calls[1][2] == ("flow",)
+    assert (options.root, options.out, options.method, options.episode) == (
+        ROOT, Path("out"), "flow", "e1"
+    )  # fmt: skip
 
 
-def test_a_front_page_of_reports_that_are_gone_refuses(ladder, _run):
-    assert _run(ladder, "judge", "A").exit_code == 0
-    (ladder / "reports" / "gate_d.json").unlink()
-    result = _run(ladder, "check", "--through", "A")
-    assert result.exit_code == 3 and "index.html is another page" in result.output
+@pytest.mark.parametrize("as_json", [False, True])
+@pytest.mark.parametrize("page", [False, True])
+def test_a_summary_is_of_what_was_proved_and_blocks_nothing(
+    stand_in, tmp_path, capsys, as_json, page
+):
+    put, calls = stand_in
+    put("gates.proof.prove_all", ["rungs"])
+    put("gates.overview.overview", ["lines"])
+    put("gates.overview.as_text", "the table")
+    put("gates.printed.print_rows")
+    if page:
+        (tmp_path / "reports").mkdir()
+        (tmp_path / "reports/index.html").write_text("")
+    assert commands.summary(tmp_path, as_json) == 0
+    assert calls[:2] == [("prove_all", tmp_path), ("overview", tmp_path, ["rungs"])]
+    assert calls[2:] == [("print_rows", ["lines"]) if as_json else ("as_text", ["lines"])]
+    announced = "Reports: reports/index.html\n" if page else ""
+    assert capsys.readouterr().out == ("" if as_json else f"the table\n{announced}")
 
 
-def test_what_cannot_be_read_is_said_before_the_front_page(ladder, _run):
-    assert _run(ladder, "judge", "A").exit_code == 0
-    (ladder / "reports" / "gate_a.json").write_text("{")
-    assert _run(ladder, "verify").exit_code == 2
+@pytest.mark.parametrize(("group", "words", "instead"), [
+    (sign, ["sign"], "card sign"), (gates, ["sign", "--card", "c"], "card sign"),
+    (gates, ["verify-card"], "card verify"), (verify, ["card", "extra"], "card verify"),
+])  # fmt: skip
+def test_a_retired_name_says_what_to_type(capsys, group, words, instead):
+    assert isinstance(group, typer.Typer)
+    group_words = words[1:] if group is sign else words
+    assert run_program(group, "genpolicy", group_words) == 2
+    said = capsys.readouterr().err
+    assert (
+        f"no command any more, expected genpolicy {instead}. See `genpolicy {instead} --help`"
+        in said
+    )
 
 
-def test_show_and_judge(ladder, _run):
-    shown = _run(ladder, "show", "C")
-    assert shown.exit_code == 0 and "Gate C: PASS" in shown.output
-    result = _run(ladder, "judge", "A")
-    assert result.exit_code == 0 and "Gate A: PASS" in result.output
-    shown = _run(ladder, "show", "A", "--json")
-    assert shown.exit_code == 0 and json.loads(shown.output)["gate"] == "A"
-
-
-def test_judge_exits_0_on_fail(ladder, _run):
-    evidence.edit_table(ladder, "audit/clocks.parquet", evidence.lags_apart)
-    result = _run(ladder, "judge", "A")
-    assert result.exit_code == 0
-    assert "Gate A: FAIL. lag_spread_steps: 4, required <= 1" in result.output
-
-
-def test_verify_card_waits_for_people(ladder, capsys):
-    def verified(*words):
-        return run_program(card, "card", ["verify", *words, "--root", str(ladder)])
-
-    assert verified() == 3
-    said = capsys.readouterr().out
-    assert said.startswith("PENDING_REVIEW: Wait for")
-    assert "  PENDING_REVIEW signature_valid: waits for a person: sign the card\n" in said
-    assert verified("--today", "soon") == 2
-
-
-@pytest.mark.parametrize(
-    ("args", "code"),
-    [
-        (("show", "X"), 2),
-        (("judge", "A"), 2),
-        (("show", "A"), 2),
-        (("verify",), 3),
-        (("sign", "--card", "c.json", "--key", "k", "--reviewer", "Eve"), 2),
-    ],
-)
-def test_errors_are_one_sentence_with_their_exit_code(tmp_path, args, code, _run):
-    result = _run(tmp_path, *args)
-    _clean(result)
-    assert result.exit_code == code
-    assert len(result.output.strip().splitlines()) == 1
-
-
-def test_a_bad_settings_file_is_exit_2(repo, _run):
-    for text in ("gate_a: {limits: {x: 1}}", "gate_a: [", "gate_a: {a: 1, a: 2}", "x: 1"):
-        (repo / "params.yaml").write_text(text)
-        result = _run(repo, "judge", "A")
-        _clean(result)
-        assert result.exit_code == 2, text
-        assert "params.yaml" in result.output
-
-
-def test_a_plan_is_written_from_the_settings_beside_it(repo, _run):
-    (repo / PREREGISTRATION).unlink()
-    result = _run(repo, "preregister")
-    assert result.exit_code == 0 and "Commit it before the evidence exists" in result.output
-    assert (repo / PREREGISTRATION).read_bytes() == plan_bytes(read_params(repo))
-
-
-def test_that_nothing_lies_here_is_said_before_simulation_is_loaded(tmp_path, _run, monkeypatch):
-    monkeypatch.setitem(sys.modules, "gates.rederive", None)
-    result = _run(tmp_path, "verify")
-    assert result.exit_code == 3 and result.output.startswith("No report lies here.")
+@pytest.mark.parametrize("letter", ["", "F", "AB", "gate_", "gate a"])
+def test_a_gate_is_one_of_five(letter):
+    with pytest.raises(BadInputError, match="expected A, B, C, D or E"):
+        commands.check(letter, ROOT)

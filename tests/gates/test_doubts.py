@@ -2,10 +2,12 @@
 
 import evidence
 import pytest
+from test_differences import REPORT
+from test_verdicts import criterion
 
 from gates.card.card import caveats_of
 from gates.card.signing import read_draft
-from gates.doubts import OF_ALL, doubts_of, for_a_card, of_a_ladder
+from gates.doubts import OF_ALL, Doubt, doubts_of, for_a_card, of_a_ladder
 from gates.proof import judge
 
 
@@ -50,6 +52,46 @@ def test_a_number_without_an_interval_is_said_to_be_one(ladder):
     assert "mode_feasible_share" in points.criteria
     assert "told_share" not in points.criteria and "data_defects" not in points.criteria
     assert points.text.startswith(f"{len(points.criteria)} criteria")
+
+
+@pytest.mark.parametrize(
+    ("count", "shown"),
+    [(1, "n0"), (3, "n0, n1, n2"), (4, "n0, n1, n2 and 1 more"), (6, "n0, n1, n2 and 3 more")],
+)
+def test_three_numbers_at_a_point_are_named_and_the_others_counted(count, shown):
+    """Of two candidates a criterion is one; what has an interval is none of them."""
+    far = {"measured": 0.1}
+    points = [criterion("PASS", who, f"n{n}").model_copy(update=far) for n in range(count)
+              for who in ("act", "flow")]  # fmt: skip
+    judged = criterion("PASS", None, "z").model_copy(update={**far, "interval": (0.0, 0.2)})
+    (doubt,) = doubts_of(REPORT.model_copy(update={"criteria": (*points, judged), "caveats": ()}))
+    said = f"{count} criteria hold for what was drawn, without an interval: {shown}"
+    assert (doubt.kind, doubt.text) == ("judged at a point", said)
+    assert doubt.criteria == tuple(f"n{n}" for n in range(count)) and doubt.candidate == ""
+
+
+@pytest.mark.parametrize(("caveat", "why"), [
+    ("", "Nothing was recorded that answers it."), ("no rows", "No rows."), ("s is 3.", "S is 3."),
+])  # fmt: skip
+@pytest.mark.parametrize("candidate", [None, "flow"])
+def test_what_a_doubt_about_a_criterion_says_to_a_person(caveat, why, candidate):
+    lacking = criterion("INCONCLUSIVE", candidate).model_copy(update={"caveat": caveat})
+    report = REPORT.model_copy(update={"criteria": (lacking,), "caveats": ()})
+    who = " (flow)" if candidate else ""
+    assert doubts_of(report) == [
+        Doubt("A", "not measured", f"?{who} {why}", ("x",), candidate or "")
+    ]
+
+
+@pytest.mark.parametrize("verdict", ["PASS", "FAIL", "INCONCLUSIVE"])
+def test_who_fell_is_said_in_the_order_of_names_and_only_where_somebody_passes(verdict):
+    fell = [criterion("FAIL", who, name) for who, name in (("b", "n"), ("a", "m"), ("a", "k"))]
+    report = REPORT.model_copy(update={
+        "criteria": (*fell, criterion("FAIL", "c")), "verdict": verdict, "caveats": (),
+        "candidates": {"b": "FAIL", "a": "FAIL", "c": "PASS"},
+    })  # fmt: skip
+    texts = [doubt.text for doubt in doubts_of(report)]
+    assert texts == (["a: m, k", "b: n"] if verdict == "PASS" else [])
 
 
 def test_a_candidate_that_fell_away_is_named_where_another_passes(ladder):
@@ -145,6 +187,7 @@ def test_what_each_gate_repeats_is_said_once_by_who_names_most(reports):
     ]  # fmt: skip
     own = [f"own of {gate}" for gate in reports]
     assert sorted(doubt.text for doubt in rest) == sorted(["the same", *own])
+    assert [doubt.gate for doubt in rest if doubt.text == "the same"] == ["A"], "the first says it"
 
 
 @pytest.mark.parametrize(("said", "weighed"), [

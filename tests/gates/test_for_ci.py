@@ -72,3 +72,37 @@ def test_no_text_breaks_out_of_its_line():
     assert as_github(found).count("\n") == 0
     assert "title=Beside the gates%2C a%2Cb%3A REFUSED::100 %25%0A::error" in as_github(found)
     assert suites(found)[0][0][0].get("message") == "100 %\n::error::forged <x>"
+
+
+def test_golden_what_both_machines_are_told():
+    """One that holds, one that fell beside it, one that is not there, and a page; by hand."""
+    fell = criterion("FAIL", "flow", "y").model_copy(update={"caveat": "late"})
+    missing = Rung("B", "reproducibility", "NOT JUDGED", "", "no report", "reports/gate_b.json", 3)
+    found = [*cases([rung("PASS"), missing], report(criterion("PASS"), fell)),
+             beside("page", "another", "p.html")]  # fmt: skip
+    assert as_junit(found).splitlines()[1:] == [
+        '<testsuites name="genpolicy">',
+        '  <testsuite name="Gate A" tests="2" failures="0" skipped="1">',
+        '    <testcase classname="Gate A" name="x" file="reports/gate_a.json" />',
+        '    <testcase classname="Gate A" name="y (flow)" file="reports/gate_a.json">',
+        '      <skipped message="FAIL: ? 1, required &lt;= 1 (late)" />',
+        "    </testcase>",
+        "  </testsuite>",
+        '  <testsuite name="Gate B" tests="1" failures="1" skipped="0">',
+        '    <testcase classname="Gate B" name="report" file="reports/gate_b.json">',
+        '      <failure type="NOT JUDGED" message="no report" />',
+        "    </testcase>",
+        "  </testsuite>",
+        '  <testsuite name="Beside the gates" tests="1" failures="1" skipped="0">',
+        '    <testcase classname="Beside the gates" name="page" file="p.html">',
+        '      <failure type="REFUSED" message="another" />',
+        "    </testcase>",
+        "  </testsuite>",
+        "</testsuites>",
+    ]
+    assert as_github(found).splitlines() == [
+        "::warning file=reports/gate_a.json,title=Gate A%2C y (flow)%3A FAIL"
+        "::? 1, required <= 1 (late)",
+        "::error file=reports/gate_b.json,title=Gate B%2C report%3A NOT JUDGED::no report",
+        "::error file=p.html,title=Beside the gates%2C page%3A REFUSED::another",
+    ]

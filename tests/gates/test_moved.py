@@ -86,6 +86,15 @@ def test_what_may_be_why_is_named_by_key():
     assert not gate.same
 
 
+@pytest.mark.parametrize(("count", "more"), [(1, ""), (6, ""), (7, " and 1 more"),
+                                             (9, " and 3 more")])  # fmt: skip
+def test_six_keys_are_named_and_the_others_counted(count, more):
+    keys = [f"k{n}" for n in range(count)]
+    gate = between([ONE], [ONE], code=dict.fromkeys(keys, "1"))
+    line = f"   because?   code: {', '.join(keys[:6])}{more}"
+    assert moved_text([gate]).splitlines() == ["A  need: PASS", line]
+
+
 def test_caveats_that_came_and_went():
     gate = between([ONE], [ONE], caveats=("two", "three"))
     assert gate.caveats == ("- one", "+ three")

@@ -52,7 +52,9 @@ def test_every_file_of_every_evidence_stage_is_bound(ladder):
 
 def test_forged_evidence_is_refused_when_it_is_judged(ladder):
     _forge(ladder)
-    with pytest.raises(IntegrityError, match=r"artifacts/stress is other than recorded"):
+    with pytest.raises(
+        IntegrityError, match=r"artifacts/stress is other than recorded \(md5 [0-9a-f]{12}…\)"
+    ):
         judge(ladder, "D")
 
 

@@ -8,9 +8,9 @@ import pytest
 import yaml
 
 from gates import planning
-from gates.bounds import share_interval, upper_quantile
+from gates.bounds import counted_interval, share_interval, upper_quantile
 from gates.evidence import MissingEvidenceError
-from gates.planning import plan_of, plan_text
+from gates.planning import Bound, Gain, Plan, _counted, plan_of, plan_text
 from gates.settings import read_params
 from gates.stress.cost import _rollouts_with
 from gates.stress.rollouts import StressSettings
@@ -173,3 +173,52 @@ def test_a_plan_without_its_section_is_bad_configuration(tmp_path):
     (tmp_path / "params.yaml").write_text("{}\n")
     with pytest.raises(ConfigError, match="gate_d"):
         plan_of(tmp_path)
+
+
+def made(*bounds, gains=()):
+    return Plan(
+        starts=90, rollouts=12_600, longest_s=63_000.0, margin=0.05, alpha=0.0125, power=0.8,
+        bounds=bounds, gains=gains,
+    )  # fmt: skip
+
+
+def test_golden_what_a_person_reads_of_a_plan():
+    """Written by hand: a mark, a column as wide as the longest name, and lines of 80 that hang."""
+    long = "none of 90 bounds it by 0.0324 only, whatever is done and however often it is run"
+    text = plan_text(made(
+        Bound("kept", True, "up to 3 of 90"), Bound("never_kept", False, long),
+        Bound("open", None, "declared not applicable"),
+        gains=(Gain(0.1, 0.29, 0.81), Gain(0.95, None, 0.34)),
+    ))  # fmt: skip
+    assert text.splitlines() == [
+        "90 starts a condition, 12,600 rollouts, at most 17.5 h of virtual time",
+        "",
+        "What these starts can show",
+        "  kept        up to 3 of 90",
+        "! never_kept  none of 90 bounds it by 0.0324 only, whatever is done and however",
+        "              often it is run",
+        "? open        declared not applicable",
+        "",
+        "Smallest gain that is found in 80% of trials (margin 0.05, alpha 0.0125)",
+        "  baseline 10%: 19 points, a candidate of 29%",
+        "  baseline 95%: none; a candidate that never fails in 34% only",
+        "",
+        "Gate D would be INCONCLUSIVE whatever the rollouts show: never_kept. Plan more",
+        "starts (stress.starts) before any is run.",
+    ]
+
+
+def test_a_plan_that_can_be_decided_warns_of_nothing():
+    for plan in (made(), made(Bound("kept", True, "x"), Bound("open", None, "y"))):
+        assert "INCONCLUSIVE" not in plan_text(plan) and plan.undecidable == ()
+    found = made(Bound("kept", True, "x"), Bound("b", False, "y"), Bound("a", False, "z"))
+    assert found.undecidable == found.as_document()["undecidable"] == ("b", "a")
+
+
+@pytest.mark.parametrize("name", ["intervention_upper", "nominal_success_lower"])
+def test_a_limit_at_the_bound_itself_is_kept(name):
+    """The least hits keep it where it lies at their very end, and none where it lies beside."""
+    low, high = counted_interval(3, 30, confidence=0.95)
+    at, step = (high, -1e-9) if name == "intervention_upper" else (low, 1e-9)
+    assert " 3 " in _counted(name, at, 30, 0.95).says
+    assert " 3 " not in _counted(name, at + step, 30, 0.95).says

@@ -1,6 +1,7 @@
 """Admission: a chain that is proved again, and twenty ways in which it is not (P20)."""
 
 import json
+import re
 import shutil
 
 import evidence
@@ -11,6 +12,9 @@ from gates.report import report_bytes, report_path
 from genpolicy.errors import ConfigError, IntegrityError, RefusedError
 from genpolicy.integrity.atomic import write_bytes
 from genpolicy.integrity.hashing import sha256_file
+
+HASH = "[0-9a-f]{16}…"
+"""A hash as it is printed: enough of it to find the file by."""
 
 
 def _edit_report(root, gate, change):
@@ -97,6 +101,36 @@ def test_one_flipped_bit_in_any_material_refuses(ladder, name):
     file.write_bytes(bytes(data))
     with pytest.raises((RefusedError, IntegrityError), match=name.rsplit("/", 1)[1]):
         admit("card", ladder)
+
+
+@pytest.mark.parametrize("stated", ["code", "parameters", "pipeline"])
+def test_what_was_judged_by_other_code_settings_or_runs_is_named_with_both_hashes(ladder, stated):
+    kind = {"pipeline": "the recorded run"}.get(stated, stated)
+    edits = {
+        "0" * 64: rf"{HASH}, required 0{{16}}… as judged",
+        None: rf"{HASH}, required none… as judged",
+    }
+    name = next(iter(json.loads((ladder / report_path("A")).read_bytes())[stated]))
+    for digest, said in edits.items():
+        _edit_report(
+            ladder, "A",
+            lambda r, d=digest: r[stated].update({name: d}) if d else r[stated].pop(name),
+        )  # fmt: skip
+        with pytest.raises(RefusedError, match=rf"{kind} of {re.escape(name)} is {said}; "):
+            admit("train_generators", ladder)
+    _edit_report(ladder, "A", lambda r: r[stated].update({"no/such.py": "1" * 64}))
+    wrong = rf"{kind} of (no/such\.py is none…|{re.escape(name)} is {HASH}), required "
+    with pytest.raises(RefusedError, match=wrong):
+        admit("train_generators", ladder)
+
+
+def test_a_material_that_changed_is_named_with_both_hashes_and_the_stage_that_makes_it(ladder):
+    file = ladder / "artifacts/audit/clocks.parquet"
+    file.write_bytes(file.read_bytes() + b" ")
+    name = r"sha256 of artifacts/audit/clocks\.parquet"
+    said = rf"{name} is {HASH}, required {HASH}; .*Run `dvc repro audit`"
+    with pytest.raises(RefusedError, match=said):
+        admit("train_generators", ladder)
 
 
 def test_a_removed_or_added_material_refuses(ladder):
@@ -191,7 +225,10 @@ def test_a_report_of_another_gate_or_another_run_refuses(ladder, repo):
 def test_judging_below_again_voids_what_stands_above(ladder):
     evidence.edit_table(ladder, "audit/clocks.parquet", lambda f: f.assign(offset_after_s=0.003))
     _judge_again(ladder, "A")
-    with pytest.raises(RefusedError, match="judged again since"):
+    with pytest.raises(
+        RefusedError,
+        match=rf"sha256 of reports/gate_a\.json is {HASH}, required {HASH}; .*judged again since",
+    ):
         admit("shadow", ladder)
 
 

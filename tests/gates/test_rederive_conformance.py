@@ -143,6 +143,36 @@ def test_a_moment_of_another_episode_is_refused(workspace):
     refused(workspace, "a moment of its own")
 
 
+@pytest.mark.parametrize("beyond", [-1, 1])
+def test_a_moment_that_the_seed_does_not_draw_is_refused(workspace, beyond):
+    """One before the first, and one behind the last: neither is read from the other end."""
+    moments = {row.moment for row in read_rows(workspace / ANSWERS, AnswerRow)}
+    last, other = max(moments), -1 if beyond < 0 else max(moments) + 1
+    rewrite(workspace, lambda row: replace(row, moment=other) if row.moment == last else row)
+    refused(workspace, "a moment of its own")
+
+
+@pytest.mark.parametrize(("changes", "said"), [
+    ({"moments": 1}, "4 chunks at 1 moments"), ({"candidates": 3}, "3 chunks at"),
+    ({"observations_sha256": "0" * 64}, "asked about other moments"),
+    ({"seeded": False}, "planted: seeded is B holds"),
+])  # fmt: skip
+def test_each_thing_that_is_said_of_the_asking_is_held_by_itself(workspace, changes, said):
+    found = CONFORMANCE.read(workspace / "artifacts/reload")["planted"]
+    assert {name: getattr(found, name) for name in changes} != changes
+    CONFORMANCE.write(workspace / "artifacts/reload", {"planted": replace(found, **changes)})
+    refused(workspace, said)
+
+
+def test_answers_of_a_server_that_nobody_can_ask_are_refused(workspace):
+    """Nothing listens where it was: who it was cannot be shown, so its answers are none."""
+    path = workspace / "planted.yaml"
+    path.write_text(
+        yaml.safe_dump({**yaml.safe_load(path.read_text()), "address": "ws://127.0.0.1:9"})
+    )
+    refused(workspace, r"planted is \d+ answers of a server, required one that starts")
+
+
 def test_moments_of_another_seed_are_refused(workspace):
     refused(workspace, "other moments|a moment of its own", {**PARAMS, "seed": SEED + 1})
 
@@ -158,7 +188,9 @@ def test_what_its_server_can_is_held_against_it(workspace):
     CONFORMANCE.write(
         workspace / "artifacts/reload", {"planted": replace(found, counts_evaluations=False)}
     )
-    refused(workspace, r"evaluations|its server can")
+    refused(workspace, r"planted: evaluations is")
+    judged(workspace, "evaluations", "unknown")
+    refused(workspace, r"planted is other things that its server can, required \(True, True\)")
 
 
 def test_findings_of_somebody_who_was_not_brought_are_refused(workspace):

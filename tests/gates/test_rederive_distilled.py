@@ -21,6 +21,8 @@ from genpolicy.integrity.hashing import sha256_bytes
 from genpolicy.policies import distillation
 
 TRAINING = {"steps": 100, "batch_size": 8}
+OF_TEACHER = {"steps": 50, "batch_size": 6}
+"""Other numbers than the student's: whose windows count three times must be seen."""
 GENERATORS = "artifacts/train_generators"
 
 
@@ -34,10 +36,11 @@ def _said(root):
     weights, config = (
         sha256_bytes((teacher / name).read_bytes()) for name in ("model.safetensors", "config.json")
     )
-    # by hand: 800 windows each; the student looks at three networks, of which one learns
+    # by hand: 800 windows of the student and 300 of its teacher; the student looks at three
+    # networks, of which one learns
     return {
         "teacher": "diffusion", "teacher_sha256": sha256_bytes(f"{weights}\n{config}\n".encode()),
-        "updates": 200, "evaluations": 3 * 800 + 800, "gradients": 2 * 800,
+        "updates": 150, "evaluations": 3 * 800 + 300, "gradients": 800 + 300,
     }  # fmt: skip
 
 
@@ -46,7 +49,7 @@ def seeds(tmp_path):
     """A teacher and its student, as training leaves them."""
     found = [tmp_path / GENERATORS / name / "seed_0" for name in ("diffusion", "manicm")]
     for folder in found:
-        _write(folder / "config.json", {"training": TRAINING})
+        _write(folder / "config.json", {"training": OF_TEACHER})
         (folder / "model.safetensors").write_bytes(folder.parent.name.encode())
     _write(found[1] / "config.json", {"training": TRAINING, "distilled": _said(tmp_path)})
     return found
@@ -75,12 +78,22 @@ def test_a_true_account_stands(tmp_path, seeds, compared):
 
 @pytest.mark.parametrize(
     ("key", "value"),
-    [("teacher_sha256", "0" * 64), ("updates", 199), ("evaluations", 3199), ("gradients", 800),
+    [("teacher_sha256", "0" * 64), ("updates", 149), ("evaluations", 2699), ("gradients", 800),
      ("unknown", 1)],
 )  # fmt: skip
 def test_an_account_that_the_teacher_does_not_bear_out_is_refused(tmp_path, seeds, key, value):
     _edit(seeds[1] / "config.json", **{key: value})
     with pytest.raises(RefusedError, match=rf"manicm/seed_0/config.json: distilled: {key}"):
+        rederive_costs(tmp_path, seeds)
+
+
+def test_a_training_that_says_nothing_of_itself_counts_for_nothing(tmp_path, seeds):
+    said = {**_said(tmp_path), "updates": 50, "evaluations": 300, "gradients": 300}
+    for training in ({}, {"training": {"batch_size": 8}}, {"training": 3}):
+        _write(seeds[1] / "config.json", {**training, "distilled": said})
+        rederive_costs(tmp_path, seeds)
+    _write(seeds[1] / "config.json", {"training": {"steps": 100}, "distilled": said})
+    with pytest.raises(RefusedError, match=r"distilled: updates is 50, required 150"):
         rederive_costs(tmp_path, seeds)
 
 
@@ -107,6 +120,11 @@ def test_a_distillation_that_gate_d_does_not_mention_is_refused(tmp_path, compar
     (compared / "distilled.json").unlink()
     with pytest.raises(RefusedError, match=r"distilled\.json: manicm"):
         rederive_distilled(tmp_path, 0)
+
+
+def test_the_configuration_is_that_of_the_seed_that_is_judged(tmp_path, compared):
+    with pytest.raises(RefusedError, match=r"distilled\.json: manicm .*, required None"):
+        rederive_distilled(tmp_path, 1)
 
 
 def test_a_distillation_of_nobody_is_refused(tmp_path, compared):

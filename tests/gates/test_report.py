@@ -3,6 +3,7 @@
 import json
 
 import pytest
+from pydantic import ValidationError
 
 from gates.proof import admit
 from gates.report import (
@@ -10,8 +11,10 @@ from gates.report import (
     StrictModel,
     limit_text,
     measured_text,
+    message,
     parse_report,
     parse_section,
+    place,
     report_path,
 )
 from genpolicy.errors import ConfigError, IntegrityError
@@ -117,3 +120,14 @@ def test_what_was_measured_and_what_is_asked_in_a_sentence(ladder):
     assert said(measured=None, threshold=None) == ("not measured", "a limit in params.yaml")
     assert said(measured=0.0, threshold=0.0, comparison=">=") == ("0", ">= 0")
     assert said(measured=1.0, verdict="PENDING_REVIEW")[0] == "pending review"
+
+
+@pytest.mark.parametrize("length", [59, 60, 61])
+def test_sixty_signs_of_what_was_found_are_shown(length):
+    class Numbers(StrictModel):
+        n: int
+
+    with pytest.raises(ValidationError) as caught:
+        Numbers.model_validate({"n": "x" * length})
+    said = f"'{'x' * min(length, 60)}' (Input should be a valid integer)"
+    assert (place(caught.value), message(caught.value)) == ("n", said)

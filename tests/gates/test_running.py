@@ -12,6 +12,7 @@ from gates.running import require_running_code
 from genpolicy.errors import IntegrityError
 
 PACKAGES = (genpolicy, gates)
+HASH = "[0-9a-f]{16}"
 
 
 def _copy(root: Path) -> None:
@@ -35,7 +36,10 @@ def test_another_file_under_the_root_is_refused_by_name(tmp_path, name):
     require_running_code(tmp_path)
     file = tmp_path / name
     file.write_text(file.read_text() + "\n")
-    with pytest.raises(IntegrityError, match=f"the running {name} is .*run `python -m gates`"):
+    with pytest.raises(
+        IntegrityError,
+        match=f"the running {name} is {HASH} of .*, expected {HASH} of .*run `python -m gates`",
+    ):
         require_running_code(tmp_path)
     file.unlink()
     with pytest.raises(IntegrityError, match=f"the running {name} is .*expected missing"):

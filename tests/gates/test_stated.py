@@ -33,6 +33,24 @@ def test_the_first_difference_is_refused_by_name(stated, derived, said):
     assert caught.value.exit_code == 3
 
 
+def test_of_several_differences_the_first_by_key_and_column_is_refused():
+    """Whatever the order of the rows: a run that is refused twice is refused in the same words."""
+    stated = [{"method": "b", "n": 1}, {"method": "a", "m": 1, "n": 1}]
+    derived = [{"method": "b", "n": 2}, {"method": "a", "m": 2, "n": 2}]
+    for rows in (stated, stated[::-1]):
+        with pytest.raises(RefusedError, match=r"count a: m is 1, required 2, as its journal says"):
+            compare(rows, derived)
+
+
+def test_a_row_is_known_by_all_of_its_keys_and_named_by_its_table():
+    rows = [{"method": "a", "start": start, "n": 1} for start in (0, 1)]
+    for table, name in (("stress/rollouts.parquet", "rollout"),
+                        ("shadow/conservation.parquet", "conservation")):  # fmt: skip
+        compare_rows("D", table, ("method", "start"), rows, rows, seed=0)
+        with pytest.raises(RefusedError, match=rf"Gate D refuses: {name} a/1 is without a journal"):
+            compare_rows("D", table, ("method", "start"), rows, rows[:1], seed=0)
+
+
 def test_keys_of_a_document():
     compare_keys("D", "power.json", {"a": 1}, {"a": 1}, "again")
     for stated in ({"a": 2}, {}, {"a": 1, "b": 2}):

@@ -98,6 +98,8 @@ def test_what_moved_since_the_reviewed_run(ladder, commit):
     reviewed = commit()
     same = status_of(ladder, RUNGS).reviewed
     assert same.commit == reviewed and all(gate.same for gate in same.moved)
+    assert [gate.gate for gate in same.moved] == list("ABCD")
+    assert same.said.startswith(f"by the card of commit {reviewed[:7]} (its signatures:")
     path = ladder / report_path("B")
     document = json.loads(path.read_text())
     document.update(verdict="FAIL")
@@ -116,8 +118,21 @@ def test_a_card_of_other_reports_is_no_review_of_these(ladder, commit):
     assert "names other reports than that commit holds" in found.said and not found.moved
 
 
-def test_a_card_that_is_none_cannot_be_compared(ladder, commit):
-    write_bytes(ladder / "cards/trial.dsse.json", b"[]")
+def _enveloped(payload):
+    return canonical_json({"payload": base64.b64encode(canonical_json(payload)).decode()})
+
+
+@pytest.mark.parametrize(
+    "card",
+    [
+        b"[]", b"{", b"{}", b'{"payload": 1}', b'{"payload": "x"}', _enveloped([]), _enveloped({}),
+        _enveloped({"predicate": {}}), _enveloped({"predicate": {"reports": []}}),
+        _enveloped({"predicate": None}),
+    ],
+    ids=bytes.decode,
+)  # fmt: skip
+def test_a_card_that_is_none_cannot_be_compared(ladder, commit, card):
+    write_bytes(ladder / "cards/trial.dsse.json", card)
     commit()
     found = status_of(ladder, RUNGS).reviewed
     assert "cannot be compared" in found.said and not found.moved

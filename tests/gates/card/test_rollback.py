@@ -1,11 +1,12 @@
 """What runs instead: the simple policy that did best, by its checkpoint and its own success."""
 
 import json
+from types import SimpleNamespace
 
 import evidence
 import pytest
 
-from gates.card.rollback import rollback_of
+from gates.card.rollback import require_rollback, rollback_of
 from gates.evidence import Evidence
 from gates.proof import judge
 from gates.report import read_report
@@ -62,3 +63,11 @@ def test_a_draft_that_names_another_rollback_is_not_of_this_chain(ladder):
     evidence.record(ladder)
     [chain] = [c for c in judge(ladder, "E").criteria if c.id == "upstream_passed"]
     assert chain.verdict == "FAIL" and "the draft's rollback is 'stop'" in chain.caveat
+
+
+@pytest.mark.parametrize("length", [59, 60, 61])
+def test_sixty_signs_of_another_rollback_are_shown(monkeypatch, length):
+    monkeypatch.setattr("gates.card.rollback.rollback_of", lambda *_: SimpleNamespace(text="y"))
+    require_rollback("y", {}, None)
+    with pytest.raises(IntegrityError, match=rf"rollback is 'x{{{min(length, 60)}}}', expected y"):
+        require_rollback("x" * length, {}, None)

@@ -1,6 +1,8 @@
 """Trial card and Gate E: pending until people sign; forged cards are refused (P21)."""
 
 import json
+import re
+from types import SimpleNamespace
 
 import pytest
 from cryptography.exceptions import UnsupportedAlgorithm
@@ -139,3 +141,44 @@ def test_a_key_that_the_library_does_not_know_is_bad_input(team, monkeypatch):
     monkeypatch.setattr(signing, "load_pem_private_key", unsupported)
     with pytest.raises(BadInputError, match="the private key is not readable"):
         team.sign(team.complete(), ["rita"])
+
+
+SIGNED = {"payload": "", "payloadType": signing.PAYLOAD_TYPE, "signatures": [
+    {"keyid": "k", "sig": ""},
+]}  # fmt: skip
+
+
+@pytest.mark.parametrize(("changes", "found"), [
+    ({"payloadType": "p" * 80}, "payloadType is '" + "p" * 59 + ", "),
+    ({"payloadType": "p" * 57}, "payloadType is '" + "p" * 57 + "', "),
+    ({"signatures": [{"keyid": [1] * 80, "sig": ""}]}, "keyid is [" + "1, " * 19 + "1,, "),
+    ({"signatures": []}, "signatures is empty, "), ({"signatures": "k"}, "signatures is empty, "),
+    ({"signatures": [SIGNED["signatures"][0], 3]}, "signatures is another form, "),
+    ({"signatures": [{"keyid": "k"}]}, "signatures is another form, "),
+    ({"signatures": [{"keyid": "k", "sig": "?"}]}, "sig is not base64, "),
+    ({"signatures": [{"keyid": "k", "sig": 3}]}, "sig is not base64, "),
+    ({"payload": "?"}, "payload is not base64, "), ({"more": 1}, "c is another document, "),
+])  # fmt: skip
+def test_an_envelope_of_another_form_is_refused_by_its_part(changes, found):
+    whole = canonical_json({**SIGNED, **changes})
+    assert signing._parse_envelope(canonical_json(SIGNED), "c") == (b"", SIGNED["signatures"])
+    with pytest.raises(BadInputError, match=re.escape(found)):
+        signing._parse_envelope(whole, "c")
+
+
+@pytest.mark.parametrize("length", [59, 60, 61])
+def test_a_caveat_that_is_left_out_is_quoted_and_the_rest_may_be_more(
+    monkeypatch, tmp_path, length
+):
+    """Sixty signs of the first that lacks; what else stands on the card is somebody's care."""
+    required = ["kept", "x" * length, "y"]
+    fields = dict.fromkeys(signing.FIXED, "same")
+    draft = SimpleNamespace(**fields, caveats=required)
+    monkeypatch.setattr(signing, "read_draft", lambda root: draft)
+    signing._check_fixed(tmp_path, SimpleNamespace(**fields, caveats=[*required, "more"]), "c")
+    with pytest.raises(BadInputError, match=rf"c: caveats is without 'x{{{min(length, 60)}}}', "):
+        signing._check_fixed(tmp_path, SimpleNamespace(**fields, caveats=["more", "kept"]), "c")
+    for name in signing.FIXED:
+        card = SimpleNamespace(**{**fields, name: "other"}, caveats=required)
+        with pytest.raises(BadInputError, match=rf"c: {name} is another value"):
+            signing._check_fixed(tmp_path, card, "c")

@@ -102,6 +102,16 @@ def test_an_action_whose_motion_was_not_proved_is_not_proved(where, proved, told
         _checked(tmp_path, *where, reproved_actions=proved)
 
 
+@pytest.mark.parametrize(("count", "named"), [
+    (2, "b0, b1"), (3, "b0, b1, b2"), (4, "b0, b1, b2 and 1 more"), (6, "b0, b1, b2 and 3 more"),
+])  # fmt: skip
+def test_three_that_do_not_belong_together_are_named_and_the_others_counted(tmp_path, count, named):
+    known = evidence.checked("a.mcap", 7)["journals"]
+    journals = {**known, **{f"b{n}": known["a.mcap"] for n in range(count)}}
+    with pytest.raises(MissingEvidenceError, match=rf"do not belong together: {named}$"):
+        _checked(tmp_path, "shadow", "a.mcap", journals=journals)
+
+
 @pytest.mark.parametrize("where", FOLDERS)
 def test_a_journal_that_nobody_checked_and_a_finding_of_none_are_named(where, tmp_path):
     with pytest.raises(MissingEvidenceError, match=r"do not belong together: a\.mcap$"):

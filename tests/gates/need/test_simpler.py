@@ -127,6 +127,23 @@ def test_ibc_is_reported_beside_the_deployed_baselines_and_not_judged(ladder):
     assert found(ladder, "baseline_mode_coverage").measured == 1.0
 
 
+def test_all_that_are_drawn_at_random_are_told_and_the_best_comes_first(ladder):
+    """Each with its own coverage and its own share of what may be executed."""
+
+    def drawn(frame):
+        of = frame["method"] == "ibc"
+        other = {"modes_valid": 1, "admissible": frame["samples"][of] // 4}
+        more = [frame[of].assign(convention=name, **other) for name in ("langevin", "annealed")]
+        return pd.concat([*more, frame], ignore_index=True)
+
+    evidence.edit_table(ladder, "measure_baselines/modes.parquet", drawn)
+    assert found(ladder, "baseline_mode_coverage").caveat.endswith(
+        "; drawn at random, as a generator: ibc, derivative_free 1 (100% of samples admissible), "
+        "ibc, langevin 0.5 (25% of samples admissible), "
+        "ibc, annealed 0.5 (25% of samples admissible)"
+    )
+
+
 def test_the_page_draws_the_factors_and_says_what_ibc_is(ladder):
     write_gate(ladder, "A")
     page = (ladder / "reports/gate_a.html").read_text()

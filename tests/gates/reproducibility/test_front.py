@@ -118,3 +118,11 @@ def test_slower_times_move_the_choice(repo):
     evidence.edit_table(repo, COVERAGE, cells("modes_covered_share", 0.5))
     with pytest.raises(MissingEvidenceError, match="euler, 2 steps below the lower end"):
         settings_of(Evidence(repo), "flow", confidence=CONFIDENCE)
+
+
+def test_a_setting_that_covers_nothing_has_its_lower_end_there(repo):
+    """The exact lower end of no mode covered is 0 itself: it is known, and nobody would take it."""
+    none = {"modes_covered_share": 0.0, "coverage_lower": 0.0}
+    evidence.edit_table(repo, COVERAGE, lambda f: f.assign(**none))
+    found = settings_of(Evidence(repo), "flow", confidence=CONFIDENCE)
+    assert {(one.coverage, one.coverage_lower) for one in found} == {(0.0, 0.0)}

@@ -1,0 +1,99 @@
+"""What is printed of the gates, and which exit code says it."""
+
+import itertools
+import json
+
+import pytest
+from test_differences import REPORT
+
+from gates import printed
+from gates.printed import page_problem, pages_code, print_cases, print_rungs, worst
+from gates.proof import Rung
+from gates.writing import INDEX
+from genpolicy.errors import BadInputError, IntegrityError
+
+BAD = {"where": "x", "found": "1", "expected": "2", "action": "Stop."}
+RUNGS = [
+    Rung("A", "need", "PASS", "", "every byte", "reports/gate_a.json", 0),
+    Rung("B", "reproducibility", "FAIL", "nfe: 5", "not shown", "reports/gate_b.json", 3),
+    Rung("E", "card", "NOT JUDGED", "", "", "reports/gate_e.json", 3),
+]
+
+
+def test_what_cannot_be_read_comes_before_what_is_refused_and_that_before_what_is_done():
+    """Every set of the codes: 1, a fault of ours, hides neither of them."""
+    for size in range(5):
+        for codes in itertools.combinations((0, 1, 2, 3), size):
+            order = [code for code in (2, 3, 1, 0) if code in codes]
+            assert worst(set(codes)) == (order or [0])[0], codes
+
+
+@pytest.mark.parametrize(
+    ("found", "said"),
+    [
+        (None, None),
+        ("", None),
+        ("reports/gate_b.md", ("reports/gate_b.md", 3, "reports/gate_b.md is another page")),
+        (BadInputError(**BAD), (INDEX, 2, "x is 1, expected 2")),
+        (IntegrityError(**BAD), (INDEX, IntegrityError.exit_code, "x is 1, expected 2")),
+    ],
+)
+def test_a_page_that_is_another_or_cannot_be_made(tmp_path, monkeypatch, capsys, found, said):
+    def changed(root):
+        assert root == tmp_path
+        if isinstance(found, Exception):
+            raise found
+        return found
+
+    monkeypatch.setattr(printed, "changed_page", changed)
+    problem = page_problem(tmp_path)
+    if said is None:
+        assert problem is None and pages_code(tmp_path) == set()
+        assert capsys.readouterr() == ("", "")
+        return
+    file, code, text = said
+    assert (problem[0], problem[2], problem[3]) == ("page", file, code)
+    assert problem[1].startswith(text)
+    assert pages_code(tmp_path) == {code}
+    assert capsys.readouterr() == ("", f"{problem[1]}\n"), "for a person, beside what is printed"
+
+
+def test_a_line_for_each_gate(capsys):
+    print_rungs(RUNGS, as_json=False)
+    assert capsys.readouterr().out.splitlines() == [
+        "A  need             PASS            every byte",
+        "B  reproducibility  FAIL            nfe: 5",
+        "E  card             NOT JUDGED",
+    ]
+
+
+def test_the_same_as_json_whole_and_in_their_own_letters(capsys):
+    print_rungs([*RUNGS, Rung("D", "stress", "FAIL", "é ≤ 1", "", "r", 3)], as_json=True)
+    out = capsys.readouterr().out
+    assert "é ≤ 1" in out and out.startswith('[\n  {\n    "gate": "A",\n')
+    rows = json.loads(out)
+    assert [row["gate"] for row in rows] == list("ABED")
+    assert rows[1] == {
+        "gate": "B", "name": "reproducibility", "verdict": "FAIL", "decided_by": "nfe: 5",
+        "note": "not shown", "report": "reports/gate_b.json", "exit_code": 3,
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("layout", ["junit", "github"])
+def test_only_a_report_that_was_proved_is_read_for_its_criteria(
+    tmp_path, monkeypatch, capsys, layout
+):
+    """What was refused, or is not there, must not speak for itself."""
+    read = []
+
+    def read_report(root, gate):
+        read.append((root, gate))
+        return REPORT, "0" * 64
+
+    monkeypatch.setattr(printed, "read_report", read_report)
+    rungs = [*RUNGS, Rung("C", "f", "REFUSED", "", "a byte", "reports/gate_c.json", 3)]
+    print_cases(tmp_path, rungs, [("page", "another", "p.html", 3)], layout)
+    assert read == [(tmp_path, "A"), (tmp_path, "B")]
+    out = capsys.readouterr().out
+    assert out.startswith("<" if layout == "junit" else "::error")
+    assert "another" in out and "p.html" in out and "a byte" in out
