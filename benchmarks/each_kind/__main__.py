@@ -7,7 +7,10 @@ of each, what does not hold, and how far its chunks are from those of the bare n
 where a verdict differs from that of the ladder's own flow, or chunks by more than the tolerance.
 
 Policies of LeRobot, trained on the ladder's export, go with them where they are named; what is
-said of them decides no exit code.
+said of them decides no exit code. Whom a gate stops is in no evidence above it. So that these are
+seen there too, each gate's report is kept, and behind it the limits that they break are widened to
+what was measured: what stands in the table is the kept report's, and above a stop it is a look.
+A run that was killed goes on where it was; remove `--work` for a new one.
 
     python -m benchmarks.each_kind
     python -m benchmarks.each_kind --lerobot act=build/lerobot-act/checkpoints/last/pretrained_model
@@ -25,8 +28,9 @@ from benchmarks.each_kind.compared import GATES, Apart, Judged, apart, differing
 from benchmarks.kinds import KINDS, of_each_kind
 from benchmarks.ladder_truth.bringing import TWIN, as_the_twin, bring_weights, enter
 from benchmarks.ladder_truth.outcome import settled
-from benchmarks.ladder_truth.workspace import hold_to_limits, make_small_ladder
+from benchmarks.ladder_truth.workspace import hold_to_limits, make_small_ladder, set_limit
 from flows.reproduce import reproduce
+from gates.report import report_path, stage_of
 
 TOLERANCE = {"trained": 0.0, "server": 0.0, "torch": 1e-5, "onnx": 1e-4}
 """m, or of a number of a rotation; as docs/candidates.md states them."""
@@ -86,7 +90,27 @@ def bring_each_kind(workspace: Path) -> None:
         )
 
 
-def run(workspace: Path) -> None:
+def judge(workspace: Path, kept: Path, onlookers: Sequence[str]) -> None:
+    """Run gate after gate, keep each report, and let on whom it stops of the onlookers."""
+    for gate in GATES:
+        file = kept / report_path(gate)
+        if not file.exists():
+            run(workspace, stage_of(gate))
+            file.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(workspace / report_path(gate), file)
+        for name in onlookers if gate != GATES[-1] else ():
+            widen(workspace, gate, judged(kept, name))
+    run(workspace)
+
+
+def widen(workspace: Path, gate: str, own: Judged) -> None:
+    """Move the limits of a gate that a candidate breaks to what was measured of it."""
+    for (where, name), answer in own.answers.items():
+        if where == gate and answer.verdict != "PASS" and answer.measured is not None:
+            set_limit(workspace, stage_of(gate), name, answer.measured)
+
+
+def run(workspace: Path, *stages: str) -> None:
     """Run a ladder to which candidates were brought; its own may not be trained again.
 
     Raises:
@@ -100,11 +124,11 @@ def run(workspace: Path) -> None:
         lines.append(line)
         print(line, file=sys.stderr, flush=True)
 
-    end = reproduce(workspace, echo=echo)
+    end = reproduce(workspace, stages=stages, echo=echo)
     ran = [line.split("'")[1] for line in lines if line.startswith("Running stage '")]
     if again := [name for name in ran if name.startswith("train_")]:
         sys.exit(f"trained again: {', '.join(again)}")
-    print(f"Ran: {', '.join(ran)}; {end.duration_s:.0f} s; exit {end.code}")
+    print(f"Ran: {', '.join(ran)}; {end.duration_s:.0f} s; exit {end.code}", flush=True)
     if end.code != 0 and not end.verdict:
         sys.exit(f"the ladder ended: {end.sentence}")
 
@@ -142,25 +166,33 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run, and print. 1 where the same weights are not judged the same."""
     args = arguments(argv)
     work = args.work.resolve()
-    workspace = work / "brought"
+    workspace, kept = work / "brought", work / "kept"
     if not args.table:
-        base = until_pinned(work / "small")
-        shutil.rmtree(workspace, ignore_errors=True)
-        shutil.copytree(base, workspace, symlinks=True)
-        bring_each_kind(workspace)
-        for name, folder in args.lerobot:
-            lerobot.bring(workspace, name, folder, interpreter=args.python, data=args.data)
-        run(workspace)
+        bring(until_pinned(work / "small"), workspace, args)
+        judge(workspace, kept, [name for name, _ in args.lerobot])
     if not args.lerobot:
         print("No policy of LeRobot: none was named (--lerobot NAME=FOLDER, after `make lerobot`).")
     far = apart(workspace)
-    found = {name: judged(workspace, name) for name in (TWIN, *sorted(far))}
+    found = {name: judged(kept, name) for name in (TWIN, *sorted(far))}
     print(table(found, {name: far[name] for name in far if name.startswith("as_")}))
     for name, own in found.items():
         print(f"\n{name}: {'; '.join(own.unmet) or 'every criterion holds'}")
     differences = wrong(found, far)
     print("\n" + ("\n".join(differences) or "Of the same weights every verdict is the same."))
     return 1 if differences else 0
+
+
+def bring(base: Path, workspace: Path, args: argparse.Namespace) -> None:
+    """A copy of the pinned ladder with everybody who is brought; once."""
+    done = workspace.with_name(f"{workspace.name}.done")
+    if done.exists():
+        return
+    shutil.rmtree(workspace, ignore_errors=True)
+    shutil.copytree(base, workspace, symlinks=True)
+    bring_each_kind(workspace)
+    for name, folder in args.lerobot:
+        lerobot.bring(workspace, name, folder, interpreter=args.python, data=args.data)
+    done.touch()
 
 
 if __name__ == "__main__":
