@@ -7,10 +7,11 @@ of each, what does not hold, and how far its chunks are from those of the bare n
 where a verdict differs from that of the ladder's own flow, or chunks by more than the tolerance.
 
 Policies of LeRobot, trained on the ladder's export, go with them where they are named; what is
-said of them decides no exit code. Whom a gate stops is in no evidence above it. So that these are
-seen there too, each gate's report is kept, and behind it the limits that they break are widened to
-what was measured: what stands in the table is the kept report's, and above a stop it is a look.
-A run that was killed goes on where it was; remove `--work` for a new one.
+said of them decides no exit code. Whom a gate stops is in no evidence above it, and a busy machine
+may stop anybody at Gate B. So that all are seen above it too, each gate's report is kept, and
+behind it the limits that they break are widened to what was measured: what stands in the table is
+the kept report's, and above a stop it is a look. A run that was killed goes on where it was;
+remove `--work` for a new one.
 
     python -m benchmarks.each_kind
     python -m benchmarks.each_kind --lerobot act=build/lerobot-act/checkpoints/last/pretrained_model
@@ -90,24 +91,28 @@ def bring_each_kind(workspace: Path) -> None:
         )
 
 
-def judge(workspace: Path, kept: Path, onlookers: Sequence[str]) -> None:
-    """Run gate after gate, keep each report, and let on whom it stops of the onlookers."""
+def judge(workspace: Path, kept: Path, names: Sequence[str]) -> None:
+    """Run gate after gate, keep each report, and let on whom it stops of those named."""
     for gate in GATES:
         file = kept / report_path(gate)
         if not file.exists():
             run(workspace, stage_of(gate))
             file.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(workspace / report_path(gate), file)
-        for name in onlookers if gate != GATES[-1] else ():
-            widen(workspace, gate, judged(kept, name))
+        if gate != GATES[-1]:
+            widen(workspace, gate, [judged(kept, name) for name in names])
     run(workspace)
 
 
-def widen(workspace: Path, gate: str, own: Judged) -> None:
-    """Move the limits of a gate that a candidate breaks to what was measured of it."""
-    for (where, name), answer in own.answers.items():
+def widen(workspace: Path, gate: str, broken_by: Sequence[Judged]) -> None:
+    """Move the limits of a gate that candidates break to the worst that was measured of them."""
+    limits: dict[str, float] = {}
+    for (where, name), answer in (pair for own in broken_by for pair in own.answers.items()):
         if where == gate and answer.verdict != "PASS" and answer.measured is not None:
-            set_limit(workspace, stage_of(gate), name, answer.measured)
+            worse = max if answer.comparison == "<=" else min
+            limits[name] = worse(limits.get(name, answer.measured), answer.measured)
+    for name, limit in limits.items():
+        set_limit(workspace, stage_of(gate), name, limit)
 
 
 def run(workspace: Path, *stages: str) -> None:
@@ -169,7 +174,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     workspace, kept = work / "brought", work / "kept"
     if not args.table:
         bring(until_pinned(work / "small"), workspace, args)
-        judge(workspace, kept, [name for name, _ in args.lerobot])
+        judge(workspace, kept, [TWIN, *(f"as_{kind}" for kind in KINDS), *dict(args.lerobot)])
     if not args.lerobot:
         print("No policy of LeRobot: none was named (--lerobot NAME=FOLDER, after `make lerobot`).")
     far = apart(workspace)

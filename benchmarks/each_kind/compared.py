@@ -9,7 +9,7 @@ import yaml
 from numpy.typing import NDArray
 
 from benchmarks.ladder_truth.bringing import FLOW
-from gates.report import Answer, GateReport, limit_text, measured_text, read_report
+from gates.report import Answer, GateReport, limit_text, measured_text, read_report, report_path
 from genpolicy.candidates.brought import read_brought
 from genpolicy.candidates.wire.policy import running
 from genpolicy.contract.chunk import actions_sha256
@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 GATES = "BCD"
 ABSENT = "not judged"
-"""Of a candidate that a gate below stopped."""
+"""Of a candidate that a gate below stopped, or of a gate that has not run."""
 
 
 @dataclass(frozen=True)
@@ -66,6 +66,9 @@ def judged(workspace: Path, name: str) -> Judged:
     verdicts: dict[str, str] = {}
     answers: dict[tuple[str, str], Answer] = {}
     for gate in GATES:
+        if not (workspace / report_path(gate)).exists():
+            verdicts[gate] = ABSENT
+            continue
         report: GateReport = read_report(workspace, gate)[0]
         verdicts[gate] = report.candidates.get(name, ABSENT)
         answers |= {(gate, a.id): a for a in report.criteria if a.candidate == name}

@@ -122,13 +122,16 @@ def test_a_verdict_of_a_gate_or_of_a_criterion_that_differs_is_named():
 
 def test_what_the_reports_say_of_one_candidate_is_read(monkeypatch, tmp_path):
     def report(workspace, gate):
-        said = {"own": "FAIL", "other": "PASS"} if gate != "D" else {"other": "PASS"}
+        said = {"own": "FAIL", "other": "PASS"} if gate == "B" else {"other": "PASS"}
         criteria = (answer(verdict="FAIL", measured=1.0), answer(candidate="other"))
         return SimpleNamespace(candidates=said, criteria=criteria if gate == "B" else ()), b""
 
     monkeypatch.setattr(compared, "read_report", report)
+    (tmp_path / "reports").mkdir()
+    for gate in "bc":  # Gate D has not run
+        (tmp_path / "reports" / f"gate_{gate}.json").touch()
     found = judged(tmp_path, "own")
-    assert found.verdicts == {"B": "FAIL", "C": "FAIL", "D": ABSENT}
+    assert found.verdicts == {"B": "FAIL", "C": ABSENT, "D": ABSENT}
     assert found.unmet == ["B nfe_mismatch FAIL (1, limit <= 0)"]
 
 
@@ -148,7 +151,7 @@ def test_the_same_weights_must_be_judged_the_same_and_draw_the_same():
         assert said.startswith(named)
 
 
-def test_limits_that_an_onlooker_breaks_are_moved_to_what_was_measured_and_no_others(tmp_path):
+def test_limits_that_somebody_breaks_are_moved_to_what_was_measured_and_no_others(tmp_path):
     limits = {
         "nfe_mismatch": [0.0, "r"],
         "conformance": [0.0, "r"],
@@ -160,11 +163,12 @@ def test_limits_that_an_onlooker_breaks_are_moved_to_what_was_measured_and_no_ot
         nfe_mismatch=answer(), conformance=answer("conformance", verdict="FAIL", measured=2.0),
         late_change_upper=answer("late_change_upper", verdict="INCONCLUSIVE", measured=None),
     )  # fmt: skip
-    command.widen(tmp_path, "C", own)
+    worse = of(conformance=answer("conformance", verdict="FAIL", measured=3.0))
+    command.widen(tmp_path, "C", [worse, own])
     assert yaml.safe_load((tmp_path / "params.yaml").read_text()) == params
-    command.widen(tmp_path, "B", own)
+    command.widen(tmp_path, "B", [worse, own])
     found = yaml.safe_load((tmp_path / "params.yaml").read_text())["gate_b"]["limits"]["model"]
-    assert found == {**limits, "conformance": [2.0, "r"]}
+    assert found == {**limits, "conformance": [3.0, "r"]}
 
 
 def test_each_gate_is_kept_as_it_judged_before_a_limit_moves(tmp_path, monkeypatch):
@@ -179,7 +183,7 @@ def test_each_gate_is_kept_as_it_judged_before_a_limit_moves(tmp_path, monkeypat
 
     monkeypatch.setattr(command, "run", run)
     monkeypatch.setattr(command, "judged", lambda kept, name: name)
-    monkeypatch.setattr(command, "widen", lambda workspace, gate, own: moved.append((gate, own)))
+    monkeypatch.setattr(command, "widen", lambda workspace, gate, own: moved.append((gate, *own)))
     command.judge(place, kept, ["lero"])
     assert ran == [("gate_b",), ("gate_c",), ("gate_d",), ()]
     assert moved == [("B", "lero"), ("C", "lero")]  # above Gate D nobody is kept out

@@ -12,7 +12,7 @@ from genpolicy.errors import ConfigError
 ROOT = Path(__file__).parents[3]
 ADAPTER = ROOT / "adapters" / "lerobot_server.py"
 HERE = (
-    "import sys; sys.path.insert(0, sys.argv.pop(1)); "
+    "import sys; sys.path[:0] = [sys.argv.pop(1)]; "
     "from genpolicy.cli.main import main; sys.exit(main())"
 )
 """Runs the code that asks: what is installed may be that of another checkout."""
