@@ -13,27 +13,24 @@ the chunks are. Who is compared must do the same work.
     python -m benchmarks.candidates
 """
 
-import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager, redirect_stdout
-from io import StringIO
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Literal
 
 import numpy as np
 import torch
 import yaml
 from numpy.typing import NDArray
 
+from benchmarks.kinds import of_each_kind
 from benchmarks.ladder_truth.bringing import ACTION
 from benchmarks.sampling import HORIZONS, SAMPLER, untrained
 from genpolicy.candidates.hosts.kinds import read_entry
 from genpolicy.candidates.hosts.translation import as_server
 from genpolicy.candidates.wire.launched import Launched
 from genpolicy.candidates.wire.remote import RemotePolicy
-from genpolicy.cli.programs import run_export_program
 from genpolicy.integrity.hashing import sha256_file
 from genpolicy.policies.policy import NetworkPolicy, load_policy
 from genpolicy.tasks.api import load_task
@@ -51,27 +48,10 @@ Way = Callable[[Array, int, int], Array]
 
 def entries(folder: Path, horizons: dict[str, object], channels: list[str]) -> Iterator[Path]:
     """An entry of each kind on the weights in `folder`."""
-    weights = {
-        f"{CHECKPOINT}/{name}": sha256_file(folder / CHECKPOINT / name)
-        for name in ("config.json", "model.safetensors")
-    }
-    serve = [
-        sys.executable,
-        "-P",
-        "-m",
-        "genpolicy",
-        "serve-policy",
-        CHECKPOINT,
-        "--port",
-        "{port}",
-    ]
     (folder / "script.py").write_text(SCRIPT)
     script = {"script.py": sha256_file(folder / "script.py")}
     kinds: dict[str, dict[str, object]] = {
-        "server": {"command": serve, "files": weights},
-        "trained": {"checkpoint": CHECKPOINT, "files": weights},
-        "torch": exported(folder, "torch", ".pt2"),
-        "onnx": exported(folder, "onnx", ".onnx"),
+        **of_each_kind(folder, CHECKPOINT),
         "scripted": {"function": "script:nothing", "stochastic": False, "files": script},
     }
     common = {
@@ -86,17 +66,6 @@ def entries(folder: Path, horizons: dict[str, object], channels: list[str]) -> I
         path = folder / f"{kind}.yaml"
         path.write_text(yaml.safe_dump({"name": kind, "kind": kind, **common, **fields}))
         yield path
-
-
-def exported(folder: Path, kind: Literal["torch", "onnx"], ending: str) -> dict[str, object]:
-    """What the command prints for an entry."""
-    with redirect_stdout(StringIO()) as said:
-        run_export_program(
-            folder / CHECKPOINT, folder / f"sampler{ending}", kind=kind,
-            encoder=folder / f"encoder{ending}", force=False,
-        )  # fmt: skip
-    fields: dict[str, object] = yaml.safe_load(said.getvalue())
-    return fields
 
 
 @contextmanager

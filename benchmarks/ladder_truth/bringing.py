@@ -60,42 +60,58 @@ class Brings:
 
     def __call__(self, workspace: Path) -> None:
         """Files, entry, and the lines of `params.yaml`."""
-        own = workspace / OWN
-        if not (own / TWIN).exists():
-            shutil.copytree(workspace / FLOW, own / TWIN)
-            shutil.copyfile(SERVER, own / SERVER.name)
-        entry = own / f"{self.name}.yaml"
-        entry.write_text(yaml.safe_dump(self._entry(workspace), sort_keys=False))
-
-        def change(params: dict[str, Any]) -> None:
-            params["candidates"][self.name] = f"{OWN}/{entry.name}"
-            params["gate_b"]["unmatched"][self.name] = {
-                "owner": "model", "reason": REASON, "expires": "2099-01-01",
-            }  # fmt: skip
-
-        edit_params(workspace, change)
-
-    def _entry(self, workspace: Path) -> dict[str, Any]:
-        identity = read_json(workspace / "artifacts/reload/identity.json")[TWIN]
-        card = identity["card"]
+        own = bring_weights(workspace)
+        shutil.copyfile(SERVER, own / SERVER.name)
         files = (f"{TWIN}/model.safetensors", f"{TWIN}/config.json", SERVER.name)
-        return {
-            "name": self.name,
+        entry = {
+            **as_the_twin(workspace, self.name),
             "kind": "server",
-            "author": "author@example.org",
             "command": [
                 sys.executable, SERVER.name, TWIN, self.wrong, "--port", "{port}",
                 "--name", self.name,
             ],
-            "files": {name: sha256_file(workspace / OWN / name) for name in files},
-            "horizons": yaml.safe_load((workspace / "params.yaml").read_text())["horizons"],
-            "observation": {
-                "observation": {"channels": CHANNELS, "history": 2, "dtype": "float64"}
-            },
-            "action": {**ACTION, **self.action},
-            "declared": {
-                **{name: card[name] for name in AS_TRAINED},
-                "training_seed": identity["seed"][0],
-                "evaluations": int(card["evaluations"]),
-            },
+            "files": {name: sha256_file(own / name) for name in files},
         }  # fmt: skip
+        entry["action"] |= self.action
+        enter(workspace, entry, REASON)
+
+
+def bring_weights(workspace: Path) -> Path:
+    """The twin's checkpoint as somebody else's: the folder in which it lies as `flow`."""
+    own = workspace / OWN
+    if not (own / TWIN).exists():
+        shutil.copytree(workspace / FLOW, own / TWIN)
+    return own
+
+
+def as_the_twin(workspace: Path, name: str) -> dict[str, Any]:
+    """What an entry says of the twin's weights, whatever hosts them."""
+    identity = read_json(workspace / "artifacts/reload/identity.json")[TWIN]
+    card = identity["card"]
+    return {
+        "name": name,
+        "author": "author@example.org",
+        "horizons": yaml.safe_load((workspace / "params.yaml").read_text())["horizons"],
+        "observation": {"observation": {"channels": CHANNELS, "history": 2, "dtype": "float64"}},
+        "action": dict(ACTION),
+        "declared": {
+            **{name: card[name] for name in AS_TRAINED},
+            "training_seed": identity["seed"][0],
+            "evaluations": int(card["evaluations"]),
+        },
+    }
+
+
+def enter(workspace: Path, entry: Mapping[str, Any], reason: str) -> None:
+    """Write an entry, and name it in `params.yaml` with the exception that Gate B wants."""
+    name = entry["name"]
+    path = workspace / OWN / f"{name}.yaml"
+    path.write_text(yaml.safe_dump(dict(entry), sort_keys=False))
+
+    def change(params: dict[str, Any]) -> None:
+        params["candidates"][name] = path.relative_to(workspace).as_posix()
+        params["gate_b"]["unmatched"][name] = {
+            "owner": "model", "reason": reason, "expires": "2099-01-01",
+        }  # fmt: skip
+
+    edit_params(workspace, change)

@@ -36,15 +36,11 @@ def methods(workspace: Path, table: str) -> set[str]:
 
 
 def test_ibc_plain_bc_and_a_policy_of_somebody_else_as_candidates(copy: Path) -> None:
-    entry = bring_flow(copy)
+    bring_flow(copy)
 
     def add(params: dict[str, Any]) -> None:
         params["train_generators"]["samplers"] = ADDED  # the others' way: the finished ladder
         params["stress"]["starts"] = 1
-        params["candidates"] = {NAME: entry.relative_to(copy).as_posix()}
-        params["gate_b"]["unmatched"] = {
-            NAME: {"owner": "model", "reason": "trained by its maker", "expires": "2030-01-31"}
-        }
 
     edit_params(copy, add)
     outcome, ran = repro(copy)

@@ -9,7 +9,13 @@ from genpolicy.candidates.wire.entry import PORT, Entry, ServerEntry
 from genpolicy.contract.observation import ObservationContract
 from genpolicy.errors import ConfigError
 
-ADAPTER = Path(__file__).parents[3] / "adapters" / "lerobot_server.py"
+ROOT = Path(__file__).parents[3]
+ADAPTER = ROOT / "adapters" / "lerobot_server.py"
+HERE = (
+    "import sys; sys.path[:0] = [sys.argv.pop(1)]; "
+    "from genpolicy.cli.main import main; sys.exit(main())"
+)
+"""Runs the code that asks: what is installed may be that of another checkout."""
 
 
 def as_server(entry: Entry, path: Path, contract: ObservationContract) -> ServerEntry:
@@ -39,7 +45,7 @@ def _own(entry: Entry, path: Path, contract: ObservationContract) -> list[str]:
         for name, part in entry.observation.items()
     }
     return [
-        sys.executable, "-P", "-m", "genpolicy", "serve-candidate", str(path.resolve()),
+        sys.executable, "-P", "-c", HERE, str(ROOT), "serve-candidate", str(path.resolve()),
         "--port", PORT, "--sha256", entry.sha256,
         *(word for name, width in widths.items() for word in ("--width", f"{name}={width}")),
     ]  # fmt: skip

@@ -1,3 +1,4 @@
+import subprocess
 import sys
 
 import pytest
@@ -18,13 +19,27 @@ def test_others_are_hosted_by_one_command_that_holds_the_entry_to_what_it_says(w
     path = written(kind)
     entry = read_entry(path)
     server = as_server(entry, path, task.observation)
-    assert server.command[:5] == [sys.executable, "-P", "-m", "genpolicy", "serve-candidate"]
+    assert server.command[:2] == [sys.executable, "-P"]
     assert server.command[5:] == [
-        str(path), "--port", "{port}", "--sha256", entry.sha256,
+        "serve-candidate", str(path), "--port", "{port}", "--sha256", entry.sha256,
         "--width", f"observation={task.observation.dim}",
     ]  # fmt: skip
     same = ("name", "author", "files", "horizons", "observation", "action", "timeout_s")
     assert all(getattr(server, name) == getattr(entry, name) for name in same)
+
+
+def test_the_host_runs_the_code_that_asks_and_no_other_that_is_installed(
+    written, task, tmp_path, monkeypatch
+):
+    """Wrong before: of two checkouts a candidate of the one was hosted by the code of the other."""
+    said = tmp_path / "checkout" / "genpolicy" / "cli" / "main.py"
+    said.parent.mkdir(parents=True)
+    said.write_text("import sys\ndef main():\n    print(__file__, sys.argv[1:])\n    return 7\n")
+    monkeypatch.setattr(translation, "ROOT", tmp_path / "checkout")
+    path = written("torch")
+    server = as_server(read_entry(path), path, task.observation)
+    done = subprocess.run(server.command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout.strip()) == (7, f"{said} {server.command[5:]}")
 
 
 def test_a_channel_that_is_none_is_refused_before_anything_starts(written, task):
