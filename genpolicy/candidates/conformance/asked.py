@@ -41,6 +41,13 @@ class Asked:
         """What the last fault was."""
         return next(reversed(self.failures.values()), ("", ""))[1]
 
+    def before(self, row: int) -> "Asked":
+        """What was answered, and what went wrong, at the moments before one."""
+        part = Asked()
+        part.answers = {at: one for at, one in self.answers.items() if at < row}
+        part.failures = {at: one for at, one in self.failures.items() if at < row}
+        return part
+
     def ask(self, policy: RemotePolicy, starts: RecordedStarts, row: int, candidates: int) -> None:
         """One moment; a fault is counted, and after many in a row nobody is asked any more."""
         if self._in_a_row >= GONE_AFTER:

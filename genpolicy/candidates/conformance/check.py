@@ -162,12 +162,13 @@ def check(
     repeats = next(one for one in of_answers if one.name == "repeats")
     complete = sorted(again.answers) == repeated(starts.apart)
     digest = _digest(again) if repeats.judged == "holds" and complete else None
+    of_each = first.before(starts.apart)
     findings = [
         *of_answers,
         found.unchanged(digest, earlier, complete=complete),
-        found.admissible(first, starts, admissible),
-        found.spans(told, first, wire),
-        found.in_time(first, deadline_s),
+        found.admissible(of_each, starts, admissible),
+        found.spans(told, of_each, wire),
+        found.in_time(of_each, deadline_s),
     ]
     return Conformance(policy.entry.name, asked, told.checkpoint, digest, tuple(findings))
 

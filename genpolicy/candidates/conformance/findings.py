@@ -116,23 +116,19 @@ def _range(counts: set[int]) -> str:
 
 
 def admissible(asked: Asked, starts: RecordedStarts, passes: Admissible | None) -> Finding:
-    """At how many moments a candidate passes all layers from rest; recorded chunks beside it.
-
-    One moment of each episode counts: those of one are no independent trials.
-    """
+    """At how many moments a candidate passes all layers from rest; recorded chunks beside it."""
     if passes is None:
         said = "no registered task has these observations"
         return Finding("admissible", "unknown", "C", said)
     reasons: Counter[str] = Counter()
     some, recorded = 0, 0
-    answered = [one for one in sorted(asked.answers.items()) if one[0] < starts.apart]
-    for row, answer in answered:
+    for row, answer in sorted(asked.answers.items()):
         seen = starts.observations[row, -1]
         verdicts = [passes(chunk, seen) for chunk in answer.actions]
         some += any(passed for passed, _ in verdicts)
         reasons.update(reason for passed, reason in verdicts if not passed)
         recorded += passes(starts.chunks[row], seen)[0]
-    moments = len(answered)
+    moments = len(asked.answers)
     low, high = clopper_pearson(some, moments)
     judged: Judged = "holds" if low > ONE_IN_TWO else "fails" if high < ONE_IN_TWO else "unknown"
     why = "".join(f"; {reason} {number}" for reason, number in reasons.most_common(3))
