@@ -90,7 +90,7 @@ def _hold_moments(
         if not 0 <= row.moment < len(starts) or starts.episodes[row.moment] != row.episode_uuid:
             refuse("B", f"{ANSWERS}: {name}/{row.moment}", row.episode_uuid, "a moment of its own")
     came = {row.moment for row in rows if row.session == FIRST and not row.fault}
-    again = [moment for moment in repeated(len(starts)) if moment in came]
+    again = [moment for moment in repeated(starts.apart) if moment in came]
     for session, expected in (
         (FIRST, list(range(len(starts)))),
         (AGAIN, again),
@@ -116,9 +116,10 @@ def _hold_findings(
     """
     place = f"{DOCUMENT}: {name}"
     asked = question(starts, dataset="", candidates=candidates)
-    if (stated.moments, stated.candidates) != (len(starts), candidates):
-        refuse("B", place, f"{stated.candidates} chunks at {stated.moments} moments",
-               f"{candidates} at {len(starts)}, as the dataset has")  # fmt: skip
+    asked_of = (stated.candidates, stated.moments, stated.episodes)
+    if asked_of != (candidates, len(starts), starts.apart):
+        refuse("B", place, "{} chunks at {} moments of {} episodes".format(*asked_of),
+               f"{candidates} at {len(starts)} of {starts.apart}, as the dataset has")  # fmt: skip
     if stated.observations_sha256 != asked.observations_sha256:
         refuse("B", place, "asked about other moments", "those that the root seed draws")
     with readable(ANSWERS):

@@ -18,6 +18,8 @@ OWN = "own"
 FLOW = "artifacts/train_generators/flow/seed_0"
 TWIN = "flow"
 """Whose weights are served: what a ladder says of it, it says of an honest copy."""
+TOGETHER = "brought_policies"
+"""All that are brought run in one copy, wrong or honest: what stops one of them stops no other."""
 CHANNELS = [
     "tcp_position_m", "tcp_rotation", "gripper_opening_m", "wrench_n", "hole_pose",
     "post_position_m", "phase",

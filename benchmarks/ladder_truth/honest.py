@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from benchmarks.ladder_truth.bringing import AS_QUATERNION, IN_MM, Brings
+from benchmarks.ladder_truth.bringing import AS_QUATERNION, IN_MM, TOGETHER, Brings
 from benchmarks.ladder_truth.planting import Plant, all_of, recordings, with_metadata
 from benchmarks.ladder_truth.workspace import BROUGHT, edit_params, set_limit
 
@@ -68,7 +68,7 @@ def _comment(file: str) -> Plant:
 
 def _brought(name: str, what: str, served: str, action: Mapping[str, Any] | None = None) -> Variant:
     return Variant(name, what, "small", Brings(name, served, action or {}),
-                   together="brought_honestly", candidate=name)  # fmt: skip
+                   together=TOGETHER, candidate=name)  # fmt: skip
 
 
 def _note(workspace: Path) -> None:

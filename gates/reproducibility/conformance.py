@@ -40,7 +40,7 @@ def conformance(evidence: Evidence, settings: ReproducibilitySettings, candidate
         parts.append(f"unknown: {', '.join(one.name for one in unknown)}")
     held = [one.name for one in found.findings if one.judged == "holds"]
     parts.append(f"holds: {', '.join(held) or 'nothing'}")
-    counted = f"{found.moments} recorded moments"
+    counted = f"{found.episodes} held-out episodes, {found.moments} recorded moments"
     return Measured(float(len(failed)), caveat="; ".join(parts), counted=counted)
 
 

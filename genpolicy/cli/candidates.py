@@ -136,7 +136,7 @@ def _text(found: Conformance) -> str:
     width = max(len(finding.name) for finding in found.findings)
     lines = [
         f"{found.candidate}: {found.asked.candidates} chunks at each of {found.asked.moments} "
-        "recorded moments, each of another episode.",
+        f"recorded moments of {found.asked.episodes} episodes.",
         f"Serves {found.checkpoint or 'an unknown checkpoint'}; its answers are "
         f"{found.answers_sha256 or 'not the same twice'}.",
         "",

@@ -45,8 +45,8 @@ def root(tmp_path_factory, _ladder):
     path = copied / "artifacts/candidates/candidates.json"
     path.write_bytes(canonical_json({"flow": somebody}))
     found = {
-        "moments": 35, "candidates": 4, "observations_sha256": "d" * 64, "seeded": True,
-        "counts_evaluations": True,
+        "episodes": 35, "moments": 175, "candidates": 4, "observations_sha256": "d" * 64,
+        "seeded": True, "counts_evaluations": True,
         "findings": [{"name": "answers", "judged": "holds", "gate": "B", "said": "35 of 35"}],
     }  # fmt: skip
     (copied / "artifacts/reload/conformance.json").write_bytes(canonical_json({"flow": found}))

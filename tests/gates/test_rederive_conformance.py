@@ -183,6 +183,13 @@ def test_another_number_of_chunks_is_refused(workspace):
     refused(workspace, "1 chunks at")
 
 
+def test_another_number_of_episodes_is_refused(workspace):
+    found = CONFORMANCE.read(workspace / "artifacts/reload")["planted"]
+    changed = replace(found, episodes=found.moments)
+    CONFORMANCE.write(workspace / "artifacts/reload", {"planted": changed})
+    refused(workspace, "of 15 episodes")
+
+
 def test_what_its_server_can_is_held_against_it(workspace):
     found = CONFORMANCE.read(workspace / "artifacts/reload")["planted"]
     CONFORMANCE.write(

@@ -131,7 +131,7 @@ def test_every_stage_counts_for_the_gate_that_judges_it() -> None:
 def test_what_is_planted_together_runs_once_and_each_is_a_candidate_of_its_own() -> None:
     together = [item for item in (*WRONGS, *HONEST) if item.together]
     lots = in_lots([*WRONGS, *HONEST])
-    assert len(lots) == len(WRONGS) + len(HONEST) - len(together) + 2
+    assert len(lots) == len(WRONGS) + len(HONEST) - len(together) + 1
     for lot in (lot for lot in lots if lot[0].together):
         assert len({item.candidate for item in lot}) == len(lot)
         for item in lot:

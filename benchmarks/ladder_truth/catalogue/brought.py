@@ -4,12 +4,11 @@ All are brought to one workspace, where each is one candidate more: what stops o
 other, and who fails a gate stands in no evidence above it.
 """
 
-from benchmarks.ladder_truth.bringing import Brings
+from benchmarks.ladder_truth.bringing import TOGETHER, Brings
 from benchmarks.ladder_truth.outcome import Expected
 from benchmarks.ladder_truth.planting import Wrong
 
 AREA = "brought policies"
-TOGETHER = "brought_policies"
 B, C, D = "B", "C", "D"
 
 

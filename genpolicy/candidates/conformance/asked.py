@@ -41,6 +41,13 @@ class Asked:
         """What the last fault was."""
         return next(reversed(self.failures.values()), ("", ""))[1]
 
+    def before(self, row: int) -> "Asked":
+        """What was answered, and what went wrong, at the moments before one."""
+        part = Asked()
+        part.answers = {at: one for at, one in self.answers.items() if at < row}
+        part.failures = {at: one for at, one in self.failures.items() if at < row}
+        return part
+
     def ask(self, policy: RemotePolicy, starts: RecordedStarts, row: int, candidates: int) -> None:
         """One moment; a fault is counted, and after many in a row nobody is asked any more."""
         if self._in_a_row >= GONE_AFTER:
@@ -59,7 +66,7 @@ class Asked:
 
 
 def asked_first(policy: RemotePolicy, starts: RecordedStarts, candidates: int) -> Asked:
-    """Every moment, in their order."""
+    """Every moment, in their order: one of each episode first."""
     asked = Asked()
     for row in range(len(starts)):
         asked.ask(policy, starts, row, candidates)
@@ -69,21 +76,21 @@ def asked_first(policy: RemotePolicy, starts: RecordedStarts, candidates: int) -
 def asked_again(
     policy: RemotePolicy, starts: RecordedStarts, first: Asked, candidates: int
 ) -> Asked:
-    """Some of the moments a second time, last one first, on a line of its own.
+    """Some of the first moment of each episode a second time, last one first, on another line.
 
     Which ones does not depend on the answers; who gave none at first has none to repeat.
     """
     policy.close()
     asked = Asked()
-    for row in reversed(repeated(len(starts))):
+    for row in reversed(repeated(starts.apart)):
         if row in first.answers:
             asked.ask(policy, starts, row, candidates)
     return asked
 
 
-def repeated(moments: int) -> list[int]:
-    """The moments that are asked again."""
-    return list(range(moments))[:: max(1, moments // AGAIN)]
+def repeated(apart: int) -> list[int]:
+    """The moments that are asked again, of so many that are each of another episode."""
+    return list(range(apart))[:: max(1, apart // AGAIN)]
 
 
 def round_trips(policy: RemotePolicy) -> list[float]:

@@ -35,12 +35,14 @@ class Question:
 
     Attributes:
         dataset: SHA-256 of the manifest of the dataset.
-        moments: Recorded moments, each of another episode.
+        episodes: Of which each gives one moment first, and further ones behind those.
+        moments: Recorded moments.
         candidates: Chunks asked for at each.
         observations_sha256: Of the observations at the moments that are asked twice.
     """
 
     dataset: str
+    episodes: int
     moments: int
     candidates: int
     observations_sha256: str
@@ -48,8 +50,9 @@ class Question:
 
 def question(starts: RecordedStarts, *, dataset: str, candidates: int) -> Question:
     """What is asked of whoever is checked at these moments."""
-    again = np.ascontiguousarray(starts.observations[repeated(len(starts))])
-    return Question(dataset, len(starts), candidates, sha256_bytes(again.tobytes()))
+    again = np.ascontiguousarray(starts.observations[repeated(starts.apart)])
+    digest = sha256_bytes(again.tobytes())
+    return Question(dataset, starts.apart, len(starts), candidates, digest)
 
 
 @dataclass(frozen=True)
@@ -157,14 +160,15 @@ def check(
     answered = Answered(first, again, after, restart_fault)
     of_answers = findings_of(starts, answered, told)
     repeats = next(one for one in of_answers if one.name == "repeats")
-    complete = sorted(again.answers) == repeated(len(starts))
+    complete = sorted(again.answers) == repeated(starts.apart)
     digest = _digest(again) if repeats.judged == "holds" and complete else None
+    of_each = first.before(starts.apart)
     findings = [
         *of_answers,
         found.unchanged(digest, earlier, complete=complete),
-        found.admissible(first, starts, admissible),
-        found.spans(told, first, wire),
-        found.in_time(first, deadline_s),
+        found.admissible(of_each, starts, admissible),
+        found.spans(told, of_each, wire),
+        found.in_time(of_each, deadline_s),
     ]
     return Conformance(policy.entry.name, asked, told.checkpoint, digest, tuple(findings))
 

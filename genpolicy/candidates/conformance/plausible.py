@@ -90,10 +90,13 @@ def slopes(chunks: Array, recorded: Array, *, rng: np.random.Generator) -> list[
     """
     columns = [*range(POSITION.stop), GRIPPER]
     theirs, ours = chunks[..., columns].mean(axis=1), recorded[..., columns].mean(axis=1)
-    return _compared((*AXES, "gripper"), theirs, ours, STANDS_M, rng)
+    rows = rng.integers(len(ours), size=(DRAWS, len(ours)))
+    return _compared((*AXES, "gripper"), theirs, ours, STANDS_M, rows)
 
 
-def start_slopes(candidates: Array, measured: Array, *, rng: np.random.Generator) -> list[Slope]:
+def start_slopes(
+    candidates: Array, measured: Array, episodes: NDArray[np.str_], *, rng: np.random.Generator
+) -> list[Slope]:
     """Slope of where the robot is on where chunks begin, axis by axis.
 
     An arm begins where it stands, whichever way it takes: of two mirrored ways the recorded one may
@@ -102,14 +105,32 @@ def start_slopes(candidates: Array, measured: Array, *, rng: np.random.Generator
     Args:
         candidates: Shape (M, N, K, 10). The median over N is taken.
         measured: Where the robot was; NaN where the observation does not say. Shape (M, 10).
-        rng: For the bootstrap over moments.
+        episodes: Of each moment, all with as many. Shape (M,).
+        rng: For the bootstrap over episodes.
     """
     begun, stood = np.median(candidates[:, :, 0, POSITION], axis=1), measured[:, POSITION]
     if not np.isfinite(stood).all():
         return []
     names = tuple(f"{axis} at the start" for axis in AXES)
     # One that commands a goal far ahead from its first action on stands, and is not another unit.
-    return [replace(one, stands=False) for one in _compared(names, begun, stood, STANDS_M, rng)]
+    compared = _compared(names, begun, stood, STANDS_M, of_episodes(episodes, rng))
+    return [replace(one, stands=False) for one in compared]
+
+
+def of_episodes(episodes: NDArray[np.str_], rng: np.random.Generator) -> NDArray[np.int64]:
+    """Draws of as many episodes as there are, each with all its moments. Shape (DRAWS, M).
+
+    What a candidate answers at moments of one episode is alike, as what was observed there is: the
+    episode is the unit, and more moments of it are a better look at one unit.
+
+    Args:
+        episodes: Of each moment, all with as many. Shape (M,).
+        rng: Draws.
+    """
+    _, begins, of = np.unique(episodes, return_index=True, return_inverse=True)
+    members = np.argsort(begins[of], kind="stable").reshape(len(begins), -1)
+    drawn: NDArray[np.int64] = members[rng.integers(len(members), size=(DRAWS, len(members)))]
+    return drawn.reshape(DRAWS, -1)
 
 
 def turn_slopes(chunks: Array, recorded: Array, *, rng: np.random.Generator) -> list[Slope]:
@@ -127,14 +148,15 @@ def turn_slopes(chunks: Array, recorded: Array, *, rng: np.random.Generator) -> 
     theirs, ours = (Turn.from_matrix(of[whole]) for of in first)
     back = ours.mean().inv()
     names = tuple(f"turn about {axis}" for axis in AXES)
-    return _compared(names, (back * theirs).as_rotvec(), (back * ours).as_rotvec(), STANDS_RAD, rng)
+    turns = (back * theirs).as_rotvec(), (back * ours).as_rotvec()
+    rows = rng.integers(len(turns[0]), size=(DRAWS, len(turns[0])))
+    return _compared(names, *turns, STANDS_RAD, rows)
 
 
 def _compared(
-    names: tuple[str, ...], theirs: Array, ours: Array, stands: float, rng: np.random.Generator
+    names: tuple[str, ...], theirs: Array, ours: Array, stands: float, rows: NDArray[np.int64]
 ) -> list[Slope]:
-    """Of numbers (M, C), those of which the recordings move at the worse end."""
-    rows = rng.integers(len(ours), size=(DRAWS, len(ours)))
+    """Of numbers (M, C), those of which the recordings move at the worse end of draws of rows."""
     found = []
     for column, name in enumerate(names):
         drawn = _moments(theirs[rows, column], ours[rows, column])

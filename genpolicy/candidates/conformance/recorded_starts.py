@@ -1,4 +1,4 @@
-"""Recorded moments that a candidate is asked about, one an episode, from start to end."""
+"""Recorded moments that a candidate is asked about: one of each episode, then more of them."""
 
 from dataclasses import dataclass
 
@@ -23,6 +23,11 @@ MEASURED = {
 """Channels of the robot's own state, as tasks and importers name them, by columns of an action."""
 MOST_STARTS = 80
 """The 95th percentile of a time has an upper end from 72 independent ones on."""
+MOST_MOMENTS = 240
+"""Whoever answers within a deadline of 0.15 s has answered them in 36 s."""
+OF_AN_EPISODE = 5
+"""Moments of an episode, at most. Where several ways are open a mirrored chunk is another way;
+behind a fork it is none, and of five, a fifth of the episode apart, one or two lie there."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +37,8 @@ class RecordedStarts:
     Attributes:
         observations: Physical units, newest last. Shape (M, H_o, D_o).
         chunks: Recorded actions from the newest observation on. Shape (M, K, 10).
-        episodes: Identifier of each one's episode. Shape (M,).
+        episodes: Identifier of each one's episode: one of each first, then further ones, of all
+            episodes in turn. Shape (M,).
         measured: Where the TCP and the gripper were at the newest observation, in the columns of
             an action; NaN where the observation does not say. Shape (M, 10).
     """
@@ -44,6 +50,11 @@ class RecordedStarts:
 
     def __len__(self) -> int:
         return len(self.episodes)
+
+    @property
+    def apart(self) -> int:
+        """How many of the first moments are each of another episode: independent of each other."""
+        return len(np.unique(self.episodes))
 
 
 def measured(observations: Array, contract: ObservationContract) -> Array:
@@ -83,10 +94,12 @@ def require_contract(data: Dataset, horizons: HorizonConfig, *, candidate: str) 
 def recorded_starts(
     data: Dataset, horizons: HorizonConfig, *, seed: int, most: int = MOST_STARTS
 ) -> RecordedStarts:
-    """One start of each held-out episode, evenly spread from the first row to the last whole chunk.
+    """A moment of each held-out episode, evenly spread from the first row to the last whole chunk.
 
     Each episode draws its place from a stream of its own name, so that the same moments are asked
-    about in whatever order episodes lie, and nobody knows them who does not know the seed.
+    about in whatever order episodes lie, and nobody knows them who does not know the seed. Further
+    moments of the same episodes follow, each a J-th of the episode behind the one before it, from
+    its end on to its start: J is `OF_AN_EPISODE`, or what `MOST_MOMENTS` leaves.
 
     Args:
         data: A verified dataset.
@@ -120,14 +133,17 @@ def recorded_starts(
     chosen = sorted(range(len(episodes)), key=lambda one: (drawn[str(episodes[one])], one))[:number]
     shares = np.modf(np.arange(number) * GOLDEN)[0]
     # Neighbours in the list lie apart in their episodes, so that every phase is asked about.
-    at = [int(share * len(chunks[episode])) for share, episode in zip(shares, chosen, strict=True)]
-    seen = np.stack([
-        observations[episode][row] for row, episode in zip(at, chosen, strict=True)
-    ])  # fmt: skip
+    parts = min(OF_AN_EPISODE, MOST_MOMENTS // number)
+    at = [
+        (episode, int((share + part / parts) % 1.0 * len(chunks[episode])))
+        for part in range(parts)
+        for share, episode in zip(shares, chosen, strict=True)
+    ]
+    seen = np.stack([observations[episode][row] for episode, row in at])
     return RecordedStarts(
         seen,
-        np.stack([chunks[episode][row] for row, episode in zip(at, chosen, strict=True)]),
-        np.array([episodes[episode] for episode in chosen]),
+        np.stack([chunks[episode][row] for episode, row in at]),
+        np.array([episodes[episode] for episode, _ in at]),
         measured(seen, data.observation_contract),
     )
 

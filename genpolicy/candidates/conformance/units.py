@@ -1,6 +1,7 @@
 """Findings about a candidate's numbers: do they speak of the moment, in the declared units?"""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,8 +33,13 @@ KNOWS_THE_MOMENT = 0.001
 
 
 def plausible(asked: Asked, starts: RecordedStarts) -> list[Finding]:
-    """Whether its chunks speak of the moment, in the units that were declared."""
-    rows = [row for row, one in sorted(asked.answers.items()) if np.isfinite(one.actions).all()]
+    """Whether its chunks speak of the moment, in the units that were declared.
+
+    Of each episode its first moment is asked for everything, since those of one episode are not
+    independent; only `along` asks for all of them.
+    """
+    finite = [row for row, one in sorted(asked.answers.items()) if np.isfinite(one.actions).all()]
+    rows = [row for row in finite if row < starts.apart]
     if len(rows) < FEWEST:
         said = f"{len(rows)} finite answers, {FEWEST} are needed"
         return [Finding(name, "unknown", "B", said) for name in PLAUSIBLE]
@@ -43,8 +49,10 @@ def plausible(asked: Asked, starts: RecordedStarts) -> list[Finding]:
     share = shuffled_share(drawn, recorded, rng=stream(0, "conformance", "shuffle"))
     follows = share <= KNOWS_THE_MOMENT
     copies = copied(drawn, recorded)
-    begun = beginnings(drawn, recorded, measured)
-    scaled = scale(chunks, recorded, follows=follows, begun=begun)
+    begun = beginnings(drawn, recorded, measured, starts.episodes[rows])
+    scaled = scale(
+        chunks, recorded, follows=follows, begun=begun, along=along(asked, starts, finite)
+    )
     return [
         Finding(
             PLAUSIBLE[0], "holds" if follows else "fails", "B",
@@ -61,17 +69,45 @@ def plausible(asked: Asked, starts: RecordedStarts) -> list[Finding]:
     ]  # fmt: skip
 
 
-def beginnings(drawn: Array, recorded: Array, measured: Array) -> list[Slope]:
+def along(asked: Asked, starts: RecordedStarts, finite: Sequence[int]) -> list[Slope]:
+    """`beginnings` at all moments of each episode of which every one was answered, if it has more.
+
+    Where a way forks, recordings go to either side, and so does a mirrored policy. Behind the fork
+    the hand stands on one side, and chunks of a mirrored policy begin on the other. How long
+    that lasts is a part of an episode: one moment of each rarely lies there.
+    """
+    if len(starts) == starts.apart:
+        return []
+    missing = set(range(len(starts))) - set(finite)
+    partly = {starts.episodes[row] for row in missing}
+    rows = [row for row in finite if starts.episodes[row] not in partly]
+    if len(np.unique(starts.episodes[rows])) < FEWEST:
+        return []
+    drawn = np.stack([asked.answers[row].actions for row in rows])
+    found = beginnings(drawn, starts.chunks[rows], starts.measured[rows], starts.episodes[rows])
+    return [replace(one, name=f"{one.name} of all moments") for one in found]
+
+
+def beginnings(
+    drawn: Array, recorded: Array, measured: Array, episodes: NDArray[np.str_]
+) -> list[Slope]:
     """How places that chunks begin at follow the robot, on axes on which recordings follow it."""
     ours, theirs = (
-        start_slopes(of, measured, rng=stream(0, "conformance", "starts"))
+        start_slopes(of, measured, episodes, rng=stream(0, "conformance", "starts"))
         for of in (recorded[:, None], drawn)
     )
     follow = {one.name for one in ours if _right(one)}
     return [one for one in theirs if one.name in follow]
 
 
-def scale(chunks: Array, recorded: Array, *, follows: bool, begun: Sequence[Slope] = ()) -> Finding:
+def scale(
+    chunks: Array,
+    recorded: Array,
+    *,
+    follows: bool,
+    begun: Sequence[Slope] = (),
+    along: Sequence[Slope] = (),
+) -> Finding:
     """Whether places and the opening move as recorded ones do. Chunks: (M, K, 10).
 
     Args:
@@ -79,13 +115,17 @@ def scale(chunks: Array, recorded: Array, *, follows: bool, begun: Sequence[Slop
         recorded: What was done there.
         follows: Whether chunks speak of the moment.
         begun: See `beginnings`.
+        along: See `along`. Of these the sign alone is asked for: a weak policy that shrinks places
+            towards their mean is no other unit, and would look like one in so many moments.
     """
     moved = slopes(chunks, recorded, rng=stream(0, "conformance", "slopes"))
     found = [*moved, *begun]
     if not found:
         return Finding("scale", "unknown", "B", "nothing moves in the recordings")
-    said = f"recorded per declared unit, 1 is right: {_listed(found)}"
-    if wrong := [one.name for one in found if _wrong(one)]:
+    said = f"recorded per declared unit, 1 is right: {_listed([*found, *along])}"
+    wrong = [one.name for one in found if _wrong(one)]
+    wrong += [one.name for one in along if one.high < 0.0]
+    if wrong:
         return Finding("scale", "fails", "B", f"{said}; wrong: {', '.join(wrong)}")
     # Of many chunks that know nothing the nearest lie on the line too.
     # Where chunks begin accuses only: a rough policy hardly knows where it stands.
@@ -102,7 +142,7 @@ def _right(one: Slope) -> bool:
     return one.low >= 1.0 / SAME_SCALE and one.high <= SAME_SCALE
 
 
-def _listed(found: list[Slope]) -> str:
+def _listed(found: Sequence[Slope]) -> str:
     return ", ".join(
         f"{one.name} {one.slope:.3g} ({one.low:.3g} to {one.high:.3g})" for one in found
     )

@@ -11,7 +11,8 @@ class Conformance:
     """What was asked of one candidate, and what was found.
 
     Attributes:
-        moments: Recorded moments, each of another held-out episode.
+        episodes: Held-out episodes that the moments are of, each with as many.
+        moments: Recorded moments.
         candidates: Chunks asked for at each.
         observations_sha256: Of what it was shown at the moments that it was asked twice.
         seeded: Whether its server says that equal names of noise give equal chunks.
@@ -19,6 +20,7 @@ class Conformance:
         findings: What follows from its answers.
     """
 
+    episodes: Count
     moments: Count
     candidates: Count
     observations_sha256: str

@@ -46,7 +46,7 @@ def second_session(policy: WirePolicy, starts: RecordedStarts, before: FirstStar
     """Ask the same ones again, after a new start."""
     number, remote = drawn(stochastic=policy.stochastic), policy.remote
     if isinstance(remote, PolicyError):
-        rows = [row for row in repeated(len(starts)) if row in before.first.answers]
+        rows = [row for row in repeated(starts.apart) if row in before.first.answers]
         return _unanswered(remote, rows)
     return asked_again(remote, starts, before.first, number)
 
@@ -82,6 +82,7 @@ def conformance_of(
     """
     asked = question(starts, dataset="", candidates=candidates)
     return Conformance(
+        episodes=starts.apart,
         moments=len(starts),
         candidates=candidates,
         observations_sha256=asked.observations_sha256,

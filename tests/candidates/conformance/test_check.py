@@ -549,3 +549,26 @@ def test_without_a_task_nothing_is_said_about_layers(serving, entry, starts, tas
         )  # fmt: skip
         policy.close()
     assert judged(found)["admissible"] == "unknown"
+
+
+def test_times_and_layers_are_of_one_moment_of_each_episode(checked, starts):
+    """Those of one episode are no independent trials."""
+    moments = replace(
+        starts,
+        observations=np.concatenate([starts.observations, starts.observations + 1e-6]),
+        chunks=np.tile(starts.chunks, (2, 1, 1)),
+        episodes=np.tile(starts.episodes, 2),
+        measured=np.tile(starts.measured, (2, 1)),
+    )
+
+    class SlowerLater(Honest):
+        @property
+        def takes_s(self):
+            return 0.003 if self.asked <= len(starts) else 6.0
+
+    tried = []
+    found = checked(SlowerLater(moments), moments=moments, passes=lambda _: not tried.append(0))
+    assert found.failed == []
+    assert (found.asked.episodes, found.asked.moments) == (40, 80)
+    assert len(tried) == 40 * 5  # four candidates and the recorded chunk
+    assert "80 of 80 moments answered" in said_of(found, "answers")

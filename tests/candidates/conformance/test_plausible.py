@@ -3,8 +3,10 @@ import pytest
 from scipy.spatial.transform import Rotation as Turn
 
 from genpolicy.candidates.conformance.plausible import (
+    DRAWS,
     copied,
     nearest,
+    of_episodes,
     shuffled_share,
     slopes,
     turn_slopes,
@@ -203,3 +205,18 @@ def test_the_factor_lies_between_both_slopes(rng):
     [found] = slopes(chunks, recorded, rng=rng)
     assert found.slope == pytest.approx(0.2, abs=0.03)
     assert found.low < 0.2 < 1.0 < found.high
+
+
+def test_episodes_are_drawn_with_all_their_moments(rng):
+    episodes = np.array(["b", "a", "c", "b", "a", "c"])
+    rows = of_episodes(episodes, rng)
+    assert rows.shape == (DRAWS, 6)
+    drawn = rows.reshape(DRAWS, 3, 2)
+    assert {tuple(pair) for pair in drawn.reshape(-1, 2).tolist()} == {(0, 3), (1, 4), (2, 5)}
+    assert len(np.unique(rows, axis=0)) > 20
+
+
+def test_moments_each_of_another_episode_are_drawn_as_they_are():
+    rows = of_episodes(np.array(["d", "a", "c", "b"]), np.random.default_rng(1))
+    expected = np.random.default_rng(1).integers(4, size=(DRAWS, 4))
+    np.testing.assert_array_equal(rows, expected)

@@ -12,14 +12,44 @@ from genpolicy.contract.observation import ObservationContract
 from genpolicy.errors import ContractError
 
 
-def test_one_moment_of_each_held_out_episode(data, kit):
+def test_one_moment_of_each_held_out_episode_and_then_four_more_of_each(data, kit):
     starts = recorded_starts(data, kit.HORIZONS, seed=0)
     split = dict(zip(data.episodes["episode_uuid"], data.episodes["split"], strict=True))
-    assert len(set(starts.episodes)) == len(starts)
-    assert {split[uuid] for uuid in starts.episodes} == {"validation", "test"}
-    assert sorted(starts.episodes) == sorted(
-        uuid for uuid, name in split.items() if name != "train"
-    )
+    held_out = sorted(uuid for uuid, name in split.items() if name != "train")
+    assert {split[uuid] for uuid in held_out} == {"validation", "test"}
+    assert sorted(starts.episodes[: starts.apart]) == held_out
+    assert len(starts) == 5 * starts.apart
+    for part in range(5):
+        np.testing.assert_array_equal(
+            starts.episodes[part * starts.apart : (part + 1) * starts.apart],
+            starts.episodes[: starts.apart],
+        )
+
+
+def test_moments_of_an_episode_lie_a_fifth_of_it_apart(data, kit):
+    starts = recorded_starts(data, kit.HORIZONS, seed=0)
+    uuids = data.episodes["episode_uuid"].to_numpy()
+    lengths = dict(zip(uuids, data.episodes["rows"], strict=True))
+    for uuid in set(starts.episodes):
+        own = np.flatnonzero(starts.episodes == uuid)
+        frames = data.frames.rows(np.flatnonzero(uuids[data.frames.episode] == uuid))
+        at = [
+            int(np.flatnonzero((frames.observation == starts.observations[row, -1]).all(axis=1))[0])
+            for row in own
+        ]
+        whole = lengths[uuid] - 15
+        apart = np.diff(np.sort(at))
+        assert np.abs(apart - whole / 5).max() <= 1.0
+
+
+def test_of_many_episodes_fewer_moments_are_asked(data, kit, monkeypatch):
+    monkeypatch.setattr("genpolicy.candidates.conformance.recorded_starts.MOST_MOMENTS", 7)
+    starts = recorded_starts(data, kit.HORIZONS, seed=0)
+    assert (starts.apart, len(starts)) == (3, 6)
+    whole = 5 * 3
+    monkeypatch.setattr("genpolicy.candidates.conformance.recorded_starts.MOST_MOMENTS", whole)
+    more = recorded_starts(data, kit.HORIZONS, seed=0)
+    np.testing.assert_array_equal(more.observations[:3], starts.observations[:3])
 
 
 def test_a_moment_is_what_was_seen_and_what_was_done_next(data, kit):
@@ -55,10 +85,10 @@ def test_fewer_are_spread_over_all_and_moments_over_the_episodes(data, kit):
         data, episodes=data.episodes.assign(split=["train"] + ["test"] * 8 + ["validation"])
     )
     starts = recorded_starts(everything, kit.HORIZONS, seed=0, most=4)
-    assert len(starts) == 4
+    assert starts.apart == 4
     rows = [
         int(np.flatnonzero((data.frames.observation == seen[-1]).all(axis=1))[0])
-        for seen in starts.observations
+        for seen in starts.observations[:4]
     ]
     shares = [data.frames.index[row] for row in rows]
     assert max(shares) - min(shares) > 20

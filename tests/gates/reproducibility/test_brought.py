@@ -17,7 +17,7 @@ FINDINGS = [
     {"name": name, "judged": "holds", "gate": "B", "said": "as it should"} for name in OF_ANSWERS
 ]
 ANSWERED = {
-    "moments": 40, "candidates": 4, "observations_sha256": "f" * 64, "seeded": True,
+    "episodes": 40, "moments": 40, "candidates": 4, "observations_sha256": "f" * 64, "seeded": True,
     "counts_evaluations": True, "findings": FINDINGS,
 }  # fmt: skip
 EXCEPTION = {"owner": "model", "reason": "trained by its maker", "expires": "2027-01-31"}

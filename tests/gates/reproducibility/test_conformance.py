@@ -27,7 +27,7 @@ def test_it_is_asked_of_who_was_brought_and_of_nobody_else(ladder):
     assert [(item.candidate, item.verdict, item.measured) for item in answers] == [
         ("flow", "PASS", 0.0)
     ]
-    assert answers[0].counted == "40 recorded moments"
+    assert answers[0].counted == "40 held-out episodes, 40 recorded moments"
     assert answers[0].evidence == ("artifacts/reload/conformance.json",)
 
 
