@@ -7,15 +7,17 @@ from pathlib import Path
 from gates.git import git
 from gates.package.archive import unpack, write_archive
 from gates.package.contents import brought, files_of_the_run
-from gates.package.groups import GROUPS, IDENTITY, contents
+from gates.package.groups import GROUPS, contents
 from gates.package.index import BundledFile, BundledGroup, BundleIndex
 from gates.package.statements import DATASET, statement_of, statement_path
 from gates.pipeline import CODE
 from gates.proof import Rung, prove_all
 from gates.report import Gate, read_report
+from gates.reproducibility.settings import RELOAD
 from gates.running import code_files
 from genpolicy.errors import BadInputError, IntegrityError, RefusedError
-from genpolicy.integrity.documents import canonical_json, read_json
+from genpolicy.evidence.documents.reproducibility import CANDIDATES
+from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_bytes, sha256_file
 
 MUST_STAND: tuple[Gate, ...] = ("A", "B", "C", "D")
@@ -57,7 +59,7 @@ def package(root: Path, candidate: str, out: Path | None = None) -> Packaged:
     _require_judged(rungs)
     policies = {policy.name for policy in brought(root)}
     groups = contents(root, candidate, brought=candidate in policies)
-    checkpoint = str(read_json(root / IDENTITY)[candidate]["checkpoint"])
+    checkpoint = CANDIDATES.read(root / RELOAD)[candidate].checkpoint
     judged = [rung.gate for rung in rungs if rung.verdict not in ("NOT JUDGED", "REFUSED")]
     statements = _statements(root, judged, candidate, checkpoint)
     named = {*files_of_the_run(root), *(name for files in groups.values() for name in files)}
@@ -119,7 +121,8 @@ def prove_bundle(path: Path, folder: Path, *, run_programs: bool) -> tuple[Bundl
     for gate in sorted({*again, *statements}):
         if again.get(gate) != statements.get(gate):
             raise _untrue(statement_path(gate), "not what the report of this gate gives")
-    if index.checkpoint != read_json(folder / IDENTITY)[index.candidate]["checkpoint"]:
+    pinned = CANDIDATES.read(folder / RELOAD).get(index.candidate)
+    if pinned is None or index.checkpoint != pinned.checkpoint:
         raise _untrue("the checkpoint", "another than the evidence names")
     groups = contents(folder, index.candidate, brought=index.candidate in programs)
     stated = {group.number: tuple(group.files) for group in index.groups}

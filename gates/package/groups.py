@@ -16,13 +16,14 @@ from gates.reproducibility.settings import BROUGHT_FOLDER, RELOAD
 from gates.settings import PARAMS_FILE
 from genpolicy.errors import BadInputError, IntegrityError
 from genpolicy.evidence.documents.brought import BROUGHT
+from genpolicy.evidence.documents.reproducibility import CANDIDATES
 from genpolicy.integrity.documents import read_json
 from genpolicy.integrity.tables import read_table
 
 LATENCY, SHADOW, STRESS = "artifacts/latency", "artifacts/shadow", "artifacts/stress"
 GENERATORS, BASELINES = "artifacts/train_generators", "artifacts/train_baselines"
 MEASURED = "artifacts/measure_baselines"
-IDENTITY = f"{RELOAD}/identity.json"
+IDENTITY = f"{RELOAD}/{CANDIDATES.file}"
 A, B, C, D, _ = (report_path(gate) for gate in GATES)
 
 
