@@ -20,6 +20,7 @@ from gates.card.card import (
     left_out,
     missing_fields,
     promoted,
+    thresholds_of,
     validity,
 )
 from gates.card.envelope import ENVELOPE_FILE, simulated_envelope, was_judged
@@ -32,6 +33,7 @@ from gates.card.signing import (
     independence,
     utc_today,
 )
+from gates.card.windows import require_aborts, windows_of
 from gates.criterion import Measured, criteria_of, criterion
 from gates.engine import GateSpec, judge, recorded_evidence
 from gates.evidence import Evidence, MissingEvidenceError
@@ -125,6 +127,9 @@ def _chain_error(root: Path, chain: Chain, draft: TrialCard | None) -> str:
             return f"gate D did not judge the condition {simulated.condition!r} of the card"
         entry = Evidence(root).document(RELOAD, CANDIDATES).get(candidate)
         require_rollback(draft.rollback, chain.reports, Evidence(root))
+        thresholds = thresholds_of(chain.reports["D"])
+        windows = windows_of(Evidence(root), candidate, simulated.condition, thresholds)
+        require_aborts(draft.abort_thresholds, draft.abort_windows, thresholds, windows)
     except (MissingEvidenceError, GenpolicyError) as error:
         return str(error)
     pinned = entry.checkpoint if entry else None

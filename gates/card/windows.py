@@ -1,9 +1,9 @@
 """Over what an abort threshold is counted: a share says nothing until it is said of how many.
 
 Shares of answers and ticks are counted over as many as one simulated trial has, shares of trials
-over the last trials; and never over so few that a single one would end it. How often such a window
-would have ended the candidate's own rollouts inside the envelope is counted beside it: a threshold
-that ends what was promoted is no threshold.
+over the last trials; and never over so few that a single one would be more than what is proposed.
+In how many of the candidate's own rollouts inside the envelope, each as a whole, the share was
+above the threshold is counted beside it: what ends the policy that was promoted is no threshold.
 """
 
 import math
@@ -12,16 +12,21 @@ from typing import Literal
 
 import numpy as np
 import pandas as pd
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
 from pydantic import Field
 
 from gates.evidence import Array, Evidence, MissingEvidenceError, counts, numbers
 from gates.report import StrictModel
 from gates.stress.cost import STOPS
-from gates.stress.rollouts import ROLLOUTS
+from gates.stress.rollouts import INVOCATIONS, ROLLOUTS
 from genpolicy.errors import IntegrityError
-from genpolicy.evidence.rows.stress import RolloutRow
+from genpolicy.evidence.rows.stress import InvocationRow, RolloutRow
 
 LATENCY = "latency_s"
+KEYS = ("seed", "perturbation", "start")
+MOST = 10_000
+"""A share of less than one of so many is none."""
 PARTS = {
     "deadline_miss_share": ("deadline_misses", "invocations"),
     "hold_share": ("hold_ticks", "ticks"),
@@ -30,8 +35,8 @@ PARTS = {
 }
 """What a share is of what, in the columns of a rollout."""
 UNITS: Mapping[str, Literal["answers", "ticks"]] = {"invocations": "answers", "ticks": "ticks"}
-QUANTILE = 0.95
-"""Of the latencies: so many of the answers must keep the threshold."""
+LATE_SHARE = 0.05
+"""Of the answers: no more may come later than the threshold; the first of a session is cold."""
 
 
 class AbortWindow(StrictModel):
@@ -40,14 +45,14 @@ class AbortWindow(StrictModel):
     Attributes:
         unit: What is counted.
         count: The last so many.
-        ended: Own rollouts inside the envelope (windows of them, of trials) that it would have
-            ended at the proposed threshold.
-        seen: Of how many; 0 where there are fewer rollouts than a window holds.
+        above: Own rollouts inside the envelope whose share is above what is proposed, each as a
+            whole; of trials, runs of so many rollouts in the order of the starts.
+        seen: Of how many; 0 where there are fewer rollouts than a run has.
     """
 
     unit: Literal["answers", "ticks", "trials"]
     count: int = Field(ge=1)
-    ended: int = Field(ge=0)
+    above: int = Field(ge=0)
     seen: int = Field(ge=0)
 
     @property
@@ -59,11 +64,11 @@ class AbortWindow(StrictModel):
 
     @property
     def tried(self) -> str:
-        """What it would have ended."""
+        """Where the candidate's own rollouts stand to it."""
         if not self.seen:
-            return "fewer rollouts than one window holds: not tried"
-        what = "windows of its rollouts" if self.unit == "trials" else "of its rollouts"
-        return f"would have ended {self.ended:,} of {self.seen:,} {what}"
+            return "not tried inside the envelope, where there are fewer rollouts"
+        of = f"runs of {self.count:,} rollouts" if self.unit == "trials" else "rollouts"
+        return f"above what is proposed in {self.above:,} of {self.seen:,} {of} inside the envelope"
 
 
 def windows_of(
@@ -82,10 +87,15 @@ def windows_of(
     """
     try:
         rows = evidence.of(ROLLOUTS, RolloutRow, candidate)
-        rows = rows[rows["perturbation"] == condition].sort_values(["seed", "start"])
+        rows = rows[rows["perturbation"] == condition].sort_values(list(KEYS))
         if len(rows) == 0:
             raise MissingEvidenceError(f"{candidate} has no rollout under {condition}")
-        return {name: _window(rows, name, limit) for name, limit in thresholds.items()}
+        times = evidence.of(INVOCATIONS, InvocationRow, candidate)
+        warm = times[(times["perturbation"] == condition) & (times["invocation"] != 0)]
+        return {
+            name: _of_latency(rows, warm, limit) if name == LATENCY else _window(rows, name, limit)
+            for name, limit in thresholds.items()
+        }
     except MissingEvidenceError as error:
         raise IntegrityError(
             where=ROLLOUTS,
@@ -95,39 +105,64 @@ def windows_of(
         ) from error
 
 
+def require_aborts(
+    thresholds: Mapping[str, float],
+    windows: Mapping[str, AbortWindow],
+    proposed: Mapping[str, float],
+    counted: Mapping[str, AbortWindow],
+) -> None:
+    """Refuse a draft that ends a trial otherwise than gate D and the rollouts say.
+
+    Raises:
+        IntegrityError: A threshold or a window is another one, missing, or of nothing.
+    """
+    for where, stated, expected in (
+        ("abort_thresholds", thresholds, proposed),
+        ("abort_windows", windows, counted),
+    ):
+        other = sorted(n for n in {*stated, *expected} if stated.get(n) != expected.get(n))
+        if other:
+            raise IntegrityError(
+                where=f"the draft's {where}.{other[0]}",
+                found=str(stated.get(other[0], "missing")),
+                expected=str(expected.get(other[0], "nothing of this name")),
+                action="Run `dvc repro card`, which drafts it again.",
+            )
+
+
+def _of_latency(rows: pd.DataFrame, warm: pd.DataFrame, limit: float) -> AbortWindow:
+    """A rollout without a warm answer has none that came late: the share of holds tells of it."""
+    late = warm.assign(late=numbers(warm, "latency_s") > limit).groupby(list(KEYS))["late"].mean()
+    above = int(np.sum(late.to_numpy() > LATE_SHARE))
+    return _of_a_trial("answers", numbers(rows, "invocations"), _more_than_one(LATE_SHARE), above)
+
+
 def _window(rows: pd.DataFrame, name: str, limit: float) -> AbortWindow:
-    if name == LATENCY:
-        # A rollout without an answer has none that came late: the share of holds tells of it.
-        ended = rows["latency_p95_s"].astype(float).to_numpy() > limit
-        least = math.ceil(1 / (1 - QUANTILE))
-        return _of_a_trial("answers", numbers(rows, "invocations"), least, ended)
     if name in PARTS:
         part, whole = PARTS[name]
         all_of = numbers(rows, whole)
-        ended = numbers(rows, part) > limit * all_of
-        return _of_a_trial(UNITS[whole], all_of, _more_than_one(limit), ended)
-    hit = (
-        rows["outcome"].isin(STOPS) if name == "reset_share" else counts(rows, "interventions") > 0
-    )
-    return _of_trials(np.asarray(hit, bool), _more_than_one(limit), limit)
+        above = int(np.sum(numbers(rows, part) > limit * all_of))
+        return _of_a_trial(UNITS[whole], all_of, _more_than_one(limit), above)
+    helped, stopped = counts(rows, "interventions") > 0, rows["outcome"].isin(STOPS).to_numpy()
+    return _of_trials(stopped if name == "reset_share" else helped, _more_than_one(limit), limit)
 
 
 def _of_a_trial(
-    unit: Literal["answers", "ticks"], sizes: Array, least: int, ended: np.ndarray
+    unit: Literal["answers", "ticks"], sizes: Array, least: int, above: int
 ) -> AbortWindow:
     usual = int(np.sort(sizes)[(len(sizes) - 1) // 2])
-    return AbortWindow(
-        unit=unit, count=max(least, usual), ended=int(np.sum(ended)), seen=len(sizes)
-    )
+    return AbortWindow(unit=unit, count=max(least, usual), above=above, seen=len(sizes))
 
 
-def _of_trials(hit: np.ndarray, count: int, limit: float) -> AbortWindow:
-    """Windows one after the other, in the order of the starts: each rollout counts once."""
-    whole = len(hit) // count
-    shares = hit[: whole * count].reshape(whole, count).mean(axis=1)
-    return AbortWindow(unit="trials", count=count, ended=int(np.sum(shares > limit)), seen=whole)
+def _of_trials(hit: NDArray[np.bool_], count: int, limit: float) -> AbortWindow:
+    """Every run of so many rollouts that follow each other in the order of the starts."""
+    if len(hit) < count:
+        return AbortWindow(unit="trials", count=count, above=0, seen=0)
+    shares = sliding_window_view(hit, count).mean(axis=1)
+    above = int(np.sum(shares > limit))
+    return AbortWindow(unit="trials", count=count, above=above, seen=len(shares))
 
 
 def _more_than_one(limit: float) -> int:
     """Fewest of which a single one is not more than the limit; 1 where none is allowed."""
-    return max(1, math.ceil(1 / limit)) if limit > 0 else 1
+    return max(1, math.ceil(1 / limit)) if limit > 1 / MOST else 1

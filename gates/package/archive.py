@@ -47,8 +47,15 @@ def write_archive(
 
     Raises:
         IntegrityError: A file is another one than the index says: something writes here.
-        BadInputError: The place cannot be written.
+        BadInputError: The place cannot be written, or is a folder.
     """
+    if not path.name or path.is_dir():
+        raise BadInputError(
+            where=str(path),
+            found="a folder",
+            expected="the name of a file",
+            action="Name the file to write: `--out flow.zip`.",
+        )
     temporary = path.with_name(f".{path.name}.tmp.{os.getpid()}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -122,6 +129,7 @@ def unpack(path: Path, folder: Path) -> tuple[BundleIndex, dict[Gate, bytes]]:
             target.parent.mkdir(parents=True, exist_ok=True)
             with target.open("xb") as stream:
                 _copy(archive, file, stream, name)
+            target.chmod(0o755 if file.executable else 0o644)
         statements: dict[Gate, bytes] = {}
         for gate, digest in index.statements.items():
             data = _bounded(archive, statement_path(gate), path)
@@ -149,6 +157,9 @@ def _opened(path: Path) -> Iterator[zipfile.ZipFile]:
         )
     try:
         with zipfile.ZipFile(path) as archive:
+            kinds = {entry.compress_type for entry in archive.infolist()}
+            if not kinds <= {zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED}:
+                raise _other(str(path), "an entry packed in another way", "deflated entries")
             yield archive
     except BROKEN as error:
         raise _other(str(path), f"broken ({error})", "a whole archive") from error

@@ -23,7 +23,8 @@ def package(
 
     The eleven groups of artifacts, everything that the verdicts of gates A to D
     rest on, and a statement for each gate; complete, or nothing is written. The
-    address names every byte: hand it over by another way than the file.
+    address names every byte: hand it over by another way than the file. Cards
+    and keys stay here.
     """
     from gates.package.bundling import package as write
 
@@ -42,39 +43,32 @@ def package(
 def verify_bundle(
     bundle: Annotated[Path, typer.Argument(help="File that `genpolicy package` wrote.")],
     address: Annotated[
-        str, typer.Option(help="Address that was handed over, or its first digits (12 or more).")
+        str, typer.Option(help="Address that was handed over, or its first 32 digits.")
     ] = "",
     run_programs: Annotated[
         bool, typer.Option("--run-programs", help="Start the policies that it brings.")
     ] = False,
     as_json: AsJson = False,
 ) -> int:
-    """Prove a bundle on any machine.
+    """Prove a bundle on another machine.
 
-    Every byte is hashed, every gate judged again and the evidence derived again:
-    the independent checker reads the journals. By the code that runs here, which
-    must be the code that judged; that of the bundle is never run. Exit 0 if all
-    is as it says (whatever the verdicts are), 3 if a report or the front page is
-    untrue, 2 if the bundle cannot be read or its bytes are others.
+    Every byte is hashed, gates A to D are judged again, the evidence is derived
+    again and the pages are printed again: the independent checker reads the
+    journals. By the code, task and libraries that are here, which must be those
+    that judged; nothing of the bundle is run. Exit 0 if all is as it says
+    (whatever the verdicts are), 3 if a report is untrue, 2 if the bundle cannot
+    be read, or it says other than its evidence.
     """
-    from gates.package.archive import read_index
-    from gates.package.bundling import prove_bundle
-    from gates.printed import pages_code, print_rungs, worst
-    from genpolicy.errors import BadInputError
+    from gates.package.proving import prove_bundle
+    from gates.printed import print_rungs, worst
 
-    found = read_index(bundle).address
-    if address and (len(address) < 12 or not found.startswith(address)):
-        raise BadInputError(
-            where=str(bundle),
-            found=f"address {found}",
-            expected=f"{address} (at least 12 digits)",
-            action="This is another bundle than the one you were told of.",
-        )
     with tempfile.TemporaryDirectory(prefix="genpolicy-bundle-") as folder:
-        index, rungs = prove_bundle(bundle, Path(folder), run_programs=run_programs)
-        codes = {rung.exit_code for rung in rungs if rung.verdict == "REFUSED"}
-        codes |= pages_code(Path(folder))
+        index, rungs = prove_bundle(
+            bundle, Path(folder), address=address, run_programs=run_programs
+        )
     print_rungs(rungs, as_json)
+    codes = {rung.exit_code for rung in rungs if rung.verdict == "REFUSED"}
     if not as_json and not codes:
         print(f"{index.candidate}: all {len(index.files)} files are what the address names.")
+        print(f"Address {index.address}")
     return worst(codes)

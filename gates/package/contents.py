@@ -1,21 +1,33 @@
-"""Every file that the verdicts of a workspace rest on, so that another machine can derive them.
+"""Every file that the verdicts of gates A to D rest on, so that another machine can derive them.
 
 That is what the pipeline lists: what its stages read (code, settings, fixtures) and what they
-wrote, beside the papers of Gate E and the files of policies that were brought.
+wrote, and the files of policies that were brought. Papers of Gate E stay behind: who may sign is
+said by the reader's own allow-list, never by one that comes with what was signed.
 """
 
 from collections.abc import Iterable
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
-from gates.card.people import ALLOW_LIST
-from gates.card.signing import CARDS
-from gates.pipeline import CODE, IGNORED, LOCK, PARAMS, PIPELINE, files_at, names_in, stages_of
+from gates.pipeline import (
+    CODE,
+    IGNORED,
+    LOCK,
+    PARAMS,
+    PIPELINE,
+    RUNGS,
+    files_at,
+    names_in,
+    stages_of,
+)
 from gates.preregistration import PREREGISTRATION
+from gates.report import stage_of
 from gates.settings import read_params, section_of
 from genpolicy.candidates.brought import BroughtPolicy, read_brought
 from genpolicy.errors import ConfigError
 
-SETTINGS = (PIPELINE, LOCK, IGNORED, PARAMS, PREREGISTRATION, ALLOW_LIST, "fixtures.yaml")
+SETTINGS = (PIPELINE, LOCK, IGNORED, PARAMS, PREREGISTRATION, "fixtures.yaml")
+OF_THE_CARD = (*RUNGS["E"], stage_of("E"))
+"""Stages whose outputs stay behind."""
 
 
 def files_of_the_run(root: Path) -> tuple[str, ...]:
@@ -23,14 +35,16 @@ def files_of_the_run(root: Path) -> tuple[str, ...]:
 
     Raises:
         ConfigError: The pipeline, the parameters or an entry cannot be read, or an entry lies
-            outside the workspace.
+            outside the workspace or behind a link.
         IntegrityError: One of the files is a link.
     """
-    listed = set(SETTINGS) | set(_of_policies(root))
-    for stage in stages_of(root, PIPELINE).values():
-        for part in ("deps", "outs", "metrics", "plots"):
-            listed |= set(names_in(stage.get(part)))
-    listed |= {CARDS, *CODE}
+    listed = {*SETTINGS, *CODE, *_of_policies(root)}
+    for name, stage in stages_of(root, PIPELINE).items():
+        if name not in OF_THE_CARD:
+            for part in ("deps", "outs", "metrics", "plots"):
+                listed |= set(names_in(stage.get(part)))
+    for path in sorted(listed):
+        _require_below(root, path, f"{PIPELINE} or an entry")
     return tuple(sorted({file for path in listed for file in files_at(root, path)}))
 
 
@@ -46,15 +60,22 @@ def brought(root: Path) -> list[BroughtPolicy]:
 
 def _of_policies(root: Path) -> Iterable[str]:
     """Entries and the files that they name."""
-    home = root.resolve()
+    entries = section_of(read_params(root), "candidates")
     for policy in brought(root):
-        for path in (policy.path, *(policy.folder / name for name in policy.entry.files)):
-            if not path.resolve().is_relative_to(home):
-                raise ConfigError(
-                    where=f"params.yaml: candidates.{policy.name}",
-                    found=f"{path}, which lies outside the workspace",
-                    expected="entries and files below the workspace",
-                    action="Put the policy into the workspace: what is named elsewhere cannot "
-                    "be carried along.",
-                )
-            yield path.resolve().relative_to(home).as_posix()
+        where = f"{PARAMS}: candidates.{policy.name}"
+        entry = PurePosixPath(str(entries[policy.name]))
+        for name in (entry, *(entry.parent / file for file in sorted(policy.entry.files))):
+            _require_below(root, name.as_posix(), where)
+            yield name.as_posix()
+
+
+def _require_below(root: Path, path: str, where: str) -> None:
+    """Refuse what leads out of the workspace, or to a file by another name."""
+    plain = root.resolve() / path
+    if ".." in PurePosixPath(path).parts or plain.resolve() != plain or path.startswith("/"):
+        raise ConfigError(
+            where=where,
+            found=f"{path}, which lies outside the workspace or behind a link",
+            expected="files below the workspace, by their own names",
+            action="Put the files into the workspace: what is named elsewhere is not carried.",
+        )

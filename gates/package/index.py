@@ -23,10 +23,12 @@ class BundledFile(StrictModel):
     Attributes:
         sha256: Of its bytes.
         size: In bytes.
+        executable: Whether it is a program.
     """
 
     sha256: Sha256
     size: int = Field(ge=0)
+    executable: bool = False
 
 
 class BundledGroup(StrictModel):
@@ -52,8 +54,9 @@ class BundleIndex(StrictModel):
         schema_version: Of this form.
         candidate: Name of the candidate.
         checkpoint: SHA-256 that identifies its weights.
-        commit: Of the checkout that it was packaged from; empty where git does not say.
-        verdicts: Of each gate.
+        commit: Of the checkout that it was packaged from; empty where git does not say, or where
+            the code is not the committed one.
+        verdicts: Of gates A to D.
         groups: The eleven groups.
         files: Every file that the verdicts rest on, by path from the root of the workspace.
         statements: SHA-256 of the statement of each gate.
@@ -62,7 +65,7 @@ class BundleIndex(StrictModel):
     schema_version: Literal[1]
     candidate: str
     checkpoint: Sha256
-    commit: str
+    commit: Annotated[str, Field(pattern=r"^([0-9a-f]{40})?$")]
     verdicts: dict[Gate, str]
     groups: list[BundledGroup]
     files: dict[str, BundledFile]
@@ -71,15 +74,16 @@ class BundleIndex(StrictModel):
     @model_validator(mode="after")
     def _paths(self) -> Self:
         """Paths stay below the folder that they are unpacked into, and groups name files."""
+        names = set(self.files)
         for name in self.files:
             path = PurePosixPath(name)
             plain = name.isprintable() and "\\" not in name and path.as_posix() == name
             if not plain or not path.parts or path.is_absolute() or ".." in path.parts:
                 raise ValueError(f"files: {name!r:.80} is no path below the workspace")
-            above = {parent.as_posix() for parent in path.parents} & set(self.files)
+            above = {parent.as_posix() for parent in path.parents} & names
             if above:
                 raise ValueError(f"files: {min(above)!r:.80} is a file and a folder")
-        unknown = {name for group in self.groups for name in group.files} - set(self.files)
+        unknown = {name for group in self.groups for name in group.files} - names
         if unknown:
             raise ValueError(f"groups: {min(unknown)!r:.80} is none of the files")
         return self

@@ -28,7 +28,7 @@ NOT_PROPOSED = "not proposed"
 ELSEWHERE = "not built here"
 AS_SIMULATED = "as simulated; for another one plan it and run again"
 ABORTS = {
-    "latency_s": "95 % of answers come later than",
+    "latency_s": "more than 5 % of answers later than",
     "deadline_miss_share": "missed deadlines above",
     "hold_share": "time it waits above",
     "rejection_share": "answers rejected whole above",
@@ -206,8 +206,7 @@ def _aborts(draft: TrialCard, signed: TrialCard | None, report: GateReport) -> l
         items.append(
             Item(
                 f"Ends it: {ABORTS[name]}",
-                f"{at_its_end(answer)} in the worst condition; inside the envelope it "
-                f"{draft.abort_windows[name].tried}",
+                f"{at_its_end(answer)} in the worst condition; {draft.abort_windows[name].tried}",
                 f"{human(answer, most)}, {draft.abort_windows[name].over}",
                 human(answer, signed.abort_thresholds[name]) if signed else "",
                 answer.owner or "nobody",

@@ -125,6 +125,19 @@ def test_answers_that_were_made_up_are_refused(workspace):
     refused(workspace, "another answer than it gives now")
 
 
+@pytest.mark.parametrize("further", [False, True])
+def test_made_up_answers_of_either_kind_of_moment_are_refused(workspace, further):
+    """The findings stand on the first moments, which are a fifth of all: each kind is sampled."""
+    apart = CONFORMANCE.read(workspace / "artifacts/reload")["planted"].episodes
+
+    def off(row):
+        hit = (row.moment >= apart) == further
+        return replace(row, actions=tuple(x + 1e-3 for x in row.actions)) if hit else row
+
+    rewrite(workspace, off)
+    refused(workspace, "another answer than it gives now")
+
+
 @pytest.mark.parametrize("session", [FIRST, AGAIN])
 def test_a_moment_that_is_left_out_is_refused(workspace, session):
     rewrite(workspace, lambda row: None if (row.session, row.moment) == (session, 0) else row)

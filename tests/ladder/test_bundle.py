@@ -1,5 +1,6 @@
 """A bundle of a real ladder is proved on "another machine", and a forged one is not."""
 
+import hashlib
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -9,8 +10,9 @@ import pytest
 import yaml
 
 from gates.package.archive import INDEX_NAME, blob_name, read_index
-from gates.package.bundling import package, prove_bundle
+from gates.package.bundling import BUNDLED, package
 from gates.package.index import BundleIndex
+from gates.package.proving import prove_bundle
 from gates.package.statements import statement_path
 from gates.proof import Rung
 from genpolicy.errors import BadInputError, IntegrityError, RefusedError
@@ -49,7 +51,7 @@ def bundle(finished: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def proved(path: Path, tmp_path: Path) -> tuple[BundleIndex, list[Rung]]:
     (tmp_path / "unpacked").mkdir()
-    return prove_bundle(path, tmp_path / "unpacked", run_programs=False)
+    return prove_bundle(path, tmp_path / "unpacked")
 
 
 def forged(path: Path, target: Path, forge: Forge) -> Path:
@@ -72,7 +74,7 @@ def other_bytes(name: str, change: Callable[[bytes], bytes]) -> Forge:
 
     def forge(index: dict, entries: Entries) -> None:
         data = change(entries[blob_name(index["files"][name]["sha256"])])
-        index["files"][name] = {"sha256": sha256_bytes(data), "size": len(data)}
+        index["files"][name] |= {"sha256": sha256_bytes(data), "size": len(data)}
         entries[blob_name(sha256_bytes(data))] = data
 
     return forge
@@ -102,8 +104,31 @@ def flipped(data: bytes) -> bytes:
     return data[:middle] + bytes([data[middle] ^ 1]) + data[middle + 1 :]
 
 
-def passed(data: bytes) -> bytes:
-    return data.replace(b'"PENDING_REVIEW"', b'"PASS"')
+def better(data: bytes) -> bytes:
+    return data.replace(b"PASS", b"FINE")
+
+
+def more_files(index: dict, entries: Entries) -> None:
+    index["files"]["reports/decision.html"] = {
+        "sha256": sha256_bytes(b"signed"), "size": 6, "executable": False,
+    }  # fmt: skip
+    entries[blob_name(sha256_bytes(b"signed"))] = b"signed"
+
+
+def nothing_unmeasured(index: dict, entries: Entries) -> None:
+    index["groups"][9]["unmeasured"] = ""
+
+
+def page_and_record(index: dict, entries: Entries) -> None:
+    """A page with the record of it, which no report binds."""
+    name = "reports/gate_d.md"
+    page = entries[blob_name(index["files"][name]["sha256"])]
+    old, new = (
+        hashlib.md5(data, usedforsecurity=False).hexdigest().encode()
+        for data in (page, better(page))
+    )
+    other_bytes(name, better)(index, entries)
+    other_bytes("dvc.lock", lambda data: data.replace(old, new))(index, entries)
 
 
 def test_a_bundle_is_proved_from_its_bytes_alone(
@@ -111,7 +136,7 @@ def test_a_bundle_is_proved_from_its_bytes_alone(
 ) -> None:
     index, rungs = proved(bundle, tmp_path)
     assert {rung.gate: rung.verdict for rung in rungs} == index.verdicts
-    assert [index.verdicts[gate] for gate in "ABCD"] == ["PASS"] * 4
+    assert index.verdicts == dict.fromkeys(BUNDLED, "PASS")
     package(finished, CANDIDATE, tmp_path / "again.zip")
     assert read_index(tmp_path / "again.zip").address == index.address
     assert (tmp_path / "again.zip").read_bytes() == bundle.read_bytes()
@@ -122,12 +147,15 @@ def test_a_bundle_is_proved_from_its_bytes_alone(
     [
         (other_bytes("artifacts/stress/rollouts.parquet", flipped), "Gate D refuses"),
         (other_bytes("artifacts/ingest/frames.parquet", flipped), "Gate A refuses"),
-        (other_bytes("reports/gate_e.json", passed), "Gate E refuses"),
+        (other_bytes("reports/gate_d.html", better), "Gate D refuses"),
+        (page_and_record, r"reports/gate_d\.md is another page"),
         (other_bytes("genpolicy/seeds.py", lambda data: data + b"\n"), "other code than runs here"),
         (another_statement, r"statements/gate_d\.json is not what"),
-        (smaller_groups, "the groups is other files"),
-        (another_candidate, "statements/gate_a|statements/gate_b"),
-        (another_checkpoint, r"statements/gate_b\.json is not what"),
+        (smaller_groups, "the groups is other than"),
+        (nothing_unmeasured, "the groups is other than"),
+        (more_files, r"beyond reports/decision\.html"),
+        (another_candidate, "the checkpoint is another"),
+        (another_checkpoint, "the checkpoint is another"),
     ],
 )
 def test_a_forged_bundle_is_not_proved(
@@ -139,12 +167,12 @@ def test_a_forged_bundle_is_not_proved(
 
 
 def test_a_verdict_that_the_evidence_does_not_give_is_refused(bundle: Path, tmp_path: Path) -> None:
-    def better(index: dict, entries: Entries) -> None:
-        index["verdicts"]["E"] = "PASS"
+    def worse(index: dict, entries: Entries) -> None:
+        index["verdicts"]["D"] = "FAIL"
 
-    _, rungs = proved(forged(bundle, tmp_path / "forged.zip", better), tmp_path)
-    assert [rung.gate for rung in rungs if rung.verdict == "REFUSED"] == ["E"]
-    assert "the index says PASS" in rungs[-1].note
+    _, rungs = proved(forged(bundle, tmp_path / "forged.zip", worse), tmp_path)
+    assert [rung.gate for rung in rungs if rung.verdict == "REFUSED"] == ["D"]
+    assert "the index says FAIL" in rungs[-1].note
 
 
 def test_programs_that_are_brought_are_not_started_unasked(bundle: Path, tmp_path: Path) -> None:
@@ -156,7 +184,9 @@ def test_programs_that_are_brought_are_not_started_unasked(bundle: Path, tmp_pat
 
     def forge(index: dict, entries: Entries) -> None:
         other_bytes("params.yaml", brought)(index, entries)
-        index["files"]["own/mine.yaml"] = {"sha256": sha256_bytes(entry), "size": len(entry)}
+        index["files"]["own/mine.yaml"] = {
+            "sha256": sha256_bytes(entry), "size": len(entry), "executable": False,
+        }  # fmt: skip
         entries[blob_name(sha256_bytes(entry))] = entry
 
     with pytest.raises(BadInputError, match=r"programs of mine.*--run-programs"):

@@ -12,10 +12,12 @@ from genpolicy.errors import ConfigError
 ROOT = Path(__file__).parents[3]
 ADAPTER = ROOT / "adapters" / "lerobot_server.py"
 HERE = (
-    "import sys; sys.path[:0] = [sys.argv.pop(1)]; "
+    "import sys; at = [*map(lambda p: p.endswith('site-packages'), sys.path), True].index(True); "
+    "sys.path[at:at] = [sys.argv.pop(1)]; "
     "from genpolicy.cli.main import main; sys.exit(main())"
 )
-"""Runs the code that asks: what is installed may be that of another checkout."""
+"""Runs the code that asks: what is installed may be that of another checkout. It comes before what
+is installed and behind Python's own modules, none of which a file beside ours may replace."""
 
 
 def as_server(entry: Entry, path: Path, contract: ObservationContract) -> ServerEntry:

@@ -35,6 +35,9 @@ def test_the_host_runs_the_code_that_asks_and_no_other_that_is_installed(
     said = tmp_path / "checkout" / "genpolicy" / "cli" / "main.py"
     said.parent.mkdir(parents=True)
     said.write_text("import sys\ndef main():\n    print(__file__, sys.argv[1:])\n    return 7\n")
+    # A file of theirs that has a name of Python's own replaces nothing.
+    (tmp_path / "checkout" / "random.py").write_text("raise SystemExit('theirs')\n")
+    said.write_text("import random\n" + said.read_text())
     monkeypatch.setattr(translation, "ROOT", tmp_path / "checkout")
     path = written("torch")
     server = as_server(read_entry(path), path, task.observation)

@@ -61,6 +61,29 @@ def out(tmp_path):
     return tmp_path / "out"
 
 
+def test_programs_can_be_run_where_they_are_unpacked(tmp_path, root, index):
+    files = {**index.files, "c": index.files["c"].model_copy(update={"executable": True})}
+    marked = index.model_copy(update={"files": files})
+    write_archive(tmp_path / "x.zip", marked, {"statements/gate_a.json": STATEMENT}, root=root)
+    folder = out(tmp_path)
+    unpack(tmp_path / "x.zip", folder)
+    assert os.access(folder / "c", os.X_OK) and not os.access(folder / "a/b.txt", os.X_OK)
+
+
+@pytest.mark.parametrize("kind", [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
+def test_an_entry_packed_in_another_way_is_refused(tmp_path, written, kind):
+    with zipfile.ZipFile(written, "a") as whole:
+        whole.writestr("more", b"x", kind)
+    with pytest.raises(IntegrityError, match="packed in another way"):
+        unpack(written, out(tmp_path))
+
+
+@pytest.mark.parametrize("place", ["", "run"])
+def test_a_folder_is_no_place_for_an_archive(tmp_path, root, index, place):
+    with pytest.raises(BadInputError, match="is a folder"):
+        write_archive(tmp_path / place, index, {}, root=root)
+
+
 def test_what_is_unpacked_is_what_lay_there(tmp_path, written, index):
     folder = out(tmp_path)
     found, statements = unpack(written, folder)

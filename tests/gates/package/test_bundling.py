@@ -8,11 +8,12 @@ import zipfile
 
 import pytest
 
+from gates.package import bundling
 from gates.package.archive import read_index
-from gates.package.bundling import package, prove_bundle
+from gates.package.bundling import package
 from gates.package.statements import statement_path
 from gates.report import read_report, report_path
-from genpolicy.errors import BadInputError, IntegrityError, RefusedError
+from genpolicy.errors import BadInputError, RefusedError
 
 
 def test_a_bundle_names_groups_verdicts_and_statements(whole, tmp_path):
@@ -54,8 +55,29 @@ def test_an_incomplete_candidate_has_no_bundle(whole, tmp_path):
     assert not (tmp_path / "act.zip").exists()
 
 
-def test_evidence_of_other_code_is_not_proved_by_this(whole, tmp_path):
-    package(whole, "flow", tmp_path / "flow.zip")
-    (tmp_path / "out").mkdir()
-    with pytest.raises(IntegrityError, match="other code than runs here"):
-        prove_bundle(tmp_path / "flow.zip", tmp_path / "out", run_programs=False)
+def test_a_candidate_that_fails_the_last_gate_has_a_bundle_too(whole, tmp_path):
+    assert read_report(whole, "D")[0].verdict != "PASS"
+    assert package(whole, "flow", tmp_path / "flow.zip").index.verdicts["D"] != "PASS"
+
+
+def test_a_name_that_not_every_machine_can_write_is_told(whole, tmp_path):
+    odd = whole / "gates" / "a\\b.py"
+    odd.parent.mkdir(exist_ok=True)
+    odd.write_text("")
+    with pytest.raises(BadInputError, match="no path below the workspace"):
+        package(whole, "flow", tmp_path / "flow.zip")
+
+
+def test_programs_are_marked(whole, tmp_path):
+    (whole / "gates").mkdir(exist_ok=True)
+    (whole / "gates/run.sh").write_text("")
+    (whole / "gates/run.sh").chmod(0o755)
+    files = package(whole, "flow", tmp_path / "flow.zip").index.files
+    assert [name for name, file in files.items() if file.executable] == ["gates/run.sh"]
+
+
+@pytest.mark.parametrize(("clean", "commit"), [("", "c" * 40), (None, "")])
+def test_a_commit_is_named_only_if_the_code_is_of_it(whole, tmp_path, monkeypatch, clean, commit):
+    said = {"diff": clean, "rev-parse": "c" * 40}
+    monkeypatch.setattr(bundling, "git", lambda root, *words: said[words[0]])
+    assert package(whole, "flow", tmp_path / "flow.zip").index.commit == commit

@@ -1,5 +1,6 @@
 """What travels: all that the verdicts rest on, and nothing from elsewhere."""
 
+import json
 import shutil
 
 import pytest
@@ -36,8 +37,17 @@ def test_everything_that_a_report_names_is_carried(whole):
     files = set(files_of_the_run(whole))
     for gate in "ABCD":
         assert set(read_report(whole, gate)[0].materials) <= files
-    assert {"dvc.yaml", "dvc.lock", "params.yaml", "reviewers.yaml"} <= files
+    assert {"dvc.yaml", "dvc.lock", "params.yaml", "preregistration.yaml"} <= files
     assert not any(name.startswith("build/") for name in files)
+
+
+def test_cards_and_keys_stay_behind(whole):
+    (whole / "cards").mkdir()
+    (whole / "cards/trial.dsse.json").write_text("{}")
+    assert (whole / "artifacts/card/card.json").is_file()
+    assert (whole / "reviewers.yaml").is_file()
+    left = ("cards/", "artifacts/card", "reviewers.yaml", "reports/gate_e")
+    assert [name for name in files_of_the_run(whole) if name.startswith(left)] == []
 
 
 def test_all_code_is_carried_but_what_the_interpreter_writes(whole):
@@ -71,8 +81,20 @@ def test_a_policy_that_was_brought_comes_with_its_entry_and_files(own):
     assert {"own/mine.yaml", "own/serve"} <= set(files_of_the_run(own))
 
 
-def test_a_policy_that_lies_elsewhere_cannot_be_carried(own, tmp_path):
+@pytest.mark.parametrize("how", ["above", "absolute", "linked"])
+def test_a_policy_that_lies_elsewhere_cannot_be_carried(own, tmp_path, how):
     shutil.move(own / "own", tmp_path / "elsewhere")
-    name(own, "../elsewhere/mine.yaml")
-    with pytest.raises(ConfigError, match="outside the workspace"):
+    if how == "linked":
+        (own / "own").symlink_to(tmp_path / "elsewhere")
+    elsewhere = {"above": "../elsewhere", "absolute": str(tmp_path / "elsewhere"), "linked": "own"}
+    name(own, f"{elsewhere[how]}/mine.yaml")
+    with pytest.raises(ConfigError, match="outside the workspace or behind a link"):
         files_of_the_run(own)
+
+
+def test_a_pipeline_that_names_what_lies_elsewhere_is_refused(whole):
+    pipeline = json.loads((whole / "dvc.yaml").read_text())
+    pipeline["stages"]["stress"]["deps"].append("../elsewhere")
+    (whole / "dvc.yaml").write_text(json.dumps(pipeline))
+    with pytest.raises(ConfigError, match=r"\.\./elsewhere, which lies outside"):
+        files_of_the_run(whole)

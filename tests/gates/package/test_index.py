@@ -72,6 +72,7 @@ def test_a_group_of_files_that_are_not_there_is_refused():
         {"checkpoint": "A" * 64},
         {"files": {"a": {"sha256": SHA, "size": -1}}},
         {"verdicts": {"F": "PASS"}},
+        {"commit": "the best one"},
         {"more": 1},
     ],
 )

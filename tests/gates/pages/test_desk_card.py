@@ -60,7 +60,7 @@ def test_every_threshold_is_named_with_what_was_seen_and_its_owner(whole, waits)
         c for c in waits["D"].criteria if (c.id, c.candidate) == ("latency_p95_s", card.candidate)
     ]
     seen = f"at most {1000 * answer.measured:.3g} ms in the worst condition"
-    assert late.seen == f"{seen}; inside the envelope it {card.abort_windows['latency_s'].tried}"
+    assert late.seen == f"{seen}; {card.abort_windows['latency_s'].tried}"
     assert late.proposed == f"{1000 * answer.threshold:.3g} ms, over the last 20 answers"
     assert late.owner == answer.owner
 
