@@ -5,10 +5,12 @@ from pathlib import Path
 
 import evidence
 import pytest
-from conftest import judge_all
 
 from gates.package.groups import STRESS
+from gates.proof import judge
+from gates.report import report_bytes, report_path
 from genpolicy.evidence.rows.stress import AgeRow
+from genpolicy.integrity.atomic import write_bytes
 from genpolicy.integrity.rows import write_rows
 
 
@@ -21,7 +23,7 @@ def _whole(tmp_path_factory: pytest.TempPathFactory, _ladder: Path) -> Path:
     (root / STRESS / "journals").mkdir(exist_ok=True)
     (root / STRESS / "journals" / "flow__nominal.mcap").write_bytes(b"a journal")
     evidence.record(root)
-    judge_all(root, "D")
+    write_bytes(root / report_path("D"), report_bytes(judge(root, "D")))
     return root
 
 
