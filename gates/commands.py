@@ -28,9 +28,7 @@ Layout = Annotated[
 
 gates = new_app("Judge evidence, prove reports; cards: `genpolicy card`.")
 verify = new_app("Prove the reports that lie here, or a bundle.")
-verify.command(
-    "bundle", epilog=examples("genpolicy verify bundle flow.zip --address 0123456789ab")
-)(verify_bundle)
+verify.command("bundle", epilog=examples("genpolicy verify bundle flow.zip"))(verify_bundle)
 
 
 @with_examples(
