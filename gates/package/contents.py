@@ -20,13 +20,14 @@ from gates.pipeline import (
     stages_of,
 )
 from gates.preregistration import PREREGISTRATION
-from gates.report import stage_of
+from gates.report import GATES, stage_of
 from gates.settings import read_params, section_of
 from genpolicy.candidates.brought import BroughtPolicy, read_brought
 from genpolicy.errors import ConfigError
 
 SETTINGS = (PIPELINE, LOCK, IGNORED, PARAMS, PREREGISTRATION, "fixtures.yaml")
-OF_THE_CARD = (*RUNGS["E"], stage_of("E"))
+LAST = GATES[-1]
+OF_THE_CARD = (*RUNGS[LAST], stage_of(LAST))
 """Stages whose outputs stay behind."""
 
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from gates.engine import environment
-from gates.package.archive import unpack
+from gates.package.archive import read_index, unpack
 from gates.package.bundling import (
     BUNDLED,
     files_to_carry,
@@ -62,8 +62,9 @@ def prove_bundle(
         ConfigError: Its task is not installed, or it names what lies outside of it.
         RefusedError: A report is missing or not what the files say.
     """
+    _require_address(path, read_index(path), address)
     index, statements = unpack(path, folder)
-    _require_address(path, index, address)
+    _require_address(path, index, address)  # of the bytes that are judged, once more
     _require_code(index, folder)
     _require_task(folder)
     _require_environment(folder)

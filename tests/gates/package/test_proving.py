@@ -41,6 +41,20 @@ def test_the_address_that_was_handed_over_must_be_its_own(bundle, prove, address
         prove(bundle, address=given.get(address, address))
 
 
+def test_what_is_judged_is_what_has_the_address(bundle, prove, monkeypatch):
+    """The file may be another one when it is opened a second time."""
+    told = read_index(bundle).model_copy(update={"commit": "c" * 40})
+    monkeypatch.setattr(proving, "read_index", lambda path: told)
+    with pytest.raises(BadInputError, match="another bundle"):
+        prove(bundle, address=told.address)
+
+
+def test_another_address_is_told_before_anything_is_unpacked(bundle, prove, tmp_path):
+    with pytest.raises(BadInputError, match="another bundle"):
+        prove(bundle, address="0" * 64)
+    assert list((tmp_path / "out").iterdir()) == []
+
+
 def test_its_first_digits_are_enough(bundle, prove):
     with pytest.raises(IntegrityError, match="other code"):
         prove(bundle, address=read_index(bundle).address[:32])
