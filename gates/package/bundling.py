@@ -57,7 +57,7 @@ def package(root: Path, candidate: str, out: Path | None = None) -> Packaged:
         ConfigError: The pipeline, the parameters or an entry cannot be read, or names what lies
             outside the workspace.
     """
-    require_judged(root)
+    rungs = require_judged(root)
     groups = groups_of(root, candidate)
     checkpoint = CANDIDATES.read(root / RELOAD)[candidate].checkpoint
     statements = statements_of(root, candidate, checkpoint)
@@ -67,7 +67,7 @@ def package(root: Path, candidate: str, out: Path | None = None) -> Packaged:
             candidate=candidate,
             checkpoint=checkpoint,
             commit=_commit(root),
-            verdicts={gate: read_report(root, gate)[0].verdict for gate in BUNDLED},
+            verdicts={rung.gate: rung.verdict for rung in rungs},
             groups=groups,
             files={name: _file(root / name) for name in files_to_carry(root, groups)},
             statements={gate: sha256_bytes(data) for gate, data in statements.items()},
