@@ -84,7 +84,7 @@ lerobot:
 	  echo "No Python 3.12 or 3.13 found, which LeRobot needs; skipped. Install one, or name it: make PYTHON_LEROBOT=/path/to/python3.12 lerobot"; \
 	  exit 0; fi; \
 	"$(PYTHON_LEROBOT)" -m venv build/lerobot; \
-	build/lerobot/bin/python -m pip install --quiet 'lerobot[dataset,diffusion]==0.6.1' accelerate websockets msgpack; \
+	build/lerobot/bin/python -m pip install --quiet 'lerobot[dataset,diffusion,async]==0.6.1' accelerate websockets msgpack; \
 	echo "LeRobot is in build/lerobot; docs/candidates.md says how to train and to serve with it."
 
 soak: env

@@ -1,18 +1,26 @@
-"""Actions that were too old when they were executed: a queue filled as LeRobot's, and ours.
+"""Actions that were too old when they were executed: LeRobot's asynchronous client, and ours.
 
-LeRobot's asynchronous client asks for the next chunk when half of its queue is left, puts what
-comes into the queue by the number of the step, mixes what overlaps (`weighted_average`: .7 of the
-new one) or takes the new one (`latest_only`), and executes the front of the queue at every tick,
-whatever its age. Ours executes nothing older than `execution.maximum_age_s`, and stands instead.
-Both meet the same starts and the same latencies, drawn by the same names: one invocation in ten
-takes as long as `TAIL_S`. LeRobot's rule is written here from its documentation (0.6.1), since its
-own client needs a robot.
+LeRobot's client executes the front of its queue at every tick, whatever its age, and asks again
+when half of the queue is left; what comes is put in by the number of the step, mixed with what
+waits there (`weighted_average`: .7 of the new one) or in its place (`latest_only`). Ours executes
+nothing older than `execution.maximum_age_s`, and stands instead. Both meet the same starts and the
+same latencies, drawn by the same names: one invocation in ten takes as long as `TAIL_S`.
+
+With `--python` LeRobot's own client and server say what is executed (`adapters/lerobot_async.py`);
+without it `Theirs` does, which a test holds against a recording of them.
 
     python -m benchmarks.async_client
+    python -m benchmarks.async_client --python build/lerobot/bin/python
 """
 
-from collections import deque
-from collections.abc import Iterator
+import argparse
+import json
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from itertools import islice
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from types import SimpleNamespace
 from typing import Any
 
@@ -51,32 +59,109 @@ def latencies_s(start: int) -> Iterator[float]:
         number += 1
 
 
-def as_lerobot(start: int, ticks: int) -> tuple[list[float], int]:
-    """Ages, s, of what is executed in so many ticks, and at how many the queue was empty.
+RULES = ("latest_only", "weighted_average")
+ADAPTER = Path(__file__).parents[1] / "adapters" / "lerobot_async.py"
+Executed = list[int | None]
+"""By tick, the tick of the oldest observation in what was executed; None where nothing was."""
 
-    A mean of two predictions is as old as the older one that is in it; `latest_only` keeps the new
-    one alone, which is the kinder count, and is what is counted here.
+
+class Theirs:
+    """The queue of LeRobot's client and the one place of its server, by the tick.
+
+    Args:
+        asked: As `asked_of` writes it.
+        latencies_s: Of each invocation, in the order in which the server begins them.
     """
-    period_s, rows = HORIZONS.action_period_s, HORIZONS.prediction_horizon
-    queue: deque[tuple[int, float]] = deque()  # number of the step, when its observation was seen
-    latest, empty, ages = -1, 0, []
-    asked: tuple[float, int, float] | None = None
-    draws = latencies_s(start)
-    for tick in range(ticks):
-        now_s = tick * period_s
-        if asked is not None and asked[0] <= now_s:
-            _, first, seen_s = asked
-            came = {step: seen_s for step in range(first, first + rows) if step > latest}
-            queue = deque(sorted((dict(queue) | came).items()))
-            asked = None
-        if asked is None and len(queue) <= LEAST_LEFT * rows:
-            asked = now_s + next(draws), latest + 1, now_s
-        if queue:
-            latest, seen_s = queue.popleft()
-            ages.append(now_s - seen_s)
-        else:
-            empty += 1
-    return ages, empty
+
+    def __init__(self, asked: dict[str, Any], latencies_s: Sequence[float]) -> None:
+        self._asked, self._latencies_s = asked, iter(latencies_s)
+        self._queue: dict[int, int] = {}  # number of the step, tick of the oldest observation
+        self._latest, self._must_go, self._any = -1, True, False
+        self._predicted: set[int] = set()
+        self._waits: tuple[int, int] | None = None  # step and tick of an observation
+        self._begun: tuple[float, int, int] | None = None  # when it comes, step, tick
+
+    def tick(self, number: int) -> int | None:
+        """What comes is put in; the front is executed; then an observation is sent, or none."""
+        now_s, executed = number * self._asked["period_s"], None
+        self._arrive(now_s)
+        if self._queue:
+            self._latest = next(iter(self._queue))
+            executed = self._queue.pop(self._latest)
+        # The client knows how long a chunk is once it has had one.
+        if not self._any or len(self._queue) <= self._asked["threshold"] * self._asked["rows"]:
+            self._send(max(self._latest, 0), number)
+        if self._begun is None:
+            self._begin(now_s)
+        return executed
+
+    def _send(self, step: int, number: int) -> None:
+        must_go = self._must_go and not self._queue
+        seen_before = step in self._predicted or self._asked["still"]
+        if must_go or not self._predicted or not seen_before:
+            self._waits = step, number
+        if must_go:
+            self._must_go = False
+
+    def _begin(self, now_s: float) -> None:
+        if self._waits is not None:
+            step, number = self._waits
+            self._waits = None
+            self._predicted.add(step)
+            self._begun = now_s + next(self._latencies_s), step, number
+
+    def _arrive(self, now_s: float) -> None:
+        while self._begun is not None and self._begun[0] <= now_s:
+            done_s, first, number = self._begun
+            self._begun, self._any, self._must_go = None, True, True
+            replaced = self._asked["rule"] == "latest_only"
+            # What the new chunk does not reach is gone.
+            self._queue = {
+                step: number if replaced else min(number, self._queue.get(step, number))
+                for step in range(first, first + self._asked["rows"])
+                if step > self._latest
+            }
+            self._begin(done_s)
+
+
+def asked_of(rule: str, ticks: Sequence[int]) -> dict[str, Any]:
+    """What both are asked: the rule of the queue, and ticks and latencies of each start."""
+    return {
+        "period_s": HORIZONS.action_period_s, "rows": HORIZONS.prediction_horizon,
+        "threshold": LEAST_LEFT, "rule": rule, "still": False,
+        "runs": [
+            {"ticks": count, "latencies_s": list(islice(latencies_s(start), count + 1))}
+            for start, count in enumerate(ticks)
+        ],
+    }  # fmt: skip
+
+
+def as_lerobot(asked: dict[str, Any], python: Path | None = None) -> list[Executed]:
+    """What LeRobot executes in each run: by its own code where its Python is named."""
+    if python is None:
+        theirs = [Theirs(asked, run["latencies_s"]) for run in asked["runs"]]
+        return [
+            [one.tick(number) for number in range(run["ticks"])]
+            for one, run in zip(theirs, asked["runs"], strict=True)
+        ]
+    with TemporaryDirectory() as scratch:  # LeRobot writes logs where it is
+        done = subprocess.run(
+            [python.absolute(), ADAPTER], input=json.dumps(asked), stdout=subprocess.PIPE,
+            text=True, check=True, cwd=scratch,
+        )  # fmt: skip
+    found: list[Executed] = json.loads(done.stdout)
+    return found
+
+
+def ages_s(executed: Sequence[Executed]) -> list[float]:
+    """How old each executed action was."""
+    period_s = HORIZONS.action_period_s
+    return [
+        (tick - seen) * period_s
+        for run in executed
+        for tick, seen in enumerate(run)
+        if seen is not None
+    ]
 
 
 class Absent:
@@ -87,46 +172,50 @@ class Absent:
         return SimpleNamespace(nfe=1)
 
 
-def main() -> None:
-    """Print both counts."""
+def ours() -> tuple[list[float], list[int]]:
+    """Ages, s, of what our executor let by in each start, and how many ticks each took."""
     task = load_task(PARAMS["task"]["name"])
     specs = task.episode_specs(3, ROLLOUTS, shares={"nominal": 1.0})
     plans = {number: demonstrate(spec).actions for number, spec in enumerate(specs)}
-    execution = ExecutionSettings(**PARAMS["execution"])
     setup = Setup(
         task=task, checker=make_checker(
             task, FeasibilitySettings(**PARAMS["feasibility"]),
             action_period_s=HORIZONS.action_period_s,
         ),
-        horizons=HORIZONS, execution=execution, latency=MODEL,
+        horizons=HORIZONS, execution=ExecutionSettings(**PARAMS["execution"]), latency=MODEL,
         perturbation="nominal", schedule=Nominal(), root_seed=SEED,
         method="bench", checkpoint="w", sampler="s",
     )  # fmt: skip
     absent: Any = Absent()
     _, rollouts = closed_loop(Rehearsed(absent, plans), setup, [spec.start for spec in specs])
-    ours = [
+    ages = [
         event.payload["age_ns"] / 1e9
         for rollout in rollouts
         for event in rollout.journal.events()
         if event.kind == "accept"
     ]
-    theirs, empty = [], 0
-    for number, rollout in enumerate(rollouts):
-        ages, starved = as_lerobot(number, rollout.tick)
-        theirs += ages
-        empty += starved
-    ticks = sum(rollout.tick for rollout in rollouts)
-    limit_s = max(execution.maximum_age_s.values())
-    print(f"{ROLLOUTS} starts, {ticks} ticks; an action may be {limit_s:g} s old")
-    print("rule                   executed  too old   share  oldest s  stood")
-    for name, ages, stood in (
-        ("LeRobot's queue", theirs, empty), ("genpolicy", ours, ticks - len(ours)),
-    ):  # fmt: skip
+    return ages, [rollout.tick for rollout in rollouts]
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Print both counts."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.async_client")
+    parser.add_argument("--python", type=Path, help="that has LeRobot: its own code is asked")
+    python = parser.parse_args(argv).python
+    mine, ticks = ours()
+    rows = {f"LeRobot, {rule}": ages_s(as_lerobot(asked_of(rule, ticks), python)) for rule in RULES}
+    limit_s = max(ExecutionSettings(**PARAMS["execution"]).maximum_age_s.values())
+    print(f"{ROLLOUTS} starts, {sum(ticks)} ticks; an action may be {limit_s:g} s old")
+    print(f"LeRobot's queue by {'its own code' if python else 'our words for it'}")
+    print("rule                       executed  too old   share  oldest s  stood")
+    for name, ages in {**rows, "genpolicy": mine}.items():
         old = sum(age > limit_s + 1e-9 for age in ages)
         print(
-            f"{name:22s} {len(ages):8d} {old:8d} {old / len(ages):7.1%} {max(ages):9.2f} {stood:6d}"
+            f"{name:26s} {len(ages):8d} {old:8d} {old / len(ages):7.1%} {max(ages):9.2f} "
+            f"{sum(ticks) - len(ages):6d}"
         )
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -4,8 +4,8 @@ It runs every time (`always_changed`): a task may be installed and recordings ma
 tree, where nothing else sees an edit. What it writes changes only when they do. Coming first, it
 also stops the ladder before a stage would replace files that somebody else put in its folder,
 where a fixture (controller, limits, supervisor, scene) is not the one that is pinned, where a
-policy that is brought is not what its entry says, and where a method or its sampler is none:
-before anything trains.
+policy that is brought is not what its entry says, where a method or its sampler is none, and where
+the machine has no such device: before anything trains.
 """
 
 from pathlib import Path
@@ -16,6 +16,7 @@ from genpolicy.documents.task import IDENTITY
 from genpolicy.integrity.atomic import output_folder, write_bytes
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.outputs import require_own_files
+from genpolicy.policies.determinism import require_device
 from genpolicy.policies.matched_training import PolicySettings
 from genpolicy.policies.methods import check_sampler, method_named
 from genpolicy.tasks.api import load_task
@@ -28,6 +29,7 @@ from stages._training import MethodsSection
 
 def work(params: Params) -> None:
     """Write both identities."""
+    require_device(params.compute.device)
     refuse_foreign_files()
     require_own_files(Path.cwd())
     entries = params.section("candidates", BroughtSection).root

@@ -97,8 +97,7 @@ def apart(workspace: Path) -> dict[str, Apart]:
     network = load_policy(workspace / FLOW)
     seen = brought_fixtures(data, network.horizons)
     names = [fixture_name(row) for row in range(len(seen))]
-    on_the_wire = [(*name, 0) for name in names]  # a message is named by its first chunk besides
-    bare = network.sample(seen, noise_names=on_the_wire, candidates=CANDIDATES).actions
+    bare = network.sample(seen, noise_names=names, candidates=CANDIDATES).actions
     table = read_table(workspace / "artifacts" / "reload" / "samples.parquet").to_pylist()
     result = {}
     for candidate in read_brought(params["candidates"], seed=0, root=workspace):

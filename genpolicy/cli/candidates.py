@@ -29,6 +29,12 @@ MOMENTS_SEED = 0
 NO_VERDICT = (
     "Nothing here is a gate's verdict: name the entry in params.yaml (candidates) for those."
 )
+ASKED_LATER = {
+    "B": "asked there besides: matching or an exception, what is declared, cold and warm times",
+    "C": "asked there besides: corrupted observations, what reaches the stub, both modes",
+    "D": "asked there: success beside the best simple policy in every condition, and its costs",
+}
+"""By gate, what a check of recorded moments cannot say."""
 
 
 @dataclass(frozen=True)
@@ -145,9 +151,23 @@ def _text(found: Conformance) -> str:
             for finding in found.findings
         ),
         "",
+        *(_of_gate(found, gate) for gate in ASKED_LATER),
+        "",
         NO_VERDICT,
     ]
     if found.failed:
         names = ", ".join(f"{one.name} (gate {one.gate})" for one in found.failed)
         lines.append(f"Refused: {names}.")
     return "\n".join(lines)
+
+
+def _of_gate(found: Conformance, gate: str) -> str:
+    """What a gate will be able to say of it, as far as the findings tell."""
+    said = []
+    for judged, words in (("fails", "here it fails"), ("unknown", "not known is")):
+        names = [one.name for one in found.findings if (one.gate, one.judged) == (gate, judged)]
+        if names:
+            said.append(f"{words} {', '.join(names)}")
+    if not said and any(one.gate == gate for one in found.findings):
+        said.append("nothing against it here")
+    return f"Gate {gate}: {'; '.join([*said, ASKED_LATER[gate]])}."

@@ -130,7 +130,15 @@ def _policy(
             expected=f"one that gate B admits: {', '.join(admitted)}",
             action="Name one of them.",
         )
-    section = read_yaml(options.root / "params.yaml").get("policy", {})
+    params = read_yaml(options.root / "params.yaml")
+    if options.method in params.get("candidates", {}):
+        raise ConfigError(
+            where="--method",
+            found=f"{options.method}, a policy that was brought",
+            expected="one that is trained here: it runs in the process that this command starts",
+            action="See its run by the wall clock in the stage `wall_clock`, or name another one.",
+        )
+    section = params.get("policy", {})
     seed = parse_settings(PolicySettings, section, where="params.yaml: policy").seeds[0]
     folder = options.root / "artifacts" / GENERATORS
     policy = trained(folder, [options.method], seeds=[seed])[0]

@@ -33,7 +33,7 @@ ROOT = Path(__file__).parents[2]
 
 def draw(policy, data):
     seen = brought_fixtures(data, policy.horizons)
-    names = [(*fixture_name(row), 0) for row in range(len(seen))]
+    names = [fixture_name(row) for row in range(len(seen))]
     return policy.sample(seen, noise_names=names, candidates=CANDIDATES).actions
 
 

@@ -14,6 +14,7 @@ import pytest
 import yaml
 
 from genpolicy.candidates.wire.connection import Listening, dial
+from genpolicy.cli.candidates import ASKED_LATER
 from genpolicy.cli.main import main
 from genpolicy.integrity.hashing import sha256_file
 
@@ -132,6 +133,11 @@ def test_the_docs_commands_as_written(checked, dataset, capsys):
     said = capsys.readouterr().out
     assert "holds   B  unchanged" in said
     assert "Nothing here is a gate's verdict" in said
+    # A line a gate: what it will find, what nobody can tell yet, what it asks besides.
+    of_b, of_c, of_d = re.findall(r"^Gate [BCD]: .*$", said, re.MULTILINE)
+    assert of_b.startswith("Gate B: not known is follows_observation") and "unchanged" not in of_b
+    assert "not known is in_time, admissible" in of_c or "admissible, in_time" in of_c
+    assert of_d == f"Gate D: {ASKED_LATER['D']}."
 
 
 def test_every_finding_of_the_docs_is_one_and_every_one_is_in_the_docs(checked):
@@ -147,7 +153,8 @@ def test_another_checkpoint_behind_the_same_entry_is_told(folder, checked, fleet
     change(folder, files={})
     code = run(folder, dataset, "--deadline", "5", "--earlier", str(checked / "checked.json"))
     assert code == 3
-    assert "Refused: unchanged (gate B)." in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "Refused: unchanged (gate B)." in said and "Gate B: here it fails unchanged;" in said
 
 
 @pytest.mark.parametrize(

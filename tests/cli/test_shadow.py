@@ -48,6 +48,20 @@ def test_only_an_admitted_method_is_replayed(root, tmp_path):
     assert not (tmp_path / "run").exists()
 
 
+def test_a_policy_that_was_brought_is_refused_by_name(root, tmp_path):
+    """It is under no folder of trained ones, and a missing file would say nothing of that."""
+    other = tmp_path / "other"
+    other.mkdir()
+    for name in ("artifacts", "fixtures.yaml", LIMITS):
+        (other / name).symlink_to(root / name)
+    params = yaml.safe_load((root / "params.yaml").read_text())
+    params["candidates"]["theirs"] = "own/theirs.yaml"
+    (other / "params.yaml").write_text(yaml.safe_dump(params))
+    with pytest.raises(ConfigError, match="theirs, a policy that was brought") as caught:
+        run_shadow(ShadowOptions(other, tmp_path / "run", "theirs"), ["theirs"])
+    assert caught.value.exit_code == 2 and not (tmp_path / "run").exists()
+
+
 def test_other_horizons_than_those_of_the_limits_are_refused(root, tmp_path):
     limits = yaml.safe_load((root / LIMITS).read_text())
     limits["horizons"]["execution_horizon"] = 9

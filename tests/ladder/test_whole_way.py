@@ -89,7 +89,7 @@ def brought_went_the_same_way(copy: Path) -> None:
 
 def other_weights_stop_the_ladder_before_anything_runs(copy: Path) -> None:
     """Weights that changed behind Gate B: what was measured is of others."""
-    flip_a_bit(copy / "own/flow/model.safetensors")
+    flip_a_bit(copy / "own/flow/seed_0/model.safetensors")
     outcome, ran = repro(copy)
     assert (outcome.code, ran) == (2, [])
     assert NAME in outcome.sentence and "model.safetensors" in outcome.sentence

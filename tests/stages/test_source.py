@@ -180,3 +180,12 @@ def test_a_folder_where_the_stages_write_is_refused(run):
 
 def test_the_first_stage_knows_every_file_of_a_dataset_without_loading_what_writes_it():
     assert set(KEPT_BY_INGEST) == {*DATA_FILES, MANIFEST_FILE}
+
+
+def test_a_device_that_is_not_there_stops_the_ladder_before_anything_else(run, stage, edit):
+    """`torch.device` knows the word; the number is beyond what any machine has."""
+    edit(run, lambda params: params["compute"].update(device="cuda:4096"))
+    shutil.rmtree(run / "artifacts" / "task", ignore_errors=True)
+    code, said = stage("task")
+    assert code == 2 and "compute.device is 'cuda:4096'" in said
+    assert not (run / "artifacts" / "task").exists()

@@ -1,5 +1,7 @@
 """The same windows by both clocks, in real processes; nothing is judged by how long it took."""
 
+import sys
+
 import numpy as np
 import pytest
 import yaml
@@ -12,6 +14,7 @@ from genpolicy.contract.latency import DECLARED_TERMS, MEASURED_TERMS
 from genpolicy.evidence.documents.shadow import CHECKER
 from genpolicy.evidence.stress.latency import DeclaredTerm, LatencyModel
 from genpolicy.execution.cell import Cell
+from genpolicy.execution.journal import read_journal
 from genpolicy.integrity.tables import read_table
 from genpolicy.verification.clocks import derived_windows
 from genpolicy.wall_clock import bench as bench_module
@@ -114,6 +117,58 @@ def test_a_policy_behind_the_wire_is_asked_by_both(
     assert {row["clock"] for row in found["invocations"]} == {"wall", "virtual"}
     by = [row["discarded_by"] for row in found["invocations"]]
     assert "checkpoint_mismatch" not in by and "sampler_mismatch" not in by
+
+
+DYING = """
+import os, sys
+from pathlib import Path
+from genpolicy.candidates.wire.connection import Listening
+from genpolicy.candidates.wire.served import ServedPolicy
+from genpolicy.policies.policy import load_policy
+
+served, asked = ServedPolicy(load_policy(Path(sys.argv[1]))), []
+
+def answer(message):
+    asked.append(message)
+    if len(asked) == 3:
+        os._exit(9)
+    return served.answer(message)
+
+with Listening(answer, served.metadata, port=int(sys.argv[2])) as listening:
+    listening.serve_forever()
+"""
+
+
+def test_a_server_that_dies_at_its_third_question_moves_nothing_more(
+    shared,
+    fleet,
+    policy,
+    entry_of,  # noqa: F811
+    tmp_path,
+):
+    """What it had answered is executed and proved; from there on nobody commands anything new."""
+    (tmp_path / "dying.py").write_text(DYING)
+    command = [sys.executable, "dying.py", str(fleet[0] / "flow" / "seed_0"), "{port}"]
+    entry = entry_of(address=None, command=command, timeout_s=1.0)
+    path = tmp_path / "planted.yaml"
+    path.write_text(yaml.safe_dump(entry.model_dump(mode="json", exclude_none=True)))
+    brought = BroughtPolicy("planted", path, entry, "c" * 64, 0)
+    with clocks._asked_elsewhere(brought, shared) as asked:
+        request = clocks.WallClockRequest(
+            root=str(shared.root), method="planted", checkpoint=asked.checkpoint,
+            sampler=asked.sampler, replay=shared.windows[0], then=tuple(shared.windows[1:]),
+        )  # fmt: skip
+        told = [*asked.command, "--candidates", "2"]
+        running = clocks.start(tmp_path / "run", request, told, ready=True)
+        running.wait()
+    journal = tmp_path / "run" / clocks.JOURNAL
+    found = [e for events in read_journal(journal).values() for e in events]
+    # One of the first two may have come too late; none of those behind them came at all.
+    assert 1 <= len([e for e in found if e.kind == "candidate"]) <= 2
+    checker = shared.checker()
+    limits = read_limits(shared.root)
+    checked = clocks.checker_document([journal], cell=limits.cell, robot=checker.cell)
+    assert checked.violations == []
 
 
 def test_windows_are_drawn_by_name_and_short_episodes_are_left_out(data, task, monkeypatch):

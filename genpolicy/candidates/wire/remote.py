@@ -25,6 +25,8 @@ from genpolicy.candidates.wire.writing import not_writable
 from genpolicy.contract.observation import ObservationContract
 
 Array = NDArray[np.float64]
+FURTHER = "further"
+"""Behind the noise's name, with the number of the first chunk, of all messages but the first."""
 
 
 @dataclass(frozen=True)
@@ -126,7 +128,9 @@ class RemotePolicy:
         drawn: list[Drawn] = []
         for first in range(0, candidates, at_once):
             number = min(at_once, candidates - first)
-            drawn.append(self._draw(observations, (*noise, first), number, given))
+            # All that is drawn at once has the name as it is, as of a policy that is asked here.
+            name = (*noise, FURTHER, first) if first else noise
+            drawn.append(self._draw(observations, name, number, given))
         chunks = np.concatenate([part.actions for part in drawn])
         mapped = self._outputs.mapped(chunks, observations[-1])
         counts = [part.evaluations for part in drawn if part.evaluations is not None]

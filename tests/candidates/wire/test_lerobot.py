@@ -1,57 +1,57 @@
-"""LeRobot's policies over the wire, against an exchange with its own code.
+"""LeRobot's policies over the wire, against exchanges with its own code.
 
-Recorded from `adapters/lerobot_server.py` with ACT of LeRobot 0.6.1, trained by LeRobot's own
-script for 300 updates on the export of the default ladder's training split.
+Recorded (`record_lerobot.py`) from `adapters/lerobot_server.py` with ACT and Diffusion of LeRobot
+0.6.1, trained by LeRobot's own script on the export of a training split (1200 and 800 updates).
 """
 
-import re
 from pathlib import Path
 
 import msgpack
 import numpy as np
 import pytest
-import yaml
 
-from genpolicy.candidates.hosts.kinds import LeRobotEntry
-from genpolicy.candidates.wire.entry import Entry, ServerEntry
 from genpolicy.candidates.wire.packing import pack, unpack
 from genpolicy.candidates.wire.remote import RemotePolicy
+from tests.candidates.wire.record_lerobot import CHUNKS, HISTORY, NAMES, entry_of
 
 HERE = Path(__file__).parent
-DOCS = HERE.parents[2] / "docs" / "candidates.md"
-RECORDED = msgpack.unpackb((HERE / "recorded" / "lerobot_act.msgpack").read_bytes())
+RECORDED = {
+    kind: msgpack.unpackb((HERE / "recorded" / f"lerobot_{kind}.msgpack").read_bytes())
+    for kind in HISTORY
+}
+EVALUATIONS = {"act": 1, "diffusion": 8}
 
 
-@pytest.fixture
-def entry():
-    """The entry of the docs."""
-    [text] = re.findall(r"```yaml\n# lerobot\.yaml\n(.*?)```", DOCS.read_text(), re.DOTALL)
-    found = LeRobotEntry.model_validate(yaml.safe_load(re.sub('"@[a-z]+@"', repr("0" * 64), text)))
-    same = {name: getattr(found, name) for name in Entry.model_fields if name != "kind"}
-    return ServerEntry(**same, kind="server", command=["serve", "{port}"])
-
-
-def test_it_is_asked_byte_for_byte_and_understood_bit_for_bit(serving, entry, task):
-    asked = []
+@pytest.mark.parametrize("kind", HISTORY)
+def test_it_is_asked_byte_for_byte_and_understood_bit_for_bit(serving, kind, task):
+    asked, recorded = [], RECORDED[kind]
 
     def answer(message):
         asked.append(pack(message))
-        return unpack(RECORDED["exchanges"][len(asked) - 1]["answered"])
+        return unpack(recorded["exchanges"][len(asked) - 1]["answered"])
 
-    with serving(answer, unpack(RECORDED["metadata"])) as address:
-        policy = RemotePolicy(entry, address, task.observation)
-        for row, exchange in zip((0, 40), RECORDED["exchanges"], strict=True):
+    with serving(answer, unpack(recorded["metadata"])) as address:
+        policy = RemotePolicy(entry_of(kind, ["serve", "{port}"]), address, task.observation)
+        for name, exchange in zip(NAMES, recorded["exchanges"], strict=True):
             seen = np.frombuffer(exchange["observations"]).reshape(2, task.observation.dim)
-            found = policy.invoke(seen, noise=("recorded", row), candidates=2)
+            found = policy.invoke(seen, noise=name, candidates=CHUNKS)
             assert found.actions.tobytes() == exchange["mapped"]
-            assert found.evaluations is None
-            assert set(found.spans_s) == {"preprocess", "sample"}
+            assert found.evaluations == EVALUATIONS[kind]
+            assert set(found.spans_s) == {"preprocess", "encode", "sample"}
+            assert found.messages == 1
         policy.close()
-    assert asked == [exchange["asked"] for exchange in RECORDED["exchanges"]]
+    assert asked == [exchange["asked"] for exchange in recorded["exchanges"]]
 
 
-def test_what_it_says_first_names_inputs_that_the_entry_gives(entry):
-    said = unpack(RECORDED["metadata"])
-    assert sorted(said["inputs"]) == sorted(entry.observation)
-    assert said["n_obs_steps"] == 1
+@pytest.mark.parametrize("kind", HISTORY)
+def test_what_it_says_first_names_inputs_that_the_entry_gives(kind):
+    said = unpack(RECORDED[kind]["metadata"])
+    assert sorted(said["inputs"]) == sorted(entry_of(kind, ["serve", "{port}"]).observation)
+    assert said["n_obs_steps"] == HISTORY[kind]
     assert said["genpolicy"]["seeded"]
+
+
+def test_what_diffusion_drew_for_two_chunks_is_two_chunks():
+    first = RECORDED["diffusion"]["exchanges"][0]
+    one, other = np.frombuffer(first["mapped"]).reshape(CHUNKS, -1)
+    assert not np.array_equal(one, other)

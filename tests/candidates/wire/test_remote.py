@@ -70,7 +70,11 @@ def test_candidates_come_in_as_many_messages_as_it_needs(line, seen):
     np.testing.assert_array_equal(found.actions[..., :3], np.broadcast_to(seen[-1, :3], (8, 16, 3)))
     said = [message[WORD] for message in planted.asked]
     assert [one["candidates"] for one in said] == [3, 3, 2]
-    assert [one["noise"] for one in said] == [["a", 1, 0], ["a", 1, 3], ["a", 1, 6]]
+    assert [one["noise"] for one in said] == [
+        ["a", 1],
+        ["a", 1, "further", 3],
+        ["a", 1, "further", 6],
+    ]
     assert len({one["invocation"] for one in said}) == 3
     assert found.evaluations == 4
     assert found.spans_s == {"sample": 1.5}

@@ -41,7 +41,7 @@ def test_behind_the_wire_it_draws_what_it_draws_here_bit_for_bit(served, policy,
         remote = RemotePolicy(entry, address, task.observation)
         found = remote.invoke(seen, noise=("stress", 5), candidates=4)
         remote.close()
-    here = policy.sample(seen[None], noise_names=[("stress", 5, 0)], candidates=4)
+    here = policy.sample(seen[None], noise_names=[("stress", 5)], candidates=4)
     assert found.actions.tobytes() == here.actions[0].tobytes()
     assert found.evaluations == here.nfe
     assert set(found.spans_s) == {"preprocess", "encode", "sample"}
@@ -72,7 +72,7 @@ def test_a_prefix_behind_the_wire_draws_what_it_draws_here_bit_for_bit(
         assert wire.guided
         found = wire.sample(seen[None], noise_names=[("s", 5)], candidates=4, prefix=plan)
         remote.close()
-    asking = {"noise_names": [("s", 5, 0)], "candidates": 4}
+    asking = {"noise_names": [("s", 5)], "candidates": 4}
     here = policy.sample(seen[None], **asking, prefix=plan)
     assert found.actions.tobytes() == here.actions.tobytes()
     assert found.nfe == here.nfe
@@ -109,7 +109,7 @@ def test_a_prefix_in_another_form_draws_the_same_within_a_millionth(
             seen[None], noise_names=[("s", 5)], candidates=2, prefix=plan
         )
         remote.close()
-    here = policy.sample(seen[None], noise_names=[("s", 5, 0)], candidates=2, prefix=plan)
+    here = policy.sample(seen[None], noise_names=[("s", 5)], candidates=2, prefix=plan)
     found_at, found_turned, found_open = split_action(found.actions)
     at, turned, opened = split_action(here.actions)
     np.testing.assert_allclose(found_at, at, atol=1e-6)

@@ -1,0 +1,31 @@
+"""LeRobot's asynchronous queue in our words, against what its own client and server executed.
+
+Recorded from `adapters/lerobot_async.py` in LeRobot 0.6.1: two rules of its queue, three
+thresholds, a robot that moves and one that stands still (whose observations its server takes for
+similar), and latencies from below a tick to longer than a chunk.
+"""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from benchmarks.async_client import ages_s, as_lerobot
+
+RECORDED = json.loads((Path(__file__).parent / "recorded" / "lerobot_async.json").read_text())
+
+
+@pytest.mark.parametrize("number", range(len(RECORDED)))
+def test_every_tick_executes_what_lerobot_executed(number):
+    recorded = RECORDED[number]
+    assert as_lerobot(recorded["asked"]) == recorded["executed"]
+
+
+def test_the_recording_holds_what_the_count_is_about():
+    """Old actions, empty queues, and mixtures that are older than what replaces: or it is blind."""
+    mixed = [one for one in RECORDED if one["asked"]["rule"] == "weighted_average"]
+    replaced = [as_lerobot(one["asked"] | {"rule": "latest_only"}) for one in mixed]
+    assert any(one["executed"] != other for one, other in zip(mixed, replaced, strict=True))
+    every = [run for one in RECORDED for run in one["executed"]]
+    assert max(ages_s(every)) > 0.9
+    assert any(seen is None for run in every for seen in run[20:])
