@@ -52,8 +52,9 @@ def test_a_policy_that_was_brought_is_refused_by_name(root, tmp_path):
     """It is under no folder of trained ones, and a missing file would say nothing of that."""
     other = tmp_path / "other"
     other.mkdir()
-    for name in ("artifacts", "fixtures.yaml", LIMITS):
-        (other / name).symlink_to(root / name)
+    (other / "artifacts").symlink_to(root / "artifacts")
+    for name in (LIMITS, "fixtures.yaml"):
+        (other / name).write_bytes((root / name).read_bytes())
     params = yaml.safe_load((root / "params.yaml").read_text())
     params["candidates"]["theirs"] = "own/theirs.yaml"
     (other / "params.yaml").write_text(yaml.safe_dump(params))
