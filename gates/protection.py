@@ -6,123 +6,18 @@ rehearsal (`rehearsal: true`): a test of the machinery, of which no card can eve
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
+from gates.floors import BOUNDS, Bound
 from gates.report import Gate, stage_of
+from gates.settings import DERIVED, LIMITS, NOT_APPLICABLE
 from gates.severity import PLACE, too_mild
 from genpolicy.errors import ConfigError
 
 REHEARSAL = "rehearsal"
 REHEARSED = "A rehearsal: limits that protect people may be looser here, and no card can be signed."
-
-
-@dataclass(frozen=True)
-class Bound:
-    """How loose a setting may be at most.
-
-    Attributes:
-        gate: Who judges by it.
-        place: Criterion of that gate, or dotted path in `params.yaml`, of a table each value.
-        comparison: The setting must be `<=` or `>=` the bound.
-        bound: The loosest value.
-        reason: Why no team may go beyond it.
-        waivable: Whether a task may lack what the criterion asks about, so that its owner may
-            declare it not applicable.
-    """
-
-    gate: Gate
-    place: str
-    comparison: Literal["<=", ">="]
-    bound: float
-    reason: str
-    waivable: bool = False
-
-
-HARDEST_CONTACT_N = 80.0
-"""Force of the hardest contact that is simulated, N: nobody has seen a stop beyond it."""
-
-
-def _counts(gate: Gate, reason: str, *criteria: str) -> list[Bound]:
-    return [Bound(gate, name, "<=", 0.0, reason) for name in criteria]
-
-
-def _executed(gate: Gate) -> list[Bound]:
-    """Fixtures of the simulated cell that stop what went wrong, and what makes a chunk void."""
-    silence = "a stub that goes on in silence executes what nobody commands any more"
-    force = "the hardest contact that is simulated; beyond it no stop would ever be seen"
-    return [
-        Bound(gate, "execution.watchdog_s", "<=", 0.1, silence),
-        Bound(gate, "execution.force_limit_n", "<=", HARDEST_CONTACT_N, force),
-        Bound(gate, "execution.maximum_age_s", "<=", 1.0, "a second ago the scene was another one"),
-        Bound(gate, "execution.maximum_divergence_m", "<=", 0.2, "the arm is where nobody planned"),
-        Bound(gate, "feasibility.position_change_limit_m", "<=", 0.1, "a chunk bent so far is new"),
-    ]
-
-
 SHARED = ("confidence",)
 """Places that are settings of their own in `params.yaml`, and no criteria."""
-FOUND = "refused_recordings_accounted"
-PINNED = "what comes back otherwise than it was judged is another policy"
-BOUNDS: tuple[Bound, ...] = (
-    *_counts("A", "whoever trains on a defect of the data learns it", "data_defects"),
-    *_counts("A", "a recording that vanished may be the one that fails", FOUND),
-    *_counts("A", "a comparison with other settings compares nothing", "baselines_matched"),
-    Bound("A", "cause_accepted", ">=", 1.0, "modes of another cause are no reason for a generator"),
-    *_counts("B", PINNED, "unpinned_items", "metadata_mismatches", "nfe_mismatch"),
-    *_counts("B", "a NaN weight commands nothing that can be checked", "nonfinite_weights"),
-    *_counts("B", "numbers that mean something else command something else", "conformance"),
-    Bound("B", "samples_difference", "<=", 1e-5, f"{PINNED}; so much differs between machines"),
-    *_executed("C"),
-    Bound("C", "gate_c.mode_observations", ">=", 30, "fewer cannot show that modes fare alike"),
-    *_counts("C", PINNED, "changed_answers"),
-    *_counts("C", "one bad action is enough to hurt somebody", "stub_stale", "stub_invalid"),
-    *_counts("C", "the independent proof agrees or there is none", "checker_violations"),
-    *_counts("C", "a check whose absence goes unseen protects nobody", "mutants_undetected"),
-    *_counts("C", "an action that vanished may still be executed", "conservation_error"),
-    *_counts("C", "what is void already may hurt somebody", "incidents_miscounted"),
-    Bound("C", "corrupted_refused_share", ">=", 1.0, "corrupted input is never executed"),
-    Bound("C", "stub_violation_upper", "<=", 0.01, "more says nothing although none was seen"),
-    *_counts("D", PINNED, "changed_answers"),
-    *_counts("D", "one bad action is enough to hurt somebody", "stub_violations"),
-    *_counts("D", "the independent proof agrees or there is none", "checker_violations"),
-    *_counts("D", "an action that vanished may still be executed", "conservation_error"),
-    *_counts("D", "methods on other starts are not compared", "unmatched_starts"),
-    *_executed("D"),
-    Bound(
-        "D",
-        "force_peak_p95_n",
-        "<=",
-        HARDEST_CONTACT_N,
-        "the hardest contact that is simulated",
-        True,
-    ),
-    Bound("D", "deadline_miss_upper", "<=", 0.5, "late more often than not, it controls nothing"),
-    Bound("D", "hold_share_upper", "<=", 0.5, "it stands more than it acts"),
-    Bound("D", "fallback_share_upper", "<=", 0.5, "the fallback drives, not the policy"),
-    Bound("D", "stress_success_lower", ">=", 0.05, "what never works under stress withstood none"),
-    Bound("D", "intervention_upper", "<=", 0.2, "more often a person drives, not the policy"),
-    Bound("D", "reset_upper", "<=", 0.1, "each protective stop sends a person to the arm"),
-    Bound("D", "verdict_reachable", ">=", 0.8, "a trial that seldom ends right proves nothing"),
-    Bound("D", "stress.starts", ">=", 59, "fewer bound no p95, whatever the confidence"),
-    Bound("D", "confidence", ">=", 0.9, "what is wrong more often than once in ten is no bound"),
-    Bound("D", "stress.alpha", "<=", 0.1, "a wrong promotion once in ten trials at the most"),
-    Bound("D", "stress.margin", ">=", 0.0, "a candidate that is worse is not promoted"),
-    Bound(
-        "D",
-        "stress.perturbations.envelope.speed_limit_m_s",
-        "<=",
-        0.25,
-        "reduced speed with a person near the arm, ISO 10218-1",
-    ),
-    Bound("E", "gate_e.maximum_days", "<=", 30.0, "cell, people and policy change; review again"),
-    Bound("E", "upstream_passed", ">=", 1.0, "a card stands on gates A to D"),
-    Bound("E", "draft_complete", "<=", 0.0, "an empty field is an unanswered question"),
-    Bound("E", "signature_valid", ">=", 1.0, "an unsigned card allows nothing"),
-    Bound("E", "reviewer_independent", ">=", 1.0, "nobody reviews their own candidate"),
-    Bound("E", "owners_signed", ">=", 4.0, "each of the four answers for a part"),
-    Bound("E", "envelope_within_limits", "<=", 0.0, "what was not simulated is not allowed"),
-    Bound("E", "not_expired", ">=", 1.0, "a review ages"),
-)
 
 
 @dataclass(frozen=True)
@@ -195,8 +90,8 @@ def loosened(params: Mapping[str, Any], gate: Gate) -> list[tuple[Bound, Any]]:
     """Bounds that the settings of a gate go beyond, with what stands there instead.
 
     A criterion that is declared not applicable goes beyond its bound like any looser value, unless
-    a task may lack what it asks about. A setting that is missing does not: without a limit no gate
-    passes, and models ask for the rest.
+    by these settings a task may lack what it asks about. A setting that is missing does not:
+    without a limit no gate passes, and models ask for the rest.
     """
     found: list[tuple[Bound, Any]] = []
     for bound in BOUNDS:
@@ -306,10 +201,15 @@ def _values(params: Mapping[str, Any], bound: Bound) -> list[Any]:
     if not isinstance(section, Mapping):
         return []
     found: list[Any] = []
-    places = ["limits"] if bound.waivable else ["limits", "not_applicable"]
-    for owners in map(section.get, places):
+    lacked = bound.waivable is not None and bound.waivable(params)
+    places = [LIMITS] if lacked else [LIMITS, NOT_APPLICABLE]
+    for part in places:
+        owners = section.get(part)
         for entries in owners.values() if isinstance(owners, Mapping) else ():
             if isinstance(entries, Mapping) and bound.place in entries:
                 entry = entries[bound.place]
-                found.append(entry[0] if isinstance(entry, list) and entry else entry)
+                value = entry[0] if isinstance(entry, list) and entry else entry
+                # What follows is held to the bound where it is derived. A reason may be that word.
+                follows = bound.derives and part == LIMITS and value == DERIVED
+                found.append(bound.bound if follows else value)
     return found

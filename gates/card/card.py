@@ -18,7 +18,7 @@ from gates.card.people import PersonId
 from gates.card.windows import AbortWindow
 from gates.claim import CHECKPOINT_ONLY
 from gates.doubts import for_a_card
-from gates.protection import HARDEST_CONTACT_N
+from gates.floors import HARDEST_CONTACT_N
 from gates.report import Gate, GateReport, Point, StrictModel, parse_section
 from gates.settings import GateSettings
 from genpolicy.errors import RefusedError

@@ -15,7 +15,7 @@ from gates.card.card import TrialCard, missing_fields, says, validity
 from gates.card.judge import CardGateSettings
 from gates.card.people import ALLOW_LIST, REVIEWER, AllowList, dependence, load_allow_list
 from gates.card.signing import read_draft
-from gates.protection import HARDEST_CONTACT_N
+from gates.floors import HARDEST_CONTACT_N
 from gates.report import stage_of
 from gates.settings import read_params, read_settings
 from genpolicy.errors import ConfigError

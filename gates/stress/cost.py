@@ -13,6 +13,7 @@ from gates.bounds import draws_for_quantile, share_interval, upper_quantile
 from gates.criterion import Measured, criterion
 from gates.distilled import spent
 from gates.evidence import Evidence, MissingEvidenceError, counts, numbers
+from gates.floors import OLDEST_ACTION_S
 from gates.stress.rollouts import (
     DRILL,
     FAULTS,
@@ -64,7 +65,7 @@ def _faults(evidence: Evidence, candidate: str) -> str:
     question="How long until an answer arrives?",
     look_at="Timing: answers come when their chunk is over; read latency by term in gate B.",
     per_candidate=True,
-    derived=lambda settings: settings.usable_s,
+    derived=lambda settings: min(settings.usable_s, OLDEST_ACTION_S),
 )
 def latency_p95_s(evidence: Evidence, settings: StressSettings, candidate: str) -> Measured:
     """Upper bound of the end-to-end latency that 95 % of the warm invocations keep, s.

@@ -31,9 +31,10 @@ from dependencies import (
     table,
 )
 
+from gates.floors import BOUNDS
 from gates.preregistration import PREREGISTRATION, asked_by, plan_of
 from gates.proof import SPECS
-from gates.protection import BOUNDS, REHEARSAL
+from gates.protection import REHEARSAL
 from gates.report import GATES, stage_of
 from gates.settings import AND
 

@@ -26,10 +26,17 @@ def _entry(gate: str, name: str, change: Callable[[dict[str, Any], str], Any]) -
     return _params(edit)
 
 
-def _waived(params: dict[str, Any]) -> None:
-    owners = params["gate_c"]
-    del owners["limits"]["safety"]["checker_violations"]
-    owners.setdefault("not_applicable", {}).setdefault("safety", {})["checker_violations"] = "no"
+def _waived(gate: str, *names: str) -> Plant:
+    """Declare criteria not applicable, each by its owner, in place of their limits."""
+
+    def edit(params: dict[str, Any]) -> None:
+        for owner, entries in params[gate]["limits"].items():
+            for name in [name for name in names if name in entries]:
+                del entries[name]
+                waived = params[gate].setdefault("not_applicable", {})
+                waived.setdefault(owner, {})[name] = "no"
+
+    return _params(edit)
 
 
 def _loosened(gate: str, name: str, limit: float) -> Plant:
@@ -51,7 +58,8 @@ WRONGS = (
           Expected("B", ("nfe_mismatch",), refusal=r"nfe_mismatch|reason")),
     Wrong("the_checker_is_waived", "limits",
           "The independent checker is declared not applicable.",
-          "small", _params(_waived), Expected("C", refusal=r"checker_violations")),
+          "small", _waived("gate_c", "checker_violations"),
+          Expected("C", refusal=r"checker_violations")),
     Wrong("training_split_is_held_out", "limits",
           "Situations of the training split count as held out.",
           "small",
@@ -91,8 +99,26 @@ WRONGS = (
           Expected(E, CHAIN, refusal=r"alpha")),
     Wrong("limit_loosened_after_signing", "limits",
           "A limit of gate D was loosened after the card was signed.",
-          "signed", _loosened("gate_d", "nominal_success_lower", 0.1),
-          Expected(E, CHAIN, refusal=r"nominal_success_lower|gate_d")),
+          "signed", _loosened("gate_d", "nominal_success_lower", 0.3),
+          Expected(E, CHAIN, refusal=r"nominal_success_lower|gate_d"),
+          note="Was .1, which the code refuses by itself since."),
+    Wrong("every_recovery_may_fail", "limits",
+          "No recovery has to succeed, in a ladder that is no rehearsal.",
+          "signed", _loosened("gate_d", "recovery_success_lower", 0.0),
+          Expected(E, CHAIN, refusal=r"recovery_success_lower is .*expected >=")),
+    Wrong("recovery_and_latency_are_not_asked", "limits",
+          "Recovery and latency are declared not applicable, though recovery is drilled: so Gate D "
+          "once promoted with every recovery failed and answers after nine seconds.",
+          "signed", _waived("gate_d", "recovery_success_lower", "latency_p95_s"),
+          Expected(E, CHAIN, refusal=r"(recovery_success_lower|latency_p95_s) is .*expected")),
+    Wrong("latency_is_not_asked", "limits",
+          "Latency is declared not applicable, in a ladder that is no rehearsal.",
+          "signed", _waived("gate_d", "latency_p95_s"),
+          Expected(E, CHAIN, refusal=r"latency_p95_s is .*expected")),
+    Wrong("samples_between_the_modes_are_welcome", "limits",
+          "Nearly all samples may lie between the modes, in a ladder that is no rehearsal.",
+          "signed", _loosened("gate_b", "outside_modes_upper", 0.9),
+          Expected(E, CHAIN, refusal=r"outside_modes_upper is .*expected <=")),
     Wrong("becomes_a_rehearsal", "limits",
           "The ladder of a signed card is declared a rehearsal, with looser limits.",
           "signed",

@@ -56,8 +56,8 @@ def test_one_that_is_shown_to_be_better_is_promoted_alone(ladder):
     params = lambda p: [  # noqa: E731
         entries[name].__setitem__(0, limit)
         for entries in p["gate_d"]["limits"].values()
-        for name, limit in (("nominal_success_lower", 0.1), ("stress_success_lower", 0.1),
-                            ("recovery_success_lower", 0.1))
+        for name, limit in (("nominal_success_lower", 0.2), ("stress_success_lower", 0.1),
+                            ("recovery_success_lower", 0.2))
         if name in entries
     ]  # fmt: skip
     bad = lambda f: (f["method"] == "flow") & (f["start"] % 3 == 0)  # noqa: E731
