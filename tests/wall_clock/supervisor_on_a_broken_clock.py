@@ -15,11 +15,11 @@ class BrokenClock:
     def __call__(self) -> float:
         now_s = time.monotonic()
         self.begin_s = now_s if self.begin_s is None else self.begin_s
-        if now_s - self.begin_s < BREAKS_AFTER_S:
-            return now_s
-        broken = {"stands": self.begin_s + BREAKS_AFTER_S, "back": now_s - 3600.0,
-                  "ahead": now_s + 3600.0, "nan": float("nan")}  # fmt: skip
-        return broken[self.fault]
+        if now_s - self.begin_s >= BREAKS_AFTER_S:
+            broken = {"stands": self.begin_s + BREAKS_AFTER_S, "back": now_s - 3600.0,
+                      "ahead": now_s + 3600.0, "nan": float("nan")}  # fmt: skip
+            return broken[self.fault]
+        return now_s
 
 
 if __name__ == "__main__":
