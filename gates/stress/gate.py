@@ -3,6 +3,7 @@
 Each candidate meets every simple baseline on identical starts. The paired test and its margin
 are fixed before the run; the cost criteria must hold together with it. All conditions and
 training seeds of one start are averaged for the gain: the start is the unit of independence.
+Inside the envelope of the card there must be a gain at all.
 """
 
 import numpy as np
@@ -15,6 +16,7 @@ from gates.preregistration import PREREGISTRATION
 from gates.stress import cost, safety, trial
 from gates.stress.choice import choose
 from gates.stress.clocks import clocks_said
+from gates.stress.gains import by_condition, inside_envelope
 from gates.stress.pairs import paired_differences
 from gates.stress.rollouts import JOURNALS, StressSettings, rollouts
 from genpolicy.statistics.eprocess import paired_e_value
@@ -29,7 +31,12 @@ from genpolicy.statistics.eprocess import paired_e_value
     derived=lambda settings: 1.0 / settings.alpha,
 )
 def promotion_e_value(evidence: Evidence, settings: StressSettings, candidate: str) -> Measured:
-    """Lowest evidence, over the baselines, that the gain exceeds the margin (e-value)."""
+    """Lowest evidence, over the baselines, that the gain exceeds the margin (e-value).
+
+    It averages conditions, and a card allows one of them: without a gain that is shown inside the
+    envelope there is nothing to promote, whatever is gained elsewhere. A loss that is shown there
+    is what is measured; where neither is shown, more starts decide.
+    """
     found = []
     for baseline in settings.baselines:
         differences = paired_differences(evidence, settings, candidate, baseline)
@@ -38,8 +45,18 @@ def promotion_e_value(evidence: Evidence, settings: StressSettings, candidate: s
     value, baseline, gain = min(found)
     text = (
         f"lowest over baselines, against {baseline}: mean gain {gain:.4g} over "
-        f"{settings.planned_starts} starts, margin {settings.margin:g}"
+        f"{settings.planned_starts} starts, margin {settings.margin:g}; "
+        f"{by_condition(evidence, settings, candidate)}"
     )
+    inside = inside_envelope(evidence, settings, candidate)
+    text = f"{text}; {inside or 'no condition inside the envelope of a card was planned'}"
+    if inside and value >= 1.0 / settings.alpha and not inside.shown:
+        if not inside.worse:
+            raise MissingEvidenceError(
+                f"a gain is shown over all conditions (e-value {value:.4g}) and none inside the "
+                f"envelope (e-value {inside.e_value:.4g}), which is all that a card allows: {text}"
+            )
+        value = inside.e_value
     return Measured(value, caveat=text, counted=f"{settings.planned_starts} starts")
 
 
@@ -78,7 +95,8 @@ GATE = GateSpec(
     caveats=(
         CHECKPOINT_ONLY,
         "Simulation: contact, sensing and delays are models; nothing here was seen on hardware.",
-        "Starts are the unit of independence; conditions and seeds of one start are averaged.",
+        "Starts are the unit of independence; conditions and seeds of one start are averaged, and "
+        "a gain must be shown inside the envelope too. In another condition it may be lost.",
         "Every cost and every bound of success holds in each planned condition, not on average.",
         "Only methods matched in data, encoder, horizons, resets and deadlines are compared, but "
         "for those that are named as unmatched.",

@@ -25,6 +25,8 @@ SUCCESS = "success"
 NOMINAL = "nominal"
 DRILL = "recovery_drill"
 """Condition in which recovery is called for on every start, so that it is exercised."""
+ENVELOPE = "envelope"
+"""The one condition inside the workspace and the speed of the trial card, which allows no other."""
 
 Interval = tuple[float, float, float]
 """Share or quantile, lower and upper end."""

@@ -9,6 +9,10 @@ from benchmarks.ladder_truth.workspace import edit_params, set_limit
 
 E = "E"
 CHAIN = ("upstream_passed", "signature_valid")
+# Any change voids a signed chain; these must be stopped for what they are.
+RECOVERY = r"recovery_success_lower is .*expected >="
+LATENCY = r"latency_p95_s is .*expected <="
+OUTSIDE = r"outside_modes_upper is .*expected <="
 
 
 def _params(change: Callable[[dict[str, Any]], Any]) -> Plant:
@@ -105,20 +109,20 @@ WRONGS = (
     Wrong("every_recovery_may_fail", "limits",
           "No recovery has to succeed, in a ladder that is no rehearsal.",
           "signed", _loosened("gate_d", "recovery_success_lower", 0.0),
-          Expected(E, CHAIN, refusal=r"recovery_success_lower is .*expected >=")),
+          Expected(E, CHAIN, refusal=RECOVERY, said=RECOVERY)),
     Wrong("recovery_and_latency_are_not_asked", "limits",
           "Recovery and latency are declared not applicable, though recovery is drilled: so Gate D "
           "once promoted with every recovery failed and answers after nine seconds.",
           "signed", _waived("gate_d", "recovery_success_lower", "latency_p95_s"),
-          Expected(E, CHAIN, refusal=r"(recovery_success_lower|latency_p95_s) is .*expected")),
+          Expected(E, CHAIN, refusal=RECOVERY, said=RECOVERY)),
     Wrong("latency_is_not_asked", "limits",
           "Latency is declared not applicable, in a ladder that is no rehearsal.",
           "signed", _waived("gate_d", "latency_p95_s"),
-          Expected(E, CHAIN, refusal=r"latency_p95_s is .*expected")),
+          Expected(E, CHAIN, refusal=LATENCY, said=LATENCY)),
     Wrong("samples_between_the_modes_are_welcome", "limits",
           "Nearly all samples may lie between the modes, in a ladder that is no rehearsal.",
           "signed", _loosened("gate_b", "outside_modes_upper", 0.9),
-          Expected(E, CHAIN, refusal=r"outside_modes_upper is .*expected <=")),
+          Expected(E, CHAIN, refusal=OUTSIDE, said=OUTSIDE)),
     Wrong("becomes_a_rehearsal", "limits",
           "The ladder of a signed card is declared a rehearsal, with looser limits.",
           "signed",

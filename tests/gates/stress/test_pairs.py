@@ -6,7 +6,7 @@ import pytest
 from asked import settings_of
 
 from gates.evidence import Evidence, MissingEvidenceError
-from gates.stress.pairs import paired_differences, success_by_start
+from gates.stress.pairs import paired_by_condition, paired_differences, success_by_start
 
 TABLE = "stress/rollouts.parquet"
 
@@ -47,3 +47,26 @@ def test_starts_that_are_not_shared_are_missing_evidence(ladder):
 
     with pytest.raises(MissingEvidenceError, match="only 60 starts are shared with bc"):
         paired_differences(*edit(ladder, change), "flow", "bc")
+
+
+def test_pairs_of_the_conditions_average_to_those_of_the_starts(ladder):
+    def change(frame):
+        lost = (frame["method"] == "flow") & (frame["perturbation"] == "nominal")
+        return frame.assign(success=frame["success"] & ~(lost & (frame["start"] % 3 == 0)))
+
+    reader, settings = edit(ladder, change)
+    found = paired_by_condition(reader, settings, "flow", "bc")
+    assert list(found) == list(evidence.CONDITIONS)
+    assert {pairs.shape for pairs in found.values()} == {(evidence.STARTS,)}
+    assert found["nominal"].mean() < found["envelope"].mean()
+    mean = np.mean(list(found.values()), axis=0)
+    np.testing.assert_allclose(mean, paired_differences(reader, settings, "flow", "bc"))
+
+
+def test_starts_that_are_not_shared_in_one_condition_are_missing_there(ladder):
+    def change(frame):
+        other = (frame["method"] == "bc") & (frame["perturbation"] == "envelope")
+        return frame.assign(start=frame["start"] + 20 * other)
+
+    with pytest.raises(MissingEvidenceError, match="only 60 starts are shared with bc in envelope"):
+        paired_by_condition(*edit(ladder, change), "flow", "bc")
