@@ -1,8 +1,8 @@
 """Convergence: is the training of the candidates, and of those they are compared with, done?
 
-Equal updates are one rule of matching: every method takes the same number on the same windows.
-Equal convergence is the other: the last quarter of the training changes nobody more than the limit.
-A method that is not done is judged by what it is not, be it the one that shall win or lose.
+Methods are compared at equal updates: each takes the same number on the same windows. Convergence
+is a condition on that: the last quarter of the training changes nobody more than the limit. A
+method that is not done is judged by what it is not, be it the one that shall win or lose.
 
 A candidate is asked by what is judged of it, valid samples: the loss of a density falls by a tenth
 in every last quarter, however long the training, when its samples have long ceased to change. Those
