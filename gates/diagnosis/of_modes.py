@@ -1,0 +1,185 @@
+"""Looks at modes: what tells them, what lies between, what projection and checks do to them."""
+
+import math
+
+import pandas as pd
+
+from gates.diagnosis.looking import Interval, Look, p95_of, share_of
+from gates.evidence import MissingEvidenceError, counts, flags, numbers
+from gates.feasibility.candidates import admissible
+from gates.feasibility.settings import CANDIDATES, HELD_OUT, NO_MODE
+from gates.need.settings import MEASURED
+from gates.reproducibility.settings import COVERAGE, RELOAD
+from gates.stress.rollouts import NOMINAL, ROLLOUTS, rollouts
+from genpolicy.evidence.documents.reproducibility import CANDIDATES as IDENTITIES
+from genpolicy.evidence.rows.need import ModeRow
+from genpolicy.evidence.rows.reproducibility import CoverageRow
+from genpolicy.evidence.rows.shadow import CandidateRow
+from genpolicy.evidence.rows.stress import RolloutRow
+
+SELECTOR_UNSEEN = (
+    "whether the selector knows more than its candidates stands in no table: the order of imports "
+    "keeps the future and the evaluator from the selectors of this code, and nothing here looks "
+    "into one that was brought"
+)
+
+
+def modes_of_condition(look: Look) -> None:
+    """Do the modes answer to the task, or to something that the policy is not told?"""
+    look.shown("B.mode_coverage_lower")
+    look.criteria(
+        "A.strata_effect", "A.told_share", "A.phase_collapse_share", "A.latent_dependence_p"
+    )
+    look.ask(_success_by_mode)
+
+
+def feasibility_and_selector(look: Look) -> None:
+    """Are the samples infeasible, or chosen badly?"""
+    look.criteria(
+        "C.admissible_share", "C.mode_admissible_gap", "D.rejection_share_upper",
+        "C.checker_violations",
+    )  # fmt: skip
+    look.ask(_reasons)
+    look.ask(_selector)
+    look.unknown.append(SELECTOR_UNSEEN)
+
+
+def alignment_and_hidden_state(look: Look) -> None:
+    """Are streams shifted against each other, or is a variable hidden?"""
+    look.shown("B.outside_modes_upper")
+    look.criteria(
+        "A.clock_residual_s", "A.lag_spread_steps", "A.calibration_residual_m", "A.data_defects",
+        "A.strata_effect", "A.told_share", "A.phase_collapse_share",
+    )  # fmt: skip
+
+
+def simpler_policies(look: Look) -> None:
+    """Do chunked BC or ACT act between the modes as well, or not at all?"""
+    look.criteria(
+        "A.chunking_valid_share", "A.remedy_valid_share", "A.latent_dependence_p",
+        "A.baseline_mode_coverage",
+    )  # fmt: skip
+    look.ask(_between_of_baselines)
+    look.ask(_between_by_nfe)
+
+
+def raw_samples(look: Look) -> None:
+    """Where do the raw samples lie, before anything repairs them?"""
+    look.criteria("C.projection_p95_m", "B.outside_modes_upper", "B.mode_coverage_lower")
+    look.ask(_reasons)
+
+
+def feasible_conditioning(look: Look) -> None:
+    """Is one mode outside what the robot can do, or is the representation wrong?"""
+    look.criteria("C.admissible_share", "C.mode_admissible_gap", "A.mode_feasible_share")
+    look.ask(_projection_by_mode)
+
+
+def _success_by_mode(look: Look) -> None:
+    """Undisturbed, is there a mode that surely stays below the limit while another does not?"""
+    look.rows("D", ROLLOUTS, RolloutRow)
+    settings = look.reports.settings("D")
+    rows = rollouts(look.reports.evidence, settings, look.candidate)
+    rows = rows.assign(won=flags(rows, "success"))[rows["perturbation"] == NOMINAL]
+    found: dict[str, Interval] = {}
+    for mode, part in _by_mode(rows):
+        share, ends = share_of(part["won"], part["start"], confidence=settings.confidence)
+        found[mode] = ends
+        look.number(
+            f"success of undisturbed rollouts in mode {mode}",
+            f"{share:.3g} ({ends[0]:.3g} to {ends[1]:.3g})",
+            f"{part['start'].nunique()} starts",
+            f"{ROLLOUTS}: success, by mode",
+        )
+    if not found:
+        raise MissingEvidenceError(f"no undisturbed rollout of {look.candidate} is told by a mode")
+    least = settings.limits.number("nominal_success_lower", otherwise=0.0)
+    for less in (mode for mode, ends in found.items() if ends[1] < least):
+        for more in (mode for mode, ends in found.items() if ends[0] > found[less][1]):
+            look.causes.append(
+                f"mode {less} fails where mode {more} succeeds: {_ends(found[less])} against "
+                f"{_ends(found[more])}, required {least:g}."
+            )
+
+
+def _reasons(look: Look) -> None:
+    rows = look.rows("C", CANDIDATES, CandidateRow)
+    rows = rows[rows["fixture"] == HELD_OUT]
+    bad = rows[admissible(rows) == 0.0]
+    where = f"{CANDIDATES}: outcome, first_reason, {HELD_OUT}"
+    seen = f"{rows['observation'].nunique()} observations"
+    look.number("held-out candidates refused", f"{len(bad)} of {len(rows)}", seen, where)
+    for reason, count in bad["first_reason"].value_counts().head(3).items():
+        look.number(f"first refused by {reason}", f"{count} of {len(bad)}", seen, where)
+
+
+def _selector(look: Look) -> None:
+    look.rows("B", f"{RELOAD}/modes.parquet", ModeRow)
+    entry = look.reports.evidence.document(RELOAD, IDENTITIES).get(look.candidate)
+    if entry is None:
+        raise MissingEvidenceError(f"{RELOAD}/{IDENTITIES.file} has no entry of {look.candidate}")
+    where = f"{RELOAD}/{IDENTITIES.file}: card.selector"
+    said = f"{entry.card.selector}, of {entry.card.candidates} candidates"
+    look.number("who chooses among the samples", said, "the identity card", where)
+
+
+def _between_of_baselines(look: Look) -> None:
+    path = f"{MEASURED}/modes.parquet"
+    frame = look.rows("A", path, ModeRow, all_methods=True)
+    for method, part in frame.groupby("method", sort=True):
+        between, drawn = counts(part, "between_modes").sum(), numbers(part, "samples").sum()
+        look.number(
+            f"samples of {method} between two modes", f"{between:g} of {drawn:g}",
+            f"{part['episode_uuid'].nunique()} episodes", f"{path}: between_modes",
+        )  # fmt: skip
+
+
+def _between_by_nfe(look: Look) -> None:
+    rows = look.rows("B", COVERAGE, CoverageRow)
+    shares = [
+        f"{share:.3g} at {nfe}"
+        for nfe, share in rows.groupby("nfe", sort=True)["between_share"].mean().items()
+    ]
+    look.number(
+        "share between two modes, by network evaluations", ", ".join(shares),
+        f"{int(numbers(rows, 'situations').max())} situations", f"{COVERAGE}: between_share",
+    )  # fmt: skip
+
+
+def _projection_by_mode(look: Look) -> None:
+    settings = look.reports.settings("C")
+    rows = look.rows("C", CANDIDATES, CandidateRow)
+    rows = rows[(rows["fixture"] == HELD_OUT) & (admissible(rows) == 1.0)]
+    found: dict[str, Interval] = {}
+    for mode, part in _by_mode(rows):
+        moved = part["position_change_m"].astype(float)
+        episodes = part["situation"].astype(str).str.rpartition(":")[0]
+        rng = settings.draws("diagnosis", "projection", look.candidate, mode)
+        point, ends = p95_of(moved, episodes, confidence=settings.confidence, rng=rng)
+        found[mode] = ends
+        look.number(
+            f"p95 of the move by projection in mode {mode}",
+            f"{_mm(point)} ({_mm(ends[0])} to {_mm(ends[1])})",
+            f"{episodes.nunique()} episodes, {len(part)} admitted candidates",
+            f"{CANDIDATES}: position_change_m, by mode",
+        )
+    most = settings.limits.number("projection_p95_m", otherwise=math.inf)
+    for more in (mode for mode, ends in found.items() if ends[0] > most):
+        for less in (mode for mode, ends in found.items() if ends[1] <= most):
+            look.causes.append(
+                f"projection moves mode {more} beyond the limit and mode {less} not: "
+                f"{_ends(found[more])} against {_ends(found[less])} m, at most {most:g}."
+            )
+
+
+def _by_mode(rows: pd.DataFrame) -> list[tuple[str, pd.DataFrame]]:
+    told = rows[~rows["mode"].isin(NO_MODE)]
+    return [(str(mode), part) for mode, part in told.groupby("mode", sort=True)]
+
+
+def _ends(ends: Interval) -> str:
+    return f"{ends[0]:.3g} to {ends[1]:.3g}"
+
+
+def _mm(metres: float) -> str:
+    return f"{1e3 * metres:.3g} mm"

@@ -1,0 +1,130 @@
+"""What a diagnosis stands on: reports that were proved just now, and the evidence they bind."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from gates.evidence import Evidence
+from gates.proof import SPECS, Rung, prove_all
+from gates.report import GATES, Answer, Gate, GateReport, read_report, stage_of
+from gates.settings import read_limits, read_params, read_settings
+from genpolicy.errors import BadInputError
+
+OF_EVIDENCE = GATES[:-1]
+"""Gates of measured evidence."""
+UNPROVED = ("REFUSED", "NOT JUDGED")
+EVERYBODY = ""
+"""In place of a candidate, where no gate has judged one yet."""
+
+
+@dataclass(frozen=True)
+class Reports:
+    """The judged reports of one repository.
+
+    Attributes:
+        root: Repository root.
+        judged: Reports that are what the files say, by gate.
+        missing: Why the others cannot be used, and what to do, by gate.
+        untrue: Exit code of a report that lies here and is not what the files say; 0 without one.
+        evidence: What lies below the root.
+    """
+
+    root: Path
+    judged: Mapping[Gate, GateReport]
+    missing: Mapping[Gate, str]
+    untrue: int
+    evidence: Evidence
+
+    @property
+    def candidates(self) -> tuple[str, ...]:
+        """Everybody whom a gate has judged; `EVERYBODY` alone where none has."""
+        reports = (self.judged[gate] for gate in OF_EVIDENCE if gate in self.judged)
+        return tuple(dict.fromkeys(name for one in reports for name in one.candidates)) or (
+            EVERYBODY,
+        )
+
+    def answer(self, name: str, candidate: str) -> Answer | str:
+        """A criterion as it was answered, of a candidate or of the whole gate.
+
+        Args:
+            name: Gate and criterion: `D.hold_share_upper`.
+            candidate: Whose; what is asked of the whole gate is the same for all.
+
+        Returns:
+            The answer; where there is none, why.
+        """
+        gate, wanted = gate_and_id(name)
+        report = self.judged.get(gate)
+        if report is None:
+            return self.missing[gate]
+        found = [c for c in report.criteria if c.id == wanted]
+        own = next((c for c in found if c.candidate in (None, candidate)), None)
+        if own is not None:
+            return own
+        if found and candidate == EVERYBODY:
+            return f"gate {gate} asks {wanted} of each candidate"
+        if candidate and candidate not in report.candidates and report.candidates:
+            return f"{candidate} does not stand at gate {gate}: it did not pass below"
+        return f"gate {gate} was not asked for {wanted}: it is waived, or does not apply here"
+
+    def settings(self, gate: Gate) -> Any:
+        """Settings of a gate, with the limits that it judged by."""
+        params, spec = read_params(self.root), SPECS[gate]
+        settings = read_settings(params, stage_of(gate), spec.settings)
+        return settings.under(read_limits(params, gate, spec.criteria))
+
+
+def gate_and_id(name: str) -> tuple[Gate, str]:
+    """Gate and criterion of a name such as `D.hold_share_upper`.
+
+    Raises:
+        KeyError: No gate of that letter.
+    """
+    letter, _, wanted = name.partition(".")
+    return {str(gate): gate for gate in GATES}[letter], wanted
+
+
+def read_reports(root: Path) -> Reports:
+    """Prove every report that lies here.
+
+    Raises:
+        ConfigError: `params.yaml` is missing or malformed.
+    """
+    rungs = prove_all(root)
+    judged = {r.gate: read_report(root, r.gate)[0] for r in rungs if r.verdict not in UNPROVED}
+    missing = {r.gate: _why(r, judged) for r in rungs if r.verdict in UNPROVED}
+    refused = {r.exit_code for r in rungs if r.verdict == "REFUSED"}
+    return Reports(root, judged, missing, max(refused, default=0), Evidence(root))
+
+
+def require_candidates(reports: Reports, candidate: str) -> tuple[str, ...]:
+    """Whom to ask about: one by name, or everybody.
+
+    Raises:
+        BadInputError: No gate has judged anybody of that name.
+    """
+    known = reports.candidates
+    if not candidate:
+        return known
+    if candidate not in known:
+        raise BadInputError(
+            where="--candidate",
+            found=repr(candidate),
+            expected=", ".join(filter(None, known)) or "nobody: no gate has judged a candidate yet",
+            action="Name one of them, or leave it out.",
+        )
+    return (candidate,)
+
+
+def _why(rung: Rung, judged: Mapping[Gate, GateReport]) -> str:
+    gate = rung.gate
+    if rung.verdict == "REFUSED":
+        return f"gate {gate} cannot be used: {rung.note}"
+    below = GATES[max(GATES.index(gate) - 1, 0)]
+    if below in judged and judged[below].verdict != "PASS":
+        said = judged[below].verdict
+        return (
+            f"gate {gate} is not judged: gate {below} says {said}, and nothing behind it is built"
+        )
+    return f"gate {gate} is not judged here: run `dvc repro {stage_of(gate)}`, or `make ladder`"

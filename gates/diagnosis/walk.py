@@ -1,0 +1,119 @@
+"""The walk: place after place in the chapter's order, as far as the first that is not in order."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+from gates.criterion import Criterion
+from gates.diagnosis.places import PLACES, place_of
+from gates.diagnosis.reports import OF_EVIDENCE, Reports
+from gates.proof import SPECS
+from gates.report import Answer, Gate, limit_text, measured_text
+
+State = Literal["in order", "in order so far", "not asked", "not decided", "RED"]
+STOPS: tuple[State, ...] = ("RED", "not decided")
+
+
+@dataclass(frozen=True)
+class Stop:
+    """One place of the order, as it was found.
+
+    Attributes:
+        place: Its name.
+        state: `RED` where a criterion is broken, `not decided` where one is open; `in order so far`
+            where the rest waits for a gate that is not judged, `not asked` where all of it does.
+        asked: Criteria that were answered.
+        unmet: Those that do not hold, as sentences: what was measured, the limit, where to look.
+        waits_for: Why some criteria have no answer.
+    """
+
+    place: str
+    state: State
+    asked: int
+    unmet: tuple[str, ...] = ()
+    waits_for: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Walk:
+    """The order as it was gone for one candidate.
+
+    Attributes:
+        candidate: Whose; empty where no gate has judged one.
+        stops: Places that were looked at.
+        behind: Places that were not, because an earlier one is not in order.
+    """
+
+    candidate: str
+    stops: tuple[Stop, ...]
+    behind: tuple[str, ...] = field(default=())
+
+    @property
+    def ended_at(self) -> Stop | None:
+        """The first place that is not in order; None where none is."""
+        last = self.stops[-1]
+        return last if last.state in STOPS else None
+
+    @property
+    def whole(self) -> bool:
+        """Whether every place was asked all that it can be asked."""
+        return all(stop.state == "in order" for stop in self.stops)
+
+
+def walk(reports: Reports, candidate: str) -> Walk:
+    """Go through the order for one candidate, and stop where something is not in order."""
+    stops: list[Stop] = []
+    for number, place in enumerate(PLACES, start=1):
+        stops.append(_look(reports, candidate, place))
+        if stops[-1].state in STOPS:
+            return Walk(candidate, tuple(stops), PLACES[number:])
+    return Walk(candidate, tuple(stops))
+
+
+def criteria_at(place: str) -> list[tuple[Gate, Criterion]]:
+    """Criteria of a place, gate after gate, each gate's in its own order."""
+    return [
+        (gate, item)
+        for gate in OF_EVIDENCE
+        for item in SPECS[gate].criteria
+        if place_of(item) == place
+    ]
+
+
+def _look(reports: Reports, candidate: str, place: str) -> Stop:
+    answers: list[tuple[Gate, Criterion, Answer]] = []
+    waits: dict[str, None] = {}
+    for gate, item in criteria_at(place):
+        found = reports.answer(f"{gate}.{item.id}", candidate)
+        if isinstance(found, Answer):
+            answers.append((gate, item, found))
+        elif _is_missing(reports, gate, item, candidate):
+            waits[found] = None
+    red = [one for one in answers if one[2].verdict == "FAIL"]
+    unmet = red or [one for one in answers if one[2].verdict != "PASS"]
+    state = _state(bool(red), bool(unmet), len(answers), bool(waits))
+    return Stop(place, state, len(answers), _sentences(unmet), tuple(waits))
+
+
+def _is_missing(reports: Reports, gate: Gate, item: Criterion, candidate: str) -> bool:
+    """Whether an answer is still to come; one that was waived is not."""
+    report = reports.judged.get(gate)
+    return report is None or (item.per_candidate and candidate not in report.candidates)
+
+
+def _state(red: bool, unmet: bool, asked: int, waits: bool) -> State:
+    if red:
+        return "RED"
+    if unmet:
+        return "not decided"
+    if waits or not asked:
+        return "in order so far" if asked else "not asked"
+    return "in order"
+
+
+def _sentences(unmet: Sequence[tuple[Gate, Criterion, Answer]]) -> tuple[str, ...]:
+    return tuple(
+        f"{answer.id} (gate {gate}): {measured_text(answer)}, required {limit_text(answer)}. "
+        f"{item.look_at}"
+        for gate, item, answer in unmet
+    )

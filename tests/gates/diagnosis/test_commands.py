@@ -1,0 +1,128 @@
+"""`genpolicy diagnose`: what it prints and by which code it ends."""
+
+import json
+
+import pytest
+
+from gates.diagnosis import commands
+from gates.diagnosis.commands import diagnose
+from gates.diagnosis.symptoms import SYMPTOMS
+from genpolicy.cli.shell import run_program
+
+
+@pytest.fixture
+def stands(monkeypatch):
+    """Reports in place of those that lie below the root, so that nothing is proved again."""
+
+    def on(reports):
+        monkeypatch.setattr("gates.diagnosis.reports.read_reports", lambda root: reports)
+
+    return on
+
+
+def run(capsys, *words):
+    code = run_program(diagnose, "genpolicy diagnose", words)
+    printed = capsys.readouterr()
+    return code, printed.out, printed.err
+
+
+def test_reports_of_a_tree_are_proved_before_anything_is_said(ladder, capsys):
+    code, out, _ = run(capsys, "--root", str(ladder), "--candidate", "flow")
+    assert code == 0
+    assert out.startswith("Proved now: A PASS, B PASS, C PASS, D PASS.\n")
+    assert "Nothing is red: every place was asked, and holds." in out
+    assert all(symptom.name in out for symptom in SYMPTOMS)
+
+
+def test_a_report_that_is_untrue_is_refused_whatever_the_others_say(ladder, capsys):
+    (ladder / "artifacts/shadow/stub.parquet").write_bytes(b"other")
+    code, out, _ = run(capsys, "--root", str(ladder))
+    assert code == 3 and "Gate C cannot be used: " in out
+
+
+def test_where_nothing_is_judged_it_is_bad_input_and_says_what_builds_it(repo, capsys):
+    (repo / "reviewers.yaml").write_text("people: []\n")
+    for words in ((), ("--checkpoints",), ("--symptom", "boundary-jump")):
+        code, out, _ = run(capsys, "--root", str(repo), *words)
+        assert code == 2 and "Proved now: no report." in out
+        assert "`dvc repro gate_a`, or `make ladder`" in out
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [(("--symptom", "jump"), "boundary-jump"), (("--candidate", "floww"), "diffusion, flow")],
+)
+def test_a_wrong_name_is_told_with_the_right_ones(stands, honest, capsys, words, said):
+    stands(honest)
+    code, out, err = run(capsys, *words)
+    assert code == 2 and out == "" and said in err
+
+
+@pytest.mark.parametrize("symptom", [symptom.name for symptom in SYMPTOMS])
+def test_a_symptom_of_which_nothing_speaks_ends_with_0(stands, honest, capsys, symptom):
+    stands(honest)
+    code, out, _ = run(capsys, "--symptom", symptom, "--candidate", "flow")
+    assert code == 0
+    assert out.count("Nothing speaks in what could be asked.") == 2
+    assert "Do not conclude: " in out
+    assert max(map(len, out.splitlines())) <= 100
+
+
+def test_what_speaks_ends_with_3(stands, honest, capsys):
+    from test_walk import turned
+
+    stands(turned(honest, "D.hold_share_upper", "FAIL", "flow"))
+    code, out, _ = run(capsys, "--candidate", "flow")
+    assert code == 3 and "6  timing and queue    RED" in out
+    behind = "What lies behind it was not asked: feasibility, contact controller, evaluator."
+    assert behind in " ".join(out.split())
+    code, out, _ = run(capsys, "--symptom", "boundary-jump", "--candidate", "flow")
+    assert code == 3 and "SPEAKS: hold_share_upper: 0.05, required <= 0.25." in out
+    assert "Before all: timing and queue (place 6 of 9) is RED." in out
+    code, out, _ = run(capsys, "--candidate", "diffusion")
+    assert code == 0
+    assert run(capsys, "--checkpoints")[0] == 2  # the other candidate holds, and the card waits
+
+
+def test_everybody_and_every_symptom_can_be_asked_at_once(stands, honest, capsys):
+    stands(honest)
+    code, out, _ = run(capsys, "--symptom", "all")
+    assert code == 3 and "SPEAKS: the wall clock differs" in out  # of diffusion, as it is planted
+    for symptom in SYMPTOMS:
+        assert f"{symptom.row} · flow" in out and f"{symptom.row} · diffusion" in out
+
+
+def test_a_walk_that_cannot_be_ended_is_no_pass(stands, honest, capsys):
+    from test_walk import without
+
+    stands(without(honest, "D"))
+    code, out, _ = run(capsys)
+    assert code == 2 and "Nothing is red as far as was asked; the rest waits: no D." in out
+    stands(without(honest, "B", "C", "D"))
+    assert run(capsys)[1].count("every candidate, in the chapter's order") == 1
+
+
+def test_checkpoints_are_a_line_each_with_their_owner(stands, honest, capsys):
+    stands(honest)
+    code, out, _ = run(capsys, "--checkpoints")
+    assert code == 2  # the card is drafted and not judged
+    assert "timing       controller  PASS           p95 deadline/freshness violated" in out
+    assert "safety       safety      NOT JUDGED     learned score owns safety" in out
+
+
+def test_json_says_the_same(stands, honest, capsys):
+    stands(honest)
+    walks = json.loads(run(capsys, "--json")[1])
+    assert [walk["candidate"] for walk in walks] == ["diffusion", "flow"]
+    assert {stop["state"] for walk in walks for stop in walk["stops"]} == {"in order"}
+    (found,) = json.loads(
+        run(capsys, "--symptom", "boundary-jump", "--candidate", "flow", "--json")[1]
+    )
+    assert found["do_not_conclude"] == "only architecture is wrong"
+    assert found["first"]["numbers"][0]["where"].startswith("reports/gate_c.json")
+    rows = json.loads(run(capsys, "--checkpoints", "--json")[1])
+    assert len(rows) == 9 and rows[0]["owner"] == "perception"
+
+
+def test_help_loads_nothing():
+    assert "gates.diagnosis.reports" not in vars(commands)

@@ -1,0 +1,133 @@
+"""Every symptom of the chapter: a planted cause is named, and where none is nothing is said."""
+
+import re
+from pathlib import Path
+
+import pytest
+from causes_planted import CAUSES, FLOW
+
+from gates.diagnosis.reports import EVERYBODY, Reports
+from gates.diagnosis.symptoms import SYMPTOMS, answered, symptoms_of
+from genpolicy.errors import BadInputError
+
+CHAPTER = (
+    ("samples diverse but unsuccessful", "whether modes map to task condition",
+     "feasibility and selector leakage", "diversity proves multimodal understanding"),
+    ("action lies between modes", "alignment and hidden state", "chunked BC and ACT baseline",
+     "diffusion needs more steps"),
+    ("jump at chunk boundary", "H_e, replanning, blending", "normalization and queue age",
+     "only architecture is wrong"),
+    ("flow wins a microbenchmark", "preprocessing, projection, queue accounting",
+     "rejection/resample and p95", "end-to-end is faster"),
+    ("oscillation at contact", "stale action and phase transition",
+     "gains, action rate, projection", "generator cannot learn contact"),
+    ("simulation passes, hardware fails", "camera, calibration, latency, contact gap",
+     "action age and controller mode", "only more data are needed"),
+    ("seed variance is large", "sampler seeds and reset bins", "training seeds and mode coverage",
+     "one mean is stable evidence"),
+    ("projection is frequent", "raw sample distribution",
+     "representation and feasible conditioning", "supervisor is too conservative"),
+    ("OOD does not stop", "threshold and probe coverage", "watchdog/fallback wiring",
+     "uncertainty owns safety"),
+)  # fmt: skip
+"""The table of chapter 6, section 7, by hand."""
+
+
+def test_the_rows_are_the_chapters_in_its_order():
+    rows = tuple((s.row, s.first.at, s.then.at, s.do_not_conclude) for s in SYMPTOMS)
+    assert rows == CHAPTER
+
+
+@pytest.mark.parametrize("symptom", SYMPTOMS, ids=lambda one: one.name)
+def test_in_an_honest_tree_nothing_speaks_and_numbers_are_shown(honest, symptom):
+    found = answered(symptom, honest, FLOW)
+    assert found.first.causes == found.then.causes == ()
+    assert not found.found and found.answerable and found.before_all == ""
+    for asked in (found.first, found.then):
+        assert asked.query.endswith("?")
+        assert asked.numbers, asked.at
+        for number in asked.numbers:
+            assert number.value and re.match(r"reports/|artifacts/|params\.yaml", number.where)
+            assert (honest.root / number.where.partition(":")[0].split(",")[0]).is_file()
+    assert "holds" in found.look_next
+
+
+@pytest.mark.parametrize(
+    ("name", "inspection", "edit", "gates", "said"),
+    CAUSES,
+    ids=[f"{name}, {inspection}: {said[:24]}" for name, inspection, _, _, said in CAUSES],
+)
+def test_a_planted_cause_is_named_where_the_row_looks_for_it(
+    planted, name, inspection, edit, gates, said
+):
+    (symptom,) = symptoms_of(name)
+    found = answered(symptom, planted(edit, gates), FLOW)
+    assert any(said in cause for cause in getattr(found, inspection).causes)
+    assert found.found
+    expected = "first" if found.first.causes else "next"
+    assert found.look_next.startswith(f"at what speaks {expected}")
+
+
+def test_every_inspection_has_a_planted_cause():
+    named = {(name, inspection) for name, inspection, *_ in CAUSES}
+    assert named == {(s.name, inspection) for s in SYMPTOMS for inspection in ("first", "then")}
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("diverse-unsuccessful", "whether the selector knows more"),
+        ("contact-oscillation", "how force and position swing in contact"),
+        ("contact-oscillation", "gains of the controller"),
+        ("simulation-only", "no rollout on hardware is recorded"),
+        ("simulation-only", "declared and not measured"),
+        ("seed-variance", "noise alone"),
+        ("seed-variance", "one training seed"),
+        ("ood-does-not-stop", "no stage probes observations out of distribution"),
+    ],
+)
+def test_what_the_ladder_does_not_record_is_said_to_be_unknown(honest, name, said):
+    (symptom,) = symptoms_of(name)
+    found = answered(symptom, honest, FLOW)
+    assert any(said in text for text in (*found.first.unknown, *found.then.unknown))
+    assert found.look_next.startswith("for what is not recorded")
+
+
+def test_a_second_training_is_no_longer_unknown(planted):
+    (edit,) = [edit for *_, edit, _, said in CAUSES if said.startswith("trainings differ")]
+    (symptom,) = symptoms_of("seed-variance")
+    found = answered(symptom, planted(edit, "D"), FLOW)
+    assert not any("one training seed" in text for text in found.then.unknown)
+
+
+def test_what_comes_first_in_the_order_is_said_before_all(planted):
+    edit, gates = next((e, g) for *_, e, g, said in CAUSES if said.startswith("lag_spread"))
+    (symptom,) = symptoms_of("boundary-jump")
+    found = answered(symptom, planted(edit, gates), FLOW)
+    assert found.before_all == "data semantics (place 1 of 9) is RED" and not found.found
+
+
+@pytest.mark.parametrize("symptom", SYMPTOMS, ids=lambda one: one.name)
+def test_without_any_report_nothing_is_answered_and_what_builds_it_is_said(honest, symptom):
+    why = {gate: f"gate {gate}: make ladder" for gate in "ABCDE"}
+    bare = Reports(Path("nowhere"), {}, why, 0, honest.evidence)
+    found = answered(symptom, bare, EVERYBODY)
+    assert not found.answerable and not found.found
+    assert any("make ladder" in text for text in (*found.first.unknown, *found.then.unknown))
+
+
+def test_a_table_that_is_gone_is_unknown_and_stops_no_other_number(planted):
+    def gone(root):
+        (root / "artifacts/stress/splices.parquet").unlink()
+
+    (symptom,) = symptoms_of("boundary-jump")
+    found = answered(symptom, planted(gone, ""), FLOW)
+    assert any("splices.parquet is missing" in text for text in found.first.unknown)
+    assert any("discarded" in number.what for number in found.first.numbers)
+
+
+def test_a_name_that_is_no_symptom_lists_those_that_are():
+    assert symptoms_of("all") == SYMPTOMS
+    with pytest.raises(BadInputError, match="boundary-jump") as caught:
+        symptoms_of("jump")
+    assert caught.value.exit_code == 2
