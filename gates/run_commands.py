@@ -80,3 +80,29 @@ def status(root: Root = Path(), as_json: AsJson = False) -> int:
     else:
         print(status_text(found))
     return 0
+
+
+@report.command(
+    "ledger", epilog=examples("genpolicy report ledger", "genpolicy report ledger --kind matched")
+)
+def ledger(
+    kind: Annotated[
+        str, typer.Option(help="matched, source_specific, abstract_only or unmatched.")
+    ] = "",
+    as_json: AsJson = False,
+) -> int:
+    """What papers say, by how far it carries here.
+
+    Each claim with its source, its place there, and what it does not show. All of
+    it is text: no number of a paper can become a limit or a rank. Every bundle
+    carries it (`genpolicy package`). Exit 0.
+    """
+    from gates.ledger import claims_of, ledger_text, read_ledger
+    from gates.printed import print_document
+
+    found = claims_of(read_ledger(), kind)
+    if as_json:
+        print_document([claim.model_dump(mode="json") for claim in found])
+    else:
+        print(ledger_text(found))
+    return 0

@@ -11,6 +11,7 @@ from typing import Literal
 
 import pyarrow.compute as pc
 
+from gates.ledger import LEDGER
 from gates.report import GATES, report_path
 from gates.reproducibility.settings import BROUGHT_FOLDER, RELOAD
 from gates.settings import PARAMS_FILE
@@ -95,7 +96,7 @@ GROUPS = (
     Group(11, "matched comparison and unmatched-evidence caveats",
           (Part(f"{GENERATORS}/matched.json"), Part(f"{STRESS}/power.json"),
            *_rows(f"{STRESS}/rollouts.parquet"), Part(f"{STRESS}/journals/*.mcap"),
-           Part(B), Part(D))),
+           Part(B), Part(D), Part(LEDGER))),
 )  # fmt: skip
 
 
