@@ -1,18 +1,32 @@
 """What could make a verdict wrong, derived from the criteria by rules, before the good news.
 
 A reader sees that twenty-two of twenty-four hold. What would change the decision is elsewhere: what
-was never measured, what nearly broke, what was judged at a point, what nobody asked.
+was never measured, what nearly broke, what was judged at a point, what nobody asked. What speaks of
+how the evidence was made (few units, one seed, an average) is in `gates.doubts_of_evidence`.
 """
 
+import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from gates.closeness import by_room, closeness
+from gates.doubt import MOST_NAMED, Doubt, about, named
+from gates.doubts_of_evidence import (
+    an_average,
+    cold_start,
+    declared,
+    few_units,
+    never_exercised,
+    not_testable,
+    one_seed,
+    untried,
+)
 from gates.preregistration import PREREGISTRATION
 from gates.protection import REHEARSED
-from gates.report import Answer, GateReport
+from gates.report import GateReport
 from gates.settings import WAIVED
 from gates.stress.clocks import DIFFER, UNSEEN
+from gates.stress.contact import UNTOUCHED
 
 OF_ALL = {
     REHEARSED: "a rehearsal",
@@ -22,27 +36,10 @@ OF_ALL = {
 """How caveats begin that each gate repeats of those below it, and their kind on the first page."""
 CLOCKS = (f"the wall clock {DIFFER} (", f"the wall clock was {UNSEEN} (")
 """In caveats of Gate D that contradict its timing, or leave it without a witness."""
-MOST_NAMED = 3
-"""Criteria that one doubt names; of more it says how many there are."""
-
-
-@dataclass(frozen=True)
-class Doubt:
-    """One reason why the verdict may be wrong.
-
-    Attributes:
-        gate: Whose evidence it is about.
-        kind: In two or three words.
-        text: What is the matter, for a person.
-        criteria: Criteria that it is about, by name; empty for a caveat of the whole gate.
-        candidate: Whose criterion it is; empty where it is one of the whole gate, or several.
-    """
-
-    gate: str
-    kind: str
-    text: str
-    criteria: tuple[str, ...] = ()
-    candidate: str = ""
+LISTING = re.compile(r"(.*?(?:Looser|\.yaml)): (.*)\.", re.DOTALL)
+"""A caveat that lists settings: what it is about, and the list."""
+BETWEEN = re.compile(r"(?<=\)), (?=\S+ \()")
+"""Between two settings that say from what to what they moved."""
 
 
 def doubts_of(report: GateReport) -> list[Doubt]:
@@ -67,7 +64,11 @@ def of_a_ladder(reports: Iterable[GateReport]) -> tuple[list[Doubt], list[Doubt]
         key = next((head for head in OF_ALL if doubt.text.startswith(head)), doubt.text)
         if key not in caveats or len(doubt.text) > len(caveats[key].text):
             caveats[key] = doubt
-    first = [replace(caveats[head], kind=kind) for head, kind in OF_ALL.items() if head in caveats]
+    first = [
+        replace(caveats[head], kind=kind, text=_the_worst(caveats[head].text))
+        for head, kind in OF_ALL.items()
+        if head in caveats
+    ]
     others = [doubt for key, doubt in caveats.items() if key not in OF_ALL]
     clocks = [
         replace(doubt, kind="two clocks")
@@ -98,15 +99,15 @@ def for_a_card(report: GateReport, candidate: str) -> list[str]:
 def _not_measured(report: GateReport) -> Iterator[Doubt]:
     """A criterion without a number says nothing, whatever the others say."""
     for answer in report.criteria:
-        if answer.verdict == "INCONCLUSIVE" and answer.interval is None:
-            yield _about(report, "not measured", answer)
+        if answer.verdict == "INCONCLUSIVE" and answer.interval is None and not untried(answer):
+            yield about(report, "not measured", answer)
 
 
 def _not_decided(report: GateReport) -> Iterator[Doubt]:
     """The limit lies inside the interval: other episodes of the same truth would say otherwise."""
     for answer in report.criteria:
         if answer.verdict == "INCONCLUSIVE" and answer.interval is not None:
-            yield _about(report, "not decided", answer)
+            yield about(report, "not decided", answer)
 
 
 def _stopped(report: GateReport) -> Iterator[Doubt]:
@@ -114,8 +115,8 @@ def _stopped(report: GateReport) -> Iterator[Doubt]:
     for name, verdict in sorted(report.candidates.items()):
         broken = [c for c in report.criteria if c.candidate == name and c.verdict == "FAIL"]
         if verdict == "FAIL" and report.verdict == "PASS":
-            named = tuple(c.id for c in broken)
-            yield Doubt(report.gate, "stopped here", f"{name}: {', '.join(named)}", named)
+            ids = tuple(c.id for c in broken)
+            yield Doubt(report.gate, "stopped here", f"{name}: {', '.join(ids)}", ids)
 
 
 def _near(report: GateReport) -> Iterator[Doubt]:
@@ -124,41 +125,50 @@ def _near(report: GateReport) -> Iterator[Doubt]:
     for near in held:
         end = "at the worse end of its interval" if near.worse_end else "at a point"
         used = f"{100 * near.used:.3g} % of its limit is used up, {end}"
-        yield _about(report, "near its limit", near.answer, used)
+        yield about(report, "near its limit", near.answer, used)
 
 
 def _at_a_point(report: GateReport) -> Iterator[Doubt]:
     """A number without an interval holds for the very episodes that were drawn."""
-    named = [c for c in report.criteria if c.interval is None and closeness(c) is not None]
-    ids = tuple(dict.fromkeys(c.id for c in named))
+    points = [c for c in report.criteria if c.interval is None and closeness(c) is not None]
+    ids = tuple(dict.fromkeys(c.id for c in points))
     if ids:
-        shown = ", ".join(ids[:MOST_NAMED])
-        more = f" and {len(ids) - MOST_NAMED} more" if len(ids) > MOST_NAMED else ""
-        text = f"{len(ids)} criteria hold for what was drawn, without an interval: {shown}{more}"
+        text = f"{len(ids)} criteria hold for what was drawn, without an interval: {named(ids)}"
         yield Doubt(report.gate, "judged at a point", text, ids)
 
 
 def _caveats(report: GateReport) -> Iterator[Doubt]:
     """What the gate itself says that it does not show, and what was waived."""
     for caveat in report.caveats:
-        yield Doubt(report.gate, "not shown", caveat)
+        if not UNTOUCHED.match(caveat):  # a rule speaks of it
+            yield Doubt(report.gate, "not shown", caveat)
 
 
-def _about(report: GateReport, kind: str, answer: Answer, more: str = "") -> Doubt:
-    who = f" ({answer.candidate})" if answer.candidate else ""
-    why = more or answer.caveat or "nothing was recorded that answers it"
-    return Doubt(report.gate, kind, f"{answer.question}{who} {_sentence(why)}", (answer.id,),
-                 answer.candidate or "")  # fmt: skip
+def _the_worst(caveat: str) -> str:
+    """A caveat that lists settings, with the first of them, and how many more there are.
 
-
-def _sentence(text: str) -> str:
-    return text[:1].upper() + text[1:] + ("" if text.endswith(".") else ".")
+    What moved since the plan begins with what moved furthest.
+    """
+    found = LISTING.fullmatch(caveat)
+    if found is None:
+        return caveat
+    items = BETWEEN.split(found[2]) if found[2].endswith(")") else found[2].split(", ")
+    if len(items) <= MOST_NAMED:
+        return caveat
+    return f"{found[1]}: {named(items)}. The caveats of the gate name all."
 
 
 RULES: Sequence[Callable[[GateReport], Iterator[Doubt]]] = (
     _not_measured,
     _not_decided,
+    never_exercised,
+    not_testable,
     _stopped,
+    cold_start,
+    an_average,
+    few_units,
+    one_seed,
+    declared,
     _near,
     _at_a_point,
     _caveats,

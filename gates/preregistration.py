@@ -204,6 +204,9 @@ def moved_caveats(root: Path, params: Mapping[str, Any], gate: Gate) -> tuple[st
         root: Repository root.
         params: `params.yaml`.
         gate: Left out is what only gates above it judge by.
+
+    Returns:
+        A sentence for each kind; what was loosened furthest is named first.
     """
     plan = read_plan(root)
     if plan is None:
@@ -212,9 +215,12 @@ def moved_caveats(root: Path, params: Mapping[str, Any], gate: Gate) -> tuple[st
     found = [move for move in moves(plan, params) if asked_by(move.place) in reached]
     texts = []
     for kind in KINDS:
-        of_kind = [str(move) for move in found if move.kind == kind]
+        of_kind = [move for move in found if move.kind == kind]
+        if kind == "loosened":
+            of_kind.sort(key=_how_far, reverse=True)
         if of_kind:
-            texts.append(f"{kind.capitalize()} since {PREREGISTRATION}: {', '.join(of_kind)}.")
+            listed = ", ".join(map(str, of_kind))
+            texts.append(f"{kind.capitalize()} since {PREREGISTRATION}: {listed}.")
     return tuple(texts)
 
 
@@ -228,6 +234,14 @@ def _kind(comparison: str, before: object, now: object) -> Kind:
         tighter = now < before if comparison == "<=" else now > before  # type: ignore[operator]
         return "tightened" if tighter else "loosened"
     return "changed"
+
+
+def _how_far(move: Move) -> float:
+    """By which share of itself a limit moved; without end of none, and of one that was dropped."""
+    ends = [float(end) for end in (move.before, move.now) if _is_number(end)]  # type: ignore[arg-type]
+    if len(ends) < 2 or ends[0] == 0:
+        return math.inf
+    return abs(ends[1] - ends[0]) / abs(ends[0])
 
 
 def _is_number(value: object) -> bool:

@@ -98,9 +98,11 @@ class GateSettings(StrictModel):
         homes: Where in `params.yaml` a field stands, if not in the gate's own section, as a dotted
             path. Of a mapping there, the names are taken, in their order; of two homes, those of
             both.
+        whole: Fields that take such a mapping as it stands there.
     """
 
     homes: ClassVar[Mapping[str, str]] = {}
+    whole: ClassVar[frozenset[str]] = frozenset()
 
     _held_to: Limits = PrivateAttr(default_factory=Limits)
 
@@ -238,7 +240,9 @@ def read_settings(params: Mapping[str, Any], name: str, model: type[Settings]) -
     for key, home in homes.items():
         if key in values:
             _refuse(f"{name}.{key}", "a second home", home, f"Remove it; `{home}` says it.")
-        values[key] = _at(params, home)
+        found = _at(params, home)
+        names_only = isinstance(found, dict) and key not in getattr(model, "whole", ())
+        values[key] = list(found) if names_only else found
     places = {key: f"{PARAMS_FILE}: {home}" for key, home in homes.items()}
     return parse_section(model, values, where=f"{PARAMS_FILE}: {name}", homes=places)
 
@@ -251,7 +255,7 @@ def _at(params: Mapping[str, Any], path: str) -> Any:
         if not isinstance(value, dict) or part not in value:
             _refuse(path, "missing", "a setting", "Add it.")
         value = value[part]
-    return list(value) if isinstance(value, dict) else value
+    return value
 
 
 def read_limits(params: Mapping[str, Any], gate: Gate, criteria: Sequence[Criterion]) -> Limits:

@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from gates.closeness import Closeness, by_room, closeness
-from gates.doubts import Doubt, of_a_ladder
+from gates.doubt import Doubt
+from gates.doubts import of_a_ladder
 from gates.pages.guide import unit
 from gates.report import GATES, NAMES, OWNERS, Answer, Gate, GateReport
 from gates.verdicts import first_unmet

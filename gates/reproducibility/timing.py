@@ -23,6 +23,8 @@ ACTIONS = (
     "reject_stale", "fallback",
 )  # fmt: skip
 """What may be declared (`genpolicy.contract.latency.DeadlineAction`)."""
+DECLARED = "declared, not measured"
+"""Said of latency terms that somebody wrote down."""
 
 
 @criterion(
@@ -46,7 +48,9 @@ def latency_terms_missing(
     ]
     acted = {term for term, _, action in settings.term_deadlines if action in ACTIONS}
     idle = [term for term in TERMS if term not in acted]
-    text = f"missing: {', '.join(missing)}" if missing else f"declared: {', '.join(declared)}"
+    stated = [term for term in TERMS if term in declared and term not in missing]
+    text = f"missing: {', '.join(missing)}; " if missing else ""
+    text += f"{len(stated)} of {len(TERMS)} terms {DECLARED}: {', '.join(stated) or 'none'}"
     if idle:
         text += f"; nothing is done where these take too long: {', '.join(idle)}"
     return Measured(float(len({*missing, *idle})), caveat=text)

@@ -32,6 +32,8 @@ from genpolicy.statistics.clustered import ratio_interval
 
 STOPS = ("collision", "force_stop")
 """Outcomes (`genpolicy.evidence.stress.state`) that stay until a person resets the cell."""
+TOO_OLD = "beyond the maximum action age"
+"""Said of a first answer that comes when nothing of it may be executed any more."""
 
 
 @criterion(
@@ -100,12 +102,18 @@ def latency_p95_s(evidence: Evidence, settings: StressSettings, candidate: str) 
         return point, *ends
 
     found = in_every_condition(rows[~cold], settings.perturbations, measure)
-    text = f"{found.caveat}; cold at most {latency[cold].max(initial=0.0):.4g} s"
+    text = f"{found.caveat}; {_cold(float(latency[cold].max(initial=0.0)), settings.oldest_s)}"
     # Missing where nothing that was compared has a teacher.
     if evidence.bind(f"{STRESS}/{DISTILLED.file}"):
         said = evidence.document(STRESS, DISTILLED).get(candidate)
         text = f"{text}; {spent(said)}" if said else text
     return replace(found, caveat=text)
+
+
+def _cold(longest_s: float, oldest_s: float) -> str:
+    """The first answer of a session, beside the oldest action that may be executed."""
+    text = f"cold at most {longest_s:.4g} s"
+    return text if longest_s <= oldest_s else f"{text}, {TOO_OLD} of {oldest_s:g} s"
 
 
 @criterion(

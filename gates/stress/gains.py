@@ -11,6 +11,9 @@ from gates.stress.pairs import paired_by_condition
 from gates.stress.rollouts import ENVELOPE, StressSettings
 from genpolicy.statistics.eprocess import gain_interval, paired_e_value
 
+WORST = "worst in"
+"""Before the name of the condition in which least is gained; the list of doubts reads it."""
+
 
 @dataclass(frozen=True)
 class Inside:
@@ -58,7 +61,7 @@ def by_condition(evidence: Evidence, settings: StressSettings, candidate: str) -
         f"{condition} {gain:+.4g} over {baseline}"
         for (gain, baseline), condition in sorted((gain, name) for name, gain in least.items())
     )
-    return f"on {settings.planned_starts} starts in each condition, worst in {told}"
+    return f"on {settings.planned_starts} starts in each condition, {WORST} {told}"
 
 
 def inside_envelope(evidence: Evidence, settings: StressSettings, candidate: str) -> Inside | None:

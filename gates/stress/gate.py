@@ -16,6 +16,7 @@ from gates.preregistration import PREREGISTRATION
 from gates.stress import cost, safety, trial
 from gates.stress.choice import choose
 from gates.stress.clocks import clocks_said
+from gates.stress.contact import contact_said
 from gates.stress.gains import by_condition, inside_envelope
 from gates.stress.pairs import paired_differences
 from gates.stress.rollouts import JOURNALS, StressSettings, rollouts
@@ -85,6 +86,11 @@ def _decide(judged: Judged) -> Decision:
         return Decision(f"return to the simpler policy ({error})")
 
 
+def _said(judged: Judged) -> list[str]:
+    """What was never touched, and how the two clocks compare."""
+    return [*contact_said(judged), *clocks_said(judged)]
+
+
 GATE = GateSpec(
     gate="D",
     settings=StressSettings,
@@ -103,5 +109,5 @@ GATE = GateSpec(
     ),
     below="C",
     decide=_decide,
-    said=clocks_said,
+    said=_said,
 )

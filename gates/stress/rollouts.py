@@ -44,6 +44,7 @@ class StressSettings(CandidateSettings):
         planned_effect: Success of baseline and candidate that the test must be able to tell apart.
         execution_horizon: Actions of a chunk that may be executed.
         action_period_s: Period of the actions, s.
+        maximum_age_s: Oldest action that may be executed, s; by phase where phases differ.
         unmatched: Candidates that are compared by exception; none is ranked among the others.
         tolerances: By owner: what the two clocks may differ by, and why; nothing is judged by it.
     """
@@ -58,8 +59,10 @@ class StressSettings(CandidateSettings):
         "planned_effect": "stress.planned_effect",
         "execution_horizon": "horizons.execution_horizon",
         "action_period_s": "horizons.action_period_s",
+        "maximum_age_s": "execution.maximum_age_s",
         "unmatched": "gate_b.unmatched",
     }
+    whole: ClassVar[frozenset[str]] = frozenset({"maximum_age_s"})
 
     candidates: tuple[str, ...] = Field(min_length=1)
     baselines: tuple[str, ...] = Field(min_length=1)
@@ -70,6 +73,7 @@ class StressSettings(CandidateSettings):
     planned_effect: tuple[float, float]
     execution_horizon: int = Field(gt=0)
     action_period_s: float = Field(gt=0.0)
+    maximum_age_s: float | dict[str, float]
     unmatched: tuple[str, ...] = ()
     tolerances: dict[Owner, dict[str, tuple[float, str]]] = Field(default_factory=dict)
 
@@ -94,6 +98,12 @@ class StressSettings(CandidateSettings):
     def usable_s(self) -> float:
         """How long after its observation a chunk still has an action to execute, s."""
         return self.execution_horizon * self.action_period_s
+
+    @property
+    def oldest_s(self) -> float:
+        """Oldest action that any phase executes, s."""
+        ages = self.maximum_age_s
+        return max(ages.values()) if isinstance(ages, dict) else ages
 
     @property
     def alpha(self) -> float:

@@ -19,9 +19,9 @@ def unmatched_starts(evidence: Evidence, settings: StressSettings, candidate: st
     """Starts, by hash of the state after reset, that the candidate and a baseline do not share."""
     own = _starts(evidence, settings, candidate)
     unmatched = {name: len(own ^ _starts(evidence, settings, name)) for name in settings.baselines}
-    text = f"{len(own)} starts by state hash; " + ", ".join(
-        f"{name} {n}" for name, n in unmatched.items()
-    )
+    seeds = rollouts(evidence, settings, candidate)["seed"].nunique()
+    text = f"{len(own)} starts by state hash, of {seeds} training seed{'s' * (seeds > 1)}; "
+    text += ", ".join(f"{name} {n}" for name, n in unmatched.items())
     return Measured(float(sum(unmatched.values())), caveat=text)
 
 

@@ -188,6 +188,7 @@ PARAMS: dict[str, Any] = {
     "confidence": 0.95,
     "horizons": {"execution_horizon": 8, "action_period_s": 0.05},
     "execution": {
+        "maximum_age_s": 0.45,
         "term_deadlines": [
             ["exposure", 0.05, "drop_observation"],
             ["capture", 0.15, "drop_observation"],
@@ -200,7 +201,7 @@ PARAMS: dict[str, Any] = {
             ["project", 0.1, "reject_candidate"],
             ["network", 0.25, "reject_stale"],
             ["queue", 0.25, "reject_stale"],
-        ]
+        ],
     },
     "task": {"name": "tabletop_insertion"},
     "train_baselines": {"samplers": {name: {} for name in (*BASELINES, *REMEDIES, DRAWN)}},

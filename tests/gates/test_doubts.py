@@ -7,7 +7,8 @@ from test_verdicts import criterion
 
 from gates.card.card import caveats_of
 from gates.card.signing import read_draft
-from gates.doubts import OF_ALL, Doubt, doubts_of, for_a_card, of_a_ladder
+from gates.doubt import Doubt
+from gates.doubts import OF_ALL, doubts_of, for_a_card, of_a_ladder
 from gates.proof import judge
 
 
@@ -142,6 +143,7 @@ def test_a_draft_says_what_could_make_its_reports_wrong(ladder):
     doubts = [text for gate in "ABCD" for text in for_a_card(reports[gate], reports["D"].promoted)]
     kinds_said = {text.split(":")[0] for text in doubts}
     assert {f"Gate {gate}, judged at a point" for gate in "AD"} <= kinds_said
+    assert {"Gate B, declared", "Gate D, one training seed"} <= kinds_said
     caveats = caveats_of(reports)
     assert set(doubts) <= set(caveats) and caveats[-1] == doubts[-1]
     assert caveats == read_draft(ladder).caveats
@@ -163,8 +165,9 @@ def test_the_gravest_kind_comes_first_whatever_its_gate(reports):
     first, rest = of_a_ladder(reports.values())
     order = [doubt.kind for report in reports.values() for doubt in doubts_of(report)]
     ranks = [
-        "not asked", "two clocks", "not measured", "not decided", "stopped here", "near its limit",
-        "judged at a point",
+        "not asked", "two clocks", "not measured", "not decided", "never exercised",
+        "hardly exercised", "not testable", "stopped here", "cold start", "an average", "small n",
+        "one training seed", "declared", "near its limit", "judged at a point",
     ]  # fmt: skip
     found = [ranks.index(doubt.kind) for doubt in first]
     assert found == sorted(found) and len(set(found)) > 1
@@ -188,6 +191,25 @@ def test_what_each_gate_repeats_is_said_once_by_who_names_most(reports):
     own = [f"own of {gate}" for gate in reports]
     assert sorted(doubt.text for doubt in rest) == sorted(["the same", *own])
     assert [doubt.gate for doubt in rest if doubt.text == "the same"] == ["A"], "the first says it"
+
+
+@pytest.mark.parametrize(("listed", "said"), [
+    (["a (1 -> 2)", "b (None -> ['x, y'])", "c.d (0 -> 1)"], None),
+    (["a (1 -> 2)", "b (None -> ['x, y (z)', 'u'])", "c.d (0 -> 1)", "e (1 -> 2)", "f (0 -> 3)"],
+     "a (1 -> 2), b (None -> ['x, y (z)', 'u']), c.d (0 -> 1) and 2 more"),
+])  # fmt: skip
+@pytest.mark.parametrize("head", list(OF_ALL)[1:])
+def test_of_many_limits_that_moved_the_first_are_named_and_the_others_counted(head, listed, said):
+    caveat = f"{head}: {', '.join(listed)}."
+    (doubt,), _ = of_a_ladder([REPORT.model_copy(update={"criteria": (), "caveats": (caveat,)})])
+    assert doubt.text == (f"{head}: {said}. The caveats of the gate name all." if said else caveat)
+
+
+def test_of_what_a_rehearsal_loosens_the_first_are_named_and_the_others_counted():
+    head = f"{next(iter(OF_ALL))} Looser"
+    caveat = f"{head}: a, b_c, d.e, stress.perturbations: camera_delay, f."
+    (doubt,), _ = of_a_ladder([REPORT.model_copy(update={"criteria": (), "caveats": (caveat,)})])
+    assert doubt.text == f"{head}: a, b_c, d.e and 2 more. The caveats of the gate name all."
 
 
 @pytest.mark.parametrize(("said", "weighed"), [

@@ -172,6 +172,21 @@ def test_the_report_binds_the_plan_and_says_what_moved(ladder):
     assert "gate_c.admissible_share" in said[1] and "seed (1 -> 5)" in said[2]
 
 
+def test_what_was_loosened_furthest_is_named_first(ladder):
+    """By the share of itself; a limit of none, and one that was dropped, before all others."""
+    (ladder / PREREGISTRATION).write_bytes(plan_bytes(evidence.PARAMS))
+
+    def change(params):
+        for name, limit in (("fallback_share_upper", 0.2), ("hold_share_upper", 9.0)):
+            evidence.set_limit("gate_d", name, limit)(params)
+        del params["gate_d"]["limits"]["safety"]["intervention_upper"]
+
+    evidence.write_params(ladder, change)
+    said = moved_caveats(ladder, yaml.safe_load((ladder / "params.yaml").read_text()), "D")[0]
+    order = [said.index(name) for name in ("intervention", "hold_share", "fallback_share")]
+    assert order == sorted(order)
+
+
 OWN_LIMIT = {
     "A": "told_share", "B": "late_change_upper", "C": "projection_p95_m",
     "D": "fallback_share_upper",

@@ -243,6 +243,19 @@ def test_a_home_is_one_setting_or_the_names_of_a_table():
             read_settings({"g": {}, **broken}, "g", _Homes)
 
 
+def test_a_field_that_takes_a_table_whole_takes_its_values_too():
+    table = {"x": 1.5, "y": 2.0}
+    for value in (table, 3.0):
+        assert read_settings({"g": {}, "a": {"b": value}}, "g", _Whole).ages == value
+
+
+class _Whole(GateSettings):
+    homes: ClassVar = {"ages": "a.b"}
+    whole: ClassVar = frozenset({"ages"})
+
+    ages: float | dict[str, float]
+
+
 class _Homes(GateSettings):
     homes: ClassVar = {"names": "a.b", "number": "a.c"}
 

@@ -9,7 +9,11 @@ from editing import cells
 from gates.evidence import MissingEvidenceError
 from gates.proof import judge
 from gates.reproducibility.latency_budget import MEASURED_HERE, TERMS
-from gates.reproducibility.timing import latency_model_ratio_upper, latency_terms_missing
+from gates.reproducibility.timing import (
+    DECLARED,
+    latency_model_ratio_upper,
+    latency_terms_missing,
+)
 
 LATENCY = "latency/latency.parquet"
 MODEL = "latency/model.parquet"
@@ -168,13 +172,19 @@ def test_a_term_that_is_not_known_is_missing_and_never_zero(ladder, term):
         ladder, LATENCY, cells("seconds", None, where=lambda f: f["component"] == term)
     )
     found = asked(ladder, latency_terms_missing, "flow", gate="B")
-    assert found.value == 1 and found.caveat == f"missing: {term}"
+    assert found.value == 1 and found.caveat.startswith(f"missing: {term}; ")
 
 
 def test_a_term_that_is_measured_here_may_not_be_declared(ladder):
     evidence.edit_table(ladder, LATENCY, cells("source", "declared"))
     found = asked(ladder, latency_terms_missing, "flow", gate="B")
-    assert found.caveat == f"missing: {', '.join(MEASURED_HERE)}"
+    assert found.caveat.startswith(f"missing: {', '.join(MEASURED_HERE)}; 6 of 11 terms {DECLARED}")
+
+
+def test_terms_that_are_declared_are_counted_and_named(ladder):
+    found = asked(ladder, latency_terms_missing, "flow", gate="B")
+    others = ", ".join(term for term in TERMS if term not in MEASURED_HERE)
+    assert found.value == 0 and found.caveat == f"6 of 11 terms {DECLARED}: {others}"
 
 
 @pytest.mark.parametrize(

@@ -178,7 +178,18 @@ def test_the_cold_invocation_is_said_and_not_judged(ladder):
     cold = lambda f: of(f) & (f["invocation"] == 0)  # noqa: E731
     evidence.edit_table(ladder, INVOCATIONS, cells("latency_s", 30.0, where=cold))
     found = flow(ladder, cost.latency_p95_s)
-    assert found.value < 0.1 and "cold at most 30 s" in found.caveat
+    assert found.value < 0.1
+    assert "cold at most 30 s, beyond the maximum action age of 0.45 s" in found.caveat
+    evidence.edit_table(ladder, INVOCATIONS, cells("latency_s", 0.45, where=cold))
+    assert flow(ladder, cost.latency_p95_s).caveat.endswith("cold at most 0.45 s")
+
+
+def test_where_phases_differ_the_oldest_action_of_any_of_them_counts(ladder):
+    ages = {"default": 0.3, "insert": 0.5}
+    evidence.write_params(ladder, lambda p: p["execution"].update(maximum_age_s=ages))
+    cold = lambda f: of(f) & (f["invocation"] == 0)  # noqa: E731
+    evidence.edit_table(ladder, INVOCATIONS, cells("latency_s", 0.51, where=cold))
+    assert "beyond the maximum action age of 0.5 s" in flow(ladder, cost.latency_p95_s).caveat
 
 
 @pytest.mark.parametrize(

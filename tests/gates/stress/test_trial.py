@@ -32,6 +32,17 @@ def test_fewer_starts_than_planned_gives_no_verdict(ladder):
     assert report.decision.startswith("No decision")
 
 
+def test_how_many_trainings_a_candidate_had_is_said(ladder):
+    said = asked(ladder, unmatched_starts, "flow", gate="D").caveat
+    assert "by state hash, of 1 training seed; " in said
+
+    def second(frame):
+        return pd.concat([frame, frame[frame["method"] == "flow"].assign(seed=9)])
+
+    evidence.edit_table(ladder, "stress/rollouts.parquet", second)
+    assert ", of 2 training seeds; " in asked(ladder, unmatched_starts, "flow", gate="D").caveat
+
+
 def test_a_reset_that_ignores_its_start_is_one_start(ladder):
     """All methods share every state, and all states are one: nothing was repeated."""
     evidence.edit_table(ladder, "stress/rollouts.parquet", cells("start_sha256", "ab" * 32))

@@ -1,0 +1,121 @@
+"""Doubts about how evidence was made: what nothing exercised, few units, one seed, an average.
+
+Each rule reads the report alone: what a criterion counted, what it says beside its number, and the
+settings. So a card repeats them from the bytes that are signed, whatever else lies here.
+"""
+
+import re
+from collections.abc import Iterator
+
+from gates.doubt import Doubt, about, named
+from gates.report import Answer, GateReport
+from gates.reproducibility.timing import DECLARED
+from gates.stress.contact import UNTOUCHED
+from gates.stress.cost import TOO_OLD
+from gates.stress.gains import WORST
+
+FEW = 20
+"""Units below which a number says little: of so many, none of which fails, an exact bound of 95 %
+still allows 14 % that would; and one more failure moves a share by five points."""
+COUNTED = re.compile(r"(?:\d+ of )?(\d+)(?: and (\d+))? (\D+)")
+"""What a number rests on, as criteria write it: `24 of 25 episodes`, `3 and 3 processes`."""
+UNTRIED = re.compile(r"(?:not measured: )?(not exercised|hardly exercised|not asked)\b")
+"""How the caveat of a criterion begins of which the evidence holds no case, or hardly one."""
+LACKED = "of them not asked of this task: "
+WAIVED_HERE = "waived_checks"
+"""Setting of Gate A that names questions which its data could not be asked."""
+
+
+def untried(answer: Answer) -> str:
+    """Why the evidence holds no case of a criterion; empty where it does."""
+    found = UNTRIED.match(answer.caveat)
+    return found[1] if found and answer.verdict == "INCONCLUSIVE" else ""
+
+
+def never_exercised(report: GateReport) -> Iterator[Doubt]:
+    """What never happened in any rollout is neither good nor bad: nothing is known of it."""
+    for answer in report.criteria:
+        if untried(answer).endswith("exercised"):
+            kind = "hardly exercised" if untried(answer).startswith("h") else "never exercised"
+            yield about(report, kind, answer)
+    for caveat in report.caveats:
+        if found := UNTOUCHED.match(caveat):
+            yield Doubt(report.gate, "never exercised", caveat, (), found[1])
+
+
+def not_testable(report: GateReport) -> Iterator[Doubt]:
+    """Questions that could not be put to this data or this task, whoever answers for them."""
+    for answer in report.criteria:
+        if untried(answer) == "not asked":
+            yield about(report, "not testable", answer)
+        if silent := _waived(report, answer):
+            text = f"{named(silent)} could not be asked of these data; an owner answers for it"
+            yield about(report, "not testable", answer, text)
+        lacking = answer.caveat.partition(LACKED)[2]
+        if lacking:
+            yield about(report, "not testable", answer, f"this task has no case of {lacking}")
+
+
+def _waived(report: GateReport, answer: Answer) -> list[str]:
+    """Waived questions that the data indeed left unasked."""
+    if answer.id != "unasked_checks" or answer.verdict != "PASS":
+        return []
+    owners = report.settings.get(WAIVED_HERE) or {}
+    idle = answer.caveat.partition("waived without need here: ")[2].split(", ")
+    return [check for checks in owners.values() for check in checks if check not in idle]
+
+
+def cold_start(report: GateReport) -> Iterator[Doubt]:
+    """The first answer after a start is left out of the bound of the others."""
+    for answer in report.criteria:
+        if found := re.search(rf"cold at most (\S+) s, {TOO_OLD} of (\S+) s", answer.caveat):
+            text = (
+                f"the first answer after a start takes up to {found[1]} s and is not judged; "
+                f"nothing older than {found[2]} s is executed, so that the robot waits for another"
+            )
+            yield about(report, "cold start", answer, text)
+
+
+def an_average(report: GateReport) -> Iterator[Doubt]:
+    """A gain over all conditions that one of them does not share."""
+    for answer in report.criteria:
+        found = re.search(rf"{WORST} (\S+) (-\S+) over", answer.caveat)
+        if found and answer.verdict == "PASS":
+            points = f"{100 * float(found[2]):.3g} points"
+            text = f"it holds for the mean over all conditions; in {found[1]} it is {points}"
+            yield about(report, "an average", answer, text)
+
+
+def few_units(report: GateReport) -> Iterator[Doubt]:
+    """A number of few independent units is one of which little can be said, whatever it is."""
+    fewest: dict[str, tuple[int, str]] = {}
+    for answer in report.criteria:
+        found = COUNTED.fullmatch(answer.counted)
+        if found and answer.verdict in ("PASS", "FAIL"):
+            own = min(int(number) for number in found.groups()[:2] if number), answer.counted
+            fewest[answer.id] = min(fewest.get(answer.id, own), own)
+    few = sorted((units, name, said) for name, (units, said) in fewest.items() if units < FEW)
+    if few:
+        listed = named([f"{name} ({said})" for _, name, said in few])
+        criteria = "1 criterion rests" if len(few) == 1 else f"{len(few)} criteria rest"
+        text = f"{criteria} on fewer than {FEW} independent units: {listed}"
+        yield Doubt(report.gate, "small n", text, tuple(name for _, name, _ in few))
+
+
+def one_seed(report: GateReport) -> Iterator[Doubt]:
+    """A training drawn once: what another draw gives, nobody has seen."""
+    who = [c.candidate or "" for c in report.criteria if " of 1 training seed;" in c.caveat]
+    if who:
+        text = f"{named(who)}: trained once; what another training seed gives was not seen"
+        yield Doubt(report.gate, "one training seed", text)
+
+
+def declared(report: GateReport) -> Iterator[Doubt]:
+    """Latency that somebody wrote down is not what the cell takes."""
+    said: dict[str, Answer] = {}
+    for answer in report.criteria:
+        found = re.search(rf"(\d+ of \d+) terms {DECLARED}: ([^;]+)", answer.caveat)
+        if found and not found[1].startswith("0 "):
+            said.setdefault(f"{found[1]} latency terms are {DECLARED}: {found[2]}", answer)
+    for text, answer in said.items():
+        yield Doubt(report.gate, "declared", text, (answer.id,), "")
