@@ -54,7 +54,7 @@ def keygen(
 @card.command(
     epilog=examples(
         "genpolicy card fill --out completed.json",
-        "genpolicy card fill --out completed.json --set spotter=Sam",
+        "genpolicy card fill --out completed.json --set spotter=sam",
     )
 )
 def fill(

@@ -11,13 +11,22 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from gates.card.card import TrialCard, missing_fields, says, validity
+from gates.card.card import TrialCard, missing_fields, validity
 from gates.card.judge import CardGateSettings
-from gates.card.people import ALLOW_LIST, REVIEWER, AllowList, dependence, load_allow_list
+from gates.card.names import says
+from gates.card.people import (
+    ALLOW_LIST,
+    REVIEWER,
+    AllowList,
+    dependence,
+    load_allow_list,
+    spotting,
+)
 from gates.card.signing import read_draft
 from gates.floors import HARDEST_CONTACT_N
 from gates.report import stage_of
 from gates.settings import read_params, read_settings
+from gates.stress.contact import untouched
 from genpolicy.errors import ConfigError
 
 NONCE_BYTES = 16
@@ -72,12 +81,19 @@ def questions(rules: Rules) -> list[Question]:
         )
         for name, value in sorted(rules.draft.abort_thresholds.items())
     ]
+    unseen = untouched(rules.draft.caveats, rules.draft.candidate)
+    said = f"; {unseen}: the evidence supports no force, so write why this one" if unseen else ""
     return [
         Question(
             "force_limit_n", f"contact force that ends the trial, N, up to {HARDEST_CONTACT_N:g}"
         ),
-        Question("force_limit_reason", "where this force comes from, measured for this cell"),
-        Question("spotter", "who stands at the stop"),
+        Question(
+            "force_limit_reason", f"where this force comes from, measured for this cell{said}"
+        ),
+        Question(
+            "spotter",
+            f"who stands at the stop, by the id on {ALLOW_LIST}; neither author nor reviewer",
+        ),
         Question("stop_path", "how the robot is stopped, from hand to drive"),
         Question("reviewer", f"who reviews, by the id on {ALLOW_LIST}"),
         Question("not_before", "first day of validity, YYYY-MM-DD", rules.today.isoformat()),
@@ -154,6 +170,13 @@ def _reviewer(rules: Rules, name: str, said: str, before: Mapping[str, Any]) -> 
     return said
 
 
+def _spotter(rules: Rules, name: str, said: str, before: Mapping[str, Any]) -> str:
+    """Nobody is named as reviewer yet; whoever has that role is told all the same."""
+    if why := spotting(said, "", rules.draft.authors, rules.allowed):
+        raise _refused(name, why, "somebody else who may stop the trial")
+    return said
+
+
 def _first(rules: Rules, name: str, said: str, before: Mapping[str, Any]) -> str:
     return _valid(rules, name, said, (said, max(said, rules.today.isoformat())))
 
@@ -183,6 +206,7 @@ def _text(rules: Rules, name: str, said: str, before: Mapping[str, Any]) -> str:
 
 _CHECKS: dict[str, Check] = {
     "force_limit_n": _force,
+    "spotter": _spotter,
     "reviewer": _reviewer,
     "not_before": _first,
     "expires": _last,

@@ -44,6 +44,7 @@ from gates.report import OWNERS, Gate, GateReport, stage_of
 from gates.reproducibility.settings import RELOAD, excepted_until
 from gates.running import require_running_code
 from gates.settings import GateSettings, read_limits, read_params, read_settings
+from gates.stress.contact import untouched
 from genpolicy.errors import GenpolicyError, IntegrityError
 from genpolicy.evidence.documents.reproducibility import CANDIDATES
 
@@ -210,12 +211,12 @@ def signature_valid(evidence: Evidence, dossier: Dossier) -> Measured:
 
 @criterion(
     ">=",
-    question="Is the reviewer none of the authors, and does no author sign?",
-    look_at="Find a reviewer who did not make the candidate.",
+    question="Are reviewer, authors and spotter different people, and does no author sign?",
+    look_at="Find a reviewer who did not make the candidate, and somebody else at the stop.",
     always=True,
 )
 def reviewer_independent(evidence: Evidence, dossier: Dossier) -> Measured:
-    """1 if the named reviewer signed and no signer is an author, else 0."""
+    """1 if the named reviewer signed, no signer is an author and the spotter is neither, else 0."""
     found = _signed(dossier.papers, "review by someone who is no author")
     if isinstance(found, Measured):
         return found
@@ -256,7 +257,11 @@ def envelope_within_limits(evidence: Evidence, dossier: Dossier) -> Measured:
     except IntegrityError as error:
         raise MissingEvidenceError(str(error)) from error
     bad = envelope_violations(found.card, draft, simulated)
-    return Measured(float(len(bad)), caveat=", ".join(bad) or "as simulated, and no command beyond")
+    text = ", ".join(bad) or "as simulated, and no command beyond"
+    if unseen := untouched(draft.caveats, draft.candidate):
+        text += f"; {unseen}: the force limit stands on the written reason alone"
+        text += f" ({found.card.force_limit_reason})"
+    return Measured(float(len(bad)), caveat=text)
 
 
 @criterion(

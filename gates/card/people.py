@@ -1,7 +1,7 @@
 """Who may sign: the allow-list `reviewers.yaml`, and who is independent of whom.
 
-A person is an identifier and a key of that list. Names are for reading: two names that look alike,
-or one name spelt in two ways, decide nothing.
+A person is an identifier and a key of that list. Names are for reading, and decide nothing; since
+the list is reviewed by eye, no two may read alike and none may hide how it is written.
 """
 
 from collections.abc import Sequence
@@ -13,14 +13,16 @@ from pydantic import Field
 from securesystemslib.signer import SSlibKey  # type: ignore[attr-defined]
 
 from gates.card.keys import key_weakness
+from gates.card.names import as_read, disguise
 from gates.report import OWNERS, StrictModel, parse_section
 from genpolicy.errors import ConfigError
 from genpolicy.integrity.documents import read_yaml
 
 ALLOW_LIST = "reviewers.yaml"
-REVIEWER, AUTHOR = "reviewer", "author"
-ROLES = (REVIEWER, *OWNERS, AUTHOR)
-PersonId = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9._-]{0,63}$")]
+REVIEWER, AUTHOR, SPOTTER = "reviewer", "author", "spotter"
+ROLES = (REVIEWER, *OWNERS, AUTHOR, SPOTTER)
+ID_FORM = r"^[a-z0-9][a-z0-9._-]{0,63}$"
+PersonId = Annotated[str, Field(pattern=ID_FORM)]
 """ASCII, so that no two of them look alike by accident of spelling."""
 Email = Annotated[str, Field(pattern=r"^[!-?A-~]+@[a-z0-9.-]+$")]
 
@@ -31,7 +33,8 @@ class Person(StrictModel):
     Attributes:
         id: Identifies the person, here and on the card.
         name: For reading.
-        role: `reviewer`, one of the four owners, or `author` (made the candidate; signs nothing).
+        role: `reviewer`, one of the four owners, `author` (made the candidate; signs nothing), or
+            `spotter` (may stand at the stop; nobody waits for a signature).
         public_key: Ed25519 public key, 64 hex digits.
         emails: Addresses under which the person commits.
     """
@@ -64,23 +67,32 @@ def load_allow_list(root: Path) -> AllowList:
     """People who may sign.
 
     Raises:
-        ConfigError: Missing, malformed, a weak key, or an identifier, key or address that appears
-            twice.
+        ConfigError: Missing, malformed, a weak key, a name in disguise, or an identifier, key,
+            address or name that appears twice.
     """
     found = parse_section(AllowList, read_yaml(root / ALLOW_LIST), where=ALLOW_LIST)
     for what, values in (
         ("id", [person.id for person in found.people]),
         ("public_key", [person.public_key for person in found.people]),
         ("emails", [mail.casefold() for person in found.people for mail in person.emails]),
+        ("name", [as_read(person.name) for person in found.people]),
     ):
         if len(set(values)) != len(values):
             raise ConfigError(
                 where=f"{ALLOW_LIST}: {what}",
                 found="the same value twice",
-                expected="one entry per person, key and address",
-                action="One person holds one role here; remove the double entry.",
+                expected="one entry per person, key, address and name",
+                action="One person holds one role here; remove the double entry, or tell the two "
+                "apart in their names.",
             )
     for person in found.people:
+        if looks := disguise(person.name):
+            raise ConfigError(
+                where=f"{ALLOW_LIST}: name of {person.id}",
+                found=looks,
+                expected="a name that a reader sees as it is written",
+                action="Write the name in its usual letters.",
+            )
         weakness = key_weakness(bytes.fromhex(person.public_key))
         if weakness:
             raise ConfigError(
@@ -113,4 +125,26 @@ def dependence(
     both = [person.id for person in signers if person.id in authors or person.role == AUTHOR]
     if both:
         return f"{both[0]} is an author and signs; authors sign nothing"
+    return ""
+
+
+def spotting(spotter: str, reviewer: str, authors: Sequence[str], allowed: AllowList) -> str:
+    """Why somebody cannot stand at the stop of a trial; empty if they can.
+
+    Who reviews the card or made the candidate has an interest in the trial going on; who stops it
+    has none but that nobody is hurt. An owner may.
+
+    Args:
+        spotter: Identifier that the card names.
+        reviewer: Likewise; empty where nobody is named yet.
+        authors: Identifiers that the card names.
+        allowed: The allow-list.
+    """
+    person = allowed.find(spotter)
+    if person is None:
+        return f"the spotter {spotter!r} is not on {ALLOW_LIST}"
+    if spotter in authors or person.role == AUTHOR:
+        return f"{spotter} is author and spotter"
+    if spotter == reviewer or person.role == REVIEWER:
+        return f"{spotter} is reviewer and spotter"
     return ""

@@ -27,7 +27,15 @@ from gates.card.card import (
     missing_fields,
     read_card,
 )
-from gates.card.people import ALLOW_LIST, REVIEWER, AllowList, Person, dependence, load_allow_list
+from gates.card.people import (
+    ALLOW_LIST,
+    REVIEWER,
+    AllowList,
+    Person,
+    dependence,
+    load_allow_list,
+    spotting,
+)
 from gates.preregistration import PREREGISTRATION, read_plan
 from gates.protection import is_rehearsal
 from gates.report import parse_section
@@ -169,15 +177,17 @@ def sign_card(root: Path, *, card_file: Path, key_file: Path, reviewer: str) -> 
 
 
 def independence(signed: SignedCard, allowed: AllowList) -> tuple[bool, str]:
-    """Whether the named reviewer signed and neither reviewer nor owners are authors."""
+    """Whether the named reviewer signed, no signer is an author, and another stands at the stop."""
     card = signed.card
     names = [person.id for person in signed.signers if person.role == REVIEWER]
     if card.reviewer not in names:
         return False, "the reviewer named on the card did not sign"
     why = dependence(card.reviewer, card.authors, signed.signers, allowed)
+    why = why or spotting(card.spotter, card.reviewer, card.authors, allowed)
     if why:
         return False, why
-    return True, f"reviewed by {card.reviewer}, candidate by {', '.join(card.authors)}"
+    made = f"candidate by {', '.join(card.authors)}"
+    return True, f"reviewed by {card.reviewer}, {made}, {card.spotter} stands at the stop"
 
 
 def conflicting_cards(root: Path, name: str) -> list[str]:
@@ -200,6 +210,8 @@ def _check_signable(card: TrialCard, person: Person, allowed: AllowList, where: 
     why = dependence(card.reviewer, card.authors, [person], allowed)
     if why:
         raise _bad(where, why, "people who did not make the candidate")
+    if why := spotting(card.spotter, card.reviewer, card.authors, allowed):
+        raise _bad(f"{where}: spotter", why, "somebody else who may stop the trial")
 
 
 def _check_fixed(root: Path, card: TrialCard, where: str) -> None:

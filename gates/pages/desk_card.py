@@ -15,7 +15,7 @@ from gates.card.rollback import rollback_of
 from gates.engine import upstream_hashes
 from gates.evidence import Evidence, MissingEvidenceError, numbers
 from gates.pages.bound import require_bound
-from gates.pages.desk import at_its_end, human
+from gates.pages.numbers import at_its_end, human
 from gates.report import OWNERS, Answer, Gate, GateReport, Point
 from gates.stress.rollouts import ROLLOUTS, STRESS
 from genpolicy.errors import IntegrityError
@@ -194,7 +194,7 @@ def _force(candidate: str, report: GateReport, evidence: Evidence) -> str:
         return ELSEWHERE
     touched = int((force > 0).sum())
     if touched == 0:
-        return f"no contact in {len(force):,} rollouts: nothing is known"
+        return f"no contact in {len(force):,} of {len(force):,} rollouts: nothing is known"
     return f"at most {force.max():.3g} N; contact in {touched:,} of {len(force):,} rollouts"
 
 

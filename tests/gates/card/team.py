@@ -38,7 +38,7 @@ FILLED = {
 }
 
 
-KEYS = {name: Ed25519PrivateKey.generate() for name in (*PEOPLE, *AUTHORS, "eve")}
+KEYS = {name: Ed25519PrivateKey.generate() for name in (*PEOPLE, *AUTHORS, "eve", "sue")}
 """Made once: what a key is worth is asked of the bytes, and costs two multiplications."""
 
 

@@ -54,6 +54,10 @@ def test_a_card_allows_exactly_what_was_simulated(draft, simulated, card):
         {"candidate": "another"},
         {"abort_thresholds": {}},
         {"abort_thresholds": {**draft.abort_thresholds, "latency_s": -1.0}},
+        {"abort_thresholds": {**draft.abort_thresholds, "mood": 0.0}},
+        {"force_limit_n": 1e9},
+        {"force_limit_n": 1e308},
+        {"workspace_lower_m": tuple(high - 1e-12 for high in draft.workspace_upper_m)},
     ):
         assert envelope_violations(card.model_copy(update=change), draft, simulated), change
 
@@ -94,6 +98,13 @@ def test_commands_beyond_the_envelope_void_it(team, key, value, text):
     assert any(text in found for found in beyond_simulation(simulated, "flow"))
     assert beyond_simulation(simulated, "diffusion") == []
     assert "was not run" in beyond_simulation(simulated, "another")[0]
+
+
+def test_a_workspace_of_nothing_holds_no_rollout(simulated):
+    """Planned so, and the rollouts as they were: each of them left it."""
+    low = simulated.workspace_lower_m
+    point = replace(simulated, workspace_upper_m=tuple(value + 1e-12 for value in low))
+    assert [text for text in beyond_simulation(point, "flow") if "outside the workspace" in text]
 
 
 def test_an_envelope_looser_than_the_task_is_none(team):
@@ -140,7 +151,12 @@ def test_a_text_that_shows_nothing_or_hides_something_is_empty(card, name, text)
 
 def test_other_scripts_and_several_lines_say_something(card):
     for text in ("Ümit Özdağ", "佐藤", "left of the cell\nat the door", "2nd button, red"):
-        assert missing_fields(card.model_copy(update={"spotter": text})) == []
+        assert missing_fields(card.model_copy(update={"stop_path": text})) == []
+
+
+@pytest.mark.parametrize("text", ["Sam", "sam s.", "sa\u0301m", "<b>sam</b>", "sam\n", "s\u0430m"])
+def test_a_spotter_who_is_no_id_of_a_list_is_missing(card, text):
+    assert missing_fields(card.model_copy(update={"spotter": text})) == ["spotter"]
 
 
 def test_both_days_count(card):

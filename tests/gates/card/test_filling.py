@@ -1,4 +1,5 @@
 import datetime
+from dataclasses import replace
 
 import pytest
 from team import FILLED, TODAY
@@ -50,6 +51,27 @@ def test_what_is_filled_can_be_signed(team, rules):
     assert envelope.is_file()
 
 
+def test_a_force_without_contact_is_asked_for_with_what_was_seen(rules):
+    """Nothing is answered for anybody; and whoever answers is told that nothing supports it."""
+    reason = next(q for q in questions(rules) if q.name == "force_limit_reason").text
+    assert "contact in" not in reason
+    said = "no contact in 540 of 540 rollouts"
+    caveat = f"{rules.draft.candidate}: {said}, so that no force of it was ever seen."
+    draft = rules.draft.model_copy(update={"caveats": (*rules.draft.caveats, caveat)})
+    unseen = replace(rules, draft=draft)
+    reason = next(q for q in questions(unseen) if q.name == "force_limit_reason").text
+    assert f"{said}: the evidence supports no force, so write why" in reason
+    with pytest.raises(ConfigError, match=f"force_limit_reason is not answered, .*{said}"):
+        filled(unseen, {n: said for n, said in ANSWERS.items() if n != "force_limit_reason"})
+    assert caveat in filled(unseen, ANSWERS).caveats
+
+
+def test_thresholds_of_none_are_strict_and_allowed(rules):
+    """A trial that ends at the first of anything; what nobody asked for is no threshold."""
+    none = {f"abort.{name}": "0" for name in rules.draft.abort_thresholds}
+    assert set(filled(rules, {**ANSWERS, **none}).abort_thresholds.values()) == {0.0}
+
+
 def test_a_threshold_may_be_lowered(rules):
     name = sorted(rules.draft.abort_thresholds)[0]
     most = rules.draft.abort_thresholds[name]
@@ -62,8 +84,14 @@ def test_a_threshold_may_be_lowered(rules):
 @pytest.mark.parametrize(
     ("name", "said"),
     [
-        *(("force_limit_n", said) for said in ("0", "-1", "80.1", "nan", "inf", "thirty", "")),
-        *(("spotter", said) for said in ("", "  ", "-", "\u200b\u200b", "sam\u202e")),
+        *(
+            ("force_limit_n", said)
+            for said in ("0", "-1", "80.1", "1e9", "1e308", "1e309", "nan", "inf", "")
+        ),
+        *(
+            ("spotter", said)
+            for said in ("", "  ", "-", "\u200b\u200b", "sam\u202e", "Sam", "rita", "ada", "nobody")
+        ),
         *(("stop_path", said) for said in ("", "--")),
         *(("force_limit_reason", said) for said in ("", "?")),
         *(("reviewer", said) for said in ("", "nobody", "ada", "mo", "Rita")),

@@ -40,6 +40,11 @@ def _edit(**changes):
     return change
 
 
+def _with_threshold(statement, name):
+    statement["predicate"]["abort_thresholds"][name] = 0.0
+    return statement
+
+
 def _subject(statement):
     statement["subject"][0]["digest"]["sha256"] = "0" * 64
     return statement
@@ -151,12 +156,29 @@ def _without_caveats(team, kept):
     _redraft(team, caveats=kept)
 
 
+def _url_safe(part):
+    """The same bytes as base64url."""
+
+    def change(team):
+        team.forge(_edit(stop_path="at the door ??????"))  # as base64 it has a slash
+        before = team.envelope.read_text()
+        document = json.loads(before)
+        for holder in [document] if part == "payload" else document["signatures"]:
+            holder[part] = holder[part].replace("+", "-").replace("/", "_").rstrip("=")
+        assert document != json.loads(before)
+        team.envelope.write_text(json.dumps(document))
+
+    return change
+
+
 def _in_alphabet(document):
     document["payload"] = f"!{document['payload']}"
 
 
 FORGERIES = {
     "a character that is no base64": (_document(_in_alphabet), "signature_valid"),
+    "the payload as base64url": (_url_safe("payload"), "signature_valid"),
+    "signatures as base64url": (_url_safe("sig"), "signature_valid"),
     "a field beside the payload": (_document(lambda d: d.update(note="ok")), "signature_valid"),
     "a field beside a signature": (
         _document(lambda d: d["signatures"][0].update(note="ok")),
@@ -212,6 +234,27 @@ FORGERIES = {
     "subject of another chain": (lambda t: t.forge(_subject), "signature_valid"),
     "force limit empty": (lambda t: t.forge(_edit(force_limit_n=None)), "draft_complete"),
     "force limit zero": (lambda t: t.forge(_edit(force_limit_n=0.0)), "envelope_within_limits"),
+    "force limit of a thousand tonnes": (
+        lambda t: t.forge(_edit(force_limit_n=1e9)),
+        "envelope_within_limits",
+    ),
+    "force limit beyond all numbers": (
+        lambda t: t.forge(_edit(force_limit_n=1e308)),
+        "envelope_within_limits",
+    ),
+    "a workspace of nothing": (
+        _looser(workspace_upper_m=[0.35 + 1e-12, -0.2 + 1e-12, 0.03 + 1e-12]),
+        "envelope_within_limits",
+    ),
+    "a threshold that nobody knows": (
+        lambda t: t.forge(lambda s: _with_threshold(s, "mood")),
+        "envelope_within_limits",
+    ),
+    "the reviewer at the stop": (lambda t: t.forge(_edit(spotter="rita")), "reviewer_independent"),
+    "the author at the stop": (lambda t: t.forge(_edit(spotter="ada")), "reviewer_independent"),
+    "a stranger at the stop": (lambda t: t.forge(_edit(spotter="nobody")), "reviewer_independent"),
+    "a spotter by name": (lambda t: t.forge(_edit(spotter="Sam S.")), "draft_complete"),
+    "markup for a spotter": (lambda t: t.forge(_edit(spotter="<b>sam</b>")), "draft_complete"),
     "spotter blank": (lambda t: t.forge(_edit(spotter="  ")), "draft_complete"),
     "faster than the draft": (lambda t: t.forge(_edit(speed_limit_m_s=0.2501)), "signature_valid"),
     "slower than simulated": (_looser(speed_limit_m_s=0.2), "envelope_within_limits"),
@@ -277,6 +320,34 @@ def test_a_card_that_lies_under_the_name_of_another_is_refused(signed):
     papers = examine(signed.root, "another")
     assert papers.refusal == "the card has another name than its file"
     assert papers.present and papers.signed is None
+
+
+def test_thresholds_of_none_are_strict_and_pass(signed):
+    known = json.loads((signed.root / "artifacts/card/card.json").read_bytes())["abort_thresholds"]
+    signed.forge(_edit(abort_thresholds=dict.fromkeys(known, 0.0)))
+    assert signed.judge().verdict == "PASS"
+
+
+def test_somebody_whose_role_is_the_stop_may_stand_there(signed):
+    signed.allow({**PEOPLE, **AUTHORS, "sue": "spotter"})
+    signed.forge(_edit(spotter="sue"))
+    report = signed.judge()
+    assert report.verdict == "PASS"
+    said = {c.id: c.caveat for c in report.criteria}["reviewer_independent"]
+    assert "sue stands at the stop" in said
+
+
+def test_a_force_limit_that_nothing_supports_is_said_beside_its_reason(signed):
+    """Here a draft alone says so; the chain would have to say it too, or the card is not of it."""
+    said = "no contact in 540 of 540 rollouts"
+    caveat = f"flow: {said}, so that no force of it was ever seen."
+    found = {c.id: c.caveat for c in signed.judge().criteria}["envelope_within_limits"]
+    assert found == "as simulated, and no command beyond"
+    draft = json.loads((signed.root / "artifacts/card/card.json").read_bytes())
+    _redraft(signed, caveats=[*draft["caveats"], caveat])
+    found = {c.id: c.caveat for c in signed.judge().criteria}["envelope_within_limits"]
+    assert f"{said}: the force limit stands on the written reason alone" in found
+    assert "(measured at this cell)" in found
 
 
 def test_a_caveat_that_people_add_stays(signed):

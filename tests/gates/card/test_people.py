@@ -3,8 +3,9 @@
 import pytest
 import yaml
 from team import AUTHORS, PEOPLE
+from test_names import LOOKS_LIKE_RITA_RAY
 
-from gates.card.people import Person, dependence, load_allow_list
+from gates.card.people import Person, dependence, load_allow_list, spotting
 from genpolicy.errors import ConfigError
 
 
@@ -25,6 +26,7 @@ def _write(root, people):
         "\uff52\uff49\uff54\uff41",  # full width
         "ri\u0301ta",  # decomposed
         "Rita",
+        "\u202eatir\u202c",  # bidirectional
         "rita ",
         "",
     ],
@@ -37,15 +39,51 @@ def test_an_identifier_has_one_spelling(team, spelling):
         load_allow_list(team.root)
 
 
-@pytest.mark.parametrize("name", ["Rita", "Ri\u200bta", "Rit\u0430"])
-def test_a_name_that_looks_like_another_decides_nothing(team, name):
-    """The author under the reviewer's name is still the author, whatever the name looks like."""
+@pytest.mark.parametrize("how", LOOKS_LIKE_RITA_RAY)
+def test_one_person_under_a_name_that_looks_like_another_is_refused(team, how):
+    """Five keys of one hand under five such names would read as five people."""
+    people = _people(team.root)
+    people[0]["name"], people[-1]["name"] = "Rita Ray", LOOKS_LIKE_RITA_RAY[how]
+    _write(team.root, people)
+    with pytest.raises(ConfigError, match=f"name of {people[-1]['id']}"):
+        load_allow_list(team.root)
+
+
+@pytest.mark.parametrize("name", ["Rita", "rita", " RITA "])
+def test_two_names_that_read_alike_are_told_apart_or_refused(team, name):
     people = _people(team.root)
     people[-1]["name"] = name
+    _write(team.root, people)
+    with pytest.raises(ConfigError, match=r"name is the same value twice"):
+        load_allow_list(team.root)
+    people[-1]["name"] = f"{name} of the south wing"
+    _write(team.root, people)
+    assert load_allow_list(team.root).find("ada") is not None
+
+
+def test_an_author_is_one_whatever_the_name(team):
+    people = _people(team.root)
+    people[-1]["name"] = "Rita of the south wing"
     _write(team.root, people)
     allowed = load_allow_list(team.root)
     assert dependence("rita", ["ada"], [allowed.find("rita")], allowed) == ""
     assert "author and reviewer" in dependence("ada", ["ada"], [], allowed)
+
+
+@pytest.mark.parametrize(("spotter", "why"), [
+    ("sam", ""), ("mo", ""), ("sue", ""), ("rita", "reviewer and spotter"),
+    ("ada", "author and spotter"), ("nobody", "not on"), ("Sam", "not on"), ("", "not on"),
+])  # fmt: skip
+def test_at_the_stop_stands_somebody_of_the_list_who_neither_reviews_nor_made_it(
+    team, spotter, why
+):
+    team.allow({**PEOPLE, **AUTHORS, "sue": "spotter"})
+    allowed = load_allow_list(team.root)
+    for reviewer in ("rita", ""):
+        found = spotting(spotter, reviewer, ["ada"], allowed)
+        assert (found == "") == (why == "") and why in found
+    assert "author and spotter" in spotting("mo", "rita", ["ada", "mo"], allowed)
+    assert "reviewer and spotter" in spotting("mo", "mo", ["ada"], allowed)
 
 
 @pytest.mark.parametrize("field", ["id", "public_key", "emails"])

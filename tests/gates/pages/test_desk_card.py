@@ -78,7 +78,8 @@ def test_without_contact_nothing_is_known_of_force(copied, waits):
     told = {**d.materials, "artifacts/stress/rollouts.parquet": digest}
     found = by_field(of(copied, {**waits, "D": d.model_copy(update={"materials": told})})[0])
     assert (
-        found["Ends it: contact force above"].seen == "no contact in 560 rollouts: nothing is known"
+        found["Ends it: contact force above"].seen
+        == "no contact in 560 of 560 rollouts: nothing is known"
     )
 
 

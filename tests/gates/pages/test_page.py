@@ -4,13 +4,18 @@ import html
 import json
 import re
 import shutil
+import sys
+from pathlib import Path
 
 import evidence
 import pytest
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "card"))
+from team import PEOPLE, Team
+
 from gates.pages.summary import markdown
 from gates.report import report_path
-from gates.writing import write_gate
+from gates.writing import write_gate, write_index
 
 EVIL = '<script>alert("x")</script>'
 
@@ -62,6 +67,19 @@ def test_names_cannot_break_out_of_page_figure_or_table(ladder):
     assert not any("<script" in line or "@all" in line for line in lines)
     widths = {len(re.findall(r"(?<!\\)\|", line)) for line in lines if line.startswith("| ")}
     assert widths == {8}
+
+
+def test_markup_in_the_fields_of_a_signed_card_stays_text(ladder):
+    """Whoever signs writes words; a page that ran them would be another card than was signed."""
+    team = Team(ladder)
+    team.sign(team.complete(stop_path=EVIL, force_limit_reason=f"<img src=x>{EVIL}"), PEOPLE)
+    evidence.record(ladder)
+    write_gate(ladder, "E")
+    write_index(ladder)
+    for page in (_page(ladder, "E"), (ladder / "reports/index.html").read_text()):
+        assert "<script" not in page and "<img src=x" not in page
+        assert "&lt;script&gt;" in page
+    assert "<script" not in (ladder / "reports/gate_e.md").read_text()
 
 
 def test_a_missing_table_is_said_in_place_of_its_figure(ladder):

@@ -1,0 +1,40 @@
+"""Words of people on cards and lists: what is not seen, and what looks like something else.
+
+A name decides nothing: ids and keys do. But a list of five entries is reviewed by eye, and one
+person under five names that look alike would pass for five.
+"""
+
+import unicodedata
+
+BLANK = "\u115f\u1160\u3164\uffa0"
+"""Letters by their category, and fillers without a shape."""
+ALIKE = ("LATIN", "CYRILLIC", "GREEK", "ARMENIAN", "CHEROKEE")
+"""Scripts with letters that look like those of another; no word has letters of two of them."""
+
+
+def says(text: str) -> bool:
+    """Whether a text holds a letter or a digit, and nothing that is not seen."""
+    seen = [character for character in text if character not in "\n\t"]
+    kinds = {"Cf" if c in BLANK else unicodedata.category(c) for c in seen}
+    return any(kind[0] in "LN" for kind in kinds) and not kinds & {"Cf", "Cc", "Co", "Cn", "Cs"}
+
+
+def disguise(name: str) -> str:
+    """Why a name may look like another one; empty if it is written as it looks.
+
+    Not told is a name of one script that looks like one of another: whole words of both are names.
+    """
+    if not says(name):
+        return "characters that are not seen, or nothing else"
+    if unicodedata.normalize("NFKC", name) != name:
+        return "letters in another form than the usual one (NFKC)"
+    for word in name.split():
+        scripts = {s for c in word if (s := unicodedata.name(c, "").partition(" ")[0]) in ALIKE}
+        if len(scripts) > 1:
+            return f"letters of {' and '.join(sorted(scripts)).lower()} in one word"
+    return ""
+
+
+def as_read(name: str) -> str:
+    """A name as a hurried reader takes it: without regard to case and spaces."""
+    return " ".join(name.casefold().split())
