@@ -118,7 +118,7 @@ def check(
     each that does not hold.
     """
     from gates.card.history import require_history
-    from gates.printed import page_problem, print_cases, print_rungs, worst
+    from gates.printed import not_built, page_problem, print_cases, print_rungs, worst
     from gates.proof import prove_all
     from gates.report import GATES
 
@@ -133,6 +133,8 @@ def check(
             problems.append(("history", str(error), "preregistration.yaml", error.exit_code))
     if layout in ("junit", "github"):
         print_cases(root, rungs, problems, layout)
+    elif layout == "text" and not as_json and (said := not_built(root, rungs)):
+        print(said)
     else:
         print_rungs(rungs, as_json or layout == "json")
     for _, text, _, _ in problems:
@@ -149,13 +151,14 @@ def verify_reports(root: Root = Path(), as_json: AsJson = False) -> int:
     what its journal says; the front page must be the one that the reports give.
     Exit 3 if a report is untrue, 2 if one cannot be read.
     """
-    from gates.printed import pages_code, print_rungs, worst
+    from gates.printed import NOT_BUILT, not_built, pages_code, print_rungs, worst
     from gates.proof import prove_all
 
-    rungs = [rung for rung in prove_all(root) if rung.verdict != "NOT JUDGED"]
-    if not rungs:
-        print("No report lies here. Run `dvc repro gate_a`.", file=sys.stderr)
-        return 3
+    every = prove_all(root)
+    rungs = [rung for rung in every if rung.verdict != "NOT JUDGED"]
+    if said := not_built(root, every) or (not rungs and NOT_BUILT):
+        print(said, file=sys.stderr)
+        return worst({3, *(rung.exit_code for rung in rungs)})
     # What derives again loads simulation and compiled kernels: not to say that nothing lies here.
     from gates.rederive import rederived
 
@@ -254,17 +257,25 @@ def verify_card(
 
 @gates.command(epilog=examples("genpolicy gates summary --json"))
 def summary(root: Root = Path(), as_json: AsJson = False) -> int:
-    """The ladder in one table, each report proved; always exits 0."""
+    """The ladder in one table, each report proved; always exits 0.
+
+    On a terminal no line is longer than 80 columns, and verdicts are coloured
+    unless NO_COLOR is set; in a pipe each stage has one line.
+    """
     from gates.overview import as_text, overview
-    from gates.printed import print_rows
+    from gates.printed import coloured, not_built, print_rows
     from gates.proof import prove_all
     from gates.writing import INDEX
 
-    lines = overview(root, prove_all(root))
+    rungs = prove_all(root)
+    lines = overview(root, rungs)
     if as_json:
         print_rows(lines)
         return 0
-    print(as_text(lines))
+    if (said := not_built(root, rungs)) and all(line.seconds is None for line in lines):
+        print(said)
+        return 0
+    print(as_text(lines, terminal=sys.stdout.isatty(), colour=coloured()))
     if (root / INDEX).is_file():
         print(f"Reports: {INDEX}")
     return 0

@@ -1,16 +1,20 @@
-"""The table at the end of a run: every stage, its verdict, what decided, its time and memory.
+"""The table at the end of a run: every stage, its verdict, who fell, its time and memory.
 
 Times come from `build/times`, which the stages write outside of everything that is hashed. Only
 those are shown that belong to the ladder as it is recorded now: of a run that stands on the runs
 below it, or of one that failed after all of them.
 """
 
+import textwrap
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import typer
+
 from gates.present import present_runs
 from gates.proof import STAGE_REQUIRES, Rung
-from gates.report import stage_of
+from gates.report import limit_text, measured_text, read_report, stage_of
 from genpolicy.errors import GenpolicyError
 from genpolicy.integrity.documents import read_json
 
@@ -18,6 +22,12 @@ TIMES = Path("build/times")
 ALWAYS = "task"
 """The stage that every run begins with, also one that changes nothing."""
 ENDS = {0: "done", 1: "FAULT", 2: "BAD INPUT", 3: "REFUSED"}
+COLUMNS = 80
+"""Of a terminal; no line of the table is longer there."""
+COLOURS = {
+    "PASS": "green", "done": "green", "FAIL": "red", "REFUSED": "red", "FAULT": "red",
+    "BAD INPUT": "red", "INCONCLUSIVE": "yellow", "PENDING_REVIEW": "yellow",
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -30,6 +40,7 @@ class Line:
         decided_by: Criterion that decided, or what follows from the verdict.
         seconds: Wall time of its last run, s.
         peak_mib: Largest memory of one of its processes, MiB.
+        stopped: Candidates that fail at a gate, each with its first criterion, number and limit.
     """
 
     stage: str
@@ -37,6 +48,7 @@ class Line:
     decided_by: str
     seconds: float | None
     peak_mib: int | None
+    stopped: tuple[str, ...] = ()
 
 
 def overview(root: Path, rungs: list[Rung]) -> list[Line]:
@@ -59,22 +71,56 @@ def overview(root: Path, rungs: list[Rung]) -> list[Line]:
         if rung is None:
             lines.append(Line(stage, ended, "", seconds, peak))
         else:
-            lines.append(Line(stage, rung.verdict, rung.decided_by or rung.note, seconds, peak))
+            decided = rung.decided_by or rung.note
+            fell = tuple(_stopped(root, rung))
+            lines.append(Line(stage, rung.verdict, decided, seconds, peak, fell))
     return lines
 
 
-def as_text(lines: list[Line]) -> str:
-    """The table for a terminal."""
+def _stopped(root: Path, rung: Rung) -> Iterator[str]:
+    """Candidates that fail, by a report that was proved: what was refused does not speak."""
+    if rung.verdict in ("NOT JUDGED", "REFUSED"):
+        return
+    report = read_report(root, rung.gate)[0]
+    for name, verdict in sorted(report.candidates.items()):
+        unmet = [c for c in report.criteria if c.candidate == name and c.verdict == verdict]
+        if verdict != "PASS" and unmet:
+            held = f"{measured_text(unmet[0])}, required {limit_text(unmet[0])}"
+            yield f"{name} {verdict}: {unmet[0].id} {held}"
+
+
+def as_text(lines: list[Line], *, terminal: bool = False, colour: bool = False) -> str:
+    """The table in text: a line for each stage, or no line longer than a terminal is wide.
+
+    Args:
+        lines: Of the table.
+        terminal: Whether a person reads it at once; otherwise each stage has one line, however
+            long, for programs that take lines apart.
+        colour: Whether verdicts are coloured.
+    """
     wide = max([len("stage"), *(len(line.stage) for line in lines)])
-    rows = [f"{'stage':<{wide}} {'verdict':<15} {'time':>8} {'memory':>8}  decided by"]
+    head = f"{'stage':<{wide}} {'verdict':<15} {'time':>8} {'memory':>8}"
+    rows = [head if terminal else f"{head}  decided by"]
     for line in lines:
         time = "" if line.seconds is None else f"{line.seconds:.1f} s"
         memory = "" if line.peak_mib is None else f"{line.peak_mib} MiB"
-        text = f"{line.stage:<{wide}} {line.verdict:<15} {time:>8} {memory:>8}  {line.decided_by}"
-        rows.append(text.rstrip())
+        verdict = f"{line.verdict:<15}"
+        if colour and line.verdict in COLOURS:
+            verdict = typer.style(verdict, fg=COLOURS[line.verdict])
+        text = f"{line.stage:<{wide}} {verdict} {time:>8} {memory:>8}"
+        said = [said for said in (line.decided_by, *line.stopped) if said]
+        if terminal:
+            rows += [text.rstrip(), *(row for one in said for row in _below(one))]
+        else:
+            rows.append(f"{text}  {'; '.join(said)}".rstrip())
     total = sum(line.seconds for line in lines if line.seconds is not None)
     rows.append(f"{'':<{wide}} {'':<15} {total:>6.1f} s")
     return "\n".join(rows)
+
+
+def _below(text: str) -> list[str]:
+    """What is said of a stage, below its line; a name that is longer than a line is broken."""
+    return textwrap.wrap(text, COLUMNS, initial_indent="  ", subsequent_indent="    ")
 
 
 def _last_run(path: Path) -> tuple[str, float | None, int | None]:

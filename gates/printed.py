@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import os
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -15,6 +16,31 @@ from genpolicy.errors import GenpolicyError
 
 Problem = tuple[str, str, str, int]
 """What blocks beside the gates: its name, a sentence, its file, an exit code."""
+NOT_BUILT = "not built: make ladder"
+ARTIFACTS = "artifacts"
+
+
+def not_built(root: Path, rungs: Sequence[Rung]) -> str:
+    """Said in place of empty rows where no stage has run here; empty where one has.
+
+    A clone brings reports without the evidence under them, of which nothing can be proved.
+
+    Args:
+        root: Repository root.
+        rungs: Every gate, as proved.
+    """
+    folder = root / ARTIFACTS
+    verdicts = {rung.verdict for rung in rungs}
+    if not verdicts <= {"NOT JUDGED", "REFUSED"} or (folder.is_dir() and any(folder.iterdir())):
+        return ""
+    if "REFUSED" not in verdicts:
+        return NOT_BUILT
+    return f"{NOT_BUILT} (reports lie here without their evidence, and nothing of it is proved)"
+
+
+def coloured() -> bool:
+    """Whether standard output is a terminal whose user wants colour (https://no-color.org)."""
+    return sys.stdout.isatty() and not os.environ.get("NO_COLOR")
 
 
 def pages_code(root: Path) -> set[int]:

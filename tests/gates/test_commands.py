@@ -131,7 +131,7 @@ def test_verifying_refuses_what_is_untrue_and_no_verdict(proved, stand_in, verdi
 def test_verifying_nothing_is_refused(proved, capsys):
     calls = proved(rungs(**dict.fromkeys("ABCDE", ("NOT JUDGED", 3))))
     assert commands.verify_reports(ROOT) == 3
-    assert capsys.readouterr().err == "No report lies here. Run `dvc repro gate_a`.\n"
+    assert capsys.readouterr().err == "not built: make ladder\n"
     assert calls == [("prove_all", ROOT)]
 
 
@@ -264,7 +264,8 @@ def test_a_summary_is_of_what_was_proved_and_blocks_nothing(
     stand_in, tmp_path, capsys, as_json, page
 ):
     put, calls = stand_in
-    put("gates.proof.prove_all", ["rungs"])
+    states = rungs()
+    put("gates.proof.prove_all", states)
     put("gates.overview.overview", ["lines"])
     put("gates.overview.as_text", "the table")
     put("gates.printed.print_rows")
@@ -272,8 +273,9 @@ def test_a_summary_is_of_what_was_proved_and_blocks_nothing(
         (tmp_path / "reports").mkdir()
         (tmp_path / "reports/index.html").write_text("")
     assert commands.summary(tmp_path, as_json) == 0
-    assert calls[:2] == [("prove_all", tmp_path), ("overview", tmp_path, ["rungs"])]
-    assert calls[2:] == [("print_rows", ["lines"]) if as_json else ("as_text", ["lines"])]
+    assert calls[:2] == [("prove_all", tmp_path), ("overview", tmp_path, states)]
+    told = ("as_text", ["lines"], False, False)  # no terminal, no colour
+    assert calls[2:] == [("print_rows", ["lines"]) if as_json else told]
     announced = "Reports: reports/index.html\n" if page else ""
     assert capsys.readouterr().out == ("" if as_json else f"the table\n{announced}")
 

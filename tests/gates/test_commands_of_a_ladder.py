@@ -1,6 +1,7 @@
 """The command line on a ladder: exit codes, one-sentence errors, no traceback."""
 
 import json
+import shutil
 import sys
 from dataclasses import dataclass
 
@@ -220,3 +221,19 @@ def test_that_nothing_lies_here_is_said_before_simulation_is_loaded(tmp_path, _r
     monkeypatch.setitem(sys.modules, "gates.rederive", None)
     result = _run(tmp_path, "verify")
     assert result.exit_code == 3 and result.output.startswith("No report lies here.")
+
+
+@pytest.mark.parametrize(("command", "code"), [
+    (("summary",), 0), (("check",), 3), (("verify",), 3),
+])  # fmt: skip
+@pytest.mark.parametrize("clone", [False, True])
+def test_where_nothing_is_built_each_command_says_how_to_build(ladder, _run, command, code, clone):
+    """A clone brings reports, and nothing that they could be proved from."""
+    shutil.rmtree(ladder / "artifacts")
+    if not clone:
+        shutil.rmtree(ladder / "reports")
+    result = _run(ladder, *command)
+    assert result.exit_code == code
+    assert result.output.startswith("not built: make ladder")
+    assert ("without their evidence" in result.output) == clone
+    assert "NOT JUDGED" not in result.output

@@ -3,14 +3,18 @@
 import hashlib
 import json
 import os
+import re
 from pathlib import Path
 
+import evidence
 import pytest
 import yaml
 
 from gates.overview import Line, as_text, overview
 from gates.present import present_runs
-from gates.proof import STAGE_REQUIRES, prove_all
+from gates.proof import STAGE_REQUIRES, judge, prove_all
+from gates.report import report_bytes, report_path
+from genpolicy.integrity.atomic import write_bytes
 
 
 def _record(root: Path, stage: str, **values: object) -> None:
@@ -114,3 +118,55 @@ def test_a_line_says_what_was_recorded_and_leaves_out_what_was_not() -> None:
     assert text[1].split() == ["audit", "done", "12.3", "s", "99", "MiB"]
     assert text[2] == "card"
     assert text[3].split() == ["12.3", "s"]
+
+
+LONG = "a_name_without_a_space_" * 9
+FELL = (f"{LONG} FAIL: projection_p95_m 0.026, required <= 0.02", "act FAIL: x 1, required <= 0")
+
+
+@pytest.mark.parametrize("colour", [False, True])
+def test_no_line_of_a_terminal_is_longer_than_it_whatever_the_names(colour: bool) -> None:
+    lines = [
+        Line("gate_c", "PASS", f"Go on with {LONG}.", 1234.5, 123456, FELL),
+        *(Line(stage, "PENDING_REVIEW", "", 1e5, 1, ()) for stage in STAGE_REQUIRES),
+    ]
+    text = as_text(lines, terminal=True, colour=colour)
+    plain = re.sub("\x1b\\[[0-9]+m", "", text)
+    assert max(map(len, plain.splitlines())) <= 80
+    assert (plain != text) == colour
+    whole = "".join(line.strip() for line in plain.splitlines())
+    assert LONG in whole and "act FAIL: x 1, required <= 0" in plain
+
+
+def test_where_nobody_looks_each_stage_has_one_line_with_all_of_it() -> None:
+    line = Line("gate_c", "PASS", "Go on.", 1.0, 1, FELL)
+    text = as_text([line, Line("card", "", "", None, None)])
+    assert "\x1b" not in text and len(text.splitlines()) == 4
+    assert text.splitlines()[1].endswith(f"  Go on.; {'; '.join(FELL)}")
+
+
+def test_each_verdict_is_coloured_as_it_is_meant() -> None:
+    text = as_text([Line("a", "FAIL", "", None, None), Line("b", "PASS", "", None, None)],
+                   terminal=True, colour=True)  # fmt: skip
+    assert text.splitlines()[1].startswith("a     \x1b[31mFAIL")
+    assert text.splitlines()[2].startswith("b     \x1b[32mPASS")
+
+
+def test_who_fell_is_named_with_number_and_limit_where_another_passes(ladder: Path) -> None:
+    def slow(frame):  # type: ignore[no-untyped-def]
+        late = (frame["method"] == "diffusion") & (frame["invocation"] > 0)
+        return frame.assign(latency_s=frame["latency_s"].where(~late, 9.0))
+
+    evidence.edit_table(ladder, "stress/invocations.parquet", slow)
+    write_bytes(ladder / report_path("D"), report_bytes(judge(ladder, "D")))
+    lines = {line.stage: line for line in overview(ladder, prove_all(ladder))}
+    assert lines["gate_d"].verdict == "PASS"
+    assert lines["gate_d"].stopped == ("diffusion FAIL: latency_p95_s 9, required <= 0.4",)
+    assert lines["gate_c"].stopped == ()
+
+
+def test_a_report_that_is_refused_does_not_say_who_fell(ladder: Path) -> None:
+    path = ladder / report_path("D")
+    path.write_bytes(path.read_bytes().replace(b'"flow":"PASS"', b'"flow":"FAIL"'))
+    lines = {line.stage: line for line in overview(ladder, prove_all(ladder))}
+    assert lines["gate_d"].verdict == "REFUSED" and lines["gate_d"].stopped == ()

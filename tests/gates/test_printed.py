@@ -7,7 +7,16 @@ import pytest
 from test_differences import REPORT
 
 from gates import printed
-from gates.printed import page_problem, pages_code, print_cases, print_rungs, worst
+from gates.printed import (
+    NOT_BUILT,
+    coloured,
+    not_built,
+    page_problem,
+    pages_code,
+    print_cases,
+    print_rungs,
+    worst,
+)
 from gates.proof import Rung
 from gates.writing import INDEX
 from genpolicy.errors import BadInputError, IntegrityError
@@ -97,3 +106,37 @@ def test_only_a_report_that_was_proved_is_read_for_its_criteria(
     out = capsys.readouterr().out
     assert out.startswith("<" if layout == "junit" else "::error")
     assert "another" in out and "p.html" in out and "a byte" in out
+
+
+def _all(*verdicts):
+    return [
+        Rung(gate, "n", verdict, "", "", "r", 3)
+        for gate, verdict in zip("ABCDE", verdicts, strict=False)
+    ]
+
+
+def test_where_nothing_is_built_one_sentence_says_what_to_do(tmp_path):
+    none, clone = _all(*["NOT JUDGED"] * 5), _all("REFUSED", *["NOT JUDGED"] * 4)
+    assert not_built(tmp_path, none) == NOT_BUILT == "not built: make ladder"
+    assert not_built(tmp_path, clone).startswith(f"{NOT_BUILT} (reports lie here without")
+    (tmp_path / "artifacts").mkdir()
+    assert not_built(tmp_path, none) == NOT_BUILT
+    (tmp_path / "artifacts/record").mkdir()
+    assert not_built(tmp_path, none) == not_built(tmp_path, clone) == ""
+
+
+@pytest.mark.parametrize("verdict", ["PASS", "FAIL", "PENDING_REVIEW", "INCONCLUSIVE"])
+def test_what_was_judged_is_built(tmp_path, verdict):
+    assert not_built(tmp_path, _all("REFUSED", verdict, "NOT JUDGED")) == ""
+
+
+@pytest.mark.parametrize(("terminal", "wish", "seen"), [
+    (True, None, True), (True, "", True), (True, "1", False), (False, None, False),
+    (False, "1", False),
+])  # fmt: skip
+def test_colour_is_for_a_terminal_whose_user_wants_it(monkeypatch, terminal, wish, seen):
+    monkeypatch.setattr("sys.stdout.isatty", lambda: terminal, raising=False)
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    if wish is not None:
+        monkeypatch.setenv("NO_COLOR", wish)
+    assert coloured() is seen
