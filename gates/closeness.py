@@ -44,7 +44,8 @@ def closeness(answer: Answer) -> Closeness | None:
     if answer.comparison == ">=" and limit == found == 1:
         return None
     used = limit / found if answer.comparison == ">=" else max(found, 0.0) / limit
-    return Closeness(answer, used, answer.interval is not None)
+    end = 1 if answer.comparison == "<=" else 0
+    return Closeness(answer, used, answer.interval is not None and found == answer.interval[end])
 
 
 def by_room(answers: list[Answer]) -> list[Closeness]:

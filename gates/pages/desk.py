@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from gates.closeness import Closeness, by_room, closeness
 from gates.doubt import Doubt
 from gates.doubts import of_a_ladder
-from gates.pages.guide import unit
+from gates.pages.numbers import at_its_end, human, judged_at
 from gates.report import GATES, NAMES, OWNERS, Answer, Gate, GateReport
 from gates.verdicts import first_unmet
 
@@ -21,16 +21,6 @@ HEADLINES: dict[Gate, tuple[str, str]] = {
     "E": ("owners_signed", "owners have signed"),
 }
 """The one number of each gate, and what it is a number of."""
-RATES = (
-    "_share",
-    "_lower",
-    "_upper",
-    "_margin",
-    "_disagreement",
-    "_coverage",
-    "_deviation",
-    "_gap",
-)
 WAITS = "PENDING_REVIEW"
 
 
@@ -153,35 +143,6 @@ def desk_of(reports: Mapping[Gate, GateReport]) -> Desk:
     )
 
 
-def human(answer: Answer, value: float | None) -> str:
-    """A number in the unit that a person uses: ms, mm, percent; three digits.
-
-    Args:
-        answer: The criterion, whose name says the unit and whose limit says whether it is a share.
-        value: The number; None is "not measured".
-    """
-    if value is None:
-        return "not measured"
-    suffix = unit(answer.id)
-    if suffix in ("s", "m") and abs(value) < 1 and value != 0:
-        return f"{1000 * value:.3g} m{suffix}"
-    if suffix:
-        return f"{value:.3g} {suffix}"
-    if "ratio" in answer.id:
-        return f"×{value:.3g}"
-    if answer.id.endswith(RATES) and answer.threshold is not None and answer.threshold <= 1:
-        return f"{100 * value:.3g} %"
-    return f"{value:.3g}" if value != int(value) else f"{int(value)}"
-
-
-def at_its_end(answer: Answer) -> str:
-    """What was measured; with the side of the interval on which it was judged."""
-    text = human(answer, answer.measured)
-    if answer.interval is None or answer.measured is None:
-        return text
-    return f"{'at most' if answer.comparison == '<=' else 'at least'} {text}"
-
-
 def _shown(report: GateReport) -> list[Answer]:
     """Criteria of the whole gate, and of the candidates that pass it or of all if none does."""
     passing = {name for name, verdict in report.candidates.items() if verdict == "PASS"}
@@ -277,4 +238,6 @@ def remark(answer: Answer) -> str:
     used = f"{100 * near.used:.3g} % of the limit is used up"
     if near.near:
         return f"near: {used}, and another draw may break it"
-    return used if near.worse_end else f"{used}; no interval says how sure that is"
+    if answer.interval is None:
+        return f"{used}; no interval says how sure that is"
+    return used if near.worse_end else f"{used}, at {judged_at(answer)}"

@@ -42,7 +42,8 @@ from gates.pages.desk_gain import gain_of
 from gates.pages.desk_line import line_of
 from gates.pages.figures import Picturable, Table, draw_all
 from gates.pages.guide import BACK_TO, QUESTIONS, READING, label, words
-from gates.pages.table import deciding, groups, not_asked, passed_by, stops, tally
+from gates.pages.numbers import human, judged_at, limit_said, rests_on
+from gates.pages.table import columns, deciding, groups, not_asked, passed_by, stops, tally
 from gates.report import GATES, NAMES, Gate, GateReport, read_report, report_bytes
 from gates.reproducibility.settings import RELOAD
 from genpolicy.errors import IntegrityError
@@ -91,11 +92,6 @@ def exact(value: float) -> str:
     return json.dumps(value)
 
 
-def short(value: float) -> str:
-    """A number for the eye, six significant digits."""
-    return f"{value:.6g}"
-
-
 def gate_page(root: Path, report: GateReport) -> str:
     """HTML of one gate's report; figures are drawn from the evidence below `root`."""
     state, card = _card(root, report)
@@ -110,6 +106,7 @@ def gate_page(root: Path, report: GateReport) -> str:
         not_asked=not_asked(report),
         stops=stops(report),
         groups=groups(report),
+        columns=columns(report),
         reading=READING[report.gate],
         words=words(report.gate),
         pictures=draw_all(PLOTS[report.gate], Evidence(root), report),
@@ -257,7 +254,10 @@ def _render(template: str, **values: Any) -> str:
         gates=GATES,
         marks=MARKS,
         exact=exact,
-        short=short,
+        human=human,
+        judged_at=judged_at,
+        limit_said=limit_said,
+        rests_on=rests_on,
         plain=lambda value: json.dumps(value, ensure_ascii=False),
         **values,
     )

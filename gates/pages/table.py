@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
-from gates.pages.guide import unit
-from gates.report import Answer, GateReport, limit_text, measured_text
+from gates.pages.numbers import human, limit_said
+from gates.report import Answer, GateReport
 from gates.settings import WAIVED
 from gates.verdicts import first_unmet
 
@@ -25,14 +25,33 @@ class Line:
 
 @dataclass(frozen=True)
 class Group:
-    """One question, with a line for the gate or one for each candidate."""
+    """One question, with a line for the gate or one for each candidate.
+
+    Attributes:
+        evidence: Files that were read for any of its numbers, each once.
+    """
 
     question: str
     id: str
     reason: str
     owner: str
-    unit: str
     lines: tuple[Line, ...]
+    evidence: tuple[str, ...]
+
+    @property
+    def holds(self) -> bool:
+        """Whether every line of it does, so that nobody has to look first."""
+        return all(line.criterion.verdict == "PASS" for line in self.lines)
+
+    def of(self, candidate: str) -> Line | None:
+        """The line of a candidate, or of the gate; None where it was not asked."""
+        own = (line for line in self.lines if line.criterion.candidate in (None, candidate))
+        return next(own, None)
+
+
+def columns(report: GateReport) -> list[str]:
+    """Candidates that a criterion speaks of, in the order in which it does."""
+    return list(dict.fromkeys(c.candidate for c in report.criteria if c.candidate is not None))
 
 
 def groups(report: GateReport) -> list[Group]:
@@ -48,8 +67,8 @@ def groups(report: GateReport) -> list[Group]:
                 name,
                 first.reason,
                 first.owner or "nobody",
-                unit(name),
                 lines,
+                tuple(dict.fromkeys(path for c in same for path in c.evidence)),
             )
         )
     return found
@@ -102,13 +121,10 @@ def deciding(report: GateReport) -> str:
 
 
 def against(criterion: Answer) -> str:
-    """Measured against required, with the unit."""
-    text = unit(criterion.id)
-    after = f" {text}" if text else ""
-    found = measured_text(criterion)
-    if criterion.verdict == "PENDING_REVIEW" or criterion.measured is None:
-        return f"{found}, required {sign(limit_text(criterion))}{after}"
-    return f"{found}{after}, required {sign(limit_text(criterion))}{after}"
+    """Measured against required, as a person reads numbers."""
+    pending = criterion.verdict == "PENDING_REVIEW"
+    found = "pending review" if pending else human(criterion, criterion.measured)
+    return f"{found}, required {limit_said(criterion)}"
 
 
 def stops(report: GateReport) -> dict[str, str]:

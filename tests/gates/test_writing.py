@@ -1,5 +1,6 @@
 """Reports for people: the same numbers as the JSON (P23), escaped, offline, the same bytes."""
 
+import html
 import json
 import re
 import shutil
@@ -7,10 +8,11 @@ import shutil
 import evidence
 import pytest
 
+from gates.pages.numbers import human, judged_at
 from gates.pages.page import gate_page, index_page
 from gates.pages.summary import markdown
 from gates.proof import judge
-from gates.report import report_bytes, report_path
+from gates.report import Answer, report_bytes, report_path
 from gates.writing import changed_page, write_gate
 from genpolicy.errors import BadInputError, GenpolicyError
 
@@ -18,6 +20,7 @@ NUMBER = re.compile(r'<data value="([^"]*)" title="([^"]*)">([^<]*)</data>')
 
 
 ROW = re.compile(r'<tr id="([^"]*)".*?</tr>', re.DOTALL)
+CELL = re.compile(r'<td id="([^"]*)".*?</td>', re.DOTALL)
 
 
 @pytest.fixture(scope="module")
@@ -36,19 +39,55 @@ def _page(root, gate):
 @pytest.mark.parametrize("gate", "ABCDE")
 def test_numbers_in_the_page_are_those_of_the_report(pages, gate):
     report = json.loads((pages / report_path(gate)).read_bytes())
-    rows = {m.group(1): m.group(0) for m in ROW.finditer(_page(pages, gate))}
-    assert len(rows) == len(report["criteria"])
+    page = _page(pages, gate)
+    rows = {m.group(1): m.group(0) for m in ROW.finditer(page)}
+    cells = {m.group(1): m.group(0) for m in CELL.finditer(page)}
+    assert list(rows) == list(dict.fromkeys(c["id"] for c in report["criteria"]))
+    assert len(cells) == sum(bool(c["candidate"]) for c in report["criteria"])
     for c in report["criteria"]:
-        row = rows[c["id"] + (f"-{c['candidate']}" if c["candidate"] else "")]
-        expected = [
-            v for v in (c["measured"], *(c["interval"] or ()), c["threshold"]) if v is not None
-        ]
-        found = NUMBER.findall(row)
-        assert [json.loads(value) for value, _, _ in found] == expected
-        assert all(text == f"{json.loads(value):.6g}" for value, _, text in found)
-        assert c["verdict"].replace("_", " ") in row
+        row = rows[c["id"]]
+        cell = cells[f"{c['id']}-{c['candidate']}"] if c["candidate"] else row
+        assert cell in row and c["verdict"].replace("_", " ") in cell
+        numbers = NUMBER.findall(cell)
+        limit, own = NUMBER.findall(row)[:1], numbers if c["candidate"] else numbers[1:]
+        if c["threshold"] is None:
+            limit, own = [], numbers
+        stated = ([c["threshold"]], [c["measured"], *(c["interval"] or ())])
+        for found, expected in zip((limit, own), stated, strict=True):
+            read = [json.loads(value) for value, _, _ in found]
+            assert read == [value for value in expected if value is not None]
+        answer = Answer.model_validate_json(json.dumps(c))
+        assert all(text == html.escape(human(answer, json.loads(value)))
+                   for value, _, text in numbers)  # fmt: skip
+        assert (f"judged at {judged_at(answer)}" in cell) == (c["measured"] is not None)
         for path in c["evidence"]:
-            assert f'href="../{path}"' in row and report["materials"][path][:12] in row
+            assert f'title="{path}"' in row and report["materials"][path][:12] in row
+
+
+@pytest.mark.parametrize("gate", "ABCDE")
+def test_no_link_leads_to_what_a_clone_does_not_bring(pages, gate):
+    """Its path and its hash stand there as text, and one sentence says where it comes from."""
+    page, report = _page(pages, gate), json.loads((pages / report_path(gate)).read_bytes())
+    assert 'href="../artifacts' not in page and page.count("no clone brings") == 1
+    for path, digest in report["materials"].items():
+        assert digest in page and f'title="{path}"' in page
+        assert (f'href="../{path}"' in page) == (not path.startswith("artifacts/"))
+
+
+def test_what_holds_is_folded_and_what_does_not_stands_open(pages, tmp_path):
+    root = tmp_path / "repo"
+    shutil.copytree(pages, root)
+    report = judge(root, "D")
+    first = next(c for c in report.criteria if c.candidate == "diffusion")
+    fell = tuple(
+        c.model_copy(update={"verdict": "FAIL"}) if c is first else c for c in report.criteria
+    )
+    page = gate_page(root, report.model_copy(update={"criteria": fell}))
+    shown, folded = page[page.index("<h2>Criteria</h2>") :].split("of which every answer holds")
+    assert f'<tr id="{first.id}">' in shown and f'<tr id="{first.id}">' not in folded
+    kept = {c.id for c in report.criteria} - {first.id}
+    assert all(f'<tr id="{name}">' in folded and name not in shown for name in kept)
+    assert f"{len(kept)} questions" in shown and "<details><summary>" in shown
 
 
 @pytest.mark.parametrize("gate", "AD")

@@ -9,7 +9,7 @@ import pytest
 
 from gates.pages.page import index_page
 from gates.pages.summary import markdown
-from gates.pages.table import deciding, groups, not_asked, passed_by, stops, tally, waived
+from gates.pages.table import columns, deciding, groups, not_asked, passed_by, stops, tally, waived
 from gates.writing import write_gate
 
 
@@ -42,7 +42,7 @@ def test_a_candidate_that_stops_names_its_criterion(ladder):
         markdown(report),
         (ladder / "reports/gate_b.html").read_text(),
     ):
-        assert "latency" in text and "required ≤ 1.5" in text
+        assert "latency" in text and "required ≤ ×1.5" in text
 
 
 def _waive(params):
@@ -81,6 +81,14 @@ def test_groups_hold_every_criterion_once_in_order(ladder, gate):
     lines = [line.criterion for group in groups(report) for line in group.lines]
     assert lines == list(report.criteria)
     assert len({group.id for group in groups(report)}) == len(groups(report))
+    for group in groups(report):
+        asked = [line.criterion.candidate for line in group.lines]
+        whole = asked == [None]
+        for who in columns(report):
+            line = group.of(who)
+            assert line is None or line.criterion.candidate == (None if whole else who)
+            assert (line is None) == (not whole and who not in asked)
+        assert set(group.evidence) == {p for line in group.lines for p in line.criterion.evidence}
 
 
 def test_what_is_not_decided_is_told_from_what_was_not_measured():

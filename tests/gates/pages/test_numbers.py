@@ -1,0 +1,65 @@
+"""Numbers as people read them, and what was held against a limit."""
+
+import pytest
+from test_verdicts import criterion
+
+from gates.pages.numbers import at_its_end, human, judged_at, limit_said, rests_on
+
+
+def of(**changes):
+    return criterion("PASS").model_copy(update=changes)
+
+
+@pytest.mark.parametrize(
+    ("name", "limit", "value", "text"),
+    [
+        ("clock_residual_s", 0.01, 0.000892, "0.892 ms"),
+        ("latency_p95_s", 0.4, 1.25, "1.25 s"),
+        ("projection_p95_m", 0.02, 0.0094, "9.4 mm"),
+        ("force_peak_p95_n", 80, 73.94, "73.9 N"),
+        ("told_share", 0.4, 0.1575, "15.8 %"),
+        ("warm_latency_ratio_upper", 1.5, 1.26, "×1.26"),
+        ("latent_dependence_p", 0.05, 0.034, "0.034"),
+        ("stub_stale", 0, 0.0, "0"),
+        ("promotion_e_value", 60, 61.234, "61.2"),
+        ("told_share", 0.4, None, "not measured"),
+        ("held_out_situations", 100, 13345.0, "13,345"),
+        ("boundary_jerk_p95_m_s3", 3250, 2031.7, "2,030 m/s³"),
+        ("latency_p95_s", 0.4, 1e9, "1e+09 s"),
+    ],
+)
+def test_numbers_stand_in_the_unit_of_a_person(name, limit, value, text):
+    assert human(of(id=name, threshold=limit), value) == text
+
+
+@pytest.mark.parametrize(("comparison", "measured", "where", "said"), [
+    ("<=", 0.3, "the worse end", "at most 30 %"), ("<=", 0.1, "the better end", "at least 10 %"),
+    (">=", 0.1, "the worse end", "at least 10 %"), (">=", 0.3, "the better end", "at most 30 %"),
+    (">=", 0.2, "a point of its interval", "20 %"),
+])  # fmt: skip
+def test_which_end_was_judged_is_said_as_it_was(comparison, measured, where, said):
+    """The worst of some conditions may be judged at the end that speaks for it."""
+    found = of(id="told_share", threshold=0.5, comparison=comparison, measured=measured,
+               interval=(0.1, 0.3))  # fmt: skip
+    assert (judged_at(found), at_its_end(found)) == (where, said)
+
+
+def test_without_an_interval_a_point_is_judged_and_without_a_number_nothing():
+    assert judged_at(of(measured=0.2)) == "a point" and judged_at(of(measured=None)) == ""
+    assert at_its_end(of(id="a_share", threshold=1.0, measured=0.2)) == "20 %"
+    assert at_its_end(of(measured=None, interval=(0.0, 1.0))) == "not measured"
+
+
+def test_a_limit_is_said_in_the_unit_of_its_number():
+    assert limit_said(of(id="clock_residual_s", threshold=0.01)) == "≤ 10 ms"
+    assert limit_said(of(id="told_share", threshold=0.4, comparison=">=")) == "≥ 40 %"
+    assert limit_said(of(threshold=None)) == "no limit"
+
+
+@pytest.mark.parametrize(("counted", "said"), [
+    ("0 of 1080 arrivals", "none of 1,080 arrivals"), ("24 of 25 episodes", "24 of 25 episodes"),
+    ("10 of 1080 arrivals", "10 of 1,080 arrivals"), ("3 and 3 processes", "3 and 3 processes"),
+    ("", ""),
+])  # fmt: skip
+def test_what_a_number_rests_on(counted, said):
+    assert rests_on(counted) == said
