@@ -123,7 +123,8 @@ def check(
     from gates.report import GATES
 
     last = _gate(through)
-    rungs = prove_all(root)[: GATES.index(last) + 1]
+    every = prove_all(root)
+    rungs = every[: GATES.index(last) + 1]
     codes = {rung.exit_code for rung in rungs if rung.verdict != "PASS"}
     problems = [page for page in [page_problem(root)] if page]
     if last == "E" and not codes:
@@ -133,7 +134,7 @@ def check(
             problems.append(("history", str(error), "preregistration.yaml", error.exit_code))
     if layout in ("junit", "github"):
         print_cases(root, rungs, problems, layout)
-    elif layout == "text" and not as_json and (said := not_built(root, rungs)):
+    elif layout == "text" and not as_json and (said := not_built(root, every)):
         print(said)
     else:
         print_rungs(rungs, as_json or layout == "json")

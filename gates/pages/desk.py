@@ -177,6 +177,8 @@ def _passes(report: GateReport | None) -> bool:
 def _against(answer: Answer) -> str:
     """Measured, against what was required."""
     sign = "at most" if answer.comparison == "<=" else "at least"
+    if answer.measured is None:
+        return f"Nothing was measured; required {sign} {human(answer, answer.threshold)}."
     found = human(answer, answer.measured)
     if answer.interval is not None:
         low, high = (human(answer, end) for end in answer.interval)

@@ -220,7 +220,7 @@ def test_a_plan_is_written_from_the_settings_beside_it(repo, _run):
 def test_that_nothing_lies_here_is_said_before_simulation_is_loaded(tmp_path, _run, monkeypatch):
     monkeypatch.setitem(sys.modules, "gates.rederive", None)
     result = _run(tmp_path, "verify")
-    assert result.exit_code == 3 and result.output.startswith("No report lies here.")
+    assert result.exit_code == 3 and result.output.startswith("not built: make ladder")
 
 
 @pytest.mark.parametrize(("command", "code"), [
