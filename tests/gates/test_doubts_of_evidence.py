@@ -113,10 +113,10 @@ def test_a_first_answer_that_comes_too_late_is_a_cold_start():
 
 
 def test_a_mean_that_one_condition_does_not_share_is_an_average():
-    (doubt,) = said("an average", answer(caveat="margin 0.05; worst in camera_delay -0.125 over bc"))
+    (doubt,) = said("an average", answer(caveat="worst in camera_delay -0.125 over bc"))
     assert "in camera_delay it is -12.5 points" in doubt.text
-    assert not said("an average", answer(caveat="margin 0.05; worst in camera_delay +0.125 over bc"))
-    assert not said("an average", answer("FAIL", caveat="margin 0.05; worst in camera_delay -1 over bc"))
+    assert not said("an average", answer(caveat="worst in camera_delay +0.125 over bc"))
+    assert not said("an average", answer("FAIL", caveat="worst in camera_delay -1 over bc"))
 
 
 @pytest.mark.parametrize(("counted", "few"), [
