@@ -97,7 +97,7 @@ def ledger(
     it is text: no number of a paper can become a limit or a rank. Every bundle
     carries it (`genpolicy package`). Exit 0.
     """
-    from gates.ledger import claims_of, ledger_text, read_ledger
+    from gates.ledger.claims import claims_of, ledger_text, read_ledger
     from gates.printed import print_document
 
     found = claims_of(read_ledger(), kind)

@@ -11,7 +11,7 @@ from typing import Literal
 
 import pyarrow.compute as pc
 
-from gates.ledger import LEDGER
+from gates.ledger.claims import LEDGER
 from gates.report import GATES, report_path
 from gates.reproducibility.settings import BROUGHT_FOLDER, RELOAD
 from gates.settings import PARAMS_FILE

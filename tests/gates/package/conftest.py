@@ -6,7 +6,7 @@ from pathlib import Path
 import evidence
 import pytest
 
-from gates.ledger import LEDGER
+from gates.ledger.claims import LEDGER
 from gates.package.groups import STRESS
 from gates.proof import judge
 from gates.report import report_bytes, report_path
@@ -20,7 +20,7 @@ def _whole(tmp_path_factory: pytest.TempPathFactory, _ladder: Path) -> Path:
     root = tmp_path_factory.mktemp("whole") / "repo"
     shutil.copytree(_ladder, root)
     (root / "limits.yaml").write_text("{}\n")
-    (root / LEDGER).parent.mkdir(exist_ok=True)
+    (root / LEDGER).parent.mkdir(parents=True, exist_ok=True)
     (root / LEDGER).write_text("claims: []\n")
     write_rows(root / STRESS / "ages.parquet", AgeRow, [AgeRow("flow", "nominal", 0.5, 0.2, 9)])
     (root / STRESS / "journals").mkdir(exist_ok=True)

@@ -14,7 +14,7 @@ from pydantic import BaseModel, TypeAdapter, ValidationError
 
 import gates
 from gates.criterion import Criterion, Measured
-from gates.ledger import KINDS, LEDGER, Claim, Ledger, claims_of, ledger_text, read_ledger
+from gates.ledger.claims import KINDS, LEDGER, Claim, Ledger, claims_of, ledger_text, read_ledger
 from gates.need.gate import GATE as NEED
 from gates.proof import SPECS
 from gates.report import Answer, GateReport, StrictModel
@@ -22,7 +22,7 @@ from gates.run_commands import ledger as command
 from gates.settings import GateSettings, Limit, Limits, read_limits
 from genpolicy.errors import BadInputError, ConfigError
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 ENTRY = {
     "id": "gain", "kind": "source_specific", "source": "a study", "locator": "table 1",
     "claim": "46.9 % better", "does_not_show": "here",
@@ -70,6 +70,17 @@ def test_every_reference_of_the_chapter_has_an_entry():
         int(n) for claim in read_ledger().claims for n in re.findall(r"\[(\d+)\]", claim.source)
     }
     assert cited == set(range(1, 18))
+
+
+def test_only_what_the_chapter_inspected_is_said_to_be_inspected():
+    """Chapter 6, section 10, by hand, and section 4 for the system boundary of [17]."""
+    inspected = {"[1]", "[2]", "[4]", "[5]", "[17]"}
+    own = claims_of(read_ledger(), "source_specific")
+    for claim in own:
+        cited = set(re.findall(r"\[\d+\]", claim.source))
+        words = "as inspected by" if cited <= inspected else "names no inspected place"
+        assert words in claim.locator, claim.id
+    assert {word for claim in own for word in re.findall(r"\[\d+\]", claim.source)} > inspected
 
 
 def test_nothing_of_a_paper_is_matched_and_what_is_names_a_criterion_that_exists():

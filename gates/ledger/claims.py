@@ -15,7 +15,7 @@ from gates.report import StrictModel, parse_section
 from genpolicy.errors import BadInputError
 from genpolicy.integrity.documents import parse_yaml
 
-LEDGER = "gates/ledger.yaml"
+LEDGER = "gates/ledger/ledger.yaml"
 Kind = Literal["matched", "source_specific", "abstract_only", "unmatched"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 OURS = "reports/"
@@ -29,7 +29,8 @@ class Claim(StrictModel):
 
     Attributes:
         id: Name of the entry.
-        kind: How far it carries: said by our own matched comparison; inspected in its source;
+        kind: How far it carries: said by our own matched comparison; told of the conditions
+            of its source, inspected there only if the locator says so;
             known from an abstract; or neither inspected in a known place nor comparable.
         source: Whose it is.
         locator: Where in the source it stands, or that no place is known.
