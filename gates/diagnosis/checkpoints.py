@@ -6,10 +6,12 @@ Every criterion of every gate carries a row, so that none is judged without a re
 from dataclasses import dataclass
 
 from gates.diagnosis.reports import Reports, gate_and_id
-from gates.report import Answer, Owner
-from gates.verdicts import combine
+from gates.report import Answer, Owner, Verdict
+from gates.verdicts import best, combine, worst
 
 NOT_JUDGED = "NOT JUDGED"
+UNMATCHED = "UNMATCHED"
+"""In place of PASS of a row that asks of matching what nobody asked of the candidate."""
 
 
 @dataclass(frozen=True)
@@ -42,10 +44,12 @@ class Ruled:
         owner: Who answers for it.
         reject_when: What forbids promotion.
         verdict: Of its criteria together: every one must hold, and of candidates one must hold in
-            all; `NOT JUDGED` where one of its gates is not.
+            all. `NOT JUDGED` where it would pass and one of its gates is not judged, `UNMATCHED`
+            where it would pass and only who was excepted from matching holds in all.
         candidates: Verdict of each that every judged gate of the row asked, by its own criteria.
         unmet: Criteria that do not hold, by gate, name and candidate.
         waits_for: Why some have no answer.
+        not_asked: What was waived or excepted, by whose word and why.
         criteria: What carries the row.
         limits_of: Owners of the limits of those that were answered.
     """
@@ -57,6 +61,7 @@ class Ruled:
     candidates: dict[str, str]
     unmet: tuple[str, ...]
     waits_for: tuple[str, ...]
+    not_asked: tuple[str, ...]
     criteria: tuple[str, ...]
     limits_of: tuple[str, ...]
 
@@ -94,7 +99,7 @@ CHECKPOINTS = (
         "only microbenchmark evidence",
         (*_of("B", "unpinned_items nonfinite_weights samples_difference nfe_mismatch "
               "mode_coverage_lower outside_modes_upper"),
-         *_of("D", "nominal_success_lower latency_p95_s")),
+         *_of("D", "nominal_success_lower stress_success_lower latency_p95_s")),
     ),
     Checkpoint(
         "timing", "controller", "full latency and action age", "trace and queue report",
@@ -121,7 +126,7 @@ CHECKPOINTS = (
         "evidence", "model", "source-specific conditions", "caveat ledger",
         "unmatched results create ranking",
         (*_of("A", "baselines_matched"), *_of("B", "unmatched_keys"),
-         *_of("D", "unmatched_starts verdict_reachable stress_success_lower promotion_e_value")),
+         *_of("D", "unmatched_starts verdict_reachable promotion_e_value")),
     ),
     Checkpoint(
         "safety", "safety", "independent supervisor", "reviewed trial card",
@@ -152,16 +157,24 @@ def _ruled(row: Checkpoint, reports: Reports) -> Ruled:
         answers += [(name, answer) for answer in found]
     stand = _who_stands(row, reports)
     counting = [a for _, a in answers if a.candidate is None or a.candidate in stand]
-    verdict, candidates = combine(counting, expects_candidates=any(a.candidate for _, a in answers))
+    excepted = {name for name in stand if _is_excepted(row, reports, name)}
+    verdict, candidates = _combined(counting, excepted, any(a.candidate for _, a in answers))
+    named = {
+        name: UNMATCHED if said == "PASS" and name in excepted else str(said)
+        for name, said in candidates.items()
+    }
+    passes = "PASS" in named.values() or not named
+    said = UNMATCHED if verdict == "PASS" and not passes else str(verdict)
     unmet = tuple(_named(name, a) for name, a in answers if a.verdict != "PASS")
     return Ruled(
         area=row.area,
         owner=row.owner,
         reject_when=row.reject_when,
-        verdict=NOT_JUDGED if waits and not unmet else verdict,
-        candidates={str(name): str(found) for name, found in candidates.items()},
+        verdict=NOT_JUDGED if waits and (verdict == "PASS" or not unmet) else said,
+        candidates=named,
         unmet=unmet,
         waits_for=tuple(waits),
+        not_asked=_not_asked(row, reports),
         criteria=row.criteria,
         limits_of=tuple(dict.fromkeys(str(a.owner) for _, a in answers if a.owner)),
     )
@@ -176,6 +189,31 @@ def _who_stands(row: Checkpoint, reports: Reports) -> set[str]:
     groups = [set(reports.judged[gate].candidates) for gate in gates]
     named = [group for group in groups if group]
     return set.intersection(*named) if named else set()
+
+
+def _combined(
+    answers: list[Answer], excepted: set[str], asked_of_each: bool
+) -> tuple[Verdict, dict[str, Verdict]]:
+    """Verdict of a row and of each candidate, those included of whom all of it was excepted."""
+    common = [a.verdict for a in answers if a.candidate is None]
+    candidates = combine(answers, expects_candidates=False)[1]
+    candidates |= {name: "PASS" for name in sorted(excepted - set(candidates))}
+    of_one = [best(candidates.values())] if asked_of_each or candidates else []
+    return worst([*common, *of_one]), candidates
+
+
+def _is_excepted(row: Checkpoint, reports: Reports, candidate: str) -> bool:
+    return any(reports.is_excepted(name, candidate) for name in row.criteria)
+
+
+def _not_asked(row: Checkpoint, reports: Reports) -> tuple[str, ...]:
+    texts = (
+        text
+        for name in row.criteria
+        for candidate in reports.candidates
+        for text in reports.not_asked(name, candidate)
+    )
+    return tuple(dict.fromkeys(texts))
 
 
 def _named(name: str, answer: Answer) -> str:

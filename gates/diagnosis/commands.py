@@ -1,11 +1,13 @@
 """`genpolicy diagnose`: where to look first. Registered in `genpolicy.commands`."""
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from genpolicy.cli.shell import AsJson, with_examples
+from genpolicy.errors import BadInputError
 
 Root = Annotated[Path, typer.Option(help="Repository root.")]
 
@@ -34,12 +36,20 @@ def diagnose(
     symptom it makes the chapter's two inspections and says what was found, what
     is not known, where to look now and what not to conclude.
 
-    Exit 0 if nothing speaks, 3 if something does or a report is untrue, 2 if
-    nothing can be answered: what builds the missing reports is said.
+    Exit 0 if all was answered and nothing speaks, 3 if something speaks, is red or
+    not decided, or a report is untrue, 2 if a report cannot be read or an answer
+    waits for a gate that is not judged: what builds it is said.
     """
     from gates.diagnosis.reports import read_reports, require_candidates
     from gates.diagnosis.symptoms import symptoms_of
 
+    if checkpoints and (symptom or candidate):
+        raise BadInputError(
+            where="--checkpoints",
+            found="--symptom" if symptom else "--candidate",
+            expected="the rows alone: they are about everybody, and about no symptom",
+            action="Leave one of them out.",
+        )
     asked = symptoms_of(symptom) if symptom else ()
     reports = read_reports(root)
     names = require_candidates(reports, candidate)
@@ -54,45 +64,64 @@ def _walks(reports: Any, names: tuple[str, ...], as_json: bool) -> int:
     from gates.diagnosis.printed import gates_text, symptoms_text, walk_text
     from gates.diagnosis.symptoms import SYMPTOMS
     from gates.diagnosis.walk import walk
-    from gates.printed import print_rows
 
     found = [walk(reports, name) for name in names]
     if as_json:
-        print_rows(found)
+        rows = [
+            _row(one, "whole") | {"ended_at": one.ended_at.place if one.ended_at else None}
+            for one in found
+        ]
+        _print(reports, "walks", rows)
     else:
         texts = (gates_text(reports), *map(walk_text, found), symptoms_text(SYMPTOMS))
         print("\n\n".join(texts))
-    if reports.untrue or any(one.ended_at for one in found):
-        return reports.untrue or 3
-    return 0 if all(one.whole for one in found) else 2
+    spoken = any(one.ended_at for one in found)
+    return _code(reports, spoken=spoken, whole=all(one.whole for one in found))
 
 
 def _symptoms(reports: Any, asked: Any, names: tuple[str, ...], as_json: bool) -> int:
     from gates.diagnosis.printed import answered_text, gates_text
     from gates.diagnosis.symptoms import answered
-    from gates.printed import print_rows
 
     found = [answered(symptom, reports, name) for symptom in asked for name in names]
     if as_json:
-        print_rows(found)
+        rows = [_row(one, "found", "undecided", "answerable") for one in found]
+        _print(reports, "answers", rows)
     else:
         print("\n\n".join([gates_text(reports), *map(answered_text, found)]))
-    if reports.untrue or any(one.found for one in found):
-        return reports.untrue or 3
-    return 0 if any(one.answerable for one in found) else 2
+    spoken = any(one.found or one.undecided or one.before_all for one in found)
+    return _code(reports, spoken=spoken, whole=all(one.answerable for one in found))
 
 
 def _checkpoints(reports: Any, as_json: bool) -> int:
-    from gates.diagnosis.checkpoints import NOT_JUDGED, ruled
+    from gates.diagnosis.checkpoints import NOT_JUDGED, UNMATCHED, ruled
     from gates.diagnosis.printed import checkpoints_text, gates_text
-    from gates.printed import print_rows
 
     rows = ruled(reports)
     if as_json:
-        print_rows(rows)
+        _print(reports, "rows", [_row(one) for one in rows])
     else:
         print(f"{gates_text(reports)}\n\n{checkpoints_text(rows)}")
     verdicts = {row.verdict for row in rows}
-    if reports.untrue or verdicts - {"PASS", NOT_JUDGED}:
-        return reports.untrue or 3
-    return 2 if NOT_JUDGED in verdicts else 0
+    spoken = bool(verdicts - {"PASS", NOT_JUDGED, UNMATCHED})
+    return _code(reports, spoken=spoken, whole=verdicts == {"PASS"})
+
+
+def _code(reports: Any, *, spoken: bool, whole: bool) -> int:
+    """What is untrue or speaks, by the precedence of all gates; else whether all was answered."""
+    from gates.printed import worst
+
+    return worst({reports.untrue, 3 if spoken else 0}) or (0 if whole else 2)
+
+
+def _row(one: Any, *derived: str) -> dict[str, Any]:
+    """A result as a dictionary, with what follows from it."""
+    return asdict(one) | {name: getattr(one, name) for name in derived}
+
+
+def _print(reports: Any, what: str, rows: list[dict[str, Any]]) -> None:
+    """Results as JSON, with the reports that they stand on."""
+    from gates.printed import print_document
+
+    proved = {gate: report.verdict for gate, report in reports.judged.items()}
+    print_document({"proved": proved, "missing": dict(reports.missing), what: rows})

@@ -1,7 +1,8 @@
 """One look: a question to judged reports and their evidence, and what was found.
 
 A criterion that is broken speaks, and so does a rule that a query states; what holds is a number.
-What nobody recorded, judged or decided is said to be so, and is no finding either way.
+What was asked and is open is not decided; what nobody recorded or judged is said to be so. Neither
+is a finding either way, and neither holds.
 """
 
 from collections.abc import Callable
@@ -11,12 +12,16 @@ import numpy as np
 import pandas as pd
 
 from gates.bounds import share_interval, upper_quantile
-from gates.diagnosis.reports import Reports
+from gates.diagnosis.reports import NoAnswer, Reports
 from gates.evidence import MissingEvidenceError
 from gates.report import Answer, Gate, limit_text, measured_text, report_path
 from genpolicy.errors import GenpolicyError
 
 Interval = tuple[float, float]
+
+
+class NotJudgedError(MissingEvidenceError):
+    """A gate whose evidence is asked for is not judged."""
 
 
 @dataclass(frozen=True)
@@ -49,14 +54,18 @@ class Look:
         candidate: Whom it is about; empty where no gate has judged one.
         numbers: What was found.
         causes: What speaks, as sentences.
+        undecided: What was asked, and has no answer either way.
         unknown: What cannot be said, and why.
+        waits_for: Why something could not be asked yet: a gate that is not judged.
     """
 
     reports: Reports
     candidate: str
     numbers: list[Number] = field(default_factory=list)
     causes: list[str] = field(default_factory=list)
+    undecided: list[str] = field(default_factory=list)
     unknown: list[str] = field(default_factory=list)
+    waits_for: list[str] = field(default_factory=list)
 
     def criteria(self, *names: str) -> None:
         """Ask criteria by name; one that is broken is a cause."""
@@ -68,7 +77,7 @@ class Look:
                     f"{answer.id}: {measured_text(answer)}, required {limit_text(answer)}.{why}"
                 )
             elif answer is not None and answer.verdict != "PASS":
-                self.unknown.append(f"{answer.id} is not decided: {answer.caveat}")
+                self.undecided.append(_open(answer))
 
     def shown(self, *names: str) -> None:
         """Ask criteria that say how bad the symptom is, and not where it comes from."""
@@ -79,10 +88,11 @@ class Look:
         """Rows of a table that a judged gate rests on, of the candidate or of everybody.
 
         Raises:
-            MissingEvidenceError: The gate is not judged, or the table has no such row.
+            NotJudgedError: The gate is not judged.
+            MissingEvidenceError: The table has no such row.
         """
         if gate not in self.reports.judged:
-            raise MissingEvidenceError(self.reports.missing[gate])
+            raise NotJudgedError(self.reports.missing[gate])
         if all_methods:
             return self.reports.evidence.rows(path, row)
         return self.reports.evidence.of(path, row, self.candidate)
@@ -92,9 +102,9 @@ class Look:
         try:
             rule(self)
         except (MissingEvidenceError, GenpolicyError) as error:
-            said = str(error)
-            if said not in self.unknown:
-                self.unknown.append(said)
+            said = self.waits_for if isinstance(error, NotJudgedError) else self.unknown
+            if str(error) not in said:
+                said.append(str(error))
 
     def number(self, what: str, value: str, counted: str, where: str) -> None:
         """Show a number that no criterion limits."""
@@ -102,9 +112,10 @@ class Look:
 
     def _answered(self, name: str) -> Answer | None:
         found = self.reports.answer(name, self.candidate)
-        if isinstance(found, str):
-            if found not in self.unknown:
-                self.unknown.append(found)
+        if isinstance(found, NoAnswer):
+            said = self.waits_for if found.waits else self.unknown
+            if found.why not in said:
+                said.append(found.why)
             return None
         of = f" of {found.candidate}" if found.candidate else ""
         self.numbers.append(
@@ -150,6 +161,12 @@ def p95_of(
     """
     found = values.to_numpy(dtype=np.float64)
     return upper_quantile(found, clusters.to_numpy(), 0.95, confidence=confidence, rng=rng)
+
+
+def _open(answer: Answer) -> str:
+    """What is open, and why if the gate says so."""
+    why = f": {answer.caveat}" if answer.caveat else ""
+    return f"{answer.id} is {answer.verdict}, required {limit_text(answer)}{why}"
 
 
 def _sentence(text: str) -> str:

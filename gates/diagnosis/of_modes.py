@@ -65,13 +65,18 @@ def simpler_policies(look: Look) -> None:
 
 def raw_samples(look: Look) -> None:
     """Where do the raw samples lie, before anything repairs them?"""
-    look.criteria("C.projection_p95_m", "B.outside_modes_upper", "B.mode_coverage_lower")
+    look.shown("C.projection_p95_m")
+    look.criteria("B.outside_modes_upper", "B.mode_coverage_lower")
+    look.ask(_moved)
     look.ask(_reasons)
 
 
 def feasible_conditioning(look: Look) -> None:
     """Is one mode outside what the robot can do, or is the representation wrong?"""
-    look.criteria("C.admissible_share", "C.mode_admissible_gap", "A.mode_feasible_share")
+    look.criteria(
+        "C.admissible_share", "C.mode_admissible_gap", "A.mode_feasible_share", "B.conformance"
+    )
+    look.ask(_representation)
     look.ask(_projection_by_mode)
 
 
@@ -91,6 +96,7 @@ def _success_by_mode(look: Look) -> None:
             f"{part['start'].nunique()} starts",
             f"{ROLLOUTS}: success, by mode",
         )
+    _without_mode(look, rows, settings.confidence)
     if not found:
         raise MissingEvidenceError(f"no undisturbed rollout of {look.candidate} is told by a mode")
     least = settings.limits.number("nominal_success_lower", otherwise=0.0)
@@ -100,6 +106,59 @@ def _success_by_mode(look: Look) -> None:
                 f"mode {less} fails where mode {more} succeeds: {_ends(found[less])} against "
                 f"{_ends(found[more])}, required {least:g}."
             )
+
+
+def _without_mode(look: Look, rows: pd.DataFrame, confidence: float) -> None:
+    """Rollouts that stand beside the modes: those that the shares of the modes do not count."""
+    part = rows[rows["mode"].isin(NO_MODE)]
+    value = f"{len(part)} of {len(rows)}"
+    if len(part):
+        share, ends = share_of(part["won"], part["start"], confidence=confidence)
+        value += f"; success {share:.3g} ({_ends(ends)})"
+    look.number(
+        "undisturbed rollouts that belong to no mode", value, f"{part['start'].nunique()} starts",
+        f"{ROLLOUTS}: mode, success",
+    )  # fmt: skip
+
+
+def _moved(look: Look) -> None:
+    """How many raw samples projection moved, those included that a layer refused."""
+    rows = look.rows("C", CANDIDATES, CandidateRow)
+    rows = rows[rows["fixture"] == HELD_OUT]
+    reached = rows[rows["position_change_m"].notna()]
+    where = f"{CANDIDATES}: position_change_m, {HELD_OUT}"
+    seen = f"{rows['observation'].nunique()} observations"
+    if len(reached) < len(rows):
+        never = f"{len(rows) - len(reached)} of {len(rows)}"
+        look.number("held-out candidates that never came to projection", never, seen, where)
+    for what, part in (
+        ("held-out candidates", reached),
+        ("refused held-out candidates", reached[admissible(reached) == 0.0]),
+    ):
+        moved = int((numbers(part, "position_change_m") > 0).sum())
+        look.number(f"{what} moved by projection", f"{moved} of {len(part)}", seen, where)
+
+
+def _representation(look: Look) -> None:
+    """Does the representation alone refuse more than may be refused in all?"""
+    settings = look.reports.settings("C")
+    rows = look.rows("C", CANDIDATES, CandidateRow)
+    rows = rows[(rows["fixture"] == HELD_OUT) & rows["representation"].notna()]
+    if len(rows) == 0:
+        raise MissingEvidenceError(f"no held-out candidate of {look.candidate} reached a layer")
+    refused = pd.Series(~flags(rows, "representation"), index=rows.index)
+    share, ends = share_of(refused, _episodes(rows), confidence=settings.confidence)
+    look.number(
+        "held-out candidates refused by the representation layer",
+        f"{int(refused.sum())} of {len(rows)}: {share:.3g} ({_ends(ends)})",
+        f"{_episodes(rows).nunique()} episodes", f"{CANDIDATES}: representation, {HELD_OUT}",
+    )  # fmt: skip
+    most = 1.0 - settings.limits.number("admissible_share", otherwise=0.0)
+    if ends[0] > most:
+        look.causes.append(
+            f"the representation is wrong for the robot: its layer alone refuses {_ends(ends)}, "
+            f"and all layers together may refuse {most:.3g}."
+        )
 
 
 def _reasons(look: Look) -> None:
@@ -136,10 +195,9 @@ def _between_of_baselines(look: Look) -> None:
 
 def _between_by_nfe(look: Look) -> None:
     rows = look.rows("B", COVERAGE, CoverageRow)
-    shares = [
-        f"{share:.3g} at {nfe}"
-        for nfe, share in rows.groupby("nfe", sort=True)["between_share"].mean().items()
-    ]
+    rows = rows.assign(between=numbers(rows, "between_share"))
+    by_nfe = rows.groupby("nfe", sort=True)["between"].mean()
+    shares = [f"{share:.3g} at {nfe}" for nfe, share in by_nfe.items()]
     look.number(
         "share between two modes, by network evaluations", ", ".join(shares),
         f"{int(numbers(rows, 'situations').max())} situations", f"{COVERAGE}: between_share",
@@ -151,9 +209,12 @@ def _projection_by_mode(look: Look) -> None:
     rows = look.rows("C", CANDIDATES, CandidateRow)
     rows = rows[(rows["fixture"] == HELD_OUT) & (admissible(rows) == 1.0)]
     found: dict[str, Interval] = {}
+    beside = int(rows["mode"].isin(NO_MODE).sum())
+    where = f"{CANDIDATES}: mode"
+    look.number("admitted candidates that belong to no mode", f"{beside} of {len(rows)}", "", where)
     for mode, part in _by_mode(rows):
         moved = part["position_change_m"].astype(float)
-        episodes = part["situation"].astype(str).str.rpartition(":")[0]
+        episodes = _episodes(part)
         rng = settings.draws("diagnosis", "projection", look.candidate, mode)
         point, ends = p95_of(moved, episodes, confidence=settings.confidence, rng=rng)
         found[mode] = ends
@@ -170,6 +231,12 @@ def _projection_by_mode(look: Look) -> None:
                 f"projection moves mode {more} beyond the limit and mode {less} not: "
                 f"{_ends(found[more])} against {_ends(found[less])} m, at most {most:g}."
             )
+
+
+def _episodes(rows: pd.DataFrame) -> pd.Series:
+    """Episode of each row: a situation is named by its episode and a step of it."""
+    found: pd.Series = rows["situation"].astype(str).str.rpartition(":")[0]
+    return found
 
 
 def _by_mode(rows: pd.DataFrame) -> list[tuple[str, pd.DataFrame]]:

@@ -76,11 +76,12 @@ def _success_by_training(look: Look) -> None:
 
 
 def _coverage_by_training(look: Look) -> None:
+    """Only shown: nothing says yet how far trainings may differ in it."""
     look.rows("B", MODES, ModeRow)
     for seed, rows in situations_of(look.reports.evidence, look.candidate).groupby("seed"):
         reached = int((numbers(rows, "modes_covered") >= numbers(rows, "modes_present")).sum())
         look.number(
-            f"situations of which training seed {seed} reaches every mode",
+            f"situations of which training seed {seed} reaches every mode, only shown",
             f"{reached} of {len(rows)}", f"{rows['episode_uuid'].nunique()} episodes",
             f"{MODES}: modes_covered",
         )  # fmt: skip

@@ -1,6 +1,6 @@
 """Looks at time: how chunks join, how old the queue is, what an answer takes from end to end."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 import pandas as pd
 
@@ -15,6 +15,7 @@ from genpolicy.evidence.rows.stress import RolloutRow, SpliceRow, StressCountRow
 SPLICES = f"{STRESS}/splices.parquet"
 COUNTS = f"{STRESS}/counts.parquet"
 WARM = "warm"
+ONE_HORIZON = "what another H_e or re-planning would do: both are fixed, and varied in no rollout"
 FURTHER = 2.0
 """From this ratio on a jump speaks: no criterion limits jumps in motion, and methods differ a bit
 in speed."""
@@ -22,10 +23,11 @@ in speed."""
 
 def chunks_joining(look: Look) -> None:
     """Is the jump one of the execution horizon, of re-planning or of blending?"""
-    look.criteria("C.boundary_jerk_p95_m_s3")
+    look.shown("C.boundary_jerk_p95_m_s3")
     look.ask(_horizons)
     look.ask(_jumps)
     look.ask(_discards)
+    look.unknown.append(ONE_HORIZON)
 
 
 def normalisation_and_queue(look: Look) -> None:
@@ -41,6 +43,7 @@ def whole_accounting(look: Look) -> None:
     """Are preprocessing, projection and queue in the account, or sampling alone?"""
     look.criteria("B.latency_terms_missing", "B.latency_model_ratio_upper")
     look.ask(_on_the_bench)
+    look.ask(declared_terms)
 
 
 def rejections_and_p95(look: Look) -> None:
@@ -65,6 +68,18 @@ def ages(look: Look) -> None:
         f"{part['start'].nunique()} starts",
         f"{ROLLOUTS}: action_age_p95_s, action_age_max_s",
     )
+
+
+def declared_terms(look: Look) -> None:
+    """Terms of latency that nobody measured."""
+    rows = look.rows("B", LATENCY, LatencyRow)
+    measured = set(rows.loc[rows["source"] == "measured", "component"].astype(str))
+    declared = sorted(set(rows["component"].astype(str)) - measured)
+    if declared:
+        look.unknown.append(
+            f"{LATENCY}: {', '.join(declared)} are declared and not measured; no machine here has "
+            "that camera, bus or network"
+        )
 
 
 def _horizons(look: Look) -> None:
@@ -151,6 +166,14 @@ def _soonest(budgets: Mapping[str, Budget]) -> str:
     return min(budgets, key=lambda name: budgets[name].terms["sample"].p50[0])
 
 
+def _is_alone(look: Look, timed: Collection[str]) -> bool:
+    """Whether there is nobody to compare with, which is said: alone, nobody is the slower one."""
+    if len(timed) > 1:
+        return False
+    look.unknown.append(f"whether anybody is through sooner: {look.candidate} alone was timed")
+    return True
+
+
 def _on_the_bench(look: Look) -> None:
     """Sampling alone against whole invocations, of every candidate that was timed."""
     budgets = _budgets(look)
@@ -159,7 +182,7 @@ def _on_the_bench(look: Look) -> None:
         where = f"{LATENCY}: seconds, {WARM}"
         look.number(f"sampling alone, {name}", _spans(budget.terms["sample"]), counted, where)
         look.number(f"all eleven terms, {name}", _spans(budget.end_to_end), counted, where)
-    if _soonest(budgets) != look.candidate:
+    if _is_alone(look, budgets) or _soonest(budgets) != look.candidate:
         return
     mine = budgets[look.candidate].end_to_end.p50
     for name, other in budgets.items():
@@ -187,7 +210,7 @@ def _in_motion(look: Look) -> None:
             f"answers refused whole and drawn again, {name}", f"{refused:g} of {asked:g}",
             f"{own['start'].nunique()} starts", f"{ROLLOUTS}: rejections, invocations",
         )  # fmt: skip
-    if _soonest(_budgets(look)) != look.candidate:
+    if _is_alone(look, ends) or _soonest(_budgets(look)) != look.candidate:
         return
     for name, other in ends.items():
         if ends[look.candidate][0] > other[1]:

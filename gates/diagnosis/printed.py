@@ -31,16 +31,23 @@ def walk_text(walk: Walk) -> str:
             f"  {number}  {stop.place:<20}{stop.state:<17}{stop.asked:>2} criteria answered"
         )
         lines += [_said(text, indent=5) for text in stop.unmet]
+        lines += [_said(f"not asked: {text}", indent=5) for text in stop.not_asked]
     ended = walk.ended_at
     if ended is not None:
         first = f"First that is not in order: {ended.place}. Look there."
         lines.append(_said(f"{first} What lies behind it was not asked: {_behind(walk.behind)}."))
-    elif walk.whole:
-        lines.append("Nothing is red: every place was asked, and holds.")
     else:
-        waits = dict.fromkeys(why for stop in walk.stops for why in stop.waits_for)
-        lines.append(_said(f"Nothing is red as far as was asked; the rest waits: {_list(waits)}."))
+        lines.append(_said(_nothing_red(walk)))
     return "\n".join(lines)
+
+
+def _nothing_red(walk: Walk) -> str:
+    waits = dict.fromkeys(why for stop in walk.stops for why in stop.waits_for)
+    if waits:
+        return f"Nothing is red as far as was asked; the rest waits: {_list(waits)}."
+    if any(stop.not_asked for stop in walk.stops):
+        return "Nothing is red as far as was asked; what was not asked stands at its place."
+    return "Nothing is red: every place was asked, and holds."
 
 
 def answered_text(answered: Answered) -> str:
@@ -75,6 +82,7 @@ def checkpoints_text(rows: Sequence[Ruled]) -> str:
         lines.append(_said(f"{carried}: {', '.join(row.criteria)}", indent=13))
         lines += [_said(f"not met: {text}", indent=13) for text in row.unmet]
         lines += [_said(f"waits: {text}", indent=13) for text in row.waits_for]
+        lines += [_said(f"not asked: {text}", indent=13) for text in row.not_asked]
     return "\n".join(lines)
 
 
@@ -84,9 +92,13 @@ def _asked_lines(title: str, asked: Asked) -> Iterable[str]:
         yield _said(_number(number), indent=2, then=4)
     for cause in asked.causes:
         yield _said(f"SPEAKS: {cause}", indent=2, then=4)
-    for text in asked.unknown:
+    for text in asked.undecided:
+        yield _said(f"Not decided: {text}.", indent=2, then=4)
+    for text in (*asked.unknown, *asked.waits_for):
         yield _said(f"Not known: {text}.", indent=2, then=4)
-    if not asked.causes:
+    if not asked.numbers:
+        yield _said("Nothing could be asked.", indent=2)
+    elif not asked.causes:
         yield _said("Nothing speaks in what could be asked.", indent=2)
 
 

@@ -55,15 +55,26 @@ class Asked:
         at: Where, in the chapter's words.
         query: The question that was put to the evidence.
         numbers: What was found.
-        causes: What speaks; none where all that could be asked is in order.
+        causes: What speaks.
+        undecided: What was asked, and is open.
         unknown: What could not be said, and why.
+        waits_for: Gates that are not judged, without which something could not be asked.
     """
 
     at: str
     query: str
     numbers: tuple[Number, ...]
     causes: tuple[str, ...]
+    undecided: tuple[str, ...]
     unknown: tuple[str, ...]
+    waits_for: tuple[str, ...]
+
+    @property
+    def holds(self) -> bool:
+        """Whether something was asked, all of it has an answer, and nothing speaks."""
+        open_ones = self.causes or self.undecided or self.unknown or self.waits_for
+        shown_open = any(number.verdict not in ("", "PASS", "FAIL") for number in self.numbers)
+        return bool(self.numbers) and not open_ones and not shown_open
 
 
 @dataclass(frozen=True)
@@ -97,9 +108,14 @@ class Answered:
         return bool(self.first.causes or self.then.causes)
 
     @property
+    def undecided(self) -> bool:
+        """Whether something was asked and is open."""
+        return bool(self.first.undecided or self.then.undecided)
+
+    @property
     def answerable(self) -> bool:
-        """Whether any number was there to look at."""
-        return bool(self.first.numbers or self.then.numbers)
+        """Whether both inspections had a number to look at, and neither waits for a gate."""
+        return all(one.numbers and not one.waits_for for one in (self.first, self.then))
 
 
 SYMPTOMS = (
@@ -214,7 +230,7 @@ def _asked(inspection: Inspection, reports: Reports, candidate: str) -> Asked:
     inspection.query(look)
     return Asked(
         inspection.at, inspection.question, tuple(look.numbers), tuple(look.causes),
-        tuple(look.unknown),
+        tuple(look.undecided), tuple(look.unknown), tuple(look.waits_for),
     )  # fmt: skip
 
 
@@ -229,7 +245,25 @@ def _look_next(symptom: Symptom, first: Asked, then: Asked) -> str:
     if first.causes:
         return f"at what speaks first ({symptom.first.at}), and ask again when it is mended"
     if then.causes:
-        return f"at what speaks next ({symptom.then.at}); what comes first holds"
-    if first.unknown or then.unknown:
-        return "for what is not recorded: all that could be asked holds"
-    return "elsewhere: all that the row names was asked, and holds"
+        return f"at what speaks next ({symptom.then.at}); {_said_of_first(first)}"
+    for asked in (first, then):
+        if asked.undecided:
+            return f"at what is not decided ({asked.at}): what it says may be the cause"
+    return _where_nothing_speaks(first, then)
+
+
+def _where_nothing_speaks(first: Asked, then: Asked) -> str:
+    if not (first.numbers or then.numbers):
+        return "for what is not known: nothing could be asked"
+    if any(number.verdict == "FAIL" for number in (*first.numbers, *then.numbers)):
+        return "elsewhere for the cause: the symptom is there, and no cause that was asked speaks"
+    if first.holds and then.holds:
+        return "elsewhere: all that the row names was asked, and holds"
+    return "for what is not known: what could be asked holds, and the rest is open"
+
+
+def _said_of_first(first: Asked) -> str:
+    """What the first inspection said, where it does not speak."""
+    if first.undecided:
+        return "what comes first is not decided"
+    return "what comes first holds" if first.holds else "what comes first is not known"

@@ -21,10 +21,12 @@ class Stop:
     Attributes:
         place: Its name.
         state: `RED` where a criterion is broken, `not decided` where one is open; `in order so far`
-            where the rest waits for a gate that is not judged, `not asked` where all of it does.
+            where the rest waits for a gate that is not judged, or was not asked of a candidate that
+            is unmatched by exception; `not asked` where nothing was answered.
         asked: Criteria that were answered.
         unmet: Those that do not hold, as sentences: what was measured, the limit, where to look.
-        waits_for: Why some criteria have no answer.
+        waits_for: Why some criteria have no answer yet.
+        not_asked: What was waived or excepted, by whose word and why.
     """
 
     place: str
@@ -32,6 +34,7 @@ class Stop:
     asked: int
     unmet: tuple[str, ...] = ()
     waits_for: tuple[str, ...] = ()
+    not_asked: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -56,7 +59,7 @@ class Walk:
 
     @property
     def whole(self) -> bool:
-        """Whether every place was asked all that it can be asked."""
+        """Whether every place was asked all that it can be asked, what was waived left out."""
         return all(stop.state == "in order" for stop in self.stops)
 
 
@@ -87,26 +90,23 @@ def _look(reports: Reports, candidate: str, place: str) -> Stop:
         found = reports.answer(f"{gate}.{item.id}", candidate)
         if isinstance(found, Answer):
             answers.append((gate, item, found))
-        elif _is_missing(reports, gate, item, candidate):
-            waits[found] = None
+        elif found.waits:
+            waits[found.why] = None
     red = [one for one in answers if one[2].verdict == "FAIL"]
     unmet = red or [one for one in answers if one[2].verdict != "PASS"]
-    state = _state(bool(red), bool(unmet), len(answers), bool(waits))
-    return Stop(place, state, len(answers), _sentences(unmet), tuple(waits))
+    names = [f"{gate}.{item.id}" for gate, item in criteria_at(place)]
+    left_out = tuple(text for name in names for text in reports.not_asked(name, candidate))
+    partly = bool(waits) or any(reports.is_excepted(name, candidate) for name in names)
+    state = _state(bool(red), bool(unmet), len(answers), partly)
+    return Stop(place, state, len(answers), _sentences(unmet), tuple(waits), left_out)
 
 
-def _is_missing(reports: Reports, gate: Gate, item: Criterion, candidate: str) -> bool:
-    """Whether an answer is still to come; one that was waived is not."""
-    report = reports.judged.get(gate)
-    return report is None or (item.per_candidate and candidate not in report.candidates)
-
-
-def _state(red: bool, unmet: bool, asked: int, waits: bool) -> State:
+def _state(red: bool, unmet: bool, asked: int, partly: bool) -> State:
     if red:
         return "RED"
     if unmet:
         return "not decided"
-    if waits or not asked:
+    if partly or not asked:
         return "in order so far" if asked else "not asked"
     return "in order"
 

@@ -118,6 +118,16 @@ def refused_by_jerk(frame):
     return frame
 
 
+def not_representable(frame):
+    """Three in four of flow's held-out candidates are refused by the representation layer."""
+    held = of_flow(frame) & (frame["fixture"] == "held_out") & (frame["candidate"] > 0)
+    frame.loc[held, ["outcome", "first_reason", "representation"]] = ["failed", "finite", False]
+    behind = ["kinematic", "geometric", "dynamic", "contact", "fresh"]
+    frame[behind] = frame[behind].astype(object)
+    frame.loc[held, behind] = None
+    return frame
+
+
 def phase_change_miscounted(frame):
     wrong = of_flow(frame) & (frame["fixture"] == "phase_change_on_the_way")
     frame.loc[wrong, "reason"] = "expired"
@@ -139,9 +149,6 @@ CAUSES = (
      "lag_spread_steps: 4"),
     ("between-modes", "then", table("measure_baselines/modes.parquet", CHUNKED), "A",
      "chunking_valid_share"),
-    ("boundary-jump", "first",
-     table(SHADOW, cells("boundary_jerk_m_s3", 9e3, where=of_flow)), "C",
-     "boundary_jerk_p95_m_s3"),
     ("boundary-jump", "first", table("stress/splices.parquet", jumps("jump_m", 6.0)), "D",
      "joining or projection makes the jump"),
     ("boundary-jump", "first", table("stress/splices.parquet", jumps("raw_jump_m", 3.0)), "D",
@@ -175,8 +182,10 @@ CAUSES = (
      "trainings differ: seed 1 succeeds in 0 to"),
     ("seed-variance", "then", table("reload/modes.parquet", cells("fewest_admissible", 0)), "B",
      "mode_coverage_lower"),
-    ("frequent-projection", "first",
-     table(SHADOW, cells("position_change_m", 0.05, where=of_flow)), "C", "projection_p95_m"),
+    ("frequent-projection", "first", table("reload/modes.parquet", cells("fewest_admissible", 0)),
+     "B", "mode_coverage_lower"),
+    ("frequent-projection", "then", table(SHADOW, not_representable), "C",
+     "the representation is wrong for the robot: its layer alone refuses"),
     ("frequent-projection", "then", table(SHADOW, right_is_moved), "C",
      "projection moves mode right beyond the limit and mode left not"),
     ("ood-does-not-stop", "first", table(SHADOW, corrupted_passes), "C",

@@ -1,13 +1,18 @@
 """`genpolicy diagnose`: what it prints and by which code it ends."""
 
 import json
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
-from gates.diagnosis import commands
 from gates.diagnosis.commands import diagnose
 from gates.diagnosis.symptoms import SYMPTOMS
 from genpolicy.cli.shell import run_program
+
+ROOT = Path(__file__).parents[3]
 
 
 @pytest.fixture
@@ -73,6 +78,8 @@ def test_what_speaks_ends_with_3(stands, honest, capsys):
 
     stands(turned(honest, "D.hold_share_upper", "FAIL", "flow"))
     code, out, _ = run(capsys, "--candidate", "flow")
+    (walk,) = json.loads(run(capsys, "--candidate", "flow", "--json")[1])["walks"]
+    assert walk["ended_at"] == "timing and queue" and not walk["whole"]
     assert code == 3 and "6  timing and queue    RED" in out
     behind = "What lies behind it was not asked: feasibility, contact controller, evaluator."
     assert behind in " ".join(out.split())
@@ -112,17 +119,79 @@ def test_checkpoints_are_a_line_each_with_their_owner(stands, honest, capsys):
 
 def test_json_says_the_same(stands, honest, capsys):
     stands(honest)
-    walks = json.loads(run(capsys, "--json")[1])
+    document = json.loads(run(capsys, "--json")[1])
+    assert document["proved"] == dict.fromkeys("ABCD", "PASS") and set(document["missing"]) == {"E"}
+    walks = document["walks"]
+    assert all(walk["whole"] and walk["ended_at"] is None for walk in walks)
     assert [walk["candidate"] for walk in walks] == ["diffusion", "flow"]
     assert {stop["state"] for walk in walks for stop in walk["stops"]} == {"in order"}
-    (found,) = json.loads(
+    document = json.loads(
         run(capsys, "--symptom", "boundary-jump", "--candidate", "flow", "--json")[1]
     )
+    (found,) = document["answers"]
+    assert (found["found"], found["undecided"], found["answerable"]) == (False, False, True)
     assert found["do_not_conclude"] == "only architecture is wrong"
     assert found["first"]["numbers"][0]["where"].startswith("reports/gate_c.json")
-    rows = json.loads(run(capsys, "--checkpoints", "--json")[1])
+    rows = json.loads(run(capsys, "--checkpoints", "--json")[1])["rows"]
     assert len(rows) == 9 and rows[0]["owner"] == "perception"
 
 
 def test_help_loads_nothing():
-    assert "gates.diagnosis.reports" not in vars(commands)
+    """In a process of its own: here everything is loaded."""
+    asked = (
+        "import sys\n"
+        "from gates.diagnosis.commands import diagnose\n"
+        "from genpolicy.cli.shell import run_program\n"
+        "code = run_program(diagnose, 'genpolicy diagnose', ['--help'])\n"
+        "heavy = [name for name in ('numpy', 'pandas', 'gates.proof') if name in sys.modules]\n"
+        "print(code, heavy, [n for n in sys.modules if n.startswith('gates.diagnosis.')])\n"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", asked], capture_output=True, text=True, cwd=ROOT, check=True
+    )
+    assert ended.stdout.splitlines()[-1] == "0 [] ['gates.diagnosis.commands']", ended.stderr
+
+
+@pytest.mark.parametrize("other", [("--symptom", "all"), ("--candidate", "flow")])
+def test_rows_take_neither_a_symptom_nor_a_candidate(stands, honest, capsys, other):
+    stands(honest)
+    code, out, err = run(capsys, "--checkpoints", *other)
+    assert code == 2 and out == "" and other[0] in err
+
+
+@pytest.mark.parametrize("verdict", ["INCONCLUSIVE", "PENDING_REVIEW"])
+def test_a_symptom_whose_criterion_is_open_ends_as_the_walk_does(stands, honest, capsys, verdict):
+    from test_walk import turned
+
+    stands(turned(honest, "D.hold_share_upper", verdict, "flow"))
+    code, out, _ = run(capsys, "--symptom", "boundary-jump", "--candidate", "flow")
+    assert code == 3 == run(capsys, "--candidate", "flow")[0]
+    assert f"Not decided: hold_share_upper is {verdict}, required <= 0.25" in " ".join(out.split())
+    assert "Look at what is not decided (normalization and queue age)" in out
+
+
+def test_one_number_is_no_answer_while_another_gate_is_not_judged(stands, honest, capsys):
+    from test_walk import without
+
+    stands(without(honest, "D"))
+    code, out, _ = run(capsys, "--symptom", "boundary-jump", "--candidate", "flow")
+    assert code == 2 and "PASS" in out and "Not known: no D." in out
+
+
+def test_a_red_place_before_an_answer_is_no_quiet_end(stands, honest, capsys):
+    from test_walk import turned
+
+    stands(turned(honest, "A.data_defects", "FAIL"))
+    code, out, _ = run(capsys, "--symptom", "ood-does-not-stop", "--candidate", "flow")
+    assert code == 3 and "SPEAKS" not in out and "Before all: data semantics" in out
+
+
+@pytest.mark.parametrize("words", [(), ("--symptom", "seed-variance"), ("--checkpoints",)])
+def test_a_report_that_cannot_be_read_comes_before_what_speaks(stands, honest, capsys, words):
+    from test_walk import turned
+
+    of_flow = turned(honest, "D.unmatched_starts", "FAIL", "flow")
+    red = turned(of_flow, "D.unmatched_starts", "FAIL", "diffusion")
+    for untrue, code in ((0, 3), (1, 3), (2, 2), (3, 3)):
+        stands(replace(red, untrue=untrue))
+        assert run(capsys, *words)[0] == code

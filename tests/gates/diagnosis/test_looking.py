@@ -21,13 +21,14 @@ def test_a_criterion_that_holds_is_a_number_and_no_cause(honest):
     assert look.causes == look.unknown == []
 
 
-def test_a_broken_one_speaks_and_an_open_one_is_unknown(honest):
+def test_a_broken_one_speaks_and_an_open_one_is_not_decided(honest):
     look = Look(turned(honest, "D.hold_share_upper", "FAIL", FLOW), FLOW)
     look.criteria("D.hold_share_upper")
     assert look.causes[0].startswith("hold_share_upper: 0.05, required <= 0.25. Worst in ")
     look = Look(turned(honest, "D.hold_share_upper", "INCONCLUSIVE", FLOW), FLOW)
     look.criteria("D.hold_share_upper")
-    assert look.causes == [] and look.unknown[0].startswith("hold_share_upper is not decided: ")
+    assert look.causes == look.unknown == []
+    assert look.undecided[0].startswith("hold_share_upper is INCONCLUSIVE, required <= 0.25")
 
 
 def test_what_only_shows_the_symptom_is_no_cause_even_where_it_is_red(honest):

@@ -90,4 +90,5 @@ def test_a_row_without_anything_unmet_is_two_lines_or_more(honest):
 def test_a_look_repeats_no_reason_why_nothing_is_known(honest):
     look = Look(without(honest, "D"), FLOW)
     look.criteria("D.hold_share_upper", "D.reset_upper")
-    assert look.unknown == ["no D"] and look.numbers == [] and look.causes == []
+    assert look.waits_for == ["no D"]
+    assert look.unknown == look.numbers == look.causes == look.undecided == []

@@ -7,6 +7,7 @@ import pytest
 
 from gates.diagnosis.reports import (
     EVERYBODY,
+    NoAnswer,
     gate_and_id,
     read_reports,
     require_candidates,
@@ -33,6 +34,13 @@ def test_a_report_that_is_not_what_the_files_say_is_not_used(ladder):
 
 
 def test_a_report_that_cannot_be_read_is_bad_input(ladder):
+    (ladder / report_path("D")).write_text("{")
+    assert read_reports(ladder).untrue == 2
+
+
+def test_of_two_the_one_that_cannot_be_read_decides(ladder):
+    path = ladder / report_path("B")
+    path.write_bytes(path.read_bytes().replace(b'"verdict": "PASS"', b'"verdict": "FAIL"', 1))
     (ladder / report_path("D")).write_text("{")
     assert read_reports(ladder).untrue == 2
 
@@ -70,11 +78,13 @@ def test_an_answer_is_the_candidates_own_or_that_of_the_gate(honest):
         ("E.not_expired", "flow", "gate E is not judged here"),
         ("D.hold_share_upper", "nobody", "nobody does not stand at gate D"),
         ("D.hold_share_upper", EVERYBODY, "asks hold_share_upper of each candidate"),
-        ("B.conformance", "flow", "gate B was not asked for conformance"),
+        ("B.conformance", "flow", "gate B: it was not asked for conformance"),
     ],
 )
 def test_why_there_is_no_answer(honest, name, candidate, said):
-    assert said in honest.answer(name, candidate)
+    found = honest.answer(name, candidate)
+    assert isinstance(found, NoAnswer) and said in found.why
+    assert found.waits == (name != "B.conformance")
 
 
 def test_settings_are_those_that_judged(honest):
