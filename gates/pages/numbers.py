@@ -17,6 +17,7 @@ RATES = (
     "_coverage",
     "_deviation",
     "_gap",
+    "_reachable",
 )
 """How names of shares end."""
 SIGNS = {"<=": "≤", ">=": "≥"}
