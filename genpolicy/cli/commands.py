@@ -40,6 +40,7 @@ REPLAY_EXAMPLES = examples(
 )
 
 EXPORT_EXAMPLES = examples("genpolicy export lerobot artifacts/ingest --out lerobot/")
+RECORDING_EXAMPLES = examples("genpolicy export recording recordings/one.mcap --out watch.mcap")
 SERVE_EXAMPLES = examples(
     "genpolicy serve-policy artifacts/train_generators/flow/seed_0 --port 8000"
 )
@@ -66,9 +67,10 @@ def program(arguments: Sequence[str]) -> int:
     app.command("ingest", epilog=IMPORT_EXAMPLES)(ingest)
     app.command("fixtures", epilog=examples("genpolicy fixtures --pin"))(fixtures)
     app.command("replay", epilog=REPLAY_EXAMPLES)(replay)
-    exports = new_app("Write a dataset or a checkpoint for others.")
+    exports = new_app("Write a dataset, a checkpoint or a rollout for others.")
     exports.callback()(lambda: None)
     exports.command("lerobot", epilog=EXPORT_EXAMPLES)(export_lerobot)
+    exports.command("recording", epilog=RECORDING_EXAMPLES)(export_recording)
     exports.command("torch", epilog=TORCH_EXAMPLES)(export_torch)
     exports.command("onnx", epilog=ONNX_EXAMPLES)(export_onnx)
     app.add_typer(exports, name="export")
@@ -174,6 +176,21 @@ def export_lerobot(
     from genpolicy.cli.exporting import run_export_lerobot
 
     return run_export_lerobot(dataset, out, split=split)
+
+
+def export_recording(
+    recording: Annotated[Path, typer.Argument(help="An MCAP recording.", metavar="RECORDING")],
+    out: Annotated[Path, typer.Option(help="MCAP file to write.")],
+    force: Annotated[bool, typer.Option("--force", help="Replace an old file.")] = False,
+) -> int:
+    """Write a recording for Foxglove or Lichtblick.
+
+    Its messages are copied byte for byte; its schemas are said in the plain
+    types that both read. The recording is only read.
+    """
+    from genpolicy.cli.replay import run_export_recording
+
+    return run_export_recording(recording, out, force=force)
 
 
 Checkpoint = Annotated[Path, typer.Argument(help="Folder of a checkpoint.")]
