@@ -40,6 +40,10 @@ REPLAY_EXAMPLES = examples(
 )
 
 EXPORT_EXAMPLES = examples("genpolicy export lerobot artifacts/ingest --out lerobot/")
+ROLLOUT_EXAMPLES = examples(
+    "genpolicy export rollout flow/push/0 --to gif --out push.gif",
+    "genpolicy export rollout flow/push/0 --to foxglove --out push.mcap",
+)
 RECORDING_EXAMPLES = examples("genpolicy export recording recordings/one.mcap --out watch.mcap")
 SERVE_EXAMPLES = examples(
     "genpolicy serve-policy artifacts/train_generators/flow/seed_0 --port 8000"
@@ -70,6 +74,7 @@ def program(arguments: Sequence[str]) -> int:
     exports = new_app("Write a dataset, a checkpoint or a rollout for others.")
     exports.callback()(lambda: None)
     exports.command("lerobot", epilog=EXPORT_EXAMPLES)(export_lerobot)
+    exports.command("rollout", epilog=ROLLOUT_EXAMPLES)(export_rollout)
     exports.command("recording", epilog=RECORDING_EXAMPLES)(export_recording)
     exports.command("torch", epilog=TORCH_EXAMPLES)(export_torch)
     exports.command("onnx", epilog=ONNX_EXAMPLES)(export_onnx)
@@ -176,6 +181,24 @@ def export_lerobot(
     from genpolicy.cli.exporting import run_export_lerobot
 
     return run_export_lerobot(dataset, out, split=split)
+
+
+def export_rollout(
+    rollout: Annotated[str, typer.Argument(help="METHOD/CONDITION/START.", metavar="ROLLOUT")],
+    out: Annotated[Path, typer.Option(help="File to write.")],
+    to: Annotated[Literal["foxglove", "gif", "rerun"], typer.Option(help="In which form.")],
+    root: Annotated[Path, typer.Option(help="The workspace.")] = Path(),
+    task: TaskName = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace an old file.")] = False,
+) -> int:
+    """Write a rollout of Gate D to be watched.
+
+    For Foxglove or Lichtblick as `genpolicy replay` does, with its layout; as a
+    GIF, from above and from the side; or for Rerun, which needs the extra rerun.
+    """
+    from genpolicy.cli.rollouts import run_export_rollout
+
+    return run_export_rollout(rollout, out, to=to, root=root, task=task, force=force)
 
 
 def export_recording(

@@ -29,7 +29,7 @@ Paths = Iterable[tuple[str, str]]
 
 DRAWN = (SCENE, ROBOT, COMMANDED, RAW, PROJECTED, REJECTED)
 AGES = (("age, ns", "/journal/accept.age_ns"), ("age of fallback, ns", "/journal/fallback.age_ns"))
-FORCES = (("force, N", "/journal/force.force_n"),)
+FORCES = (("force, each new peak, N", "/journal/force.force_n"),)
 STATES = (
     ("who commands", "/journal/mode.new"),
     ("phase", "/journal/phase.new"),
