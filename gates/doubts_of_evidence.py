@@ -17,8 +17,10 @@ from gates.stress.gains import WORST
 FEW = 20
 """Units below which a number says little: of so many, none of which fails, an exact bound of 95 %
 still allows 14 % that would; and one more failure moves a share by five points."""
-COUNTED = re.compile(r"(?:\d+ of )?(\d+)(?: and (\d+))? (\D+)")
+COUNTED = re.compile(r"(?:\d+ of )?(\d+)(?: and (\d+))? (\D+?)(?:, .*)?")
 """What a number rests on, as criteria write it: `24 of 25 episodes`, `3 and 3 processes`."""
+REPEATED = "times"
+"""How criteria count that ask one and the same again, to the bit: of those a few are enough."""
 UNTRIED = re.compile(r"(?:not measured: )?(not exercised|hardly exercised|not asked)\b")
 """How the caveat of a criterion begins of which the evidence holds no case, or hardly one."""
 LACKED = "of them not asked of this task: "
@@ -87,18 +89,18 @@ def an_average(report: GateReport) -> Iterator[Doubt]:
 
 
 def few_units(report: GateReport) -> Iterator[Doubt]:
-    """A number of few independent units is one of which little can be said, whatever it is."""
+    """A number of few units is one of which little can be said, whatever it is."""
     fewest: dict[str, tuple[int, str]] = {}
     for answer in report.criteria:
         found = COUNTED.fullmatch(answer.counted)
-        if found and answer.verdict in ("PASS", "FAIL"):
+        if found and found[3] != REPEATED and answer.verdict in ("PASS", "FAIL"):
             own = min(int(number) for number in found.groups()[:2] if number), answer.counted
             fewest[answer.id] = min(fewest.get(answer.id, own), own)
     few = sorted((units, name, said) for name, (units, said) in fewest.items() if units < FEW)
     if few:
         listed = named([f"{name} ({said})" for _, name, said in few])
         criteria = "1 criterion rests" if len(few) == 1 else f"{len(few)} criteria rest"
-        text = f"{criteria} on fewer than {FEW} independent units: {listed}"
+        text = f"{criteria} on fewer than {FEW} units: {listed}"
         yield Doubt(report.gate, "small n", text, tuple(name for _, name, _ in few))
 
 
@@ -107,7 +109,7 @@ def one_seed(report: GateReport) -> Iterator[Doubt]:
     who = [c.candidate or "" for c in report.criteria if " of 1 training seed;" in c.caveat]
     if who:
         text = f"{named(who)}: trained once; what another training seed gives was not seen"
-        yield Doubt(report.gate, "one training seed", text)
+        yield Doubt(report.gate, "one training seed", text, ("unmatched_starts",))
 
 
 def declared(report: GateReport) -> Iterator[Doubt]:

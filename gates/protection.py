@@ -62,7 +62,14 @@ NAMED: tuple[Named, ...] = (
     Named(
         "D",
         "stress.perturbations",
-        ("nominal", "camera_delay", "compute_contention", "network_jitter", "queue_reorder"),
+        (
+            "nominal",
+            "camera_delay",
+            "compute_contention",
+            "network_jitter",
+            "queue_reorder",
+            "envelope",
+        ),
         "what was never injected was never withstood",
     ),
 )

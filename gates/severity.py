@@ -1,4 +1,4 @@
-"""How hard a planned disturbance must be at least: fixed here, as the floors of `gates.protection`.
+"""How hard a planned disturbance must be at least: fixed here, as those of `gates.floors`.
 
 A condition of the right kind with a probability and a size of next to nothing is met by anybody,
 and would be counted as withstood.

@@ -104,7 +104,7 @@ NAMED = (
     Named("a card is a day too long", CARD,
           "(last - first).days + 1 > maximum_days", "(last - first).days > maximum_days"),
     Named("an empty set of abort thresholds", CARD,
-          "sorted({*ABORT_FROM, *draft.abort_thresholds})", "sorted({*draft.abort_thresholds})"),
+          "sorted({*ABORT_FROM, *draft.abort_thresholds,", "sorted({*draft.abort_thresholds,"),
     Named("an abort threshold is raised", CARD, "not 0 <= value <= limit:", "not 0 <= value:"),
     Named("a card is drafted of who failed", CARD,
           'report.verdict != "PASS" or name is None', "name is None"),

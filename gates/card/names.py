@@ -36,5 +36,5 @@ def disguise(name: str) -> str:
 
 
 def as_read(name: str) -> str:
-    """A name as a hurried reader takes it: without regard to case and spaces."""
+    """A name as a hurried reader takes it: whatever its case, and however wide its spaces."""
     return " ".join(name.casefold().split())

@@ -183,8 +183,9 @@ def independence(signed: SignedCard, allowed: AllowList) -> tuple[bool, str]:
     if card.reviewer not in names:
         return False, "the reviewer named on the card did not sign"
     why = dependence(card.reviewer, card.authors, signed.signers, allowed)
-    why = why or spotting(card.spotter, card.reviewer, card.authors, allowed)
     if why:
+        return False, why
+    if why := spotting(card.spotter, card.reviewer, card.authors, allowed):
         return False, why
     made = f"candidate by {', '.join(card.authors)}"
     return True, f"reviewed by {card.reviewer}, {made}, {card.spotter} stands at the stop"

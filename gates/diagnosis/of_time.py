@@ -15,6 +15,8 @@ from genpolicy.evidence.rows.stress import RolloutRow, SpliceRow, StressCountRow
 SPLICES = f"{STRESS}/splices.parquet"
 COUNTS = f"{STRESS}/counts.parquet"
 WARM = "warm"
+SAMPLING = "sample"
+"""The term of latency that a microbenchmark of samplers looks at."""
 ONE_HORIZON = "what another H_e or re-planning would do: both are fixed, and varied in no rollout"
 FURTHER = 2.0
 """From this ratio on a jump speaks: no criterion limits jumps in motion, and methods differ a bit
@@ -163,7 +165,7 @@ def _budgets(look: Look) -> dict[str, Budget]:
 
 def _soonest(budgets: Mapping[str, Budget]) -> str:
     """Who wins the microbenchmark: the shortest median of sampling alone."""
-    return min(budgets, key=lambda name: budgets[name].terms["sample"].p50[0])
+    return min(budgets, key=lambda name: budgets[name].terms[SAMPLING].p50[0])
 
 
 def _is_alone(look: Look, timed: Collection[str]) -> bool:
@@ -180,7 +182,7 @@ def _on_the_bench(look: Look) -> None:
     for name, budget in budgets.items():
         counted = f"{budget.end_to_end.n} warm invocations"
         where = f"{LATENCY}: seconds, {WARM}"
-        look.number(f"sampling alone, {name}", _spans(budget.terms["sample"]), counted, where)
+        look.number(f"sampling alone, {name}", _spans(budget.terms[SAMPLING]), counted, where)
         look.number(f"all eleven terms, {name}", _spans(budget.end_to_end), counted, where)
     if _is_alone(look, budgets) or _soonest(budgets) != look.candidate:
         return

@@ -8,15 +8,15 @@ phases and modes, which are escaped.
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-import numpy as np
 from markupsafe import Markup, escape
 
 from gates.evidence import Array
 from gates.pages.reasons import personal
 from genpolicy.replay.film import PERIOD_S, Film, Frame, Outline
+from genpolicy.replay.views import ABOVE, View, views_of
 from genpolicy.tasks.api import Workspace
 
-WIDTH, GAP, MARGIN_M = 320.0, 8.0, 0.03
+WIDTH, GAP = 320.0, 8.0
 """Units of the drawing; one is about a pixel where three clips stand side by side."""
 STRIP, LABELS = 34.0, 14.0
 """Height of the strip of force and of that of age, and of the names above and between them."""
@@ -25,32 +25,6 @@ NARROW = 34.0
 OTHERS = {"fallback": "fallback", "intervention": "person"}
 """Who commands where the policy does not, and how that is drawn."""
 LEAST_WIDE = 6.0
-ABOVE, ASIDE = 0, 1
-
-
-@dataclass(frozen=True)
-class View:
-    """One of the two views.
-
-    Attributes:
-        side: `ABOVE` or `ASIDE`.
-        left: Where it begins in the drawing.
-        low_m: Lower corner of what it shows.
-        scale: Units of the drawing per m.
-        height: Of the view.
-    """
-
-    side: int
-    left: float
-    low_m: Array
-    scale: float
-    height: float
-
-    def points(self, outline: Array) -> str:
-        """Corners (n, 2), m, as an attribute of SVG."""
-        across = self.left + (outline[:, 0] - self.low_m[0]) * self.scale
-        down = self.height - (outline[:, 1] - self.low_m[1]) * self.scale
-        return " ".join(f"{x:.1f},{y:.1f}" for x, y in zip(across, down, strict=True))
 
 
 def drawn_clip(film: Film, workspace: Workspace, number: int, *, said: str) -> Markup:
@@ -63,7 +37,7 @@ def drawn_clip(film: Film, workspace: Workspace, number: int, *, said: str) -> M
         said: What it shows, for who does not see it.
     """
     name = f"clip{number}"
-    views = _views(workspace)
+    views = views_of(workspace, width=WIDTH, gap=GAP)
     top = max(view.height for view in views)
     height = top + 2 * (LABELS + STRIP) + LABELS
     parts = [
@@ -80,20 +54,9 @@ def drawn_clip(film: Film, workspace: Workspace, number: int, *, said: str) -> M
     return Markup("").join(parts)
 
 
-def _views(workspace: Workspace) -> tuple[View, View]:
-    low, high = np.array(workspace.lower_m) - MARGIN_M, np.array(workspace.upper_m) + MARGIN_M
-    panel = (WIDTH - GAP) / 2
-    scale = panel / (high[0] - low[0])
-    return tuple(  # type: ignore[return-value]
-        View(
-            side=side,
-            left=side * (panel + GAP),
-            low_m=low[[0, axis]],
-            scale=scale,
-            height=scale * (high[axis] - low[axis]),
-        )
-        for side, axis in ((ABOVE, 1), (ASIDE, 2))
-    )
+def _points(view: View, outline: Array) -> str:
+    """Corners (n, 2), m, as an attribute of SVG."""
+    return " ".join(f"{x:.1f},{y:.1f}" for x, y in view.places(outline).tolist())
 
 
 def _view(film: Film, view: View, name: str) -> Iterator[Markup]:
@@ -110,7 +73,7 @@ def _view(film: Film, view: View, name: str) -> Iterator[Markup]:
         yield _moving(film, view, kind, lambda frame, place=place: frame.scene[place][1], name)  # type: ignore[misc]
     if len(film.path_m):
         axes = [0, 1] if view.side == ABOVE else [0, 2]
-        path = view.points(film.path_m[:, axes])
+        path = _points(view, film.path_m[:, axes])
         yield Markup('<polyline class="path" points="{}"/>').format(path)
     yield _moving(film, view, "held", lambda frame: frame.held, name)
     yield _moving(film, view, "hand", lambda frame: frame.hand, name)
@@ -122,7 +85,7 @@ def _moving(
 ) -> Markup:
     """One outline over all frames; one that never moves is not animated."""
     found = [of(frame) for frame in film.frames]
-    values = ["" if outline is None else view.points(outline[view.side]) for outline in found]
+    values = ["" if outline is None else _points(view, outline[view.side]) for outline in found]
     if len(set(values)) == 1:
         return Markup('<polygon class="{}" points="{}"/>').format(kind, values[-1])
     return Markup(

@@ -17,6 +17,7 @@ RATES = (
     "_coverage",
     "_deviation",
     "_gap",
+    "_reachable",
 )
 """How names of shares end."""
 SIGNS = {"<=": "≤", ">=": "≥"}
@@ -83,6 +84,5 @@ def rests_on(counted: str) -> str:
 
 def _three(value: float) -> str:
     """Three digits that count, and no powers of ten where a person would write none."""
-    if 1000 <= abs(value) < 1e9:
-        return f"{float(f'{value:.3g}'):,.0f}"
-    return f"{value:.3g}"
+    rounded = float(f"{value:.3g}")
+    return f"{rounded:,.0f}" if 1000 <= abs(rounded) < 1e9 else f"{value:.3g}"

@@ -13,18 +13,27 @@ from gates.engine import Judged
 from gates.evidence import MissingEvidenceError, numbers
 from gates.stress.rollouts import rollouts
 
+FORCE = "force_peak_p95_n"
 UNTOUCHED = re.compile(r"(\S+): (no contact in [\d,]+ of [\d,]+ rollouts)\b")
 """How the caveat of a candidate that touched nothing begins: its name, and what was seen."""
 
 
 def contact_said(judged: Judged) -> list[str]:
-    """A caveat for each candidate that touched nothing in any planned condition."""
+    """A caveat for each candidate that touched nothing in any planned condition.
+
+    And for each that touched something although its force was declared not to matter.
+    """
     said = []
     for name in judged.candidates:
         try:
             forces = numbers(rollouts(judged.evidence, judged.settings, name), "force_peak_n")
         except MissingEvidenceError:
             continue  # the criteria say what is missing
+        if np.any(forces > 0) and FORCE in judged.settings.limits.waived:
+            said.append(
+                f"{name}: touched something in {np.sum(forces > 0):,} of {len(forces):,} rollouts, "
+                f"with up to {forces.max():.3g} N, and no limit of force was asked."
+            )
         if np.all(forces == 0):
             count = f"{len(forces):,} of {len(forces):,}"
             said.append(

@@ -67,7 +67,7 @@ def _faults(evidence: Evidence, candidate: str) -> str:
     question="How long until an answer arrives?",
     look_at="Timing: answers come when their chunk is over; read latency by term in gate B.",
     per_candidate=True,
-    derived=lambda settings: min(settings.usable_s, OLDEST_ACTION_S),
+    derived=lambda settings: min(settings.usable_s, settings.oldest_s, OLDEST_ACTION_S),
 )
 def latency_p95_s(evidence: Evidence, settings: StressSettings, candidate: str) -> Measured:
     """Upper bound of the end-to-end latency that 95 % of the warm invocations keep, s.

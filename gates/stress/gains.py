@@ -55,7 +55,8 @@ def by_condition(evidence: Evidence, settings: StressSettings, candidate: str) -
     for baseline in settings.baselines:
         pairs = paired_by_condition(evidence, settings, candidate, baseline)
         for condition, found in pairs.items():
-            gain = (float(found.mean()), baseline)
+            # Rounded, since a mean over seeds that is nothing may come out as -1e-18.
+            gain = (round(float(found.mean()), 12) + 0.0, baseline)
             least[condition] = min(least.get(condition, gain), gain)
     told = ", ".join(
         f"{condition} {gain:+.4g} over {baseline}"

@@ -6,9 +6,6 @@ import pandas as pd
 from gates.evidence import Array, Evidence, MissingEvidenceError, flags
 from gates.stress.rollouts import StressSettings, rollouts
 
-LEAST = "least in"
-"""Before the condition in which a gain is least, in the words of `least_gain`."""
-
 
 def paired_differences(
     evidence: Evidence, settings: StressSettings, method: str, baseline: str

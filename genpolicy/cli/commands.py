@@ -40,6 +40,11 @@ REPLAY_EXAMPLES = examples(
 )
 
 EXPORT_EXAMPLES = examples("genpolicy export lerobot artifacts/ingest --out lerobot/")
+ROLLOUT_EXAMPLES = examples(
+    "genpolicy export rollout flow/push/0 --to gif --out push.gif",
+    "genpolicy export rollout flow/push/0 --to foxglove --out push.mcap",
+)
+RECORDING_EXAMPLES = examples("genpolicy export recording recordings/one.mcap --out watch.mcap")
 SERVE_EXAMPLES = examples(
     "genpolicy serve-policy artifacts/train_generators/flow/seed_0 --port 8000"
 )
@@ -66,9 +71,11 @@ def program(arguments: Sequence[str]) -> int:
     app.command("ingest", epilog=IMPORT_EXAMPLES)(ingest)
     app.command("fixtures", epilog=examples("genpolicy fixtures --pin"))(fixtures)
     app.command("replay", epilog=REPLAY_EXAMPLES)(replay)
-    exports = new_app("Write a dataset or a checkpoint for others.")
+    exports = new_app("Write a dataset, a checkpoint or a rollout for others.")
     exports.callback()(lambda: None)
     exports.command("lerobot", epilog=EXPORT_EXAMPLES)(export_lerobot)
+    exports.command("rollout", epilog=ROLLOUT_EXAMPLES)(export_rollout)
+    exports.command("recording", epilog=RECORDING_EXAMPLES)(export_recording)
     exports.command("torch", epilog=TORCH_EXAMPLES)(export_torch)
     exports.command("onnx", epilog=ONNX_EXAMPLES)(export_onnx)
     app.add_typer(exports, name="export")
@@ -174,6 +181,39 @@ def export_lerobot(
     from genpolicy.cli.exporting import run_export_lerobot
 
     return run_export_lerobot(dataset, out, split=split)
+
+
+def export_rollout(
+    rollout: Annotated[str, typer.Argument(help="METHOD/CONDITION/START.", metavar="ROLLOUT")],
+    out: Annotated[Path, typer.Option(help="File to write.")],
+    to: Annotated[Literal["foxglove", "gif", "rerun"], typer.Option(help="In which form.")],
+    root: Annotated[Path, typer.Option(help="The workspace.")] = Path(),
+    task: TaskName = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace an old file.")] = False,
+) -> int:
+    """Write a rollout of Gate D to be watched.
+
+    For Foxglove or Lichtblick as `genpolicy replay` does, with its layout; as a
+    GIF, from above and from the side; or for Rerun, which needs the extra rerun.
+    """
+    from genpolicy.cli.rollouts import run_export_rollout
+
+    return run_export_rollout(rollout, out, to=to, root=root, task=task, force=force)
+
+
+def export_recording(
+    recording: Annotated[Path, typer.Argument(help="An MCAP recording.", metavar="RECORDING")],
+    out: Annotated[Path, typer.Option(help="MCAP file to write.")],
+    force: Annotated[bool, typer.Option("--force", help="Replace an old file.")] = False,
+) -> int:
+    """Write a recording for Foxglove or Lichtblick.
+
+    Its messages are copied byte for byte; its schemas are said in the plain
+    types that both read. The recording is only read.
+    """
+    from genpolicy.cli.replay import run_export_recording
+
+    return run_export_recording(recording, out, force=force)
 
 
 Checkpoint = Annotated[Path, typer.Argument(help="Folder of a checkpoint.")]

@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from genpolicy.contract.action import ACTION_DIM
 from genpolicy.errors import BadInputError, ContractError
 from genpolicy.execution.cell import FALLBACK_HASH, Cell
+from genpolicy.execution.event_schemas import event_schema, schema_name
 from genpolicy.execution.nanoseconds import NEVER_NS, NS_PER_S, ns_or_none
 from genpolicy.integrity.atomic import write_bytes
 from genpolicy.integrity.documents import canonical_json
@@ -254,10 +255,8 @@ def write_journal(path: Path, sessions: Iterable[Journal]) -> None:
     writer.start(profile="", library="genpolicy")
     channels: dict[str, int] = {}
     for kind, fields in EVENT_FIELDS.items():
-        schema = {"type": "object", "required": ["session", "n", "t", *fields]}
-        schema_id = writer.register_schema(
-            f"genpolicy.journal.{kind}", "jsonschema", canonical_json(schema)
-        )
+        schema = canonical_json(event_schema(kind, fields))
+        schema_id = writer.register_schema(schema_name(kind), "jsonschema", schema)
         channels[kind] = writer.register_channel(f"/journal/{kind}", "json", schema_id)
     encode = json.JSONEncoder(separators=(",", ":"), allow_nan=False).encode
     names: set[str] = set()

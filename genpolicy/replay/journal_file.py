@@ -1,4 +1,7 @@
-"""A journal's file with every byte of its messages, and the file that a replay is written into."""
+"""A journal's file with every byte of its messages, and the file that a replay is written into.
+
+The schemas of its channels are written anew: those of older journals are none that a viewer reads.
+"""
 
 import io
 import json
@@ -7,10 +10,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mcap.reader import make_reader
-from mcap.records import Channel, Message, Schema
+from mcap.records import Channel, Message
 from mcap.writer import CompressionType, Writer
 
 from genpolicy.errors import BadInputError
+from genpolicy.execution.event_schemas import event_schema, schema_name
 from genpolicy.execution.journal import (
     EVENT_FIELDS,
     JOURNAL_VERSION,
@@ -48,13 +52,11 @@ class JournalFile:
 
     Attributes:
         session: Its name.
-        schemas: Of the file, by number.
         channels: Of the file, by number.
         events: Of the session, in order.
     """
 
     session: str
-    schemas: dict[int, Schema]
     channels: dict[int, Channel]
     events: list[Recorded]
 
@@ -112,14 +114,14 @@ def read_session(path: Path, name: str | None) -> JournalFile:
         ) from error
     chosen = _chosen(path, sessions, name)
     _require_version(path, sessions[chosen])
-    return JournalFile(chosen, dict(summary.schemas), dict(summary.channels), sessions[chosen])
+    return JournalFile(chosen, dict(summary.channels), sessions[chosen])
 
 
 def write_replay_bytes(journal: JournalFile, drawn: Iterable[Drawn]) -> bytes:
     """A replay as the bytes of an MCAP file; the same input gives the same bytes.
 
-    The channels of the journal keep their numbers' order, schemas and names, its messages their
-    bytes, times and numbers. Each message that is drawn follows the events of its time.
+    The channels of the journal keep their numbers' order and names, its messages their bytes,
+    times and numbers. Each message that is drawn follows the events of its time.
 
     Args:
         journal: The session.
@@ -165,19 +167,19 @@ def write_replay_bytes(journal: JournalFile, drawn: Iterable[Drawn]) -> bytes:
 
 def _register_journal(writer: Writer, journal: JournalFile) -> dict[int, int]:
     """Number of each channel of the journal in the new file."""
-    numbers = {
-        number: writer.register_schema(schema.name, schema.encoding, schema.data)
-        for number, schema in sorted(journal.schemas.items())
-    }
-    return {
-        number: writer.register_channel(
+    found = {}
+    for number, channel in sorted(journal.channels.items()):
+        kind = channel.topic.removeprefix(TOPIC)
+        if kind not in EVENT_FIELDS:  # without a message, or reading it would have been refused
+            continue
+        schema = canonical_json(event_schema(kind, EVENT_FIELDS[kind]))
+        found[number] = writer.register_channel(
             channel.topic,
             channel.message_encoding,
-            numbers.get(channel.schema_id, 0),
+            writer.register_schema(schema_name(kind), "jsonschema", schema),
             dict(channel.metadata),
         )
-        for number, channel in sorted(journal.channels.items())
-    }
+    return found
 
 
 def _merged(

@@ -1,7 +1,8 @@
 """Foxglove's well-known messages that a replay is made of: their JSON schemas, and what fills them.
 
 Named and shaped as the viewer knows them (`foxglove.SceneUpdate`, `foxglove.FrameTransform`); the
-schemas describe the fields that are written here, and no others. Lengths in m, in the robot's base
+schemas describe the fields that are written here, and no others, in the plain types that public
+viewers read (`genpolicy.execution.event_schemas` says which). Lengths in m, in the robot's base
 frame unless a frame is named; colours are red, green, blue and opacity from 0 to 1.
 
 Source: Foxglove, well-known message schemas.
@@ -14,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from genpolicy.data.recording.wire import FRAME, LOG_SCHEMA, LOG_SCHEMA_NAME, timestamp
+from genpolicy.data.recording.wire import FRAME, JOINTS, LOG_SCHEMA, LOG_SCHEMA_NAME, timestamp
 
 Array = NDArray[np.float64]
 Json = dict[str, Any]
@@ -22,6 +23,8 @@ Colour = tuple[float, float, float, float]
 
 SCENE_SCHEMA_NAME = "foxglove.SceneUpdate"
 TRANSFORM_SCHEMA_NAME = "foxglove.FrameTransform"
+JOINTS_SCHEMA_NAME = JOINTS.schema_name
+"""As in a recording: a viewer's plot of one opens the other."""
 LINE_STRIP, LINE_LIST = 0, 2
 DELETE_ALL = 1
 DECIMALS = 6
@@ -58,21 +61,21 @@ _CYLINDER = _object(
     pose=_POSE, size=_VECTOR, bottom_scale=_NUMBER, top_scale=_NUMBER, color=_COLOUR
 )
 _LINE = _object(
-    type={"enum": [LINE_STRIP, 1, LINE_LIST]}, pose=_POSE, thickness=_NUMBER, scale_invariant=_FLAG,
-    points=_list(_VECTOR), color=_COLOUR, colors=_list(_COLOUR),
-    indices=_list({"type": "integer", "minimum": 0}),
+    type={"type": "integer", "enum": [LINE_STRIP, 1, LINE_LIST]},
+    pose=_POSE, thickness=_NUMBER, scale_invariant=_FLAG, points=_list(_VECTOR), color=_COLOUR,
+    colors=_list(_COLOUR), indices=_list({"type": "integer", "minimum": 0}),
 )  # fmt: skip
 _LETTERS = _object(
     pose=_POSE, billboard=_FLAG, font_size=_NUMBER, scale_invariant=_FLAG, color=_COLOUR, text=_TEXT
 )
-_UNUSED = {"type": "array", "maxItems": 0}
+_UNUSED = {"type": "array", "items": _object(), "maxItems": 0}
 _ENTITY = _object(
     timestamp=_TIME, frame_id=_TEXT, id=_TEXT, lifetime=_DURATION, frame_locked=_FLAG,
     metadata=_list(_object(key=_TEXT, value=_TEXT)),
     arrows=_UNUSED, cubes=_list(_SOLID), spheres=_list(_SOLID), cylinders=_list(_CYLINDER),
     lines=_list(_LINE), triangles=_UNUSED, texts=_list(_LETTERS), models=_UNUSED,
 )  # fmt: skip
-_DELETION = _object(timestamp=_TIME, type={"enum": [0, DELETE_ALL]}, id=_TEXT)
+_DELETION = _object(timestamp=_TIME, type={"type": "integer", "enum": [0, DELETE_ALL]}, id=_TEXT)
 
 SCHEMAS: dict[str, Json] = {
     SCENE_SCHEMA_NAME: {
@@ -86,6 +89,9 @@ SCHEMAS: dict[str, Json] = {
         ),
     },
     LOG_SCHEMA_NAME: LOG_SCHEMA,
+    JOINTS_SCHEMA_NAME: {
+        "title": JOINTS_SCHEMA_NAME, **_object(timestamp=_TIME, position_rad=_list(_NUMBER)),
+    },
 }  # fmt: skip
 """JSON schema of each message, by its name."""
 
@@ -193,6 +199,11 @@ def transform(time_ns: int, child: str, position_m: Array, rotation: Array) -> J
         "translation": vector(position_m),
         "rotation": quaternion(rotation),
     }
+
+
+def joints(time_ns: int, q_rad: Array) -> Json:
+    """Positions of the joints (J,), rad."""
+    return {"timestamp": timestamp(time_ns), "position_rad": _rounded(q_rad)}
 
 
 def log(time_ns: int, level: int, message: str, *, name: str, source: tuple[str, int]) -> Json:

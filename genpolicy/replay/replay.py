@@ -6,8 +6,10 @@ from pathlib import Path
 from genpolicy.documents.task import IDENTITY
 from genpolicy.errors import ConfigError
 from genpolicy.integrity.atomic import write_bytes
+from genpolicy.integrity.documents import canonical_json
 from genpolicy.replay.bodies import DrawnCell
 from genpolicy.replay.journal_file import read_session, write_replay_bytes
+from genpolicy.replay.panels import panels
 from genpolicy.replay.proposals import Proposals
 from genpolicy.replay.timeline import Timeline
 from genpolicy.tasks.api import load_task
@@ -35,6 +37,8 @@ class Written:
 def write_replay(journal: Path, out: Path, *, session: str | None, task: str | None) -> Written:
     """Write one session of a journal with the scene drawn beside it; the journal is only read.
 
+    Beside the file stands a layout that opens it (`layout_file`).
+
     Args:
         journal: The journal.
         out: The MCAP file to write, whole or not at all.
@@ -54,11 +58,22 @@ def write_replay(journal: Path, out: Path, *, session: str | None, task: str | N
         timeline = Timeline(cell, proposals, found.session)
         drawn = list(timeline.messages(item.event for item in found.events))
         data = write_replay_bytes(found, drawn)
+    layout = panels(
+        {item.topic for item in drawn} | {channel.topic for channel in found.channels.values()},
+        joint_count=cell.collision.kinematics.joint_count,
+        workspace=cell.workspace,
+    )
     write_bytes(out, data)
+    write_bytes(layout_file(out), canonical_json(layout))
     topics: dict[str, int] = {}
     for item in drawn:
         topics[item.topic] = topics.get(item.topic, 0) + 1
     return Written(found.session, len(found.events), dict(sorted(topics.items())))
+
+
+def layout_file(out: Path) -> Path:
+    """Where the layout of a replay stands."""
+    return out.with_name(f"{out.stem}.layout.json")
 
 
 def task_of(journal: Path) -> str:

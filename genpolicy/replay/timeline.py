@@ -20,12 +20,14 @@ from genpolicy.replay.bodies import DrawnCell, frame_of, poses_of, primitives
 from genpolicy.replay.journal_file import Drawn
 from genpolicy.replay.messages import (
     IDENTITY,
+    JOINTS_SCHEMA_NAME,
     SCENE_SCHEMA_NAME,
     TRANSFORM_SCHEMA_NAME,
     Colour,
     Json,
     dots,
     entity,
+    joints,
     letters,
     line,
     log,
@@ -40,14 +42,16 @@ from genpolicy.robot.scene_state import SceneState
 
 Array = NDArray[np.float64]
 
-SCENE, ROBOT, COMMANDED, PROPOSED, REJECTED = (
-    f"/replay/{name}" for name in ("scene", "robot", "commanded", "proposed", "rejected")
+SCENE, ROBOT, COMMANDED, RAW, PROJECTED, REJECTED = (
+    f"/replay/{name}" for name in ("scene", "robot", "commanded", "raw", "projected", "rejected")
 )
 TRANSFORMS, LOG = "/replay/tf", "/replay/log"
+JOINTS_COMMANDED, JOINTS_MEASURED = "/replay/joints/commanded", "/replay/joints/measured"
 COMMANDED_FRAME = "tcp_commanded"
 
 INK: Colour = (0.1, 0.1, 0.1, 1.0)
 BLUE: Colour = (0.0, 0.45, 0.70, 1.0)
+SKY: Colour = (0.35, 0.70, 0.90, 0.8)
 PURPLE: Colour = (0.80, 0.47, 0.65, 1.0)
 ORANGE: Colour = (0.90, 0.60, 0.0, 0.9)
 FAINT: Colour = (0.90, 0.60, 0.0, 0.4)
@@ -74,6 +78,7 @@ class Timeline:
         self._changed: dict[str, list[Json]] = {}
         self._logs: list[Json] = []
         self._frame: tuple[Array, Array] | None = None
+        self._joints: dict[str, Array] = {}
         self._bodies: Any = None
         self._scene = cell.scene(SceneState())
         self._chunks: dict[int, tuple[Mapping[str, Any], Array, Array | None]] = {}
@@ -106,9 +111,11 @@ class Timeline:
         if self._frame is not None:
             content = transform(now_ns, COMMANDED_FRAME, *self._frame)
             yield Drawn(TRANSFORMS, TRANSFORM_SCHEMA_NAME, now_ns, content)
+        for topic, q_rad in self._joints.items():
+            yield Drawn(topic, JOINTS_SCHEMA_NAME, now_ns, joints(now_ns, q_rad))
         for content in self._logs:
             yield Drawn(LOG, LOG_SCHEMA_NAME, now_ns, content)
-        self._changed, self._logs, self._frame = {}, [], None
+        self._changed, self._logs, self._frame, self._joints = {}, [], None, {}
 
     def _take(self, event: Event, now_ns: int) -> None:
         payload = event.payload
@@ -169,18 +176,19 @@ class Timeline:
         actions, motion = decode_actions(payload["actions"]), payload["motion"]
         q_rad = None if motion is None else _joints(motion, "q_rad")
         self._chunks[payload["arrival"]] = (payload, actions, q_rad)
-        if motion is not None and not self._posed:
-            opening_m = float(decode_actions(motion["last_action"])[0, GRIPPER])
-            self._show_robot(now_ns, _joints(motion, "q_meas_rad")[-1], opening_m)
+        if motion is not None:
+            measured = _joints(motion, "q_meas_rad")[-1]
+            self._joints[JOINTS_MEASURED] = measured
+            if not self._posed:
+                opening_m = float(decode_actions(motion["last_action"])[0, GRIPPER])
+                self._show_robot(now_ns, measured, opening_m)
         look = PURPLE if payload["source"] == FALLBACK else BLUE
-        points = actions[:, POSITION]
+        raw = decode_actions(payload["raw"] or payload["actions"])[:, POSITION]
+        away_mm = 1e3 * np.linalg.norm(raw - actions[:, POSITION], axis=1).max(initial=0.0)
         facts = [(name, str(payload[name])) for name in ("chunk_id", "method", "source", "phase")]
-        self._changed[PROPOSED] = [
-            entity(
-                "proposed", now_ns, facts=facts, lines=[line(points, look)],
-                spheres=dots(points, look, diameter_m=DOT_M),
-            )
-        ]  # fmt: skip
+        facts.append(("moved by projection", f"at most {away_mm:.2f} mm"))
+        self._changed[RAW] = [_chunk("raw", now_ns, raw, SKY, facts)]
+        self._changed[PROJECTED] = [_chunk("projected", now_ns, actions[:, POSITION], look, facts)]
 
     def _command(self, now_ns: int, payload: Mapping[str, Any]) -> None:
         action = decode_actions(payload["action"])[0]
@@ -191,6 +199,7 @@ class Timeline:
             checked = row - int(chunk["checked_rows"][0])
             if 0 <= checked < len(q_rad):
                 self._show_robot(now_ns, q_rad[checked], float(opening))
+                self._joints[JOINTS_COMMANDED] = q_rad[checked]
         self._at_m, self._frame = position, (position, rotation)
         self._path.append(position)
         text = f"{payload['chunk_id']} row {row}, age {payload['age_ns'] / 1e6:.0f} ms"
@@ -254,6 +263,16 @@ class Timeline:
             return self._at_m
         low, high = np.array(self._cell.workspace.lower_m), np.array(self._cell.workspace.upper_m)
         return np.array([*(low[:2] + high[:2]) / 2, high[2]])
+
+
+def _chunk(
+    name: str, now_ns: int, points_m: Array, look: Colour, facts: Sequence[tuple[str, str]]
+) -> Json:
+    """The way of a chunk, with a dot at each of its actions (n, 3)."""
+    return entity(
+        name, now_ns, facts=facts, lines=[line(points_m, look)],
+        spheres=dots(points_m, look, diameter_m=DOT_M),
+    )  # fmt: skip
 
 
 def _offending(found: RejectedProposal) -> Array | None:

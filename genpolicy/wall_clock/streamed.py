@@ -15,6 +15,7 @@ from mcap.records import Channel, Message
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
+from genpolicy.execution.event_schemas import event_schema, schema_name
 from genpolicy.execution.journal import (
     EVENT_FIELDS,
     MAXIMUM_CHUNK_BYTES,
@@ -61,9 +62,8 @@ class StreamedJournal(Journal):
         self._writer.start(profile="", library="genpolicy")
         self._channels: dict[str, int] = {}
         for kind, fields in EVENT_FIELDS.items():
-            schema = {"type": "object", "required": ["session", "n", "t", *fields]}
-            name = f"genpolicy.journal.{kind}"
-            schema_id = self._writer.register_schema(name, "jsonschema", canonical_json(schema))
+            schema = canonical_json(event_schema(kind, fields))
+            schema_id = self._writer.register_schema(schema_name(kind), "jsonschema", schema)
             self._channels[kind] = self._writer.register_channel(
                 f"{TOPIC}{kind}", "json", schema_id
             )

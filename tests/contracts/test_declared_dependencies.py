@@ -14,15 +14,17 @@ from metadata import ROOT, name_of, project
 
 PRODUCT = ("genpolicy", "gates", "stages", "flows")
 SUPPORT = ("tests", "benchmarks")
-EXTRAS = ("zarr", "hdf5", "onnx")
+EXTRAS = ("zarr", "hdf5", "onnx", "rerun")
 NOT_IMPORTED = {
     "dvc": "flows run it as a process (`dvc repro`), so that it stays out of ours",
     "onnxscript": "torch.onnx writes with it",
     "fastapi": "not ours: the bound keeps Prefect's server alive, see the comment there",
 }
 # Its wheel installs below a prefix of its own, where the metadata of modules do not look.
-# That of `mutation` need not be installed.
-INSTALLED_BY = {"pinocchio": {"pin"}, "cosmic_ray": {"cosmic-ray"}}
+# Those of `mutation` and `rerun` need not be installed.
+INSTALLED_BY = {
+    "pinocchio": {"pin"}, "cosmic_ray": {"cosmic-ray"}, "rerun": {"rerun-sdk"},
+}  # fmt: skip
 
 
 @cache

@@ -1,7 +1,16 @@
-"""The README's map names what there is, and all of it."""
+"""The README's map names what there is, and all of it; its numbers are those of the reports."""
 
+import copy
 import re
+import sys
 from pathlib import Path
+
+import pytest
+import yaml
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+import readme
 
 ROOT = Path(__file__).parents[2]
 README = ROOT / "README.md"
@@ -55,3 +64,57 @@ def test_a_path_that_is_gone_is_found() -> None:
         "| `genpolicy/data`, `gone` | `tests/none` |\n\n## More\n`other.py`\n"
     )
     assert missing(text) == ["gates/reproducibility.py", "genpolicy/gone", "tests/none"]
+
+
+def test_what_the_readme_says_of_the_default_ladder_is_what_the_reports_say() -> None:
+    text, found = README.read_text(), readme.reports()
+    assert found, "no report lies in reports/"
+    assert readme.placed(text, readme.section(found)) == text, (
+        "run `python tests/contracts/readme.py --write`, and read the words around it"
+    )
+
+
+@pytest.mark.parametrize("name", ["measured", "threshold", "interval", "verdict"])
+def test_a_number_that_moves_is_seen(name: str) -> None:
+    """Injected fault: one field of the criterion that decides."""
+    found = readme.reports()
+    moved = copy.deepcopy(found)
+    item = next(i for i in moved["A"]["criteria"] if i["id"] == "remedy_valid_share")
+    item[name] = {"interval": [0.1, 0.2], "verdict": "FAIL"}.get(name, 0.123)
+    assert readme.section(moved) != readme.section(found)
+
+
+def test_a_row_is_as_a_person_reads_it() -> None:
+    """Golden by hand."""
+    item = {
+        "id": "x_share", "candidate": "flow", "question": "Enough?", "measured": 0.51234,
+        "interval": [0.36, 0.51234], "counted": "223 episodes", "comparison": "<=",
+        "threshold": 0.5, "verdict": "INCONCLUSIVE",
+    }  # fmt: skip
+    report = {"verdict": "FAIL", "decision": "No.", "diagnosis": "a. Next: b.",
+              "criteria": [item, {**item, "id": "held", "verdict": "PASS"}]}  # fmt: skip
+    assert readme.section({"B": report}).splitlines()[:2] + readme.section(
+        {"B": report}
+    ).splitlines()[5:] == [
+        "**Gate B is FAIL**: 1 of 2 criteria hold.",
+        "No. Next: b.",
+        "| `x_share` of flow | Enough? | 51.2 % (36 % to 51.2 %), 223 episodes | ≤ 50 % | open |",
+    ]
+
+
+def test_the_picture_of_the_flow_has_every_stage_and_no_other() -> None:
+    chart = README.read_text().partition("```mermaid\n")[2].partition("```")[0]
+    stages = set(yaml.safe_load((ROOT / "dvc.yaml").read_text())["stages"])
+    words = re.sub(r"-- \w+ -->|-->|\(\[.*?\]\)|flowchart", " ", chart)
+    named = set(re.findall(r"[a-z][a-z_]+", words))
+    gates = set(re.findall(r"\{(\w+)\}", chart))
+    assert stages <= named | gates
+    assert (named | gates) - stages <= {"people"}
+
+
+def test_every_picture_of_a_document_is_there_and_draws_itself() -> None:
+    for path in (README, *(ROOT / "docs").glob("*.md")):
+        for name in re.findall(r"!\[[^\]]*\]\(([^)]+)\)", path.read_text()):
+            picture = path.parent / name
+            assert picture.is_file(), f"{path.name}: {name}"
+            assert picture.suffix == ".svg", "a picture that nobody makes again goes stale"

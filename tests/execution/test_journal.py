@@ -3,6 +3,8 @@
 import io
 import json
 import math
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,6 +22,9 @@ from genpolicy.execution.journal import (
 )
 from genpolicy.execution.nanoseconds import NEVER_NS
 from genpolicy.verification.checker import check_journal
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from viewer_rules import unread
 
 
 def played(name):
@@ -57,6 +62,11 @@ def test_the_file_is_plain_mcap_with_event_time_as_log_time(tmp_path):
     assert (message.log_time, message.publish_time, message.sequence) == (1_500_000_000,) * 2 + (0,)
     expected = b'{"session":"s","n":0,"t":1500000000,"id":"i-1","stage":"begin","detail":""}'
     assert message.data == expected
+
+
+def test_a_viewer_reads_every_channel(tmp_path):
+    write_journal(tmp_path / "j.mcap", [played("a")])
+    assert unread((tmp_path / "j.mcap").read_bytes()) == ({}, len(EVENT_FIELDS))
 
 
 def test_every_event_has_the_fields_of_its_kind():

@@ -167,6 +167,6 @@ def test_who_fell_is_named_with_number_and_limit_where_another_passes(ladder: Pa
 
 def test_a_report_that_is_refused_does_not_say_who_fell(ladder: Path) -> None:
     path = ladder / report_path("D")
-    path.write_bytes(path.read_bytes().replace(b'"flow":"PASS"', b'"flow":"FAIL"'))
+    path.write_bytes(path.read_bytes().replace(b'"flow": "PASS"', b'"flow": "FAIL"'))
     lines = {line.stage: line for line in overview(ladder, prove_all(ladder))}
     assert lines["gate_d"].verdict == "REFUSED" and lines["gate_d"].stopped == ()

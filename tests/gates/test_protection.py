@@ -116,8 +116,8 @@ def test_golden_what_each_list_must_or_may_name():
         ("D", "stress.baselines",
          ("chunked_bc", "chunked_l1", "one_mode_bc", "bc_noise", "act"), False),
         ("D", "stress.perturbations",
-         ("nominal", "camera_delay", "compute_contention", "network_jitter", "queue_reorder"),
-         False),
+         ("nominal", "camera_delay", "compute_contention", "network_jitter", "queue_reorder",
+          "envelope"), False),
     }  # fmt: skip
 
 
@@ -150,7 +150,8 @@ def test_the_shipped_lists_name_what_they_must(request):
 
 def test_a_condition_counts_by_its_kind_and_not_by_its_name():
     """`camera_delay: {kind: nominal}` is no camera delay, by whatever name it goes."""
-    conditions = {"nominal": {}, "camera_delay": {}, "compute_contention": {}, "queue_reorder": {}}
+    conditions = {"nominal": {}, "camera_delay": {}, "compute_contention": {}, "queue_reorder": {},
+                  "envelope": {}}  # fmt: skip
     jitter = {"slow_line": {"kind": "network_jitter"}}
     assert lacking({"stress": {"perturbations": conditions | jitter}}, "D") == []
     for bad in ({"network_jitter": {"kind": "nominal"}}, {"slow_line": {}}):

@@ -2,14 +2,19 @@
 
 import hashlib
 import shutil
+import sys
+from pathlib import Path
 
 import pytest
 from replayed import SESSION, added, copied
 
 from genpolicy.errors import BadInputError, ConfigError, IntegrityError
-from genpolicy.execution.journal import JOURNAL_VERSION, Journal, write_journal
+from genpolicy.execution.journal import EVENT_FIELDS, JOURNAL_VERSION, Journal, write_journal
 from genpolicy.integrity.hashing import sha256_file
 from genpolicy.replay.replay import task_of, write_replay
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from viewer_rules import unread
 
 
 def write(journal, out, **options):
@@ -25,8 +30,23 @@ def test_a_replay_has_the_journal_and_what_was_drawn(journal, tmp_path):
     counted = {}
     for topic, *_ in added(data):
         counted[topic] = counted.get(topic, 0) + 1
-    assert done.topics == counted and len(counted) == 7
+    assert done.topics == counted and len(counted) == 10
     assert sha256_file(journal) == before
+
+
+def test_a_viewer_reads_every_channel_also_of_an_older_journal(journal, tmp_path, monkeypatch):
+    write(journal, tmp_path / "r.mcap")
+    assert unread((tmp_path / "r.mcap").read_bytes()) == ({}, 10 + len(EVENT_FIELDS))
+    old = Journal("s")
+    old.add("session", 0, {"version": JOURNAL_VERSION, "labels": {}})
+    monkeypatch.setattr(
+        "genpolicy.execution.journal.event_schema",
+        lambda kind, fields: {"type": "object", "required": ["session", "n", "t", *fields]},
+    )
+    write_journal(tmp_path / "old.mcap", [old])
+    assert unread((tmp_path / "old.mcap").read_bytes())[1] == 0
+    write(tmp_path / "old.mcap", tmp_path / "r.mcap", session=None, task="tabletop_insertion")
+    assert unread((tmp_path / "r.mcap").read_bytes())[0] == {}
 
 
 def test_the_same_input_gives_the_same_bytes(journal, tmp_path):

@@ -16,9 +16,12 @@ from genpolicy.replay.messages import SCENE_SCHEMA_NAME, SCHEMAS
 from genpolicy.replay.proposals import Proposals
 from genpolicy.replay.timeline import (
     COMMANDED,
+    JOINTS_COMMANDED,
+    JOINTS_MEASURED,
     LOG,
     PATH_POINTS,
-    PROPOSED,
+    PROJECTED,
+    RAW,
     REJECTED,
     ROBOT,
     SCENE,
@@ -62,14 +65,15 @@ def accept(t_ns, position, row=0):
 def test_every_message_is_valid_json_of_its_schema(shown):
     validators = {name: jsonschema.Draft202012Validator(schema) for name, schema in SCHEMAS.items()}
     assert {item.topic for item in shown} == {
-        SCENE, ROBOT, COMMANDED, PROPOSED, REJECTED, TRANSFORMS, LOG,
+        SCENE, ROBOT, COMMANDED, RAW, PROJECTED, REJECTED, TRANSFORMS, LOG,
+        JOINTS_COMMANDED, JOINTS_MEASURED,
     }  # fmt: skip
     for item in shown:
         document = json.loads(json.dumps(item.content, allow_nan=False))
         validators[item.schema].validate(document)
         stamps = [document.get("timestamp")]
         stamps += [part["timestamp"] for kind in document.values() if isinstance(kind, list)
-                   for part in kind]  # fmt: skip
+                   for part in kind if isinstance(part, dict)]  # fmt: skip
         for stamp in filter(None, stamps):
             assert stamp["sec"] * 10**9 + stamp["nsec"] == item.time_ns
 
@@ -131,10 +135,48 @@ def test_the_arm_holds_the_tool_where_it_was_commanded(shown, events, cell):
 
 def test_the_proposed_chunk_is_a_line_through_all_its_actions(shown, events):
     enqueued = next(item.payload for item in events if item.kind == "enqueue")
-    own = entities(last(shown, PROPOSED))["proposed"]
+    own = entities(last(shown, PROJECTED))["projected"]
     points = [[point[axis] for axis in "xyz"] for point in own["lines"][0]["points"]]
     np.testing.assert_allclose(points, decode_actions(enqueued["actions"])[:, POSITION], atol=1e-6)
     assert {"key": "chunk_id", "value": enqueued["chunk_id"]} in own["metadata"]
+
+
+def test_the_chunk_as_sampled_stands_beside_the_projected_one_and_says_how_far_it_was_moved(
+    cell, events
+):
+    """Property: where the journal keeps no other actions, they are those that were admitted."""
+    enqueued = next(item for item in events if item.kind == "enqueue")
+    admitted = decode_actions(enqueued.payload["actions"])
+    moved = np.array(admitted)
+    moved[3, 1] += 0.002
+    for raw, expected, said in (
+        ("", admitted, "at most 0.00 mm"), (encode_actions(moved), moved, "at most 2.00 mm"),
+    ):  # fmt: skip
+        told = event("enqueue", 5, **{**enqueued.payload, "raw": raw})
+        shown = list(timeline(cell).messages([told]))
+        own = entities(last(shown, RAW))["raw"]
+        points = [[point[axis] for axis in "xyz"] for point in own["lines"][0]["points"]]
+        np.testing.assert_allclose(points, expected[:, POSITION], atol=1e-6)
+        assert {"key": "moved by projection", "value": said} in own["metadata"]
+        other = entities(last(shown, PROJECTED))["projected"]
+        assert own["lines"][0]["color"] != other["lines"][0]["color"]
+
+
+def test_joints_are_those_that_were_commanded_and_those_that_were_measured(shown, events):
+    enqueued = [item for item in events if item.kind == "enqueue"]
+    measured = [item for item in shown if item.topic == JOINTS_MEASURED]
+    assert len(measured) == len(enqueued) >= 1
+    for told, item in zip(enqueued, measured, strict=True):
+        expected = np.frombuffer(bytes.fromhex(told.payload["motion"]["q_meas_rad"]))
+        np.testing.assert_allclose(item.content["position_rad"], expected[-7:], atol=1e-6)
+    motion, first = enqueued[0].payload["motion"], enqueued[0].payload["checked_rows"][0]
+    joints = np.frombuffer(bytes.fromhex(motion["q_rad"])).reshape(-1, motion["joints"])
+    commanded = {item.time_ns: item.content for item in shown if item.topic == JOINTS_COMMANDED}
+    accepted = [item for item in events if item.kind == "accept"]
+    assert set(commanded) == {item.t for item in accepted}
+    for told in accepted:
+        found = commanded[told.t]["position_rad"]
+        np.testing.assert_allclose(found, joints[told.payload["row"] - first], atol=1e-6)
 
 
 def test_rejected_proposals_bear_another_colour_the_action_and_the_reason(shown, events):
@@ -142,7 +184,7 @@ def test_rejected_proposals_bear_another_colour_the_action_and_the_reason(shown,
     rejected = [payload for payload in payloads if payload["first_reason"]]
     found = entities(last(shown, REJECTED))
     assert len(found) == len(rejected) >= 3
-    blue = entities(last(shown, PROPOSED))["proposed"]["lines"][0]["color"]
+    blue = entities(last(shown, PROJECTED))["projected"]["lines"][0]["color"]
     for payload, own in zip(rejected, found.values(), strict=True):
         assert payload["first_reason"].replace("_", " ") in own["texts"][0]["text"]
         assert f"action {payload['measures']['first_row']}" in own["texts"][0]["text"]
@@ -254,7 +296,8 @@ def test_chunks_of_the_fallback_have_their_own_colour(shown, events, cell):
     other = Event("s", 0, "enqueue", 0, {**enqueued.payload, "source": "fallback"})
     found = list(timeline(cell).messages([other]))
     colours = [
-        entities(last(items, PROPOSED))["proposed"]["lines"][0]["color"] for items in (shown, found)
+        entities(last(items, PROJECTED))["projected"]["lines"][0]["color"]
+        for items in (shown, found)
     ]
     assert colours[0] != colours[1]
     assert any(item.topic == ROBOT for item in found)  # where it was measured, before any command

@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
-from causes_planted import CAUSES, FLOW
+from causes_planted import CAUSES, FLOW, jumps, table
 from test_walk import turned
 
 from gates.diagnosis.reports import EVERYBODY, Reports
@@ -122,6 +122,32 @@ def test_a_planted_cause_is_named_where_the_row_looks_for_it(
         assert (
             found.look_next == f"at what speaks next ({symptom.then.at}); what comes first {first}"
         )
+
+
+def _right_and_seldom_failing(frame):
+    """Flow goes right on odd starts and fails on every fifth of these: certain, and no failure."""
+    right = (frame["method"] == FLOW) & (frame["start"] % 2 == 1)
+    frame.loc[right, "mode"] = "right"
+    frame.loc[right & (frame["start"] % 10 == 1), ["success", "outcome"]] = [False, "collision"]
+    return frame
+
+
+@pytest.mark.parametrize(
+    ("name", "edit"),
+    [
+        ("boundary-jump", table("stress/splices.parquet", jumps("raw_jump_m", 1.5))),
+        ("boundary-jump", table("stress/splices.parquet", jumps("jump_m", 3.0))),
+        ("diverse-unsuccessful", table("stress/rollouts.parquet", _right_and_seldom_failing)),
+    ],
+)
+def test_a_difference_that_does_not_matter_says_nothing(planted, name, edit):
+    (symptom,) = symptoms_of(name)
+    assert not answered(symptom, planted(edit, ""), FLOW).found
+
+
+def test_who_does_not_win_the_microbenchmark_is_accused_of_no_slower_answer(honest):
+    (symptom,) = symptoms_of("fast-microbenchmark")
+    assert not answered(symptom, honest, "diffusion").found
 
 
 def test_every_inspection_has_a_planted_cause():

@@ -5,8 +5,9 @@ import re
 import numpy as np
 import pytest
 
-from gates.pages.clips_drawn import GAP, MARGIN_M, STRIP, WIDTH, drawn_clip
+from gates.pages.clips_drawn import GAP, STRIP, WIDTH, drawn_clip
 from genpolicy.replay.film import Film, Frame
+from genpolicy.replay.views import MARGIN_M
 from genpolicy.tasks.api import Workspace
 
 SPACE = Workspace(lower_m=(0.3, -0.2, 0.0), upper_m=(0.7, 0.2, 0.2))

@@ -105,8 +105,8 @@ FACTORS = {"ms": 1e-3, "mm": 1e-3, "%": 1e-2}
 
 def _read(text):
     """Side and number, in units of the evidence, of what a person reads on the desk."""
-    side, number, unit = re.fullmatch(r"(at most |at least |)×?([-+.e\d]+) ?(.*)", text).groups()
-    return side.strip(), float(number) * FACTORS.get(unit, 1.0)
+    side, number, unit = re.fullmatch(r"(at most |at least |)×?([-+.e\d,]+) ?(.*)", text).groups()
+    return side.strip(), float(number.replace(",", "")) * FACTORS.get(unit, 1.0)
 
 
 def _close(value):
@@ -114,7 +114,13 @@ def _close(value):
 
 
 def _side(answer):
-    return "" if answer.interval is None else {"<=": "at most", ">=": "at least"}[answer.comparison]
+    """Of the end that was judged, whichever it is."""
+    low, high = answer.interval or (None, None)
+    return (
+        {high: "at most", low: "at least"}.get(answer.measured, "")
+        if low != high
+        else ("" if low is None else {"<=": "at most", ">=": "at least"}[answer.comparison])
+    )
 
 
 @pytest.mark.parametrize("spoilt", [False, True])

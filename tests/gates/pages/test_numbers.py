@@ -26,6 +26,7 @@ def of(**changes):
         ("held_out_situations", 100, 13345.0, "13,345"),
         ("boundary_jerk_p95_m_s3", 3250, 2031.7, "2,030 m/s³"),
         ("latency_p95_s", 0.4, 1e9, "1e+09 s"),
+        ("latency_p95_s", 0.4, 0.9997, "1,000 ms"),
     ],
 )
 def test_numbers_stand_in_the_unit_of_a_person(name, limit, value, text):

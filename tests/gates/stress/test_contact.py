@@ -34,6 +34,18 @@ def test_who_never_touched_is_said_and_stays_on_the_card_where_force_is_not_judg
     assert any(text.startswith(f"flow: {said}") for text in caveats_of({"D": kept}))
 
 
+def test_who_touched_although_its_force_was_declared_not_to_matter_is_said(ladder):
+    def told():
+        return [text for text in judge(ladder, "D").caveats if "no limit of force" in text]
+
+    assert told() == []
+    evidence.write_params(ladder, _waive_force)
+    assert [text.partition(":")[0] for text in told()] == ["diffusion", "flow"]
+    evidence.edit_table(ladder, ROLLOUTS, cells("force_peak_n", 0.0, where=_of("flow")))
+    (text,) = told()
+    assert text.startswith("diffusion: touched something in ") and " N, and no limit" in text
+
+
 def test_one_touch_is_a_touch_and_what_is_missing_is_the_matter_of_the_criteria(ladder):
     def once(frame):
         first = _of("flow")(frame) & (frame["start"] == 0) & (frame["perturbation"] == "nominal")
