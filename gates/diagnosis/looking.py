@@ -45,7 +45,7 @@ class Number:
     verdict: str = ""
 
 
-@dataclass
+@dataclass(frozen=True)
 class Look:
     """A look at one candidate: what a query fills in.
 
