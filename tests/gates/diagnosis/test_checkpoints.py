@@ -129,6 +129,15 @@ def test_who_is_excepted_from_matching_does_not_carry_a_row_that_asks_for_it(hon
     assert of_b.verdict == UNMATCHED and of_b.candidates["diffusion"] == "FAIL"
 
 
+def test_the_walk_of_who_is_excepted_is_never_whole(honest):
+    found = walk(excepted(honest, "flow"), "flow")
+    asked_less = [stop for stop in found.stops if stop.not_asked]
+    assert asked_less and {stop.state for stop in asked_less} <= {"in order so far", "not asked"}
+    assert found.ended_at is None and not found.whole
+    assert "what was not asked stands at its place" in " ".join(walk_text(found).split())
+    assert walk(excepted(honest, "flow"), "diffusion").whole
+
+
 def test_an_exception_is_said_with_who_answers_until_when_and_why(ladder):
     bring(ladder, unmatched=EXCEPTION)
     reports = Reports(ladder, {"B": judge(ladder, "B")}, {g: f"no {g}" for g in "ACDE"}, 0,
