@@ -38,7 +38,7 @@ def gains_rate_and_projection(look: Look) -> None:
     """Do gains, the rate of actions or projection make it swing?"""
     look.criteria("D.force_peak_p95_n", "D.reset_upper", "D.hold_share_upper", "C.projection_p95_m")
     look.ask(_contact_layer)
-    look.unknown += [NO_TRACE, GAINS]
+    look.unknown.extend([NO_TRACE, GAINS])
 
 
 def simulated_and_declared(look: Look) -> None:
