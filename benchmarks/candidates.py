@@ -87,7 +87,7 @@ def here(policy: NetworkPolicy) -> Way:
     """The checkpoint in this process."""
 
     def ask(seen: Array, name: int, candidates: int) -> Array:
-        names = [("benchmark", name, 0)]
+        names = [("benchmark", name)]
         found: Array = policy.sample(seen[None], noise_names=names, candidates=candidates).actions[
             0
         ]
