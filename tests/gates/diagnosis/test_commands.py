@@ -10,6 +10,7 @@ import pytest
 
 from gates.diagnosis.commands import diagnose
 from gates.diagnosis.symptoms import SYMPTOMS
+from gates.stress.clocks import UNTOLD, Compared
 from genpolicy.cli.shell import run_program
 
 ROOT = Path(__file__).parents[3]
@@ -195,3 +196,24 @@ def test_a_report_that_cannot_be_read_comes_before_what_speaks(stands, honest, c
     for untrue, code in ((0, 3), (1, 3), (2, 2), (3, 3)):
         stands(replace(red, untrue=untrue))
         assert run(capsys, *words)[0] == code
+
+
+def test_clocks_that_cannot_be_told_apart_are_asked_and_open(stands, honest, capsys, monkeypatch):
+    """No place of the walk asks them, so the symptom alone can say it."""
+    few = Compared(UNTOLD, "too few episodes", 3)
+    monkeypatch.setattr("gates.diagnosis.of_motion.compared", lambda *_: few)
+    stands(honest)
+    code, out, _ = run(capsys, "--symptom", "simulation-only", "--candidate", "flow")
+    assert code == 3 and "Not decided: whether the two clocks agree: too few episodes." in out
+
+
+def test_of_two_candidates_one_that_waits_leaves_it_unanswered(stands, honest, capsys):
+    report = honest.judged["D"]
+    criteria = tuple(c for c in report.criteria if c.candidate != "diffusion")
+    judged = {**honest.judged, "D": report.model_copy(
+        update={"criteria": criteria, "candidates": {"flow": "PASS"}})}  # fmt: skip
+    stands(replace(honest, judged=judged))
+    words = ("--symptom", "boundary-jump")
+    assert run(capsys, *words, "--candidate", "flow")[0] == 0
+    code, out, _ = run(capsys, *words)
+    assert code == 2 and "diffusion does not stand at gate D" in " ".join(out.split())

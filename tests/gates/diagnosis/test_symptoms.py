@@ -79,6 +79,8 @@ def test_where_the_first_is_open_it_is_not_said_to_hold(honest):
     (symptom,) = symptoms_of("between-modes")
     broken = turned(honest, "A.chunking_valid_share", "FAIL")
     assert answered(symptom, broken, FLOW).look_next.endswith("; what comes first holds")
+    shown = turned(broken, "B.outside_modes_upper", "INCONCLUSIVE", FLOW)
+    assert answered(symptom, shown, FLOW).look_next.endswith("; what comes first is not known")
     found = answered(symptom, turned(broken, "A.told_share", "INCONCLUSIVE"), FLOW)
     assert found.undecided and not found.first.holds
     assert found.look_next.endswith("; what comes first is not decided")
