@@ -36,7 +36,8 @@ def diagnose(
     symptom it makes the chapter's two inspections and says what was found, what
     is not known, where to look now and what not to conclude.
 
-    Exit 0 if all was answered and nothing speaks, 3 if something speaks, is red or
+    Exit 0 if every answer has its numbers and nothing speaks (what no stage records
+    is unknown all the same), 3 if something speaks, is red or
     not decided, or a report is untrue, 2 if a report cannot be read or an answer
     waits for a gate that is not judged: what builds it is said.
     """

@@ -51,6 +51,8 @@ def alignment_and_hidden_state(look: Look) -> None:
         "A.clock_residual_s", "A.lag_spread_steps", "A.calibration_residual_m", "A.data_defects",
         "A.strata_effect", "A.told_share", "A.phase_collapse_share",
     )  # fmt: skip
+    # A question to the data that an owner waived is in no number of these.
+    look.unknown.extend(look.reports.not_asked("A.unasked_checks", look.candidate))
 
 
 def simpler_policies(look: Look) -> None:

@@ -45,7 +45,7 @@ def _nothing_red(walk: Walk) -> str:
     waits = dict.fromkeys(why for stop in walk.stops for why in stop.waits_for)
     if waits:
         return f"Nothing is red as far as was asked; the rest waits: {_list(waits)}."
-    if any(stop.not_asked for stop in walk.stops):
+    if not walk.whole or any(stop.not_asked for stop in walk.stops):
         return "Nothing is red as far as was asked; what was not asked stands at its place."
     return "Nothing is red: every place was asked, and holds."
 

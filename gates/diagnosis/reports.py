@@ -200,10 +200,11 @@ def _why(rung: Rung, judged: Mapping[Gate, GateReport]) -> str:
     gate = rung.gate
     if rung.verdict == "REFUSED":
         return f"gate {gate} cannot be used: {rung.note}"
-    below = GATES[max(GATES.index(gate) - 1, 0)]
-    if below in judged and judged[below].verdict != "PASS":
-        said = judged[below].verdict
-        return (
-            f"gate {gate} is not judged: gate {below} says {said}, and nothing behind it is built"
-        )
+    for below in GATES[: GATES.index(gate)]:
+        if below in judged and judged[below].verdict != "PASS":
+            said = judged[below].verdict
+            return (
+                f"gate {gate} is not judged: gate {below} says {said}, and nothing behind it is "
+                "built"
+            )
     return f"gate {gate} is not judged here: run `dvc repro {stage_of(gate)}`, or `make ladder`"

@@ -73,7 +73,7 @@ class Asked:
     def holds(self) -> bool:
         """Whether something was asked, all of it has an answer, and nothing speaks."""
         open_ones = self.causes or self.undecided or self.unknown or self.waits_for
-        shown_open = any(number.verdict not in ("", "PASS", "FAIL") for number in self.numbers)
+        shown_open = any(number.verdict not in ("", "PASS") for number in self.numbers)
         return bool(self.numbers) and not open_ones and not shown_open
 
 
@@ -257,6 +257,9 @@ def _where_nothing_speaks(first: Asked, then: Asked) -> str:
         return "for what is not known: nothing could be asked"
     if any(number.verdict == "FAIL" for number in (*first.numbers, *then.numbers)):
         return "elsewhere for the cause: the symptom is there, and no cause that was asked speaks"
+    shown = {number.verdict for number in (*first.numbers, *then.numbers)} - {"", "PASS"}
+    if shown:
+        return "for what is not known: a number that is shown is not decided"
     if first.holds and then.holds:
         return "elsewhere: all that the row names was asked, and holds"
     return "for what is not known: what could be asked holds, and the rest is open"

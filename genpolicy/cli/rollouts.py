@@ -57,7 +57,7 @@ def run_export_rollout(
     found, cell = read_session(journal, rollout), load_task(task or task_of(journal))
     data, frames = _gif(found, cell)
     write_bytes(out, data)
-    print(f"gif       {out} ({len(data) / 1e3:.0f} kB, {frames} pictures)")
+    print(f"gif       {out} ({len(data) / 1e3:.0f} kB, {frames} moments)")
     print(f"session   {rollout}")
     return 0
 
@@ -90,7 +90,7 @@ def journal_of(rollout: str, root: Path) -> Path:
             where=str(path),
             found="missing",
             expected=f"a journal of Gate D; there {'are ' + some if there else 'is none'}",
-            action="Name one of them."
+            action=f"Name one of them with a start, as {there[0]}/0."
             if there
             else "Run `make ladder`: gate D has to be reached, "
             "or name another workspace by --root.",

@@ -24,7 +24,7 @@ Colour = tuple[float, float, float, float]
 SCENE_SCHEMA_NAME = "foxglove.SceneUpdate"
 TRANSFORM_SCHEMA_NAME = "foxglove.FrameTransform"
 JOINTS_SCHEMA_NAME = JOINTS.schema_name
-"""As in a recording: a viewer's plot of one opens the other."""
+"""As in a recording: the same fields."""
 LINE_STRIP, LINE_LIST = 0, 2
 DELETE_ALL = 1
 DECIMALS = 6

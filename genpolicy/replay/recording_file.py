@@ -72,8 +72,9 @@ def _viewable(found: Container) -> bytes:
 def _register(writer: Writer, channel: Channel, schema: Schema | None) -> int:
     topic, number = channel.topic, 0
     known = stream_of(topic)
-    if known is not None:
-        own = next(item.kind for item in known[1] if item.name == topic)
+    own = next((item.kind for item in known[1] if item.name == topic), None) if known else None
+    # A stream of another maker may go by the same topic: its schema is its own.
+    if own is not None and schema is not None and schema.name == own.schema_name:
         data = canonical_json(plain(own.schema))
         number = writer.register_schema(own.schema_name, "jsonschema", data)
     elif schema is not None:

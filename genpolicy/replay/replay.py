@@ -63,8 +63,9 @@ def write_replay(journal: Path, out: Path, *, session: str | None, task: str | N
         joint_count=cell.collision.kinematics.joint_count,
         workspace=cell.workspace,
     )
-    write_bytes(out, data)
+    # The layout first: where it cannot be written, no replay says that it is whole.
     write_bytes(layout_file(out), canonical_json(layout))
+    write_bytes(out, data)
     topics: dict[str, int] = {}
     for item in drawn:
         topics[item.topic] = topics.get(item.topic, 0) + 1

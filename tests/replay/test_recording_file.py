@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap.writer import CompressionType, Writer
 
 from genpolicy.data.recording.container import parse_container
 from genpolicy.data.recording.reader import read_episode
@@ -46,6 +47,20 @@ def test_messages_metadata_and_times_are_those_of_the_recording(recording, tmp_p
               for found in (first, second)]  # fmt: skip
     assert topics[0] == topics[1] and first.metadata == second.metadata
     assert recording.read_bytes() == before
+
+
+def test_another_makers_stream_on_a_known_topic_keeps_its_own_schema(tmp_path):
+    """Injected fault: the same topic, other bytes; a schema of ours would lie about them."""
+    with (tmp_path / "e.mcap").open("wb") as stream:
+        writer = Writer(stream, compression=CompressionType.ZSTD, enable_data_crcs=True)
+        writer.start()
+        schema = writer.register_schema("theirs.Joints", "protobuf", b"theirs")
+        channel = writer.register_channel("/robot/joints", "protobuf", schema)
+        writer.add_message(channel, 1, b"\x01", 1)
+        writer.finish()
+    write_viewable(tmp_path / "e.mcap", tmp_path / "v.mcap")
+    [schema] = parsed(tmp_path / "v.mcap").schemas.values()
+    assert (schema.name, schema.encoding, schema.data) == ("theirs.Joints", "protobuf", b"theirs")
 
 
 def test_the_copy_is_a_recording_still(recording, tmp_path):

@@ -3,12 +3,14 @@
 import re
 from pathlib import Path
 
+import evidence
 import pytest
 from causes_planted import CAUSES, FLOW, jumps, table
 from test_walk import turned
 
 from gates.diagnosis.reports import EVERYBODY, Reports
 from gates.diagnosis.symptoms import SYMPTOMS, answered, symptoms_of
+from gates.evidence import Evidence
 from genpolicy.errors import BadInputError
 
 CHAPTER = (
@@ -216,3 +218,16 @@ def test_a_name_that_is_no_symptom_lists_those_that_are():
     with pytest.raises(BadInputError, match="boundary-jump") as caught:
         symptoms_of("jump")
     assert caught.value.exit_code == 2
+
+
+def test_a_question_to_the_data_that_an_owner_waived_is_not_known(ladder, honest):
+    """It is in no number: a defect that nobody looked for is no defect that was not found."""
+
+    def waive(params):
+        params["gate_a"]["waived_checks"] = {"perception": {"of_a_camera": "there is none"}}
+
+    evidence.write_params(ladder, waive)
+    reports = Reports(ladder, honest.judged, honest.missing, 0, Evidence(ladder))
+    found = answered(next(s for s in SYMPTOMS if s.name == "between-modes"), reports, FLOW)
+    assert any(text.startswith("of_a_camera need not be asked") for text in found.first.unknown)
+    assert found.look_next == PARTLY
