@@ -21,6 +21,7 @@ from gates.evidence import Evidence
 from gates.proof import SPECS
 from gates.settings import read_limits, read_params, read_settings
 from gates.stress.clocks import AGREE, compared
+from gates.stress.rollouts import StressSettings
 from genpolicy.candidates.judged import BASELINES, trained
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.contract.settings import parse_settings
@@ -55,7 +56,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     execution = parse_settings(ExecutionSettings, params["execution"], where="execution")
     timing = parse_settings(LatencySection, params["latency"], where="latency")
     spec = SPECS["D"]
-    settings = read_settings(params, "gate_d", spec.settings)
+    settings = read_settings(params, "gate_d", StressSettings)
     settings = settings.under(read_limits(params, "D", spec.criteria))
     (policy,) = trained(
         root / "artifacts" / BASELINES, [args.method], seeds=params["policy"]["seeds"][:1]
