@@ -101,8 +101,15 @@ def test_the_shipped_ladder_exercises_both(request):
     assert not any(bound.waivable(params) for bound in BOUNDS if bound.waivable)
 
 
-@pytest.mark.parametrize(("horizon", "limit_s"), [(8, 0.4), (20, 1.0), (180, OLDEST_ACTION_S)])
-def test_a_limit_that_follows_from_settings_is_held_to_its_bound(ladder, horizon, limit_s):
+@pytest.mark.parametrize(
+    ("horizon", "oldest_s", "limit_s"),
+    [(8, 0.45, 0.4), (20, 0.45, 0.45), (180, 0.45, 0.45), (180, 9.0, OLDEST_ACTION_S)],
+)
+def test_a_limit_that_follows_from_settings_is_held_to_its_bound(
+    ladder, horizon, oldest_s, limit_s
+):
     """With an execution horizon of 180 actions of .05 s an answer after 9 s was in time."""
-    settings = settings_of(ladder, "D").model_copy(update={"execution_horizon": horizon})
+    settings = settings_of(ladder, "D").model_copy(
+        update={"execution_horizon": horizon, "maximum_age_s": oldest_s}
+    )
     assert latency_p95_s.derived(settings) == pytest.approx(limit_s)

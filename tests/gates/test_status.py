@@ -89,7 +89,8 @@ def test_the_commit_of_the_reports_and_that_they_moved_since(ladder, commit):
     known = commit()
     assert status_of(ladder, RUNGS).committed.startswith(known[:7])
     assert status_of(ladder, RUNGS).committed.endswith(", Ada")
-    write_bytes(ladder / report_path("A"), b"{}")
+    path = ladder / report_path("A")
+    write_bytes(path, path.read_bytes() + b"\n")
     assert status_of(ladder, RUNGS).committed.endswith("Ada; changed since, not committed")
 
 

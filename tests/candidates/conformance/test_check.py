@@ -394,7 +394,7 @@ def test_a_wrong_order_of_a_quaternion_is_stopped(checked, starts):
 
 def test_the_axis_and_the_factor_are_told(checked, starts):
     said = next(f.said for f in checked(Millimetres(starts)).findings if f.name == "scale")
-    assert "x 0.000995 (" in said
+    assert "x 0.000979 (" in said
     assert "wrong: x, y, z, x at the start" in said
     said = next(f.said for f in checked(Mirrored(starts)).findings if f.name == "scale")
     assert said.endswith("wrong: y, y at the start")

@@ -50,7 +50,7 @@ def test_each_observation_is_asked_under_its_own_name(wire, task):
     assert drawn.actions.shape == (3, 3, 16, 10)
     assert drawn.nfe == 4
     np.testing.assert_array_equal(drawn.actions[:, 0, 0, 0], [0.0, 1.0, 2.0])
-    assert [asked[WORD]["noise"][:2] for asked in planted.asked] == [["a", 1], ["b", 0], ["c", 2]]
+    assert [asked[WORD]["noise"][:2] for asked in planted.asked] == [["a", 1], ["b"], ["c", 2]]
     assert (policy.asked, dict(policy.faults)) == (3, {})
     assert (policy.method, policy.guided, policy.prediction_horizon) == ("planted", False, 16)
 
