@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -144,9 +145,16 @@ class Reports:
 
     def settings(self, gate: Gate) -> Any:
         """Settings of a gate, with the limits that it judged by."""
-        params, spec = read_params(self.root), SPECS[gate]
-        settings = read_settings(params, stage_of(gate), spec.settings)
-        return settings.under(read_limits(params, gate, spec.criteria))
+        if gate not in self._settings:
+            params, spec = read_params(self.root), SPECS[gate]
+            settings = read_settings(params, stage_of(gate), spec.settings)
+            self._settings[gate] = settings.under(read_limits(params, gate, spec.criteria))
+        return self._settings[gate]
+
+    @cached_property
+    def _settings(self) -> dict[Gate, Any]:
+        """What was read of them: a walk asks for the same hundreds of times."""
+        return {}
 
 
 def gate_and_id(name: str) -> tuple[Gate, str]:
