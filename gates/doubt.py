@@ -39,7 +39,7 @@ def about(report: GateReport, kind: str, answer: Answer, more: str = "") -> Doub
     """
     who = f" ({answer.candidate})" if answer.candidate else ""
     why = more or answer.caveat or "nothing was recorded that answers it"
-    return Doubt(report.gate, kind, f"{answer.question}{who} {_sentence(why)}", (answer.id,),
+    return Doubt(report.gate, kind, f"{answer.question}{who} {sentence(why)}", (answer.id,),
                  answer.candidate or "")  # fmt: skip
 
 
@@ -49,5 +49,6 @@ def named(items: Sequence[str]) -> str:
     return ", ".join(items[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
 
 
-def _sentence(text: str) -> str:
+def sentence(text: str) -> str:
+    """Words as a sentence: its first letter large, and an end."""
     return text[:1].upper() + text[1:] + ("" if text.endswith(".") else ".")

@@ -13,6 +13,7 @@ import pandas as pd
 
 from gates.bounds import share_interval, upper_quantile
 from gates.diagnosis.reports import NoAnswer, Reports
+from gates.doubt import sentence
 from gates.evidence import MissingEvidenceError
 from gates.report import Answer, Gate, limit_text, measured_text, report_path
 from genpolicy.errors import GenpolicyError
@@ -72,7 +73,7 @@ class Look:
         for name in names:
             answer = self._answered(name)
             if answer is not None and answer.verdict == "FAIL":
-                why = f" {_sentence(answer.caveat)}" if answer.caveat else ""
+                why = f" {sentence(answer.caveat)}" if answer.caveat else ""
                 self.causes.append(
                     f"{answer.id}: {measured_text(answer)}, required {limit_text(answer)}.{why}"
                 )
@@ -167,7 +168,3 @@ def _open(answer: Answer) -> str:
     """What is open, and why if the gate says so."""
     why = f": {answer.caveat}" if answer.caveat else ""
     return f"{answer.id} is {answer.verdict}, required {limit_text(answer)}{why}"
-
-
-def _sentence(text: str) -> str:
-    return text[:1].upper() + text[1:] + ("" if text.endswith(".") else ".")
