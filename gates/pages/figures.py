@@ -12,35 +12,32 @@ from gates.evidence import Evidence, MissingEvidenceError
 from gates.report import GateReport
 from genpolicy.integrity.hashing import sha256_bytes_of
 from genpolicy.pages.figures.drawing import (
-    BLUE,
-    BROWN,
     DASHES,
-    GREEN,
-    GREY,
-    INK,
-    OLIVE,
-    ORANGE,
-    PALETTE,
-    PURPLE,
-    SKY,
-    TEAL,
     Picture,
     drawn,
 )
 
 METHODS = {
-    "bc": INK,
-    "chunked_bc": GREY,
-    "chunked_l1": BROWN,
-    "one_mode_bc": OLIVE,
-    "bc_noise": TEAL,
-    "act": GREEN,
-    "cvae": PURPLE,
-    "ibc": SKY,
-    "diffusion": BLUE,
-    "flow": ORANGE,
+    "bc": "#3C3C69",
+    "chunked_bc": "#780000",
+    "chunked_l1": "#874B3C",
+    "one_mode_bc": "#4B1E2D",
+    "bc_noise": "#965AFF",
+    "act": "#00A578",
+    "cvae": "#B478A5",
+    "ibc": "#9696F0",
+    "diffusion": "#006969",
+    "flow": "#E1872D",
+    "flow_policy": "#C34B00",
+    "manicm": "#783CB4",
 }
-"""Colour of each method, the same in every figure of every gate; baselines first."""
+"""Colour of each method, the same in every figure of every gate; baselines first.
+
+Found by search: none is grey, and any two are at least 15 apart (CAM02-UCS), also for readers
+without red, green or blue cones, as a test holds.
+"""
+MARKERS = "osD^vPXpdh<8"
+"""One shape of a point per method, so that nothing is told by colour alone."""
 PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
 LARGEST_PHOTO_BYTES = 400_000
 
@@ -229,13 +226,19 @@ def in_order(names: Iterable[str]) -> list[str]:
 
 
 def colours(names: Iterable[str]) -> dict[str, str]:
-    """One colour per name: that of the method, where it is one."""
+    """One colour per name: that of the method, where it is one; others take those that are free."""
     order = in_order(names)
-    free = [colour for colour in PALETTE if colour not in {METHODS.get(n) for n in order}]
+    free = [colour for name, colour in METHODS.items() if name not in order] or [*METHODS.values()]
     others = [name for name in order if name not in METHODS]
     return {name: METHODS[name] for name in order if name in METHODS} | {
         name: free[i % len(free)] for i, name in enumerate(others)
     }
+
+
+def markers(names: Iterable[str]) -> dict[str, str]:
+    """One shape of a point per name, by the same rule as `colours`."""
+    shapes = dict(zip(METHODS.values(), MARKERS, strict=True))
+    return {name: shapes[colour] for name, colour in colours(names).items()}
 
 
 def dashes(names: Iterable[str]) -> dict[str, Any]:

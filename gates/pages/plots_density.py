@@ -5,7 +5,7 @@ import math
 from matplotlib.figure import Figure
 
 from gates.evidence import Evidence
-from gates.pages.figures import Plot, Table, colours, in_order
+from gates.pages.figures import Plot, Table, colours, in_order, markers
 from gates.report import GateReport
 from gates.reproducibility.densities import Agreement, agreement, densities
 from gates.reproducibility.settings import DENSITY
@@ -15,11 +15,11 @@ from genpolicy.pages.figures.drawing import GREY, new_figure
 def _densities(evidence: Evidence, report: GateReport) -> Figure:
     frame = densities(evidence)
     methods = in_order(frame["method"])
-    colour = colours(methods)
+    colour, shape = colours(methods), markers(methods)
     figure, places = new_figure(height=2.8, columns=len(methods))
     for axes, method in zip(places, methods, strict=True):
         own = frame[frame["method"] == method]
-        axes.plot(own["share"], own["gain"], "o", ms=4, color=colour[method])
+        axes.plot(own["share"], own["gain"], shape[method], ms=4, color=colour[method])
         axes.axhline(0.0, color=GREY, lw=0.8)
         axes.set_xlim(-0.03, 1.03)
         axes.set_xlabel(f"{method}: share of samples in the mode")

@@ -1,9 +1,11 @@
 """Figure of Gate B: samplers of the sweep against each other, with the deadline drawn in."""
 
+from typing import Any
+
 from matplotlib.figure import Figure
 
 from gates.evidence import Evidence
-from gates.pages.figures import Listing, Plot, Table, colours, in_order
+from gates.pages.figures import Listing, Plot, Table, colours, in_order, markers
 from gates.report import GateReport
 from gates.reproducibility.front import (
     SWEEP,
@@ -36,7 +38,7 @@ def _sweeps(evidence: Evidence, report: GateReport) -> Sweeps:
 
 def _front(evidence: Evidence, report: GateReport) -> Figure:
     sweeps = _sweeps(evidence, report)
-    colour = colours(list(sweeps))
+    colour, shape = colours(sweeps), markers(sweeps)
     figure, places = new_figure(columns=3)
     for method, (settings, _, _) in sweeps.items():
         kept = efficient(settings)
@@ -46,8 +48,9 @@ def _front(evidence: Evidence, report: GateReport) -> Figure:
             axes.plot(*zip(*sorted(line), strict=True), color=colour[method], lw=0.9)
             for at, height, on in zip(times, heights, kept, strict=True):
                 face = colour[method] if on else "white"
-                axes.plot([at], [height], "o", ms=4, color=colour[method], markerfacecolor=face)
-        places[0].plot([], [], "o", color=colour[method], label=method)
+                look: dict[str, Any] = {"color": colour[method], "marker": shape[method], "ms": 4}
+                axes.plot([at], [height], markerfacecolor=face, **look)
+        places[0].plot([], [], shape[method], color=colour[method], label=method)
     names = ("every mode reached, share", "chunk error, normalised", "jerk p95, m/s³")
     for axes, name in zip(places, names, strict=True):
         for deadline_s in sorted({found[2] for found in sweeps.values()}):

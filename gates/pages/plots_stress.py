@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from gates.evidence import Evidence, MissingEvidenceError, flags, numbers
-from gates.pages.figures import Plot, colours, dashes, in_order
+from gates.pages.figures import Plot, colours, dashes, in_order, markers
 from gates.pages.limits import draw_limit
 from gates.report import GateReport
 from gates.stress.rollouts import ROLLOUTS
@@ -39,7 +39,7 @@ def _success(evidence: Evidence, report: GateReport) -> Figure:
     frame = evidence.rows(ROLLOUTS, RolloutRow)
     methods, conditions = in_order(frame["method"]), sorted(set(frame["perturbation"]))
     conditions.sort(key=lambda name: name != "nominal")
-    colour = colours(methods)
+    colour, shape = colours(methods), markers(methods)
     level = float(report.settings["confidence"])
     figure, (axes,) = new_figure(height=1.2 + 0.12 * len(methods) * len(conditions))
     step = 0.8 / len(methods)
@@ -53,8 +53,8 @@ def _success(evidence: Evidence, report: GateReport) -> Figure:
             hits, height = flags(rows, "success"), place - 0.4 + step * (rank + 0.5)
             low, high = clopper_pearson(int(hits.sum()), len(hits), level)
             axes.hlines(height, low, high, color=colour[method], lw=1.8)
-            axes.plot([hits.mean()], [height], "o", color=colour[method], ms=4)
-        axes.plot([], [], "o-", color=colour[method], label=method)
+            axes.plot([hits.mean()], [height], shape[method], color=colour[method], ms=4)
+        axes.plot([], [], f"{shape[method]}-", color=colour[method], label=method)
     counts = frame.groupby("perturbation").size()
     labels = [f"{name} (n = {int(counts[name]) // len(methods)} each)" for name in conditions]
     axes.set_yticks(np.arange(len(conditions)), labels)
@@ -120,13 +120,13 @@ def _outcomes(evidence: Evidence, report: GateReport) -> Figure:
 def _force(evidence: Evidence, report: GateReport) -> Figure:
     frame = evidence.rows(ROLLOUTS, RolloutRow)
     methods = in_order(frame["method"])
-    colour = colours(methods)
+    colour, shape = colours(methods), markers(methods)
     figure, (axes,) = new_figure(height=1.0 + 0.32 * len(methods))
     for place, method in enumerate(methods):
         values = numbers(frame[frame["method"] == method], "force_peak_n")
         low, middle, high = np.quantile(values, [0.05, 0.5, 0.95], method="higher")
         axes.hlines(place, low, high, color=colour[method], lw=4, alpha=0.5)
-        axes.plot([middle], [place], "o", color=colour[method])
+        axes.plot([middle], [place], shape[method], color=colour[method])
         axes.plot([values.max()], [place], ">", color=colour[method], ms=4)
     axes.set_yticks(np.arange(len(methods)), methods)
     axes.set_ylim(len(methods) - 0.4, -0.6)

@@ -2,12 +2,13 @@
 
 import itertools
 import math
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from gates.evidence import Evidence, MissingEvidenceError, numbers
-from gates.pages.figures import Plot, Table, colours, dashes, in_order
+from gates.pages.figures import Plot, Table, colours, dashes, in_order, markers
 from gates.report import GateReport
 from gates.reproducibility.latency_budget import (
     LATENCY,
@@ -33,7 +34,7 @@ def _latency(evidence: Evidence, report: GateReport) -> Figure:
     if len(warm) == 0:
         raise MissingEvidenceError("no warm measurement")
     methods = in_order(warm["method"])
-    colour = colours(methods)
+    colour, shape = colours(methods), markers(methods)
     figure, (axes,) = new_figure(height=1.0 + 0.3 * len(TERMS))
     step = 0.7 / max(len(methods), 1)
     for rank, method in enumerate(methods):
@@ -46,10 +47,10 @@ def _latency(evidence: Evidence, report: GateReport) -> Figure:
             height = place - 0.35 + step * (rank + 0.5)
             p50, p95 = np.quantile(times, [0.5, 0.95], method="higher")
             axes.hlines(height, p50, times.max(), color=colour[method], lw=1.0)
-            axes.plot([p50], [height], "o", color=colour[method], ms=4)
+            axes.plot([p50], [height], shape[method], color=colour[method], ms=4)
             axes.plot([p95], [height], "|", color=colour[method], ms=8, mew=1.8)
             axes.plot([times.max()], [height], ">", color=colour[method], ms=3)
-        axes.plot([], [], "o", color=colour[method], label=method)
+        axes.plot([], [], shape[method], color=colour[method], label=method)
     declared = set(warm.loc[warm["source"] == "declared", "component"])
     axes.set_yticks(
         np.arange(len(TERMS)), [f"{t} (declared)" if t in declared else t for t in TERMS]
@@ -57,7 +58,7 @@ def _latency(evidence: Evidence, report: GateReport) -> Figure:
     axes.invert_yaxis()
     axes.set_xscale("log")
     plain_ticks(axes.xaxis)
-    axes.set_xlabel("warm latency, ms (dot p50, bar p95, arrow maximum)")
+    axes.set_xlabel("warm latency, ms (point p50, bar p95, arrow maximum)")
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     return figure
 
@@ -123,7 +124,7 @@ def _coverage(evidence: Evidence, report: GateReport) -> Figure:
 def _by_candidates(evidence: Evidence, report: GateReport) -> Figure:
     frame = evidence.rows(CANDIDATES_DRAWN, CandidatesRow)
     methods = in_order(frame["method"])
-    colour = colours(methods)
+    colour, shape = colours(methods), markers(methods)
     counts = sorted(set(frame["candidates"].tolist()))
     figure, (axes,) = new_figure(height=2.8)
     for place, method in enumerate(methods):
@@ -135,8 +136,9 @@ def _by_candidates(evidence: Evidence, report: GateReport) -> Figure:
                 at = rank + (place - (len(methods) - 1) / 2) * 0.2 + (0.0 if quiet else 0.08)
                 axes.vlines(at, p50, p95, color=colour[method], lw=1.2)
                 face = colour[method] if quiet else "white"
-                axes.plot([at], [p50], "o", ms=4, color=colour[method], markerfacecolor=face)
-        axes.plot([], [], "o", color=colour[method], label=method)
+                look: dict[str, Any] = {"color": colour[method], "marker": shape[method], "ms": 4}
+                axes.plot([at], [p50], markerfacecolor=face, **look)
+        axes.plot([], [], shape[method], color=colour[method], label=method)
     deadline = _deadline_s(evidence)
     if deadline is not None:
         axes.axhline(deadline * MILLI, color=GREY, lw=0.8)
@@ -163,7 +165,7 @@ def _deadline_s(evidence: Evidence) -> float | None:
 def _processes(evidence: Evidence, report: GateReport) -> Figure:
     frame = evidence.rows(LATENCY, LatencyRow)
     methods = in_order(frame["method"])
-    colour = colours(methods)
+    colour, shape = colours(methods), markers(methods)
     figure, places = new_figure(height=1.0 + 0.3 * len(methods), columns=len(TEMPERATURES))
     for axes, temperature in zip(places, TEMPERATURES, strict=True):
         for place, method in enumerate(methods):
@@ -171,9 +173,13 @@ def _processes(evidence: Evidence, report: GateReport) -> Figure:
             for run, medians in spans_of_processes(own, temperature).items():
                 face = colour[method] if run == 1 else "white"
                 heights = np.full(len(medians), place + 0.16 * (-1 if run == 1 else 1))
-                axes.plot(
-                    medians * MILLI, heights, "o", ms=5, color=colour[method], markerfacecolor=face
-                )
+                look: dict[str, Any] = {
+                    "color": colour[method],
+                    "marker": shape[method],
+                    "ms": 5,
+                    "ls": "",
+                }
+                axes.plot(medians * MILLI, heights, markerfacecolor=face, **look)
         axes.set_yticks(np.arange(len(methods)), methods)
         axes.set_ylim(len(methods) - 0.5, -0.5)
         axes.set_xscale("log")
