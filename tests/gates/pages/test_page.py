@@ -11,6 +11,7 @@ import evidence
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "card"))
+from markup import Markup
 from team import PEOPLE, Team
 
 from gates.pages.summary import markdown
@@ -48,6 +49,30 @@ def test_the_page_is_offline_small_and_whole(pages, gate):
         for c in report["caveats"]
     )
     assert text.index(report["verdict"].replace("_", " ")) < text.index("<h2>Criteria</h2>")
+
+
+@pytest.mark.parametrize("gate", "ABCDE")
+def test_the_markup_of_a_page_is_what_a_checker_takes(pages, gate):
+    assert Markup(_page(pages, gate)).wrong == []
+
+
+def test_the_markup_of_the_front_page_is_what_a_checker_takes(pages):
+    write_index(pages)
+    assert Markup((pages / "reports/index.html").read_text()).wrong == []
+
+
+@pytest.mark.parametrize(
+    ("text", "wrong"),
+    [
+        ("<figure><h3>a</h3><figcaption>b</figcaption><p>c</p></figure>", "caption"),
+        ("<h1>a</h1><h3>b</h3>", "h3 follows h1"),
+        ('<p id="a">b</p><p id="a">c</p>', "id a stands 2 times"),
+        ("<div><p>a</div>", "div ends where p is open"),
+        ("<div>", "stay open"),
+    ],
+)
+def test_the_checker_of_markup_sees_what_is_wrong(text, wrong):
+    assert any(wrong in found for found in Markup(text).wrong)
 
 
 def test_the_front_page_names_every_gate(pages):
