@@ -32,6 +32,15 @@ def test_every_stage_has_a_line_and_what_did_not_run_is_empty(tmp_path: Path) ->
     assert lines["gate_a"].verdict == "NOT JUDGED"
 
 
+@pytest.mark.parametrize(
+    ("code", "said"), [(0, "done"), (1, "FAULT"), (2, "BAD INPUT"), (3, "REFUSED")]
+)
+def test_each_exit_code_has_its_word(tmp_path: Path, code: int, said: str) -> None:
+    _record(tmp_path, "record", seconds=1.0, peak_mib=1, exit_code=code)
+    lines = {line.stage: line for line in overview(tmp_path, prove_all(tmp_path))}
+    assert lines["record"].verdict == said
+
+
 def test_a_refused_stage_says_so_and_the_times_add_up(tmp_path: Path) -> None:
     _record(tmp_path, "record", seconds=12.3, peak_mib=145, exit_code=0)
     _record(tmp_path, "train_generators", seconds=1.0, peak_mib=99, exit_code=3)
@@ -142,6 +151,8 @@ def test_where_nobody_looks_each_stage_has_one_line_with_all_of_it() -> None:
     line = Line("gate_c", "PASS", "Go on.", 1.0, 1, FELL)
     text = as_text([line, Line("card", "", "", None, None)])
     assert "\x1b" not in text and len(text.splitlines()) == 4
+    assert text.splitlines()[0].split() == ["stage", "verdict", "time", "memory", "decided", "by"]
+    assert as_text([line], terminal=True).splitlines()[0].split() == text.split()[:4]
     assert text.splitlines()[1].endswith(f"  Go on.; {'; '.join(FELL)}")
 
 

@@ -215,6 +215,7 @@ def test_shadow_candidates_of_this_checkpoint_stand_and_of_another_are_refused(
     ({"situation": "elsewhere:1"}, "a row of an episode of the dataset"),
     ({"situation": None}, "beside it"),
     ({"candidate": SAMPLES}, rf"drawn, required one of {SAMPLES} candidates"),
+    ({"candidate": -1}, rf"drawn, required one of {SAMPLES} candidates"),
 ])  # fmt: skip
 @pytest.mark.parametrize("fixture", ["held_out", "two_modes"])
 def test_a_candidate_of_another_moment_is_refused(

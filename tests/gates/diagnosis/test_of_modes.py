@@ -58,6 +58,22 @@ def test_of_who_was_trained_here_conformance_is_unknown(honest):
     assert said.startswith("0 of ")
 
 
+def test_only_held_out_candidates_say_what_the_representation_refuses(planted):
+    """Every corrupted candidate is refused by it, and every third of ten that were held out."""
+
+    def change(frame):
+        held = of_flow(frame) & (frame["fixture"] == "held_out")
+        frame.loc[of_flow(frame) & ~held, "representation"] = False
+        frame.loc[frame[held].index[:3], "representation"] = False
+        return frame
+
+    look = Look(planted(lambda root: evidence.edit_table(
+        root, "shadow/candidates.parquet", change), ""), FLOW)  # fmt: skip
+    feasible_conditioning(look)
+    said = value(look, "held-out candidates refused by the representation layer")
+    assert said.startswith("3 of ")
+
+
 def test_a_share_between_modes_that_is_missing_is_not_averaged_away(planted):
     def change(frame):
         frame.loc[frame[of_flow(frame)].index[0], "between_share"] = np.nan

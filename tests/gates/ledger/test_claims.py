@@ -199,3 +199,15 @@ def test_an_unknown_kind_lists_the_kinds():
     with pytest.raises(BadInputError, match="source_specific") as caught:
         claims_of(read_ledger(), "proven")
     assert caught.value.exit_code == 2
+
+
+def test_each_claim_stands_below_its_own_kind_once():
+    claims = read_ledger().claims
+    lines = ledger_text(claims).splitlines()
+    heads = {f"{kind}: {sum(c.kind == kind for c in claims)}": kind for kind in KINDS}
+    kind, found = "", {}
+    for line in lines:
+        kind = heads.get(line, kind)
+        if line.startswith("  ") and line[2] != " ":
+            found[line.split(" · ")[0].strip()] = kind
+    assert found == {claim.id: claim.kind for claim in claims}

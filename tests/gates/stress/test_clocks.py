@@ -89,6 +89,15 @@ def test_few_episodes_cannot_tell(ladder):
     assert (found.answer, found.episodes) == (UNTOLD, 15) and "too few episodes" in found.why
 
 
+@pytest.mark.parametrize("clock", ["wall", "virtual"])
+def test_an_episode_that_one_clock_alone_ran_is_compared_with_nothing(ladder, clock):
+    def less(frame):
+        return frame[(frame["clock"] != clock) | (frame["episode"] < "held_out_40")]
+
+    evidence.edit_table(ladder, INVOCATIONS, less)
+    assert of(ladder).episodes == 40
+
+
 def test_without_a_tolerance_nothing_agrees(ladder):
     evidence.write_params(ladder, lambda p: p["gate_d"].pop("tolerances"))
     assert of(ladder).answer == UNTOLD and "tolerance none fixed" in of(ladder).why

@@ -73,6 +73,26 @@ def test_the_lowest_bound_over_the_conditions_decides_and_the_starts_are_the_tri
     assert undisturbed.value > found.value
 
 
+def test_a_count_of_starts_that_is_no_whole_number_is_rounded_down(ladder):
+    """Two rollouts of a start count half each: eleven halves are five starts of eighty, not six."""
+
+    def spoil(frame):
+        nominal = (frame["perturbation"] == "nominal") & (frame["method"] == "flow")
+        twice = frame[nominal].assign(seed=frame["seed"] + 1)
+        won = twice["start"] < 11
+        lost = frame.assign(success=frame["success"] & ~nominal)
+        frame = pd.concat([lost, twice.assign(success=won)])
+        ended = frame["outcome"].where(frame["success"], "failed").mask(frame["success"], SUCCESS)
+        return frame.assign(outcome=ended)
+
+    settings = settings_of(ladder, "D")
+    evidence.edit_table(ladder, TABLE, spoil)
+    rows = of(ladder)
+    assert len(rows[rows["perturbation"] == "nominal"]) == 2 * evidence.STARTS
+    found = success_lower(Evidence(ladder), settings, "flow", ("nominal",))
+    assert found.value == clopper_pearson(5, evidence.STARTS, settings.confidence)[0]
+
+
 @pytest.mark.parametrize(
     ("success", "outcome"), [(True, "collision"), (True, ""), (False, "success")]
 )
