@@ -1,5 +1,7 @@
 """Looks at modes: what belongs to none is counted, and what projection does to refused ones."""
 
+import re
+
 import evidence
 import numpy as np
 import pytest
@@ -48,6 +50,23 @@ def test_refused_candidates_are_counted_where_projection_moved_them(planted):
     )
     assert 0 < int(of_refused) < int(of)
     assert (int(moved), int(refused)) == (int(of), int(of_refused))
+
+
+def test_the_interval_of_a_move_goes_from_its_lower_to_its_upper_end(planted):
+    """Moves that differ from episode to episode, so that the two ends are two numbers."""
+
+    def change(frame):
+        mine = frame[of_flow(frame)]
+        steps = np.linspace(0.001, 0.02, len(mine))
+        frame.loc[mine.index, "position_change_m"] = steps
+        return frame
+
+    look = Look(planted(lambda root: evidence.edit_table(
+        root, "shadow/candidates.parquet", change), ""), FLOW)  # fmt: skip
+    feasible_conditioning(look)
+    said = value(look, "p95 of the move by projection in mode left")
+    point, lower, upper = (float(text) for text in re.findall(r"[\d.]+(?= mm)", said))
+    assert lower < upper and lower <= point <= upper
 
 
 def test_of_who_was_trained_here_conformance_is_unknown(honest):

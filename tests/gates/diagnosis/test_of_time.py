@@ -2,8 +2,9 @@
 
 from dataclasses import replace
 
+import evidence
 import pytest
-from causes_planted import FLOW
+from causes_planted import FLOW, of_flow
 
 from gates.diagnosis.looking import Look
 from gates.diagnosis.of_time import chunks_joining, rejections_and_p95, whole_accounting
@@ -45,3 +46,17 @@ def test_that_no_other_horizon_was_tried_is_said(honest):
     look = Look(honest, FLOW)
     chunks_joining(look)
     assert any("varied in no rollout" in text for text in look.unknown)
+
+
+@pytest.mark.parametrize(("seconds", "later"), [(0.05, True), (0.0, False)])
+def test_who_is_through_later_is_said_of_who_is_and_of_nobody_else(planted, seconds, later):
+    """Flow samples soonest; with 50 ms more of projection the other is through sooner."""
+
+    def change(frame):
+        frame.loc[of_flow(frame) & (frame["component"] == "project"), "seconds"] += seconds
+        return frame
+
+    look = Look(planted(lambda root: evidence.edit_table(
+        root, "latency/latency.parquet", change), ""), FLOW)  # fmt: skip
+    whole_accounting(look)
+    assert any("is through sooner" in cause for cause in look.causes) == later
