@@ -6,6 +6,7 @@ show, and a gain that is too small to be found leaves it with the simpler policy
 """
 
 import dataclasses
+import math
 import textwrap
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -20,10 +21,11 @@ from gates.stated import section
 from gates.stress.gate import GATE
 from gates.stress.rollouts import StressSettings
 from gates.stress.trial import reachable
+from genpolicy.evidence.documents.stress import Power
 from genpolicy.evidence.stress.settings import StressSettings as StressSection
 from genpolicy.evidence.stress.tables import POWER_CORRELATION, POWER_TRIALS, power_document
 from genpolicy.seeds import stream
-from genpolicy.statistics.eprocess import power_table
+from genpolicy.statistics.eprocess import paired_e_value, power_table, simulate_pairs
 
 FEWER = ("intervention_upper", "reset_upper")
 """Criteria of which a rollout is hit or not, and hits are bad: bounded from above."""
@@ -39,6 +41,8 @@ BASELINES = (0.1, 0.3, 0.5, 0.7, 0.9)
 COLUMNS = 80
 STEPS = 100
 """Gains are looked for in points of a hundred."""
+MOST_STARTS = 1000
+"""So many starts are tried for the stated effect, and no more."""
 
 
 @dataclass(frozen=True)
@@ -73,26 +77,52 @@ class Gain:
 
 
 @dataclass(frozen=True)
+class Stated:
+    """The effect for which the trial is planned, and whether it is found.
+
+    Attributes:
+        baseline_success: Success of the best baseline, as `stress.planned_effect` says.
+        candidate_success: Success of a candidate worth promoting.
+        promote_share: How often such a candidate is promoted, of the simulated trials.
+        starts_needed: Starts from which it is promoted as often as is asked; None: not with as
+            many as are tried.
+    """
+
+    baseline_success: float
+    candidate_success: float
+    promote_share: float
+    starts_needed: int | None
+
+
+@dataclass(frozen=True)
 class Plan:
     """What is planned, and what it can decide.
 
     Attributes:
         starts: Starts of each method in each condition.
+        methods: Candidates and baselines, each run on every start.
+        conditions: Names.
+        candidates: Names of those that are registered; alpha is shared between them.
         rollouts: Over all methods and conditions.
         longest_s: Virtual time if each rollout took its limit, s.
         margin: Gain to be shown.
         alpha: Chance of a wrong promotion of one candidate.
         power: Share of trials in which a gain is to be found.
+        stated: The effect that the plan is for.
         bounds: By criterion, in the order of the gate.
         gains: By assumed baseline.
     """
 
     starts: int
+    methods: int
+    conditions: tuple[str, ...]
+    candidates: tuple[str, ...]
     rollouts: int
     longest_s: float
     margin: float
     alpha: float
     power: float
+    stated: Stated
     bounds: tuple[Bound, ...]
     gains: tuple[Gain, ...]
 
@@ -115,23 +145,31 @@ def plan_of(root: Path) -> Plan:
     params = read_params(root)
     settings = read_settings(params, stage_of("D"), StressSettings)
     limits = read_limits(params, "D", GATE.criteria)
+    settings = settings.under(limits)
     planned = section(params, "stress", StressSection)
     methods = dict.fromkeys([*settings.candidates, *settings.baselines])
     rollouts = len(methods) * len(settings.perturbations) * settings.planned_starts
     power = limits.number(REACHABLE, otherwise=POWER)
+    table = power_document(
+        planned, candidates=len(settings.candidates), root_seed=settings.root_seed
+    )
     return Plan(
         starts=settings.planned_starts,
+        methods=len(methods),
+        conditions=settings.perturbations,
+        candidates=settings.candidates,
         rollouts=rollouts,
         longest_s=rollouts * planned.episode_limit_s,
         margin=settings.margin,
         alpha=settings.alpha,
         power=power,
-        bounds=tuple(_bounds(settings, limits, planned)),
+        stated=_stated(settings, table, power),
+        bounds=tuple(_bounds(settings, limits, table)),
         gains=tuple(_gains(settings, power)),
     )
 
 
-def _bounds(settings: StressSettings, limits: Limits, planned: StressSection) -> Iterator[Bound]:
+def _bounds(settings: StressSettings, limits: Limits, table: Power) -> Iterator[Bound]:
     starts = settings.planned_starts
     for item in GATE.criteria:
         if item.id in limits.waived:
@@ -144,7 +182,7 @@ def _bounds(settings: StressSettings, limits: Limits, planned: StressSection) ->
         elif item.id in (TOUCHED, ANSWERED):
             yield _quantile(item.id, starts, settings.confidence)
         elif item.id == REACHABLE and limit is not None:
-            yield _reachable(settings, planned, limit)
+            yield _reachable(settings, table, limit)
 
 
 def _counted(name: str, limit: float, starts: int, confidence: float) -> Bound:
@@ -173,15 +211,41 @@ def _quantile(name: str, starts: int, confidence: float) -> Bound:
     return Bound(name, None, f"{starts} starts bound a p95 only if answers of one start differ")
 
 
-def _reachable(settings: StressSettings, planned: StressSection, limit: float) -> Bound:
-    candidates = len(settings.candidates)
-    power = power_document(planned, candidates=candidates, root_seed=settings.root_seed)
+def _reachable(settings: StressSettings, table: Power, limit: float) -> Bound:
+    """What the gate will say of its own power: the same function says it."""
     try:
-        found = reachable(power, settings)
+        found = reachable(table, settings)
     except MissingEvidenceError as error:
         return Bound(REACHABLE, False, str(error))
     assert found.value is not None, "a share of trials is a number"
     return Bound(REACHABLE, found.value >= limit, found.caveat)
+
+
+def _stated(settings: StressSettings, table: Power, power: float) -> Stated:
+    """How often the stated effect is found, and with how many starts often enough."""
+    baseline, candidate = settings.planned_effect
+    shares = {
+        (row.baseline_success, row.candidate_success): row.promote_share for row in table.rows
+    }
+    trials = simulate_pairs(
+        baseline,
+        candidate,
+        correlation=POWER_CORRELATION,
+        shape=(POWER_TRIALS, MOST_STARTS),
+        rng=stream(settings.root_seed, "plan", "starts"),
+    )
+    tests = (
+        paired_e_value(differences, margin=settings.margin, alpha=settings.alpha)
+        for differences in trials
+    )
+    needed = sorted(test.pairs_needed or MOST_STARTS + 1 for test in tests)
+    enough = needed[math.ceil(power * len(needed)) - 1]
+    return Stated(
+        baseline_success=baseline,
+        candidate_success=candidate,
+        promote_share=shares[settings.planned_effect],
+        starts_needed=enough if enough <= MOST_STARTS else None,
+    )
 
 
 def _gains(settings: StressSettings, power: float) -> Iterator[Gain]:
@@ -213,8 +277,13 @@ def _gains(settings: StressSettings, power: float) -> Iterator[Gain]:
 def plan_text(plan: Plan) -> str:
     """The plan for a person, 80 columns."""
     lines = [
-        f"{plan.starts} starts a condition, {plan.rollouts:,} rollouts, at most "
-        f"{plan.longest_s / 3600:.1f} h of virtual time",
+        f"{plan.starts} starts of {plan.methods} methods in {len(plan.conditions)} conditions: "
+        f"{plan.rollouts:,} rollouts,",
+        f"at most {plan.longest_s / 3600:.1f} h of virtual time",
+        f"{len(plan.candidates)} registered candidates, each at alpha {plan.alpha:.3g}; "
+        f"margin {plan.margin:g}",
+        "",
+        *_stated_text(plan),
         "",
         "What these starts can show",
     ]
@@ -226,8 +295,7 @@ def plan_text(plan: Plan) -> str:
         lines += textwrap.wrap(bound.says, COLUMNS, initial_indent=begin, subsequent_indent=indent)
     lines += [
         "",
-        f"Smallest gain that is found in {plan.power:.0%} of trials "
-        f"(margin {plan.margin:g}, alpha {plan.alpha:.3g})",
+        f"Smallest gain that is found in {plan.power:.0%} of trials with {plan.starts} starts",
         *(_gain_text(gain) for gain in plan.gains),
     ]
     if plan.undecidable:
@@ -238,6 +306,21 @@ def plan_text(plan: Plan) -> str:
         )
         lines += ["", *textwrap.wrap(text, COLUMNS)]
     return "\n".join(lines)
+
+
+def _stated_text(plan: Plan) -> list[str]:
+    stated = plan.stated
+    needed = (
+        f"from about {stated.starts_needed} starts on"
+        if stated.starts_needed is not None
+        else f"not even by {MOST_STARTS} starts"
+    )
+    return [
+        f"The stated effect: success {stated.candidate_success:.0%} against "
+        f"{stated.baseline_success:.0%} (stress.planned_effect)",
+        f"  found in {stated.promote_share:.0%} of trials with {plan.starts} starts; in "
+        f"{plan.power:.0%} {needed}",
+    ]
 
 
 def _gain_text(gain: Gain) -> str:

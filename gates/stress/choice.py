@@ -13,7 +13,7 @@ from itertools import permutations
 
 from gates.claim import IN_SHORT
 from gates.engine import Decision, Judged
-from gates.evidence import Evidence
+from gates.evidence import Array, Evidence
 from gates.stress.cost import latency_p95_s
 from gates.stress.pairs import paired_differences
 from gates.stress.rollouts import StressSettings
@@ -71,11 +71,29 @@ def _of_unmatched(passed: Sequence[str], judged: Judged) -> Decision:
 def _of_matched(passed: Sequence[str], judged: Judged, settings: StressSettings) -> Decision:
     if len(passed) == 1:
         return Decision(f"promote {passed[0]}, {IN_SHORT}", promoted=passed[0])
+    return ranked(
+        passed, comparisons(judged.evidence, settings, passed), settings, _latency(judged)
+    )
+
+
+def ranked(
+    passed: Sequence[str],
+    found: Sequence[Comparison],
+    settings: StressSettings,
+    latency_s: Mapping[str, float],
+) -> Decision:
+    """One or either of several that passed.
+
+    Args:
+        passed: Their names, as registered.
+        found: Every ordered pair of them.
+        settings: The family's error.
+        latency_s: How soon the answers of each come, s.
+    """
     needed = 1.0 / pair_alpha(settings)
-    found = comparisons(judged.evidence, settings, passed)
     shown = [one for one in found if one.e_value >= needed]
     left = [name for name in passed if all(one.other != name for one in shown)] or passed
-    for_the_card = sooner(left, _latency(judged))
+    for_the_card = sooner(left, latency_s)
     others = [name for name in passed if name not in left]
     better = f"; shown to be worse: {', '.join(others)}" if others else ""
     if len(left) == 1:
@@ -110,9 +128,14 @@ def comparisons(
     found = []
     for better, other in permutations(names, 2):
         differences = paired_differences(evidence, settings, better, other)
-        test = paired_e_value(differences, margin=0.0, alpha=pair_alpha(settings))
-        found.append(Comparison(better, other, test.e_value, float(differences.mean())))
+        found.append(compared(better, other, differences, settings))
     return found
+
+
+def compared(better: str, other: str, differences: Array, settings: StressSettings) -> Comparison:
+    """One ordered pair: `better` minus `other` on each start. Shape (starts,)."""
+    test = paired_e_value(differences, margin=0.0, alpha=pair_alpha(settings))
+    return Comparison(better, other, test.e_value, float(differences.mean()))
 
 
 def sooner(names: Sequence[str], latency_s: Mapping[str, float]) -> str:

@@ -4,9 +4,10 @@ The promotion test averages the conditions of a start, so that what is gained in
 another. Each is told; one is asked: inside the envelope there must be a gain at all.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
-from gates.evidence import Evidence
+from gates.evidence import Array, Evidence
 from gates.stress.pairs import paired_by_condition
 from gates.stress.rollouts import ENVELOPE, StressSettings
 from genpolicy.statistics.eprocess import gain_interval, paired_e_value
@@ -21,21 +22,34 @@ class Inside:
 
     Attributes:
         baseline: Over which there is least evidence of a gain.
-        gain: Mean difference over the starts.
-        interval: Gains that the pairs do not speak against.
-        starts: Pairs.
+        differences: Of the pairs with it. Shape (starts,).
+        alpha: Error of the test, and of each end of the interval.
         e_value: Evidence that there is a gain.
         shown: Whether one is shown, over every baseline.
         worse: Whether over this baseline it is shown to be a loss.
     """
 
     baseline: str
-    gain: float
-    interval: tuple[float, float]
-    starts: int
+    differences: Array = field(repr=False, compare=False)
+    alpha: float
     e_value: float
     shown: bool
     worse: bool
+
+    @property
+    def gain(self) -> float:
+        """Mean difference over the starts."""
+        return float(self.differences.mean())
+
+    @property
+    def starts(self) -> int:
+        """Pairs."""
+        return len(self.differences)
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Gains that the pairs do not speak against."""
+        return gain_interval(self.differences, alpha=self.alpha)
 
     def __str__(self) -> str:
         low, high = self.interval
@@ -43,6 +57,26 @@ class Inside:
             f"inside the envelope {self.gain:+.4g} over {self.baseline} on {self.starts} starts, "
             f"between {low:+.3g} and {high:+.3g}"
         )
+
+
+@dataclass(frozen=True)
+class Least:
+    """The least evidence over the baselines that the gain exceeds the margin.
+
+    Attributes:
+        e_value: Over all conditions.
+        baseline: Over which.
+        gain: Mean difference over the starts.
+        inside: The same question inside the envelope, for any gain; None where none is planned.
+        measured: What is held against the limit; None where a gain is shown over all conditions
+            and inside the envelope neither a gain nor a loss is.
+    """
+
+    e_value: float
+    baseline: str
+    gain: float
+    inside: Inside | None
+    measured: float | None
 
 
 def by_condition(evidence: Evidence, settings: StressSettings, candidate: str) -> str:
@@ -78,21 +112,54 @@ def inside_envelope(evidence: Evidence, settings: StressSettings, candidate: str
     """
     if ENVELOPE not in settings.perturbations:
         return None
+    return inside_pairs(
+        {
+            baseline: paired_by_condition(evidence, settings, candidate, baseline)[ENVELOPE]
+            for baseline in settings.baselines
+        },
+        settings,
+    )
+
+
+def inside_pairs(differences: Mapping[str, Array], settings: StressSettings) -> Inside:
+    """The same from the pairs inside the envelope, by baseline. Shape (starts,) each."""
     margin, alpha = min(0.0, settings.margin), settings.alpha
-    found = []
-    for baseline in settings.baselines:
-        pairs = paired_by_condition(evidence, settings, candidate, baseline)[ENVELOPE]
-        test = paired_e_value(pairs, margin=margin, alpha=alpha)
-        found.append((test.e_value, baseline, pairs))
-    value, baseline, pairs = min(found, key=lambda one: (one[0], one[2].mean()))
-    loss = paired_e_value(-pairs, margin=-margin, alpha=alpha)
-    shown = value >= 1.0 / alpha
+    tests = {
+        baseline: paired_e_value(pairs, margin=margin, alpha=alpha)
+        for baseline, pairs in differences.items()
+    }
+    baseline = min(tests, key=lambda name: (tests[name].e_value, differences[name].mean()))
+    loss = paired_e_value(-differences[baseline], margin=-margin, alpha=alpha)
+    shown = tests[baseline].e_value >= 1.0 / alpha
     return Inside(
         baseline=baseline,
-        gain=float(pairs.mean()),
-        interval=gain_interval(pairs, alpha=alpha),
-        starts=len(pairs),
-        e_value=value,
+        differences=differences[baseline],
+        alpha=alpha,
+        e_value=tests[baseline].e_value,
         shown=shown,
         worse=not shown and loss.decision == "promote",
     )
+
+
+def least_gain(
+    differences: Mapping[str, Array], inside: Inside | None, settings: StressSettings
+) -> Least:
+    """The rule of promotion, from pairs: a gain over every baseline, and one inside the envelope.
+
+    Args:
+        differences: Candidate minus baseline over all conditions of a start, by baseline. Shape
+            (starts,) each.
+        inside: What is shown inside the envelope.
+        settings: Margin and alpha.
+    """
+    e_value, baseline = min(
+        (
+            paired_e_value(pairs, margin=settings.margin, alpha=settings.alpha).e_value,
+            baseline,
+        )
+        for baseline, pairs in differences.items()
+    )
+    measured: float | None = e_value
+    if inside and e_value >= 1.0 / settings.alpha and not inside.shown:
+        measured = inside.e_value if inside.worse else None
+    return Least(e_value, baseline, float(differences[baseline].mean()), inside, measured)

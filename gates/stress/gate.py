@@ -17,10 +17,9 @@ from gates.stress import cost, safety, trial
 from gates.stress.choice import choose
 from gates.stress.clocks import clocks_said
 from gates.stress.contact import contact_said
-from gates.stress.gains import by_condition, inside_envelope
+from gates.stress.gains import by_condition, inside_envelope, least_gain
 from gates.stress.pairs import paired_differences
 from gates.stress.rollouts import JOURNALS, StressSettings, rollouts
-from genpolicy.statistics.eprocess import paired_e_value
 
 
 @criterion(
@@ -38,27 +37,24 @@ def promotion_e_value(evidence: Evidence, settings: StressSettings, candidate: s
     envelope there is nothing to promote, whatever is gained elsewhere. A loss that is shown there
     is what is measured; where neither is shown, more starts decide.
     """
-    found = []
-    for baseline in settings.baselines:
-        differences = paired_differences(evidence, settings, candidate, baseline)
-        test = paired_e_value(differences, margin=settings.margin, alpha=settings.alpha)
-        found.append((float(test.e_value), baseline, float(differences.mean())))
-    value, baseline, gain = min(found)
+    differences = {
+        baseline: paired_differences(evidence, settings, candidate, baseline)
+        for baseline in settings.baselines
+    }
+    inside = inside_envelope(evidence, settings, candidate)
+    least = least_gain(differences, inside, settings)
     text = (
-        f"lowest over baselines, against {baseline}: mean gain {gain:.4g} over "
+        f"lowest over baselines, against {least.baseline}: mean gain {least.gain:.4g} over "
         f"{settings.planned_starts} starts, margin {settings.margin:g}; "
         f"{by_condition(evidence, settings, candidate)}"
     )
-    inside = inside_envelope(evidence, settings, candidate)
     text = f"{text}; {inside or 'no condition inside the envelope of a card was planned'}"
-    if inside and value >= 1.0 / settings.alpha and not inside.shown:
-        if not inside.worse:
-            raise MissingEvidenceError(
-                f"a gain is shown over all conditions (e-value {value:.4g}) and none inside the "
-                f"envelope (e-value {inside.e_value:.4g}), which is all that a card allows: {text}"
-            )
-        value = inside.e_value
-    return Measured(value, caveat=text, counted=f"{settings.planned_starts} starts")
+    if inside and least.measured is None:
+        raise MissingEvidenceError(
+            f"a gain is shown over all conditions (e-value {least.e_value:.4g}) and none inside "
+            f"the envelope (e-value {inside.e_value:.4g}), which is all that a card allows: {text}"
+        )
+    return Measured(least.measured, caveat=text, counted=f"{settings.planned_starts} starts")
 
 
 def best_baseline(evidence: Evidence, settings: StressSettings) -> str:

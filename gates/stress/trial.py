@@ -51,7 +51,10 @@ def _starts(evidence: Evidence, settings: StressSettings, method: str) -> set[tu
     always=True,
 )
 def verdict_reachable(evidence: Evidence, settings: StressSettings) -> Measured:
-    """Share of simulated trials that end right: where the planned effect holds, and the margin."""
+    """Share of simulated trials that end right: where the planned effect holds, and the margin.
+
+    Too little power at the planned effect says nothing bad of anybody: more starts decide.
+    """
     return reachable(evidence.document(STRESS, POWER), settings)
 
 
@@ -59,10 +62,15 @@ def reachable(power: Power, settings: StressSettings) -> Measured:
     """Share of the simulated trials of a power table that end right.
 
     The lower of two: promotion in the world of the planned effect, and return in the worlds in
-    which the gain is at most the margin.
+    which the gain is at most the margin. `genpolicy plan` asks the same before a rollout.
+
+    Args:
+        power: The table.
+        settings: With the limits of the gate, of which one is the power that is asked.
 
     Raises:
-        MissingEvidenceError: The table is for another test, or lacks one of these worlds.
+        MissingEvidenceError: The table is for another test, or lacks one of these worlds. Or the
+            planned effect is found less often than is asked: a trial of this size shows nothing.
     """
     for key, stated, planned in (
         ("margin", power.margin, settings.margin),
@@ -84,6 +92,10 @@ def reachable(power: Power, settings: StressSettings) -> Measured:
         f"success {baseline:g} against {candidate:g} is promoted in {promote:.3g} of simulated "
         f"trials; a gain of at most the margin is returned in {back:.3g}"
     )
+    limit = settings.limits.of.get("verdict_reachable")
+    asked = limit.limit if limit and limit.limit is not None else 0.0
+    if not promote >= asked:
+        raise MissingEvidenceError(f"too few starts to find the planned effect: {text}")
     return Measured(min(promote, back), caveat=text)
 
 

@@ -1,8 +1,11 @@
 """What a plan can decide is what the gate would say of such rollouts."""
 
 import json
+import math
 from pathlib import Path
 
+import evidence
+import numpy as np
 import pandas as pd
 import pytest
 import yaml
@@ -10,7 +13,8 @@ import yaml
 from gates import planning
 from gates.bounds import counted_interval, share_interval, upper_quantile
 from gates.evidence import MissingEvidenceError
-from gates.planning import Bound, Gain, Plan, _counted, plan_of, plan_text
+from gates.planning import Bound, Gain, Plan, Stated, _counted, plan_of, plan_text
+from gates.proof import judge
 from gates.settings import read_params
 from gates.stress.cost import _rollouts_with
 from gates.stress.rollouts import StressSettings
@@ -175,10 +179,114 @@ def test_a_plan_without_its_section_is_bad_configuration(tmp_path):
         plan_of(tmp_path)
 
 
-def made(*bounds, gains=()):
+def promoted_by(starts, *, baseline, candidate, correlation, margin, alpha):
+    """Chance that the e-process has reached 1 / alpha after each number of starts, exactly.
+
+    Independent of the product: the evidence depends on wins and losses alone, whose distribution
+    is carried from start to start; what has reached the threshold leaves.
+
+    Returns:
+        Shape (starts,).
+    """
+    wins = correlation * max(candidate - baseline, 0.0)
+    wins += (1.0 - correlation) * candidate * (1.0 - baseline)
+    losses = correlation * max(baseline - candidate, 0.0)
+    losses += (1.0 - correlation) * baseline * (1.0 - candidate)
+    some = np.arange(starts + 1)
+    a, c = some[:, None], some[None, :]
+    left, reached, path = np.zeros((starts + 1, starts + 1)), 0.0, []
+    left[0, 0] = 1.0
+    for n in range(1, starts + 1):
+        after = left * (1.0 - wins - losses)
+        after[1:] += left[:-1] * wins
+        after[:, 1:] += left[:, :-1] * losses
+        value = np.zeros_like(after)
+        for share in (0.35, 0.45, 0.55, 0.65, 0.75, 0.85):
+            stake = share / (1.0 + margin)
+            value += np.exp(
+                a * math.log1p(stake * (1 - margin)) + c * math.log1p(-stake * (1 + margin))
+                + (n - a - c) * math.log1p(-stake * margin)
+            ) / 6  # fmt: skip
+        over = (value >= 1.0 / alpha) & (a + c <= n)
+        reached += after[over].sum()
+        left = np.where(over, 0.0, after)
+        path.append(reached)
+    return np.array(path)
+
+
+def test_golden_power_and_starts_needed_are_those_of_an_exact_calculation(planned, monkeypatch):
+    """The shipped plan: dynamic programming over wins and losses gives .8624 and 80 starts."""
+    monkeypatch.setattr(planning, "POWER_TRIALS", 4000)
+    plan = planned()
+    exact = promoted_by(
+        200, baseline=0.5, candidate=0.8, correlation=POWER_CORRELATION, margin=plan.margin,
+        alpha=plan.alpha,
+    )  # fmt: skip
+    assert exact[plan.starts - 1] == pytest.approx(0.86243, abs=1e-5)
+    error = math.sqrt(exact[89] * (1 - exact[89]) / 4000)
+    assert abs(plan.stated.promote_share - exact[89]) < 4 * error
+    least = int(np.flatnonzero(exact >= plan.power)[0]) + 1
+    assert least == 80
+    # What 4000 trials blur: starts at which the exact share lies within four errors of the power.
+    near = np.flatnonzero(np.abs(exact - plan.power) < 4 * error) + 1
+    assert near[0] <= plan.stated.starts_needed <= near[-1] + 1
+
+
+def test_golden_smallest_gains_are_those_of_an_exact_calculation(planned, monkeypatch):
+    """The same calculation: at the gain that is named enough is found, two points below not."""
+    monkeypatch.setattr(planning, "POWER_TRIALS", 4000)
+    plan = planned()
+    for gain in plan.gains:
+        if gain.candidate_success is None:
+            continue
+        for less, enough in ((-0.01, True), (0.02, False)):
+            exact = promoted_by(
+                90, baseline=gain.baseline_success, candidate=gain.candidate_success - less,
+                correlation=POWER_CORRELATION, margin=plan.margin, alpha=plan.alpha,
+            )  # fmt: skip
+            assert (exact[-1] >= plan.power) == enough
+
+
+@pytest.mark.parametrize(("starts", "verdict"), [(76, "INCONCLUSIVE"), (90, "PASS")])
+def test_the_gate_says_of_its_power_what_the_plan_said(planned, repo, starts, verdict):
+    """One table, one rule: 76 starts find the shipped effect too seldom, 90 often enough."""
+    plan = planned(starts=starts)
+    settings = {"starts": starts, "margin": 0.05, "alpha": 0.05, "planned_effect": [0.5, 0.8]}
+    share = plan.stated.promote_share
+
+    def change(params):
+        params["stress"] = {**params["stress"], **settings}
+
+    evidence.write_params(repo, change)
+    row = {"baseline_success": 0.5, "correlation": 0.3, "margin": 0.05, "pairs": starts,
+           "median_pairs": None}  # fmt: skip
+    evidence.edit_document(
+        repo, "stress/power.json",
+        lambda _: {"margin": 0.05, "alpha": 0.025, "pairs": starts, "rows": [
+            {**row, "candidate_success": 0.8, "promote_share": share, "return_share": 1 - share},
+            {**row, "candidate_success": 0.55, "promote_share": 0.01, "return_share": 0.99},
+        ]},
+    )  # fmt: skip
+    (found,) = [a for a in judge(repo, "D").criteria if a.id == "verdict_reachable"]
+    assert found.verdict == verdict
+    bound = by_name(plan)["verdict_reachable"]
+    assert bound.decidable == (verdict == "PASS")
+    assert bound.says.split(";")[0] == found.caveat.removeprefix("not measured: ").split(";")[0]
+    assert ("verdict_reachable" in plan.undecidable) == (verdict == "INCONCLUSIVE")
+
+
+def test_an_effect_that_no_number_of_starts_finds_is_said(planned, monkeypatch):
+    monkeypatch.setattr(planning, "MOST_STARTS", 20)
+    plan = planned()
+    assert plan.stated.starts_needed is None
+    assert "in 80% not even by 20 starts" in plan_text(plan)
+
+
+def made(*bounds, gains=(), needed=77):
     return Plan(
-        starts=90, rollouts=12_600, longest_s=63_000.0, margin=0.05, alpha=0.0125, power=0.8,
-        bounds=bounds, gains=gains,
+        starts=90, methods=8, conditions=("nominal", "push"), candidates=("diffusion", "flow"),
+        rollouts=12_600, longest_s=63_000.0, margin=0.05, alpha=0.0125, power=0.8,
+        stated=Stated(0.5, 0.8, 0.86, needed), bounds=bounds, gains=gains,
     )  # fmt: skip
 
 
@@ -191,7 +299,12 @@ def test_golden_what_a_person_reads_of_a_plan():
         gains=(Gain(0.1, 0.29, 0.81), Gain(0.95, None, 0.34)),
     ))  # fmt: skip
     assert text.splitlines() == [
-        "90 starts a condition, 12,600 rollouts, at most 17.5 h of virtual time",
+        "90 starts of 8 methods in 2 conditions: 12,600 rollouts,",
+        "at most 17.5 h of virtual time",
+        "2 registered candidates, each at alpha 0.0125; margin 0.05",
+        "",
+        "The stated effect: success 80% against 50% (stress.planned_effect)",
+        "  found in 86% of trials with 90 starts; in 80% from about 77 starts on",
         "",
         "What these starts can show",
         "  kept        up to 3 of 90",
@@ -199,7 +312,7 @@ def test_golden_what_a_person_reads_of_a_plan():
         "              often it is run",
         "? open        declared not applicable",
         "",
-        "Smallest gain that is found in 80% of trials (margin 0.05, alpha 0.0125)",
+        "Smallest gain that is found in 80% of trials with 90 starts",
         "  baseline 10%: 19 points, a candidate of 29%",
         "  baseline 95%: none; a candidate that never fails in 34% only",
         "",

@@ -3,7 +3,7 @@
 import evidence
 import pandas as pd
 import pytest
-from asked import asked, settings_of
+from asked import asked, found_in, settings_of
 from editing import cells
 
 from gates.evidence import MissingEvidenceError
@@ -107,14 +107,27 @@ def test_only_the_planned_effect_counts_as_found(ladder):
         document["rows"] = [huge, {**planned, "promote_share": 0.47, "return_share": 0.53}, none]
 
     evidence.edit_document(ladder, POWER, change)
-    found = asked(ladder, verdict_reachable, gate="D")
-    assert found.value == 0.47 and "0.5 against 0.95 is promoted in 0.47" in found.caveat
-    assert judge(ladder, "D").verdict == "FAIL"
+    with pytest.raises(MissingEvidenceError, match=r"0\.5 against 0\.95 is promoted in 0\.47"):
+        asked(ladder, verdict_reachable, gate="D")
+
+
+@pytest.mark.parametrize(("share", "verdict"), [(0.79975, "INCONCLUSIVE"), (0.8, "PASS")])
+def test_too_little_power_decides_nothing_and_enough_does(ladder, share, verdict):
+    """Of a candidate that passes otherwise, and of one that gains nothing: that is a FAIL."""
+    evidence.edit_document(ladder, POWER, lambda d: d["rows"][0].update(promote_share=share))
+    report = judge(ladder, "D")
+    (found,) = found_in(report, "verdict_reachable")
+    assert (found.verdict, report.verdict) == (verdict, verdict)
+    if verdict == "INCONCLUSIVE":
+        assert "too few starts to find the planned effect" in found.caveat
+        assert report.promoted is None and report.decision.startswith("No decision")
+    assert set(report.candidates.values()) == {"PASS"}
 
 
 def test_a_test_that_promotes_at_the_margin_is_no_test(ladder):
     evidence.edit_document(ladder, POWER, lambda d: d["rows"][1].update(return_share=0.6))
     assert asked(ladder, verdict_reachable, gate="D").value == 0.6
+    assert judge(ladder, "D").verdict == "FAIL"
 
 
 @pytest.mark.parametrize("row", [0, 1])

@@ -1,0 +1,145 @@
+"""All of Gate D, judged by the gate itself over tables that lie in memory and in no file.
+
+`gates.engine.judge` runs unchanged. What it reads comes from `Tables`, which stands where parquet
+files do: the columns are those of the row classes, checked as always.
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from benchmarks.decision.worlds import CONDITIONS, Array, Drawn
+from gates.engine import judge
+from gates.evidence import Evidence, MissingEvidenceError
+from gates.pipeline import TASK_IDENTITY
+from gates.report import GateReport
+from gates.settings import Limits
+from gates.stress.gate import GATE
+from gates.stress.rollouts import INVOCATIONS, JOURNALS, ROLLOUTS, STRESS, StressSettings
+from genpolicy.evidence.documents.stress import POWER
+from genpolicy.integrity.documents import canonical_json
+
+TICKS, ASKED = 160, 20
+"""Ticks of a rollout, and invocations in it."""
+
+
+class Tables(Evidence):
+    """Evidence that lies in memory.
+
+    Args:
+        tables: By path.
+        documents: JSON documents, by path.
+    """
+
+    def __init__(self, tables: Mapping[str, pa.Table], documents: Mapping[str, Any]) -> None:
+        super().__init__(Path("nowhere"))
+        self._given = tables
+        self._bytes = {path: canonical_json(value) for path, value in documents.items()}
+
+    def bind(self, *patterns: str) -> list[str]:
+        """One journal and the identity of a task, of which nothing is asked here."""
+        there = {JOURNALS: f"{STRESS}/journals/a.mcap", TASK_IDENTITY: TASK_IDENTITY}
+        return [there[pattern] for pattern in patterns if pattern in there]
+
+    def _table(self, path: str) -> pa.Table:
+        self._touched[path] = None
+        if path not in self._given:
+            raise MissingEvidenceError(f"{path} is missing")
+        return self._given[path]
+
+    def _read(self, path: str) -> bytes:
+        if path not in self._bytes:
+            raise MissingEvidenceError(f"{path} is missing")
+        return self._bytes[path]
+
+
+def judged(
+    drawn: Drawn, settings: StressSettings, limits: Limits, power: object, rng: np.random.Generator
+) -> GateReport:
+    """The report of Gate D on one trial."""
+    tables = _tables(drawn, settings, rng)
+    documents = {f"{STRESS}/{POWER.file}": power, f"{STRESS}/checker.json": _checked()}
+    evidence = Tables(tables, documents)
+    return judge(GATE, evidence, limits, settings, candidates=settings.candidates)
+
+
+def _tables(
+    drawn: Drawn, settings: StressSettings, rng: np.random.Generator
+) -> dict[str, pa.Table]:
+    methods = (*settings.baselines, *settings.candidates)
+    won = np.concatenate([drawn.baselines, drawn.candidates]) > 0.5
+    if not np.array_equal(won, np.concatenate([drawn.baselines, drawn.candidates])):
+        raise ValueError("the whole rule is asked of one checkpoint of each candidate")
+    rows = _rollouts(methods, won, rng)
+    judged_rows = rows[rows["method"].isin(settings.candidates)]
+    cells = pd.MultiIndex.from_product([methods, CONDITIONS], names=["method", "perturbation"])
+    frame = cells.to_frame(index=False)
+    tables = {
+        ROLLOUTS: rows,
+        INVOCATIONS: _invocations(judged_rows, rng),
+        f"{STRESS}/stub.parquet": frame.assign(arrivals=500, stale=0, invalid=0),
+        f"{STRESS}/counts.parquet": frame.assign(reason="expired", count=10),
+        f"{STRESS}/conservation.parquet": frame.assign(
+            generated=100, executed=88, discarded=10, queued=2
+        ),
+    }
+    return {
+        path: pa.Table.from_pandas(table, preserve_index=False) for path, table in tables.items()
+    }
+
+
+def _rollouts(
+    methods: tuple[str, ...], won: NDArray[np.bool_], rng: np.random.Generator
+) -> pd.DataFrame:
+    """Outcomes as drawn; costs of a sound policy: few misses, holds, rejections and stops."""
+    starts = won.shape[2]
+    index = pd.MultiIndex.from_product(
+        [methods, CONDITIONS, range(starts)], names=["method", "perturbation", "start"]
+    )
+    rows = index.to_frame(index=False)
+    n, success = len(rows), won.reshape(-1)
+    stopped = rng.random(n) < STOPPED
+    drilled = (rows["perturbation"] == "recovery_drill").to_numpy()
+    ends = np.where(success, "success", np.where(stopped, "force_stop", "timeout"))
+    hold, fallback = rng.binomial(TICKS, HELD, n), rng.binomial(TICKS, FELL_BACK, n)
+    return rows.assign(
+        seed=0,
+        start_sha256=[f"{c}{s}" for c, s in zip(rows["perturbation"], rows["start"], strict=True)],
+        outcome=ends, success=success, duration_s=8.0, ticks=TICKS,
+        action_ticks=TICKS - hold - fallback, hold_ticks=hold, fallback_ticks=fallback,
+        invocations=ASKED, deadline_misses=rng.binomial(ASKED, MISSED, n), discards=1,
+        rejections=rng.binomial(ASKED, REJECTED, n), rejected_by="",
+        recovery_attempted=drilled, recovered=drilled & success,
+        interventions=(rng.random(n) < CALLED).astype(np.int64), action_age_p50_s=0.1,
+        action_age_p95_s=0.2, action_age_max_s=0.3, latency_p95_s=0.1,
+        force_peak_n=20.0 * np.exp(0.3 * rng.standard_normal(n)), mode="left",
+    )  # fmt: skip
+
+
+STOPPED = 0.05
+"""Share of failures that end in a protective stop."""
+HELD, FELL_BACK, MISSED, REJECTED, CALLED = 0.05, 0.02, 0.05, 0.05, 0.01
+"""Shares of ticks, of invocations and of rollouts: a sound policy, well inside the limits."""
+
+
+def _invocations(rows: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
+    columns = ["method", "seed", "perturbation", "start"]
+    frame = rows[columns].loc[rows.index.repeat(ASKED)].reset_index(drop=True)
+    number = np.tile(np.arange(ASKED), len(rows))
+    latency: Array = 0.1 * np.exp(0.3 * rng.standard_normal(len(frame)))
+    return frame.assign(invocation=number, latency_s=latency)
+
+
+def _checked() -> dict[str, Any]:
+    """Nothing wrong in one journal."""
+    found = {"violations": [], "checked_actions": 100, "reproved_actions": 100}
+    more = {
+        "sessions": 1, "events": 9, "checked_fallback_actions": 0, "chunks": 9, "discarded": {},
+        "oldest_action_s": 0.1, "longest_silence_s": 0.05,
+    }  # fmt: skip
+    return {**found, "journals": {"a.mcap": found | more}}
