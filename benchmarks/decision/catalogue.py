@@ -6,7 +6,7 @@ MARGIN = 0.05
 """That of the shipped plan, at which worlds are built; the runner refuses another one."""
 WRONG = 0.05
 """Most false promotions."""
-TIED = {"methods_alike": 0.3, "conditions_alike": 1.0}
+ALL_ALIKE = 1.0
 """As `genpolicy plan` assumes: all conditions of a start end alike, which is most noise."""
 
 
@@ -23,7 +23,7 @@ NULLS = (
           registered=1, peeking=10),
     _null("peeking", "as the first, looked at after every 10 starts", (0.5, 0.2), peeking=10),
     _null("peeking_tied", "looked at every 10, all conditions of a start alike", (0.5, 0.2),
-          peeking=10, **TIED),
+          peeking=10, conditions_alike=ALL_ALIKE),
     _null("hard_starts", "nine of ten outcomes decided by the start for all methods", (0.5, 0.2),
           methods_alike=0.9),
     _null("no_pairing", "starts say nothing: methods independent", (0.5, 0.2), methods_alike=0.0),
@@ -47,13 +47,13 @@ NULLS = (
 
 POWERS = (
     World("planned", "the planned effect: .8 against .5, all conditions of a start alike",
-          ("promoted",), (0.5, 0.2), (0.8,), least=0.8, **TIED),
-    World("planned_half", "the same, half of the starts end alike", ("promoted",), (0.5, 0.2), (0.8,),
-          least=0.8),
+          ("promoted",), (0.5, 0.2), (0.8,), least=0.8, conditions_alike=ALL_ALIKE),
+    World("planned_half", "the same, half of the starts end alike", ("promoted",), (0.5, 0.2),
+          (0.8,), least=0.8),
     World("planned_five", "the same over five equal simple methods", ("promoted",), (0.5,) * 5,
           (0.8,)),
-    World("planned_five_tied", "the same, all conditions of a start alike", ("promoted",), (0.5,) * 5,
-          (0.8,), **TIED),
+    World("planned_five_tied", "the same, all conditions of a start alike", ("promoted",),
+          (0.5,) * 5, (0.8,), conditions_alike=ALL_ALIKE),
     World("planned_spread", "training seeds differ by sd .15; one runs", ("promoted",), (0.5, 0.2),
           (0.8,), spread=0.15),
     World("two_apart", "two good candidates, .85 and .7", ("worse", "either"),
