@@ -1,0 +1,113 @@
+"""The benchmark of Gate D's decisions counts what it says, through the gate's own functions."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.decision import rule, tables
+from benchmarks.decision.__main__ import WHOLE, of_world, planned, rule_alone, whole_gate
+from benchmarks.decision.catalogue import WORLDS
+from benchmarks.decision.worlds import CONDITIONS, World, draw, outcomes
+from gates.stress import gains
+from genpolicy.seeds import stream
+
+ROOT = Path(__file__).parents[3]
+BY_NAME = {world.name: world for world in WORLDS}
+
+
+@pytest.fixture(scope="module")
+def shipped():
+    return planned(ROOT)
+
+
+def test_outcomes_have_the_shares_of_the_world_and_are_tied_as_it_says():
+    shares = np.array([[0.5] * 8, [0.8] * 8])
+    won = outcomes(shares, 4000, 0.3, 0.5, stream(1, "a"))
+    assert won.mean(axis=(1, 2)) == pytest.approx([0.5, 0.8], abs=0.02)
+    # As in `simulate_pairs`: .3 of the pairs share a draw, so a loss happens in .7 * .5 * .2.
+    assert (won[1] < won[0]).mean() == pytest.approx(0.07, abs=0.01)
+    # Half of the starts end alike in all conditions, the others by chance.
+    alike = (won[0] == won[0][:1]).all(axis=0).mean()
+    assert alike == pytest.approx(0.5 + 0.5 * 2 * 0.5**8, abs=0.03)
+    tied = outcomes(shares, 300, 1.0, 1.0, stream(1, "b"))
+    assert (tied == tied[:, :1]).all() and (tied[1] >= tied[0]).all()
+
+
+def test_every_world_at_the_margin_gains_the_margin_and_no_more():
+    for name in ("margin", "low", "high", "one_condition", "three"):
+        world = BY_NAME[name]
+        drawn = draw(world, 10, stream(1, name))
+        gains_ = drawn.of_method.mean(axis=1) - drawn.simple.mean(axis=1).max()
+        assert gains_ == pytest.approx([0.05] * len(world.candidates))
+
+
+def test_a_trial_is_drawn_the_same_again_and_another_is_another():
+    world = BY_NAME["spread_3_0.1"]
+    one, same, other = (draw(world, 20, stream(13, "decision", n)) for n in (1, 1, 2))
+    assert one.candidates.tobytes() == same.candidates.tobytes() != other.candidates.tobytes()
+    assert set(np.unique(one.candidates * 3)) <= {0.0, 1.0, 2.0, 3.0} and len(one.truth) == 1
+
+
+def test_a_rule_that_promotes_everybody_is_counted_as_wrong(shipped, monkeypatch):
+    world, settings = BY_NAME["never"], shipped[0]
+    assert rule_alone(world, settings, 3)["hits"] == {"false": 0}
+
+    def anything(differences, inside, settings):
+        return gains.Least(99.0, next(iter(differences)), 1.0, inside, 1e6)
+
+    monkeypatch.setattr(rule, "least_gain", anything)
+    assert rule_alone(world, settings, 3)["hits"] == {"false": 3}
+
+
+def test_what_a_share_is_of(shipped):
+    """One promoted of two that differ: whose gain it is decides what is counted."""
+    world = BY_NAME["two_apart"]
+    own = of_world(shipped[0], world)
+    assert own.alpha == pytest.approx(shipped[0].alpha)
+    drawn = draw(world, 20, stream(1, "c"))
+    alone = rule.Told(("FAIL", "PASS"), "candidate_1", alone=True)
+    said = {asks: rule.counted(asks, drawn, alone, 0.05, own.candidates) for asks in rule.COUNTS}
+    assert [asks for asks, hit in said.items() if hit] == ["promoted", "worse"]
+    either = replace(alone, verdicts=("PASS", "PASS"), alone=False)
+    assert rule.counted("either", drawn, either, 0.05, own.candidates)
+    assert not rule.counted("worse", drawn, either, 0.05, own.candidates)
+    higher = replace(drawn, truth=drawn.truth - 0.3)
+    assert rule.counted("false", higher, alone, 0.05, own.candidates)
+    assert not rule.counted("false_of_method", higher, alone, 0.05, own.candidates)
+
+
+def test_peeking_ends_at_the_first_pass_and_never_takes_one_back(shipped):
+    """Won from the first thirty starts and lost from all others: shown, whenever one looks."""
+    world = replace(BY_NAME["alone"], candidates=(0.8,))
+    own = of_world(shipped[0], world)
+    drawn = draw(world, 90, stream(1, "d"))
+    won = np.where(np.arange(90) < 30, 1.0, 0.0)
+    drawn = replace(
+        drawn, candidates=np.tile(won, (1, 8, 1)), baselines=np.zeros_like(drawn.baselines)
+    )
+    for looks in (0, 10):
+        assert rule.told(drawn, own, looks).verdicts == ("PASS",)
+
+
+def test_the_whole_gate_says_of_the_gain_what_the_rule_says(shipped):
+    settings, limits, section = shipped
+    assert set(settings.perturbations) == set(CONDITIONS)
+    for world in (WHOLE[1], WHOLE[2]):
+        found = whole_gate(world, settings, limits, section, 1)
+        assert sum(found["verdicts"].values()) == 1
+        assert ("promotion_e_value" in found["unmet"]) == (world.name == "at_the_margin")
+
+
+def test_a_share_is_judged_at_the_worse_end():
+    world = World("a", "b", ("false",), (0.5,), (0.55,), most=0.05)
+    assert [tables.kept(world, 0, n) for n in (40, 10_000)] == [False, True]
+    assert tables.kept(replace(world, most=None, least=0.8), 82, 100) is False
+    assert tables.kept(replace(world, most=None), 82, 100) is None
+    page = "x <!-- begin of p -->\nold\n<!-- end of p --> y"
+    assert tables.into_page(page, "p", "new") == (
+        "x <!-- begin of p -->\n\nnew\n<!-- end of p --> y"
+    )
+    with pytest.raises(ValueError, match="begin of q"):
+        tables.into_page(page, "q", "new")
