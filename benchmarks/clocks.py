@@ -26,7 +26,7 @@ from genpolicy.candidates.judged import BASELINES, trained
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.contract.settings import parse_settings
 from genpolicy.data.dataset import load_dataset
-from genpolicy.evidence.reproducibility.latency import LatencyPlan, latency_models, measured_rows
+from genpolicy.evidence.reproducibility.latency import LatencyPlan, latency_models, measure_all
 from genpolicy.evidence.stress.latency import LatencySection
 from genpolicy.execution.cell import Cell, ExecutionSettings
 from genpolicy.feasibility.settings import FeasibilitySettings
@@ -66,7 +66,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         dataset=dataset, task=task, feasibility=feasibility, horizons=horizons,
         samples=stress["samples"], warm=timing.warm, cold=timing.cold,
     )  # fmt: skip
-    rows = pd.DataFrame([vars(row) for row in measured_rows(plan, [policy])])
+    rows = pd.DataFrame([vars(row) for row in measure_all(plan, [policy]).rows])
     with TemporaryDirectory() as scratch:
         folder = Path(scratch) / "artifacts" / "wall_clock"
         folder.mkdir(parents=True)

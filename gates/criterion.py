@@ -23,6 +23,8 @@ class Measured:
         pending: Set where only a person can supply the answer and has not yet.
         counted: The independent units that the number rests on: "24 of 25 episodes"; empty for a
             number that counts none.
+        undecided: What decides where the limit lies inside the interval, without a semicolon;
+            empty where more of the same evidence does.
     """
 
     value: float | None
@@ -30,6 +32,7 @@ class Measured:
     caveat: str = ""
     pending: bool = False
     counted: str = ""
+    undecided: str = ""
 
 
 @dataclass(frozen=True)

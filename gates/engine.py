@@ -224,7 +224,8 @@ def _answer(
     verdict = judge_criterion(value, threshold, item.comparison, interval)
     caveat = measured.caveat
     if verdict == "INCONCLUSIVE" and value is not None and threshold is not None:
-        caveat = f"{caveat}; {ASTRIDE}" if caveat else ASTRIDE
+        said = measured.undecided or ASTRIDE
+        caveat = f"{caveat}; {said}" if caveat else said
     if measured.pending and verdict != "PASS" and limit is not None:
         verdict = "PENDING_REVIEW"
     return Answer(
@@ -265,11 +266,18 @@ def _diagnosis(spec: GateSpec, judged: Judged) -> str:
         lacking = "No criterion decided: criteria, limits, the task's identity or a record lack."
         return "" if judged.verdict == "PASS" else lacking
     of = f" of {decided.candidate}" if decided.candidate else ""
-    said = ASTRIDE if decided.caveat.endswith(ASTRIDE) else decided.caveat
-    why = f" ({said})" if said and (decided.measured is None or said == ASTRIDE) else ""
+    undecided = _undecided(decided)
+    said = undecided or decided.caveat
+    why = f" ({said})" if said and (decided.measured is None or undecided) else ""
     look_at = next(item.look_at for item in spec.criteria if item.id == decided.id)
-    look_at = f"Should it be broken: {look_at}" if said == ASTRIDE else look_at
+    look_at = f"Should it be broken: {look_at}" if undecided else look_at
     return f"First unmet: {decided.id}{of}{why}. {look_at}"
+
+
+def _undecided(answer: Answer) -> str:
+    """What would decide, where the limit lies inside the interval: the last of what is said."""
+    inside = answer.verdict == "INCONCLUSIVE" and None not in (answer.measured, answer.threshold)
+    return answer.caveat.rpartition("; ")[2] if inside else ""
 
 
 def _decision(spec: GateSpec) -> Callable[[Judged], Decision]:

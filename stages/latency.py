@@ -13,7 +13,7 @@ from genpolicy.evidence.reproducibility.latency import (
     PROCESSES,
     LatencyPlan,
     declared_rows,
-    measured_rows,
+    measure_all,
     model_rows,
 )
 from genpolicy.evidence.reproducibility.load import candidates_rows
@@ -22,6 +22,7 @@ from genpolicy.evidence.rows.reproducibility import (
     CandidatesRow,
     LatencyModelRow,
     LatencyRow,
+    MachineRow,
     SweepLatencyRow,
 )
 from genpolicy.evidence.stress.latency import LatencySection
@@ -70,9 +71,10 @@ def work(params: Params) -> None:
             draws=section.warm * len(PROCESSES),
             generator=stream(params.seed, "latency", "declared"),
         )
-        rows = measured_rows(plan, policies)
-        model = model_rows(rows, section.declared_terms, root_seed=params.seed)
-        write_rows(folder / "latency.parquet", LatencyRow, rows + declared)
+        taken = measure_all(plan, policies)
+        model = model_rows(taken.rows, section.declared_terms, root_seed=params.seed)
+        write_rows(folder / "latency.parquet", LatencyRow, taken.rows + declared)
+        write_rows(folder / "machine.parquet", MachineRow, taken.machine)
         write_rows(folder / "model.parquet", LatencyModelRow, model)
         write_rows(folder / "candidates.parquet", CandidatesRow, candidates_rows(plan, policies))
         write_rows(

@@ -79,6 +79,7 @@ GROUPS = (
           (OWN, Part(PARAMS_FILE), Part("limits.yaml"))),
     Group(6, "latency by component, action age",
           _rows(f"{LATENCY}/latency.parquet", f"{LATENCY}/model.parquet",
+                f"{LATENCY}/machine.parquet",
                 f"{STRESS}/ages.parquet", f"{STRESS}/invocations.parquet")),
     Group(7, "diversity, mode coverage, feasibility rejection, projection",
           _rows(f"{RELOAD}/modes.parquet", f"{SHADOW}/candidates.parquet")),

@@ -31,6 +31,8 @@ from gates.pages import (
     tables_faults,
     tables_feasibility,
     tables_holds,
+    tables_machine,
+    tables_matching,
     tables_overruns,
     tables_stress,
 )
@@ -64,8 +66,10 @@ PLOTS: dict[str, tuple[Picturable, ...]] = {
     "A": plots_need.PLOTS,
     "B": (
         *plots_convergence.PLOTS,
+        tables_matching.RULES,
         *plots_time.PLOTS,
         tables_overruns.DECLARED,
+        tables_machine.BESIDE,
         *plots_front.PLOTS,
         *plots_density.PLOTS,
     ),

@@ -5,13 +5,14 @@ import numpy as np
 from gates.claim import CHECKPOINT_ONLY
 from gates.criterion import Measured, criteria_of, criterion
 from gates.distilled import spent
-from gates.engine import GateSpec
+from gates.engine import GateSpec, Judged
 from gates.evidence import Array, Evidence, MissingEvidenceError, numbers
 from gates.need.settings import TRAINED as BASELINES
 from gates.need.simpler import unmatched
 from gates.reproducibility import conformance, convergence, modes, timing
 from gates.reproducibility.front import SWEEP
 from gates.reproducibility.identity import contradicted, unrecorded
+from gates.reproducibility.matching import matched_by
 from gates.reproducibility.settings import (
     BROUGHT_FOLDER,
     COVERAGE,
@@ -247,6 +248,19 @@ def _range(values: Array) -> str:
     return f"{low:g}" if low == high else f"{low:g} to {high:g}"
 
 
+def _both_rules(judged: Judged) -> list[str]:
+    """What equal updates and equal convergence say of every candidate that was trained here."""
+    settings: ReproducibilitySettings = judged.settings
+    limit = settings.limits.of.get("baseline_fall_upper")
+    return matched_by(
+        judged.evidence,
+        candidates=[name for name in judged.candidates if name not in settings.brought],
+        baselines=settings.baselines,
+        limit=limit.limit if limit is not None else None,
+        confidence=settings.confidence,
+    )
+
+
 GATE = GateSpec(
     gate="B",
     settings=ReproducibilitySettings,
@@ -259,6 +273,7 @@ GATE = GateSpec(
         COVERAGE,
         DENSITY,
         "artifacts/latency/candidates.parquet",
+        "artifacts/latency/machine.parquet",
         SWEEP,
     ),
     back_to="training",
@@ -272,4 +287,5 @@ GATE = GateSpec(
         "Updates are equal for all methods; how far each training has come is told beside them.",
     ),
     below="A",
+    said=_both_rules,
 )

@@ -4,7 +4,8 @@ import numpy as np
 import pandas as pd
 
 from gates.criterion import Measured, criterion
-from gates.evidence import Evidence, MissingEvidenceError, numbers
+from gates.evidence import Array, Evidence, MissingEvidenceError, numbers
+from gates.reproducibility.contention import Ends, running, waited_share, weigh
 from gates.reproducibility.latency_budget import (
     LATENCY,
     MEASURED_HERE,
@@ -64,25 +65,42 @@ def _ratio_of_runs(
     evidence: Evidence, settings: ReproducibilitySettings, candidate: str, temperature: str
 ) -> Measured:
     rows = _latency(evidence, candidate)
+    wall, (first, second) = _compared(rows, temperature, settings.confidence)
+    without = share = None
+    if (alone := running(rows)) is not None:
+        without, ran = _compared(alone, temperature, settings.confidence)
+        share = waited_share(np.concatenate([first, second]), np.concatenate(ran))
+    limit = _limit(settings, f"{temperature}_latency_ratio_upper")
+    weighed = weigh(wall, without, share=share, limit=limit)
+    text = (
+        f"{np.median(first) * MILLI:.4g} ms and {np.median(second) * MILLI:.4g} ms, {temperature}, "
+        f"over {len(first)} processes each; {weighed.said}; {_least_stable(rows, temperature)}"
+    )
+    if limit is not None and limit > 1.0:
+        spread = spread_found(limit, len(first), confidence=settings.confidence)
+        text += f"; equal runs pass in four of five if processes differ by {spread:.2g} at most"
+    counted = f"{len(first)} and {len(second)} processes"
+    return Measured(wall.most, weighed.interval, text, counted=counted, undecided=weighed.undecided)
+
+
+def _compared(
+    rows: pd.DataFrame, temperature: str, confidence: float
+) -> tuple[Ends, tuple[Array, Array]]:
+    """Slower over faster run, and what an invocation takes in each process of either, s."""
     spans = spans_of_processes(rows, temperature)
     if sorted(spans) != [1, 2] or len({len(found) for found in spans.values()}) != 1:
         raise MissingEvidenceError("two runs of as many processes each are needed")
     first, second = spans[1], spans[2]
     if len(first) < FEWEST:
         raise MissingEvidenceError(f"{len(first)} process of each run tells nothing of another")
-    _, lower, upper = ratio_of_means(first, second, confidence=settings.confidence)
+    _, lower, upper = ratio_of_means(first, second, confidence=confidence)
     # Slower over faster: what stands on both sides of 1 may be none.
-    least, slower = max(1.0, lower, 1.0 / upper), max(upper, 1.0 / lower)
-    text = (
-        f"{np.median(first) * MILLI:.4g} ms and {np.median(second) * MILLI:.4g} ms, {temperature}, "
-        f"over {len(first)} processes each; {_least_stable(rows, temperature)}"
-    )
-    limit = settings.limits.of.get(f"{temperature}_latency_ratio_upper")
-    if limit is not None and limit.limit is not None and limit.limit > 1.0:
-        spread = spread_found(limit.limit, len(first), confidence=settings.confidence)
-        text += f"; equal runs pass in four of five if processes differ by {spread:.2g} at most"
-    counted = f"{len(first)} and {len(second)} processes"
-    return Measured(slower, (least, slower), text, counted=counted)
+    return Ends(max(1.0, lower, 1.0 / upper), max(upper, 1.0 / lower)), (first, second)
+
+
+def _limit(settings: ReproducibilitySettings, name: str) -> float | None:
+    found = settings.limits.of.get(name)
+    return found.limit if found is not None else None
 
 
 def _least_stable(rows: pd.DataFrame, temperature: str) -> str:
@@ -133,32 +151,56 @@ def latency_model_ratio_upper(
     Either way a candidate would win by a clock that is not the cell's: where its own invocations
     take longer than drawn, or those of a baseline shorter. The furthest of them is measured.
     """
+    limit = _limit(settings, "latency_model_ratio_upper")
     asked = [(candidate, True), *((name, False) for name in settings.baselines)]
-    found = [_held(evidence, settings, name, longer=longer) for name, longer in asked]
-    upper, interval, text, processes = max(found)
-    return Measured(upper, interval, text, counted=f"{processes} processes")
+    found = [_held(evidence, settings, name, longer=longer, limit=limit) for name, longer in asked]
+    # Who is shown to be beyond the limit stands before whoever may be further beyond it.
+    return max(found, key=lambda one: (_shown(one, limit), one.value))
+
+
+def _shown(found: Measured, limit: float | None) -> bool:
+    return limit is not None and found.interval is not None and not found.interval[0] <= limit
 
 
 def _held(
-    evidence: Evidence, settings: ReproducibilitySettings, method: str, *, longer: bool
-) -> tuple[float, tuple[float, float], str, int]:
-    """How much longer (or shorter) a method's processes took than was drawn of the others.
-
-    Returns:
-        Upper end, interval, both in words, and the number of processes.
-    """
+    evidence: Evidence,
+    settings: ReproducibilitySettings,
+    method: str,
+    *,
+    longer: bool,
+    limit: float | None,
+) -> Measured:
+    """How much longer (or shorter) a method's processes took than was drawn of the others."""
     rows = evidence.of(MODEL, LatencyModelRow, method)
     high = rows[rows["level"] == P95]
     if set(high["run"]) != {1, 2} or len(high) < 2 * FEWEST:
         raise MissingEvidenceError(f"{method}: the p95 of several processes of both runs is needed")
-    measured, drawn = numbers(high, "measured_s"), numbers(high, "drawn_s")
-    if not np.all((measured > 0) & (drawn > 0)):
-        raise MissingEvidenceError(f"{method}: a quantile of no time")
-    pair = (measured, drawn) if longer else (drawn, measured)
-    ratio, lower, upper = ratio_to(*pair, confidence=settings.confidence)
+    pair = _times(high, "measured_s", "drawn_s", method)
+    ratio, wall = _ratio(pair, longer=longer, confidence=settings.confidence)
+    without = share = None
+    if not high[["measured_running_s", "drawn_running_s"]].isna().any(axis=None):
+        alone = _times(high, "measured_running_s", "drawn_running_s", method)
+        without = _ratio(alone, longer=longer, confidence=settings.confidence)[1]
+        share = max(waited_share(*both) for both in zip(pair, alone, strict=True))
+    weighed = weigh(wall, without, share=share, limit=limit)
+    measured, drawn = pair
     text = (
         f"{method}: p95 of {len(high)} processes {np.median(measured) * MILLI:.4g} ms, drawn "
         f"{np.median(drawn) * MILLI:.4g} ms from the others: "
-        f"{'took' if longer else 'drawn'} {ratio:.3g} of it"
+        f"{'took' if longer else 'drawn'} {ratio:.3g} of it; {weighed.said}"
     )
-    return upper, (lower, upper), text, len(high)
+    counted = f"{len(high)} processes"
+    return Measured(wall.most, weighed.interval, text, counted=counted, undecided=weighed.undecided)
+
+
+def _times(rows: pd.DataFrame, measured: str, drawn: str, method: str) -> tuple[Array, Array]:
+    pair = numbers(rows, measured), numbers(rows, drawn)
+    if not all(np.all(times > 0) for times in pair):
+        raise MissingEvidenceError(f"{method}: a quantile of no time")
+    return pair
+
+
+def _ratio(pair: tuple[Array, Array], *, longer: bool, confidence: float) -> tuple[float, Ends]:
+    """What was measured over what was drawn, or the other way round: mean and ends."""
+    ratio, lower, upper = ratio_to(*(pair if longer else pair[::-1]), confidence=confidence)
+    return ratio, Ends(lower, upper)

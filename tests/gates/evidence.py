@@ -52,6 +52,7 @@ from genpolicy.evidence.rows.reproducibility import (
     DensityRow,
     LatencyModelRow,
     LatencyRow,
+    MachineRow,
     NfeRow,
     SampleRow,
     SweepLatencyRow,
@@ -1175,6 +1176,7 @@ def _latency(root: Path) -> None:
                 "seconds": (SPEED[m] if term == "sample" else 0.001)
                 * (1 + 0.01 * i + 0.02 * run + 0.01 * process),
                 "source": "measured" if term in MEASURED_HERE else "declared",
+                "waited_s": 1e-6 if term in MEASURED_HERE else None,
             }
             for m in CANDIDATES
             for run in (1, 2)
@@ -1196,11 +1198,35 @@ def _latency(root: Path) -> None:
                 "level": level,
                 "measured_s": SPEED[m] * (1 + level / 10 + 0.01 * process),
                 "drawn_s": SPEED[m] * (1.02 + level / 10),
+                "measured_running_s": 0.96 * SPEED[m] * (1 + level / 10 + 0.01 * process),
+                "drawn_running_s": 0.96 * SPEED[m] * (1.02 + level / 10),
             }
             for m in (*CANDIDATES, *COMPARED)
             for run in (1, 2)
             for process in (1, 2, 3)
             for level in (0.5, 0.95)
+        ],
+    )
+    table(
+        root,
+        "latency/machine.parquet",
+        MachineRow,
+        [
+            {
+                "method": m,
+                "run": run,
+                "process": process,
+                "seconds": 4.0 + SPEED[m],
+                "cpu_s": 3.5,
+                "voluntary": 40,
+                "involuntary": 3 * run + process,
+                "others_s": 0.1 * process,
+                "stolen_s": 0.01 * run,
+                "cpus": 2,
+            }
+            for m in (*CANDIDATES, *COMPARED)
+            for run in (1, 2)
+            for process in (1, 2, 3)
         ],
     )
 

@@ -52,7 +52,7 @@ PARAMS = yaml.safe_load((Path(__file__).parents[2] / "params.yaml").read_text())
 DECLARED = PARAMS["latency"]["declared"]
 DECLARED |= {term: [0.001, 0.001] for term in DECLARED}
 LATENCY = [
-    LatencyRow(method, 1, 1, str(term), "model", how, 1, seconds, "measured")
+    LatencyRow(method, 1, 1, str(term), "model", how, 1, seconds, "measured", None)
     for method in ("flow", "bc")
     for how, seconds in (("cold", 0.005), ("warm", 0.002))
     for term in MEASURED_TERMS

@@ -22,6 +22,7 @@ from genpolicy.candidates.wire.policy import WirePolicy
 from genpolicy.contract.action import join_action
 from genpolicy.contract.chunk import Candidate, ChunkMetadata, Proposal
 from genpolicy.contract.latency import Term
+from genpolicy.evidence.reproducibility.processor import RunQueue, run_queue, waited_s
 from genpolicy.policies.guidance import Prefix
 from genpolicy.policies.policy import NetworkPolicy, load_policy
 from genpolicy.policies.protocol import Policy
@@ -46,12 +47,23 @@ class Measurement:
         temperature: `cold` or `warm`.
         repeat: Which invocation of its temperature.
         seconds: Wall time, s.
+        waited_s: How much of it the call could have run and had no processor, s; None where nobody
+            knows, as of what another process does.
     """
 
     component: str
     temperature: Temperature
     repeat: int
     seconds: float
+    waited_s: float | None
+
+
+@dataclass(frozen=True)
+class Span:
+    """What a term took, and how much of that it waited for a processor, s; None if unknown."""
+
+    seconds: float
+    waited_s: float | None
 
 
 def measure_policy(
@@ -91,24 +103,31 @@ def measure_policy(
         return load_policy(folder, expected_sha256=expected_sha256, sampler=sampler, device=device)
 
     results = []
-    for repeat in range(cold_repeats):
+    with run_queue() as queue:
+
+        def timed(policy: NetworkPolicy, index: int) -> dict[str, Span]:
+            row = observations[index % len(observations)][None]
+            return _spans(_Clock(queue), policy, _Asked(row, index, candidates), project, joining)
+
+        for repeat in range(cold_repeats):
+            policy = load()
+            _evict_caches(repeat)
+            results += _measurements("cold", repeat, timed(policy, repeat))
         policy = load()
-        _evict_caches(repeat)
-        row = observations[repeat % len(observations)][None]
-        spans = invoke(
-            policy, row, repeat=repeat, candidates=candidates, project=project, joining=joining
-        )
-        results += [Measurement(name, "cold", repeat, value) for name, value in spans.items()]
-    policy = load()
-    for index in range(discarded_repeats + warm_repeats):
-        row = observations[index % len(observations)][None]
-        spans = invoke(
-            policy, row, repeat=index, candidates=candidates, project=project, joining=joining
-        )
-        repeat = index - discarded_repeats
-        if repeat >= 0:
-            results += [Measurement(name, "warm", repeat, value) for name, value in spans.items()]
+        for index in range(discarded_repeats + warm_repeats):
+            spans, repeat = timed(policy, index), index - discarded_repeats
+            if repeat >= 0:
+                results += _measurements("warm", repeat, spans)
     return results
+
+
+def _measurements(
+    temperature: Temperature, repeat: int, spans: dict[str, Span]
+) -> list[Measurement]:
+    return [
+        Measurement(name, temperature, repeat, span.seconds, span.waited_s)
+        for name, span in spans.items()
+    ]
 
 
 def measure_running(
@@ -122,6 +141,8 @@ def measure_running(
     joining: JoiningSettings,
 ) -> list[Measurement]:
     """The same of a policy behind the wire: the first answer of a new server is the cold one.
+
+    Of waiting nothing is known: what the server does, and what it takes from us, is its own.
 
     Args:
         start: Starts the server, and ends it.
@@ -137,16 +158,11 @@ def measure_running(
         own = joining_of(joining, policy)
         _evict_caches(0)
         for index in range(-1 - discarded_repeats, warm_repeats):
-            spans = invoke(
-                policy, observations[index % len(observations)][None], repeat=index,
-                candidates=candidates, project=project, joining=own,
-            )  # fmt: skip
+            asked = _Asked(observations[index % len(observations)][None], index, candidates)
+            spans = _spans(_Clock(), policy, asked, project, own)
             temperature: Temperature = "warm" if index >= 0 else "cold"
             if index >= 0 or index == -1 - discarded_repeats:
-                results += [
-                    Measurement(name, temperature, max(index, 0), value)
-                    for name, value in spans.items()
-                ]
+                results += _measurements(temperature, max(index, 0), spans)
     return results
 
 
@@ -159,67 +175,90 @@ def invoke(
     project: Projection | None,
     joining: JoiningSettings = REPLACING,
 ) -> dict[str, float]:
-    """Spans of one invocation, s; by a rule that joins, behind a plan that speaks for all it may.
+    """What the terms of one invocation took, s; by a rule that joins, behind a plan before it.
 
-    What that plan is takes no time here, and would have been drawn by the invocation before.
+    That plan speaks for all that it may; what it is takes no time here, and would have been drawn
+    by the invocation before.
     """
-    spans: dict[str, float] = {}
-    metadata = _metadata(policy, repeat)
+    asked = _Asked(row, repeat, candidates)
+    spans = _spans(_Clock(), policy, asked, project, joining)
+    return {name: span.seconds for name, span in spans.items()}
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """One observation (1, H_o, D_o), which invocation, and how many candidates it draws."""
+
+    row: Array
+    repeat: int
+    candidates: int
+
+
+class _Clock:
+    """Spans of one invocation; of a run queue, where it is given, what was waited in it."""
+
+    def __init__(self, queue: RunQueue | None = None) -> None:
+        self._queue = queue or RunQueue(None)
+        self.spans: dict[str, Span] = {}
+
+    @contextmanager
+    def timed(self, term: Term) -> Iterator[None]:
+        """Time the block as a term. The queue is read inside the span: no wait outside counts."""
+        start = time.perf_counter()
+        before = self._queue.now()
+        yield
+        after = self._queue.now()
+        seconds = time.perf_counter() - start
+        self.spans[str(term)] = Span(seconds, waited_s(before, after, wall_s=seconds))
+
+
+def _spans(
+    clock: _Clock,
+    policy: NetworkPolicy | WirePolicy,
+    asked: _Asked,
+    project: Projection | None,
+    joining: JoiningSettings,
+) -> dict[str, Span]:
+    metadata = _metadata(policy, asked.repeat)
     reach = policy.horizons.execution_horizon - 1
     votes = (
         []
         if joining.rule == REPLACE
         else [_plan_before(metadata, policy.prediction_horizon, reach)]
     )
-    asked = _Asked(row, repeat, candidates, _guided(policy, votes, joining))
-    chunks = _drawn(policy, asked, spans)
-    with _timed(spans, Term.SELECT):
-        metadata = _metadata(policy, repeat)
+    chunks = _drawn(clock, policy, asked, _guided(policy, votes, joining))
+    with clock.timed(Term.SELECT):
+        metadata = _metadata(policy, asked.repeat)
         drawn = [Candidate(metadata, actions) for actions in chunks]
         proposal = join(drawn, 0, votes, joining)
     if project is not None:
-        with _timed(spans, Term.PROJECT):
+        with clock.timed(Term.PROJECT):
             project(proposal)
-    return spans
+    return clock.spans
 
 
-@dataclass(frozen=True)
-class _Asked:
-    """One observation (1, H_o, D_o), which invocation, its candidates and what they go on from."""
-
-    row: Array
-    repeat: int
-    candidates: int
-    guided: Prefix | None
-
-
-def _drawn(policy: NetworkPolicy | WirePolicy, asked: _Asked, spans: dict[str, float]) -> Array:
+def _drawn(
+    clock: _Clock, policy: NetworkPolicy | WirePolicy, asked: _Asked, guided: Prefix | None
+) -> Array:
     """Chunks (N, K, D_a) of an observation, and what the terms of the model took."""
     name = ("latency", asked.repeat)
     if isinstance(policy, WirePolicy):
         terms, chunks = policy.timed(
-            asked.row[0], noise=name, candidates=asked.candidates, prefix=asked.guided
+            asked.row[0], noise=name, candidates=asked.candidates, prefix=guided
         )
-        spans.update({str(term): seconds for term, seconds in terms.items()})
+        clock.spans.update({str(term): Span(seconds, None) for term, seconds in terms.items()})
         return chunks
-    with _timed(spans, Term.PREPROCESS):
+    with clock.timed(Term.PREPROCESS):
         normalised = policy.preprocess(asked.row)
-    with _timed(spans, Term.ENCODE):
+    with clock.timed(Term.ENCODE):
         condition = policy.encode(normalised)
         policy.synchronise()
-    with _timed(spans, Term.SAMPLE):
+    with clock.timed(Term.SAMPLE):
         samples = policy.sample_encoded(
-            condition, noise_names=[name], candidates=asked.candidates, prefix=asked.guided
+            condition, noise_names=[name], candidates=asked.candidates, prefix=guided
         )
     own: Array = samples.actions[0]
     return own
-
-
-@contextmanager
-def _timed(spans: dict[str, float], term: Term) -> Iterator[None]:
-    start = time.perf_counter()
-    yield
-    spans[str(term)] = time.perf_counter() - start
 
 
 def _plan_before(metadata: ChunkMetadata, rows: int, reach: int) -> Votes:

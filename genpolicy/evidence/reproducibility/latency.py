@@ -30,7 +30,12 @@ from genpolicy.evidence.reproducibility.benchmark import (
     measure_running,
 )
 from genpolicy.evidence.reproducibility.measure import in_fresh_process
-from genpolicy.evidence.rows.reproducibility import LatencyModelRow, LatencyRow
+from genpolicy.evidence.reproducibility.processor import (
+    Machine,
+    machine_between,
+    machine_now,
+)
+from genpolicy.evidence.rows.reproducibility import LatencyModelRow, LatencyRow, MachineRow
 from genpolicy.evidence.stress.latency import DeclaredTerm, LatencyModel, draw_latency
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.policies.fixtures import fixture_observations
@@ -71,28 +76,47 @@ class LatencyPlan:
     joining: JoiningSettings = field(default_factory=JoiningSettings)
 
 
-def measured_rows(plan: LatencyPlan, policies: Sequence[Contender]) -> list[LatencyRow]:
+@dataclass(frozen=True)
+class Taken:
+    """What the measurements of all methods found.
+
+    Attributes:
+        rows: Terms, with their times.
+        machine: What ran beside each of the processes.
+    """
+
+    rows: list[LatencyRow]
+    machine: list[MachineRow]
+
+
+def measure_all(plan: LatencyPlan, policies: Sequence[Contender]) -> Taken:
     """Terms measured on this machine: two runs of several processes per method, in turns.
 
     Methods and runs take turns, so that a machine which grows slower slows all of them.
     """
-    return [
-        LatencyRow(
-            method=judged.name,
-            run=run,
-            process=process,
-            component=item.component,
-            owner=str(OWNERS[Term(item.component)]),
-            temperature=item.temperature,
-            repeat=item.repeat,
-            seconds=item.seconds,
-            source="measured",
-        )
-        for process in PROCESSES
-        for run in RUNS
-        for judged in policies
-        for item in in_fresh_process(measure_terms, plan, judged)
-    ]
+    taken = Taken([], [])
+    for process in PROCESSES:
+        for run in RUNS:
+            for judged in policies:
+                items, beside = in_fresh_process(measure_process, plan, judged)
+                taken.rows.extend(_measured_row(judged.name, run, process, item) for item in items)
+                taken.machine.append(MachineRow(judged.name, run, process, **vars(beside)))
+    return taken
+
+
+def _measured_row(method: str, run: int, process: int, item: Measurement) -> LatencyRow:
+    return LatencyRow(
+        method=method,
+        run=run,
+        process=process,
+        component=item.component,
+        owner=str(OWNERS[Term(item.component)]),
+        temperature=item.temperature,
+        repeat=item.repeat,
+        seconds=item.seconds,
+        source="measured",
+        waited_s=item.waited_s,
+    )
 
 
 def declared_rows(
@@ -135,11 +159,19 @@ def declared_rows(
                 repeat=repeat,
                 seconds=float(value),
                 source="declared",
+                waited_s=None,
             )
             for name in names
             for repeat, value in enumerate(drawn)
         ]
     return rows
+
+
+def measure_process(plan: LatencyPlan, judged: Contender) -> tuple[list[Measurement], Machine]:
+    """Spans of one method in this process, and what ran on the machine meanwhile."""
+    before = machine_now()
+    items = measure_terms(plan, judged)
+    return items, machine_between(before, machine_now())
 
 
 def measure_terms(plan: LatencyPlan, judged: Contender) -> list[Measurement]:
@@ -227,7 +259,8 @@ def model_rows(
 ) -> list[LatencyModelRow]:
     """What the model made from all other processes says of each process.
 
-    Only measured terms are summed: nothing here can contradict a declared one.
+    Only measured terms are summed: nothing here can contradict a declared one. The same is said
+    without the time that was waited for a processor, of methods of which all of it is known.
 
     Args:
         rows: Measured rows of both runs.
@@ -235,8 +268,23 @@ def model_rows(
         root_seed: Root seed of the ladder.
     """
     table = pd.DataFrame([vars(row) for row in rows])
+    waited = table["waited_s"].astype(float)
+    unknown = set(table.loc[waited.isna(), "method"])
+    known = ~table["method"].isin(unknown)
+    running = table.assign(seconds=table["seconds"] - waited)[known]
+    ran = _held_out(running, declared, root_seed) if known.any() else {}
+    return [
+        LatencyModelRow(*place, *quantiles, *ran.get(place, (None, None)))
+        for place, quantiles in _held_out(table, declared, root_seed).items()
+    ]
+
+
+def _held_out(
+    table: pd.DataFrame, declared: Mapping[str, DeclaredTerm], root_seed: int
+) -> dict[tuple[str, int, int, float], tuple[float, float]]:
+    """Quantiles of each process, measured and drawn, s, by method, run, process and level."""
     warm = table[table["temperature"] == "warm"]
-    found = []
+    found = {}
     for run, process in warm[["run", "process"]].drop_duplicates().itertuples(index=False):
         part = warm[(warm["run"] == run) & (warm["process"] == process)]
         others = table[(table["run"] != run) | (table["process"] != process)]
@@ -244,17 +292,11 @@ def model_rows(
         for method, model in latency_models(others, declared).items():
             drawn = np.fromiter(_drawn_spans(model, root_seed), dtype=np.float64)
             measured = spans.loc[method].to_numpy()
-            found += [
-                LatencyModelRow(
-                    method=method,
-                    run=int(run),
-                    process=int(process),
-                    level=level,
-                    measured_s=float(np.quantile(measured, level, method="higher")),
-                    drawn_s=float(np.quantile(drawn, level, method="higher")),
+            for level in LEVELS:
+                found[method, int(run), int(process), level] = (
+                    float(np.quantile(measured, level, method="higher")),
+                    float(np.quantile(drawn, level, method="higher")),
                 )
-                for level in LEVELS
-            ]
     return found
 
 

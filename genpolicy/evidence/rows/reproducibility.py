@@ -132,6 +132,9 @@ class LatencyRow:
         repeat: Which invocation of its temperature.
         seconds: Duration, s.
         source: `measured` on this machine, or `declared`.
+        waited_s: How much of it the call could have run and had no processor, because other
+            processes had them, s; None where the kernel does not say, and of what is declared or
+            done behind the wire.
     """
 
     method: str
@@ -143,6 +146,38 @@ class LatencyRow:
     repeat: int
     seconds: float
     source: str
+    waited_s: float | None
+
+
+@dataclass(frozen=True)
+class MachineRow:
+    """`machine.parquet` of latency: what ran on the machine while one process was measured.
+
+    Attributes:
+        method: The method.
+        run: Which of the two measurements, from 1.
+        process: Which fresh process of its run, from 1.
+        seconds: How long it measured, s.
+        cpu_s: Time on a processor of the process itself, s.
+        voluntary: How often it gave its processor away: it slept, or waited for something.
+        involuntary: How often its processor was taken away.
+        others_s: Work of all other processes, on all processors, s; the server of a policy behind
+            the wire is among them. None where the kernel does not say.
+        stolen_s: Time of all processors that the host of the machine gave to others, s; None
+            likewise.
+        cpus: Processors.
+    """
+
+    method: str
+    run: int
+    process: int
+    seconds: float
+    cpu_s: float
+    voluntary: int
+    involuntary: int
+    others_s: float | None
+    stolen_s: float | None
+    cpus: int
 
 
 @dataclass(frozen=True)
@@ -156,6 +191,10 @@ class LatencyModelRow:
         level: Which quantile of an invocation's measured terms, summed.
         measured_s: That quantile in the process, s.
         drawn_s: The same of invocations drawn from the model, s.
+        measured_running_s: That quantile without the time waited for a processor, s; None where
+            nobody knows of one of the terms.
+        drawn_running_s: The same of invocations drawn from a model without that time, s; None
+            likewise.
     """
 
     method: str
@@ -164,6 +203,8 @@ class LatencyModelRow:
     level: float
     measured_s: float
     drawn_s: float
+    measured_running_s: float | None
+    drawn_running_s: float | None
 
 
 @dataclass(frozen=True)

@@ -104,13 +104,13 @@ def test_bounds_that_are_no_times_are_refused(bounds):
         DeclaredTerm(*bounds)
 
 
-def measured(spans, *, processes=3):
+def measured(spans, *, processes=3, waits=lambda *_: 0.0):
     """Rows of method `a`: `spans(run, process, repeat, term)` seconds; cold as warm."""
     return [
         LatencyRow(
             method="a", run=run, process=process, component=str(name), owner=str(OWNERS[name]),
             temperature=temperature, repeat=repeat, seconds=spans(run, process, repeat, str(name)),
-            source="measured",
+            source="measured", waited_s=waits(run, process, repeat, str(name)),
         )
         for run in (1, 2)
         for process in range(1, processes + 1)
@@ -159,3 +159,29 @@ def test_a_process_is_no_part_of_the_model_that_it_is_held_against():
         assert not own or row.drawn_s == pytest.approx(0.005)
     (high,) = [r for r in rows if (r.run, r.process) == slow and r.level == 0.95]
     assert high.measured_s / high.drawn_s == pytest.approx(20.0)
+
+
+def test_the_time_waited_is_in_the_model_on_the_wall_and_not_in_the_one_beside_it():
+    """One process of six waited for nine tenths of its time."""
+    busy = (2, 3)
+    rows = model_rows(
+        measured(
+            lambda run, process, repeat, name: 0.01 if (run, process) == busy else 0.001,
+            waits=lambda run, process, repeat, name: 0.009 if (run, process) == busy else 0.0,
+        ),
+        DECLARED, root_seed=1,
+    )  # fmt: skip
+    for row in rows:
+        own = (row.run, row.process) == busy
+        assert row.measured_s == pytest.approx(0.05 if own else 0.005)
+        assert row.measured_running_s == pytest.approx(0.005)
+        assert row.drawn_running_s == pytest.approx(0.005)
+
+
+def test_of_a_method_with_one_unknown_wait_nothing_is_said_without_it():
+    def some(run, process, repeat, name):
+        return None if (run, process, repeat, name) == (1, 1, 0, "encode") else 0.0
+
+    rows = model_rows(measured(lambda *_: 0.001, waits=some), DECLARED, root_seed=1)
+    assert len(rows) == 12
+    assert all(row.measured_running_s is None and row.drawn_running_s is None for row in rows)

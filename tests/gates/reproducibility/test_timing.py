@@ -17,6 +17,7 @@ from gates.reproducibility.timing import (
 
 LATENCY = "latency/latency.parquet"
 MODEL = "latency/model.parquet"
+UNKNOWN = {"measured_running_s": np.nan, "drawn_running_s": np.nan}
 RATIOS = {"warm": "warm_latency_ratio_upper", "cold": "cold_latency_ratio_upper"}
 
 
@@ -100,7 +101,8 @@ def _as_drawn(rows, factor):
     """All processes as drawn, but those of some rows so many times as long."""
 
     def change(frame):
-        return frame.assign(measured_s=frame["drawn_s"] * np.where(rows(frame), factor, 1.0))
+        measured = frame["drawn_s"] * np.where(rows(frame), factor, 1.0)
+        return frame.assign(measured_s=measured, **UNKNOWN)
 
     return change
 
@@ -144,7 +146,8 @@ def test_a_baseline_without_a_model_leaves_no_verdict(ladder, name):
 def test_processes_that_scatter_leave_the_model_unproven(ladder):
     def scattered(frame):
         return frame.assign(
-            measured_s=frame["drawn_s"] * np.choose(frame["process"] - 1, [0.5, 1.0, 2.0])
+            measured_s=frame["drawn_s"] * np.choose(frame["process"] - 1, [0.5, 1.0, 2.0]),
+            **UNKNOWN,
         )
 
     evidence.edit_table(ladder, MODEL, scattered)
