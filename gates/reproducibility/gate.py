@@ -249,7 +249,7 @@ def _range(values: Array) -> str:
 
 
 def _both_rules(judged: Judged) -> list[str]:
-    """What equal updates and equal convergence say of every candidate that was trained here."""
+    """Of whom equal updates or equal convergence do not hold, among those trained here."""
     settings: ReproducibilitySettings = judged.settings
     limit = settings.limits.of.get("baseline_fall_upper")
     return matched_by(

@@ -78,10 +78,10 @@ def trained(
     done = judge_criterion(fall.interval[1], limit, "<=", fall.interval)
     near = []
     for frame in losses(evidence, root, method).values():
-        totals = frame["total"].sum().sort_index()
-        beyond = totals.index[totals > (1.0 + limit) * totals.iloc[-1]]
-        steps = totals.index if len(beyond) == 0 else totals.index[totals.index > beyond[-1]]
-        near.append(int(steps[0]))
+        steps = sorted(int(step) for step in frame["total"].columns)
+        total = [float(frame["total"][step].sum()) for step in steps]
+        beyond = [place for place, loss in enumerate(total) if loss > (1.0 + limit) * total[-1]]
+        near.append(steps[beyond[-1] + 1 if beyond else 0])
     return Trained(method, updates_of(evidence, root, method), fall, max(near), done)
 
 
@@ -128,7 +128,10 @@ def matched_by(
     limit: float | None,
     confidence: float,
 ) -> list[str]:
-    """What a report says of both rules: a sentence for each candidate that was trained here."""
+    """What a report says of both rules: a sentence for each candidate that one does not hold for.
+
+    Where both hold the page says so, and nothing is left to doubt.
+    """
     said = []
     for name in candidates:
         if limit is None:
@@ -142,7 +145,8 @@ def matched_by(
         except MissingEvidenceError as error:
             said.append(f"{name}, matched by equal updates and convergence: not measured, {error}.")
             continue
-        said += [_said(name, found, limit)] if found else []
+        if any(rule != "PASS" for pair in found for rule in (pair.by_updates, pair.by_convergence)):
+            said.append(_said(name, found, limit))
     return said
 
 

@@ -28,8 +28,7 @@ def found_of(root, **changed):
 
 
 def test_both_rules_hold_where_all_took_as_many_updates_and_all_are_done(ladder):
-    assert "Equal updates: PASS." in said_of(ladder)
-    assert f"{BY_CONVERGENCE} PASS. The page" in said_of(ladder)
+    assert not [text for text in judge(ladder, "B").caveats if "matched" in text]
     for pair in found_of(ladder):
         assert (pair.by_updates, pair.by_convergence, pair.remains) == ("PASS", "PASS", "")
         # By hand: 1.5 and 1.0 over 0.96 at the end; 1.0 is within a tenth of it, 1.5 is not.
