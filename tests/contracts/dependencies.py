@@ -20,6 +20,7 @@ PACKAGES = ("genpolicy", "gates", "stages", "flows")
 CODE = ("genpolicy", "gates", "stages")
 TABLE = ROOT / "docs" / "dependencies.md"
 TASK_LOADER = "genpolicy.tasks.api"
+CONTRACTS = "stages._contracts"
 TASK_STAGE, IDENTITY = "task", "artifacts/task/identity.json"
 # Admission decides whether a stage may begin, never what it computes. Evidence stages depend on
 # what it decides about (`artifacts/gate_x/verdict.json`), so that an edit of a gate or of a report
@@ -80,9 +81,10 @@ def of_a_plugin(module: str) -> bool:
 
 
 def loads_a_task(stage: str) -> bool:
-    """Whether a stage reaches what loads a task."""
+    """Whether a stage reaches what loads a task, or holds what it reads against its identity."""
     module = f"stages.{stage}"
-    return TASK_LOADER in {module} | graph().find_upstream_modules(module)
+    reached = {module} | graph().find_upstream_modules(module)
+    return bool(reached & {TASK_LOADER, CONTRACTS})
 
 
 def reached_modules(module: str) -> set[str]:

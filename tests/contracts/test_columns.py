@@ -51,6 +51,7 @@ MADE = {
     ("gates/pages/plots_need.py", "mean"): "the same",
     ("gates/pages/plots_need.py", "size"): "the same",
     ("gates/pages/plots_convergence.py", "total"): "made in `gates.reproducibility.convergence`",
+    ("gates/reproducibility/matching.py", "total"): "the same",
     ("gates/pages/plots_density.py", "gain"): "made in `gates.reproducibility.densities`",
     ("gates/pages/plots_density.py", "share"): "the same",
 }

@@ -8,8 +8,10 @@ import pytest
 
 from genpolicy.errors import ContractError
 from genpolicy.integrity.hashing import sha256_file
+from stages import train_generators
 from stages._contracts import require_contract_of_task, require_one_contract
 
+TRAIN = (train_generators,)
 TASK = {"observation_sha256": "o", "action_sha256": "a", "name": "t", "phases": {"all": ["p"]}}
 MANIFEST = {
     "observation_contract": {"sha256": "o"}, "action_contract": {"sha256": "a"}, "phases": ["p"],
@@ -69,3 +71,15 @@ def test_a_checkpoint_of_another_dataset_is_refused_where_the_dataset_is_read(ar
     require_one_contract("train_x", dataset=False)
     with pytest.raises(ContractError, match="dataset is other"):
         require_one_contract("train_x")
+
+
+@pytest.mark.parametrize("stage", TRAIN)
+def test_nothing_is_trained_on_a_dataset_of_another_contract(artifacts, monkeypatch, stage):
+    def trains(*_args, **_others):
+        pytest.fail("it trained")
+
+    for name, instead in (("admit", lambda *_: None), ("train_matched", trains)):
+        monkeypatch.setattr(stage, name, instead)
+    artifacts("ingest/manifest.json", {**MANIFEST, "phases": ["q"]})
+    with pytest.raises(ContractError, match=r"manifest\.json: phase"):
+        stage.work(None)
