@@ -4,7 +4,7 @@
 #   make smoke    the same ladder, reduced (params.smoke.yaml), in its own workspace build/smoke
 #   make test     format, lint, types, import contracts, tests
 #   make soak     twenty million random events against executor, stub and supervisor, ten thousand
-#                 random chunks at every millisecond (an hour and a half)
+#                 random chunks at every millisecond (an hour and a half; it goes on where it was cut)
 #   make lint     make test without the tests
 #   make lerobot  LeRobot's own environment in build/lerobot, to train and serve its policies
 #   make doctor   versions against the pins, disk, memory, telemetry, DVC
@@ -13,6 +13,7 @@
 # Variables: TORCH_INDEX=<url>  another package index for torch (CPU or CUDA builds)
 #            PYTHON=<path>      another Python 3.11 (3.12 should do, 3.11 is tested)
 #            JOBS=<n>           test processes, default 2
+#            SEED=<n>           seed of `make soak`, default 0
 #
 # An end of `make ladder`: 0 the ladder ran to its end, and gate E passes or waits for people;
 # otherwise make prints "Error 3" (refused by a gate, the table says which), "Error 2" (bad
@@ -27,6 +28,7 @@ VENV := .venv
 BIN := $(CURDIR)/$(VENV)/bin
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 JOBS ?= 2
+SEED ?= 0
 PYTHON_LEROBOT ?= $(shell command -v python3.12 || command -v python3.13)
 TORCH_PIN := $(shell grep -E '^torch==' constraints.txt)
 
@@ -50,7 +52,7 @@ WANTED := $(shell cat constraints.txt pyproject.toml | $(SHA256) | cut -d' ' -f1
 .PHONY: help env ladder smoke test soak lerobot lint doctor clean
 
 help:
-	@sed -n '1,20p' Makefile | sed 's/^# \{0,1\}//'
+	@sed -n '1,21p' Makefile | sed 's/^# \{0,1\}//'
 
 env:
 	@if [ "$$(cat $(VENV)/.ok 2>/dev/null)" = "$(WANTED)" ]; then exit 0; fi; \
@@ -88,8 +90,8 @@ lerobot:
 	echo "LeRobot is in build/lerobot; docs/candidates.md says how to train and to serve with it."
 
 soak: env
-	@python tests/feasibility/dense.py
-	@python tests/execution/soak.py
+	@python -m benchmarks.soak chunks --wanted 10000 --seed $(SEED)
+	@python -m benchmarks.soak events --wanted 20000000 --seed $(SEED)
 
 lint: env
 	@code=0; ruff check . || code=1; ruff format --check . || code=1; \

@@ -1,6 +1,6 @@
 """Random events against executor, stub and supervisor, judged by a model of its own.
 
-    python tests/execution/soak.py --events 20000000      (`make soak`)
+    python -m benchmarks.soak events --wanted 20000000      (`make soak`)
 
 The model knows nothing of the table of checks: it says who may command, from when on observations
 count, and how far one command may lie from the last. What a session left is judged once more by
@@ -8,10 +8,8 @@ the independent checker. Chunks are honest in themselves: each begins one step f
 command of the moment in which it is made. What happens to them is not.
 """
 
-import argparse
 import math
 import random
-import sys
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -22,7 +20,6 @@ from genpolicy.evidence.shadow.rig import CHECKPOINT, IMITATED, ROWS, SAMPLER, R
 from genpolicy.execution.cell import FALLBACK_HASH
 from genpolicy.execution.checks import Checks
 from genpolicy.execution.supervisor import Supervisor
-from genpolicy.statistics.intervals import clopper_pearson
 from genpolicy.verification.checker import check_messages
 
 PERIOD_NS = 50_000_000
@@ -349,7 +346,7 @@ class Soaked:
     wrongs: list[str] = field(default_factory=list)
 
 
-def soak(seed: int, events: int, checks: Checks = IMITATED) -> Soaked:
+def soak(seed: int | str, events: int, checks: Checks = IMITATED) -> Soaked:
     """At least so many events, in sessions named by the seed; stops at the first wrong one."""
     found = Soaked()
     while found.events < events and not found.wrongs:
@@ -359,23 +356,3 @@ def soak(seed: int, events: int, checks: Checks = IMITATED) -> Soaked:
         found.commands += walk.rig.stub.accepted
         found.wrongs += [f"session {seed} {found.sessions - 1}: {wrong}" for wrong in walk.wrongs]
     return found
-
-
-def main() -> int:
-    """Command line; 1 where something was wrong."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--events", type=int, default=20_000_000)
-    parser.add_argument("--seed", type=int, default=0)
-    args = parser.parse_args()
-    found = soak(args.seed, args.events)
-    upper = clopper_pearson(len(found.wrongs), found.commands)[1]
-    print(
-        f"{found.events} events in {found.sessions} sessions, {found.commands} commands, "
-        f"{len(found.wrongs)} wrong; at most {upper:.2g} of the commands (95 %)"
-    )
-    print("\n".join(found.wrongs))
-    return 1 if found.wrongs else 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -1,6 +1,6 @@
 """Random chunks through projection and six layers; what is admitted is looked at every millisecond.
 
-    python tests/feasibility/dense.py --admitted 10000      (`make soak`)
+    python -m benchmarks.soak chunks --wanted 10000      (`make soak`)
 
 Each draw is a family of chunks, from one that is easy to one that is refused; the admitted one that
 is nearest to being refused is looked at. The eye is MuJoCo's kinematics and contacts, and finite
@@ -8,9 +8,7 @@ differences, along lines of joints from command to command, and from where the a
 What the checker of journals says of the same chunks is asked as well: it must object to none.
 """
 
-import argparse
 import math
-import sys
 from collections import Counter
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -31,7 +29,6 @@ from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.robot.controller import CONTROLLER_MODE
 from genpolicy.robot.impedance import STIFFNESS_N_M
 from genpolicy.robot.scene_state import SceneState
-from genpolicy.statistics.intervals import clopper_pearson
 from genpolicy.tasks.api import load_task
 from genpolicy.verification.body import OwnBody
 from genpolicy.verification.motion import MotionProof
@@ -376,24 +373,3 @@ def look(seed, admitted, checks=CHECKS, *, kinds=KINDS, until=None):
             found.admitted[families[i].kind] += 1
             found.wrongs += [f"chunk {number} ({families[i].kind}): {one}" for one in said[:1]]
     return found
-
-
-def main():
-    """Command line; 1 where something was wrong."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--admitted", type=int, default=10_000)
-    parser.add_argument("--seed", type=int, default=0)
-    args = parser.parse_args()
-    found = look(args.seed, args.admitted)
-    total = found.admitted.total()
-    upper = clopper_pearson(len(found.wrongs), total)[1]
-    print(f"{total} admitted chunks {dict(found.admitted)}, next to them refused by:")
-    print(", ".join(f"{name} {count}" for name, count in found.refused.most_common()))
-    print("worst: " + ", ".join(f"{value:.4g} {name}" for name, value in found.worst.items()))
-    print(f"{len(found.wrongs)} wrong; at most {upper:.2g} of such chunks (95 %)")
-    print("\n".join(found.wrongs))
-    return 1 if found.wrongs else 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
