@@ -18,6 +18,7 @@ import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import Any
 
 from genpolicy.integrity.hashing import sha256_bytes
 from genpolicy.statistics.intervals import clopper_pearson
@@ -54,19 +55,19 @@ Found = tuple[int, int, list[str]]
 """Done, at risk and wrongs of a part."""
 
 
-def events_of(soak: Callable, seed: int, number: int) -> Found:
+def events_of(soak: Callable[..., Any], seed: int, number: int) -> Found:
     """Random events against executor, stub and supervisor."""
     found = soak(f"{seed}.{number}", 50_000)
     return found.events, found.commands, found.wrongs
 
 
-def chunks_of(look: Callable, seed: int, number: int) -> Found:
+def chunks_of(look: Callable[..., Any], seed: int, number: int) -> Found:
     """Random chunks that are just admitted, at every millisecond."""
     found = look([seed, number], 250)
     return found.admitted.total(), found.admitted.total(), found.wrongs
 
 
-KINDS: dict[str, tuple[str, str, Callable[[Callable, int, int], Found], str]] = {
+KINDS: dict[str, tuple[str, str, Callable[[Callable[..., Any], int, int], Found], str]] = {
     "events": ("tests/execution/soak.py", "soak", events_of, "commands"),
     "chunks": ("tests/feasibility/dense.py", "look", chunks_of, "chunks"),
 }

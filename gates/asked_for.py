@@ -1,9 +1,10 @@
-"""What Gate C asks for by name: every row of both tables of checks, every incident on the way.
+"""What Gate C asks for by name: every row of both tables of checks, every incident, every fixture.
 
 No setting leaves one out. Written out, not imported: every stage reads the gates, and training may
 know neither feasibility nor execution. Tests hold the lists to the tables
 (`genpolicy/feasibility/checks.py`, `genpolicy/execution/checks.py`, of votes
-`genpolicy/candidates/votes.py`, `genpolicy/evidence/shadow/on_the_way.py`).
+`genpolicy/candidates/votes.py`, of what stops `genpolicy/evidence/shadow/stop_mutants.py`, and
+`genpolicy/evidence/shadow/on_the_way.py`, `genpolicy/evidence/shadow/corruption.py`).
 """
 
 CHECKS_ASKED_FOR = (
@@ -83,6 +84,7 @@ CHECKS_ASKED_FOR = (
     "execution.behind_accepted",
     "execution.behind_queued",
     "execution.predecessor",
+    "execution.queue_overflow",
     "execution.superseded",
     "execution.out_of_order",
     "execution.sequence",
@@ -93,6 +95,9 @@ CHECKS_ASKED_FOR = (
     "execution.vote_horizon",
     "execution.vote_valid",
     "execution.vote_age",
+    "execution.deaf_to_force",
+    "execution.deaf_to_collision",
+    "execution.deaf_to_emergency_stop",
 )
 NOT_ASKED_OF_EVERY_TASK = (
     "geometric.scene_collision",
@@ -134,3 +139,49 @@ INCIDENTS_ASKED_FOR = {
 OF_TWO = ("copy_on_the_way", "overtaken_on_the_way", "policy_hang_on_the_way")
 """In these two chunks are counted, of which one is executed: the first of two copies, the newer of
 two that come in the wrong order, the one before the one that never comes."""
+REFUSED_FOR = {
+    "too_long": "shape",
+    "not_a_number": "finite",
+    "late_row_not_a_number": "finite",
+    "infeasible_rotation": "rotation_degenerate",
+    "late_row_without_rotation": "rotation_degenerate",
+    "scaled_rotation": "rotation_not_orthonormal",
+    "gripper_out_of_range": "gripper_range",
+    "far_ahead": "projection_too_large",
+    "outside_workspace": "workspace",
+    "out_of_reach": "unreachable",
+    "awkward_posture": "joint_position",
+    "singular_posture": "singular",
+    "flipped_branch": "branch_jump",
+    "collision": "scene_collision",
+    "folded_posture": "self_collision",
+    "leap": "swept_collision",
+    "cut_off": "measured_collision",
+    "other_period": "action_period",
+    "fast_joint": "joint_velocity",
+    "broken_boundary": "joint_acceleration",
+    "jolt_before": "joint_jerk",
+    "fast_tcp": "tcp_speed",
+    "fast_turn": "tcp_turn",
+    "heavy_jolt": "joint_torque",
+    "heavy_load": "payload_torque",
+    "left_behind": "measured_velocity",
+    "pushed_aside": "measured_acceleration",
+    "old_state": "state_age",
+    "other_controller": "controller_mode",
+    "aside_in_contact": "approach_direction",
+    "fast_in_contact": "contact_speed",
+    "early_release": "gripper_opening",
+    "on_another_surface": "contact_surface",
+    "pressed_in": "contact_force",
+    "earlier_session": "session_epoch",
+    "calibration_change": "calibration_mismatch",
+    "phase_change": "phase_transition",
+    "checkpoint_swap": "checkpoint_mismatch",
+    "sampler_swap": "sampler_mismatch",
+    "future_observation": "future_observation",
+    "reordered_chunk": "behind_accepted",
+    "stale_observation": "stale_observation",
+    "expired": "expired",
+}
+"""Corrupted fixtures, and the check that a good chunk is refused by once it is broken so."""

@@ -46,10 +46,16 @@ def share_interval(
         raise MissingEvidenceError("no rows to take a share of")
     share = float(np.mean(np.asarray(hits, dtype=np.float64)))
     trials = len(set(np.asarray(clusters).tolist()))
+    return (share, *interval_of(share, trials, confidence=confidence, favourable=favourable))
+
+
+def interval_of(
+    share: float, trials: int, *, confidence: float, favourable: bool
+) -> tuple[float, float]:
+    """Exact interval of a share that was counted over so many clusters; arguments as above."""
     product = round(share * trials, 9)
     successes = math.floor(product) if favourable else math.ceil(product)
-    lower, upper = clopper_pearson(successes, trials, confidence)
-    return share, lower, upper
+    return clopper_pearson(successes, trials, confidence)
 
 
 def counted_interval(hits: float, trials: float, *, confidence: float) -> tuple[float, float]:

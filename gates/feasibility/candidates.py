@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 
+from gates.asked_for import REFUSED_FOR
 from gates.bounds import counted_interval, share_interval, upper_quantile, widest_gap
 from gates.criterion import Measured, criterion
 from gates.evidence import Array, Evidence, MissingEvidenceError, flags, numbers
@@ -37,7 +38,7 @@ def _held_out(evidence: Evidence, candidate: str) -> pd.DataFrame:
     return rows
 
 
-def _episodes(rows: pd.DataFrame) -> pd.Series:
+def episodes_of(rows: pd.DataFrame) -> pd.Series:
     """Episode of each row: a situation is named by its episode and a step of it."""
     found: pd.Series = rows["situation"].astype(str).str.rpartition(":")[0]
     return found
@@ -75,7 +76,7 @@ def mode_admissible_gap(
     rows = rows[rows["fixture"] == TWO_MODES]
     if len(rows) == 0:
         raise MissingEvidenceError("no situation with several modes was sampled")
-    rows = rows.assign(admissible=admissible(rows), episode=_episodes(rows))
+    rows = rows.assign(admissible=admissible(rows), episode=episodes_of(rows))
     rows = rows[~rows["mode"].isin(NO_MODE)]
     odd, said = _odd(rows, settings)
     rows = rows[~rows["mode"].isin(odd)]
@@ -123,7 +124,7 @@ def _odd(rows: pd.DataFrame, settings: FeasibilitySettings) -> tuple[list[str], 
 def admissible_share(evidence: Evidence, settings: FeasibilitySettings, candidate: str) -> Measured:
     """Lower bound of the share of held-out candidates that pass all six layers."""
     rows = _held_out(evidence, candidate)
-    episodes = _episodes(rows)
+    episodes = episodes_of(rows)
     share, lower, upper = share_interval(
         admissible(rows), episodes.to_numpy(), confidence=settings.confidence, favourable=True
     )
@@ -167,7 +168,7 @@ def _of_admissible(
     if len(rows) == 0:
         raise MissingEvidenceError("no candidate is admissible")
     values = np.abs(numbers(rows, column))
-    episodes = _episodes(rows)
+    episodes = episodes_of(rows)
     point, interval = upper_quantile(
         values,
         episodes.to_numpy(),
@@ -207,5 +208,7 @@ def corrupted_refused_share(
     text = f"{len(rows)} candidates of {rows['fixture'].nunique()} corrupted fixtures" + (
         f"; let through or refused without reason: {', '.join(through)}" if through else ""
     )
+    own = rows["first_reason"] == rows["fixture"].map(REFUSED_FOR)
+    text += f"; {int((refused & ~own).sum())} refused for another reason than their fixture's own"
     counted = f"{refused.sum()} of {len(rows)} candidates"
     return Measured(float(refused.mean()), interval, text, counted=counted)

@@ -35,6 +35,7 @@ from gates.pages import (
     tables_matching,
     tables_overruns,
     tables_stress,
+    tables_survival,
 )
 from gates.pages.clips import clips_of
 from gates.pages.desk import desk_of
@@ -76,6 +77,7 @@ PLOTS: dict[str, tuple[Picturable, ...]] = {
     "C": (
         *plots_feasibility.PLOTS,
         *tables_feasibility.LISTINGS,
+        *tables_survival.LISTINGS,
         *plots_rejected.GALLERIES,
         *plots_incidents.PLOTS,
         *tables_holds.LISTINGS,

@@ -4,8 +4,10 @@ from collections.abc import Iterable
 
 import pandas as pd
 
-from gates.asked_for import CHECKS_ASKED_FOR
+from gates.asked_for import CHECKS_ASKED_FOR, REFUSED_FOR
+from gates.bounds import share_interval
 from gates.evidence import Evidence
+from gates.feasibility.candidates import episodes_of
 from gates.feasibility.settings import (
     CANDIDATES,
     HELD_OUT,
@@ -16,6 +18,7 @@ from gates.feasibility.settings import (
 )
 from gates.pages.figures import Folded, Listing, Table, in_order
 from gates.pages.reasons import REASON_WORDS, said
+from gates.pages.tables_survival import percent
 from gates.report import GateReport
 from genpolicy.evidence.rows.shadow import CandidateRow
 
@@ -25,13 +28,13 @@ NOTHING = "nothing"
 
 def _rejections(evidence: Evidence, report: GateReport) -> Table:
     """Reasons in the order of the checks, with a line for each method."""
-    held = _held_out(evidence)
+    held, confidence = _held_out(evidence), float(report.settings["confidence"])
     lines, told = [], set[str]()
     for reason, method, own, rows in _groups(held):
         because = "as above" if reason in told else REASON_WORDS.get(reason, "")
         told.add(reason)
         lines.append(
-            (f"{_layer(reason)}: {said(reason)}", method, _of(rows, own),
+            (f"{_layer(reason)}: {said(reason)}", method, _of(rows, own, confidence),
              _where(rows, own, "phase"), _where(rows, own, "mode"), because)
         )  # fmt: skip
     heads = ("layer: reason", "method", "rejected", "by phase", "by mode", "because")
@@ -58,10 +61,14 @@ def _layer(reason: str) -> str:
     return LAYER_OF.get(reason, "no layer")
 
 
-def _of(rows: pd.DataFrame, own: pd.DataFrame) -> str:
-    """How many of how many, with those that could not be judged."""
+def _of(rows: pd.DataFrame, own: pd.DataFrame, confidence: float) -> str:
+    """How many of how many, the interval over episodes, and those that could not be judged."""
     unknown = int((own["outcome"] == UNKNOWN).sum())
-    text = f"{len(own)} of {len(rows)} ({100 * len(own) / len(rows):.2g} %)"
+    share, low, high = share_interval(
+        rows.index.isin(own.index), episodes_of(rows).to_numpy(), confidence=confidence,
+        favourable=False,
+    )  # fmt: skip
+    text = f"{len(own)} of {len(rows)}: {percent(share, (low, high))}"
     return text + (f", {unknown} of them unknown" if unknown else "")
 
 
@@ -101,17 +108,21 @@ def _quiet(evidence: Evidence, report: GateReport) -> Table:
 
 
 def _corrupted(evidence: Evidence, report: GateReport) -> Table:
-    """For which reasons each corrupted fixture was refused."""
+    """For which reason each corrupted fixture was to be refused, and for which it was."""
     frame = evidence.rows(CANDIDATES, CandidateRow)
     frame = frame[~frame["fixture"].isin(INTACT).to_numpy()]
     lines = []
     for fixture, rows in frame.groupby("fixture"):
         refused = rows[rows["outcome"] != PASSED]
+        expected = REFUSED_FOR.get(str(fixture), "")
         counts = refused["first_reason"].value_counts()
-        names = sorted(counts.index, key=lambda name: (-counts[name], str(name)))
-        text = ", ".join(f"{said(str(name)) or 'no reason'} {counts[name]}" for name in names)
-        lines.append((said(str(fixture)), text, f"{len(refused)} of {len(rows)}"))
-    return ("corrupted fixture", "refused for", "refused"), *lines
+        names = sorted(set(counts.index) - {expected}, key=lambda name: (-counts[name], str(name)))
+        others = ", ".join(f"{said(str(name)) or 'no reason'} {counts[name]}" for name in names)
+        lines.append(
+            (said(str(fixture)), said(expected) or "nobody knows", str(counts.get(expected, 0)),
+             others or "none", f"{len(refused)} of {len(rows)}")
+        )  # fmt: skip
+    return ("corrupted fixture", "expected", "refused for that", "for another", "refused"), *lines
 
 
 LISTINGS = (
@@ -119,14 +130,15 @@ LISTINGS = (
         "What was rejected, and why",
         "Candidates on held-out observations, by the first check that did not hold: layer and "
         "reason, then of each method how many, in which phases and in which modes of how many "
-        "there. A mode that loses far more than the other is removed by the checks. Unknown is "
-        "what could not be evaluated; it does not pass.",
+        "there. In brackets the exact interval of the share, over episodes. A mode that loses far "
+        "more than the other is removed by the checks. Unknown is what could not be evaluated; it "
+        "does not pass.",
         CANDIDATES,
         _rejections,
         folded=(
             Folded("Every phase with every mode", _each),
             Folded("Reasons that rejected nothing", _quiet),
-            Folded("What corrupted fixtures were refused for", _corrupted),
+            Folded("What corrupted fixtures were to be refused for, and were", _corrupted),
         ),
     ),
 )

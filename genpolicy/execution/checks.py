@@ -27,6 +27,8 @@ class Place(StrEnum):
     ARRIVAL = "arrival"
     QUEUE = "queue"
     """Of every waiting chunk, on each event and before each command."""
+    ROOM = "room"
+    """Of the queue, when a chunk enters it: the oldest leaves until there is room."""
     ROWS = "rows"
     """Of each row, when a chunk enters the queue: may it be executed at all?"""
     PAST = "past"
@@ -264,6 +266,7 @@ CHECKS: Checks = (
     _row("predecessor",
          lambda m: m.chunk.metadata.predecessor_chunk_id in ("", m.head),
          _R.BROKEN_PREDECESSOR, _P.ARRIVAL),
+    _row("queue_overflow", lambda m: m.waiting < m.capacity, _R.QUEUE_OVERFLOW, _P.ROOM),
     _row("superseded", _not_superseded, _R.SUPERSEDED, _P.ROWS, _P.DUE),
     _row("out_of_order", lambda m: m.last_due_ns is None or m.due_ns > m.last_due_ns,
          _R.OUT_OF_ORDER, _P.DUE, _P.STUB),

@@ -91,11 +91,17 @@ class ChunkQueue:
             self._trim(now_ns, old, view, newer_start_ns=about.times.start_ns)
             if old.open_rows == 0:
                 self.close(now_ns, old, DiscardReason.SUPERSEDED)
-        while len(self._chunks) >= self._capacity:
-            self.close(now_ns, self._chunks[0], DiscardReason.QUEUE_OVERFLOW)
+        while self._chunks and (reason := self._no_room(now_ns)) is not None:
+            self.close(now_ns, self._chunks[0], reason)
         self._journal.add("enqueue", now_ns, _enqueue_payload(chunk))
         self._chunks.append(chunk)
         self.head = chunk.chunk_id
+
+    def _no_room(self, now_ns: int) -> DiscardReason | None:
+        """Why the oldest chunk must leave before another enters; None if there is room."""
+        moment = Moment(now_ns=now_ns, waiting=len(self._chunks), capacity=self._capacity)
+        check = refusal(self._checks, Place.ROOM, moment)
+        return None if check is None else check.reason
 
     def remaining(self, now_ns: int) -> int:
         """Actions that can still be executed."""

@@ -142,6 +142,8 @@ class Moment:
         accepted_start_ns: Start of that action's chunk.
         queued_condition_ns: Newest observation under a waiting chunk; None if none waits.
         queued_start_ns: Latest start of a waiting chunk.
+        waiting: Chunks that wait.
+        capacity: Chunks that may.
         newer_start_ns: Earliest start of a chunk that arrived after this one.
         last_due_ns: Begin of the window of the action accepted last.
         sequence: Number of the offer.
@@ -164,6 +166,8 @@ class Moment:
     accepted_start_ns: int | None = None
     queued_condition_ns: int | None = None
     queued_start_ns: int | None = None
+    waiting: int = 0
+    capacity: int = 0
     newer_start_ns: int | None = None
     last_due_ns: int | None = None
     sequence: int | None = None

@@ -32,7 +32,7 @@ GOOD = Moment(
     sequence=5, last_sequence=4, last_due_ns=250 * MS, watchdog_ns=100 * MS,
     last_accept_ns=260 * MS, follows=True,
     accepted_condition_ns=100 * MS, accepted_start_ns=200 * MS, queued_condition_ns=100 * MS,
-    queued_start_ns=200 * MS, newer_start_ns=350 * MS,
+    queued_start_ns=200 * MS, newer_start_ns=350 * MS, waiting=1, capacity=2,
 )  # fmt: skip
 
 
@@ -89,6 +89,7 @@ BAD = {
     "behind_accepted": replace(GOOD, accepted_condition_ns=100 * MS + 1),
     "behind_queued": replace(GOOD, queued_start_ns=200 * MS + 1),
     "predecessor": metadata(predecessor_chunk_id="ghost"),
+    "queue_overflow": replace(GOOD, waiting=2),
     "superseded": replace(GOOD, newer_start_ns=300 * MS),
     "out_of_order": replace(GOOD, last_due_ns=300 * MS),
     "sequence": replace(GOOD, last_sequence=5),

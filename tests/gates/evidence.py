@@ -73,6 +73,7 @@ from genpolicy.evidence.rows.stress import (
     StressStubRow,
 )
 from genpolicy.evidence.shadow.on_the_way import INCIDENTS as ON_THE_WAY
+from genpolicy.evidence.shadow.stop_mutants import DEAF
 from genpolicy.execution.checks import CHECKS as EXECUTION_CHECKS
 from genpolicy.feasibility.checks import CHECKS as FEASIBILITY_CHECKS
 from genpolicy.integrity.documents import canonical_json
@@ -87,6 +88,7 @@ CHECKS = (
     *((check.layer, check.name) for check in FEASIBILITY_CHECKS),
     *(("execution", check.name) for check in EXECUTION_CHECKS),
     *(("execution", f"vote_{check.name}") for check in VOTE_CHECKS),
+    *(("execution", f"deaf_to_{name}") for name in DEAF),
 )
 
 BASELINES = ("bc", "chunked_bc", "act")

@@ -213,6 +213,14 @@ def _late_in_contact(rig: Rig) -> None:
     rig.tick(2)
 
 
+def _three_in_a_row(rig: Rig) -> None:
+    """One chunk more than may wait, each of which begins behind the one before."""
+    rig.observe()
+    for place in range(1, rig.cell.execution.queue_capacity + 2):
+        rig.deliver(rig.chunk(action_start_time_s=rig.now_s + 0.1 * place))
+    rig.tick(1)
+
+
 def _one_window_twice(rig: Rig) -> None:
     _begin(rig)
     rig.now_ns -= 2_000_000  # still in the window of the action accepted last
@@ -309,6 +317,7 @@ SCENARIOS: dict[str, Scenario] = {
     "phase_transition": _bad(task_phase="insert"),
     "predecessor": _bad(predecessor_chunk_id="never seen"),
     "same_action": _offered(sequence=2, altered=True),
+    "queue_overflow": _three_in_a_row,
     "sampler_mismatch": _bad(sampler_config_hash="0" * 64),
     "continuity": _a_row_left_out,
     "sequence": _offered(sequence=1, altered=False),

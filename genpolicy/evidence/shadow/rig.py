@@ -127,6 +127,7 @@ class Rig:
     Args:
         checks: The table of executor, stub and supervisor; the whole one takes no imitation.
         stub_checks: That of the stub, where it is another.
+        supervisor: What makes its supervisor; a deaf one only for the evidence on mutants.
         execution_horizon: Actions of a chunk that may be executed.
         session: Name of the session.
         labels: What the session says of itself.
@@ -138,6 +139,7 @@ class Rig:
         *,
         checks: Checks = IMITATED,
         stub_checks: Checks | None = None,
+        supervisor: type[Supervisor] = Supervisor,
         session: str = "rig",
         labels: Mapping[str, str] | None = None,
         execution_horizon: int = HORIZONS.execution_horizon,
@@ -145,7 +147,7 @@ class Rig:
     ) -> None:
         self.journal = Journal(session, labels)
         self.cell = rig_cell(execution_horizon=execution_horizon, **changes)
-        self.supervisor = Supervisor(self.cell.execution, self.journal, checks=checks)
+        self.supervisor = supervisor(self.cell.execution, self.journal, checks=checks)
         own = checks if stub_checks is None else stub_checks
         self.stub = ControllerStub(self.cell, self.journal, self.supervisor, checks=own)
         self.executor = Executor(self.cell, self.journal, self.stub, checks=checks)

@@ -23,6 +23,7 @@ from genpolicy.evidence.rows.shadow import (
 from genpolicy.evidence.shadow.found import ShadowEvidence
 from genpolicy.evidence.shadow.holds import hold_rows
 from genpolicy.evidence.shadow.mutants import run_mutants
+from genpolicy.evidence.shadow.stop_mutants import stop_mutants
 from genpolicy.evidence.shadow.vote_mutants import vote_mutants
 from genpolicy.execution.cell import Cell
 from genpolicy.execution.journal import write_journal
@@ -80,9 +81,10 @@ def write_shadow(
 def all_mutants(layers: list[LayerMutant]) -> list[Mutant]:
     """Content of `mutants.json`: checks of the six layers, then those of the execution.
 
-    The executor's checks are owned by freshness and hand-over, layer six and beyond.
+    The executor's checks are owned by freshness and hand-over, layer six and beyond. Last come what
+    the supervisor stops for.
     """
-    return [*layers, *run_mutants(), *vote_mutants()]
+    return [*layers, *run_mutants(), *vote_mutants(), *stop_mutants()]
 
 
 def account_rows(accounts: Sequence[Account]) -> list[dict[str, Any]]:

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gates.asked_for import REFUSED_FOR
 from genpolicy.contract.action import GRIPPER
 from genpolicy.evidence.shadow.case import decide, refusals
 from genpolicy.evidence.shadow.corruption import CORRUPTIONS
@@ -68,6 +69,16 @@ def test_every_check_has_a_fixture_of_its_own():
     assert [(item.layer, item.check) for item in owned] == [(c.layer, c.name) for c in CHECKS]
     assert {name for item in CORRUPTIONS for name in item.behind} <= {c.name for c in CHECKS}
     assert all(item.check not in item.behind for item in CORRUPTIONS)
+
+
+def test_the_gate_expects_of_each_fixture_what_a_good_chunk_is_refused_for(applied, shadow):
+    assert list(REFUSED_FOR) == [item.name for item in CORRUPTIONS]
+    for item in CORRUPTIONS:
+        if item.check:
+            assert REFUSED_FOR[item.name] == item.check
+            continue  # that it refuses by its name is asked of its mutant
+        found = {decide(shadow.checker, case).reason for case in applied(item)}
+        assert found == {REFUSED_FOR[item.name]}
 
 
 FAST = ("joint_velocity", "joint_acceleration", "joint_jerk", "tcp_speed", "tcp_turn")

@@ -1,12 +1,13 @@
 """The independent checker and its mutants: checks that were never left out are undetected."""
 
 import json
+import shutil
 
 import evidence
 import pytest
 from asked import found_in
 
-from gates.asked_for import NOT_ASKED_OF_EVERY_TASK
+from gates.asked_for import CHECKS_ASKED_FOR, NOT_ASKED_OF_EVERY_TASK
 from gates.evidence import Evidence, MissingEvidenceError
 from gates.feasibility.proof import checked_violations, mutants_undetected
 from gates.feasibility.settings import SHADOW, FeasibilitySettings
@@ -31,6 +32,24 @@ def test_a_check_that_was_never_disabled_is_undetected(ladder):
     report = judge(ladder, "C")
     assert report.verdict == "FAIL"
     assert "representation.shape (not tried)" in found_in(report, "mutants_undetected")[0].caveat
+
+
+@pytest.fixture(scope="module")
+def one_ladder(tmp_path_factory, _ladder):
+    """A ladder whose mutants are written anew for each row."""
+    root = tmp_path_factory.mktemp("mutants") / "ladder"
+    shutil.copytree(_ladder, root)
+    return root
+
+
+@pytest.mark.parametrize("name", CHECKS_ASKED_FOR)
+def test_a_mutant_that_nobody_noticed_turns_gate_c_red_by_its_name(name, one_ladder):
+    missed = [row | {"detected": f"{row['layer']}.{row['check']}" != name} for row in ROWS]
+    evidence.edit_document(one_ladder, "shadow/mutants.json", lambda rows: missed)
+    report = judge(one_ladder, "C")
+    red = [answer.id for answer in report.criteria if answer.verdict == "FAIL"]
+    assert (report.verdict, red) == ("FAIL", ["mutants_undetected"])
+    assert f"not detected: {name}" in found_in(report, "mutants_undetected")[0].caveat
 
 
 @pytest.mark.parametrize("row", range(len(ROWS)))

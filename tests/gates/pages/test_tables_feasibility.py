@@ -41,9 +41,9 @@ def test_each_reason_stands_with_its_layer_method_phases_and_modes(shown):
     heads, *lines = shown.listed
     assert heads[:5] == ("layer: reason", "method", "rejected", "by phase", "by mode")
     assert [line[:5] for line in lines] == [
-        ("geometric: scene collision", "flow", "6 of 320 (1.9 %), 1 of them unknown",
+        ("geometric: scene collision", "flow", "6 of 320: 1.9 % (0.063 to 13), 1 of them unknown",
          "approach 4 of 318, insert 2 of 2", "left 3 of 160, right 3 of 160"),
-        ("dynamic: joint jerk", "flow", "4 of 320 (1.2 %)", "approach 4 of 318", "left 4 of 160"),
+        ("dynamic: joint jerk", "flow", "4 of 320: 1.2 % (0.063 to 13)", "approach 4 of 318", "left 4 of 160"),
     ]  # fmt: skip
     assert all(len(line) == len(heads) and line[-1] for line in lines)
 
@@ -61,7 +61,9 @@ def test_each_phase_with_each_mode_counts_every_rejection_once(shown):
     assert [line[0] for line in corrupted[1:]] == sorted(
         name.replace("_", " ") for name in evidence.FIXTURES[2:]
     )
-    assert {line[1:] for line in corrupted[1:]} == {("joint jerk 32", "32 of 32")}
+    told = {line[0]: line[1:] for line in corrupted[1:]}
+    assert told["collision"] == ("scene collision", "0", "joint jerk 32", "32 of 32")
+    assert {line[1:] for line in told.values()} == {("0", "joint jerk 32", "32 of 32")}
 
 
 def test_without_a_rejection_it_says_so(whole, judged):
@@ -92,3 +94,15 @@ def test_the_page_shows_the_table_and_folds_the_rest(copied, judged):
         "What corrupted fixtures were refused for (5)",
         "Every condition (30)", "Every phase (12)",
     ]  # fmt: skip
+
+
+def test_a_fixture_that_is_refused_for_its_own_reason_says_so(copied, judged):
+    def own(frame):
+        hit = (frame["fixture"] == "collision") & (frame["candidate"] == 0)
+        return frame.assign(first_reason=frame["first_reason"].mask(hit, "scene_collision"))
+
+    evidence.edit_table(copied, TABLE, own)
+    (found,) = draw_all(LISTINGS, Evidence(copied), judged("C"))
+    (line,) = (line for line in found.folded[2][1][1:] if line[0] == "collision")
+    hits, others = int(line[2]), line[3]
+    assert hits > 0 and (hits == 32 or others == f"joint jerk {32 - hits}")
