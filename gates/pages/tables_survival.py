@@ -20,8 +20,8 @@ WAYS = "_on_the_way"
 
 def percent(share: float, interval: tuple[float, float]) -> str:
     """A share and its interval as a person reads them."""
-    low, high = (f"{100 * end:.2g}" for end in interval)
-    return f"{100 * share:.2g} % ({low} to {high})"
+    low, high = (f"{100 * end:.3g}" for end in interval)
+    return f"{100 * share:.3g} % ({low} to {high})"
 
 
 def _survival(evidence: Evidence, report: GateReport) -> Table:

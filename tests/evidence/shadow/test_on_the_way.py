@@ -14,6 +14,7 @@ from genpolicy.evidence.shadow.case import newer_than
 from genpolicy.evidence.shadow.on_the_way import INCIDENTS, SUFFIX
 from genpolicy.evidence.shadow.session import play, play_incident
 from genpolicy.evidence.shadow.shadow import admit, case_of
+from genpolicy.evidence.shadow.stop_mutants import DEAF
 from genpolicy.execution.cell import Cell
 from genpolicy.execution.checks import CHECKS, without
 from genpolicy.execution.executor import Executor
@@ -102,6 +103,16 @@ def test_an_executor_that_does_not_look_is_seen(shadow, demonstrated, name, monk
     once = of_two(incident)
     assert found.account.discarded != {incident.reason: 1} or (found.arrivals and not once)
     assert found.account.executed == (name == "copy_on_the_way")
+
+
+@pytest.mark.parametrize("name", DEAF)
+def test_a_supervisor_that_is_deaf_to_what_stops_is_seen(shadow, demonstrated, name, monkeypatch):
+    monkeypatch.setattr(session, "Supervisor", DEAF[name][0])
+    for other in DEAF:
+        incident = named(other if other == "emergency_stop" else f"{other}_stop")
+        found = injected(shadow, demonstrated, incident)
+        assert (found.account.executed > 0) == (other == name)
+        assert (found.account.discarded == {incident.reason: 1}) == (other != name)
 
 
 @pytest.mark.parametrize(("name", "why"), [

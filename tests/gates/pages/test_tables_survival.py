@@ -7,6 +7,7 @@ from gates.evidence import Evidence
 from gates.feasibility.settings import CANDIDATES
 from gates.pages.figures import draw_all
 from gates.pages.tables_survival import COUNTS, LISTINGS, percent
+from gates.proof import judge
 from genpolicy.statistics.intervals import clopper_pearson
 
 TABLE, BALANCE = (path.removeprefix("artifacts/") for path in (CANDIDATES, COUNTS))
@@ -15,16 +16,16 @@ TABLE, BALANCE = (path.removeprefix("artifacts/") for path in (CANDIDATES, COUNT
 def shown(root, judged):
     survival, became = draw_all(LISTINGS, Evidence(root), judged("C"))
     assert survival.skipped == became.skipped == ""
-    return (
-        [dict(zip(found.listed[0], line, strict=True)) for found in (one,) for line in found.listed[1:]]
-        for one in (survival, became)
-    )  # fmt: skip
+    return [
+        [dict(zip(heads, line, strict=True)) for line in lines]
+        for heads, *lines in (survival.listed, became.listed)
+    ]
 
 
 def test_a_mode_that_loses_half_shows_half_with_its_interval_over_episodes(copied, judged):
     def lost(frame):
         own = (frame["method"] == "flow") & (frame["fixture"] == "held_out")
-        gone = own & (frame["mode"] == "left") & (frame["candidate"] % 2 == 0)
+        gone = own & (frame["mode"] == "left") & (frame["observation"] % 2 == 0)
         return frame.assign(
             dynamic=frame["dynamic"].mask(gone, False),
             outcome=frame["outcome"].mask(gone, "failed"),
@@ -56,13 +57,13 @@ def test_every_action_went_somewhere(whole, judged):
             assert total == sum(parts) > 0
 
 
-def test_what_was_discarded_stands_by_its_reason_with_an_interval(copied, judged):
+def test_what_was_discarded_stands_by_its_reason_with_an_interval(copied):
     def renamed(frame):
         own = (frame["method"] == "flow") & (frame["fixture"] == "held_out")
         return frame.assign(reason=frame["reason"].mask(own & (frame["count"] > 0), "expired"))
 
     evidence.edit_table(copied, BALANCE, renamed)
-    _, lines = shown(copied, judged)
+    _, lines = shown(copied, lambda gate: judge(copied, gate))
     (line,) = (
         line for line in lines if (line["method"], line["became of it"]) == ("flow", "expired")
     )
@@ -71,7 +72,11 @@ def test_what_was_discarded_stands_by_its_reason_with_an_interval(copied, judged
 
 @pytest.mark.parametrize(
     ("share", "interval", "text"),
-    [(0.5, (0.25, 0.755), "50 % (25 to 76)"), (0.0, (0.0, 0.0321), "0 % (0 to 3.2)")],
+    [
+        (0.5, (0.25, 0.755), "50 % (25 to 75.5)"),
+        (0.0, (0.0, 0.0321), "0 % (0 to 3.21)"),
+        (1.0, (0.955, 1.0), "100 % (95.5 to 100)"),
+    ],
 )
 def test_a_share_is_said_in_percent(share, interval, text):
     assert percent(share, interval) == text
