@@ -59,7 +59,8 @@ from genpolicy.verification.expected import ExpectedSettings
 from genpolicy.verification.journal_source import readable
 from genpolicy.verification.motion import ExpectedMotion
 from genpolicy.verification.report import JournalReport
-from genpolicy.verification.rollouts import derived_rollouts
+from genpolicy.verification.recoveries import KEYS as RECOVERY
+from genpolicy.verification.rollouts import derived_with_recoveries
 from genpolicy.verification.spliced import Spliced
 from genpolicy.verification.tables import KEYS, derived_tables
 
@@ -182,14 +183,15 @@ def _tables(
     """Every table that journals speak of: each row what they say, and none without the other."""
     seed = training_seed(params)
     with readable(f"{STRESS}/journals"):
-        rollouts = [row for path in journals for row in derived_rollouts(path).values()]
+        derived = [derived_with_recoveries(path) for path in journals]
         spliced = Spliced(motion.scene_path)
         tables = derived_tables(journals, spliced)
     written = root / FAULTS
     stated_faults = read_table(written).to_pylist() if written.is_file() else []
     _faults(params, stated_faults, tables.pop(Path(FAULTS).stem))
     for name, keys, rows in (
-        ("rollouts", ROLLOUT, rollouts),
+        ("rollouts", ROLLOUT, [row for rows, _ in derived for row in rows.values()]),
+        ("recoveries", RECOVERY, [row for _, rows in derived for row in rows]),
         *((name, KEYS[name], rows) for name, rows in tables.items()),
     ):
         path = f"{STRESS}/{name}.parquet"

@@ -75,7 +75,7 @@ def compare_rows(
         RefusedError: They differ, or a row is stated twice.
     """
     name = path.rpartition("/")[2].partition(".")[0]
-    what = name.removesuffix("s") if name != "conservation" else name
+    what = {"recoveries": "recovery"}.get(name, name.removesuffix("s"))
 
     def by_key(rows: Sequence[Row]) -> dict[Key, Row]:
         found: dict[Key, Row] = {}

@@ -42,7 +42,7 @@ ON_PAGE = {
     "b": ("plots_convergence", "plots_density", "plots_front", "plots_time"),
     "c": ("plots_feasibility", "plots_incidents", "plots_rejected", "tables_feasibility",
           "tables_holds"),
-    "d": ("plots_stress", "tables_overruns", "tables_stress"),
+    "d": ("plots_stress", "tables_overruns", "tables_recovery", "tables_stress"),
 }  # fmt: skip
 """Modules that one gate's page alone shows."""
 TESTS = {

@@ -34,6 +34,7 @@ from gates.pages import (
     tables_machine,
     tables_matching,
     tables_overruns,
+    tables_recovery,
     tables_stress,
     tables_survival,
 )
@@ -84,6 +85,7 @@ PLOTS: dict[str, tuple[Picturable, ...]] = {
     ),
     "D": (
         *plots_stress.PLOTS,
+        *tables_recovery.LISTINGS,
         tables_clocks.CLOCKS,
         tables_overruns.DONE,
         tables_faults.FAILED,

@@ -29,7 +29,7 @@ from genpolicy.integrity.hashing import sha256_bytes_of
 
 Array = NDArray[np.float64]
 
-JOURNAL_VERSION = 7
+JOURNAL_VERSION = 8
 CLOCK_AHEAD = "clock_ahead"
 LONGEST_JUMP_NS = 60 * NS_PER_S
 """No component of a session is silent for longer; a clock that is further ahead is doubted."""
@@ -65,6 +65,7 @@ EVENT_FIELDS: dict[str, tuple[str, ...]] = {
     "invalidate": ("reason", "before_ns"),
     "mode": ("old", "new"),
     "reset": ("session_epoch",),
+    "recovery_force": ("force_n",),
     "force": ("force_n",),
     "push": ("force_n", "duration_s", "in_contact"),
     "outcome": ("outcome", "mode"),

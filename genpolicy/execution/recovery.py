@@ -47,6 +47,7 @@ class Recovery:
         self._journal = journal
         self._phase = ""
         self._since_ns = 0
+        self._peak_n = 0.0
         self._hold_ns = to_ns(settings.recovery_hold_s)
         self._primitive_ns = to_ns(settings.primitive_timeout_s)
         self._human_ns = to_ns(settings.human_timeout_s)
@@ -61,8 +62,19 @@ class Recovery:
         if self.state is not RecoveryState.IDLE:
             return
         self.attempts += 1
-        self._phase = phase
+        self._phase, self._peak_n = phase, 0.0
         self._go(now_s, RecoveryState.HOLD, cause)
+
+    def feel(self, now_s: float, force_n: float) -> None:
+        """Note a contact force; while it holds or a primitive runs a new peak goes on record.
+
+        It is the peak of this recovery, which may be less than was felt before it. What is done
+        about a force is the supervisor's.
+        """
+        if self.state in (RecoveryState.HOLD, *PRIMITIVES) and force_n > self._peak_n:
+            self._peak_n = float(force_n)
+            payload = {"force_n": self._peak_n}
+            self._journal.add("recovery_force", self._journal.clock(now_s), payload)
 
     def advance(self, now_s: float) -> RecoveryState:
         """Let time act: the hold ends, a primitive or a person takes too long."""

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from genpolicy.verification.journal_source import Message, read_messages
+from genpolicy.verification.recoveries import Recoveries
 
 CALLS_A_PERSON = ("ask_human", "abort")
 SUCCESS = "success"
@@ -28,10 +29,21 @@ def derived_rollouts(path: Path) -> dict[str, dict[str, Any]]:
         IntegrityError: No regular file.
         BadInputError: Not a whole journal, or an event that cannot be read.
     """
+    return derived_with_recoveries(path)[0]
+
+
+def derived_with_recoveries(path: Path) -> tuple[dict[str, dict[str, Any]], list[dict[str, Any]]]:
+    """The same, and the rows of `recoveries.parquet`, which name no training seed.
+
+    Raises:
+        IntegrityError: No regular file.
+        BadInputError: Not a whole journal, or an event that cannot be read.
+    """
     sessions: dict[str, _Session] = {}
     for kind, message in read_messages(path):
         sessions.setdefault(str(message.get("session")), _Session()).read(kind, message)
-    return {name: session.columns() for name, session in sessions.items()}
+    rollouts = {name: session.columns() for name, session in sessions.items()}
+    return rollouts, [row for session in sessions.values() for row in session.recovered()]
 
 
 def differences(row: dict[str, Any], derived: dict[str, Any]) -> list[str]:
@@ -55,9 +67,11 @@ class _Session:
     open_rejections: set[str] = field(default_factory=set)
     ages_ns: list[int] = field(default_factory=list)
     latencies_s: dict[str, float] = field(default_factory=dict)
+    recoveries: Recoveries = field(default_factory=Recoveries)
 
     def read(self, kind: str, m: Message) -> None:
         """Take an event in."""
+        self.recoveries.read(kind, m)
         if kind == "session":
             self.labels, self.period_ns = m["labels"], m["period_ns"]
         elif kind == "invocation":
@@ -73,8 +87,6 @@ class _Session:
         elif kind in ("discard", "finish"):
             self.counts["discards"] += m["ended"] == "discarded"
         elif kind == "recovery":
-            # A stop also leaves `idle`, and nothing is tried after it.
-            self.counts["recoveries"] += m["old"] == "idle" and m["new"] == "hold"
             self.counts["calls"] += m["new"] in CALLS_A_PERSON
         elif kind == "force":
             self.peak_n = max(self.peak_n, m["force_n"])
@@ -100,15 +112,26 @@ class _Session:
             self.open_rejections.add(invocation)
             self.rejected_by[str(m["first_reason"])] += 1
 
-    def columns(self) -> dict[str, Any]:
-        """The columns at the end."""
-        ages = [age / 1e9 for age in self.ages_ns]
-        recovered = self.counts["recoveries"] > 0
-        ticks = round(self.end_ns / self.period_ns) if self.period_ns else 0
+    def named(self) -> dict[str, Any]:
+        """Which rollout it is."""
         return {
             "method": self.labels.get("method"),
             "perturbation": self.labels.get("perturbation"),
             "start": int(self.labels.get("start", -1)),
+        }
+
+    def recovered(self) -> list[dict[str, Any]]:
+        """A row for each entry into recovery."""
+        rows = self.recoveries.rows(succeeded=self.outcome == SUCCESS)
+        return [{**self.named(), **row} for row in rows]
+
+    def columns(self) -> dict[str, Any]:
+        """The columns at the end."""
+        ages = [age / 1e9 for age in self.ages_ns]
+        recoveries = self.recovered()
+        ticks = round(self.end_ns / self.period_ns) if self.period_ns else 0
+        return {
+            **self.named(),
             "start_sha256": self.labels.get("start_sha256"),
             "outcome": self.outcome,
             "success": self.outcome == SUCCESS,
@@ -124,8 +147,8 @@ class _Session:
             "rejected_by": max(
                 sorted(self.rejected_by), key=lambda name: self.rejected_by[name], default=""
             ),
-            "recovery_attempted": recovered,
-            "recovered": recovered and self.outcome == SUCCESS,
+            "recovery_attempted": bool(recoveries),
+            "recovered": bool(recoveries) and recoveries[-1]["recovered"],
             "interventions": self.counts["calls"],
             "action_age_p50_s": order_statistic(ages, 0.5),
             "action_age_p95_s": order_statistic(ages, 0.95),

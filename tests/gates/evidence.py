@@ -67,6 +67,7 @@ from genpolicy.evidence.rows.stress import (
     ConservationRow,
     InvocationRow,
     OverrunRow,
+    RecoveryRow,
     RolloutRow,
     SpliceRow,
     StressCountRow,
@@ -382,7 +383,32 @@ def edit_table(root: Path, path: str, change: Any) -> None:
     if path == "stress/rollouts.parquet":
         frame = ended_as_it_counts(before, frame)
     write_table(file, pa.Table.from_pandas(pd.DataFrame(frame), preserve_index=False))
+    if path == "stress/rollouts.parquet" and not {"recovery_attempted", "recovered"} - set(frame):
+        table(root, "stress/recoveries.parquet", RecoveryRow, recoveries_of(frame))
     record(root)
+
+
+def recoveries_of(frame: pd.DataFrame) -> list[dict[str, Any]]:
+    """One entry into recovery of each rollout that attempted one, that says as much as it does."""
+    rows = frame[frame["recovery_attempted"].eq(True)].to_dict("records")  # noqa: FBT003
+    return [_entry(row) for row in rows]
+
+
+def _entry(row: dict[str, Any]) -> dict[str, Any]:
+    start, drill = row["start"], row["perturbation"] == "recovery_drill"
+    ended = "handed_back"
+    if not row["success"]:
+        ended = {"collision": "stopped"}.get(row["outcome"], ("person", "timed_out")[start % 2])
+    return {
+        "method": row["method"], "seed": row["seed"], "perturbation": row["perturbation"],
+        "start": start, "recovery": 0, "phase": ("approach", "align", "insert")[start % 3],
+        "cause": "drill" if drill else "silence", "primitives": "retreat classical_return",
+        "failures": int(ended == "timed_out"), "ended": ended,
+        "resampled_only": row["success"] and not row["recovered"],
+        "taken_over": ended == "handed_back", "succeeded": row["success"],
+        "recovered": row["recovered"], "duration_s": 2.0 + 0.01 * start,
+        "force_peak_n": 0.5 * (start % 7), "resets": int(ended == "stopped"),
+    }  # fmt: skip
 
 
 def ended_as_it_counts(before: pd.DataFrame, frame: pd.DataFrame) -> pd.DataFrame:
@@ -1533,6 +1559,8 @@ def _stress(root: Path) -> None:
                     }
                 )
     table(root, "stress/rollouts.parquet", RolloutRow, rows)
+    entered = recoveries_of(pd.DataFrame(rows))
+    table(root, "stress/recoveries.parquet", RecoveryRow, entered)
     table(
         root,
         "stress/invocations.parquet",

@@ -25,6 +25,7 @@ from genpolicy.evidence.rows.stress import (
     FaultRow,
     InvocationRow,
     OverrunRow,
+    RecoveryRow,
     RolloutRow,
     SpliceRow,
     StressCountRow,
@@ -36,6 +37,7 @@ from genpolicy.evidence.stress.tables import power_document
 from genpolicy.execution.cell import Cell, ExecutionSettings
 from genpolicy.execution.executor import Executor
 from genpolicy.execution.journal import Journal, write_journal
+from genpolicy.execution.recovery import Recovery
 from genpolicy.execution.stub import ControllerStub
 from genpolicy.execution.supervisor import Supervisor
 from genpolicy.integrity.documents import canonical_json
@@ -45,7 +47,7 @@ from genpolicy.seeds import stream
 from genpolicy.tasks.api import WorldSettings, load_task
 from genpolicy.verification.checker import check_journal
 from genpolicy.verification.commands import reach_of
-from genpolicy.verification.rollouts import derived_rollouts
+from genpolicy.verification.rollouts import derived_with_recoveries
 from genpolicy.verification.tables import derived_tables
 
 PARAMS = yaml.safe_load((Path(__file__).parents[2] / "params.yaml").read_text())
@@ -69,7 +71,7 @@ POWER = canonical_json(
 )  # fmt: skip
 TABLES = {
     "invocations": InvocationRow, "counts": StressCountRow, "conservation": ConservationRow,
-    "stub": StressStubRow, "ages": AgeRow, "overruns": OverrunRow,
+    "stub": StressStubRow, "ages": AgeRow, "overruns": OverrunRow, "recoveries": RecoveryRow,
 }  # fmt: skip
 
 
@@ -107,6 +109,10 @@ def _session(name: str, start: int, fault: str = "") -> Journal:
     if fault:
         journal.invocation(0.2, invocation_id="one", stage="fault", detail=fault)
     executor.end_invocation(0.2, "one", "deadline")
+    if (method, start) == ("bc", 1):
+        recovery = Recovery(execution, journal)
+        recovery.trigger(0.2, "approach", "silence")
+        recovery.feel(0.2, 1.5)
     for force_n in (3.0, 7.5, 2.0):
         journal.add("force", journal.clock(0.2), {"force_n": force_n})
     outcome = "collision" if start == 0 else "timeout"
@@ -126,14 +132,16 @@ def root(tmp_path):
     folder = tmp_path / STRESS
     (folder / "journals").mkdir(parents=True)
     expected, _ = module._held_to(PARAMS)
-    rows, documents = [], {}
+    rows, recoveries, documents = [], [], {}
     for name in NAMES:
         path = folder / "journals" / f"{name}.mcap"
         write_journal(path, [_session(name, start) for start in (0, 1)])
         documents[path.name] = check_journal(path, expected).as_document()
-        for columns in derived_rollouts(path).values():
-            rows.append(RolloutRow(**columns, seed=0))
+        derived, entered = derived_with_recoveries(path)
+        rows += [RolloutRow(**columns, seed=0) for columns in derived.values()]
+        recoveries += [RecoveryRow(**columns, seed=0) for columns in entered]
     write_rows(folder / "rollouts.parquet", RolloutRow, rows)
+    write_rows(folder / "recoveries.parquet", RecoveryRow, recoveries)
     for name, listed in derived_tables(sorted((folder / "journals").iterdir())).items():
         if name == "faults":  # nobody was brought
             continue
@@ -231,6 +239,7 @@ FORGED_TABLES = {
     "conservation": ("generated", 9, "conservation bc/nominal: generated"),
     "stub": ("stale", 1, "stub bc/nominal: stale"),
     "overruns": ("count", 2, "overrun bc/nominal//: count"),
+    "recoveries": ("recovered", True, "recovery bc/nominal/1/0: recovered"),
 }
 
 

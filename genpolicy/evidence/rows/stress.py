@@ -26,7 +26,7 @@ class RolloutRow:
         rejections: Invocations of which no candidate passed.
         rejected_by: Most common reason; empty where none was rejected.
         recovery_attempted: Whether a recovery began.
-        recovered: Whether it succeeded after one.
+        recovered: Whether the last one counts as recovered (`RecoveryRow`).
         interventions: Calls for a person.
         action_age_p50_s: Median age of the accepted actions, s; None without any.
         action_age_p95_s: 95 % quantile, s.
@@ -116,6 +116,52 @@ class SpliceRow:
     raw_jerk_m_s3: float | None
     jump_m: float
     jerk_m_s3: float | None
+
+
+@dataclass(frozen=True)
+class RecoveryRow:
+    """`recoveries.parquet` of stress: one entry into recovery.
+
+    Attributes:
+        method: The method.
+        seed: Number of its training seed.
+        perturbation: What was injected.
+        start: Number of the initial state.
+        recovery: Count in this rollout, from 0.
+        phase: Task phase in which it began.
+        cause: Why it began, as the rollout names it.
+        primitives: Those that began, in order, a space between; empty where none did.
+        failures: Of these, failed.
+        ended: `handed_back` (the last primitive reached its goal), `timed_out` or `refused` (once
+            too often), `person` (one was called), `stopped`, or `episode_over`.
+        resampled_only: It handed back and its primitives had commanded nothing but the pose that
+            was held, so that whatever helped was a new sample.
+        taken_over: After it handed back the policy commanded, before anything else began.
+        succeeded: The rollout ended in success.
+        recovered: It handed back, not by samples alone, the policy took over and succeeded, and
+            none of the later recoveries of the rollout began in the same phase.
+        duration_s: From its begin to its end, s.
+        force_peak_n: Largest contact force meanwhile, N.
+        resets: Stops meanwhile that stay until a person resets the cell.
+    """
+
+    method: str
+    seed: int
+    perturbation: str
+    start: int
+    recovery: int
+    phase: str
+    cause: str
+    primitives: str
+    failures: int
+    ended: str
+    resampled_only: bool
+    taken_over: bool
+    succeeded: bool
+    recovered: bool
+    duration_s: float
+    force_peak_n: float
+    resets: int
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from genpolicy.evidence.rows.stress import (
     StressStubRow,
 )
 from genpolicy.evidence.stress.envelope import checker_under
+from genpolicy.evidence.stress.recoveries import recovery_rows
 from genpolicy.evidence.stress.rollout import Rollout
 from genpolicy.evidence.stress.shard import Shard, ShardResult
 from genpolicy.evidence.stress.shard_rows import (
@@ -91,11 +92,13 @@ def _run(shard: Shard, task: Task, policy: Running) -> ShardResult:
     for rollout in rollouts:
         rollout.end(Outcome.TIMEOUT)
     write_journal(shard.journal, [rollout.journal for rollout in rollouts])
-    parts = [rollout_row(shard, rollout) for rollout in rollouts]
+    recoveries = [recovery_rows(shard, rollout) for rollout in rollouts]
+    parts = [rollout_row(shard, *each) for each in zip(rollouts, recoveries, strict=True)]
     return ShardResult(
         rollouts=[row for row, _ in parts],
         invocations=[row for rollout in rollouts for row in invocation_rows(shard, rollout)],
         splices=[row for rollout in rollouts for row in splice_rows(shard, rollout)],
+        recoveries=[row for rows in recoveries for row in rows],
         overruns=overrun_rows(shard, rollouts),
         faults=fault_rows(shard, rollouts),
         accounts=[rollout.executor.conservation().chunks for rollout in rollouts],

@@ -216,6 +216,7 @@ class Rollout:
         self.world.advance()
         self.tick += 1
         self.tally.feel(self.journal, self.now_s, self.world.contact_force_n)
+        self.recovery.feel(self.now_s, self.world.contact_force_n)
         if self.world.success:
             self._end(Outcome.SUCCESS)
 

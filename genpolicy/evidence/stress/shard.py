@@ -14,6 +14,7 @@ from genpolicy.evidence.rows.stress import (
     FaultRow,
     InvocationRow,
     OverrunRow,
+    RecoveryRow,
     RolloutRow,
     SpliceRow,
     StressStubRow,
@@ -83,6 +84,7 @@ class ShardResult:
         rollouts: One row per start.
         invocations: One row per invocation.
         splices: One row per chunk that entered a queue.
+        recoveries: One row per entry into recovery.
         overruns: One row per term that took longer than it may.
         faults: One row per kind in which the policy's process failed.
         accounts: Balance of chunks, per rollout.
@@ -94,6 +96,7 @@ class ShardResult:
     rollouts: list[RolloutRow]
     invocations: list[InvocationRow]
     splices: list[SpliceRow]
+    recoveries: list[RecoveryRow]
     overruns: list[OverrunRow]
     faults: list[FaultRow]
     accounts: list[Account]

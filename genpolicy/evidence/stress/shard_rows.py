@@ -10,6 +10,7 @@ from genpolicy.evidence.rows.stress import (
     FaultRow,
     InvocationRow,
     OverrunRow,
+    RecoveryRow,
     RolloutRow,
     SpliceRow,
 )
@@ -22,8 +23,16 @@ Array = NDArray[np.float64]
 NS_PER_S = 1e9
 
 
-def rollout_row(shard: Shard, rollout: Rollout) -> tuple[RolloutRow, Array]:
-    """One row of `rollouts.parquet`, and the ages of its actions, computed from the journal."""
+def rollout_row(
+    shard: Shard, rollout: Rollout, recoveries: Sequence[RecoveryRow]
+) -> tuple[RolloutRow, Array]:
+    """One row of `rollouts.parquet`, and the ages of its actions, computed from the journal.
+
+    Args:
+        shard: Whose rollout it is.
+        rollout: One that has ended.
+        recoveries: Its rows of `recoveries.parquet`, in the order of entry.
+    """
     events = rollout.journal.events()
     ages = np.array(
         [event.payload["age_ns"] / NS_PER_S for event in events if event.kind == "accept"]
@@ -50,7 +59,7 @@ def rollout_row(shard: Shard, rollout: Rollout) -> tuple[RolloutRow, Array]:
         rejections=tally.rejections,
         rejected_by=_most_common(tally.rejected_by),
         recovery_attempted=rollout.recovery.attempts > 0,
-        recovered=rollout.recovery.attempts > 0 and rollout.outcome is Outcome.SUCCESS,
+        recovered=bool(recoveries) and recoveries[-1].recovered,
         interventions=tally.interventions,
         action_age_p50_s=_quantile(ages, 0.5),
         action_age_p95_s=_quantile(ages, 0.95),

@@ -22,6 +22,7 @@ from genpolicy.evidence.rows.stress import (
     FaultRow,
     InvocationRow,
     OverrunRow,
+    RecoveryRow,
     RolloutRow,
     SpliceRow,
     StressCountRow,
@@ -64,6 +65,8 @@ def write_stress(folder: Path, shards: Sequence[Shard], *, workers: int, schedul
     write_rows(folder / "invocations.parquet", InvocationRow, invocations)
     splices = [row for _, result in pairs for row in result.splices]
     write_rows(folder / "splices.parquet", SpliceRow, splices)
+    recoveries = [row for _, result in pairs for row in result.recoveries]
+    write_rows(folder / "recoveries.parquet", RecoveryRow, recoveries)
     counts: list[StressCountRow] = []
     balances: list[ConservationRow] = []
     for shard, result in pairs:
