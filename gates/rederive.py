@@ -58,8 +58,8 @@ from genpolicy.verification.commands import reach_of
 from genpolicy.verification.expected import ExpectedSettings
 from genpolicy.verification.journal_source import readable
 from genpolicy.verification.motion import ExpectedMotion
-from genpolicy.verification.report import JournalReport
 from genpolicy.verification.recoveries import KEYS as RECOVERY
+from genpolicy.verification.report import JournalReport
 from genpolicy.verification.rollouts import derived_with_recoveries
 from genpolicy.verification.spliced import Spliced
 from genpolicy.verification.tables import KEYS, derived_tables
@@ -190,8 +190,8 @@ def _tables(
     stated_faults = read_table(written).to_pylist() if written.is_file() else []
     _faults(params, stated_faults, tables.pop(Path(FAULTS).stem))
     for name, keys, rows in (
-        ("rollouts", ROLLOUT, [row for rows, _ in derived for row in rows.values()]),
-        ("recoveries", RECOVERY, [row for _, rows in derived for row in rows]),
+        ("rollouts", ROLLOUT, [row for own, _ in derived for row in own.values()]),
+        ("recoveries", RECOVERY, [row for _, own in derived for row in own]),
         *((name, KEYS[name], rows) for name, rows in tables.items()),
     ):
         path = f"{STRESS}/{name}.parquet"

@@ -53,6 +53,7 @@ def work(params: Params) -> None:
         feasibility=params.section("feasibility", FeasibilitySettings),
         root_seed=params.seed,
         joining=section.joining,
+        person=section.person,
         fixtures=fixtures,
     )
     judged = in_comparison(

@@ -12,7 +12,7 @@ import pandas as pd
 from gates.bounds import draws_for_quantile, share_interval, upper_quantile
 from gates.criterion import Measured, criterion
 from gates.distilled import spent
-from gates.evidence import Evidence, MissingEvidenceError, counts, numbers
+from gates.evidence import Evidence, MissingEvidenceError, counts, flags, numbers
 from gates.floors import OLDEST_ACTION_S
 from gates.stress.rollouts import (
     DRILL,
@@ -184,9 +184,26 @@ def _share_of(  # noqa: PLR0917
     per_candidate=True,
 )
 def intervention_upper(evidence: Evidence, settings: StressSettings, candidate: str) -> Measured:
-    """Upper bound of the share of rollouts in which a person had to step in."""
+    """Upper bound of the share of rollouts in which a person had to step in.
+
+    Where people had the arm, their time for each success of the policy is said beside it.
+    """
     rows = rollouts(evidence, settings, candidate)
-    return _rollouts_with(rows.assign(hit=counts(rows, "interventions") > 0), settings)
+    found = _rollouts_with(rows.assign(hit=counts(rows, "interventions") > 0), settings)
+    said = _persons_time(rows)
+    return replace(found, caveat=f"{found.caveat}; {said}") if said else found
+
+
+def _persons_time(rows: pd.DataFrame) -> str:
+    """How long people had the arm; empty if nobody ever did."""
+    had_s, successes = float(numbers(rows, "person_s").sum()), int(flags(rows, "success").sum())
+    if np.any(numbers(rows, "person_s") < 0):
+        raise MissingEvidenceError("a person had the arm for less than no time")
+    if had_s == 0:
+        return ""
+    if successes == 0:
+        return f"people had the arm for {had_s:.4g} s, and nothing succeeded"
+    return f"people had the arm for {had_s / successes:.3g} s for each of {successes} successes"
 
 
 @criterion(

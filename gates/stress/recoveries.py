@@ -91,7 +91,7 @@ class Coverage:
     gain_of_both: float | None
 
 
-def coverage(  # noqa: PLR0917
+def coverage(
     evidence: Evidence, settings: StressSettings, method: str, baseline: str, condition: str
 ) -> Coverage:
     """Recovery from the same perturbed starts, paired: a method's share minus a baseline's.

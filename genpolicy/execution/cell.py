@@ -31,13 +31,14 @@ NotNegative = Annotated[float, Field(ge=0)]
 
 
 class RecoveryState(StrEnum):
-    """Where recovery stands; IDLE while the policy commands."""
+    """Where recovery stands; IDLE while the policy commands, PERSON while a person does."""
 
     IDLE = "idle"
     HOLD = "hold"
     RETREAT = "retreat"
     CLASSICAL_RETURN = "classical_return"
     ASK_HUMAN = "ask_human"
+    PERSON = "person"
     ABORT = "abort"
     STOPPED = "stopped"
 

@@ -21,7 +21,8 @@ _TYPES: Mapping[str, Json] = {
         ("session", "fallback_hash", "controller_mode", "phase", "calibration_epoch",
          "ignored_because", "old", "new", "checkpoint", "sampler", "mode", "id", "stage", "detail",
          "history", "chunk_id", "invocation", "rule", "method", "source", "predecessor", "raw",
-         "actions_sha256", "ended", "at", "reason", "action", "event", "state", "cause", "outcome"),
+         "actions_sha256", "ended", "at", "reason", "action", "event", "state", "cause", "outcome",
+         "who"),
         _TEXT,
     ),
     **dict.fromkeys(

@@ -62,6 +62,7 @@ EVENT_FIELDS: dict[str, tuple[str, ...]] = {
     "hold": ("reason",),
     "supervisor": ("event", "state", "detail"),
     "recovery": ("old", "new", "cause", "phase", "failures"),
+    "person": ("stage", "who"),
     "invalidate": ("reason", "before_ns"),
     "mode": ("old", "new"),
     "reset": ("session_epoch",),

@@ -120,6 +120,24 @@ class Recovery:
             self._refuse("a resolution without a person", "a person's name")
         self._go(now_s, RecoveryState.IDLE, f"resolved by {person}")
 
+    def person_took_over(self, now_s: float, person: str) -> None:
+        """Who was asked has come and has the arm."""
+        self._expect(RecoveryState.ASK_HUMAN)
+        self._go(now_s, RecoveryState.PERSON, f"taken over by {person}")
+
+    def person_handed_back(self, now_s: float, person: str) -> None:
+        """The person has brought the arm away from what stopped the policy, which may go on.
+
+        It clears nothing: a stop is another state, out of which this does not lead.
+        """
+        self._expect(RecoveryState.PERSON)
+        self._go(now_s, RecoveryState.IDLE, f"handed back by {person}")
+
+    def person_gave_up(self, now_s: float, person: str) -> None:
+        """The person has not managed to in the time that there was."""
+        self._expect(RecoveryState.PERSON)
+        self._go(now_s, RecoveryState.ABORT, f"given up by {person}")
+
     def stop(self, now_s: float, cause: str) -> None:
         """From every state; stays until `human_reset`."""
         if self.state is not RecoveryState.STOPPED:

@@ -5,8 +5,9 @@ about freshness: phase, calibration, newest observation, voiding events and stop
 again from the raw events, and every accepted action is compared bit for bit with the chunk that
 was admitted. Where the caller says what the robot is, executed rows are proved feasible again, by
 MuJoCo (`motion`). Rules: P1 gate to stub, P2 watchdog, P3 monotone, P4 chain, P5 newest first,
-P6 feasible (and of a blend its own admission, `joined`), P7 stop is sticky, `clock` (no answer
-before its time), `conservation`, `journal` (form), `settings` (declared limits).
+P6 feasible (and of a blend its own admission, `joined`), P7 stop is sticky, P8 a person has the arm
+(`attended`), `clock` (no answer before its time), `conservation`, `journal` (form), `settings`
+(declared limits).
 """
 
 import hashlib
@@ -14,6 +15,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from genpolicy.contract.action import ACTION_DIM
+from genpolicy.verification.attended import Attended
 from genpolicy.verification.balance import Balance
 from genpolicy.verification.continuity import Continuity
 from genpolicy.verification.expected import ExpectedSettings
@@ -82,6 +84,7 @@ class _Session:
         self.balance = Balance()
         self.invocations = Invocations()
         self.joined = Joined()
+        self.attended = Attended()
         self.continuity = Continuity()
         self.chunks: dict[str, Message] = {}
         self.open: dict[int, Message] = {}
@@ -116,8 +119,8 @@ class _Session:
         if (self.n == 0) != (kind == "session"):
             self.flag("journal.settings", f"Event {self.n} is {kind}; settings stand first, once.")
         try:
-            for rule, sentence in self.invocations.follow(kind, m):
-                self.flag(rule, sentence)
+            for rule, text in (*self.invocations.follow(kind, m), *self.attended.follow(kind, m)):
+                self.flag(rule, text)
             self._follow(kind, m)
             for rule, sentence in self.joined.follow(
                 kind, m, self.world.void_before, self.settings

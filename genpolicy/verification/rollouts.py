@@ -13,7 +13,8 @@ from typing import Any
 from genpolicy.verification.journal_source import Message, read_messages
 from genpolicy.verification.recoveries import Recoveries
 
-CALLS_A_PERSON = ("ask_human", "abort")
+ASKED, ABORTED = "ask_human", "abort"
+"""What calls a person: recovery asks one, or gives up by itself."""
 SUCCESS = "success"
 NEVER_ANSWERED = ("deadline", "overrun")
 """How an invocation ends that missed its deadline: that of the whole, or that of a term."""
@@ -87,7 +88,12 @@ class _Session:
         elif kind in ("discard", "finish"):
             self.counts["discards"] += m["ended"] == "discarded"
         elif kind == "recovery":
-            self.counts["calls"] += m["new"] in CALLS_A_PERSON
+            # Who was called and did not come, or gave up, was called once.
+            self.counts["calls"] += m["new"] == ASKED or (
+                m["new"] == ABORTED and m["old"] not in (ASKED, "person")
+            )
+        elif kind == "person":
+            self.counts["person_ns"] += -m["t"] if m["stage"] == "took_over" else m["t"]
         elif kind == "force":
             self.peak_n = max(self.peak_n, m["force_n"])
         elif kind == "outcome":
@@ -150,6 +156,7 @@ class _Session:
             "recovery_attempted": bool(recoveries),
             "recovered": bool(recoveries) and recoveries[-1]["recovered"],
             "interventions": self.counts["calls"],
+            "person_s": self.counts["person_ns"] / 1e9,
             "action_age_p50_s": order_statistic(ages, 0.5),
             "action_age_p95_s": order_statistic(ages, 0.95),
             "action_age_max_s": order_statistic(ages, 1.0),

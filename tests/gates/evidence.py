@@ -390,8 +390,8 @@ def edit_table(root: Path, path: str, change: Any) -> None:
 
 def recoveries_of(frame: pd.DataFrame) -> list[dict[str, Any]]:
     """One entry into recovery of each rollout that attempted one, that says as much as it does."""
-    rows = frame[frame["recovery_attempted"].eq(True)].to_dict("records")  # noqa: FBT003
-    return [_entry(row) for row in rows]
+    begun = frame[frame["recovery_attempted"].fillna(False).astype(bool)]  # a cell may be empty
+    return [_entry(row) for row in begun.to_dict("records")]
 
 
 def _entry(row: dict[str, Any]) -> dict[str, Any]:
@@ -1550,6 +1550,7 @@ def _stress(root: Path) -> None:
                         "recovery_attempted": condition == "recovery_drill",
                         "recovered": success and condition == "recovery_drill",
                         "interventions": 0,
+                        "person_s": 0.0,
                         "action_age_p50_s": 0.1,
                         "action_age_p95_s": 0.2 + 0.001 * start,
                         "action_age_max_s": 0.3,

@@ -28,6 +28,7 @@ class RolloutRow:
         recovery_attempted: Whether a recovery began.
         recovered: Whether the last one counts as recovered (`RecoveryRow`).
         interventions: Calls for a person.
+        person_s: How long one had the arm, s.
         action_age_p50_s: Median age of the accepted actions, s; None without any.
         action_age_p95_s: 95 % quantile, s.
         action_age_max_s: Oldest, s.
@@ -56,6 +57,7 @@ class RolloutRow:
     recovery_attempted: bool
     recovered: bool
     interventions: int
+    person_s: float
     action_age_p50_s: float | None
     action_age_p95_s: float | None
     action_age_max_s: float | None

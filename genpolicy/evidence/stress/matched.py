@@ -77,6 +77,7 @@ def _run(shard: Shard, task: Task, policy: Running) -> ShardResult:
         checkpoint=policy.checkpoint_hash,
         sampler=joining.sampler_hash(policy.sampler_config_hash),
         joining=joining,
+        person=comparison.person,
     )
     epoch = task.calibration_epochs[-1]
     rollouts = [

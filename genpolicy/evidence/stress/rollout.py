@@ -41,9 +41,9 @@ from genpolicy.evidence.stress.state import (
     Tally,
     in_flight,
 )
+from genpolicy.execution.attended import AttendedExecutor
 from genpolicy.execution.cell import FALLBACK_HASH, Cell, RecoveryState
 from genpolicy.execution.command import Command
-from genpolicy.execution.executor import Executor
 from genpolicy.execution.recovery import Recovery, step
 from genpolicy.execution.stub import ControllerStub
 from genpolicy.execution.supervisor import Supervisor
@@ -56,6 +56,7 @@ from genpolicy.tasks.api import Start, World, WorldSettings
 Array = NDArray[np.float64]
 
 FRESH = LAYERS[-1]
+CALLED = (RecoveryState.ASK_HUMAN, RecoveryState.PERSON, RecoveryState.ABORT)
 
 
 class Rollout:
@@ -84,7 +85,7 @@ class Rollout:
         cell.require_task(setup.task.phases)
         self.supervisor = Supervisor(cell.execution, self.journal)
         self.stub = ControllerStub(cell, self.journal, self.supervisor)
-        self.executor = Executor(cell, self.journal, self.stub)
+        self.executor = AttendedExecutor(cell, self.journal, self.stub)
         self.recovery = Recovery(cell.execution, self.journal)
         self.outcome: Outcome | None = None
         self.tally = Tally()
@@ -96,6 +97,7 @@ class Rollout:
         )
         self._joined = Joined(setup, self.journal)
         self._fallback = Fallback(setup, self.world, self.executor, self.recovery)
+        self.person = setup.attendance(self.world, self.executor, self.recovery, start_index)
         self._newest_accepted_s: float | None = None
         self._last_command_s: float | None = None
         before = [self.world.last_action] * COMMANDS_AT_THE_BOUNDARY
@@ -218,7 +220,7 @@ class Rollout:
         self.tally.feel(self.journal, self.now_s, self.world.contact_force_n)
         self.recovery.feel(self.now_s, self.world.contact_force_n)
         if self.world.success:
-            self._end(Outcome.SUCCESS)
+            self._end(Outcome.ASSISTED if self.person.helped else Outcome.SUCCESS)
 
     def end(self, outcome: Outcome) -> None:
         """End from outside: the time is over."""
@@ -290,19 +292,19 @@ class Rollout:
             self.recovery.trigger(now_s, self.world.phase, cause)
         if not self.recovery.active:
             return
+        ticks, admit = self.tally.fallback_ticks, self._admit_fallback
+        metadata = lambda: self._fallback.metadata(self.journal.session, now_s)  # noqa: E731
         state = step(
             self.recovery,
             self.executor,
             now_s=now_s,
-            metadata=lambda: self._fallback.metadata(self.journal.session, now_s),
-            plan=lambda state: self._fallback.plan(state, ticks=self.tally.fallback_ticks),
-            admit=self._admit_fallback,
+            metadata=metadata,
+            plan=lambda state: self._fallback.plan(state, ticks=ticks),
+            admit=admit,
         )
-        if state in (RecoveryState.ASK_HUMAN, RecoveryState.ABORT):
-            self.tally.interventions += 1
-            self.executor.intervene(now_s)
+        if state in CALLED and not self.person.attend(now_s, ticks, metadata, admit):
             self._end(Outcome.INTERVENTION)
-        elif state is RecoveryState.IDLE:
+        elif self.recovery.state is RecoveryState.IDLE:
             self._last_command_s = now_s  # the silence is over; the policy gets its time
 
     def _admit_fallback(self, proposal: Proposal) -> Admitted | None:

@@ -6,6 +6,7 @@ from pydantic import Field, field_validator, model_validator
 
 from genpolicy.candidates.joining import JoiningSettings
 from genpolicy.contract.settings import Settings
+from genpolicy.evidence.stress.person import PersonSettings
 from genpolicy.evidence.stress.perturbations import Perturbation, ReducedEnvelope
 
 ENVELOPE = "envelope"
@@ -28,6 +29,7 @@ class StressSettings(Settings):
         planned_effect: Success of a baseline and of a candidate that is worth promoting; a gain
             of this size must be found.
         joining: How a chunk joins the plan that it takes over from, by one rule for all methods.
+        person: Who comes when recovery calls a person; null: nobody, and the call ends a rollout.
     """
 
     starts: int = Field(ge=1)
@@ -39,6 +41,7 @@ class StressSettings(Settings):
     alpha: float = Field(gt=0.0, lt=1.0)
     planned_effect: tuple[Share, Share]
     joining: JoiningSettings = Field(default_factory=JoiningSettings)
+    person: PersonSettings | None = None
 
     @field_validator("planned_effect", mode="before")
     @classmethod

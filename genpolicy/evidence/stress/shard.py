@@ -20,6 +20,7 @@ from genpolicy.evidence.rows.stress import (
     StressStubRow,
 )
 from genpolicy.evidence.stress.latency import LatencyModel
+from genpolicy.evidence.stress.person import PersonSettings
 from genpolicy.evidence.stress.perturbations import Perturbation
 from genpolicy.execution.cell import Cell
 from genpolicy.execution.ledger import Account
@@ -41,6 +42,7 @@ class Comparison:
         feasibility: Thresholds of the six layers.
         root_seed: Root seed.
         joining: How chunks join.
+        person: Who comes when a person is called; None: nobody, and the call ends a rollout.
         fixtures: Those of Gate B, for who was brought. Shape (F, H_o, D_o).
     """
 
@@ -52,6 +54,7 @@ class Comparison:
     feasibility: FeasibilitySettings
     root_seed: int
     joining: JoiningSettings = field(default_factory=JoiningSettings)
+    person: PersonSettings | None = None
     fixtures: Array = field(default_factory=lambda: NO_FIXTURES, compare=False)
 
 

@@ -14,6 +14,7 @@ from genpolicy.evidence.rows.stress import (
     RolloutRow,
     SpliceRow,
 )
+from genpolicy.evidence.stress.person import person_s
 from genpolicy.evidence.stress.rollout import Rollout
 from genpolicy.evidence.stress.shard import Shard
 from genpolicy.evidence.stress.state import Outcome
@@ -60,7 +61,8 @@ def rollout_row(
         rejected_by=_most_common(tally.rejected_by),
         recovery_attempted=rollout.recovery.attempts > 0,
         recovered=bool(recoveries) and recoveries[-1].recovered,
-        interventions=tally.interventions,
+        interventions=rollout.person.calls,
+        person_s=person_s(events),
         action_age_p50_s=_quantile(ages, 0.5),
         action_age_p95_s=_quantile(ages, 0.95),
         action_age_max_s=_quantile(ages, 1.0),

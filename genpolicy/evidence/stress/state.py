@@ -14,11 +14,14 @@ from genpolicy.contract.chunk import ChunkMetadata
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.contract.latency import Overrun, Term, overruns
 from genpolicy.evidence.stress.latency import LatencyModel, draw_check, draw_latency
+from genpolicy.evidence.stress.person import Attendance, PersonSettings
 from genpolicy.evidence.stress.perturbations import Perturbation, injection
+from genpolicy.execution.attended import AttendedExecutor
 from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.execution.journal import Journal
+from genpolicy.execution.recovery import Recovery
 from genpolicy.feasibility.admission import FeasibilityChecker
-from genpolicy.tasks.api import Task
+from genpolicy.tasks.api import Task, World
 
 Array = NDArray[np.float64]
 
@@ -31,6 +34,8 @@ class Outcome(StrEnum):
     FORCE_STOP = "force_stop"
     INTERVENTION = "intervention"
     TIMEOUT = "timeout"
+    ASSISTED = "assisted"
+    """The task's success test held after a person had the arm: no success of the policy."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +55,7 @@ class Setup:
         checkpoint: Its weights.
         sampler: Its sampler settings, and the rule by which its chunks join.
         joining: That rule.
+        person: Who comes when one is called; None: nobody.
     """
 
     task: Task
@@ -64,9 +70,17 @@ class Setup:
     checkpoint: str
     sampler: str
     joining: JoiningSettings = field(default_factory=JoiningSettings)
+    person: PersonSettings | None = None
 
     def __post_init__(self) -> None:
         self.checker.cell.require_within(self.execution.force_limit_n)
+
+    def attendance(
+        self, world: World, executor: AttendedExecutor, recovery: Recovery, start: int
+    ) -> Attendance:
+        """The person of one rollout."""
+        key = (self.root_seed, self.perturbation, start)
+        return Attendance(self.person, self.task, world, executor, recovery, key)
 
     def journal(self, start: int, start_sha256: str) -> Journal:
         """The empty journal of one rollout."""
@@ -147,7 +161,6 @@ class Tally:
     hold_ticks: int = 0
     fallback_ticks: int = 0
     deadline_misses: int = 0
-    interventions: int = 0
     force_peak_n: float = 0.0
     rejected_by: dict[str, int] = field(default_factory=dict)
     refused: set[str] = field(default_factory=set)

@@ -67,7 +67,7 @@ def test_a_demonstrated_plan_succeeds_and_is_proved(run, kit, plans, tmp_path):
     report = prove(rollouts, kit, tmp_path)
     assert report.checked_actions > 200
     for rollout in rollouts:
-        assert rollout.tally.interventions == rollout.tally.deadline_misses == 0
+        assert rollout.person.calls == rollout.tally.deadline_misses == 0
         assert rollout.world.success and not rollout.world.collision
         ticks = rollout.tally.action_ticks + rollout.tally.hold_ticks
         assert ticks + rollout.tally.fallback_ticks == rollout.tick
@@ -251,7 +251,7 @@ def test_without_geometric_checks_the_supervisor_ends_it_in_collision(
     assert rollout.outcome is Outcome.COLLISION
     assert rollout.supervisor.stopped
     assert str(rollout.recovery.state) == "stopped"
-    assert rollout.tally.interventions == 0
+    assert rollout.person.calls == 0
 
 
 def test_not_a_number_moves_nothing(run, kit, tmp_path):
@@ -311,7 +311,7 @@ def test_too_slow_executes_nothing_and_calls_a_person(run, kit, plans, tmp_path)
     assert rollout.tally.action_ticks == 0
     assert rollout.tally.deadline_misses >= 3
     assert rollout.recovery.attempts >= 1
-    assert rollout.outcome is Outcome.INTERVENTION and rollout.tally.interventions == 1
+    assert rollout.outcome is Outcome.INTERVENTION and rollout.person.calls == 1
     reasons = Counter(event.payload["reason"] for event in of_kind(rollout, "discard"))
     assert reasons["expired"] >= 1
     # Given up once each, and only ever after the deadline.

@@ -1,4 +1,4 @@
-"""Recovery at Gate D: by phase and cause with its cost, and what a candidate covers beyond others."""
+"""Recovery at Gate D: by phase and cause with its cost, and what is covered beyond others."""
 
 import evidence
 import pytest

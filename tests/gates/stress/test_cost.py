@@ -280,3 +280,19 @@ def test_a_start_that_is_hit_under_one_seed_counts_against_it(ladder, criterion,
 
     evidence.edit_table(ladder, ROLLOUTS, two)
     assert flow(ladder, criterion).interval == clopper_pearson(1, N, 0.95)
+
+
+def test_the_time_of_people_is_said_for_each_success(ladder):
+    own = lambda f: f["method"] == "flow"  # noqa: E731
+    before = asked(ladder, cost.intervention_upper, "flow", gate="D")
+    assert "people had the arm" not in before.caveat
+    evidence.edit_table(ladder, ROLLOUTS, cells("person_s", 0.5, where=own))
+    rows = evidence.read_table(ladder / "artifacts" / ROLLOUTS).to_pandas()
+    mine = rows[rows["method"] == "flow"]
+    found = asked(ladder, cost.intervention_upper, "flow", gate="D")
+    each = 0.5 * len(mine) / mine["success"].sum()
+    assert found.value == before.value
+    assert f"for {each:.3g} s for each of {mine['success'].sum()} successes" in found.caveat
+    evidence.edit_table(ladder, ROLLOUTS, cells("person_s", -1.0, where=own, share=0.01))
+    with pytest.raises(MissingEvidenceError, match="less than no time"):
+        asked(ladder, cost.intervention_upper, "flow", gate="D")

@@ -1,4 +1,4 @@
-"""Entries into recovery beside their rollouts, and what is covered from the same perturbed starts."""
+"""Entries into recovery beside their rollouts; what is covered from the same perturbed starts."""
 
 import evidence
 import pytest
