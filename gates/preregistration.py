@@ -63,6 +63,7 @@ PLANNED: Mapping[str, Planned] = {
     "stress.episode_limit_s": Planned("", "D"),
     "stress.samples": Planned("", "A"),
     "stress.joining": Planned("", "B"),
+    "stress.person": Planned("", "D"),
     "gate_d.tolerances": Planned("", "D"),
 }
 """What the plan names beside limits."""

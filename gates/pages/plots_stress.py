@@ -19,6 +19,7 @@ from genpolicy.pages.figures.drawing import (
     PURPLE,
     RED,
     SKY,
+    TEAL,
     new_figure,
 )
 from genpolicy.statistics.intervals import clopper_pearson
@@ -31,8 +32,9 @@ OUTCOMES = {
     "force_stop": SKY,
     "stopped": GREY,
     "collision": RED,
+    "assisted": TEAL,
 }
-"""Known outcomes, best first; a colour stays with its outcome in every report."""
+"""Known outcomes; what succeeded after a person had the arm stands last. A colour stays with its outcome in every report."""
 
 
 def _success(evidence: Evidence, report: GateReport) -> Figure:

@@ -36,6 +36,8 @@ def said_of(kind: str, payload: Mapping[str, Any]) -> tuple[int, str] | None:  #
         return (WARNING if payload["event"] == "watchdog" else INFO), text
     if kind == "reset":
         return WARNING, f"reset: session epoch {payload['session_epoch']}"
+    if kind == "person":
+        return WARNING, f"person: {payload['who']} {payload['stage'].replace('_', ' ')}"
     if kind == "outcome":
         return INFO, f"outcome: {payload['outcome']}"
     return None

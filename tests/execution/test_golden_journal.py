@@ -22,8 +22,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from held import hold
 
 GOLDEN = Path(__file__).parent / "golden"
-OF_OTHERS = {"joined", "force", "push", "outcome"}
-"""Written by those who vote, move the arm or end an episode; no part of this package."""
+OF_OTHERS = {"joined", "force", "push", "outcome", "person"}
+"""Written by those who vote, move the arm or end an episode, and where somebody has the arm."""
 JOINTS = 7
 LONG = 200  # signs; what is longer is told by its hash
 
@@ -108,6 +108,8 @@ def somebody_else_commands(rig):
     """A recovery by the fallback, a person, a reset; offers that are no row of a chunk."""
     recovery = Recovery(rig.cell.execution, rig.journal)
     recovery.trigger(rig.now_s, rig.phase, "divergence")
+    recovery.feel(rig.now_s, 4.5)
+    recovery.feel(rig.now_s, 4.25)
     rig.executor.begin_fallback(rig.now_s)
     rig.tick(5)
     recovery.advance(rig.now_s)

@@ -31,6 +31,7 @@ CANDIDATE = {"chunk_id": "3/1", "index": 1, "first_reason": "scene_collision"}
         ("supervisor", {"event": "human_reset", "state": "run", "detail": "spotter"}, INFO,
          "supervisor: human_reset, now run (spotter)"),
         ("reset", {"session_epoch": 2}, WARNING, "reset: session epoch 2"),
+        ("person", {"stage": "took_over", "who": "ada"}, WARNING, "person: ada took over"),
         ("outcome", {"outcome": "success", "mode": "left"}, INFO, "outcome: success"),
     ],
 )  # fmt: skip

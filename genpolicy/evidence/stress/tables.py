@@ -164,7 +164,7 @@ def plan_shards(
 
     Raises:
         ConfigError: A method whose latency was not measured, an envelope that is looser than the
-            cell, or a rule of joining that a method cannot keep and is not exempt from.
+            cell, a person for whom nobody waits as long, or a rule of joining that a method cannot keep and is not exempt from.
     """
     for schedule in perturbations.values():
         if isinstance(schedule, ReducedEnvelope):
@@ -176,6 +176,14 @@ def plan_shards(
             found=f"with {', '.join(untimed)}, whose latency was not measured",
             expected=f"methods out of {', '.join(sorted(latency))}",
             action="Correct the names, or run `dvc repro latency`.",
+        )
+    waits_s = comparison.cell.execution.human_timeout_s
+    if comparison.person is not None and not comparison.person.reaction_s[1] <= waits_s:
+        raise ConfigError(
+            where="params.yaml: stress.person.reaction_s",
+            found=f"up to {comparison.person.reaction_s[1]:g} s",
+            expected=f"at most execution.human_timeout_s, {waits_s:g} s",
+            action="Let recovery wait for longer, or have the person come sooner.",
         )
     for policy in judged if comparison.joining.rule == REAL_TIME else ():
         if isinstance(policy, JudgedPolicy):  # a server says it when it is asked

@@ -12,6 +12,7 @@ from genpolicy.candidates.judged import JudgedPolicy
 from genpolicy.errors import ConfigError
 from genpolicy.evidence.documents.shadow import CHECKER
 from genpolicy.evidence.documents.stress import DISTILLED
+from genpolicy.evidence.shadow.rig import EXECUTION
 from genpolicy.evidence.stress.latency import (
     DECLARED_TERMS,
     MEASURED_TERMS,
@@ -19,6 +20,7 @@ from genpolicy.evidence.stress.latency import (
     LatencyModel,
 )
 from genpolicy.evidence.stress.matched import matched_starts
+from genpolicy.evidence.stress.person import PersonSettings
 from genpolicy.evidence.stress.perturbations import Nominal, QueueReorder
 from genpolicy.evidence.stress.settings import StressSettings
 from genpolicy.evidence.stress.shard import Comparison
@@ -38,7 +40,9 @@ from genpolicy.verification.rollouts import differences
 from genpolicy.verification.tables import KEYS, derived_tables
 from tests.candidates.conftest import entry_of  # noqa: F401
 
-JOINED = SimpleNamespace(joining=JoiningSettings())
+JOINED = SimpleNamespace(
+    joining=JoiningSettings(), person=None, cell=SimpleNamespace(execution=EXECUTION)
+)
 PERTURBATIONS = {
     "nominal": Nominal(),
     "queue_reorder": QueueReorder(probability=0.5, magnitude_s=0.25),
@@ -122,6 +126,20 @@ def test_a_server_that_does_not_start_costs_its_deadlines_and_nobody_else_s(
     assert 0 < planted["deadline_misses"] == sum(counted.values())
     assert by_method["flow"]["deadline_misses"] == 0
     assert CHECKER.read(tmp_path).violations == []
+
+
+def test_a_person_for_whom_nobody_waits_as_long_is_refused(tmp_path):
+    judged, models = [JudgedPolicy("a", 0, tmp_path, "")], {"a": None}
+    waits_s = EXECUTION.human_timeout_s
+    for latest_s, refused in ((waits_s, False), (waits_s + 0.1, True)):
+        person = PersonSettings(reaction_s=(0.0, latest_s), longest_s=1.0)
+        joined = SimpleNamespace(**{**vars(JOINED), "person": person})
+        arguments = (joined, judged, PERTURBATIONS)
+        if refused:
+            with pytest.raises(ConfigError, match=r"stress\.person\.reaction_s is up to"):
+                plan_shards(*arguments, latency=models, journals=tmp_path)
+        else:
+            assert plan_shards(*arguments, latency=models, journals=tmp_path)
 
 
 def test_every_method_meets_every_perturbation(tmp_path):
