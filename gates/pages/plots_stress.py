@@ -34,7 +34,8 @@ OUTCOMES = {
     "collision": RED,
     "assisted": TEAL,
 }
-"""Known outcomes; what succeeded after a person had the arm stands last. A colour stays with its outcome in every report."""
+"""Known outcomes, best first, and that of an arm that a person had, which is none of the policy; a
+colour stays with its outcome in every report."""
 
 
 def _success(evidence: Evidence, report: GateReport) -> Figure:

@@ -164,7 +164,8 @@ def plan_shards(
 
     Raises:
         ConfigError: A method whose latency was not measured, an envelope that is looser than the
-            cell, a person for whom nobody waits as long, or a rule of joining that a method cannot keep and is not exempt from.
+            cell, a person for whom nobody waits as long, or a rule of joining that a method cannot
+            keep and is not exempt from.
     """
     for schedule in perturbations.values():
         if isinstance(schedule, ReducedEnvelope):
