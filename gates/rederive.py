@@ -16,7 +16,7 @@ from gates.rederive_clocks import rederive_clocks
 from gates.rederive_conformance import rederive_conformance
 from gates.rederive_dataset import TRAININGS, rederive_dataset, rederive_trainings, trainings
 from gates.rederive_distilled import rederive_costs, rederive_distilled
-from gates.rederive_disturbance import rederive_disturbance
+from gates.rederive_disturbance import rederive_disturbance, rederive_severities
 from gates.rederive_draws import rederive_rollout_draws, rederive_shadow_draws
 from gates.rederive_latency import rederive_latency
 from gates.rederive_sessions import rederive_sessions
@@ -124,6 +124,7 @@ def rederive(root: Path, gate: Gate) -> None:
         rederive_clocks(root, params, held_to)
         rederive_latency(root, params, journals)
         rederive_disturbance(params, journals)
+        rederive_severities(root, params)
         rederive_rollout_draws(root, params, journals)
         rederive_distilled(root, training_seed(params))
         _envelope(root, params)

@@ -6,11 +6,29 @@ from typing import Any
 
 from gates.rederive_shadow import TaskSection
 from gates.stated import refuse, root_seed, section
-from genpolicy.evidence.stress.settings import StressSettings
+from gates.stress.rollouts import STRESS
+from genpolicy.evidence.stress.settings import SEVERITIES, StressSettings
+from genpolicy.integrity.tables import read_table
 from genpolicy.tasks.api import load_task
 from genpolicy.verification.attended import PlannedPerson, attended_otherwise
 from genpolicy.verification.disturbed import Plan, disturbed_otherwise
 from genpolicy.verification.journal_source import readable
+
+
+def rederive_severities(root: Path, params: Mapping[str, Any]) -> None:
+    """Hold `severities.parquet` against the plan: every size that is shown was to be run.
+
+    Raises:
+        RefusedError: It says another size, another condition, or is there without a plan.
+        ConfigError: The section of `params.yaml` cannot be read.
+        IntegrityError: It is no whole table.
+    """
+    path = root / STRESS / SEVERITIES
+    planned = [vars(row) for row in section(params, "stress", StressSettings).severity_rows]
+    stated = read_table(path).to_pylist() if path.is_file() else []
+    if stated != planned:
+        told = f"{len(stated)} sizes of conditions, {len(planned)} by the plan, or other ones"
+        refuse("D", f"{STRESS}/{SEVERITIES}", told, "what params.yaml plans")
 
 
 def rederive_disturbance(params: Mapping[str, Any], journals: Sequence[Path]) -> None:
@@ -25,7 +43,7 @@ def rederive_disturbance(params: Mapping[str, Any], journals: Sequence[Path]) ->
     stress = section(params, "stress", StressSettings)
     task = load_task(section(params, "task", TaskSection).name)
     plan = Plan(
-        perturbations={name: entry.model_dump() for name, entry in stress.perturbations.items()},
+        perturbations={name: entry.model_dump() for name, entry in stress.conditions.items()},
         contact_phases=frozenset(task.contact_phases),
         root_seed=root_seed(params),
     )

@@ -27,7 +27,7 @@ def rederive_latency(root: Path, params: Mapping[str, Any], journals: Sequence[P
     """
     stress = section(params, "stress", StressSettings)
     declared = section(params, "latency", LatencySection).declared
-    planned = {name: entry.model_dump() for name, entry in stress.perturbations.items()}
+    planned = {name: entry.model_dump() for name, entry in stress.conditions.items()}
     with readable(LATENCY):
         times = Times(
             read_table(root / LATENCY).to_pylist(),

@@ -43,6 +43,16 @@ MILDEST: tuple[Mildest, ...] = (
         "less than an action period of delay moves no action",
     ),
     Mildest(
+        "frame_drop",
+        {"probability": 0.05},
+        "one lost picture in a rollout is what a camera loses on a good day",
+    ),
+    Mildest(
+        "policy_stall",
+        {"probability": 0.02, "magnitude_s": 0.1},
+        "a policy that hangs for less than two action periods is a slow one",
+    ),
+    Mildest(
         "queue_reorder",
         {"probability": 0.02, "magnitude_s": 0.1},
         "a chunk that waits for less than two action periods is not overtaken",

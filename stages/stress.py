@@ -10,9 +10,10 @@ from genpolicy.evidence.documents.stress import POWER
 from genpolicy.evidence.fixtures_again import NO_FIXTURES, brought_fixtures
 from genpolicy.evidence.reproducibility.latency import latency_models
 from genpolicy.evidence.rows.reproducibility import LatencyRow
+from genpolicy.evidence.rows.stress import SeverityRow
 from genpolicy.evidence.stress.latency import LatencySection
 from genpolicy.evidence.stress.matched import matched_starts
-from genpolicy.evidence.stress.settings import StressSettings
+from genpolicy.evidence.stress.settings import SEVERITIES, StressSettings
 from genpolicy.evidence.stress.shard import Comparison
 from genpolicy.evidence.stress.tables import (
     plan_shards,
@@ -22,7 +23,7 @@ from genpolicy.evidence.stress.tables import (
 from genpolicy.execution.cell import Cell, ExecutionSettings
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.atomic import output_folder
-from genpolicy.integrity.rows import read_columns
+from genpolicy.integrity.rows import read_columns, write_rows
 from genpolicy.policies.matched_training import PolicySettings
 from genpolicy.tasks.api import load_task
 from stages._contracts import require_one_contract
@@ -67,7 +68,7 @@ def work(params: Params) -> None:
         shards = plan_shards(
             comparison,
             judged,
-            section.perturbations,
+            section.conditions,
             latency=latency_models(table, timing.declared_terms),
             journals=folder / "journals",
         )
@@ -75,6 +76,8 @@ def work(params: Params) -> None:
             folder, shards, workers=params.compute.workers, scheduler=params.compute.scheduler
         )
         POWER.write(folder, power)
+        if graded := section.severity_rows:
+            write_rows(folder / SEVERITIES, SeverityRow, graded)
 
 
 if __name__ == "__main__":

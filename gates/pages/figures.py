@@ -78,6 +78,7 @@ class Plot:
     Attributes:
         also: Further files that it is drawn from.
         read: The same in words, for readers who do not see it: heads, then rows of cells.
+        optional: Left out where the report names no such source: then there was none to write.
     """
 
     title: str
@@ -86,6 +87,7 @@ class Plot:
     draw: Callable[[Evidence, GateReport], Figure]
     also: tuple[str, ...] = ()
     read: Callable[[Evidence, GateReport], Table] | None = None
+    optional: bool = False
 
     def picture(self, evidence: Evidence, report: GateReport, salt: str) -> dict[str, Any]:
         """What this adds to a `Shown`."""
@@ -198,7 +200,7 @@ Picturable = Plot | Photo | Listing | Series
 
 def left_out(plot: Picturable, report: GateReport) -> bool:
     """Whether a report has no such figure, since there was nothing to write."""
-    optional = isinstance(plot, Listing) and plot.optional
+    optional = isinstance(plot, Listing | Plot) and plot.optional
     return optional and plot.source not in report.materials
 
 

@@ -35,6 +35,7 @@ from gates.pages import (
     tables_matching,
     tables_overruns,
     tables_recovery,
+    tables_severity,
     tables_stress,
     tables_survival,
 )
@@ -86,6 +87,8 @@ PLOTS: dict[str, tuple[Picturable, ...]] = {
     "D": (
         *plots_stress.PLOTS,
         *tables_recovery.LISTINGS,
+        tables_severity.CURVE,
+        tables_severity.HALF,
         tables_clocks.CLOCKS,
         tables_overruns.DONE,
         tables_faults.FAILED,

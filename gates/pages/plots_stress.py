@@ -1,6 +1,7 @@
 """Figures of Gate D: success per condition, action age, outcomes."""
 
 import numpy as np
+import pandas as pd
 from matplotlib.figure import Figure
 
 from gates.evidence import Evidence, MissingEvidenceError, flags, numbers
@@ -38,8 +39,14 @@ OUTCOMES = {
 colour stays with its outcome in every report."""
 
 
-def _success(evidence: Evidence, report: GateReport) -> Figure:
+def _judged(evidence: Evidence, report: GateReport) -> pd.DataFrame:
+    """Rollouts of the conditions that are judged; milder and harder ones are a figure of theirs."""
     frame = evidence.rows(ROLLOUTS, RolloutRow)
+    return frame[frame["perturbation"].isin(list(report.settings["perturbations"]))]
+
+
+def _success(evidence: Evidence, report: GateReport) -> Figure:
+    frame = _judged(evidence, report)
     methods, conditions = in_order(frame["method"]), sorted(set(frame["perturbation"]))
     conditions.sort(key=lambda name: name != "nominal")
     colour, shape = colours(methods), markers(methods)
@@ -70,7 +77,7 @@ def _success(evidence: Evidence, report: GateReport) -> Figure:
 
 
 def _age(evidence: Evidence, report: GateReport) -> Figure:
-    frame = evidence.rows(ROLLOUTS, RolloutRow)
+    frame = _judged(evidence, report)
     frame = frame[numbers(frame, "action_ticks") > 0]
     if len(frame) == 0:
         raise MissingEvidenceError("no rollout executed an action")
@@ -90,7 +97,7 @@ def _age(evidence: Evidence, report: GateReport) -> Figure:
 
 
 def _outcomes(evidence: Evidence, report: GateReport) -> Figure:
-    frame = evidence.rows(ROLLOUTS, RolloutRow)
+    frame = _judged(evidence, report)
     methods = in_order(frame["method"])
     seen = set(frame["outcome"])
     names = [*(name for name in OUTCOMES if name in seen), *sorted(seen - set(OUTCOMES))]
@@ -121,7 +128,7 @@ def _outcomes(evidence: Evidence, report: GateReport) -> Figure:
 
 
 def _force(evidence: Evidence, report: GateReport) -> Figure:
-    frame = evidence.rows(ROLLOUTS, RolloutRow)
+    frame = _judged(evidence, report)
     methods = in_order(frame["method"])
     colour, shape = colours(methods), markers(methods)
     figure, (axes,) = new_figure(height=1.0 + 0.32 * len(methods))

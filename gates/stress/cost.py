@@ -15,6 +15,7 @@ from gates.distilled import spent
 from gates.evidence import Evidence, MissingEvidenceError, counts, flags, numbers
 from gates.floors import OLDEST_ACTION_S
 from gates.stress.rollouts import (
+    CURVES,
     DRILL,
     FAULTS,
     INVOCATIONS,
@@ -280,6 +281,10 @@ def force_peak_p95_n(evidence: Evidence, settings: StressSettings, candidate: st
     per_candidate=True,
 )
 def stress_success_lower(evidence: Evidence, settings: StressSettings, candidate: str) -> Measured:
-    """Lowest lower bound of success over the perturbations."""
+    """Lowest lower bound of success over the perturbations.
+
+    Conditions that are milder or harder than the planned ones are shown beside it, not judged.
+    """
+    evidence.bind(CURVES)
     conditions = [name for name in settings.perturbations if name != NOMINAL]
     return success_lower(evidence, settings, candidate, conditions)

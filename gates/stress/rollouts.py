@@ -13,6 +13,7 @@ from gates.evidence import Evidence, MissingEvidenceError, flags
 from gates.report import Owner
 from gates.settings import CandidateSettings
 from genpolicy.evidence.rows.stress import RolloutRow
+from genpolicy.evidence.stress.settings import SEVERITIES
 
 STRESS = "artifacts/stress"
 ROLLOUTS = f"{STRESS}/rollouts.parquet"
@@ -20,6 +21,8 @@ JOURNALS = f"{STRESS}/journals/*.mcap"
 INVOCATIONS = f"{STRESS}/invocations.parquet"
 FAULTS = f"{STRESS}/faults.parquet"
 """Missing where no policy in a process of its own was compared."""
+CURVES = f"{STRESS}/{SEVERITIES}"
+"""Missing where success is shown against no severity."""
 SUCCESS = "success"
 """How a rollout ended that succeeded."""
 NOMINAL = "nominal"

@@ -6,6 +6,7 @@ time, and the JSON message is the payload plus `session`, `n` and `t`. Arrays of
 of little-endian float64 rows, so that equality is equality of bits (`decode_actions`).
 """
 
+import hashlib
 import io
 import json
 from collections.abc import Iterable, Mapping, Sequence
@@ -22,7 +23,7 @@ from genpolicy.contract.action import ACTION_DIM
 from genpolicy.errors import BadInputError, ContractError
 from genpolicy.execution.cell import FALLBACK_HASH, Cell
 from genpolicy.execution.event_schemas import event_schema, schema_name
-from genpolicy.execution.nanoseconds import NEVER_NS, NS_PER_S, ns_or_none
+from genpolicy.execution.nanoseconds import NEVER_NS, NS_PER_S, ns_or_none, to_ns
 from genpolicy.integrity.atomic import write_bytes
 from genpolicy.integrity.documents import canonical_json
 from genpolicy.integrity.hashing import sha256_bytes_of
@@ -42,12 +43,14 @@ EVENT_FIELDS: dict[str, tuple[str, ...]] = {
                 "fallback_hash", "controller_mode", "checks_missing"),
     "observation": ("event_time_ns", "phase", "calibration_epoch", "used", "ignored_because"),
     "scene": ("bodies",),
+    "exposure": ("sha256",),
+    "arrived": ("exposed_ns",),
     "phase": ("event_time_ns", "old", "new"),
     "epoch": ("event_time_ns", "old", "new"),
     "active": ("checkpoint", "sampler"),
     "controller": ("mode",),
     "invocation": ("id", "stage", "detail"),
-    "conditioning": ("id", "key", "rows", "history"),
+    "conditioning": ("id", "exposed_ns", "key", "rows", "history"),
     "joined": ("chunk_id", "invocation", "rule", "draw", "parents"),
     "candidate": ("chunk_id", "method", "index", "layers", "first_reason", "measures"),
     "enqueue": ("arrival", "chunk_id", "source", "method", "condition_ns", "start_ns", "period_ns",
@@ -170,25 +173,46 @@ class Journal:
         """Record where bodies of the scene were seen: positions, m, and quaternions, by name."""
         self.add("scene", self.clock(now_s), {"bodies": encode_poses(poses)})
 
+    def exposure(self, now_s: float, observation: Array) -> None:
+        """Record that something was exposed, and its hash: what an invocation says it saw is this.
+
+        Args:
+            now_s: Time, s.
+            observation: What was seen. Shape (D_o,).
+        """
+        seen = hashlib.sha256(np.ascontiguousarray(observation, dtype="<f8").tobytes())
+        self.add("exposure", self.clock(now_s), {"sha256": seen.hexdigest()})
+
+    def arrived(self, now_s: float, *, exposed_s: float) -> None:
+        """Record that what was exposed at a time is there now."""
+        self.add("arrived", self.clock(now_s), {"exposed_ns": to_ns(exposed_s)})
+
     def invocation(self, now_s: float, *, invocation_id: str, stage: str, detail: str = "") -> None:
         """Record the begin of an invocation, the check of another candidate, or the end."""
         payload = {"id": invocation_id, "stage": stage, "detail": detail}
         self.add("invocation", self.clock(now_s), payload)
 
     def conditioning(
-        self, now_s: float, *, invocation_id: str, key: Sequence[str | int], history: Array
+        self,
+        now_s: float,
+        *,
+        invocation_id: str,
+        exposed_s: float,
+        key: Sequence[str | int],
+        history: Array,
     ) -> None:
         """Record what an invocation draws from, so that anybody can draw again.
 
         Args:
             now_s: Time, s.
             invocation_id: The invocation.
+            exposed_s: When the newest observation that it sees was exposed, s.
             key: Names of its noise; with the checkpoint they say which numbers are drawn.
             history: The observations that it sees, oldest first. Shape (H_o, D_o).
         """
         payload = {
-            "id": invocation_id, "key": list(key), "rows": len(history),
-            "history": encode_actions(history),
+            "id": invocation_id, "exposed_ns": to_ns(exposed_s), "key": list(key),
+            "rows": len(history), "history": encode_actions(history),
         }  # fmt: skip
         self.add("conditioning", self.clock(now_s), payload)
 

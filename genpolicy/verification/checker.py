@@ -6,8 +6,8 @@ again from the raw events, and every accepted action is compared bit for bit wit
 was admitted. Where the caller says what the robot is, executed rows are proved feasible again, by
 MuJoCo (`motion`). Rules: P1 gate to stub, P2 watchdog, P3 monotone, P4 chain, P5 newest first,
 P6 feasible (and of a blend its own admission, `joined`), P7 stop is sticky, P8 a person has the arm
-(`attended`), `clock` (no answer before its time), `conservation`, `journal` (form), `settings`
-(declared limits).
+(`attended`), `clock` (no answer before its time), `sensor` (nothing seen before it arrived),
+`conservation`, `journal` (form), `settings` (declared limits).
 """
 
 import hashlib

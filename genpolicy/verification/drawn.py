@@ -94,7 +94,6 @@ class _Session:
             self.scene = m["bodies"]
         elif kind == "invocation" and m["stage"] == "begin":
             self.begun.append(m["id"])
-            self.rejoined.begin(m)
         elif kind == "conditioning":
             yield from self._conditioning(m)
         elif kind == "joined":
@@ -120,6 +119,7 @@ class _Session:
         if m["key"] != planned:
             yield f"the noise of {name!r} is named {m['key']}, {planned} by the plan"
         self.conditions[name] = m, self.scene
+        self.rejoined.begin(m)
 
     def _enqueue(self, m: Message) -> Iterator[str]:
         name = m["chunk_id"]

@@ -12,6 +12,7 @@ shadow evaluation has none, and there nothing is asked.
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from genpolicy.verification.arrived import Arrived
 from genpolicy.verification.journal_source import Message
 
 Finding = tuple[str, str]
@@ -33,9 +34,9 @@ TIMED = "start_sha256"
 
 @dataclass
 class _Invocation:
-    """One that is under way: when it began, what it has cost so far, and what was judged of it."""
+    """One that is under way: what it saw, what it has cost since, and what was judged of it."""
 
-    begun_ns: int
+    exposed_ns: int
     cost_s: float
     checks: int = 0
     judged: int = 0
@@ -44,7 +45,7 @@ class _Invocation:
     failed: bool = False
 
     def due_ns(self) -> float:
-        return self.begun_ns + self.cost_s * 1e9 - ROUNDING_NS
+        return self.exposed_ns + self.cost_s * 1e9 - ROUNDING_NS
 
 
 class Invocations:
@@ -52,11 +53,13 @@ class Invocations:
 
     def __init__(self) -> None:
         self._of: dict[str, _Invocation] = {}
+        self._arrived = Arrived()
         self._timed = False
         self._failing = ""
 
     def follow(self, kind: str, m: Message) -> Iterator[Finding]:
-        """Take an event in; yields what it could not have cost so little."""
+        """Take an event in; yields what it could not have cost so little, or have seen."""
+        yield from self._arrived.follow(kind, m)
         if kind == "session":
             self._timed = TIMED in m["labels"]
         elif not self._timed:
@@ -64,6 +67,9 @@ class Invocations:
         elif kind == "invocation":
             yield from self._missed(m)
             yield from self._invocation(m)
+        elif kind == "conditioning":
+            if m["id"] in self._of:  # what it takes counts from what it saw
+                self._of[m["id"]].exposed_ns = m["exposed_ns"]
         elif kind == "joined":
             if m["invocation"] in self._of:  # the chunk is an answer to it, whatever its own id
                 self._of[m["chunk_id"]] = self._of[m["invocation"]]

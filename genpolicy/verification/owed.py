@@ -16,12 +16,14 @@ from typing import Any
 
 from genpolicy.seeds import stream
 from genpolicy.verification.journal_source import Message, read_messages
+from genpolicy.verification.sensed import SENSED, Sensed, sensed_s
 
 ROUNDING_S = 1e-9
 CHECK = "project"
 """The term that every further candidate costs once more."""
-DELAYS = {"camera_delay": "capture", "queue_reorder": "queue", "network_jitter": "network"}
-"""Which term a perturbation of this kind adds its `magnitude_s` to; of the last a share of it."""
+DELAYS = {"queue_reorder": "queue", "network_jitter": "network", "policy_stall": "sample"}
+"""Which term of an invocation a perturbation of this kind adds its `magnitude_s` to; of jitter a
+share of it."""
 
 FLOW = (
     "exposure", "capture", "decode", "transfer", "preprocess", "encode", "sample", "select",
@@ -94,15 +96,32 @@ class Times:
             for method in warm
         }
 
-    def begins_with_s(self, method: str, condition: str, start: int, number: int) -> float:
-        """What invocation `number` takes to its first candidate, s; NaN of an unknown method."""
-        return sum(self._terms_s(method, condition, start, number).values(), start=0.0)
+    def sensed_s(self, condition: str, start: int, exposure: int) -> dict[str, float]:
+        """What each sensor term of an exposure takes, s; infinite where it never comes."""
+        key = ("exposed", condition, start, exposure)
+        lots = stream(self._seed, *key).random(len(SENSED) + 2)
+        return sensed_s(self._planned[condition], self._declared, list(map(float, lots)))
 
-    def _terms_s(self, method: str, condition: str, start: int, number: int) -> dict[str, float]:
+    def begins_with_s(
+        self, method: str, condition: str, start: int, number: int, exposure: int
+    ) -> float:
+        """What invocation `number` takes from that exposure to its first candidate, s.
+
+        NaN of an unknown method.
+        """
+        return sum(self._terms_s(method, condition, start, number, exposure).values(), start=0.0)
+
+    def _terms_s(
+        self, method: str, condition: str, start: int, number: int, exposure: int
+    ) -> dict[str, float]:
         """The same by term, in the order of the flow."""
+        sensed_s = self.sensed_s(condition, start, exposure)
         hit, measured = self.hit(condition, start, number), self._warm.get(method, {})
         drawn_s = {} if measured else {COLD: math.nan}
         for term in FLOW if measured else ():
+            if term in sensed_s:
+                drawn_s[term] = sensed_s[term]
+                continue
             lot = self._lot(condition, start, number, term)
             if term in self._declared:
                 least_s, most_s = self._declared[term]
@@ -116,14 +135,14 @@ class Times:
         return drawn_s
 
     def owes(
-        self, method: str, condition: str, start: int, number: int
+        self, method: str, condition: str, start: int, number: int, exposure: int
     ) -> list[tuple[str, str, float]]:
         """Terms of an invocation that take too long: which, what is done, and when it is known, s.
 
         The last one is that which ends it, if any does.
         """
         found, begun_s = [], 0.0
-        for term, drawn_s in self._terms_s(method, condition, start, number).items():
+        for term, drawn_s in self._terms_s(method, condition, start, number, exposure).items():
             most_s, action = self._deadlines.get(term, (math.inf, GOES_ON))
             if not drawn_s <= most_s:
                 found.append((term, action, begun_s + most_s))
@@ -181,6 +200,7 @@ def _at(seconds: Sequence[float], lot: float) -> float:
 class _Owed:
     """What an invocation owes for terms that took too long."""
 
+    exposed_ns: int
     begun_ns: int
     terms: list[tuple[str, str, float]]
     unchecked: set[int] = field(default_factory=set)
@@ -197,7 +217,7 @@ class _Owed:
         if self.stated.count(said) > len(owed) + self.checks.count(said):
             return f"states {m['detail']!r}, and that term took no longer than it may"
         if owed and action not in ON_ARRIVAL and said not in self.checks:
-            known_ns = self.begun_ns + owed[0][2] * 1e9
+            known_ns = max(self.exposed_ns + owed[0][2] * 1e9, self.begun_ns)
             if not -ROUNDING_S * 1e9 <= m["t"] - known_ns <= period_ns + ROUNDING_S * 1e9:
                 return f"states {m['detail']!r} at {m['t']} ns, known at {known_ns:.0f} ns"
         return ""
@@ -213,7 +233,7 @@ class _Owed:
             for one in self.terms
             if one[1] not in ON_ARRIVAL
             and one[:2] not in self.stated
-            and self.begun_ns + one[2] * 1e9 + period_ns < end_ns
+            and max(self.exposed_ns + one[2] * 1e9, self.begun_ns) + period_ns < end_ns
         ]
 
     def forbids(self, candidate: int) -> bool:
@@ -234,6 +254,9 @@ class _Session:
     period_ns: int
     owed: dict[str, _Owed] = field(default_factory=dict)
 
+    def __post_init__(self) -> None:
+        self.sensed = Sensed(self.condition, self.start, self.period_ns)
+
 
 def stated_otherwise(path: Path, times: Times) -> Iterator[str]:
     """What a journal of rollouts states that is not what was drawn again, in words.
@@ -250,6 +273,8 @@ def stated_otherwise(path: Path, times: Times) -> Iterator[str]:
             labels = m["labels"]
             own = (str(labels["method"]), str(labels["perturbation"]), int(labels["start"]))
             sessions[name] = _Session(*own, {}, {}, {}, int(m["period_ns"]))
+        elif kind in ("exposure", "arrived"):
+            sessions[name].sensed.read(kind, m)
         elif kind == "invocation":
             yield from _stated(m, sessions[name], times)
         elif kind == "joined":
@@ -258,6 +283,7 @@ def stated_otherwise(path: Path, times: Times) -> Iterator[str]:
             yield from _arrived(m, sessions[name], times)
         elif kind == "end":
             yield from _left_out(m, sessions[name], times)
+            yield from sessions[name].sensed.otherwise(m["t"], times.sensed_s)
 
 
 def _stated(m: Message, session: _Session, times: Times) -> Iterator[str]:
@@ -265,8 +291,9 @@ def _stated(m: Message, session: _Session, times: Times) -> Iterator[str]:
     which = f"invocation {m['id']!r}"
     if m["stage"] == "begin":
         number = session.numbers.setdefault(m["id"], len(session.numbers))
-        owed_s = times.begins_with_s(*own, number)
-        owed = session.owed[m["id"]] = _Owed(m["t"], times.owes(*own, number))
+        exposure, exposed_ns = session.sensed.newest
+        owed_s = times.begins_with_s(*own, number, exposure)
+        owed = session.owed[m["id"]] = _Owed(exposed_ns, m["t"], times.owes(*own, number, exposure))
         if (CHECK, UNCHECKED) in [one[:2] for one in owed.terms]:
             owed.unchecked.add(0)
     elif m["stage"] == "check":

@@ -100,8 +100,8 @@ class Rejoined:
         self._entered: list[tuple[Message, Message]] = []
 
     def begin(self, m: Message) -> None:
-        """An invocation begins."""
-        self._begun[m["id"]] = (m["t"], len(self._entered))
+        """An invocation begins, and states what it sees."""
+        self._begun[m["id"]] = (m["exposed_ns"], len(self._entered))
 
     def join(self, m: Message) -> Iterator[str]:
         """A candidate is made; yields what it may not rest on, in words."""
@@ -126,7 +126,7 @@ class Rejoined:
         name = own["invocation"]
         begun_ns, before = self._begun[name]
         if chunk["start_ns"] != begun_ns:
-            yield f"{name!r} starts at {chunk['start_ns']} ns, and was asked at {begun_ns} ns"
+            yield f"{name!r} starts at {chunk['start_ns']} ns, and saw what was at {begun_ns} ns"
         when = own["t"], entered
         if own["rule"] == NEAREST:
             when = self._at_first.get(name, (0, 0))

@@ -9,7 +9,7 @@ STOP_STATES = ("protective_stop", "emergency_stop")
 KINDS = frozenset({
     "observation", "phase", "epoch", "active", "invocation", "candidate", "refuse", "supervisor",
     "recovery", "invalidate", "mode", "reset", "force", "outcome", "scene", "controller",
-    "conditioning", "push", "joined", "recovery_force", "person",
+    "conditioning", "push", "joined", "recovery_force", "person", "exposure", "arrived",
 })  # fmt: skip
 
 

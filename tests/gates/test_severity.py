@@ -24,6 +24,8 @@ def test_golden_what_is_the_least():
     assert {item.kind: dict(item.least) for item in MILDEST} == {
         "camera_delay": {"probability": 0.5, "magnitude_s": 0.05},
         "compute_contention": {"probability": 0.2, "factor": 2.0},
+        "frame_drop": {"probability": 0.05},
+        "policy_stall": {"probability": 0.02, "magnitude_s": 0.1},
         "network_jitter": {"probability": 0.2, "magnitude_s": 0.05},
         "queue_reorder": {"probability": 0.02, "magnitude_s": 0.1},
     }

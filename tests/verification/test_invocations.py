@@ -1,5 +1,7 @@
 """The virtual clock's debts: nothing is judged before its time; each further candidate costs."""
 
+import hashlib
+
 import pytest
 
 from genpolicy.candidates.wire.faults import Fault
@@ -11,17 +13,28 @@ BEGIN = ("invocation", {"t": 100 * MS, "id": "a", "stage": "begin", "detail": "0
 CHECK = ("invocation", {"t": 200 * MS, "id": "a", "stage": "check", "detail": "0.03"})
 FIRST = ("candidate", {"t": 200 * MS, "chunk_id": "a", "index": 0})
 SECOND = ("candidate", {"t": 200 * MS, "chunk_id": "a", "index": 1})
-QUEUED = ("enqueue", {"t": 200 * MS, "chunk_id": "a", "source": "policy"})
+QUEUED = ("enqueue", {"t": 200 * MS, "chunk_id": "a", "source": "policy",
+                      "condition_ns": 100 * MS, "start_ns": 100 * MS})  # fmt: skip
 FAULT = ("invocation", {"t": 250 * MS, "id": "a", "stage": "fault", "detail": "late"})
 MISSED = ("invocation", {"t": 250 * MS, "id": "a", "stage": "end", "detail": "deadline"})
 OTHER = ("invocation", {"t": 250 * MS, "id": "b", "stage": "begin", "detail": "0.06"})
 END = ("end", {"t": 400 * MS})
 ANSWERED = ("invocation", {"t": 200 * MS, "id": "a", "stage": "end", "detail": "answered"})
 
+SAW = {"t": 101 * MS, "exposed_ns": 100 * MS, "rows": 1, "history": "00" * 8}
+SEEN = [
+    ("exposure", {"t": 100 * MS, "sha256": hashlib.sha256(bytes(8)).hexdigest()}),
+    ("arrived", {"t": 101 * MS, "exposed_ns": 100 * MS}),
+]
+
 
 def rules(*events, session=SESSION):
     seen = Invocations()
-    told = (session, *events)
+    told = [session, *SEEN]
+    for event in events:
+        told.append(event)
+        if event[1].get("stage") == "begin":
+            told.append(("conditioning", {**SAW, "id": event[1]["id"]}))
     return [rule for kind, message in told for rule, _ in seen.follow(kind, message)]
 
 

@@ -1,6 +1,7 @@
 """What invocations had to take: drawn by the checker, by the virtual clock, and by hand."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -9,6 +10,7 @@ from pydantic import TypeAdapter
 
 from genpolicy.contract.latency import DECLARED_TERMS, MEASURED_TERMS
 from genpolicy.evidence.reproducibility.latency import latency_models
+from genpolicy.evidence.stress.exposures import sensor_terms
 from genpolicy.evidence.stress.latency import DeclaredTerm, draw_check, draw_latency
 from genpolicy.evidence.stress.perturbations import Perturbation, injection
 from genpolicy.execution.journal import Journal, write_journal
@@ -19,6 +21,8 @@ DECLARED = {str(term): (0.001 * n, 0.002 * n) for n, term in enumerate(DECLARED_
 PLANNED = {
     "nominal": {"kind": "nominal"},
     "camera": {"kind": "camera_delay", "probability": 1.0, "magnitude_s": 0.08},
+    "frames": {"kind": "frame_drop", "probability": 0.4},
+    "stall": {"kind": "policy_stall", "probability": 0.3, "magnitude_s": 0.2},
     "load": {"kind": "compute_contention", "probability": 0.5, "factor": 4.0},
     "jitter": {"kind": "network_jitter", "probability": 0.5, "magnitude_s": 0.12},
     "reorder": {"kind": "queue_reorder", "probability": 0.3, "magnitude_s": 0.3},
@@ -65,9 +69,14 @@ def test_the_clock_and_the_checker_draw_the_same(clock, method, condition):
             key = {"root_seed": SEED, "start": start, "invocation": number}
             hit = injection(perturbation, name=condition, **key)
             drawn = {"perturbation": condition, "compute_factor": hit.compute_factor, **key}
-            total_s = draw_latency(clock[method], extra_s=hit.extra_s, **drawn).total_s
+            terms_s = draw_latency(clock[method], extra_s=hit.extra_s, **drawn).terms
+            setup = SimpleNamespace(
+                root_seed=SEED, perturbation=condition, schedule=perturbation, latency=clock[method]
+            )
+            sensor_s, lost = sensor_terms(setup, start=start, number=number + 5)
+            total_s = math.inf if lost else sum({**terms_s, **sensor_s}.values())
             place = (method, condition, start, number)
-            assert own.begins_with_s(*place) == pytest.approx(total_s, abs=1e-12)
+            assert own.begins_with_s(*place, number + 5) == pytest.approx(total_s, abs=1e-12)
             for candidate in (1, 2):
                 check_s = draw_check(clock[method], candidate=candidate, **drawn)
                 assert own.check_s(*place, candidate) == check_s
@@ -84,18 +93,21 @@ def test_by_hand():
     fixed = {name: (0.001, 0.001) for name in DECLARED}
     own = Times(rows, declared=fixed, perturbations=PLANNED, root_seed=SEED)
     # Six declared terms, five measured ones; the first call costs 5 * 3 ms more.
-    assert own.begins_with_s("flow", "nominal", 0, 1) == pytest.approx(0.016)
-    assert own.begins_with_s("flow", "nominal", 0, 0) == pytest.approx(0.031)
-    assert own.begins_with_s("flow", "camera", 0, 1) == pytest.approx(0.096)
+    assert own.begins_with_s("flow", "nominal", 0, 1, 4) == pytest.approx(0.016)
+    assert own.begins_with_s("flow", "nominal", 0, 0, 4) == pytest.approx(0.031)
+    assert own.begins_with_s("flow", "camera", 0, 1, 4) == pytest.approx(0.096)
     assert own.check_s("flow", "nominal", 0, 1, 1) == 0.002
     assert own.hit("nominal", 0, 0) == Hit()
 
 
 def test_what_was_not_measured_owes_no_number():
     own = times([row for row in ROWS if row["temperature"] == "warm"])
-    assert math.isnan(own.begins_with_s("flow", "nominal", 0, 0))
-    assert not math.isnan(own.begins_with_s("flow", "nominal", 0, 1))
-    for other in (own.begins_with_s("act", "nominal", 0, 1), own.check_s("act", "load", 0, 1, 1)):
+    assert math.isnan(own.begins_with_s("flow", "nominal", 0, 0, 4))
+    assert not math.isnan(own.begins_with_s("flow", "nominal", 0, 1, 4))
+    for other in (
+        own.begins_with_s("act", "nominal", 0, 1, 4),
+        own.check_s("act", "load", 0, 1, 1),
+    ):
         assert math.isnan(other)
 
 
@@ -104,7 +116,7 @@ def test_a_declared_row_is_no_measured_one():
     own, other = times(), times([*ROWS, declared])
     for number in range(40):
         place = ("flow", "nominal", 0, number)
-        assert own.begins_with_s(*place) == other.begins_with_s(*place)
+        assert own.begins_with_s(*place, 4) == other.begins_with_s(*place, 4)
 
 
 def a_journal(path, *, condition="reorder", changed=None, judged=True):
@@ -117,8 +129,11 @@ def a_journal(path, *, condition="reorder", changed=None, judged=True):
         for number in range(3):
             name = f"{journal.session}/{number}"
             place = ("flow", condition, start, number)
+            sensed_s = sum(own.sensed_s(condition, start, number).values())
+            journal.exposure(number, np.zeros(3))
+            journal.arrived(number + sensed_s, exposed_s=number)
             for stage, owed_s in (
-                ("begin", own.begins_with_s(*place)),
+                ("begin", own.begins_with_s(*place, number)),
                 ("check", own.check_s(*place, 1)),
                 ("check", own.check_s(*place, 2)),
             ):

@@ -260,6 +260,23 @@ class FaultRow:
 
 
 @dataclass(frozen=True)
+class SeverityRow:
+    """`severities.parquet` of stress: a size of a condition that a curve is drawn over.
+
+    Attributes:
+        perturbation: Name under which it was run; that of the condition where it is judged.
+        of: The condition.
+        field: Which of its fields.
+        severity: How large that is.
+    """
+
+    perturbation: str
+    of: str
+    field: str
+    severity: float
+
+
+@dataclass(frozen=True)
 class AgeRow:
     """`ages.parquet` of stress: quantiles of the action age over all rollouts of a shard.
 

@@ -136,7 +136,7 @@ class Deliveries:
         for overrun in list(flying.overran):
             ends = overrun.action in ENDING
             on_arrival = not ends and overrun.action != DeadlineAction.CONTINUE
-            if on_arrival or not flying.begun_s + overrun.known_s <= now_s + ROUNDING_S:
+            if on_arrival or not flying.exposed_s + overrun.known_s <= now_s + ROUNDING_S:
                 continue
             self._note(flying, overrun, now_s)
             if ends:
@@ -194,7 +194,7 @@ class Deliveries:
         self._executor.end_invocation(now_s, name, why)
 
     def _overdue(self, flying: InFlight, now_s: float) -> bool:
-        return now_s - flying.begun_s >= self._setup.execution.deadline_s - ROUNDING_S
+        return now_s - flying.exposed_s >= self._setup.execution.deadline_s - ROUNDING_S
 
     def _miss(self, flying: InFlight, now_s: float) -> None:
         """The deadline has passed: the next invocation may begin; the chunk may still come."""

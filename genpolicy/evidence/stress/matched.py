@@ -131,7 +131,7 @@ def step(active: Sequence[Rollout], policy: Policy, *, samples: int) -> None:
     asking = [rollout for rollout in active if rollout.wanted is not None]
     if asking:
         drawn = policy.sample(
-            np.stack([rollout.conditioning() for rollout in asking]),
+            np.stack([rollout.conditioning for rollout in asking]),
             noise_names=[rollout.noise_name for rollout in asking],
             candidates=candidates_of(policy, samples),
             prefix=_prefix(asking),

@@ -1,8 +1,8 @@
-"""Perturbation schedules: what is injected at which invocation, the same for every method.
+"""Perturbation schedules: what is injected when, the same for every method.
 
-A schedule is a pure function of root seed, perturbation, start and invocation. It never sees
-the method, so two methods on the same start meet the same world. One class a kind, with the
-fields that this kind has and no other.
+A schedule is a pure function of root seed, perturbation, start, and exposure or invocation. It
+never sees the method, so two methods on the same start meet the same world. One class a kind, with
+the fields that this kind has and no other.
 """
 
 from abc import abstractmethod
@@ -25,12 +25,12 @@ DRILL_S = (0.5, 3.0)
 
 @dataclass(frozen=True)
 class Injection:
-    """What one invocation suffers.
+    """What one exposure or one invocation suffers.
 
     Attributes:
         extra_s: Added duration by latency term, s.
         compute_factor: Slow-down of measured terms.
-        dropped: The chunk is lost on the way.
+        dropped: The observation, or the chunk, is lost on the way.
     """
 
     extra_s: dict[str, float] = field(default_factory=dict)
@@ -38,27 +38,35 @@ class Injection:
     dropped: bool = False
 
 
-class InvocationPerturbation(Settings):
-    """What hits some invocations.
+class ByLot(Settings):
+    """What hits some, and not others.
 
     Attributes:
-        probability: Share of invocations that it hits. None, and no size of nothing, is refused: a
-            condition in which nothing happens would pass as one that was met.
+        probability: Share that it hits. None, and no size of nothing, is refused: a condition in
+            which nothing happens would pass as one that was met.
     """
 
     probability: float = Field(default=1.0, gt=0.0, le=1.0)
 
     @abstractmethod
     def hit(self, lot: float) -> Injection:
-        """What an invocation suffers that it hits.
+        """What one suffers that it hits.
 
         Args:
             lot: Uniform in [0, 1), for a size that varies.
         """
 
 
-class CameraDelay(InvocationPerturbation):
-    """The picture comes later; `magnitude_s` is added to the capture, s."""
+class ExposurePerturbation(ByLot):
+    """What hits some exposures: an observation comes late or never."""
+
+
+class InvocationPerturbation(ByLot):
+    """What hits some invocations."""
+
+
+class CameraDelay(ExposurePerturbation):
+    """Pictures come later; `magnitude_s` is added to the capture, s. What is seen is older."""
 
     kind: Literal["camera_delay"] = "camera_delay"
     magnitude_s: float = Field(gt=0.0)
@@ -66,6 +74,27 @@ class CameraDelay(InvocationPerturbation):
     def hit(self, lot: float) -> Injection:
         """Always the whole delay."""
         return Injection(extra_s={"capture": self.magnitude_s})
+
+
+class FrameDrop(ExposurePerturbation):
+    """A picture is lost; the next invocation waits for a later one."""
+
+    kind: Literal["frame_drop"] = "frame_drop"
+
+    def hit(self, lot: float) -> Injection:
+        """The picture is lost."""
+        return Injection(dropped=True)
+
+
+class PolicyStall(InvocationPerturbation):
+    """The policy hangs for `magnitude_s`, s, and then goes on sampling."""
+
+    kind: Literal["policy_stall"] = "policy_stall"
+    magnitude_s: float = Field(gt=0.0)
+
+    def hit(self, lot: float) -> Injection:
+        """Always the whole time."""
+        return Injection(extra_s={"sample": self.magnitude_s})
 
 
 class ComputeContention(InvocationPerturbation):
@@ -162,6 +191,8 @@ class ReducedEnvelope(Settings):
 Perturbation = Annotated[
     Nominal
     | CameraDelay
+    | FrameDrop
+    | PolicyStall
     | ComputeContention
     | NetworkJitter
     | QueueReorder
@@ -183,6 +214,19 @@ def injection(
     falls = float(generator.random()) < perturbation.probability
     lot = float(generator.random())
     return perturbation.hit(lot) if falls else Injection()
+
+
+def sensing(perturbation: Perturbation, *, falls: float, lot: float) -> Injection:
+    """What a perturbation does to an exposure, by two draws, uniform in [0, 1).
+
+    Args:
+        perturbation: The condition.
+        falls: Decides whether it hits.
+        lot: Decides how hard, where that varies.
+    """
+    if not isinstance(perturbation, ExposurePerturbation) or falls >= perturbation.probability:
+        return Injection()
+    return perturbation.hit(lot)
 
 
 @dataclass(frozen=True)

@@ -1,10 +1,10 @@
 """One closed-loop rollout on the virtual clock: world, executor, stub, supervisor, recovery.
 
-The world goes on while the policy thinks: an invocation that begins at a tick is delivered at the
-first tick after its latency has passed. Its candidates are checked one after the other, and each
-check takes its time: an answer whose first candidate is refused comes later. A rollout is advanced
-tick by tick from outside, so that many of them run in lockstep and share the network's batches; it
-never sees the others.
+The world goes on while observations travel and the policy thinks. An invocation that is wanted
+begins when the next observation arrives, is conditioned on it, and is delivered at the first tick
+after its latency has passed, which counts from the exposure. Its candidates are checked one after
+the other, and each check takes its time. A rollout is advanced tick by tick from outside, so that
+many of them run in lockstep and share the network's batches; it never sees the others.
 """
 
 from collections import deque
@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from genpolicy.candidates.selector import tries_another
 from genpolicy.contract.chunk import (
     Candidate,
-    ChunkMetadata,
     DiscardReason,
     Proposal,
     actions_sha256,
@@ -31,6 +30,7 @@ from genpolicy.evidence.admission_context import (
 )
 from genpolicy.evidence.stress.deliveries import Deliveries
 from genpolicy.evidence.stress.disturbance import Disturbance
+from genpolicy.evidence.stress.exposures import Exposure, Exposures, conditioned_on
 from genpolicy.evidence.stress.fallback import Fallback
 from genpolicy.evidence.stress.joined import Joined
 from genpolicy.evidence.stress.splices import Splice, splice_of
@@ -62,14 +62,18 @@ CALLED = (RecoveryState.ASK_HUMAN, RecoveryState.PERSON, RecoveryState.ABORT)
 class Rollout:
     """One world under one policy, advanced from outside, tick by tick, until `outcome`.
 
-    A tick is: `sense`; while `pending` names a chunk, judge it and `settle` it; `decide`; fill the
-    `wanted` invocation with samples; `act`.
+    A tick is: `sense`; while `pending` names a chunk, judge it and `settle` it; `decide`, up to the
+    last observation that arrives before the next tick; fill the `wanted` invocation with samples;
+    `act`.
 
     Args:
         setup: What it shares with the others.
         start: Initial state.
         start_index: Its number; keys of all draws.
         calibration_epoch: Calibration in force.
+
+    Attributes:
+        conditioning: What the invocation that began last sees, oldest first. Shape (H_o, D_o).
     """
 
     def __init__(
@@ -92,9 +96,8 @@ class Rollout:
         self.splices: list[Splice] = []
         self.tick = self.invocations = 0
         self.wanted: InFlight | None = None
-        self._deliveries = Deliveries(
-            setup, self.executor, self.journal, self.tally, start=start_index
-        )
+        shared = setup, self.executor, self.journal, self.tally
+        self._deliveries = Deliveries(*shared, start=start_index)
         self._joined = Joined(setup, self.journal)
         self._fallback = Fallback(setup, self.world, self.executor, self.recovery)
         self.person = setup.attendance(self.world, self.executor, self.recovery, start_index)
@@ -102,7 +105,9 @@ class Rollout:
         self._last_command_s: float | None = None
         before = [self.world.last_action] * COMMANDS_AT_THE_BOUNDARY
         self._commanded: deque[Array] = deque(before, maxlen=COMMANDS_AT_THE_BOUNDARY)
-        self.history: deque[Array] = deque(maxlen=setup.horizons.observation_horizon)
+        self._seen = self.conditioning = np.zeros(0)
+        self._exposures = Exposures(setup, self.journal, start=start_index)
+        self._command = Command("hold", "empty")
         self._measured: deque[Array] = deque(maxlen=2)
         self._disturbance = Disturbance(setup, self.world, start=start_index)
         self.executor.set_active(0.0, setup.checkpoint, setup.sampler)
@@ -118,11 +123,6 @@ class Rollout:
         """Whether the rollout has ended."""
         return self.outcome is not None
 
-    def conditioning(self) -> Array:
-        """The last H_o observations, oldest first, the first one repeated. Shape (H_o, D_o)."""
-        missing = self.setup.horizons.observation_horizon - len(self.history)
-        return np.stack([self.history[0]] * missing + list(self.history))
-
     @property
     def noise_name(self) -> tuple[str, str, int, int]:
         """Names of the noise of the invocation that began last."""
@@ -131,12 +131,12 @@ class Rollout:
     def sense(self) -> None:
         """Observe, supervise, and collect what has been delivered by now."""
         now_s, world = self.now_s, self.world
-        observation = world.observe()
-        self.history.append(observation)
+        self._seen = observation = world.observe()
         self._measured.append(world.q_meas)
         self.journal.scene(now_s, self.setup.task.scene_poses(observation))
         position, _ = world.tcp_pose
         self.tally.path_m.append(np.array(position))
+        self._exposures.expose(now_s, observation, world.phase, world.calibration_epoch)
         divergence_m = float(np.linalg.norm(position - world.last_action[:3]))
         self.executor.observe(now_s, now_s, world.phase, world.calibration_epoch, divergence_m)
         self._supervise(now_s)
@@ -199,22 +199,26 @@ class Rollout:
         self._deliveries.write_off(flying, reason, now_s)
 
     def decide(self) -> None:
-        """Recover where needed; sets `wanted` if the policy must sample."""
+        """Recover, command, look at what arrives before the next tick; may set `wanted`."""
         now_s, self.wanted = self.now_s, None
         self._recover(now_s)
-        idle = not self.done and self.recovery.state is RecoveryState.IDLE
-        if idle and self.executor.needs_invocation(now_s):
-            self.wanted = self._begin_invocation(now_s)
+        if self.done:
+            return
+        idle = self.recovery.state is RecoveryState.IDLE
+        asks = idle and self.executor.needs_invocation(now_s)
+        self._command = self.executor.tick(now_s)
+        self._disturbance.push(self.journal, now_s)
+        next_s = (self.tick + 1) * self.setup.horizons.action_period_s
+        for exposure in self._exposures.arriving(next_s):
+            if asks and self.wanted is None:
+                self.wanted = self._begin_invocation(exposure)
 
     def act(self) -> None:
-        """One tick of the executor, one action period of the world."""
-        now_s = self.now_s
+        """One action period of the world."""
         if self.wanted is not None:
             self._deliveries.add(self.wanted)
             self.wanted = None
-        command = self.executor.tick(now_s)
-        self._apply(command, now_s)
-        self._disturbance.push(self.journal, now_s)
+        self._apply(self._command, self.now_s)
         self.world.advance()
         self.tick += 1
         self.tally.feel(self.journal, self.now_s, self.world.contact_force_n)
@@ -230,7 +234,7 @@ class Rollout:
     def _end(self, outcome: Outcome) -> None:
         self.outcome = outcome
         self._deliveries.end(self.now_s)
-        self.tally.conclude(self.journal, self.setup.task, outcome, self.history[-1])
+        self.tally.conclude(self.journal, self.setup.task, outcome, self._seen)
         self.executor.end_episode(self.now_s)
 
     def _supervise(self, now_s: float) -> None:
@@ -244,31 +248,28 @@ class Rollout:
             self.recovery.stop(now_s, "force")
             self._end(Outcome.FORCE_STOP)
 
-    def _begin_invocation(self, now_s: float) -> InFlight:
-        horizons, number = self.setup.horizons, self.invocations
+    def _begin_invocation(self, exposure: Exposure) -> InFlight:
+        now_s, number = exposure.arrival_s, self.invocations
         self.invocations += 1
-        metadata = ChunkMetadata(
-            chunk_id=f"{self.journal.session}/{number}",
-            condition_observation_event_time_s=now_s,
-            policy_checkpoint_hash=self.setup.checkpoint,
-            sampler_config_hash=self.setup.sampler,
-            action_start_time_s=now_s,
-            action_period_s=horizons.action_period_s,
-            valid_until_s=now_s + horizons.execution_horizon * horizons.action_period_s,
-            task_phase=self.world.phase,
-            calibration_epoch=self.world.calibration_epoch,
-            predecessor_chunk_id=self.executor.chain_head,
-            session_epoch=self.executor.session_epoch,
-            method=self.setup.method,
-            candidate_index=0,
-        )
+        name = f"{self.journal.session}/{number}"
+        metadata = conditioned_on(exposure, self.setup, self.executor, chunk_id=name)
+        self.conditioning = self._exposures.conditioning()
         flying = in_flight(
-            self.setup, metadata, self.history[-1], start=self.start_index, number=number
+            self.setup,
+            metadata,
+            exposure.observation,
+            sensor_s=exposure.terms_s,
+            start=self.start_index,
+            number=number,
         )
         self._joined.begin(flying)
         self.executor.begin_invocation(now_s, metadata.chunk_id, repr(flying.total_s))
         self.journal.conditioning(
-            now_s, invocation_id=metadata.chunk_id, key=self.noise_name, history=self.conditioning()
+            now_s,
+            invocation_id=metadata.chunk_id,
+            exposed_s=exposure.exposed_s,
+            key=self.noise_name,
+            history=self.conditioning,
         )
         self.tally.latencies_s.append(flying.total_s)
         return flying
@@ -319,7 +320,7 @@ class Rollout:
 
     def _moment(self) -> Moment:
         return Moment(
-            observation=self.history[-1],
+            observation=self._seen,
             q_meas=self._measured[-1],
             commanded=list(self._commanded),
             now_s=self.now_s,

@@ -1,5 +1,6 @@
 """Section `stress`: the matched comparison, registered before it runs."""
 
+from itertools import pairwise
 from typing import Annotated, Any
 
 from pydantic import Field, field_validator, model_validator
@@ -7,11 +8,35 @@ from pydantic import Field, field_validator, model_validator
 from genpolicy.candidates.joining import JoiningSettings
 from genpolicy.contract.settings import Settings
 from genpolicy.evidence.stress.person import PersonSettings
+from genpolicy.evidence.rows.stress import SeverityRow
 from genpolicy.evidence.stress.perturbations import Perturbation, ReducedEnvelope
 
+SEVERITIES = "severities.parquet"
+"""Beside the rollouts where a curve is planned, and only there."""
+GRADED = "@"
+"""Between a condition and a size of it that is run for a curve, in the name of that."""
 ENVELOPE = "envelope"
 """Name of the condition that runs inside the trial card's envelope, and its kind."""
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
+
+
+class Grades(Settings):
+    """How hard a condition is made, apart from what is judged.
+
+    Attributes:
+        field: Which of its fields.
+        values: Sizes of it, rising, the judged one among them.
+    """
+
+    field: str
+    values: list[float] = Field(min_length=2)
+
+    @field_validator("values")
+    @classmethod
+    def _rising(cls, values: list[float]) -> list[float]:
+        if not all(low < high for low, high in pairwise(values)):
+            raise ValueError("the sizes must rise")
+        return values
 
 
 class StressSettings(Settings):
@@ -24,6 +49,8 @@ class StressSettings(Settings):
         baselines: Simpler methods in the comparison, timed and run beside the candidates.
         perturbations: What is injected, by name; `nominal` is one of them. One that names no kind
             is of the kind of its name.
+        severities: Conditions of which success is shown against how hard they are, by name. What is
+            judged stays the condition as it is planned; the others are run beside it.
         margin: Pre-registered gain in success.
         alpha: Pre-registered family-wise error; each candidate gets its equal share.
         planned_effect: Success of a baseline and of a candidate that is worth promoting; a gain
@@ -37,6 +64,7 @@ class StressSettings(Settings):
     samples: int = Field(ge=1)
     baselines: list[str]
     perturbations: dict[str, Perturbation]
+    severities: dict[str, Grades] = Field(default_factory=dict)
     margin: float
     alpha: float = Field(gt=0.0, lt=1.0)
     planned_effect: tuple[Share, Share]
@@ -66,11 +94,59 @@ class StressSettings(Settings):
         return self
 
     @model_validator(mode="after")
+    def _grades_of_what_is_planned(self) -> "StressSettings":
+        for name, grades in self.severities.items():
+            own = getattr(self.perturbations.get(name), grades.field, None)
+            if not isinstance(own, float):
+                raise ValueError(f"`{name}.{grades.field}` is no number of a planned condition")
+            if own not in grades.values:
+                raise ValueError(f"the judged size {own:g} of `{name}` is not among the sizes")
+        names = [*self.perturbations]
+        names += [row.perturbation for row in self.severity_rows if row.perturbation != row.of]
+        if len(set(names)) < len(names):
+            raise ValueError("the names of conditions and their sizes must be unique")
+        self._graded()  # a size that its kind refuses is refused here
+        return self
+
+    @model_validator(mode="after")
     def _effect_beyond_margin(self) -> "StressSettings":
         baseline, candidate = self.planned_effect
         if not candidate - baseline > self.margin:
             raise ValueError("the planned effect must be larger than the margin")
         return self
+
+    @property
+    def severity_rows(self) -> list[SeverityRow]:
+        """Every size of every curve, and the name under which it is run; that judged keeps its own.
+
+        The names are unique: a condition and a size behind `@`.
+        """
+        return [
+            SeverityRow(
+                perturbation=name if size == own else f"{name}{GRADED}{size:g}",
+                of=name,
+                field=grades.field,
+                severity=size,
+            )
+            for name, grades in self.severities.items()
+            for own in [getattr(self.perturbations[name], grades.field)]
+            for size in grades.values
+        ]
+
+    @property
+    def conditions(self) -> dict[str, Perturbation]:
+        """All that is run, by name: what is judged, and what is harder or milder than it."""
+        return {**self.perturbations, **self._graded()}
+
+    def _graded(self) -> dict[str, Perturbation]:
+        return {
+            row.perturbation: planned.model_validate(
+                {**planned.model_dump(), row.field: row.severity}
+            )
+            for row in self.severity_rows
+            if row.perturbation != row.of
+            for planned in [self.perturbations[row.of]]
+        }
 
     def alpha_of_each(self, candidates: int) -> float:
         """Error that one of so many pre-registered candidates may spend (Bonferroni)."""

@@ -1,7 +1,7 @@
 """What rollouts share, and what one of them carries along."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -101,7 +101,7 @@ class InFlight:
         number: Count of invocations in this rollout.
         metadata: Of the chunk to come; candidate 0.
         observation: What it is conditioned on; the newest of the history. Shape (D_o,).
-        begun_s: Tick at which it began.
+        exposed_s: When what it is conditioned on was exposed; all its times count from there.
         arrival_s: When its candidate is judged; later with each one that is refused.
         compute_factor: What compute contention multiplies its measured terms by.
         dropped: Lost on the way.
@@ -118,7 +118,7 @@ class InFlight:
     number: int
     metadata: ChunkMetadata
     observation: Array
-    begun_s: float
+    exposed_s: float
     arrival_s: float
     compute_factor: float
     dropped: bool
@@ -149,7 +149,7 @@ class InFlight:
     @property
     def total_s(self) -> float:
         """Its end-to-end latency so far: the eleven terms, and every check after the first, s."""
-        return self.arrival_s - self.begun_s
+        return self.arrival_s - self.exposed_s
 
 
 @dataclass
@@ -188,14 +188,21 @@ class Tally:
 
 
 def in_flight(
-    setup: Setup, metadata: ChunkMetadata, observation: Array, *, start: int, number: int
+    setup: Setup,
+    metadata: ChunkMetadata,
+    observation: Array,
+    *,
+    sensor_s: Mapping[str, float],
+    start: int,
+    number: int,
 ) -> InFlight:
     """An invocation that begins now: how long it takes, and what it suffers.
 
     Args:
         setup: What all rollouts share.
-        metadata: Of the chunk to come; it begins at `action_start_time_s`.
+        metadata: Of the chunk to come; it starts where the observation was exposed.
         observation: What it is conditioned on. Shape (D_o,).
+        sensor_s: What each sensor term of the observation took, by name, s.
         start: Index of the initial state; key of the draws.
         number: Count of invocations in this rollout; key of the draws.
     """
@@ -215,16 +222,17 @@ def in_flight(
         extra_s=hit.extra_s,
         compute_factor=hit.compute_factor,
     )
-    begun_s = metadata.action_start_time_s
+    terms_s = {**draw.terms, **sensor_s}
+    exposed_s = metadata.condition_observation_event_time_s
     return InFlight(
         number=number,
         metadata=metadata,
         observation=observation,
-        begun_s=begun_s,
-        arrival_s=begun_s + draw.total_s,
+        exposed_s=exposed_s,
+        arrival_s=exposed_s + sum(terms_s.values()),
         compute_factor=hit.compute_factor,
         dropped=hit.dropped,
-        overran=list(overruns(draw.terms, setup.execution.term_deadlines)),
+        overran=list(overruns(terms_s, setup.execution.term_deadlines)),
     )
 
 

@@ -14,10 +14,11 @@ from genpolicy.evidence.stress.perturbations import (
     drill_s,
     injection,
     pushes,
+    sensing,
 )
 
 KINDS = {
-    "camera_delay": {"magnitude_s": 0.08},
+    "policy_stall": {"magnitude_s": 0.08},
     "compute_contention": {"factor": 4.0},
     "network_jitter": {"magnitude_s": 0.12},
     "queue_reorder": {"magnitude_s": 0.3},
@@ -63,7 +64,7 @@ def test_the_share_of_hits_is_the_probability():
 
 
 def test_each_kind_touches_what_it_names():
-    assert at(settings("camera_delay")).extra_s == {"capture": 0.08}
+    assert at(settings("policy_stall")).extra_s == {"sample": 0.08}
     assert at(settings("queue_reorder")).extra_s == {"queue": 0.3}
     assert at(settings("compute_contention")) == Injection(compute_factor=4.0)
     assert at(settings("chunk_drop")) == Injection(dropped=True)
@@ -71,6 +72,21 @@ def test_each_kind_touches_what_it_names():
     assert 0 <= min(sizes) < 0.01 and 0.11 < max(sizes) <= 0.12
     for other in (Nominal(), SidewaysPush(force_n=15.0), RecoveryDrill()):
         assert at(other) == Injection()
+
+
+@pytest.mark.parametrize(
+    ("entry", "suffers"),
+    [
+        ({"kind": "camera_delay", "magnitude_s": 0.08}, Injection(extra_s={"capture": 0.08})),
+        ({"kind": "frame_drop"}, Injection(dropped=True)),
+    ],
+)
+def test_what_hits_exposures_hits_no_invocation(entry, suffers):
+    item = parsed({**entry, "probability": 0.3})
+    assert sensing(item, falls=0.29, lot=0.5) == suffers
+    assert sensing(item, falls=0.3, lot=0.5) == Injection() == at(item)
+    for other in (Nominal(), settings("policy_stall"), RecoveryDrill()):
+        assert sensing(other, falls=0.0, lot=0.5) == Injection()
 
 
 def pushed(item, start):

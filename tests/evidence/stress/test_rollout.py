@@ -151,7 +151,8 @@ def test_an_invocation_is_in_flight_until_its_last_candidate_was_judged(run, kit
     begun = [e.t for e in of_kind(rollout, "invocation") if e.payload["stage"] == "begin"]
     ended = [e for e in of_kind(rollout, "invocation") if e.payload["stage"] == "end"]
     assert ended[0].payload["detail"] == "deadline" and rollout.tally.deadline_misses == 1
-    assert begun[0] == 0 and begun[1] == ended[0].t == 150_000_000
+    # Each begins with the first observation to come: 4 to 8 ms after its exposure.
+    assert 0 < begun[0] < 10_000_000 and ended[0].t == 150_000_000 < begun[1] < 160_000_000
 
 
 @pytest.mark.parametrize(("seconds", "refused"), [(0.08, 2), (0.2, 3), (0.3, 5)])
@@ -338,13 +339,15 @@ def test_a_slow_method_pays_with_age_and_holds(run, kit, plans):
 
 
 def test_camera_delay_shifts_every_latency_by_itself(run, kit, plans):
+    """Of 1 to 2 ms for each of six declared terms the sums differ by 2 ms and less."""
     delay = CameraDelay(magnitude_s=0.08)
     (plain,) = run(kit.Replay(plans.actions), ticks=40)
     (late,) = run(kit.Replay(plans.actions), schedule=delay, ticks=40)
     both = min(len(plain.tally.latencies_s), len(late.tally.latencies_s))
     assert both >= 3
     shift = np.array(late.tally.latencies_s[:both]) - np.array(plain.tally.latencies_s[:both])
-    np.testing.assert_allclose(shift, 0.08, atol=1e-12)
+    np.testing.assert_allclose(shift, 0.08, atol=0.002)
+    assert shift[0] == pytest.approx(0.08, abs=1e-12)  # of one exposure and one invocation
     # 36 to 42 ms and 80 ms more: from one tick to three.
     assert ages_s(late).min() - ages_s(plain).min() == pytest.approx(0.10)
 

@@ -40,3 +40,47 @@ def test_what_is_out_of_range_or_unknown_is_refused(change):
 
 def test_the_ladder_s_own_section_fits(kit):
     assert StressSettings(**kit.PARAMS["stress"]).starts >= 1
+
+
+LATE = {"camera_delay": {"probability": 1.0, "magnitude_s": 0.08}}
+
+
+def graded(**grades):
+    planned = {**PLAIN["perturbations"], **LATE}
+    return StressSettings(**{**PLAIN, "perturbations": planned, "severities": grades})
+
+
+def test_a_graded_condition_is_run_and_the_planned_one_stays_the_judged_one():
+    settings = graded(camera_delay={"field": "magnitude_s", "values": [0.04, 0.08, 0.16]})
+    assert list(settings.perturbations) == ["nominal", "camera_delay"]
+    found = {name: one.model_dump().get("magnitude_s") for name, one in settings.conditions.items()}
+    assert found == {
+        "nominal": None, "camera_delay": 0.08, "camera_delay@0.04": 0.04, "camera_delay@0.16": 0.16,
+    }  # fmt: skip
+    assert [tuple(vars(row).values()) for row in settings.severity_rows] == [
+        ("camera_delay@0.04", "camera_delay", "magnitude_s", 0.04),
+        ("camera_delay", "camera_delay", "magnitude_s", 0.08),
+        ("camera_delay@0.16", "camera_delay", "magnitude_s", 0.16),
+    ]
+    plain = StressSettings(**PLAIN)
+    assert plain.conditions == plain.perturbations and plain.severity_rows == []
+
+
+@pytest.mark.parametrize(
+    ("name", "field", "values", "said"),
+    [
+        ("camera_delay", "magnitude_s", [0.04, 0.16], "judged size"),
+        ("camera_delay", "magnitude_s", [0.08], "at least 2"),
+        ("camera_delay", "magnitude_s", [0.16, 0.08], "rise"),
+        ("camera_delay", "magnitude_s", [0.08, 0.08], "rise"),
+        ("camera_delay", "magnitude_s", [0.0, 0.08], "greater than 0"),
+        ("camera_delay", "probability", [1.0, 1.5], "less than or equal to 1"),
+        ("camera_delay", "force_n", [0.04, 0.08], "no number of a planned condition"),
+        ("camera_delay", "kind", [0.04, 0.08], "no number of a planned condition"),
+        ("push", "force_n", [5.0, 15.0], "no number of a planned condition"),
+        ("camera_delay", "magnitude_s", [0.08, 0.16, 0.160000001], "unique"),
+    ],
+)
+def test_a_grade_that_is_none_is_refused(name, field, values, said):
+    with pytest.raises(ValidationError, match=said):
+        graded(**{name: {"field": field, "values": values}})

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from genpolicy.contract.chunk import ChunkMetadata
-from genpolicy.evidence.stress.perturbations import CameraDelay, ChunkDrop
+from genpolicy.evidence.stress.perturbations import ChunkDrop, PolicyStall
 from genpolicy.evidence.stress.state import Tally, in_flight
 
 METADATA = ChunkMetadata(
@@ -16,24 +16,28 @@ METADATA = ChunkMetadata(
     method="scripted", candidate_index=0,
 )  # fmt: skip
 SEEN = np.arange(3.0)
+SENSOR_S = {"exposure": 0.001, "capture": 0.0015, "decode": 0.001, "transfer": 0.0015}
 
 
 @pytest.fixture
 def begin(make_fixture):
     def make(*, start=0, number=1, metadata=METADATA, **changes):
-        return in_flight(make_fixture(**changes), metadata, SEEN, start=start, number=number)
+        return in_flight(
+            make_fixture(**changes), metadata, SEEN,
+            sensor_s=SENSOR_S, start=start, number=number,
+        )  # fmt: skip
 
     return make
 
 
-def test_it_begins_with_its_chunk_and_arrives_after_its_latency(begin):
+def test_its_times_count_from_what_it_saw(begin):
     found = begin()
-    assert found.begun_s == 2.0 and found.arrival_s == 2.0 + found.total_s
-    # Compute terms sum to 30 ms, six declared terms to 6 to 12 ms.
-    assert 0.03 + 0.005 <= found.total_s <= 0.03 + 0.013
+    assert found.exposed_s == 1.95 and found.arrival_s == pytest.approx(1.95 + found.total_s)
+    # Compute terms sum to 30 ms, its observation took 5 ms, network and queue take 2 to 4 ms.
+    assert 0.03 + 0.005 + 0.002 <= found.total_s <= 0.03 + 0.005 + 0.004
     assert not found.dropped and not found.given_up and found.chunks is None
-    later = begin(metadata=replace(METADATA, action_start_time_s=3.0))
-    assert later.arrival_s == 3.0 + found.total_s
+    later = begin(metadata=replace(METADATA, condition_observation_event_time_s=3.0))
+    assert later.arrival_s == pytest.approx(3.0 + found.total_s)
 
 
 def test_the_same_key_suffers_the_same_and_each_part_of_it_counts(begin):
@@ -45,7 +49,7 @@ def test_the_same_key_suffers_the_same_and_each_part_of_it_counts(begin):
 
 
 def test_what_is_injected_is_added_or_lost(begin):
-    late = begin(schedule=CameraDelay(kind="camera_delay", probability=1.0, magnitude_s=0.2))
+    late = begin(schedule=PolicyStall(probability=1.0, magnitude_s=0.2))
     assert late.total_s == pytest.approx(begin().total_s + 0.2)
     assert begin(schedule=ChunkDrop(kind="chunk_drop", probability=1.0)).dropped
 

@@ -26,6 +26,8 @@ from genpolicy.verification.tables import derived_tables
 PERIOD_S = 0.05
 USUAL_S = 0.002
 """What a term takes that is not slow; it may take ten times as long."""
+SENSED_S = 4 * USUAL_S
+"""When an observation is there: its four terms after its exposure."""
 
 
 def of_kind(rollout, kind):
@@ -97,7 +99,6 @@ def times(model, rows):
 
 
 @pytest.mark.parametrize(("term", "action"), [
-    ("exposure", "drop_observation"), ("capture", "drop_observation"),
     ("encode", "cancel_candidate"), ("sample", "cancel_candidate"),
 ])  # fmt: skip
 def test_an_invocation_ends_when_the_time_of_its_term_is_over(play, term, action):
@@ -108,7 +109,7 @@ def test_an_invocation_ends_when_the_time_of_its_term_is_over(play, term, action
         ["overrun", f"{term} {action}"],
         ["end", "overrun"],
     ]
-    assert [when for when, *_ in first] == [0.0, PERIOD_S, PERIOD_S, PERIOD_S]
+    assert [when for when, *_ in first] == [SENSED_S, PERIOD_S, PERIOD_S, PERIOD_S + SENSED_S]
     assert first[3][1] == "begin"
     assert rollout.tally.action_ticks == 0 and rollout.tally.deadline_misses == 5
     (reason,) = {event.payload["reason"] for event in of_kind(rollout, "discard")} - {
@@ -117,13 +118,27 @@ def test_an_invocation_ends_when_the_time_of_its_term_is_over(play, term, action
     assert reason == "expired"
 
 
-@pytest.mark.parametrize("term", ["decode", "transfer", "preprocess"])
-def test_a_skipped_invocation_lets_a_period_pass(play, term):
-    rollout = play(term, 0.5, table(**{term: "skip_invocation"}), ticks=6)
+@pytest.mark.parametrize(("term", "action"), [
+    ("exposure", "drop_observation"), ("capture", "drop_observation"),
+    ("decode", "skip_invocation"), ("transfer", "skip_invocation"),
+])  # fmt: skip
+def test_an_observation_that_took_too_long_is_dropped_when_it_comes(play, term, action):
+    """0.13 s of one term: nothing begins before one is there, and what begins ends at once."""
+    rollout = play(term, 0.13, table(**{term: action}), ticks=8)
+    first = stages(rollout)[:3]
+    assert first == [
+        (0.136, "begin", first[0][2]), (0.15, "overrun", f"{term} {action}"),
+        (0.15 if action == "drop_observation" else 0.2, "end", "overrun"),
+    ]  # fmt: skip
+    assert rollout.tally.action_ticks == 0 and not of_kind(rollout, "candidate")
+
+
+def test_a_skipped_invocation_lets_a_period_pass(play):
+    rollout = play("preprocess", 0.5, table(preprocess="skip_invocation"), ticks=6)
     begun = [when for when, stage, _ in stages(rollout) if stage == "begin"]
-    assert begun == [0.0, pytest.approx(2 * PERIOD_S), pytest.approx(4 * PERIOD_S)]
+    assert begun == pytest.approx([k * PERIOD_S + SENSED_S for k in (0, 2, 4)])
     said = [detail for _, stage, detail in stages(rollout) if stage == "overrun"]
-    assert said == [f"{term} skip_invocation"] * 3
+    assert said == ["preprocess skip_invocation"] * 3
 
 
 @pytest.mark.parametrize("term", ["network", "queue"])
@@ -235,12 +250,17 @@ def forged(play, kit, tmp_path):
     def ask(term, change, candidates=()):
         slow_s = 0.11 if term in ON_ARRIVAL else 0.5
         rows = table(**{term: ACTIONS[term]})
-        rollout = play(term, slow_s, rows, ticks=8)
+        rollout = play(term, slow_s, rows, ticks=14)
         journal = type(rollout.journal)(rollout.journal.session, rollout.journal.labels)
         (begun,) = of_kind(rollout, "session")
         journal.add("session", 0, begun.payload)
+        for exposed in of_kind(rollout, "exposure"):
+            journal.add("exposure", exposed.t, exposed.payload)
+        coming = of_kind(rollout, "arrived")
         number = -1
         for when, stage, detail in change(stages(rollout)):
+            while coming and coming[0].t <= when * 1e9 + 1e3:
+                journal.add("arrived", coming[0].t, coming.pop(0).payload)
             number += stage == "begin"
             name = f"{journal.session}/{number}"
             journal.invocation(when, invocation_id=name, stage=stage, detail=detail)
@@ -249,6 +269,8 @@ def forged(play, kit, tmp_path):
                 0.3, chunk_id=f"{journal.session}/0", method="scripted", index=index,
                 layers={}, first_reason=None, measures={},
             )  # fmt: skip
+        for late in coming:
+            journal.add("arrived", late.t, late.payload)
         (end,) = of_kind(rollout, "end")
         journal.add("end", end.t, end.payload)
         write_journal(tmp_path / "other.mcap", [journal])
