@@ -7,7 +7,8 @@ from typing import Any
 from gates.rederive_shadow import TaskSection
 from gates.stated import refuse, root_seed, section
 from gates.stress.rollouts import STRESS
-from genpolicy.evidence.stress.settings import SEVERITIES, StressSettings
+from genpolicy.evidence.rows.stress import SEVERITIES
+from genpolicy.evidence.stress.settings import StressSettings
 from genpolicy.integrity.tables import read_table
 from genpolicy.tasks.api import load_task
 from genpolicy.verification.attended import PlannedPerson, attended_otherwise

@@ -10,10 +10,10 @@ from genpolicy.evidence.documents.stress import POWER
 from genpolicy.evidence.fixtures_again import NO_FIXTURES, brought_fixtures
 from genpolicy.evidence.reproducibility.latency import latency_models
 from genpolicy.evidence.rows.reproducibility import LatencyRow
-from genpolicy.evidence.rows.stress import SeverityRow
+from genpolicy.evidence.rows.stress import SEVERITIES, SeverityRow
 from genpolicy.evidence.stress.latency import LatencySection
 from genpolicy.evidence.stress.matched import matched_starts
-from genpolicy.evidence.stress.settings import SEVERITIES, StressSettings
+from genpolicy.evidence.stress.settings import StressSettings
 from genpolicy.evidence.stress.shard import Comparison
 from genpolicy.evidence.stress.tables import (
     plan_shards,

@@ -12,8 +12,7 @@ from gates.criterion import Measured
 from gates.evidence import Evidence, MissingEvidenceError, flags
 from gates.report import Owner
 from gates.settings import CandidateSettings
-from genpolicy.evidence.rows.stress import RolloutRow
-from genpolicy.evidence.stress.settings import SEVERITIES
+from genpolicy.evidence.rows.stress import SEVERITIES, RolloutRow
 
 STRESS = "artifacts/stress"
 ROLLOUTS = f"{STRESS}/rollouts.parquet"

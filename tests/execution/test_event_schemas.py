@@ -39,8 +39,10 @@ def test_events_are_what_their_schemas_say():
         rig.now_s, chunk_id="x", method="flow", index=0, layers={"fresh": None}, first_reason=None
     )
     rig.journal.conditioning(
-        rig.now_s, invocation_id="i", key=("drawn", 3), history=rig.chunk().actions
+        rig.now_s, invocation_id="i", exposed_s=0.0, key=("drawn", 3), history=rig.chunk().actions
     )
+    rig.journal.exposure(rig.now_s, rig.chunk().actions[0])
+    rig.journal.arrived(rig.now_s, exposed_s=0.0)
     rig.supervisor.emergency_stop(rig.now_s)
     rig.tick(2)
     seen = set()

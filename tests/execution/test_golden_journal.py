@@ -163,10 +163,14 @@ def it_stops(rig):
 
 def told_to_the_journal(rig):
     """What policies and feasibility have it write down."""
-    rig.executor.begin_invocation(rig.now_s, "i-1", "asked")
     history = np.arange(20.0).reshape(2, 10)
+    rig.journal.exposure(rig.now_s, history[-1])
+    rig.journal.arrived(rig.now_s, exposed_s=rig.now_s)
+    rig.executor.begin_invocation(rig.now_s, "i-1", "asked")
     key = ("drawn", 3)
-    rig.journal.conditioning(rig.now_s, invocation_id="i-1", key=key, history=history)
+    rig.journal.conditioning(
+        rig.now_s, invocation_id="i-1", exposed_s=rig.now_s, key=key, history=history
+    )
     rig.journal.candidate(
         rig.now_s, chunk_id="x", method="flow", index=2, layers={"representation": True},
         first_reason="workspace", measures={"votes": 3},

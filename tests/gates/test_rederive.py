@@ -14,12 +14,14 @@ from makers import maker, write_policy
 from gates import rederive as module
 from gates.proof import Rung
 from gates.rederive import STRESS, rederive, rederived
+from gates.rederive_disturbance import rederive_severities
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.contract.latency import MEASURED_TERMS
 from genpolicy.errors import BadInputError, ConfigError, IntegrityError, RefusedError
 from genpolicy.evidence.documents import shadow, stress
 from genpolicy.evidence.rows.reproducibility import LatencyRow
 from genpolicy.evidence.rows.stress import (
+    SEVERITIES,
     AgeRow,
     ConservationRow,
     FaultRow,
@@ -27,6 +29,7 @@ from genpolicy.evidence.rows.stress import (
     OverrunRow,
     RecoveryRow,
     RolloutRow,
+    SeverityRow,
     SpliceRow,
     StressCountRow,
     StressStubRow,
@@ -59,7 +62,7 @@ LATENCY = [
     for how, seconds in (("cold", 0.005), ("warm", 0.002))
     for term in MEASURED_TERMS
 ]
-FIRST_S = 0.031
+SENSED_S, FIRST_S = 0.004, 0.031
 """Six declared terms, five measured ones, and the five of a cold call 3 ms longer each."""
 NAMES = ("flow__nominal", "bc__nominal", "flow__envelope")
 POWER = canonical_json(
@@ -102,10 +105,13 @@ def _session(name: str, start: int, fault: str = "") -> Journal:
     for tick in range(4):
         now_s = tick * horizons.action_period_s
         executor.observe(now_s, now_s, "approach", "epoch_1", 0.0)
+        journal.exposure(now_s, np.zeros(24))
         executor.tick(now_s)
+        journal.arrived(now_s + SENSED_S, exposed_s=now_s)
     executor.begin_invocation(0.2, "one", repr(FIRST_S))
     key = ["stress", perturbation, start, 1]
-    journal.conditioning(0.2, invocation_id="one", key=key, history=np.zeros((2, 24)))
+    history = np.zeros((2, 24))
+    journal.conditioning(0.2, invocation_id="one", exposed_s=now_s, key=key, history=history)
     if fault:
         journal.invocation(0.2, invocation_id="one", stage="fault", detail=fault)
     executor.end_invocation(0.2, "one", "deadline")
@@ -431,6 +437,27 @@ def test_a_rollout_that_was_not_pushed_as_planned_is_refused(root, monkeypatch):
     monkeypatch.setattr("gates.rederive_disturbance.disturbed_otherwise", lambda path, plan: said)
     with pytest.raises(RefusedError, match=r"bc__nominal\.mcap is 'bc/nominal/0' was pushed never"):
         rederive(root, "D")
+
+
+def test_sizes_that_nobody_planned_are_refused(root):
+    """Of a curve that is shown; what is planned and not written is refused as well."""
+    path = root / STRESS / SEVERITIES
+    rows = [
+        SeverityRow("camera_delay@0.04", "camera_delay", "magnitude_s", 0.04),
+        SeverityRow("camera_delay", "camera_delay", "magnitude_s", 0.08),
+    ]
+    planned = {"camera_delay": {"field": "magnitude_s", "values": [0.04, 0.08]}}
+    params = PARAMS | {"stress": PARAMS["stress"] | {"severities": planned}}
+    rederive_severities(root, PARAMS)
+    with pytest.raises(RefusedError, match=r"severities\.parquet is 0 sizes"):
+        rederive_severities(root, params)
+    write_rows(path, SeverityRow, rows)
+    rederive_severities(root, params)
+    with pytest.raises(RefusedError, match=r"severities\.parquet is 2 sizes"):
+        rederive_severities(root, PARAMS)
+    write_rows(path, SeverityRow, [replace(rows[0], severity=0.05), rows[1]])
+    with pytest.raises(RefusedError, match="params"):
+        rederive_severities(root, params)
 
 
 def test_an_invocation_that_does_not_say_from_what_it_drew_is_refused(root, monkeypatch):

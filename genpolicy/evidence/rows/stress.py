@@ -2,6 +2,9 @@
 
 from dataclasses import dataclass
 
+SEVERITIES = "severities.parquet"
+"""Beside the rollouts where a curve is planned, and only there."""
+
 
 @dataclass(frozen=True)
 class RolloutRow:

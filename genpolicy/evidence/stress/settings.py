@@ -7,12 +7,10 @@ from pydantic import Field, field_validator, model_validator
 
 from genpolicy.candidates.joining import JoiningSettings
 from genpolicy.contract.settings import Settings
-from genpolicy.evidence.stress.person import PersonSettings
 from genpolicy.evidence.rows.stress import SeverityRow
+from genpolicy.evidence.stress.person import PersonSettings
 from genpolicy.evidence.stress.perturbations import Perturbation, ReducedEnvelope
 
-SEVERITIES = "severities.parquet"
-"""Beside the rollouts where a curve is planned, and only there."""
 GRADED = "@"
 """Between a condition and a size of it that is run for a curve, in the name of that."""
 ENVELOPE = "envelope"

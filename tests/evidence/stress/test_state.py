@@ -54,6 +54,26 @@ def test_what_is_injected_is_added_or_lost(begin):
     assert begin(schedule=ChunkDrop(kind="chunk_drop", probability=1.0)).dropped
 
 
+def test_five_ms_of_sampling_are_five_ms_of_an_answer_and_whole_ticks_of_an_action(begin, kit):
+    """What comes is as old as it took, to the nanosecond; what is accepted waits for a tick.
+
+    Golden: an answer of 37 to 39 ms takes 5 more, at every quantile. The controller looks every 50
+    ms, so that its first action is no older for it; one of 49 to 51 ms is a whole tick older.
+    """
+    period_s = kit.HORIZONS.action_period_s
+
+    def ages_s(compute_s):
+        model = kit.latency(compute_s)
+        return np.sort([begin(start=n, latency=model).total_s for n in range(300)])
+
+    quick, slow, slower = ages_s(0.03), ages_s(0.035), ages_s(0.042)
+    assert len(set(quick)) == 300  # a distribution, and no few values
+    np.testing.assert_allclose(slow - quick, 0.005, atol=1e-12)
+    accepted = [np.ceil(ages / period_s) for ages in (quick, slow, slower)]
+    assert set(accepted[0]) == set(accepted[1]) == {1.0}
+    assert set(accepted[2]) == {1.0, 2.0}
+
+
 def test_the_journal_of_a_rollout_is_named_by_its_start(make_fixture):
     fixture = make_fixture(perturbation="storm")
     journal = fixture.journal(3, "f" * 64)
