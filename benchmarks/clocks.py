@@ -59,7 +59,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     settings = read_settings(params, "gate_d", StressSettings)
     settings = settings.under(read_limits(params, "D", spec.criteria))
     (policy,) = trained(
-        root / "artifacts" / BASELINES, [args.method], seeds=params["policy"]["seeds"][:1]
+        root / "artifacts" / BASELINES,
+        [args.method],
+        seeds=params["policy"]["seeds"][:1],
+        device=params["compute"]["device"],
     )
     dataset = root / "artifacts" / "ingest"
     plan = LatencyPlan(

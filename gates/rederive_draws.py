@@ -19,9 +19,9 @@ from gates.rederive_joined import Rule, hold_joined, prefixes_of
 from gates.rederive_sessions import REPLACING, checkpoint_of
 from gates.rederive_shadow import TaskSection
 from gates.report import Gate
-from gates.stated import refuse, section, training_seed
+from gates.stated import device_of, refuse, section, training_seed
 from genpolicy.candidates.joining import JoiningSettings
-from genpolicy.candidates.judged import candidates_of
+from genpolicy.candidates.judged import candidates_of, loaded_on
 from genpolicy.candidates.wire.policy import WirePolicy, running
 from genpolicy.contract.action import ACTION_DIM
 from genpolicy.contract.chunk import actions_sha256
@@ -34,7 +34,6 @@ from genpolicy.evidence.stress.settings import StressSettings
 from genpolicy.execution.journal import encode_poses
 from genpolicy.integrity.hashing import sha256_file
 from genpolicy.integrity.rows import read_rows
-from genpolicy.policies.policy import load_policy
 from genpolicy.policies.protocol import NoiseName, Policy
 from genpolicy.seeds import stream
 from genpolicy.tasks.api import Task, load_task
@@ -198,6 +197,7 @@ def _draw_again(
     """
     task = load_task(section(params, "task", TaskSection).name)
     rows = section(params, "horizons", HorizonConfig).prediction_horizon
+    device = device_of(params)
     for method, items in sorted(asked.items()):
         other = brought_policy(root, params, method)
         if other is not None:
@@ -208,7 +208,7 @@ def _draw_again(
         folder = checkpoint_of(root, method, training_seed(params))
         if folder is None:
             refuse(gate, items[0].place, f"drawn by {method}", "a policy that was trained")
-        policy = load_policy(folder)
+        policy = loaded_on(device, folder)
         count = samples if always else candidates_of(policy, samples)
         _compare(gate, policy, items, count=count, rule=Rule(joining.named(method), rows))
 

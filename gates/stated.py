@@ -35,6 +35,23 @@ def training_seed(params: Mapping[str, Any]) -> object:
     return seeds[0] if isinstance(seeds, list) and seeds else None
 
 
+def device_of(params: Mapping[str, Any]) -> str:
+    """Torch device on which what is trained here is asked.
+
+    Raises:
+        ConfigError: The section is missing, or names none.
+    """
+    device = section_of(params, "compute").get("device")
+    if not isinstance(device, str):
+        raise ConfigError(
+            where=f"{PARAMS_FILE}: compute.device",
+            found=repr(device),
+            expected="the name of a device",
+            action="Restore the file from version control.",
+        )
+    return device
+
+
 def root_seed(params: Mapping[str, Any]) -> int:
     """Root seed of the workspace.
 

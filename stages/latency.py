@@ -53,6 +53,7 @@ def work(params: Params) -> None:
         candidates=[*generators, *(policy.name for policy in brought)],
         brought=brought,
         seed=seed,
+        device=params.compute.device,
     )
     plan = LatencyPlan(
         dataset=ARTIFACTS / "ingest",

@@ -28,7 +28,8 @@ def work(params: Params) -> None:
         root_seed=params.seed,
     )
     seeds = params.section("policy", PolicySettings).seeds
-    baselines = trained(ARTIFACTS / "train_baselines", names, seeds=seeds)
+    folder_of, device = ARTIFACTS / "train_baselines", params.compute.device
+    baselines = trained(folder_of, names, seeds=seeds, device=device)
     with output_folder(ARTIFACTS / "measure_baselines") as folder:
         write_baselines(
             plan,

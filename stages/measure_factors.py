@@ -46,7 +46,8 @@ def work(params: Params) -> None:
         confidence=confidence_of(params),
     )
     seeds = params.section("policy", PolicySettings).seeds
-    checkpoints = trained(ARTIFACTS / "train_factors", variants, seeds=seeds)
+    folder_of, device = ARTIFACTS / "train_factors", params.compute.device
+    checkpoints = trained(folder_of, variants, seeds=seeds, device=device)
     with output_folder(ARTIFACTS / "measure_factors") as folder:
         write_factors(
             plan,

@@ -52,7 +52,7 @@ def work(params: Params) -> None:
         root_seed=params.seed,
     )
     root = ARTIFACTS / "train_generators"
-    candidates = trained(root, names, seeds=seeds)
+    candidates = trained(root, names, seeds=seeds, device=params.compute.device)
     brought = read_brought(params.section("candidates", BroughtSection).root, seed=seeds[0])
     with output_folder(ARTIFACTS / "reload") as folder:
         write_reload(plan, candidates, root / "fixtures.parquet", folder, brought=brought)

@@ -55,9 +55,12 @@ def work(params: Params) -> None:
     )
     brought = read_brought(params.section("candidates", BroughtSection).root, seed=seed)
     fixtures = brought_fixtures(data, params.horizons) if brought else NO_FIXTURES
+    candidates = admitted_contenders(
+        ARTIFACTS, admitted, brought, seed=seed, device=params.compute.device
+    )
     with output_folder(ARTIFACTS / "shadow") as folder:
         found, again = [], []
-        for candidate in admitted_contenders(ARTIFACTS, admitted, brought, seed=seed):
+        for candidate in candidates:
             with opened(candidate, task.observation, scene=task.scene_path) as policy:
                 again += asked_again(policy, fixtures, condition="shadow", when=BEFORE)
                 seen = shadow_policy(

@@ -58,8 +58,9 @@ def work(params: Params) -> None:
         fixtures=fixtures,
     )
     judged = in_comparison(
-        ARTIFACTS, baselines=section.baselines, candidates=admitted, brought=brought, seed=seed
-    )
+        ARTIFACTS, baselines=section.baselines, candidates=admitted, brought=brought, seed=seed,
+        device=params.compute.device,
+    )  # fmt: skip
     # Alpha is shared between all that were registered, not between those that came this far.
     trained = params.section("train_generators", MethodsSection).samplers
     registered = len(trained) + len(brought)

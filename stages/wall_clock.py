@@ -33,6 +33,7 @@ def work(params: Params) -> None:
     timing = params.section("latency", LatencySection)
     table = read_columns(ARTIFACTS / "latency" / "latency.parquet", LatencyRow).to_pandas()
     seed = params.section("policy", PolicySettings).seeds[0]
+    device = params.compute.device
     brought = read_brought(params.section("candidates", BroughtSection).root, seed=seed)
     with (
         output_folder(ARTIFACTS / "wall_clock") as folder,
@@ -52,7 +53,7 @@ def work(params: Params) -> None:
         write_clocks(
             folder,
             shared,
-            admitted_contenders(ARTIFACTS, admitted, brought, seed=seed),
+            admitted_contenders(ARTIFACTS, admitted, brought, seed=seed, device=device),
             latency_models(table, timing.declared_terms),
         )
 

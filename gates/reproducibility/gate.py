@@ -1,6 +1,7 @@
 """Gate B, reproducibility: is a candidate pinned, and does it come back the same?"""
 
 import numpy as np
+import pandas as pd
 
 from gates.claim import CHECKPOINT_ONLY
 from gates.criterion import Measured, criteria_of, criterion
@@ -24,7 +25,7 @@ from gates.reproducibility.settings import (
 from genpolicy.evidence.documents.brought import BROUGHT, FAULTS, Brought
 from genpolicy.evidence.documents.given import MATCHED, DistilledConfig, TrainedConfig
 from genpolicy.evidence.documents.reproducibility import CANDIDATES, CandidateIdentity
-from genpolicy.evidence.rows.reproducibility import NfeRow, SampleRow
+from genpolicy.evidence.rows.reproducibility import FIXTURES_ON, NfeRow, SampleRow
 
 MANIFEST = "artifacts/ingest/manifest.json"
 TOTAL = "total"
@@ -110,6 +111,8 @@ def unpinned_items(
     if entry.dataset != evidence.digest(MANIFEST):
         missing.append("dataset: trained on another one than the audited")
     missing += unrecorded(entry.card) + contradicted(entry, _config(evidence, candidate))
+    if entry.card.device != settings.device:
+        missing.append(f"device: ran on {entry.card.device}, compute.device is {settings.device}")
     return Measured(float(len(missing)), caveat=", ".join(missing) or "all pinned by hash")
 
 
@@ -217,7 +220,23 @@ def samples_difference(
         raise MissingEvidenceError(f"{unequal} hashes differ although no sample is said to")
     seeds = rows["seed"].nunique()
     text = f"{len(rows)} samples of {seeds} training seeds, {unequal} not bit-equal"
+    if candidate not in settings.brought:
+        text += _where_drawn(rows, settings.device)
     return Measured(largest, caveat=text)
+
+
+def _where_drawn(rows: pd.DataFrame, device: str) -> str:
+    """That of every seed the fixtures of training came back on the CPU, and those of the device.
+
+    Raises:
+        MissingEvidenceError: They were not drawn in one of these places.
+    """
+    for place in dict.fromkeys((FIXTURES_ON, device)):
+        if set(rows.loc[rows["device"] == place, "seed"]) != set(rows["seed"]):
+            raise MissingEvidenceError(f"not every seed was drawn again on {place}")
+    if device == FIXTURES_ON:
+        return ""
+    return f"; on {device}, two processes that loaded there against each other"
 
 
 @criterion(

@@ -54,6 +54,7 @@ class ReproducibilitySettings(CandidateSettings):
 
     Attributes:
         baselines: Simpler methods that candidates will be compared with.
+        device: Torch device on which what is trained here is asked.
         term_deadlines: Of each latency term, what it may take, s, and what is done beyond.
         budget_reference: Method whose parameter count is the budget.
         mode_minimum_share: Share of the samples of a situation that must be admissible and reach
@@ -64,10 +65,12 @@ class ReproducibilitySettings(CandidateSettings):
     homes: ClassVar[Mapping[str, str]] = {
         **CandidateSettings.homes,
         "baselines": "stress.baselines",
+        "device": "compute.device",
         "term_deadlines": "execution.term_deadlines",
     }
 
     baselines: tuple[str, ...] = Field(min_length=1)
+    device: str
     term_deadlines: tuple[tuple[str, float, str], ...]
     budget_reference: str
     mode_minimum_share: float = Field(gt=0.0, le=0.5)

@@ -50,16 +50,29 @@ def joining_of(rule: JoiningSettings, policy: Running) -> JoiningSettings:
 
 
 def admitted_contenders(
-    artifacts: Path, admitted: Sequence[str], brought: Sequence[BroughtPolicy], *, seed: int
+    artifacts: Path,
+    admitted: Sequence[str],
+    brought: Sequence[BroughtPolicy],
+    *,
+    seed: int,
+    device: str,
 ) -> list[Contender]:
     """Those that a gate admitted, in its order.
+
+    Args:
+        artifacts: Folder of the stages' outputs.
+        admitted: Their names.
+        brought: Every policy that was brought.
+        seed: The training seed that is promoted.
+        device: Torch device of those that run here; one that was brought says its own.
 
     Raises:
         BadInputError: A checkpoint is missing or malformed.
     """
     others = {policy.name: policy for policy in brought}
     own = [name for name in admitted if name not in others]
-    of_ours = {one.name: one for one in trained(artifacts / GENERATORS, own, seeds=[seed])}
+    ours = trained(artifacts / GENERATORS, own, seeds=[seed], device=device)
+    of_ours = {one.name: one for one in ours}
     return [others.get(name) or of_ours[name] for name in admitted]
 
 
@@ -70,6 +83,7 @@ def in_comparison(
     candidates: Collection[str],
     brought: Sequence[BroughtPolicy],
     seed: int,
+    device: str,
 ) -> list[Contender]:
     """Baselines, then trained candidates, then brought ones: who stands in the comparison.
 
@@ -79,6 +93,7 @@ def in_comparison(
         candidates: Names of the candidates in it.
         brought: Every policy that was brought; those that are no candidate stay out.
         seed: The training seed that is promoted.
+        device: Torch device of those that run here; one that was brought says its own.
 
     Raises:
         ConfigError: A method stands on both sides.
@@ -86,5 +101,5 @@ def in_comparison(
     """
     others = {policy.name for policy in brought}
     own = [name for name in candidates if name not in others]
-    ours = compared(artifacts, baselines=baselines, generators=own, seed=seed)
+    ours = compared(artifacts, baselines=baselines, generators=own, seed=seed, device=device)
     return [*ours, *(policy for policy in brought if policy.name in candidates)]

@@ -6,8 +6,11 @@ from pathlib import Path
 from typing import Literal
 
 from genpolicy.errors import ConfigError
+from genpolicy.policies.checkpoint import load_checkpoint
+from genpolicy.policies.determinism import require_device
 from genpolicy.policies.policy import NetworkPolicy, load_policy
 from genpolicy.policies.protocol import Policy
+from genpolicy.policies.settings import SamplerConfig
 
 BASELINES = "train_baselines"
 GENERATORS = "train_generators"
@@ -22,6 +25,7 @@ class JudgedPolicy:
         seed: Number of its training seed.
         folder: Its files.
         sha256: Its identity; `load` refuses other files.
+        device: Torch device that it runs on, `compute.device`.
         kind: Where it comes from; `trained` here, with the training in `folder`'s config.
     """
 
@@ -29,16 +33,40 @@ class JudgedPolicy:
     seed: int
     folder: Path
     sha256: str
+    device: str
     kind: Literal["trained"] = "trained"
 
     def load(self) -> NetworkPolicy:
-        """The policy, from its files.
+        """The policy, from its files, on its device.
 
         Raises:
+            ConfigError: This machine has no such device.
             IntegrityError: The files are not those of the identity.
             BadInputError: The files are missing or malformed.
         """
-        return load_policy(self.folder, expected_sha256=self.sha256)
+        return loaded_on(self.device, self.folder, sha256=self.sha256)
+
+
+def loaded_on(device: str, folder: Path, *, sha256: str | None = None) -> NetworkPolicy:
+    """A checkpoint on a device: the one way in which whoever asks a policy loads it.
+
+    Args:
+        device: Torch device.
+        folder: Its files.
+        sha256: Its identity, where it is known.
+
+    Raises:
+        ConfigError: This machine has no such device.
+        IntegrityError: The files are not those of the identity.
+        BadInputError: The files are missing or malformed.
+    """
+    require_device(device)
+    return load_policy(folder, expected_sha256=sha256, device=device)
+
+
+def sampling_by(policy: NetworkPolicy, sampler: SamplerConfig) -> NetworkPolicy:
+    """The same weights on the same device, under another sampler."""
+    return NetworkPolicy(policy.checkpoint, sampler=sampler, device=policy.device)
 
 
 def candidates_of(policy: Policy, samples: int) -> int:
@@ -46,8 +74,16 @@ def candidates_of(policy: Policy, samples: int) -> int:
     return samples if policy.stochastic else 1
 
 
-def trained(root: Path, names: Iterable[str], *, seeds: Iterable[int]) -> list[JudgedPolicy]:
+def trained(
+    root: Path, names: Iterable[str], *, seeds: Iterable[int], device: str
+) -> list[JudgedPolicy]:
     """Checkpoints `<name>/seed_<n>` below a root, names outermost.
+
+    Args:
+        root: Folder of a stage that trains.
+        names: Whose.
+        seeds: Numbers of the training seeds.
+        device: Torch device that they run on.
 
     Raises:
         BadInputError: A checkpoint is missing or malformed.
@@ -57,12 +93,17 @@ def trained(root: Path, names: Iterable[str], *, seeds: Iterable[int]) -> list[J
     for name in names:
         for seed in numbers:
             folder = root / name / f"seed_{seed}"
-            found.append(JudgedPolicy(name, seed, folder, load_policy(folder).checkpoint_hash))
+            found.append(JudgedPolicy(name, seed, folder, load_checkpoint(folder).sha256, device))
     return found
 
 
 def compared(
-    artifacts: Path, *, baselines: Sequence[str], generators: Iterable[str], seed: int
+    artifacts: Path,
+    *,
+    baselines: Sequence[str],
+    generators: Iterable[str],
+    seed: int,
+    device: str,
 ) -> list[JudgedPolicy]:
     """Baselines, then generators, of one training seed: who stands in the comparison.
 
@@ -71,6 +112,7 @@ def compared(
         baselines: Simpler methods in it.
         generators: Candidates in it.
         seed: The training seed that is promoted.
+        device: Torch device that they run on.
 
     Raises:
         ConfigError: A method stands on both sides; its rows could not be told apart.
@@ -85,6 +127,6 @@ def compared(
             action="Let it stand for promotion or be what candidates are held against, not both.",
         )
     return [
-        *trained(artifacts / BASELINES, baselines, seeds=[seed]),
-        *trained(artifacts / GENERATORS, candidates, seeds=[seed]),
+        *trained(artifacts / BASELINES, baselines, seeds=[seed], device=device),
+        *trained(artifacts / GENERATORS, candidates, seeds=[seed], device=device),
     ]

@@ -261,6 +261,7 @@ def serve_policy(
     sha256: Annotated[
         str | None, typer.Option(help="What the checkpoint must be; any if absent.")
     ] = None,
+    device: Annotated[str, typer.Option(help="Torch device that it runs on.")] = "cpu",
 ) -> int:
     """Serve a checkpoint over openpi's protocol.
 
@@ -269,7 +270,7 @@ def serve_policy(
     """
     from genpolicy.cli.serving import run_serve
 
-    return run_serve(checkpoint, port=port, sha256=sha256)
+    return run_serve(checkpoint, port=port, sha256=sha256, device=device)
 
 
 def serve_candidate(

@@ -2,24 +2,26 @@
 
 from pathlib import Path
 
+from genpolicy.candidates.devices import require_here
 from genpolicy.candidates.hosts.hosted import Served
 from genpolicy.candidates.hosts.serving import hosted
+from genpolicy.candidates.judged import loaded_on
 from genpolicy.candidates.wire.connection import LOOPBACK, Listening
 from genpolicy.candidates.wire.served import ServedPolicy
 from genpolicy.errors import ConfigError
-from genpolicy.policies.policy import load_policy
 
 INTERRUPTED = 130
 
 
-def run_serve(checkpoint: Path, *, port: int, sha256: str | None) -> int:
+def run_serve(checkpoint: Path, *, port: int, sha256: str | None, device: str) -> int:
     """Serve a checkpoint on this machine until an interrupt. Returns the exit code.
 
     Raises:
-        ConfigError: Nobody may listen on that port.
+        ConfigError: Nobody may listen on that port, or this machine has no such device.
         BadInputError: The checkpoint is missing, malformed, or another one.
     """
-    policy = load_policy(checkpoint, expected_sha256=sha256)
+    require_here(device, where="--device")
+    policy = loaded_on(device, checkpoint, sha256=sha256)
     return _listen(ServedPolicy(policy), policy.method, port)
 
 

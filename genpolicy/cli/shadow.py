@@ -26,7 +26,7 @@ from genpolicy.wall_clock.limits import WallClockLimits, read_limits
 from genpolicy.wall_clock.messages import Order
 from genpolicy.wall_clock.recorded import replay_of
 from genpolicy.wall_clock.request import WallClockRequest
-from genpolicy.wall_clock.run import POLICY, Running, start
+from genpolicy.wall_clock.run import Running, loading, start
 from genpolicy.wall_clock.streamed import JOURNAL
 
 LOOK_S = 0.1
@@ -76,7 +76,8 @@ def run_shadow(options: ShadowOptions, admitted: Sequence[str]) -> int:
         replay=replay_of(data, load_task(limits.task), options.episode or _held_out(data)),
     )
     del loaded
-    running = start(options.out, request, [*POLICY, str(policy.folder), policy.sha256])
+    command = loading(policy.folder, policy.sha256, device=policy.device)
+    running = start(options.out, request, command)
     print(f"Replaying {len(request.replay)} rows. {HELP}")
     outcome = attend(running, sys.stdin)
     return _tell(outcome, _checked(options.out, limits))
@@ -141,7 +142,8 @@ def _policy(
     section = params.get("policy", {})
     seed = parse_settings(PolicySettings, section, where="params.yaml: policy").seeds[0]
     folder = options.root / "artifacts" / GENERATORS
-    policy = trained(folder, [options.method], seeds=[seed])[0]
+    device = str(params.get("compute", {}).get("device"))
+    policy = trained(folder, [options.method], seeds=[seed], device=device)[0]
     horizons = policy.load().horizons
     if horizons != limits.horizons:
         raise ConfigError(

@@ -39,7 +39,7 @@ from genpolicy.wall_clock.limits import read_limits
 from genpolicy.wall_clock.policy import answer_of
 from genpolicy.wall_clock.proxy import LinePlan, planned
 from genpolicy.wall_clock.request import WallClockRequest
-from genpolicy.wall_clock.run import POLICY, PROXY, start
+from genpolicy.wall_clock.run import POLICY, PROXY, loading, start
 from genpolicy.wall_clock.session import SupervisedSession
 from genpolicy.wall_clock.streamed import JOURNAL, StreamedJournal, collect, session_file
 from genpolicy.wall_clock.virtual import run_virtually
@@ -200,7 +200,8 @@ def _asked_elsewhere(candidate: Contender, shared: Bench) -> Iterator[_Asked]:
         yield _Asked(
             policy.checkpoint_hash, policy.sampler_config_hash,
             candidates_of(policy, shared.samples),
-            [*POLICY, str(candidate.folder), candidate.sha256], lambda: nullcontext(policy),
+            loading(candidate.folder, candidate.sha256, device=candidate.device),
+            lambda: nullcontext(policy),
         )  # fmt: skip
         return
     verify_files(candidate.entry, candidate.folder)

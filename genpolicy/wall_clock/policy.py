@@ -15,9 +15,9 @@ from pathlib import Path
 from genpolicy.candidates.brought import BroughtPolicy
 from genpolicy.candidates.hosts.kinds import read_entry
 from genpolicy.candidates.hosts.translation import as_server
+from genpolicy.candidates.judged import loaded_on
 from genpolicy.candidates.wire.policy import WirePolicy, WireSamples
 from genpolicy.candidates.wire.remote import RemotePolicy
-from genpolicy.policies.policy import load_policy
 from genpolicy.policies.protocol import Policy
 from genpolicy.tasks.api import load_task
 from genpolicy.wall_clock.channel import Inbox, frame, send_all
@@ -30,16 +30,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("policy", type=Path)
     parser.add_argument("sha256")
     parser.add_argument("--candidates", type=int, default=1, help="drawn in an invocation")
+    parser.add_argument("--device", default="", help="that a checkpoint runs on")
     parser.add_argument("--address", default="", help="of the server of a policy that is brought")
     parser.add_argument("--task", default="", help="whose observation the server is given")
     for name in ("asks", "answers"):
         parser.add_argument(f"--{name}", type=int, required=True, help="file descriptor")
     parser.add_argument("--ready", type=int, help="file descriptor to say on that it has loaded")
     given = parser.parse_args(arguments)
+    if not (given.address or given.device):
+        parser.error("--device of a checkpoint, or --address of a server")
     if given.address:
         policy: Policy = _behind_the_wire(given.policy, given.sha256, given.address, given.task)
     else:
-        policy = load_policy(given.policy, expected_sha256=given.sha256)
+        policy = loaded_on(given.device, given.policy, sha256=given.sha256)
     if given.ready is not None:
         os.write(given.ready, b".")
         os.close(given.ready)

@@ -28,6 +28,11 @@ LOG = "supervisor.log"
 REFUSED = 2
 
 
+def loading(folder: Path, sha256: str, *, device: str) -> list[str]:
+    """Command of a policy's process that loads a checkpoint on a device."""
+    return [*POLICY, str(folder), sha256, "--device", device]
+
+
 @dataclass
 class Running:
     """A run that was started.

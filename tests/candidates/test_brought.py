@@ -84,12 +84,14 @@ def test_who_stands_is_who_was_admitted_in_its_order(fleet, brought, tmp_path):
     (tmp_path / "train_generators").symlink_to(fleet[0])
     (tmp_path / "train_baselines").symlink_to(fleet[0])
     others = read_brought(brought(), seed=0, root=tmp_path)
-    found = admitted_contenders(tmp_path, ["planted", "flow"], others, seed=0)
+    found = admitted_contenders(tmp_path, ["planted", "flow"], others, seed=0, device="cpu")
     assert [one.name for one in found] == ["planted", "flow"]
-    assert admitted_contenders(tmp_path, ["flow"], others, seed=0)[0].name == "flow"
+    assert admitted_contenders(tmp_path, ["flow"], others, seed=0, device="cpu")[0].name == "flow"
     compared = in_comparison(
         tmp_path, baselines=["bc"], candidates=["flow", "planted"], brought=others, seed=0
     )
     assert [one.name for one in compared] == ["bc", "flow", "planted"]
-    only = in_comparison(tmp_path, baselines=["bc"], candidates=["flow"], brought=others, seed=0)
+    only = in_comparison(
+        tmp_path, baselines=["bc"], candidates=["flow"], brought=others, seed=0, device="cpu"
+    )
     assert [one.name for one in only] == ["bc", "flow"]

@@ -1078,6 +1078,7 @@ def _reload(root: Path) -> None:
             {
                 "method": m,
                 "seed": 0,
+                "device": "cpu",
                 "row": i,
                 "sha256_trained": digest,
                 "sha256_reloaded": digest,

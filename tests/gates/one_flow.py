@@ -91,7 +91,7 @@ def roll_out(path, checkpoint, *, joining=None, starts=4, **execution):
         {name: DeclaredTerm(0.001, 0.002) for name in DECLARED_TERMS},
         {name: np.full(8, 0.004) for name in MEASURED_TERMS}, 0.0,
     )  # fmt: skip
-    judged = JudgedPolicy("flow", 0, folder, sha256)
+    judged = JudgedPolicy("flow", 0, folder, sha256, "cpu")
     run_shard(Shard(comparison, judged, times, "envelope", slow, path))
     return path
 

@@ -138,7 +138,7 @@ def test_an_invocation_that_cannot_be_read_is_bad_input(root, params, journals, 
 def test_another_processor_may_round_and_what_is_further_away_is_another_draw(
     root, params, journals, monkeypatch
 ):
-    load = module.load_policy
+    load = module.loaded_on
 
     class Rounds:
         """A policy on a processor that rounds by so much."""
@@ -152,9 +152,9 @@ def test_another_processor_may_round_and_what_is_further_away_is_another_draw(
             return replace(drawn, actions=drawn.actions + self.by)
 
     monkeypatch.setattr(module, "OF_A_JOURNAL", 1000)
-    monkeypatch.setattr(module, "load_policy", lambda folder: Rounds(load(folder), 9e-6))
+    monkeypatch.setattr(module, "loaded_on", lambda *at: Rounds(load(*at), 9e-6))
     rederive_rollout_draws(root, params, journals[:1])
-    monkeypatch.setattr(module, "load_policy", lambda folder: Rounds(load(folder), 1.1e-5))
+    monkeypatch.setattr(module, "loaded_on", lambda *at: Rounds(load(*at), 1.1e-5))
     with pytest.raises(RefusedError, match=r"up to 1\.1e-05 beside it" + LIMIT):
         rederive_rollout_draws(root, params, journals[:1])
 
@@ -188,7 +188,7 @@ def shadows(checkpoints, dataset, tmp_path_factory):
     for folder, _ in checkpoints:
         root = tmp_path_factory.mktemp("shadow")
         (root / SHADOW).mkdir(parents=True)
-        policy = module.load_policy(folder)
+        policy = module.loaded_on("cpu", folder)
         rows = shadow_policy(tried, policy, seen[:4], seed=0, two_mode=seen[4:]).candidates
         write_rows(root / SHADOW / "candidates.parquet", CandidateRow, rows)
         (root / SHADOW / "journal.mcap").write_bytes(b"only its hash is asked for")

@@ -122,7 +122,7 @@ def root(written, moments, data, tmp_path, monkeypatch):
     monkeypatch.setattr(module, "missing_checks_evidence", lambda *_: list(LAYERS_TRIED))
     monkeypatch.setattr("genpolicy.evidence.shadow.tables.run_mutants", lambda: [EXECUTION_TRIED])
     demonstrator = Demonstrator(moments[1])
-    monkeypatch.setattr("gates.rederive_draws.load_policy", lambda folder: demonstrator)
+    monkeypatch.setattr("gates.rederive_draws.loaded_on", lambda *_: demonstrator)
     monkeypatch.setattr("gates.rederive_draws.load_dataset", lambda folder: data)
     return shutil.copytree(written, tmp_path / "repo")
 
@@ -138,7 +138,7 @@ def write(root, name, rows):
 def test_candidates_that_the_named_checkpoint_does_not_draw_are_refused(root, moments, monkeypatch):
     other = Demonstrator(moments[1])
     other.chunks = {key: chunk + 2e-5 for key, chunk in other.chunks.items()}
-    monkeypatch.setattr("gates.rederive_draws.load_policy", lambda folder: other)
+    monkeypatch.setattr("gates.rederive_draws.loaded_on", lambda *_: other)
     with pytest.raises(RefusedError, match=r"candidate operator/held_out/0/0 is up to 2e-05"):
         rederive(root, "C")
 

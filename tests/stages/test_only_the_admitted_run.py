@@ -1,6 +1,7 @@
 """A candidate that failed a gate does not run in the stage behind it, while others go on."""
 
 import json
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
@@ -11,6 +12,8 @@ from stages import shadow, stress
 from stages._stage import load_params
 
 ALL = ("diffusion", "flow")
+ELSEWHERE = "cpu:0"
+"""A device that every machine has, and that is not the word `cpu`."""
 
 
 @pytest.fixture
@@ -20,6 +23,7 @@ def params(evidence, monkeypatch):
     monkeypatch.chdir(root)
     found = load_params()
     monkeypatch.chdir(evidence)
+    found = replace(found, compute=found.compute.model_copy(update={"device": ELSEWHERE}))
     assert set(found.raw["train_generators"]["samplers"]) > set(ALL)
     return found
 
@@ -28,10 +32,13 @@ def params(evidence, monkeypatch):
 def weightless(monkeypatch):
     """Checkpoints without weights; what is loaded says its method."""
 
-    def load(folder, **_):
-        return SimpleNamespace(method=folder.parent.name, checkpoint_hash=folder.parent.name)
+    def load(folder, *, device, **_):
+        return SimpleNamespace(method=folder.parent.name, device=device)
 
     monkeypatch.setattr(judged, "load_policy", load)
+    monkeypatch.setattr(
+        judged, "load_checkpoint", lambda folder: SimpleNamespace(sha256=folder.parent.name)
+    )
 
 
 def nothing(*_, **__):
@@ -75,6 +82,7 @@ def test_shadow_samples_what_passed_gate_b(
     monkeypatch.setattr(shadow, "shadow_policy", judged)
     shadow.work(params)
     assert [policy.method for policy in ran] == [name for name in ALL if name != failed]
+    assert {policy.device for policy in ran} == {ELSEWHERE}
 
 
 @pytest.mark.parametrize("failed", [None, *ALL])
@@ -101,3 +109,4 @@ def test_stress_rolls_out_what_passed_gate_c(
     stress.work(params)
     baselines = params.raw["stress"]["baselines"]
     assert [policy.name for policy in ran] == [*baselines, *(n for n in ALL if n != failed)]
+    assert {policy.device for policy in ran} == {ELSEWHERE}

@@ -55,7 +55,7 @@ def told(folder):
 
 
 def test_a_trained_policy_by_both_clocks(shared, fleet, tmp_path):
-    candidates = trained(fleet[0], ["flow"], seeds=[0])
+    candidates = trained(fleet[0], ["flow"], seeds=[0], device="cpu")
     write_clocks(tmp_path, shared, candidates, {"flow": MODEL})
     found, checked = told(tmp_path), CHECKER.read(tmp_path)
     assert set(checked.journals) == {"flow__wall.mcap", "flow__virtual.mcap"}

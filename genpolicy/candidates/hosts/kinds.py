@@ -7,7 +7,7 @@ from pydantic import Field, model_validator
 
 from genpolicy.candidates.hosts.onnx_library import require_onnx
 from genpolicy.candidates.wire.declared import DIGEST
-from genpolicy.candidates.wire.entry import Entry, ServerEntry
+from genpolicy.candidates.wire.entry import CPU, Entry, ServerEntry
 from genpolicy.contract.settings import Settings, parse_settings
 from genpolicy.errors import ConfigError
 from genpolicy.integrity.documents import read_yaml
@@ -91,6 +91,12 @@ class TrainedEntry(HostedEntry):
         """Weights and config."""
         return [_below(self.checkpoint, name) for name in CHECKPOINT_FILES]
 
+    def require_host(self) -> None:
+        """The device that it declares."""
+        from genpolicy.candidates.devices import require_here  # noqa: PLC0415  (loads torch)
+
+        require_here(self.device, where=f"declared.device of the candidate {self.name}")
+
 
 class DrawingEntry(HostedEntry):
     """What is a function of its inputs, noise among them.
@@ -143,6 +149,15 @@ class ProgramEntry(DrawingEntry):
     def _arrays_only(self) -> "ProgramEntry":
         if self.constants:
             raise ValueError("a program is given arrays of the observation and noise, no constants")
+        return self
+
+    @model_validator(mode="after")
+    def _on_the_cpu(self) -> "ProgramEntry":
+        if self.device != CPU:
+            raise ValueError(
+                f"declared.device is {self.device}; programs run on the {CPU} here: serve it by a "
+                "command of your own (kind server)"
+            )
         return self
 
     def essential(self, folder: Path) -> list[str]:

@@ -17,11 +17,11 @@ from genpolicy.candidates.hosts.kinds import (
 from genpolicy.candidates.hosts.onnx_library import require_onnx
 from genpolicy.candidates.hosts.ports import Program, check_ports
 from genpolicy.candidates.hosts.scripted import scripted_function
+from genpolicy.candidates.judged import loaded_on
 from genpolicy.candidates.wire.entry import Entry, verify_files
 from genpolicy.candidates.wire.served import ServedPolicy
 from genpolicy.errors import ConfigError, IntegrityError
 from genpolicy.integrity.hashing import read_verified
-from genpolicy.policies.policy import load_policy
 
 HOSTED = [name for name, kind in KINDS.items() if issubclass(kind, HostedEntry)]
 
@@ -49,7 +49,7 @@ def hosted(path: Path, *, sha256: str | None, widths: Mapping[str, int]) -> Serv
         )
     verify_files(entry, folder)
     if isinstance(entry, TrainedEntry):
-        return ServedPolicy(load_policy(folder / entry.checkpoint))
+        return ServedPolicy(loaded_on(entry.device, folder / entry.checkpoint))
     if isinstance(entry, ProgramEntry):
         return _program(entry, folder, widths)
     if isinstance(entry, ScriptedEntry):

@@ -63,4 +63,7 @@ def _lerobot(entry: LeRobotEntry) -> list[str]:
             expected="the adapter that serves policies of LeRobot",
             action="Work in a checkout of genpolicy; the adapter is no part of the package.",
         )
-    return [str(interpreter), str(ADAPTER), entry.pretrained_model, "--port", PORT]
+    return [
+        str(interpreter), str(ADAPTER), entry.pretrained_model, "--port", PORT,
+        "--device", entry.device,
+    ]  # fmt: skip

@@ -15,6 +15,7 @@ from genpolicy.integrity.hashing import read_verified, sha256_bytes
 NAME = r"^[a-z][a-z0-9_]{0,63}$"
 PORT = "{port}"
 RESERVED = "genpolicy"
+CPU = "cpu"
 LENGTH = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 """One of the unit in m."""
 
@@ -244,6 +245,11 @@ class Entry(Settings):
     def sha256(self) -> str:
         """Of all that it says, the hashes of its files among it."""
         return sha256_bytes(canonical_json(self.model_dump(mode="json")))
+
+    @property
+    def device(self) -> str:
+        """Where it runs, as its maker declares; the CPU where nothing is declared."""
+        return self.declared.device if self.declared else CPU
 
     @property
     def started_here(self) -> bool:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from genpolicy.candidates.judged import JudgedPolicy
+from genpolicy.candidates.judged import JudgedPolicy, sampling_by
 from genpolicy.compute import map_shards
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.contract.settings import Settings
@@ -118,12 +118,12 @@ def mode_rows(
     checker = make_checker(task, plan.feasibility, action_period_s=plan.horizons.action_period_s)
     conventions = {policy.sampler.name: policy.sampler, **plan.conventions.get(policy.method, {})}
     for convention, sampler in conventions.items():
-        require_repeatable(NetworkPolicy(policy.checkpoint, sampler=sampler), held_out, convention)
+        require_repeatable(sampling_by(policy, sampler), held_out, convention)
     return [
         row
         for convention, sampler in conventions.items()
         for row in modes_of_policy(
-            NetworkPolicy(policy.checkpoint, sampler=sampler),
+            sampling_by(policy, sampler),
             held_out,
             seed=seed,
             convention=convention,
@@ -165,7 +165,7 @@ def latent_rows(
     if test is None or test.method != policy.method or len(held_out.situations) < 2:
         return []
     found = latent_dependence(
-        NetworkPolicy(policy.checkpoint, sampler=plan.conventions[test.method][test.convention]),
+        sampling_by(policy, plan.conventions[test.method][test.convention]),
         held_out,
         samples=plan.samples,
         permutations=test.permutations,

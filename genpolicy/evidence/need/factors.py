@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from genpolicy.candidates.judged import JudgedPolicy
+from genpolicy.candidates.judged import JudgedPolicy, sampling_by
 from genpolicy.compute import map_shards
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.data.dataset import Dataset, load_dataset
@@ -133,7 +133,7 @@ def measure_variant(job: tuple[FactorPlan, JudgedPolicy]) -> FactorRows:
     factor = plan.variants[trained.name].factor
     found = FactorRows([], [])
     for convention, sampler in plan.samplers_of(trained.name).items():
-        policy = NetworkPolicy(own.checkpoint, sampler=sampler)
+        policy = sampling_by(own, sampler)
         errors = episode_errors(data, policy, horizons, stride=plan.stride)
         found.errors.extend(
             FactorErrorRow(trained.name, factor, trained.seed, convention, **asdict(item))

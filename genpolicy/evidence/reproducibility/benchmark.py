@@ -72,7 +72,7 @@ def measure_policy(
     *,
     expected_sha256: str | None,
     sampler: SamplerConfig | None = None,
-    device: str = "cpu",
+    device: str,
     cold_repeats: int = 5,
     warm_repeats: int = 200,
     discarded_repeats: int = DISCARDED,

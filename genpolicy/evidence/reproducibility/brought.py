@@ -173,6 +173,7 @@ def _compared(candidate: BroughtPolicy, first: Array, again: Array) -> list[Samp
         SampleRow(
             method=candidate.name,
             seed=candidate.seed,
+            device=_device(candidate),
             row=row,
             sha256_trained=actions_sha256(before),
             sha256_reloaded=actions_sha256(after),
@@ -180,6 +181,11 @@ def _compared(candidate: BroughtPolicy, first: Array, again: Array) -> list[Samp
         )
         for row, (before, after) in enumerate(zip(first, again, strict=True))
     ]
+
+
+def _device(candidate: BroughtPolicy) -> str:
+    declared = candidate.entry.declared
+    return declared.device if declared else ""
 
 
 def _evaluations(candidate: BroughtPolicy, first: int, again: int) -> list[NfeRow]:
@@ -258,7 +264,7 @@ def card_of_brought(candidate: BroughtPolicy, deployment: Deployment) -> Identit
         tolerance=said.tolerance if said else None,
         evaluations=str(said.evaluations) if said else "",
         precision=said.precision if said else "",
-        device=said.device if said else "",
+        device=_device(candidate),
         threads=said.threads if said else 0,
         cpu_capability=said.cpu_capability if said else "",
         warm_up=DISCARDED,

@@ -214,6 +214,7 @@ def measure_terms(plan: LatencyPlan, judged: Contender) -> list[Measurement]:
         judged.folder,
         observations,
         expected_sha256=judged.sha256,
+        device=judged.device,
         cold_repeats=plan.cold,
         warm_repeats=plan.warm,
         candidates=candidates_of(policy, plan.samples),

@@ -1,11 +1,11 @@
 """Gate B's evidence: does a checkpoint come back the same, and what does fewer NFE cost?"""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from genpolicy.candidates.brought import BroughtPolicy
-from genpolicy.candidates.judged import JudgedPolicy
+from genpolicy.candidates.judged import JudgedPolicy, loaded_on, sampling_by
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.data.dataset import Dataset, load_dataset
 from genpolicy.errors import ContractError
@@ -16,9 +16,9 @@ from genpolicy.evidence.documents.reproducibility import CANDIDATES, CandidateId
 from genpolicy.evidence.need.held_out import HeldOut, held_out_situations, modes_of_policy
 from genpolicy.evidence.need.offline import offline_rows
 from genpolicy.evidence.reproducibility.brought import Answered, Asked, ask_brought
+from genpolicy.evidence.reproducibility.fixtures import fixtures_again
 from genpolicy.evidence.reproducibility.identity import Deployment, identities
 from genpolicy.evidence.reproducibility.likelihood import density_rows, drawn_situations
-from genpolicy.evidence.reproducibility.measure import in_fresh_process
 from genpolicy.evidence.reproducibility.sweep import (
     Sweep,
     coverage_row,
@@ -33,8 +33,8 @@ from genpolicy.feasibility.admission import FeasibilityChecker
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.rows import read_rows, write_rows
 from genpolicy.policies.evaluations import allowed_evaluations
-from genpolicy.policies.fixtures import FixtureRow, compare_fixtures, reload_fixture
-from genpolicy.policies.policy import NetworkPolicy, load_policy
+from genpolicy.policies.fixtures import FixtureRow
+from genpolicy.policies.policy import NetworkPolicy
 from genpolicy.policies.validation_row import EARLIER_FOLDER
 from genpolicy.tasks.api import Task, load_task
 
@@ -171,7 +171,7 @@ def _measured(
     rows.modes += own
     rows.coverage += swept
     rows.earlier += modes_of_policy(
-        load_policy(candidate.folder / EARLIER_FOLDER),
+        loaded_on(candidate.device, candidate.folder / EARLIER_FOLDER),
         held_out,
         seed=seed,
         convention=policy.sampler.name,
@@ -193,7 +193,7 @@ def nonfinite_weights(policy: NetworkPolicy) -> int:
 def _reloaded(
     plan: ReloadPlan, candidate: JudgedPolicy, before: Sequence[FixtureRow], rows: ReloadRows
 ) -> int:
-    """Fixtures again, in a fresh process; returns how many metadata fields differ."""
+    """Fixtures again, in fresh processes; returns how many metadata fields differ."""
     if not before:
         raise ContractError(
             where=f"fixtures of {candidate.name}, seed {candidate.seed}",
@@ -201,20 +201,11 @@ def _reloaded(
             expected="samples drawn at training",
             action="Train the generators again (`dvc repro train_generators`).",
         )
-    after = in_fresh_process(
-        reload_fixture,
-        candidate.folder,
-        plan.dataset,
-        horizons=plan.horizons,
-        method=candidate.name,
-        seed=candidate.seed,
-        count=len(before),
+    compared, counted, differing = fixtures_again(
+        candidate, before, plan.dataset, horizons=plan.horizons
     )
-    compared, differing = compare_fixtures(before, after)
-    rows.samples += [
-        SampleRow(candidate.name, candidate.seed, **asdict(fixture)) for fixture in compared
-    ]
-    allowed, counted = allowed_evaluations(candidate.load().sampler), after[0].nfe
+    rows.samples += compared
+    allowed = allowed_evaluations(candidate.load().sampler)
     rows.nfe.append(
         NfeRow(
             method=candidate.name,
@@ -243,7 +234,7 @@ def _sweep(
     own: list[ModeRow] = []
     rows, windows = [], swept_windows(data, plan.horizons)
     for sampler in swept_samplers(policy.sampler, plan.sweep.get(policy.method, ())):
-        tried = NetworkPolicy(policy.checkpoint, sampler=sampler)
+        tried = sampling_by(policy, sampler)
         found = modes_of_policy(
             tried,
             held_out,

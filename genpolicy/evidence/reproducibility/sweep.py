@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from genpolicy.candidates.judged import JudgedPolicy, candidates_of
+from genpolicy.candidates.judged import JudgedPolicy, candidates_of, sampling_by
 from genpolicy.contract.action import POSITION
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.contract.settings import Settings
@@ -24,7 +24,6 @@ from genpolicy.evidence.rows.reproducibility import CoverageRow, SweepLatencyRow
 from genpolicy.policies.fixtures import fixture_observations
 from genpolicy.policies.matched_training import training_windows
 from genpolicy.policies.ode_samplers import ADAPTIVE_TABLEAUS
-from genpolicy.policies.policy import NetworkPolicy
 from genpolicy.policies.protocol import NoiseName, Policy
 from genpolicy.policies.settings import SamplerConfig
 from genpolicy.policies.windows import Windows
@@ -172,10 +171,7 @@ def measure_sweep(
         load_dataset(plan.dataset), horizons=plan.horizons, count=OBSERVATIONS
     )
     loaded = judged.load()
-    policies = [
-        NetworkPolicy(loaded.checkpoint, sampler=sampler)
-        for sampler in swept_samplers(loaded.sampler, sweep)
-    ]
+    policies = [sampling_by(loaded, sampler) for sampler in swept_samplers(loaded.sampler, sweep)]
     rows = []
     for repeat in range(-DISCARDED, REPEATS):
         row = seen[repeat % len(seen)][None]

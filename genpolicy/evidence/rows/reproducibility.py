@@ -2,22 +2,30 @@
 
 from dataclasses import dataclass
 
+FIXTURES_ON = "cpu"
+"""Where training draws its fixtures, whatever device it trains on."""
+
 
 @dataclass(frozen=True)
 class SampleRow:
-    """`samples.parquet` of reload: one fixture, sampled at training and after reload.
+    """`samples.parquet` of reload: one fixture, drawn before and after reload.
+
+    On the CPU the first draw is that of training. On another device it is that of a process which
+    loaded the same files there; of who was brought, that of its first start.
 
     Attributes:
         method: The candidate.
         seed: Number of its training seed.
+        device: Where both were drawn; of who was brought, where its maker says.
         row: Which fixture.
-        sha256_trained: Of the samples drawn at training.
+        sha256_trained: Of the samples drawn first; empty where they were none.
         sha256_reloaded: Of those drawn by a fresh process from the files.
         max_abs_difference: Largest difference of an action component, in its own unit.
     """
 
     method: str
     seed: int
+    device: str
     row: int
     sha256_trained: str
     sha256_reloaded: str

@@ -45,7 +45,7 @@ def measure(variants, folder, *, dataset, audit, kit):
         conventions={"act": {"z_prior": SamplerConfig(name="z_prior")}}, samples=3, stride=16,
         confidence=0.95,
     )  # fmt: skip
-    checkpoints = trained(folder, variants, seeds=[0])
+    checkpoints = trained(folder, variants, seeds=[0], device="cpu")
     write_factors(study, checkpoints, folder, workers=1, scheduler="local")
 
 

@@ -21,7 +21,7 @@ def test_each_count_is_timed_alone_and_beside_a_load(few, fleet, dataset, kit):
         dataset=dataset, task="tabletop_insertion", feasibility=kit.FEASIBILITY,
         horizons=kit.HORIZONS, samples=4, warm=2, cold=2,
     )  # fmt: skip
-    rows = load.candidates_rows(plan, trained(fleet[0], ["bc", "flow"], seeds=[0]))
+    rows = load.candidates_rows(plan, trained(fleet[0], ["bc", "flow"], seeds=[0], device="cpu"))
     assert [(row.method, row.candidates, row.load, row.repeat) for row in rows] == [
         ("flow", count, beside, repeat)
         for beside in (load.QUIET, load.BUSY) for count in (1, 3) for repeat in (0, 1)

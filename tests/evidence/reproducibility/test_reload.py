@@ -6,7 +6,7 @@ from gates.reproducibility.identity import unrecorded
 from genpolicy.candidates.judged import trained
 from genpolicy.errors import ContractError
 from genpolicy.evidence.documents.reproducibility import CANDIDATES
-from genpolicy.evidence.reproducibility import reload
+from genpolicy.evidence.reproducibility import fixtures
 from genpolicy.evidence.reproducibility.identity import Deployment
 from genpolicy.evidence.reproducibility.reload import ReloadPlan, write_reload
 from genpolicy.evidence.reproducibility.sweep import Quality, coverage_row
@@ -32,7 +32,7 @@ def reloaded(fleet, dataset, data, policy, kit, tmp_path_factory):
     rows = fixture_rows(policy, seen, method="flow", seed=0)
     write_rows(root / "fixtures.parquet", FixtureRow, rows)
     (root / "out").mkdir()
-    candidates = trained(fleet[0], ["flow"], seeds=[0])
+    candidates = trained(fleet[0], ["flow"], seeds=[0], device="cpu")
     write_reload(plan, candidates, root / "fixtures.parquet", root / "out")
     return plan, candidates, root / "out"
 
@@ -92,7 +92,7 @@ def test_a_solver_that_evaluates_once_too_often_is_not_what_it_says(
         return honest(velocity, noise, **settings)
 
     monkeypatch.setattr(methods, "sample_ode", wasteful)
-    monkeypatch.setattr(reload, "in_fresh_process", lambda work, *a, **k: work(*a, **k))
+    monkeypatch.setattr(fixtures, "in_fresh_process", lambda work, *a, **k: work(*a, **k))
     seen = fixture_observations(data, horizons=kit.HORIZONS, count=3)
     rows = fixture_rows(policy, seen, method="flow", seed=0)
     write_rows(tmp_path / "fixtures.parquet", FixtureRow, rows)

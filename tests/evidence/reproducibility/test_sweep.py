@@ -90,7 +90,7 @@ def test_every_swept_setting_is_timed_under_the_name_that_its_samples_have(
         dataset=dataset, task="tabletop_insertion", feasibility=kit.FEASIBILITY,
         horizons=kit.HORIZONS, samples=4, warm=2, cold=2,
     )  # fmt: skip
-    (flow,) = trained(fleet[0], ["flow"], seeds=[0])
+    (flow,) = trained(fleet[0], ["flow"], seeds=[0], device="cpu")
     tried = [1, SamplerConfig(name="midpoint")]
     rows = sweep.sweep_latency_rows(plan, [flow], {"flow": tried})
     assert rows and [row.repeat for row in rows] == [0, 0, 0, 1, 1, 1]

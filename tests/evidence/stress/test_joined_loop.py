@@ -55,7 +55,7 @@ def folder(rule, task, fleet, kit, tmp_path_factory):
         episode_limit_s=1.5, samples=SAMPLES, cell=Cell(kit.HORIZONS, kit.EXECUTION),
         feasibility=kit.FEASIBILITY, root_seed=1, joining=JoiningSettings(rule=rule),
     )  # fmt: skip
-    judged = [JudgedPolicy("flow", 0, root / "flow" / "seed_0", trained["flow"][0])]
+    judged = [JudgedPolicy("flow", 0, root / "flow" / "seed_0", trained["flow"][0], "cpu")]
     shards = plan_shards(
         comparison, judged, {"nominal": Nominal()},
         latency={"flow": LATENCY}, journals=folder / "journals",

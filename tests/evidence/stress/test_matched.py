@@ -93,7 +93,7 @@ def shard(checkpoints, plans, kit, tmp_path_factory):
         shared["starts"] = changes.pop("starts", shared["starts"])
         parts = {
             "comparison": Comparison(**shared),
-            "judged": JudgedPolicy(method, 0, folder_of, sha256), "perturbation": "nominal",
+            "judged": JudgedPolicy(method, 0, folder_of, sha256, "cpu"), "perturbation": "nominal",
             "schedule": Nominal(), "latency": kit.latency(), "journal": folder / f"{count}.mcap",
         }  # fmt: skip
         return Shard(**(parts | changes))

@@ -61,7 +61,7 @@ def written(task, fleet, kit, tmp_path_factory):
     folder = tmp_path_factory.mktemp("stress")
     root, trained = fleet
     judged = [
-        JudgedPolicy(method, 0, root / method / "seed_0", trained[method][0])
+        JudgedPolicy(method, 0, root / method / "seed_0", trained[method][0], "cpu")
         for method in ("chunked_bc", "flow")
     ]
     starts = tuple(s.to_json() for s in matched_starts(task, root_seed=1, count=2))
@@ -94,7 +94,7 @@ def test_a_server_that_does_not_start_costs_its_deadlines_and_nobody_else_s(
     command = [sys.executable, "-c", "raise SystemExit('no weights here')  # {port}"]
     entry = entry_of(address=None, command=command)
     judged = [
-        JudgedPolicy("flow", 0, root / "flow" / "seed_0", trained["flow"][0]),
+        JudgedPolicy("flow", 0, root / "flow" / "seed_0", trained["flow"][0], "cpu"),
         BroughtPolicy("planted", tmp_path / "planted.yaml", entry, "c" * 64, 0),
     ]
     starts = tuple(s.to_json() for s in matched_starts(task, root_seed=1, count=1))
@@ -143,7 +143,7 @@ def test_a_person_for_whom_nobody_waits_as_long_is_refused(tmp_path):
 
 
 def test_every_method_meets_every_perturbation(tmp_path):
-    judged = [JudgedPolicy(name, 0, tmp_path, "") for name in "abc"]
+    judged = [JudgedPolicy(name, 0, tmp_path, "", "cpu") for name in "abc"]
     models = dict.fromkeys("abc")
     plan = plan_shards(JOINED, judged, PERTURBATIONS, latency=models, journals=tmp_path)
     assert [(shard.perturbation, shard.judged.name) for shard in plan] == [
@@ -154,7 +154,7 @@ def test_every_method_meets_every_perturbation(tmp_path):
 
 
 def test_a_method_whose_latency_was_not_measured_is_a_bad_setting(tmp_path):
-    judged = [JudgedPolicy(name, 0, tmp_path, "") for name in "abc"]
+    judged = [JudgedPolicy(name, 0, tmp_path, "", "cpu") for name in "abc"]
     models = dict.fromkeys("ac")
     with pytest.raises(ConfigError, match="with b, whose latency was not measured"):
         plan_shards(JOINED, judged, PERTURBATIONS, latency=models, journals=tmp_path)
@@ -300,7 +300,7 @@ def test_a_distilled_policy_s_teacher_and_what_it_took_stand_beside_the_comparis
     }
     hashes, _ = train_methods(plan, samplers, folder=tmp_path / "trained")
     judged = [
-        JudgedPolicy(name, 0, tmp_path / "trained" / name / "seed_0", hashes[name][0])
+        JudgedPolicy(name, 0, tmp_path / "trained" / name / "seed_0", hashes[name][0], "cpu")
         for name in samplers
     ]
     (tmp_path / "stress").mkdir()
