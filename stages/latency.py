@@ -8,7 +8,6 @@ from pathlib import Path
 from gates.proof import admit
 from genpolicy.candidates.brought import BroughtSection, read_brought
 from genpolicy.candidates.contenders import in_comparison
-from genpolicy.candidates.judged import JudgedPolicy
 from genpolicy.evidence.reproducibility.latency import (
     PROCESSES,
     LatencyPlan,
@@ -83,7 +82,7 @@ def work(params: Params) -> None:
             SweepLatencyRow,
             sweep_latency_rows(
                 plan,
-                [p for p in policies if isinstance(p, JudgedPolicy) and p.name in generators],
+                [policy for policy in policies if policy.name not in stress.baselines],
                 sweep,
             ),
         )

@@ -4,7 +4,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from gates.evidence import Evidence
+from gates.evidence import Evidence, MissingEvidenceError
 from gates.pages.figures import Listing, Plot, Table, colours, in_order, markers
 from gates.report import GateReport
 from gates.reproducibility.front import (
@@ -27,12 +27,25 @@ Sweeps = dict[str, tuple[list[Setting], Choice, float]]
 
 
 def _sweeps(evidence: Evidence, report: GateReport) -> Sweeps:
-    """Of each method its settings, what the rule says, and the deadline, s."""
+    """Of each method its settings, what the rule says, and the deadline, s.
+
+    A method of which a term is unknown stands on no axis; that is no reason to show nobody.
+
+    Raises:
+        MissingEvidenceError: Of no method everything is known.
+    """
     confidence, found = float(report.settings["confidence"]), {}
+    unknown = []
     for method in in_order(evidence.rows(COVERAGE, CoverageRow)["method"]):
-        settings = settings_of(evidence, method, confidence=confidence)
+        try:
+            settings = settings_of(evidence, method, confidence=confidence)
+        except MissingEvidenceError as error:
+            unknown.append(error)
+            continue
         deadline_s = deadline_of(evidence, method)
         found[method] = settings, choice(settings, deadline_s=deadline_s), deadline_s
+    if unknown and not found:
+        raise unknown[0]
     return found
 
 
@@ -45,7 +58,8 @@ def _front(evidence: Evidence, report: GateReport) -> Figure:
         for axes, heights in zip(places, _heights(settings), strict=True):
             times = [setting.answer_s * MILLI for setting in settings]
             line = [at for at, on in zip(zip(times, heights, strict=True), kept, strict=True) if on]
-            axes.plot(*zip(*sorted(line), strict=True), color=colour[method], lw=0.9)
+            if line:
+                axes.plot(*zip(*sorted(line), strict=True), color=colour[method], lw=0.9)
             for at, height, on in zip(times, heights, kept, strict=True):
                 face = colour[method] if on else "white"
                 look: dict[str, Any] = {"color": colour[method], "marker": shape[method], "ms": 4}
@@ -92,10 +106,16 @@ def _table(evidence: Evidence, report: GateReport) -> Table:
                     f"{setting.coverage:.3g} ({setting.coverage_lower:.3g})",
                     f"{setting.chunk_error:.3g}",
                     f"{setting.jerk_p95_m_s3:.4g}",
-                    "yes" if on else "no",
+                    _said(setting, on=on),
                 )
             )
     return (heads, *rows)
+
+
+def _said(setting: Setting, *, on: bool) -> str:
+    if setting.nonfinite:
+        return f"no: {setting.nonfinite} chunks are no numbers"
+    return "yes" if on else "no"
 
 
 def _advice(evidence: Evidence, report: GateReport) -> Table:

@@ -38,6 +38,7 @@ class Setting:
         coverage_lower: Lower end of its interval.
         chunk_error: Mean absolute error on held-out windows, normalised units.
         jerk_p95_m_s3: p95 of the largest jerk inside a chunk, m/s^3.
+        nonfinite: Chunks on held-out windows that are no numbers; their error and jerk are NaN.
     """
 
     name: str
@@ -50,9 +51,12 @@ class Setting:
     coverage_lower: float
     chunk_error: float
     jerk_p95_m_s3: float
+    nonfinite: int = 0
 
     def dominates(self, other: "Setting") -> bool:
-        """As good in everything, and better in something."""
+        """As good in everything, and better in something; what diverges is as good as nothing."""
+        if self.nonfinite or other.nonfinite:
+            return other.nonfinite > 0 and not self.nonfinite
         own, its = self._costs(), other._costs()
         return own != its and all(a <= b for a, b in zip(own, its, strict=True))
 
@@ -117,16 +121,21 @@ def _setting(row: dict[str, object], times: pd.DataFrame, rest_s: float) -> Sett
         coverage_lower=shares["coverage_lower"],
         chunk_error=shares["chunk_error"],
         jerk_p95_m_s3=shares["jerk_p95_m_s3"],
+        nonfinite=int(str(row["nonfinite"])),
     )
 
 
 def efficient(settings: Sequence[Setting]) -> list[bool]:
-    """Whether each lies on the front."""
-    return [not any(other.dominates(one) for other in settings) for one in settings]
+    """Whether each lies on the front; what diverges never does."""
+    return [
+        not one.nonfinite and not any(other.dominates(one) for other in settings)
+        for one in settings
+    ]
 
 
 def choice(settings: Sequence[Setting], *, deadline_s: float) -> Choice:
     """What the rule says of the settings of a method, from the cheapest."""
+    settings = [setting for setting in settings if not setting.nonfinite]
     kept = [setting for setting in settings if setting.answer_s <= deadline_s]
     if not kept:
         return Choice(None, None, None)

@@ -161,7 +161,7 @@ def _identity(evidence: Evidence, candidate: str) -> CandidateIdentity:
 
 @criterion(
     "<=",
-    question="Are all weights finite?",
+    question="Are all weights finite, and is what they draw?",
     look_at="Generator training: training diverged; lower the rate or look at the data.",
     per_candidate=True,
     always=True,
@@ -169,10 +169,12 @@ def _identity(evidence: Evidence, candidate: str) -> CandidateIdentity:
 def nonfinite_weights(
     evidence: Evidence, settings: ReproducibilitySettings, candidate: str
 ) -> Measured:
-    """Weights that are NaN or infinite; behind the wire, answers that are none or not finite."""
-    found = float(_identity(evidence, candidate).nonfinite_weights)
+    """Weights and chunks that are NaN or infinite; behind the wire, answers without a finite one."""
+    entry = _identity(evidence, candidate)
+    found = float(entry.nonfinite_weights + entry.nonfinite_chunks)
     if candidate not in settings.brought:
-        return Measured(found)
+        chunks = f"{entry.nonfinite_chunks} chunks of its own sampler hold a number that is none"
+        return Measured(found, caveat=chunks if entry.nonfinite_chunks else "")
     text = "behind the wire nobody sees weights: counted are invocations without a finite chunk"
     return Measured(found, caveat=f"{text}{_failed(evidence, candidate)}")
 

@@ -1,4 +1,4 @@
-"""A device that somebody names elsewhere than in `params.yaml`: on the command line, in an entry."""
+"""A device that is named elsewhere than in `params.yaml`: on the command line, in an entry."""
 
 from genpolicy.errors import ConfigError
 from genpolicy.policies.determinism import require_device

@@ -33,6 +33,11 @@ class OfflineError:
     position_rmse_m: float
 
 
+def numbers_or_nan(chunks: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Chunks (B, K, D_a) with infinity as NaN, which no arithmetic behind it warns of."""
+    return np.where(np.isfinite(chunks), chunks, np.nan)
+
+
 def masked_errors(
     policy: Policy,
     windows: Windows,
@@ -42,6 +47,9 @@ def masked_errors(
     noise_names: list[NoiseName],
 ) -> list[OfflineError]:
     """Errors of one candidate per window, grouped by phase.
+
+    A chunk that is no numbers makes the errors of its phase NaN: a mean over the others would
+    flatter.
 
     Args:
         policy: The policy; its K may be shorter than the windows' chunks.
@@ -65,8 +73,8 @@ def masked_errors(
             action="Pass the columns of the same windows.",
         )
     horizon = policy.prediction_horizon
-    sampled = policy.sample(windows.observations, noise_names=noise_names, candidates=1).finite()
-    predicted, target = sampled.actions[:, 0], windows.actions[:, :horizon]
+    sampled = policy.sample(windows.observations, noise_names=noise_names, candidates=1)
+    predicted, target = numbers_or_nan(sampled.actions[:, 0]), windows.actions[:, :horizon]
     counts = ~windows.is_pad[:, :horizon]
     scale = normalisation.action
     absolute = np.abs(scale.normalise(predicted) - scale.normalise(target)).mean(axis=-1)

@@ -60,5 +60,7 @@ def test_a_policy_is_loaded_where_it_is_to_run_and_keeps_its_device_under_other_
 def test_a_device_that_is_not_there_is_a_setting_that_is_wrong(fleet, monkeypatch):
     monkeypatch.setattr(torch.cuda, "device_count", lambda: 0)
     (flow,) = trained(fleet[0], ["flow"], seeds=[0], device="cuda")
-    with pytest.raises(ConfigError, match=r"compute\.device is 'cuda', which this machine does not"):
+    with pytest.raises(
+        ConfigError, match=r"compute\.device is 'cuda', which this machine does not"
+    ):
         flow.load()

@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 
 import pytest
+import torch
 import yaml
 
 from genpolicy.candidates.wire.connection import Listening, dial
@@ -236,7 +237,10 @@ def test_a_served_policy_says_where_it_is_and_ends_on_an_interrupt(fleet):
         server.wait()
 
 
-def test_what_cannot_be_served(fleet, tmp_path, capsys):
+def test_what_cannot_be_served(fleet, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(torch.cuda, "device_count", lambda: 0)
+    assert main(["serve-policy", str(tmp_path), "--device", "cuda"]) == 2
+    assert "--device is 'cuda', which this machine does not have" in capsys.readouterr().err
     assert main(["serve-policy", str(tmp_path)]) == 2
     assert "config.json is not readable" in capsys.readouterr().err
     checkpoint = str(fleet[0] / "flow" / "seed_0")

@@ -189,6 +189,7 @@ VARIANTS = {
 }
 PARAMS: dict[str, Any] = {
     "seed": 1,
+    "compute": {"device": "cpu"},
     "confidence": 0.95,
     "horizons": {"execution_horizon": 8, "action_period_s": 0.05},
     "execution": {
@@ -1146,6 +1147,7 @@ def _reload(root: Path) -> None:
                 "admissible_share": 0.9,
                 "between_share": 0.0,
                 "chunk_error": 0.1 + 0.1 / nfe,
+                "nonfinite": 0,
                 "jerk_p95_m_s3": 1000.0 + 100.0 / nfe,
             }
             for m in CANDIDATES
@@ -1166,6 +1168,7 @@ def _reload(root: Path) -> None:
                 "sampler": "s",
                 "metadata_mismatches": 0,
                 "nonfinite_weights": 0,
+                "nonfinite_chunks": 0,
                 "card": _identity_card(hashlib.sha256(manifest).hexdigest()),
             }
             for m in CANDIDATES

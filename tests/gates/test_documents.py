@@ -40,7 +40,7 @@ def root(tmp_path_factory, _ladder):
     # Nobody is brought to that ladder, and of nobody no key can be left out.
     somebody = {
         "author": "a@example.org", "sha256": "a" * 64, "files": {"weights": "b" * 64},
-        "started_here": True, "dataset": "c" * 64, "training_seed": 1,
+        "program": {}, "started_here": True, "dataset": "c" * 64, "training_seed": 1,
     }  # fmt: skip
     path = copied / "artifacts/candidates/candidates.json"
     path.write_bytes(canonical_json({"flow": somebody}))

@@ -60,6 +60,21 @@ def test_another_file_is_refused(workspace):
         rederive_brought(workspace, PARAMS)
 
 
+def test_another_program_behind_the_same_files_is_refused(workspace):
+    """Its entry, weights and answers to hashes are the same; what serves them is not."""
+    own, path = workspace / "own", workspace / "own/planted.yaml"
+    command = ["python", "serve.py", "--port", "{port}"]
+    served = {**yaml.safe_load(path.read_text()), "address": None, "command": command}
+    path.write_text(yaml.safe_dump(served))
+    (own / "serve.py").write_text("first")
+    found = read_brought(PARAMS["candidates"], seed=3, root=workspace)
+    BROUGHT.write(workspace / "artifacts/candidates", brought_document(found))
+    rederive_brought(workspace, PARAMS)
+    (own / "serve.py").write_text("second")
+    with pytest.raises(RefusedError, match=r"candidates\.json: planted"):
+        rederive_brought(workspace, PARAMS)
+
+
 def test_one_that_params_do_not_name_is_refused(workspace):
     with pytest.raises(RefusedError, match=r"candidates\.json: planted"):
         rederive_brought(workspace, {**PARAMS, "candidates": {}})

@@ -18,8 +18,8 @@ def test_an_answer_is_the_sample_of_that_observation(fleet, policy, data):
     folder = fleet[0] / "flow" / "seed_0"
     (asks_r, asks_w), (answers_r, answers_w) = os.pipe(), os.pipe()
     ready_r, ready_w = os.pipe()
-    words = [str(folder), policy.checkpoint_hash, "--device", "cpu", "--asks", str(asks_r), "--answers",
-             str(answers_w), "--ready", str(ready_w)]  # fmt: skip
+    words = [str(folder), policy.checkpoint_hash, "--device", "cpu", "--asks", str(asks_r),
+             "--answers", str(answers_w), "--ready", str(ready_w)]  # fmt: skip
     serving = threading.Thread(target=main, args=(words,), daemon=True)
     serving.start()
     assert os.read(ready_r, 1) == b"."  # nobody has asked it yet

@@ -8,6 +8,7 @@ from genpolicy.candidates.wire.channels import columns_of
 from genpolicy.candidates.wire.entry import PORT, Entry, ServerEntry
 from genpolicy.contract.observation import ObservationContract
 from genpolicy.errors import ConfigError
+from genpolicy.integrity.hashing import sha256_file
 
 ROOT = Path(__file__).parents[3]
 ADAPTER = ROOT / "adapters" / "lerobot_server.py"
@@ -38,6 +39,35 @@ def as_server(entry: Entry, path: Path, contract: ObservationContract) -> Server
     common = {name: getattr(entry, name) for name in Entry.model_fields if name != "kind"}
     command = _lerobot(entry) if isinstance(entry, LeRobotEntry) else _own(entry, path, contract)
     return ServerEntry(**common, kind="server", command=command)
+
+
+def program_files(entry: Entry, folder: Path) -> dict[str, str]:
+    """What runs a candidate, beside the files that are it: SHA-256 by path.
+
+    Our own host is none of it: every stage that starts one depends on its code. What an
+    environment has installed, an interpreter among it, is bound by nothing.
+
+    Args:
+        entry: What it is.
+        folder: Of the entry's file.
+
+    Returns:
+        Of a LeRobot policy the adapter; of a server the files that words of its command name from
+        the folder. Empty of the others.
+
+    Raises:
+        IntegrityError: One is no regular file.
+    """
+    if isinstance(entry, LeRobotEntry):
+        return {f"adapters/{ADAPTER.name}": sha256_file(ADAPTER)} if ADAPTER.is_file() else {}
+    if not isinstance(entry, ServerEntry):
+        return {}
+    named = [word for word in entry.command or () if not Path(word).is_absolute()]
+    return {
+        word: sha256_file(folder / word)
+        for word in named
+        if word not in entry.files and (folder / word).is_file()
+    }
 
 
 def _own(entry: Entry, path: Path, contract: ObservationContract) -> list[str]:

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from genpolicy.candidates.brought import BroughtPolicy
+from genpolicy.candidates.hosts.translation import program_files
 from genpolicy.documents.document import Count, Document
 
 
@@ -15,6 +16,8 @@ class Brought:
         author: Who made it, as an e-mail address; may not review it.
         sha256: Of what its entry says.
         files: What it is: SHA-256 of each file, by path from the entry's folder.
+        program: What runs it beside them: SHA-256 of the adapter, or of each file that its command
+            names from that folder.
         started_here: Whether the ladder starts its server; else somebody else does.
         dataset: SHA-256 of the manifest of the dataset that it was trained on; empty if unsaid.
         training_seed: Root seed of its training; None if unsaid.
@@ -23,6 +26,7 @@ class Brought:
     author: str
     sha256: str
     files: dict[str, str]
+    program: dict[str, str]
     started_here: bool
     dataset: str
     training_seed: int | None
@@ -58,6 +62,7 @@ def brought_document(policies: Sequence[BroughtPolicy]) -> dict[str, Brought]:
             author=policy.entry.author,
             sha256=policy.sha256,
             files=dict(policy.entry.files),
+            program=program_files(policy.entry, policy.folder),
             started_here=policy.entry.started_here,
             dataset=policy.entry.declared.dataset if policy.entry.declared else "",
             training_seed=policy.entry.declared.training_seed if policy.entry.declared else None,

@@ -87,7 +87,10 @@ class CandidateIdentity:
         seed: Root seed of each training.
         sampler: Configuration of the sampler.
         metadata_mismatches: Fields that a fresh process read otherwise, over all seeds.
-        nonfinite_weights: Weights that are NaN or infinite, over all seeds.
+        nonfinite_weights: Weights that are NaN or infinite, over all seeds; of who was brought,
+            invocations without a finite chunk.
+        nonfinite_chunks: Chunks of its own sampler on held-out windows that hold a number that is
+            none, over all seeds.
         card: What names it to a reviewer.
     """
 
@@ -100,6 +103,7 @@ class CandidateIdentity:
     sampler: str
     metadata_mismatches: Count
     nonfinite_weights: Count
+    nonfinite_chunks: Count
     card: IdentityCard
 
 

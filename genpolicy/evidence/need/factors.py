@@ -21,6 +21,7 @@ from genpolicy.evidence.rows.need import EffectRow, FactorErrorRow, FactorModeRo
 from genpolicy.feasibility.settings import FeasibilitySettings
 from genpolicy.integrity.rows import write_rows
 from genpolicy.policies.matched_training import training_windows
+from genpolicy.policies.offline import numbers_or_nan
 from genpolicy.policies.policy import NetworkPolicy
 from genpolicy.policies.settings import SamplerConfig
 from genpolicy.policies.variants import Variant, reference_of, resolved
@@ -169,7 +170,7 @@ def episode_errors(
     """Errors of one sampled chunk per held-out window, mean per episode, normalised units.
 
     The error of the first action stands beside that of the chunk: it is what a policy of one
-    action can be compared by.
+    action can be compared by. A chunk that is no numbers makes those of its episode NaN.
     """
     some, steps = slice(None, None, stride), policy.prediction_horizon
     scale = data.normalisation.action
@@ -182,14 +183,15 @@ def episode_errors(
             prediction_horizon=horizons.prediction_horizon,
         )
         windows = training_windows(data, split, horizons)
-        drawn = policy.sample(
+        sampled = policy.sample(
             windows.observations[some],
             noise_names=[
                 ("factors", int(e), int(i))
                 for e, i in zip(cut.episode[some], cut.index[some], strict=True)
             ],
             candidates=1,
-        ).finite().actions[:, 0]  # fmt: skip
+        )  # fmt: skip
+        drawn = numbers_or_nan(sampled.actions[:, 0])
         target = scale.normalise(windows.actions[some, :steps])
         error = np.abs(scale.normalise(drawn) - target).mean(axis=2)
         counts = ~windows.is_pad[some, :steps]

@@ -43,11 +43,13 @@ def latent_dependence(
         held_out.observations,
         noise_names=[SHARED_NOISE] * len(held_out.situations),
         candidates=samples,
-    ).finite()
+    ).actions
+    # A latent that gives no numbers somewhere says nothing; with none left, nothing varies.
+    whole = np.isfinite(drawn).all(axis=(0, 2, 3))
     normalised = policy.checkpoint.normalisation.observation.normalise(held_out.observations)
     return dependence(
         normalised.reshape(len(normalised), -1),
-        drawn.actions[..., POSITION],
+        (drawn[:, whole] if whole.any() else np.zeros_like(drawn[:, :1]))[..., POSITION],
         permutations=permutations,
         rng=stream(root_seed, "latent_dependence"),
     )

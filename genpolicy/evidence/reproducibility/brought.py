@@ -20,7 +20,6 @@ from genpolicy.candidates.wire.faults import Fault
 from genpolicy.candidates.wire.policy import WirePolicy, running
 from genpolicy.contract.chunk import actions_sha256
 from genpolicy.data.dataset import Dataset
-from genpolicy.errors import NonFiniteError
 from genpolicy.evidence.documents.brought import Failed
 from genpolicy.evidence.documents.conformance import Conformance
 from genpolicy.evidence.documents.reproducibility import CandidateIdentity, IdentityCard
@@ -83,7 +82,7 @@ class Answered:
         samples: Fixtures, before and after the new start.
         nfe: Counted network evaluations; empty where its server does not count.
         modes: Two-mode situations.
-        coverage: The same in one row; empty where an answer was none.
+        coverage: The same in one row; empty where no sampler is declared.
     """
 
     identity: CandidateIdentity
@@ -203,12 +202,7 @@ def _coverage(
     declared = candidate.entry.declared
     if not modes or declared is None:
         return []
-    try:
-        quality = quality_of(
-            policy, swept_windows(asked.data, asked.deployment.horizons), asked.data
-        )
-    except NonFiniteError:
-        return []
+    quality = quality_of(policy, swept_windows(asked.data, asked.deployment.horizons), asked.data)
     return [
         drawn_by(
             modes, steps=declared.sampler_steps, sampler_sha256=candidate.sampler_sha256,
@@ -235,6 +229,7 @@ def _identity(
         sampler=candidate.sampler_sha256,
         metadata_mismatches=differing,
         nonfinite_weights=broken,
+        nonfinite_chunks=0,  # among the invocations of `broken`
         card=card_of_brought(candidate, deployment),
     )
 

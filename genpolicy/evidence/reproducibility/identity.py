@@ -61,6 +61,7 @@ def identities(
             sampler=policies[0].sampler_config_hash,
             metadata_mismatches=0,
             nonfinite_weights=0,
+            nonfinite_chunks=0,
             card=card_of(policies, data, deployment),
         )
     return result

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from genpolicy.contract.action import POSITION
 from genpolicy.data.dataset import Dataset
+from genpolicy.errors import NonFiniteError
 from genpolicy.evidence.need.held_out import HeldOut
 from genpolicy.evidence.need.method_modes import sample_modes
 from genpolicy.evidence.rows.reproducibility import DensityRow
@@ -72,7 +73,7 @@ def density_rows(
         return []
     names = [("modes", s.episode_uuid, s.index) for s in held_out.situations]
     asked = policy.sample(held_out.observations, noise_names=names, candidates=samples)
-    drawn = asked.finite().actions
+    drawn = asked.actions
     demonstrated = _demonstrated(data, held_out, policy.prediction_horizon)
     rows = []
     for situation, observation, chunks in zip(
@@ -81,11 +82,7 @@ def density_rows(
         found = sample_modes(chunks, situation.mode_paths, position=POSITION)
         reached = found.counts(np.ones(len(chunks), dtype=np.bool_))
         modes = [modal_chunk(path, demonstrated) for path in situation.mode_paths]
-        densities = log_density(
-            policy,
-            np.repeat(observation[None], len(modes), axis=0),
-            np.stack([mode.actions for mode in modes]),
-        )
+        densities = _log_densities(policy, observation, modes)
         rows += [
             DensityRow(
                 method=policy.method,
@@ -102,6 +99,18 @@ def density_rows(
             for number, mode in enumerate(modes)
         ]
     return rows
+
+
+def _log_densities(policy: NetworkPolicy, observation: Array, modes: Sequence[ModalChunk]) -> Array:
+    """Of each mode, nats; NaN where the weights give no numbers. Shape (M,)."""
+    try:
+        return log_density(
+            policy,
+            np.repeat(observation[None], len(modes), axis=0),
+            np.stack([mode.actions for mode in modes]),
+        )
+    except NonFiniteError:
+        return np.full(len(modes), np.nan)
 
 
 def modal_chunk(path: Array, demonstrated: Array) -> ModalChunk:

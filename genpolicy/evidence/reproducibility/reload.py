@@ -140,13 +140,14 @@ def write_reload(
         before = [r for r in written if (r.method, r.seed) == (candidate.name, candidate.seed)]
         differing = _reloaded(plan, candidate, before, rows)
         policy = candidate.load()
+        diverged = _measured(plan, candidate, policy, asked, rows)
         entry = identity[candidate.name]
         identity[candidate.name] = replace(
             entry,
             metadata_mismatches=entry.metadata_mismatches + differing,
             nonfinite_weights=entry.nonfinite_weights + nonfinite_weights(policy),
+            nonfinite_chunks=entry.nonfinite_chunks + diverged,
         )
-        _measured(plan, candidate, policy, asked, rows)
     answered = {other.name: ask_brought(other, asked) for other in brought}
     for name, answers in answered.items():
         identity[name] = rows.take(name, answers)
@@ -162,12 +163,18 @@ def _measured(
     policy: NetworkPolicy,
     asked: Asked,
     rows: ReloadRows,
-) -> None:
-    """Errors, modes, sweep and densities of a candidate that came back."""
+) -> int:
+    """Errors, modes, sweep and densities of a candidate that came back.
+
+    Returns:
+        How many of its own sampler's chunks hold a number that is none.
+    """
     data, held_out, seed = asked.data, asked.held_out, candidate.seed
     task, checker = asked.task, asked.checker
     rows.offline += offline_rows(policy, data, seed=seed, horizons=plan.horizons)
-    own, swept = _sweep(plan, policy, held_out, seed, task=task, checker=checker, data=data)
+    own, swept, diverged = _sweep(
+        plan, policy, held_out, seed, task=task, checker=checker, data=data
+    )
     rows.modes += own
     rows.coverage += swept
     rows.earlier += modes_of_policy(
@@ -182,6 +189,7 @@ def _measured(
     rows.density += density_rows(
         policy, drawn_situations(held_out), data, seed=seed, samples=plan.samples
     )
+    return diverged
 
 
 def nonfinite_weights(policy: NetworkPolicy) -> int:
@@ -229,10 +237,13 @@ def _sweep(
     task: Task,
     checker: FeasibilityChecker,
     data: Dataset,
-) -> tuple[list[ModeRow], list[CoverageRow]]:
-    """Modes with the candidate's own sampler, and coverage with this one and the swept ones."""
+) -> tuple[list[ModeRow], list[CoverageRow], int]:
+    """Modes with the candidate's own sampler, coverage with this one and the swept ones.
+
+    The number is that of chunks of its own sampler that are none.
+    """
     own: list[ModeRow] = []
-    rows, windows = [], swept_windows(data, plan.horizons)
+    rows, windows, diverged = [], swept_windows(data, plan.horizons), 0
     for sampler in swept_samplers(policy.sampler, plan.sweep.get(policy.method, ())):
         tried = sampling_by(policy, sampler)
         found = modes_of_policy(
@@ -244,9 +255,9 @@ def _sweep(
             task=task,
             checker=checker,
         )
+        quality = quality_of(tried, windows, data)
         if sampler == policy.sampler:
-            own = found
+            own, diverged = found, quality.nonfinite
         if found:
-            quality = quality_of(tried, windows, data)
             rows.append(coverage_row(found, sampler=sampler, quality=quality))
-    return own, rows
+    return own, rows, diverged

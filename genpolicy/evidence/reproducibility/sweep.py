@@ -4,6 +4,7 @@ What is drawn comes back byte for byte and is counted in `reload`; times are mea
 A row of either names the sampler's settings by hash, which joins them.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -11,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from genpolicy.candidates.judged import JudgedPolicy, candidates_of, sampling_by
+from genpolicy.candidates.contenders import Contender, Running, opened
+from genpolicy.candidates.judged import candidates_of, sampling_by
 from genpolicy.contract.action import POSITION
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.contract.settings import Settings
@@ -24,10 +26,12 @@ from genpolicy.evidence.rows.reproducibility import CoverageRow, SweepLatencyRow
 from genpolicy.policies.fixtures import fixture_observations
 from genpolicy.policies.matched_training import training_windows
 from genpolicy.policies.ode_samplers import ADAPTIVE_TABLEAUS
+from genpolicy.policies.policy import NetworkPolicy
 from genpolicy.policies.protocol import NoiseName, Policy
 from genpolicy.policies.settings import SamplerConfig
 from genpolicy.policies.windows import Windows
 from genpolicy.statistics.intervals import clopper_pearson
+from genpolicy.tasks.api import load_task
 
 Sweep = Mapping[str, Sequence[int | SamplerConfig]]
 
@@ -54,12 +58,16 @@ class Quality:
     """What one sampler draws on held-out windows.
 
     Attributes:
-        chunk_error: Mean absolute error of the actions that are not padding, normalised units.
-        jerk_p95_m_s3: Over chunks, of the largest jerk of the positions inside one, m/s^3.
+        chunk_error: Mean absolute error of the actions that are not padding, normalised units;
+            NaN where a chunk is no numbers, since a mean over the others would flatter.
+        jerk_p95_m_s3: Over chunks, of the largest jerk of the positions inside one, m/s^3; NaN
+            there too.
+        nonfinite: Chunks that hold a number that is none.
     """
 
     chunk_error: float
     jerk_p95_m_s3: float
+    nonfinite: int
 
 
 def swept_samplers(own: SamplerConfig, sweep: Sequence[int | SamplerConfig]) -> list[SamplerConfig]:
@@ -88,8 +96,9 @@ def quality_of(policy: Policy, windows: Windows, data: Dataset) -> Quality:
     """
     horizon = policy.prediction_horizon
     names: list[NoiseName] = [("sweep", row) for row in range(len(windows.observations))]
-    asked = policy.sample(windows.observations, noise_names=names, candidates=1)
-    drawn = asked.finite().actions[:, 0]
+    drawn = policy.sample(windows.observations, noise_names=names, candidates=1).actions[:, 0]
+    if diverged := int((~np.isfinite(drawn)).any(axis=(1, 2)).sum()):
+        return Quality(math.nan, math.nan, diverged)
     scale, wanted = data.normalisation.action, windows.actions[:, :horizon]
     error = np.abs(scale.normalise(drawn) - scale.normalise(wanted)).mean(axis=-1)
     return Quality(
@@ -97,6 +106,7 @@ def quality_of(policy: Policy, windows: Windows, data: Dataset) -> Quality:
         jerk_p95_m_s3=jerk_p95_m_s3(
             drawn[:, :, POSITION], period_s=policy.horizons.action_period_s
         ),
+        nonfinite=0,
     )
 
 
@@ -149,13 +159,17 @@ def drawn_by(
         between_share=sum(row.between_modes for row in found) / drawn,
         chunk_error=quality.chunk_error,
         jerk_p95_m_s3=quality.jerk_p95_m_s3,
+        nonfinite=quality.nonfinite,
     )
 
 
 def sweep_latency_rows(
-    plan: LatencyPlan, policies: Sequence[JudgedPolicy], sweep: Sweep
+    plan: LatencyPlan, policies: Sequence[Contender], sweep: Sweep
 ) -> list[SweepLatencyRow]:
-    """What an invocation of each candidate takes with each sampler of its sweep."""
+    """What an invocation of each candidate takes with each sampler of its sweep.
+
+    Who was brought has one setting, that of its entry, and stands on the front beside the others.
+    """
     return [
         row
         for judged in policies
@@ -164,14 +178,22 @@ def sweep_latency_rows(
 
 
 def measure_sweep(
-    plan: LatencyPlan, judged: JudgedPolicy, sweep: Sequence[int | SamplerConfig]
+    plan: LatencyPlan, judged: Contender, sweep: Sequence[int | SamplerConfig]
 ) -> list[SweepLatencyRow]:
     """Rows of one method, measured in this process; samplers take turns, call by call."""
-    seen = fixture_observations(
-        load_dataset(plan.dataset), horizons=plan.horizons, count=OBSERVATIONS
-    )
-    loaded = judged.load()
-    policies = [sampling_by(loaded, sampler) for sampler in swept_samplers(loaded.sampler, sweep)]
+    data = load_dataset(plan.dataset)
+    seen = fixture_observations(data, horizons=plan.horizons, count=OBSERVATIONS)
+    scene = load_task(plan.task).scene_path
+    with opened(judged, data.observation_contract, scene=scene) as own:
+        policies: list[Running] = [own]
+        if isinstance(own, NetworkPolicy):
+            policies = [sampling_by(own, tried) for tried in swept_samplers(own.sampler, sweep)]
+        return _in_turns(plan, judged.name, policies, seen)
+
+
+def _in_turns(
+    plan: LatencyPlan, name: str, policies: Sequence[Running], seen: NDArray[np.float64]
+) -> list[SweepLatencyRow]:
     rows = []
     for repeat in range(-DISCARDED, REPEATS):
         row = seen[repeat % len(seen)][None]
@@ -181,11 +203,12 @@ def measure_sweep(
             if repeat >= 0:
                 rows.append(
                     SweepLatencyRow(
-                        method=judged.name,
+                        method=name,
                         sampler_sha256=policy.sampler_config_hash,
                         candidates=count,
                         repeat=repeat,
-                        seconds=sum(spans.values()),
+                        # A term that nobody measures is in the term `sample`.
+                        seconds=float(np.nansum(list(spans.values()))),
                     )
                 )
     return rows

@@ -74,8 +74,10 @@ class CoverageRow:
         spread_m: Mean over situations of the samples' spread, m.
         admissible_share: Share of the samples that pass the six layers.
         between_share: Share of the samples in the middle between two modes.
-        chunk_error: Mean absolute error on held-out windows, normalised units.
-        jerk_p95_m_s3: p95 over the same chunks of the largest jerk inside one, m/s^3.
+        chunk_error: Mean absolute error on held-out windows, normalised units; NaN where a chunk
+            of them is no numbers.
+        jerk_p95_m_s3: p95 over the same chunks of the largest jerk inside one, m/s^3; likewise.
+        nonfinite: Of the same chunks, those that hold a number that is none.
     """
 
     method: str
@@ -93,6 +95,7 @@ class CoverageRow:
     between_share: float
     chunk_error: float
     jerk_p95_m_s3: float
+    nonfinite: int
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,10 @@
 import pytest
+import torch
 
 from genpolicy.candidates.brought import require_brought
 from genpolicy.candidates.hosts import onnx_library
 from genpolicy.candidates.hosts.kinds import KINDS, read_entry
+from genpolicy.candidates.hosts.translation import as_server
 from genpolicy.candidates.wire.entry import verify_files
 from genpolicy.errors import ConfigError, IntegrityError
 from tests.candidates.conftest import ENTRY
@@ -16,6 +18,7 @@ DECLARED = {
     "batch_rows": 1,
 }  # fmt: skip
 
+ALONE = {**DECLARED, "threads": 1}
 OBSERVED = ENTRY["observation"]["observation"]
 
 
@@ -70,6 +73,7 @@ def test_an_unknown_kind_names_the_known_ones(written):
         ("torch", {"noise": {**NOISE, "input": "observation"}}, "observation is given twice"),
         ("torch", {"constants": {"prompt": "go"}}, "no constants"),
         ("torch", {"declared": DECLARED}, "threads is 1, declared.threads 4"),
+        ("torch", {"declared": {**ALONE, "device": "cuda"}}, "programs run on the cpu here"),
         ("trained", {"threads": 2}, "Input should be 1"),
         ("trained", {"observation": {"state": ENTRY["observation"]["observation"]}}, "one input"),
         ("trained", {"observation": {"observation": {**OBSERVED, "dtype": "float32"}}}, "float64"),
@@ -97,6 +101,23 @@ def test_what_nothing_here_can_run_is_refused_before_anything_trains(
         path = written(kind)
         with pytest.raises(ConfigError, match=action):
             require_brought({"planted": str(path)}, horizons=read_entry(path).horizons)
+
+
+def test_a_device_that_is_declared_and_not_there_is_refused_before_anything_trains(
+    written, task, monkeypatch
+):
+    monkeypatch.setattr(torch.cuda, "device_count", lambda: 0)
+    path = written("trained", declared={**ALONE, "device": "cuda"})
+    entry = read_entry(path)
+    assert entry.device == "cuda" and read_entry(written("scripted")).device == "cpu"
+    for ask in (
+        lambda: require_brought({"planted": str(path)}, horizons=entry.horizons),
+        lambda: as_server(entry, path, task.observation),
+    ):
+        with pytest.raises(
+            ConfigError, match=r"declared\.device of the candidate planted is 'cuda'"
+        ):
+            ask()
 
 
 def test_noise_of_several_steps_has_an_axis_more(written):

@@ -5,8 +5,9 @@ import pytest
 
 from genpolicy.candidates.hosts import translation
 from genpolicy.candidates.hosts.kinds import read_entry
-from genpolicy.candidates.hosts.translation import as_server
+from genpolicy.candidates.hosts.translation import as_server, program_files
 from genpolicy.errors import ConfigError, ContractError
+from genpolicy.integrity.hashing import sha256_file
 from tests.candidates.conftest import ENTRY
 
 
@@ -61,11 +62,26 @@ def test_lerobot_runs_in_its_own_interpreter(written, task, tmp_path, monkeypatc
     interpreter.symlink_to(sys.executable)
     server = as_server(read_entry(path), path, task.observation)
     assert server.command == [
-        str(interpreter), str(translation.ADAPTER), "act", "--port", "{port}",
+        str(interpreter), str(translation.ADAPTER), "act", "--port", "{port}", "--device", "cpu",
     ]  # fmt: skip
     monkeypatch.setattr(translation, "ADAPTER", tmp_path / "absent.py")
     with pytest.raises(ConfigError, match=r"absent\.py"):
         as_server(read_entry(path), path, task.observation)
+
+
+def test_what_runs_a_candidate_is_known_by_hash_beside_its_files(written, entry_of, tmp_path):
+    assert program_files(read_entry(written("torch")), tmp_path) == {}
+    lerobot = program_files(read_entry(written("lerobot")), tmp_path)
+    assert lerobot == {"adapters/lerobot_server.py": sha256_file(translation.ADAPTER)}
+    (tmp_path / "serve.py").write_text("first")
+    (tmp_path / "weights.bin").write_text("weights")
+    words = [sys.executable, "serve.py", "weights.bin", "absent.py", "--port", "{port}"]
+    server = entry_of(address=None, command=words, files={"weights.bin": "0" * 64})
+    first = program_files(server, tmp_path)
+    assert list(first) == ["serve.py"]
+    (tmp_path / "serve.py").write_text("second")
+    assert program_files(server, tmp_path) != first
+    assert program_files(entry_of(), tmp_path) == {}
 
 
 def test_the_identity_of_an_entry_does_not_move_without_a_word(entry_of):

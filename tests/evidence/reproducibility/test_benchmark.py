@@ -56,7 +56,8 @@ def test_what_is_timed_is_joined_as_it_is_deployed(fleet, observations, monkeypa
 
     monkeypatch.setattr(NetworkPolicy, "sample_encoded", spied)
     measure_policy(
-        fleet[0] / method / "seed_0", observations, expected_sha256=None, device="cpu", cold_repeats=1,
+        fleet[0] / method / "seed_0", observations, expected_sha256=None, device="cpu",
+        cold_repeats=1,
         warm_repeats=1, discarded_repeats=0, candidates=2, project=proposed.append,
         joining=JoiningSettings(rule=rule),
     )  # fmt: skip
@@ -86,7 +87,8 @@ def test_as_many_candidates_are_drawn_as_are_deployed(fleet, observations, monke
 
     monkeypatch.setattr(NetworkPolicy, "sample_encoded", spied)
     measure_policy(
-        fleet[0] / "flow" / "seed_0", observations, expected_sha256=None, device="cpu", cold_repeats=1,
+        fleet[0] / "flow" / "seed_0", observations, expected_sha256=None, device="cpu",
+        cold_repeats=1,
         warm_repeats=2, discarded_repeats=1, candidates=4,
     )  # fmt: skip
     assert asked == [4] * 4

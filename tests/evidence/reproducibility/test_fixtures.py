@@ -83,9 +83,7 @@ def test_what_is_no_number_there_is_a_row_and_no_end(
     assert [math.isnan(row.max_abs_difference) for row in rows] == [False] * 3 + [True] * 3
 
 
-def test_a_device_that_is_not_there_is_said_by_the_process_that_looked(
-    fleet, dataset, before, kit
-):
+def test_a_device_that_is_not_there_is_said_by_the_process_that_looked(fleet, dataset, before, kit):
     if torch.cuda.is_available():
         pytest.skip("this machine has the device")
     (flow,) = trained(fleet[0], ["flow"], seeds=[0], device="cuda")

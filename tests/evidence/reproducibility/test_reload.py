@@ -1,5 +1,7 @@
 """Reload and sweep of a barely trained candidate: equal samples, modes counted once."""
 
+import math
+
 import pytest
 
 from gates.reproducibility.identity import unrecorded
@@ -54,7 +56,7 @@ def test_modes_of_the_chosen_steps_are_those_of_the_sweep(reloaded):
     swept = [(row.sampler, row.steps, row.nfe) for row in coverage]
     assert swept == [("euler", 1, 1), ("euler", 2, 2), ("midpoint", 1, 2)]
     assert {row.convention for row in modes} == {"euler"} and len(modes) == 2
-    quality = Quality(coverage[1].chunk_error, coverage[1].jerk_p95_m_s3)
+    quality = Quality(coverage[1].chunk_error, coverage[1].jerk_p95_m_s3, 0)
     own = SamplerConfig(name="euler", steps=2)
     assert coverage_row(modes, sampler=own, quality=quality) == coverage[1]
     assert all(row.chunk_error > 0 and row.jerk_p95_m_s3 > 0 for row in coverage)
@@ -118,3 +120,30 @@ def test_a_candidate_without_fixtures_is_refused(reloaded, tmp_path):
     write_rows(tmp_path / "fixtures.parquet", FixtureRow, [])
     with pytest.raises(ContractError, match="fixtures of flow, seed 0 is none"):
         write_reload(plan, candidates, tmp_path / "fixtures.parquet", tmp_path)
+
+
+@pytest.mark.parametrize("steps", [1, 2])
+def test_weights_that_give_no_numbers_under_a_sampler_are_rows_and_end_nothing(
+    reloaded, tmp_path, monkeypatch, steps
+):
+    """By one step it is a setting of the sweep that diverges, by two the candidate itself."""
+    plan, candidates, folder = reloaded
+    honest = methods.sample_ode
+
+    def diverging(velocity, noise, *, name, steps: int):
+        drawn = honest(velocity, noise, name=name, steps=steps).clone()
+        if (name, steps) == ("euler", diverged):
+            drawn[drawn[:, 0, 0] > 0.0] = float("inf")
+        return drawn
+
+    diverged = steps
+    monkeypatch.setattr(methods, "sample_ode", diverging)
+    write_reload(plan, candidates, folder.parent / "fixtures.parquet", tmp_path)
+    found = {row.steps: row for row in read_rows(tmp_path / "coverage.parquet", CoverageRow)
+             if row.sampler == "euler"}  # fmt: skip
+    assert found[steps].nonfinite > 0 and math.isnan(found[steps].chunk_error)
+    assert found[3 - steps].nonfinite == 0 and found[3 - steps].chunk_error > 0.0
+    own = CANDIDATES.read(tmp_path)["flow"]
+    assert (own.nonfinite_weights, own.nonfinite_chunks) == (0, found[2].nonfinite)
+    offline = read_rows(tmp_path / "offline.parquet", OfflineRow)
+    assert any(math.isnan(row.masked_mae) for row in offline) == (steps == 2)

@@ -72,7 +72,7 @@ def test_a_tolerance_belongs_to_solvers_that_choose_their_steps():
         modes_present=2, modes_covered=2, between_modes=0, far_from_modes=0, admissible=4, valid=4,
         modes_valid=2, fewest_admissible=1, nfe=4, spread_m=0.1,
     )  # fmt: skip
-    quality = Quality(0.25, 7.0)
+    quality = Quality(0.25, 7.0, 0)
     euler = SamplerConfig(name="euler", steps=4)
     row = coverage_row([mode], sampler=euler, quality=quality)
     assert (row.tolerance, row.sampler_sha256, row.steps) == (None, euler.hash(), 4)
@@ -103,3 +103,12 @@ def test_every_swept_setting_is_timed_under_the_name_that_its_samples_have(
     assert all(row.seconds > 0 and row.candidates == 4 for row in rows)
     alone = measure_sweep(plan, flow, ())
     assert {row.sampler_sha256 for row in alone} == {loaded.sampler_config_hash}
+
+
+@pytest.mark.parametrize("number", [np.inf, np.nan])
+def test_a_chunk_that_is_no_numbers_marks_its_setting_and_ends_nothing(policy, data, kit, number):
+    windows = swept_windows(data, kit.HORIZONS)
+    spoiled = windows.actions.copy()
+    spoiled[:2, 5, 0] = number
+    found = quality_of(Said(policy, spoiled), windows, data)
+    assert found.nonfinite == 2 and np.isnan([found.chunk_error, found.jerk_p95_m_s3]).all()

@@ -31,3 +31,23 @@ def test_without_times_the_gate_judges_the_same_and_the_page_says_what_is_missin
     report = judge(ladder, "B")
     assert (report.verdict, report.criteria) == (before.verdict, before.criteria)
     assert f"{SWEEP} has no rows" in gate_page(ladder, report)
+
+
+def test_one_of_whom_a_term_is_unknown_stands_on_no_axis_and_hides_nobody(ladder):
+    """Wrong before: with a brought candidate, which nobody timed, the figure was empty."""
+    path = SWEEP.removeprefix("artifacts/")
+    evidence.edit_table(ladder, path, lambda frame: frame[frame["method"] != "flow"])
+    figure, _ = draw_all(PLOTS, Evidence(ladder), judge(ladder, "B"))
+    assert {row[0] for row in figure.in_words[1:]} == {"diffusion"}
+
+
+def test_a_setting_that_diverges_is_marked_in_the_table(ladder):
+    def diverged(frame):
+        one = (frame["method"] == "flow") & (frame["steps"] == 2)
+        lost = frame[["chunk_error", "jerk_p95_m_s3"]].mask(one)
+        return frame.assign(nonfinite=frame["nonfinite"].mask(one, 7), **lost)
+
+    evidence.edit_table(ladder, "reload/coverage.parquet", diverged)
+    figure, _ = draw_all(PLOTS, Evidence(ladder), judge(ladder, "B"))
+    said = {row[2]: row[-1] for row in figure.in_words[1:] if row[0] == "flow"}
+    assert said == {"2": "no: 7 chunks are no numbers", "4": "yes", "8": "yes", "16": "yes"}

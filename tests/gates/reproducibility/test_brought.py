@@ -45,7 +45,8 @@ def bring(root, *, unmatched, change=None, document=None, findings=None):
     )
     pinned = {
         "author": "author@example.org", "sha256": identity["checkpoint"],
-        "files": {"weights.bin": "a" * 64}, "started_here": True, "dataset": identity["dataset"],
+        "files": {"weights.bin": "a" * 64}, "program": {}, "started_here": True,
+        "dataset": identity["dataset"],
         "training_seed": identity["seed"][0],
     }  # fmt: skip
     evidence.document(root, "candidates/candidates.json", {"flow": {**pinned, **(document or {})}})

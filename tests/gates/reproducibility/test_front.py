@@ -1,5 +1,6 @@
 """The front of the sweep, and the rule that names a setting: golden by hand, and properties."""
 
+import math
 from dataclasses import replace
 
 import evidence
@@ -51,6 +52,16 @@ def test_the_cheapest_within_the_interval_of_the_best_that_keeps_the_deadline():
         "0.85, where the interval of the best begins (eight, 0.95)."
     )
     assert loses == "two saves 2 ms; coverage -0.26, chunk error +100.0%, jerk +0.0%."
+
+
+def test_a_setting_that_diverges_is_never_advised_and_never_on_the_front():
+    """It is the cheapest, and nothing is known of its error."""
+    lost = replace(setting("one", 0.001, 0.99, error=math.nan, jerk=math.nan), nonfinite=2)
+    settings = [lost, *FOUR]
+    assert efficient(settings) == [False, *efficient(FOUR)] and any(efficient(FOUR))
+    assert FOUR[0].dominates(lost) and not lost.dominates(FOUR[0])
+    assert choice(settings, deadline_s=0.15) == choice(FOUR, deadline_s=0.15)
+    assert choice([lost], deadline_s=0.15).deploy is None
 
 
 def test_the_deadline_decides_what_is_asked():

@@ -1,6 +1,7 @@
 """What pins a candidate and what a fresh process must give back."""
 
 import evidence
+import pandas as pd
 import pytest
 from asked import asked, found_in, red
 from editing import cells
@@ -177,3 +178,40 @@ def test_a_reference_without_parameters_is_no_budget_and_one_of_one_is(ladder):
     )  # fmt: skip
     with pytest.raises(MissingEvidenceError, match="parameters"):
         asked(ladder, parameter_budget_deviation, "flow", gate="B")
+
+
+@pytest.mark.parametrize(
+    ("rows", "expected"),
+    [
+        ({"cpu": 0.0, "cuda": 0.0}, ("PASS", "two processes that loaded there")),
+        ({"cpu": 0.0, "cuda": 1e-3}, ("FAIL", "two processes that loaded there")),
+        ({"cpu": 0.0}, ("INCONCLUSIVE", "not every seed was drawn again on cuda")),
+        ({"cuda": 0.0}, ("INCONCLUSIVE", "not every seed was drawn again on cpu")),
+    ],
+)
+def answer_of(root, name):
+    return next(one for one in found_in(judge(root, "B"), name) if one.candidate == "flow")
+
+
+def test_on_another_device_both_comparisons_are_asked_for(ladder, rows, expected):
+    def drawn(frame):
+        return pd.concat([
+            frame.assign(device=device, max_abs_difference=largest, sha256_reloaded="b" * 64)
+            if largest else frame.assign(device=device)
+            for device, largest in rows.items()
+        ])  # fmt: skip
+
+    evidence.edit_table(ladder, "reload/samples.parquet", drawn)
+    evidence.write_params(ladder, lambda params: params["compute"].update(device="cuda"))
+    found = answer_of(ladder, "samples_difference")
+    assert found.verdict == expected[0] and expected[1] in found.caveat
+    pinned = answer_of(ladder, "unpinned_items")
+    assert pinned.verdict == "FAIL" and "ran on cpu, compute.device is cuda" in pinned.caveat
+
+
+def test_chunks_of_its_own_sampler_that_are_no_numbers_fail_a_candidate(ladder):
+    evidence.edit_document(
+        ladder, "reload/identity.json", lambda said: said["flow"].update(nonfinite_chunks=3)
+    )
+    found = answer_of(ladder, "nonfinite_weights")
+    assert found.verdict == "FAIL" and "3 chunks of its own sampler" in found.caveat
