@@ -55,6 +55,13 @@ class BroughtPolicy:
         }
         return sha256_bytes(canonical_json({"entry": self.sha256, **sampler}))
 
+    def sampler_sha256_of(self, name: str | None) -> str:
+        """The same of another setting of its entry; of None, of the judged one."""
+        if name is None:
+            return self.sampler_sha256
+        said = self.entry.samplers[name].model_dump(mode="json")
+        return sha256_bytes(canonical_json({"entry": self.sha256, "name": name, **said}))
+
 
 def read_brought(
     section: Mapping[str, str], *, seed: int, root: Path = Path()

@@ -149,6 +149,8 @@ class ProgramEntry(DrawingEntry):
     def _arrays_only(self) -> "ProgramEntry":
         if self.constants:
             raise ValueError("a program is given arrays of the observation and noise, no constants")
+        if self.samplers:
+            raise ValueError("samplers: a program is written out with one; bring another program")
         return self
 
     @model_validator(mode="after")

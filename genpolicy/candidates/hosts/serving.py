@@ -17,11 +17,15 @@ from genpolicy.candidates.hosts.kinds import (
 from genpolicy.candidates.hosts.onnx_library import require_onnx
 from genpolicy.candidates.hosts.ports import Program, check_ports
 from genpolicy.candidates.hosts.scripted import scripted_function
-from genpolicy.candidates.judged import loaded_on
+from genpolicy.candidates.judged import loaded_on, sampling_by
+from genpolicy.candidates.wire.declared import Choice
 from genpolicy.candidates.wire.entry import Entry, verify_files
 from genpolicy.candidates.wire.served import ServedPolicy
+from genpolicy.contract.settings import parse_settings
 from genpolicy.errors import ConfigError, IntegrityError
 from genpolicy.integrity.hashing import read_verified
+from genpolicy.policies.policy import NetworkPolicy
+from genpolicy.policies.settings import SamplerConfig
 
 HOSTED = [name for name, kind in KINDS.items() if issubclass(kind, HostedEntry)]
 
@@ -49,7 +53,8 @@ def hosted(path: Path, *, sha256: str | None, widths: Mapping[str, int]) -> Serv
         )
     verify_files(entry, folder)
     if isinstance(entry, TrainedEntry):
-        return ServedPolicy(loaded_on(entry.device, folder / entry.checkpoint))
+        policy = loaded_on(entry.device, folder / entry.checkpoint)
+        return ServedPolicy(policy, samplers=_chosen(policy, entry.samplers))
     if isinstance(entry, ProgramEntry):
         return _program(entry, folder, widths)
     if isinstance(entry, ScriptedEntry):
@@ -64,6 +69,24 @@ def hosted(path: Path, *, sha256: str | None, widths: Mapping[str, int]) -> Serv
         expected=f"a kind that is hosted here ({', '.join(HOSTED)})",
         action="Check it with `genpolicy check-candidate`, which starts that server.",
     )
+
+
+def _chosen(policy: NetworkPolicy, choices: Mapping[str, Choice]) -> dict[str, NetworkPolicy]:
+    """A checkpoint under each setting that its entry lets be asked for.
+
+    Raises:
+        ConfigError: No sampler of ours, or none of its method.
+    """
+    found = {}
+    for name, choice in choices.items():
+        said = {"name": choice.sampler, "steps": choice.sampler_steps}
+        for key in ("eta", "tolerance"):
+            if getattr(choice, key) is not None:
+                said[key] = getattr(choice, key)
+        own = policy.sampler.model_dump() | said
+        sampler = parse_settings(SamplerConfig, own, where=f"samplers.{name}")
+        found[name] = sampling_by(policy, sampler)
+    return found
 
 
 def _program(entry: ProgramEntry, folder: Path, widths: Mapping[str, int]) -> HostedPolicy:

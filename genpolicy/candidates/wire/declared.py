@@ -7,6 +7,22 @@ from genpolicy.contract.settings import Settings
 DIGEST = r"^[0-9a-f]{64}$"
 
 
+class Choice(Settings):
+    """A setting of the sampler that an entry lets be asked for, beside the one that is judged.
+
+    Attributes:
+        sampler: Name of the sampler.
+        sampler_steps: Its steps.
+        eta: Share of the ancestral noise; None of a sampler that has none.
+        tolerance: Error of a step; None of a sampler that does not choose its steps.
+    """
+
+    sampler: str = Field(min_length=1)
+    sampler_steps: int = Field(ge=1)
+    eta: float | None = None
+    tolerance: float | None = None
+
+
 class Declared(Settings):
     """What nobody but its maker can say of a policy, for the identity card of Gate B.
 

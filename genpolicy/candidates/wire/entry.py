@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from genpolicy.candidates.wire.declared import DIGEST, Declared
+from genpolicy.candidates.wire.declared import DIGEST, Choice, Declared
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.contract.settings import Settings
 from genpolicy.errors import ConfigError
@@ -213,6 +213,8 @@ class Entry(Settings):
         action: What its chunks mean.
         stochastic: Whether the candidates of one observation differ; else one is drawn.
         declared: What the identity card of Gate B asks for; without it the gate fails by name.
+        samplers: Other settings that may be asked of it, by the names that its server knows them
+            by. They are measured beside the judged one, and decide nothing.
         start_timeout_s: How long it may take to listen.
         timeout_s: How long an answer is waited for before it counts as none.
     """
@@ -227,6 +229,7 @@ class Entry(Settings):
     action: Output
     stochastic: bool = True
     declared: Declared | None = None
+    samplers: dict[Annotated[str, Field(pattern=NAME)], Choice] = Field(default_factory=dict)
     start_timeout_s: float = Field(default=60.0, gt=0, le=600)
     timeout_s: float = Field(default=2.0, gt=0, le=60)
 
@@ -244,7 +247,10 @@ class Entry(Settings):
     @property
     def sha256(self) -> str:
         """Of all that it says, the hashes of its files among it."""
-        return sha256_bytes(canonical_json(self.model_dump(mode="json")))
+        said = self.model_dump(mode="json")
+        if not self.samplers:  # an entry without any is who it was before there were some
+            del said["samplers"]
+        return sha256_bytes(canonical_json(said))
 
     @property
     def device(self) -> str:

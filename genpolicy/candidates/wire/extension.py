@@ -39,6 +39,7 @@ class Capabilities(Settings):
         counts_evaluations: It counts network evaluations at the network.
         spans: Latency terms that it measures, by their names in the contract.
         prefix: It can draw chunks that go on from given actions.
+        samplers: Names of other settings of its sampler that a message may ask for.
     """
 
     version: int = Field(default=0, ge=0)
@@ -50,6 +51,7 @@ class Capabilities(Settings):
     counts_evaluations: bool = False
     spans: tuple[str, ...] = ()
     prefix: bool = False
+    samplers: tuple[str, ...] = ()
 
 
 def capabilities(metadata: dict[str, Any]) -> Capabilities:
@@ -62,7 +64,8 @@ def capabilities(metadata: dict[str, Any]) -> Capabilities:
     if said is None:
         return Capabilities()
     try:
-        told = Capabilities.model_validate({**said, "spans": tuple(said.get("spans", ()))})
+        lists = {name: tuple(said.get(name, ())) for name in ("spans", "samplers")}
+        told = Capabilities.model_validate({**said, **lists})
     except (ValidationError, TypeError, AttributeError) as error:
         raise PolicyError(Fault.MALFORMED, f"its metadata: {str(error).splitlines()[0]}") from error
     if told.version != VERSION:
@@ -110,10 +113,18 @@ class GoesOn:
 
 
 def request(
-    invocation: str, noise: NoiseName, candidates: int, prefix: GoesOn | None = None
+    invocation: str,
+    noise: NoiseName,
+    candidates: int,
+    prefix: GoesOn | None = None,
+    sampler: str | None = None,
 ) -> dict[str, Any]:
     """What a message to a server with the extension says."""
-    said = {"invocation": invocation, "noise": list(noise), "candidates": candidates}
+    said: dict[str, Any] = {
+        "invocation": invocation, "noise": list(noise), "candidates": candidates,
+    }  # fmt: skip
+    if sampler is not None:
+        said["sampler"] = sampler
     if prefix is None:
         return {WORD: said}
     given = {
@@ -124,7 +135,13 @@ def request(
 
 
 def read_answer(
-    answer: dict[str, Any], *, key: str, told: Capabilities, invocation: str, candidates: int
+    answer: dict[str, Any],
+    *,
+    key: str,
+    told: Capabilities,
+    invocation: str,
+    candidates: int,
+    sampler: str | None = None,
 ) -> Drawn:
     """The chunks of an answer.
 
@@ -134,6 +151,7 @@ def read_answer(
         told: What the server said of itself at first.
         invocation: What was asked.
         candidates: How many chunks were asked for.
+        sampler: Which other setting was asked for; its hash is not that of the metadata.
 
     Raises:
         PolicyError: Another invocation's, another checkpoint's, or no actions of that number.
@@ -147,7 +165,7 @@ def read_answer(
         if not isinstance(named, str) or named != invocation:
             found = f"an answer to {str(named)[:40]!r}, asked was {invocation!r}"
             raise PolicyError(Fault.UNREQUESTED, found)
-        for name in ("checkpoint", "sampler"):
+        for name in ("checkpoint", *(["sampler"] if sampler is None else [])):
             before, now = getattr(told, name), said.get(name)
             if before is not None and not (isinstance(now, str) and now == before):
                 raise PolicyError(

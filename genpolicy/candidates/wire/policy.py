@@ -57,6 +57,7 @@ class WirePolicy:
         brought: Who it is.
         remote: How it is asked; or why it cannot be: then every invocation ends in that fault.
         clock: Of this machine.
+        sampler: Another setting that it is asked for, by its name in the entry; None: the judged.
 
     Attributes:
         asked: Invocations so far.
@@ -66,8 +67,9 @@ class WirePolicy:
 
     def __init__(
         self, brought: BroughtPolicy, remote: RemotePolicy | PolicyError, *,
-        clock: Clock = time.perf_counter,
+        clock: Clock = time.perf_counter, sampler: str | None = None,
     ) -> None:  # fmt: skip
+        self._sampler = sampler
         self._brought, self._remote, self._clock = brought, remote, clock
         self._in_a_row = 0
         self.asked = 0
@@ -87,7 +89,16 @@ class WirePolicy:
     @property
     def sampler_config_hash(self) -> str:
         """SHA-256 of what its entry says of the sampler."""
-        return self._brought.sampler_sha256
+        return self._brought.sampler_sha256_of(self._sampler)
+
+    def sampling_by(self, sampler: str) -> "WirePolicy":
+        """The same server, asked for another setting; faults there are no faults of this one."""
+        return WirePolicy(self._brought, self._remote, clock=self._clock, sampler=sampler)
+
+    @property
+    def samplers(self) -> list[str]:
+        """Other settings that its entry names, in order."""
+        return sorted(self._brought.entry.samplers)
 
     @property
     def horizons(self) -> HorizonConfig:
@@ -181,7 +192,9 @@ class WirePolicy:
         try:
             if isinstance(self._remote, PolicyError):
                 raise self._remote
-            answer = self._remote.invoke(observations, noise=noise, candidates=count, prefix=prefix)
+            answer = self._remote.invoke(
+                observations, noise=noise, candidates=count, prefix=prefix, sampler=self._sampler
+            )
         except PolicyError as error:
             self._in_a_row += 1
             return self._counted(error)

@@ -105,7 +105,7 @@ class RemotePolicy:
 
     def invoke(
         self, observations: Array, *, noise: NoiseName, candidates: int,
-        prefix: GoesOn | None = None,
+        prefix: GoesOn | None = None, sampler: str | None = None,
     ) -> Invocation:  # fmt: skip
         """Candidate chunks of one observation.
 
@@ -114,6 +114,7 @@ class RemotePolicy:
             noise: Name of the noise; a server that cannot be seeded never sees it.
             candidates: N >= 1. Asked for one by one where the server draws no more at once.
             prefix: Mapped actions that the chunks go on from, of one that takes a prefix.
+            sampler: Another setting than the judged one, by its name.
 
         Raises:
             ContractError: A prefix in whose form the entry says no actions.
@@ -130,7 +131,7 @@ class RemotePolicy:
             number = min(at_once, candidates - first)
             # All that is drawn at once has the name as it is, as of a policy that is asked here.
             name = (*noise, FURTHER, first) if first else noise
-            drawn.append(self._draw(observations, name, number, given))
+            drawn.append(self._draw(observations, name, number, given, sampler))
         chunks = np.concatenate([part.actions for part in drawn])
         mapped = self._outputs.mapped(chunks, observations[-1])
         counts = [part.evaluations for part in drawn if part.evaluations is not None]
@@ -157,18 +158,25 @@ class RemotePolicy:
             self._line = None
 
     def _draw(
-        self, observations: Array, noise: NoiseName, candidates: int, prefix: GoesOn | None
+        self,
+        observations: Array,
+        noise: NoiseName,
+        candidates: int,
+        prefix: GoesOn | None,
+        sampler: str | None,
     ) -> Drawn:
+        if sampler is not None and sampler not in self.told.samplers:
+            raise PolicyError(Fault.REFUSED, f"its metadata offer no sampler {sampler!r}")
         invocation = str(self._asked)
         self._asked += 1
         message = {**self._inputs.of(observations), **self.entry.constants}
         if self.told.version:
-            message |= request(invocation, noise, candidates, prefix)
+            message |= request(invocation, noise, candidates, prefix, sampler)
         try:
             answer = self._connected().ask(message, timeout_s=self.entry.timeout_s)
             drawn = read_answer(
                 answer, key=self.entry.action.key, told=self.told, invocation=invocation,
-                candidates=candidates,
+                candidates=candidates, sampler=sampler,
             )  # fmt: skip
             self._check_shape(drawn)
         except PolicyError as error:

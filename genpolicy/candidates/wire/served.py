@@ -3,6 +3,7 @@
 import itertools
 import math
 import time
+from collections.abc import Mapping
 from typing import Any, NoReturn
 
 import numpy as np
@@ -31,10 +32,13 @@ class ServedPolicy:
 
     Args:
         policy: The verified checkpoint with its sampler.
+        samplers: The same weights under other samplers, by the names that a message may ask for.
     """
 
-    def __init__(self, policy: NetworkPolicy) -> None:
-        self._policy = policy
+    def __init__(
+        self, policy: NetworkPolicy, *, samplers: Mapping[str, NetworkPolicy] | None = None
+    ) -> None:
+        self._policy, self._samplers = policy, dict(samplers or {})
         self._unnamed = itertools.count()
 
     @property
@@ -52,6 +56,7 @@ class ServedPolicy:
                 "counts_evaluations": True,
                 "spans": [str(Term.PREPROCESS), str(Term.ENCODE), str(Term.SAMPLE)],
                 "prefix": self._policy.guided,
+                **({"samplers": sorted(self._samplers)} if self._samplers else {}),
             },
         }
 
@@ -71,7 +76,8 @@ class ServedPolicy:
         preprocessed = time.perf_counter()
         condition = self._policy.encode(prepared)
         encoded = time.perf_counter()
-        drawn = self._policy.sample_encoded(
+        policy = self._chosen((message.get(WORD) or {}).get("sampler"))
+        drawn = policy.sample_encoded(
             condition, noise_names=[name], candidates=number, prefix=prefix
         )
         sampled = time.perf_counter()
@@ -82,7 +88,7 @@ class ServedPolicy:
             WORD: {
                 "invocation": asked[0],
                 "checkpoint": self._policy.checkpoint_hash,
-                "sampler": self._policy.sampler_config_hash,
+                "sampler": policy.sampler_config_hash,
                 "nfe": drawn.nfe,
                 "spans_s": {
                     str(Term.PREPROCESS): preprocessed - begun,
@@ -91,6 +97,15 @@ class ServedPolicy:
                 },
             },
         }
+
+    def _chosen(self, name: Any) -> NetworkPolicy:
+        """The policy under the sampler that a message asks for."""
+        if name is None:
+            return self._policy
+        if not isinstance(name, str) or name not in self._samplers:
+            known = ", ".join(sorted(self._samplers)) or "none"
+            _refuse(f"{WORD}.sampler", repr(name)[:80], f"one of {known}")
+        return self._samplers[name]
 
     def _prefix(self, found: Any) -> Prefix | None:
         """What the chunks go on from, in the actions of the checkpoint, which are the mapped."""
@@ -138,8 +153,10 @@ def read_request(found: Any) -> tuple[str, NoiseName, int] | None:
     if found is None:
         return None
     names = {"invocation", "noise", "candidates"}
-    if not isinstance(found, dict) or set(found) - {"prefix"} != names:
-        _refuse(WORD, repr(found)[:80], "invocation, noise and candidates; prefix besides")
+    if not isinstance(found, dict) or set(found) - {"prefix", "sampler"} != names:
+        _refuse(
+            WORD, repr(found)[:80], "invocation, noise and candidates; prefix and sampler besides"
+        )
     invocation, noise, number = found["invocation"], found["noise"], found["candidates"]
     if not isinstance(invocation, str) or len(invocation) > LONGEST_NAME:
         _refuse(f"{WORD}.invocation", repr(invocation)[:80], f"up to {LONGEST_NAME} signs")

@@ -82,7 +82,7 @@ class Answered:
         samples: Fixtures, before and after the new start.
         nfe: Counted network evaluations; empty where its server does not count.
         modes: Two-mode situations.
-        coverage: The same in one row; empty where no sampler is declared.
+        coverage: The same in one row, where a sampler is declared; and one of each further setting.
     """
 
     identity: CandidateIdentity
@@ -121,7 +121,7 @@ def ask_brought(candidate: BroughtPolicy, asked: Asked) -> Answered:
             policy, asked.held_out, seed=candidate.seed, convention=_sampler(candidate.entry),
             samples=asked.samples, task=asked.task, checker=asked.checker,
         )  # fmt: skip
-        coverage = _coverage(policy, candidate, asked, modes)
+        coverage = _coverage(policy, candidate, asked, modes) + _swept(policy, candidate, asked)
         session, told = first_session(policy, starts), policy.told
     before = policy
     with running(candidate, contract, scene=asked.task.scene_path) as policy:
@@ -209,6 +209,25 @@ def _coverage(
             tolerance=declared.tolerance, quality=quality,
         )
     ]  # fmt: skip
+
+
+def _swept(policy: WirePolicy, candidate: BroughtPolicy, asked: Asked) -> list[CoverageRow]:
+    """A row of each further setting that its entry names; one of no answer counts as no numbers."""
+    rows, windows = [], swept_windows(asked.data, asked.deployment.horizons)
+    for name, choice in sorted(candidate.entry.samplers.items()):
+        tried = policy.sampling_by(name)
+        modes = modes_of_policy(
+            tried, asked.held_out, seed=candidate.seed, convention=choice.sampler,
+            samples=asked.samples, task=asked.task, checker=asked.checker,
+        )  # fmt: skip
+        if modes:
+            rows.append(
+                drawn_by(
+                    modes, steps=choice.sampler_steps, sampler_sha256=tried.sampler_config_hash,
+                    tolerance=choice.tolerance, quality=quality_of(tried, windows, asked.data),
+                )
+            )  # fmt: skip
+    return rows
 
 
 def _sampler(entry: Entry) -> str:
