@@ -8,11 +8,13 @@ import pytest
 
 from gates.reproducibility.identity import unrecorded
 from genpolicy.candidates.brought import BroughtPolicy
+from genpolicy.candidates.judged import sampling_by
 from genpolicy.candidates.wire import remote
 from genpolicy.candidates.wire.served import ServedPolicy
 from genpolicy.evidence.need.held_out import held_out_situations
 from genpolicy.evidence.reproducibility.brought import Asked, ask_brought
 from genpolicy.evidence.reproducibility.identity import Deployment
+from genpolicy.policies.settings import SamplerConfig
 from tests.candidates.conftest import entry_of, serving  # noqa: F401
 
 DECLARED = {
@@ -35,9 +37,9 @@ def asking(data, task, checker, kit, tmp_path):
 def answered(asking, serving, entry_of, tmp_path):  # noqa: F811
     """What a server of some metadata and answers answers, as evidence."""
 
-    def ask(answer, metadata, declared=DECLARED):
+    def ask(answer, metadata, declared=DECLARED, **fields):
         with serving(answer, metadata) as address:
-            entry = entry_of(address=address, declared=declared)
+            entry = entry_of(address=address, declared=declared, **fields)
             brought = BroughtPolicy("planted", tmp_path / "planted.yaml", entry, "c" * 64, 0)
             return ask_brought(brought, asking)
 
@@ -57,6 +59,20 @@ def test_our_own_weights_behind_the_wire_come_back_the_same(answered, policy):
     (mode,), (coverage,) = found.modes, found.coverage
     assert (mode.method, mode.convention, mode.nfe, mode.samples) == ("planted", "euler", 2, 2)
     assert (coverage.steps, coverage.nfe) == (2, 2)
+
+
+def test_other_settings_that_it_lets_us_choose_are_rows_beside_the_judged_one(answered, policy):
+    """One that its server does not know is a row too, and no fault of the candidate."""
+    other = sampling_by(policy, SamplerConfig(name="euler", steps=1))
+    served = ServedPolicy(policy, samplers={"one": other})
+    named = {name: {"sampler": "euler", "sampler_steps": 1} for name in ("one", "unknown")}
+    found = answered(served.answer, served.metadata, samplers=named)
+    own, one, unknown = found.coverage
+    assert [row.steps for row in found.coverage] == [2, 1, 1]
+    assert (own.nfe, one.nfe, one.nonfinite) == (2, 1, 0) and one.chunk_error > 0.0
+    assert unknown.nonfinite > 0 and np.isnan(unknown.chunk_error)
+    assert len({row.sampler_sha256 for row in found.coverage}) == 3
+    assert found.failed.faults == {} and {row.nfe for row in found.modes} == {2}
 
 
 def test_what_nobody_declares_is_missing_by_name(answered, policy):
@@ -135,7 +151,8 @@ def test_a_server_that_does_not_start_costs_this_candidate_and_says_why(
     assert found.failed.faults == {"closed": 16, "gone": found.failed.asked - 16}
     assert "no weights here" in found.failed.last_words
     assert np.isnan([row.max_abs_difference for row in found.samples]).all()
-    assert (found.nfe, found.coverage) == ([], [])
+    (coverage,) = found.coverage
+    assert found.nfe == [] and coverage.nonfinite > 0 and np.isnan(coverage.chunk_error)
 
 
 def test_other_metadata_after_the_new_start_are_counted(answered, policy, monkeypatch):
