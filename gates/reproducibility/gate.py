@@ -169,7 +169,7 @@ def _identity(evidence: Evidence, candidate: str) -> CandidateIdentity:
 def nonfinite_weights(
     evidence: Evidence, settings: ReproducibilitySettings, candidate: str
 ) -> Measured:
-    """Weights and chunks that are NaN or infinite; behind the wire, answers without a finite one."""
+    """Weights and chunks that are not finite; behind the wire, answers without a finite chunk."""
     entry = _identity(evidence, candidate)
     found = float(entry.nonfinite_weights + entry.nonfinite_chunks)
     if candidate not in settings.brought:

@@ -126,7 +126,7 @@ def test_where_no_clock_was_compared_there_is_nothing_to_derive(tmp_path):
     [
         (lambda own, other: own[:1], "replays is "),
         (lambda own, other: own[::-1], "replays is "),
-        (lambda own, other: other, "replays is "),
+        (lambda own, other: other, "replays is |asked at another scene"),
         (lambda own, other: [own[0], own[1].model_copy(update={
             "observations": other[0].observations})], "asked at another scene"),
     ],

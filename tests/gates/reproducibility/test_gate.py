@@ -180,6 +180,10 @@ def test_a_reference_without_parameters_is_no_budget_and_one_of_one_is(ladder):
         asked(ladder, parameter_budget_deviation, "flow", gate="B")
 
 
+def answer_of(root, name):
+    return next(one for one in found_in(judge(root, "B"), name) if one.candidate == "flow")
+
+
 @pytest.mark.parametrize(
     ("rows", "expected"),
     [
@@ -189,10 +193,6 @@ def test_a_reference_without_parameters_is_no_budget_and_one_of_one_is(ladder):
         ({"cuda": 0.0}, ("INCONCLUSIVE", "not every seed was drawn again on cpu")),
     ],
 )
-def answer_of(root, name):
-    return next(one for one in found_in(judge(root, "B"), name) if one.candidate == "flow")
-
-
 def test_on_another_device_both_comparisons_are_asked_for(ladder, rows, expected):
     def drawn(frame):
         return pd.concat([
