@@ -1,0 +1,22 @@
+"""Every monitor of the registry scores finitely, or says why it cannot."""
+
+import math
+
+import pytest
+
+from genpolicy.monitors.protocol import Unavailable
+from genpolicy.monitors.registry import CONTROLS, MONITORS
+
+
+@pytest.mark.parametrize("name", MONITORS)
+@pytest.mark.parametrize("method", ["flow", "chunked_bc"])
+def test_a_score_or_a_reason(kit, name, method):
+    monitor = MONITORS[name](kit.fit(method, others=[kit.policies(method, 1)]))
+    if isinstance(monitor, Unavailable):
+        assert monitor.why
+        return
+    assert math.isfinite(monitor.score(kit.invocation(method, candidates=2)))
+
+
+def test_controls_are_the_last_of_them():
+    assert tuple(MONITORS)[-2:] == CONTROLS
