@@ -18,6 +18,7 @@ from gates.stress.choice import choose
 from gates.stress.clocks import clocks_said
 from gates.stress.contact import contact_said
 from gates.stress.gains import by_condition, inside_envelope, least_gain
+from gates.stress.monitors import monitors_said
 from gates.stress.pairs import paired_differences
 from gates.stress.rollouts import JOURNALS, StressSettings, rollouts
 
@@ -83,8 +84,8 @@ def _decide(judged: Judged) -> Decision:
 
 
 def _said(judged: Judged) -> list[str]:
-    """What was never touched, and how the two clocks compare."""
-    return [*contact_said(judged), *clocks_said(judged)]
+    """What was never touched, how the two clocks compare, and what monitors would have said."""
+    return [*contact_said(judged), *clocks_said(judged), *monitors_said(judged)]
 
 
 GATE = GateSpec(

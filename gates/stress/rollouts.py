@@ -49,6 +49,7 @@ class StressSettings(CandidateSettings):
         maximum_age_s: Oldest action that may be executed, s; by phase where phases differ.
         unmatched: Candidates that are compared by exception; none is ranked among the others.
         tolerances: By owner: what the two clocks may differ by, and why; nothing is judged by it.
+        monitor_costs: By owner: what a cell of the monitors' cost matrix costs, and why; likewise.
     """
 
     homes: ClassVar[Mapping[str, str]] = {
@@ -78,10 +79,15 @@ class StressSettings(CandidateSettings):
     maximum_age_s: float | dict[str, float]
     unmatched: tuple[str, ...] = ()
     tolerances: dict[Owner, dict[str, tuple[float, str]]] = Field(default_factory=dict)
+    monitor_costs: dict[Owner, dict[str, tuple[float, str]]] = Field(default_factory=dict)
 
     def tolerance(self, name: str) -> float | None:
         """What the clocks may differ by in one respect; None where nobody has said."""
         return next((of[name][0] for of in self.tolerances.values() if name in of), None)
+
+    def monitor_cost(self, name: str) -> float | None:
+        """What a cell of the monitors' cost matrix costs; None where nobody has said."""
+        return next((of[name][0] for of in self.monitor_costs.values() if name in of), None)
 
     def excepted(self, criterion: str, candidate: str | None) -> bool:
         """Whether a criterion is asked of those that were brought only, and this one was not."""

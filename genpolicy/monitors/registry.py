@@ -7,13 +7,11 @@ from genpolicy.monitors.controls import SampleVariance, TimeInEpisode
 from genpolicy.monitors.disagreement import SeedDisagreement
 from genpolicy.monitors.encoder import EncoderDistance
 from genpolicy.monitors.log_density import LogDensity
+from genpolicy.monitors.names import TIME, VARIANCE
 from genpolicy.monitors.own_loss import OwnLoss
 from genpolicy.monitors.protocol import Fit, Monitor, Unavailable
 from genpolicy.monitors.support import Support
 
-TIME, VARIANCE = "time_in_episode", "sample_variance"
-CONTROLS = (TIME, VARIANCE)
-"""Shown beside every monitor, and never taken for one."""
 MONITORS: dict[str, Callable[[Fit], Monitor | Unavailable]] = {
     "support": Support.fitted,
     "encoder_distance": EncoderDistance.fitted,

@@ -10,7 +10,9 @@ from typing import Any
 
 import pandas as pd
 import pyarrow as pa
+import watched
 import yaml
+from watched import write_watched
 
 from gates import pipeline
 from gates.cause import default_limits
@@ -298,7 +300,13 @@ PARAMS: dict[str, Any] = {
             mutants_undetected=(0, "safety"),
         ),
     },
+    "monitors": watched.SECTION,
     "gate_d": {
+        "monitor_costs": by_owner(
+            missed_failure=(10.0, "safety"),
+            alarmed_failure=(2.0, "safety"),
+            false_alarm=(1.0, "model"),
+        ),
         "tolerances": by_owner(age_distance=(0.15, "controller"), share=(0.1, "controller")),
         "limits": by_owner(
             unmatched_starts=(0, "model"),
@@ -469,6 +477,7 @@ def build(root: Path) -> None:
     _shadow(root)
     _stress(root)
     _clocks(root)
+    write_watched(root)
     (root / CODE).parent.mkdir(parents=True)
     (root / CODE).write_text("STIFFNESS = 1\n")
     (root / "dvc.yaml").write_text(yaml.safe_dump({"stages": {}}))

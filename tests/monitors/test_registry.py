@@ -4,8 +4,9 @@ import math
 
 import pytest
 
+from genpolicy.monitors.names import CONTROLS
 from genpolicy.monitors.protocol import Unavailable
-from genpolicy.monitors.registry import CONTROLS, MONITORS
+from genpolicy.monitors.registry import MONITORS
 
 
 @pytest.mark.parametrize("name", MONITORS)

@@ -78,6 +78,7 @@ def _run(shard: Shard, task: Task, policy: Running) -> ShardResult:
         sampler=joining.sampler_hash(policy.sampler_config_hash),
         joining=joining,
         person=comparison.person,
+        probe=shard.probe,
     )
     epoch = task.calibration_epochs[-1]
     rollouts = [

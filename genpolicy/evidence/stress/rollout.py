@@ -81,7 +81,7 @@ class Rollout:
     ) -> None:
         self.setup = setup
         self.start_index = start_index
-        settings = WorldSettings(calibration_epoch=calibration_epoch)
+        settings = WorldSettings(calibration_epoch, setup.probe, seed=start_index)
         self.world: World = setup.task.make_world(start, settings=settings)
         self.start_sha256 = self.world.state_sha256()
         self.journal = setup.journal(start_index, self.start_sha256)

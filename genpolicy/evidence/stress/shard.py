@@ -25,6 +25,7 @@ from genpolicy.evidence.stress.perturbations import Perturbation
 from genpolicy.execution.cell import Cell
 from genpolicy.execution.ledger import Account
 from genpolicy.feasibility.settings import FeasibilitySettings
+from genpolicy.tasks.api import NOMINAL_PROBE
 
 Array = NDArray[np.float64]
 
@@ -69,6 +70,7 @@ class Shard:
         perturbation: Name of the perturbation.
         schedule: What it injects.
         journal: File to write the journal to.
+        probe: Probe of the task that its worlds are under.
     """
 
     comparison: Comparison
@@ -77,6 +79,7 @@ class Shard:
     perturbation: str
     schedule: Perturbation
     journal: Path
+    probe: str = NOMINAL_PROBE
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.execution.journal import Journal
 from genpolicy.execution.recovery import Recovery
 from genpolicy.feasibility.admission import FeasibilityChecker
-from genpolicy.tasks.api import Task, World
+from genpolicy.tasks.api import NOMINAL_PROBE, Task, World
 
 Array = NDArray[np.float64]
 
@@ -56,6 +56,7 @@ class Setup:
         sampler: Its sampler settings, and the rule by which its chunks join.
         joining: That rule.
         person: Who comes when one is called; None: nobody.
+        probe: Probe of the task that their worlds are under.
     """
 
     task: Task
@@ -71,6 +72,7 @@ class Setup:
     sampler: str
     joining: JoiningSettings = field(default_factory=JoiningSettings)
     person: PersonSettings | None = None
+    probe: str = NOMINAL_PROBE
 
     def __post_init__(self) -> None:
         self.checker.cell.require_within(self.execution.force_limit_n)

@@ -1,0 +1,102 @@
+"""Rollouts for the monitors: of what starts, and under which probe.
+
+Starts of the three kinds are named streams of their own: no start that sets a threshold counts a
+false alarm, none of either is one of the matched comparison, and all severities share theirs.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from genpolicy.candidates.contenders import Contender
+from genpolicy.candidates.joining import REAL_TIME
+from genpolicy.errors import ConfigError
+from genpolicy.evidence.monitors.settings import JUDGED, THRESHOLDS, MonitorsSettings
+from genpolicy.evidence.stress.latency import LatencyModel
+from genpolicy.evidence.stress.perturbations import Nominal
+from genpolicy.evidence.stress.shard import Comparison, Shard
+from genpolicy.seeds import stream
+from genpolicy.tasks.api import NOMINAL_PROBE, Task
+
+PROBED = "probed"
+STREAM = "monitors"
+
+
+def starts_of(task: Task, kind: str, *, root_seed: int, count: int) -> tuple[str, ...]:
+    """Initial states of one kind, as JSON; start i does not depend on how many there are."""
+    return tuple(
+        task.sample_start(stream(root_seed, STREAM, kind, index)).to_json()
+        for index in range(count)
+    )
+
+
+def plan_thresholds(
+    comparison: Comparison,
+    judged: Sequence[Contender],
+    settings: MonitorsSettings,
+    task: Task,
+    *,
+    latency: Mapping[str, LatencyModel],
+    journals: Path,
+) -> list[Shard]:
+    """Nominal rollouts whose successes set the thresholds, one shard per method."""
+    return _shards(
+        comparison, judged, task, {THRESHOLDS: (NOMINAL_PROBE, THRESHOLDS)},
+        {THRESHOLDS: settings.threshold_starts}, latency=latency, journals=journals,
+    )  # fmt: skip
+
+
+def plan_judged(
+    comparison: Comparison,
+    judged: Sequence[Contender],
+    settings: MonitorsSettings,
+    task: Task,
+    *,
+    latency: Mapping[str, LatencyModel],
+    journals: Path,
+) -> list[Shard]:
+    """Other nominal rollouts, then every family and severity; one shard per method and condition.
+
+    Raises:
+        ConfigError: Chunks join by a rule under which none can be drawn again by itself.
+    """
+    conditions = {JUDGED: (NOMINAL_PROBE, JUDGED)}
+    conditions |= {name: (name, PROBED) for name in settings.conditions}
+    counts = {JUDGED: settings.judged_starts, PROBED: settings.probe_starts}
+    return _shards(comparison, judged, task, conditions, counts, latency=latency, journals=journals)
+
+
+def _shards(
+    comparison: Comparison,
+    judged: Sequence[Contender],
+    task: Task,
+    conditions: Mapping[str, tuple[str, str]],
+    counts: Mapping[str, int],
+    *,
+    latency: Mapping[str, LatencyModel],
+    journals: Path,
+) -> list[Shard]:
+    if comparison.joining.rule == REAL_TIME:
+        raise ConfigError(
+            where="params.yaml: monitors",
+            found=f"probes, and stress.joining: {REAL_TIME}",
+            expected="a rule under which what an invocation draws hangs on what it sees alone",
+            action="Leave out the probes (`monitors: {}`), or choose another rule.",
+        )
+    drawn = {
+        kind: starts_of(task, kind, root_seed=comparison.root_seed, count=count)
+        for kind, count in counts.items()
+    }
+    return [
+        Shard(
+            comparison=replace(comparison, starts=drawn[kind]),
+            judged=policy,
+            latency=latency[policy.name],
+            perturbation=condition,
+            schedule=Nominal(),
+            journal=journals / f"{policy.name}__{condition}.mcap",
+            probe=probe,
+        )
+        for condition, (probe, kind) in conditions.items()
+        for policy in judged
+    ]
