@@ -69,7 +69,8 @@ class WorldSettings:
 
     Attributes:
         calibration_epoch: Which camera calibration the observations carry.
-        probe: Name of an out-of-distribution probe of the task, or `nominal`.
+        probe: Name of an out-of-distribution probe of the task, `<probe>@<severity>` for a graded
+            one (1 is as the task defines it), or `nominal`.
         seed: Seed of the probe's own disturbances (sensor noise of a probe, for instance).
     """
 

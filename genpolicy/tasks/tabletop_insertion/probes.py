@@ -1,5 +1,6 @@
 """Calibration epochs and out-of-distribution probes of the cell, each a few named numbers."""
 
+import math
 from dataclasses import dataclass, field
 from typing import TypeVar
 
@@ -52,6 +53,18 @@ class Probe:
     camera: CameraError = field(default_factory=CameraError)
     variant: Variant = field(default_factory=Variant)
 
+    def graded(self, severity: float) -> "Probe":
+        """The same probe, so many times as far from nominal."""
+        return Probe(
+            CameraError(**{name: severity * value for name, value in vars(self.camera).items()}),
+            Variant(
+                **{
+                    name: 1.0 + severity * (value - 1.0)
+                    for name, value in vars(self.variant).items()
+                }
+            ),
+        )
+
 
 EPOCHS: dict[str, Epoch] = {
     "epoch_1": Epoch(
@@ -87,12 +100,29 @@ def find_epoch(name: str) -> Epoch:
 
 
 def find_probe(name: str) -> Probe:
-    """The probe of a name.
+    """The probe of a name, `<probe>` or `<probe>@<severity>`.
 
     Raises:
-        ConfigError: There is none.
+        ConfigError: There is none, or the severity is no positive number.
     """
-    return _find(PROBES, name, "the probe")
+    plain, graded, severity = name.partition("@")
+    probe = _find(PROBES, plain, "the probe")
+    return probe.graded(_severity(severity, name)) if graded else probe
+
+
+def _severity(text: str, name: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0.0 < value < math.inf:
+        raise ConfigError(
+            where=f"the severity of the probe {name!r}",
+            found=repr(text),
+            expected="a positive number",
+            action="Give one behind the `@`, or leave out both.",
+        )
+    return value
 
 
 def _find(table: dict[str, T], name: str, where: str) -> T:
