@@ -19,6 +19,7 @@ from gates.rederive_distilled import rederive_costs, rederive_distilled
 from gates.rederive_disturbance import rederive_disturbance, rederive_severities
 from gates.rederive_draws import rederive_rollout_draws, rederive_shadow_draws
 from gates.rederive_latency import rederive_latency
+from gates.rederive_monitors import rederive_monitors
 from gates.rederive_sessions import rederive_sessions
 from gates.rederive_shadow import SHADOW, TaskSection, rederive_shadow
 from gates.rederive_splices import rederive_splices
@@ -122,6 +123,7 @@ def rederive(root: Path, gate: Gate) -> None:
     else:
         _tables(root, params, held_to[1], journals)
         rederive_clocks(root, params, held_to)
+        rederive_monitors(root, params, held_to)
         rederive_latency(root, params, journals)
         rederive_disturbance(params, journals)
         rederive_severities(root, params)

@@ -77,6 +77,7 @@ def compare_rows(
     derived: Sequence[Row],
     *,
     seed: object,
+    origin: str = "its journal",
 ) -> None:
     """Each row that a table states is what its journal says, and neither is without the other.
 
@@ -87,6 +88,7 @@ def compare_rows(
         stated: Rows of the table.
         derived: The same rows, as journals say.
         seed: What the column `seed` must hold, where the table has one; no journal names it.
+        origin: What says so, for messages.
 
     Raises:
         RefusedError: They differ, or a row is stated twice.
@@ -107,12 +109,13 @@ def compare_rows(
     for key in sorted({*told, *expected}, key=repr):
         where = f"{what} {_joined(key)}"
         if key not in told or key not in expected:
-            found = "without a journal" if key in told else "only in a journal"
-            refuse(gate, where, found, f"one row of {path} and what a journal says")
+            plain = origin.replace("its ", "a ")
+            found = f"without {plain}" if key in told else f"only in {plain}"
+            refuse(gate, where, found, f"one row of {path} and what {plain} says")
         row = dict(told[key])
         own = {**expected[key], **({"seed": seed} if "seed" in row else {})}
         for column in differences(row, own)[:1]:
-            text = f"{own[column]!r}, as its journal says"
+            text = f"{own[column]!r}, as {origin} says"
             refuse(gate, f"{where}: {column}", f"{row.get(column)!r}", text)
 
 

@@ -7,8 +7,10 @@ from gates.evidence import MissingEvidenceError, counts, flags, numbers
 from gates.feasibility.incidents import counted
 from gates.feasibility.settings import CANDIDATES, HELD_OUT, SHADOW
 from gates.stress.clocks import DIFFER, UNSEEN, UNTOLD, WALL_CLOCK, compared
+from gates.stress.monitors import ALARMS, THRESHOLDS, watched_of
 from gates.stress.rollouts import ROLLOUTS, STRESS
 from genpolicy.evidence.documents.shadow import MUTANTS
+from genpolicy.evidence.rows.monitors import MonitorAlarmRow, MonitorThresholdRow
 from genpolicy.evidence.rows.shadow import CandidateRow, ShadowHoldRow, ShadowStubRow
 from genpolicy.evidence.rows.stress import ConservationRow, RolloutRow, StressCountRow
 
@@ -19,9 +21,9 @@ NO_TRACE = (
 )
 GAINS = "gains of the controller: pinned by fixtures.yaml, and varied in no rollout"
 NO_HARDWARE = "no rollout on hardware is recorded, so that nothing here compares with one"
-NO_PROBES = (
-    "no stage probes observations out of distribution, and no threshold of a monitor is recorded: "
-    "its coverage and its false negatives are unknown"
+ONLY_SIMULATED = (
+    "what is out of distribution in your cell: probes are those of the simulated task, and an "
+    "alarm stops nothing"
 )
 MODE_CHECKS = ("dynamic.controller_mode", "execution.controller_mode")
 STOP_CHECKS = ("execution.watchdog", "execution.stopped", "execution.after_stop")
@@ -63,7 +65,8 @@ def age_and_controller_mode(look: Look) -> None:
 def threshold_and_probes(look: Look) -> None:
     """Was what must stop ever shown to the monitors, and from which threshold do they say so?"""
     look.criteria("C.corrupted_refused_share")
-    look.unknown.append(NO_PROBES)
+    look.ask(_monitors)
+    look.unknown.append(ONLY_SIMULATED)
 
 
 def stops_wired(look: Look) -> None:
@@ -123,6 +126,20 @@ def _contact(look: Look) -> None:
         "starts with any contact", f"{touched['start'].nunique()} of {rows['start'].nunique()}",
         f"{len(rows)} rollouts", f"{ROLLOUTS}: force_peak_n",
     )  # fmt: skip
+
+
+def _monitors(look: Look) -> None:
+    """What each monitor would have said of probes; never why something did or did not stop."""
+    look.rows("D", ALARMS, MonitorAlarmRow)
+    look.rows("D", THRESHOLDS, MonitorThresholdRow)
+    found = watched_of(look.reports.evidence, look.reports.settings("D"), look.candidate)
+    for one in found.watched:
+        low, high = one.coverage[1:]
+        look.number(
+            f"failures under probes that {one.monitor} would have said before",
+            f"{low:.2g} to {high:.2g}", f"{one.failures} failures",
+            f"{ALARMS}, thresholds.parquet: {one.monitor}",
+        )  # fmt: skip
 
 
 def _watched(look: Look, names: tuple[str, ...]) -> None:

@@ -39,6 +39,17 @@ LIMIT_CHANGER = re.compile(
 )
 
 
+MONITORS = "genpolicy.monitors"
+WATCHES = ("genpolicy/monitors/", "genpolicy/evidence/monitors/", "gates/", "stages/monitors.py")
+"""Who may know of monitors: what scores journals, and what reports it."""
+DECIDES = (
+    "genpolicy.execution.executor", "genpolicy.execution.recovery", "genpolicy.execution.stub",
+    "genpolicy.execution.supervisor", "genpolicy.feasibility", "genpolicy.robot",
+    "genpolicy.verification", "genpolicy.wall_clock",
+)  # fmt: skip
+"""What a monitor may not reach, whichever way round."""
+
+
 def findings(source: str) -> list[str]:
     """Everything in a module that this project forbids, as `line: what`."""
     found: list[str] = []
@@ -249,3 +260,50 @@ def test_the_processes_of_the_wall_clock_reach_pipes_and_files_only(path: Path) 
     assert names <= MAY_IMPORT
     assert ("subprocess" in names) <= (path.name == "run.py")
     assert "/dev" not in path.read_text() and "ioctl" not in path.read_text()
+
+
+def _imports(path: Path) -> set[str]:
+    """Modules that a file imports, with the names that it takes from them."""
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            found |= {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
+    return found
+
+
+def _reaches(path: Path, names: tuple[str, ...]) -> list[str]:
+    return sorted(
+        module
+        for module in _imports(path)
+        for name in names
+        if module == name or module.startswith(f"{name}.")
+    )
+
+
+def test_nothing_that_decides_what_a_robot_does_knows_of_a_monitor() -> None:
+    """No score can clear or mask a stop, alter an action or delay an answer: nobody asks for one.
+
+    Neither the rollouts of gates C and D nor the wall clock import a monitor or what scores
+    by one; scores are read from journals that are whole.
+    """
+    watched = (MONITORS, "genpolicy.evidence.monitors")
+    knowing = {
+        path.relative_to(ROOT).as_posix()
+        for package in ("genpolicy", "gates", "stages", "flows")
+        for path in sorted((ROOT / package).rglob("*.py"))
+        if _reaches(path, watched)
+    }
+    assert "genpolicy/evidence/monitors/scored.py" in knowing
+    assert sorted(name for name in knowing if not name.startswith(WATCHES)) == []
+
+
+def test_a_monitor_reaches_nothing_that_decides() -> None:
+    folders = ("genpolicy/monitors", "genpolicy/evidence/monitors")
+    files = [path for folder in folders for path in sorted((ROOT / folder).glob("*.py"))]
+    assert len(files) > 10
+    of_scores = [path for path in files if path.name != "tables.py"]  # which runs the rollouts
+    found = {path.name: _reaches(path, DECIDES) for path in of_scores}
+    # Settings of the cell, and of the checks, go into the rollouts as they stand.
+    assert {name: names for name, names in found.items() if names} == {}

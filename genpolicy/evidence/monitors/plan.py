@@ -16,7 +16,7 @@ from genpolicy.evidence.stress.latency import LatencyModel
 from genpolicy.evidence.stress.perturbations import Nominal
 from genpolicy.evidence.stress.shard import Comparison, Shard
 from genpolicy.seeds import stream
-from genpolicy.tasks.api import NOMINAL_PROBE, Task
+from genpolicy.tasks.api import NOMINAL_PROBE, Task, WorldSettings
 
 PROBED = "probed"
 STREAM = "monitors"
@@ -28,6 +28,24 @@ def starts_of(task: Task, kind: str, *, root_seed: int, count: int) -> tuple[str
         task.sample_start(stream(root_seed, STREAM, kind, index)).to_json()
         for index in range(count)
     )
+
+
+def start_hashes(task: Task, settings: MonitorsSettings, *, root_seed: int) -> list[str]:
+    """Condition, start and hash of the state after reset, of every rollout that is planned."""
+    planned = [
+        (THRESHOLDS, NOMINAL_PROBE, THRESHOLDS, settings.threshold_starts),
+        (JUDGED, NOMINAL_PROBE, JUDGED, settings.judged_starts),
+        *((name, name, PROBED, settings.probe_starts) for name in settings.conditions),
+    ]
+    found = []
+    for condition, probe, kind, count in planned:
+        for index, text in enumerate(starts_of(task, kind, root_seed=root_seed, count=count)):
+            world = task.make_world(
+                task.start_from_json(text),
+                settings=WorldSettings(task.calibration_epochs[-1], probe, seed=index),
+            )
+            found.append(f"{condition}/{index}/{world.state_sha256()}")
+    return found
 
 
 def plan_thresholds(

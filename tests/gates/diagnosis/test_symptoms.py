@@ -169,7 +169,7 @@ def test_every_inspection_has_a_planted_cause():
         ("simulation-only", "declared and not measured"),
         ("seed-variance", "noise alone"),
         ("seed-variance", "one training seed"),
-        ("ood-does-not-stop", "no stage probes observations out of distribution"),
+        ("ood-does-not-stop", "what is out of distribution in your cell"),
     ],
 )
 def test_what_the_ladder_does_not_record_is_said_to_be_unknown(honest, name, said):

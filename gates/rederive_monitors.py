@@ -1,0 +1,81 @@
+"""Thresholds and alarms of monitors, computed again from recorded scores; ends from journals.
+
+Scores themselves are taken as recorded: the checkpoint is bound, and what it draws for the stress
+rollouts is drawn again elsewhere. What a reader acts on, who would have alarmed when, follows from
+them by rank and comparison alone.
+"""
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from gates.rederive_shadow import TaskSection
+from gates.stated import compare_keys, compare_rows, root_seed, section, training_seed
+from gates.stress.monitors import ALARMS, MONITORS, THRESHOLDS
+from genpolicy.evidence.documents.shadow import CHECKER
+from genpolicy.evidence.monitors.alarms import alarm_rows, threshold_rows
+from genpolicy.evidence.monitors.plan import start_hashes
+from genpolicy.evidence.monitors.settings import MonitorsSettings
+from genpolicy.evidence.rows.monitors import MonitorScoreRow
+from genpolicy.evidence.rows.stress import RolloutRow
+from genpolicy.evidence.shadow.tables import checked
+from genpolicy.integrity.rows import read_rows
+from genpolicy.integrity.tables import read_table
+from genpolicy.tasks.api import load_task
+from genpolicy.verification.checker import check_journal
+from genpolicy.verification.expected import ExpectedSettings
+from genpolicy.verification.journal_source import readable
+from genpolicy.verification.motion import ExpectedMotion
+from genpolicy.verification.rollouts import derived_rollouts
+
+SCORES = "scores.parquet"
+PHASE = ("method", "monitor", "phase")
+OF_A_ROLLOUT = ("method", "monitor", "family", "severity", "start", "phase")
+ROLLOUT = ("method", "perturbation", "start")
+
+
+def rederive_monitors(
+    root: Path, params: Mapping[str, Any], held_to: tuple[ExpectedSettings, ExpectedMotion]
+) -> None:
+    """Hold what Gate D prints of the monitors against scores and journals; nothing where none ran.
+
+    Args:
+        root: Root of the workspace.
+        params: `params.yaml`.
+        held_to: What every session must have declared, and what every executed row must keep to.
+
+    Raises:
+        RefusedError: A threshold or an alarm is not what the scores give, a rollout not what its
+            journal says or begun elsewhere than planned, or a finding of the checker another.
+        IntegrityError: A file is missing or no regular file.
+        BadInputError: A file cannot be read.
+    """
+    folder = root / MONITORS
+    if not folder.is_dir():
+        return
+    settings = section(params, "monitors", MonitorsSettings)
+    task = load_task(section(params, "task", TaskSection).name)
+    rollouts = read_rows(folder / "rollouts.parquet", RolloutRow)
+    scores = read_rows(folder / "scores.parquet", MonitorScoreRow)
+    above = threshold_rows(scores, rollouts, alpha=settings.alpha, phases=task.phases)
+    alarms = alarm_rows(scores, rollouts, above, settings, contact_phases=task.contact_phases)
+    for path, keys, again in ((THRESHOLDS, PHASE, above), (ALARMS, OF_A_ROLLOUT, alarms)):
+        stated = read_table(root / path).to_pylist()
+        derived = [asdict(row) for row in again]
+        compare_rows("D", path, keys, stated, derived, seed=None, origin=SCORES)
+    journals = sorted(folder.glob("journals/*.mcap"))
+    with readable(f"{MONITORS}/journals"):
+        ended = [row for path in journals for row in derived_rollouts(path).values()]
+    path = f"{MONITORS}/rollouts.parquet"
+    rows = read_table(root / path).to_pylist()
+    compare_rows("D", path, ROLLOUT, rows, ended, seed=training_seed(params))
+    if not journals:
+        return
+    planned = start_hashes(task, settings, root_seed=root_seed(params))
+    named = {f"{row.perturbation}/{row.start}/{row.start_sha256}": "" for row in rollouts}
+    compare_keys("D", path, named, dict.fromkeys(planned, ""), "as planned")
+    read = checked({path.name: check_journal(path, *held_to).as_document() for path in journals})
+    where = f"{MONITORS}/{CHECKER.file}"
+    plain = CHECKER.plain(CHECKER.read(folder))
+    compare_keys("D", where, plain, CHECKER.plain(read), "as checked again")
