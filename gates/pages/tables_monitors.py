@@ -46,7 +46,11 @@ def _listed(evidence: Evidence, report: GateReport) -> Table:
 
 def _graded(evidence: Evidence, report: GateReport) -> Table:
     settings = _settings(evidence, report)
-    rows = by_rollout(_alarms(evidence, report))
+    heads = ("method", "probe", "severity", "monitor", "rollouts", "detected", "failures alarmed")
+    alarms = _alarms(evidence, report)
+    if alarms is None:
+        return (heads,)
+    rows = by_rollout(alarms)
     lines: list[tuple[str, ...]] = []
     key = ["method", "family", "severity", "monitor"]
     for (method, family, severity, monitor), own in felt(rows).groupby(key, sort=False):
@@ -59,12 +63,16 @@ def _graded(evidence: Evidence, report: GateReport) -> Table:
                 _interval(found), f"{early} of {len(failed)}",
             )
         )  # fmt: skip
-    heads = ("method", "probe", "severity", "monitor", "rollouts", "detected", "failures alarmed")
     return (heads, *lines)
 
 
 def _joint(evidence: Evidence, report: GateReport) -> Table:
-    rows = by_rollout(_alarms(evidence, report))
+    heads = ("method", "monitor", "first alarm in", "no recovery, success", "no recovery, failure",
+             "recovery succeeded", "recovery failed")  # fmt: skip
+    alarms = _alarms(evidence, report)
+    if alarms is None:
+        return (heads,)
+    rows = by_rollout(alarms)
     tried, saved = flags(rows, "recovery_attempted"), flags(rows, "recovered")
     good = flags(rows, "success")
     cells = pd.DataFrame(
@@ -78,8 +86,6 @@ def _joint(evidence: Evidence, report: GateReport) -> Table:
     key = ["method", "monitor", "alarm"]
     counted = cells.groupby(key, sort=False).sum().reset_index()
     lines = [tuple(f"{cell}" for cell in line) for line in counted.itertuples(index=False)]
-    heads = ("method", "monitor", "first alarm in", "no recovery, success", "no recovery, failure",
-             "recovery succeeded", "recovery failed")  # fmt: skip
     return (heads, *lines)
 
 
@@ -100,8 +106,11 @@ def _costs(evidence: Evidence, report: GateReport) -> Table:
     return (("what", "cost", "owner", "why"), *lines)
 
 
-def _alarms(evidence: Evidence, report: GateReport) -> pd.DataFrame:
+def _alarms(evidence: Evidence, report: GateReport) -> pd.DataFrame | None:
+    """Rows of all methods in their order; None where no probe was run."""
     require_bound(evidence, report, ALARMS)
+    if not evidence.records(ALARMS, MonitorAlarmRow):
+        return None
     rows = evidence.rows(ALARMS, MonitorAlarmRow)
     order = {name: place for place, name in enumerate(in_order(rows["method"]))}
     return rows.sort_values("method", key=lambda names: names.map(order), kind="stable")

@@ -1,12 +1,12 @@
 """The stage's work on real rollouts: order, tables, journals, and what is not touched."""
 
 import pytest
+from _probed import write_probed
 
 from genpolicy.evidence.documents.shadow import CHECKER
 from genpolicy.evidence.monitors import tables as module
-from genpolicy.evidence.monitors.plan import plan_judged, plan_thresholds
-from genpolicy.evidence.monitors.scored import scorings
-from genpolicy.evidence.monitors.tables import Work, write_monitors, write_unwatched
+from genpolicy.evidence.monitors.plan import plan_judged
+from genpolicy.evidence.monitors.tables import write_unwatched
 from genpolicy.evidence.rows.monitors import (
     MonitorAlarmRow,
     MonitorScoreRow,
@@ -19,33 +19,10 @@ from genpolicy.integrity.rows import read_rows
 from genpolicy.verification.rollouts import derived_rollouts, differences
 
 
-def write(folder, bench, task):
-    def plan(make):
-        return make(
-            bench.comparison, bench.watched, bench.settings, task,
-            latency=bench.latency, journals=folder / "journals",
-        )  # fmt: skip
-
-    def judged():
-        assert (folder / "thresholds.parquet").is_file(), "frozen before a judging start is drawn"
-        return plan(plan_judged)
-
-    write_monitors(
-        folder,
-        bench.settings,
-        thresholds=plan(plan_thresholds),
-        judged=judged,
-        scoring=lambda shards: scorings(
-            shards, bench.settings, artifacts=bench.artifacts, other_seeds=[]
-        ),
-        work=Work(1, "local"),
-    )
-
-
 @pytest.fixture(scope="module")
 def written(tmp_path_factory, bench, task):
     folder = tmp_path_factory.mktemp("monitors")
-    write(folder, bench, task)
+    write_probed(folder, bench, task)
     return folder
 
 
@@ -107,7 +84,7 @@ def test_journals_are_the_same_bytes_with_and_without_monitors(written, bench, t
 
 
 def test_the_same_bytes_every_time(written, bench, task, tmp_path):
-    write(tmp_path, bench, task)
+    write_probed(tmp_path, bench, task)
     for path in sorted(written.rglob("*")):
         if path.is_file():
             assert path.read_bytes() == (tmp_path / path.relative_to(written)).read_bytes(), path

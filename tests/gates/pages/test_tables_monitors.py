@@ -1,0 +1,71 @@
+"""The table of monitors: controls marked, severities apart, alarm and recovery together."""
+
+import evidence
+import pytest
+
+from gates.evidence import Evidence, MissingEvidenceError
+from gates.pages.tables_monitors import UNAVAILABLE, WATCHED
+from gates.proof import judge
+from gates.stress.monitors import ALARMS
+from genpolicy.evidence.rows.monitors import MonitorAlarmRow, MonitorUnavailableRow
+from genpolicy.integrity.rows import read_rows, write_rows
+
+
+@pytest.fixture
+def tables(ladder):
+    """The listed table and the folded ones, by name; lines without their heads."""
+    found = Evidence(ladder)
+    report = judge(ladder, "D")
+    folded = {item.summary: item.read(found, report)[1:] for item in WATCHED.folded}
+    return {"": WATCHED.read(found, report)[1:], **folded}
+
+
+def test_each_monitor_stands_beside_both_controls_and_both_ends_of_the_cost(tables):
+    own = [line[1] for line in tables[""] if line[0] == "flow"]
+    assert own == [
+        "support", "time_in_episode (control)", "sample_variance (control)",
+        "never an alarm", "always an alarm",
+    ]  # fmt: skip
+    support = next(line for line in tables[""] if line[:2] == ("flow", "support"))
+    assert support[2] == "6"
+    assert support[3].startswith("1 (")
+    assert support[-2:] == ("2", "1.6")
+
+
+def test_severities_stand_apart(tables):
+    graded = [line[1:4] for line in tables["By probe and severity"] if line[0] == "flow"]
+    assert ("lighting", "1", "support") in graded
+    assert ("lighting", "2", "support") in graded
+    assert ("contact_anomaly", "2", "sample_variance") in graded
+    assert all(line[4] == "4" for line in tables["By probe and severity"])
+
+
+def test_alarm_recovery_and_phase_are_counted_together(tables):
+    """12 successes and 8 failures with a failed recovery, 6 of them alarmed in the insertion."""
+    joint = {line[:3]: line[3:] for line in tables["Alarm, recovery and phase together"]}
+    assert joint["flow", "support", "insert"] == ("0", "0", "0", "6")
+    assert joint["flow", "support", "none"] == ("12", "0", "0", "2")
+
+
+def test_costs_have_owners_and_who_cannot_watch_says_why(tables):
+    assert ("missed_failure", "10", "safety", "test") in tables["The cost matrix"]
+    (first, *_) = tables["Monitors that cannot watch a method"]
+    assert first[1] == "seed_disagreement" and "one seed" in first[2]
+
+
+def test_a_table_that_the_report_does_not_name_is_not_shown(ladder):
+    report = judge(ladder, "D")
+    write_rows(ladder / ALARMS, MonitorAlarmRow, read_rows(ladder / ALARMS, MonitorAlarmRow)[:-1])
+    with pytest.raises(MissingEvidenceError, match="not the file that the report names"):
+        WATCHED.read(Evidence(ladder), report)
+
+
+def test_what_was_not_run_is_said(ladder):
+    write_rows(ladder / ALARMS, MonitorAlarmRow, [])
+    write_rows(ladder / UNAVAILABLE, MonitorUnavailableRow, [])
+    evidence.record(ladder)
+    report = judge(ladder, "D")
+    found = Evidence(ladder)
+    lines = WATCHED.read(found, report)[1:]
+    assert all(line[1].startswith("not looked at") for line in lines)
+    assert all(len(item.read(found, report)) >= 1 for item in WATCHED.folded)
