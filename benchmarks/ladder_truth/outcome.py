@@ -21,7 +21,7 @@ GATE_OF_STAGE = {
          "train_factors", "measure_factors", "gate_a"), "A"),
     **dict.fromkeys(("candidates", "train_generators", "reload", "latency", "gate_b"), "B"),
     **dict.fromkeys(("shadow", "gate_c"), "C"),
-    **dict.fromkeys(("wall_clock", "stress", "gate_d"), "D"),
+    **dict.fromkeys(("wall_clock", "stress", "monitors", "gate_d"), "D"),
     **dict.fromkeys(("card", "gate_e"), "E"),
 }  # fmt: skip
 LAST = {"small": "E", "brought": "A", "signed": "E"}

@@ -183,9 +183,9 @@ def _sentence(found: Candidate) -> str:
         "no monitor is shown to cover more than the clock and the spread of the draws"
     )  # fmt: skip
     return (
-        f"of {best.failures} failures under probes the best monitor ({best.monitor}) was early in "
-        f"{best.coverage[0]:.2g} ({best.coverage[1]:.2g} to {best.coverage[2]:.2g}), the clock in "
-        f"{clock.coverage[0]:.2g}; {shown}"
+        f"of {best.failures} failures under probes, {best.monitor} had an alarm before a share of "
+        f"{best.coverage[0]:.2g} ({best.coverage[1]:.2g} to {best.coverage[2]:.2g}), more than any "
+        f"other monitor or as many, and the clock before {clock.coverage[0]:.2g}; {shown}"
     )
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from genpolicy.candidates import judged
 from genpolicy.evidence.documents.stress import Power
-from stages import shadow, stress
+from stages import monitors, shadow, stress
 from stages._stage import load_params
 
 ALL = ("diffusion", "flow")
@@ -110,3 +110,38 @@ def test_stress_rolls_out_what_passed_gate_c(
     baselines = params.raw["stress"]["baselines"]
     assert [policy.name for policy in ran] == [*baselines, *(n for n in ALL if n != failed)]
     assert {policy.device for policy in ran} == {ELSEWHERE}
+
+
+@pytest.mark.parametrize("failed", [None, *ALL])
+def test_monitors_watch_what_passed_gate_c(
+    evidence, stage, gate_evidence, params, weightless, monkeypatch, failed
+):
+    def invalid(frame):
+        hit = frame["method"] == failed
+        return frame.assign(invalid=frame["invalid"].where(~hit, 1))
+
+    gate_evidence.edit_table(evidence, "shadow/stub.parquet", invalid)
+    verdicts(evidence, stage, "gate_a", "gate_b", "gate_c")
+    ran = []
+    without(
+        monkeypatch, monitors, "require_one_contract", "load_task", "Comparison", "latency_models",
+        "write_monitors",
+    )  # fmt: skip
+    monkeypatch.setattr(
+        monitors, "plan_thresholds", lambda _, watched, *__, **___: ran.extend(watched)
+    )
+    monitors.work(params)
+    assert [policy.name for policy in ran] == [name for name in ALL if name != failed]
+
+
+def test_without_probes_there_are_tables_without_rows(
+    evidence, stage, params, weightless, monkeypatch
+):
+    verdicts(evidence, stage, "gate_a", "gate_b", "gate_c")
+    without(monkeypatch, monitors, "require_one_contract", "load_task")
+    monkeypatch.setattr(monitors, "write_monitors", None)
+    params.raw["monitors"] = {}
+    monitors.work(params)
+    written = evidence / "artifacts" / "monitors"
+    assert len(list(written.glob("*.parquet"))) == 5
+    assert not (written / "journals").exists()
