@@ -21,7 +21,6 @@ ALLOWED: dict[str, str] = {
     "genpolicy.data.formats.contract:_Dumper.ignore_aliases": YAML,
     "genpolicy.data.formats.contract:_Dumper.represent_mapping": YAML,
     "genpolicy.data.formats.contract:_Dumper.represent_sequence": YAML,
-    "genpolicy.execution.journal:read_journal": READS_BACK,
     "genpolicy.execution.recovery:Recovery.human_resolved": (
         "the way out of `ask_human`: a person's, so nothing of ours may take it"
     ),

@@ -2,7 +2,7 @@
 
 import math
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
@@ -25,8 +25,6 @@ from genpolicy.statistics.conformal import conformal_rank, conformal_threshold
 
 Rollout = tuple[str, str, int]
 """Method, condition and start."""
-Above = Mapping[tuple[str, str, str], float]
-"""Threshold by method, monitor and phase."""
 
 
 def threshold_rows(

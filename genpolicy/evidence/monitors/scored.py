@@ -159,7 +159,7 @@ def _invocations(path: Path) -> list[_Seen]:
 def _of_session(events: Sequence[Event]) -> Iterator[_Seen]:
     labels = next(event.payload["labels"] for event in events if event.kind == "session")
     drawn = {
-        event.payload["chunk_id"]: event.payload["measures"]["drawn_sha256"]
+        event.payload["chunk_id"]: event.payload["measures"].get("drawn_sha256", "")
         for event in events
         if event.kind == "candidate" and event.payload["index"] == 0
     }
