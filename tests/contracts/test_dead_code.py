@@ -11,7 +11,6 @@ sys.path.insert(0, str(Path(__file__).parent))
 from dead_code import PRODUCT, Tree, parse, tree
 
 # Definition: why nothing of ours reads it. An entry that is read, or gone, is an error too.
-READS_BACK = "reads what the product writes, for whoever audits a run"
 YAML = "PyYAML calls it of every loader or dumper"
 IMPORTS = "Python's import system asks a loader for it"
 ALLOWED: dict[str, str] = {

@@ -94,4 +94,4 @@ def test_the_settings_are_few_enough_to_be_read() -> None:
     def leaves(value: object) -> int:
         return sum(map(leaves, value.values())) if isinstance(value, dict) else 1
 
-    assert leaves(params()) <= 255
+    assert leaves(params()) <= 270
