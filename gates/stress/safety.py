@@ -15,7 +15,7 @@ from genpolicy.evidence.rows.stress import ConservationRow, StressCountRow, Stre
 
 @criterion(
     ">=",
-    question="When recovery begins, does it recover, by more than new samples?",
+    question="When recovery begins, does it help, by more than new samples?",
     look_at="Recovery: read by phase and cause how it ended, and whether the policy went on.",
     per_candidate=True,
 )

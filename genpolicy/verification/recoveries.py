@@ -15,7 +15,8 @@ KEYS = ("method", "perturbation", "start", "recovery")
 HANDED_BACK = "handed_back"
 ENDS = {"idle": HANDED_BACK, "ask_human": "person", "stopped": "stopped"}
 """How an entry ended, by the state that it went to; an abort has words of its own."""
-PRIMITIVES = ("retreat", "classical_return")
+NO_PRIMITIVES = ("idle", "hold", "ask_human", "person", "abort", "stopped")
+"""States that move nothing by themselves; every other one is a primitive."""
 COMMANDS = ("accept", "fallback")
 Event = tuple[str, Message]
 
@@ -64,7 +65,7 @@ class _Entry:
         return {
             "phase": self.first["phase"],
             "cause": self.first["cause"],
-            "primitives": " ".join(m["new"] for m in states if m["new"] in PRIMITIVES),
+            "primitives": " ".join(m["new"] for m in states if m["new"] not in NO_PRIMITIVES),
             "failures": (states[-1]["failures"] if states else self.failed) - self.failed,
             "ended": self.ended,
             "resampled_only": self.ended == HANDED_BACK and still,

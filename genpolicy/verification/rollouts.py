@@ -20,21 +20,10 @@ NEVER_ANSWERED = ("deadline", "overrun")
 """How an invocation ends that missed its deadline: that of the whole, or that of a term."""
 
 
-def derived_rollouts(path: Path) -> dict[str, dict[str, Any]]:
-    """Columns of each rollout of a journal file, by session.
-
-    Returns:
-        By session: the columns of `RolloutRow` that follow from events. Times in s, force in N.
-
-    Raises:
-        IntegrityError: No regular file.
-        BadInputError: Not a whole journal, or an event that cannot be read.
-    """
-    return derived_with_recoveries(path)[0]
-
-
 def derived_with_recoveries(path: Path) -> tuple[dict[str, dict[str, Any]], list[dict[str, Any]]]:
-    """The same, and the rows of `recoveries.parquet`, which name no training seed.
+    """Columns of each rollout of a journal file by session, and rows of `recoveries.parquet`.
+
+    Neither names a training seed. Times in s, force in N.
 
     Raises:
         IntegrityError: No regular file.

@@ -81,7 +81,6 @@ PLAIN = {
 WORDS = {
     ("gates/reproducibility/gate.py", "align"): "a verb, of configurations",
     ("gates/diagnosis/checkpoints.py", "retreat"): "a primitive of recovery, not a phase",
-    ("gates/stress/safety.py", "retreat"): "a primitive of recovery, not a phase",
     ("genpolicy/audit/semantics/calibration.py", "release"): "the pose of reference is by "
     "definition that of what something is released into, in any task",
     ("genpolicy/data/formats/sampling.py", "grasp"): "a word by which columns are recognised",

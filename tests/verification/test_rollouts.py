@@ -5,7 +5,7 @@ import pytest
 from genpolicy.evidence.shadow.rig import EXECUTION
 from genpolicy.execution.journal import Journal, write_journal
 from genpolicy.execution.recovery import Recovery
-from genpolicy.verification.rollouts import derived_rollouts
+from genpolicy.verification.rollouts import derived_with_recoveries
 
 
 @pytest.mark.parametrize("stopped", [False, True])
@@ -21,5 +21,5 @@ def test_a_recovery_was_attempted_where_one_began_and_not_where_it_only_stopped(
     if stopped:
         recovery.stop(2.0, "force")
     write_journal(tmp_path / "journal.mcap", [journal])
-    (columns,) = derived_rollouts(tmp_path / "journal.mcap").values()
+    (columns,) = derived_with_recoveries(tmp_path / "journal.mcap")[0].values()
     assert columns["recovery_attempted"] == (recovery.attempts > 0) == begun

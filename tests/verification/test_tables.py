@@ -6,7 +6,7 @@ import pytest
 from genpolicy.contract.chunk import DiscardReason
 from genpolicy.evidence.shadow.rig import Rig
 from genpolicy.execution.journal import write_journal
-from genpolicy.verification.rollouts import derived_rollouts
+from genpolicy.verification.rollouts import derived_with_recoveries
 from genpolicy.verification.tables import AGE_LEVELS, KEYS, derived_tables
 
 
@@ -92,7 +92,10 @@ def test_invocations_are_numbered_in_the_order_in_which_they_began(tables):
 
 def test_a_rollout_s_latency_counts_every_check(sessions, tmp_path):
     write_journal(tmp_path / "journal.mcap", [rig.journal for rig in sessions])
-    found = [row["latency_p95_s"] for row in derived_rollouts(tmp_path / "journal.mcap").values()]
+    found = [
+        row["latency_p95_s"]
+        for row in derived_with_recoveries(tmp_path / "journal.mcap")[0].values()
+    ]
     assert found == [0.52, 1.03]
 
 

@@ -15,7 +15,7 @@ from genpolicy.evidence.stress.state import Outcome
 from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.verification.checker import check_messages
 from genpolicy.verification.owed import Times, stated_otherwise
-from genpolicy.verification.rollouts import derived_rollouts
+from genpolicy.verification.rollouts import derived_with_recoveries
 from genpolicy.verification.tables import derived_tables
 
 DEADLINE_NS, PERIOD_NS = 150_000_000, 50_000_000
@@ -78,7 +78,7 @@ def test_it_is_a_missed_deadline_with_its_kind_beside_it(play, kit, tmp_path):
     assert kit.check([rollout], tmp_path).violations == []
     assert rollout.executor.conservation().error == 0
     path = tmp_path / "journal.mcap"
-    (derived,) = derived_rollouts(path).values()
+    (derived,) = derived_with_recoveries(path)[0].values()
     assert derived["deadline_misses"] == 3
     counted = {row["fault"]: row["count"] for row in derived_tables([path])["faults"]}
     assert counted == {"late": 2, "shape": 1}

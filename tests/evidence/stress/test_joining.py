@@ -10,7 +10,7 @@ from genpolicy.candidates.joining import BLENDS, JoiningSettings
 from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.execution.journal import write_journal
 from genpolicy.verification.checker import check_messages
-from genpolicy.verification.rollouts import derived_rollouts
+from genpolicy.verification.rollouts import derived_with_recoveries
 from genpolicy.verification.spliced import Spliced
 from genpolicy.verification.tables import derived_tables
 
@@ -90,7 +90,7 @@ def test_every_rule_is_proved_from_its_journal(played, kit, tmp_path, rule):
     rollout = played(rule)
     report = kit.check([rollout], tmp_path, execution=settings(kit))
     assert report.violations == [] and report.reproved_actions > 10
-    (columns,) = derived_rollouts(tmp_path / "journal.mcap").values()
+    (columns,) = derived_with_recoveries(tmp_path / "journal.mcap")[0].values()
     assert columns["rejections"] == rollout.tally.rejections
     entered = of_kind(rollout, "enqueue")
     assert [splice.parents > 0 for splice in rollout.splices] == [

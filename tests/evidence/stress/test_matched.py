@@ -23,7 +23,7 @@ from genpolicy.seeds import stream
 from genpolicy.tasks.api import WorldSettings
 from genpolicy.verification.checker import check_journal
 from genpolicy.verification.commands import reach_of
-from genpolicy.verification.rollouts import derived_rollouts, differences
+from genpolicy.verification.rollouts import derived_with_recoveries, differences
 
 METHODS = {
     "chunked_bc": SamplerConfig(name="direct"),
@@ -165,7 +165,7 @@ def test_every_row_follows_from_its_journal(shard, kit, seconds):
     """Answered in time, answered late and rejected, never answered: recoveries among them."""
     plan = shard(latency=kit.latency(seconds))
     result = run_shard(plan)
-    derived = derived_rollouts(plan.journal)
+    derived = derived_with_recoveries(plan.journal)[0]
     assert len(derived) == len(result.rollouts)
     for row in result.rollouts:
         columns = derived[f"flow/nominal/{row.start}"]
@@ -177,7 +177,7 @@ def test_every_row_follows_from_its_journal(shard, kit, seconds):
 def test_a_row_that_was_changed_is_told_from_its_journal(shard, column):
     plan = shard()
     row = asdict(run_shard(plan).rollouts[0])
-    columns = derived_rollouts(plan.journal)["flow/nominal/0"]
+    columns = derived_with_recoveries(plan.journal)[0]["flow/nominal/0"]
     row[column] = {"success": True, "outcome": "success", "mode": "other"}.get(column, 123)
     assert differences(row, columns) == [column]
 

@@ -20,7 +20,7 @@ from genpolicy.execution.journal import write_journal
 from genpolicy.feasibility.checks import CHECKS as LAYER_CHECKS
 from genpolicy.seeds import stream
 from genpolicy.verification.checker import check_messages
-from genpolicy.verification.rollouts import derived_rollouts
+from genpolicy.verification.rollouts import derived_with_recoveries
 
 
 def of_kind(rollout, kind):
@@ -165,7 +165,7 @@ def test_wherever_it_ends_row_and_journal_count_alike(run, kit, plans, tmp_path,
         )  # fmt: skip
         path = tmp_path / f"{ticks}.mcap"
         write_journal(path, [rollout.journal])
-        (derived,) = derived_rollouts(path).values()
+        (derived,) = derived_with_recoveries(path)[0].values()
         tally = rollout.tally
         assert derived["rejections"] == tally.rejections, ticks
         assert derived["deadline_misses"] == tally.deadline_misses

@@ -20,7 +20,7 @@ from genpolicy.evidence.stress.state import Outcome
 from genpolicy.execution.cell import ExecutionSettings
 from genpolicy.execution.journal import write_journal
 from genpolicy.verification.owed import Times, stated_otherwise
-from genpolicy.verification.rollouts import derived_rollouts
+from genpolicy.verification.rollouts import derived_with_recoveries
 from genpolicy.verification.tables import derived_tables
 
 PERIOD_S = 0.05
@@ -68,7 +68,7 @@ def play(run, kit, plans, tmp_path):
         assert report.violations == [] and rollout.executor.conservation().error == 0
         path = tmp_path / "journal.mcap"
         assert list(stated_otherwise(path, times(model, rows))) == []
-        (derived,) = derived_rollouts(path).values()
+        (derived,) = derived_with_recoveries(path)[0].values()
         assert derived["deadline_misses"] == rollout.tally.deadline_misses
         counted = {
             (row["term"], row["action"]): row["count"]
