@@ -35,7 +35,7 @@ RUNGS: dict[Gate, tuple[str, ...]] = {
     ),
     "B": ("candidates", "train_generators", "reload", "latency"),
     "C": ("shadow",),
-    "D": ("wall_clock", "stress", "monitors"),
+    "D": ("wall_clock", "stress"),
     "E": ("card",),
 }  # fmt: skip
 """Evidence stages between a gate and the one below it."""

@@ -59,7 +59,6 @@ STAGE_REQUIRES: dict[str, Gate | None] = {
     "gate_c": None,
     "wall_clock": "C",
     "stress": "C",
-    "monitors": "C",
     "gate_d": None,
     "card": "D",
     "gate_e": None,

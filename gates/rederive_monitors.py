@@ -11,8 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from gates.rederive_shadow import TaskSection
+from gates.settings import PARAMS_FILE, section_of
 from gates.stated import compare_keys, compare_rows, root_seed, section, training_seed
 from gates.stress.monitors import ALARMS, MONITORS, THRESHOLDS
+from genpolicy.contract.settings import parse_settings
 from genpolicy.evidence.documents.shadow import CHECKER
 from genpolicy.evidence.monitors.alarms import alarm_rows, threshold_rows
 from genpolicy.evidence.monitors.plan import start_hashes
@@ -30,6 +32,7 @@ from genpolicy.verification.motion import ExpectedMotion
 from genpolicy.verification.rollouts import derived_rollouts
 
 SCORES = "scores.parquet"
+WHERE = f"{PARAMS_FILE}: stress.monitors"
 PHASE = ("method", "monitor", "phase")
 OF_A_ROLLOUT = ("method", "monitor", "family", "severity", "start", "phase")
 ROLLOUT = ("method", "perturbation", "start")
@@ -54,7 +57,9 @@ def rederive_monitors(
     folder = root / MONITORS
     if not folder.is_dir():
         return
-    settings = section(params, "monitors", MonitorsSettings)
+    settings = parse_settings(
+        MonitorsSettings, section_of(params, "stress").get("monitors", {}), where=WHERE
+    )
     task = load_task(section(params, "task", TaskSection).name)
     rollouts = read_rows(folder / "rollouts.parquet", RolloutRow)
     scores = read_rows(folder / "scores.parquet", MonitorScoreRow)

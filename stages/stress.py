@@ -1,4 +1,7 @@
-"""Stage `stress`: all methods on identical starts, deadlines and perturbations, in simulation."""
+"""Stage `stress`: all methods on identical starts, deadlines and perturbations, in simulation.
+
+Those that were admitted then run under probes, for the monitors (`_monitors`).
+"""
 
 from pathlib import Path
 
@@ -27,12 +30,13 @@ from genpolicy.integrity.rows import read_columns, write_rows
 from genpolicy.policies.matched_training import PolicySettings
 from genpolicy.tasks.api import load_task
 from stages._contracts import require_one_contract
+from stages._monitors import watch
 from stages._stage import ARTIFACTS, Params, main
 from stages._training import MethodsSection
 
 
 def work(params: Params) -> None:
-    """Admit through gate C, then run every method under every perturbation."""
+    """Admit through gate C, then run every method under every perturbation, then the probes."""
     admitted = admit("stress", Path.cwd()).candidates
     require_one_contract("train_baselines", "train_generators", dataset=False)
     section = params.section("stress", StressSettings)
@@ -64,13 +68,14 @@ def work(params: Params) -> None:
     # Alpha is shared between all that were registered, not between those that came this far.
     trained = params.section("train_generators", MethodsSection).samplers
     registered = len(trained) + len(brought)
+    latency = latency_models(table, timing.declared_terms)
     power = power_document(section, candidates=registered, root_seed=params.seed)
     with output_folder(ARTIFACTS / "stress") as folder:
         shards = plan_shards(
             comparison,
             judged,
             section.conditions,
-            latency=latency_models(table, timing.declared_terms),
+            latency=latency,
             journals=folder / "journals",
         )
         write_stress(
@@ -79,6 +84,7 @@ def work(params: Params) -> None:
         POWER.write(folder, power)
         if graded := section.severity_rows:
             write_rows(folder / SEVERITIES, SeverityRow, graded)
+    watch(params, comparison, [one for one in judged if one.name in admitted], latency)
 
 
 if __name__ == "__main__":

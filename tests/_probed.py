@@ -1,4 +1,4 @@
-"""Short rollouts of a barely trained flow under probes, as the stage `monitors` writes them."""
+"""Short rollouts of a barely trained flow under probes, as the stage `stress` writes them."""
 
 import shutil
 from types import SimpleNamespace

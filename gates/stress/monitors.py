@@ -32,7 +32,7 @@ NO_AUTHORITY = (
     "No monitor has authority: scores are computed from journals after a rollout is over, and no "
     "stop, hold or call for a person in this ladder hangs on one."
 )
-UNWATCHED = "no monitor was looked at: no probe was run (`monitors` in params.yaml)"
+UNWATCHED = "no monitor was looked at: no probe was run (`stress.monitors` in params.yaml)"
 Interval = tuple[float, float, float]
 """Share, lower and upper end; NaN, 0 and 1 where there was no case."""
 

@@ -40,7 +40,7 @@ LIMIT_CHANGER = re.compile(
 
 
 MONITORS = "genpolicy.monitors"
-WATCHES = ("genpolicy/monitors/", "genpolicy/evidence/monitors/", "gates/", "stages/monitors.py")
+WATCHES = ("genpolicy/monitors/", "genpolicy/evidence/monitors/", "gates/", "stages/_monitors.py")
 """Who may know of monitors: what scores journals, and what reports it."""
 DECIDES = (
     "genpolicy.execution.executor", "genpolicy.execution.recovery", "genpolicy.execution.stub",

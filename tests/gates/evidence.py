@@ -217,6 +217,7 @@ PARAMS: dict[str, Any] = {
     "train_generators": {"samplers": {name: {} for name in CANDIDATES}},
     "candidates": {},
     "stress": {
+        "monitors": watched.SECTION,
         "starts": STARTS,
         "baselines": list(COMPARED),
         "perturbations": {name: {} for name in CONDITIONS},
@@ -300,7 +301,6 @@ PARAMS: dict[str, Any] = {
             mutants_undetected=(0, "safety"),
         ),
     },
-    "monitors": watched.SECTION,
     "gate_d": {
         "monitor_costs": by_owner(
             missed_failure=(10.0, "safety"),

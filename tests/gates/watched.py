@@ -1,4 +1,4 @@
-"""Evidence of the stage `monitors`: a support that sees probes, a clock that sees long failures.
+"""Evidence of the monitors: a support that sees probes, a clock that sees long failures.
 
 Thresholds and alarms are computed from these scores as the stage computes them; what the scores
 mean is planned here: 12 successes set thresholds, 6 of 8 judged episodes succeed, two families.

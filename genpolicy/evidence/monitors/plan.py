@@ -96,10 +96,10 @@ def _shards(
 ) -> list[Shard]:
     if comparison.joining.rule == REAL_TIME:
         raise ConfigError(
-            where="params.yaml: monitors",
+            where="params.yaml: stress.monitors",
             found=f"probes, and stress.joining: {REAL_TIME}",
             expected="a rule under which what an invocation draws hangs on what it sees alone",
-            action="Leave out the probes (`monitors: {}`), or choose another rule.",
+            action="Leave out the probes (`stress.monitors: {}`), or choose another rule.",
         )
     drawn = {
         kind: starts_of(task, kind, root_seed=comparison.root_seed, count=count)

@@ -87,7 +87,7 @@ def scorings(
 
     Args:
         shards: Rollouts that were run.
-        settings: Section `monitors`.
+        settings: `stress.monitors`.
         artifacts: Folder of the stages' outputs.
         other_seeds: Training seeds beside the one that is judged.
 
@@ -222,7 +222,7 @@ def _require_same(scoring: Scoring, one: _Seen, chunks: Array) -> None:
             where=f"{scoring.judged.name}: {one.condition}, start {one.start}",
             found=f"another chunk than was drawn by invocation {one.number}",
             expected="the same from the same observations and noise",
-            action="Run `dvc repro monitors` on one machine.",
+            action="Run `dvc repro stress` on one machine.",
         )
 
 

@@ -1,4 +1,4 @@
-"""Section `monitors`: which probes are run, and what the monitors are asked."""
+"""`stress.monitors`: which probes are run, and what the monitors are asked."""
 
 import math
 from typing import Annotated, Literal
@@ -37,7 +37,7 @@ class ProbeFamily(Settings):
 
 
 class MonitorsSettings(Settings):
-    """Section `monitors`; without monitors or without probes nothing is run.
+    """`stress.monitors`; without monitors or without probes nothing is run.
 
     Attributes:
         kinds: Monitors beside the two controls, by name.

@@ -1,4 +1,4 @@
-"""Section `monitors`: conditions by name, and what is refused."""
+"""`stress.monitors`: conditions by name, and what is refused."""
 
 import pytest
 from pydantic import ValidationError
