@@ -29,7 +29,7 @@ from genpolicy.verification.checker import check_journal
 from genpolicy.verification.expected import ExpectedSettings
 from genpolicy.verification.journal_source import readable
 from genpolicy.verification.motion import ExpectedMotion
-from genpolicy.verification.rollouts import derived_rollouts
+from genpolicy.verification.rollouts import derived_with_recoveries
 
 SCORES = "scores.parquet"
 WHERE = f"{PARAMS_FILE}: stress.monitors"
@@ -71,7 +71,7 @@ def rederive_monitors(
         compare_rows("D", path, keys, stated, derived, seed=None, origin=SCORES)
     journals = sorted(folder.glob("journals/*.mcap"))
     with readable(f"{MONITORS}/journals"):
-        ended = [row for path in journals for row in derived_rollouts(path).values()]
+        ended = [row for path in journals for row in derived_with_recoveries(path)[0].values()]
     path = f"{MONITORS}/rollouts.parquet"
     rows = read_table(root / path).to_pylist()
     compare_rows("D", path, ROLLOUT, rows, ended, seed=training_seed(params))

@@ -40,7 +40,7 @@ NUMBERS = {
     "ticks": 100, "action_ticks": 90, "hold_ticks": 10, "fallback_ticks": 0, "deadline_misses": 0,
     "discards": 0, "rejections": 0, "rejected_by": "", "interventions": 0,
     "action_age_p50_s": 0.1, "action_age_p95_s": 0.2, "action_age_max_s": 0.3,
-    "latency_p95_s": 0.05, "force_peak_n": 3.0, "mode": "left",
+    "latency_p95_s": 0.05, "force_peak_n": 3.0, "mode": "left", "person_s": 0.0,
 }  # fmt: skip
 
 

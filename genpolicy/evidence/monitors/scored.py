@@ -112,7 +112,7 @@ def scorings(
 def _others(judged: Contender, artifacts: Path, seeds: Sequence[int]) -> tuple[JudgedPolicy, ...]:
     if not isinstance(judged, JudgedPolicy):
         return ()
-    return tuple(trained(artifacts / GENERATORS, [judged.name], seeds=seeds))
+    return tuple(trained(artifacts / GENERATORS, [judged.name], seeds=seeds, device=judged.device))
 
 
 def score_method(scoring: Scoring) -> Scored:

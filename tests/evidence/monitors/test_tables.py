@@ -16,7 +16,7 @@ from genpolicy.evidence.rows.monitors import (
 from genpolicy.evidence.rows.stress import RolloutRow
 from genpolicy.evidence.stress.matched import run_shard
 from genpolicy.integrity.rows import read_rows
-from genpolicy.verification.rollouts import derived_rollouts, differences
+from genpolicy.verification.rollouts import derived_with_recoveries, differences
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +64,7 @@ def test_rows_are_what_journals_say_and_the_checker_finds_nothing(written):
         for row in read_rows(written / "rollouts.parquet", RolloutRow)
     }
     for path in sorted((written / "journals").glob("*.mcap")):
-        for derived in derived_rollouts(path).values():
+        for derived in derived_with_recoveries(path)[0].values():
             row = rows.pop((derived["perturbation"], derived["start"]))
             assert differences(row, derived) == []
     assert not rows
