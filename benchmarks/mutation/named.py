@@ -45,6 +45,7 @@ JUDGE, TRIAL, ROLLOUTS = "gates/card/judge.py", "gates/stress/trial.py", "gates/
 BOUNDS, VERDICTS = "gates/bounds.py", "gates/verdicts.py"
 PAPERS = "gates/card/papers.py"
 STUB, QUEUE = "genpolicy/execution/stub.py", "genpolicy/execution/chunk_queue.py"
+CHECKS = "genpolicy/execution/checks.py"
 ARRIVAL, EXECUTOR = "genpolicy/execution/arrival.py", "genpolicy/execution/executor.py"
 NAMED = (
     Named("the reviewer may be an author", PEOPLE, "if reviewer in authors:", "if False:"),
@@ -122,8 +123,8 @@ NAMED = (
     Named("counts are rounded down", BOUNDS,
           "math.floor(product) if favourable else math.ceil(product)", "math.floor(product)"),
     Named("rows are counted for clusters", BOUNDS,
-          "trials = len(set(np.asarray(clusters).tolist()))\n    product",
-          "trials = len(hits)\n    product"),
+          "trials = len(set(np.asarray(clusters).tolist()))\n    return",
+          "trials = len(hits)\n    return"),
     Named("no criterion at all is PASS", VERDICTS,
           'max(verdicts, key=SEVERITY.__getitem__, default="INCONCLUSIVE")',
           'max(verdicts, key=SEVERITY.__getitem__, default="PASS")'),
@@ -147,9 +148,8 @@ NAMED = (
           ""),
     Named("the stub forgets how the queue stopped", STUB,
           "return replace(view, stopped=self.supervisor.stopped)", "return view"),
-    Named("a full queue takes one more", QUEUE,
-          "while len(self._chunks) >= self._capacity:",
-          "while len(self._chunks) > self._capacity:"),
+    Named("a full queue takes one more", CHECKS,
+          "lambda m: m.waiting < m.capacity", "lambda m: m.waiting <= m.capacity"),
     Named("an older chunk stays beside a newer one", QUEUE,
           "            self._trim(now_ns, old, view, newer_start_ns=about.times.start_ns)\n", ""),
     Named("a broken chain goes on", QUEUE, "and not keeps_chain:", "and False:"),

@@ -54,6 +54,9 @@ MADE = {
     ("gates/reproducibility/matching.py", "total"): "the same",
     ("gates/pages/plots_density.py", "gain"): "made in `gates.reproducibility.densities`",
     ("gates/pages/plots_density.py", "share"): "the same",
+    ("gates/pages/tables_survival.py", "broken"): "a place of the table: no frame, sums by place",
+    ("gates/pages/tables_survival.py", "held"): "the same",
+    ("gates/pages/tables_survival.py", "way"): "the same",
 }
 # Methods of a frame that take names of columns, and functions that take one after the frame.
 METHODS = {"groupby", "sort_values", "drop_duplicates", "set_index", "pivot", "dropna"}

@@ -85,6 +85,7 @@ WORDS = {
     "definition that of what something is released into, in any task",
     ("genpolicy/data/formats/sampling.py", "grasp"): "a word by which columns are recognised",
     ("genpolicy/data/formats/units.py", "grasp"): "the same",
+    ("gates/asked_for.py", "release"): "a corrupted fixture: a gripper that opens early",
     ("genpolicy/evidence/shadow/corruption.py", "release"): "a gripper that opens early",
     ("genpolicy/evidence/shadow/corruption.py", "approach"): "name of a check of contact",
     ("genpolicy/evidence/shadow/at_the_margin.py", "approach"): "the same",

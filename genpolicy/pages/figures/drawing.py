@@ -19,7 +19,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 BLUE, ORANGE, GREEN = "#0072B2", "#E69F00", "#009E73"
 RED, PURPLE, SKY, GREY, INK = "#D55E00", "#CC79A7", "#56B4E9", "#8A8F98", "#1F2430"
-BROWN, OLIVE, TEAL = "#7A5C3E", "#7F8C1F", "#2A9D9D"
+TEAL = "#2A9D9D"
 PALETTE = (BLUE, ORANGE, GREEN, PURPLE, SKY, RED, GREY, INK)
 DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (2, 1.2)), (0, (6, 1.5, 1, 1.5)))
 HATCHES = ("", "//", "..", "xx", "\\\\", "++", "--", "oo")
