@@ -26,6 +26,7 @@ from gates.report import (
     read_report,
     report_path,
     stage_of,
+    writer_of,
 )
 from gates.reproducibility import gate as reproducibility
 from gates.stress import gate as stress
@@ -275,7 +276,7 @@ def _check_materials(root: Path, gate: Gate, report: GateReport) -> None:
         except IntegrityError as error:
             found = error.found
         if found != expected:
-            stage = Path(name).parts[1] if len(Path(name).parts) > 2 else stage_of(gate)
+            stage = writer_of(name) if len(Path(name).parts) > 2 else stage_of(gate)
             raise _refused(
                 gate,
                 f"sha256 of {name}",
@@ -285,8 +286,7 @@ def _check_materials(root: Path, gate: Gate, report: GateReport) -> None:
             )
     for name in outputs_of(root, gate):
         if name not in report.materials:
-            stage = Path(name).parts[1]
-            action = f"Run `dvc repro {stage}` and judge again, or remove it."
+            action = f"Run `dvc repro {writer_of(name)}` and judge again, or remove it."
             raise _refused(gate, name, "a file that nobody judged", "in the report", action)
 
 

@@ -21,7 +21,7 @@ GATE_OF_STAGE = {
          "train_factors", "measure_factors", "gate_a"), "A"),
     **dict.fromkeys(("candidates", "train_generators", "reload", "latency", "gate_b"), "B"),
     **dict.fromkeys(("shadow", "gate_c"), "C"),
-    **dict.fromkeys(("wall_clock", "stress", "monitors", "gate_d"), "D"),
+    **dict.fromkeys(("wall_clock", "stress", "gate_d"), "D"),
     **dict.fromkeys(("card", "gate_e"), "E"),
 }  # fmt: skip
 LAST = {"small": "E", "brought": "A", "signed": "E"}
@@ -31,8 +31,10 @@ PROOF = ("verify", "report")
 _PROOF = {"signed": ("gates", "check", "--through", "E")}
 """Synthetic evidence has no journals from which it could be derived again."""
 REFUSES = re.compile(r"Gate (?P<gate>[A-E]) refuses: (?P<what>.*)")
-OUTPUT = re.compile(r"^artifacts/(?P<stage>\w+)/")
+OUTPUT = re.compile(r"^artifacts/(?P<folder>\w+)/")
 """Begins the refusal of a file in a stage's folder, which comes before any stage."""
+BESIDE = {"monitors": "stress"}
+"""Folders that have not the name of the stage that writes them."""
 REFUSED_CRITERION = re.compile(r"^[a-z_0-9]+(\([a-z_0-9]+\))? is ")
 WAITING = "PENDING_REVIEW"
 
@@ -254,7 +256,8 @@ def refused_by(stage: str, sentence: str) -> Stop | None:
     refused = REFUSES.search(sentence)
     if refused is None:
         output = OUTPUT.match(sentence)
-        stage = output["stage"] if output and not stage else stage
+        if output and not stage:
+            stage = BESIDE.get(output["folder"], output["folder"])
         return Stop(GATE_OF_STAGE.get(stage, "A"), "refusal", sentence or "dvc itself")
     if REFUSED_CRITERION.match(refused["what"]) and not refused["what"].startswith("report"):
         return None

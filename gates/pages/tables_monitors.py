@@ -8,7 +8,17 @@ from gates.evidence import Evidence, MissingEvidenceError, flags
 from gates.pages.bound import require_bound
 from gates.pages.figures import Folded, Listing, Table, in_order
 from gates.report import GateReport, parse_section, report_path
-from gates.stress.monitors import ALARMS, MONITORS, THRESHOLDS, by_rollout, felt, share, watched_of
+from gates.stress.monitors import (
+    ALARMS,
+    MONITORS,
+    THRESHOLDS,
+    UNWATCHED,
+    by_rollout,
+    felt,
+    share,
+    unwatched,
+    watched_of,
+)
 from gates.stress.rollouts import StressSettings
 from genpolicy.evidence.rows.monitors import MonitorAlarmRow, MonitorUnavailableRow
 
@@ -21,6 +31,8 @@ HEADS = (
 
 def _listed(evidence: Evidence, report: GateReport) -> Table:
     settings = _settings(evidence, report)
+    if unwatched(evidence):
+        return (HEADS, *((name, UNWATCHED, *[""] * 7) for name in report.candidates))
     lines: list[tuple[str, ...]] = []
     for candidate in report.candidates:
         try:
@@ -109,7 +121,7 @@ def _costs(evidence: Evidence, report: GateReport) -> Table:
 def _alarms(evidence: Evidence, report: GateReport) -> pd.DataFrame | None:
     """Rows of all methods in their order; None where no probe was run."""
     require_bound(evidence, report, ALARMS)
-    if not evidence.records(ALARMS, MonitorAlarmRow):
+    if unwatched(evidence):
         return None
     rows = evidence.rows(ALARMS, MonitorAlarmRow)
     order = {name: place for place, name in enumerate(in_order(rows["method"]))}

@@ -18,9 +18,9 @@ from gates.bounds import share_interval
 from gates.engine import Judged
 from gates.evidence import Evidence, MissingEvidenceError, flags, numbers
 from gates.stress.rollouts import StressSettings
-from genpolicy.errors import GenpolicyError
+from genpolicy.errors import GenpolicyError, IntegrityError
 from genpolicy.evidence.rows.monitors import MonitorAlarmRow, MonitorThresholdRow
-from genpolicy.monitors.names import CONTROLS, TIME
+from genpolicy.monitors.names import CONTROLS, TIME, VARIANCE
 
 MONITORS = "artifacts/monitors"
 ALARMS, THRESHOLDS = f"{MONITORS}/alarms.parquet", f"{MONITORS}/thresholds.parquet"
@@ -33,6 +33,8 @@ NO_AUTHORITY = (
     "stop, hold or call for a person in this ladder hangs on one."
 )
 UNWATCHED = "no monitor was looked at: no probe was run (`stress.monitors` in params.yaml)"
+IN_WORDS = {TIME: "the clock", VARIANCE: "the spread of the draws"}
+BLIND = "no monitor could watch it; why stands with the table of monitors"
 Interval = tuple[float, float, float]
 """Share, lower and upper end; NaN, 0 and 1 where there was no case."""
 
@@ -84,6 +86,11 @@ class Candidate:
     watched: tuple[Watched, ...]
     quiet_cost: float | None = None
     loud_cost: float | None = None
+
+    @property
+    def controls(self) -> tuple[str, ...]:
+        """The controls that were there, in words: who draws one chunk at a time has no spread."""
+        return tuple(IN_WORDS[one.monitor] for one in self.watched if one.is_control)
 
     @property
     def better_than_controls(self) -> tuple[str, ...]:
@@ -164,24 +171,40 @@ def monitors_said(judged: Judged) -> list[str]:
     said = [NO_AUTHORITY]
     for candidate in judged.candidates:
         try:
-            found = watched_of(judged.evidence, judged.settings, candidate)
-        except (MissingEvidenceError, GenpolicyError):
-            said.append(f"{candidate}: {UNWATCHED}.")
+            nothing = unwatched(judged.evidence)
+            found = None if nothing else watched_of(judged.evidence, judged.settings, candidate)
+        except IntegrityError:  # other bytes than were written are no gap in what is known
+            raise
+        except (MissingEvidenceError, GenpolicyError) as error:
+            said.append(f"{candidate}: no monitor was looked at: {error}.")
             continue
-        said.append(f"{candidate}: {_sentence(found)}.")
+        said.append(f"{candidate}: {UNWATCHED if found is None else _sentence(found)}.")
     return said
+
+
+def unwatched(evidence: Evidence) -> bool:
+    """Whether no probe was run: the table lies there and has no rows.
+
+    Raises:
+        MissingEvidenceError: There is no such table.
+    """
+    return not evidence.records(ALARMS, MonitorAlarmRow)
 
 
 def _sentence(found: Candidate) -> str:
     own = [one for one in found.watched if not one.is_control]
+    if not own:
+        return BLIND
     best = max(own, key=lambda one: -1.0 if math.isnan(one.coverage[0]) else one.coverage[0])
     if not best.failures:
         return "no probe made it fail, so that what a monitor would miss was not seen"
     clock = next(one for one in found.watched if one.monitor == TIME)
-    better = found.better_than_controls
-    shown = f"covers more than both controls: {', '.join(better)}" if better else (
-        "no monitor is shown to cover more than the clock and the spread of the draws"
-    )  # fmt: skip
+    better, controls = found.better_than_controls, " and ".join(found.controls)
+    shown = (
+        f"covers more than {controls}: {', '.join(better)}"
+        if better
+        else f"no monitor is shown to cover more than {controls}"
+    )
     return (
         f"of {best.failures} failures under probes, {best.monitor} had an alarm before a share of "
         f"{best.coverage[0]:.2g} ({best.coverage[1]:.2g} to {best.coverage[2]:.2g}), more than any "

@@ -19,6 +19,7 @@ from gates.cause import default_limits
 from gates.cause.limits import OWN
 from gates.feasibility.settings import LAYERS
 from gates.preregistration import PREREGISTRATION, plan_bytes
+from gates.report import folders_of
 from gates.reproducibility.timing import MEASURED_HERE, TERMS
 from genpolicy.audit.component_rows import ComponentModes, Tremor
 from genpolicy.audit.reach_rows import Alternative, FindingDraw, Reach, Side, StructureDraw
@@ -493,7 +494,7 @@ def record(root: Path) -> None:
     stages, runs = {}, {}
     for gate, names in pipeline.RUNGS.items():
         for name in names:
-            outs = [out for out in (f"artifacts/{name}",) if (root / out).is_dir()]
+            outs = [out for out in folders_of(name) if (root / out).is_dir()]
             keys = [name] if isinstance(params, dict) and name in params else []
             stages[name] = {"cmd": name, "deps": [CODE], "params": keys, "outs": outs}
             runs[name] = {

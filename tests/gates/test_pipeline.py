@@ -40,7 +40,13 @@ def test_every_file_of_every_evidence_stage_is_bound(ladder):
     bound = set()
     for gate in "ABCDE":
         bound |= set(judge(ladder, gate).materials)
-    folders = [f"artifacts/{stage}" for stages in pipeline.RUNGS.values() for stage in stages]
+    stages = [stage for names in pipeline.RUNGS.values() for stage in names]
+    folders = [*(f"artifacts/{stage}" for stage in stages), "artifacts/monitors"]
+    assert set(folders) == {
+        path.relative_to(ladder).as_posix()
+        for path in (ladder / "artifacts").iterdir()
+        if path.is_dir() and not path.name.startswith("gate_")
+    } | {"artifacts/record"}
     lying = {
         path.relative_to(ladder).as_posix()
         for folder in folders
@@ -48,6 +54,28 @@ def test_every_file_of_every_evidence_stage_is_bound(ladder):
         if path.is_file()
     }
     assert lying and lying <= bound
+
+
+def test_what_stress_writes_beside_its_folder_is_bound_and_its_own(ladder):
+    """The probes' scores, rollouts, journals: the report names each, and nobody adds one."""
+    own = {
+        path.relative_to(ladder).as_posix()
+        for path in (ladder / "artifacts/monitors").rglob("*")
+        if path.is_file()
+    }
+    assert {f"artifacts/monitors/{name}.parquet" for name in ("scores", "unavailable")} < own
+    assert own <= set(judge(ladder, "D").materials)
+    (ladder / "artifacts/monitors/notes.txt").write_text("all fine")
+    judged = r"monitors/notes\.txt is a file that nobody judged.*Run `dvc repro stress` and judge"
+    with pytest.raises(RefusedError, match=judged):
+        admit("card", ladder)
+    wrote = r"artifacts/monitors is other than recorded.*what `stress` wrote by dvc\.lock"
+    with pytest.raises(IntegrityError, match=wrote):
+        judge(ladder, "D")
+    (ladder / "artifacts/monitors/notes.txt").unlink()
+    (ladder / "artifacts/monitors/scores.parquet").write_bytes(b"other")
+    with pytest.raises(RefusedError, match=r"monitors/scores\.parquet.*Run `dvc repro stress`"):
+        admit("card", ladder)
 
 
 def test_forged_evidence_is_refused_when_it_is_judged(ladder):

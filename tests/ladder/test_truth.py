@@ -97,7 +97,11 @@ def test_a_stop_below_the_named_gate_is_elsewhere() -> None:
 
 def test_a_refusal_before_any_stage_counts_for_the_gate_of_the_folder_that_it_names() -> None:
     said = "is a file that the stage stress did not write, expected nothing else"
-    for place, gate in (("artifacts/stress/journals/extra.mcap", "D"), ("reports/x", "A")):
+    for place, gate in (
+        ("artifacts/stress/journals/extra.mcap", "D"),
+        ("artifacts/monitors/scores.parquet", "D"),
+        ("reports/x", "A"),
+    ):
         stop = refused_by("", f"{place} {said}")
         assert stop and (stop.gate, stop.reason) == (gate, "refusal")
     stop = refused_by("shadow", f"artifacts/stress/journals/extra.mcap {said}")

@@ -4,9 +4,10 @@ import evidence
 import pytest
 
 from gates.evidence import Evidence, MissingEvidenceError
+from gates.pages.figures import draw_all
 from gates.pages.tables_monitors import UNAVAILABLE, WATCHED
 from gates.proof import judge
-from gates.stress.monitors import ALARMS
+from gates.stress.monitors import ALARMS, UNWATCHED
 from genpolicy.evidence.rows.monitors import MonitorAlarmRow, MonitorUnavailableRow
 from genpolicy.integrity.rows import read_rows, write_rows
 
@@ -66,6 +67,25 @@ def test_what_was_not_run_is_said(ladder):
     evidence.record(ladder)
     report = judge(ladder, "D")
     found = Evidence(ladder)
-    lines = WATCHED.read(found, report)[1:]
-    assert all(line[1].startswith("not looked at") for line in lines)
-    assert all(len(item.read(found, report)) >= 1 for item in WATCHED.folded)
+    (shown,) = draw_all([WATCHED], found, report)
+    assert not shown.skipped
+    assert [line[:2] for line in shown.listed[1:]] == [
+        (name, UNWATCHED) for name in report.candidates
+    ]
+    assert all(table for _, table in shown.folded)
+
+
+def test_a_candidate_without_rows_is_said_beside_the_others(ladder):
+    rows = [r for r in read_rows(ladder / ALARMS, MonitorAlarmRow) if r.method == "flow"]
+    write_rows(ladder / ALARMS, MonitorAlarmRow, rows)
+    evidence.record(ladder)
+    lines = WATCHED.read(Evidence(ladder), judge(ladder, "D"))
+    (line,) = [one for one in lines if one[0] == "diffusion"]
+    assert "not looked at" in line[1] and "has no rows of diffusion" in line[1]
+
+
+def test_the_page_shows_the_table_of_a_run(ladder):
+    """What it reads is bound by the report of the run; else the page would say that it is not."""
+    (shown,) = draw_all([WATCHED], Evidence(ladder), judge(ladder, "D"))
+    assert not shown.skipped
+    assert len(shown.listed) > 1 and len(shown.folded) == 4

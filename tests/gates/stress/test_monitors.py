@@ -10,10 +10,20 @@ import watched
 from gates.evidence import Evidence, MissingEvidenceError
 from gates.proof import SPECS, judge
 from gates.settings import read_params, read_settings
-from gates.stress.monitors import ALARMS, NO_AUTHORITY, by_rollout, felt, watched_of
+from gates.stress.monitors import (
+    ALARMS,
+    BLIND,
+    NO_AUTHORITY,
+    UNWATCHED,
+    by_rollout,
+    felt,
+    watched_of,
+)
 from gates.stress.rollouts import StressSettings
+from genpolicy.errors import IntegrityError
 from genpolicy.evidence.rows.monitors import MonitorAlarmRow
 from genpolicy.integrity.rows import read_rows, write_rows
+from genpolicy.monitors.names import TIME, VARIANCE
 
 
 @pytest.fixture
@@ -99,7 +109,40 @@ def test_nothing_run_is_nothing_known(ladder, settings):
         of(ladder, settings)
     evidence.record(ladder)
     caveats = judge(ladder, "D").caveats
-    assert sum("no monitor was looked at" in text for text in caveats) == 2
+    assert sum(text.endswith(f": {UNWATCHED}.") for text in caveats) == 2
+
+
+def test_a_table_without_rows_of_one_candidate_is_not_called_a_run_without_probes(ladder):
+    rows = [row for row in read_rows(ladder / ALARMS, MonitorAlarmRow) if row.method == "flow"]
+    write_rows(ladder / ALARMS, MonitorAlarmRow, rows)
+    evidence.record(ladder)
+    (said,) = [text for text in judge(ladder, "D").caveats if text.startswith("diffusion: no mon")]
+    assert "has no rows of diffusion" in said and UNWATCHED not in said
+
+
+def test_bytes_that_are_no_table_refuse(ladder):
+    (ladder / ALARMS).write_bytes(b"no table")
+    evidence.record(ladder)
+    with pytest.raises(IntegrityError, match="alarms"):
+        judge(ladder, "D")
+
+
+def only(ladder, *monitors):
+    rows = [row for row in read_rows(ladder / ALARMS, MonitorAlarmRow) if row.monitor in monitors]
+    write_rows(ladder / ALARMS, MonitorAlarmRow, rows)
+    evidence.record(ladder)
+    return [text for text in judge(ladder, "D").caveats if text.startswith("flow: ")]
+
+
+def test_where_no_monitor_could_watch_it_is_said(ladder):
+    """One training seed and `seed_disagreement` alone, or weights that are not known here."""
+    assert f"flow: {BLIND}." in only(ladder, TIME, VARIANCE)
+
+
+def test_controls_are_named_that_were_there(ladder):
+    """Who draws one chunk at a time has no spread, and none is spoken of."""
+    (said,) = [text for text in only(ladder, "support", TIME) if "failures under probes" in text]
+    assert said.endswith("no monitor is shown to cover more than the clock.")
 
 
 def test_the_report_says_that_no_monitor_has_authority_and_no_criterion_hangs_on_one(ladder):
