@@ -6,7 +6,12 @@ from dataclasses import replace
 from genpolicy.candidates.contenders import Contender
 from genpolicy.contract.settings import parse_settings
 from genpolicy.evidence.fixtures_again import NO_FIXTURES
-from genpolicy.evidence.monitors.plan import plan_judged, plan_thresholds
+from genpolicy.evidence.monitors.plan import (
+    WHERE,
+    plan_judged,
+    plan_thresholds,
+    require_runnable,
+)
 from genpolicy.evidence.monitors.scored import Scoring, scorings
 from genpolicy.evidence.monitors.settings import MonitorsSettings
 from genpolicy.evidence.monitors.tables import Work, write_monitors, write_unwatched
@@ -19,8 +24,25 @@ from genpolicy.tasks.api import load_task
 from stages._stage import ARTIFACTS, Params
 
 
+def planned(params: Params) -> MonitorsSettings:
+    """What is run under probes; read before the comparison, which takes hours.
+
+    Args:
+        params: The parameters; what is run stands in `stress.monitors`.
+
+    Raises:
+        ConfigError: `stress.monitors` has an unknown key or a wrong value, the task knows no such
+            probe, or probes are asked for under a rule of joining that they cannot be scored under.
+    """
+    stress = params.section("stress", StressSettings)
+    section = parse_settings(MonitorsSettings, stress.monitors, where=WHERE)
+    require_runnable(section, stress.joining, load_task(params.task.name), root_seed=params.seed)
+    return section
+
+
 def watch(
     params: Params,
+    section: MonitorsSettings,
     comparison: Comparison,
     watched: Sequence[Contender],
     latency: Mapping[str, LatencyModel],
@@ -28,20 +50,12 @@ def watch(
     """Run thresholds, freeze them, run what judges them, score all of it.
 
     Args:
-        params: The parameters; what is run stands in `stress.monitors`.
+        params: The parameters.
+        section: What is run.
         comparison: What the rollouts of the comparison share; these have starts of their own.
         watched: Who was admitted.
         latency: Of each of them the time that an answer takes.
-
-    Raises:
-        ConfigError: `stress.monitors` has an unknown key or a wrong value, or probes are asked for
-            under a rule of joining that they cannot be scored under.
     """
-    section = parse_settings(
-        MonitorsSettings,
-        params.section("stress", StressSettings).monitors,
-        where="params.yaml: stress.monitors",
-    )
     if not section.on:
         with output_folder(ARTIFACTS / "monitors") as folder:
             write_unwatched(folder)

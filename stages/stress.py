@@ -30,7 +30,7 @@ from genpolicy.integrity.rows import read_columns, write_rows
 from genpolicy.policies.matched_training import PolicySettings
 from genpolicy.tasks.api import load_task
 from stages._contracts import require_one_contract
-from stages._monitors import watch
+from stages._monitors import planned, watch
 from stages._stage import ARTIFACTS, Params, main
 from stages._training import MethodsSection
 
@@ -40,6 +40,7 @@ def work(params: Params) -> None:
     admitted = admit("stress", Path.cwd()).candidates
     require_one_contract("train_baselines", "train_generators", dataset=False)
     section = params.section("stress", StressSettings)
+    probed = planned(params)
     timing = params.section("latency", LatencySection)
     table = read_columns(ARTIFACTS / "latency" / "latency.parquet", LatencyRow).to_pandas()
     task = load_task(params.task.name)
@@ -84,7 +85,7 @@ def work(params: Params) -> None:
         POWER.write(folder, power)
         if graded := section.severity_rows:
             write_rows(folder / SEVERITIES, SeverityRow, graded)
-    watch(params, comparison, [one for one in judged if one.name in admitted], latency)
+    watch(params, probed, comparison, [one for one in judged if one.name in admitted], latency)
 
 
 if __name__ == "__main__":

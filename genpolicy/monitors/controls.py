@@ -9,6 +9,8 @@ import numpy as np
 from genpolicy.contract.normalisation import MinMax
 from genpolicy.monitors.protocol import Fit, Invocation, Unavailable
 
+ONE_CANDIDATE = Unavailable("an invocation draws one candidate, which has no spread")
+
 
 class TimeInEpisode:
     """The clock."""
@@ -32,10 +34,10 @@ class SampleVariance:
     @classmethod
     def fitted(cls, fit: Fit) -> "SampleVariance | Unavailable":
         """Nothing is learned but the scale of actions."""
-        if fit.policy is not None and not fit.policy.stochastic:
-            return Unavailable(f"{fit.policy.method} always draws the same chunk")
+        if fit.candidates < 2:
+            return ONE_CANDIDATE
         return cls(fit.normalisation.action)
 
     def score(self, invocation: Invocation) -> float:
-        """Mean variance per number of a chunk, normalised units; 0 of one candidate."""
+        """Mean variance per number of a chunk, normalised units."""
         return float(np.var(self._scale.normalise(invocation.chunks), axis=0).mean())

@@ -41,6 +41,7 @@ class Fit:
         action_period_s: Time from one row of a chunk to the next, s.
         policy: The policy that is watched; None where its weights are not known here.
         others: The same method from other training seeds.
+        candidates: How many an invocation draws.
     """
 
     windows: Windows
@@ -48,6 +49,7 @@ class Fit:
     action_period_s: float
     policy: NetworkPolicy | None = None
     others: Sequence[NetworkPolicy] = ()
+    candidates: int = 1
 
 
 @dataclass(frozen=True)

@@ -22,3 +22,5 @@ MONITORS: dict[str, Callable[[Fit], Monitor | Unavailable]] = {
     TIME: TimeInEpisode.fitted,
     VARIANCE: SampleVariance.fitted,
 }
+READ_DRAWS = ("own_loss", "chunk_consistency", "log_density", "seed_disagreement", VARIANCE)
+"""Those whose score hangs on what an invocation drew; the others ask what it saw, and when."""

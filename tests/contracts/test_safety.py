@@ -40,8 +40,15 @@ LIMIT_CHANGER = re.compile(
 
 
 MONITORS = "genpolicy.monitors"
-WATCHES = ("genpolicy/monitors/", "genpolicy/evidence/monitors/", "gates/", "stages/_monitors.py")
-"""Who may know of monitors: what scores journals, and what reports it."""
+WATCHES = ("genpolicy/monitors/", "genpolicy/evidence/monitors/")
+"""What scores journals."""
+REPORTS = {
+    "gates/diagnosis/of_motion.py", "gates/pages/tables_monitors.py", "gates/rederive_monitors.py",
+    "gates/stress/gate.py", "gates/stress/monitors.py", "stages/_monitors.py",
+}  # fmt: skip
+"""Who else may know of monitors: what runs the scoring, proves it, and reports it."""
+JUDGES = tuple(f"gates/stress/{name}.py" for name in ("trial", "cost", "safety", "choice", "gains"))
+"""Criteria of Gate D and its choice, none of which may hang on a monitor, by whatever way."""
 DECIDES = (
     "genpolicy.execution.executor", "genpolicy.execution.recovery", "genpolicy.execution.stub",
     "genpolicy.execution.supervisor", "genpolicy.feasibility", "genpolicy.robot",
@@ -288,7 +295,7 @@ def test_nothing_that_decides_what_a_robot_does_knows_of_a_monitor() -> None:
     Neither the rollouts of gates C and D nor the wall clock import a monitor or what scores
     by one; scores are read from journals that are whole.
     """
-    watched = (MONITORS, "genpolicy.evidence.monitors")
+    watched = (MONITORS, "genpolicy.evidence.monitors", "gates.stress.monitors")
     knowing = {
         path.relative_to(ROOT).as_posix()
         for package in ("genpolicy", "gates", "stages", "flows")
@@ -296,7 +303,42 @@ def test_nothing_that_decides_what_a_robot_does_knows_of_a_monitor() -> None:
         if _reaches(path, watched)
     }
     assert "genpolicy/evidence/monitors/scored.py" in knowing
-    assert sorted(name for name in knowing if not name.startswith(WATCHES)) == []
+    assert {name for name in knowing if not name.startswith(WATCHES)} == REPORTS
+
+
+def _file_of(module: str) -> Path | None:
+    path = ROOT / module.replace(".", "/")
+    found = (path.with_suffix(".py"), path / "__init__.py")
+    return next((file for file in found if file.is_file()), None)
+
+
+def reached(path: Path) -> set[str]:
+    """Modules of the product that a file imports, and those that these import."""
+    known: set[str] = set()
+    ahead = [path]
+    while ahead:
+        for name in _imports(ahead.pop()) - known:
+            file = _file_of(name)
+            if name.split(".")[0] in ("gates", "genpolicy") and file is not None:
+                known.add(name)
+                ahead.append(file)
+    return known
+
+
+@pytest.mark.parametrize("judge", JUDGES)
+def test_no_criterion_of_gate_d_reaches_a_monitor(judge: str) -> None:
+    """What is judged and who is chosen hangs on nothing that a monitor said."""
+    found = reached(ROOT / judge)
+    assert "gates.evidence" in found
+    own = ("genpolicy.monitors", "genpolicy.evidence.monitors", "gates.stress.monitors")
+    assert (
+        sorted(name for name in found if f"{name}.".startswith(tuple(f"{o}." for o in own))) == []
+    )
+
+
+def test_ways_to_a_monitor_are_followed() -> None:
+    found = reached(ROOT / "gates/stress/gate.py")
+    assert {"gates.stress.monitors", "genpolicy.monitors.names"} <= found
 
 
 def test_a_monitor_reaches_nothing_that_decides() -> None:

@@ -101,6 +101,7 @@ def kit(policies, statistics):
             action_period_s=PERIOD_S,
             policy=None if method is None else policies(method, seed),
             others=others,
+            candidates=4,
         )
 
     def invocation(method="flow", *, shift=0.0, time_s=0.1, before=None, name=0, candidates=4):

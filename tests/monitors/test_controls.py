@@ -1,5 +1,7 @@
 """The controls: a clock, and the spread of the draws."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -22,6 +24,8 @@ def test_variance_by_hand(kit):
 
 
 def test_who_draws_the_same_chunk_has_no_variance(kit):
-    found = SampleVariance.fitted(kit.fit("chunked_bc"))
-    assert isinstance(found, Unavailable)
-    assert "always draws the same chunk" in found.why
+    """Whoever it is: of one candidate per invocation there is no variance of 0 either."""
+    for method in ("chunked_bc", "flow", None):
+        found = SampleVariance.fitted(replace(kit.fit(method), candidates=1))
+        assert isinstance(found, Unavailable)
+        assert "one candidate" in found.why

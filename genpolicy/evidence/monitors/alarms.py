@@ -46,6 +46,8 @@ def threshold_rows(
     largest: dict[tuple[str, str, str], dict[Rollout, float]] = defaultdict(dict)
     watched: dict[tuple[str, str], None] = {}
     for row in scores:
+        if row.condition != THRESHOLDS:  # of who scores elsewhere only, nothing is known here
+            continue
         rollout = (row.method, row.condition, row.start)
         watched[row.method, row.monitor] = None
         if rollout in good:

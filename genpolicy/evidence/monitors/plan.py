@@ -9,9 +9,14 @@ from dataclasses import replace
 from pathlib import Path
 
 from genpolicy.candidates.contenders import Contender
-from genpolicy.candidates.joining import REAL_TIME
-from genpolicy.errors import ConfigError
-from genpolicy.evidence.monitors.settings import JUDGED, THRESHOLDS, MonitorsSettings
+from genpolicy.candidates.joining import REAL_TIME, JoiningSettings
+from genpolicy.errors import ConfigError, GenpolicyError
+from genpolicy.evidence.monitors.settings import (
+    JUDGED,
+    THRESHOLDS,
+    MonitorsSettings,
+    condition_of,
+)
 from genpolicy.evidence.stress.latency import LatencyModel
 from genpolicy.evidence.stress.perturbations import Nominal
 from genpolicy.evidence.stress.shard import Comparison, Shard
@@ -20,6 +25,46 @@ from genpolicy.tasks.api import NOMINAL_PROBE, Task, WorldSettings
 
 PROBED = "probed"
 STREAM = "monitors"
+WHERE = "params.yaml: stress.monitors"
+
+
+def require_runnable(
+    settings: MonitorsSettings, joining: JoiningSettings, task: Task, *, root_seed: int
+) -> None:
+    """Refuse probes that cannot be run or scored, before anything else is run for hours.
+
+    Args:
+        settings: `stress.monitors`.
+        joining: The rule of all methods, `stress.joining`.
+        task: Makes a world of each probe.
+        root_seed: `seed`.
+
+    Raises:
+        ConfigError: Chunks join by a rule under which none can be drawn again by itself, or the
+            task knows no such probe.
+    """
+    if not settings.on:
+        return
+    if joining.rule == REAL_TIME:
+        raise ConfigError(
+            where=WHERE,
+            found=f"probes, and stress.joining: {REAL_TIME}",
+            expected="a rule under which what an invocation draws hangs on what it sees alone",
+            action="Leave out the probes (`stress.monitors: {}`), or choose another rule.",
+        )
+    (text,) = starts_of(task, PROBED, root_seed=root_seed, count=1)
+    for name, family in settings.probes.items():
+        for severity in family.severities:
+            probe = WorldSettings(task.calibration_epochs[-1], condition_of(name, severity))
+            try:
+                task.make_world(task.start_from_json(text), settings=probe)
+            except GenpolicyError as error:
+                raise ConfigError(
+                    where=f"{WHERE}.probes.{name}",
+                    found=f"refused by the task {task.name} at severity {severity:g}: {error}",
+                    expected="a probe that the task can be run under",
+                    action="Correct or leave out the probe.",
+                ) from error
 
 
 def starts_of(task: Task, kind: str, *, root_seed: int, count: int) -> tuple[str, ...]:
@@ -73,11 +118,7 @@ def plan_judged(
     latency: Mapping[str, LatencyModel],
     journals: Path,
 ) -> list[Shard]:
-    """Other nominal rollouts, then every family and severity; one shard per method and condition.
-
-    Raises:
-        ConfigError: Chunks join by a rule under which none can be drawn again by itself.
-    """
+    """Other nominal rollouts, then every family and severity; a shard per method and condition."""
     conditions = {JUDGED: (NOMINAL_PROBE, JUDGED)}
     conditions |= {name: (name, PROBED) for name in settings.conditions}
     counts = {JUDGED: settings.judged_starts, PROBED: settings.probe_starts}
@@ -94,13 +135,6 @@ def _shards(
     latency: Mapping[str, LatencyModel],
     journals: Path,
 ) -> list[Shard]:
-    if comparison.joining.rule == REAL_TIME:
-        raise ConfigError(
-            where="params.yaml: stress.monitors",
-            found=f"probes, and stress.joining: {REAL_TIME}",
-            expected="a rule under which what an invocation draws hangs on what it sees alone",
-            action="Leave out the probes (`stress.monitors: {}`), or choose another rule.",
-        )
     drawn = {
         kind: starts_of(task, kind, root_seed=comparison.root_seed, count=count)
         for kind, count in counts.items()

@@ -14,13 +14,13 @@ from genpolicy.candidates.contenders import Contender, opened
 from genpolicy.candidates.judged import GENERATORS, JudgedPolicy, candidates_of, trained
 from genpolicy.contract.chunk import actions_sha256, raw_actions
 from genpolicy.data.dataset import load_dataset
-from genpolicy.errors import IntegrityError, NonFiniteError
+from genpolicy.errors import GenpolicyError, IntegrityError
 from genpolicy.evidence.monitors.settings import MonitorsSettings
 from genpolicy.evidence.rows.monitors import MonitorScoreRow, MonitorUnavailableRow
 from genpolicy.evidence.stress.shard import Shard
 from genpolicy.execution.journal import Event, read_journal
 from genpolicy.monitors.protocol import Fit, Invocation, Monitor, Unavailable
-from genpolicy.monitors.registry import MONITORS
+from genpolicy.monitors.registry import MONITORS, READ_DRAWS
 from genpolicy.policies.matched_training import training_windows
 from genpolicy.policies.policy import NetworkPolicy
 from genpolicy.policies.protocol import NoiseName, Policy
@@ -30,6 +30,9 @@ Array = NDArray[np.float64]
 
 NS_PER_S = 1e9
 DATASET = "ingest"
+FAILS = (GenpolicyError, ArithmeticError, ValueError, RuntimeError)
+"""How a monitor fails: numbers that are none, or a fit that does not come about."""
+OTHERWISE = "it does not draw the same again"
 
 
 @dataclass(frozen=True)
@@ -118,9 +121,11 @@ def _others(judged: Contender, artifacts: Path, seeds: Sequence[int]) -> tuple[J
 def score_method(scoring: Scoring) -> Scored:
     """Fit every monitor on the training split and score every invocation of the journals.
 
+    A monitor that fails, at its fit or at a score, has no scores here, and says why: nothing is
+    judged by one, so that none may keep the others or the verdict waiting.
+
     Raises:
         IntegrityError: A journal, or what was drawn, is not what it was.
-        NonFiniteError: A score is NaN or infinite.
     """
     task = load_task(scoring.task)
     name = scoring.judged.name
@@ -131,12 +136,12 @@ def score_method(scoring: Scoring) -> Scored:
             for path in scoring.journals
             for row in _scores(_invocations(path), scoring, policy, monitors, task)
         ]
-    absent = [
-        MonitorUnavailableRow(name, monitor, found.why)
+    absent = {
+        monitor: MonitorUnavailableRow(name, monitor, found.why)
         for monitor, found in monitors.items()
         if isinstance(found, Unavailable)
-    ]
-    return Scored(scores, absent)
+    }
+    return Scored([row for row in scores if row.monitor not in absent], [*absent.values()])
 
 
 def _fitted(scoring: Scoring, policy: Policy) -> dict[str, Monitor | Unavailable]:
@@ -147,8 +152,18 @@ def _fitted(scoring: Scoring, policy: Policy) -> dict[str, Monitor | Unavailable
         action_period_s=policy.horizons.action_period_s,
         policy=policy if isinstance(policy, NetworkPolicy) else None,
         others=[other.load() for other in scoring.others],
+        candidates=candidates_of(policy, scoring.samples),
     )
-    return {monitor: MONITORS[monitor](fit) for monitor in scoring.monitors}
+    return {monitor: _fit(monitor, fit) for monitor in scoring.monitors}
+
+
+def _fit(name: str, fit: Fit) -> Monitor | Unavailable:
+    try:
+        return MONITORS[name](fit)
+    except IntegrityError:
+        raise
+    except FAILS as error:
+        return Unavailable(f"its fit failed: {error}")
 
 
 def _invocations(path: Path) -> list[_Seen]:
@@ -194,13 +209,20 @@ def _scores(
     ).actions
     before: dict[int, Invocation] = {}
     for one, chunks in zip(seen, drawn, strict=True):
-        _require_same(scoring, one, chunks)
+        if not _is_same(scoring, one, chunks):
+            gone = Unavailable(f"{_at(one)}: {OTHERWISE}")
+            known = [n for n, found in monitors.items() if not isinstance(found, Unavailable)]
+            monitors.update(dict.fromkeys([n for n in known if n in READ_DRAWS], gone))
         if not np.isfinite(chunks).all():  # the first layer rejected it; nobody scores it
             continue
         invocation = Invocation(one.time_s, one.history, chunks, before.get(one.start))
         before[one.start] = Invocation(one.time_s, one.history, chunks)
         for name, monitor in monitors.items():
             if isinstance(monitor, Unavailable):
+                continue
+            score = _score(monitor, invocation)
+            if isinstance(score, Unavailable):
+                monitors[name] = Unavailable(f"{_at(one)}: {score.why}")
                 continue
             yield MonitorScoreRow(
                 method=scoring.judged.name,
@@ -210,28 +232,36 @@ def _scores(
                 time_s=one.time_s,
                 phase=task.phase_of(one.history[-1]),
                 monitor=name,
-                score=_finite(monitor.score(invocation), name),
+                score=score,
             )
 
 
-def _require_same(scoring: Scoring, one: _Seen, chunks: Array) -> None:
-    """Refuse to score what was not drawn; invocations that nobody judged say nothing of it."""
-    of_ours = isinstance(scoring.judged, JudgedPolicy)
-    if of_ours and one.drawn_sha256 and actions_sha256(raw_actions(chunks[0])) != one.drawn_sha256:
+def _at(one: _Seen) -> str:
+    return f"{one.condition}, start {one.start}, invocation {one.number}"
+
+
+def _is_same(scoring: Scoring, one: _Seen, chunks: Array) -> bool:
+    """Whether this is what was drawn; invocations that nobody judged say nothing of it.
+
+    Raises:
+        IntegrityError: It is not, and the policy runs here, from bound files.
+    """
+    same = not one.drawn_sha256 or actions_sha256(raw_actions(chunks[0])) == one.drawn_sha256
+    if not same and isinstance(scoring.judged, JudgedPolicy):
         raise IntegrityError(
             where=f"{scoring.judged.name}: {one.condition}, start {one.start}",
             found=f"another chunk than was drawn by invocation {one.number}",
             expected="the same from the same observations and noise",
             action="Run `dvc repro stress` on one machine.",
         )
+    return same
 
 
-def _finite(score: float, monitor: str) -> float:
-    if not np.isfinite(score):
-        raise NonFiniteError(
-            where=f"the score of {monitor}",
-            found=str(score),
-            expected="a finite number",
-            action="Look at the monitor; leave no score out.",
-        )
-    return score
+def _score(monitor: Monitor, invocation: Invocation) -> float | Unavailable:
+    try:
+        score = monitor.score(invocation)
+    except IntegrityError:
+        raise
+    except FAILS as error:
+        return Unavailable(f"it failed: {error}")
+    return score if np.isfinite(score) else Unavailable(f"its score was {score}")

@@ -1,7 +1,7 @@
 """The stage's work: thresholds first, frozen, then the episodes that judge them; as tables."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from genpolicy.compute import map_shards
@@ -62,13 +62,15 @@ def write_monitors(
     above = threshold_rows(scored.scores, rollouts, alpha=settings.alpha, phases=task.phases)
     write_rows(folder / "thresholds.parquet", MonitorThresholdRow, above)
     shards = judged()
-    more, again = _run(shards, scoring, work)
+    gone = {(row.method, row.monitor) for row in scored.unavailable}
+    more, again = _run(shards, lambda some: [_without(one, gone) for one in scoring(some)], work)
     rollouts, scores = [*rollouts, *more], [*scored.scores, *again.scores]
+    absent = [*scored.unavailable, *again.unavailable]
     alarms = alarm_rows(scores, rollouts, above, settings, contact_phases=task.contact_phases)
     write_rows(folder / "rollouts.parquet", RolloutRow, rollouts)
     write_rows(folder / "scores.parquet", MonitorScoreRow, scores)
     write_rows(folder / "alarms.parquet", MonitorAlarmRow, alarms)
-    write_rows(folder / "unavailable.parquet", MonitorUnavailableRow, again.unavailable)
+    write_rows(folder / "unavailable.parquet", MonitorUnavailableRow, absent)
     comparison = thresholds[0].comparison
     robot = cell_of(
         task,
@@ -86,6 +88,12 @@ def write_unwatched(folder: Path) -> None:
     write_rows(folder / "scores.parquet", MonitorScoreRow, [])
     write_rows(folder / "alarms.parquet", MonitorAlarmRow, [])
     write_rows(folder / "unavailable.parquet", MonitorUnavailableRow, [])
+
+
+def _without(one: Scoring, gone: set[tuple[str, str]]) -> Scoring:
+    """Without the monitors that have no thresholds of this method: they would be silent."""
+    left = tuple(name for name in one.monitors if (one.judged.name, name) not in gone)
+    return replace(one, monitors=left)
 
 
 def _run(

@@ -95,7 +95,7 @@ class MonitorAlarmRow:
 
 @dataclass(frozen=True)
 class MonitorUnavailableRow:
-    """`unavailable.parquet` of monitors: a monitor that cannot watch a method.
+    """`unavailable.parquet` of monitors: a monitor that cannot watch a method, or failed.
 
     Attributes:
         method: The method.

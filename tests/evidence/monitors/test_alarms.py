@@ -72,6 +72,15 @@ def test_a_failed_episode_sets_no_threshold():
     assert (row.threshold, row.episodes) == (2.0, 1)
 
 
+def test_scores_of_other_conditions_say_nothing_of_thresholds():
+    """The stage has those of the thresholds alone, and who verifies has all: the same rows."""
+    rows, ends = clocked("thresholds", 0, [0, 2]), [rollout("thresholds", 0)]
+    late = scored("judged", 0, [9, 9], monitor="own_loss")
+    both = [*ends, rollout("judged", 0)]
+    alone = threshold_rows(rows, ends, alpha=0.5, phases=("approach",))
+    assert threshold_rows([*rows, *late], both, alpha=0.5, phases=("approach",)) == alone
+
+
 def alarms(rows, ends, above):
     found = alarm_rows(rows, ends, above, SETTINGS, contact_phases=frozenset({"insert"}))
     return {(row.family, row.phase): row for row in of(found)}

@@ -1,6 +1,9 @@
 """`stress.monitors`: conditions by name, and what is refused."""
 
+from pathlib import Path
+
 import pytest
+import yaml
 from pydantic import ValidationError
 
 from genpolicy.evidence.monitors.settings import MonitorsSettings, condition_of, family_of
@@ -20,6 +23,16 @@ def test_conditions_are_named_by_family_and_severity():
     assert family_of("judged") == ("nominal", 0.0)
     assert family_of(condition_of("contact_anomaly", 0.25)) == ("contact_anomaly", 0.25)
     assert settings.watching == ("support", "time_in_episode", "sample_variance")
+
+
+def test_the_rollouts_of_the_default_are_as_many_as_is_said():
+    root = Path(__file__).parents[3]
+    text = (root / "params.yaml").read_text()
+    found = MonitorsSettings(**yaml.safe_load(text)["stress"]["monitors"])
+    probed = found.probe_starts * len(found.conditions)
+    count = found.threshold_starts + found.judged_starts + probed
+    assert f"probes; {count} rollouts of each" in text
+    assert f"The default is {count} rollouts" in (root / "docs/monitors.md").read_text()
 
 
 def test_nothing_asked_is_off():

@@ -5,7 +5,9 @@ from _probed import write_probed
 
 from genpolicy.evidence.documents.shadow import CHECKER
 from genpolicy.evidence.monitors import tables as module
+from genpolicy.evidence.monitors.alarms import threshold_rows
 from genpolicy.evidence.monitors.plan import plan_judged
+from genpolicy.evidence.monitors.scored import Scored
 from genpolicy.evidence.monitors.tables import write_unwatched
 from genpolicy.evidence.rows.monitors import (
     MonitorAlarmRow,
@@ -88,6 +90,38 @@ def test_the_same_bytes_every_time(written, bench, task, tmp_path):
     for path in sorted(written.rglob("*")):
         if path.is_file():
             assert path.read_bytes() == (tmp_path / path.relative_to(written)).read_bytes(), path
+
+
+@pytest.mark.parametrize("fails_at", ["thresholds", "judged"])
+def test_a_monitor_that_fails_once_alarms_nowhere_and_says_why(
+    written, bench, task, tmp_path, monkeypatch, fails_at
+):
+    """Without thresholds it would pass for one that is silent; the others are as without it."""
+    score = module.score_method
+
+    def failing(scoring):
+        found = score(scoring)
+        if "own_loss" not in scoring.monitors or fails_at not in {
+            row.condition for row in found.scores
+        }:
+            return found
+        left = [row for row in found.scores if row.monitor != "own_loss"]
+        why = MonitorUnavailableRow("flow", "own_loss", "it failed")
+        return Scored(left, [*found.unavailable, why])
+
+    monkeypatch.setattr(module, "score_method", failing)
+    write_probed(tmp_path, bench, task)
+    absent = read_rows(tmp_path / "unavailable.parquet", MonitorUnavailableRow)
+    assert sorted(row.monitor for row in absent) == ["own_loss", "seed_disagreement"]
+    alarms = read_rows(tmp_path / "alarms.parquet", MonitorAlarmRow)
+    before = read_rows(written / "alarms.parquet", MonitorAlarmRow)
+    assert alarms == [row for row in before if row.monitor != "own_loss"]
+    scores = read_rows(tmp_path / "scores.parquet", MonitorScoreRow)
+    again = threshold_rows(
+        scores, read_rows(tmp_path / "rollouts.parquet", RolloutRow),
+        alpha=bench.settings.alpha, phases=task.phases,
+    )  # fmt: skip
+    assert again == read_rows(tmp_path / "thresholds.parquet", MonitorThresholdRow)
 
 
 def test_nothing_asked_writes_tables_without_rows(tmp_path, monkeypatch):
