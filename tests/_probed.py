@@ -47,7 +47,7 @@ def make_bench(fleet, dataset, kit, artifacts):
         comparison=comparison,
         latency={"flow": latency},
         settings=MonitorsSettings(**SECTION),
-        watched=trained(artifacts / "train_generators", ["flow"], seeds=[0]),
+        watched=trained(artifacts / "train_generators", ["flow"], seeds=[0], device="cpu"),
         artifacts=artifacts,
     )
 

@@ -25,7 +25,7 @@ def rollout(condition, start, *, success=True):
         hold_ticks=0, fallback_ticks=0, invocations=4, deadline_misses=0, discards=0, rejections=0,
         rejected_by="", recovery_attempted=not success, recovered=False, interventions=0,
         action_age_p50_s=None, action_age_p95_s=None, action_age_max_s=None, latency_p95_s=None,
-        force_peak_n=0.0, mode="",
+        force_peak_n=0.0, mode="", person_s=0.0,
     )  # fmt: skip
 
 
