@@ -5,6 +5,7 @@ import math
 from gates.criterion import Measured, criterion
 from gates.evidence import Evidence, MissingEvidenceError
 from gates.stress.rollouts import NOMINAL, STRESS, StressSettings, rollouts, success_lower
+from gates.verdicts import rounded
 from genpolicy.evidence.documents.stress import POWER, Power
 
 
@@ -53,7 +54,8 @@ def _starts(evidence: Evidence, settings: StressSettings, method: str) -> set[tu
 def verdict_reachable(evidence: Evidence, settings: StressSettings) -> Measured:
     """Share of simulated trials that end right: where the planned effect holds, and the margin.
 
-    Too little power at the planned effect says nothing bad of anybody: more starts decide.
+    Too little power at the planned effect says nothing bad of anybody: more starts decide. A test
+    that promotes without a gain is broken, and more starts do not mend it.
     """
     return reachable(evidence.document(STRESS, POWER), settings)
 
@@ -70,7 +72,8 @@ def reachable(power: Power, settings: StressSettings) -> Measured:
 
     Raises:
         MissingEvidenceError: The table is for another test, or lacks one of these worlds. Or the
-            planned effect is found less often than is asked: a trial of this size shows nothing.
+            planned effect is found less often than is asked, by a test that returns often enough
+            where there is no gain: a trial of this size shows nothing.
     """
     for key, stated, planned in (
         ("margin", power.margin, settings.margin),
@@ -94,7 +97,9 @@ def reachable(power: Power, settings: StressSettings) -> Measured:
     )
     limit = settings.limits.of.get("verdict_reachable")
     asked = limit.limit if limit and limit.limit is not None else 0.0
-    if not promote >= asked:
+    # Rounded as it is judged: whatever fails by the return share is never called too small.
+    sound = rounded(back) >= asked
+    if sound and not promote >= asked:
         raise MissingEvidenceError(f"too few starts to find the planned effect: {text}")
     return Measured(min(promote, back), caveat=text)
 

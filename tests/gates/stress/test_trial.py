@@ -130,6 +130,24 @@ def test_a_test_that_promotes_at_the_margin_is_no_test(ladder):
     assert judge(ladder, "D").verdict == "FAIL"
 
 
+@pytest.mark.parametrize(
+    ("promote", "back", "verdict"),
+    [(0.5, 0.6, "FAIL"), (0.5, 0.79975, "FAIL"), (0.5, 0.8, "INCONCLUSIVE")],
+)
+def test_a_test_that_is_wrong_is_not_called_too_small(ladder, promote, back, verdict):
+    """More starts mend a test that finds too little, and none that promotes without a gain."""
+
+    def change(document):
+        planned, none = document["rows"]
+        planned["promote_share"], none["return_share"] = promote, back
+
+    evidence.edit_document(ladder, POWER, change)
+    report = judge(ladder, "D")
+    (found,) = found_in(report, "verdict_reachable")
+    assert (found.verdict, report.verdict) == (verdict, verdict)
+    assert ("too few starts" in found.caveat) == (verdict == "INCONCLUSIVE")
+
+
 @pytest.mark.parametrize("row", [0, 1])
 def test_a_power_table_without_its_worlds_is_missing_evidence(ladder, row):
     evidence.edit_document(ladder, POWER, lambda d: d["rows"].pop(row) and None)
