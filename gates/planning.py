@@ -7,7 +7,6 @@ show, and a gain that is too small to be found leaves it with the simpler policy
 
 import dataclasses
 import math
-import textwrap
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,7 +20,10 @@ from gates.stated import section
 from gates.stress.gate import GATE
 from gates.stress.rollouts import StressSettings
 from gates.stress.trial import reachable
+from gates.verdicts import judge_criterion, rounded
+from genpolicy.contract.settings import parse_settings
 from genpolicy.evidence.documents.stress import Power
+from genpolicy.evidence.monitors.settings import MonitorsSettings
 from genpolicy.evidence.stress.settings import StressSettings as StressSection
 from genpolicy.evidence.stress.tables import POWER_CORRELATION, POWER_TRIALS, power_document
 from genpolicy.seeds import stream
@@ -38,7 +40,6 @@ REACHABLE = "verdict_reachable"
 POWER = 0.8
 """Power of the smallest gain, where `verdict_reachable` has no limit of its own."""
 BASELINES = (0.1, 0.3, 0.5, 0.7, 0.9)
-COLUMNS = 80
 STEPS = 100
 """Gains are looked for in points of a hundred."""
 MOST_STARTS = 1000
@@ -53,11 +54,13 @@ class Bound:
         criterion: Its name.
         decidable: Whether some result keeps the limit; None where that cannot be said before.
         says: Which results do, or why none does.
+        fails: Whether the gate is a FAIL whatever is run: a test that promotes without a gain.
     """
 
     criterion: str
     decidable: bool | None
     says: str
+    fails: bool = False
 
 
 @dataclass(frozen=True)
@@ -103,8 +106,11 @@ class Plan:
         methods: Candidates and baselines, each run on every start.
         conditions: Names.
         candidates: Names of those that are registered; alpha is shared between them.
-        rollouts: Over all methods and conditions.
-        longest_s: Virtual time if each rollout took its limit, s.
+        rollouts: Over all methods and conditions: the comparison.
+        graded_rollouts: Beside it, of conditions made harder or milder (`stress.severities`).
+        probe_rollouts: After it, under probes and without, for the monitors (`stress.monitors`),
+            if every registered candidate is admitted.
+        longest_s: Virtual time if each of all these rollouts took its limit, s.
         margin: Gain to be shown.
         alpha: Chance of a wrong promotion of one candidate.
         power: Share of trials in which a gain is to be found.
@@ -118,6 +124,8 @@ class Plan:
     conditions: tuple[str, ...]
     candidates: tuple[str, ...]
     rollouts: int
+    graded_rollouts: int
+    probe_rollouts: int
     longest_s: float
     margin: float
     alpha: float
@@ -130,6 +138,11 @@ class Plan:
     def undecidable(self) -> tuple[str, ...]:
         """Criteria that no result of this plan can meet."""
         return tuple(bound.criterion for bound in self.bounds if bound.decidable is False)
+
+    @property
+    def failing(self) -> tuple[str, ...]:
+        """Those of them that fail whatever is run; the others can only not be shown."""
+        return tuple(bound.criterion for bound in self.bounds if bound.fails)
 
     def as_document(self) -> dict[str, Any]:
         """For JSON."""
@@ -148,7 +161,10 @@ def plan_of(root: Path) -> Plan:
     settings = settings.under(limits)
     planned = section(params, "stress", StressSection)
     methods = dict.fromkeys([*settings.candidates, *settings.baselines])
-    rollouts = len(methods) * len(settings.perturbations) * settings.planned_starts
+    of_condition = len(methods) * settings.planned_starts
+    rollouts = of_condition * len(planned.perturbations)
+    graded = of_condition * (len(planned.conditions) - len(planned.perturbations))
+    probed = len(settings.candidates) * _probed(planned)
     power = limits.number(REACHABLE, otherwise=POWER)
     table = power_document(
         planned, candidates=len(settings.candidates), root_seed=settings.root_seed
@@ -159,7 +175,9 @@ def plan_of(root: Path) -> Plan:
         conditions=settings.perturbations,
         candidates=settings.candidates,
         rollouts=rollouts,
-        longest_s=rollouts * planned.episode_limit_s,
+        graded_rollouts=graded,
+        probe_rollouts=probed,
+        longest_s=(rollouts + graded + probed) * planned.episode_limit_s,
         margin=settings.margin,
         alpha=settings.alpha,
         power=power,
@@ -167,6 +185,21 @@ def plan_of(root: Path) -> Plan:
         bounds=tuple(_bounds(settings, limits, table)),
         gains=tuple(_gains(settings, power)),
     )
+
+
+def _probed(planned: StressSection) -> int:
+    """Rollouts of each admitted candidate for the monitors.
+
+    Raises:
+        ConfigError: `stress.monitors` has an unknown key or a wrong value.
+    """
+    monitors = parse_settings(
+        MonitorsSettings, planned.monitors, where="params.yaml: stress.monitors"
+    )
+    if not monitors.on:
+        return 0
+    probed = len(monitors.conditions) * monitors.probe_starts
+    return monitors.threshold_starts + monitors.judged_starts + probed
 
 
 def _bounds(settings: StressSettings, limits: Limits, table: Power) -> Iterator[Bound]:
@@ -218,7 +251,8 @@ def _reachable(settings: StressSettings, table: Power, limit: float) -> Bound:
     except MissingEvidenceError as error:
         return Bound(REACHABLE, False, str(error))
     assert found.value is not None, "a share of trials is a number"
-    return Bound(REACHABLE, found.value >= limit, found.caveat)
+    verdict = judge_criterion(rounded(found.value), limit, ">=")
+    return Bound(REACHABLE, verdict == "PASS", found.caveat, fails=verdict == "FAIL")
 
 
 def _stated(settings: StressSettings, table: Power, power: float) -> Stated:
@@ -272,63 +306,3 @@ def _gains(settings: StressSettings, power: float) -> Iterator[Gain]:
             middle = (above + below) // 2
             below, above = (below, middle) if found(middle) >= power else (middle, above)
         yield Gain(baseline, above / STEPS, found(above))
-
-
-def plan_text(plan: Plan) -> str:
-    """The plan for a person, 80 columns."""
-    lines = [
-        f"{plan.starts} starts of {plan.methods} methods in {len(plan.conditions)} conditions: "
-        f"{plan.rollouts:,} rollouts,",
-        f"at most {plan.longest_s / 3600:.1f} h of virtual time",
-        f"{len(plan.candidates)} registered candidates, each at alpha {plan.alpha:.3g}; "
-        f"margin {plan.margin:g}",
-        "",
-        *_stated_text(plan),
-        "",
-        "What these starts can show",
-    ]
-    wide = max((len(bound.criterion) for bound in plan.bounds), default=0)
-    marks = {True: " ", False: "!", None: "?"}
-    for bound in plan.bounds:
-        begin = f"{marks[bound.decidable]} {bound.criterion:<{wide}}  "
-        indent = " " * len(begin)
-        lines += textwrap.wrap(bound.says, COLUMNS, initial_indent=begin, subsequent_indent=indent)
-    lines += [
-        "",
-        f"Smallest gain that is found in {plan.power:.0%} of trials with {plan.starts} starts",
-        *(_gain_text(gain) for gain in plan.gains),
-    ]
-    if plan.undecidable:
-        names = ", ".join(plan.undecidable)
-        text = (
-            f"Gate D would be INCONCLUSIVE whatever the rollouts show: {names}. Plan more starts "
-            "(stress.starts) before any is run."
-        )
-        lines += ["", *textwrap.wrap(text, COLUMNS)]
-    return "\n".join(lines)
-
-
-def _stated_text(plan: Plan) -> list[str]:
-    stated = plan.stated
-    needed = (
-        f"from about {stated.starts_needed} starts on"
-        if stated.starts_needed is not None
-        else f"not even by {MOST_STARTS} starts"
-    )
-    return [
-        f"The stated effect: success {stated.candidate_success:.0%} against "
-        f"{stated.baseline_success:.0%} (stress.planned_effect)",
-        f"  found in {stated.promote_share:.0%} of trials with {plan.starts} starts; in "
-        f"{plan.power:.0%} {needed}",
-    ]
-
-
-def _gain_text(gain: Gain) -> str:
-    if gain.candidate_success is None:
-        most = f"a candidate that never fails in {gain.promote_share:.0%} only"
-        return f"  baseline {gain.baseline_success:.0%}: none; {most}"
-    points = round((gain.candidate_success - gain.baseline_success) * 100)
-    return (
-        f"  baseline {gain.baseline_success:.0%}: {points} points, a candidate of "
-        f"{gain.candidate_success:.0%}"
-    )

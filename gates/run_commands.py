@@ -20,9 +20,11 @@ def plan(root: Root = Path(), as_json: AsJson = False) -> int:
 
     Which results keep each limit at this number of starts, and the smallest
     gain that the paired test finds. Reads params.yaml alone. Exit 3 if a limit
-    cannot be kept by any result: the gate would be INCONCLUSIVE in any case.
+    cannot be kept by any result: the gate would be INCONCLUSIVE in any case, or
+    a FAIL, where the test promotes without a gain.
     """
-    from gates.planning import plan_of, plan_text
+    from gates.plan_text import plan_text
+    from gates.planning import plan_of
     from gates.printed import print_document
 
     found = plan_of(root)

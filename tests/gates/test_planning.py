@@ -1,5 +1,6 @@
 """What a plan can decide is what the gate would say of such rollouts."""
 
+import dataclasses
 import json
 import math
 from pathlib import Path
@@ -10,10 +11,12 @@ import pandas as pd
 import pytest
 import yaml
 
+from gates import plan_text as plan_text_module
 from gates import planning
 from gates.bounds import counted_interval, share_interval, upper_quantile
 from gates.evidence import MissingEvidenceError
-from gates.planning import Bound, Gain, Plan, Stated, _counted, plan_of, plan_text
+from gates.plan_text import plan_text
+from gates.planning import _counted, plan_of
 from gates.proof import judge
 from gates.settings import read_params
 from gates.stress.cost import _rollouts_with
@@ -144,7 +147,35 @@ def test_rollouts_and_time_are_those_of_methods_conditions_and_starts(planned):
     methods = {*params["train_generators"]["samplers"], *params["stress"]["baselines"]}
     plan = planned(starts=90, episode_limit_s=6.0)
     assert plan.rollouts == len(methods) * len(params["stress"]["perturbations"]) * 90
-    assert plan.longest_s == plan.rollouts * 6.0
+    assert plan.longest_s == (plan.rollouts + plan.probe_rollouts) * 6.0
+
+
+def test_what_is_graded_and_what_is_probed_is_counted_apart(planned):
+    """Sizes beside the judged one are run by all methods, probes by the candidates alone."""
+    push, jitter = {"force_n": [7.5, 15.0, 30.0]}, {"magnitude_s": [0.06, 0.12]}
+    severities = {
+        name: {"field": field, "values": values}
+        for name, sizes in (("push", push), ("network_jitter", jitter))
+        for field, values in sizes.items()
+    }
+    probes = {"lighting": {"severities": [1.0, 2.0]}, "unseen_object": {"severities": [2.0]}}
+    monitors = {
+        "kinds": ["support"], "threshold_starts": 11, "judged_starts": 7, "probe_starts": 5,
+        "probes": probes,
+    }  # fmt: skip
+    plan = planned(starts=90, episode_limit_s=6.0, severities=severities, monitors=monitors)
+    assert plan.rollouts == plan.methods * len(plan.conditions) * 90
+    assert plan.graded_rollouts == plan.methods * 3 * 90
+    assert plan.probe_rollouts == len(plan.candidates) * (11 + 7 + 3 * 5)
+    assert plan.longest_s == 6.0 * (plan.rollouts + plan.graded_rollouts + plan.probe_rollouts)
+    for off in ({}, {**monitors, "kinds": []}, {**monitors, "probes": {}}):
+        bare = planned(starts=90, monitors=off)
+        assert (bare.graded_rollouts, bare.probe_rollouts) == (0, 0)
+
+
+def test_a_plan_of_monitors_that_cannot_be_read_is_bad_configuration(planned):
+    with pytest.raises(ConfigError, match=r"stress\.monitors"):
+        planned(monitors={"knids": ["support"]})
 
 
 def test_what_is_waived_is_said_and_blocks_nothing(tmp_path, planned):
@@ -275,57 +306,34 @@ def test_the_gate_says_of_its_power_what_the_plan_said(planned, repo, starts, ve
     assert ("verdict_reachable" in plan.undecidable) == (verdict == "INCONCLUSIVE")
 
 
+@pytest.mark.parametrize(("promote", "back"), [(0.5, 0.6), (0.9, 0.6)])
+def test_a_test_that_promotes_without_a_gain_fails_before_a_rollout(
+    planned, monkeypatch, promote, back
+):
+    """As at the gate: that is no question of more starts, whatever its power."""
+    whole = planning.power_document
+
+    def broken(*args, **kwargs):
+        table = whole(*args, **kwargs)
+        rows = [
+            dataclasses.replace(row, promote_share=promote, return_share=back) for row in table.rows
+        ]
+        return dataclasses.replace(table, rows=rows)
+
+    monkeypatch.setattr(planning, "power_document", broken)
+    plan = planned()
+    assert plan.failing == ("verdict_reachable",) == plan.undecidable
+    assert "would be a FAIL whatever the rollouts show: verdict_reachable" in plan_text(plan)
+    monkeypatch.setattr(planning, "power_document", whole)
+    assert planned(starts=3).failing == ()
+
+
 def test_an_effect_that_no_number_of_starts_finds_is_said(planned, monkeypatch):
-    monkeypatch.setattr(planning, "MOST_STARTS", 20)
+    for module in (planning, plan_text_module):
+        monkeypatch.setattr(module, "MOST_STARTS", 20)
     plan = planned()
     assert plan.stated.starts_needed is None
     assert "in 80% not even by 20 starts" in plan_text(plan)
-
-
-def made(*bounds, gains=(), needed=77):
-    return Plan(
-        starts=90, methods=8, conditions=("nominal", "push"), candidates=("diffusion", "flow"),
-        rollouts=12_600, longest_s=63_000.0, margin=0.05, alpha=0.0125, power=0.8,
-        stated=Stated(0.5, 0.8, 0.86, needed), bounds=bounds, gains=gains,
-    )  # fmt: skip
-
-
-def test_golden_what_a_person_reads_of_a_plan():
-    """Written by hand: a mark, a column as wide as the longest name, and lines of 80 that hang."""
-    long = "none of 90 bounds it by 0.0324 only, whatever is done and however often it is run"
-    text = plan_text(made(
-        Bound("kept", True, "up to 3 of 90"), Bound("never_kept", False, long),
-        Bound("open", None, "declared not applicable"),
-        gains=(Gain(0.1, 0.29, 0.81), Gain(0.95, None, 0.34)),
-    ))  # fmt: skip
-    assert text.splitlines() == [
-        "90 starts of 8 methods in 2 conditions: 12,600 rollouts,",
-        "at most 17.5 h of virtual time",
-        "2 registered candidates, each at alpha 0.0125; margin 0.05",
-        "",
-        "The stated effect: success 80% against 50% (stress.planned_effect)",
-        "  found in 86% of trials with 90 starts; in 80% from about 77 starts on",
-        "",
-        "What these starts can show",
-        "  kept        up to 3 of 90",
-        "! never_kept  none of 90 bounds it by 0.0324 only, whatever is done and however",
-        "              often it is run",
-        "? open        declared not applicable",
-        "",
-        "Smallest gain that is found in 80% of trials with 90 starts",
-        "  baseline 10%: 19 points, a candidate of 29%",
-        "  baseline 95%: none; a candidate that never fails in 34% only",
-        "",
-        "Gate D would be INCONCLUSIVE whatever the rollouts show: never_kept. Plan more",
-        "starts (stress.starts) before any is run.",
-    ]
-
-
-def test_a_plan_that_can_be_decided_warns_of_nothing():
-    for plan in (made(), made(Bound("kept", True, "x"), Bound("open", None, "y"))):
-        assert "INCONCLUSIVE" not in plan_text(plan) and plan.undecidable == ()
-    found = made(Bound("kept", True, "x"), Bound("b", False, "y"), Bound("a", False, "z"))
-    assert found.undecidable == found.as_document()["undecidable"] == ("b", "a")
 
 
 @pytest.mark.parametrize("name", ["intervention_upper", "nominal_success_lower"])

@@ -35,7 +35,7 @@ def asked(monkeypatch):
         return called
 
     for place, found in (
-        ("gates.planning.plan_text", "the plan"),
+        ("gates.plan_text.plan_text", "the plan"),
         ("gates.moved.moved_text", "what moved"),
         ("gates.moved.moved", [Found(("a",))]),
         ("gates.proof.prove_all", "rungs"),

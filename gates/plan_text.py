@@ -1,0 +1,86 @@
+"""What a plan can decide, for a person."""
+
+import textwrap
+
+from gates.planning import MOST_STARTS, Gain, Plan
+
+COLUMNS = 80
+WHATEVER = "Gate D would be INCONCLUSIVE whatever the rollouts show"
+
+
+def plan_text(plan: Plan) -> str:
+    """The plan for a person, 80 columns."""
+    lines = [
+        f"{plan.starts} starts of {plan.methods} methods in {len(plan.conditions)} conditions: "
+        f"{plan.rollouts:,} rollouts,",
+        *_beside(plan),
+        f"at most {plan.longest_s / 3600:.1f} h of virtual time",
+        f"{len(plan.candidates)} registered candidates, each at alpha {plan.alpha:.3g}; "
+        f"margin {plan.margin:g}",
+        "",
+        *_stated_text(plan),
+        "",
+        "What these starts can show",
+    ]
+    wide = max((len(bound.criterion) for bound in plan.bounds), default=0)
+    marks = {True: " ", False: "!", None: "?"}
+    for bound in plan.bounds:
+        begin = f"{marks[bound.decidable]} {bound.criterion:<{wide}}  "
+        indent = " " * len(begin)
+        lines += textwrap.wrap(bound.says, COLUMNS, initial_indent=begin, subsequent_indent=indent)
+    lines += [
+        "",
+        f"Smallest gain that is found in {plan.power:.0%} of trials with {plan.starts} starts",
+        *(_gain_text(gain) for gain in plan.gains),
+    ]
+    open_ = [name for name in plan.undecidable if name not in plan.failing]
+    if plan.failing:
+        lines += _warned(
+            f"Gate D would be a FAIL whatever the rollouts show: {', '.join(plan.failing)}. The "
+            "test promotes without a gain, which more starts do not mend."
+        )
+    if open_:
+        what = "Not to be shown either" if plan.failing else WHATEVER
+        lines += _warned(
+            f"{what}: {', '.join(open_)}. Plan more starts (stress.starts) before any is run."
+        )
+    return "\n".join(lines)
+
+
+def _warned(text: str) -> list[str]:
+    return ["", *textwrap.wrap(text, COLUMNS)]
+
+
+def _beside(plan: Plan) -> list[str]:
+    """What is run and not compared, where there is some."""
+    graded, probed = plan.graded_rollouts, plan.probe_rollouts
+    return [
+        *([f"{graded:,} beside them of graded sizes (stress.severities),"] if graded else []),
+        *([f"up to {probed:,} after them for the monitors (stress.monitors),"] if probed else []),
+    ]
+
+
+def _stated_text(plan: Plan) -> list[str]:
+    stated = plan.stated
+    needed = (
+        f"from about {stated.starts_needed} starts on"
+        if stated.starts_needed is not None
+        else f"not even by {MOST_STARTS} starts"
+    )
+    return [
+        f"The stated effect: success {stated.candidate_success:.0%} against "
+        f"{stated.baseline_success:.0%} (stress.planned_effect)",
+        f"  found in {stated.promote_share:.0%} of trials with {plan.starts} starts; in "
+        f"{plan.power:.0%} {needed}",
+    ]
+
+
+def _gain_text(gain: Gain) -> str:
+    if gain.candidate_success is None:
+        most = f"a candidate that never fails in {gain.promote_share:.0%} only"
+        return f"  baseline {gain.baseline_success:.0%}: none; {most}"
+    points = round((gain.candidate_success - gain.baseline_success) * 100)
+    return (
+        f"  baseline {gain.baseline_success:.0%}: {points} points, a candidate of "
+        f"{gain.candidate_success:.0%}"
+    )

@@ -1,0 +1,72 @@
+"""What a person reads of a plan."""
+
+from gates.plan_text import plan_text
+from gates.planning import Bound, Gain, Plan, Stated
+
+
+def made(*bounds, gains=(), needed=77, graded=0, probed=0):
+    return Plan(
+        starts=90, methods=8, conditions=("nominal", "push"), candidates=("diffusion", "flow"),
+        rollouts=12_600, graded_rollouts=graded, probe_rollouts=probed, longest_s=63_000.0,
+        margin=0.05, alpha=0.0125, power=0.8,
+        stated=Stated(0.5, 0.8, 0.86, needed), bounds=bounds, gains=gains,
+    )  # fmt: skip
+
+
+def test_golden_what_a_person_reads_of_a_plan():
+    """Written by hand: a mark, a column as wide as the longest name, and lines of 80 that hang."""
+    long = "none of 90 bounds it by 0.0324 only, whatever is done and however often it is run"
+    text = plan_text(made(
+        Bound("kept", True, "up to 3 of 90"), Bound("never_kept", False, long),
+        Bound("open", None, "declared not applicable"),
+        gains=(Gain(0.1, 0.29, 0.81), Gain(0.95, None, 0.34)),
+    ))  # fmt: skip
+    assert text.splitlines() == [
+        "90 starts of 8 methods in 2 conditions: 12,600 rollouts,",
+        "at most 17.5 h of virtual time",
+        "2 registered candidates, each at alpha 0.0125; margin 0.05",
+        "",
+        "The stated effect: success 80% against 50% (stress.planned_effect)",
+        "  found in 86% of trials with 90 starts; in 80% from about 77 starts on",
+        "",
+        "What these starts can show",
+        "  kept        up to 3 of 90",
+        "! never_kept  none of 90 bounds it by 0.0324 only, whatever is done and however",
+        "              often it is run",
+        "? open        declared not applicable",
+        "",
+        "Smallest gain that is found in 80% of trials with 90 starts",
+        "  baseline 10%: 19 points, a candidate of 29%",
+        "  baseline 95%: none; a candidate that never fails in 34% only",
+        "",
+        "Gate D would be INCONCLUSIVE whatever the rollouts show: never_kept. Plan more",
+        "starts (stress.starts) before any is run.",
+    ]
+
+
+def test_a_plan_that_can_be_decided_warns_of_nothing():
+    for plan in (made(), made(Bound("kept", True, "x"), Bound("open", None, "y"))):
+        assert "INCONCLUSIVE" not in plan_text(plan) and plan.undecidable == ()
+    found = made(Bound("kept", True, "x"), Bound("b", False, "y"), Bound("a", False, "z"))
+    assert found.undecidable == found.as_document()["undecidable"] == ("b", "a")
+
+
+def test_what_is_run_beside_the_comparison_is_said_apart():
+    lines = plan_text(made(graded=5_400, probed=176)).splitlines()
+    assert lines[1:4] == [
+        "5,400 beside them of graded sizes (stress.severities),",
+        "up to 176 after them for the monitors (stress.monitors),",
+        "at most 17.5 h of virtual time",
+    ]
+
+
+def test_a_broken_test_is_a_fail_and_no_question_of_more_starts():
+    broken = Bound("power", False, "x", fails=True)
+    assert plan_text(made(broken)).splitlines()[-3:] == [
+        "",
+        "Gate D would be a FAIL whatever the rollouts show: power. The test promotes",
+        "without a gain, which more starts do not mend.",
+    ]
+    both = plan_text(made(broken, Bound("cost", False, "y")))
+    assert "INCONCLUSIVE" not in both
+    assert "Not to be shown either: cost. Plan more starts" in both
