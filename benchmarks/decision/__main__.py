@@ -4,8 +4,9 @@ Two parts. The rule of promotion and choice is asked alone in every world (`--tr
 gate, with all of its criteria over tables in memory, is asked in a few (`--whole`). All other
 criteria only take away promotions, so a false promotion of the whole gate is one of the rule too.
 
-Results are one JSON file per world; a run that was killed goes on where it was. Every trial has
-its own named stream, so that a share depends on nothing but the number of trials.
+Results are one JSON file per world; a run that was killed goes on where it was. What other code,
+settings or another world left does not count: a file holds the hash of all it was of. Every trial
+has its own named stream, so that a share depends on nothing but the number of trials.
 """
 
 import argparse
@@ -14,9 +15,11 @@ import json
 import sys
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
+
+from pydantic import BaseModel
 
 from benchmarks.decision import tables
 from benchmarks.decision.catalogue import MARGIN, WORLDS
@@ -29,9 +32,18 @@ from gates.stress.gate import GATE
 from gates.stress.rollouts import StressSettings
 from genpolicy.evidence.stress.settings import StressSettings as StressSection
 from genpolicy.evidence.stress.tables import power_document
+from genpolicy.integrity.documents import canonical_json
+from genpolicy.integrity.hashing import sha256_bytes
 from genpolicy.seeds import stream
 
+ROOT = Path(__file__).parents[2]
 ROOT_SEED = 13
+CODE = (
+    "benchmarks/decision", "gates/stress", "gates/bounds.py", "gates/engine.py",
+    "gates/verdicts.py",
+    "genpolicy/evidence/stress/tables.py", "genpolicy/seeds.py", "genpolicy/statistics",
+)  # fmt: skip
+"""What a result is of."""
 WHOLE = (
     World("good", "the planned effect, .8 against .5", ("promoted",), (0.5, 0.2), (0.8,)),
     World("better", ".9 against .5", ("promoted",), (0.5, 0.2), (0.9,)),
@@ -46,7 +58,7 @@ def arguments(argv: Sequence[str] | None = None) -> argparse.Namespace:
     """The command line."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.decision", description=__doc__)
     parser.add_argument("--trials", type=int, default=10_000, help="of the rule, in each world")
-    parser.add_argument("--whole", type=int, default=200, help="of the whole gate, in each world")
+    parser.add_argument("--whole", type=int, default=20, help="of the whole gate, in each world")
     parser.add_argument("--only", action="append", default=[], help="name of a world")
     parser.add_argument("--out", type=Path, default=Path("build/decision"))
     parser.add_argument("--docs", type=Path, help="page to print the tables into")
@@ -127,14 +139,17 @@ def main(argv: Sequence[str] | None = None) -> int:
     settings, limits, section = planned(Path())
     args.out.mkdir(parents=True, exist_ok=True)
     wanted = [world for world in WORLDS if not args.only or world.name in args.only]
+    code = code_of(ROOT)
     results = {
-        world.name: _kept(args.out / f"rule_{world.name}.json", args.trials,
-                          lambda w=world: rule_alone(w, settings, args.trials))
+        world.name: kept(args.out / f"rule_{world.name}.json", args.trials,
+                         hash_of(code, world, settings),
+                         lambda w=world: rule_alone(w, settings, args.trials))
         for world in wanted
     }  # fmt: skip
     gates = [
-        _kept(args.out / f"whole_{world.name}.json", args.whole,
-              lambda w=world: whole_gate(w, settings, limits, section, args.whole))
+        kept(args.out / f"whole_{world.name}.json", args.whole,
+             hash_of(code, world, settings, limits, section),
+             lambda w=world: whole_gate(w, settings, limits, section, args.whole))
         for world in WHOLE if args.whole and (not args.only or world.name in args.only)
     ]  # fmt: skip
     texts = {"promotion": tables.promotion(results), "whole": tables.whole(gates)}
@@ -144,20 +159,47 @@ def main(argv: Sequence[str] | None = None) -> int:
         for name, text in texts.items():
             page = tables.into_page(page, name, text)
         args.docs.write_text(page)
-    kept = (
+    held = (
         tables.kept(world, results[world.name]["hits"][world.asks[0]], args.trials)
         for world in wanted
     )
-    return 1 if any(answer is False for answer in kept) else 0
+    return 1 if any(answer is False for answer in held) else 0
 
 
-def _kept(path: Path, trials: int, run: Any) -> dict[str, Any]:
-    """A result that is there with as many trials, else a new one, written at once."""
+def code_of(root: Path) -> str:
+    """Hash of the code that a result is of, below a checkout: the rule, its test, the worlds."""
+    files = sorted(file for place in CODE for file in _python_in(root / place))
+    named = [f"{file.relative_to(root)} {sha256_bytes(file.read_bytes())}" for file in files]
+    return sha256_bytes("\n".join(named).encode())
+
+
+def _python_in(place: Path) -> list[Path]:
+    return [place] if place.suffix == ".py" else [*place.rglob("*.py")]
+
+
+def hash_of(code: str, world: World, *asked: BaseModel | Limits) -> str:
+    """Hash of a code, a world, and the settings and limits under which it was asked."""
+    parts = [
+        dataclasses.asdict(part) if isinstance(part, Limits) else part.model_dump(mode="json")
+        for part in asked
+    ]
+    return sha256_bytes(canonical_json([code, dataclasses.asdict(world), *parts]))
+
+
+def kept(path: Path, trials: int, of: str, run: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+    """A result that is there, of the same hash and as many trials; else a new one, written at once.
+
+    Args:
+        path: Its file.
+        trials: How many are wanted.
+        of: Hash of all that the result hangs on.
+        run: Plays the trials.
+    """
     if path.exists():
         found: dict[str, Any] = json.loads(path.read_text())
-        if found["trials"] == trials:
+        if (found["trials"], found.get("of")) == (trials, of):
             return found
-    result: dict[str, Any] = run()
+    result = {**run(), "of": of}
     print(f"{result['name']:<20} {result['trials']:>6} trials {result['seconds']:>7} s", flush=True)
     path.with_suffix(".tmp").write_text(json.dumps(result, indent=1, sort_keys=True) + "\n")
     path.with_suffix(".tmp").rename(path)

@@ -49,7 +49,11 @@ def names(world: World) -> tuple[str, ...]:
 
 
 def told(drawn: Drawn, settings: StressSettings, peeking: int = 0) -> Told:
-    """What the rule says; with peeking a candidate passes once it has passed at any look."""
+    """What the rule says; with peeking it is asked at every look, and the first pass ends it.
+
+    As the rule stands a peeker is told nothing else: the evidence is its highest so far. What is
+    asked here is that it stays so, by looks at the rollouts so far and not by that argument.
+    """
     starts = drawn.baselines.shape[2]
     looks = (*range(peeking, starts, peeking), starts) if peeking else (starts,)
     passed = [_promotion(drawn, number, looks, settings) for number in range(len(drawn.candidates))]

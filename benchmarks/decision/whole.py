@@ -114,7 +114,7 @@ def _rollouts(
         action_ticks=TICKS - hold - fallback, hold_ticks=hold, fallback_ticks=fallback,
         invocations=ASKED, deadline_misses=rng.binomial(ASKED, MISSED, n), discards=1,
         rejections=rng.binomial(ASKED, REJECTED, n), rejected_by="",
-        recovery_attempted=drilled, recovered=drilled & success,
+        recovery_attempted=drilled, recovered=drilled & success, person_s=0.0,
         interventions=(rng.random(n) < CALLED).astype(np.int64), action_age_p50_s=0.1,
         action_age_p95_s=0.2, action_age_max_s=0.3, latency_p95_s=0.1,
         force_peak_n=20.0 * np.exp(0.3 * rng.standard_normal(n)), mode="left",

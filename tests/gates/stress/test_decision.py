@@ -1,5 +1,6 @@
 """The benchmark of Gate D's decisions counts what it says, through the gate's own functions."""
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -7,11 +8,22 @@ import numpy as np
 import pytest
 
 from benchmarks.decision import rule, tables
-from benchmarks.decision.__main__ import WHOLE, of_world, planned, rule_alone, whole_gate
+from benchmarks.decision.__main__ import (
+    WHOLE,
+    arguments,
+    code_of,
+    hash_of,
+    kept,
+    of_world,
+    planned,
+    rule_alone,
+    whole_gate,
+)
 from benchmarks.decision.catalogue import WORLDS
 from benchmarks.decision.worlds import CONDITIONS, World, draw, outcomes
 from gates.stress import gains
 from genpolicy.seeds import stream
+from genpolicy.statistics.eprocess import paired_e_value
 
 ROOT = Path(__file__).parents[3]
 BY_NAME = {world.name: world for world in WORLDS}
@@ -78,17 +90,59 @@ def test_what_a_share_is_of(shipped):
     assert not rule.counted("false_of_method", higher, alone, 0.05, own.candidates)
 
 
-def test_peeking_ends_at_the_first_pass_and_never_takes_one_back(shipped):
-    """Won from the first thirty starts and lost from all others: shown, whenever one looks."""
-    world = replace(BY_NAME["alone"], candidates=(0.8,))
+def test_a_peeker_asks_at_every_look_of_the_rollouts_so_far_and_ends_at_the_first_pass(
+    shipped, monkeypatch
+):
+    """Won by the candidate from the first thirty starts alone, or from none."""
+    world = BY_NAME["alone"]
     own = of_world(shipped[0], world)
     drawn = draw(world, 90, stream(1, "d"))
-    won = np.where(np.arange(90) < 30, 1.0, 0.0)
-    drawn = replace(
-        drawn, candidates=np.tile(won, (1, 8, 1)), baselines=np.zeros_like(drawn.baselines)
-    )
-    for looks in (0, 10):
-        assert rule.told(drawn, own, looks).verdicts == ("PASS",)
+    drawn = replace(drawn, baselines=np.zeros_like(drawn.baselines))
+    looks = []
+
+    def spied(differences, inside, settings):
+        looks.extend({len(pairs) for pairs in (*differences.values(), inside.differences)})
+        return gains.least_gain(differences, inside, settings)
+
+    monkeypatch.setattr(rule, "least_gain", spied)
+    won = np.tile(np.where(np.arange(90) < 30, 1.0, 0.0), (1, 8, 1))
+    needed = paired_e_value(won[0, 0], margin=own.margin, alpha=own.alpha).pairs_needed
+    assert needed is not None and needed <= 10  # so the first of the looks is enough
+    assert rule.told(replace(drawn, candidates=won), own, 10).verdicts == ("PASS",)
+    assert looks == [10]
+    looks.clear()
+    late = np.roll(won, 25, axis=2)  # nothing is won before the 26th start
+    assert rule.told(replace(drawn, candidates=late), own, 10).verdicts == ("PASS",)
+    assert looks[:3] == [10, 20, 30] and len(looks) < 9
+    looks.clear()
+    assert rule.told(replace(drawn, candidates=0.0 * won), own, 20).verdicts == ("FAIL",)
+    assert looks == [20, 40, 60, 80, 90]
+    looks.clear()
+    assert rule.told(replace(drawn, candidates=won), own).verdicts == ("PASS",)
+    assert looks == [90]
+
+
+def latest(differences, *, margin, alpha):
+    """The e-process by the evidence at hand, which a later start may take back."""
+    found = paired_e_value(differences, margin=margin, alpha=alpha)
+    return replace(found, e_value=float(found.path[-1]))
+
+
+def test_who_peeks_at_every_start_is_told_what_the_last_look_says(shipped, monkeypatch):
+    """The evidence is its highest so far; by the evidence at hand a peeker would pass oftener."""
+    world = replace(BY_NAME["alone"], candidates=(0.68,))
+    own = of_world(shipped[0], world)
+    trials = [draw(world, 90, stream(1, "peeking", number)) for number in range(25)]
+
+    def passed(looks):
+        return [rule.told(drawn, own, looks).verdicts for drawn in trials]
+
+    once, always = passed(0), passed(1)
+    assert once == always
+    assert 5 <= once.count(("PASS",)) <= 20  # either is told
+    monkeypatch.setattr(gains, "paired_e_value", latest)
+    once, always = passed(0), passed(1)
+    assert once.count(("PASS",)) < always.count(("PASS",))
 
 
 def test_the_whole_gate_says_of_the_gain_what_the_rule_says(shipped):
@@ -111,3 +165,55 @@ def test_a_share_is_judged_at_the_worse_end():
     )
     with pytest.raises(ValueError, match="begin of q"):
         tables.into_page(page, "q", "new")
+
+
+def test_a_result_counts_only_for_what_it_was_of(tmp_path):
+    runs = []
+
+    def run():
+        runs.append(1)
+        return {"name": "a", "trials": 5, "seconds": 0.0, "run": len(runs)}
+
+    path = tmp_path / "a.json"
+    assert kept(path, 5, "one", run)["run"] == kept(path, 5, "one", run)["run"] == 1
+    assert kept(path, 5, "other", run)["run"] == 2 and kept(path, 5, "other", run)["run"] == 2
+    assert kept(path, 6, "other", run)["run"] == 3
+    path.write_text('{"trials": 5, "run": 0}')  # of a runner that said of nothing what it was of
+    assert kept(path, 5, "other", run)["run"] == 4
+
+
+def test_code_settings_limits_and_world_are_in_the_hash(shipped, tmp_path):
+    settings, limits, section = shipped
+    world = BY_NAME["margin"]
+    others = {
+        hash_of("code", world, settings, limits, section),
+        hash_of("edited", world, settings, limits, section),
+        hash_of("code", replace(world, methods_alike=0.4), settings, limits, section),
+        hash_of("code", world, settings.model_copy(update={"margin": 0.1}), limits, section),
+        hash_of("code", world, settings, replace(limits, waived={}, of={}), section),
+        hash_of("code", world, settings, limits, section.model_copy(update={"alpha": 0.1})),
+    }
+    assert len(others) == 6
+    assert hash_of("code", world, *shipped) == hash_of("code", world, *planned(ROOT))
+
+
+@pytest.mark.parametrize(
+    "place",
+    ["gates/stress/gains.py", "genpolicy/statistics/eprocess.py", "benchmarks/decision/rule.py"],
+)
+def test_an_edit_of_the_rule_is_other_code(tmp_path, place):
+    for part in ("gates", "genpolicy", "benchmarks/decision"):
+        shutil.copytree(ROOT / part, tmp_path / part)
+    assert code_of(tmp_path) == code_of(ROOT)
+    (tmp_path / place).write_text((ROOT / place).read_text() + "\n")
+    assert code_of(tmp_path) != code_of(ROOT)
+
+
+def test_the_page_shows_as_many_trials_as_its_command_asks_for():
+    page = (ROOT / "docs" / "decision-accuracy.md").read_text()
+    asked = arguments([])
+    for name, column, trials in (("promotion", 3, asked.trials), ("whole", 2, asked.whole)):
+        table = page.partition(tables.BEGIN.format(name))[2].partition(tables.END.format(name))[0]
+        rows = [line.split("|") for line in table.splitlines() if line.startswith("| ")]
+        shown = {row[column].strip() for row in rows if row[1].strip() != "world"}
+        assert shown == {f"{trials:,}"}
