@@ -28,9 +28,10 @@ AGAIN = (
 
 @dataclass(frozen=True)
 class Ends:
-    """A ratio that is held against an upper limit, at either end of its interval."""
+    """A ratio that is held against an upper limit: itself, and either end of its interval."""
 
     least: float
+    point: float
     most: float
 
 
@@ -53,13 +54,16 @@ def running(rows: pd.DataFrame) -> pd.DataFrame | None:
     """Rows of `latency.parquet` without the time that was waited; None where some is not known.
 
     Raises:
-        MissingEvidenceError: A term that waited as long as it took, or less than no time.
+        MissingEvidenceError: A term that took no number of seconds, waited as long as it took, or
+            less than no time.
     """
     measured = (rows["source"] == "measured").to_numpy()
     waited = _waited(rows[measured])
     if waited is None:
         return None
     seconds = rows["seconds"].to_numpy(dtype=np.float64, na_value=np.nan, copy=True)
+    if not np.isfinite(seconds[measured]).all():
+        raise MissingEvidenceError("a term that was measured took no number of seconds")
     if not np.all((waited >= 0.0) & (waited < seconds[measured])):
         raise MissingEvidenceError("a term waited for a processor longer than it took")
     seconds[measured] -= waited
@@ -89,6 +93,9 @@ def _waited(rows: pd.DataFrame) -> Array | None:
 def weigh(wall: Ends, without: Ends | None, *, share: float | None, limit: float | None) -> Weighed:
     """The interval of a ratio, with what waiting explains of it.
 
+    It explains a ratio that is no longer above the limit without it, itself and not only the lower
+    end: a wait in one process alone makes the interval wide, and explains none of the ratio.
+
     Args:
         wall: The ratio of times on the wall: what must hold.
         without: The same without the time waited; None where that is not known.
@@ -101,9 +108,9 @@ def weigh(wall: Ends, without: Ends | None, *, share: float | None, limit: float
     said = f"at most {share:.2g} of it waiting for a processor"
     if not share >= CONTENDED_SHARE:
         return Weighed(plain, said)
-    said += f" and without that {without.least:.3g} to {without.most:.3g}"
+    said += f" and without that {without.point:.3g} ({without.least:.3g} to {without.most:.3g})"
     broken = limit is not None and not wall.most <= limit
-    if limit is None or not broken or not without.least <= limit:
+    if limit is None or not broken or not max(without.least, without.point) <= limit:
         return Weighed(plain, said)
     undecided = f"other programs had the processor and that may be all of it: {AGAIN}"
     return Weighed((min(wall.least, without.least), wall.most), said, undecided)

@@ -93,9 +93,10 @@ def _compared(
     first, second = spans[1], spans[2]
     if len(first) < FEWEST:
         raise MissingEvidenceError(f"{len(first)} process of each run tells nothing of another")
-    _, lower, upper = ratio_of_means(first, second, confidence=confidence)
+    ratio, lower, upper = ratio_of_means(first, second, confidence=confidence)
     # Slower over faster: what stands on both sides of 1 may be none.
-    return Ends(max(1.0, lower, 1.0 / upper), max(upper, 1.0 / lower)), (first, second)
+    ends = (max(1.0, lower, 1.0 / upper), max(upper, 1.0 / lower))
+    return Ends(ends[0], max(ratio, 1.0 / ratio), ends[1]), (first, second)
 
 
 def _limit(settings: ReproducibilitySettings, name: str) -> float | None:
@@ -176,18 +177,18 @@ def _held(
     if set(high["run"]) != {1, 2} or len(high) < 2 * FEWEST:
         raise MissingEvidenceError(f"{method}: the p95 of several processes of both runs is needed")
     pair = _times(high, "measured_s", "drawn_s", method)
-    ratio, wall = _ratio(pair, longer=longer, confidence=settings.confidence)
+    wall = _ratio(pair, longer=longer, confidence=settings.confidence)
     without = share = None
     if not high[["measured_running_s", "drawn_running_s"]].isna().any(axis=None):
         alone = _times(high, "measured_running_s", "drawn_running_s", method)
-        without = _ratio(alone, longer=longer, confidence=settings.confidence)[1]
+        without = _ratio(alone, longer=longer, confidence=settings.confidence)
         share = max(waited_share(*both) for both in zip(pair, alone, strict=True))
     weighed = weigh(wall, without, share=share, limit=limit)
     measured, drawn = pair
     text = (
         f"{method}: p95 of {len(high)} processes {np.median(measured) * MILLI:.4g} ms, drawn "
         f"{np.median(drawn) * MILLI:.4g} ms from the others: "
-        f"{'took' if longer else 'drawn'} {ratio:.3g} of it; {weighed.said}"
+        f"{'took' if longer else 'drawn'} {wall.point:.3g} of it; {weighed.said}"
     )
     counted = f"{len(high)} processes"
     return Measured(wall.most, weighed.interval, text, counted=counted, undecided=weighed.undecided)
@@ -200,7 +201,7 @@ def _times(rows: pd.DataFrame, measured: str, drawn: str, method: str) -> tuple[
     return pair
 
 
-def _ratio(pair: tuple[Array, Array], *, longer: bool, confidence: float) -> tuple[float, Ends]:
-    """What was measured over what was drawn, or the other way round: mean and ends."""
+def _ratio(pair: tuple[Array, Array], *, longer: bool, confidence: float) -> Ends:
+    """What was measured over what was drawn, or the other way round."""
     ratio, lower, upper = ratio_to(*(pair if longer else pair[::-1]), confidence=confidence)
-    return ratio, Ends(lower, upper)
+    return Ends(lower, ratio, upper)

@@ -22,7 +22,8 @@ from gates.verdicts import judge_criterion
 
 LATENCY, MODEL = "latency/latency.parquet", "latency/model.parquet"
 RATIOS = {"warm": "warm_latency_ratio_upper", "cold": "cold_latency_ratio_upper"}
-ENDS = [Ends(*pair) for pair in itertools.combinations_with_replacement((1.0, 1.2, 1.4, 3.0), 2)]
+LIMITS = {"warm": 1.5, "cold": 2.0}  # of the evidence
+ENDS = [Ends(*one) for one in itertools.combinations_with_replacement((1.0, 1.2, 1.4, 3.0), 3)]
 
 
 def verdict(wall, weighed, limit):
@@ -39,7 +40,7 @@ def test_contention_can_take_a_fail_back_and_nothing_else(limit, share):
         found = verdict(wall, weighed, limit)
         excused = (
             without is not None and share is not None and share >= CONTENDED_SHARE
-            and without.least <= limit
+            and without.point <= limit
         )  # fmt: skip
         assert found == ("INCONCLUSIVE" if plain == "FAIL" and excused else plain)
         assert weighed.interval[1] == wall.most  # what must hold is the time on the wall
@@ -60,6 +61,12 @@ def test_the_time_that_was_waited_is_taken_off_what_was_measured():
 
 def test_one_term_of_which_nothing_is_known_leaves_nothing_known():
     assert running(table(waited_s=[0.5, None, None])) is None
+
+
+@pytest.mark.parametrize("seconds", [np.nan, np.inf])
+def test_a_term_that_took_no_number_of_seconds_is_named_as_that(seconds):
+    with pytest.raises(MissingEvidenceError, match="took no number of seconds"):
+        running(table(waited_s=[0.0, 0.0, None], seconds=[seconds, 3.0, 9.0]))
 
 
 @pytest.mark.parametrize("waited", [2.0, 2.5, -0.1])
@@ -138,6 +145,25 @@ def test_what_passes_beside_other_programs_passes(ladder):
     evidence.edit_table(ladder, LATENCY, both)
     for found in found_in(judge(ladder, "B"), RATIOS["warm"]):
         assert found.verdict == "PASS" and "waiting for a processor" in found.caveat
+
+
+@pytest.mark.parametrize("temperature", RATIOS)
+def test_a_wait_in_one_process_alone_explains_no_ratio_of_all(ladder, temperature):
+    """Three processes of a run took a multiple, and one of them waited a little of it.
+
+    Wrong before: its interval grew wide enough to hold the limit, and the ratio was excused.
+    """
+
+    def change(frame):
+        frame = stretched(temperature, waited=0.0, factor=1.2 * LIMITS[temperature])(frame)
+        own = (frame["source"] == "measured") & (frame["temperature"] == temperature)
+        last = frame.loc[frame["run"] == 2, "process"].max()
+        alone = own & (frame["run"] == 2) & (frame["process"] == last)
+        return frame.assign(waited_s=frame["waited_s"].mask(alone, 0.3 * frame["seconds"]))
+
+    evidence.edit_table(ladder, LATENCY, change)
+    for found in found_in(judge(ladder, "B"), RATIOS[temperature]):
+        assert found.verdict == "FAIL" and AGAIN not in found.caveat, found
 
 
 def modelled(method, *, waited, column="measured_s", factor=3.0):
