@@ -101,7 +101,7 @@ def baseline_fall_upper(evidence: Evidence, settings: ReproducibilitySettings) -
     """Largest upper bound, over the simple baselines, of the fall over the last quarter."""
     found, foreign = [], []
     for method in dict.fromkeys((settings.budget_reference, *settings.baselines)):
-        if method == settings.budget_reference or _trained(evidence, method):
+        if method == settings.budget_reference or has_training(evidence, method):
             fall = last_quarter(evidence, BASELINES, method, confidence=settings.confidence)
             found.append((fall.interval[1], method, fall))
         else:
@@ -167,7 +167,7 @@ def updates_of(evidence: Evidence, root: str, method: str) -> int:
     return entry.config.training.steps
 
 
-def _trained(evidence: Evidence, method: str) -> bool:
+def has_training(evidence: Evidence, method: str) -> bool:
     """Whether a baseline has a training: by the account of it, not by weights that may be gone."""
     named = method in evidence.document(BASELINES, MATCHED).methods
     return named or bool(evidence.bind(f"{BASELINES}/{method}/seed_*/model.safetensors"))

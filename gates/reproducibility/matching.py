@@ -13,7 +13,13 @@ from dataclasses import dataclass
 from gates.evidence import Evidence, MissingEvidenceError
 from gates.need.settings import TRAINED as BASELINES
 from gates.report import Verdict
-from gates.reproducibility.convergence import Fall, last_quarter, losses, updates_of
+from gates.reproducibility.convergence import (
+    Fall,
+    has_training,
+    last_quarter,
+    losses,
+    updates_of,
+)
 from gates.reproducibility.settings import GENERATORS
 from gates.verdicts import judge_criterion, worst
 
@@ -108,7 +114,7 @@ def pairs(
     held = [
         trained(evidence, BASELINES, name, limit=limit, confidence=confidence)
         for name in dict.fromkeys(baselines)
-        if evidence.bind(f"{BASELINES}/{name}/seed_*/model.safetensors")
+        if has_training(evidence, name)
     ]
     return [
         Pair(candidate, baseline)
@@ -145,6 +151,8 @@ def matched_by(
         except MissingEvidenceError as error:
             said.append(f"{name}, matched by equal updates and convergence: not measured, {error}.")
             continue
+        if not found:
+            said.append(f"{name}, matched by two rules: no baseline to match with.")
         if any(rule != "PASS" for pair in found for rule in (pair.by_updates, pair.by_convergence)):
             said.append(_said(name, found, limit))
     return said

@@ -3,9 +3,9 @@
 import evidence
 import pytest
 
-from gates.evidence import Evidence
+from gates.evidence import Evidence, MissingEvidenceError
 from gates.proof import judge
-from gates.reproducibility.matching import pairs
+from gates.reproducibility.matching import matched_by, pairs
 
 BY_CONVERGENCE = "Equal convergence (the loss of both falls by 0.1 at most over the last quarter):"
 
@@ -84,6 +84,18 @@ def test_what_was_not_measured_is_said(ladder):
     train(ladder, "train_baselines", "act",
           [row for row in evidence.validation() if row["step"] != 3000])  # fmt: skip
     assert "equal updates and convergence: not measured" in said_of(ladder)
+
+
+def test_without_a_baseline_that_says_so(ladder):
+    asked = {"candidates": ("flow",), "limit": 0.1, "confidence": 0.95}
+    (said,) = matched_by(Evidence(ladder), baselines=(), **asked)
+    assert said == "flow, matched by two rules: no baseline to match with."
+
+
+def test_a_baseline_whose_weights_are_gone_is_still_one_that_was_trained(ladder):
+    (ladder / "artifacts/train_baselines/act/seed_0/model.safetensors").unlink()
+    with pytest.raises(MissingEvidenceError, match="while act was trained"):
+        found_of(ladder)
 
 
 def test_without_a_limit_nobody_says_what_is_done(ladder):
