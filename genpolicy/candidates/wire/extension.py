@@ -85,11 +85,13 @@ class Drawn:
         actions: Candidate chunks as the policy wrote them. Shape (N, K, D).
         evaluations: Network evaluations of a sample; None where it does not count.
         spans_s: Seconds by latency term, of the terms that it measures.
+        sampler: Hash of the sampler's settings that drew them; None where it does not say.
     """
 
     actions: Array
     evaluations: int | None = None
     spans_s: dict[str, float] = field(default_factory=dict)
+    sampler: str | None = None
 
 
 @dataclass(frozen=True)
@@ -142,6 +144,7 @@ def read_answer(
     invocation: str,
     candidates: int,
     sampler: str | None = None,
+    settings: str | None = None,
 ) -> Drawn:
     """The chunks of an answer.
 
@@ -152,6 +155,7 @@ def read_answer(
         invocation: What was asked.
         candidates: How many chunks were asked for.
         sampler: Which other setting was asked for; its hash is not that of the metadata.
+        settings: That hash, as it was answered first; None before.
 
     Raises:
         PolicyError: Another invocation's, another checkpoint's, or no actions of that number.
@@ -171,10 +175,17 @@ def read_answer(
                 raise PolicyError(
                     Fault.CHANGED, f"its {name} was {before[:16]}…, and is {str(now)[:16]}…"
                 )
+    own = said.get("sampler")
+    another = isinstance(own, str) and own != told.sampler and own == (settings or own)
+    if told.sampler is not None and sampler is not None and not another:
+        raise PolicyError(
+            Fault.CHANGED, f"the setting {sampler!r} is answered under {str(own)[:16]}…"
+        )
     return Drawn(
         _actions(answer.get(key), key, told, candidates),
         _count(said.get("nfe")) if told.counts_evaluations else None,
         {term: _seconds(said.get("spans_s"), term) for term in told.spans},
+        own if isinstance(own, str) else None,
     )
 
 

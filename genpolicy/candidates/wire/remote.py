@@ -82,6 +82,7 @@ class RemotePolicy:
         )  # fmt: skip
         self._outputs = Outputs(entry.action, contract, scene=scene)
         self._asked = 0
+        self._settings: dict[str | None, str] = {}  # hash by setting, as first answered
         self._line: Connection | None = None
         try:
             self.told: Capabilities = capabilities(self._connected().metadata)
@@ -176,9 +177,11 @@ class RemotePolicy:
             answer = self._connected().ask(message, timeout_s=self.entry.timeout_s)
             drawn = read_answer(
                 answer, key=self.entry.action.key, told=self.told, invocation=invocation,
-                candidates=candidates, sampler=sampler,
+                candidates=candidates, sampler=sampler, settings=self._settings.get(sampler),
             )  # fmt: skip
             self._check_shape(drawn)
+            if drawn.sampler is not None:
+                self._settings.setdefault(sampler, drawn.sampler)
         except PolicyError as error:
             self.close()
             if ended := self._ended():

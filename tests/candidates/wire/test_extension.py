@@ -130,3 +130,14 @@ def test_an_answer_that_is_not_what_was_asked_is_a_fault(answer, fault):
 def test_a_chunk_that_is_not_finite_is_left_to_feasibility():
     answer = {**ANSWER, "actions": np.full((2, 3, 5), np.nan)}
     assert np.isnan(read(answer).actions).all()
+
+
+@pytest.mark.parametrize("own", ["b" * 64, None, 3, "d" * 64])
+def test_another_setting_is_answered_under_one_hash_of_its_own(own):
+    """Not that of the judged one, nor another one than before."""
+    asked = {"key": "actions", "told": capabilities(said()), "invocation": "7", "candidates": 2}
+    first = read_answer(answered(sampler="c" * 64), **asked, sampler="one")
+    assert first.sampler == "c" * 64
+    with pytest.raises(PolicyError) as error:
+        read_answer(answered(sampler=own), **asked, sampler="one", settings=first.sampler)
+    assert error.value.fault is Fault.CHANGED
