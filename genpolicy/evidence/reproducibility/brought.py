@@ -121,7 +121,7 @@ def ask_brought(candidate: BroughtPolicy, asked: Asked) -> Answered:
             policy, asked.held_out, seed=candidate.seed, convention=_sampler(candidate.entry),
             samples=asked.samples, task=asked.task, checker=asked.checker,
         )  # fmt: skip
-        coverage = _coverage(policy, candidate, asked, modes) + _swept(policy, candidate, asked)
+        coverage = _coverage(policy, candidate, asked, modes)
         session, told = first_session(policy, starts), policy.told
     before = policy
     with running(candidate, contract, scene=asked.task.scene_path) as policy:
@@ -129,6 +129,10 @@ def ask_brought(candidate: BroughtPolicy, asked: Asked) -> Answered:
         # What somebody else runs is not started anew by us, and nothing is known of that.
         anew = second_session(policy, starts, session) if candidate.entry.started_here else None
     failed = _failed(before, policy)
+    if candidate.entry.samplers:
+        # Behind all that is judged, on a start of its own: one of these settings may hang or die.
+        with running(candidate, contract, scene=asked.task.scene_path) as further:
+            coverage = coverage + _swept(further, candidate, asked)
     broken = sum(failed.faults.values())
     number = drawn(stochastic=candidate.entry.stochastic)
     # Chunks that came and hold a number that is none, beside questions that got no chunk.

@@ -75,6 +75,28 @@ def test_other_settings_that_it_lets_us_choose_are_rows_beside_the_judged_one(an
     assert found.failed.faults == {} and {row.nfe for row in found.modes} == {2}
 
 
+class DiesOf(ServedPolicy):
+    """Once it was asked for another setting it answers nothing any more."""
+
+    gone = False
+
+    def answer(self, message):
+        self.gone = self.gone or "sampler" in message["genpolicy"]
+        if self.gone:
+            raise ValueError("gone")
+        return super().answer(message)
+
+
+def test_a_further_setting_that_ends_the_server_costs_nothing_that_is_judged(answered, policy):
+    dies = DiesOf(policy, samplers={"one": policy})
+    named = {"one": {"sampler": "euler", "sampler_steps": 1}}
+    found = answered(dies.answer, dies.metadata, samplers=named)
+    assert (found.failed.faults, found.identity.nonfinite_weights) == ({}, 0)
+    assert {row.max_abs_difference for row in found.samples} == {0.0}
+    own, one = found.coverage
+    assert own.nonfinite == 0 and one.nonfinite > 0
+
+
 def test_what_nobody_declares_is_missing_by_name(answered, policy):
     served = ServedPolicy(policy)
     found = answered(served.answer, served.metadata, declared=None)
