@@ -14,6 +14,7 @@ from pydantic import Field
 
 from genpolicy.candidates.contenders import Contender, Running, opened
 from genpolicy.candidates.judged import candidates_of, sampling_by
+from genpolicy.candidates.wire.policy import WirePolicy
 from genpolicy.contract.action import POSITION
 from genpolicy.contract.horizons import HorizonConfig
 from genpolicy.contract.settings import Settings
@@ -193,6 +194,11 @@ def measure_sweep(
         return _in_turns(plan, judged.name, policies, seen)
 
 
+def _faults(policy: Running) -> int:
+    """Invocations that ended in a fault; a fault is no answer, and takes no time that counts."""
+    return sum(policy.faults.values()) if isinstance(policy, WirePolicy) else 0
+
+
 def _in_turns(
     plan: LatencyPlan, name: str, policies: Sequence[Running], seen: NDArray[np.float64]
 ) -> list[SweepLatencyRow]:
@@ -201,8 +207,9 @@ def _in_turns(
         row = seen[repeat % len(seen)][None]
         for policy in policies:
             count = candidates_of(policy, plan.samples)
+            before = _faults(policy)
             spans = invoke(policy, row, repeat=repeat, candidates=count, project=None)
-            if repeat >= 0:
+            if repeat >= 0 and _faults(policy) == before:
                 rows.append(
                     SweepLatencyRow(
                         method=name,

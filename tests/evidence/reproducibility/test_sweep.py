@@ -5,7 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from genpolicy.candidates.brought import BroughtPolicy
 from genpolicy.candidates.judged import trained
+from genpolicy.candidates.wire.entry import ServerEntry
+from genpolicy.candidates.wire.faults import Fault, PolicyError
+from genpolicy.candidates.wire.policy import WirePolicy
 from genpolicy.evidence.reproducibility import sweep
 from genpolicy.evidence.reproducibility.latency import LatencyPlan
 from genpolicy.evidence.reproducibility.sweep import (
@@ -18,8 +22,10 @@ from genpolicy.evidence.reproducibility.sweep import (
     swept_windows,
 )
 from genpolicy.evidence.rows.need import ModeRow
+from genpolicy.policies.fixtures import fixture_observations
 from genpolicy.policies.policy import NetworkPolicy
 from genpolicy.policies.settings import SamplerConfig
+from tests.candidates.conftest import ENTRY
 
 PERIOD_S = 0.05
 
@@ -112,3 +118,18 @@ def test_a_chunk_that_is_no_numbers_marks_its_setting_and_ends_nothing(policy, d
     spoiled[:2, 5, 0] = number
     found = quality_of(Said(policy, spoiled), windows, data)
     assert found.nonfinite == 2 and np.isnan([found.chunk_error, found.jerk_p95_m_s3]).all()
+
+
+def test_a_setting_that_answers_nothing_has_no_times(dataset, data, kit, policy, tmp_path):
+    """Wrong before: its faults, of microseconds each, stood on the front as the fastest answers."""
+    plan = LatencyPlan(
+        dataset=dataset, task="tabletop_insertion", feasibility=kit.FEASIBILITY,
+        horizons=kit.HORIZONS, samples=2, warm=2, cold=2,
+    )  # fmt: skip
+    entry = ServerEntry.model_validate(ENTRY)
+    brought = BroughtPolicy("planted", tmp_path / "planted.yaml", entry, "c" * 64, 0)
+    absent = WirePolicy(brought, PolicyError(Fault.REFUSED, "no"))
+    seen = fixture_observations(data, horizons=kit.HORIZONS, count=2)
+    rows = sweep._in_turns(plan, "planted", [policy, absent], seen)
+    assert {row.sampler_sha256 for row in rows} == {policy.sampler_config_hash}
+    assert len(rows) == sweep.REPEATS
