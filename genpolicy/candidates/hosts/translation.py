@@ -1,5 +1,6 @@
 """From an entry of any kind to the server that hosts it: one command, in a child of its own."""
 
+import re
 import sys
 from pathlib import Path
 
@@ -12,6 +13,8 @@ from genpolicy.integrity.hashing import sha256_file
 
 ROOT = Path(__file__).parents[3]
 ADAPTER = ROOT / "adapters" / "lerobot_server.py"
+INTERPRETER = re.compile(r"(python|pypy|node|perl|ruby|julia|bash|sh)[0-9.]*$")
+OPTION = re.compile(r"--?[A-Za-z][\w-]*=")
 HERE = (
     "import sys; at = [*map(lambda p: p.endswith('site-packages'), sys.path), True].index(True); "
     "sys.path[at:at] = [sys.argv.pop(1)]; "
@@ -45,7 +48,8 @@ def program_files(entry: Entry, folder: Path) -> dict[str, str]:
     """What runs a candidate, beside the files that are it: SHA-256 by path.
 
     Our own host is none of it: every stage that starts one depends on its code. What an
-    environment has installed, an interpreter among it, is bound by nothing.
+    environment has installed, an interpreter among it, is bound by nothing; nor is a module that
+    `-m` names, or whatever a script imports or reads, unless it stands in `files`.
 
     Args:
         entry: What it is.
@@ -53,20 +57,23 @@ def program_files(entry: Entry, folder: Path) -> dict[str, str]:
 
     Returns:
         Of a LeRobot policy the adapter; of a server the files that words of its command name from
-        the folder. Empty of the others.
+        the folder, as they are or behind `--x=`; of a link its target. Empty of the others.
 
     Raises:
-        IntegrityError: One is no regular file.
+        IntegrityError: One cannot be read.
     """
     if isinstance(entry, LeRobotEntry):
         return {f"adapters/{ADAPTER.name}": sha256_file(ADAPTER)} if ADAPTER.is_file() else {}
     if not isinstance(entry, ServerEntry):
         return {}
-    named = [word for word in entry.command or () if not Path(word).is_absolute()]
+    command = list(entry.command or ())
+    if command and INTERPRETER.match(Path(command[0]).name):
+        command = command[1:]
+    named = [word.partition("=")[2] if OPTION.match(word) else word for word in command]
     return {
-        word: sha256_file(folder / word)
+        word: sha256_file((folder / word).resolve())  # of a link, what it leads to
         for word in named
-        if word not in entry.files and (folder / word).is_file()
+        if word not in entry.files and not Path(word).is_absolute() and (folder / word).is_file()
     }
 
 

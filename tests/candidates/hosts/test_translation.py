@@ -84,6 +84,24 @@ def test_what_runs_a_candidate_is_known_by_hash_beside_its_files(written, entry_
     assert program_files(entry_of(), tmp_path) == {}
 
 
+def test_an_interpreter_of_the_folder_is_none_of_it_and_links_and_options_are(entry_of, tmp_path):
+    """Wrong before: the link of an environment to its interpreter ended the stage for everybody."""
+    (tmp_path / "venv/bin").mkdir(parents=True)
+    (tmp_path / "venv/bin/python3.11").symlink_to(sys.executable)
+    (tmp_path / "real.py").write_text("serve")
+    (tmp_path / "serve.py").symlink_to(tmp_path / "real.py")
+    (tmp_path / "config.yaml").write_text("steps: 2")
+    words = ["venv/bin/python3.11", "serve.py", "--config=config.yaml", "--port={port}"]
+    found = program_files(entry_of(address=None, command=words), tmp_path)
+    assert found == {
+        "serve.py": sha256_file(tmp_path / "real.py"),
+        "config.yaml": sha256_file(tmp_path / "config.yaml"),
+    }
+    (tmp_path / "server").write_text("binary")
+    own = program_files(entry_of(address=None, command=["server", "{port}"]), tmp_path)
+    assert list(own) == ["server"]
+
+
 def test_the_identity_of_an_entry_does_not_move_without_a_word(entry_of):
     """Evidence names it: another one makes all that was recorded another candidate's."""
     assert entry_of().sha256 == IDENTITY
