@@ -3,14 +3,15 @@
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationError, model_validator
 
 from genpolicy.candidates.hosts.onnx_library import require_onnx
-from genpolicy.candidates.wire.declared import DIGEST
+from genpolicy.candidates.wire.declared import DIGEST, Choice
 from genpolicy.candidates.wire.entry import CPU, Entry, ServerEntry
 from genpolicy.contract.settings import Settings, parse_settings
 from genpolicy.errors import ConfigError
 from genpolicy.integrity.documents import read_yaml
+from genpolicy.policies.settings import SamplerConfig
 
 FUNCTION = r"^[A-Za-z_][A-Za-z0-9_]*:[A-Za-z_][A-Za-z0-9_]*$"
 CHECKPOINT_FILES = ("config.json", "model.safetensors")
@@ -226,7 +227,10 @@ class LeRobotEntry(Entry):
         return [_below(self.pretrained_model, name) for name in sorted(names)]
 
     def require_host(self) -> None:
-        """Its interpreter."""
+        """Its interpreter, and the device that it declares."""
+        from genpolicy.candidates.devices import require_here  # noqa: PLC0415  (loads torch)
+
+        require_here(self.device, where=f"declared.device of the candidate {self.name}")
         if not Path(self.interpreter).is_file():
             raise ConfigError(
                 where=f"interpreter of the candidate {self.name}",
@@ -268,7 +272,49 @@ def read_entry(path: Path) -> Entry:
             expected=f"one of {', '.join(KINDS)}",
             action="See docs/candidates.md.",
         )
-    return parse_settings(KINDS[kind], values, where=str(path))
+    entry = parse_settings(KINDS[kind], values, where=str(path))
+    if isinstance(entry, TrainedEntry) and entry.samplers:
+        _require_settings(entry, path)
+    return entry
+
+
+def chosen(own: SamplerConfig, choice: Choice, *, where: str) -> SamplerConfig:
+    """The settings that a choice asks for.
+
+    What a choice can say and does not has its default, never that of the judged sampler; what it
+    cannot say (`clip`, `population`, `batch_rows`) stays as the checkpoint has it.
+
+    Raises:
+        ConfigError: No sampler of ours.
+    """
+    said = choice.model_dump(exclude={"sampler", "sampler_steps"}, exclude_none=True)
+    kept = own.model_dump(include={"clip", "population", "batch_rows"})
+    said |= {"name": choice.sampler, "steps": choice.sampler_steps}
+    return parse_settings(SamplerConfig, kept | said, where=where)
+
+
+def _require_settings(entry: TrainedEntry, path: Path) -> None:
+    """Refuse a setting that its checkpoint cannot have, before a host dies of it."""
+    from genpolicy.policies.checkpoint import CheckpointConfig  # noqa: PLC0415  (loads torch)
+    from genpolicy.policies.methods import check_sampler, method_named  # noqa: PLC0415  (likewise)
+
+    file = path.parent / entry.checkpoint / CHECKPOINT_FILES[0]
+    if not file.is_file():
+        return  # refused by name where files are verified
+    try:
+        config = CheckpointConfig.model_validate_json(file.read_bytes())
+    except ValidationError:
+        return  # refused by name where it is loaded
+    for name, choice in entry.samplers.items():
+        where = f"{path}: samplers.{name}"
+        sampler = chosen(config.sampler, choice, where=where)
+        try:
+            check_sampler(method_named(config.method), sampler, config.head)
+        except ConfigError as error:
+            raise ConfigError(
+                where=where, found=f"{error.found} ({error.where})", expected=error.expected,
+                action=error.action,
+            ) from error  # fmt: skip
 
 
 def _below(folder: str, name: str) -> str:

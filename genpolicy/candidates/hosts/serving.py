@@ -12,6 +12,7 @@ from genpolicy.candidates.hosts.kinds import (
     ScriptedEntry,
     TorchEntry,
     TrainedEntry,
+    chosen,
     read_entry,
 )
 from genpolicy.candidates.hosts.onnx_library import require_onnx
@@ -21,11 +22,9 @@ from genpolicy.candidates.judged import loaded_on, sampling_by
 from genpolicy.candidates.wire.declared import Choice
 from genpolicy.candidates.wire.entry import Entry, verify_files
 from genpolicy.candidates.wire.served import ServedPolicy
-from genpolicy.contract.settings import parse_settings
 from genpolicy.errors import ConfigError, IntegrityError
 from genpolicy.integrity.hashing import read_verified
 from genpolicy.policies.policy import NetworkPolicy
-from genpolicy.policies.settings import SamplerConfig
 
 HOSTED = [name for name, kind in KINDS.items() if issubclass(kind, HostedEntry)]
 
@@ -79,12 +78,7 @@ def _chosen(policy: NetworkPolicy, choices: Mapping[str, Choice]) -> dict[str, N
     """
     found = {}
     for name, choice in choices.items():
-        said = {"name": choice.sampler, "steps": choice.sampler_steps}
-        for key in ("eta", "tolerance"):
-            if getattr(choice, key) is not None:
-                said[key] = getattr(choice, key)
-        own = policy.sampler.model_dump() | said
-        sampler = parse_settings(SamplerConfig, own, where=f"samplers.{name}")
+        sampler = chosen(policy.sampler, choice, where=f"samplers.{name}")
         found[name] = sampling_by(policy, sampler)
     return found
 

@@ -15,12 +15,14 @@ class Choice(Settings):
         sampler_steps: Its steps.
         eta: Share of the ancestral noise; None of a sampler that has none.
         tolerance: Error of a step; None of a sampler that does not choose its steps.
+        nfe_cap: Network evaluations after which a sample is given up; None likewise.
     """
 
     sampler: str = Field(min_length=1)
     sampler_steps: int = Field(ge=1)
     eta: float | None = None
     tolerance: float | None = None
+    nfe_cap: int | None = None
 
 
 class Declared(Settings):

@@ -1,12 +1,16 @@
+import shutil
+
 import pytest
 import torch
 
 from genpolicy.candidates.brought import require_brought
 from genpolicy.candidates.hosts import onnx_library
-from genpolicy.candidates.hosts.kinds import KINDS, read_entry
+from genpolicy.candidates.hosts.kinds import KINDS, chosen, read_entry
 from genpolicy.candidates.hosts.translation import as_server
+from genpolicy.candidates.wire.declared import Choice
 from genpolicy.candidates.wire.entry import verify_files
 from genpolicy.errors import ConfigError, IntegrityError
+from genpolicy.policies.settings import SamplerConfig
 from tests.candidates.conftest import ENTRY
 from tests.candidates.hosts.conftest import NOISE
 
@@ -118,6 +122,37 @@ def test_a_device_that_is_declared_and_not_there_is_refused_before_anything_trai
             ConfigError, match=r"declared\.device of the candidate planted is 'cuda'"
         ):
             ask()
+
+
+@pytest.mark.parametrize("device", ["NVIDIA A100", "cuda"])
+def test_lerobot_is_put_on_a_device_that_is_here(written, tmp_path, monkeypatch, device):
+    monkeypatch.setattr(torch.cuda, "device_count", lambda: 0)
+    monkeypatch.chdir(tmp_path)
+    entry = read_entry(written("lerobot", declared={**DECLARED, "device": device}))
+    with pytest.raises(ConfigError, match=r"declared\.device of the candidate planted"):
+        entry.require_host()
+
+
+def test_a_choice_inherits_nothing_that_it_could_have_said():
+    """Wrong before: dpm_2m took the eta of the judged ddim, which no such sampler has."""
+    own = SamplerConfig(name="ddim", steps=4, eta=0.5, tolerance=0.01, clip=2.0, nfe_cap=9)
+    found = chosen(own, Choice(sampler="dpm_2m", sampler_steps=2), where="samplers.a")
+    assert found == SamplerConfig(name="dpm_2m", steps=2, clip=2.0)
+    same = Choice(sampler="ddim", sampler_steps=4, nfe_cap=7)
+    assert chosen(own, same, where="").model_dump(include={"eta", "nfe_cap"}) == {
+        "eta": 0.0, "nfe_cap": 7,
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("choice", [{"sampler": "ddim"}, {"sampler": "euler", "eta": 0.5},
+                                    {"sampler": "unknown"}])  # fmt: skip
+def test_a_setting_that_its_checkpoint_cannot_have_is_refused_when_it_is_read(
+    written, fleet, choice
+):
+    path = written("trained", samplers={"a": {**choice, "sampler_steps": 2}})
+    shutil.copy(fleet[0] / "flow/seed_0/config.json", path.parent / "flow/config.json")
+    with pytest.raises(ConfigError, match=r"samplers\.a"):
+        read_entry(path)
 
 
 def test_noise_of_several_steps_has_an_axis_more(written):
