@@ -58,14 +58,14 @@ class _Entry:
     def columns(self) -> dict[str, Any]:
         """What it says by itself; times in s, force in N."""
         states = [m for kind, m in self.meanwhile if kind == "recovery"]
-        commanded = [m["action"] for kind, m in self.meanwhile if kind in COMMANDS]
+        primitives = [m["new"] for m in states if m["new"] not in NO_PRIMITIVES]
         forces_n = [m["force_n"] for kind, m in self.meanwhile if kind == "recovery_force"]
-        still = len({*([self.held] if self.held else []), *commanded}) < 2
+        still = len({*([self.held] if self.held else []), *self._driven()}) < 2
         last_ns = self.meanwhile[-1][1]["t"] if self.meanwhile else self.first["t"]
         return {
             "phase": self.first["phase"],
             "cause": self.first["cause"],
-            "primitives": " ".join(m["new"] for m in states if m["new"] not in NO_PRIMITIVES),
+            "primitives": " ".join(primitives),
             "failures": (states[-1]["failures"] if states else self.failed) - self.failed,
             "ended": self.ended,
             "resampled_only": self.ended == HANDED_BACK and still,
@@ -75,6 +75,14 @@ class _Entry:
             "force_peak_n": max(forces_n, default=0.0),
             "resets": int(self.ended == "stopped"),
         }
+
+    def _driven(self) -> Iterator[str]:
+        """The actions that its primitives commanded: of the fallback, from the first of them on."""
+        driving = False
+        for kind, m in self.meanwhile:
+            driving |= kind == "recovery" and m["new"] not in NO_PRIMITIVES
+            if driving and kind == "fallback":
+                yield m["action"]
 
 
 class Recoveries:

@@ -7,65 +7,118 @@ from genpolicy.seeds import stream
 from genpolicy.verification.attended import Attended, PlannedPerson, attended_otherwise
 
 WHO = "ada"
-CALLED = ("mode", {"old": "fallback", "new": "intervention"})
-CAME = ("person", {"stage": "took_over", "who": WHO})
+FELL = ("mode", {"old": "run", "new": "fallback"})
+HELD = ("recovery", {"old": "idle", "new": "hold"})
+ASKED = ("recovery", {"old": "hold", "new": "ask_human"})
+INTERVENES = ("mode", {"old": "fallback", "new": "intervention"})
+CALLED = (FELL, HELD, ASKED, INTERVENES)
+TOOK = ("person", {"stage": "took_over", "who": WHO})
 DRIVES = ("mode", {"old": "intervention", "new": "fallback"})
+HAS = ("recovery", {"old": "ask_human", "new": "person"})
+CAME = (TOOK, DRIVES, HAS)
 CHUNK = ("enqueue", {"arrival": 1, "chunk_id": "c", "method": WHO})
 ROW = ("fallback", {"arrival": 1})
-GONE = ("person", {"stage": "handed_back", "who": WHO})
-BACK = ("mode", {"old": "intervention", "new": "run"})
+LEFT = ("person", {"stage": "handed_back", "who": WHO})
+BACK = (INTERVENES, ("mode", {"old": "intervention", "new": "run"}))
+FREE = ("recovery", {"old": "person", "new": "idle"})
+GONE = (LEFT, *BACK, FREE)
+LEAVES = ("recovery", {"old": "person", "new": "abort"})
 OF_POLICY = ("enqueue", {"arrival": 2, "chunk_id": "p", "method": "flow"})
 STOPPED = ("supervisor", {"event": "force", "state": "protective_stop"})
 CLEARED = ("supervisor", {"event": "human_reset", "state": "run"})
-ENDED = ("outcome", {"outcome": "assisted"})
+LATER = ("observation", {"later": True})
+WON = ("outcome", {"outcome": "success"})
+OVER = ("person", {"stage": "episode_over", "who": WHO})
+END = (("mode", {"old": "fallback", "new": "ended"}), ("end", {}))
 
 
 def rules(*events):
-    attended = Attended()
-    return [rule for kind, m in events for rule, _ in attended.follow(kind, m)]
+    """Rules that are broken; all events at one time, up to `LATER`."""
+    attended, found, t = Attended(), [], 0
+    for kind, m in events:
+        t += "later" in m
+        found += [rule for rule, _ in attended.follow(kind, {"t": t, **m})]
+    return found
 
 
 def test_called_come_driven_and_gone_is_in_order():
-    assert rules(CALLED, CAME, DRIVES, CHUNK, ROW, GONE, BACK, OF_POLICY,
-                 ("accept", {"arrival": 2}), ENDED) == []  # fmt: skip
+    begun = (*CALLED, LATER, *CAME, LATER, CHUNK, ROW, LATER)
+    assert rules(*begun, *GONE, LATER, OF_POLICY, ("accept", {"arrival": 2}),
+                 ("outcome", {"outcome": "assisted"})) == []  # fmt: skip
+    given_up = ("person", {"stage": "gave_up", "who": WHO})
+    assert rules(*begun, given_up, INTERVENES, LEAVES, LATER, ("end", {})) == []
+    assert rules(*begun, OVER, *END) == []
+    assert rules(*begun, STOPPED, ("recovery", {"old": "person", "new": "stopped"}), LATER,
+                 OVER, *END) == []  # fmt: skip
 
 
 @pytest.mark.parametrize(
     ("events", "rule"),
     [
-        ((CAME,), "P8.take_over"),
-        ((CALLED, CAME, DRIVES, CAME), "P8.take_over"),
-        ((CALLED, ("person", {"stage": "took_over", "who": " "})), "P8.take_over"),
-        ((CALLED, STOPPED, CAME), "P8.stop"),
-        ((CALLED, CAME, DRIVES, STOPPED, CLEARED), "P8.reset"),
-        ((CALLED, CAME, DRIVES, OF_POLICY), "P8.queue"),
-        ((OF_POLICY, CALLED, CAME, DRIVES, ("accept", {"arrival": 2})), "P8.drives"),
-        ((OF_POLICY, CALLED, CAME, DRIVES, ("fallback", {"arrival": 2})), "P8.drives"),
-        ((CALLED, CAME, DRIVES, CHUNK, GONE, ROW), "P8.drives"),
-        ((CALLED, CAME, DRIVES, BACK), "P8.mode"),
-        ((CALLED, CAME, DRIVES, GONE, BACK, ("outcome", {"outcome": "success"})), "P8.success"),
-        ((GONE,), "P8.person"),
-        ((CALLED, CAME, DRIVES, ("person", {"stage": "lost", "who": WHO})), "P8.person"),
+        ((*CALLED[:3], TOOK), "P8.take_over"),
+        ((*CALLED, *CAME, TOOK), "P8.take_over"),
+        ((*CALLED, ("person", {"stage": "took_over", "who": " "})), "P8.take_over"),
+        ((FELL, HELD, INTERVENES, TOOK), "P8.take_over"),
+        ((*CALLED, STOPPED, *CAME), "P8.stop"),
+        ((*CALLED, *CAME, STOPPED, CLEARED), "P8.reset"),
+        ((*CALLED, *CAME, OF_POLICY), "P8.queue"),
+        ((*CALLED, OF_POLICY), "P8.queue"),
+        ((OF_POLICY, *CALLED, *CAME, ("fallback", {"arrival": 2})), "P8.drives"),
+        ((*CALLED, *CAME, CHUNK, *GONE, ROW), "P8.drives"),
+        ((FELL, HELD, CHUNK, ROW), "P8.drives"),
+        ((*CALLED, *CAME, BACK[1], LEFT, FREE), "P8.mode"),
+        ((*CALLED, *CAME, *GONE, WON), "P8.success"),
+        # A call alone is enough, whether somebody came or not.
+        ((*CALLED, WON), "P8.success"),
+        ((FELL, HELD, ("recovery", {"old": "hold", "new": "retreat"}),
+          ("recovery", {"old": "retreat", "new": "abort"}), WON), "P8.success"),
+        ((LEFT,), "P8.person"),
+        ((*CALLED, *CAME, ("person", {"stage": "lost", "who": WHO})), "P8.person"),
+        # The person is left out: the state, the mode and the going say that there was one.
+        ((*CALLED, HAS), "P8.person"),
+        ((*CALLED, DRIVES), "P8.mode"),
+        ((*CALLED, *CAME, LATER, FREE), "P8.person"),
+        ((*CALLED, *CAME, LATER, LEAVES), "P8.person"),
+        # Or its state is.
+        ((*CALLED, TOOK, DRIVES, LATER), "P8.person"),
+        ((*CALLED, *CAME, LATER, LEFT, *BACK, ("end", {})), "P8.person"),
+        ((*CALLED, *CAME, LATER, OVER, LATER), "P8.person"),
+        ((*CALLED[:3], LATER), "P8.called"),
+        ((*CALLED[:3], ("end", {})), "P8.called"),
     ],
-)
+)  # fmt: skip
 def test_each_thing_that_may_not_be_is_found(events, rule):
     assert rules(*events) == [rule]
 
 
+@pytest.mark.parametrize("kind", ["accept", "fallback"])
+def test_of_the_policy_nothing_is_executed_while_a_person_has_the_arm(kind):
+    assert "P8.drives" in rules(OF_POLICY, *CALLED, *CAME, (kind, {"arrival": 2}))
+
+
 PLAN = PlannedPerson((0.5, 1.5), 2.0, 11)
-PERIOD_NS = 50_000_000
 
 
-def planned(tmp_path, *, later=0, had_ns=1_000_000_000):
-    """A journal in which a person is called at 1 s, comes as drawn or later, and stays a while."""
+def planned(tmp_path, *, later=0, had_ns=1_000_000_000, comes=True, waits=40, period_s=0.05):
+    """A journal in which a person is called at 1 s, comes as drawn or later, and stays a while.
+
+    One that nobody comes to is aborted after so many ticks.
+    """
+    period_ns = round(period_s * 1e9)
     journal = Journal("r", {"perturbation": "push", "start": "4"})
-    journal.add("session", 0, {"labels": journal.labels, "period_ns": PERIOD_NS})
+    journal.add("session", 0, {"labels": journal.labels, "period_ns": period_ns})
     asked = {"old": "hold", "new": "ask_human", "cause": "", "phase": "", "failures": 0}
     journal.add("recovery", 1_000_000_000, asked)
     due_s = stream(11, "person", "push", 4, 0).uniform(0.5, 1.5)
-    came_ns = 1_000_000_000 + PERIOD_NS * (int(due_s / 0.05) + 1 + later)
-    journal.add("person", came_ns, CAME[1])
-    journal.add("person", came_ns + had_ns, GONE[1])
+    came_ns = 1_000_000_000 + round(period_s * 1e9 * (int(due_s / period_s) + 1 + later))
+    if comes:
+        journal.add("recovery", came_ns, asked | HAS[1])
+        journal.add("person", came_ns, TOOK[1])
+        journal.add("person", came_ns + had_ns, LEFT[1])
+    elif waits is not None:
+        aborted = {"old": "ask_human", "new": "abort"}
+        journal.add("recovery", 1_000_000_000 + waits * period_ns, asked | aborted)
+    journal.add("end", 9_000_000_000, {})
     write_journal(tmp_path / "j.mcap", [journal])
     return tmp_path / "j.mcap"
 
@@ -81,8 +134,17 @@ def test_the_person_is_drawn_again(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "said"),
     [({"later": 1}, "took over at"), ({"later": -1}, "took over at"),
-     ({"had_ns": 2_200_000_000}, "had the arm for 2.200 s")],
+     ({"had_ns": 2_200_000_000}, "had the arm for 2.200 s"),
+     ({"comes": False}, "nobody took over"), ({"comes": False, "waits": None}, "nobody took over")],
 )  # fmt: skip
 def test_who_comes_at_another_time_or_stays_too_long_is_found(tmp_path, changes, said):
     (found,) = attended_otherwise(planned(tmp_path, **changes), PLAN)
     assert said in found and found.startswith("in 'r'")
+
+
+def test_who_would_have_come_too_late_is_not_missed_and_a_period_need_be_no_whole_ns(tmp_path):
+    due_s = stream(11, "person", "push", 4, 0).uniform(0.5, 1.5)
+    for more, found in ((1, 0), (2, 1)):
+        path = planned(tmp_path, comes=False, waits=int(due_s / 0.05) + more)
+        assert len(list(attended_otherwise(path, PLAN))) == found
+    assert list(attended_otherwise(planned(tmp_path, period_s=1 / 30), PLAN)) == []

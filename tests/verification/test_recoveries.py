@@ -91,6 +91,12 @@ def test_a_recovery_whose_primitives_move_the_arm_and_whose_policy_goes_on(tmp_p
         # Before the first command nobody knows what was held: one row is no motion.
         (("enter:insert", "advance", "fallback:moved", "reach", "reach", "accept:moved"),
          Outcome.SUCCESS, {"resampled_only": True}),
+        # What the policy commanded meanwhile is no motion of a primitive.
+        (("accept:held", "enter:insert", "advance", "accept:moved", "reach", "reach",
+          "accept:moved"), Outcome.SUCCESS, {"resampled_only": True}),
+        # Nor is what is driven while it holds, before any.
+        (("accept:held", "enter:insert", "fallback:moved", "advance", "reach", "reach",
+          "accept:moved"), Outcome.SUCCESS, {"resampled_only": True}),
         # Success without one action of the policy is the fallback's.
         ((*BEGIN, "reach", "reach"), Outcome.SUCCESS, {"taken_over": False, "succeeded": True}),
         ((*BEGIN, "reach", "reach", "accept:held"), Outcome.TIMEOUT,

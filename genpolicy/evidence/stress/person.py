@@ -69,7 +69,6 @@ class Attendance:
 
     Attributes:
         calls: Calls for a person so far.
-        helped: Whether it has ever had the arm.
     """
 
     def __init__(  # noqa: PLR0917
@@ -82,7 +81,6 @@ class Attendance:
         key: tuple[int, str, int],
     ) -> None:
         self.calls = 0
-        self.helped = False
         self._settings = settings
         self._task, self._world = task, world
         self._executor, self._recovery = executor, recovery
@@ -120,7 +118,7 @@ class Attendance:
             if not come:
                 return True
             self._recovery.person_took_over(now_s, WHO)
-            self.helped, self._since_s, self._planned = True, now_s, None
+            self._since_s, self._planned = now_s, None
         if self._spent_s + (now_s - self._since_s) > settings.longest_s:
             self._executor.intervene(now_s)
             self._recovery.person_gave_up(now_s, WHO)

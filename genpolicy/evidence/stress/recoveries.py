@@ -1,7 +1,7 @@
 """Each entry into recovery as a row: why it began, what it did, and what followed.
 
-A recovery is more than another sample. It counts where its own primitive moved the arm to its
-goal, the policy took over from there and the episode succeeded; not where the same phase had to be
+A recovery is more than another sample. It counts where its own primitive commanded the arm to
+its goal, the policy took over from there and the episode succeeded; not where the same phase had to be
 recovered again, where a person was called, or where new samples alone had helped.
 """
 
@@ -79,8 +79,10 @@ def entries_of(events: Iterable[Event]) -> list[Entry]:
         elif kind in ("accept", "fallback"):
             if entry is not None:
                 # Before the first command nobody knows what was held; the first row is it then.
-                entry.moved |= running and (entry.held or payload["action"]) != payload["action"]
-                entry.held = entry.held or payload["action"]
+                # What moves is a primitive's own, and nothing of the policy.
+                if running and kind == "fallback" and entry.primitives:
+                    entry.held = entry.held or payload["action"]
+                    entry.moved |= entry.held != payload["action"]
                 entry.taken_over |= kind == "accept" and entry.ended == HANDED_BACK
             commanded = payload["action"]
         elif kind == "recovery_force" and entry is not None and running:

@@ -224,7 +224,7 @@ class Rollout:
         self.tally.feel(self.journal, self.now_s, self.world.contact_force_n)
         self.recovery.feel(self.now_s, self.world.contact_force_n)
         if self.world.success:
-            self._end(Outcome.ASSISTED if self.person.helped else Outcome.SUCCESS)
+            self._end(Outcome.ASSISTED if self.person.calls else Outcome.SUCCESS)
 
     def end(self, outcome: Outcome) -> None:
         """End from outside: the time is over."""

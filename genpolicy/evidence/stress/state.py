@@ -35,7 +35,7 @@ class Outcome(StrEnum):
     INTERVENTION = "intervention"
     TIMEOUT = "timeout"
     ASSISTED = "assisted"
-    """The task's success test held after a person had the arm: no success of the policy."""
+    """The task's success test held after a person was called: no success of the policy."""
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import pytest
 from pydantic import ValidationError
 
-from genpolicy.evidence.stress.person import WHO, PersonSettings, person_s
+from genpolicy.evidence.stress.person import WHO, Attendance, PersonSettings, person_s
 from genpolicy.evidence.stress.recoveries import recovery_rows
 from genpolicy.evidence.stress.rollout import Rollout
 from genpolicy.evidence.stress.state import Outcome
@@ -108,6 +108,20 @@ def test_one_who_comes_too_late_finds_it_aborted(play):
     assert states(rollout)[-1][1] == RecoveryState.ABORT and not of_kind(rollout, "person")
 
 
+def test_success_while_the_person_is_still_on_the_way_is_not_the_policy_s(play, monkeypatch):
+    """Whoever was called had to be: what succeeds by itself meanwhile is assisted at best."""
+    call = Attendance.attend
+
+    def there(attendance, *given):
+        goes_on = call(attendance, *given)
+        monkeypatch.setattr(type(attendance._world), "success", True)
+        return goes_on
+
+    monkeypatch.setattr(Attendance, "attend", there)
+    rollout = play()
+    assert not of_kind(rollout, "person") and rollout.outcome is Outcome.ASSISTED
+
+
 def test_one_who_does_not_get_there_in_time_gives_up(play):
     rollout = play(person=PersonSettings(reaction_s=[0.0, 0.0], longest_s=0.3))
     assert rollout.outcome is Outcome.INTERVENTION
@@ -120,7 +134,7 @@ def test_a_stop_while_the_person_drives_stays(play, monkeypatch):
     sense = Rollout.sense
 
     def pushed(rollout):
-        if rollout.person.helped and rollout.executor.person:
+        if rollout.executor.person:
             rollout.supervisor.observe_force(rollout.now_s, 1e3, rollout.world.phase)
         sense(rollout)
 
