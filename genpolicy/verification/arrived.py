@@ -3,8 +3,9 @@
 A rollout on the virtual clock states the hash of what it exposes when it does, and when each of
 these arrives. An invocation states what it was conditioned on. Here both are held against each
 other: an observation that is used before it is there would make a late camera harmless, and an
-older one than had to be used would age actions that need not be. That they arrive when the plan
-says is asked of `owed`.
+older one than had to be used would age actions that need not be. Each tick exposes one, as it
+observes: a second one would undo the loss of the first. That they arrive when the plan says is
+asked of `owed`.
 """
 
 import hashlib
@@ -23,6 +24,7 @@ class Arrived:
     def __init__(self) -> None:
         self._timed = False
         self._exposed: dict[int, str] = {}
+        self._unobserved: int | None = None
         self._there: set[int] = set()
         self._seen: dict[str, int] = {}
 
@@ -33,7 +35,13 @@ class Arrived:
         elif not self._timed:
             return
         elif kind == "exposure":
-            self._exposed[m["t"]] = m["sha256"]
+            if self._unobserved is not None or not m["t"] > max(self._exposed, default=-1):
+                yield "sensor.exposed", f"At {m['t']} ns more is exposed than once a tick."
+            self._exposed[m["t"]], self._unobserved = m["sha256"], m["t"]
+        elif kind == "observation":
+            if self._unobserved != m["t"]:
+                yield "sensor.exposed", f"The tick at {m['t']} ns exposes nothing."
+            self._unobserved = None
         elif kind == "arrived":
             yield from self._arrive(m["exposed_ns"], m["t"])
         elif kind == "conditioning":

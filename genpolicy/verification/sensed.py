@@ -1,4 +1,4 @@
-"""When each exposure had to arrive, drawn again, and whether a journal states just that."""
+"""When each exposure had to be, and to arrive, drawn again, and whether a journal states that."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -69,13 +69,18 @@ class Sensed:
     def otherwise(
         self, end_ns: int, takes_s: Callable[[str, int, int], Mapping[str, float]]
     ) -> Iterator[str]:
-        """What did not arrive when it had to, in words.
+        """What was not exposed, or did not arrive, when it had to, in words.
 
         Args:
             end_ns: When the rollout ended.
             takes_s: Sensor terms by condition, start and number of the exposure, s.
         """
+        if len(self._exposed_ns) < round(end_ns / self.period_ns):
+            yield f"{len(self._exposed_ns)} exposures until {end_ns} ns, one a period was to be"
         for number, exposed_ns in enumerate(self._exposed_ns):
+            # The period is told in whole ns, and a number may be any.
+            if not abs(exposed_ns - number * self.period_ns) <= ROUNDING_NS + number / 2:
+                yield f"exposure {number} is at {exposed_ns} ns, and was to be one a period"
             own_s = sum(takes_s(self.condition, self.start, number).values())
             due_ns, came_ns = exposed_ns + own_s * 1e9, self._there_ns.get(exposed_ns)
             if came_ns is None:

@@ -41,9 +41,17 @@ def queued(condition=50, start=50, chunk_id="a"):
 SEEN = (exposed(0, 0), exposed(1, 50), arrived(90, 0), exposed(2, 100), arrived(140, 50))
 
 
+ALONE = ("exposure", {**exposed(3, 150)[1], "alone": True})
+
+
 def rules(*events, session=SESSION):
-    seen = Arrived()
-    return [rule for kind, m in (session, *events) for rule, _ in seen.follow(kind, m)]
+    """Rules that are broken where each exposure is one of a tick that observes."""
+    seen, found = Arrived(), []
+    for kind, m in (session, *events):
+        found += seen.follow(kind, m)
+        if kind == "exposure" and "alone" not in m:
+            found += seen.follow("observation", {"t": m["t"]})
+    return [rule for rule, _ in found]
 
 
 def test_the_newest_that_is_there():
@@ -67,6 +75,10 @@ def test_the_newest_that_is_there():
         ((*SEEN, began(140, 50, (0, 1)), queued(condition=100)), "sensor.claims"),
         ((*SEEN, began(140, 50, (0, 1)), queued(start=100)), "sensor.claims"),
         ((*SEEN, queued()), "sensor.claims"),
+        ((*SEEN, exposed(3, 100)), "sensor.exposed"),
+        ((*SEEN, exposed(3, 90)), "sensor.exposed"),
+        ((*SEEN, ALONE, exposed(3, 151)), "sensor.exposed"),
+        ((*SEEN, ("observation", {"t": 150 * MS})), "sensor.exposed"),
     ],
 )
 def test_what_could_not_have_been_seen_is_found(events, rule):

@@ -37,15 +37,18 @@ def test_by_hand_and_as_the_schedule_says(planned, total_s):
     assert more_s == pytest.approx(0.08 if total_s == 0.0875 else 0.0)
 
 
-def followed(*arrivals, end=200):
+TIMES = (0, 50, 100)
+
+
+def followed(*arrivals, end=150, exposed=TIMES):
     """Two exposures that take 20 ms, and one that never comes; the arrivals of a journal, ms."""
     own = Sensed("x", 3, 50 * MS)
-    for t in (0, 50, 100):
-        own.read("exposure", {"t": t * MS})
-    for exposed, t in arrivals:
-        own.read("arrived", {"exposed_ns": exposed * MS, "t": t * MS})
-    takes = {0: 0.02, 1: 0.02, 2: math.inf}
-    return own, list(own.otherwise(end * MS, lambda name, start, n: {name: takes[n]}))
+    for t in exposed:
+        own.read("exposure", {"t": round(t * MS)})
+    for of, t in arrivals:
+        own.read("arrived", {"exposed_ns": of * MS, "t": t * MS})
+    takes = {0: 0.02, 1: 0.02}
+    return own, list(own.otherwise(end * MS, lambda _, start, n: {"all": takes.get(n, math.inf)}))
 
 
 def test_arrivals_as_planned():
@@ -53,6 +56,27 @@ def test_arrivals_as_planned():
     assert found == [] and own.newest == (1, 50 * MS)
     assert followed((0, 20), end=100)[1] == []  # it ended before it could be told
     assert Sensed("x", 3, 50 * MS).newest == (-1, -1)
+
+
+@pytest.mark.parametrize(
+    ("exposed", "said"),
+    [
+        # The second one, a ns behind a lost first one, would undo its loss.
+        ((0, 50, 50 + 1e-6, 150), "exposure 2 is at 50000001 ns"),
+        ((0, 50, 100 + 1e-5), "exposure 2 is at 100000010 ns"),
+        ((0, 50), "2 exposures until 150000000 ns"),
+    ],
+)
+def test_exposures_at_other_times_than_one_a_period_are_found(exposed, said):
+    _, found = followed((0, 20), (50, 70), exposed=exposed)
+    assert len(found) == 1 and found[0].startswith(said)
+
+
+def test_a_period_of_no_whole_ns_is_told_in_whole_ones():
+    own = Sensed("x", 3, round(1e9 / 30))
+    for number in range(300):
+        own.read("exposure", {"t": round(number * 1e9 / 30)})
+    assert list(own.otherwise(round(10e9), lambda *_: {"all": math.inf})) == []
 
 
 @pytest.mark.parametrize(
@@ -65,5 +89,6 @@ def test_arrivals_as_planned():
     ],
 )
 def test_what_comes_sooner_later_or_not_is_found(arrivals, said):
-    _, found = followed(*arrivals)
+    exposed = (*TIMES, 150)
+    _, found = followed(*arrivals, end=200, exposed=exposed)
     assert len(found) == 1 and found[0].startswith(said)
